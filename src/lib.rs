@@ -1,0 +1,1 @@
+//! libupt: real-time soft tissue for game engines.
