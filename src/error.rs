@@ -1,0 +1,99 @@
+//! The library's error: what went wrong, where, and what to do about it.
+//!
+//! Every variant maps to one status code of `docs/abi.md`.
+
+use std::path::PathBuf;
+
+/// Everything that can fail in this library.
+///
+/// A call that returns an error has changed nothing: the handle is in the state it was in before.
+#[derive(Debug, Clone, thiserror::Error)]
+pub enum Error {
+    /// A size, index, enumerator or range is wrong.
+    #[error("{0}")]
+    Argument(String),
+    /// The scene is in use by another thread or has a step in flight.
+    #[error("{0}")]
+    Busy(String),
+    /// An input holds NaN or infinity.
+    #[error("{0}")]
+    NonFinite(String),
+    /// The call does not fit the state of the scene or of the library.
+    #[error("{0}")]
+    State(String),
+    /// This build or this bundle kind cannot do it.
+    #[error("{0}")]
+    Unsupported(String),
+    /// ONNX Runtime is missing, too old or broken; the message lists what was tried.
+    #[error("ONNX Runtime: {0}")]
+    Runtime(String),
+    /// No provider of the list can run the model.
+    #[error("provider: {0}")]
+    Provider(String),
+    /// A file cannot be read.
+    #[error("{}: {cause}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        cause: String,
+    },
+    /// A bundle is invalid; names the file and the field.
+    #[error("{file}: {message}")]
+    Bundle {
+        /// File of the bundle, for instance `bundle.json`.
+        file: String,
+        /// Field or tensor, what is wrong with it, and what to do.
+        message: String,
+    },
+    /// A bundle's or a snapshot's version is not supported.
+    #[error("{0}")]
+    Version(String),
+    /// A snapshot is damaged or of another model.
+    #[error("snapshot: {0}")]
+    Snapshot(String),
+    /// The guard refused the new state; the last good state stays.
+    #[error("guard: {0}")]
+    Guard(String),
+    /// A panic was caught: a bug in this library.
+    #[error("internal error: {0}")]
+    Panic(String),
+}
+
+/// The library's result.
+pub type Result<T> = std::result::Result<T, Error>;
+
+impl Error {
+    /// The status code of `docs/abi.md`.
+    pub fn status(&self) -> i32 {
+        match self {
+            Error::Argument(_) => -2,
+            Error::Busy(_) => -5,
+            Error::NonFinite(_) => -6,
+            Error::State(_) => -7,
+            Error::Unsupported(_) => -8,
+            Error::Runtime(_) => -20,
+            Error::Provider(_) => -21,
+            Error::Io { .. } => -30,
+            Error::Bundle { .. } => -31,
+            Error::Version(_) => -32,
+            Error::Snapshot(_) => -33,
+            Error::Guard(_) => -40,
+            Error::Panic(_) => -90,
+        }
+    }
+
+    pub(crate) fn bundle(file: impl Into<String>, message: impl Into<String>) -> Self {
+        Error::Bundle {
+            file: file.into(),
+            message: message.into(),
+        }
+    }
+
+    pub(crate) fn io(path: impl Into<PathBuf>, cause: impl std::fmt::Display) -> Self {
+        Error::Io {
+            path: path.into(),
+            cause: cause.to_string(),
+        }
+    }
+}

@@ -1,0 +1,147 @@
+//! What a host chooses: library, model and scene options, with their defaults.
+
+use std::path::PathBuf;
+
+/// Where a stage's graph runs (values of `UPT_PROVIDER_*`).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(i32)]
+pub enum Provider {
+    /// ONNX Runtime's CPU provider; always there.
+    Cpu = 0,
+    /// NVIDIA CUDA.
+    Cuda = 1,
+    /// NVIDIA TensorRT.
+    TensorRt = 2,
+    /// NVIDIA TensorRT-RTX, a plugin provider.
+    TensorRtRtx = 3,
+}
+
+/// Arithmetic of the heavy stages (values of `UPT_PRECISION_*`).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(i32)]
+pub enum Precision {
+    /// Plain float32.
+    F32 = 0,
+    /// bfloat16 products, float32 sums, on CPUs that have them.
+    Bf16 = 1,
+    /// float16 tables or graphs.
+    F16 = 2,
+    /// int8 weights, where the bundle carries `*.int8.onnx`.
+    Int8 = 3,
+}
+
+/// What runs the decoder of a `upt` bundle (values of `UPT_KERNEL_*`).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(i32)]
+pub enum DecoderKernel {
+    /// The native kernel on the CPU, ONNX Runtime elsewhere.
+    Auto = 0,
+    /// The fused native kernel.
+    Native = 1,
+    /// ONNX Runtime, in tiles.
+    Onnx = 2,
+}
+
+/// What happens when the guard refuses a state (values of `UPT_GUARD_*`).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(i32)]
+pub enum GuardPolicy {
+    /// Keep the last good state and return [`crate::Error::Guard`].
+    Hold = 0,
+    /// Publish finite states and set flags.
+    Report = 1,
+    /// Replace the state by the linear-elastic response, or by rest where there is none, and set flags.
+    Blend = 2,
+}
+
+/// A static set of indices of a model's mesh (values of `UPT_SET_*`).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(i32)]
+pub enum IndexSet {
+    /// Nodes of the boundary faces, ascending.
+    SurfaceNodes = 0,
+    /// Nodes of the faces that instruments may touch, ascending.
+    DomainNodes = 1,
+    /// Nodes held at zero under the bundle's boundary condition, ascending.
+    HeldNodes = 2,
+    /// Boundary triangles, three nodes each, outward.
+    SurfaceFaces = 3,
+    /// Triangles of the domain, three nodes each.
+    DomainFaces = 4,
+    /// Tetrahedra, four nodes each.
+    Tets = 5,
+}
+
+/// Options of the process-wide part of the library.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct InitOptions {
+    /// Default thread count of models; 0 means 1.
+    pub threads: usize,
+    /// ONNX Runtime's shared library; `None` searches beside libupt, `ORT_DYLIB_PATH`, then the system.
+    pub onnxruntime_path: Option<PathBuf>,
+}
+
+/// Options of [`crate::Model::open`].
+#[derive(Debug, Clone, Default)]
+pub struct ModelOptions {
+    /// Threads of a step; 0 takes [`InitOptions::threads`].
+    pub threads: usize,
+    /// Providers in order of preference; empty means the CPU.
+    pub providers: Vec<Provider>,
+    /// GPU to use.
+    pub device_id: i32,
+    /// Precision asked for; what runs is in the stats. Default float32.
+    pub precision: Option<Precision>,
+    /// Bytes a GPU provider may allocate; 0 means no limit.
+    pub gpu_memory_limit: u64,
+    /// Folder for compiled engines; `None` compiles them at each start.
+    pub cache_dir: Option<PathBuf>,
+    /// Allow TensorFloat-32 on CUDA (off: it costs about 1e-3 a layer in a closed loop).
+    pub allow_tf32: bool,
+    /// Capture a CUDA graph where shapes allow it.
+    pub cuda_graph: bool,
+    /// Fail with [`crate::Error::Provider`] instead of falling back to the next provider.
+    pub no_fallback: bool,
+}
+
+/// Options of [`crate::Scene::new`].
+#[derive(Debug, Clone)]
+pub struct SceneOptions {
+    /// Threads of a step, the host's own included; 0 takes the model's.
+    pub threads: usize,
+    /// Decoder of a `upt` bundle.
+    pub kernel: DecoderKernel,
+    /// Precision of the native kernels; `None` takes the model's.
+    pub precision: Option<Precision>,
+    /// What happens when the guard refuses a state.
+    pub guard_policy: GuardPolicy,
+    /// A mesh of the scene's own (`upt` bundles without a prior); `None` takes the bundle's.
+    pub mesh_path: Option<PathBuf>,
+    /// Do not enforce held and contact nodes.
+    pub free_boundary: bool,
+    /// Never sleep.
+    pub no_sleep: bool,
+    /// Check the sign of every decoded tetrahedron's volume.
+    pub check_inversion: bool,
+    /// [`crate::Scene::submit`] replaces an input that has not started instead of failing.
+    pub latest_wins: bool,
+    /// Cubic instead of linear [`crate::Scene::sample`].
+    pub cubic_sampling: bool,
+}
+
+impl Default for SceneOptions {
+    fn default() -> Self {
+        SceneOptions {
+            threads: 0,
+            kernel: DecoderKernel::Auto,
+            precision: None,
+            guard_policy: GuardPolicy::Hold,
+            mesh_path: None,
+            free_boundary: false,
+            no_sleep: false,
+            check_inversion: false,
+            latest_wins: false,
+            cubic_sampling: false,
+        }
+    }
+}

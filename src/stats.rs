@@ -1,0 +1,76 @@
+//! What a scene tells about its last step: stage times, flags, what ran where.
+
+use crate::options::{DecoderKernel, Precision, Provider};
+
+/// Bits of [`SceneStats::flags`] (values of `UPT_FLAG_*`).
+pub mod flag {
+    /// A contact displacement is larger than the model was trained on.
+    pub const PUSH: u32 = 1;
+    /// A contact patch's area is outside the trained range.
+    pub const CONTACT_AREA: u32 = 2;
+    /// A contact node is outside the domain.
+    pub const SITE: u32 = 4;
+    /// A contact moved faster than the model was trained on.
+    pub const RATE: u32 = 8;
+    /// More contact patches at once than the model was trained on.
+    pub const SITES: u32 = 16;
+    /// Guard: a displacement is beyond the bound.
+    pub const BOUND: u32 = 32;
+    /// Guard: a displacement is NaN or infinite.
+    pub const NON_FINITE: u32 = 64;
+    /// Guard: an element is inverted.
+    pub const INVERTED: u32 = 128;
+    /// Guard: the state grows without cause.
+    pub const GROWTH: u32 = 256;
+    /// The learned correction was bounded.
+    pub const CLAMPED: u32 = 512;
+    /// The contact block was near singular and was regularised.
+    pub const REGULARISED: u32 = 1024;
+}
+
+/// Statistics of a scene's last step.
+#[derive(Debug, Clone, Copy)]
+pub struct SceneStats {
+    /// Bits of [`flag`].
+    pub flags: u32,
+    /// Steps since creation or reset.
+    pub step_count: u64,
+    /// Wall time of the whole step, ms; the stages follow.
+    pub step_ms: f64,
+    /// Input checks.
+    pub check_ms: f64,
+    /// Contact solve and linear response.
+    pub prior_ms: f64,
+    /// Node features and encoder half.
+    pub encode_ms: f64,
+    /// Mean over the radius graph.
+    pub aggregate_ms: f64,
+    /// `latent.onnx`.
+    pub latent_ms: f64,
+    /// Decoder or table products.
+    pub decode_ms: f64,
+    /// Guard.
+    pub guard_ms: f64,
+    /// Nodes decoded by the step.
+    pub decoded_node_count: u64,
+    /// Nodes in contact.
+    pub contact_count: u64,
+    /// Bytes of the scene's own buffers.
+    pub memory_bytes: u64,
+    /// Threads of a step.
+    pub threads: u32,
+    /// What decodes.
+    pub kernel: DecoderKernel,
+    /// Where the latent stage runs.
+    pub provider: Provider,
+    /// Precision that runs.
+    pub precision: Precision,
+    /// Largest displacement of the last state, mm.
+    pub max_displacement_mm: f32,
+    /// Trust indicator, 0 is good, above 1 is outside of what was trained on.
+    pub indicator: f32,
+    /// The scene is at rest and a step is free.
+    pub sleeping: bool,
+    /// A panic was caught in the scene; only dropping it is allowed.
+    pub poisoned: bool,
+}
