@@ -1,0 +1,95 @@
+//! The Python virtual environment `target/venv`, and what pip installs into it.
+
+use std::path::Path;
+use std::process::Command;
+
+use anyhow::{Context, Result, bail};
+use sha2::{Digest, Sha256};
+
+use crate::process::run_checked;
+use crate::workspace::Workspace;
+
+/// Formatters pinned to one version, so that every machine agrees.
+const TOOLS: &[&str] = &["ruff==0.14.5", "clang-format==14.0.6"];
+
+/// Makes the environment where it is absent. Only pip is in it then.
+pub fn create(workspace: &Workspace) -> Result<()> {
+    if workspace.python().exists() && works(workspace) {
+        return Ok(());
+    }
+    let mut command = Command::new("python3");
+    command
+        .args(["-m", "venv", "--clear"])
+        .arg(workspace.venv());
+    run_checked(
+        "python3 -m venv",
+        &mut command,
+        &workspace.logs().join("venv.log"),
+    )
+    .context("install Python 3.10 or later with its venv module (Debian: python3-venv)")?;
+    Ok(())
+}
+
+fn works(workspace: &Workspace) -> bool {
+    Command::new(workspace.python())
+        .args(["-c", "import pip"])
+        .output()
+        .is_ok_and(|output| output.status.success())
+}
+
+/// Installs the formatters.
+pub fn install_tools(workspace: &Workspace) -> Result<()> {
+    install(workspace, "tools", TOOLS, TOOLS.join(" ").as_bytes())
+}
+
+/// Installs the package `training/` with its test extra, editable.
+pub fn install_training(workspace: &Workspace) -> Result<()> {
+    let project = workspace.path("training/pyproject.toml");
+    let stated =
+        std::fs::read(&project).with_context(|| format!("cannot read {}", project.display()))?;
+    let target = format!("{}[test]", workspace.path("training").display());
+    install(workspace, "training", &["-e", &target], &stated)
+}
+
+/// Runs pip once for each content of `key`; a stamp in the environment remembers it.
+fn install(workspace: &Workspace, name: &str, arguments: &[&str], key: &[u8]) -> Result<()> {
+    create(workspace)?;
+    let stamp = workspace.venv().join(format!("upt-{name}.stamp"));
+    let wanted = format!("{:x}", Sha256::digest(key));
+    if std::fs::read_to_string(&stamp).is_ok_and(|found| found == wanted) {
+        return Ok(());
+    }
+    let mut command = pip(workspace);
+    command
+        .args(["install", "--quiet", "--disable-pip-version-check"])
+        .args(arguments);
+    let log = workspace.logs().join(format!("pip-{name}.log"));
+    run_checked(&format!("pip install ({name})"), &mut command, &log)
+        .context("pip needs a package index: set PIP_INDEX_URL if yours is not the default")?;
+    std::fs::write(&stamp, wanted)?;
+    Ok(())
+}
+
+/// `python -m pip` of the environment.
+pub fn pip(workspace: &Workspace) -> Command {
+    let mut command = Command::new(workspace.python());
+    command.args(["-m", "pip"]);
+    command
+}
+
+/// Unpacks a zip file (a wheel) by Python's own reader.
+pub fn unzip(workspace: &Workspace, archive: &Path, into: &Path) -> Result<()> {
+    let output = Command::new(workspace.python())
+        .args(["-m", "zipfile", "-e"])
+        .arg(archive)
+        .arg(into)
+        .output()?;
+    if !output.status.success() {
+        bail!(
+            "cannot unpack {}: {}",
+            archive.display(),
+            String::from_utf8_lossy(&output.stderr)
+        );
+    }
+    Ok(())
+}
