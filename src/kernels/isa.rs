@@ -1,0 +1,156 @@
+//! Which vector instructions this machine runs: found once, by [`Isa::detect`]. The kernels take
+//! an `Isa` argument, so that tests and benches can ask for any that the machine has.
+
+use std::sync::OnceLock;
+
+/// An instruction set that the kernels are compiled for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Isa {
+    /// Plain Rust: the readable reference, right everywhere.
+    Scalar,
+    /// 128-bit Advanced SIMD (AArch64).
+    Neon,
+    /// 256-bit AVX2 with FMA and F16C (x86-64).
+    Avx2,
+    /// 512-bit AVX-512 F, BW, DQ, VL (x86-64).
+    Avx512,
+}
+
+impl Isa {
+    /// The best of this machine. The environment variable `UPT_ISA` (`scalar`, `neon`, `avx2`,
+    /// `avx512`) lowers it, for measurements; a set that the machine lacks is ignored.
+    pub fn detect() -> Self {
+        static BEST: OnceLock<Isa> = OnceLock::new();
+        *BEST.get_or_init(|| {
+            let asked = std::env::var("UPT_ISA").ok().and_then(|s| Self::parse(&s));
+            match asked {
+                Some(isa) if isa.is_available() => isa,
+                _ => Self::available().last().copied().unwrap_or(Isa::Scalar),
+            }
+        })
+    }
+
+    /// All sets that this machine runs, slowest first; `Scalar` is always there.
+    pub fn available() -> Vec<Self> {
+        [Isa::Scalar, Isa::Neon, Isa::Avx2, Isa::Avx512]
+            .into_iter()
+            .filter(|isa| isa.is_available())
+            .collect()
+    }
+
+    /// Whether this machine runs the set.
+    pub fn is_available(self) -> bool {
+        match self {
+            Isa::Scalar => true,
+            #[cfg(target_arch = "aarch64")]
+            Isa::Neon => std::arch::is_aarch64_feature_detected!("neon"),
+            #[cfg(target_arch = "x86_64")]
+            Isa::Avx2 => {
+                is_x86_feature_detected!("avx2")
+                    && is_x86_feature_detected!("fma")
+                    && is_x86_feature_detected!("f16c")
+            }
+            #[cfg(target_arch = "x86_64")]
+            Isa::Avx512 => {
+                Isa::Avx2.is_available()
+                    && is_x86_feature_detected!("avx512f")
+                    && is_x86_feature_detected!("avx512bw")
+                    && is_x86_feature_detected!("avx512dq")
+                    && is_x86_feature_detected!("avx512vl")
+            }
+            #[allow(unreachable_patterns)]
+            _ => false,
+        }
+    }
+
+    /// Whether the machine multiplies bf16 pairs (`vdpbf16ps`); the bf16 decoder needs it.
+    pub fn has_bf16() -> bool {
+        #[cfg(target_arch = "x86_64")]
+        {
+            Isa::Avx512.is_available() && is_x86_feature_detected!("avx512bf16")
+        }
+        #[cfg(not(target_arch = "x86_64"))]
+        {
+            false
+        }
+    }
+
+    /// The name in statistics and in `UPT_ISA`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Isa::Scalar => "scalar",
+            Isa::Neon => "neon",
+            Isa::Avx2 => "avx2",
+            Isa::Avx512 => "avx512",
+        }
+    }
+
+    /// The set of that name, if there is one.
+    pub fn parse(name: &str) -> Option<Self> {
+        [Isa::Scalar, Isa::Neon, Isa::Avx2, Isa::Avx512]
+            .into_iter()
+            .find(|isa| isa.name().eq_ignore_ascii_case(name.trim()))
+    }
+}
+
+/// Defines `fn name(isa, args..)`: the scalar function for `Isa::Scalar`, else `body::<Lanes>`
+/// compiled with the instruction set's features. An `Isa` that the machine lacks takes the scalar
+/// path, so the function is safe to call with any value.
+macro_rules! by_isa {
+    ($(#[$meta:meta])* $vis:vis fn $name:ident($($arg:ident : $ty:ty),* $(,)?) = $body:ident, $scalar:ident;) => {
+        $(#[$meta])*
+        #[allow(clippy::too_many_arguments)]
+        $vis fn $name(isa: $crate::kernels::Isa, $($arg: $ty),*) {
+            #[cfg(target_arch = "x86_64")]
+            #[target_feature(enable = "avx2,fma,f16c")]
+            #[allow(clippy::too_many_arguments)]
+            fn avx2($($arg: $ty),*) {
+                // SAFETY: the features of these lanes are enabled here.
+                unsafe { $body::<$crate::kernels::lanes::Avx2>($($arg),*) }
+            }
+            #[cfg(target_arch = "x86_64")]
+            #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx2,fma,f16c")]
+            #[allow(clippy::too_many_arguments)]
+            fn avx512($($arg: $ty),*) {
+                // SAFETY: the features of these lanes are enabled here.
+                unsafe { $body::<$crate::kernels::lanes::Avx512>($($arg),*) }
+            }
+            #[cfg(target_arch = "aarch64")]
+            #[target_feature(enable = "neon")]
+            #[allow(clippy::too_many_arguments)]
+            fn neon($($arg: $ty),*) {
+                // SAFETY: the features of these lanes are enabled here.
+                unsafe { $body::<$crate::kernels::lanes::Neon>($($arg),*) }
+            }
+            match isa {
+                #[cfg(target_arch = "x86_64")]
+                // SAFETY: the machine has the features.
+                $crate::kernels::Isa::Avx512 if isa.is_available() => unsafe { avx512($($arg),*) },
+                #[cfg(target_arch = "x86_64")]
+                // SAFETY: the machine has the features.
+                $crate::kernels::Isa::Avx2 if isa.is_available() => unsafe { avx2($($arg),*) },
+                #[cfg(target_arch = "aarch64")]
+                // SAFETY: the machine has the features.
+                $crate::kernels::Isa::Neon if isa.is_available() => unsafe { neon($($arg),*) },
+                _ => $scalar($($arg),*),
+            }
+        }
+    };
+}
+pub(crate) use by_isa;
+
+#[cfg(test)]
+mod tests {
+    use super::Isa;
+
+    #[test]
+    fn the_detected_set_is_available_and_named() {
+        let best = Isa::detect();
+        assert!(best.is_available());
+        assert!(Isa::available().contains(&best));
+        for isa in Isa::available() {
+            assert_eq!(Isa::parse(isa.name()), Some(isa));
+        }
+        assert_eq!(Isa::parse("sse9"), None);
+    }
+}
