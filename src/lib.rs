@@ -5,6 +5,7 @@
 //! of the instruments, and gives the next displacement, `u[t+dt] = M(u[t], c[t])`.
 //! Lengths are mm, forces mN, fields row-major `[K,3]` float32.
 
+pub mod bundle;
 pub mod error;
 pub mod ffi;
 pub mod kernels;

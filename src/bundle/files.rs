@@ -1,0 +1,86 @@
+//! The files of a bundle: read once, size and SHA-256 checked against the manifest.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use sha2::{Digest, Sha256};
+
+use super::manifest::Manifest;
+use super::tensors::TensorFile;
+use crate::error::{Error, Result};
+
+/// An opened bundle folder.
+#[derive(Debug)]
+pub struct BundleFiles {
+    folder: PathBuf,
+    /// The manifest, checked.
+    pub manifest: Manifest,
+    /// SHA-256 of `bundle.json`, which holds the hashes of all other files: the identity of the bundle.
+    pub hash: [u8; 32],
+}
+
+impl BundleFiles {
+    /// Reads `bundle.json` and checks that each listed file exists with its size.
+    pub fn open(folder: &Path) -> Result<BundleFiles> {
+        let path = folder.join("bundle.json");
+        let bytes = fs::read(&path).map_err(|error| Error::io(&path, error))?;
+        let manifest = Manifest::parse(&bytes)?;
+        for (name, entry) in &manifest.files {
+            let path = folder.join(name);
+            let found = fs::metadata(&path).map_err(|error| Error::io(&path, error))?;
+            if found.len() != entry.bytes {
+                return Err(Error::bundle(
+                    name,
+                    format!(
+                        "has {} bytes, bundle.json field `files.{name}.bytes` says {}; fetch or export the bundle again",
+                        found.len(),
+                        entry.bytes
+                    ),
+                ));
+            }
+        }
+        Ok(BundleFiles {
+            folder: folder.to_owned(),
+            manifest,
+            hash: Sha256::digest(&bytes).into(),
+        })
+    }
+
+    /// Whether the manifest lists `name`.
+    pub fn has(&self, name: &str) -> bool {
+        self.manifest.files.contains_key(name)
+    }
+
+    /// The bytes of a listed file, hash checked.
+    pub fn read(&self, name: &str) -> Result<Vec<u8>> {
+        let entry = self.manifest.files.get(name).ok_or_else(|| {
+            Error::bundle(
+                "bundle.json",
+                format!("field `files`: `{name}` is not listed"),
+            )
+        })?;
+        let path = self.folder.join(name);
+        let bytes = fs::read(&path).map_err(|error| Error::io(&path, error))?;
+        let digest = hex(&Sha256::digest(&bytes));
+        if !digest.eq_ignore_ascii_case(&entry.sha256) {
+            return Err(Error::bundle(
+                name,
+                format!(
+                    "SHA-256 is {digest}, bundle.json field `files.{name}.sha256` says {}; fetch or export the bundle again",
+                    entry.sha256
+                ),
+            ));
+        }
+        Ok(bytes)
+    }
+
+    /// A listed safetensors file.
+    pub fn tensors(&self, name: &str) -> Result<TensorFile> {
+        TensorFile::parse(name, self.read(name)?)
+    }
+}
+
+/// Lower-case hex.
+pub(crate) fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}

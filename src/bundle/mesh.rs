@@ -1,0 +1,178 @@
+//! `mesh.safetensors`: the tetrahedral mesh of a bundle, checked, and the node sets that follow from it.
+
+use sha2::{Digest, Sha256};
+
+use super::files::hex;
+use super::manifest::Boundary;
+use super::tensors::TensorFile;
+use crate::error::{Error, Result};
+use safetensors::Dtype;
+
+/// A checked mesh; lengths in mm.
+#[derive(Debug)]
+pub struct Mesh {
+    /// Rest positions `[K,3]`.
+    pub positions: Vec<f32>,
+    /// Tetrahedra `[T,4]`.
+    pub tets: Vec<u32>,
+    /// Boundary triangles `[F,3]`, outward.
+    pub surface_faces: Vec<u32>,
+    /// Triangles of the domain `[D,3]`.
+    pub domain_faces: Vec<u32>,
+    /// Nodes of the boundary triangles, ascending.
+    pub surface_nodes: Vec<u32>,
+    /// Nodes of the domain's triangles, ascending.
+    pub domain_nodes: Vec<u32>,
+    /// Nodes held at zero, ascending.
+    pub held_nodes: Vec<u32>,
+    /// A third of the area of each node's boundary triangles `[K]`, mm^2.
+    pub node_area: Vec<f32>,
+    /// The mesh hash of `docs/formats.md`.
+    pub sha256: String,
+}
+
+impl Mesh {
+    /// Reads and checks a mesh.
+    pub fn parse(file: &TensorFile, boundary: Boundary) -> Result<Mesh> {
+        let text = file.text();
+        if text.get("format").map(String::as_str) != Some("upt-mesh") {
+            return Err(Error::bundle(
+                file.name(),
+                "metadata `format` must be `upt-mesh`",
+            ));
+        }
+        if text.get("version").map(String::as_str) != Some("1") {
+            return Err(Error::Version(format!(
+                "{}: metadata `version` is {:?}, this library reads version 1",
+                file.name(),
+                text.get("version")
+            )));
+        }
+        let positions = file.f32("positions", &[None, Some(3)])?;
+        let count = positions.len() / 3;
+        if count < 4 {
+            return Err(file.bad("positions", "needs at least 4 nodes"));
+        }
+        let tets = file.indices("tets", &[None, Some(4)], count)?;
+        if let Some(at) = tets
+            .chunks_exact(4)
+            .position(|tet| volume(&positions, tet) <= 0.0)
+        {
+            return Err(file.bad("tets", format!("element {at} has no positive volume")));
+        }
+        let surface_faces = file.indices("surface", &[None, Some(3)], count)?;
+        let domain = if file.has("domain") {
+            file.indices("domain", &[None], surface_faces.len() / 3)?
+        } else {
+            Vec::new()
+        };
+        let domain_faces: Vec<u32> = domain
+            .iter()
+            .flat_map(|&face| {
+                surface_faces[3 * face as usize..3 * face as usize + 3]
+                    .iter()
+                    .copied()
+            })
+            .collect();
+        let set = |name: &str| {
+            if file.has(name) {
+                file.ascending(name, count)
+            } else {
+                Ok(Vec::new())
+            }
+        };
+        let fixed = set("fixed")?;
+        let supported = set("supported")?;
+        let mut hash = Sha256::new();
+        hash.update(file.raw("positions", Dtype::F32, &[None, Some(3)])?);
+        hash.update(file.raw("tets", Dtype::I32, &[None, Some(4)])?);
+        for name in ["fixed", "supported"] {
+            if file.has(name) {
+                hash.update(file.raw(name, Dtype::I32, &[None])?);
+            }
+        }
+        let mut held_nodes = fixed;
+        if boundary == Boundary::Supported {
+            held_nodes.extend(supported);
+        }
+        Ok(Mesh {
+            node_area: node_area(&positions, &surface_faces),
+            surface_nodes: unique(surface_faces.clone()),
+            domain_nodes: unique(domain_faces.clone()),
+            held_nodes: unique(held_nodes),
+            positions,
+            tets,
+            surface_faces,
+            domain_faces,
+            sha256: hex(&hash.finalize()),
+        })
+    }
+
+    /// Number of nodes, `K`.
+    pub fn node_count(&self) -> usize {
+        self.positions.len() / 3
+    }
+
+    /// Bytes held.
+    pub fn memory_bytes(&self) -> usize {
+        4 * (self.positions.len()
+            + self.tets.len()
+            + self.surface_faces.len()
+            + self.domain_faces.len()
+            + self.surface_nodes.len()
+            + self.domain_nodes.len()
+            + self.held_nodes.len()
+            + self.node_area.len())
+    }
+}
+
+fn unique(mut nodes: Vec<u32>) -> Vec<u32> {
+    nodes.sort_unstable();
+    nodes.dedup();
+    nodes
+}
+
+fn at(positions: &[f32], node: u32) -> [f64; 3] {
+    let i = 3 * node as usize;
+    [
+        positions[i] as f64,
+        positions[i + 1] as f64,
+        positions[i + 2] as f64,
+    ]
+}
+
+fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
+}
+
+/// Six times the signed volume of a tetrahedron.
+pub(crate) fn volume(positions: &[f32], tet: &[u32]) -> f64 {
+    let origin = at(positions, tet[0]);
+    let [a, b, c] = [1, 2, 3].map(|k| minus(at(positions, tet[k]), origin));
+    let n = cross(a, b);
+    n[0] * c[0] + n[1] * c[1] + n[2] * c[2]
+}
+
+fn node_area(positions: &[f32], faces: &[u32]) -> Vec<f32> {
+    let mut area = vec![0.0f64; positions.len() / 3];
+    for face in faces.chunks_exact(3) {
+        let origin = at(positions, face[0]);
+        let n = cross(
+            minus(at(positions, face[1]), origin),
+            minus(at(positions, face[2]), origin),
+        );
+        let third = (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]).sqrt() / 6.0;
+        for &node in face {
+            area[node as usize] += third;
+        }
+    }
+    area.into_iter().map(|a| a as f32).collect()
+}

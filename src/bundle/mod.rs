@@ -1,0 +1,15 @@
+//! Bundles: bytes on disk -> checked values. The format is `docs/formats.md`.
+
+mod files;
+mod manifest;
+mod mesh;
+mod tensors;
+
+pub use files::BundleFiles;
+pub use manifest::{
+    Base, Bound, Boundary, Coordinates, Dims, Envelope, Fade, Feature, FileEntry, Graph, Manifest,
+    ManifestKind, Material, MeshEntry, Normalisation, PriorEntry, ReducedEntry, ReducedInput,
+    UptEntry,
+};
+pub use mesh::Mesh;
+pub use tensors::TensorFile;
