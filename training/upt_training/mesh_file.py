@@ -1,0 +1,107 @@
+"""Mesh files (`*.mesh.safetensors`, docs/formats.md): read, write, hash.
+
+`positions` are rest positions in mm, `[K, 3]` float32; `tets` `[T, 4]` int32; `surface` `[F, 3]` int32, outward;
+`domain` `[D]` rows of `surface` that instruments may touch; `fixed` and `supported` are ascending node sets.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from safetensors import SafetensorError, safe_open
+from safetensors.numpy import save_file
+
+from upt_training.errors import InputError
+
+
+@dataclass
+class Mesh:
+    """A tetrahedral mesh with its named sets. Lengths in mm."""
+
+    positions: np.ndarray
+    tets: np.ndarray
+    surface: np.ndarray
+    domain: np.ndarray
+    fixed: np.ndarray
+    supported: np.ndarray
+    metadata: dict = field(default_factory=dict)
+
+    @property
+    def node_count(self) -> int:
+        return len(self.positions)
+
+    @property
+    def sha256(self) -> str:
+        """The mesh hash: SHA-256 of the bytes of positions, tets, fixed, supported."""
+        digest = hashlib.sha256()
+        for array in (self.positions, self.tets, self.fixed, self.supported):
+            digest.update(np.ascontiguousarray(array).tobytes())
+        return digest.hexdigest()
+
+    @property
+    def domain_nodes(self) -> np.ndarray:
+        """Nodes of the domain's faces, ascending."""
+        return np.unique(self.surface[self.domain])
+
+    def held_nodes(self, boundary: str) -> np.ndarray:
+        """Nodes held at zero under the boundary condition `fixed` or `supported`, ascending."""
+        if boundary == "fixed":
+            return self.fixed
+        if boundary == "supported":
+            return np.union1d(self.fixed, self.supported).astype(np.int32)
+        raise InputError(f"boundary {boundary!r} is unknown: use 'fixed' or 'supported'")
+
+    def node_areas(self) -> np.ndarray:
+        """A third of the area of each node's surface faces, mm², `[K]` float64."""
+        corner = self.positions[self.surface].astype(np.float64)
+        normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+        area = 0.5 * np.linalg.norm(normal, axis=1)
+        out = np.zeros(self.node_count)
+        np.add.at(out, self.surface.ravel(), np.repeat(area / 3.0, 3))
+        return out
+
+    def save(self, path: Path) -> None:
+        metadata = {"format": "upt-mesh", "version": "1", "units": "mm", **self.metadata}
+        tensors = {
+            "positions": np.ascontiguousarray(self.positions, np.float32),
+            "tets": np.ascontiguousarray(self.tets, np.int32),
+            "surface": np.ascontiguousarray(self.surface, np.int32),
+            "domain": np.ascontiguousarray(self.domain, np.int32),
+            "fixed": np.ascontiguousarray(self.fixed, np.int32),
+            "supported": np.ascontiguousarray(self.supported, np.int32),
+        }
+        save_file(tensors, str(path), metadata={k: str(v) for k, v in metadata.items()})
+        Path(path).chmod(0o644)
+
+
+def load_mesh(path: Path | str) -> Mesh:
+    """Read a mesh file; raises `InputError` that names the file and the field."""
+    path = Path(path)
+    if not path.exists():
+        raise InputError(f"{path}: no such mesh file")
+    try:
+        with safe_open(str(path), "numpy") as file:
+            metadata = file.metadata() or {}
+            names = set(file.keys())
+            missing = {"positions", "tets", "surface"} - names
+            if missing:
+                raise InputError(f"{path}: tensor {sorted(missing)[0]!r} is missing; this is not a mesh file")
+            empty = np.zeros(0, np.int32)
+            get = {n: file.get_tensor(n) if n in names else empty for n in _TENSORS}
+    except SafetensorError as error:
+        raise InputError(f"{path}: not a readable safetensors file ({error}); make the mesh again") from error
+    mesh = Mesh(**get, metadata=metadata)
+    if not np.isfinite(mesh.positions).all():
+        node = int(np.argwhere(~np.isfinite(mesh.positions))[0, 0])
+        raise InputError(f"{path}: positions of node {node} are not finite")
+    for name in ("tets", "surface", "fixed", "supported"):
+        array = getattr(mesh, name)
+        if array.size and (array.min() < 0 or array.max() >= mesh.node_count):
+            raise InputError(f"{path}: {name} names a node outside 0..{mesh.node_count - 1}")
+    return mesh
+
+
+_TENSORS = ("positions", "tets", "surface", "domain", "fixed", "supported")
