@@ -1,1 +1,36 @@
-//! The C ABI.
+//! The C ABI: `include/upt.h` and the C# bindings are generated from this folder (`cargo xtask header`).
+//!
+//! A function checks its pointers, finds its handle, calls one safe function and turns the result into a status;
+//! there is no other logic here. Conventions: `docs/abi.md`; why it is built this way: `docs/decisions/001-ffi.md`.
+
+#![allow(non_camel_case_types, clippy::missing_safety_doc)]
+
+mod call;
+mod convert;
+mod instrument;
+mod library;
+mod log;
+mod model;
+mod pointers;
+mod points;
+mod region;
+mod registry;
+mod scene;
+mod state;
+mod status;
+mod structs;
+mod worker;
+
+#[cfg(feature = "fault")]
+mod fault;
+
+pub use instrument::*;
+pub use library::*;
+pub use model::*;
+pub use points::*;
+pub use region::*;
+pub use scene::*;
+pub use state::*;
+pub use status::*;
+pub use structs::*;
+pub use worker::*;

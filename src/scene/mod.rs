@@ -69,6 +69,10 @@ impl Scene {
         let _ = out;
         Ok(())
     }
+    /// Nodes of the scene's mesh, `K`.
+    pub fn node_count(&self) -> usize {
+        0
+    }
     /// Nodes of `read` (`K`, or the region's count).
     pub fn region_count(&self) -> usize {
         0

@@ -1,0 +1,131 @@
+//! The frame of every exported function: panics stop here, failures become a status and the thread's message.
+
+use std::any::Any;
+use std::cell::RefCell;
+use std::ffi::c_char;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use super::status::{UPT_ERR_PANIC, upt_status};
+use crate::error::Error;
+
+/// A status with its message.
+pub(super) struct Failure {
+    pub status: upt_status,
+    pub message: String,
+}
+
+/// What the body of an exported function gives.
+pub(super) type Answer = Result<upt_status, Failure>;
+
+/// A failure of the boundary itself (pointers, sizes, handles).
+pub(super) fn fail<T>(status: upt_status, message: impl Into<String>) -> Result<T, Failure> {
+    Err(Failure {
+        status,
+        message: message.into(),
+    })
+}
+
+impl From<Error> for Failure {
+    fn from(error: Error) -> Self {
+        Failure {
+            status: error.status(),
+            message: error.to_string(),
+        }
+    }
+}
+
+thread_local! {
+    /// NUL-terminated message of the last failed call of this thread.
+    static LAST_ERROR: RefCell<Vec<u8>> = const { RefCell::new(Vec::new()) };
+}
+
+/// Runs an exported function's body. `on_panic` marks the handle that can no longer be trusted.
+pub(super) fn call(
+    name: &str,
+    on_panic: impl FnOnce(),
+    body: impl FnOnce() -> Answer,
+) -> upt_status {
+    let failure = match catch_unwind(AssertUnwindSafe(body)) {
+        Ok(Ok(status)) => return status,
+        Ok(Err(failure)) => failure,
+        Err(payload) => {
+            on_panic();
+            Failure {
+                status: UPT_ERR_PANIC,
+                message: format!("internal error: {}", panic_message(payload.as_ref())),
+            }
+        }
+    };
+    remember(name, &failure.message);
+    failure.status
+}
+
+fn panic_message(payload: &(dyn Any + Send)) -> &str {
+    payload
+        .downcast_ref::<&str>()
+        .copied()
+        .or_else(|| payload.downcast_ref::<String>().map(String::as_str))
+        .unwrap_or("panic without a message")
+}
+
+/// Stores `name: message` for [`last_error`]. At thread exit, when the storage is gone, the message is dropped.
+fn remember(name: &str, message: &str) {
+    let _ = LAST_ERROR.try_with(|last| {
+        let mut last = last.borrow_mut();
+        last.clear();
+        last.extend_from_slice(name.as_bytes());
+        last.extend_from_slice(b": ");
+        last.extend(
+            message
+                .bytes()
+                .map(|byte| if byte == 0 { b' ' } else { byte }),
+        );
+        last.push(0);
+    });
+}
+
+/// The thread's message, or an empty string.
+pub(super) fn last_error() -> *const c_char {
+    LAST_ERROR
+        .try_with(|last| {
+            let last = last.borrow();
+            if last.is_empty() {
+                c"".as_ptr()
+            } else {
+                last.as_ptr().cast()
+            }
+        })
+        .unwrap_or(c"".as_ptr())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::ffi::CStr;
+
+    #[test]
+    fn a_panic_becomes_a_status_and_marks_the_handle() {
+        let mut marked = false;
+        let status = call("upt_x", || marked = true, || panic!("index {} of {}", 4, 3));
+        assert_eq!(status, UPT_ERR_PANIC);
+        assert!(marked);
+        let message = unsafe { CStr::from_ptr(last_error()) };
+        assert_eq!(message, c"upt_x: internal error: index 4 of 3");
+    }
+
+    #[test]
+    fn messages_belong_to_their_thread() {
+        call("upt_a", || (), || fail(-2, "here"));
+        std::thread::spawn(|| {
+            assert_eq!(unsafe { CStr::from_ptr(last_error()) }, c"");
+            call("upt_b", || (), || fail(-2, "nul \0 inside"));
+            assert_eq!(
+                unsafe { CStr::from_ptr(last_error()) },
+                c"upt_b: nul   inside"
+            );
+        })
+        .join()
+        .unwrap();
+        assert_eq!(unsafe { CStr::from_ptr(last_error()) }, c"upt_a: here");
+    }
+}

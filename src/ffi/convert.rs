@@ -1,0 +1,131 @@
+//! Integers of the host -> the library's enums and options.
+
+use super::call::{Failure, fail};
+use super::pointers::{optional_path, slice};
+use super::status::*;
+use super::structs::*;
+use crate::{
+    DecoderKernel, GuardPolicy, IndexSet, InitOptions, ModelOptions, Precision, Provider,
+    SceneOptions,
+};
+
+fn unknown<T>(field: &str, value: i32) -> Result<T, Failure> {
+    fail(
+        UPT_ERR_ARGUMENT,
+        format!("{field} is {value}, which has no meaning; see upt.h"),
+    )
+}
+
+fn provider(value: i32) -> Result<Provider, Failure> {
+    Ok(match value {
+        UPT_PROVIDER_CPU => Provider::Cpu,
+        UPT_PROVIDER_CUDA => Provider::Cuda,
+        UPT_PROVIDER_TENSORRT => Provider::TensorRt,
+        UPT_PROVIDER_TENSORRT_RTX => Provider::TensorRtRtx,
+        _ => return unknown("providers[]", value),
+    })
+}
+
+/// 0 is the default, which is f32 for a model and the model's for a scene.
+fn precision(value: i32) -> Result<Option<Precision>, Failure> {
+    Ok(match value {
+        UPT_PRECISION_F32 => None,
+        UPT_PRECISION_BF16 => Some(Precision::Bf16),
+        UPT_PRECISION_F16 => Some(Precision::F16),
+        UPT_PRECISION_INT8 => Some(Precision::Int8),
+        _ => return unknown("precision", value),
+    })
+}
+
+fn kernel(value: i32) -> Result<DecoderKernel, Failure> {
+    Ok(match value {
+        UPT_KERNEL_AUTO => DecoderKernel::Auto,
+        UPT_KERNEL_NATIVE => DecoderKernel::Native,
+        UPT_KERNEL_ONNX => DecoderKernel::Onnx,
+        _ => return unknown("kernel", value),
+    })
+}
+
+fn guard_policy(value: i32) -> Result<GuardPolicy, Failure> {
+    Ok(match value {
+        UPT_GUARD_HOLD => GuardPolicy::Hold,
+        UPT_GUARD_REPORT => GuardPolicy::Report,
+        UPT_GUARD_BLEND => GuardPolicy::Blend,
+        _ => return unknown("guard_policy", value),
+    })
+}
+
+pub(super) fn index_set(value: i32) -> Result<IndexSet, Failure> {
+    Ok(match value {
+        UPT_SET_SURFACE_NODES => IndexSet::SurfaceNodes,
+        UPT_SET_DOMAIN_NODES => IndexSet::DomainNodes,
+        UPT_SET_FIXED_NODES => IndexSet::HeldNodes,
+        UPT_SET_SURFACE_FACES => IndexSet::SurfaceFaces,
+        UPT_SET_DOMAIN_FACES => IndexSet::DomainFaces,
+        UPT_SET_TETS => IndexSet::Tets,
+        _ => return unknown("set", value),
+    })
+}
+
+pub(super) fn flag(field: &str, value: u8) -> Result<bool, Failure> {
+    match value {
+        0 => Ok(false),
+        1 => Ok(true),
+        _ => fail(
+            UPT_ERR_ARGUMENT,
+            format!("{field} is {value}; a flag is 0 or 1"),
+        ),
+    }
+}
+
+pub(super) fn reserved(bytes: &[u8]) -> Result<(), Failure> {
+    match bytes.iter().all(|&byte| byte == 0) {
+        true => Ok(()),
+        false => fail(
+            UPT_ERR_ARGUMENT,
+            "reserved bytes must be zero; clear the struct first",
+        ),
+    }
+}
+
+pub(super) unsafe fn init_options(raw: &upt_init_options) -> Result<InitOptions, Failure> {
+    Ok(InitOptions {
+        threads: raw.threads as usize,
+        onnxruntime_path: unsafe { optional_path(raw.onnxruntime_path, "onnxruntime_path") }?,
+    })
+}
+
+pub(super) unsafe fn model_options(raw: &upt_model_options) -> Result<ModelOptions, Failure> {
+    reserved(&[raw.reserved])?;
+    let providers = unsafe { slice(raw.providers, raw.provider_count, "providers") }?;
+    Ok(ModelOptions {
+        threads: raw.threads as usize,
+        providers: providers
+            .iter()
+            .map(|&value| provider(value))
+            .collect::<Result<_, _>>()?,
+        device_id: raw.device_id,
+        precision: precision(raw.precision)?,
+        gpu_memory_limit: raw.gpu_memory_limit,
+        cache_dir: unsafe { optional_path(raw.cache_dir, "cache_dir") }?,
+        allow_tf32: flag("allow_tf32", raw.allow_tf32)?,
+        cuda_graph: flag("cuda_graph", raw.cuda_graph)?,
+        no_fallback: flag("no_fallback", raw.no_fallback)?,
+    })
+}
+
+pub(super) unsafe fn scene_options(raw: &upt_scene_options) -> Result<SceneOptions, Failure> {
+    reserved(&raw.reserved)?;
+    Ok(SceneOptions {
+        threads: raw.threads as usize,
+        kernel: kernel(raw.kernel)?,
+        precision: precision(raw.precision)?,
+        guard_policy: guard_policy(raw.guard_policy)?,
+        mesh_path: unsafe { optional_path(raw.mesh_path, "mesh_path") }?,
+        free_boundary: flag("free_boundary", raw.free_boundary)?,
+        no_sleep: flag("no_sleep", raw.no_sleep)?,
+        check_inversion: flag("check_inversion", raw.check_inversion)?,
+        latest_wins: flag("latest_wins", raw.latest_wins)?,
+        cubic_sampling: flag("cubic_sampling", raw.cubic_sampling)?,
+    })
+}

@@ -1,0 +1,115 @@
+//! Library-wide calls: start, end, version, messages, providers.
+
+use core::ffi::{c_char, c_void};
+
+use super::call::{Answer, call, fail, last_error};
+use super::status::*;
+use super::structs::*;
+use super::{convert, log, pointers};
+
+/// Version of the C ABI that `upt_abi_version` returns. Bindings compare it at load.
+pub const UPT_ABI_VERSION: u32 = 1;
+
+/// Starts the library with options of the host's. Optional: the first model does it with the defaults.
+///
+/// options: NULL means the defaults.
+/// Threads: any. Errors: `UPT_ERR_STATE` when the library was started with other options, `UPT_ERR_STRUCT_SIZE`,
+/// `UPT_ERR_ARGUMENT`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn upt_init(options: *const upt_init_options) -> upt_status {
+    call(
+        "upt_init",
+        || (),
+        || {
+            let raw = unsafe { pointers::options(options) }?;
+            crate::init(&unsafe { convert::init_options(&raw) }?)?;
+            Ok(UPT_OK)
+        },
+    )
+}
+
+/// Ends the library. Call it before the process exits when a GPU provider was used.
+///
+/// Threads: any. Errors: `UPT_ERR_STATE` while models or scenes live.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn upt_shutdown() -> upt_status {
+    call(
+        "upt_shutdown",
+        || (),
+        || {
+            crate::shutdown()?;
+            Ok(UPT_OK)
+        },
+    )
+}
+
+/// The library's version, for instance "0.1.0". Threads: any.
+#[unsafe(no_mangle)]
+pub extern "C" fn upt_version() -> *const c_char {
+    concat!(env!("CARGO_PKG_VERSION"), "\0").as_ptr().cast()
+}
+
+/// `UPT_ABI_VERSION` of the library that runs; refuse to go on when it is not the header's. Threads: any.
+#[unsafe(no_mangle)]
+pub extern "C" fn upt_abi_version() -> u32 {
+    UPT_ABI_VERSION
+}
+
+/// The message of the last failed call of the calling thread (UTF-8), "" when there is none.
+/// It is valid until that thread's next call. Threads: any.
+#[unsafe(no_mangle)]
+pub extern "C" fn upt_last_error() -> *const c_char {
+    last_error()
+}
+
+/// The name of a status, for instance "UPT_ERR_BUSY"; "UPT_UNKNOWN" for other numbers. Threads: any.
+#[unsafe(no_mangle)]
+pub extern "C" fn upt_status_name(status: upt_status) -> *const c_char {
+    super::status::name(status).as_ptr()
+}
+
+/// Sets the receiver of log messages; NULL ends it. When the call returns, the former receiver is no longer running.
+///
+/// user: handed to the receiver. level: `UPT_LOG_*`; less severe messages are not made at all.
+/// Threads: any, but not from inside the receiver. Errors: `UPT_ERR_ARGUMENT` for an unknown level, `UPT_ERR_STATE`
+/// when the process is a Rust program that has a `tracing` subscriber of its own.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn upt_set_log(
+    callback: upt_log_fn,
+    user: *mut c_void,
+    level: i32,
+) -> upt_status {
+    call(
+        "upt_set_log",
+        || (),
+        || {
+            if !(UPT_LOG_OFF..=UPT_LOG_TRACE).contains(&level) {
+                return fail(
+                    UPT_ERR_ARGUMENT,
+                    format!("level is {level}; levels are 0 to 5"),
+                );
+            }
+            log::set(callback, user, level)
+        },
+    )
+}
+
+/// Lists the providers as JSON: `[{"name":"cpu","available":true,"reason":""}]`. Loads ONNX Runtime.
+///
+/// out: text with its NUL; NULL with capacity 0 only asks. needed: bytes with the NUL, always written; may be NULL.
+/// Threads: any. Errors: `UPT_ERR_RUNTIME`, `UPT_ERR_ARGUMENT` when capacity is too small, `UPT_ERR_NULL`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn upt_providers(
+    out: *mut c_char,
+    capacity: u64,
+    needed: *mut u64,
+) -> upt_status {
+    call(
+        "upt_providers",
+        || (),
+        || -> Answer {
+            let text = crate::providers_json()?;
+            unsafe { pointers::copy_text(&text, out, capacity, needed) }
+        },
+    )
+}

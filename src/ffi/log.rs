@@ -1,0 +1,180 @@
+//! The log callback: a `tracing` subscriber that forwards events and the ends of spans of this library and of `ort`.
+
+use std::collections::HashMap;
+use std::ffi::{CString, c_void};
+use std::fmt::{Debug, Write};
+use std::sync::atomic::{AtomicI32, AtomicU64, Ordering};
+use std::sync::{LazyLock, Mutex, Once, PoisonError, RwLock};
+use std::time::Instant;
+
+use tracing::field::{Field, Visit};
+use tracing::span::{Attributes, Id, Record};
+use tracing::subscriber::Interest;
+use tracing::{Event, Level, Metadata, Subscriber};
+
+use super::call::{Answer, fail};
+use super::status::*;
+use super::structs::upt_log_fn;
+
+struct Receiver {
+    callback: upt_log_fn,
+    user: *mut c_void,
+}
+
+// The host promises that its callback takes calls of any thread.
+unsafe impl Send for Receiver {}
+unsafe impl Sync for Receiver {}
+
+/// A reader holds the lock while the callback runs, so that a change waits for it.
+static RECEIVER: RwLock<Receiver> = RwLock::new(Receiver {
+    callback: None,
+    user: std::ptr::null_mut(),
+});
+static LEVEL: AtomicI32 = AtomicI32::new(UPT_LOG_OFF);
+static INSTALLED: AtomicI32 = AtomicI32::new(0);
+static INSTALL: Once = Once::new();
+static SPANS: LazyLock<Mutex<HashMap<u64, OpenSpan>>> = LazyLock::new(Default::default);
+static NEXT_SPAN: AtomicU64 = AtomicU64::new(1);
+
+struct OpenSpan {
+    text: String,
+    level: i32,
+    start: Instant,
+    references: usize,
+}
+
+pub(super) fn set(callback: upt_log_fn, user: *mut c_void, level: i32) -> Answer {
+    if callback.is_some() && level != UPT_LOG_OFF {
+        INSTALL.call_once(|| {
+            let done = tracing::subscriber::set_global_default(Forward).is_ok();
+            INSTALLED.store(done.into(), Ordering::Release);
+        });
+        if INSTALLED.load(Ordering::Acquire) == 0 {
+            return fail(
+                UPT_ERR_STATE,
+                "the process has a tracing subscriber of its own; listen there",
+            );
+        }
+    }
+    let mut receiver = RECEIVER.write().unwrap_or_else(PoisonError::into_inner);
+    *receiver = Receiver { callback, user };
+    let level = if callback.is_some() {
+        level
+    } else {
+        UPT_LOG_OFF
+    };
+    LEVEL.store(level, Ordering::Release);
+    Ok(UPT_OK)
+}
+
+fn emit(level: i32, text: String) {
+    let receiver = RECEIVER.read().unwrap_or_else(PoisonError::into_inner);
+    if let (Some(callback), Ok(text)) = (receiver.callback, CString::new(text.replace('\0', " "))) {
+        unsafe { callback(level, text.as_ptr(), receiver.user) };
+    }
+}
+
+fn level_of(metadata: &Metadata<'_>) -> i32 {
+    match *metadata.level() {
+        Level::ERROR => UPT_LOG_ERROR,
+        Level::WARN => UPT_LOG_WARN,
+        Level::INFO => UPT_LOG_INFO,
+        Level::DEBUG => UPT_LOG_DEBUG,
+        Level::TRACE => UPT_LOG_TRACE,
+    }
+}
+
+/// `message field=value ...`
+#[derive(Default)]
+struct Text(String);
+
+impl Visit for Text {
+    fn record_debug(&mut self, field: &Field, value: &dyn Debug) {
+        if !self.0.is_empty() {
+            self.0.push(' ');
+        }
+        let _ = match field.name() {
+            "message" => write!(self.0, "{value:?}"),
+            name => write!(self.0, "{name}={value:?}"),
+        };
+    }
+}
+
+struct Forward;
+
+impl Subscriber for Forward {
+    fn register_callsite(&self, metadata: &'static Metadata<'static>) -> Interest {
+        let crate_name = metadata.target().split("::").next();
+        match crate_name {
+            Some("upt" | "ort") => Interest::sometimes(),
+            _ => Interest::never(),
+        }
+    }
+
+    fn enabled(&self, metadata: &Metadata<'_>) -> bool {
+        level_of(metadata) <= LEVEL.load(Ordering::Acquire)
+    }
+
+    fn new_span(&self, attributes: &Attributes<'_>) -> Id {
+        let mut text = Text(attributes.metadata().name().to_owned());
+        attributes.record(&mut text);
+        let span = OpenSpan {
+            text: text.0,
+            level: level_of(attributes.metadata()),
+            start: Instant::now(),
+            references: 1,
+        };
+        let id = NEXT_SPAN.fetch_add(1, Ordering::Relaxed);
+        SPANS
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .insert(id, span);
+        Id::from_u64(id)
+    }
+
+    fn record(&self, id: &Id, values: &Record<'_>) {
+        let mut spans = SPANS.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(span) = spans.get_mut(&id.into_u64()) {
+            let mut text = Text(std::mem::take(&mut span.text));
+            values.record(&mut text);
+            span.text = text.0;
+        }
+    }
+
+    fn record_follows_from(&self, _: &Id, _: &Id) {}
+
+    fn event(&self, event: &Event<'_>) {
+        let mut text = Text::default();
+        event.record(&mut text);
+        emit(level_of(event.metadata()), text.0);
+    }
+
+    fn enter(&self, _: &Id) {}
+
+    fn exit(&self, _: &Id) {}
+
+    fn clone_span(&self, id: &Id) -> Id {
+        let mut spans = SPANS.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(span) = spans.get_mut(&id.into_u64()) {
+            span.references += 1;
+        }
+        id.clone()
+    }
+
+    fn try_close(&self, id: Id) -> bool {
+        let mut spans = SPANS.lock().unwrap_or_else(PoisonError::into_inner);
+        let id = id.into_u64();
+        match spans.get_mut(&id) {
+            Some(span) if span.references > 1 => span.references -= 1,
+            Some(_) => {
+                let span = spans.remove(&id).expect("looked up under the same lock");
+                drop(spans);
+                let milliseconds = span.start.elapsed().as_secs_f64() * 1e3;
+                emit(span.level, format!("{}: {milliseconds:.3} ms", span.text));
+                return true;
+            }
+            None => {}
+        }
+        false
+    }
+}

@@ -1,0 +1,163 @@
+//! `upt_model`: open, close, what it is.
+
+use core::ffi::c_char;
+
+use super::call::call;
+use super::registry::{add_model, find_model, remove_model};
+use super::status::*;
+use super::structs::*;
+use super::{convert, pointers};
+use crate::Model;
+
+/// Opens and checks a bundle (sizes, dtypes, SHA-256) and makes it ready to step.
+///
+/// path: the bundle's folder, UTF-8. options: NULL means the defaults. out: the new model.
+/// Threads: any. Errors: `UPT_ERR_IO`, `UPT_ERR_BUNDLE`, `UPT_ERR_VERSION`, `UPT_ERR_RUNTIME`, `UPT_ERR_PROVIDER`,
+/// `UPT_ERR_UNSUPPORTED`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NULL`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn upt_model_open(
+    path: *const c_char,
+    options: *const upt_model_options,
+    out: *mut *mut upt_model,
+) -> upt_status {
+    call(
+        "upt_model_open",
+        || (),
+        || {
+            let out = pointers::place(out, "out")?;
+            let path = unsafe { pointers::path(path, "path") }?;
+            let raw = unsafe { pointers::options(options) }?;
+            let model = Model::open(&path, &unsafe { convert::model_options(&raw) }?)?;
+            unsafe { out.write(add_model(model)) };
+            Ok(UPT_OK)
+        },
+    )
+}
+
+/// Closes a model. Scenes made of it keep what they need and live on.
+///
+/// Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also when it was closed before).
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn upt_model_close(model: *mut upt_model) -> upt_status {
+    call(
+        "upt_model_close",
+        || (),
+        || {
+            drop(remove_model(model)?);
+            Ok(UPT_OK)
+        },
+    )
+}
+
+/// Says what a model is. Set `out->struct_size` first.
+///
+/// Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn upt_model_get_info(
+    model: *const upt_model,
+    out: *mut upt_model_info,
+) -> upt_status {
+    call(
+        "upt_model_get_info",
+        || (),
+        || {
+            let model = find_model(model)?;
+            let fill = |struct_size| {
+                let info = model.info();
+                Ok(upt_model_info {
+                    struct_size,
+                    kind: info.kind as i32,
+                    node_count: info.node_count,
+                    tet_count: info.tet_count,
+                    surface_face_count: info.surface_face_count,
+                    domain_node_count: info.domain_node_count,
+                    held_node_count: info.held_node_count,
+                    supernode_count: info.supernode_count,
+                    dt: info.dt,
+                    max_push_mm: info.max_push_mm,
+                    provider: info.provider as i32,
+                    precision: info.precision as i32,
+                    memory_bytes: info.memory_bytes,
+                    load_seconds: info.load_seconds,
+                })
+            };
+            unsafe { pointers::fill(out, fill) }
+        },
+    )
+}
+
+/// Describes a model as JSON: name, bundle hash, the provider of each stage and why others were not taken.
+///
+/// out: text with its NUL; NULL with capacity 0 only asks. needed: bytes with the NUL, always written; may be NULL.
+/// Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` when capacity is too small.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn upt_model_describe(
+    model: *const upt_model,
+    out: *mut c_char,
+    capacity: u64,
+    needed: *mut u64,
+) -> upt_status {
+    call(
+        "upt_model_describe",
+        || (),
+        || {
+            let text = find_model(model)?.describe_json();
+            unsafe { pointers::copy_text(&text, out, capacity, needed) }
+        },
+    )
+}
+
+/// Copies the rest positions.
+///
+/// out: `[K,3]` floats, mm. count: floats in out, 3 K.
+/// Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` when count is not 3 K.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn upt_model_positions(
+    model: *const upt_model,
+    out: *mut f32,
+    count: u64,
+) -> upt_status {
+    call(
+        "upt_model_positions",
+        || (),
+        || {
+            let model = find_model(model)?;
+            let positions = model.positions();
+            if count != positions.len() as u64 {
+                return super::call::fail(
+                    UPT_ERR_ARGUMENT,
+                    format!(
+                        "count is {count}; 3 K = {} floats are needed",
+                        positions.len()
+                    ),
+                );
+            }
+            unsafe { pointers::slice_mut(out, count, "out") }?.copy_from_slice(positions);
+            Ok(UPT_OK)
+        },
+    )
+}
+
+/// Copies a static index set.
+///
+/// set: `UPT_SET_*`. out: node indices; NULL with capacity 0 only asks. capacity: indices that fit in out.
+/// needed: indices in the set (3 a face, 4 a tetrahedron), always written; may be NULL.
+/// Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` (unknown set, capacity too small).
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn upt_model_indices(
+    model: *const upt_model,
+    set: i32,
+    out: *mut u32,
+    capacity: u64,
+    needed: *mut u64,
+) -> upt_status {
+    call(
+        "upt_model_indices",
+        || (),
+        || {
+            let model = find_model(model)?;
+            let indices = model.indices(convert::index_set(set)?);
+            unsafe { pointers::copy_out(indices, out, capacity, needed) }
+        },
+    )
+}

@@ -1,0 +1,210 @@
+//! Raw pointers of the host -> slices, paths, structs. Checks what can be checked: NULL, alignment, size.
+
+use std::ffi::{CStr, c_char};
+use std::path::PathBuf;
+
+use super::call::{Answer, Failure, fail};
+use super::status::*;
+use super::structs::*;
+
+/// A struct that starts with `struct_size`. Later versions only grow; each size ever published stays known.
+///
+/// # Safety
+/// `repr(C)`, first field `struct_size: u32`, every bit pattern of zeros valid.
+pub(super) unsafe trait Sized32: Copy {
+    const NAME: &'static str;
+    const KNOWN: &'static [usize] = &[size_of::<Self>()];
+}
+
+macro_rules! sized {
+    ($($name:ident),*) => {$(
+        unsafe impl Sized32 for $name { const NAME: &'static str = stringify!($name); }
+    )*};
+}
+sized!(
+    upt_init_options,
+    upt_model_options,
+    upt_model_info,
+    upt_scene_options,
+    upt_instrument,
+    upt_scene_stats
+);
+
+fn check<T>(pointer: *const T, name: &str) -> Result<(), Failure> {
+    if pointer.is_null() {
+        return fail(UPT_ERR_NULL, format!("{name} is NULL"));
+    }
+    if !pointer.is_aligned() {
+        let align = align_of::<T>();
+        return fail(
+            UPT_ERR_ARGUMENT,
+            format!("{name} is not aligned to {align} bytes"),
+        );
+    }
+    Ok(())
+}
+
+fn length<T>(count: u64, name: &str) -> Result<usize, Failure> {
+    match usize::try_from(count) {
+        Ok(count) if count <= isize::MAX as usize / size_of::<T>().max(1) => Ok(count),
+        _ => fail(
+            UPT_ERR_ARGUMENT,
+            format!("{name}: a count of {count} is beyond any memory"),
+        ),
+    }
+}
+
+/// `count` elements; an empty array may be NULL.
+pub(super) unsafe fn slice<'a, T>(
+    pointer: *const T,
+    count: u64,
+    name: &str,
+) -> Result<&'a [T], Failure> {
+    let count = length::<T>(count, name)?;
+    if count == 0 {
+        return Ok(&[]);
+    }
+    check(pointer, name)?;
+    Ok(unsafe { std::slice::from_raw_parts(pointer, count) })
+}
+
+/// As [`slice`], but NULL with count 0 means that there is none.
+pub(super) unsafe fn optional<'a, T>(
+    pointer: *const T,
+    count: u64,
+    name: &str,
+) -> Result<Option<&'a [T]>, Failure> {
+    if pointer.is_null() && count == 0 {
+        return Ok(None);
+    }
+    unsafe { slice(pointer, count, name) }.map(Some)
+}
+
+/// `count` elements to write.
+pub(super) unsafe fn slice_mut<'a, T>(
+    pointer: *mut T,
+    count: u64,
+    name: &str,
+) -> Result<&'a mut [T], Failure> {
+    let count = length::<T>(count, name)?;
+    if count == 0 {
+        return Ok(&mut []);
+    }
+    check(pointer, name)?;
+    Ok(unsafe { std::slice::from_raw_parts_mut(pointer, count) })
+}
+
+/// A place for one value.
+pub(super) fn place<T>(pointer: *mut T, name: &str) -> Result<*mut T, Failure> {
+    check(pointer, name).map(|()| pointer)
+}
+
+/// A UTF-8 path.
+pub(super) unsafe fn path(pointer: *const c_char, name: &str) -> Result<PathBuf, Failure> {
+    check(pointer, name)?;
+    match unsafe { CStr::from_ptr(pointer) }.to_str() {
+        Ok("") => fail(UPT_ERR_ARGUMENT, format!("{name} is empty")),
+        Ok(text) => Ok(PathBuf::from(text)),
+        Err(error) => fail(UPT_ERR_ARGUMENT, format!("{name} is not UTF-8: {error}")),
+    }
+}
+
+/// A UTF-8 path, or none when NULL.
+pub(super) unsafe fn optional_path(
+    pointer: *const c_char,
+    name: &str,
+) -> Result<Option<PathBuf>, Failure> {
+    if pointer.is_null() {
+        return Ok(None);
+    }
+    unsafe { path(pointer, name) }.map(Some)
+}
+
+unsafe fn struct_size<T: Sized32>(pointer: *const T, name: &str) -> Result<usize, Failure> {
+    check(pointer, name)?;
+    let size = unsafe { pointer.cast::<u32>().read() } as usize;
+    if T::KNOWN.contains(&size) {
+        return Ok(size);
+    }
+    fail(
+        UPT_ERR_STRUCT_SIZE,
+        format!(
+            "{name}: struct_size is {size}; set it to sizeof({}), here {}",
+            T::NAME,
+            size_of::<T>()
+        ),
+    )
+}
+
+/// An options struct; NULL means the defaults (all zero).
+pub(super) unsafe fn options<T: Sized32>(pointer: *const T) -> Result<T, Failure> {
+    if pointer.is_null() {
+        return Ok(unsafe { std::mem::zeroed() });
+    }
+    unsafe { required(pointer, "options") }
+}
+
+/// A struct to read; fields that the caller's version does not have are zero.
+pub(super) unsafe fn required<T: Sized32>(pointer: *const T, name: &str) -> Result<T, Failure> {
+    let size = unsafe { struct_size(pointer, name) }?;
+    let mut value: T = unsafe { std::mem::zeroed() };
+    unsafe {
+        std::ptr::copy_nonoverlapping(pointer.cast::<u8>(), (&raw mut value).cast(), size);
+    }
+    Ok(value)
+}
+
+/// A struct to fill: `make` is called once `struct_size` is accepted; only the caller's fields are written.
+pub(super) unsafe fn fill<T: Sized32>(
+    out: *mut T,
+    make: impl FnOnce(u32) -> Result<T, Failure>,
+) -> Answer {
+    let size = unsafe { struct_size(out, "out") }?;
+    let value = make(size as u32)?;
+    unsafe { std::ptr::copy_nonoverlapping((&raw const value).cast::<u8>(), out.cast(), size) };
+    Ok(UPT_OK)
+}
+
+/// Copies `values` to the host. `needed` (may be NULL) is always written; a NULL `out` with capacity 0 only asks.
+pub(super) unsafe fn copy_out<T: Copy>(
+    values: &[T],
+    out: *mut T,
+    capacity: u64,
+    needed: *mut u64,
+) -> Answer {
+    if out.is_null() && capacity == 0 && needed.is_null() {
+        return fail(UPT_ERR_NULL, "out and needed are both NULL");
+    }
+    if !needed.is_null() {
+        unsafe { place(needed, "needed")?.write(values.len() as u64) };
+    }
+    if out.is_null() && capacity == 0 {
+        return Ok(UPT_OK);
+    }
+    if capacity < values.len() as u64 {
+        return fail(
+            UPT_ERR_ARGUMENT,
+            format!("capacity is {capacity}, {} are needed", values.len()),
+        );
+    }
+    unsafe { slice_mut(out, values.len() as u64, "out") }?.copy_from_slice(values);
+    Ok(UPT_OK)
+}
+
+/// Copies text with its NUL to the host, as [`copy_out`].
+pub(super) unsafe fn copy_text(
+    text: &str,
+    out: *mut c_char,
+    capacity: u64,
+    needed: *mut u64,
+) -> Answer {
+    let mut bytes: Vec<u8> = text.bytes().filter(|&byte| byte != 0).collect();
+    bytes.push(0);
+    unsafe { copy_out(&bytes, out.cast(), capacity, needed) }
+}
+
+/// Whether two arrays share memory.
+pub(super) fn overlap(a: &[f32], b: &[f32]) -> bool {
+    let (a, b) = (a.as_ptr_range(), b.as_ptr_range());
+    a.start < b.end && b.start < a.end
+}

@@ -1,0 +1,64 @@
+//! `upt_scene`: points that move with the tissue, such as a render mesh's vertices.
+
+use super::call::fail;
+use super::pointers::{optional, place, slice_mut};
+use super::registry::call_scene;
+use super::status::*;
+use super::structs::*;
+
+/// Attaches points to the tissue; they replace those attached before.
+///
+/// points: `[n,3]`, rest positions, mm; NULL with count 0 detaches. count: points, n.
+/// Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_NON_FINITE`,
+/// `UPT_ERR_ARGUMENT`, `UPT_ERR_UNSUPPORTED`, `UPT_ERR_PANIC`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn upt_scene_attach_points(
+    scene: *mut upt_scene,
+    points: *const f32,
+    count: u64,
+) -> upt_status {
+    call_scene("upt_scene_attach_points", scene, |scene| {
+        let points = unsafe { optional(points, count.saturating_mul(3), "points") }?;
+        scene.attach_points(points)?;
+        Ok(UPT_OK)
+    })
+}
+
+/// Copies the displacement of the attached points in the last state.
+///
+/// out: `[n,3]`, mm. out_count: floats in out, 3 n.
+/// Threads: one at a time. Errors: `UPT_ERR_STATE` when no points are attached, `UPT_ERR_NULL`, `UPT_ERR_HANDLE`,
+/// `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`, `UPT_ERR_PANIC`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn upt_scene_read_points(
+    scene: *mut upt_scene,
+    out: *mut f32,
+    out_count: u64,
+) -> upt_status {
+    call_scene("upt_scene_read_points", scene, |scene| {
+        place(out, "out")?;
+        scene.read_points(unsafe { slice_mut(out, out_count, "out") }?)?;
+        Ok(UPT_OK)
+    })
+}
+
+/// As `upt_scene_sample`, at the attached points.
+///
+/// alpha: 0 the state before, 1 the last state. out: `[n,3]`, mm. out_count: floats in out, 3 n.
+/// Threads: one at a time. Errors: as `upt_scene_read_points`, and `UPT_ERR_NON_FINITE`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn upt_scene_sample_points(
+    scene: *mut upt_scene,
+    alpha: f64,
+    out: *mut f32,
+    out_count: u64,
+) -> upt_status {
+    call_scene("upt_scene_sample_points", scene, |scene| {
+        place(out, "out")?;
+        if !alpha.is_finite() {
+            return fail(UPT_ERR_NON_FINITE, format!("alpha is {alpha}"));
+        }
+        scene.sample_points(alpha, unsafe { slice_mut(out, out_count, "out") }?)?;
+        Ok(UPT_OK)
+    })
+}

@@ -1,0 +1,147 @@
+//! Live handles. A handle is a number that is never used twice, not an address: a closed, foreign or invented
+//! handle is found out by a look-up and is never followed.
+
+use std::collections::HashMap;
+use std::ptr::without_provenance_mut;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, LazyLock, PoisonError, RwLock};
+
+use super::call::{Answer, Failure, call, fail};
+use super::status::*;
+use super::structs::{upt_model, upt_scene};
+use crate::{Model, Scene};
+
+/// Numbers of the two kinds differ in their last digit, so that a wrong kind can be named.
+const STRIDE: usize = 16;
+const MODEL_TAG: usize = 1;
+const SCENE_TAG: usize = 2;
+
+static NEXT: AtomicUsize = AtomicUsize::new(STRIDE);
+static MODELS: Live<Model> = Live::new(MODEL_TAG, "model");
+static SCENES: Live<SceneEntry> = Live::new(SCENE_TAG, "scene");
+
+/// A scene and whether a bug was caught in it.
+pub(super) struct SceneEntry {
+    pub scene: Scene,
+    pub poisoned: AtomicBool,
+}
+
+struct Live<T> {
+    tag: usize,
+    kind: &'static str,
+    entries: LazyLock<RwLock<HashMap<usize, Arc<T>>>>,
+}
+
+impl<T> Live<T> {
+    const fn new(tag: usize, kind: &'static str) -> Self {
+        Live {
+            tag,
+            kind,
+            entries: LazyLock::new(Default::default),
+        }
+    }
+
+    fn insert(&self, value: Arc<T>) -> usize {
+        let handle = NEXT.fetch_add(STRIDE, Ordering::Relaxed) + self.tag;
+        let mut entries = self.entries.write().unwrap_or_else(PoisonError::into_inner);
+        entries.insert(handle, value);
+        handle
+    }
+
+    fn get(&self, handle: usize) -> Result<Arc<T>, Failure> {
+        let entries = self.entries.read().unwrap_or_else(PoisonError::into_inner);
+        match entries.get(&handle) {
+            Some(value) => Ok(value.clone()),
+            None => self.refuse(handle),
+        }
+    }
+
+    /// Takes the entry out; `UPT_ERR_BUSY` while a call of another thread holds it and `exclusive` is asked for.
+    fn remove(&self, handle: usize, exclusive: bool) -> Result<Arc<T>, Failure> {
+        let mut entries = self.entries.write().unwrap_or_else(PoisonError::into_inner);
+        match entries.get(&handle) {
+            None => self.refuse(handle),
+            Some(value) if exclusive && Arc::strong_count(value) > 1 => fail(
+                UPT_ERR_BUSY,
+                format!(
+                    "another thread is in a call on this {}; try again after it",
+                    self.kind
+                ),
+            ),
+            Some(_) => Ok(entries
+                .remove(&handle)
+                .expect("looked up under the same lock")),
+        }
+    }
+
+    fn refuse<U>(&self, handle: usize) -> Result<U, Failure> {
+        if handle == 0 {
+            return fail(UPT_ERR_NULL, format!("{} is NULL", self.kind));
+        }
+        let issued = handle >= STRIDE && handle < NEXT.load(Ordering::Relaxed) + STRIDE;
+        let what = match handle % STRIDE {
+            tag if tag == self.tag && issued => "it was closed",
+            MODEL_TAG if issued => "it is a model",
+            SCENE_TAG if issued => "it is a scene",
+            _ => "this library never made it",
+        };
+        fail(
+            UPT_ERR_HANDLE,
+            format!("{} is not a live {0} handle: {what}", self.kind),
+        )
+    }
+}
+
+pub(super) fn add_model(model: Arc<Model>) -> *mut upt_model {
+    without_provenance_mut(MODELS.insert(model))
+}
+
+pub(super) fn add_scene(scene: Scene) -> *mut upt_scene {
+    without_provenance_mut(SCENES.insert(Arc::new(SceneEntry {
+        scene,
+        poisoned: AtomicBool::new(false),
+    })))
+}
+
+pub(super) fn find_model(model: *const upt_model) -> Result<Arc<Model>, Failure> {
+    MODELS.get(model.addr())
+}
+
+pub(super) fn remove_model(model: *mut upt_model) -> Result<Arc<Model>, Failure> {
+    MODELS.remove(model.addr(), false)
+}
+
+pub(super) fn find_scene(scene: *const upt_scene) -> Result<Arc<SceneEntry>, Failure> {
+    SCENES.get(scene.addr())
+}
+
+pub(super) fn remove_scene(scene: *mut upt_scene) -> Result<Arc<SceneEntry>, Failure> {
+    SCENES.remove(scene.addr(), true)
+}
+
+/// A call on a scene that must not have been poisoned; a panic poisons it.
+pub(super) fn call_scene(
+    name: &str,
+    scene: *const upt_scene,
+    body: impl FnOnce(&Scene) -> Answer,
+) -> upt_status {
+    let entry = find_scene(scene);
+    let poison = || {
+        if let Ok(entry) = &entry {
+            entry.poisoned.store(true, Ordering::Release);
+        }
+    };
+    call(name, poison, || {
+        let entry = match &entry {
+            Ok(entry) => entry,
+            Err(failure) => return fail(failure.status, failure.message.clone()),
+        };
+        if entry.poisoned.load(Ordering::Acquire) {
+            return fail(
+                UPT_ERR_PANIC,
+                "a bug was caught in an earlier call on this scene; destroy it",
+            );
+        }
+        body(&entry.scene)
+    })
+}

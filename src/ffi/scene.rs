@@ -1,0 +1,180 @@
+//! `upt_scene`: make, end, reset, step, read.
+
+use super::call::{Failure, call};
+use super::pointers::{overlap, slice, slice_mut};
+use super::registry::{add_scene, call_scene, find_model, remove_scene};
+use super::status::*;
+use super::structs::*;
+use super::{convert, pointers};
+use crate::{Contact, Scene, StepInput};
+
+/// Makes a scene at rest.
+///
+/// options: NULL means the defaults. out: the new scene. The scene keeps what it needs of the model.
+/// Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`,
+/// `UPT_ERR_UNSUPPORTED`, `UPT_ERR_IO`, `UPT_ERR_BUNDLE`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn upt_scene_create(
+    model: *const upt_model,
+    options: *const upt_scene_options,
+    out: *mut *mut upt_scene,
+) -> upt_status {
+    call(
+        "upt_scene_create",
+        || (),
+        || {
+            let out = pointers::place(out, "out")?;
+            let model = find_model(model)?;
+            let raw = unsafe { pointers::options(options) }?;
+            let scene = Scene::new(model, &unsafe { convert::scene_options(&raw) }?)?;
+            unsafe { out.write(add_scene(scene)) };
+            Ok(UPT_OK)
+        },
+    )
+}
+
+/// Ends a scene; a step in flight is waited for. The only call that a poisoned scene takes beside `upt_scene_get_stats`.
+///
+/// Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also when it was destroyed before), `UPT_ERR_BUSY` while
+/// another thread is in a call on it.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn upt_scene_destroy(scene: *mut upt_scene) -> upt_status {
+    call(
+        "upt_scene_destroy",
+        || (),
+        || {
+            drop(remove_scene(scene)?);
+            Ok(UPT_OK)
+        },
+    )
+}
+
+/// Back to rest. The region and attached points stay.
+///
+/// Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_PANIC`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn upt_scene_reset(scene: *mut upt_scene) -> upt_status {
+    call_scene("upt_scene_reset", scene, |scene| {
+        scene.reset()?;
+        Ok(UPT_OK)
+    })
+}
+
+/// One step: u(t), c(t) -> u(t + dt).
+///
+/// displacement: `[K,3]`, mm; NULL takes the scene's own state. collision: `[K,3]`, mm, zero but at nodes in contact,
+/// where it is the displacement that the instrument imposes at the end of the step; NULL means no contact.
+/// out: `[n,3]`, mm (n: K, or the region's count), may be NULL; it may be the same memory as an input, at the price of
+/// a copy. out_count: floats in out, 3 n; 0 when out is NULL.
+/// Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`,
+/// `UPT_ERR_NON_FINITE`, `UPT_ERR_UNSUPPORTED`, `UPT_ERR_GUARD`, `UPT_ERR_RUNTIME`, `UPT_ERR_PANIC`; the state stays.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn upt_scene_step(
+    scene: *mut upt_scene,
+    displacement: *const f32,
+    collision: *const f32,
+    out: *mut f32,
+    out_count: u64,
+) -> upt_status {
+    call_scene("upt_scene_step", scene, |scene| {
+        let floats = 3 * scene.node_count() as u64;
+        let field = |pointer: *const f32, name| match pointer.is_null() {
+            true => Ok(None),
+            false => unsafe { slice(pointer, floats, name) }.map(Some),
+        };
+        let displacement = field(displacement, "displacement")?;
+        let contact = field(collision, "collision")?.map_or(Contact::None, Contact::Dense);
+        let input = StepInput {
+            displacement,
+            contact,
+        };
+        unsafe { step(scene, input, out, out_count) }
+    })
+}
+
+/// One step from the scene's own state with the nodes in contact listed.
+///
+/// contact_nodes: `[m]` node indices, each at most once, in any order. contact_vectors: `[m,3]`, mm: the displacement of
+/// these nodes at the end of the step. contact_count: m; 0 means no contact and both may be NULL.
+/// out, out_count, threads and errors: as `upt_scene_step`; also `UPT_ERR_ARGUMENT` for an index of K or more.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn upt_scene_step_contacts(
+    scene: *mut upt_scene,
+    contact_nodes: *const u32,
+    contact_vectors: *const f32,
+    contact_count: u64,
+    out: *mut f32,
+    out_count: u64,
+) -> upt_status {
+    call_scene("upt_scene_step_contacts", scene, |scene| {
+        let (nodes, vectors) = unsafe { contacts(contact_nodes, contact_vectors, contact_count) }?;
+        let contact = Contact::Sparse { nodes, vectors };
+        let input = StepInput {
+            displacement: None,
+            contact,
+        };
+        unsafe { step(scene, input, out, out_count) }
+    })
+}
+
+/// Copies the last published state.
+///
+/// out: `[n,3]`, mm, in the region's order (all nodes when there is none). out_count: floats in out, 3 n.
+/// Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`, `UPT_ERR_PANIC`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn upt_scene_read(
+    scene: *mut upt_scene,
+    out: *mut f32,
+    out_count: u64,
+) -> upt_status {
+    call_scene("upt_scene_read", scene, |scene| {
+        pointers::place(out, "out")?;
+        scene.read(unsafe { slice_mut(out, out_count, "out") }?)?;
+        Ok(UPT_OK)
+    })
+}
+
+/// The sparse collision field `[m]`, `[m,3]`.
+pub(super) unsafe fn contacts<'a>(
+    nodes: *const u32,
+    vectors: *const f32,
+    count: u64,
+) -> Result<(&'a [u32], &'a [f32]), Failure> {
+    let nodes = unsafe { slice(nodes, count, "contact_nodes") }?;
+    let vectors = unsafe { slice(vectors, count.saturating_mul(3), "contact_vectors") }?;
+    Ok((nodes, vectors))
+}
+
+/// `out` may be an input's memory; Rust's references may not, so such an input is copied first.
+unsafe fn step(
+    scene: &Scene,
+    input: StepInput,
+    out: *mut f32,
+    out_count: u64,
+) -> super::call::Answer {
+    if out.is_null() && out_count == 0 {
+        scene.step(input, None)?;
+        return Ok(UPT_OK);
+    }
+    let out_view = unsafe { slice(out.cast_const(), out_count, "out") }?;
+    let copied = |field: &[f32]| overlap(field, out_view).then(|| field.to_vec());
+    let displacement = input.displacement.and_then(copied);
+    let contact = match input.contact {
+        Contact::Dense(field) => copied(field),
+        Contact::Sparse { vectors, .. } => copied(vectors),
+        Contact::None => None,
+    };
+    let input = StepInput {
+        displacement: displacement.as_deref().or(input.displacement),
+        contact: match (contact.as_deref(), input.contact) {
+            (Some(copy), Contact::Dense(_)) => Contact::Dense(copy),
+            (Some(copy), Contact::Sparse { nodes, .. }) => Contact::Sparse {
+                nodes,
+                vectors: copy,
+            },
+            (_, contact) => contact,
+        },
+    };
+    scene.step(input, Some(unsafe { slice_mut(out, out_count, "out") }?))?;
+    Ok(UPT_OK)
+}

@@ -1,0 +1,92 @@
+//! `upt_scene`: statistics and snapshots.
+
+use std::sync::atomic::Ordering;
+
+use super::call::call;
+use super::pointers;
+use super::registry::{call_scene, find_scene};
+use super::status::*;
+use super::structs::*;
+
+/// Says what the last step did and cost. Set `out->struct_size` first. Works while a step is in flight and on a
+/// poisoned scene.
+///
+/// Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn upt_scene_get_stats(
+    scene: *const upt_scene,
+    out: *mut upt_scene_stats,
+) -> upt_status {
+    call(
+        "upt_scene_get_stats",
+        || (),
+        || {
+            let entry = find_scene(scene)?;
+            let fill = |struct_size| {
+                let stats = entry.scene.stats();
+                Ok(upt_scene_stats {
+                    struct_size,
+                    flags: stats.flags,
+                    step_count: stats.step_count,
+                    step_ms: stats.step_ms,
+                    check_ms: stats.check_ms,
+                    prior_ms: stats.prior_ms,
+                    encode_ms: stats.encode_ms,
+                    aggregate_ms: stats.aggregate_ms,
+                    latent_ms: stats.latent_ms,
+                    decode_ms: stats.decode_ms,
+                    guard_ms: stats.guard_ms,
+                    decoded_node_count: stats.decoded_node_count,
+                    contact_count: stats.contact_count,
+                    memory_bytes: stats.memory_bytes,
+                    threads: stats.threads,
+                    kernel: stats.kernel as i32,
+                    provider: stats.provider as i32,
+                    precision: stats.precision as i32,
+                    max_displacement_mm: stats.max_displacement_mm,
+                    indicator: stats.indicator,
+                    sleeping: stats.sleeping.into(),
+                    poisoned: (stats.poisoned || entry.poisoned.load(Ordering::Acquire)).into(),
+                    reserved: [0; 6],
+                })
+            };
+            unsafe { pointers::fill(out, fill) }
+        },
+    )
+}
+
+/// Saves the state, to resume to the bit.
+///
+/// out: bytes; NULL with capacity 0 only asks. capacity: bytes that fit in out.
+/// needed: bytes of the snapshot, always written; may be NULL.
+/// Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT` when capacity is
+/// too small, `UPT_ERR_PANIC`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn upt_scene_save(
+    scene: *mut upt_scene,
+    out: *mut u8,
+    capacity: u64,
+    needed: *mut u64,
+) -> upt_status {
+    call_scene("upt_scene_save", scene, |scene| {
+        let snapshot = scene.save()?;
+        unsafe { pointers::copy_out(&snapshot, out, capacity, needed) }
+    })
+}
+
+/// Restores a snapshot of the same model.
+///
+/// Threads: one at a time. Errors: `UPT_ERR_SNAPSHOT`, `UPT_ERR_VERSION`, `UPT_ERR_NULL`, `UPT_ERR_HANDLE`,
+/// `UPT_ERR_BUSY`, `UPT_ERR_PANIC`; the state stays.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn upt_scene_restore(
+    scene: *mut upt_scene,
+    bytes: *const u8,
+    count: u64,
+) -> upt_status {
+    call_scene("upt_scene_restore", scene, |scene| {
+        pointers::place(bytes.cast_mut(), "bytes")?;
+        scene.restore(unsafe { pointers::slice(bytes, count, "bytes") }?)?;
+        Ok(UPT_OK)
+    })
+}

@@ -1,0 +1,159 @@
+//! Status codes and the enums of the C ABI: 32-bit integer constants, so that every host language can hold them.
+
+/// What a call returns: 0 is success, positive values are not errors, negative values are errors.
+pub type upt_status = i32;
+
+/// Success.
+pub const UPT_OK: i32 = 0;
+/// The submitted step has not finished.
+pub const UPT_PENDING: i32 = 1;
+/// A required pointer is NULL.
+pub const UPT_ERR_NULL: i32 = -1;
+/// A size, index, enum or range is wrong.
+pub const UPT_ERR_ARGUMENT: i32 = -2;
+/// `struct_size` is not one that this library knows.
+pub const UPT_ERR_STRUCT_SIZE: i32 = -3;
+/// Not a live handle of this type.
+pub const UPT_ERR_HANDLE: i32 = -4;
+/// The scene is in use by another thread or has a step in flight.
+pub const UPT_ERR_BUSY: i32 = -5;
+/// An input holds NaN or Inf.
+pub const UPT_ERR_NON_FINITE: i32 = -6;
+/// The call does not fit the state (for instance: wait without submit).
+pub const UPT_ERR_STATE: i32 = -7;
+/// This build or this bundle cannot do it.
+pub const UPT_ERR_UNSUPPORTED: i32 = -8;
+/// ONNX Runtime is missing, too old or broken; the message lists what was tried.
+pub const UPT_ERR_RUNTIME: i32 = -20;
+/// No provider of the list can run the model.
+pub const UPT_ERR_PROVIDER: i32 = -21;
+/// A file cannot be read.
+pub const UPT_ERR_IO: i32 = -30;
+/// A bundle is invalid; the message names the file and the field.
+pub const UPT_ERR_BUNDLE: i32 = -31;
+/// The version of a bundle or snapshot is not supported.
+pub const UPT_ERR_VERSION: i32 = -32;
+/// A snapshot is damaged or of another model.
+pub const UPT_ERR_SNAPSHOT: i32 = -33;
+/// The guard refused the new state; the last good state stays.
+pub const UPT_ERR_GUARD: i32 = -40;
+/// A bug in the library; the scene involved can only be destroyed.
+pub const UPT_ERR_PANIC: i32 = -90;
+
+/// ONNX Runtime's CPU provider and the native kernels.
+pub const UPT_PROVIDER_CPU: i32 = 0;
+/// NVIDIA CUDA.
+pub const UPT_PROVIDER_CUDA: i32 = 1;
+/// NVIDIA TensorRT.
+pub const UPT_PROVIDER_TENSORRT: i32 = 2;
+/// NVIDIA TensorRT-RTX (a plugin provider).
+pub const UPT_PROVIDER_TENSORRT_RTX: i32 = 3;
+
+/// A Universal Physics Transformer.
+pub const UPT_KIND_UPT: i32 = 0;
+/// A linear-elastic response with a learned correction in a static basis.
+pub const UPT_KIND_REDUCED: i32 = 1;
+
+/// No messages.
+pub const UPT_LOG_OFF: i32 = 0;
+/// Failures.
+pub const UPT_LOG_ERROR: i32 = 1;
+/// Fallbacks and envelope violations.
+pub const UPT_LOG_WARN: i32 = 2;
+/// Loading: what was opened and who runs it.
+pub const UPT_LOG_INFO: i32 = 3;
+/// Stage times.
+pub const UPT_LOG_DEBUG: i32 = 4;
+/// Everything.
+pub const UPT_LOG_TRACE: i32 = 5;
+
+/// 32-bit floats: the reference.
+pub const UPT_PRECISION_F32: i32 = 0;
+/// bfloat16 products where the CPU has them.
+pub const UPT_PRECISION_BF16: i32 = 1;
+/// 16-bit floats (GPU providers).
+pub const UPT_PRECISION_F16: i32 = 2;
+/// 8-bit integers, where the bundle carries them.
+pub const UPT_PRECISION_INT8: i32 = 3;
+
+/// The library chooses the decoder.
+pub const UPT_KERNEL_AUTO: i32 = 0;
+/// The fused native decoder.
+pub const UPT_KERNEL_NATIVE: i32 = 1;
+/// ONNX Runtime sessions in node tiles.
+pub const UPT_KERNEL_ONNX: i32 = 2;
+
+/// Keep the last good state and return `UPT_ERR_GUARD`.
+pub const UPT_GUARD_HOLD: i32 = 0;
+/// Publish finite states and set flags.
+pub const UPT_GUARD_REPORT: i32 = 1;
+/// Replace a refused state by the prior's or by rest and set flags.
+pub const UPT_GUARD_BLEND: i32 = 2;
+
+/// A push is longer than the model was trained on.
+pub const UPT_FLAG_PUSH: u32 = 1;
+/// A contact area is outside the trained range.
+pub const UPT_FLAG_CONTACT_AREA: u32 = 2;
+/// A contact lies outside the domain.
+pub const UPT_FLAG_SITE: u32 = 4;
+/// A push changes faster than trained.
+pub const UPT_FLAG_RATE: u32 = 8;
+/// More separate contact sites than trained.
+pub const UPT_FLAG_SITES: u32 = 16;
+/// Guard: a displacement passes the bound.
+pub const UPT_FLAG_BOUND: u32 = 32;
+/// Guard: the state is not finite.
+pub const UPT_FLAG_NON_FINITE: u32 = 64;
+/// Guard: an element is inverted.
+pub const UPT_FLAG_INVERTED: u32 = 128;
+/// Guard: the displacement grew too much in one step.
+pub const UPT_FLAG_GROWTH: u32 = 256;
+/// The learned correction was bounded.
+pub const UPT_FLAG_CLAMPED: u32 = 512;
+/// The contact block was nearly singular and was regularised.
+pub const UPT_FLAG_REGULARISED: u32 = 1024;
+
+/// Nodes of the surface.
+pub const UPT_SET_SURFACE_NODES: i32 = 0;
+/// Nodes that instruments may touch.
+pub const UPT_SET_DOMAIN_NODES: i32 = 1;
+/// Nodes held at zero under the bundle's boundary condition.
+pub const UPT_SET_FIXED_NODES: i32 = 2;
+/// Surface triangles, 3 node indices each, outward.
+pub const UPT_SET_SURFACE_FACES: i32 = 3;
+/// Triangles that instruments may touch, 3 node indices each, outward.
+pub const UPT_SET_DOMAIN_FACES: i32 = 4;
+/// Tetrahedra, 4 node indices each, positive volume.
+pub const UPT_SET_TETS: i32 = 5;
+
+/// An instrument's shape: a capsule along local y.
+pub const UPT_SHAPE_CAPSULE: i32 = 0;
+/// An instrument's shape: a box.
+pub const UPT_SHAPE_BOX: i32 = 1;
+/// An instrument's shape: a box with rounded corners.
+pub const UPT_SHAPE_SPATULA: i32 = 2;
+
+/// The C name of a status, NUL-terminated.
+pub(super) fn name(status: upt_status) -> &'static std::ffi::CStr {
+    match status {
+        UPT_OK => c"UPT_OK",
+        UPT_PENDING => c"UPT_PENDING",
+        UPT_ERR_NULL => c"UPT_ERR_NULL",
+        UPT_ERR_ARGUMENT => c"UPT_ERR_ARGUMENT",
+        UPT_ERR_STRUCT_SIZE => c"UPT_ERR_STRUCT_SIZE",
+        UPT_ERR_HANDLE => c"UPT_ERR_HANDLE",
+        UPT_ERR_BUSY => c"UPT_ERR_BUSY",
+        UPT_ERR_NON_FINITE => c"UPT_ERR_NON_FINITE",
+        UPT_ERR_STATE => c"UPT_ERR_STATE",
+        UPT_ERR_UNSUPPORTED => c"UPT_ERR_UNSUPPORTED",
+        UPT_ERR_RUNTIME => c"UPT_ERR_RUNTIME",
+        UPT_ERR_PROVIDER => c"UPT_ERR_PROVIDER",
+        UPT_ERR_IO => c"UPT_ERR_IO",
+        UPT_ERR_BUNDLE => c"UPT_ERR_BUNDLE",
+        UPT_ERR_VERSION => c"UPT_ERR_VERSION",
+        UPT_ERR_SNAPSHOT => c"UPT_ERR_SNAPSHOT",
+        UPT_ERR_GUARD => c"UPT_ERR_GUARD",
+        UPT_ERR_PANIC => c"UPT_ERR_PANIC",
+        _ => c"UPT_UNKNOWN",
+    }
+}

@@ -1,0 +1,205 @@
+//! The structs that cross the C ABI. Each begins with `struct_size`, has no implicit padding at its end that
+//! carries meaning, and holds only integers, floats and pointers (blittable in C#).
+
+use core::ffi::{c_char, c_void};
+use safer_ffi::derive_ReprC;
+
+/// A bundle made ready to step. Immutable; may be used from any thread at once.
+pub struct upt_model {
+    _opaque: [u8; 0],
+}
+
+/// One deforming body. Used by one thread at a time; a call while another is running returns `UPT_ERR_BUSY`.
+pub struct upt_scene {
+    _opaque: [u8; 0],
+}
+
+/// Receives log messages (UTF-8, valid during the call). Any thread may call it; it must not call the library.
+pub type upt_log_fn =
+    Option<unsafe extern "C" fn(level: i32, message: *const c_char, user: *mut c_void)>;
+
+/// Options of `upt_init`.
+#[derive_ReprC]
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct upt_init_options {
+    /// `sizeof(upt_init_options)`.
+    pub struct_size: u32,
+    /// Default number of threads of a model; 0: 1.
+    pub threads: u32,
+    /// ONNX Runtime's shared library, a path; NULL: beside libupt, then `ORT_DYLIB_PATH`, then the system.
+    pub onnxruntime_path: *const c_char,
+}
+
+/// Options of `upt_model_open`.
+#[derive_ReprC]
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct upt_model_options {
+    /// `sizeof(upt_model_options)`.
+    pub struct_size: u32,
+    /// Threads that a step may use, the caller's included; 0: the default of `upt_init`.
+    pub threads: u32,
+    /// `UPT_PROVIDER_*` in order of preference; NULL: CPU.
+    pub providers: *const i32,
+    /// Entries in `providers`.
+    pub provider_count: u64,
+    /// Device of GPU providers.
+    pub device_id: i32,
+    /// `UPT_PRECISION_*`.
+    pub precision: i32,
+    /// Bytes; 0: no limit.
+    pub gpu_memory_limit: u64,
+    /// Folder for compiled engines; NULL: none is kept.
+    pub cache_dir: *const c_char,
+    /// 1: TF32 products allowed (CUDA; errors near 1e-3).
+    pub allow_tf32: u8,
+    /// 1: capture CUDA graphs.
+    pub cuda_graph: u8,
+    /// 1: fail with `UPT_ERR_PROVIDER` when the first provider cannot run the model.
+    pub no_fallback: u8,
+    /// Zero.
+    pub reserved: u8,
+}
+
+/// What a model is; filled by `upt_model_get_info`.
+#[derive_ReprC]
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct upt_model_info {
+    /// `sizeof(upt_model_info)`, set by the caller.
+    pub struct_size: u32,
+    /// `UPT_KIND_*`.
+    pub kind: i32,
+    /// K, the nodes of the bundle's mesh.
+    pub node_count: u64,
+    /// Tetrahedra.
+    pub tet_count: u64,
+    /// Boundary triangles.
+    pub surface_face_count: u64,
+    /// Nodes that instruments may touch.
+    pub domain_node_count: u64,
+    /// Nodes held at zero.
+    pub held_node_count: u64,
+    /// Supernodes (kind `UPT_KIND_UPT`), else 0.
+    pub supernode_count: u64,
+    /// Length of a step, seconds.
+    pub dt: f32,
+    /// Longest push that the model was trained on, mm.
+    pub max_push_mm: f32,
+    /// `UPT_PROVIDER_*` that runs the latent stage.
+    pub provider: i32,
+    /// `UPT_PRECISION_*`.
+    pub precision: i32,
+    /// Host memory of the model.
+    pub memory_bytes: u64,
+    /// Wall time of `upt_model_open`.
+    pub load_seconds: f64,
+}
+
+/// Options of `upt_scene_create`.
+#[derive_ReprC]
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct upt_scene_options {
+    /// `sizeof(upt_scene_options)`.
+    pub struct_size: u32,
+    /// Threads of a step; 0: the model's.
+    pub threads: u32,
+    /// `UPT_KERNEL_*`: who decodes.
+    pub kernel: i32,
+    /// `UPT_PRECISION_*` of the native decoder.
+    pub precision: i32,
+    /// `UPT_GUARD_*`.
+    pub guard_policy: i32,
+    /// A mesh of the host's own (`*.mesh.safetensors`); NULL: the bundle's.
+    pub mesh_path: *const c_char,
+    /// 1: do not enforce held and contact nodes.
+    pub free_boundary: u8,
+    /// 1: never sleep.
+    pub no_sleep: u8,
+    /// 1: the guard looks for inverted elements in each step.
+    pub check_inversion: u8,
+    /// 1: a submit while a step is in flight replaces the waiting contact instead of `UPT_ERR_BUSY`.
+    pub latest_wins: u8,
+    /// 1: sample with a cubic through the last states instead of a line.
+    pub cubic_sampling: u8,
+    /// Zero.
+    pub reserved: [u8; 3],
+}
+
+/// A rigid instrument; the input of `upt_scene_contacts_from_instruments`.
+#[derive_ReprC]
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct upt_instrument {
+    /// `sizeof(upt_instrument)`, the same in every element of an array.
+    pub struct_size: u32,
+    /// `UPT_SHAPE_*`.
+    pub shape: i32,
+    /// Centre, mm, in the mesh's frame.
+    pub position: [f32; 3],
+    /// Unit quaternion x, y, z, w.
+    pub rotation: [f32; 4],
+    /// Half sizes along the local axes, mm; a capsule's half length is `[1]` (local y).
+    pub half_extents: [f32; 3],
+    /// A capsule's radius or a spatula's corner radius, mm.
+    pub radius: f32,
+    /// 1: touched nodes move with the instrument until it leaves; 0: they slide.
+    pub sticking: u8,
+    /// Zero.
+    pub reserved: [u8; 3],
+}
+
+/// What the last step did and cost; filled by `upt_scene_get_stats`.
+#[derive_ReprC]
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct upt_scene_stats {
+    /// `sizeof(upt_scene_stats)`, set by the caller.
+    pub struct_size: u32,
+    /// `UPT_FLAG_*` of the last step.
+    pub flags: u32,
+    /// Steps since creation or reset.
+    pub step_count: u64,
+    /// The whole step, ms; the stages follow.
+    pub step_ms: f64,
+    /// Input checks, ms.
+    pub check_ms: f64,
+    /// Contact solve and linear response, ms.
+    pub prior_ms: f64,
+    /// Encoder, ms.
+    pub encode_ms: f64,
+    /// Message mean, ms.
+    pub aggregate_ms: f64,
+    /// Latent network, ms.
+    pub latent_ms: f64,
+    /// Decoder, ms.
+    pub decode_ms: f64,
+    /// Guard and publishing, ms.
+    pub guard_ms: f64,
+    /// Nodes decoded in the last step.
+    pub decoded_node_count: u64,
+    /// Contact nodes of the last step.
+    pub contact_count: u64,
+    /// Host memory of the scene beside the model.
+    pub memory_bytes: u64,
+    /// Threads of a step.
+    pub threads: u32,
+    /// `UPT_KERNEL_*` that decodes.
+    pub kernel: i32,
+    /// `UPT_PROVIDER_*` that runs the latent stage.
+    pub provider: i32,
+    /// `UPT_PRECISION_*` of the decoder.
+    pub precision: i32,
+    /// Largest displacement among the decoded nodes, mm.
+    pub max_displacement_mm: f32,
+    /// Calibrated trust indicator; 0: good.
+    pub indicator: f32,
+    /// 1: the scene sleeps.
+    pub sleeping: u8,
+    /// 1: a bug was caught in an earlier call; only destroy is left.
+    pub poisoned: u8,
+    /// Zero.
+    pub reserved: [u8; 6],
+}

@@ -1,0 +1,81 @@
+//! `upt_scene` without waiting: the scene's own worker steps, the host polls and samples.
+
+use std::time::Duration;
+
+use super::call::{Answer, fail};
+use super::pointers::{place, slice_mut};
+use super::registry::call_scene;
+use super::scene::contacts;
+use super::status::*;
+use super::structs::*;
+use crate::Progress;
+
+/// Starts a step on the scene's worker and returns at once.
+///
+/// contact_nodes, contact_vectors, contact_count: as `upt_scene_step_contacts`; copied before the call returns.
+/// Threads: one at a time. Errors: `UPT_ERR_BUSY` while a step is in flight (unless the scene was made with
+/// `latest_wins`), `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NON_FINITE`, `UPT_ERR_PANIC`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn upt_scene_submit(
+    scene: *mut upt_scene,
+    contact_nodes: *const u32,
+    contact_vectors: *const f32,
+    contact_count: u64,
+) -> upt_status {
+    call_scene("upt_scene_submit", scene, |scene| {
+        let (nodes, vectors) = unsafe { contacts(contact_nodes, contact_vectors, contact_count) }?;
+        scene.submit(nodes, vectors)?;
+        Ok(UPT_OK)
+    })
+}
+
+/// Asks whether the submitted step has finished; never waits.
+///
+/// Returns `UPT_OK`, `UPT_PENDING`, or the step's error (once).
+/// Threads: one at a time. Errors: the step's; `UPT_ERR_STATE` when nothing was submitted, `UPT_ERR_NULL`,
+/// `UPT_ERR_HANDLE`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn upt_scene_poll(scene: *mut upt_scene) -> upt_status {
+    call_scene("upt_scene_poll", scene, |scene| progress(scene.poll()?))
+}
+
+/// Waits for the submitted step, at most `timeout_ms` milliseconds.
+///
+/// Returns `UPT_OK`, `UPT_PENDING` when the time is over, or the step's error (once).
+/// Threads: one at a time. Errors: as `upt_scene_poll`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn upt_scene_wait(scene: *mut upt_scene, timeout_ms: u32) -> upt_status {
+    call_scene("upt_scene_wait", scene, |scene| {
+        progress(scene.wait(Duration::from_millis(timeout_ms.into()))?)
+    })
+}
+
+/// Interpolates between the last two states, for frames between steps. Works while a step is in flight.
+///
+/// alpha: 0 the state before, 1 the last state; from 0 to 1. out: `[n,3]`, mm, in the region's order.
+/// out_count: floats in out, 3 n.
+/// Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`,
+/// `UPT_ERR_NON_FINITE`, `UPT_ERR_PANIC`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn upt_scene_sample(
+    scene: *mut upt_scene,
+    alpha: f64,
+    out: *mut f32,
+    out_count: u64,
+) -> upt_status {
+    call_scene("upt_scene_sample", scene, |scene| {
+        place(out, "out")?;
+        if !alpha.is_finite() {
+            return fail(UPT_ERR_NON_FINITE, format!("alpha is {alpha}"));
+        }
+        scene.sample(alpha, unsafe { slice_mut(out, out_count, "out") }?)?;
+        Ok(UPT_OK)
+    })
+}
+
+fn progress(progress: Progress) -> Answer {
+    Ok(match progress {
+        Progress::Done => UPT_OK,
+        Progress::Pending => UPT_PENDING,
+    })
+}
