@@ -1,8 +1,12 @@
 //! The only place that knows `ort`: finding the library, environment, providers, sessions.
+//!
+//! Nothing here is touched, and no library is opened, until a model is opened or the providers are asked for.
 
-use crate::error::{Error, Result};
+mod locate;
+mod providers;
+mod runtime;
+mod stage;
 
-/// JSON list of providers: `[{"name","available","reason"}]`. Loads ONNX Runtime.
-pub fn providers_json() -> Result<String> {
-    Err(Error::Unsupported("providers".into()))
-}
+pub use providers::{ProviderChoice, ProviderPlan, providers_json};
+pub use runtime::Runtime;
+pub use stage::{Stage, StageOptions};

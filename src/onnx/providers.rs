@@ -1,0 +1,204 @@
+//! Execution providers: an ordered wish, what really runs, and why the others do not.
+
+use std::path::PathBuf;
+
+use ort::ep::{self, ExecutionProvider, ExecutionProviderDispatch};
+
+use super::runtime::Runtime;
+use crate::error::{Error, Result};
+use crate::library;
+use crate::options::{ModelOptions, Precision, Provider};
+
+impl Provider {
+    /// Lower-case name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Provider::Cpu => "cpu",
+            Provider::Cuda => "cuda",
+            Provider::TensorRt => "tensorrt",
+            Provider::TensorRtRtx => "tensorrt-rtx",
+        }
+    }
+}
+
+/// Which providers to try for a session, with their options.
+#[derive(Debug, Clone)]
+pub struct ProviderPlan {
+    order: Vec<Provider>,
+    device_id: i32,
+    memory_limit: u64,
+    cache_dir: Option<PathBuf>,
+    allow_tf32: bool,
+    cuda_graph: bool,
+    fp16: bool,
+    fallback: bool,
+}
+
+/// What runs a session and why providers before it in the list do not.
+#[derive(Debug, Clone)]
+pub struct ProviderChoice {
+    /// What runs.
+    pub provider: Provider,
+    /// Provider and reason, for each that was asked for and not taken.
+    pub refused: Vec<(Provider, String)>,
+}
+
+impl ProviderPlan {
+    /// The plan of a model's options. The cache folder is keyed by `identity` (the bundle's hash).
+    pub fn new(options: &ModelOptions, identity: &str) -> ProviderPlan {
+        let mut order = options.providers.clone();
+        let fallback = !options.no_fallback;
+        if order.is_empty() || (fallback && !order.contains(&Provider::Cpu)) {
+            order.push(Provider::Cpu);
+        }
+        ProviderPlan {
+            order,
+            device_id: options.device_id,
+            memory_limit: options.gpu_memory_limit,
+            cache_dir: options.cache_dir.as_ref().map(|dir| dir.join(identity)),
+            allow_tf32: options.allow_tf32,
+            cuda_graph: options.cuda_graph,
+            fp16: options.precision == Some(Precision::F16),
+            fallback,
+        }
+    }
+
+    /// The CPU alone.
+    pub fn cpu() -> ProviderPlan {
+        ProviderPlan::new(&ModelOptions::default(), "")
+    }
+
+    /// Calls `make` with one provider after the other until one works.
+    pub(super) fn choose<T>(
+        &self,
+        mut make: impl FnMut(
+            Provider,
+            Option<ExecutionProviderDispatch>,
+        ) -> std::result::Result<T, String>,
+    ) -> Result<(T, ProviderChoice)> {
+        let mut refused = Vec::new();
+        for &provider in &self.order {
+            let made = self
+                .dispatch(provider)
+                .and_then(|dispatch| make(provider, dispatch));
+            match made {
+                Ok(value) => return Ok((value, ProviderChoice { provider, refused })),
+                Err(reason) => {
+                    tracing::warn!(provider = provider.name(), reason, "provider not taken");
+                    refused.push((provider, reason));
+                }
+            }
+        }
+        let list: Vec<String> = refused
+            .iter()
+            .map(|(provider, reason)| format!("{}: {reason}", provider.name()))
+            .collect();
+        let note = if self.fallback {
+            ""
+        } else {
+            " (no_fallback is set)"
+        };
+        Err(Error::Provider(format!("{}{note}", list.join("; "))))
+    }
+
+    fn dispatch(
+        &self,
+        provider: Provider,
+    ) -> std::result::Result<Option<ExecutionProviderDispatch>, String> {
+        if let Some(reason) = missing(provider) {
+            return Err(reason);
+        }
+        if let Some(dir) = &self.cache_dir {
+            std::fs::create_dir_all(dir)
+                .map_err(|error| format!("cache_dir {}: {error}", dir.display()))?;
+        }
+        let cache = self.cache_dir.as_ref().map(|dir| dir.display().to_string());
+        let dispatch: ExecutionProviderDispatch = match provider {
+            Provider::Cpu => return Ok(None),
+            #[cfg(feature = "cuda")]
+            Provider::Cuda => {
+                let mut cuda = ep::CUDA::default()
+                    .with_device_id(self.device_id)
+                    .with_tf32(self.allow_tf32)
+                    .with_cuda_graph(self.cuda_graph);
+                if self.memory_limit > 0 {
+                    cuda = cuda.with_memory_limit(self.memory_limit as usize);
+                }
+                cuda.build()
+            }
+            #[cfg(feature = "tensorrt")]
+            Provider::TensorRt => {
+                let mut trt = ep::TensorRT::default()
+                    .with_device_id(self.device_id)
+                    .with_fp16(self.fp16)
+                    .with_cuda_graph(self.cuda_graph);
+                if let Some(cache) = cache {
+                    trt = trt
+                        .with_engine_cache(true)
+                        .with_engine_cache_path(&cache)
+                        .with_timing_cache(true)
+                        .with_timing_cache_path(&cache);
+                }
+                trt.build()
+            }
+            #[cfg(feature = "tensorrt-rtx")]
+            Provider::TensorRtRtx => {
+                let mut rtx = ep::NVRTX::default()
+                    .with_device_id(self.device_id.max(0) as u32)
+                    .with_cuda_graph(self.cuda_graph);
+                if let Some(cache) = cache {
+                    rtx = rtx.with_runtime_cache_path(cache);
+                }
+                rtx.build()
+            }
+            #[cfg(not(all(feature = "cuda", feature = "tensorrt", feature = "tensorrt-rtx")))]
+            _ => unreachable!("`missing` refuses providers of features that are off"),
+        };
+        Ok(Some(dispatch.error_on_failure()))
+    }
+}
+
+/// Why this build or the loaded library cannot offer a provider; `None` when they may.
+fn missing(provider: Provider) -> Option<String> {
+    let available: ort::Result<bool> = match provider {
+        Provider::Cpu => return None,
+        #[cfg(feature = "cuda")]
+        Provider::Cuda => ep::CUDA::is_available(),
+        #[cfg(feature = "tensorrt")]
+        Provider::TensorRt => ep::TensorRT::is_available(),
+        #[cfg(feature = "tensorrt-rtx")]
+        Provider::TensorRtRtx => ep::NVRTX::is_available(),
+        #[cfg(not(all(feature = "cuda", feature = "tensorrt", feature = "tensorrt-rtx")))]
+        _ => return Some(format!("this build lacks the feature `{}`", provider.name())),
+    };
+    match available {
+        Ok(true) => None,
+        Ok(false) => Some(format!(
+            "the loaded ONNX Runtime was built without the {} provider",
+            provider.name()
+        )),
+        Err(error) => Some(error.to_string()),
+    }
+}
+
+/// JSON list of providers: `[{"name","available","reason"}]`. Loads ONNX Runtime.
+pub fn providers_json() -> Result<String> {
+    let runtime = Runtime::get(library::current().onnxruntime_path.as_deref())?;
+    let list: Vec<serde_json::Value> = [
+        Provider::Cpu,
+        Provider::Cuda,
+        Provider::TensorRt,
+        Provider::TensorRtRtx,
+    ]
+    .into_iter()
+    .map(|provider| {
+        let reason = missing(provider);
+        serde_json::json!({
+            "name": provider.name(),
+            "available": reason.is_none(),
+            "reason": reason.unwrap_or_else(|| format!("offered by {}", runtime.path().display())),
+        })
+    })
+    .collect();
+    Ok(serde_json::Value::Array(list).to_string())
+}

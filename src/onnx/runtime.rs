@@ -1,0 +1,108 @@
+//! ONNX Runtime's environment: made once a process, never torn down, telemetry off.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+use ort::environment::Environment;
+use ort::logging::LogLevel;
+
+use super::locate;
+use crate::error::{Error, Result};
+
+/// The loaded library.
+pub struct Runtime {
+    pub(super) environment: Environment,
+    path: PathBuf,
+    version: String,
+}
+
+static RUNTIME: OnceLock<Runtime> = OnceLock::new();
+static LOADING: Mutex<()> = Mutex::new(());
+
+impl Runtime {
+    /// The process's runtime; the first call finds and loads the library.
+    ///
+    /// # Errors
+    /// [`Error::Runtime`] lists every candidate that was tried and why it was not taken. A later call tries again.
+    pub fn get(explicit: Option<&Path>) -> Result<&'static Runtime> {
+        if let Some(runtime) = RUNTIME.get() {
+            return Ok(runtime);
+        }
+        let _one_at_a_time = LOADING.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(runtime) = RUNTIME.get() {
+            return Ok(runtime);
+        }
+        let runtime = load(explicit)?;
+        tracing::info!(path = %runtime.path.display(), version = %runtime.version, "ONNX Runtime loaded");
+        Ok(RUNTIME.get_or_init(|| runtime))
+    }
+
+    /// Whether the library has been loaded.
+    pub fn is_loaded() -> bool {
+        RUNTIME.get().is_some()
+    }
+
+    /// File that was loaded.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Build description of the library.
+    pub fn version(&self) -> &str {
+        &self.version
+    }
+}
+
+fn load(explicit: Option<&Path>) -> Result<Runtime> {
+    let mut tried = Vec::new();
+    for (path, why) in locate::candidates(explicit) {
+        if path.is_absolute() && !path.exists() {
+            tried.push(format!("{} ({why}): no such file", path.display()));
+            continue;
+        }
+        let opened = catch_unwind(AssertUnwindSafe(|| open(&path)));
+        match opened {
+            Ok(Ok(runtime)) => return Ok(runtime),
+            Ok(Err(cause)) => tried.push(format!("{} ({why}): {cause}", path.display())),
+            Err(_) => tried.push(format!(
+                "{} ({why}): it is not a working ONNX Runtime",
+                path.display()
+            )),
+        }
+    }
+    Err(Error::Runtime(format!(
+        "no usable library (version 1.{} or newer); tried {}. Put {} beside libupt, set ORT_DYLIB_PATH, \
+         or fetch it with `cargo xtask ort`",
+        ort::MINOR_VERSION,
+        tried.join("; "),
+        locate::plain_name()
+    )))
+}
+
+fn open(path: &Path) -> std::result::Result<Runtime, String> {
+    let builder = ort::init_from(path).map_err(|error| error.to_string())?;
+    let environment = builder
+        .with_name("upt")
+        .with_telemetry(false)
+        .with_logger(Arc::new(log))
+        .build()
+        .map_err(|error| error.to_string())?;
+    environment.set_log_level(LogLevel::Warning);
+    Ok(Runtime {
+        environment,
+        path: path.to_owned(),
+        version: ort::info().to_owned(),
+    })
+}
+
+fn log(level: LogLevel, _category: &str, _id: &str, place: &str, message: &str) {
+    match level {
+        LogLevel::Verbose => tracing::trace!(target: "onnxruntime", place, "{message}"),
+        LogLevel::Info => tracing::debug!(target: "onnxruntime", place, "{message}"),
+        LogLevel::Warning => tracing::warn!(target: "onnxruntime", place, "{message}"),
+        LogLevel::Error | LogLevel::Fatal => {
+            tracing::error!(target: "onnxruntime", place, "{message}")
+        }
+    }
+}
