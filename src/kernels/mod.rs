@@ -5,10 +5,19 @@
 //! from a [`Pool`]. All results have the same bits for any thread count, and any subset of rows
 //! gives the bits that the whole set gives (on one `Isa`; different sets differ in rounding).
 
+pub mod aggregate;
+pub mod encode;
 pub mod flush;
 pub mod isa;
+mod lanes;
+mod math;
 pub mod pool;
+#[cfg(test)]
+pub(crate) mod random;
+pub mod respond;
+pub mod rows;
 
 pub use flush::FlushToZero;
 pub use isa::Isa;
+pub use math::gelu;
 pub use pool::{Pool, PoolError};

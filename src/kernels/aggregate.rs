@@ -1,0 +1,408 @@
+//! The message mean of the encoder: for supernode `i` with neighbours `N(i)` (a CSR row),
+//! `out_i = 1/|N(i)| sum_{j in N(i)} GELU(source_j + target_i)`, exact GELU.
+//!
+//! `source [n,d]`, `target [n_S,d]`, `out [n_S,d]`, row-major. One thread computes a row, adding
+//! neighbours in index order: the same bits for any thread count. [`encode_aggregate`] is the
+//! same mean with `source` and `target` computed on the fly from their tables
+//! (see [`super::encode`]), so that no `[n,d]` array is written at all.
+
+use super::encode::LowRank;
+use super::isa::{Isa, by_isa};
+use super::lanes::Lanes;
+use super::math::{gelu, gelu_lanes};
+use super::pool::{Parts, Pool, PoolError};
+
+/// Rows of a neighbour list: row `i` is `neighbours[offsets[i]..offsets[i + 1]]`.
+#[derive(Debug, Clone, Copy)]
+pub struct Csr<'a> {
+    /// `[n_S + 1]`, ascending.
+    pub offsets: &'a [u32],
+    /// Node indices.
+    pub neighbours: &'a [u32],
+}
+
+impl Csr<'_> {
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        self.offsets.len().saturating_sub(1)
+    }
+
+    fn row(&self, i: usize) -> &[u32] {
+        &self.neighbours[self.offsets[i] as usize..self.offsets[i + 1] as usize]
+    }
+}
+
+/// Rows a chunk: enough work to pay for taking it, few enough to share evenly.
+const ROWS: usize = 8;
+
+/// `out_i = mean_j GELU(source_j + target_i)`; a row without neighbours gives 0.
+///
+/// `source [n,width]`, `target [n_S,width]`, `out [n_S,width]`.
+///
+/// # Errors
+/// [`PoolError::Panicked`] where a neighbour lies outside `source`.
+///
+/// # Panics
+/// If `target` or `out` is not `[n_S,width]`.
+pub fn aggregate(
+    isa: Isa,
+    pool: &Pool,
+    csr: Csr<'_>,
+    width: usize,
+    source: &[f32],
+    target: &[f32],
+    out: &mut [f32],
+) -> Result<(), PoolError> {
+    let rows = csr.rows();
+    assert_eq!(target.len(), rows * width, "target must be [n_S, width]");
+    assert_eq!(out.len(), rows * width, "out must be [n_S, width]");
+    let parts = Parts::new(out);
+    pool.run(rows.div_ceil(ROWS), &|chunk, _| {
+        for i in chunk * ROWS..((chunk + 1) * ROWS).min(rows) {
+            // SAFETY: row i belongs to this chunk alone.
+            let out = unsafe { parts.part(i * width, width) };
+            row(isa, csr.row(i), source, &target[i * width..][..width], out);
+        }
+    })
+}
+
+/// [`aggregate`] of `source_j = source_table_j + W_s f_j`, `target_i = target_table_{s_i} + W_t f_{s_i}`
+/// for supernodes `s`, without storing either.
+///
+/// `source_table`, `target_table` `[n,d]`, `features [n,f]`, `supernodes [n_S]`, `out [n_S,d]`.
+/// `scratch [threads * d]` holds a target row a thread. Only features of supernodes and their
+/// neighbours are read.
+///
+/// # Errors
+/// [`PoolError::Panicked`] where an index lies outside the tables.
+///
+/// # Panics
+/// If the shapes do not match.
+#[allow(clippy::too_many_arguments)]
+pub fn encode_aggregate(
+    isa: Isa,
+    pool: &Pool,
+    csr: Csr<'_>,
+    supernodes: &[u32],
+    source: LowRank<'_>,
+    target: LowRank<'_>,
+    features: &[f32],
+    scratch: &mut [f32],
+    out: &mut [f32],
+) -> Result<(), PoolError> {
+    let (rows, width) = (csr.rows(), source.width);
+    source.check(features);
+    target.check(features);
+    assert_eq!(target.width, width, "source and target widths differ");
+    assert_eq!(supernodes.len(), rows, "one supernode a row");
+    assert_eq!(out.len(), rows * width, "out must be [n_S, width]");
+    assert!(scratch.len() >= pool.threads() * width, "scratch too small");
+    let parts = Parts::new(out);
+    let scratch = Parts::new(scratch);
+    pool.run(rows.div_ceil(ROWS), &|chunk, worker| {
+        // SAFETY: scratch of this worker alone.
+        let target_row = unsafe { scratch.part(worker * width, width) };
+        for i in chunk * ROWS..((chunk + 1) * ROWS).min(rows) {
+            // SAFETY: row i belongs to this chunk alone.
+            let out = unsafe { parts.part(i * width, width) };
+            super::encode::row(isa, target, features, supernodes[i] as usize, target_row);
+            fused_row(isa, csr.row(i), source, features, target_row, out);
+        }
+    })
+}
+
+fn row_scalar(neighbours: &[u32], source: &[f32], target: &[f32], out: &mut [f32]) {
+    let width = target.len();
+    out.fill(0.0);
+    for &j in neighbours {
+        let source = &source[j as usize * width..][..width];
+        for ((out, s), t) in out.iter_mut().zip(source).zip(target) {
+            *out += gelu(s + t);
+        }
+    }
+    let mean = 1.0 / neighbours.len().max(1) as f32;
+    out.iter_mut().for_each(|o| *o *= mean);
+}
+
+by_isa! { fn row(neighbours: &[u32], source: &[f32], target: &[f32], out: &mut [f32]) = row_body, row_scalar; }
+
+#[inline(always)]
+unsafe fn row_body<V: Lanes>(neighbours: &[u32], source: &[f32], target: &[f32], out: &mut [f32]) {
+    let width = target.len();
+    let last = neighbours.iter().copied().max().unwrap_or(0) as usize;
+    assert!(
+        neighbours.is_empty() || (last + 1) * width <= source.len(),
+        "neighbour {last} lies outside the source rows"
+    );
+    let mut column = 0;
+    // SAFETY: columns stay below `width`, rows are checked above.
+    unsafe {
+        let mean = V::splat(1.0 / neighbours.len().max(1) as f32);
+        while column + 2 * V::N <= width {
+            let t = [0, 1].map(|v| V::load(target.as_ptr().add(column + v * V::N)));
+            let mut sum = [V::splat(0.0); 2];
+            for &j in neighbours {
+                let from = source.as_ptr().add(j as usize * width + column);
+                for v in 0..2 {
+                    sum[v] = sum[v].add(gelu_lanes(V::load(from.add(v * V::N)).add(t[v])));
+                }
+            }
+            for v in 0..2 {
+                sum[v]
+                    .mul(mean)
+                    .store(out.as_mut_ptr().add(column + v * V::N));
+            }
+            column += 2 * V::N;
+        }
+        while column < width {
+            let count = (width - column).min(V::N);
+            let t = load_some::<V>(target.as_ptr().add(column), count);
+            let mut sum = V::splat(0.0);
+            for &j in neighbours {
+                let s = load_some::<V>(source.as_ptr().add(j as usize * width + column), count);
+                sum = sum.add(gelu_lanes(s.add(t)));
+            }
+            store_some(sum.mul(mean), out.as_mut_ptr().add(column), count);
+            column += count;
+        }
+    }
+}
+
+fn fused_row_scalar(
+    neighbours: &[u32],
+    source: LowRank<'_>,
+    features: &[f32],
+    target: &[f32],
+    out: &mut [f32],
+) {
+    out.fill(0.0);
+    for &j in neighbours {
+        for (column, (out, t)) in out.iter_mut().zip(target).enumerate() {
+            *out += gelu(source.at(features, j as usize, column) + t);
+        }
+    }
+    let mean = 1.0 / neighbours.len().max(1) as f32;
+    out.iter_mut().for_each(|o| *o *= mean);
+}
+
+by_isa! {
+    fn fused_row(neighbours: &[u32], source: LowRank<'_>, features: &[f32], target: &[f32], out: &mut [f32])
+        = fused_row_body, fused_row_scalar;
+}
+
+#[inline(always)]
+unsafe fn fused_row_body<V: Lanes>(
+    neighbours: &[u32],
+    source: LowRank<'_>,
+    features: &[f32],
+    target: &[f32],
+    out: &mut [f32],
+) {
+    let (width, rank) = (source.width, source.rank);
+    let last = neighbours.iter().copied().max().unwrap_or(0) as usize;
+    assert!(
+        neighbours.is_empty()
+            || ((last + 1) * width <= source.table.len() && (last + 1) * rank <= features.len()),
+        "neighbour {last} lies outside the tables"
+    );
+    let mut column = 0;
+    // SAFETY: columns stay below `width`, rows are checked above.
+    unsafe {
+        let mean = V::splat(1.0 / neighbours.len().max(1) as f32);
+        while column + 2 * V::N <= width {
+            let t = [0, 1].map(|v| V::load(target.as_ptr().add(column + v * V::N)));
+            let mut sum = [V::splat(0.0); 2];
+            for &j in neighbours {
+                let from = source.table.as_ptr().add(j as usize * width + column);
+                let feature = features.as_ptr().add(j as usize * rank);
+                let mut message = [0, 1].map(|v| V::load(from.add(v * V::N)));
+                for k in 0..rank {
+                    let f = V::splat(*feature.add(k));
+                    let weight = source.weight_t.as_ptr().add(k * width + column);
+                    for v in 0..2 {
+                        message[v] = V::load(weight.add(v * V::N)).mul_add(f, message[v]);
+                    }
+                }
+                for v in 0..2 {
+                    sum[v] = sum[v].add(gelu_lanes(message[v].add(t[v])));
+                }
+            }
+            for v in 0..2 {
+                sum[v]
+                    .mul(mean)
+                    .store(out.as_mut_ptr().add(column + v * V::N));
+            }
+            column += 2 * V::N;
+        }
+        while column < width {
+            let count = (width - column).min(V::N);
+            let t = load_some::<V>(target.as_ptr().add(column), count);
+            let mut sum = V::splat(0.0);
+            for &j in neighbours {
+                let s = source.lanes::<V>(features, j as usize, column, count);
+                sum = sum.add(gelu_lanes(s.add(t)));
+            }
+            store_some(sum.mul(mean), out.as_mut_ptr().add(column), count);
+            column += count;
+        }
+    }
+}
+
+/// `count <= N` lanes from memory.
+#[inline(always)]
+pub(super) unsafe fn load_some<V: Lanes>(from: *const f32, count: usize) -> V {
+    // SAFETY: the caller's.
+    unsafe {
+        if count == V::N {
+            V::load(from)
+        } else {
+            V::load_part(from, count)
+        }
+    }
+}
+
+/// `count <= N` lanes to memory.
+#[inline(always)]
+pub(super) unsafe fn store_some<V: Lanes>(x: V, to: *mut f32, count: usize) {
+    // SAFETY: the caller's.
+    unsafe {
+        if count == V::N {
+            x.store(to)
+        } else {
+            x.store_part(to, count)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::random::Random;
+    use super::*;
+
+    struct Case {
+        offsets: Vec<u32>,
+        neighbours: Vec<u32>,
+        nodes: usize,
+        rows: usize,
+    }
+
+    fn case(random: &mut Random, nodes: usize, rows: usize) -> Case {
+        let (mut offsets, mut neighbours) = (vec![0], Vec::new());
+        for i in 0..rows {
+            for _ in 0..(i % 9) {
+                neighbours.push(random.below(nodes) as u32);
+            }
+            offsets.push(neighbours.len() as u32);
+        }
+        Case {
+            offsets,
+            neighbours,
+            nodes,
+            rows,
+        }
+    }
+
+    impl Case {
+        fn csr(&self) -> Csr<'_> {
+            Csr {
+                offsets: &self.offsets,
+                neighbours: &self.neighbours,
+            }
+        }
+    }
+
+    #[test]
+    fn every_isa_matches_scalar_and_threads_do_not_matter() {
+        let mut random = Random::new(3);
+        for width in [1, 7, 16, 40, 96, 128] {
+            let case = case(&mut random, 200, 61);
+            let source = random.normal(case.nodes * width, 2.0);
+            let target = random.normal(case.rows * width, 2.0);
+            let run = |isa, threads| {
+                let mut out = vec![f32::NAN; case.rows * width];
+                let pool = Pool::new(threads).unwrap();
+                aggregate(isa, &pool, case.csr(), width, &source, &target, &mut out).unwrap();
+                out
+            };
+            let want = run(Isa::Scalar, 1);
+            assert!(want[..width].iter().all(|&x| x == 0.0), "row 0 is empty");
+            for isa in Isa::available() {
+                let got = run(isa, 1);
+                let worst = super::super::random::max_error(&want, &got);
+                assert!(worst < 2e-6, "{} width {width}: {worst:e}", isa.name());
+                assert_eq!(got, run(isa, 2));
+                assert_eq!(got, run(isa, 4));
+            }
+        }
+    }
+
+    #[test]
+    fn fused_equals_encode_then_aggregate() {
+        let mut random = Random::new(4);
+        for (width, rank) in [(5, 3), (96, 6), (128, 16), (24, 10)] {
+            let case = case(&mut random, 150, 33);
+            let features = random.normal(case.nodes * rank, 1.0);
+            let tables = [0, 1].map(|_| random.normal(case.nodes * width, 1.0));
+            let weights = [0, 1].map(|_| random.normal(width * rank, 0.5));
+            let supernodes: Vec<u32> = (0..case.rows)
+                .map(|_| random.below(case.nodes) as u32)
+                .collect();
+            let packed: Vec<_> = weights
+                .iter()
+                .map(|w| super::super::encode::transpose_weight(w, width, rank))
+                .collect();
+            let low_rank = |k: usize| LowRank::new(&tables[k], &packed[k], width, rank);
+            for isa in Isa::available() {
+                let pool = Pool::new(2).unwrap();
+                let mut source = vec![0.0; case.nodes * width];
+                let all: Vec<u32> = (0..case.nodes as u32).collect();
+                super::super::encode::encode(isa, &pool, low_rank(0), &features, &all, &mut source)
+                    .unwrap();
+                let mut target = vec![0.0; case.rows * width];
+                super::super::encode::encode(
+                    isa,
+                    &pool,
+                    low_rank(1),
+                    &features,
+                    &supernodes,
+                    &mut target,
+                )
+                .unwrap();
+                let mut want = vec![0.0; case.rows * width];
+                aggregate(isa, &pool, case.csr(), width, &source, &target, &mut want).unwrap();
+                let mut got = vec![f32::NAN; case.rows * width];
+                let mut scratch = vec![0.0; pool.threads() * width];
+                encode_aggregate(
+                    isa,
+                    &pool,
+                    case.csr(),
+                    &supernodes,
+                    low_rank(0),
+                    low_rank(1),
+                    &features,
+                    &mut scratch,
+                    &mut got,
+                )
+                .unwrap();
+                assert_eq!(want, got, "{} width {width}", isa.name());
+            }
+        }
+    }
+
+    #[test]
+    fn a_neighbour_outside_is_an_error() {
+        let pool = Pool::new(2).unwrap();
+        let csr = Csr {
+            offsets: &[0, 1],
+            neighbours: &[5],
+        };
+        let hook = std::panic::take_hook();
+        std::panic::set_hook(Box::new(|_| {}));
+        for isa in Isa::available() {
+            let mut out = [0.0; 16];
+            let result = aggregate(isa, &pool, csr, 16, &[0.0; 80], &[0.0; 16], &mut out);
+            assert!(result.is_err(), "{}", isa.name());
+        }
+        std::panic::set_hook(hook);
+    }
+}

@@ -1,0 +1,127 @@
+//! 128-bit lanes: Advanced SIMD of AArch64.
+
+use super::Lanes;
+use core::arch::aarch64::*;
+
+/// Four f32.
+#[derive(Clone, Copy)]
+pub(crate) struct Neon(float32x4_t);
+
+// SAFETY (all functions): the trait's contract; NEON is part of every AArch64 target used here.
+impl Lanes for Neon {
+    const N: usize = 4;
+
+    #[inline(always)]
+    unsafe fn splat(x: f32) -> Self {
+        unsafe { Self(vdupq_n_f32(x)) }
+    }
+    #[inline(always)]
+    unsafe fn load(from: *const f32) -> Self {
+        unsafe { Self(vld1q_f32(from)) }
+    }
+    #[inline(always)]
+    unsafe fn store(self, to: *mut f32) {
+        unsafe { vst1q_f32(to, self.0) }
+    }
+    #[inline(always)]
+    unsafe fn load_part(from: *const f32, count: usize) -> Self {
+        let mut lanes = [0.0f32; 4];
+        unsafe {
+            core::ptr::copy_nonoverlapping(from, lanes.as_mut_ptr(), count);
+            Self(vld1q_f32(lanes.as_ptr()))
+        }
+    }
+    #[inline(always)]
+    unsafe fn store_part(self, to: *mut f32, count: usize) {
+        let mut lanes = [0.0f32; 4];
+        unsafe {
+            vst1q_f32(lanes.as_mut_ptr(), self.0);
+            core::ptr::copy_nonoverlapping(lanes.as_ptr(), to, count);
+        }
+    }
+    #[inline(always)]
+    unsafe fn load_f16(from: *const half::f16) -> Self {
+        unsafe {
+            let bits = vld1_u16(from.cast());
+            let wide: float32x4_t;
+            core::arch::asm!(
+                "fcvtl {wide:v}.4s, {bits:v}.4h",
+                wide = lateout(vreg) wide,
+                bits = in(vreg) bits,
+                options(pure, nomem, nostack, preserves_flags)
+            );
+            Self(wide)
+        }
+    }
+    #[inline(always)]
+    unsafe fn add(self, other: Self) -> Self {
+        unsafe { Self(vaddq_f32(self.0, other.0)) }
+    }
+    #[inline(always)]
+    unsafe fn sub(self, other: Self) -> Self {
+        unsafe { Self(vsubq_f32(self.0, other.0)) }
+    }
+    #[inline(always)]
+    unsafe fn mul(self, other: Self) -> Self {
+        unsafe { Self(vmulq_f32(self.0, other.0)) }
+    }
+    #[inline(always)]
+    unsafe fn div(self, other: Self) -> Self {
+        unsafe { Self(vdivq_f32(self.0, other.0)) }
+    }
+    #[inline(always)]
+    unsafe fn mul_add(self, a: Self, b: Self) -> Self {
+        unsafe { Self(vfmaq_f32(b.0, self.0, a.0)) }
+    }
+    #[inline(always)]
+    unsafe fn sqrt(self) -> Self {
+        unsafe { Self(vsqrtq_f32(self.0)) }
+    }
+    #[inline(always)]
+    unsafe fn max(self, other: Self) -> Self {
+        unsafe { Self(vmaxq_f32(self.0, other.0)) }
+    }
+    #[inline(always)]
+    unsafe fn min(self, other: Self) -> Self {
+        unsafe { Self(vminq_f32(self.0, other.0)) }
+    }
+    #[inline(always)]
+    unsafe fn round(self) -> Self {
+        unsafe { Self(vrndnq_f32(self.0)) }
+    }
+    #[inline(always)]
+    unsafe fn scale_by_power(self, exponent: Self) -> Self {
+        unsafe {
+            let biased = vaddq_s32(vcvtq_s32_f32(exponent.0), vdupq_n_s32(127));
+            let power = vreinterpretq_f32_s32(vshlq_n_s32::<23>(biased));
+            Self(vmulq_f32(self.0, power))
+        }
+    }
+    #[inline(always)]
+    unsafe fn sums(four: [Self; 4]) -> [f32; 4] {
+        unsafe {
+            let [a, b, c, d] = four.map(|r| r.0);
+            let sum = vpaddq_f32(vpaddq_f32(a, b), vpaddq_f32(c, d));
+            let mut out = [0.0; 4];
+            vst1q_f32(out.as_mut_ptr(), sum);
+            out
+        }
+    }
+    #[inline(always)]
+    unsafe fn transpose(from: *const f32, row_offset: &[usize], to: *mut f32, stride: usize) {
+        unsafe {
+            let r0 = vld1q_f32(from.add(row_offset[0]));
+            let r1 = vld1q_f32(from.add(row_offset[1]));
+            let r2 = vld1q_f32(from.add(row_offset[2]));
+            let r3 = vld1q_f32(from.add(row_offset[3]));
+            let a = vreinterpretq_f64_f32(vtrn1q_f32(r0, r1));
+            let b = vreinterpretq_f64_f32(vtrn2q_f32(r0, r1));
+            let c = vreinterpretq_f64_f32(vtrn1q_f32(r2, r3));
+            let d = vreinterpretq_f64_f32(vtrn2q_f32(r2, r3));
+            vst1q_f32(to, vreinterpretq_f32_f64(vtrn1q_f64(a, c)));
+            vst1q_f32(to.add(stride), vreinterpretq_f32_f64(vtrn1q_f64(b, d)));
+            vst1q_f32(to.add(2 * stride), vreinterpretq_f32_f64(vtrn2q_f64(a, c)));
+            vst1q_f32(to.add(3 * stride), vreinterpretq_f32_f64(vtrn2q_f64(b, d)));
+        }
+    }
+}

@@ -1,0 +1,448 @@
+//! Decode of the reduced model: `u_row = basis_row . q_k` for the rows of spatial block `k`.
+//!
+//! Block `k` has nodes `block_nodes[block_offsets[k]..block_offsets[k + 1]]`, a basis
+//! `U_k [3 n_k, r_k]` (row-major, row `3 * local + axis`, `r_k` a multiple of 8, f32 or f16) and the
+//! part `q[rank_offsets[k]..rank_offsets[k + 1]]` of the coordinates. A [`RowPlan`] lists which
+//! nodes are wanted, block by block, and where each goes in the output. Every row is summed in one
+//! fixed order, so a region gives the bits of the full decode, for any thread count.
+
+use super::isa::{Isa, by_isa};
+use super::lanes::Lanes;
+use super::pool::{Parts, Pool, PoolError};
+use half::f16;
+
+/// Numbers stored as f32 or f16.
+#[derive(Debug, Clone, Copy)]
+pub enum Stored<'a> {
+    F32(&'a [f32]),
+    F16(&'a [f16]),
+}
+
+impl Stored<'_> {
+    /// How many numbers.
+    pub fn len(&self) -> usize {
+        match self {
+            Stored::F32(x) => x.len(),
+            Stored::F16(x) => x.len(),
+        }
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+/// The block-wise basis as stored in `prior.safetensors`.
+#[derive(Debug, Clone, Copy)]
+pub struct BlockBasis<'a> {
+    /// `[K]`: node of each row group, block after block.
+    pub block_nodes: &'a [u32],
+    /// `[B + 1]` into `block_nodes`.
+    pub block_offsets: &'a [u32],
+    /// `[B + 1]` into `q`; differences are multiples of 8.
+    pub rank_offsets: &'a [u32],
+    /// `[sum_k 3 n_k r_k]`.
+    pub basis: Stored<'a>,
+}
+
+/// A run of wanted nodes in one block.
+#[derive(Debug, Clone, Copy)]
+struct Run {
+    block: u32,
+    /// Into `RowPlan::{locals, outputs}`.
+    start: u32,
+    end: u32,
+}
+
+/// Which nodes to decode: made once a region, read each step.
+#[derive(Debug, Clone, Default)]
+pub struct RowPlan {
+    runs: Vec<Run>,
+    /// Node's place in its block.
+    locals: Vec<u32>,
+    /// Node's row in the output.
+    outputs: Vec<u32>,
+    /// Start of each block's basis; `[B + 1]`.
+    basis_offsets: Vec<usize>,
+    output_rows: usize,
+}
+
+/// Nodes a run at most: a chunk of work for one thread.
+const RUN_NODES: usize = 128;
+
+impl RowPlan {
+    /// All nodes, node `i` to row `i` of an output `[K,3]`.
+    ///
+    /// # Panics
+    /// As [`RowPlan::region`].
+    pub fn full(basis: &BlockBasis<'_>) -> Self {
+        let all: Vec<u32> = (0..basis.block_nodes.len() as u32).collect();
+        Self::region(basis, &all, false)
+    }
+
+    /// The nodes of a list (no node twice). `compact`: node `nodes[i]` goes to row `i` of an output
+    /// `[nodes,3]`; else to row `nodes[i]` of an output `[K,3]`.
+    ///
+    /// # Panics
+    /// If a node is not in the basis or the offsets do not fit the basis (a bundle's loader checks).
+    pub fn region(basis: &BlockBasis<'_>, nodes: &[u32], compact: bool) -> Self {
+        let node_count = basis.block_nodes.len();
+        let mut basis_offsets = vec![0];
+        for k in 0..basis.block_offsets.len() - 1 {
+            let n = (basis.block_offsets[k + 1] - basis.block_offsets[k]) as usize;
+            let rank = (basis.rank_offsets[k + 1] - basis.rank_offsets[k]) as usize;
+            assert!(
+                rank.is_multiple_of(8),
+                "rank of block {k} must be a multiple of 8"
+            );
+            basis_offsets.push(basis_offsets[k] + 3 * n * rank);
+        }
+        assert_eq!(
+            basis.basis.len(),
+            basis_offsets[basis_offsets.len() - 1],
+            "basis length"
+        );
+        let mut row_of_node = vec![u32::MAX; node_count];
+        for (i, &node) in nodes.iter().enumerate() {
+            row_of_node[node as usize] = if compact { i as u32 } else { node };
+        }
+        let mut plan = Self {
+            basis_offsets,
+            output_rows: if compact { nodes.len() } else { node_count },
+            ..Self::default()
+        };
+        for k in 0..basis.block_offsets.len() - 1 {
+            let range = basis.block_offsets[k] as usize..basis.block_offsets[k + 1] as usize;
+            let mut start = plan.locals.len();
+            for (local, &node) in basis.block_nodes[range].iter().enumerate() {
+                let row = row_of_node[node as usize];
+                if row == u32::MAX {
+                    continue;
+                }
+                plan.locals.push(local as u32);
+                plan.outputs.push(row);
+                if plan.locals.len() - start == RUN_NODES {
+                    plan.end_run(k, &mut start);
+                }
+            }
+            plan.end_run(k, &mut start);
+        }
+        assert_eq!(
+            plan.locals.len(),
+            nodes.len(),
+            "a node of the list is unknown or twice in it"
+        );
+        plan
+    }
+
+    fn end_run(&mut self, block: usize, start: &mut usize) {
+        if self.locals.len() > *start {
+            self.runs.push(Run {
+                block: block as u32,
+                start: *start as u32,
+                end: self.locals.len() as u32,
+            });
+            *start = self.locals.len();
+        }
+    }
+
+    /// Nodes decoded.
+    pub fn nodes(&self) -> usize {
+        self.locals.len()
+    }
+
+    /// Rows of the output: K, or the list's length where the plan is compact.
+    pub fn output_rows(&self) -> usize {
+        self.output_rows
+    }
+}
+
+/// Writes `u_node = U_k[node] q_k` for the plan's nodes; other rows of `out` keep their values.
+///
+/// `q [Q]`, `out [output_rows,3]`.
+///
+/// # Errors
+/// [`PoolError`] where a worker failed.
+///
+/// # Panics
+/// If `basis` is not the one the plan was made for, or `q` or `out` have another length.
+pub fn decode_rows(
+    isa: Isa,
+    pool: &Pool,
+    basis: &BlockBasis<'_>,
+    plan: &RowPlan,
+    q: &[f32],
+    out: &mut [f32],
+) -> Result<(), PoolError> {
+    let ranks = basis.rank_offsets;
+    assert_eq!(
+        ranks.len(),
+        plan.basis_offsets.len(),
+        "plan of another basis"
+    );
+    assert_eq!(
+        basis.basis.len(),
+        plan.basis_offsets[ranks.len() - 1],
+        "plan of another basis"
+    );
+    assert_eq!(q.len(), ranks[ranks.len() - 1] as usize, "q must be [Q]");
+    assert_eq!(out.len(), 3 * plan.output_rows, "out must be [rows, 3]");
+    let parts = Parts::new(out);
+    pool.run(plan.runs.len(), &|chunk, _| {
+        let run = plan.runs[chunk];
+        let (k, items) = (run.block as usize, run.start as usize..run.end as usize);
+        let q = &q[ranks[k] as usize..ranks[k + 1] as usize];
+        let range = plan.basis_offsets[k]..plan.basis_offsets[k + 1];
+        let (locals, outputs) = (&plan.locals[items.clone()], &plan.outputs[items]);
+        match basis.basis {
+            Stored::F32(basis) => nodes_f32(isa, &basis[range], q, locals, outputs, &parts),
+            Stored::F16(basis) => nodes_f16(isa, &basis[range], q, locals, outputs, &parts),
+        }
+    })
+}
+
+/// A stored number that registers can be filled from.
+pub(super) trait Number: Copy {
+    fn wide(self) -> f32;
+    /// `N` numbers.
+    unsafe fn lanes<V: Lanes>(from: *const Self) -> V;
+}
+impl Number for f32 {
+    fn wide(self) -> f32 {
+        self
+    }
+    #[inline(always)]
+    unsafe fn lanes<V: Lanes>(from: *const Self) -> V {
+        // SAFETY: the caller's.
+        unsafe { V::load(from) }
+    }
+}
+impl Number for f16 {
+    fn wide(self) -> f32 {
+        self.to_f32()
+    }
+    #[inline(always)]
+    unsafe fn lanes<V: Lanes>(from: *const Self) -> V {
+        // SAFETY: the caller's.
+        unsafe { V::load_f16(from) }
+    }
+}
+
+/// The last `count < N` numbers of a row; only a rank of 8 in 16 lanes comes here.
+#[inline(always)]
+unsafe fn part_lanes<V: Lanes, T: Number>(from: *const T, count: usize) -> V {
+    let mut wide = [0.0f32; 16];
+    // SAFETY: the caller's; `wide` is as long as the longest register.
+    unsafe {
+        for (i, wide) in wide.iter_mut().enumerate().take(count) {
+            *wide = (*from.add(i)).wide();
+        }
+        V::load(wide.as_ptr())
+    }
+}
+
+fn nodes_scalar<T: Number>(
+    basis: &[T],
+    q: &[f32],
+    locals: &[u32],
+    outputs: &[u32],
+    out: &Parts<f32>,
+) {
+    let rank = q.len();
+    for (&local, &output) in locals.iter().zip(outputs) {
+        for axis in 0..3 {
+            let row = &basis[(3 * local as usize + axis) * rank..][..rank];
+            let u = row.iter().zip(q).map(|(b, q)| b.wide() * q).sum();
+            // SAFETY: a plan names each output row once.
+            unsafe { out.write(3 * output as usize + axis, u) };
+        }
+    }
+}
+
+by_isa! {
+    fn nodes_f32(basis: &[f32], q: &[f32], locals: &[u32], outputs: &[u32], out: &Parts<f32>) = nodes_body, nodes_scalar;
+}
+by_isa! {
+    fn nodes_f16(basis: &[f16], q: &[f32], locals: &[u32], outputs: &[u32], out: &Parts<f32>) = nodes_body, nodes_scalar;
+}
+
+/// Four nodes, twelve rows at a time; a short last group repeats its last node.
+#[inline(always)]
+#[allow(clippy::extra_unused_type_parameters)]
+unsafe fn nodes_body<V: Lanes>(
+    basis: &[impl Number],
+    q: &[f32],
+    locals: &[u32],
+    outputs: &[u32],
+    out: &Parts<f32>,
+) {
+    let rank = q.len();
+    let highest = locals.iter().copied().max().unwrap_or(0) as usize;
+    assert!(
+        (3 * highest + 3) * rank <= basis.len(),
+        "node outside its block"
+    );
+    let whole = rank - rank % V::N;
+    for (locals, outputs) in locals.chunks(4).zip(outputs.chunks(4)) {
+        // SAFETY: rows are inside `basis` by the check above; a plan names each output row once.
+        unsafe {
+            let node = |i: usize| {
+                let local = locals[i.min(locals.len() - 1)] as usize;
+                basis.as_ptr().add(3 * local * rank)
+            };
+            let nodes = [node(0), node(1), node(2), node(3)];
+            let mut sums = [[V::splat(0.0); 4]; 3];
+            let mut column = 0;
+            while column < whole {
+                let q = V::load(q.as_ptr().add(column));
+                for axis in 0..3 {
+                    for i in 0..4 {
+                        let row = Number::lanes::<V>(nodes[i].add(axis * rank + column));
+                        sums[axis][i] = row.mul_add(q, sums[axis][i]);
+                    }
+                }
+                column += V::N;
+            }
+            if column < rank {
+                let count = rank - column;
+                let q = V::load_part(q.as_ptr().add(column), count);
+                for axis in 0..3 {
+                    for i in 0..4 {
+                        let row = part_lanes::<V, _>(nodes[i].add(axis * rank + column), count);
+                        sums[axis][i] = row.mul_add(q, sums[axis][i]);
+                    }
+                }
+            }
+            for axis in 0..3 {
+                let u = V::sums(sums[axis]);
+                for (&output, u) in outputs.iter().zip(u) {
+                    out.write(3 * output as usize + axis, u);
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::random::{Random, max_error};
+    use super::*;
+
+    struct Case {
+        nodes: Vec<u32>,
+        blocks: Vec<u32>,
+        ranks: Vec<u32>,
+        wide: Vec<f32>,
+        half: Vec<f16>,
+        q: Vec<f32>,
+    }
+
+    fn case() -> Case {
+        let mut random = Random::new(9);
+        let mut case = Case {
+            nodes: (0..700).collect(),
+            blocks: vec![0],
+            ranks: vec![0],
+            wide: Vec::new(),
+            half: Vec::new(),
+            q: Vec::new(),
+        };
+        for i in (1..700).rev() {
+            let j = random.below(i + 1);
+            case.nodes.swap(i, j);
+        }
+        for (n, rank) in [(1u32, 8u32), (300, 24), (5, 40), (0, 16), (394, 64)] {
+            case.blocks.push(case.blocks.last().unwrap() + n);
+            case.ranks.push(case.ranks.last().unwrap() + rank);
+            case.wide
+                .extend(random.normal((3 * n * rank) as usize, 0.3));
+        }
+        case.half = case.wide.iter().map(|&x| f16::from_f32(x)).collect();
+        case.q = random.normal(*case.ranks.last().unwrap() as usize, 2.0);
+        case
+    }
+
+    impl Case {
+        fn basis(&self, f16: bool) -> BlockBasis<'_> {
+            BlockBasis {
+                block_nodes: &self.nodes,
+                block_offsets: &self.blocks,
+                rank_offsets: &self.ranks,
+                basis: if f16 {
+                    Stored::F16(&self.half)
+                } else {
+                    Stored::F32(&self.wide)
+                },
+            }
+        }
+    }
+
+    fn run(isa: Isa, threads: usize, case: &Case, f16: bool, plan: &RowPlan) -> Vec<f32> {
+        let mut out = vec![f32::NAN; 3 * plan.output_rows()];
+        let pool = Pool::new(threads).unwrap();
+        decode_rows(isa, &pool, &case.basis(f16), plan, &case.q, &mut out).unwrap();
+        out
+    }
+
+    #[test]
+    fn every_isa_matches_scalar_f32_and_f16() {
+        let case = case();
+        let plan = RowPlan::full(&case.basis(false));
+        let exact = run(Isa::Scalar, 1, &case, false, &plan);
+        for isa in Isa::available() {
+            for f16 in [false, true] {
+                let want = run(Isa::Scalar, 1, &case, f16, &plan);
+                let got = run(isa, 1, &case, f16, &plan);
+                assert!(max_error(&want, &got) < 1e-5, "{} f16 {f16}", isa.name());
+                assert_eq!(got, run(isa, 2, &case, f16, &plan));
+                assert_eq!(got, run(isa, 4, &case, f16, &plan));
+            }
+            let got = run(isa, 1, &case, true, &plan);
+            let error = max_error(&exact, &got);
+            assert!(error > 0.0 && error < 2e-2, "storage error {error:e}");
+        }
+    }
+
+    #[test]
+    fn a_region_has_the_bits_of_the_whole() {
+        let case = case();
+        let mut random = Random::new(12);
+        for isa in Isa::available() {
+            for f16 in [false, true] {
+                let full = run(isa, 1, &case, f16, &RowPlan::full(&case.basis(f16)));
+                for count in [0, 1, 2, 3, 77, 400] {
+                    let mut nodes: Vec<u32> = (0..700).collect();
+                    for i in 0..count {
+                        let j = i + random.below(700 - i);
+                        nodes.swap(i, j);
+                    }
+                    nodes.truncate(count);
+                    let compact = run(
+                        isa,
+                        2,
+                        &case,
+                        f16,
+                        &RowPlan::region(&case.basis(f16), &nodes, true),
+                    );
+                    let spread = run(
+                        isa,
+                        2,
+                        &case,
+                        f16,
+                        &RowPlan::region(&case.basis(f16), &nodes, false),
+                    );
+                    for (i, &node) in nodes.iter().enumerate() {
+                        let want = &full[3 * node as usize..][..3];
+                        assert_eq!(want, &compact[3 * i..][..3]);
+                        assert_eq!(want, &spread[3 * node as usize..][..3]);
+                    }
+                    assert_eq!(
+                        spread.iter().filter(|x| x.is_nan()).count(),
+                        3 * (700 - count)
+                    );
+                }
+            }
+        }
+    }
+}
