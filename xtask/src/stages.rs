@@ -348,7 +348,7 @@ fn c(workspace: &Workspace) -> Result<Outcome> {
 }
 
 fn csharp(workspace: &Workspace) -> Result<Outcome> {
-    script(workspace, "csharp", "unity-plugin/Tests/run.sh")
+    script(workspace, "csharp", "tests/csharp/run.sh")
 }
 
 fn godot(workspace: &Workspace) -> Result<Outcome> {

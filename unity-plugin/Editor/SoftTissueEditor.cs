@@ -1,0 +1,64 @@
+using Upt.Interop;
+using UnityEditor;
+using UnityEngine;
+
+namespace Upt.Editor
+{
+    /// <summary>Inspector of <see cref="SoftTissue"/>: in play mode, step times per stage and the envelope
+    /// flags in words.</summary>
+    [CustomEditor(typeof(SoftTissue))]
+    public sealed class SoftTissueEditor : UnityEditor.Editor
+    {
+        private static readonly string[] FlagNames = {
+            "push beyond the trained range",
+            "contact area beyond the trained range",
+            "contact outside the trained domain",
+            "instrument faster than the trained range",
+            "more sites than the trained range",
+            "guard: displacement bound",
+            "guard: not finite",
+            "guard: inverted elements",
+            "guard: growth",
+            "correction bounded",
+            "contact block regularised",
+        };
+
+        public override void OnInspectorGUI()
+        {
+            DrawDefaultInspector();
+            SoftTissue tissue = (SoftTissue)target;
+            if (!Application.isPlaying || !tissue.IsRunning) return;
+            upt_scene_stats stats = tissue.LastStats;
+            EditorGUILayout.LabelField("Step", stats.step_ms.ToString("0.000") + " ms, " + stats.contact_count +
+                                                   " nodes in contact" + (stats.sleeping != 0 ? ", asleep" : ""));
+            for (int i = 0; i < FlagNames.Length; i++)
+                if ((stats.flags & (1u << i)) != 0) EditorGUILayout.HelpBox(FlagNames[i], MessageType.Warning);
+            Repaint();
+        }
+
+        public override bool RequiresConstantRepaint()
+        {
+            return Application.isPlaying;
+        }
+
+        /// <summary>The trained domain (green) and, in play mode, a red frame when a flag is set.</summary>
+        [DrawGizmo(GizmoType.Selected)]
+        private static void DrawDomain(SoftTissue tissue, GizmoType kind)
+        {
+            if (!tissue.IsRunning) return;
+            Gizmos.matrix = tissue.transform.localToWorldMatrix;
+            Gizmos.color = tissue.LastStats.flags == 0 ? Color.green : Color.red;
+            Vector3[] outline = tissue.DomainPoints();
+            for (int i = 0; i + 2 < outline.Length; i += 3)
+            {
+                Gizmos.DrawLine(outline[i], outline[i + 1]);
+                Gizmos.DrawLine(outline[i + 1], outline[i + 2]);
+                Gizmos.DrawLine(outline[i + 2], outline[i]);
+            }
+            Gizmos.color = Color.yellow;
+            Vector3[] contacts = tissue.ContactPoints();
+            float size = 2f * tissue.unitsPerMillimetre;
+            for (int i = 0; i < contacts.Length; i++) Gizmos.DrawWireCube(contacts[i], new Vector3(size, size, size));
+        }
+    }
+}

@@ -1,0 +1,71 @@
+using Upt.Interop;
+using UnityEngine;
+
+namespace Upt
+{
+    /// <summary>Shape of an instrument's tip.</summary>
+    public enum InstrumentShape
+    {
+        Capsule = 0,
+        Box = 1,
+        Spatula = 2,
+    }
+
+    /// <summary>An instrument that pushes tissue: its pose is the transform's. Sizes are in
+    /// millimetres.</summary>
+    public sealed class Instrument : MonoBehaviour
+    {
+        [Tooltip("Capsule, box, or spatula (a box with rounded corners).")]
+        public InstrumentShape shape = InstrumentShape.Spatula;
+
+        [Tooltip("Half extents, mm. A capsule uses y: half its length without the caps.")]
+        public Vector3 halfExtents = new Vector3(6f, 20f, 1f);
+
+        [Tooltip("Radius of the capsule, or of the spatula's rounding, mm.")]
+        public float radius = 1f;
+
+        [Tooltip("Tissue in contact sticks to the instrument instead of sliding along it.")]
+        public bool sticking = false;
+
+        /// <summary>The instrument in the axes and units of <paramref name="tissue"/>'s bundle.</summary>
+        public unsafe upt_instrument PoseIn(Transform tissue, float unitsPerMillimetre)
+        {
+            upt_instrument instrument = default(upt_instrument);
+            instrument.struct_size = (uint)sizeof(upt_instrument);
+            instrument.shape = (int)shape;
+            Anatomical.FromUnity(tissue.InverseTransformPoint(transform.position), unitsPerMillimetre,
+                                 instrument.position);
+            Anatomical.FromUnity(Quaternion.Inverse(tissue.rotation) * transform.rotation, instrument.rotation);
+            // The map exchanges the second and third axis, and so the extents along them.
+            instrument.half_extents[0] = halfExtents.x;
+            instrument.half_extents[1] = shape == InstrumentShape.Capsule ? halfExtents.y : halfExtents.z;
+            instrument.half_extents[2] = shape == InstrumentShape.Capsule ? halfExtents.z : halfExtents.y;
+            if (shape == InstrumentShape.Capsule) TurnCapsule(ref instrument);
+            instrument.radius = radius;
+            instrument.sticking = (byte)(sticking ? 1 : 0);
+            return instrument;
+        }
+
+        /// <summary>A Unity capsule lies along Unity's y, which is RAS z; the library's lies along its own
+        /// local y: a quarter turn about x brings one to the other.</summary>
+        private static unsafe void TurnCapsule(ref upt_instrument instrument)
+        {
+            const float half = 0.70710678f;
+            fixed (float* q = instrument.rotation)
+            {
+                float x = q[0], y = q[1], z = q[2], w = q[3];
+                q[0] = w * half + x * half;
+                q[1] = y * half + z * half;
+                q[2] = z * half - y * half;
+                q[3] = w * half - x * half;
+            }
+        }
+
+        private void OnDrawGizmosSelected()
+        {
+            Gizmos.matrix = transform.localToWorldMatrix;
+            Gizmos.color = Color.cyan;
+            Gizmos.DrawWireCube(Vector3.zero, halfExtents * 0.002f);
+        }
+    }
+}

@@ -1,0 +1,61 @@
+using System;
+using System.Runtime.InteropServices;
+
+namespace Upt.Interop
+{
+    /// <summary>Marks a static method that native code calls, for IL2CPP's ahead-of-time compiler,
+    /// which recognises the attribute by its name.</summary>
+    [AttributeUsage(AttributeTargets.Method)]
+    internal sealed class MonoPInvokeCallbackAttribute : Attribute
+    {
+        public MonoPInvokeCallbackAttribute(Type type)
+        {
+            Type = type;
+        }
+
+        public Type Type { get; private set; }
+    }
+
+    /// <summary>Messages of the native library. They may come from any thread.</summary>
+    public static unsafe class Log
+    {
+        [UnmanagedFunctionPointer(CallingConvention.Cdecl)]
+        private delegate void NativeLog(int level, byte* message, IntPtr user);
+
+        private static readonly NativeLog Callback = OnMessage;
+        private static volatile Action<int, string> receiver;
+
+        /// <summary>
+        /// Sends messages of at least <paramref name="level"/> (<c>Native.UPT_LOG_*</c>) to
+        /// <paramref name="target"/>, from any thread. A null target turns the log off; do so before the
+        /// scripting domain is unloaded.
+        /// </summary>
+        public static void Set(Action<int, string> target, int level)
+        {
+            Library.Verify();
+            if (target == null)
+            {
+                Status.Check(Native.upt_set_log(IntPtr.Zero, null, Native.UPT_LOG_OFF));
+                receiver = null;
+                return;
+            }
+            receiver = target;
+            Status.Check(Native.upt_set_log(Marshal.GetFunctionPointerForDelegate(Callback), null, level));
+        }
+
+        [MonoPInvokeCallback(typeof(NativeLog))]
+        private static void OnMessage(int level, byte* message, IntPtr user)
+        {
+            Action<int, string> target = receiver;
+            if (target == null) return;
+            try
+            {
+                target(level, Utf8.Decode(message));
+            }
+            catch (Exception)
+            {
+                // An exception must not unwind through native frames; the receiver's own fault stays with it.
+            }
+        }
+    }
+}

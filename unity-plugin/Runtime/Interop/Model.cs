@@ -1,0 +1,123 @@
+using System;
+
+namespace Upt.Interop
+{
+    /// <summary>An opened bundle: immutable, shared by scenes, safe from any thread.</summary>
+    public sealed unsafe class Model : IDisposable
+    {
+        private readonly ModelHandle handle;
+
+        /// <summary>Counts, time step, provider and memory of the model.</summary>
+        public upt_model_info Info { get; private set; }
+
+        /// <summary>Opens the bundle folder <paramref name="path"/> with the CPU provider and
+        /// <paramref name="threads"/> threads (0: the library's default). Throws
+        /// <see cref="UptException"/>, whose message names the file and field that is wrong.</summary>
+        public Model(string path, uint threads)
+        {
+            Library.Verify();
+            upt_model_options options = default(upt_model_options);
+            options.struct_size = (uint)sizeof(upt_model_options);
+            options.threads = threads;
+            IntPtr pointer = IntPtr.Zero;
+            fixed (byte* bytes = Utf8.Encode(path, "path"))
+            {
+                Status.Check(Native.upt_model_open(bytes, &options, &pointer));
+            }
+            handle = new ModelHandle(pointer);
+            upt_model_info info = default(upt_model_info);
+            info.struct_size = (uint)sizeof(upt_model_info);
+            int status = Native.upt_model_get_info(pointer, &info);
+            if (status < 0) handle.Dispose();
+            Status.Check(status);
+            Info = info;
+        }
+
+        internal ModelHandle Handle
+        {
+            get { return handle; }
+        }
+
+        /// <summary>Number of mesh nodes, <c>K</c>.</summary>
+        public int NodeCount
+        {
+            get { return checked((int)Info.node_count); }
+        }
+
+        /// <summary>Rest positions, <c>3 K</c> floats, mm.</summary>
+        public float[] Positions()
+        {
+            float[] positions = new float[3 * NodeCount];
+            bool added = false;
+            handle.DangerousAddRef(ref added);
+            try
+            {
+                fixed (float* pointer = positions)
+                {
+                    Status.Check(Native.upt_model_positions(handle.DangerousGetHandle(), pointer,
+                                                            (ulong)positions.Length));
+                }
+            }
+            finally
+            {
+                handle.DangerousRelease();
+            }
+            return positions;
+        }
+
+        /// <summary>An index set (<c>Native.UPT_SET_*</c>) of the mesh: nodes, or 3 per face, or 4 per
+        /// tetrahedron.</summary>
+        public uint[] Indices(int set)
+        {
+            bool added = false;
+            handle.DangerousAddRef(ref added);
+            try
+            {
+                ulong needed = 0;
+                Status.Check(Native.upt_model_indices(handle.DangerousGetHandle(), set, null, 0, &needed));
+                uint[] indices = new uint[needed];
+                if (needed == 0) return indices;
+                fixed (uint* pointer = indices)
+                {
+                    Status.Check(Native.upt_model_indices(handle.DangerousGetHandle(), set, pointer, needed,
+                                                          &needed));
+                }
+                return indices;
+            }
+            finally
+            {
+                handle.DangerousRelease();
+            }
+        }
+
+        /// <summary>JSON: the bundle's name and hash, the provider of each stage and why others were not
+        /// taken.</summary>
+        public string Describe()
+        {
+            bool added = false;
+            handle.DangerousAddRef(ref added);
+            try
+            {
+                ulong needed = 0;
+                Status.Check(Native.upt_model_describe(handle.DangerousGetHandle(), null, 0, &needed));
+                byte[] text = new byte[needed + 1];
+                fixed (byte* pointer = text)
+                {
+                    Status.Check(Native.upt_model_describe(handle.DangerousGetHandle(), pointer,
+                                                           (ulong)text.Length, &needed));
+                    return Utf8.Decode(pointer);
+                }
+            }
+            finally
+            {
+                handle.DangerousRelease();
+            }
+        }
+
+        /// <summary>Closes the model; scenes made from it go on until they are disposed.</summary>
+        public void Dispose()
+        {
+            handle.Dispose();
+        }
+    }
+}

@@ -1,0 +1,96 @@
+using Upt.Interop;
+using UnityEngine;
+
+namespace Upt.Samples
+{
+    /// <summary>
+    /// The whole sample: put this on an empty object in an empty scene, assign a UptModel asset, press play.
+    /// It builds the brain and a spatula. The spatula presses by itself; while the left mouse button is
+    /// held, its depth follows the button and its place the pointer's height.
+    /// </summary>
+    public sealed class PushedBrain : MonoBehaviour
+    {
+        [Tooltip("The model asset (bundle brain-reduced or brain-fast).")]
+        public UptModel model;
+
+        [Tooltip("Deepest push, mm.")]
+        public float depth = 10f;
+
+        [Tooltip("Seconds of one press.")]
+        public float period = 4f;
+
+        private const float UnitsPerMillimetre = 0.001f;
+        private SoftTissue tissue;
+        private Instrument spatula;
+        private Vector3 site;
+        private Vector3 outward;
+        private float time;
+
+        /// <summary>The tissue that the sample made.</summary>
+        public SoftTissue Tissue
+        {
+            get { return tissue; }
+        }
+
+        private void OnEnable()
+        {
+            if (model == null)
+            {
+                Debug.LogError("PushedBrain: assign a UptModel asset", this);
+                return;
+            }
+            GameObject brain = new GameObject("Brain");
+            brain.SetActive(false);
+            brain.AddComponent<MeshFilter>();
+            MeshRenderer renderer = brain.AddComponent<MeshRenderer>();
+            renderer.sharedMaterial = new Material(Shader.Find("Standard"));
+            renderer.sharedMaterial.color = new Color(0.86f, 0.62f, 0.58f);
+            tissue = brain.AddComponent<SoftTissue>();
+            tissue.model = model;
+            tissue.unitsPerMillimetre = UnitsPerMillimetre;
+
+            GameObject tool = new GameObject("Spatula");
+            spatula = tool.AddComponent<Instrument>();
+            spatula.halfExtents = new Vector3(6f, 8f, 1.5f);
+            spatula.radius = 1.5f;
+            tissue.instruments.Add(spatula);
+            tool.SetActive(true);
+            brain.SetActive(true);
+            FindSite();
+        }
+
+        private void OnDisable()
+        {
+            if (tissue != null) Object.Destroy(tissue.gameObject);
+            if (spatula != null) Object.Destroy(spatula.gameObject);
+        }
+
+        private void Update()
+        {
+            if (tissue == null || !tissue.IsRunning) return;
+            time += Time.deltaTime;
+            float press = 0.5f - 0.5f * (float)System.Math.Cos(2.0 * System.Math.PI * time / period);
+            if (Input.GetMouseButton(0)) press = 1f;
+            float clearance = (spatula.halfExtents.z + spatula.radius) * UnitsPerMillimetre;
+            spatula.transform.position =
+                tissue.transform.TransformPoint(site + outward * (clearance - press * depth * UnitsPerMillimetre));
+            spatula.transform.rotation = Quaternion.LookRotation(outward, Vector3.up);
+        }
+
+        /// <summary>The middle of the trained domain, and the direction out of the tissue there.</summary>
+        private void FindSite()
+        {
+            Vector3[] corners = tissue.DomainPoints();
+            if (corners.Length < 3) return;
+            Vector3 middle = Vector3.zero;
+            for (int i = 0; i < corners.Length; i++) middle += corners[i];
+            middle = middle * (1f / corners.Length);
+            int best = 0;
+            for (int i = 0; i + 2 < corners.Length; i += 3)
+                if ((corners[i] - middle).magnitude < (corners[best] - middle).magnitude) best = i;
+            site = (corners[best] + corners[best + 1] + corners[best + 2]) * (1f / 3f);
+            // RAS winding is outward; the exchange of axes turns the cross product round.
+            outward = Vector3.Cross(corners[best + 2] - corners[best], corners[best + 1] - corners[best]).normalized;
+        }
+    }
+}
