@@ -1,0 +1,77 @@
+"""`python -m upt_training train | evaluate | export`; `--help` on each. Wrong input ends with a message and exit code 2."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from upt_training.errors import InputError
+
+
+def parser() -> argparse.ArgumentParser:
+    top = argparse.ArgumentParser(prog="python -m upt_training", description="Train, evaluate and export the surrogate")
+    commands = top.add_subparsers(dest="command", required=True)
+
+    train = commands.add_parser("train", help="train a configuration on a dataset")
+    train.add_argument("--config", type=Path, required=True, help="configs/NAME.toml")
+    train.add_argument("--data", type=Path, required=True, help="dataset folder")
+    train.add_argument("--mesh", type=Path, help="mesh file; default: found by the dataset's mesh hash")
+    train.add_argument("--prior", type=Path, help="prior.safetensors, for configurations that use the linear response")
+    train.add_argument("--out", type=Path, default=Path("runs/last"), help="run folder")
+    train.add_argument("--resume", action="store_true", help="continue the run in --out, exactly")
+    train.add_argument("--init", type=Path, help="checkpoint whose weights to start from")
+    train.add_argument("--device", default="auto", help="auto, cpu, cuda, cuda:N")
+    train.add_argument("--threads", type=int, default=1)
+    train.add_argument("--max-minutes", type=float, default=0.0, help="stop with a checkpoint after this time")
+    train.add_argument("--precise", action="store_true", help="full float32 products (no TF32 or bf16 inside)")
+
+    evaluate = commands.add_parser("evaluate", help="autoregressive rollouts of a bundle on held-out cases, as JSON")
+    evaluate.add_argument("bundle", type=Path)
+    evaluate.add_argument("--data", type=Path, required=True)
+    evaluate.add_argument("--mesh", type=Path, help="another mesh than the bundle's (the data's)")
+    evaluate.add_argument("--prior", type=Path, help="prior of that mesh")
+    evaluate.add_argument("--split", default="test", choices=["train", "test", "all"])
+    evaluate.add_argument("--schemes", nargs="*", help="only these")
+    evaluate.add_argument("--count", type=int, default=0, help="at most this many cases")
+    evaluate.add_argument("--precision", default="f32", choices=["f32", "f16", "int8"])
+    evaluate.add_argument("--out", type=Path, help="JSON file; default: standard output")
+    evaluate.add_argument("--no-hausdorff", action="store_true")
+
+    export = commands.add_parser("export", help="write the bundle of a run")
+    export.add_argument("run", type=Path, help="run folder or checkpoint")
+    export.add_argument("--out", type=Path, required=True, help="bundle folder")
+    export.add_argument("--mesh", type=Path, required=True)
+    export.add_argument("--data", type=Path, help="dataset: envelope, material and real inputs for the self-check")
+    export.add_argument("--prior", type=Path)
+    export.add_argument("--name")
+    export.add_argument("--description", default="")
+    export.add_argument("--errors", type=Path, help="JSON of `evaluate` to put into bundle.json")
+    export.add_argument("--paper-split", action="store_true", help="also the paper's two halves")
+    export.add_argument("--step", action="store_true", help="also the whole step in one graph")
+    export.add_argument("--f16", action="store_true", help="also half-precision graphs")
+    export.add_argument("--int8", action="store_true", help="also dynamically quantised graphs")
+    return top
+
+
+def main(arguments: list[str] | None = None) -> int:
+    options = parser().parse_args(arguments)
+    try:
+        if options.command == "train":
+            from upt_training.run import train_command
+
+            return train_command(options)
+        if options.command == "evaluate":
+            from upt_training.evaluate import evaluate_command
+
+            return evaluate_command(options)
+        from upt_training.export import export_command
+
+        return export_command(options)
+    except InputError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+
+
+if __name__ == "__main__":
+    sys.exit(main())

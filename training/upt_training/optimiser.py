@@ -1,0 +1,45 @@
+"""Lion (Chen et al. 2023), AdamW, and the learning-rate schedule: warm-up (constant as in the paper, or linear), cosine."""
+
+from __future__ import annotations
+
+import math
+
+import torch
+
+
+class Lion(torch.optim.Optimizer):
+    """Sign of an interpolated momentum; decoupled weight decay."""
+
+    def __init__(self, parameters, lr: float, betas=(0.9, 0.99), weight_decay: float = 0.0):
+        super().__init__(parameters, {"lr": lr, "betas": betas, "weight_decay": weight_decay})
+
+    @torch.no_grad()
+    def step(self, closure=None):
+        for group in self.param_groups:
+            first, second = group["betas"]
+            for p in group["params"]:
+                if p.grad is None:
+                    continue
+                state = self.state[p]
+                if not state:
+                    state["momentum"] = torch.zeros_like(p)
+                m = state["momentum"]
+                p.mul_(1.0 - group["lr"] * group["weight_decay"])
+                p.add_(torch.sign(m.lerp(p.grad, 1.0 - first)), alpha=-group["lr"])
+                m.lerp_(p.grad, 1.0 - second)
+
+
+def make_optimiser(settings, model: torch.nn.Module) -> torch.optim.Optimizer:
+    if settings.optimiser == "lion":
+        return Lion(model.parameters(), settings.learning_rate, weight_decay=settings.weight_decay)
+    return torch.optim.AdamW(model.parameters(), settings.learning_rate, betas=(0.9, 0.98), weight_decay=settings.weight_decay)
+
+
+def learning_rate(settings, epoch: float) -> float:
+    """At a (fractional) epoch. Lion: constant warm-up phase, then cosine. AdamW: linear warm-up, then cosine."""
+    total = settings.epochs + settings.autoregressive_epochs
+    if epoch < settings.warmup_epochs:
+        ramp = 1.0 if settings.optimiser == "lion" else (epoch + 1e-3) / settings.warmup_epochs
+        return settings.learning_rate * ramp
+    progress = (epoch - settings.warmup_epochs) / max(1e-9, total - settings.warmup_epochs)
+    return settings.learning_rate * (0.01 + 0.99 * 0.5 * (1.0 + math.cos(math.pi * min(1.0, progress))))

@@ -1,0 +1,82 @@
+"""Where training windows start: at the truth (stochastic teacher forcing) or at the model's own states (replay pool).
+
+The pool holds rollouts in progress. A window continues some of them, is scored against the truth and puts its last
+state back, so every prediction serves as training sample and as the next input, and the inputs are those of inference.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+
+from upt_training.rollout import State
+
+
+def truth_state(cache, case: np.ndarray, frame: np.ndarray, device) -> State:
+    """The true state at `frame` (0 is rest)."""
+    now, before = cache.fields(case, frame), cache.fields(case, frame - 1)
+    prior = now["prior"].to(device) if "prior" in now else None
+    return State(now["u"].to(device), before["u"].to(device), prior)
+
+
+class ReplayPool:
+    """`slots` rollouts: case, frame, and the state there."""
+
+    def __init__(self, cache, slots: int, generator: np.random.Generator):
+        n = len(cache.nodes)
+        self.cache, self.generator = cache, generator
+        self.case = generator.integers(cache.case_count, size=slots)
+        self.frame = generator.integers(0, cache.frame_count - 1, size=slots)
+        start = truth_state(cache, self.case, self.frame, "cpu")
+        self.u, self.previous = start.u.clone(), start.previous.clone()
+        self.next = 0
+        assert self.u.shape == (slots, n, 3)
+
+    def take(self, batch: int, window: int, device) -> tuple[np.ndarray, np.ndarray, np.ndarray, State]:
+        """Slots, cases, frames and states of the next `batch` rollouts; finished ones restart (most of them at rest)."""
+        slots = (self.next + np.arange(batch)) % len(self.case)
+        self.next = int((self.next + batch) % len(self.case))
+        for s in slots:
+            if self.frame[s] + window >= self.cache.frame_count or not torch.isfinite(self.u[s]).all():
+                case = int(self.generator.integers(self.cache.case_count))
+                late = int(self.generator.integers(0, self.cache.frame_count - window - 1))
+                frame = 0 if self.generator.random() < 0.7 else late
+                state = truth_state(self.cache, np.array([case]), np.array([frame]), "cpu")
+                self.case[s], self.frame[s] = case, frame
+                self.u[s], self.previous[s] = state.u[0], state.previous[0]
+        state = State(self.u[slots].to(device), self.previous[slots].to(device), None)
+        if self.cache.prior is not None:
+            state.prior = self.cache.fields(self.case[slots], self.frame[slots])["prior"].to(device)
+        return slots, self.case[slots].copy(), self.frame[slots].copy(), state
+
+    def put(self, slots: np.ndarray, frame: np.ndarray, state: State) -> None:
+        self.frame[slots] = frame
+        self.u[slots] = state.u.detach().cpu()
+        self.previous[slots] = state.previous.detach().cpu()
+
+    def state_dict(self) -> dict:
+        return {"case": self.case, "frame": self.frame, "u": self.u, "previous": self.previous, "next": self.next}
+
+    def load_state_dict(self, values: dict) -> None:
+        for name, value in values.items():
+            setattr(self, name, value)
+
+
+def corrupt(state: State, contact: torch.Tensor, probability: float, noise_mm: float, draw: torch.Generator) -> State:
+    """Corrupted states while in contact, so that the contact and not a copy of the state decides.
+
+    With `probability` a sample in contact has its deviation from the response (or the state itself, without a prior)
+    scaled by a random factor in [0, 2]; all samples get white noise of `noise_mm`.
+    """
+    batch, device = len(state.u), state.u.device
+    u, previous = state.u, state.previous
+    if probability > 0:
+        touched = (contact.amax(dim=(1, 2)) > 0).cpu()
+        chosen = (torch.rand(batch, generator=draw) < probability) & touched
+        factor = torch.where(chosen, 2.0 * torch.rand(batch, generator=draw), torch.ones(batch))
+        change = (factor - 1.0).to(device)[:, None, None] * (u - state.prior if state.prior is not None else u)
+        u, previous = u + change, previous + change
+    if noise_mm > 0:
+        u = u + noise_mm * torch.randn(u.shape, generator=draw).to(device)
+        previous = previous + noise_mm * torch.randn(u.shape, generator=draw).to(device)
+    return State(u, previous, state.prior)

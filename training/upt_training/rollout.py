@@ -1,0 +1,110 @@
+"""One step of the recurrence on a node subset, batched, differentiable: features, network, base, boundary conditions.
+
+`u' = base + network(features)`, with `base` 0, `u` or `L(c')`; then held nodes are 0 and contact nodes `c'` when the
+boundary is enforced. All fields `[B, n, 3]` in mm on the subset's nodes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+
+from upt_training.graph import Graph
+from upt_training.mesh_file import Mesh
+from upt_training.model import Upt
+
+
+@dataclass
+class State:
+    """Displacement of this and the previous frame, and the prior's response of this frame."""
+
+    u: torch.Tensor
+    previous: torch.Tensor
+    prior: torch.Tensor | None
+
+    def detach(self) -> State:
+        return State(self.u.detach(), self.previous.detach(), self.prior)
+
+
+class Stepper:
+    """Static data of a subset: `nodes` must hold every node the graph reads."""
+
+    def __init__(self, model: Upt, mesh: Mesh, graph: Graph, nodes: np.ndarray, boundary: str, exact: bool, device="cpu"):
+        place = np.full(mesh.node_count, -1)
+        place[nodes] = np.arange(len(nodes))
+        neighbours, mask = graph.padded()
+        neighbours = place[neighbours] * (mask > 0)
+        assert (neighbours >= 0).all() and (place[graph.supernodes] >= 0).all()
+        held = np.zeros(mesh.node_count, bool)
+        held[mesh.held_nodes(boundary)] = True
+        self.model, self.exact, self.device = model, exact, torch.device(device)
+        to = self.device
+        self.neighbours = torch.from_numpy(neighbours).to(to)
+        self.mask = torch.from_numpy(mask).to(to)
+        self.supernodes = torch.from_numpy(place[graph.supernodes]).to(to)
+        self.positions = torch.from_numpy(mesh.positions[nodes].astype(np.float32)).to(to)
+        self.free = torch.from_numpy(~held[nodes]).to(to, torch.float32)[:, None]
+        self.node_count = len(nodes)
+
+    def tables(self) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+        return self.model.tables(self.positions)
+
+    def rest(self, batch: int) -> State:
+        zero = torch.zeros(batch, self.node_count, 3, device=self.device)
+        return State(zero, zero, zero if self.model.settings.uses_prior else None)
+
+    def step(self, state: State, target: dict[str, torch.Tensor], tables) -> State:
+        """`target` holds `c`, `contact` and (where used) `prior` of the end of the step."""
+        fields = {
+            "displacement": state.u,
+            "previous_displacement": state.previous,
+            "collision": target["c"],
+            "contact": target["contact"],
+            "prior": target.get("prior"),
+            "previous_prior": state.prior,
+        }
+        source, key, query = tables
+        features = self.model.normalise(fields)
+        out = self.model(features, (source, key), self.neighbours, self.mask, self.supernodes, query).float()
+        base = self.model.settings.base
+        if base == "displacement":
+            out = out + state.u
+        elif base == "prior":
+            out = out + target["prior"]
+        if self.exact:
+            out = self.free * torch.where(target["contact"] > 0, target["c"], out)
+        return State(out, state.u, target.get("prior"))
+
+
+def squared_error(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
+    """The paper's MSE of each sample: mean over nodes of the squared distance, mm², `[B]`."""
+    return (a - b).square().sum(-1).mean(-1)
+
+
+@torch.no_grad()
+def cache_rollout(stepper: Stepper, cache, cases: np.ndarray) -> dict[str, np.ndarray]:
+    """Autoregressive rollouts from rest over all frames: `mse [cases, F-1]` mm², `max [cases, F-1]` mm."""
+    model = stepper.model
+    was_training = model.training
+    model.eval()
+    tables, state = stepper.tables(), stepper.rest(len(cases))
+    mse, largest, moved = [], [], []
+    for t in range(1, cache.frame_count):
+        target = {k: v.to(stepper.device) for k, v in cache.fields(cases, np.full(len(cases), t)).items()}
+        state = stepper.step(state, target, tables)
+        mse.append(squared_error(state.u, target["u"]).cpu().numpy())
+        largest.append((state.u - target["u"]).abs().amax(dim=(1, 2)).cpu().numpy())
+        moved.append(state.u.abs().amax(dim=(1, 2)).cpu().numpy())
+    model.train(was_training)
+    stack = [np.stack(x, axis=1) for x in (mse, largest, moved)]
+    return {"mse": stack[0], "max": stack[1], "moved": stack[2]}
+
+
+def autoregressive_scores(result: dict[str, np.ndarray]) -> dict[str, float]:
+    """Averages as in the paper: the first step is excluded; the maximum is over all the others."""
+    return {
+        "mse_mm2": float(result["mse"][:, 1:].mean()),
+        "max_mm": float(result["max"][:, 1:].max(axis=1).mean()),
+    }

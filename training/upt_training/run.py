@@ -1,0 +1,118 @@
+"""`python -m upt_training train`: puts data, mesh, prior, configuration and device together and runs the trainer."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from pathlib import Path
+
+import numpy as np
+import torch
+import torch.distributed as distributed
+
+from upt_training.config import Settings, load_settings
+from upt_training.dataset import open_dataset
+from upt_training.errors import InputError
+from upt_training.field_cache import build_cache
+from upt_training.graph import build_graph
+from upt_training.mesh_file import Mesh, load_mesh
+from upt_training.prior_table import PriorTable
+from upt_training.trainer import Trainer
+
+SUBSET_SEED = 11
+
+
+def find_mesh(mesh: Path | None, data: Path) -> Mesh:
+    """The mesh given, or the one in the data folder or in `onnx/meshes` whose hash the manifest names."""
+    if mesh is not None:
+        return load_mesh(mesh)
+    import json
+
+    manifest = Path(data) / "manifest.json"
+    if not manifest.exists():
+        raise InputError(f"{manifest}: no such file; make a dataset with `upt dataset`")
+    wanted = json.loads(manifest.read_text()).get("mesh_sha256")
+    for folder in (Path(data), Path("onnx/meshes"), Path("../onnx/meshes")):
+        for path in sorted(folder.glob("*.mesh.safetensors")):
+            found = load_mesh(path)
+            if found.sha256 == wanted:
+                return found
+    raise InputError(f"{manifest}: its mesh was not found in {data} or onnx/meshes; pass --mesh")
+
+
+def choose_device(name: str) -> str:
+    if name == "auto":
+        name = "cuda" if torch.cuda.is_available() else "cpu"
+    if name.startswith("cuda") and not torch.cuda.is_available():
+        raise InputError(f"device {name!r} is missing on this machine; use --device cpu")
+    return name
+
+
+def training_nodes(mesh: Mesh, graph, loss_nodes: int) -> np.ndarray:
+    """The encoder's needed nodes and `loss_nodes` further ones (seeded); 0: all nodes."""
+    if loss_nodes == 0:
+        return np.arange(mesh.node_count)
+    needed = graph.needed_nodes()
+    rest = np.setdiff1d(np.arange(mesh.node_count), needed)
+    extra = np.random.default_rng(SUBSET_SEED).choice(rest, min(loss_nodes, len(rest)), replace=False)
+    return np.union1d(needed, extra)
+
+
+def make_trainer(settings: Settings, data: Path, mesh: Mesh, prior: Path | None, out: Path, device: str) -> Trainer:
+    dataset = open_dataset(data, mesh)
+    boundary = dataset.manifest.get("boundary", "fixed")
+    if settings.model.uses_prior and prior is None:
+        raise InputError("the configuration uses the linear response: pass --prior prior.safetensors")
+    table = PriorTable(prior, mesh.node_count) if settings.model.uses_prior else None
+    graph = build_graph(mesh, settings.model.graph)
+    t = settings.train
+    nodes = training_nodes(mesh, graph, t.loss_nodes)
+    train_cases = dataset.select("train", t.schemes, t.train_cases)
+    test_cases = dataset.select("test", t.schemes)
+    if not train_cases or not test_cases:
+        raise InputError(f"{data}: {len(train_cases)} training and {len(test_cases)} test cases; both are needed")
+    cache = Path(data) / ".cache" if os.access(data, os.W_OK) else Path(out) / "cache"
+    train = build_cache(cache, mesh, train_cases, nodes, table)
+    test = build_cache(cache, mesh, test_cases, nodes, table)
+    return Trainer(settings, out, mesh, graph, train, test, boundary, device)
+
+
+def train_command(options) -> int:
+    torch.set_num_threads(options.threads)
+    torch.set_float32_matmul_precision("highest" if options.precise else "medium")
+    device = choose_device(options.device)
+    out = Path(options.out)
+    if options.resume and (out / "config.toml").exists():
+        settings = load_settings(out / "config.toml")
+    else:
+        settings = load_settings(options.config)
+    if not options.resume and (out / "last.pt").exists():
+        raise InputError(f"{out}: already holds a run; pass --resume to continue it or another --out")
+    ranks = int(os.environ.get("WORLD_SIZE", "1"))
+    if ranks > 1:
+        distributed.init_process_group("nccl" if device.startswith("cuda") else "gloo")
+        if device == "cuda":
+            device = f"cuda:{os.environ.get('LOCAL_RANK', '0')}"
+    mesh = find_mesh(options.mesh, options.data)
+    if ranks > 1 and distributed.get_rank() > 0:
+        distributed.barrier()  # rank 0 makes the cache
+    trainer = make_trainer(settings, options.data, mesh, options.prior, out, device)
+    if ranks > 1 and distributed.get_rank() == 0:
+        distributed.barrier()
+    out.mkdir(parents=True, exist_ok=True)
+    if not options.resume and trainer.rank == 0:
+        shutil.copyfile(options.config, out / "config.toml")
+    if options.resume and (out / "last.pt").exists():
+        trainer.resume(out / "last.pt")
+    elif options.init:
+        trainer.start_from(options.init)
+    if trainer.rank == 0:
+        print(f"{settings.name}: {trainer.model.parameter_count()} parameters, {trainer.train_cache.case_count} cases, "
+              f"{trainer.stepper.node_count} of {mesh.node_count} nodes, {trainer.total_steps} steps, "
+              f"from step {trainer.step_count}, {device}", flush=True)  # fmt: skip
+    ended = trainer.fit(options.max_minutes)
+    if trainer.rank == 0:
+        print(f"{ended} at step {trainer.step_count}; best autoregressive MSE {trainer.best:.5f} mm²", flush=True)
+    if ranks > 1:
+        distributed.destroy_process_group()
+    return 0

@@ -1,0 +1,285 @@
+"""The training loop: stochastic teacher forcing (paper, Eq. STF), pure teacher forcing, or replay of own states.
+
+A window of `S` predictions; before each but the first the input is the truth with probability `p`, which falls
+linearly from 1 to 0 over the first `epochs` and is 0 in the `autoregressive_epochs`. Back-propagation through time;
+the first prediction is excluded from the loss (its input is the truth). Loss in mm² over the subset's nodes.
+"""
+
+from __future__ import annotations
+
+import copy
+import csv
+import time
+from pathlib import Path
+
+import numpy as np
+import torch
+import torch.distributed as distributed
+
+from upt_training.config import Settings
+from upt_training.errors import InputError
+from upt_training.field_cache import FieldCache
+from upt_training.model import Upt, load_state
+from upt_training.optimiser import learning_rate, make_optimiser
+from upt_training.replay import ReplayPool, corrupt, truth_state
+from upt_training.rollout import State, Stepper, autoregressive_scores, cache_rollout, squared_error
+
+POOL_SLOTS = 64
+
+
+class Trainer:
+    """Owns model, optimiser, random state and the run folder (`last.pt`, `best.pt`, `log.csv`)."""
+
+    def __init__(self, settings: Settings, folder: Path, mesh, graph, train: FieldCache, test: FieldCache, boundary, device):
+        self.settings, self.folder, self.device = settings, Path(folder), torch.device(device)
+        self.mesh, self.boundary = mesh, boundary
+        self.train_cache, self.test_cache = train, test
+        t = settings.train
+        torch.manual_seed(t.seed)
+        self.model = Upt(settings.model)
+        self.model.set_coordinates(mesh.positions)
+        self.model.set_normalisation(*normalisation(train, settings.model))
+        self.model.to(self.device)
+        self.ema = copy.deepcopy(self.model).requires_grad_(False) if t.ema > 0 else None
+        self.stepper = Stepper(self.model, mesh, graph, train.nodes, boundary, t.exact_boundary, device)
+        self.optimiser = make_optimiser(t, self.model)
+        self.world = distributed.get_world_size() if distributed.is_initialized() else 1
+        self.rank = distributed.get_rank() if distributed.is_initialized() else 0
+        self.generator = np.random.default_rng([t.seed, self.rank])
+        self.draw = torch.Generator().manual_seed(t.seed + 7919 * self.rank)
+        self.pool = ReplayPool(train, POOL_SLOTS, self.generator) if t.strategy == "replay" else None
+        self.step_count, self.best, self.stale = 0, float("inf"), 0
+        self.loss_scale = 1.0 / float((self.model.output_scale**2).sum())
+        windows = train.case_count * (train.frame_count - 1) // max(1, t.window)
+        self.steps_per_epoch = t.steps_per_epoch or max(1, windows // (t.micro_batch * t.accumulate * self.world))
+        self.total_steps = self.steps_per_epoch * (t.epochs + t.autoregressive_epochs)
+
+    # -- one window ---------------------------------------------------------------------------------------------
+
+    def teacher_probability(self) -> float:
+        t = self.settings.train
+        if t.strategy == "teacher":
+            return 1.0
+        return max(0.0, 1.0 - self.step_count / max(1, self.steps_per_epoch * t.epochs))
+
+    def _target(self, case: np.ndarray, frame: np.ndarray) -> dict[str, torch.Tensor]:
+        return {k: v.to(self.device) for k, v in self.train_cache.fields(case, frame).items()}
+
+    def _teach(self, state: State, case: np.ndarray, frame: np.ndarray, p: float) -> State:
+        """Replace the state by the truth with probability `p`, sample by sample."""
+        forced = torch.rand(len(case), generator=self.draw) < p
+        if not forced.any():
+            return state
+        truth = truth_state(self.train_cache, case, frame, self.device)
+        forced = forced.to(self.device)[:, None, None]
+        u, previous = torch.where(forced, truth.u, state.u), torch.where(forced, truth.previous, state.previous)
+        return State(u, previous, state.prior)
+
+    def window_loss(self, p: float) -> torch.Tensor:
+        t = self.settings.train
+        slots = None
+        if self.pool is not None:
+            slots, case, frame, state = self.pool.take(t.micro_batch, t.window, self.device)
+            state = self._teach(state, case, frame, p)
+            first, window = 1, t.window
+        else:
+            window = 2 if t.strategy == "teacher" else t.window
+            case = self.generator.integers(self.train_cache.case_count, size=t.micro_batch)
+            frame = self.generator.integers(0, self.train_cache.frame_count - window, size=t.micro_batch)
+            first = 2
+            if p >= 1.0:  # the first prediction would be thrown away: start at the second's true input
+                frame, first, window = frame + 1, 1, window - 1
+            state = truth_state(self.train_cache, case, frame, self.device)
+        tables, loss, scored = self.stepper.tables(), 0.0, 0
+        for i in range(1, window + 1):
+            if i > 1 and p > 0:
+                state = self._teach(state, case, frame, p)
+            frame = frame + 1
+            target = self._target(case, frame)
+            if t.corrupt_contact > 0 or t.input_noise_mm > 0:
+                state = corrupt(state, target["contact"], t.corrupt_contact, t.input_noise_mm, self.draw)
+            with torch.autocast(self.device.type, torch.bfloat16, enabled=t.bf16):
+                state = self.stepper.step(state, target, tables)
+            if i >= first:
+                loss, scored = loss + squared_error(state.u, target["u"]).mean(), scored + 1
+        if slots is not None:
+            self.pool.put(slots, frame, state)
+        return loss / scored
+
+    def train_step(self) -> tuple[float, float]:
+        """One optimiser step over `accumulate` windows: mean loss in mm² and the gradient norm before clipping."""
+        t = self.settings.train
+        rate = learning_rate(t, self.step_count / self.steps_per_epoch)
+        for group in self.optimiser.param_groups:
+            group["lr"] = rate
+        self.model.train()
+        self.optimiser.zero_grad(set_to_none=True)
+        p, total = self.teacher_probability(), 0.0
+        for _ in range(t.accumulate):
+            loss = self.window_loss(p)
+            (loss * self.loss_scale / t.accumulate).backward()
+            total += float(loss.detach()) / t.accumulate
+        if self.world > 1:
+            for parameter in self.model.parameters():
+                distributed.all_reduce(parameter.grad)
+                parameter.grad /= self.world
+        norm = float(torch.nn.utils.clip_grad_norm_(self.model.parameters(), t.clip))
+        if np.isfinite(total) and np.isfinite(norm):
+            self.optimiser.step()
+        self.step_count += 1
+        if self.ema is not None:
+            decay = min(t.ema, (1 + self.step_count) / (10 + self.step_count))
+            with torch.no_grad():
+                for mean, value in zip(self.ema.parameters(), self.model.parameters(), strict=True):
+                    mean.lerp_(value, 1.0 - decay)
+        return total, norm
+
+    # -- evaluation and files -----------------------------------------------------------------------------------
+
+    def evaluate(self) -> dict[str, float]:
+        """Autoregressive scores of the held-out cases, with the averaged weights where there are any."""
+        count = min(self.settings.train.evaluate_cases, self.test_cache.case_count)
+        cases = np.unique(np.linspace(0, self.test_cache.case_count - 1, count).round().astype(int))
+        self.stepper.model = self.ema if self.ema is not None else self.model
+        scores = autoregressive_scores(cache_rollout(self.stepper, self.test_cache, cases))
+        self.stepper.model = self.model
+        return scores
+
+    def fit(self, max_minutes: float = 0.0, report=print) -> str:
+        """Train to the end, to early stopping or to the time limit; returns which. Resumes exactly from `last.pt`."""
+        t, began, first = self.settings.train, time.monotonic(), self.step_count
+        running, norms, spoken = [], [], time.monotonic()
+        while self.step_count < self.total_steps:
+            loss, norm = self.train_step()
+            running.append(loss)
+            norms.append(norm)
+            elapsed = time.monotonic() - began
+            if time.monotonic() - spoken > 30 and self.rank == 0:
+                spoken = time.monotonic()
+                left = elapsed / (self.step_count - first) * (self.total_steps - self.step_count)
+                report(f"step {self.step_count}/{self.total_steps} loss {np.mean(running[-200:]):.4f} mm², "
+                       f"{left / 60:.0f} min left", flush=True)  # fmt: skip
+            if self.step_count % (self.steps_per_epoch * t.evaluate_every) == 0 or self.step_count == self.total_steps:
+                if self._evaluate_and_save(running, norms, elapsed, report):
+                    return "stopped early"
+                running, norms = [], []
+            if max_minutes and elapsed > 60 * max_minutes:
+                self.save("last.pt")
+                return "time limit"
+        return "finished"
+
+    def _evaluate_and_save(self, running, norms, elapsed, report) -> bool:
+        t = self.settings.train
+        scores = self.evaluate()
+        row = {
+            "step": self.step_count,
+            "epoch": round(self.step_count / self.steps_per_epoch, 3),
+            "teacher_probability": round(self.teacher_probability(), 4),
+            "learning_rate": learning_rate(t, self.step_count / self.steps_per_epoch),
+            "train_mse_mm2": float(np.mean(running)) if running else float("nan"),
+            "max_gradient_norm": float(np.max(norms)) if norms else float("nan"),
+            **{f"test_{k}": v for k, v in scores.items()},
+            "seconds": round(elapsed, 1),
+        }
+        better = scores["mse_mm2"] < self.best
+        self.best, self.stale = (scores["mse_mm2"], 0) if better else (self.best, self.stale + 1)
+        if self.rank == 0:
+            report(" ".join(f"{k}={v:.5g}" for k, v in row.items()), flush=True)
+            self._log(row)
+            if better:
+                self.save("best.pt")
+            self.save("last.pt")
+        return bool(t.patience) and self.stale >= t.patience
+
+    def _log(self, row: dict) -> None:
+        path = self.folder / "log.csv"
+        new = not path.exists()
+        with path.open("a", newline="") as file:
+            writer = csv.DictWriter(file, row.keys())
+            if new:
+                writer.writeheader()
+            writer.writerow(row)
+
+    def save(self, name: str) -> None:
+        """Everything that a resumed run needs to be the same run, written beside and moved into place."""
+        if self.rank != 0:
+            return
+        state = {
+            "format": "upt-checkpoint",
+            "settings": self.settings.to_dict(),
+            "model_hash": self.settings.model_hash(),
+            "mesh_sha256": self.mesh.sha256,
+            "boundary": self.boundary,
+            "model": self.model.state_dict(),
+            "ema": self.ema.state_dict() if self.ema is not None else None,
+            "optimiser": self.optimiser.state_dict(),
+            "pool": self.pool.state_dict() if self.pool is not None and name == "last.pt" else None,
+            "random": {
+                "torch": torch.get_rng_state(),
+                "draw": self.draw.get_state(),
+                "numpy": self.generator.bit_generator.state,
+            },
+            "step_count": self.step_count,
+            "best": self.best,
+            "stale": self.stale,
+        }
+        torch.save(state, self.folder / (name + ".tmp"))
+        (self.folder / (name + ".tmp")).rename(self.folder / name)
+
+    def resume(self, path: Path) -> None:
+        """Continue from `last.pt` of the same configuration."""
+        state = load_checkpoint(path)
+        if state["model_hash"] != self.settings.model_hash():
+            raise InputError(f"{path}: checkpoint of another configuration; resume with the one in its run folder")
+        if state["mesh_sha256"] != self.mesh.sha256:
+            raise InputError(f"{path}: checkpoint of another mesh; start a new run with --init {path}")
+        load_state(self.model, state["model"], str(path))
+        if self.ema is not None and state["ema"] is not None:
+            load_state(self.ema, state["ema"], str(path))
+        self.optimiser.load_state_dict(state["optimiser"])
+        if self.pool is not None and state["pool"] is not None:
+            self.pool.load_state_dict(state["pool"])
+        torch.set_rng_state(state["random"]["torch"])
+        self.draw.set_state(state["random"]["draw"])
+        self.generator.bit_generator.state = state["random"]["numpy"]
+        self.step_count, self.best, self.stale = state["step_count"], state["best"], state["stale"]
+
+    def start_from(self, path: Path) -> None:
+        """Take the weights (and the normalisation) of another run, for transfer to another mesh or recipe."""
+        state = load_checkpoint(path)
+        weights = state["ema"] or state["model"]
+        load_state(self.model, weights, str(path))
+        if self.ema is not None:
+            load_state(self.ema, weights, str(path))
+        self.loss_scale = 1.0 / float((self.model.output_scale**2).sum())
+
+
+def normalisation(cache: FieldCache, model) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+    """Per-axis mean and std of `u`, the output's scale (std of what the network adds to its base) and the mixing scale."""
+    cases = np.unique(np.linspace(0, cache.case_count - 1, min(40, cache.case_count)).astype(int))
+    frames = np.arange(0, cache.frame_count, 2)
+    u = np.concatenate([cache.displacement[c][frames].astype(np.float32).reshape(-1, 3) for c in cases])
+    mean, std = u.mean(axis=0), u.std(axis=0)
+    if model.base == "displacement":
+        step = [np.diff(cache.displacement[c].astype(np.float32), axis=0).reshape(-1, 3) for c in cases]
+        out = np.concatenate(step).std(axis=0)
+    elif model.base == "prior":
+        prior = np.concatenate([cache.prior[c][frames].astype(np.float32).reshape(-1, 3) for c in cases])
+        out = (u - prior).std(axis=0)
+    else:
+        out = std
+    scale = float(np.clip(std.mean() / max(1e-6, out.mean()), 1.0, 5.0))
+    return mean, np.maximum(std, 1e-6), np.maximum(out, 1e-6), scale
+
+
+def load_checkpoint(path: Path) -> dict:
+    path = Path(path)
+    if not path.exists():
+        raise InputError(f"{path}: no such checkpoint")
+    try:
+        state = torch.load(path, map_location="cpu", weights_only=False)
+    except Exception as error:
+        raise InputError(f"{path}: not a readable checkpoint ({error}); use the one before it") from error
+    if not isinstance(state, dict) or state.get("format") != "upt-checkpoint":
+        raise InputError(f"{path}: not a checkpoint of this package")
+    return state
