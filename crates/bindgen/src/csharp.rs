@@ -1,0 +1,142 @@
+//! The C# bindings: blittable structs, raw pointers, C names. C# 7.2, no `in` parameters (Mono crashes on them).
+
+use std::fmt::Write;
+
+use anyhow::{Result, bail};
+
+use crate::source::{Function, Kind, Named, Source, Struct};
+
+const HEAD: &str = "\
+// Written by `cargo xtask header` from src/ffi/; conventions: docs/abi.md.
+// SPDX-License-Identifier: Apache-2.0 OR MIT
+using System;
+using System.Runtime.InteropServices;
+
+namespace Upt.Interop
+{
+";
+
+/// The whole file.
+pub fn write(source: &Source) -> Result<String> {
+    let mut out = String::from(HEAD);
+    for item in &source.structs {
+        structure(&mut out, source, item)?;
+        out.push('\n');
+    }
+    out.push_str("    /// <summary>The C ABI, as it is.</summary>\n");
+    out.push_str("    public static unsafe class Native\n    {\n");
+    out.push_str("        const string Library = \"upt\";\n\n");
+    for constant in &source.constants {
+        summary(&mut out, 8, &constant.doc);
+        let ty = if constant.unsigned { "uint" } else { "int" };
+        let (name, value) = (&constant.name, &constant.value);
+        writeln!(out, "        public const {ty} {name} = {value};")?;
+    }
+    for item in &source.functions {
+        out.push('\n');
+        function(&mut out, source, item)?;
+    }
+    out.push_str("    }\n}\n");
+    Ok(out)
+}
+
+fn structure(out: &mut String, source: &Source, item: &Struct) -> Result<()> {
+    summary(out, 4, &item.doc);
+    out.push_str("    [StructLayout(LayoutKind.Sequential)]\n");
+    writeln!(out, "    public unsafe struct {}\n    {{", item.name)?;
+    for Named { doc, name, kind } in &item.fields {
+        summary(out, 8, doc);
+        match kind {
+            Kind::Array(element, length) => {
+                let element = ty(source, element)?;
+                writeln!(out, "        public fixed {element} {name}[{length}];")?;
+            }
+            _ => writeln!(out, "        public {} {name};", ty(source, kind)?)?,
+        }
+    }
+    out.push_str("    }\n");
+    Ok(())
+}
+
+fn function(out: &mut String, source: &Source, item: &Function) -> Result<()> {
+    summary(out, 8, &item.doc);
+    out.push_str("        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]\n");
+    let result = match &item.result {
+        Some(kind) => ty(source, kind)?,
+        None => "void".into(),
+    };
+    let parameters = item
+        .parameters
+        .iter()
+        .map(|parameter| {
+            Ok(format!(
+                "{} {}",
+                ty(source, &parameter.kind)?,
+                escape(&parameter.name)
+            ))
+        })
+        .collect::<Result<Vec<_>>>()?;
+    let (name, parameters) = (&item.name, parameters.join(", "));
+    writeln!(
+        out,
+        "        public static extern {result} {name}({parameters});"
+    )?;
+    Ok(())
+}
+
+fn ty(source: &Source, kind: &Kind) -> Result<String> {
+    Ok(match kind {
+        Kind::Number(name) => match name.as_str() {
+            "u8" => "byte",
+            "i32" => "int",
+            "u32" => "uint",
+            "u64" => "ulong",
+            "f32" => "float",
+            "f64" => "double",
+            _ => bail!("{name} has no C# type"),
+        }
+        .into(),
+        Kind::Named(name) if name == "upt_log_fn" => "IntPtr".into(),
+        Kind::Named(name) if source.structs.iter().any(|item| item.name == *name) => name.clone(),
+        Kind::Pointer(target) => match target.as_ref() {
+            Kind::Named(name) if name == "c_char" => "byte*".into(),
+            Kind::Named(name) if name == "c_void" || source.opaque.contains(name) => {
+                "IntPtr".into()
+            }
+            target => format!("{}*", ty(source, target)?),
+        },
+        _ => bail!("{kind:?} has no C# type"),
+    })
+}
+
+/// `out`, `in`, `ref`, `params` are words of C#.
+fn escape(name: &str) -> String {
+    match name {
+        "out" | "in" | "ref" | "params" | "object" | "string" => format!("@{name}"),
+        _ => name.into(),
+    }
+}
+
+fn summary(out: &mut String, indent: usize, doc: &[String]) {
+    let paragraph = doc.join("\n");
+    let text = paragraph
+        .trim()
+        .replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;");
+    let pad = " ".repeat(indent);
+    let lines: Vec<&str> = text.lines().collect();
+    match lines.as_slice() {
+        [] => {}
+        [line] => {
+            let _ = writeln!(out, "{pad}/// <summary>{line}</summary>");
+        }
+        lines => {
+            let _ = writeln!(out, "{pad}/// <summary>");
+            for line in lines {
+                let _ = writeln!(out, "{}", format!("{pad}/// {line}").trim_end());
+            }
+            let _ = writeln!(out, "{pad}/// </summary>");
+        }
+    }
+}

@@ -1,0 +1,63 @@
+//! Writes the bindings of the C ABI from its one source, `src/ffi/`: the C header (cbindgen) and the C# class.
+//! Both are committed; the test `fresh` fails when they are stale.
+
+pub mod csharp;
+pub mod source;
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+
+/// One generated file.
+pub struct Output {
+    /// Below the repository's root.
+    pub path: &'static str,
+    /// What it has to hold.
+    pub text: String,
+}
+
+/// The repository's root.
+pub fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .ancestors()
+        .nth(2)
+        .expect("the crate lies two folders below the root")
+        .to_path_buf()
+}
+
+/// All generated files.
+pub fn outputs() -> Result<Vec<Output>> {
+    let root = root();
+    Ok(vec![
+        Output {
+            path: "include/upt.h",
+            text: header(&root)?,
+        },
+        Output {
+            path: "unity-plugin/Runtime/Interop/Native.g.cs",
+            text: csharp::write(&source::read(&root)?)?,
+        },
+    ])
+}
+
+/// `include/upt.h`.
+fn header(root: &Path) -> Result<String> {
+    let config =
+        cbindgen::Config::from_file(root.join("cbindgen.toml")).map_err(anyhow::Error::msg)?;
+    let mut builder = cbindgen::Builder::new().with_config(config);
+    for file in source::FILES {
+        builder = builder.with_src(root.join(source::FOLDER).join(file));
+    }
+    let mut bytes = Vec::new();
+    builder.generate().context("cbindgen")?.write(&mut bytes);
+    Ok(without_line_comments(&String::from_utf8(bytes)?))
+}
+
+/// C89 has no `//` comments; cbindgen writes them behind `extern "C"` braces and `#endif`.
+fn without_line_comments(header: &str) -> String {
+    let lines = header.lines().map(|line| match line.split_once(" // ") {
+        Some((code, _)) => format!("{}\n", code.trim_end()),
+        None => format!("{line}\n"),
+    });
+    lines.collect()
+}

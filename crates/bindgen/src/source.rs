@@ -1,0 +1,219 @@
+//! Reads `src/ffi/`: constants, structs and functions with their doc comments.
+
+use std::path::Path;
+
+use anyhow::{Context, Result, bail};
+use syn::{Attribute, Expr, FnArg, Item, Lit, Pat, ReturnType, Type};
+
+/// Where the C ABI is written.
+pub const FOLDER: &str = "src/ffi";
+
+/// The files with exported items, in the order of the header.
+pub const FILES: [&str; 10] = [
+    "status.rs",
+    "structs.rs",
+    "library.rs",
+    "model.rs",
+    "scene.rs",
+    "worker.rs",
+    "region.rs",
+    "points.rs",
+    "instrument.rs",
+    "state.rs",
+];
+
+/// A doc comment's lines.
+pub type Doc = Vec<String>;
+
+/// `pub const NAME: i32 = VALUE;`
+pub struct Constant {
+    pub doc: Doc,
+    pub name: String,
+    pub unsigned: bool,
+    pub value: String,
+}
+
+/// A type that can cross the boundary.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Kind {
+    /// A number: its Rust name.
+    Number(String),
+    /// `c_char`, `c_void` or a struct by name.
+    Named(String),
+    /// A pointer.
+    Pointer(Box<Kind>),
+    /// A fixed array.
+    Array(Box<Kind>, usize),
+}
+
+/// A field or a parameter.
+pub struct Named {
+    pub doc: Doc,
+    pub name: String,
+    pub kind: Kind,
+}
+
+/// A `repr(C)` struct.
+pub struct Struct {
+    pub doc: Doc,
+    pub name: String,
+    pub fields: Vec<Named>,
+}
+
+/// An exported function.
+pub struct Function {
+    pub doc: Doc,
+    pub name: String,
+    pub parameters: Vec<Named>,
+    pub result: Option<Kind>,
+}
+
+/// The whole ABI.
+#[derive(Default)]
+pub struct Source {
+    pub constants: Vec<Constant>,
+    pub opaque: Vec<String>,
+    pub structs: Vec<Struct>,
+    pub functions: Vec<Function>,
+}
+
+/// Parses the files of the ABI.
+pub fn read(root: &Path) -> Result<Source> {
+    let mut source = Source::default();
+    for name in FILES {
+        let path = root.join(FOLDER).join(name);
+        let text = std::fs::read_to_string(&path).with_context(|| path.display().to_string())?;
+        let file = syn::parse_file(&text).with_context(|| path.display().to_string())?;
+        for item in &file.items {
+            source
+                .add(item)
+                .with_context(|| path.display().to_string())?;
+        }
+    }
+    Ok(source)
+}
+
+impl Source {
+    fn add(&mut self, item: &Item) -> Result<()> {
+        match item {
+            Item::Const(item) if is_public(&item.vis) => {
+                let value = match item.expr.as_ref() {
+                    Expr::Lit(literal) => integer(&literal.lit)?,
+                    Expr::Unary(unary) => match unary.expr.as_ref() {
+                        Expr::Lit(literal) => format!("-{}", integer(&literal.lit)?),
+                        _ => bail!("{}: not an integer", item.ident),
+                    },
+                    _ => bail!("{}: not an integer", item.ident),
+                };
+                self.constants.push(Constant {
+                    doc: doc(&item.attrs),
+                    name: item.ident.to_string(),
+                    unsigned: kind(&item.ty)? == Kind::Number("u32".into()),
+                    value,
+                });
+            }
+            Item::Struct(item) if is_public(&item.vis) && has(&item.attrs, "repr") => {
+                let fields = item.fields.iter().map(|field| {
+                    Ok(Named {
+                        doc: doc(&field.attrs),
+                        name: field.ident.as_ref().context("tuple struct")?.to_string(),
+                        kind: kind(&field.ty)?,
+                    })
+                });
+                self.structs.push(Struct {
+                    doc: doc(&item.attrs),
+                    name: item.ident.to_string(),
+                    fields: fields.collect::<Result<_>>()?,
+                });
+            }
+            Item::Struct(item) if is_public(&item.vis) => self.opaque.push(item.ident.to_string()),
+            Item::Fn(item) if is_public(&item.vis) && item.sig.abi.is_some() => {
+                let parameters = item.sig.inputs.iter().map(|input| {
+                    let FnArg::Typed(input) = input else {
+                        bail!("self in {}", item.sig.ident)
+                    };
+                    let Pat::Ident(name) = input.pat.as_ref() else {
+                        bail!("pattern")
+                    };
+                    Ok(Named {
+                        doc: Doc::new(),
+                        name: name.ident.to_string(),
+                        kind: kind(&input.ty)?,
+                    })
+                });
+                self.functions.push(Function {
+                    doc: doc(&item.attrs),
+                    name: item.sig.ident.to_string(),
+                    parameters: parameters.collect::<Result<_>>()?,
+                    result: match &item.sig.output {
+                        ReturnType::Default => None,
+                        ReturnType::Type(_, result) => Some(kind(result)?),
+                    },
+                });
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+}
+
+fn is_public(visibility: &syn::Visibility) -> bool {
+    matches!(visibility, syn::Visibility::Public(_))
+}
+
+fn has(attributes: &[Attribute], name: &str) -> bool {
+    attributes
+        .iter()
+        .any(|attribute| attribute.path().is_ident(name))
+}
+
+fn integer(literal: &Lit) -> Result<String> {
+    match literal {
+        Lit::Int(value) => Ok(value.base10_digits().to_owned()),
+        _ => bail!("a constant that is not an integer"),
+    }
+}
+
+fn doc(attributes: &[Attribute]) -> Doc {
+    let lines = attributes
+        .iter()
+        .filter(|attribute| attribute.path().is_ident("doc"));
+    lines
+        .filter_map(
+            |attribute| match &attribute.meta.require_name_value().ok()?.value {
+                Expr::Lit(literal) => match &literal.lit {
+                    Lit::Str(text) => Some(text.value().trim().to_owned()),
+                    _ => None,
+                },
+                _ => None,
+            },
+        )
+        .collect()
+}
+
+fn kind(ty: &Type) -> Result<Kind> {
+    Ok(match ty {
+        Type::Ptr(pointer) => Kind::Pointer(Box::new(kind(&pointer.elem)?)),
+        Type::Array(array) => {
+            let Expr::Lit(length) = &array.len else {
+                bail!("array length")
+            };
+            Kind::Array(Box::new(kind(&array.elem)?), integer(&length.lit)?.parse()?)
+        }
+        Type::Path(path) => {
+            let name = path
+                .path
+                .segments
+                .last()
+                .context("empty path")?
+                .ident
+                .to_string();
+            match name.as_str() {
+                "u8" | "i32" | "u32" | "u64" | "f32" | "f64" => Kind::Number(name),
+                "upt_status" => Kind::Number("i32".into()),
+                _ => Kind::Named(name),
+            }
+        }
+        _ => bail!("a type that cannot cross the C ABI"),
+    })
+}

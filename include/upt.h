@@ -1,0 +1,1014 @@
+/* libupt: real-time soft tissue for game engines and simulators.
+ *
+ * Written by `cargo xtask header` from src/ffi/; conventions: docs/abi.md.
+ * SPDX-License-Identifier: Apache-2.0 OR MIT
+ */
+
+#ifndef UPT_H
+#define UPT_H
+
+#include <stdint.h>
+
+/**
+ * Success.
+ */
+#define UPT_OK 0
+
+/**
+ * The submitted step has not finished.
+ */
+#define UPT_PENDING 1
+
+/**
+ * A required pointer is NULL.
+ */
+#define UPT_ERR_NULL -1
+
+/**
+ * A size, index, enum or range is wrong.
+ */
+#define UPT_ERR_ARGUMENT -2
+
+/**
+ * `struct_size` is not one that this library knows.
+ */
+#define UPT_ERR_STRUCT_SIZE -3
+
+/**
+ * Not a live handle of this type.
+ */
+#define UPT_ERR_HANDLE -4
+
+/**
+ * The scene is in use by another thread or has a step in flight.
+ */
+#define UPT_ERR_BUSY -5
+
+/**
+ * An input holds NaN or Inf.
+ */
+#define UPT_ERR_NON_FINITE -6
+
+/**
+ * The call does not fit the state (for instance: wait without submit).
+ */
+#define UPT_ERR_STATE -7
+
+/**
+ * This build or this bundle cannot do it.
+ */
+#define UPT_ERR_UNSUPPORTED -8
+
+/**
+ * ONNX Runtime is missing, too old or broken; the message lists what was tried.
+ */
+#define UPT_ERR_RUNTIME -20
+
+/**
+ * No provider of the list can run the model.
+ */
+#define UPT_ERR_PROVIDER -21
+
+/**
+ * A file cannot be read.
+ */
+#define UPT_ERR_IO -30
+
+/**
+ * A bundle is invalid; the message names the file and the field.
+ */
+#define UPT_ERR_BUNDLE -31
+
+/**
+ * The version of a bundle or snapshot is not supported.
+ */
+#define UPT_ERR_VERSION -32
+
+/**
+ * A snapshot is damaged or of another model.
+ */
+#define UPT_ERR_SNAPSHOT -33
+
+/**
+ * The guard refused the new state; the last good state stays.
+ */
+#define UPT_ERR_GUARD -40
+
+/**
+ * A bug in the library; the scene involved can only be destroyed.
+ */
+#define UPT_ERR_PANIC -90
+
+/**
+ * ONNX Runtime's CPU provider and the native kernels.
+ */
+#define UPT_PROVIDER_CPU 0
+
+/**
+ * NVIDIA CUDA.
+ */
+#define UPT_PROVIDER_CUDA 1
+
+/**
+ * NVIDIA TensorRT.
+ */
+#define UPT_PROVIDER_TENSORRT 2
+
+/**
+ * NVIDIA TensorRT-RTX (a plugin provider).
+ */
+#define UPT_PROVIDER_TENSORRT_RTX 3
+
+/**
+ * A Universal Physics Transformer.
+ */
+#define UPT_KIND_UPT 0
+
+/**
+ * A linear-elastic response with a learned correction in a static basis.
+ */
+#define UPT_KIND_REDUCED 1
+
+/**
+ * No messages.
+ */
+#define UPT_LOG_OFF 0
+
+/**
+ * Failures.
+ */
+#define UPT_LOG_ERROR 1
+
+/**
+ * Fallbacks and envelope violations.
+ */
+#define UPT_LOG_WARN 2
+
+/**
+ * Loading: what was opened and who runs it.
+ */
+#define UPT_LOG_INFO 3
+
+/**
+ * Stage times.
+ */
+#define UPT_LOG_DEBUG 4
+
+/**
+ * Everything.
+ */
+#define UPT_LOG_TRACE 5
+
+/**
+ * 32-bit floats: the reference.
+ */
+#define UPT_PRECISION_F32 0
+
+/**
+ * bfloat16 products where the CPU has them.
+ */
+#define UPT_PRECISION_BF16 1
+
+/**
+ * 16-bit floats (GPU providers).
+ */
+#define UPT_PRECISION_F16 2
+
+/**
+ * 8-bit integers, where the bundle carries them.
+ */
+#define UPT_PRECISION_INT8 3
+
+/**
+ * The library chooses the decoder.
+ */
+#define UPT_KERNEL_AUTO 0
+
+/**
+ * The fused native decoder.
+ */
+#define UPT_KERNEL_NATIVE 1
+
+/**
+ * ONNX Runtime sessions in node tiles.
+ */
+#define UPT_KERNEL_ONNX 2
+
+/**
+ * Keep the last good state and return `UPT_ERR_GUARD`.
+ */
+#define UPT_GUARD_HOLD 0
+
+/**
+ * Publish finite states and set flags.
+ */
+#define UPT_GUARD_REPORT 1
+
+/**
+ * Replace a refused state by the prior's or by rest and set flags.
+ */
+#define UPT_GUARD_BLEND 2
+
+/**
+ * A push is longer than the model was trained on.
+ */
+#define UPT_FLAG_PUSH 1
+
+/**
+ * A contact area is outside the trained range.
+ */
+#define UPT_FLAG_CONTACT_AREA 2
+
+/**
+ * A contact lies outside the domain.
+ */
+#define UPT_FLAG_SITE 4
+
+/**
+ * A push changes faster than trained.
+ */
+#define UPT_FLAG_RATE 8
+
+/**
+ * More separate contact sites than trained.
+ */
+#define UPT_FLAG_SITES 16
+
+/**
+ * Guard: a displacement passes the bound.
+ */
+#define UPT_FLAG_BOUND 32
+
+/**
+ * Guard: the state is not finite.
+ */
+#define UPT_FLAG_NON_FINITE 64
+
+/**
+ * Guard: an element is inverted.
+ */
+#define UPT_FLAG_INVERTED 128
+
+/**
+ * Guard: the displacement grew too much in one step.
+ */
+#define UPT_FLAG_GROWTH 256
+
+/**
+ * The learned correction was bounded.
+ */
+#define UPT_FLAG_CLAMPED 512
+
+/**
+ * The contact block was nearly singular and was regularised.
+ */
+#define UPT_FLAG_REGULARISED 1024
+
+/**
+ * Nodes of the surface.
+ */
+#define UPT_SET_SURFACE_NODES 0
+
+/**
+ * Nodes that instruments may touch.
+ */
+#define UPT_SET_DOMAIN_NODES 1
+
+/**
+ * Nodes held at zero under the bundle's boundary condition.
+ */
+#define UPT_SET_FIXED_NODES 2
+
+/**
+ * Surface triangles, 3 node indices each, outward.
+ */
+#define UPT_SET_SURFACE_FACES 3
+
+/**
+ * Triangles that instruments may touch, 3 node indices each, outward.
+ */
+#define UPT_SET_DOMAIN_FACES 4
+
+/**
+ * Tetrahedra, 4 node indices each, positive volume.
+ */
+#define UPT_SET_TETS 5
+
+/**
+ * An instrument's shape: a capsule along local y.
+ */
+#define UPT_SHAPE_CAPSULE 0
+
+/**
+ * An instrument's shape: a box.
+ */
+#define UPT_SHAPE_BOX 1
+
+/**
+ * An instrument's shape: a box with rounded corners.
+ */
+#define UPT_SHAPE_SPATULA 2
+
+/**
+ * Version of the C ABI that `upt_abi_version` returns. Bindings compare it at load.
+ */
+#define UPT_ABI_VERSION 1
+
+/**
+ * A bundle made ready to step. Immutable; may be used from any thread at once.
+ */
+typedef struct upt_model upt_model;
+
+/**
+ * One deforming body. Used by one thread at a time; a call while another is running returns `UPT_ERR_BUSY`.
+ */
+typedef struct upt_scene upt_scene;
+
+/**
+ * What a call returns: 0 is success, positive values are not errors, negative values are errors.
+ */
+typedef int32_t upt_status;
+
+/**
+ * Options of `upt_init`.
+ */
+typedef struct upt_init_options {
+  /**
+   * `sizeof(upt_init_options)`.
+   */
+  uint32_t struct_size;
+  /**
+   * Default number of threads of a model; 0: 1.
+   */
+  uint32_t threads;
+  /**
+   * ONNX Runtime's shared library, a path; NULL: beside libupt, then `ORT_DYLIB_PATH`, then the system.
+   */
+  const char *onnxruntime_path;
+} upt_init_options;
+
+/**
+ * Receives log messages (UTF-8, valid during the call). Any thread may call it; it must not call the library.
+ */
+typedef void (*upt_log_fn)(int32_t level,
+                           const char *message,
+                           void *user);
+
+/**
+ * Options of `upt_model_open`.
+ */
+typedef struct upt_model_options {
+  /**
+   * `sizeof(upt_model_options)`.
+   */
+  uint32_t struct_size;
+  /**
+   * Threads that a step may use, the caller's included; 0: the default of `upt_init`.
+   */
+  uint32_t threads;
+  /**
+   * `UPT_PROVIDER_*` in order of preference; NULL: CPU.
+   */
+  const int32_t *providers;
+  /**
+   * Entries in `providers`.
+   */
+  uint64_t provider_count;
+  /**
+   * Device of GPU providers.
+   */
+  int32_t device_id;
+  /**
+   * `UPT_PRECISION_*`.
+   */
+  int32_t precision;
+  /**
+   * Bytes; 0: no limit.
+   */
+  uint64_t gpu_memory_limit;
+  /**
+   * Folder for compiled engines; NULL: none is kept.
+   */
+  const char *cache_dir;
+  /**
+   * 1: TF32 products allowed (CUDA; errors near 1e-3).
+   */
+  uint8_t allow_tf32;
+  /**
+   * 1: capture CUDA graphs.
+   */
+  uint8_t cuda_graph;
+  /**
+   * 1: fail with `UPT_ERR_PROVIDER` when the first provider cannot run the model.
+   */
+  uint8_t no_fallback;
+  /**
+   * Zero.
+   */
+  uint8_t reserved;
+} upt_model_options;
+
+/**
+ * What a model is; filled by `upt_model_get_info`.
+ */
+typedef struct upt_model_info {
+  /**
+   * `sizeof(upt_model_info)`, set by the caller.
+   */
+  uint32_t struct_size;
+  /**
+   * `UPT_KIND_*`.
+   */
+  int32_t kind;
+  /**
+   * K, the nodes of the bundle's mesh.
+   */
+  uint64_t node_count;
+  /**
+   * Tetrahedra.
+   */
+  uint64_t tet_count;
+  /**
+   * Boundary triangles.
+   */
+  uint64_t surface_face_count;
+  /**
+   * Nodes that instruments may touch.
+   */
+  uint64_t domain_node_count;
+  /**
+   * Nodes held at zero.
+   */
+  uint64_t held_node_count;
+  /**
+   * Supernodes (kind `UPT_KIND_UPT`), else 0.
+   */
+  uint64_t supernode_count;
+  /**
+   * Length of a step, seconds.
+   */
+  float dt;
+  /**
+   * Longest push that the model was trained on, mm.
+   */
+  float max_push_mm;
+  /**
+   * `UPT_PROVIDER_*` that runs the latent stage.
+   */
+  int32_t provider;
+  /**
+   * `UPT_PRECISION_*`.
+   */
+  int32_t precision;
+  /**
+   * Host memory of the model.
+   */
+  uint64_t memory_bytes;
+  /**
+   * Wall time of `upt_model_open`.
+   */
+  double load_seconds;
+} upt_model_info;
+
+/**
+ * Options of `upt_scene_create`.
+ */
+typedef struct upt_scene_options {
+  /**
+   * `sizeof(upt_scene_options)`.
+   */
+  uint32_t struct_size;
+  /**
+   * Threads of a step; 0: the model's.
+   */
+  uint32_t threads;
+  /**
+   * `UPT_KERNEL_*`: who decodes.
+   */
+  int32_t kernel;
+  /**
+   * `UPT_PRECISION_*` of the native decoder.
+   */
+  int32_t precision;
+  /**
+   * `UPT_GUARD_*`.
+   */
+  int32_t guard_policy;
+  /**
+   * A mesh of the host's own (`*.mesh.safetensors`); NULL: the bundle's.
+   */
+  const char *mesh_path;
+  /**
+   * 1: do not enforce held and contact nodes.
+   */
+  uint8_t free_boundary;
+  /**
+   * 1: never sleep.
+   */
+  uint8_t no_sleep;
+  /**
+   * 1: the guard looks for inverted elements in each step.
+   */
+  uint8_t check_inversion;
+  /**
+   * 1: a submit while a step is in flight replaces the waiting contact instead of `UPT_ERR_BUSY`.
+   */
+  uint8_t latest_wins;
+  /**
+   * 1: sample with a cubic through the last states instead of a line.
+   */
+  uint8_t cubic_sampling;
+  /**
+   * Zero.
+   */
+  uint8_t reserved[3];
+} upt_scene_options;
+
+/**
+ * A rigid instrument; the input of `upt_scene_contacts_from_instruments`.
+ */
+typedef struct upt_instrument {
+  /**
+   * `sizeof(upt_instrument)`, the same in every element of an array.
+   */
+  uint32_t struct_size;
+  /**
+   * `UPT_SHAPE_*`.
+   */
+  int32_t shape;
+  /**
+   * Centre, mm, in the mesh's frame.
+   */
+  float position[3];
+  /**
+   * Unit quaternion x, y, z, w.
+   */
+  float rotation[4];
+  /**
+   * Half sizes along the local axes, mm; a capsule's half length is `[1]` (local y).
+   */
+  float half_extents[3];
+  /**
+   * A capsule's radius or a spatula's corner radius, mm.
+   */
+  float radius;
+  /**
+   * 1: touched nodes move with the instrument until it leaves; 0: they slide.
+   */
+  uint8_t sticking;
+  /**
+   * Zero.
+   */
+  uint8_t reserved[3];
+} upt_instrument;
+
+/**
+ * What the last step did and cost; filled by `upt_scene_get_stats`.
+ */
+typedef struct upt_scene_stats {
+  /**
+   * `sizeof(upt_scene_stats)`, set by the caller.
+   */
+  uint32_t struct_size;
+  /**
+   * `UPT_FLAG_*` of the last step.
+   */
+  uint32_t flags;
+  /**
+   * Steps since creation or reset.
+   */
+  uint64_t step_count;
+  /**
+   * The whole step, ms; the stages follow.
+   */
+  double step_ms;
+  /**
+   * Input checks, ms.
+   */
+  double check_ms;
+  /**
+   * Contact solve and linear response, ms.
+   */
+  double prior_ms;
+  /**
+   * Encoder, ms.
+   */
+  double encode_ms;
+  /**
+   * Message mean, ms.
+   */
+  double aggregate_ms;
+  /**
+   * Latent network, ms.
+   */
+  double latent_ms;
+  /**
+   * Decoder, ms.
+   */
+  double decode_ms;
+  /**
+   * Guard and publishing, ms.
+   */
+  double guard_ms;
+  /**
+   * Nodes decoded in the last step.
+   */
+  uint64_t decoded_node_count;
+  /**
+   * Contact nodes of the last step.
+   */
+  uint64_t contact_count;
+  /**
+   * Host memory of the scene beside the model.
+   */
+  uint64_t memory_bytes;
+  /**
+   * Threads of a step.
+   */
+  uint32_t threads;
+  /**
+   * `UPT_KERNEL_*` that decodes.
+   */
+  int32_t kernel;
+  /**
+   * `UPT_PROVIDER_*` that runs the latent stage.
+   */
+  int32_t provider;
+  /**
+   * `UPT_PRECISION_*` of the decoder.
+   */
+  int32_t precision;
+  /**
+   * Largest displacement among the decoded nodes, mm.
+   */
+  float max_displacement_mm;
+  /**
+   * Calibrated trust indicator; 0: good.
+   */
+  float indicator;
+  /**
+   * 1: the scene sleeps.
+   */
+  uint8_t sleeping;
+  /**
+   * 1: a bug was caught in an earlier call; only destroy is left.
+   */
+  uint8_t poisoned;
+  /**
+   * Zero.
+   */
+  uint8_t reserved[6];
+} upt_scene_stats;
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/**
+ * Starts the library with options of the host's. Optional: the first model does it with the defaults.
+ *
+ * options: NULL means the defaults.
+ * Threads: any. Errors: `UPT_ERR_STATE` when the library was started with other options, `UPT_ERR_STRUCT_SIZE`,
+ * `UPT_ERR_ARGUMENT`.
+ */
+upt_status upt_init(const struct upt_init_options *options);
+
+/**
+ * Ends the library. Call it before the process exits when a GPU provider was used.
+ *
+ * Threads: any. Errors: `UPT_ERR_STATE` while models or scenes live.
+ */
+upt_status upt_shutdown(void);
+
+/**
+ * The library's version, for instance "0.1.0". Threads: any.
+ */
+const char *upt_version(void);
+
+/**
+ * `UPT_ABI_VERSION` of the library that runs; refuse to go on when it is not the header's. Threads: any.
+ */
+uint32_t upt_abi_version(void);
+
+/**
+ * The message of the last failed call of the calling thread (UTF-8), "" when there is none.
+ * It is valid until that thread's next call. Threads: any.
+ */
+const char *upt_last_error(void);
+
+/**
+ * The name of a status, for instance "UPT_ERR_BUSY"; "UPT_UNKNOWN" for other numbers. Threads: any.
+ */
+const char *upt_status_name(upt_status status);
+
+/**
+ * Sets the receiver of log messages; NULL ends it. When the call returns, the former receiver is no longer running.
+ *
+ * user: handed to the receiver. level: `UPT_LOG_*`; less severe messages are not made at all.
+ * Threads: any, but not from inside the receiver. Errors: `UPT_ERR_ARGUMENT` for an unknown level, `UPT_ERR_STATE`
+ * when the process is a Rust program that has a `tracing` subscriber of its own.
+ */
+upt_status upt_set_log(upt_log_fn callback,
+                       void *user,
+                       int32_t level);
+
+/**
+ * Lists the providers as JSON: `[{"name":"cpu","available":true,"reason":""}]`. Loads ONNX Runtime.
+ *
+ * out: text with its NUL; NULL with capacity 0 only asks. needed: bytes with the NUL, always written; may be NULL.
+ * Threads: any. Errors: `UPT_ERR_RUNTIME`, `UPT_ERR_ARGUMENT` when capacity is too small, `UPT_ERR_NULL`.
+ */
+upt_status upt_providers(char *out,
+                         uint64_t capacity,
+                         uint64_t *needed);
+
+/**
+ * Opens and checks a bundle (sizes, dtypes, SHA-256) and makes it ready to step.
+ *
+ * path: the bundle's folder, UTF-8. options: NULL means the defaults. out: the new model.
+ * Threads: any. Errors: `UPT_ERR_IO`, `UPT_ERR_BUNDLE`, `UPT_ERR_VERSION`, `UPT_ERR_RUNTIME`, `UPT_ERR_PROVIDER`,
+ * `UPT_ERR_UNSUPPORTED`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NULL`.
+ */
+upt_status upt_model_open(const char *path,
+                          const struct upt_model_options *options,
+                          struct upt_model **out);
+
+/**
+ * Closes a model. Scenes made of it keep what they need and live on.
+ *
+ * Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also when it was closed before).
+ */
+upt_status upt_model_close(struct upt_model *model);
+
+/**
+ * Says what a model is. Set `out->struct_size` first.
+ *
+ * Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`.
+ */
+upt_status upt_model_get_info(const struct upt_model *model,
+                              struct upt_model_info *out);
+
+/**
+ * Describes a model as JSON: name, bundle hash, the provider of each stage and why others were not taken.
+ *
+ * out: text with its NUL; NULL with capacity 0 only asks. needed: bytes with the NUL, always written; may be NULL.
+ * Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` when capacity is too small.
+ */
+upt_status upt_model_describe(const struct upt_model *model,
+                              char *out,
+                              uint64_t capacity,
+                              uint64_t *needed);
+
+/**
+ * Copies the rest positions.
+ *
+ * out: `[K,3]` floats, mm. count: floats in out, 3 K.
+ * Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` when count is not 3 K.
+ */
+upt_status upt_model_positions(const struct upt_model *model,
+                               float *out,
+                               uint64_t count);
+
+/**
+ * Copies a static index set.
+ *
+ * set: `UPT_SET_*`. out: node indices; NULL with capacity 0 only asks. capacity: indices that fit in out.
+ * needed: indices in the set (3 a face, 4 a tetrahedron), always written; may be NULL.
+ * Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` (unknown set, capacity too small).
+ */
+upt_status upt_model_indices(const struct upt_model *model,
+                             int32_t set,
+                             uint32_t *out,
+                             uint64_t capacity,
+                             uint64_t *needed);
+
+/**
+ * Makes a scene at rest.
+ *
+ * options: NULL means the defaults. out: the new scene. The scene keeps what it needs of the model.
+ * Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`,
+ * `UPT_ERR_UNSUPPORTED`, `UPT_ERR_IO`, `UPT_ERR_BUNDLE`.
+ */
+upt_status upt_scene_create(const struct upt_model *model,
+                            const struct upt_scene_options *options,
+                            struct upt_scene **out);
+
+/**
+ * Ends a scene; a step in flight is waited for. The only call that a poisoned scene takes beside `upt_scene_get_stats`.
+ *
+ * Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also when it was destroyed before), `UPT_ERR_BUSY` while
+ * another thread is in a call on it.
+ */
+upt_status upt_scene_destroy(struct upt_scene *scene);
+
+/**
+ * Back to rest. The region and attached points stay.
+ *
+ * Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_PANIC`.
+ */
+upt_status upt_scene_reset(struct upt_scene *scene);
+
+/**
+ * One step: u(t), c(t) -> u(t + dt).
+ *
+ * displacement: `[K,3]`, mm; NULL takes the scene's own state. collision: `[K,3]`, mm, zero but at nodes in contact,
+ * where it is the displacement that the instrument imposes at the end of the step; NULL means no contact.
+ * out: `[n,3]`, mm (n: K, or the region's count), may be NULL; it may be the same memory as an input, at the price of
+ * a copy. out_count: floats in out, 3 n; 0 when out is NULL.
+ * Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`,
+ * `UPT_ERR_NON_FINITE`, `UPT_ERR_UNSUPPORTED`, `UPT_ERR_GUARD`, `UPT_ERR_RUNTIME`, `UPT_ERR_PANIC`; the state stays.
+ */
+upt_status upt_scene_step(struct upt_scene *scene,
+                          const float *displacement,
+                          const float *collision,
+                          float *out,
+                          uint64_t out_count);
+
+/**
+ * One step from the scene's own state with the nodes in contact listed.
+ *
+ * contact_nodes: `[m]` node indices, each at most once, in any order. contact_vectors: `[m,3]`, mm: the displacement of
+ * these nodes at the end of the step. contact_count: m; 0 means no contact and both may be NULL.
+ * out, out_count, threads and errors: as `upt_scene_step`; also `UPT_ERR_ARGUMENT` for an index of K or more.
+ */
+upt_status upt_scene_step_contacts(struct upt_scene *scene,
+                                   const uint32_t *contact_nodes,
+                                   const float *contact_vectors,
+                                   uint64_t contact_count,
+                                   float *out,
+                                   uint64_t out_count);
+
+/**
+ * Copies the last published state.
+ *
+ * out: `[n,3]`, mm, in the region's order (all nodes when there is none). out_count: floats in out, 3 n.
+ * Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`, `UPT_ERR_PANIC`.
+ */
+upt_status upt_scene_read(struct upt_scene *scene,
+                          float *out,
+                          uint64_t out_count);
+
+/**
+ * Starts a step on the scene's worker and returns at once.
+ *
+ * contact_nodes, contact_vectors, contact_count: as `upt_scene_step_contacts`; copied before the call returns.
+ * Threads: one at a time. Errors: `UPT_ERR_BUSY` while a step is in flight (unless the scene was made with
+ * `latest_wins`), `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NON_FINITE`, `UPT_ERR_PANIC`.
+ */
+upt_status upt_scene_submit(struct upt_scene *scene,
+                            const uint32_t *contact_nodes,
+                            const float *contact_vectors,
+                            uint64_t contact_count);
+
+/**
+ * Asks whether the submitted step has finished; never waits.
+ *
+ * Returns `UPT_OK`, `UPT_PENDING`, or the step's error (once).
+ * Threads: one at a time. Errors: the step's; `UPT_ERR_STATE` when nothing was submitted, `UPT_ERR_NULL`,
+ * `UPT_ERR_HANDLE`.
+ */
+upt_status upt_scene_poll(struct upt_scene *scene);
+
+/**
+ * Waits for the submitted step, at most `timeout_ms` milliseconds.
+ *
+ * Returns `UPT_OK`, `UPT_PENDING` when the time is over, or the step's error (once).
+ * Threads: one at a time. Errors: as `upt_scene_poll`.
+ */
+upt_status upt_scene_wait(struct upt_scene *scene,
+                          uint32_t timeout_ms);
+
+/**
+ * Interpolates between the last two states, for frames between steps. Works while a step is in flight.
+ *
+ * alpha: 0 the state before, 1 the last state; from 0 to 1. out: `[n,3]`, mm, in the region's order.
+ * out_count: floats in out, 3 n.
+ * Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`,
+ * `UPT_ERR_NON_FINITE`, `UPT_ERR_PANIC`.
+ */
+upt_status upt_scene_sample(struct upt_scene *scene,
+                            double alpha,
+                            float *out,
+                            uint64_t out_count);
+
+/**
+ * Restricts what a step decodes and what `upt_scene_step`, `_read` and `_sample` write to these nodes, in this order.
+ *
+ * nodes: `[n]` indices, in any order; NULL with count 0: all nodes. A step costs less with fewer nodes.
+ * Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT` for an index of K
+ * or more, `UPT_ERR_PANIC`.
+ */
+upt_status upt_scene_set_region(struct upt_scene *scene,
+                                const uint32_t *nodes,
+                                uint64_t count);
+
+/**
+ * Decodes any nodes of the last state, whatever the region is.
+ *
+ * nodes: `[n]` indices. out: `[n,3]`, mm. out_count: floats in out, 3 n.
+ * Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`, `UPT_ERR_PANIC`.
+ */
+upt_status upt_scene_decode(struct upt_scene *scene,
+                            const uint32_t *nodes,
+                            uint64_t count,
+                            float *out,
+                            uint64_t out_count);
+
+/**
+ * Attaches points to the tissue; they replace those attached before.
+ *
+ * points: `[n,3]`, rest positions, mm; NULL with count 0 detaches. count: points, n.
+ * Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_NON_FINITE`,
+ * `UPT_ERR_ARGUMENT`, `UPT_ERR_UNSUPPORTED`, `UPT_ERR_PANIC`.
+ */
+upt_status upt_scene_attach_points(struct upt_scene *scene,
+                                   const float *points,
+                                   uint64_t count);
+
+/**
+ * Copies the displacement of the attached points in the last state.
+ *
+ * out: `[n,3]`, mm. out_count: floats in out, 3 n.
+ * Threads: one at a time. Errors: `UPT_ERR_STATE` when no points are attached, `UPT_ERR_NULL`, `UPT_ERR_HANDLE`,
+ * `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`, `UPT_ERR_PANIC`.
+ */
+upt_status upt_scene_read_points(struct upt_scene *scene,
+                                 float *out,
+                                 uint64_t out_count);
+
+/**
+ * As `upt_scene_sample`, at the attached points.
+ *
+ * alpha: 0 the state before, 1 the last state. out: `[n,3]`, mm. out_count: floats in out, 3 n.
+ * Threads: one at a time. Errors: as `upt_scene_read_points`, and `UPT_ERR_NON_FINITE`.
+ */
+upt_status upt_scene_sample_points(struct upt_scene *scene,
+                                   double alpha,
+                                   float *out,
+                                   uint64_t out_count);
+
+/**
+ * Finds the nodes that rigid instruments touch and the displacement that they impose: the input of a step.
+ *
+ * instruments: array; every element has its `struct_size` set. contact_nodes: `[capacity]`, contact_vectors:
+ * `[capacity,3]`, mm; both may be NULL with capacity 0, which only asks. contact_count: contacts found, always written.
+ * Threads: one at a time. Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "contact", `UPT_ERR_NULL`,
+ * `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_NON_FINITE`, `UPT_ERR_ARGUMENT` (also when capacity
+ * is too small), `UPT_ERR_PANIC`.
+ */
+upt_status upt_scene_contacts_from_instruments(struct upt_scene *scene,
+                                               const struct upt_instrument *instruments,
+                                               uint64_t instrument_count,
+                                               uint32_t *contact_nodes,
+                                               float *contact_vectors,
+                                               uint64_t capacity,
+                                               uint64_t *contact_count);
+
+/**
+ * Copies the reaction of the tissue at the last step's contact nodes, in their order.
+ *
+ * out: `[m,3]`, mN, the force on the instrument. out_count: floats in out, 3 m.
+ * Threads: one at a time. Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "forces", `UPT_ERR_NULL`,
+ * `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_STATE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_PANIC`.
+ */
+upt_status upt_scene_contact_force(struct upt_scene *scene,
+                                   float *out,
+                                   uint64_t out_count);
+
+/**
+ * Says what the last step did and cost. Set `out->struct_size` first. Works while a step is in flight and on a
+ * poisoned scene.
+ *
+ * Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`.
+ */
+upt_status upt_scene_get_stats(const struct upt_scene *scene,
+                               struct upt_scene_stats *out);
+
+/**
+ * Saves the state, to resume to the bit.
+ *
+ * out: bytes; NULL with capacity 0 only asks. capacity: bytes that fit in out.
+ * needed: bytes of the snapshot, always written; may be NULL.
+ * Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT` when capacity is
+ * too small, `UPT_ERR_PANIC`.
+ */
+upt_status upt_scene_save(struct upt_scene *scene,
+                          uint8_t *out,
+                          uint64_t capacity,
+                          uint64_t *needed);
+
+/**
+ * Restores a snapshot of the same model.
+ *
+ * Threads: one at a time. Errors: `UPT_ERR_SNAPSHOT`, `UPT_ERR_VERSION`, `UPT_ERR_NULL`, `UPT_ERR_HANDLE`,
+ * `UPT_ERR_BUSY`, `UPT_ERR_PANIC`; the state stays.
+ */
+upt_status upt_scene_restore(struct upt_scene *scene,
+                             const uint8_t *bytes,
+                             uint64_t count);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif  /* UPT_H */

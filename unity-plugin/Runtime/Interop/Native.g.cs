@@ -1,0 +1,624 @@
+// Written by `cargo xtask header` from src/ffi/; conventions: docs/abi.md.
+// SPDX-License-Identifier: Apache-2.0 OR MIT
+using System;
+using System.Runtime.InteropServices;
+
+namespace Upt.Interop
+{
+    /// <summary>Options of `upt_init`.</summary>
+    [StructLayout(LayoutKind.Sequential)]
+    public unsafe struct upt_init_options
+    {
+        /// <summary>`sizeof(upt_init_options)`.</summary>
+        public uint struct_size;
+        /// <summary>Default number of threads of a model; 0: 1.</summary>
+        public uint threads;
+        /// <summary>ONNX Runtime's shared library, a path; NULL: beside libupt, then `ORT_DYLIB_PATH`, then the system.</summary>
+        public byte* onnxruntime_path;
+    }
+
+    /// <summary>Options of `upt_model_open`.</summary>
+    [StructLayout(LayoutKind.Sequential)]
+    public unsafe struct upt_model_options
+    {
+        /// <summary>`sizeof(upt_model_options)`.</summary>
+        public uint struct_size;
+        /// <summary>Threads that a step may use, the caller's included; 0: the default of `upt_init`.</summary>
+        public uint threads;
+        /// <summary>`UPT_PROVIDER_*` in order of preference; NULL: CPU.</summary>
+        public int* providers;
+        /// <summary>Entries in `providers`.</summary>
+        public ulong provider_count;
+        /// <summary>Device of GPU providers.</summary>
+        public int device_id;
+        /// <summary>`UPT_PRECISION_*`.</summary>
+        public int precision;
+        /// <summary>Bytes; 0: no limit.</summary>
+        public ulong gpu_memory_limit;
+        /// <summary>Folder for compiled engines; NULL: none is kept.</summary>
+        public byte* cache_dir;
+        /// <summary>1: TF32 products allowed (CUDA; errors near 1e-3).</summary>
+        public byte allow_tf32;
+        /// <summary>1: capture CUDA graphs.</summary>
+        public byte cuda_graph;
+        /// <summary>1: fail with `UPT_ERR_PROVIDER` when the first provider cannot run the model.</summary>
+        public byte no_fallback;
+        /// <summary>Zero.</summary>
+        public byte reserved;
+    }
+
+    /// <summary>What a model is; filled by `upt_model_get_info`.</summary>
+    [StructLayout(LayoutKind.Sequential)]
+    public unsafe struct upt_model_info
+    {
+        /// <summary>`sizeof(upt_model_info)`, set by the caller.</summary>
+        public uint struct_size;
+        /// <summary>`UPT_KIND_*`.</summary>
+        public int kind;
+        /// <summary>K, the nodes of the bundle's mesh.</summary>
+        public ulong node_count;
+        /// <summary>Tetrahedra.</summary>
+        public ulong tet_count;
+        /// <summary>Boundary triangles.</summary>
+        public ulong surface_face_count;
+        /// <summary>Nodes that instruments may touch.</summary>
+        public ulong domain_node_count;
+        /// <summary>Nodes held at zero.</summary>
+        public ulong held_node_count;
+        /// <summary>Supernodes (kind `UPT_KIND_UPT`), else 0.</summary>
+        public ulong supernode_count;
+        /// <summary>Length of a step, seconds.</summary>
+        public float dt;
+        /// <summary>Longest push that the model was trained on, mm.</summary>
+        public float max_push_mm;
+        /// <summary>`UPT_PROVIDER_*` that runs the latent stage.</summary>
+        public int provider;
+        /// <summary>`UPT_PRECISION_*`.</summary>
+        public int precision;
+        /// <summary>Host memory of the model.</summary>
+        public ulong memory_bytes;
+        /// <summary>Wall time of `upt_model_open`.</summary>
+        public double load_seconds;
+    }
+
+    /// <summary>Options of `upt_scene_create`.</summary>
+    [StructLayout(LayoutKind.Sequential)]
+    public unsafe struct upt_scene_options
+    {
+        /// <summary>`sizeof(upt_scene_options)`.</summary>
+        public uint struct_size;
+        /// <summary>Threads of a step; 0: the model's.</summary>
+        public uint threads;
+        /// <summary>`UPT_KERNEL_*`: who decodes.</summary>
+        public int kernel;
+        /// <summary>`UPT_PRECISION_*` of the native decoder.</summary>
+        public int precision;
+        /// <summary>`UPT_GUARD_*`.</summary>
+        public int guard_policy;
+        /// <summary>A mesh of the host's own (`*.mesh.safetensors`); NULL: the bundle's.</summary>
+        public byte* mesh_path;
+        /// <summary>1: do not enforce held and contact nodes.</summary>
+        public byte free_boundary;
+        /// <summary>1: never sleep.</summary>
+        public byte no_sleep;
+        /// <summary>1: the guard looks for inverted elements in each step.</summary>
+        public byte check_inversion;
+        /// <summary>1: a submit while a step is in flight replaces the waiting contact instead of `UPT_ERR_BUSY`.</summary>
+        public byte latest_wins;
+        /// <summary>1: sample with a cubic through the last states instead of a line.</summary>
+        public byte cubic_sampling;
+        /// <summary>Zero.</summary>
+        public fixed byte reserved[3];
+    }
+
+    /// <summary>A rigid instrument; the input of `upt_scene_contacts_from_instruments`.</summary>
+    [StructLayout(LayoutKind.Sequential)]
+    public unsafe struct upt_instrument
+    {
+        /// <summary>`sizeof(upt_instrument)`, the same in every element of an array.</summary>
+        public uint struct_size;
+        /// <summary>`UPT_SHAPE_*`.</summary>
+        public int shape;
+        /// <summary>Centre, mm, in the mesh's frame.</summary>
+        public fixed float position[3];
+        /// <summary>Unit quaternion x, y, z, w.</summary>
+        public fixed float rotation[4];
+        /// <summary>Half sizes along the local axes, mm; a capsule's half length is `[1]` (local y).</summary>
+        public fixed float half_extents[3];
+        /// <summary>A capsule's radius or a spatula's corner radius, mm.</summary>
+        public float radius;
+        /// <summary>1: touched nodes move with the instrument until it leaves; 0: they slide.</summary>
+        public byte sticking;
+        /// <summary>Zero.</summary>
+        public fixed byte reserved[3];
+    }
+
+    /// <summary>What the last step did and cost; filled by `upt_scene_get_stats`.</summary>
+    [StructLayout(LayoutKind.Sequential)]
+    public unsafe struct upt_scene_stats
+    {
+        /// <summary>`sizeof(upt_scene_stats)`, set by the caller.</summary>
+        public uint struct_size;
+        /// <summary>`UPT_FLAG_*` of the last step.</summary>
+        public uint flags;
+        /// <summary>Steps since creation or reset.</summary>
+        public ulong step_count;
+        /// <summary>The whole step, ms; the stages follow.</summary>
+        public double step_ms;
+        /// <summary>Input checks, ms.</summary>
+        public double check_ms;
+        /// <summary>Contact solve and linear response, ms.</summary>
+        public double prior_ms;
+        /// <summary>Encoder, ms.</summary>
+        public double encode_ms;
+        /// <summary>Message mean, ms.</summary>
+        public double aggregate_ms;
+        /// <summary>Latent network, ms.</summary>
+        public double latent_ms;
+        /// <summary>Decoder, ms.</summary>
+        public double decode_ms;
+        /// <summary>Guard and publishing, ms.</summary>
+        public double guard_ms;
+        /// <summary>Nodes decoded in the last step.</summary>
+        public ulong decoded_node_count;
+        /// <summary>Contact nodes of the last step.</summary>
+        public ulong contact_count;
+        /// <summary>Host memory of the scene beside the model.</summary>
+        public ulong memory_bytes;
+        /// <summary>Threads of a step.</summary>
+        public uint threads;
+        /// <summary>`UPT_KERNEL_*` that decodes.</summary>
+        public int kernel;
+        /// <summary>`UPT_PROVIDER_*` that runs the latent stage.</summary>
+        public int provider;
+        /// <summary>`UPT_PRECISION_*` of the decoder.</summary>
+        public int precision;
+        /// <summary>Largest displacement among the decoded nodes, mm.</summary>
+        public float max_displacement_mm;
+        /// <summary>Calibrated trust indicator; 0: good.</summary>
+        public float indicator;
+        /// <summary>1: the scene sleeps.</summary>
+        public byte sleeping;
+        /// <summary>1: a bug was caught in an earlier call; only destroy is left.</summary>
+        public byte poisoned;
+        /// <summary>Zero.</summary>
+        public fixed byte reserved[6];
+    }
+
+    /// <summary>The C ABI, as it is.</summary>
+    public static unsafe class Native
+    {
+        const string Library = "upt";
+
+        /// <summary>Success.</summary>
+        public const int UPT_OK = 0;
+        /// <summary>The submitted step has not finished.</summary>
+        public const int UPT_PENDING = 1;
+        /// <summary>A required pointer is NULL.</summary>
+        public const int UPT_ERR_NULL = -1;
+        /// <summary>A size, index, enum or range is wrong.</summary>
+        public const int UPT_ERR_ARGUMENT = -2;
+        /// <summary>`struct_size` is not one that this library knows.</summary>
+        public const int UPT_ERR_STRUCT_SIZE = -3;
+        /// <summary>Not a live handle of this type.</summary>
+        public const int UPT_ERR_HANDLE = -4;
+        /// <summary>The scene is in use by another thread or has a step in flight.</summary>
+        public const int UPT_ERR_BUSY = -5;
+        /// <summary>An input holds NaN or Inf.</summary>
+        public const int UPT_ERR_NON_FINITE = -6;
+        /// <summary>The call does not fit the state (for instance: wait without submit).</summary>
+        public const int UPT_ERR_STATE = -7;
+        /// <summary>This build or this bundle cannot do it.</summary>
+        public const int UPT_ERR_UNSUPPORTED = -8;
+        /// <summary>ONNX Runtime is missing, too old or broken; the message lists what was tried.</summary>
+        public const int UPT_ERR_RUNTIME = -20;
+        /// <summary>No provider of the list can run the model.</summary>
+        public const int UPT_ERR_PROVIDER = -21;
+        /// <summary>A file cannot be read.</summary>
+        public const int UPT_ERR_IO = -30;
+        /// <summary>A bundle is invalid; the message names the file and the field.</summary>
+        public const int UPT_ERR_BUNDLE = -31;
+        /// <summary>The version of a bundle or snapshot is not supported.</summary>
+        public const int UPT_ERR_VERSION = -32;
+        /// <summary>A snapshot is damaged or of another model.</summary>
+        public const int UPT_ERR_SNAPSHOT = -33;
+        /// <summary>The guard refused the new state; the last good state stays.</summary>
+        public const int UPT_ERR_GUARD = -40;
+        /// <summary>A bug in the library; the scene involved can only be destroyed.</summary>
+        public const int UPT_ERR_PANIC = -90;
+        /// <summary>ONNX Runtime's CPU provider and the native kernels.</summary>
+        public const int UPT_PROVIDER_CPU = 0;
+        /// <summary>NVIDIA CUDA.</summary>
+        public const int UPT_PROVIDER_CUDA = 1;
+        /// <summary>NVIDIA TensorRT.</summary>
+        public const int UPT_PROVIDER_TENSORRT = 2;
+        /// <summary>NVIDIA TensorRT-RTX (a plugin provider).</summary>
+        public const int UPT_PROVIDER_TENSORRT_RTX = 3;
+        /// <summary>A Universal Physics Transformer.</summary>
+        public const int UPT_KIND_UPT = 0;
+        /// <summary>A linear-elastic response with a learned correction in a static basis.</summary>
+        public const int UPT_KIND_REDUCED = 1;
+        /// <summary>No messages.</summary>
+        public const int UPT_LOG_OFF = 0;
+        /// <summary>Failures.</summary>
+        public const int UPT_LOG_ERROR = 1;
+        /// <summary>Fallbacks and envelope violations.</summary>
+        public const int UPT_LOG_WARN = 2;
+        /// <summary>Loading: what was opened and who runs it.</summary>
+        public const int UPT_LOG_INFO = 3;
+        /// <summary>Stage times.</summary>
+        public const int UPT_LOG_DEBUG = 4;
+        /// <summary>Everything.</summary>
+        public const int UPT_LOG_TRACE = 5;
+        /// <summary>32-bit floats: the reference.</summary>
+        public const int UPT_PRECISION_F32 = 0;
+        /// <summary>bfloat16 products where the CPU has them.</summary>
+        public const int UPT_PRECISION_BF16 = 1;
+        /// <summary>16-bit floats (GPU providers).</summary>
+        public const int UPT_PRECISION_F16 = 2;
+        /// <summary>8-bit integers, where the bundle carries them.</summary>
+        public const int UPT_PRECISION_INT8 = 3;
+        /// <summary>The library chooses the decoder.</summary>
+        public const int UPT_KERNEL_AUTO = 0;
+        /// <summary>The fused native decoder.</summary>
+        public const int UPT_KERNEL_NATIVE = 1;
+        /// <summary>ONNX Runtime sessions in node tiles.</summary>
+        public const int UPT_KERNEL_ONNX = 2;
+        /// <summary>Keep the last good state and return `UPT_ERR_GUARD`.</summary>
+        public const int UPT_GUARD_HOLD = 0;
+        /// <summary>Publish finite states and set flags.</summary>
+        public const int UPT_GUARD_REPORT = 1;
+        /// <summary>Replace a refused state by the prior's or by rest and set flags.</summary>
+        public const int UPT_GUARD_BLEND = 2;
+        /// <summary>A push is longer than the model was trained on.</summary>
+        public const uint UPT_FLAG_PUSH = 1;
+        /// <summary>A contact area is outside the trained range.</summary>
+        public const uint UPT_FLAG_CONTACT_AREA = 2;
+        /// <summary>A contact lies outside the domain.</summary>
+        public const uint UPT_FLAG_SITE = 4;
+        /// <summary>A push changes faster than trained.</summary>
+        public const uint UPT_FLAG_RATE = 8;
+        /// <summary>More separate contact sites than trained.</summary>
+        public const uint UPT_FLAG_SITES = 16;
+        /// <summary>Guard: a displacement passes the bound.</summary>
+        public const uint UPT_FLAG_BOUND = 32;
+        /// <summary>Guard: the state is not finite.</summary>
+        public const uint UPT_FLAG_NON_FINITE = 64;
+        /// <summary>Guard: an element is inverted.</summary>
+        public const uint UPT_FLAG_INVERTED = 128;
+        /// <summary>Guard: the displacement grew too much in one step.</summary>
+        public const uint UPT_FLAG_GROWTH = 256;
+        /// <summary>The learned correction was bounded.</summary>
+        public const uint UPT_FLAG_CLAMPED = 512;
+        /// <summary>The contact block was nearly singular and was regularised.</summary>
+        public const uint UPT_FLAG_REGULARISED = 1024;
+        /// <summary>Nodes of the surface.</summary>
+        public const int UPT_SET_SURFACE_NODES = 0;
+        /// <summary>Nodes that instruments may touch.</summary>
+        public const int UPT_SET_DOMAIN_NODES = 1;
+        /// <summary>Nodes held at zero under the bundle's boundary condition.</summary>
+        public const int UPT_SET_FIXED_NODES = 2;
+        /// <summary>Surface triangles, 3 node indices each, outward.</summary>
+        public const int UPT_SET_SURFACE_FACES = 3;
+        /// <summary>Triangles that instruments may touch, 3 node indices each, outward.</summary>
+        public const int UPT_SET_DOMAIN_FACES = 4;
+        /// <summary>Tetrahedra, 4 node indices each, positive volume.</summary>
+        public const int UPT_SET_TETS = 5;
+        /// <summary>An instrument's shape: a capsule along local y.</summary>
+        public const int UPT_SHAPE_CAPSULE = 0;
+        /// <summary>An instrument's shape: a box.</summary>
+        public const int UPT_SHAPE_BOX = 1;
+        /// <summary>An instrument's shape: a box with rounded corners.</summary>
+        public const int UPT_SHAPE_SPATULA = 2;
+        /// <summary>Version of the C ABI that `upt_abi_version` returns. Bindings compare it at load.</summary>
+        public const uint UPT_ABI_VERSION = 1;
+
+        /// <summary>
+        /// Starts the library with options of the host's. Optional: the first model does it with the defaults.
+        ///
+        /// options: NULL means the defaults.
+        /// Threads: any. Errors: `UPT_ERR_STATE` when the library was started with other options, `UPT_ERR_STRUCT_SIZE`,
+        /// `UPT_ERR_ARGUMENT`.
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_init(upt_init_options* options);
+
+        /// <summary>
+        /// Ends the library. Call it before the process exits when a GPU provider was used.
+        ///
+        /// Threads: any. Errors: `UPT_ERR_STATE` while models or scenes live.
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_shutdown();
+
+        /// <summary>The library's version, for instance "0.1.0". Threads: any.</summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern byte* upt_version();
+
+        /// <summary>`UPT_ABI_VERSION` of the library that runs; refuse to go on when it is not the header's. Threads: any.</summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern uint upt_abi_version();
+
+        /// <summary>
+        /// The message of the last failed call of the calling thread (UTF-8), "" when there is none.
+        /// It is valid until that thread's next call. Threads: any.
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern byte* upt_last_error();
+
+        /// <summary>The name of a status, for instance "UPT_ERR_BUSY"; "UPT_UNKNOWN" for other numbers. Threads: any.</summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern byte* upt_status_name(int status);
+
+        /// <summary>
+        /// Sets the receiver of log messages; NULL ends it. When the call returns, the former receiver is no longer running.
+        ///
+        /// user: handed to the receiver. level: `UPT_LOG_*`; less severe messages are not made at all.
+        /// Threads: any, but not from inside the receiver. Errors: `UPT_ERR_ARGUMENT` for an unknown level, `UPT_ERR_STATE`
+        /// when the process is a Rust program that has a `tracing` subscriber of its own.
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_set_log(IntPtr callback, IntPtr user, int level);
+
+        /// <summary>
+        /// Lists the providers as JSON: `[{"name":"cpu","available":true,"reason":""}]`. Loads ONNX Runtime.
+        ///
+        /// out: text with its NUL; NULL with capacity 0 only asks. needed: bytes with the NUL, always written; may be NULL.
+        /// Threads: any. Errors: `UPT_ERR_RUNTIME`, `UPT_ERR_ARGUMENT` when capacity is too small, `UPT_ERR_NULL`.
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_providers(byte* @out, ulong capacity, ulong* needed);
+
+        /// <summary>
+        /// Opens and checks a bundle (sizes, dtypes, SHA-256) and makes it ready to step.
+        ///
+        /// path: the bundle's folder, UTF-8. options: NULL means the defaults. out: the new model.
+        /// Threads: any. Errors: `UPT_ERR_IO`, `UPT_ERR_BUNDLE`, `UPT_ERR_VERSION`, `UPT_ERR_RUNTIME`, `UPT_ERR_PROVIDER`,
+        /// `UPT_ERR_UNSUPPORTED`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NULL`.
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_model_open(byte* path, upt_model_options* options, IntPtr* @out);
+
+        /// <summary>
+        /// Closes a model. Scenes made of it keep what they need and live on.
+        ///
+        /// Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also when it was closed before).
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_model_close(IntPtr model);
+
+        /// <summary>
+        /// Says what a model is. Set `out-&gt;struct_size` first.
+        ///
+        /// Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`.
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_model_get_info(IntPtr model, upt_model_info* @out);
+
+        /// <summary>
+        /// Describes a model as JSON: name, bundle hash, the provider of each stage and why others were not taken.
+        ///
+        /// out: text with its NUL; NULL with capacity 0 only asks. needed: bytes with the NUL, always written; may be NULL.
+        /// Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` when capacity is too small.
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_model_describe(IntPtr model, byte* @out, ulong capacity, ulong* needed);
+
+        /// <summary>
+        /// Copies the rest positions.
+        ///
+        /// out: `[K,3]` floats, mm. count: floats in out, 3 K.
+        /// Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` when count is not 3 K.
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_model_positions(IntPtr model, float* @out, ulong count);
+
+        /// <summary>
+        /// Copies a static index set.
+        ///
+        /// set: `UPT_SET_*`. out: node indices; NULL with capacity 0 only asks. capacity: indices that fit in out.
+        /// needed: indices in the set (3 a face, 4 a tetrahedron), always written; may be NULL.
+        /// Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` (unknown set, capacity too small).
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_model_indices(IntPtr model, int set, uint* @out, ulong capacity, ulong* needed);
+
+        /// <summary>
+        /// Makes a scene at rest.
+        ///
+        /// options: NULL means the defaults. out: the new scene. The scene keeps what it needs of the model.
+        /// Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`,
+        /// `UPT_ERR_UNSUPPORTED`, `UPT_ERR_IO`, `UPT_ERR_BUNDLE`.
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_scene_create(IntPtr model, upt_scene_options* options, IntPtr* @out);
+
+        /// <summary>
+        /// Ends a scene; a step in flight is waited for. The only call that a poisoned scene takes beside `upt_scene_get_stats`.
+        ///
+        /// Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also when it was destroyed before), `UPT_ERR_BUSY` while
+        /// another thread is in a call on it.
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_scene_destroy(IntPtr scene);
+
+        /// <summary>
+        /// Back to rest. The region and attached points stay.
+        ///
+        /// Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_PANIC`.
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_scene_reset(IntPtr scene);
+
+        /// <summary>
+        /// One step: u(t), c(t) -&gt; u(t + dt).
+        ///
+        /// displacement: `[K,3]`, mm; NULL takes the scene's own state. collision: `[K,3]`, mm, zero but at nodes in contact,
+        /// where it is the displacement that the instrument imposes at the end of the step; NULL means no contact.
+        /// out: `[n,3]`, mm (n: K, or the region's count), may be NULL; it may be the same memory as an input, at the price of
+        /// a copy. out_count: floats in out, 3 n; 0 when out is NULL.
+        /// Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`,
+        /// `UPT_ERR_NON_FINITE`, `UPT_ERR_UNSUPPORTED`, `UPT_ERR_GUARD`, `UPT_ERR_RUNTIME`, `UPT_ERR_PANIC`; the state stays.
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_scene_step(IntPtr scene, float* displacement, float* collision, float* @out, ulong out_count);
+
+        /// <summary>
+        /// One step from the scene's own state with the nodes in contact listed.
+        ///
+        /// contact_nodes: `[m]` node indices, each at most once, in any order. contact_vectors: `[m,3]`, mm: the displacement of
+        /// these nodes at the end of the step. contact_count: m; 0 means no contact and both may be NULL.
+        /// out, out_count, threads and errors: as `upt_scene_step`; also `UPT_ERR_ARGUMENT` for an index of K or more.
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_scene_step_contacts(IntPtr scene, uint* contact_nodes, float* contact_vectors, ulong contact_count, float* @out, ulong out_count);
+
+        /// <summary>
+        /// Copies the last published state.
+        ///
+        /// out: `[n,3]`, mm, in the region's order (all nodes when there is none). out_count: floats in out, 3 n.
+        /// Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`, `UPT_ERR_PANIC`.
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_scene_read(IntPtr scene, float* @out, ulong out_count);
+
+        /// <summary>
+        /// Starts a step on the scene's worker and returns at once.
+        ///
+        /// contact_nodes, contact_vectors, contact_count: as `upt_scene_step_contacts`; copied before the call returns.
+        /// Threads: one at a time. Errors: `UPT_ERR_BUSY` while a step is in flight (unless the scene was made with
+        /// `latest_wins`), `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NON_FINITE`, `UPT_ERR_PANIC`.
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_scene_submit(IntPtr scene, uint* contact_nodes, float* contact_vectors, ulong contact_count);
+
+        /// <summary>
+        /// Asks whether the submitted step has finished; never waits.
+        ///
+        /// Returns `UPT_OK`, `UPT_PENDING`, or the step's error (once).
+        /// Threads: one at a time. Errors: the step's; `UPT_ERR_STATE` when nothing was submitted, `UPT_ERR_NULL`,
+        /// `UPT_ERR_HANDLE`.
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_scene_poll(IntPtr scene);
+
+        /// <summary>
+        /// Waits for the submitted step, at most `timeout_ms` milliseconds.
+        ///
+        /// Returns `UPT_OK`, `UPT_PENDING` when the time is over, or the step's error (once).
+        /// Threads: one at a time. Errors: as `upt_scene_poll`.
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_scene_wait(IntPtr scene, uint timeout_ms);
+
+        /// <summary>
+        /// Interpolates between the last two states, for frames between steps. Works while a step is in flight.
+        ///
+        /// alpha: 0 the state before, 1 the last state; from 0 to 1. out: `[n,3]`, mm, in the region's order.
+        /// out_count: floats in out, 3 n.
+        /// Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`,
+        /// `UPT_ERR_NON_FINITE`, `UPT_ERR_PANIC`.
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_scene_sample(IntPtr scene, double alpha, float* @out, ulong out_count);
+
+        /// <summary>
+        /// Restricts what a step decodes and what `upt_scene_step`, `_read` and `_sample` write to these nodes, in this order.
+        ///
+        /// nodes: `[n]` indices, in any order; NULL with count 0: all nodes. A step costs less with fewer nodes.
+        /// Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT` for an index of K
+        /// or more, `UPT_ERR_PANIC`.
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_scene_set_region(IntPtr scene, uint* nodes, ulong count);
+
+        /// <summary>
+        /// Decodes any nodes of the last state, whatever the region is.
+        ///
+        /// nodes: `[n]` indices. out: `[n,3]`, mm. out_count: floats in out, 3 n.
+        /// Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`, `UPT_ERR_PANIC`.
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_scene_decode(IntPtr scene, uint* nodes, ulong count, float* @out, ulong out_count);
+
+        /// <summary>
+        /// Attaches points to the tissue; they replace those attached before.
+        ///
+        /// points: `[n,3]`, rest positions, mm; NULL with count 0 detaches. count: points, n.
+        /// Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_NON_FINITE`,
+        /// `UPT_ERR_ARGUMENT`, `UPT_ERR_UNSUPPORTED`, `UPT_ERR_PANIC`.
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_scene_attach_points(IntPtr scene, float* points, ulong count);
+
+        /// <summary>
+        /// Copies the displacement of the attached points in the last state.
+        ///
+        /// out: `[n,3]`, mm. out_count: floats in out, 3 n.
+        /// Threads: one at a time. Errors: `UPT_ERR_STATE` when no points are attached, `UPT_ERR_NULL`, `UPT_ERR_HANDLE`,
+        /// `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`, `UPT_ERR_PANIC`.
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_scene_read_points(IntPtr scene, float* @out, ulong out_count);
+
+        /// <summary>
+        /// As `upt_scene_sample`, at the attached points.
+        ///
+        /// alpha: 0 the state before, 1 the last state. out: `[n,3]`, mm. out_count: floats in out, 3 n.
+        /// Threads: one at a time. Errors: as `upt_scene_read_points`, and `UPT_ERR_NON_FINITE`.
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_scene_sample_points(IntPtr scene, double alpha, float* @out, ulong out_count);
+
+        /// <summary>
+        /// Finds the nodes that rigid instruments touch and the displacement that they impose: the input of a step.
+        ///
+        /// instruments: array; every element has its `struct_size` set. contact_nodes: `[capacity]`, contact_vectors:
+        /// `[capacity,3]`, mm; both may be NULL with capacity 0, which only asks. contact_count: contacts found, always written.
+        /// Threads: one at a time. Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "contact", `UPT_ERR_NULL`,
+        /// `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_NON_FINITE`, `UPT_ERR_ARGUMENT` (also when capacity
+        /// is too small), `UPT_ERR_PANIC`.
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_scene_contacts_from_instruments(IntPtr scene, upt_instrument* instruments, ulong instrument_count, uint* contact_nodes, float* contact_vectors, ulong capacity, ulong* contact_count);
+
+        /// <summary>
+        /// Copies the reaction of the tissue at the last step's contact nodes, in their order.
+        ///
+        /// out: `[m,3]`, mN, the force on the instrument. out_count: floats in out, 3 m.
+        /// Threads: one at a time. Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "forces", `UPT_ERR_NULL`,
+        /// `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_STATE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_PANIC`.
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_scene_contact_force(IntPtr scene, float* @out, ulong out_count);
+
+        /// <summary>
+        /// Says what the last step did and cost. Set `out-&gt;struct_size` first. Works while a step is in flight and on a
+        /// poisoned scene.
+        ///
+        /// Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`.
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_scene_get_stats(IntPtr scene, upt_scene_stats* @out);
+
+        /// <summary>
+        /// Saves the state, to resume to the bit.
+        ///
+        /// out: bytes; NULL with capacity 0 only asks. capacity: bytes that fit in out.
+        /// needed: bytes of the snapshot, always written; may be NULL.
+        /// Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT` when capacity is
+        /// too small, `UPT_ERR_PANIC`.
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_scene_save(IntPtr scene, byte* @out, ulong capacity, ulong* needed);
+
+        /// <summary>
+        /// Restores a snapshot of the same model.
+        ///
+        /// Threads: one at a time. Errors: `UPT_ERR_SNAPSHOT`, `UPT_ERR_VERSION`, `UPT_ERR_NULL`, `UPT_ERR_HANDLE`,
+        /// `UPT_ERR_BUSY`, `UPT_ERR_PANIC`; the state stays.
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_scene_restore(IntPtr scene, byte* bytes, ulong count);
+    }
+}
