@@ -1,1 +1,61 @@
-fn main() {}
+//! The command `upt`. One file a subcommand: each has its options (`clap::Args`) and
+//! `run(options) -> anyhow::Result<ExitCode>`.
+//!
+//! Exit codes: 0 done; 1 the command ran and its finding is bad (`doctor`, `stress`); 2 wrong usage or
+//! input, with a message on stderr that says what to do. A closed pipe ends the program quietly.
+
+mod completions;
+mod doctor;
+mod host;
+mod machine;
+mod prior;
+mod render;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+#[derive(Parser)]
+#[command(
+    name = "upt",
+    version,
+    about = "Soft tissue in real time: surrogates of nonlinear FEM, and the solver that they are measured against",
+    after_help = "Each command explains itself: `upt report --help`. Most take --json for machine-readable output.",
+    arg_required_else_help = true
+)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// What was found on this machine: ONNX Runtime, providers, CPU features, bundles.
+    Doctor(doctor::Options),
+    /// Linear-elastic compliance columns of a mesh, the raw material of priors and reduced bundles.
+    Prior(prior::Options),
+    /// Shell completions, on stdout.
+    Completions(completions::Options),
+}
+
+fn main() -> ExitCode {
+    end_quietly_on_closed_pipe();
+    let outcome = match Arguments::parse().command {
+        Command::Doctor(options) => doctor::run(&options),
+        Command::Prior(options) => prior::run(&options),
+        Command::Completions(options) => completions::run::<Arguments>(&options),
+    };
+    outcome.unwrap_or_else(|error| {
+        eprintln!("error: {error:#}");
+        ExitCode::from(2)
+    })
+}
+
+/// `upt ... | head` must not panic: Rust ignores SIGPIPE at start; the default action is put back.
+fn end_quietly_on_closed_pipe() {
+    #[cfg(unix)]
+    // SAFETY: no other thread runs yet, and SIG_DFL is a valid disposition of SIGPIPE.
+    unsafe {
+        libc::signal(libc::SIGPIPE, libc::SIG_DFL);
+    }
+}

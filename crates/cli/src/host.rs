@@ -1,0 +1,242 @@
+//! The library as a host sees it: the functions of `upt.h`, called through their C signatures.
+//!
+//! What is measured here is what a C or C# program gets; nothing reaches behind the ABI.
+
+use std::ffi::{CStr, CString};
+use std::path::Path;
+
+use anyhow::{Context, Result, bail};
+use upt::ffi;
+
+/// How a model is opened.
+#[derive(Clone, Debug)]
+pub struct ModelSettings {
+    pub threads: u32,
+    /// `UPT_PROVIDER_*`.
+    pub provider: i32,
+    /// `UPT_PRECISION_*`.
+    pub precision: i32,
+    /// Fail rather than take another provider.
+    pub exact: bool,
+}
+
+impl Default for ModelSettings {
+    fn default() -> Self {
+        Self {
+            threads: 1,
+            provider: ffi::UPT_PROVIDER_CPU,
+            precision: ffi::UPT_PRECISION_F32,
+            exact: false,
+        }
+    }
+}
+
+/// An open model; closed when dropped.
+pub struct Model {
+    handle: *mut ffi::upt_model,
+    info: ffi::upt_model_info,
+}
+
+/// A scene; destroyed when dropped. Used by the thread that made it.
+pub struct Scene {
+    handle: *mut ffi::upt_scene,
+}
+
+fn size_of<T>() -> u32 {
+    size_of::<T>() as u32
+}
+
+/// A struct of the ABI whose fields are integers, floats and nullable pointers, all zero.
+///
+/// SAFETY: the caller names a `repr(C)` struct for which all-zero bytes are a value: the ABI's
+/// documented default of every options struct.
+unsafe fn zeroed<T>() -> T {
+    unsafe { std::mem::MaybeUninit::zeroed().assume_init() }
+}
+
+fn check(call: &str, status: i32) -> Result<()> {
+    if status >= 0 {
+        return Ok(());
+    }
+    // SAFETY: both return NUL-terminated text that is valid until this thread's next call.
+    let (name, message) = unsafe {
+        (
+            CStr::from_ptr(ffi::upt_status_name(status)),
+            CStr::from_ptr(ffi::upt_last_error()),
+        )
+    };
+    bail!(
+        "{call}: {} ({})",
+        message.to_string_lossy(),
+        name.to_string_lossy()
+    )
+}
+
+impl Model {
+    /// `upt_model_open`.
+    pub fn open(path: &Path, settings: &ModelSettings) -> Result<Self> {
+        let text = path
+            .to_str()
+            .with_context(|| format!("{}: the path is not UTF-8", path.display()))?;
+        let text = CString::new(text)?;
+        let providers = [settings.provider];
+        // SAFETY: options and path live across the call; `handle` and `info` are places to write to.
+        unsafe {
+            let mut options: ffi::upt_model_options = zeroed();
+            options.struct_size = size_of::<ffi::upt_model_options>();
+            options.threads = settings.threads;
+            options.providers = providers.as_ptr();
+            options.provider_count = 1;
+            options.precision = settings.precision;
+            options.no_fallback = u8::from(settings.exact);
+            let mut handle = std::ptr::null_mut();
+            check(
+                "upt_model_open",
+                ffi::upt_model_open(text.as_ptr(), &options, &mut handle),
+            )?;
+            let mut info: ffi::upt_model_info = zeroed();
+            info.struct_size = size_of::<ffi::upt_model_info>();
+            let mut model = Self { handle, info };
+            check(
+                "upt_model_get_info",
+                ffi::upt_model_get_info(handle, &mut model.info),
+            )?;
+            Ok(model)
+        }
+    }
+
+    pub fn info(&self) -> &ffi::upt_model_info {
+        &self.info
+    }
+
+    /// `upt_model_indices` of a `UPT_SET_*`.
+    pub fn indices(&self, set: i32) -> Result<Vec<u32>> {
+        let mut needed = 0;
+        // SAFETY: a NULL buffer of capacity 0 asks for the count; the second call has that capacity.
+        unsafe {
+            ffi::upt_model_indices(self.handle, set, std::ptr::null_mut(), 0, &mut needed);
+            let mut out = vec![0u32; needed as usize];
+            check(
+                "upt_model_indices",
+                ffi::upt_model_indices(self.handle, set, out.as_mut_ptr(), needed, &mut needed),
+            )?;
+            Ok(out)
+        }
+    }
+
+    /// `upt_model_positions`, `[K][3]`, mm.
+    pub fn positions(&self) -> Result<Vec<[f32; 3]>> {
+        let count = self.info.node_count as usize;
+        let mut out = vec![[0.0f32; 3]; count];
+        // SAFETY: `out` holds 3 K floats.
+        check("upt_model_positions", unsafe {
+            ffi::upt_model_positions(self.handle, out.as_mut_ptr().cast(), 3 * count as u64)
+        })?;
+        Ok(out)
+    }
+}
+
+impl Drop for Model {
+    fn drop(&mut self) {
+        // SAFETY: the handle came from upt_model_open and is closed once.
+        unsafe { ffi::upt_model_close(self.handle) };
+    }
+}
+
+impl Scene {
+    /// `upt_scene_create`; the guard reports instead of refusing, so that errors can be measured.
+    pub fn create(model: &Model, kernel: i32) -> Result<Self> {
+        // SAFETY: the options live across the call; `handle` is a place to write to.
+        unsafe {
+            let mut options: ffi::upt_scene_options = zeroed();
+            options.struct_size = size_of::<ffi::upt_scene_options>();
+            options.kernel = kernel;
+            options.precision = model.info.precision;
+            options.guard_policy = ffi::UPT_GUARD_REPORT;
+            let mut handle = std::ptr::null_mut();
+            check(
+                "upt_scene_create",
+                ffi::upt_scene_create(model.handle, &options, &mut handle),
+            )?;
+            Ok(Self { handle })
+        }
+    }
+
+    /// `upt_scene_reset`.
+    pub fn reset(&mut self) -> Result<()> {
+        // SAFETY: the handle is live.
+        check("upt_scene_reset", unsafe {
+            ffi::upt_scene_reset(self.handle)
+        })
+    }
+
+    /// `upt_scene_set_region`; an empty list means all nodes.
+    pub fn set_region(&mut self, nodes: &[u32]) -> Result<()> {
+        let pointer = if nodes.is_empty() {
+            std::ptr::null()
+        } else {
+            nodes.as_ptr()
+        };
+        // SAFETY: pointer and count describe `nodes`.
+        check("upt_scene_set_region", unsafe {
+            ffi::upt_scene_set_region(self.handle, pointer, nodes.len() as u64)
+        })
+    }
+
+    /// `upt_scene_step_contacts`: one step from the scene's own state.
+    pub fn step(
+        &mut self,
+        nodes: &[u32],
+        vectors: &[[f32; 3]],
+        out: &mut [[f32; 3]],
+    ) -> Result<()> {
+        // SAFETY: the pointers and counts describe the slices, which live across the call.
+        let status = unsafe {
+            ffi::upt_scene_step_contacts(
+                self.handle,
+                nodes.as_ptr(),
+                vectors.as_ptr().cast(),
+                nodes.len() as u64,
+                out.as_mut_ptr().cast(),
+                3 * out.len() as u64,
+            )
+        };
+        check("upt_scene_step_contacts", status)
+    }
+
+    /// `upt_scene_decode`: displacement of any nodes in the last state.
+    pub fn decode(&mut self, nodes: &[u32], out: &mut [[f32; 3]]) -> Result<()> {
+        // SAFETY: the pointers and counts describe the slices.
+        let status = unsafe {
+            ffi::upt_scene_decode(
+                self.handle,
+                nodes.as_ptr(),
+                nodes.len() as u64,
+                out.as_mut_ptr().cast(),
+                3 * out.len() as u64,
+            )
+        };
+        check("upt_scene_decode", status)
+    }
+
+    /// `upt_scene_get_stats`.
+    pub fn stats(&self) -> Result<ffi::upt_scene_stats> {
+        // SAFETY: the struct is a place to write to and states its size.
+        unsafe {
+            let mut stats: ffi::upt_scene_stats = zeroed();
+            stats.struct_size = size_of::<ffi::upt_scene_stats>();
+            check(
+                "upt_scene_get_stats",
+                ffi::upt_scene_get_stats(self.handle, &mut stats),
+            )?;
+            Ok(stats)
+        }
+    }
+}
+
+impl Drop for Scene {
+    fn drop(&mut self) {
+        // SAFETY: the handle came from upt_scene_create and is destroyed once.
+        unsafe { ffi::upt_scene_destroy(self.handle) };
+    }
+}
