@@ -1,0 +1,198 @@
+//! `upt prior`: compliance columns of the nodes that instruments may touch.
+//!
+//! Writes `columns [3D,3K]` (mm/mN, the field of a unit force at each contact degree of freedom),
+//! `compliance [3D,3D]` and `contact_nodes [D]` as one safetensors file, streamed: memory is the
+//! sparse factor and one batch of columns. `python -m upt_training.reduced` builds bundles from it.
+
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::Instant;
+
+use anyhow::{Context, bail};
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use serde_json::json;
+use tissue::linear::{Factor, Lame, Stiffness, compliance_columns};
+use tissue::mesh::{Boundary, Mesh};
+
+/// Options of `upt prior`.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Example:\n  upt prior --mesh onnx/meshes/brain.mesh.safetensors --out brain.columns.safetensors"
+)]
+pub struct Options {
+    /// Mesh file (`*.mesh.safetensors`) with a domain and held nodes.
+    #[arg(long)]
+    pub mesh: PathBuf,
+    /// Held node sets: `fixed` or `supported`.
+    #[arg(long, default_value = "fixed")]
+    pub boundary: Boundary,
+    /// File to write.
+    #[arg(long)]
+    pub out: PathBuf,
+    /// Young's modulus, Pa.
+    #[arg(long, default_value_t = 3000.0)]
+    pub young: f64,
+    /// Poisson's ratio.
+    #[arg(long, default_value_t = 0.49)]
+    pub poisson: f64,
+    /// Right-hand sides solved together.
+    #[arg(long, default_value_t = 96)]
+    pub batch: usize,
+    /// Threads of the factorisation and the solves (0: all).
+    #[arg(long, default_value_t = 0)]
+    pub threads: usize,
+    /// Print the result as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Nodes of the domain's faces that are not held, ascending.
+fn contact_nodes(mesh: &Mesh, held: &[u32]) -> Vec<u32> {
+    let mut nodes: Vec<u32> = mesh
+        .domain
+        .iter()
+        .flat_map(|&face| mesh.surface[face as usize])
+        .collect();
+    nodes.sort_unstable();
+    nodes.dedup();
+    nodes.retain(|node| held.binary_search(node).is_err());
+    nodes
+}
+
+/// Header of a safetensors file whose tensors follow in the given order (name, dtype, shape).
+fn header(tensors: &[(&str, &str, [usize; 2])], metadata: serde_json::Value) -> Vec<u8> {
+    let mut object = serde_json::Map::new();
+    object.insert("__metadata__".to_string(), metadata);
+    let mut offset = 0usize;
+    for (name, dtype, shape) in tensors {
+        let end = offset + 4 * shape[0] * shape[1];
+        let dims: Vec<usize> = if shape[1] == 1 {
+            vec![shape[0]]
+        } else {
+            shape.to_vec()
+        };
+        object.insert(
+            (*name).to_string(),
+            json!({"dtype": dtype, "shape": dims, "data_offsets": [offset, end]}),
+        );
+        offset = end;
+    }
+    let mut text = serde_json::Value::Object(object).to_string().into_bytes();
+    text.resize(text.len().next_multiple_of(8), b' ');
+    let mut bytes = (text.len() as u64).to_le_bytes().to_vec();
+    bytes.extend(text);
+    bytes
+}
+
+fn floats(values: impl Iterator<Item = f32>) -> Vec<u8> {
+    values.flat_map(f32::to_le_bytes).collect()
+}
+
+/// Runs the command.
+pub fn run(args: &Options) -> anyhow::Result<ExitCode> {
+    let mesh = Mesh::read(&args.mesh)?;
+    let held = mesh.held_nodes(args.boundary);
+    let nodes = contact_nodes(&mesh, &held);
+    if nodes.is_empty() {
+        bail!(
+            "{}: the set `domain` has no free node, so nothing can be touched",
+            args.mesh.display()
+        );
+    }
+    let lame = Lame::from_young(args.young, args.poisson)?;
+    let started = Instant::now();
+    let stiffness = Stiffness::assemble(&mesh.positions, &mesh.tets, &held, lame)?;
+    let factor = Factor::new(&stiffness, &mesh.positions, args.threads)?;
+    let stats = factor.stats(&stiffness);
+    let factor_seconds = started.elapsed().as_secs_f64();
+    if !args.json {
+        eprintln!(
+            "{} free dofs, {} entries in the factor ({:.2} GiB), {factor_seconds:.1} s",
+            stats.dofs,
+            stats.factor_entries,
+            stats.factor_entries as f64 * 8.0 / (1u64 << 30) as f64
+        );
+    }
+
+    let (rows, width) = (3 * nodes.len(), 3 * mesh.node_count());
+    let metadata = json!({
+        "format": "upt-compliance", "version": "1", "mesh_name": mesh.name, "mesh_sha256": mesh.hash(),
+        "boundary": args.boundary.as_str(), "young_pa": args.young.to_string(), "poisson": args.poisson.to_string(),
+    });
+    let temporary = args.out.with_extension("partial");
+    let file = File::create(&temporary)
+        .with_context(|| format!("{}: cannot be created", temporary.display()))?;
+    let mut out = BufWriter::with_capacity(1 << 22, file);
+    // The compliance block is known last, so it follows the columns.
+    out.write_all(&header(
+        &[
+            ("columns", "F32", [rows, width]),
+            ("compliance", "F32", [rows, rows]),
+            ("contact_nodes", "I32", [nodes.len(), 1]),
+        ],
+        metadata,
+    ))?;
+    let bar = if args.json {
+        ProgressBar::hidden()
+    } else {
+        ProgressBar::new(rows as u64)
+    };
+    bar.set_style(ProgressStyle::with_template(
+        "{bar:40} {pos}/{len} columns, {eta} left",
+    )?);
+    let started = Instant::now();
+    let compliance =
+        compliance_columns(&stiffness, &factor, &nodes, args.batch, |first, fields| {
+            out.write_all(&floats(fields.iter().copied()))?;
+            bar.set_position((first + fields.len() / width) as u64);
+            Ok(())
+        })?;
+    bar.finish_and_clear();
+    let solve_seconds = started.elapsed().as_secs_f64();
+    out.write_all(&floats(compliance.block.iter().map(|&a| a as f32)))?;
+    for node in &nodes {
+        out.write_all(&(*node as i32).to_le_bytes())?;
+    }
+    out.into_inner()
+        .map_err(|e| e.into_error())
+        .and_then(|file| file.sync_all())
+        .with_context(|| format!("{}: writing failed", temporary.display()))?;
+    std::fs::rename(&temporary, &args.out)
+        .with_context(|| format!("{}: cannot be renamed", temporary.display()))?;
+    report(
+        args,
+        &args.out,
+        rows,
+        width,
+        stats.factor_entries,
+        factor_seconds,
+        solve_seconds,
+    )
+}
+
+fn report(
+    args: &Options,
+    out: &Path,
+    rows: usize,
+    width: usize,
+    factor_entries: usize,
+    factor_seconds: f64,
+    solve_seconds: f64,
+) -> anyhow::Result<ExitCode> {
+    if args.json {
+        let value = json!({
+            "columns": rows, "dofs": width, "factor_entries": factor_entries,
+            "factor_s": factor_seconds, "solve_s": solve_seconds, "file": out.display().to_string(),
+        });
+        println!("{value}");
+    } else {
+        println!(
+            "{}: {rows} columns of {width} dofs, factor {factor_seconds:.1} s, solves {solve_seconds:.1} s",
+            out.display()
+        );
+    }
+    Ok(ExitCode::SUCCESS)
+}
