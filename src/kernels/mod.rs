@@ -6,6 +6,7 @@
 //! gives the bits that the whole set gives (on one `Isa`; different sets differ in rounding).
 
 pub mod aggregate;
+pub mod contact;
 pub mod encode;
 pub mod flush;
 pub mod isa;

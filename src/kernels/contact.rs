@@ -1,0 +1,435 @@
+//! Contact forces of the linear-elastic prior: `f = A_CC^-1 c`, where `A_CC [3m,3m]` is gathered
+//! from the compliance `A` (mm/mN) at the degrees of freedom in contact and `c` is the displacement
+//! there (mm).
+//!
+//! Dense Cholesky `A_CC = U^T U` in f64, in place, upper triangle, row-major; blocks of rows are
+//! factored and then subtracted from the rest by a register-tiled product. f64 because neighbouring
+//! contact nodes move almost alike: at a condition number of 1e5 an f32 factor keeps two digits, and
+//! at these sizes f64 costs tens of microseconds. Where a pivot is lost in the rounding of the
+//! stored f32 compliance, a relative Tikhonov term is added and reported.
+
+use super::isa::{Isa, by_isa};
+use super::lanes::Lanes;
+
+/// Pivots below this part of their diagonal are rounding noise of the f32 compliance.
+const PIVOT_FLOOR: f64 = 1e-6;
+/// First Tikhonov term, relative to the mean diagonal; ten times more on each further attempt.
+const FIRST_TERM: f64 = 1e-5;
+const ATTEMPTS: i32 = 6;
+/// Rows factored before the rest is updated.
+const BLOCK: usize = 24;
+
+/// Why no factor could be made.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum FactorError {
+    /// The compliance holds a NaN, an infinity or a diagonal that is not positive.
+    #[error(
+        "compliance of contact dof {dof} is {value}: it must be finite and positive; rebuild prior.safetensors"
+    )]
+    Diagonal { dof: u32, value: f32 },
+    /// No Tikhonov term made the block positive definite.
+    #[error(
+        "compliance block of {order} contact dofs is not positive definite even with a relative Tikhonov term of {term:e}; rebuild prior.safetensors"
+    )]
+    Indefinite { order: usize, term: f64 },
+}
+
+/// How a factor came out.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FactorReport {
+    /// Degrees of freedom, `3 m`.
+    pub order: usize,
+    /// Tikhonov term relative to the mean diagonal; 0 where none was needed.
+    pub term: f64,
+}
+
+impl FactorReport {
+    /// Whether the block was near-singular and was changed.
+    pub fn regularised(&self) -> bool {
+        self.term > 0.0
+    }
+}
+
+/// A Cholesky factor of the contact block, kept while the contact nodes stay.
+#[derive(Debug, Default)]
+pub struct ContactFactor {
+    order: usize,
+    upper: Vec<f64>,
+    right: Vec<f64>,
+    ready: bool,
+}
+
+impl ContactFactor {
+    /// Room for blocks up to `order = 3 m`; larger ones make [`ContactFactor::factor`] allocate.
+    pub fn with_capacity(order: usize) -> Self {
+        Self {
+            upper: Vec::with_capacity(order * order),
+            right: Vec::with_capacity(order),
+            ..Self::default()
+        }
+    }
+
+    /// Degrees of freedom of the current factor; 0 before the first.
+    pub fn order(&self) -> usize {
+        if self.ready { self.order } else { 0 }
+    }
+
+    /// Gathers rows and columns `dofs` of `compliance [n,n]` and factors the block.
+    ///
+    /// # Errors
+    /// See [`FactorError`]; there is no factor then ([`ContactFactor::order`] is 0).
+    ///
+    /// # Panics
+    /// If a dof is not below `n` or `compliance` is not `[n,n]`.
+    pub fn factor(
+        &mut self,
+        isa: Isa,
+        compliance: &[f32],
+        n: usize,
+        dofs: &[u32],
+    ) -> Result<FactorReport, FactorError> {
+        assert_eq!(compliance.len(), n * n, "compliance must be [n, n]");
+        let order = dofs.len();
+        self.ready = false;
+        self.order = order;
+        self.upper.resize(order * order, 0.0);
+        self.right.resize(order, 0.0);
+        let mut mean = 0.0;
+        for &dof in dofs {
+            let value = compliance[dof as usize * (n + 1)];
+            if !(value > 0.0 && value.is_finite()) {
+                return Err(FactorError::Diagonal { dof, value });
+            }
+            mean += f64::from(value) / order as f64;
+        }
+        let mut term = 0.0;
+        for attempt in 0..ATTEMPTS {
+            for (i, &row) in dofs.iter().enumerate() {
+                let from = &compliance[row as usize * n..][..n];
+                let to = &mut self.upper[i * order..][..order];
+                for (to, &column) in to[i..].iter_mut().zip(&dofs[i..]) {
+                    *to = f64::from(from[column as usize]);
+                }
+                to[i] += term * mean;
+            }
+            let mut positive = true;
+            factor_upper(isa, &mut self.upper, order, &mut positive);
+            if positive {
+                self.ready = true;
+                return Ok(FactorReport { order, term });
+            }
+            term = FIRST_TERM * 10f64.powi(attempt);
+        }
+        Err(FactorError::Indefinite { order, term })
+    }
+
+    /// `forces = A_CC^-1 displacement`, both `[3m]`, mm to mN.
+    ///
+    /// # Panics
+    /// If there is no factor or a length is not its order.
+    pub fn solve(&mut self, isa: Isa, displacement: &[f32], forces: &mut [f32]) {
+        assert!(
+            self.ready || self.order == 0,
+            "no factor: call factor first"
+        );
+        assert_eq!(displacement.len(), self.order, "displacement must be [3m]");
+        assert_eq!(forces.len(), self.order, "forces must be [3m]");
+        for (to, &from) in self.right.iter_mut().zip(displacement) {
+            *to = f64::from(from);
+        }
+        solve_upper(isa, &self.upper, &mut self.right);
+        for (to, &from) in forces.iter_mut().zip(&self.right) {
+            *to = from as f32;
+        }
+    }
+}
+
+/// Whether a pivot stands out of the rounding of its diagonal `pivot + removed`; a NaN does not.
+fn is_sound(pivot: f64, removed: f64) -> bool {
+    pivot > PIVOT_FLOOR * (pivot + removed)
+}
+
+/// `A = U^T U`, the readable way; `positive` is false where a pivot is too small.
+fn factor_upper_scalar(a: &mut [f64], n: usize, positive: &mut bool) {
+    for k in 0..n {
+        let pivot = a[k * n + k];
+        let removed: f64 = (0..k).map(|i| a[i * n + k] * a[i * n + k]).sum();
+        if !is_sound(pivot, removed) {
+            *positive = false;
+            return;
+        }
+        let root = pivot.sqrt();
+        for j in k..n {
+            a[k * n + j] /= root;
+        }
+        for i in k + 1..n {
+            for j in i..n {
+                a[i * n + j] -= a[k * n + i] * a[k * n + j];
+            }
+        }
+    }
+}
+
+by_isa! { fn factor_upper(a: &mut [f64], n: usize, positive: &mut bool) = factor_upper_body, factor_upper_scalar; }
+
+/// The same, by blocks of rows. Only the compiler's vector instructions depend on `V`.
+#[inline(always)]
+unsafe fn factor_upper_body<V: Lanes>(a: &mut [f64], n: usize, positive: &mut bool) {
+    let mut start = 0;
+    while start < n {
+        let end = (start + BLOCK).min(n);
+        if !factor_rows(a, n, start, end) {
+            *positive = false;
+            return;
+        }
+        let (done, rest) = a.split_at_mut(end * n);
+        let block = &done[start * n..];
+        let mut i = end;
+        while i + 4 <= n {
+            let rows = &mut rest[(i - end) * n..][..4 * n];
+            // The first tile starts on the diagonal: what it writes below is never read.
+            let mut j = i;
+            while j + 16 <= n {
+                subtract_tile::<4, 16>(block, rows, n, i, j);
+                j += 16;
+            }
+            while j + 4 <= n {
+                subtract_tile::<4, 4>(block, rows, n, i, j);
+                j += 4;
+            }
+            while j < n {
+                subtract_tile::<4, 1>(block, rows, n, i, j);
+                j += 1;
+            }
+            i += 4;
+        }
+        while i < n {
+            let rows = &mut rest[(i - end) * n..][..n];
+            for j in i..n {
+                subtract_tile::<1, 1>(block, rows, n, i, j);
+            }
+            i += 1;
+        }
+        start = end;
+    }
+}
+
+/// Factors rows `start..end`, whose earlier rows have been subtracted already.
+#[inline(always)]
+fn factor_rows(a: &mut [f64], n: usize, start: usize, end: usize) -> bool {
+    for k in start..end {
+        let (above, below) = a.split_at_mut((k + 1) * n);
+        let pivot = above[k * n + k];
+        let removed: f64 = (0..k).map(|i| above[i * n + k] * above[i * n + k]).sum();
+        if !is_sound(pivot, removed) {
+            return false;
+        }
+        let row = &mut above[k * n..];
+        let inverse = 1.0 / pivot.sqrt();
+        row[k..].iter_mut().for_each(|x| *x *= inverse);
+        for i in k + 1..end {
+            let factor = row[i];
+            let to = &mut below[(i - k - 1) * n..][i..n];
+            for (to, &x) in to.iter_mut().zip(&row[i..]) {
+                *to = (-factor).mul_add(x, *to);
+            }
+        }
+    }
+    true
+}
+
+/// `rows[r][j + c] -= sum_k block[k][i + r] * block[k][j + c]` for an `R x C` tile in registers.
+#[inline(always)]
+fn subtract_tile<const R: usize, const C: usize>(
+    block: &[f64],
+    rows: &mut [f64],
+    n: usize,
+    i: usize,
+    j: usize,
+) {
+    let mut sum = [[0.0f64; C]; R];
+    for row in block.chunks_exact(n) {
+        let left: &[f64; R] = row[i..i + R].try_into().expect("R numbers");
+        let right: &[f64; C] = row[j..j + C].try_into().expect("C numbers");
+        for r in 0..R {
+            for c in 0..C {
+                sum[r][c] = left[r].mul_add(right[c], sum[r][c]);
+            }
+        }
+    }
+    for (r, sum) in sum.iter().enumerate() {
+        for (to, sum) in rows[r * n + j..][..C].iter_mut().zip(sum) {
+            *to -= sum;
+        }
+    }
+}
+
+fn solve_upper_scalar(u: &[f64], x: &mut [f64]) {
+    solve(u, x);
+}
+
+by_isa! { fn solve_upper(u: &[f64], x: &mut [f64]) = solve_upper_body, solve_upper_scalar; }
+
+#[inline(always)]
+unsafe fn solve_upper_body<V: Lanes>(u: &[f64], x: &mut [f64]) {
+    solve(u, x);
+}
+
+/// `U^T U x = b` in place.
+#[inline(always)]
+fn solve(u: &[f64], x: &mut [f64]) {
+    let n = x.len();
+    for k in 0..n {
+        let row = &u[k * n..][..n];
+        let y = x[k] / row[k];
+        x[k] = y;
+        for (x, &u) in x[k + 1..].iter_mut().zip(&row[k + 1..]) {
+            *x -= y * u;
+        }
+    }
+    for k in (0..n).rev() {
+        let row = &u[k * n..][..n];
+        let mut sums = [0.0; 8];
+        let (us, xs) = (row[k + 1..].chunks_exact(8), x[k + 1..].chunks_exact(8));
+        let tail: f64 = us
+            .remainder()
+            .iter()
+            .zip(xs.remainder())
+            .map(|(u, x)| u * x)
+            .sum();
+        for (u, x) in us.zip(xs) {
+            for lane in 0..8 {
+                sums[lane] += u[lane] * x[lane];
+            }
+        }
+        x[k] = (x[k] - tail - sums.iter().sum::<f64>()) / row[k];
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::random::Random;
+    use super::*;
+
+    /// A compliance-like matrix: points on a patch, `1 / (distance + a)` between them, 3 axes.
+    fn compliance(random: &mut Random, nodes: usize) -> Vec<f32> {
+        let points: Vec<[f64; 2]> = (0..nodes)
+            .map(|_| [random.unit() * 30.0, random.unit() * 30.0])
+            .collect();
+        let n = 3 * nodes;
+        let mut a = vec![0.0; n * n];
+        for i in 0..n {
+            for j in 0..n {
+                let (p, q) = (points[i / 3], points[j / 3]);
+                let distance = (p[0] - q[0]).hypot(p[1] - q[1]);
+                let same_axis = if i % 3 == j % 3 { 1.0 } else { 0.2 };
+                a[i * n + j] = (same_axis * 0.01 / (1.0 + distance)) as f32;
+            }
+        }
+        a
+    }
+
+    fn residual(a: &[f32], n: usize, dofs: &[u32], f: &[f32], c: &[f32]) -> f64 {
+        let mut worst = 0.0f64;
+        for (i, &row) in dofs.iter().enumerate() {
+            let sum: f64 = dofs
+                .iter()
+                .zip(f)
+                .map(|(&column, &f)| {
+                    f64::from(a[row as usize * n + column as usize]) * f64::from(f)
+                })
+                .sum();
+            worst = worst.max((sum - f64::from(c[i])).abs());
+        }
+        worst
+    }
+
+    #[test]
+    fn forces_reproduce_the_displacement_on_every_isa() {
+        let mut random = Random::new(2);
+        let nodes = 150;
+        let n = 3 * nodes;
+        let a = compliance(&mut random, nodes);
+        for isa in Isa::available() {
+            let mut factor = ContactFactor::with_capacity(n);
+            let room = factor.upper.capacity();
+            for m in [1, 2, 7, 8, 9, 40, 150] {
+                let dofs: Vec<u32> = (0..3 * m as u32).collect();
+                let c = random.normal(3 * m, 5.0);
+                let mut f = vec![0.0; 3 * m];
+                let report = factor.factor(isa, &a, n, &dofs).unwrap();
+                assert!(!report.regularised());
+                factor.solve(isa, &c, &mut f);
+                let error = residual(&a, n, &dofs, &f, &c);
+                assert!(error < 2e-4, "{} m {m}: {error:e}", isa.name());
+            }
+            assert_eq!(
+                factor.upper.capacity(),
+                room,
+                "no allocation within capacity"
+            );
+        }
+    }
+
+    #[test]
+    fn the_blocked_factor_equals_the_reference() {
+        let mut random = Random::new(8);
+        let a = compliance(&mut random, 40);
+        let reference: Vec<f64> = a.iter().map(|&x| f64::from(x)).collect();
+        let mut want = reference.clone();
+        let mut positive = true;
+        factor_upper_scalar(&mut want, 120, &mut positive);
+        assert!(positive);
+        for isa in Isa::available() {
+            let mut got = reference.clone();
+            factor_upper(isa, &mut got, 120, &mut positive);
+            for i in 0..120 {
+                for j in i..120 {
+                    let error = (want[i * 120 + j] - got[i * 120 + j]).abs();
+                    assert!(error < 1e-12, "{} {i} {j}: {error:e}", isa.name());
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_dof_given_twice_is_regularised_and_reported() {
+        let mut random = Random::new(6);
+        let a = compliance(&mut random, 20);
+        let mut dofs: Vec<u32> = (0..60).collect();
+        dofs.extend([0, 1, 2]);
+        let mut c = random.normal(60, 5.0);
+        c.extend_from_within(0..3);
+        for isa in Isa::available() {
+            let mut factor = ContactFactor::default();
+            let report = factor.factor(isa, &a, 60, &dofs).unwrap();
+            assert!(report.regularised() && report.term < 1e-3, "{report:?}");
+            let mut f = vec![0.0; 63];
+            factor.solve(isa, &c, &mut f);
+            assert!(f.iter().all(|f| f.is_finite()));
+            let error = residual(&a, 60, &dofs, &f, &c);
+            assert!(error < 0.05, "{}: {error:e} mm", isa.name());
+        }
+    }
+
+    #[test]
+    fn nonsense_is_an_error() {
+        let mut factor = ContactFactor::default();
+        for isa in Isa::available() {
+            let nan = [1.0, 0.0, 0.0, f32::NAN];
+            let result = factor.factor(isa, &nan, 2, &[0, 1]);
+            assert!(matches!(result, Err(FactorError::Diagonal { dof: 1, .. })));
+            let indefinite = [1.0, 9.0, 9.0, 1.0];
+            let result = factor.factor(isa, &indefinite, 2, &[0, 1]);
+            assert!(matches!(
+                result,
+                Err(FactorError::Indefinite { order: 2, .. })
+            ));
+            let hole = [1.0, f32::NAN, f32::NAN, 1.0];
+            assert!(factor.factor(isa, &hole, 2, &[0, 1]).is_err());
+            assert_eq!(factor.order(), 0);
+            factor.factor(isa, &[], 0, &[]).unwrap();
+            factor.solve(isa, &[], &mut []);
+        }
+    }
+}
