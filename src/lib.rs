@@ -8,11 +8,14 @@
 pub mod bundle;
 pub mod error;
 pub mod ffi;
+pub mod graph;
+pub mod grid;
 pub mod kernels;
 pub mod library;
 pub mod model;
 pub mod onnx;
 pub mod options;
+pub mod prior;
 pub mod scene;
 pub mod stats;
 

@@ -113,6 +113,16 @@ impl Mesh {
         self.positions.len() / 3
     }
 
+    /// Rest position of a node, mm.
+    pub fn position(&self, node: u32) -> [f32; 3] {
+        let i = 3 * node as usize;
+        [
+            self.positions[i],
+            self.positions[i + 1],
+            self.positions[i + 2],
+        ]
+    }
+
     /// Bytes held.
     pub fn memory_bytes(&self) -> usize {
         4 * (self.positions.len()

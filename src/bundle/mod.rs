@@ -6,6 +6,7 @@ mod mesh;
 mod tensors;
 
 pub use files::BundleFiles;
+pub(crate) use files::hex;
 pub use manifest::{
     Base, Bound, Boundary, Coordinates, Dims, Envelope, Fade, Feature, FileEntry, Graph, Manifest,
     ManifestKind, Material, MeshEntry, Normalisation, PriorEntry, ReducedEntry, ReducedInput,

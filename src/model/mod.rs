@@ -1,10 +1,21 @@
 //! [`Model`]: a bundle made ready to step. Immutable, shared by scenes, safe from any thread.
 
+mod reduced;
+mod upt;
+
 use std::path::Path;
 use std::sync::Arc;
+use std::time::Instant;
 
-use crate::error::{Error, Result};
+pub use reduced::ReducedModel;
+pub use upt::{UptModel, UptTables};
+
+use crate::bundle::{BundleFiles, Manifest, ManifestKind, Mesh};
+use crate::error::Result;
+use crate::library::{self, Alive};
+use crate::onnx::{ProviderChoice, ProviderPlan, Runtime};
 use crate::options::{IndexSet, ModelOptions, Precision, Provider};
+use crate::prior::PriorTable;
 
 /// The bundle kinds (values of `UPT_KIND_*`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -47,34 +58,197 @@ pub struct ModelInfo {
     pub load_seconds: f64,
 }
 
+/// What differs between the kinds.
+pub enum KindModel {
+    /// Kind `upt`.
+    Upt(Box<UptModel>),
+    /// Kind `reduced`.
+    Reduced(ReducedModel),
+}
+
 /// A bundle made ready to step.
-pub struct Model {}
+pub struct Model {
+    /// The manifest.
+    pub manifest: Manifest,
+    /// SHA-256 of `bundle.json`.
+    pub hash: [u8; 32],
+    /// The bundle's mesh.
+    pub mesh: Arc<Mesh>,
+    /// The linear response, where the bundle has one.
+    pub prior: Option<PriorTable>,
+    /// The kind's own part.
+    pub kind: KindModel,
+    pub(crate) runtime: &'static Runtime,
+    pub(crate) plan: ProviderPlan,
+    pub(crate) threads: usize,
+    pub(crate) precision: Precision,
+    choice: ProviderChoice,
+    load_seconds: f64,
+    _alive: Alive,
+}
 
 impl Model {
-    /// Opens and validates the bundle in the folder `path`.
+    /// Opens and validates the bundle in the folder `path`, loads ONNX Runtime and computes the static tables.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], [`crate::Error::Bundle`] (names file and field), [`crate::Error::Version`],
+    /// [`crate::Error::Runtime`], [`crate::Error::Provider`].
     pub fn open(path: &Path, options: &ModelOptions) -> Result<Arc<Model>> {
-        let _ = options;
-        Err(Error::Unsupported(path.display().to_string()))
+        let start = Instant::now();
+        let _span = tracing::info_span!("open", path = %path.display()).entered();
+        let process = library::current();
+        let files = BundleFiles::open(path)?;
+        let manifest = files.manifest.clone();
+        let mesh_file = files.tensors(&manifest.mesh.file)?;
+        let mesh = Mesh::parse(&mesh_file, manifest.boundary)?;
+        if mesh.node_count() != manifest.mesh.nodes {
+            return Err(crate::Error::bundle(
+                "bundle.json",
+                format!(
+                    "field `mesh.nodes` is {}, {} has {} nodes",
+                    manifest.mesh.nodes,
+                    manifest.mesh.file,
+                    mesh.node_count()
+                ),
+            ));
+        }
+        if !mesh.sha256.eq_ignore_ascii_case(&manifest.mesh.mesh_sha256) {
+            return Err(crate::Error::bundle(
+                "bundle.json",
+                format!(
+                    "field `mesh.mesh_sha256` is {}, the mesh in {} has {}",
+                    manifest.mesh.mesh_sha256, manifest.mesh.file, mesh.sha256
+                ),
+            ));
+        }
+        let prior = match &manifest.prior {
+            Some(entry) => Some(PriorTable::parse(
+                &files.tensors(&entry.file)?,
+                &manifest,
+                &mesh,
+            )?),
+            None => None,
+        };
+        let runtime = Runtime::get(process.onnxruntime_path.as_deref())?;
+        let plan = ProviderPlan::new(options, &crate::bundle::hex(&files.hash));
+        let threads = match (options.threads, process.threads) {
+            (0, 0) => 1,
+            (0, n) => n,
+            (n, _) => n,
+        };
+        let (kind, choice) = match manifest.kind {
+            ManifestKind::Reduced => {
+                let (model, choice) = ReducedModel::open(&files, runtime, &plan)?;
+                (KindModel::Reduced(model), choice)
+            }
+            ManifestKind::Upt => {
+                let (model, choice) = UptModel::open(&files, &mesh, runtime, &plan, threads)?;
+                (KindModel::Upt(Box::new(model)), choice)
+            }
+        };
+        let model = Model {
+            hash: files.hash,
+            mesh: Arc::new(mesh),
+            prior,
+            kind,
+            runtime,
+            plan,
+            threads,
+            precision: options.precision.unwrap_or(Precision::F32),
+            choice,
+            load_seconds: start.elapsed().as_secs_f64(),
+            manifest,
+            _alive: Alive::new(),
+        };
+        tracing::info!(name = %model.manifest.name, seconds = model.load_seconds, "model opened");
+        Ok(Arc::new(model))
     }
 
     /// What the model is.
     pub fn info(&self) -> ModelInfo {
-        unreachable!("a model cannot be opened yet")
+        let (kind, supernodes, own) = match &self.kind {
+            KindModel::Upt(upt) => (
+                Kind::Upt,
+                upt.tables.graph.supernodes.len(),
+                upt.memory_bytes() + upt.tables.memory_bytes(),
+            ),
+            KindModel::Reduced(reduced) => (Kind::Reduced, 0, reduced.memory_bytes()),
+        };
+        let prior = self.prior.as_ref().map_or(0, PriorTable::memory_bytes);
+        ModelInfo {
+            kind,
+            node_count: self.mesh.node_count() as u64,
+            tet_count: (self.mesh.tets.len() / 4) as u64,
+            surface_face_count: (self.mesh.surface_faces.len() / 3) as u64,
+            domain_node_count: self.mesh.domain_nodes.len() as u64,
+            held_node_count: self.mesh.held_nodes.len() as u64,
+            supernode_count: supernodes as u64,
+            dt: self.manifest.dt_s as f32,
+            max_push_mm: self.manifest.envelope.max_push_mm,
+            provider: self.choice.provider,
+            precision: Precision::F32,
+            memory_bytes: (own + prior + self.mesh.memory_bytes()) as u64,
+            load_seconds: self.load_seconds,
+        }
     }
 
-    /// JSON: name, bundle hash, provider of each stage and why others were not taken.
+    /// JSON: name, bundle hash, provider of each stage and why others were not taken, ONNX Runtime's file and version.
     pub fn describe_json(&self) -> String {
-        String::new()
+        let refused: Vec<serde_json::Value> = self
+            .choice
+            .refused
+            .iter()
+            .map(
+                |(provider, reason)| serde_json::json!({"name": provider.name(), "reason": reason}),
+            )
+            .collect();
+        let native = "native";
+        let latent = self.choice.provider.name();
+        let stages = match self.info().kind {
+            Kind::Upt => serde_json::json!({
+                "encode": native, "aggregate": native, "latent": latent,
+                "decode": "native, or onnxruntime where the scene asks for it",
+            }),
+            Kind::Reduced => {
+                serde_json::json!({"prior": native, "latent": latent, "decode": native})
+            }
+        };
+        serde_json::json!({
+            "name": self.manifest.name,
+            "kind": self.manifest_kind(),
+            "bundle_sha256": crate::bundle::hex(&self.hash),
+            "mesh_sha256": self.mesh.sha256,
+            "nodes": self.mesh.node_count(),
+            "threads": self.threads,
+            "stages": stages,
+            "providers_refused": refused,
+            "instruction_set": format!("{:?}", crate::kernels::Isa::detect()),
+            "onnxruntime": {"path": self.runtime.path().display().to_string(), "version": self.runtime.version()},
+        })
+        .to_string()
+    }
+
+    fn manifest_kind(&self) -> &'static str {
+        match self.manifest.kind {
+            ManifestKind::Upt => "upt",
+            ManifestKind::Reduced => "reduced",
+        }
     }
 
     /// Rest positions `[K,3]`, mm.
     pub fn positions(&self) -> &[f32] {
-        &[]
+        &self.mesh.positions
     }
 
     /// A static index set.
     pub fn indices(&self, set: IndexSet) -> &[u32] {
-        let _ = set;
-        &[]
+        match set {
+            IndexSet::SurfaceNodes => &self.mesh.surface_nodes,
+            IndexSet::DomainNodes => &self.mesh.domain_nodes,
+            IndexSet::HeldNodes => &self.mesh.held_nodes,
+            IndexSet::SurfaceFaces => &self.mesh.surface_faces,
+            IndexSet::DomainFaces => &self.mesh.domain_faces,
+            IndexSet::Tets => &self.mesh.tets,
+        }
     }
 }

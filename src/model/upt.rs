@@ -1,0 +1,315 @@
+//! Kind `upt`: graphs, native weights, and the static tables of a mesh.
+
+use std::sync::Arc;
+
+use crate::bundle::{BundleFiles, Mesh, TensorFile, UptEntry};
+use crate::error::{Error, Result};
+use crate::graph::SupernodeGraph;
+use crate::kernels::encode::transpose_weight;
+use crate::onnx::{ProviderChoice, ProviderPlan, Runtime, Stage, StageOptions};
+
+/// Nodes a run of `embed.onnx`.
+const EMBED_TILE: usize = 2048;
+/// Nodes a run of `decoder.onnx`: activations stay in cache.
+pub const DECODER_TILE: usize = 1024;
+
+/// Weights of the decoder for the native kernel, matrices `[out,in]`.
+#[derive(Debug)]
+pub struct DecoderTensors {
+    /// `[h,h]`, `[h]`.
+    pub attention_out: (Vec<f32>, Vec<f32>),
+    /// `[h]`, `[h]`.
+    pub norm2: (Vec<f32>, Vec<f32>),
+    /// `[m,h]`, `[m]`.
+    pub mlp1: (Vec<f32>, Vec<f32>),
+    /// `[h,m]`, `[h]`.
+    pub mlp2: (Vec<f32>, Vec<f32>),
+    /// `[h]`, `[h]`.
+    pub norm3: (Vec<f32>, Vec<f32>),
+    /// `[3,h]`, `[3]`.
+    pub head: (Vec<f32>, Vec<f32>),
+}
+
+/// Everything that depends on the mesh alone.
+#[derive(Debug)]
+pub struct UptTables {
+    /// Supernodes and radius graph, in nodes of the mesh.
+    pub graph: SupernodeGraph,
+    /// Supernodes and their neighbours, ascending: the rows of the two encoder tables.
+    pub encode_nodes: Vec<u32>,
+    /// Supernodes as rows of the encoder tables.
+    pub supernode_rows: Vec<u32>,
+    /// The graph's neighbours as rows of the encoder tables.
+    pub neighbour_rows: Vec<u32>,
+    /// `[encode_nodes,d]`.
+    pub source_table: Vec<f32>,
+    /// `[encode_nodes,d]`.
+    pub target_table: Vec<f32>,
+    /// `[K,2h]`.
+    pub query_table: Vec<f32>,
+}
+
+impl UptTables {
+    /// Bytes held.
+    pub fn memory_bytes(&self) -> usize {
+        4 * (self.encode_nodes.len()
+            + self.supernode_rows.len()
+            + self.neighbour_rows.len()
+            + self.graph.supernodes.len()
+            + self.graph.offsets.len()
+            + self.graph.neighbours.len()
+            + self.source_table.len()
+            + self.target_table.len()
+            + self.query_table.len())
+    }
+}
+
+/// The part of a model that only kind `upt` has.
+pub struct UptModel {
+    /// The manifest's entry.
+    pub entry: UptEntry,
+    /// `[f,d]`, transposed for the kernels.
+    pub source_weight: Vec<f32>,
+    /// `[f,d]`, transposed for the kernels.
+    pub target_weight: Vec<f32>,
+    /// Decoder weights.
+    pub decoder: DecoderTensors,
+    /// Tables of the bundle's mesh.
+    pub tables: Arc<UptTables>,
+    embed: Vec<u8>,
+    latent: Vec<u8>,
+    decoder_graph: Vec<u8>,
+}
+
+impl UptModel {
+    /// Reads graphs and weights, makes a session of each graph once, computes the tables of the bundle's mesh.
+    pub fn open(
+        files: &BundleFiles,
+        mesh: &Mesh,
+        runtime: &'static Runtime,
+        plan: &ProviderPlan,
+        threads: usize,
+    ) -> Result<(UptModel, ProviderChoice)> {
+        let entry = files
+            .manifest
+            .upt
+            .clone()
+            .ok_or_else(|| Error::bundle("bundle.json", "field `upt` is missing"))?;
+        let weights = files.tensors(&entry.weights)?;
+        let (d, f) = (entry.dims.encoder, entry.feature_width());
+        let matrix = |name: &str| weights.f32(name, &[Some(d), Some(f)]);
+        let embed = files.read("embed.onnx")?;
+        let source_weight = transpose_weight(&matrix("encoder.source")?, d, f);
+        let target_weight = transpose_weight(&matrix("encoder.target")?, d, f);
+        let tables = Arc::new(make_tables(&entry, &embed, mesh, runtime, threads)?);
+        let model = UptModel {
+            source_weight,
+            target_weight,
+            decoder: decoder_tensors(&weights, &entry)?,
+            tables,
+            embed,
+            latent: files.read("latent.onnx")?,
+            decoder_graph: files.read("decoder.onnx")?,
+            entry,
+        };
+        let choice = model
+            .latent_stage(runtime, plan, threads, model.tables.graph.supernodes.len())?
+            .choice()
+            .clone();
+        Ok((model, choice))
+    }
+
+    /// Tables of another mesh.
+    pub fn tables_of(
+        &self,
+        mesh: &Mesh,
+        runtime: &'static Runtime,
+        threads: usize,
+    ) -> Result<UptTables> {
+        make_tables(&self.entry, &self.embed, mesh, runtime, threads)
+    }
+
+    /// Query rows `[n,2h]` of any points `[n,3]`, mm.
+    pub fn queries(
+        &self,
+        points: &[f32],
+        runtime: &'static Runtime,
+        threads: usize,
+    ) -> Result<Vec<f32>> {
+        Ok(embed_points(&self.entry, &self.embed, points, runtime, threads)?.2)
+    }
+
+    /// A session of `latent.onnx`: `supernodes [n_S,d]` -> `keys [L,h]`, `values [L,h]`.
+    pub fn latent_stage(
+        &self,
+        runtime: &'static Runtime,
+        plan: &ProviderPlan,
+        threads: usize,
+        supernodes: usize,
+    ) -> Result<Stage> {
+        let dims = &self.entry.dims;
+        let kv: &[usize] = &[dims.latent_tokens, dims.decoder];
+        Stage::new(
+            runtime,
+            "latent.onnx",
+            &self.latent,
+            &[("supernodes", &[supernodes, dims.encoder])],
+            &[("keys", kv), ("values", kv)],
+            &StageOptions {
+                threads,
+                plan: plan.clone(),
+            },
+        )
+    }
+
+    /// A session of `decoder.onnx` for tiles of [`DECODER_TILE`] nodes:
+    /// `queries [n,2h]`, `keys`, `values` -> `displacement [n,3]`.
+    pub fn decoder_stage(&self, runtime: &'static Runtime, plan: &ProviderPlan) -> Result<Stage> {
+        let dims = &self.entry.dims;
+        let kv: &[usize] = &[dims.latent_tokens, dims.decoder];
+        Stage::new(
+            runtime,
+            "decoder.onnx",
+            &self.decoder_graph,
+            &[
+                ("queries", &[DECODER_TILE, dims.query]),
+                ("keys", kv),
+                ("values", kv),
+            ],
+            &[("displacement", &[DECODER_TILE, 3])],
+            &StageOptions {
+                threads: 1,
+                plan: plan.clone(),
+            },
+        )
+    }
+
+    /// Bytes held beside the tables.
+    pub fn memory_bytes(&self) -> usize {
+        self.embed.len()
+            + self.latent.len()
+            + self.decoder_graph.len()
+            + 4 * (self.source_weight.len() + self.target_weight.len())
+    }
+}
+
+fn decoder_tensors(file: &TensorFile, entry: &UptEntry) -> Result<DecoderTensors> {
+    let (h, m) = (entry.dims.decoder, entry.dims.decoder_mlp);
+    let linear = |name: &str, out: usize, input: usize| {
+        Ok::<_, Error>((
+            file.f32(&format!("decoder.{name}.weight"), &[Some(out), Some(input)])?,
+            file.f32(&format!("decoder.{name}.bias"), &[Some(out)])?,
+        ))
+    };
+    let norm = |name: &str| {
+        Ok::<_, Error>((
+            file.f32(&format!("decoder.{name}.weight"), &[Some(h)])?,
+            file.f32(&format!("decoder.{name}.bias"), &[Some(h)])?,
+        ))
+    };
+    Ok(DecoderTensors {
+        attention_out: linear("attention_out", h, h)?,
+        norm2: norm("norm2")?,
+        mlp1: linear("mlp1", m, h)?,
+        mlp2: linear("mlp2", h, m)?,
+        norm3: norm("norm3")?,
+        head: linear("head", 3, h)?,
+    })
+}
+
+fn make_tables(
+    entry: &UptEntry,
+    embed: &[u8],
+    mesh: &Mesh,
+    runtime: &'static Runtime,
+    threads: usize,
+) -> Result<UptTables> {
+    let _span = tracing::debug_span!("tables", nodes = mesh.node_count()).entered();
+    let graph = SupernodeGraph::of_mesh(mesh, &entry.graph);
+    let encode_nodes = graph.needed_nodes();
+    let mut row = vec![u32::MAX; mesh.node_count()];
+    for (at, &node) in encode_nodes.iter().enumerate() {
+        row[node as usize] = at as u32;
+    }
+    let rows = |nodes: &[u32]| {
+        nodes
+            .iter()
+            .map(|&node| row[node as usize])
+            .collect::<Vec<u32>>()
+    };
+    let (source, target, query_table) =
+        embed_points(entry, embed, &mesh.positions, runtime, threads)?;
+    let d = entry.dims.encoder;
+    let pick = |table: &[f32]| {
+        encode_nodes
+            .iter()
+            .flat_map(|&node| {
+                table[node as usize * d..(node as usize + 1) * d]
+                    .iter()
+                    .copied()
+            })
+            .collect::<Vec<f32>>()
+    };
+    Ok(UptTables {
+        supernode_rows: rows(&graph.supernodes),
+        neighbour_rows: rows(&graph.neighbours),
+        source_table: pick(&source),
+        target_table: pick(&target),
+        query_table,
+        encode_nodes,
+        graph,
+    })
+}
+
+/// `embed.onnx` over points `[n,3]`: source `[n,d]`, target `[n,d]`, query `[n,2h]`.
+fn embed_points(
+    entry: &UptEntry,
+    embed: &[u8],
+    points: &[f32],
+    runtime: &'static Runtime,
+    threads: usize,
+) -> Result<(Vec<f32>, Vec<f32>, Vec<f32>)> {
+    let (d, q) = (entry.dims.encoder, entry.dims.query);
+    let mut stage = Stage::new(
+        runtime,
+        "embed.onnx",
+        embed,
+        &[("positions", &[EMBED_TILE, 3])],
+        &[
+            ("source_table", &[EMBED_TILE, d]),
+            ("target_table", &[EMBED_TILE, d]),
+            ("query_table", &[EMBED_TILE, q]),
+        ],
+        &StageOptions {
+            threads,
+            plan: ProviderPlan::cpu(),
+        },
+    )?;
+    let count = points.len() / 3;
+    let mut tables = [
+        Vec::with_capacity(count * d),
+        Vec::with_capacity(count * d),
+        Vec::with_capacity(count * q),
+    ];
+    for tile in points.chunks(3 * EMBED_TILE) {
+        let input = stage.input(0);
+        input.fill(0.0);
+        input[..tile.len()].copy_from_slice(tile);
+        stage.run()?;
+        for (index, (table, width)) in tables.iter_mut().zip([d, d, q]).enumerate() {
+            table.extend_from_slice(&stage.output(index)[..tile.len() / 3 * width]);
+        }
+    }
+    if let Some(name) = ["source_table", "target_table", "query_table"]
+        .iter()
+        .zip(&tables)
+        .find_map(|(name, table)| table.iter().any(|x| !x.is_finite()).then_some(name))
+    {
+        return Err(Error::bundle(
+            "embed.onnx",
+            format!("output `{name}` holds values that are not finite"),
+        ));
+    }
+    let [source, target, query] = tables;
+    Ok((source, target, query))
+}

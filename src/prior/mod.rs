@@ -1,0 +1,11 @@
+//! The linear-elastic response `L(c)` of the held mesh to prescribed contact displacements
+//! (`prior.safetensors` of `docs/formats.md`), shared by both bundle kinds.
+//!
+//! Contact forces `f = A_CC^-1 c` from the exact compliance `A` between contact degrees of freedom, then the field in
+//! block coordinates `q = sum_i f_i response[i]`, `u_k = U_k q_k`.
+
+mod response;
+mod table;
+
+pub use response::{ContactResponse, SolveReport};
+pub use table::{Numbers, PriorTable};

@@ -1,0 +1,155 @@
+//! The contact solve: collision field -> contact forces -> linear response in block coordinates.
+
+use super::table::{NO_COLUMN, PriorTable};
+use crate::error::{Error, Result};
+use crate::kernels::contact::ContactFactor;
+use crate::kernels::respond::accumulate_rows;
+use crate::kernels::rows::Stored;
+use crate::kernels::{Isa, Pool};
+
+/// Contact nodes for which the factor has room from the start; larger sets allocate once.
+const ROOM: usize = 256;
+
+/// What a solve met.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct SolveReport {
+    /// A contact node has no column of its own: it is held, or outside of the domain.
+    pub outside: bool,
+    /// The contact block was near singular and a Tikhonov term was added.
+    pub regularised: bool,
+    /// The set of columns differs from the last one solved for.
+    pub refactored: bool,
+}
+
+/// Contact forces, and the factor that is kept while the contact nodes stay the same.
+#[derive(Debug)]
+pub struct ContactResponse {
+    factor: ContactFactor,
+    factored: Vec<u32>,
+    regularised: bool,
+    columns: Vec<u32>,
+    rows: Vec<u32>,
+    values: Vec<f32>,
+    forces: Vec<f32>,
+    // By column: sum of imposed displacements, how many, whether the column's own node is among them.
+    sum: Vec<[f32; 3]>,
+    count: Vec<u32>,
+    own: Vec<bool>,
+}
+
+impl ContactResponse {
+    /// Buffers for a table.
+    pub fn new(table: &PriorTable) -> ContactResponse {
+        let columns = table.contact_nodes.len();
+        ContactResponse {
+            factor: ContactFactor::with_capacity(3 * columns.min(ROOM)),
+            factored: Vec::with_capacity(3 * columns),
+            regularised: false,
+            columns: Vec::with_capacity(columns),
+            rows: Vec::with_capacity(3 * columns),
+            values: Vec::with_capacity(3 * columns),
+            forces: Vec::with_capacity(3 * columns),
+            sum: vec![[0.0; 3]; columns],
+            count: vec![0; columns],
+            own: vec![false; columns],
+        }
+    }
+
+    /// Solves for the forces. A node without a column of its own lends its displacement to the nearest column (the
+    /// mean of all that borrow it); a column's own node goes before borrowers; held nodes are left out.
+    pub fn solve(
+        &mut self,
+        isa: Isa,
+        table: &PriorTable,
+        held: &[bool],
+        nodes: &[u32],
+        vectors: &[f32],
+    ) -> Result<SolveReport> {
+        let mut report = SolveReport::default();
+        self.columns.clear();
+        for (&node, c) in nodes.iter().zip(vectors.chunks_exact(3)) {
+            let column = table.nearest_column[node as usize];
+            if held[node as usize] || column == NO_COLUMN {
+                report.outside = true;
+                continue;
+            }
+            let slot = column as usize;
+            let own = table.contact_nodes[slot] == node;
+            report.outside |= !own;
+            if self.count[slot] == 0 {
+                self.columns.push(column);
+            }
+            if self.own[slot] {
+                continue;
+            }
+            if own {
+                self.own[slot] = true;
+                self.sum[slot] = [c[0], c[1], c[2]];
+                self.count[slot] = 1;
+            } else {
+                let sum = &mut self.sum[slot];
+                *sum = [sum[0] + c[0], sum[1] + c[1], sum[2] + c[2]];
+                self.count[slot] += 1;
+            }
+        }
+        self.columns.sort_unstable();
+        self.rows.clear();
+        self.values.clear();
+        for &column in &self.columns {
+            let slot = column as usize;
+            for axis in 0..3 {
+                self.rows.push(3 * column + axis as u32);
+                self.values
+                    .push(self.sum[slot][axis] / self.count[slot] as f32);
+            }
+            self.sum[slot] = [0.0; 3];
+            self.count[slot] = 0;
+            self.own[slot] = false;
+        }
+        if self.rows != self.factored {
+            report.refactored = true;
+            self.factored.clear();
+            self.regularised = false;
+            if !self.rows.is_empty() {
+                let made = self
+                    .factor
+                    .factor(
+                        isa,
+                        &table.compliance,
+                        3 * table.contact_nodes.len(),
+                        &self.rows,
+                    )
+                    .map_err(|error| Error::bundle("prior.safetensors", error.to_string()))?;
+                self.regularised = made.regularised();
+            }
+            self.factored.extend_from_slice(&self.rows);
+        }
+        report.regularised = self.regularised && !self.rows.is_empty();
+        self.forces.clear();
+        self.forces.resize(self.rows.len(), 0.0);
+        if !self.rows.is_empty() {
+            self.factor.solve(isa, &self.values, &mut self.forces);
+        }
+        Ok(report)
+    }
+
+    /// Contact forces of the last solve, mN, three a column.
+    pub fn forces(&self) -> &[f32] {
+        &self.forces
+    }
+
+    /// The field of the last solve in block coordinates, `q = sum_i f_i response[i]`.
+    pub fn field(&self, isa: Isa, pool: &Pool, table: &PriorTable, q: &mut [f32]) -> Result<()> {
+        self.expand(isa, pool, table.response.stored(), q)
+    }
+
+    /// The forces through a table of `[3D,n]`, for instance `force_to_z`.
+    pub fn expand(&self, isa: Isa, pool: &Pool, table: Stored<'_>, out: &mut [f32]) -> Result<()> {
+        if self.rows.is_empty() || out.is_empty() {
+            out.fill(0.0);
+            return Ok(());
+        }
+        accumulate_rows(isa, pool, table, &self.rows, &self.forces, false, out)
+            .map_err(|error| Error::Panic(error.to_string()))
+    }
+}

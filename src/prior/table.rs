@@ -1,0 +1,257 @@
+//! `prior.safetensors`, checked: compliance, block-wise basis, response, residual modes.
+
+use half::f16;
+
+use crate::bundle::{Manifest, Mesh, TensorFile};
+use crate::error::Result;
+use crate::grid::{PointGrid, squared_distance};
+use crate::kernels::rows::{BlockBasis, Stored};
+
+/// Numbers kept at the width in which they are stored.
+#[derive(Debug)]
+pub enum Numbers {
+    /// float32.
+    F32(Vec<f32>),
+    /// float16.
+    F16(Vec<f16>),
+}
+
+impl Numbers {
+    fn read(file: &TensorFile, tensor: &str, shape: &[Option<usize>]) -> Result<Numbers> {
+        Ok(if file.is_f16(tensor) {
+            Numbers::F16(file.f16(tensor, shape)?)
+        } else {
+            Numbers::F32(file.f32(tensor, shape)?)
+        })
+    }
+
+    /// As the kernels take it.
+    pub fn stored(&self) -> Stored<'_> {
+        match self {
+            Numbers::F32(values) => Stored::F32(values),
+            Numbers::F16(values) => Stored::F16(values),
+        }
+    }
+
+    /// Element `index`, widened.
+    pub fn at(&self, index: usize) -> f32 {
+        match self {
+            Numbers::F32(values) => values[index],
+            Numbers::F16(values) => values[index].to_f32(),
+        }
+    }
+
+    fn bytes(&self) -> usize {
+        match self {
+            Numbers::F32(values) => 4 * values.len(),
+            Numbers::F16(values) => 2 * values.len(),
+        }
+    }
+}
+
+/// A node without a column near it.
+pub const NO_COLUMN: u32 = u32::MAX;
+/// How far outside the domain a contact node borrows a column, in typical edges of the domain.
+const REACH: f64 = 4.0;
+
+/// The tables of the linear response.
+#[derive(Debug)]
+pub struct PriorTable {
+    /// Nodes with compliance columns `[D]`, ascending.
+    pub contact_nodes: Vec<u32>,
+    /// Compliance `[3D,3D]`, mm/mN.
+    pub compliance: Vec<f32>,
+    block_nodes: Vec<u32>,
+    block_offsets: Vec<u32>,
+    rank_offsets: Vec<u32>,
+    basis: Numbers,
+    /// Response of a unit force `[3D,Q]`, mm/mN.
+    pub response: Numbers,
+    /// Residual modes `[r,Q]`; empty where the bundle has none.
+    pub residual: Vec<f32>,
+    /// `[3D,r_z]`; empty where the bundle has none.
+    pub force_to_z: Vec<f32>,
+    /// `[3D,r]`; empty where the bundle has none.
+    pub force_to_p: Vec<f32>,
+    /// For each node the column (index into `contact_nodes`) of itself or of the nearest contact node within
+    /// [`REACH`] typical edges of the domain; [`NO_COLUMN`] for nodes farther away.
+    pub nearest_column: Vec<u32>,
+}
+
+impl PriorTable {
+    /// Reads and checks the tables for a mesh.
+    pub fn parse(file: &TensorFile, manifest: &Manifest, mesh: &Mesh) -> Result<PriorTable> {
+        let count = mesh.node_count();
+        let contact_nodes = file.ascending("contact_nodes", count)?;
+        if contact_nodes.is_empty() {
+            return Err(file.bad("contact_nodes", "must not be empty"));
+        }
+        let dofs = 3 * contact_nodes.len();
+        let compliance = file.f32("compliance", &[Some(dofs), Some(dofs)])?;
+        if let Some(at) = (0..dofs).find(|&i| compliance[i * dofs + i] <= 0.0) {
+            return Err(file.bad(
+                "compliance",
+                format!("diagonal element {at} is not positive"),
+            ));
+        }
+        let block_nodes = file.indices("block_nodes", &[Some(count)], count)?;
+        let mut seen = vec![false; count];
+        for (at, &node) in block_nodes.iter().enumerate() {
+            if std::mem::replace(&mut seen[node as usize], true) {
+                return Err(file.bad(
+                    "block_nodes",
+                    format!("element {at}: node {node} is there twice"),
+                ));
+            }
+        }
+        let block_offsets = file.offsets("block_offsets", count)?;
+        if block_offsets.last() != Some(&count) {
+            return Err(file.bad("block_offsets", format!("must end with {count}")));
+        }
+        let rank_offsets = file.offsets("rank_offsets", 1 << 28)?;
+        if rank_offsets.len() != block_offsets.len() {
+            return Err(file.bad(
+                "rank_offsets",
+                format!(
+                    "has {} elements, must have {}",
+                    rank_offsets.len(),
+                    block_offsets.len()
+                ),
+            ));
+        }
+        if let Some(at) = rank_offsets
+            .windows(2)
+            .position(|pair| (pair[1] - pair[0]) % 8 != 0)
+        {
+            return Err(file.bad(
+                "rank_offsets",
+                format!("rank of block {at} is not a multiple of 8"),
+            ));
+        }
+        let width = *rank_offsets.last().unwrap_or(&0);
+        let size: usize = block_offsets
+            .windows(2)
+            .zip(rank_offsets.windows(2))
+            .map(|(nodes, ranks)| 3 * (nodes[1] - nodes[0]) * (ranks[1] - ranks[0]))
+            .sum();
+        let optional = |name: &str, shape: [usize; 2]| {
+            if shape[1] > 0 {
+                file.float(name, &[Some(shape[0]), Some(shape[1])])
+            } else {
+                Ok(Vec::new())
+            }
+        };
+        let (modes, response_modes) = manifest
+            .reduced
+            .as_ref()
+            .map_or((0, 0), |reduced| (reduced.modes, reduced.response_modes));
+        let narrow = |values: Vec<usize>| values.into_iter().map(|value| value as u32).collect();
+        Ok(PriorTable {
+            nearest_column: nearest_columns(mesh, &contact_nodes),
+            contact_nodes,
+            compliance,
+            block_nodes,
+            block_offsets: narrow(block_offsets),
+            rank_offsets: narrow(rank_offsets),
+            basis: Numbers::read(file, "basis", &[Some(size)])?,
+            response: Numbers::read(file, "response", &[Some(dofs), Some(width)])?,
+            residual: if modes > 0 {
+                file.float("residual", &[Some(modes), Some(width)])?
+            } else {
+                Vec::new()
+            },
+            force_to_z: optional("force_to_z", [dofs, response_modes])?,
+            force_to_p: optional("force_to_p", [dofs, modes])?,
+        })
+    }
+
+    /// Length of `q`.
+    pub fn width(&self) -> usize {
+        self.rank_offsets.last().map_or(0, |&width| width as usize)
+    }
+
+    /// The block-wise basis as the kernels take it.
+    pub fn basis(&self) -> BlockBasis<'_> {
+        BlockBasis {
+            block_nodes: &self.block_nodes,
+            block_offsets: &self.block_offsets,
+            rank_offsets: &self.rank_offsets,
+            basis: self.basis.stored(),
+        }
+    }
+
+    /// Column of a node that has one.
+    pub fn column(&self, node: u32) -> Option<u32> {
+        let column = self.nearest_column[node as usize];
+        (column != NO_COLUMN && self.contact_nodes[column as usize] == node).then_some(column)
+    }
+
+    /// `q += U^T u` of a field `[K,3]`: its coordinates in the orthonormal block bases.
+    pub fn project(&self, field: &[f32], q: &mut [f32]) {
+        let mut row = 0;
+        for (block, ranks) in self.rank_offsets.windows(2).enumerate() {
+            let (start, rank) = (ranks[0] as usize, (ranks[1] - ranks[0]) as usize);
+            let q = &mut q[start..start + rank];
+            let nodes = self.block_offsets[block] as usize..self.block_offsets[block + 1] as usize;
+            for &node in &self.block_nodes[nodes] {
+                for &u in &field[3 * node as usize..3 * node as usize + 3] {
+                    match &self.basis {
+                        Numbers::F32(basis) => {
+                            for (q, &phi) in q.iter_mut().zip(&basis[row..row + rank]) {
+                                *q += phi * u;
+                            }
+                        }
+                        Numbers::F16(basis) => {
+                            for (q, phi) in q.iter_mut().zip(&basis[row..row + rank]) {
+                                *q += phi.to_f32() * u;
+                            }
+                        }
+                    }
+                    row += rank;
+                }
+            }
+        }
+    }
+
+    /// Bytes held.
+    pub fn memory_bytes(&self) -> usize {
+        4 * (self.contact_nodes.len()
+            + self.compliance.len()
+            + self.block_nodes.len()
+            + self.block_offsets.len()
+            + self.rank_offsets.len()
+            + self.residual.len()
+            + self.force_to_z.len()
+            + self.force_to_p.len()
+            + self.nearest_column.len())
+            + self.basis.bytes()
+            + self.response.bytes()
+    }
+}
+
+/// For each node the nearest of `contact_nodes` (ties: the smallest index), by a cell grid.
+fn nearest_columns(mesh: &Mesh, contact_nodes: &[u32]) -> Vec<u32> {
+    let grid = PointGrid::new(
+        contact_nodes
+            .iter()
+            .flat_map(|&node| mesh.position(node))
+            .collect(),
+    );
+    let area: f64 = contact_nodes
+        .iter()
+        .map(|&node| mesh.node_area[node as usize] as f64)
+        .sum();
+    let edge = (area / contact_nodes.len() as f64).sqrt();
+    (0..mesh.node_count() as u32)
+        .map(|node| {
+            let p = mesh.position(node);
+            let column = grid.nearest(p);
+            let d2 = squared_distance(p, mesh.position(contact_nodes[column as usize]));
+            if d2.sqrt() <= REACH * edge {
+                column
+            } else {
+                NO_COLUMN
+            }
+        })
+        .collect()
+}
