@@ -10,7 +10,7 @@ from .brain import Anatomy
 from .mesh_file import save
 
 # Lattice spacings, mm, of the three resolutions, chosen for the best elements within the count.
-SPACINGS = {3000: 10.32, 21670: 5.1275, 151201: 2.57}
+SPACINGS = {3000: 10.32, 21670: 5.1275, 151201: 2.575}
 TOLERANCE = 0.01
 
 
