@@ -7,6 +7,7 @@
 
 pub mod aggregate;
 pub mod contact;
+pub mod decoder;
 pub mod encode;
 pub mod flush;
 pub mod isa;

@@ -1,0 +1,113 @@
+//! The micro-kernel: `y [out][nodes] = W x [in][nodes]` with nodes in the lanes.
+//!
+//! `R` outputs by `C` registers of nodes stay in registers while the depth runs by: a step of the
+//! depth is `C` loads, `R` broadcasts and `R C` fused multiply-adds. Each output is one chain of
+//! multiply-adds in the order of the depth, whatever `R` and `C` are.
+
+use super::weights::GROUP;
+use crate::kernels::lanes::Lanes;
+use crate::kernels::math::gelu_lanes;
+
+/// What happens to a sum before it is stored.
+#[derive(Clone, Copy)]
+pub(super) enum Finish {
+    /// `y = s`
+    Plain,
+    /// `y = s * scale`, a factor a node.
+    Scale(*const f32),
+    /// `y = GELU(s + b)`
+    Gelu(*const f32),
+    /// `y = y + (s + b)`
+    Residual(*const f32),
+}
+
+/// `y = finish(W x)`; `panels [groups][depth][8]`, `x [depth][C N]`, `y [8 groups][C N]`.
+///
+/// # Safety
+/// See [`Lanes`]; the pointers hold what the shapes say.
+#[inline(always)]
+pub(super) unsafe fn multiply<V: Lanes, const R: usize, const C: usize>(
+    panels: &[f32],
+    depth: usize,
+    x: *const f32,
+    y: *mut f32,
+    finish: Finish,
+) {
+    let stride = C * V::N;
+    for (group, panel) in panels.chunks_exact(GROUP * depth).enumerate() {
+        for part in (0..GROUP).step_by(R) {
+            // SAFETY: the caller's.
+            unsafe {
+                let mut sum = [[V::splat(0.0); C]; R];
+                let mut weight = panel.as_ptr().add(part);
+                let mut from = x;
+                for _ in 0..depth {
+                    let mut column = [V::splat(0.0); C];
+                    for c in 0..C {
+                        column[c] = V::load(from.add(c * V::N));
+                    }
+                    for r in 0..R {
+                        let w = V::splat(*weight.add(r));
+                        for c in 0..C {
+                            sum[r][c] = column[c].mul_add(w, sum[r][c]);
+                        }
+                    }
+                    weight = weight.add(GROUP);
+                    from = from.add(stride);
+                }
+                let row = group * GROUP + part;
+                store::<V, R, C>(sum, y.add(row * stride), row, finish);
+            }
+        }
+    }
+}
+
+/// Stores `R` rows of sums; `row` is the first one's index in the layer's outputs.
+///
+/// # Safety
+/// As [`multiply`].
+#[inline(always)]
+pub(super) unsafe fn store<V: Lanes, const R: usize, const C: usize>(
+    sum: [[V; C]; R],
+    y: *mut f32,
+    row: usize,
+    finish: Finish,
+) {
+    // SAFETY: the caller's.
+    unsafe {
+        match finish {
+            Finish::Plain => {
+                for r in 0..R {
+                    for c in 0..C {
+                        sum[r][c].store(y.add((r * C + c) * V::N));
+                    }
+                }
+            }
+            Finish::Scale(scale) => {
+                for r in 0..R {
+                    for c in 0..C {
+                        let scale = V::load(scale.add(c * V::N));
+                        sum[r][c].mul(scale).store(y.add((r * C + c) * V::N));
+                    }
+                }
+            }
+            Finish::Gelu(bias) => {
+                for r in 0..R {
+                    let bias = V::splat(*bias.add(row + r));
+                    for c in 0..C {
+                        gelu_lanes(sum[r][c].add(bias)).store(y.add((r * C + c) * V::N));
+                    }
+                }
+            }
+            Finish::Residual(bias) => {
+                for r in 0..R {
+                    let bias = V::splat(*bias.add(row + r));
+                    for c in 0..C {
+                        let to = y.add((r * C + c) * V::N);
+                        V::load(to).add(sum[r][c].add(bias)).store(to);
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,230 @@
+use super::*;
+use crate::kernels::random::{Random, max_error};
+
+struct Case {
+    decoder: PackedDecoder,
+    tokens: DecoderTokens,
+    queries: Vec<f32>,
+    nodes: usize,
+}
+
+fn case(h: usize, heads: usize, tokens: usize, mlp: usize, nodes: usize) -> Case {
+    let mut random = Random::new((h + tokens) as u64);
+    let mut matrix = |o: usize, d: usize| {
+        let weight = random.normal(o * d, 1.0 / (d as f32).sqrt());
+        (weight, random.normal(o, 0.3))
+    };
+    let (o, m1, m2, head) = (matrix(h, h), matrix(mlp, h), matrix(h, mlp), matrix(3, h));
+    let norm = |mut t: (Vec<f32>, Vec<f32>)| {
+        t.0.iter_mut().for_each(|x| *x = 1.0 + 0.2 * *x);
+        t
+    };
+    let (n2, n3) = (norm(matrix(h, 1)), norm(matrix(h, 1)));
+    let decoder = PackedDecoder::new(&DecoderWeights {
+        hidden: h,
+        heads,
+        mlp,
+        attention_out: (&o.0, &o.1),
+        norm2: (&n2.0, &n2.1),
+        mlp1: (&m1.0, &m1.1),
+        mlp2: (&m2.0, &m2.1),
+        norm3: (&n3.0, &n3.1),
+        head: (&head.0, &head.1),
+    })
+    .unwrap();
+    let mut packed = DecoderTokens::new(&decoder, tokens);
+    let (keys, values) = (
+        random.normal(tokens * h, 1.5),
+        random.normal(tokens * h, 1.0),
+    );
+    packed.set(DecoderPrecision::Bf16, &keys, &values);
+    Case {
+        decoder,
+        tokens: packed,
+        queries: random.normal(nodes * 2 * h, 1.0),
+        nodes,
+    }
+}
+
+fn run(
+    case: &Case,
+    isa: Isa,
+    threads: usize,
+    precision: DecoderPrecision,
+    rows: DecoderRows<'_>,
+) -> Vec<f32> {
+    let count = match rows {
+        DecoderRows::Compact(rows) => rows.len(),
+        _ => case.nodes,
+    };
+    let mut out = vec![f32::NAN; 3 * count];
+    let pool = Pool::new(threads).unwrap();
+    let mut scratch = DecoderScratch::new(&case.decoder, case.tokens.len(), threads);
+    decode(
+        isa,
+        &pool,
+        precision,
+        &case.decoder,
+        &case.tokens,
+        &case.queries,
+        rows,
+        &mut scratch,
+        &mut out,
+    )
+    .unwrap();
+    out
+}
+
+const SHAPES: [(usize, usize, usize, usize); 5] = [
+    (64, 2, 64, 128),
+    (128, 4, 256, 256),
+    (32, 1, 32, 32),
+    (24, 2, 13, 50),
+    (20, 5, 7, 9),
+];
+
+#[test]
+fn every_isa_matches_scalar() {
+    for (h, heads, tokens, mlp) in SHAPES {
+        let case = case(h, heads, tokens, mlp, 131);
+        let want = run(
+            &case,
+            Isa::Scalar,
+            1,
+            DecoderPrecision::F32,
+            DecoderRows::All,
+        );
+        for isa in Isa::available() {
+            let got = run(&case, isa, 1, DecoderPrecision::F32, DecoderRows::All);
+            let error = max_error(&want, &got);
+            println!("h {h} L {tokens} {}: {error:.1e}", isa.name());
+            assert!(error < 1e-5, "h {h} {}: {error:e}", isa.name());
+        }
+    }
+}
+
+#[test]
+fn the_scalar_reference_matches_the_definition_in_f64() {
+    // One head, one token: attention is the value, so the formula is short enough to restate.
+    let case = case(8, 1, 1, 4, 3);
+    let got = run(
+        &case,
+        Isa::Scalar,
+        1,
+        DecoderPrecision::F32,
+        DecoderRows::All,
+    );
+    let d = &case.decoder;
+    let linear = |l: &weights::Linear, x: &[f64]| -> Vec<f64> {
+        (0..l.plain.len() / l.depth)
+            .map(|o| {
+                let row = l.plain[o * l.depth..][..l.depth].iter();
+                row.zip(x).map(|(w, x)| f64::from(*w) * x).sum::<f64>() + f64::from(l.bias[o])
+            })
+            .collect()
+    };
+    let norm = |x: &[f64]| -> Vec<f64> {
+        let mean = x.iter().sum::<f64>() / x.len() as f64;
+        let var = x.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / x.len() as f64;
+        x.iter().map(|x| (x - mean) / (var + 1e-6).sqrt()).collect()
+    };
+    let value: Vec<f64> = case.tokens.values.iter().map(|&v| f64::from(v)).collect();
+    let attended = linear(&d.attention_out, &value);
+    for node in 0..3 {
+        let x = &case.queries[node * 16..][..8];
+        let y: Vec<f64> = x
+            .iter()
+            .zip(&attended)
+            .map(|(x, a)| f64::from(*x) + a)
+            .collect();
+        let mut hidden = linear(&d.mlp1, &norm(&y));
+        for x in &mut hidden {
+            *x = 0.5 * *x * (1.0 + libm::erf(*x / 2f64.sqrt()));
+        }
+        let added = linear(&d.mlp2, &hidden);
+        let y: Vec<f64> = y.iter().zip(&added).map(|(a, b)| a + b).collect();
+        for (want, got) in linear(&d.head, &norm(&y)).iter().zip(&got[3 * node..]) {
+            assert!((want - f64::from(*got)).abs() < 2e-6, "{want} {got}");
+        }
+    }
+}
+
+#[test]
+fn threads_and_regions_do_not_change_a_bit() {
+    for (h, heads, tokens, mlp) in [SHAPES[0], SHAPES[3]] {
+        let case = case(h, heads, tokens, mlp, 400);
+        let mut random = Random::new(77);
+        let mut rows: Vec<u32> = (0..400).collect();
+        for i in 0..123 {
+            let j = i + random.below(400 - i);
+            rows.swap(i, j);
+        }
+        rows.truncate(123);
+        for precision in [DecoderPrecision::F32, DecoderPrecision::Bf16] {
+            for isa in Isa::available() {
+                let full = run(&case, isa, 1, precision, DecoderRows::All);
+                assert_eq!(full, run(&case, isa, 2, precision, DecoderRows::All));
+                assert_eq!(full, run(&case, isa, 4, precision, DecoderRows::All));
+                let compact = run(&case, isa, 2, precision, DecoderRows::Compact(&rows));
+                let scatter = run(&case, isa, 2, precision, DecoderRows::Scatter(&rows));
+                for (i, &row) in rows.iter().enumerate() {
+                    let want = &full[3 * row as usize..][..3];
+                    assert_eq!(want, &compact[3 * i..][..3]);
+                    assert_eq!(want, &scatter[3 * row as usize..][..3]);
+                }
+                assert_eq!(
+                    scatter.iter().filter(|x| x.is_nan()).count(),
+                    3 * (400 - 123)
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn bf16_stays_near_f32() {
+    let isa = Isa::Avx512;
+    if !Isa::has_bf16() {
+        return;
+    }
+    for (h, heads, tokens, mlp) in SHAPES {
+        let case = case(h, heads, tokens, mlp, 100);
+        let want = run(&case, isa, 1, DecoderPrecision::F32, DecoderRows::All);
+        let got = run(&case, isa, 1, DecoderPrecision::Bf16, DecoderRows::All);
+        let size = want.iter().map(|x| x.abs()).fold(0.0, f32::max);
+        let error = max_error(&want, &got) / size;
+        println!("bf16 h {h} L {tokens}: {error:.1e} of the largest output");
+        assert!(error > 0.0 && error < 2e-2, "h {h}: {error:e}");
+    }
+}
+
+#[test]
+fn nonsense_in_a_query_stays_in_its_node() {
+    for isa in Isa::available() {
+        let mut case = case(64, 2, 64, 128, 60);
+        let clean = run(&case, isa, 1, DecoderPrecision::F32, DecoderRows::All);
+        case.queries[7 * 128 + 100] = f32::NAN;
+        let got = run(&case, isa, 1, DecoderPrecision::F32, DecoderRows::All);
+        assert!(got[21..24].iter().all(|x| x.is_nan()), "{}", isa.name());
+        assert_eq!(clean[..21], got[..21]);
+        assert_eq!(clean[24..], got[24..]);
+    }
+}
+
+#[test]
+fn a_wrong_shape_is_named() {
+    let (square, wide, h) = (vec![0.0; 64], vec![0.0; 24], vec![0.0; 8]);
+    let result = PackedDecoder::new(&DecoderWeights {
+        hidden: 8,
+        heads: 2,
+        mlp: 4,
+        attention_out: (&square, &h),
+        norm2: (&h, &h),
+        mlp1: (&wide, &h[..4]),
+        mlp2: (&square[..32], &h),
+        norm3: (&h, &h),
+        head: (&wide, &h[..3]),
+    });
+    let message = result.err().unwrap();
+    assert!(message.contains("decoder.mlp1 has 24 weights"), "{message}");
+}

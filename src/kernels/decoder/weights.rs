@@ -1,0 +1,278 @@
+//! The decoder's weights as the micro-kernels read them: packed once a model
+//! ([`PackedDecoder`]), keys and values once a step ([`DecoderTokens`]).
+//!
+//! A packed matrix `[out,in]` is groups of eight outputs, `[out/8][in][8]`, zeros behind the last
+//! output. The affine parts of LN_2 and LN_3 are folded into `W_1` and `W_3`; the attention's
+//! `1/sqrt(h/heads)` and the `log2 e` of its exponential are folded into the keys.
+
+use half::bf16;
+
+/// Outputs a group.
+pub(super) const GROUP: usize = 8;
+
+/// The decoder's tensors as stored in `weights.safetensors`; matrices `[out,in]` row-major.
+#[derive(Debug, Clone, Copy)]
+pub struct DecoderWeights<'a> {
+    /// `h`.
+    pub hidden: usize,
+    /// Attention heads; divides `h`.
+    pub heads: usize,
+    /// `m`.
+    pub mlp: usize,
+    /// `decoder.attention_out.weight [h,h]`, `.bias [h]`.
+    pub attention_out: (&'a [f32], &'a [f32]),
+    /// `decoder.norm2.weight [h]`, `.bias [h]`.
+    pub norm2: (&'a [f32], &'a [f32]),
+    /// `decoder.mlp1.weight [m,h]`, `.bias [m]`.
+    pub mlp1: (&'a [f32], &'a [f32]),
+    /// `decoder.mlp2.weight [h,m]`, `.bias [h]`.
+    pub mlp2: (&'a [f32], &'a [f32]),
+    /// `decoder.norm3.weight [h]`, `.bias [h]`.
+    pub norm3: (&'a [f32], &'a [f32]),
+    /// `decoder.head.weight [3,h]`, `.bias [3]`.
+    pub head: (&'a [f32], &'a [f32]),
+}
+
+/// `W x + b` ready for the micro-kernel.
+#[derive(Debug, Default)]
+pub(super) struct Linear {
+    pub depth: usize,
+    /// `[out,in]`, for the scalar reference.
+    pub plain: Vec<f32>,
+    /// `[out/8][in][8]`.
+    pub panels: Vec<f32>,
+    /// `[out/8][in/2][8][2]`, for bf16.
+    pub pairs: Vec<bf16>,
+    /// `[out]`, zeros up to a multiple of 8.
+    pub bias: Vec<f32>,
+}
+
+impl Linear {
+    fn new(outputs: usize, depth: usize, weight: Vec<f32>, bias: Vec<f32>) -> Self {
+        let mut linear = Self {
+            depth,
+            bias,
+            ..Self::default()
+        };
+        linear.bias.resize(outputs.next_multiple_of(GROUP), 0.0);
+        linear.panels.resize(panel_floats(outputs, depth), 0.0);
+        linear.pairs.resize(pair_count(outputs, depth), bf16::ZERO);
+        pack(&mut linear.panels, outputs, depth, |o, k| {
+            weight[o * depth + k]
+        });
+        pack_pairs(&mut linear.pairs, outputs, depth, |o, k| {
+            weight[o * depth + k]
+        });
+        linear.plain = weight;
+        linear
+    }
+
+    /// `W LN(y) + b` where `LN` has a scale and a shift, as a layer on the plain normalised `y`.
+    fn after_norm(outputs: usize, depth: usize, layer: Tensors<'_>, norm: Tensors<'_>) -> Self {
+        let (mut weight, mut bias) = (layer.0.to_vec(), layer.1.to_vec());
+        for o in 0..outputs {
+            let row = &mut weight[o * depth..][..depth];
+            let shift: f64 = row
+                .iter()
+                .zip(norm.1)
+                .map(|(w, b)| f64::from(*w) * f64::from(*b))
+                .sum();
+            bias[o] += shift as f32;
+            row.iter_mut().zip(norm.0).for_each(|(w, g)| *w *= g);
+        }
+        Self::new(outputs, depth, weight, bias)
+    }
+}
+
+type Tensors<'a> = (&'a [f32], &'a [f32]);
+
+pub(super) fn panel_floats(outputs: usize, depth: usize) -> usize {
+    outputs.next_multiple_of(GROUP) * depth
+}
+
+pub(super) fn pair_count(outputs: usize, depth: usize) -> usize {
+    outputs.next_multiple_of(GROUP) * depth.next_multiple_of(2)
+}
+
+fn pack(panels: &mut [f32], outputs: usize, depth: usize, weight: impl Fn(usize, usize) -> f32) {
+    for (group, panel) in panels.chunks_exact_mut(GROUP * depth).enumerate() {
+        for (k, eight) in panel.chunks_exact_mut(GROUP).enumerate() {
+            for (r, x) in eight.iter_mut().enumerate() {
+                let o = group * GROUP + r;
+                *x = if o < outputs { weight(o, k) } else { 0.0 };
+            }
+        }
+    }
+}
+
+fn pack_pairs(
+    pairs: &mut [bf16],
+    outputs: usize,
+    depth: usize,
+    weight: impl Fn(usize, usize) -> f32,
+) {
+    let even = depth.next_multiple_of(2);
+    for (group, panel) in pairs.chunks_exact_mut(GROUP * even).enumerate() {
+        for (k2, sixteen) in panel.chunks_exact_mut(2 * GROUP).enumerate() {
+            for (i, x) in sixteen.iter_mut().enumerate() {
+                let (o, k) = (group * GROUP + i / 2, 2 * k2 + i % 2);
+                *x = if o < outputs && k < depth {
+                    bf16::from_f32(weight(o, k))
+                } else {
+                    bf16::ZERO
+                };
+            }
+        }
+    }
+}
+
+/// The decoder of a model, packed. Immutable; shared by scenes and threads.
+#[derive(Debug)]
+pub struct PackedDecoder {
+    pub(super) hidden: usize,
+    pub(super) heads: usize,
+    pub(super) mlp: usize,
+    pub(super) attention_out: Linear,
+    pub(super) mlp1: Linear,
+    pub(super) mlp2: Linear,
+    pub(super) head: Linear,
+}
+
+impl PackedDecoder {
+    /// Packs a model's decoder.
+    ///
+    /// # Errors
+    /// A sentence naming the tensor whose length does not fit, for the bundle's loader.
+    pub fn new(w: &DecoderWeights<'_>) -> Result<Self, String> {
+        let (h, m) = (w.hidden, w.mlp);
+        if h == 0 || w.heads == 0 || !h.is_multiple_of(w.heads) {
+            return Err(format!(
+                "decoder width {h} is not a multiple of {} heads",
+                w.heads
+            ));
+        }
+        for (name, tensors, outputs, depth) in [
+            ("attention_out", w.attention_out, h, h),
+            ("norm2", w.norm2, h, 1),
+            ("mlp1", w.mlp1, m, h),
+            ("mlp2", w.mlp2, h, m),
+            ("norm3", w.norm3, h, 1),
+            ("head", w.head, 3, h),
+        ] {
+            if tensors.0.len() != outputs * depth || tensors.1.len() != outputs {
+                return Err(format!(
+                    "decoder.{name} has {} weights and {} biases, not {} and {outputs}",
+                    tensors.0.len(),
+                    tensors.1.len(),
+                    outputs * depth
+                ));
+            }
+        }
+        let plain = |t: Tensors<'_>, o, d| Linear::new(o, d, t.0.to_vec(), t.1.to_vec());
+        Ok(Self {
+            hidden: h,
+            heads: w.heads,
+            mlp: m,
+            attention_out: plain(w.attention_out, h, h),
+            mlp1: Linear::after_norm(m, h, w.mlp1, w.norm2),
+            mlp2: plain(w.mlp2, h, m),
+            head: Linear::after_norm(3, h, w.head, w.norm3),
+        })
+    }
+
+    /// `h`.
+    pub fn hidden(&self) -> usize {
+        self.hidden
+    }
+
+    /// Multiplications and additions of one node, two a multiply-add.
+    pub fn flops(&self, tokens: usize) -> usize {
+        let h = self.hidden;
+        2 * (2 * h * tokens + h * h + 2 * h * self.mlp + 3 * h)
+    }
+}
+
+/// One step's keys and values, packed. Made once ([`DecoderTokens::new`]), filled each step
+/// without allocation ([`DecoderTokens::set`]).
+#[derive(Debug)]
+pub struct DecoderTokens {
+    tokens: usize,
+    hidden: usize,
+    heads: usize,
+    /// Scaled keys `[L,h]`, for the scalar reference.
+    pub(super) keys: Vec<f32>,
+    /// `[L,h]`.
+    pub(super) values: Vec<f32>,
+    /// A head after another: `[L, h/heads]` as panels.
+    pub(super) key_panels: Vec<f32>,
+    /// A head after another: `[h/heads, L]` as panels.
+    pub(super) value_panels: Vec<f32>,
+    pub(super) key_pairs: Vec<bf16>,
+    pub(super) value_pairs: Vec<bf16>,
+}
+
+impl DecoderTokens {
+    /// Room for `tokens = L` latent tokens; zeros until [`DecoderTokens::set`].
+    pub fn new(decoder: &PackedDecoder, tokens: usize) -> Self {
+        let (h, heads) = (decoder.hidden, decoder.heads);
+        let width = h / heads;
+        Self {
+            tokens,
+            hidden: h,
+            heads,
+            keys: vec![0.0; tokens * h],
+            values: vec![0.0; tokens * h],
+            key_panels: vec![0.0; heads * panel_floats(tokens, width)],
+            value_panels: vec![0.0; heads * panel_floats(width, tokens)],
+            key_pairs: vec![bf16::ZERO; heads * pair_count(tokens, width)],
+            value_pairs: vec![bf16::ZERO; heads * pair_count(width, tokens)],
+        }
+    }
+
+    /// Takes a step's `keys [L,h]` and `values [L,h]`, the outputs of `latent.onnx`.
+    ///
+    /// # Panics
+    /// If they have another length.
+    pub fn set(&mut self, precision: super::DecoderPrecision, keys: &[f32], values: &[f32]) {
+        let (h, tokens, width) = (self.hidden, self.tokens, self.hidden / self.heads);
+        assert_eq!(keys.len(), tokens * h, "keys must be [L, h]");
+        assert_eq!(values.len(), tokens * h, "values must be [L, h]");
+        let scale = std::f32::consts::LOG2_E / (width as f32).sqrt();
+        for (to, from) in self.keys.iter_mut().zip(keys) {
+            *to = from * scale;
+        }
+        self.values.copy_from_slice(values);
+        for head in 0..self.heads {
+            let column = head * width;
+            let key = |l: usize, k: usize| self.keys[l * h + column + k];
+            let value = |o: usize, l: usize| values[l * h + column + o];
+            let (k, v) = (panel_floats(tokens, width), panel_floats(width, tokens));
+            pack(&mut self.key_panels[head * k..][..k], tokens, width, key);
+            pack(
+                &mut self.value_panels[head * v..][..v],
+                width,
+                tokens,
+                value,
+            );
+            if precision == super::DecoderPrecision::Bf16 {
+                let (k, v) = (pair_count(tokens, width), pair_count(width, tokens));
+                pack_pairs(&mut self.key_pairs[head * k..][..k], tokens, width, key);
+                pack_pairs(&mut self.value_pairs[head * v..][..v], width, tokens, value);
+            }
+        }
+    }
+
+    /// `L`.
+    pub fn len(&self) -> usize {
+        self.tokens
+    }
+
+    /// Whether there are no tokens.
+    pub fn is_empty(&self) -> bool {
+        self.tokens == 0
+    }
+
+    pub(super) fn hidden(&self) -> usize {
+        self.hidden
+    }
+}
