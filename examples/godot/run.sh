@@ -1,0 +1,89 @@
+#!/usr/bin/env bash
+# Builds the extension and runs the brain in Godot 4: headless with assertions, then in a window under Xvfb for a screenshot.
+# Godot: GODOT in the environment, else fetched beside (fetch_godot.sh).
+# Environment (cargo xtask test sets it): UPT_ROOT, UPT_LIB_DIR, UPT_INCLUDE_DIR, UPT_BUNDLES, UPT_BUILD_DIR, ORT_DYLIB_PATH.
+# Last line: "N passed, N failed, N skipped".
+set -euo pipefail
+
+root=${UPT_ROOT:-$(cd "$(dirname "$0")/../.." && pwd)}
+libraries=${UPT_LIB_DIR:-$root/target/release}
+include=${UPT_INCLUDE_DIR:-$root/include}
+bundles=${UPT_BUNDLES:-$root/onnx}
+build=${UPT_BUILD_DIR:-$root/target}/godot
+export ORT_DYLIB_PATH=${ORT_DYLIB_PATH:-$root/target/ort/libonnxruntime.so}
+here=$root/examples/godot
+
+bundle=
+for name in "${UPT_BUNDLE:-}" "$bundles/brain-reduced" "$bundles/brain-fast" "$bundles/brain-coarse"; do
+  if [ -n "$name" ] && [ -f "$name/bundle.json" ]; then bundle=$name; break; fi
+done
+[ -n "$bundle" ] || { echo "no bundle in $bundles" >&2; exit 1; }
+
+mkdir -p "$build"
+if ! godot=$("$here/fetch_godot.sh" "$build/engine"); then
+  if [ "${CI:-}" = true ]; then
+    echo "Godot could not be fetched, and CI does not skip it"
+    echo "0 passed, 1 failed, 0 skipped"
+    exit 1
+  fi
+  echo "skipped: no Godot 4 (set GODOT to the path of 4.3 or newer)"
+  echo "0 passed, 0 failed, 1 skipped"
+  exit 0
+fi
+echo "Godot $("$godot" --version | tail -n 1), bundle $(basename "$bundle")"
+
+project=$build/project
+rm -rf "$project"
+mkdir -p "$project/bin"
+cp "$here"/project.godot "$here"/upt.gdextension "$here"/main.tscn "$here"/pushed_brain.gd "$project/"
+(cd "$build" && "$godot" --headless --dump-gdextension-interface >/dev/null 2>&1)
+cc -std=c11 -O2 -Wall -Wextra -Werror -fPIC -shared -fvisibility=hidden -I"$build" -I"$include" "$here"/*.c \
+  -o "$project/bin/libupt_godot.so" -L"$libraries" -lupt -Wl,-rpath,"$libraries"
+# The editor's first scan writes the list of extensions.
+mkdir -p "$project/.godot"
+echo "res://upt.gdextension" >"$project/.godot/extension_list.cfg"
+
+passed=0
+failed=0
+check() { # name command...
+  local name=$1
+  shift
+  if timeout 300 "$@" >"$build/$name.log" 2>&1 && grep -q '^OK ' "$build/$name.log"; then
+    passed=$((passed + 1))
+    echo "$name: $(grep '^OK ' "$build/$name.log")"
+  else
+    failed=$((failed + 1))
+    echo "$name FAILED:"
+    tail -n 30 "$build/$name.log"
+  fi
+}
+check headless "$godot" --headless --path "$project" --fixed-fps 60 -- --bundle="$bundle" --frames=60 --check
+
+# A bundle that is not there: a message, exit code 1, no crash.
+status=0
+"$godot" --headless --path "$project" --fixed-fps 60 -- --bundle="$build/no-such-bundle" --frames=3 >"$build/missing.log" 2>&1 || status=$?
+if [ "$status" -eq 1 ] && grep -q "FAILED could not open the bundle" "$build/missing.log"; then
+  passed=$((passed + 1))
+else
+  failed=$((failed + 1))
+  echo "missing bundle: exit code $status"
+  tail -n 20 "$build/missing.log"
+fi
+
+if command -v Xvfb >/dev/null; then
+  rm -f "$build/brain.png"
+  check window xvfb-run -a -s "-screen 0 1024x768x24" "$godot" --path "$project" --rendering-method gl_compatibility \
+    --rendering-driver opengl3 --audio-driver Dummy --fixed-fps 60 -- --bundle="$bundle" --frames=42 --screenshot="$build/brain.png" --check
+  if [ -s "$build/brain.png" ]; then
+    passed=$((passed + 1))
+    echo "screenshot: $build/brain.png"
+  else
+    failed=$((failed + 1))
+    echo "no screenshot was written"
+  fi
+  echo "$passed passed, $failed failed, 0 skipped"
+else
+  echo "skipped: window test, Xvfb is missing (apt-get install xvfb)"
+  echo "$passed passed, $failed failed, 1 skipped"
+fi
+[ "$failed" -eq 0 ]
