@@ -5,6 +5,9 @@
 //! from a [`Pool`]. All results have the same bits for any thread count, and any subset of rows
 //! gives the bits that the whole set gives (on one `Isa`; different sets differ in rounding).
 
+// Register tiles are small arrays walked by index, several of them at once.
+#![allow(clippy::needless_range_loop)]
+
 pub mod aggregate;
 pub mod contact;
 pub mod decoder;
@@ -14,8 +17,8 @@ pub mod isa;
 mod lanes;
 mod math;
 pub mod pool;
-#[cfg(test)]
-pub(crate) mod random;
+#[doc(hidden)]
+pub mod random;
 pub mod respond;
 pub mod rows;
 

@@ -10,6 +10,7 @@
 
 mod bf16;
 mod gemm;
+pub mod probe;
 mod scalar;
 mod tile;
 mod weights;
@@ -50,7 +51,7 @@ pub struct DecoderScratch {
 /// Sixteen f32 on a cache line of their own.
 #[repr(align(64))]
 #[derive(Debug, Clone, Copy)]
-pub(super) struct CacheLine(#[allow(dead_code)] [f32; 16]);
+pub(super) struct CacheLine(pub(super) [f32; 16]);
 
 impl DecoderScratch {
     /// Room for `threads` workers on tiles of any instruction set.

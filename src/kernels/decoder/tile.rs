@@ -14,7 +14,7 @@ pub(super) const MAX_NODES: usize = 64;
 pub(super) fn nodes(isa: Isa) -> usize {
     match isa {
         Isa::Avx512 => 48,
-        Isa::Avx2 => 24,
+        Isa::Avx2 => 16,
         Isa::Neon => 8,
         Isa::Scalar => 16,
     }
@@ -88,7 +88,7 @@ unsafe fn body<V: Lanes>(
     unsafe {
         match V::N {
             16 => layers::<V, 8, 3>(decoder, tokens, queries, rows, scratch, out),
-            8 => layers::<V, 4, 3>(decoder, tokens, queries, rows, scratch, out),
+            8 => layers::<V, 4, 2>(decoder, tokens, queries, rows, scratch, out),
             _ => layers::<V, 8, 2>(decoder, tokens, queries, rows, scratch, out),
         }
     }
