@@ -51,7 +51,7 @@ def build_block_basis(
     forces: np.ndarray,
     modes: np.ndarray,
     amplitudes: np.ndarray,
-    tolerance_mm: float = 2e-3,
+    tolerance_mm: float = 3e-3,
     size: int = 256,
     max_rank: int = 256,
     progress: Callable[[int, int], None] = lambda done, total: None,

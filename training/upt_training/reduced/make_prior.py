@@ -30,14 +30,14 @@ def block_basis_of(
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> tuple[BlockBasis, dict]:
     """Block basis for sampled patches and for `modes [r, 3K]` with their `amplitudes [r]` (mm)."""
-    forces = sample_forces(mesh, columns, max(512, 3 * len(columns.contact_nodes) // 2))
+    forces = sample_forces(mesh, columns, max(1024, 3 * len(columns.contact_nodes)))
     return build_block_basis(mesh, columns, forces, modes, amplitudes, tolerance_mm, progress=progress)
 
 
 def make_prior(
     mesh: Mesh,
     columns: Columns,
-    tolerance_mm: float = 2e-3,
+    tolerance_mm: float = 3e-3,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> tuple[Prior, dict]:
     """A prior of the linear response alone, and the size and error of its block basis."""

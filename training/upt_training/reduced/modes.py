@@ -1,0 +1,77 @@
+"""Residual modes: the leading right singular vectors of `R = u - L(c)` over training frames (proper orthogonal decomposition).
+
+The SVD is randomised (Halko, Martinsson and Tropp 2011): two products with the sampled frames per power iteration.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from upt_training.reduced.columns import Columns
+from upt_training.reduced.trajectories import Case
+
+
+@dataclass
+class Modes:
+    """Orthonormal rows: residual modes `[r, 3K]` and response modes `[r_z, 3K]`; amplitudes are RMS over frames, mm."""
+
+    residual: np.ndarray
+    residual_amplitudes: np.ndarray
+    response: np.ndarray
+    response_amplitudes: np.ndarray
+
+
+def linear_fields(columns: Columns, forces: np.ndarray) -> np.ndarray:
+    """`L = forces @ columns` over the touched degrees of freedom only, `[n, 3K]` float32, mm."""
+    touched = np.flatnonzero(np.any(forces != 0.0, axis=0))
+    if not len(touched):
+        return np.zeros((len(forces), columns.columns.shape[1]), np.float32)
+    return forces[:, touched].astype(np.float32) @ columns.columns[touched]
+
+
+def leading_modes(frames: np.ndarray, count: int, seed: int = 3, iterations: int = 2) -> tuple[np.ndarray, np.ndarray]:
+    """Leading right singular vectors `[count, 3K]` and singular values over `sqrt(n)` of `frames [n, 3K]`."""
+    width = min(count + 16, *frames.shape)
+    rng = np.random.default_rng(seed)
+    sketch = frames @ rng.standard_normal((frames.shape[1], width)).astype(np.float32)
+    for _ in range(iterations):
+        sketch, _ = np.linalg.qr(sketch)
+        back, _ = np.linalg.qr(frames.T @ sketch)
+        sketch = frames @ back
+    left, _ = np.linalg.qr(sketch)
+    small = left.T @ frames
+    _, values, vectors = np.linalg.svd(small, full_matrices=False)
+    count = min(count, len(values))
+    return np.ascontiguousarray(vectors[:count]), values[:count] / np.sqrt(len(frames))
+
+
+def learn_modes(
+    columns: Columns,
+    cases: list[Case],
+    residual_count: int,
+    response_count: int,
+    memory_gib: float = 1.5,
+    seed: int = 1,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> Modes:
+    """Modes of frames drawn at random from every case; two sets of sampled frames stay within `memory_gib` each."""
+    rng = np.random.default_rng(seed)
+    width = columns.columns.shape[1]
+    share = int(memory_gib * 2**30 / (4 * width * max(len(cases), 1)))
+    share = max(1, min(share, 48, *(case.frames - 1 for case in cases)))
+    residual = np.zeros((share * len(cases), width), np.float32)
+    response = np.zeros((share * len(cases), width), np.float32)
+    for index, case in enumerate(cases):
+        picked = np.sort(rng.choice(np.arange(1, case.frames), share, replace=False))
+        linear = linear_fields(columns, case.forces(columns)[picked])
+        rows = slice(index * share, (index + 1) * share)
+        response[rows] = linear
+        residual[rows] = np.asarray(case.displacement[picked], np.float32).reshape(share, -1) - linear
+        progress(index + 1, len(cases))
+    phi, phi_amplitude = leading_modes(residual, residual_count)
+    del residual
+    psi, psi_amplitude = leading_modes(response, response_count)
+    return Modes(phi, phi_amplitude, psi, psi_amplitude)

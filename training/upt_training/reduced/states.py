@@ -1,0 +1,107 @@
+"""Trajectories in reduced coordinates: what training and most of the evaluation need, a few MB instead of GB.
+
+Per frame: `b = Phi^T (u - L)`, `z = Psi^T L`, `p = Phi^T L`, contact flags, and norms that turn errors of `b` into the
+mean squared error of the field: `|u - u'|^2 = |R|^2 - |b|^2 + |b - b'|^2`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import numpy as np
+
+from upt_training.reduced.columns import Columns
+from upt_training.reduced.modes import Modes, linear_fields
+from upt_training.reduced.trajectories import Case
+
+
+@dataclass
+class States:
+    """Arrays over `[cases, frames]`; lengths in mm."""
+
+    b: np.ndarray
+    z: np.ndarray
+    p: np.ndarray
+    contact: np.ndarray
+    changed: np.ndarray
+    push: np.ndarray
+    response_norm: np.ndarray
+    response_jump: np.ndarray
+    residual_square: np.ndarray
+    field_square: np.ndarray
+    scheme: np.ndarray
+    split: np.ndarray
+    file: np.ndarray
+    nodes: np.ndarray
+
+    @property
+    def cases(self) -> int:
+        return len(self.b)
+
+    @property
+    def frames(self) -> int:
+        return self.b.shape[1]
+
+    @property
+    def modes(self) -> int:
+        return self.b.shape[2]
+
+    def pick(self, mask: np.ndarray) -> States:
+        """The cases where `mask` holds."""
+        return States(**{f.name: getattr(self, f.name)[mask] if f.name != "nodes" else self.nodes for f in fields(self)})
+
+    def save(self, path: Path) -> None:
+        temporary = path.with_suffix(".partial.npz")
+        np.savez(temporary, **{f.name: getattr(self, f.name) for f in fields(self)})
+        temporary.rename(path)
+
+
+def load_states(path: Path) -> States:
+    with np.load(path, allow_pickle=False) as file:
+        return States(**{name: file[name] for name in file.files})
+
+
+def join_states(parts: list[States]) -> States:
+    """Datasets of the same mesh and modes behind one another (shorter ones are refused by numpy)."""
+    joined = {f.name: np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(States) if f.name != "nodes"}
+    return States(**joined, nodes=parts[0].nodes)
+
+
+def project_cases(
+    columns: Columns,
+    modes: Modes,
+    cases: list[Case],
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> States:
+    """Every frame of `cases` in reduced coordinates."""
+    frames = cases[0].frames
+    collected: dict[str, list] = {f.name: [] for f in fields(States) if f.name != "nodes"}
+    for index, case in enumerate(cases):
+        linear = linear_fields(columns, case.forces(columns))
+        field = case.fields()
+        jump = np.zeros(frames, np.float32)
+        jump[1:] = np.sqrt([np.dot(d, d) for d in (b - a for a, b in zip(linear[:-1], linear[1:], strict=True))])
+        collected["field_square"].append(_squares(field))
+        residual = np.subtract(field, linear, out=field)
+        collected["b"].append(residual @ modes.residual.T)
+        collected["z"].append(linear @ modes.response.T)
+        collected["p"].append(linear @ modes.residual.T)
+        collected["contact"].append(case.in_contact())
+        collected["changed"].append(case.set_changed())
+        collected["push"].append(case.largest_push().astype(np.float32))
+        collected["response_norm"].append(np.sqrt(_squares(linear)).astype(np.float32))
+        collected["response_jump"].append(jump)
+        collected["residual_square"].append(_squares(residual))
+        collected["scheme"].append(case.scheme)
+        collected["split"].append(case.split)
+        collected["file"].append(case.path.name)
+        progress(index + 1, len(cases))
+    arrays = {name: np.array(values) for name, values in collected.items()}
+    return States(**arrays, nodes=np.array(columns.node_count))
+
+
+def _squares(fields_: np.ndarray) -> np.ndarray:
+    """Squared norm of each row, float64."""
+    return np.array([np.dot(row, row) for row in fields_], np.float64)

@@ -1,0 +1,175 @@
+"""Training of the correction: ridge base, then rollouts with noise on the state and back-propagation through time."""
+
+from __future__ import annotations
+
+import copy
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from upt_training.reduced.network import Correction, ridge_base
+from upt_training.reduced.rollout import (
+    Limits,
+    drive_of,
+    field_mse,
+    release_frames,
+    rollout,
+    rollout_from_rest,
+    true_limits,
+    windows,
+)
+from upt_training.reduced.states import States
+
+
+@dataclass
+class Settings:
+    """`stages` are `(steps of a rollout, batch, share of the updates)`."""
+
+    hidden: int = 384
+    depth: int = 2
+    updates: int = 4000
+    stages: list[tuple[int, int, float]] = field(default_factory=lambda: [(4, 256, 0.3), (16, 96, 0.4), (40, 48, 0.3)])
+    learning_rate: float = 1.5e-3
+    weight_decay: float = 0.02
+    noise: float = 0.05
+    ridge: float = 1e-6
+    ema: float = 0.998
+    seed: int = 1
+    validate_every: int = 250
+
+
+def state_pairs(states: States) -> tuple[np.ndarray, np.ndarray]:
+    """One-step inputs `[n, n_in]` and targets `[n, r]` along the true trajectories."""
+    b, z, p = states.b, states.z, states.p
+    before = np.concatenate([np.zeros_like(b[:, :1]), b[:, :-2]], axis=1)
+    flags = states.contact.astype(np.float32)[..., None]
+    inputs = np.concatenate(
+        [b[:, :-1], before, z[:, 1:], z[:, :-1], p[:, 1:], p[:, :-1], flags[:, 1:], flags[:, :-1]], axis=2
+    )
+    return inputs.reshape(-1, inputs.shape[2]), b[:, 1:].reshape(-1, b.shape[2])
+
+
+def prepare(states: States, settings: Settings) -> Correction:
+    """A model with its scales and its ridge base fitted to `states`; the MLP adds nothing yet."""
+    torch.manual_seed(settings.seed)
+    model = Correction(states.modes, states.z.shape[2], settings.hidden, settings.depth)
+    inputs, targets = state_pairs(states)
+    rms = {name: math.sqrt(float((getattr(states, name) ** 2).sum(2).mean())) + 1e-9 for name in ("b", "z", "p")}
+    r, rz = states.modes, states.z.shape[2]
+    groups = [(2 * r, rms["b"]), (2 * rz, rms["z"]), (2 * r, rms["p"])]
+    spread = math.sqrt(32.0)
+    scale = np.concatenate([np.full(count, spread / value) for count, value in groups] + [np.ones(2)])
+    model.input_scale.copy_(torch.from_numpy(scale.astype(np.float32)))
+    deviation = states.b.reshape(-1, r).std(0) * settings.noise
+    noise = np.concatenate([deviation, deviation, np.zeros(2 * rz + 2 * r + 2)])
+    ridge_base(model, inputs, targets, noise, settings.ridge)
+    with torch.no_grad():
+        error = targets - model(torch.from_numpy(inputs)).numpy()
+    output = error.std(0) + 1e-3 * error.std()
+    model.output_scale.copy_(torch.from_numpy(output.astype(np.float32)))
+    return model
+
+
+def summary(states: States, b: np.ndarray) -> dict[str, float]:
+    """Mean squared errors of full rollouts, mm²: all cases, schemes 1-4, scheme 5, after abrupt release."""
+    mse = field_mse(states, b)
+    out = {"mse": float(mse[:, 2:].mean())}
+    trained = np.isin(states.scheme, ["1", "2", "3", "4"])
+    for name, mask in (("schemes_1_4", trained), ("scheme_5", states.scheme == "5")):
+        if mask.any():
+            out[name] = float(mse[mask][:, 2:].mean())
+    released = release_frames(states)
+    if released.any():
+        out["after_release"] = float(mse[released].mean())
+    return out
+
+
+def train(
+    states: States,
+    validation: States,
+    limits: Limits,
+    settings: Settings,
+    report: Callable[[str], None] = print,
+    checkpoint: Path | None = None,
+) -> tuple[Correction, dict]:
+    """Train on `states`; the model returned is the EMA copy with the smallest validation error over full rollouts."""
+    model = prepare(states, settings)
+    base = summary(validation, rollout_from_rest(model, validation, limits))
+    report("ridge base alone: " + ", ".join(f"{k} {v:.5f}" for k, v in base.items()))
+    average = copy.deepcopy(model)
+    best, best_error = copy.deepcopy(model), base["mse"]
+    if not math.isfinite(best_error):
+        best_error = math.inf
+    rng = np.random.default_rng(settings.seed)
+    drive, true_b = drive_of(states), torch.from_numpy(states.b)
+    limit = torch.from_numpy(true_limits(states, limits))
+    deviation = torch.from_numpy(states.b.reshape(-1, states.modes).std(0))
+    optimiser = torch.optim.AdamW(model.mlp.parameters(), lr=settings.learning_rate, weight_decay=settings.weight_decay)
+    done, started, history, running = 0, time.monotonic(), [], []
+    first = 0
+    if checkpoint and checkpoint.exists():
+        saved = torch.load(checkpoint, weights_only=False)
+        model.load_state_dict(saved["model"])
+        average.load_state_dict(saved["average"])
+        best.load_state_dict(saved["best"])
+        optimiser.load_state_dict(saved["optimiser"])
+        first, best_error, history = saved["update"], saved["best_error"], saved["history"]
+        rng = np.random.default_rng([settings.seed, first])
+        report(f"resumed at update {first}")
+    for steps, batch, share in settings.stages:
+        for _ in range(round(share * settings.updates)):
+            done += 1
+            if done <= first:
+                continue
+            rate = settings.learning_rate * min(1.0, done / 100) * 0.5 * (1 + math.cos(math.pi * done / (settings.updates + 1)))
+            for group in optimiser.param_groups:
+                group["lr"] = rate
+            cases = torch.from_numpy(rng.integers(states.cases, size=batch))
+            starts = torch.from_numpy(rng.integers(states.frames - steps, size=batch))
+            pieces = type(drive)(**{k: windows(v, cases, starts, steps + 1) for k, v in vars(drive).items()})
+            target = windows(true_b, cases, starts, steps + 1)
+            b = target[:, 0]
+            b_prev = true_b[cases, (starts - 1).clamp_min(0)]
+            common = torch.randn_like(b) * deviation * settings.noise
+            b = b + common + 0.5 * torch.randn_like(b) * deviation * settings.noise
+            b_prev = b_prev + common
+            model.train()
+            found = rollout(model, pieces, b, b_prev, limit[cases, starts], limits)
+            loss = ((found - target[:, 1:]) ** 2).sum(2).mean() / float(states.nodes)
+            optimiser.zero_grad()
+            loss.backward()
+            torch.nn.utils.clip_grad_norm_(model.mlp.parameters(), 1.0)
+            optimiser.step()
+            running.append(float(loss))
+            decay = min(settings.ema, (done + 1) / (done + 10))
+            with torch.no_grad():
+                for kept, current in zip(average.mlp.parameters(), model.mlp.parameters(), strict=True):
+                    kept.lerp_(current, 1 - decay)
+            if done % settings.validate_every == 0 or done == settings.updates:
+                now = summary(validation, rollout_from_rest(average, validation, limits))
+                history.append({"update": done, "steps": steps, "loss": float(np.mean(running)), **now})
+                if now["mse"] < best_error:
+                    best_error = now["mse"]
+                    best.load_state_dict(average.state_dict())
+                left = (time.monotonic() - started) / max(done - first, 1) * (settings.updates - done)
+                text = ", ".join(f"{k} {v:.5f}" for k, v in now.items())
+                report(f"update {done}/{settings.updates} ({steps} steps): loss {np.mean(running):.5f}, {text}, {left:.0f} s left")
+                running = []
+                if checkpoint:
+                    saved = {
+                        "model": model.state_dict(),
+                        "average": average.state_dict(),
+                        "best": best.state_dict(),
+                        "optimiser": optimiser.state_dict(),
+                        "update": done,
+                        "best_error": best_error,
+                        "history": history,
+                    }
+                    torch.save(saved, checkpoint.with_suffix(".partial"))
+                    checkpoint.with_suffix(".partial").rename(checkpoint)
+    return best, {"base": base, "history": history, "validation_mse": best_error}
