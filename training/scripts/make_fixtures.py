@@ -46,7 +46,15 @@ def main() -> None:
     (fixtures / "graph.safetensors").chmod(0o644)
     config, out = ROOT / "training/configs/tiny.toml", fixtures / "tiny-upt"
     code = random_bundle.main(
-        ["--config", str(config), "--mesh", str(fixtures / "box.mesh.safetensors"), "--out", str(out), "--step"]
+        [
+            "--config",
+            str(config),
+            "--mesh",
+            str(fixtures / "box.mesh.safetensors"),
+            "--out",
+            str(out),
+            "--step",
+        ]
     )
     raise SystemExit(code)
 

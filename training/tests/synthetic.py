@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 from safetensors.numpy import save_file
+
 from upt_training.box_mesh import box_mesh
 
 
@@ -23,9 +24,23 @@ def write_dataset(folder: Path, cases: int = 10, frames: int = 21, seed: int = 0
         file = f"case-{index:05d}.trajectory.safetensors"
         write_case(data / file, mesh, frames, scheme, generator)
         split = "test" if (index // 2) % 5 == 4 else "train"
-        entries.append({"index": index, "file": file, "scheme": scheme, "seed": index, "split": split, "status": "done"})
+        entries.append(
+            {
+                "index": index,
+                "file": file,
+                "scheme": scheme,
+                "seed": index,
+                "split": split,
+                "status": "done",
+            }
+        )
     material = {"young_pa": 3000, "poisson": 0.49, "density_kg_m3": 1000, "damping_per_s": 20}
-    manifest = {"format": "upt-dataset", "version": 1, "mesh_name": "box", "mesh_sha256": mesh.sha256}
+    manifest = {
+        "format": "upt-dataset",
+        "version": 1,
+        "mesh_name": "box",
+        "mesh_sha256": mesh.sha256,
+    }
     manifest |= {"boundary": "fixed", "material": material, "seed": seed, "cases": entries}
     (data / "manifest.json").write_text(json.dumps(manifest))
     return data
@@ -55,8 +70,13 @@ def write_case(path: Path, mesh, frames: int, scheme: str, generator) -> None:
         "displacement": u.astype(np.float32),
         "contact_offsets": np.asarray(offsets, np.int32),
         "contact_nodes": np.concatenate(nodes).astype(np.int32),
-        "contact_vectors": np.concatenate(vectors).astype(np.float32),
+        "contact_vectors": np.ascontiguousarray(np.concatenate(vectors), np.float32),
     }
-    metadata = {"format": "upt-trajectory", "version": "1", "mesh_sha256": mesh.sha256, "scheme": scheme}
+    metadata = {
+        "format": "upt-trajectory",
+        "version": "1",
+        "mesh_sha256": mesh.sha256,
+        "scheme": scheme,
+    }
     metadata |= {"boundary": "fixed", "seed": "0", "site": json.dumps(centre.tolist())}
     save_file(tensors, str(path), metadata=metadata)

@@ -1,4 +1,7 @@
-"""`python -m upt_training train | evaluate | export`; `--help` on each. Wrong input ends with a message and exit code 2."""
+"""`python -m upt_training train | evaluate | export`; `--help` on each.
+
+Wrong input ends with a message and exit code 2.
+"""
 
 from __future__ import annotations
 
@@ -17,14 +20,17 @@ def parser() -> argparse.ArgumentParser:
     train.add_argument("--config", type=Path, required=True, help="configs/NAME.toml")
     train.add_argument("--data", type=Path, required=True, help="dataset folder")
     train.add_argument("--mesh", type=Path, help="mesh file; default: found by the dataset's mesh hash")
-    train.add_argument("--prior", type=Path, help="prior.safetensors, for configurations that use the linear response")
+    train.add_argument(
+        "--prior",
+        type=Path,
+        help="prior.safetensors, for configurations that use the linear response",
+    )
     train.add_argument("--out", type=Path, default=Path("runs/last"), help="run folder")
     train.add_argument("--resume", action="store_true", help="continue the run in --out, exactly")
     train.add_argument("--init", type=Path, help="checkpoint whose weights to start from")
     train.add_argument("--device", default="auto", help="auto, cpu, cuda, cuda:N")
     train.add_argument("--threads", type=int, default=1)
     train.add_argument("--max-minutes", type=float, default=0.0, help="stop with a checkpoint after this time")
-    train.add_argument("--precise", action="store_true", help="full float32 products (no TF32 or bf16 inside)")
 
     evaluate = commands.add_parser("evaluate", help="autoregressive rollouts of a bundle on held-out cases, as JSON")
     evaluate.add_argument("bundle", type=Path)

@@ -86,7 +86,11 @@ class BundleSession:
             path = path if path.exists() else folder / f"{name}.onnx"
             return onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
 
-        self.encoder, self.latent, self.decoder = session("encoder"), session("latent"), session("decoder")
+        self.encoder, self.latent, self.decoder = (
+            session("encoder"),
+            session("latent"),
+            session("decoder"),
+        )
         positions = mesh.positions.astype(np.float32)
         self.tables = session("embed").run(None, {"positions": positions})
         self.graph = graph
@@ -97,7 +101,11 @@ class BundleSession:
         return self.decode(*self.keys_values(features))
 
     def keys_values(self, features: np.ndarray) -> list[np.ndarray]:
-        inputs = {"features": features, "source_table": self.tables[0], "target_table": self.tables[1]}
+        inputs = {
+            "features": features,
+            "source_table": self.tables[0],
+            "target_table": self.tables[1],
+        }
         source, target = self.encoder.run(None, inputs)
         x = torch.from_numpy(source[self.graph.neighbours] + target[self.targets])
         edge = torch.nn.functional.gelu(x).numpy()
@@ -125,7 +133,10 @@ def self_check(model: Upt, folder: Path, mesh: Mesh, graph: Graph, feature_sets:
             ours = model(x, (source, target), neighbours, mask, supernodes, query).numpy()
             original = model.forward_unfactored(x, positions, neighbours, mask, supernodes).numpy()
             scale = float(np.abs(original).max())
-            others = {"onnxruntime_vs_pytorch": session(features), "unfactored_vs_pytorch": original}
+            others = {
+                "onnxruntime_vs_pytorch": session(features),
+                "unfactored_vs_pytorch": original,
+            }
             if (folder / "step.onnx").exists():
                 others["step_vs_pytorch"] = _run_step(folder, session, graph, model, features)
             if (folder / "paper_encoder.onnx").exists():
@@ -141,8 +152,17 @@ def self_check(model: Upt, folder: Path, mesh: Mesh, graph: Graph, feature_sets:
 def _run_step(folder: Path, session: BundleSession, graph: Graph, model: Upt, features: np.ndarray) -> np.ndarray:
     neighbours, mask = graph.padded(model.settings.graph.max_degree)
     step = onnxruntime.InferenceSession(str(folder / "step.onnx"), providers=["CPUExecutionProvider"])
-    inputs = {"features": features, "source_table": session.tables[0], "target_table": session.tables[1]}
-    inputs |= {"query_table": session.tables[2], "neighbours": neighbours, "mask": mask, "supernodes": graph.supernodes}
+    inputs = {
+        "features": features,
+        "source_table": session.tables[0],
+        "target_table": session.tables[1],
+    }
+    inputs |= {
+        "query_table": session.tables[2],
+        "neighbours": neighbours,
+        "mask": mask,
+        "supernodes": graph.supernodes,
+    }
     return step.run(None, inputs)[0]
 
 
@@ -217,14 +237,24 @@ def write_bundle(
             "force_unit": "mN",
             "boundary": boundary,
             "material": material or MATERIAL,
-            "mesh": {"file": "mesh.safetensors", "nodes": mesh.node_count, "mesh_sha256": mesh.sha256},
+            "mesh": {
+                "file": "mesh.safetensors",
+                "nodes": mesh.node_count,
+                "mesh_sha256": mesh.sha256,
+            },
             "envelope": envelope or ENVELOPE,
             "precisions": written,
             "upt": {
                 "features": s.features,
                 "base": s.base,
-                "normalisation": {"mean": model.feature_mean.tolist(), "std": model.feature_std.tolist()},
-                "coordinates": {"offset": model.coordinate_offset.tolist(), "scale": float(model.coordinate_scale)},
+                "normalisation": {
+                    "mean": model.feature_mean.tolist(),
+                    "std": model.feature_std.tolist(),
+                },
+                "coordinates": {
+                    "offset": model.coordinate_offset.tolist(),
+                    "scale": float(model.coordinate_scale),
+                },
                 "graph": asdict(s.graph),
                 "dims": {
                     "encoder": s.encoder,
@@ -236,7 +266,11 @@ def write_bundle(
                 },
                 "weights": "weights.safetensors",
             },
-            "provenance": {"parameters": model.parameter_count(), **(provenance or {}), "export_check": check},
+            "provenance": {
+                "parameters": model.parameter_count(),
+                **(provenance or {}),
+                "export_check": check,
+            },
             "errors": errors or {},
         }
         if prior is not None and s.uses_prior:

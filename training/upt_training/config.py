@@ -86,6 +86,7 @@ class TrainSettings:
     input_noise_mm: float = 0.0
     corrupt_contact: float = 0.0  # probability that a contact state is replaced by a corrupted one (replay)
     loss_nodes: int = 0  # nodes decoded and scored a step besides the needed ones; 0: all nodes
+    scored_rows: int = 0  # rows a one-step window is scored on (drawn anew each time); 0: all of the subset
     exact_boundary: bool = False  # held nodes 0 and contact nodes c inside the training rollout
     bf16: bool = False
     seed: int = 1
@@ -149,7 +150,11 @@ def settings_from_dict(values: dict, where: str = "configuration") -> Settings:
             raise InputError(f"{where}.model.features: {name!r} is not one of {', '.join(FEATURE_WIDTH)}")
     if model.base not in BASES:
         raise InputError(f"{where}.model.base: {model.base!r} is not one of {', '.join(BASES)}")
-    for width, heads in (("encoder", "encoder_heads"), ("latent", "latent_heads"), ("decoder", "decoder_heads")):
+    for width, heads in (
+        ("encoder", "encoder_heads"),
+        ("latent", "latent_heads"),
+        ("decoder", "decoder_heads"),
+    ):
         if getattr(model, width) % getattr(model, heads):
             raise InputError(f"{where}.model.{width} must be a multiple of {heads}")
     if settings.train.strategy not in ("stf", "teacher", "replay"):

@@ -15,7 +15,12 @@ import numpy as np
 from upt_training.errors import InputError
 from upt_training.mesh_file import Mesh
 
-DTYPES = {"F32": np.dtype("<f4"), "F16": np.dtype("<f2"), "I32": np.dtype("<i4"), "F64": np.dtype("<f8")}
+DTYPES = {
+    "F32": np.dtype("<f4"),
+    "F16": np.dtype("<f2"),
+    "I32": np.dtype("<i4"),
+    "F64": np.dtype("<f8"),
+}
 
 
 def map_safetensors(path: Path) -> tuple[dict[str, np.ndarray], dict[str, str]]:
@@ -107,7 +112,12 @@ def open_trajectory(path: Path, mesh: Mesh | None = None) -> Trajectory:
                 f"{mesh.sha256[:12]}…, {mesh.node_count} nodes); pass the mesh the data was made with"
             )
     return Trajectory(
-        path, u, tensors["contact_offsets"], tensors["contact_nodes"], tensors["contact_vectors"], metadata
+        path,
+        u,
+        tensors["contact_offsets"],
+        tensors["contact_nodes"],
+        tensors["contact_vectors"],
+        metadata,
     )
 
 

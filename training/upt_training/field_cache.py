@@ -85,7 +85,11 @@ def build_cache(folder: Path, mesh: Mesh, cases: list[Case], nodes: np.ndarray, 
             if local is not None and len(touched):
                 response[i, t] = local.response(touched, vectors)
     np.save(staging / "nodes.npy", nodes)
-    header = {"prior": prior is not None, "schemes": [c.scheme for c in cases], "index": [c.index for c in cases]}
+    header = {
+        "prior": prior is not None,
+        "schemes": [c.scheme for c in cases],
+        "index": [c.index for c in cases],
+    }
     (staging / "cache.json").write_text(json.dumps(header))
     del displacement, contact, response
     staging.rename(out)

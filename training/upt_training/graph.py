@@ -47,7 +47,11 @@ def node_keys(count: int, seed: int) -> np.ndarray:
 
 
 def choose_supernodes(
-    node_count: int, supernode_count: int, seed: int, domain_nodes: np.ndarray, domain_fraction: float
+    node_count: int,
+    supernode_count: int,
+    seed: int,
+    domain_nodes: np.ndarray,
+    domain_fraction: float,
 ) -> np.ndarray:
     """Ascending node indices: smallest keys of the domain first (`round(fraction * n_S)`), then of all the rest."""
     if node_count <= supernode_count:
@@ -84,8 +88,12 @@ def radius_graph(positions: np.ndarray, supernodes: np.ndarray, radius: float, m
 
 
 def build_graph(mesh, settings) -> Graph:
-    """The graph of a mesh for a bundle's `graph` settings (radius_mm, max_degree, supernodes, seed, domain_fraction)."""
+    """The graph of a mesh for a bundle's `graph` settings (`config.GraphSettings`)."""
     supernodes = choose_supernodes(
-        mesh.node_count, settings.supernodes, settings.seed, mesh.domain_nodes, settings.domain_fraction
+        mesh.node_count,
+        settings.supernodes,
+        settings.seed,
+        mesh.domain_nodes,
+        settings.domain_fraction,
     )
     return radius_graph(mesh.positions, supernodes, settings.radius_mm, settings.max_degree)

@@ -1,4 +1,4 @@
-"""The surrogate M: (u^t, c^{t+Δt}) -> u^{t+Δt}: a Universal Physics Transformer (paper, section "Deep learning architecture").
+"""The surrogate M: (u^t, c^{t+Δt}) -> u^{t+Δt}: a Universal Physics Transformer (paper, "Deep learning architecture").
 
 concat(features) -> Linear + sincos -> mean message passing onto supernodes -> transformer -> perceiver pooling ->
 approximator -> perceiver decoder. The message Linears are kept factored (docs/formats.md, "Graphs of a upt bundle"):
@@ -42,16 +42,12 @@ class Upt(nn.Module):
             Block(d, settings.encoder_heads, settings.mlp_ratio, settings.drop_path)
             for _ in range(settings.encoder_depth)
         )
-        self.pool = PerceiverPool(
-            settings.latent_tokens, settings.latent, d, settings.latent_heads, settings.mlp_ratio
-        )
+        self.pool = PerceiverPool(settings.latent_tokens, settings.latent, d, settings.latent_heads, settings.mlp_ratio)
         self.approximator = nn.ModuleList(
             Block(settings.latent, settings.latent_heads, settings.mlp_ratio, settings.drop_path)
             for _ in range(settings.approximator_depth)
         )
-        self.decoder = Decoder(
-            settings.decoder, settings.decoder_heads, settings.decoder_mlp_ratio, settings.latent
-        )
+        self.decoder = Decoder(settings.decoder, settings.decoder_heads, settings.decoder_mlp_ratio, settings.latent)
         self.register_buffer("feature_mean", torch.zeros(3))
         self.register_buffer("feature_std", torch.ones(3))
         self.register_buffer("coordinate_offset", torch.zeros(3))
@@ -108,7 +104,7 @@ class Upt(nn.Module):
         return source, target, self.decoder.queries(sincos(p, self.settings.decoder))
 
     def aggregate(self, source, target, neighbours, mask) -> torch.Tensor:
-        """Mean over a supernode's row of `GELU(source_j + target_i)`: `[..., n, d]`, `[..., n_S, d]` -> `[..., n_S, d]`."""
+        """Mean over a row of `GELU(source_j + target_i)`: `[..., n, d]`, `[..., n_S, d]` -> `[..., n_S, d]`."""
         edge = functional.gelu(source[..., neighbours, :] + target[..., :, None, :])
         return (edge * mask[..., None]).sum(-2) / mask.sum(-1, keepdim=True)
 
@@ -128,16 +124,22 @@ class Upt(nn.Module):
 
     # -- the whole ----------------------------------------------------------------------------------------------
 
-    def forward(self, features, tables, neighbours, mask, supernodes, query) -> torch.Tensor:
+    def forward(self, features, tables, neighbours, mask, supernodes, query, scored=None) -> torch.Tensor:
         """Features `[..., n, f]` of the table's nodes -> `[..., m, 3]` mm for the rows of `query`.
 
         `tables` = (source `[n, d]`, target `[n, d]`); `neighbours [n_S, degree]` and `supernodes [n_S]` index `n`.
+        `scored`: rows of `query` through which gradients flow; the others are decoded without (training only).
         """
-        w_source, w_target = self.encoder_weights()
-        source = features @ w_source.T + tables[0]
-        target = features[..., supernodes, :] @ w_target.T + tables[1][supernodes]
+        with torch.autocast(features.device.type, enabled=False):  # differences of the features need float32
+            w_source, w_target = self.encoder_weights()
+            source = features @ w_source.T + tables[0]
+            target = features[..., supernodes, :] @ w_target.T + tables[1][supernodes]
         k, v = self.latent(self.aggregate(source, target, neighbours, mask))
-        return self.decode(query, k, v)
+        if scored is None:
+            return self.decode(query, k, v)
+        with torch.no_grad():
+            out = self.decode(query, k, v)
+        return out.index_copy(-2, scored, self.decode(query[scored], k, v).to(out.dtype))
 
     def forward_unfactored(self, features, positions, neighbours, mask, supernodes) -> torch.Tensor:
         """The paper's layout, edge by edge, all nodes decoded; for the export's self-check."""

@@ -33,7 +33,10 @@ class Writer:
         return name
 
     def op(self, kind: str, *inputs: str, outputs: int = 1, **attributes):
-        names = [f"{kind.lower()}_{self.count}_{i}" if outputs > 1 else f"{kind.lower()}_{self.count}" for i in range(outputs)]
+        names = [
+            f"{kind.lower()}_{self.count}_{i}" if outputs > 1 else f"{kind.lower()}_{self.count}"
+            for i in range(outputs)
+        ]
         self.nodes.append(helper.make_node(kind, list(inputs), names, name=f"{kind}_{self.count}", **attributes))
         self.count += 1
         return names if outputs > 1 else names[0]
@@ -64,13 +67,20 @@ class Writer:
 
     def norm(self, x: str, module) -> str:
         return self.op(
-            "LayerNormalization", x, self.constant(module.weight), self.constant(module.bias, "b"), axis=-1, epsilon=EPS
+            "LayerNormalization",
+            x,
+            self.constant(module.weight),
+            self.constant(module.bias, "b"),
+            axis=-1,
+            epsilon=EPS,
         )
 
     def gelu(self, x: str) -> str:
         erf = self.op("Erf", self.op("Div", x, self.constant(np.float32(np.sqrt(2.0)))))
         return self.op(
-            "Mul", self.op("Mul", x, self.op("Add", erf, self.constant(np.float32(1.0)))), self.constant(np.float32(0.5))
+            "Mul",
+            self.op("Mul", x, self.op("Add", erf, self.constant(np.float32(1.0)))),
+            self.constant(np.float32(0.5)),
         )
 
     def mlp(self, x: str, module) -> str:
@@ -173,7 +183,10 @@ def encoder_graph(model: Upt) -> onnx.ModelProto:
     s, w = model.settings, Writer("encoder")
     d = s.encoder
     features = w.input("features", ["n", s.feature_count])
-    source_table, target_table = w.input("source_table", ["n", d]), w.input("target_table", ["n", d])
+    source_table, target_table = (
+        w.input("source_table", ["n", d]),
+        w.input("target_table", ["n", d]),
+    )
     w_source, w_target = model.encoder_weights()
     w.output(w.op("Add", w.linear(features, w_source), source_table), "source", ["n", d])
     w.output(w.op("Add", w.linear(features, w_target), target_table), "target", ["n", d])
@@ -202,7 +215,10 @@ def step_graph(model: Upt) -> onnx.ModelProto:
     s, w = model.settings, Writer("step")
     d, degree = s.encoder, s.graph.max_degree
     features = w.input("features", ["n", s.feature_count])
-    source_table, target_table = w.input("source_table", ["n", d]), w.input("target_table", ["n", d])
+    source_table, target_table = (
+        w.input("source_table", ["n", d]),
+        w.input("target_table", ["n", d]),
+    )
     query = w.input("query_table", ["n", 2 * s.decoder])
     neighbours = w.input("neighbours", ["n_S", degree], TensorProto.INT64)
     mask = w.input("mask", ["n_S", degree])

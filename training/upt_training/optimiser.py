@@ -1,4 +1,4 @@
-"""Lion (Chen et al. 2023), AdamW, and the learning-rate schedule: warm-up (constant as in the paper, or linear), cosine."""
+"""Lion (Chen et al. 2023), AdamW, and the learning-rate schedule: warm-up (constant or linear), cosine."""
 
 from __future__ import annotations
 
@@ -32,7 +32,12 @@ class Lion(torch.optim.Optimizer):
 def make_optimiser(settings, model: torch.nn.Module) -> torch.optim.Optimizer:
     if settings.optimiser == "lion":
         return Lion(model.parameters(), settings.learning_rate, weight_decay=settings.weight_decay)
-    return torch.optim.AdamW(model.parameters(), settings.learning_rate, betas=(0.9, 0.98), weight_decay=settings.weight_decay)
+    return torch.optim.AdamW(
+        model.parameters(),
+        settings.learning_rate,
+        betas=(0.9, 0.98),
+        weight_decay=settings.weight_decay,
+    )
 
 
 def learning_rate(settings, epoch: float) -> float:

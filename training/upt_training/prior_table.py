@@ -21,7 +21,15 @@ class PriorTable:
 
     def __init__(self, path: Path, node_count: int):
         tensors, _ = map_safetensors(Path(path))
-        for name in ("contact_nodes", "compliance", "block_nodes", "block_offsets", "rank_offsets", "basis", "response"):
+        for name in (
+            "contact_nodes",
+            "compliance",
+            "block_nodes",
+            "block_offsets",
+            "rank_offsets",
+            "basis",
+            "response",
+        ):
             if name not in tensors:
                 raise InputError(f"{path}: tensor {name!r} is missing; this is not a prior")
         if len(tensors["block_nodes"]) != node_count:
@@ -33,7 +41,11 @@ class PriorTable:
         self.response_q = np.asarray(tensors["response"], np.float32)
         self.blocks = []
         basis, at = np.asarray(tensors["basis"], np.float32), 0
-        offsets, ranks, nodes = tensors["block_offsets"], tensors["rank_offsets"], np.asarray(tensors["block_nodes"])
+        offsets, ranks, nodes = (
+            tensors["block_offsets"],
+            tensors["rank_offsets"],
+            np.asarray(tensors["block_nodes"]),
+        )
         for k in range(len(offsets) - 1):
             members = nodes[offsets[k] : offsets[k + 1]]
             rank = int(ranks[k + 1] - ranks[k])

@@ -42,7 +42,11 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--name")
     parser.add_argument("--prior", type=Path)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--paper-split", action="store_true", help="also write paper_encoder.onnx, paper_decoder.onnx")
+    parser.add_argument(
+        "--paper-split",
+        action="store_true",
+        help="also write paper_encoder.onnx, paper_decoder.onnx",
+    )
     parser.add_argument("--step", action="store_true", help="also write step.onnx")
     options = parser.parse_args(arguments)
     try:

@@ -33,7 +33,7 @@ class ReplayPool:
         assert self.u.shape == (slots, n, 3)
 
     def take(self, batch: int, window: int, device) -> tuple[np.ndarray, np.ndarray, np.ndarray, State]:
-        """Slots, cases, frames and states of the next `batch` rollouts; finished ones restart (most of them at rest)."""
+        """Slots, cases, frames and states of the next `batch` rollouts; finished ones restart, most at rest."""
         slots = (self.next + np.arange(batch)) % len(self.case)
         self.next = int((self.next + batch) % len(self.case))
         for s in slots:
@@ -55,7 +55,13 @@ class ReplayPool:
         self.previous[slots] = state.previous.detach().cpu()
 
     def state_dict(self) -> dict:
-        return {"case": self.case, "frame": self.frame, "u": self.u, "previous": self.previous, "next": self.next}
+        return {
+            "case": self.case,
+            "frame": self.frame,
+            "u": self.u,
+            "previous": self.previous,
+            "next": self.next,
+        }
 
     def load_state_dict(self, values: dict) -> None:
         for name, value in values.items():

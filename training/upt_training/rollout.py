@@ -31,7 +31,16 @@ class State:
 class Stepper:
     """Static data of a subset: `nodes` must hold every node the graph reads."""
 
-    def __init__(self, model: Upt, mesh: Mesh, graph: Graph, nodes: np.ndarray, boundary: str, exact: bool, device="cpu"):
+    def __init__(
+        self,
+        model: Upt,
+        mesh: Mesh,
+        graph: Graph,
+        nodes: np.ndarray,
+        boundary: str,
+        exact: bool,
+        device="cpu",
+    ):
         place = np.full(mesh.node_count, -1)
         place[nodes] = np.arange(len(nodes))
         neighbours, mask = graph.padded()
@@ -55,7 +64,7 @@ class Stepper:
         zero = torch.zeros(batch, self.node_count, 3, device=self.device)
         return State(zero, zero, zero if self.model.settings.uses_prior else None)
 
-    def step(self, state: State, target: dict[str, torch.Tensor], tables) -> State:
+    def step(self, state: State, target: dict[str, torch.Tensor], tables, scored=None) -> State:
         """`target` holds `c`, `contact` and (where used) `prior` of the end of the step."""
         fields = {
             "displacement": state.u,
@@ -67,7 +76,7 @@ class Stepper:
         }
         source, key, query = tables
         features = self.model.normalise(fields)
-        out = self.model(features, (source, key), self.neighbours, self.mask, self.supernodes, query).float()
+        out = self.model(features, (source, key), self.neighbours, self.mask, self.supernodes, query, scored).float()
         base = self.model.settings.base
         if base == "displacement":
             out = out + state.u

@@ -79,7 +79,6 @@ def make_trainer(settings: Settings, data: Path, mesh: Mesh, prior: Path | None,
 
 def train_command(options) -> int:
     torch.set_num_threads(options.threads)
-    torch.set_float32_matmul_precision("highest" if options.precise else "medium")
     device = choose_device(options.device)
     out = Path(options.out)
     if options.resume and (out / "config.toml").exists():
@@ -112,7 +111,10 @@ def train_command(options) -> int:
               f"from step {trainer.step_count}, {device}", flush=True)  # fmt: skip
     ended = trainer.fit(options.max_minutes)
     if trainer.rank == 0:
-        print(f"{ended} at step {trainer.step_count}; best autoregressive MSE {trainer.best:.5f} mm²", flush=True)
+        print(
+            f"{ended} at step {trainer.step_count}; best autoregressive MSE {trainer.best:.5f} mm²",
+            flush=True,
+        )
     if ranks > 1:
         distributed.destroy_process_group()
     return 0

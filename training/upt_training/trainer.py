@@ -30,7 +30,17 @@ POOL_SLOTS = 64
 class Trainer:
     """Owns model, optimiser, random state and the run folder (`last.pt`, `best.pt`, `log.csv`)."""
 
-    def __init__(self, settings: Settings, folder: Path, mesh, graph, train: FieldCache, test: FieldCache, boundary, device):
+    def __init__(
+        self,
+        settings: Settings,
+        folder: Path,
+        mesh,
+        graph,
+        train: FieldCache,
+        test: FieldCache,
+        boundary,
+        device,
+    ):
         self.settings, self.folder, self.device = settings, Path(folder), torch.device(device)
         self.mesh, self.boundary = mesh, boundary
         self.train_cache, self.test_cache = train, test
@@ -72,7 +82,10 @@ class Trainer:
             return state
         truth = truth_state(self.train_cache, case, frame, self.device)
         forced = forced.to(self.device)[:, None, None]
-        u, previous = torch.where(forced, truth.u, state.u), torch.where(forced, truth.previous, state.previous)
+        u, previous = (
+            torch.where(forced, truth.u, state.u),
+            torch.where(forced, truth.previous, state.previous),
+        )
         return State(u, previous, state.prior)
 
     def window_loss(self, p: float) -> torch.Tensor:
@@ -91,6 +104,9 @@ class Trainer:
                 frame, first, window = frame + 1, 1, window - 1
             state = truth_state(self.train_cache, case, frame, self.device)
         tables, loss, scored = self.stepper.tables(), 0.0, 0
+        rows = None
+        if t.scored_rows and window == 1:
+            rows = torch.randperm(self.stepper.node_count, generator=self.draw)[: t.scored_rows].to(self.device)
         for i in range(1, window + 1):
             if i > 1 and p > 0:
                 state = self._teach(state, case, frame, p)
@@ -99,9 +115,12 @@ class Trainer:
             if t.corrupt_contact > 0 or t.input_noise_mm > 0:
                 state = corrupt(state, target["contact"], t.corrupt_contact, t.input_noise_mm, self.draw)
             with torch.autocast(self.device.type, torch.bfloat16, enabled=t.bf16):
-                state = self.stepper.step(state, target, tables)
+                state = self.stepper.step(state, target, tables, rows if window == 1 else None)
             if i >= first:
-                loss, scored = loss + squared_error(state.u, target["u"]).mean(), scored + 1
+                a, b = (
+                    (state.u, target["u"]) if window > 1 or rows is None else (state.u[:, rows], target["u"][:, rows])
+                )
+                loss, scored = loss + squared_error(a, b).mean(), scored + 1
         if slots is not None:
             self.pool.put(slots, frame, state)
         return loss / scored
@@ -255,7 +274,7 @@ class Trainer:
 
 
 def normalisation(cache: FieldCache, model) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-    """Per-axis mean and std of `u`, the output's scale (std of what the network adds to its base) and the mixing scale."""
+    """Per-axis mean and std of `u`, std of what the network adds to its base, and the mixing scale."""
     cases = np.unique(np.linspace(0, cache.case_count - 1, min(40, cache.case_count)).astype(int))
     frames = np.arange(0, cache.frame_count, 2)
     u = np.concatenate([cache.displacement[c][frames].astype(np.float32).reshape(-1, 3) for c in cases])

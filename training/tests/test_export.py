@@ -1,0 +1,126 @@
+"""Export: the bundle's graphs equal the PyTorch model and the unfactored original; the manifest's hashes are right."""
+
+import hashlib
+import json
+
+import numpy as np
+import pytest
+import torch
+from conftest import CONFIGS
+from safetensors.numpy import load_file
+
+from upt_training.__main__ import main
+from upt_training.bundle import TOLERANCE
+from upt_training.bundle_rollout import BundleRunner
+from upt_training.config import load_settings
+from upt_training.dataset import open_dataset, open_trajectory
+from upt_training.mesh_file import load_mesh
+from upt_training.run import make_trainer
+
+
+@pytest.fixture(scope="module")
+def bundle(trained, data, mesh_path, tmp_path_factory):
+    out = tmp_path_factory.mktemp("bundle") / "tiny"
+    code = main(["export", str(trained), "--out", str(out), "--mesh", str(mesh_path), "--data", str(data),
+                 "--step", "--paper-split", "--int8", "--f16"])  # fmt: skip
+    assert code == 0
+    return out
+
+
+def test_self_check_and_hashes(bundle):
+    manifest = json.loads((bundle / "bundle.json").read_text())
+    check = manifest["provenance"]["export_check"]
+    assert set(check) == {
+        "onnxruntime_vs_pytorch", "unfactored_vs_pytorch", "step_vs_pytorch", "paper_split_vs_pytorch",
+    }  # fmt: skip
+    assert all(0 <= v < TOLERANCE for v in check.values())
+    for name, entry in manifest["files"].items():
+        data = (bundle / name).read_bytes()
+        assert len(data) == entry["bytes"] and hashlib.sha256(data).hexdigest() == entry["sha256"]
+
+
+def test_bundle_rollout_equals_the_training_rollout(bundle, trained, data, mesh_path):
+    mesh = load_mesh(mesh_path)
+    trainer = make_trainer(load_settings(trained / "config.toml"), data, mesh, None, trained, "cpu")
+    trainer.start_from(trained / "best.pt")
+    trainer.model.eval()
+    runner = BundleRunner(bundle)
+    case = open_dataset(data, mesh).select("test")[0]
+    trajectory = open_trajectory(case.path, mesh)
+    state, tables = trainer.stepper.rest(1), trainer.stepper.tables()
+    with torch.no_grad():
+        for t in range(1, trajectory.frame_count):
+            nodes, vectors = trajectory.contact(t)
+            c, contact = torch.zeros(1, mesh.node_count, 3), torch.zeros(1, mesh.node_count, 1)
+            c[0, nodes], contact[0, nodes] = torch.from_numpy(np.array(vectors)), 1.0
+            state = trainer.stepper.step(state, {"c": c, "contact": contact}, tables)
+            found = runner.step(nodes, vectors)
+            assert np.abs(found - state.u[0].numpy()).max() < 1e-4 * max(1.0, np.abs(found).max())
+    assert np.abs(found).max() > 0.05
+
+
+def test_kernel_weights_equal_the_graphs(bundle):
+    """encoder.onnx must be the low-rank update that weights.safetensors describes."""
+    runner, weights = BundleRunner(bundle), load_file(str(bundle / "weights.safetensors"))
+    x = np.random.default_rng(0).standard_normal((50, 10)).astype(np.float32)
+    d = weights["encoder.source"].shape[0]
+    zero = np.zeros((50, d), np.float32)
+    source, target = runner.session.encoder.run(None, {"features": x, "source_table": zero, "target_table": zero})
+    assert np.abs(source - x @ weights["encoder.source"].T).max() < 1e-5 * np.abs(source).max()
+    assert np.abs(target - x @ weights["encoder.target"].T).max() < 1e-5 * np.abs(target).max()
+
+
+def test_any_subset_decodes_alone(bundle):
+    runner = BundleRunner(bundle)
+    features = np.random.default_rng(1).standard_normal((runner.mesh.node_count, 10)).astype(np.float32)
+    keys, values = runner.session.keys_values(features)
+    subset = np.array([3, 77, 140])
+    whole, alone = runner.session.decode(keys, values), runner.session.decode(keys, values, subset)
+    assert np.abs(whole[subset] - alone).max() < 1e-6 * np.abs(whole).max()
+
+
+def test_evaluate_reports_the_papers_metrics(bundle, data, tmp_path):
+    results = {}
+    for precision in ("f32", "f16", "int8"):
+        out = tmp_path / f"{precision}.json"
+        code = main(
+            [
+                "evaluate",
+                str(bundle),
+                "--data",
+                str(data),
+                "--precision",
+                precision,
+                "--out",
+                str(out),
+            ]
+        )
+        assert code == 0
+        results[precision] = json.loads(out.read_text())
+    table = results["f32"]["all"]
+    assert set(table) == {"bundle", "zero"}
+    assert set(table["bundle"]) == {"mse_mm2", "max_mm", "relative_l2", "hausdorff_mm"}
+    assert table["zero"]["relative_l2"]["mean"] == pytest.approx(1.0)
+    assert table["bundle"]["mse_mm2"]["mean"] < 0.6 * table["zero"]["mse_mm2"]["mean"]
+    assert table["bundle"]["mse_mm2"]["min"] <= table["bundle"]["mse_mm2"]["mean"] <= table["bundle"]["mse_mm2"]["max"]
+    f32, int8 = (results[p]["all"]["bundle"]["mse_mm2"]["mean"] for p in ("f32", "int8"))
+    assert abs(f32 - int8) < 0.05 * f32
+
+
+def test_a_failed_export_leaves_the_old_bundle(bundle, trained, data, mesh_path, tmp_path, monkeypatch):
+    before = (bundle / "bundle.json").read_bytes()
+    monkeypatch.setattr("upt_training.bundle.TOLERANCE", 0.0)
+    code = main(
+        [
+            "export",
+            str(trained),
+            "--out",
+            str(bundle),
+            "--mesh",
+            str(mesh_path),
+            "--data",
+            str(data),
+        ]
+    )
+    assert code == 2 and (bundle / "bundle.json").read_bytes() == before
+    assert load_settings(CONFIGS / "tiny.toml").name == "tiny"

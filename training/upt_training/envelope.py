@@ -1,0 +1,38 @@
+"""The envelope of a dataset: what the model was trained on (docs/formats.md, `envelope`)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from upt_training.dataset import Case, open_trajectory
+from upt_training.mesh_file import Mesh
+
+
+def measure_envelope(mesh: Mesh, cases: list[Case]) -> dict:
+    """Largest push and push rate (mm), range of contact areas (mm²), largest displacement times two as the bound."""
+    areas = mesh.node_areas()
+    push, rate, smallest, widest, largest = 0.0, 0.0, np.inf, 0.0, 0.0
+    for case in cases:
+        trajectory = open_trajectory(case.path, mesh)
+        before: dict[int, np.ndarray] = {}
+        for t in range(1, trajectory.frame_count):
+            nodes, vectors = trajectory.contact(t)
+            if len(nodes):
+                push = max(push, float(np.linalg.norm(vectors, axis=1).max()))
+                area = float(areas[nodes].sum())
+                smallest, widest = min(smallest, area), max(widest, area)
+                if before:
+                    moves = [np.linalg.norm(v - before[n]) for n, v in zip(nodes, vectors, strict=True) if n in before]
+                    rate = max([rate, *map(float, moves)])
+            before = dict(zip(nodes.tolist(), np.asarray(vectors), strict=True))
+        largest = max(
+            largest,
+            float(np.abs(trajectory.displacement[:: max(1, trajectory.frame_count // 8)]).max()),
+        )
+    return {
+        "max_push_mm": round(push, 3),
+        "max_push_rate_mm": round(rate, 3),
+        "contact_area_mm2": [round(smallest, 1), round(widest, 1)],
+        "max_sites": 1,
+        "displacement_bound_mm": round(max(2.0 * largest, 30.0), 1),
+    }

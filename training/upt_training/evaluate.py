@@ -1,0 +1,104 @@
+"""`python -m upt_training evaluate BUNDLE --data DIR`: all steps of held-out cases, autoregressive from rest, as JSON.
+
+Beside the bundle, on the same cases: predict zero, and (where the bundle has a prior) the linear-elastic quasi-static
+response alone and with a fitted decay after release.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from pathlib import Path
+
+import numpy as np
+
+from upt_training.bundle_rollout import BundleRunner
+from upt_training.dataset import open_dataset, open_trajectory
+from upt_training.mesh_file import load_mesh
+from upt_training.metrics import RolloutMetrics, summary
+
+DECAY = 0.55  # share of the response kept a step after release (fitted on training cases of the coarse mesh)
+
+
+def evaluate_case(runner: BundleRunner, trajectory, baselines: bool, with_hausdorff: bool) -> dict[str, RolloutMetrics]:
+    """Rollout of one case: metrics of the bundle and of the plain methods."""
+    site = trajectory.metadata.get("site")
+    site = np.asarray(json.loads(site)) if site else None
+    names = ["bundle"] + (["zero"] if baselines else [])
+    if baselines and runner.prior is not None:
+        names += ["linear", "linear_decay"]
+    metrics = {n: RolloutMetrics(runner.mesh.positions, site, with_hausdorff) for n in names}
+    runner.reset()
+    truth = trajectory.read()
+    free = np.zeros_like(runner.u)
+    for t in range(1, trajectory.frame_count):
+        nodes, vectors = trajectory.contact(t)
+        before = runner.prior_now
+        metrics["bundle"].add(runner.step(nodes, vectors), truth[t])
+        if "zero" in metrics:
+            metrics["zero"].add(np.zeros_like(free), truth[t])
+        if "linear" in metrics:
+            metrics["linear"].add(runner.prior_now, truth[t])
+            free = DECAY * (free if before.any() is np.False_ else before) if len(nodes) == 0 else np.zeros_like(free)
+            metrics["linear_decay"].add(runner.prior_now + free, truth[t])
+    return metrics
+
+
+def evaluate_bundle(
+    runner: BundleRunner, cases, *, baselines: bool = True, with_hausdorff: bool = True, report=None
+) -> dict:
+    """Per case, per scheme and overall scores."""
+    rows, schemes = [], {}
+    for case in cases:
+        trajectory = open_trajectory(case.path, runner.mesh)
+        began = time.monotonic()
+        metrics = evaluate_case(runner, trajectory, baselines, with_hausdorff)
+        seconds = time.monotonic() - began
+        scores = {name: m.scores() for name, m in metrics.items()}
+        rows.append({"index": case.index, "file": case.path.name, "scheme": case.scheme, **scores})
+        rows[-1]["mse_per_step_mm2"] = metrics["bundle"].mse
+        schemes.setdefault(case.scheme, []).append(scores)
+        if report:
+            report(f"case {case.index} scheme {case.scheme}: " + ", ".join(
+                f"{n} {s['mse_mm2']:.4f}" for n, s in scores.items()) + f" mm², {seconds:.0f} s")  # fmt: skip
+
+    def table(group: list[dict]) -> dict:
+        return {name: summary([s[name] for s in group]) for name in group[0]}
+
+    every = [s for group in schemes.values() for s in group]
+    return {
+        "cases": rows,
+        "schemes": {k: table(v) for k, v in sorted(schemes.items())},
+        "all": table(every),
+    }
+
+
+def evaluate_command(options) -> int:
+    mesh = load_mesh(options.mesh) if options.mesh else None
+    runner = BundleRunner(options.bundle, mesh, options.prior, options.precision)
+    dataset = open_dataset(options.data, runner.mesh)
+    cases = dataset.select(options.split, options.schemes, options.count)
+    import sys
+
+    result = evaluate_bundle(
+        runner,
+        cases,
+        with_hausdorff=not options.no_hausdorff,
+        report=lambda text: print(text, file=sys.stderr, flush=True),
+    )
+    result = {
+        "bundle": runner.manifest["name"],
+        "precision": options.precision,
+        "nodes": runner.mesh.node_count,
+        "boundary": dataset.manifest.get("boundary"),
+        "dataset_seed": dataset.manifest.get("seed"),
+        **result,
+    }
+    text = json.dumps(result, indent=1)
+    if options.out:
+        Path(options.out).write_text(text + "\n")
+        for name, scores in result["all"].items():
+            print(f"{name}: " + ", ".join(f"{k} {v['mean']:.4f} ± {v['std']:.4f}" for k, v in scores.items()))
+    else:
+        print(text)
+    return 0
