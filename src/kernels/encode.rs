@@ -24,7 +24,7 @@ impl<'a> LowRank<'a> {
     /// If the lengths are not multiples of the shapes.
     pub fn new(table: &'a [f32], weight_t: &'a [f32], width: usize, rank: usize) -> Self {
         assert!(
-            width > 0 && table.len() % width == 0,
+            width > 0 && table.len().is_multiple_of(width),
             "table must be [n, width]"
         );
         assert_eq!(weight_t.len(), rank * width, "weight must be [rank, width]");
