@@ -6,10 +6,12 @@
 //! Lengths are mm, forces mN, fields row-major `[K,3]` float32.
 
 pub mod bundle;
+pub mod envelope;
 pub mod error;
 pub mod ffi;
 pub mod graph;
 pub mod grid;
+pub mod guard;
 pub mod kernels;
 pub mod library;
 pub mod model;

@@ -13,4 +13,5 @@ pub use manifest::{
     UptEntry,
 };
 pub use mesh::Mesh;
+pub(crate) use mesh::volume;
 pub use tensors::TensorFile;

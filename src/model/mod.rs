@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 pub use reduced::ReducedModel;
-pub use upt::{UptModel, UptTables};
+pub use upt::{DECODER_TILE, UptModel, UptTables};
 
 use crate::bundle::{BundleFiles, Manifest, ManifestKind, Mesh};
 use crate::error::Result;

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use crate::bundle::{BundleFiles, Mesh, TensorFile, UptEntry};
 use crate::error::{Error, Result};
 use crate::graph::SupernodeGraph;
+use crate::kernels::decoder::{DecoderWeights, PackedDecoder};
 use crate::kernels::encode::transpose_weight;
 use crate::onnx::{ProviderChoice, ProviderPlan, Runtime, Stage, StageOptions};
 
@@ -13,23 +14,6 @@ const EMBED_TILE: usize = 2048;
 /// Nodes a run of `decoder.onnx`: activations stay in cache.
 pub const DECODER_TILE: usize = 1024;
 
-/// Weights of the decoder for the native kernel, matrices `[out,in]`.
-#[derive(Debug)]
-pub struct DecoderTensors {
-    /// `[h,h]`, `[h]`.
-    pub attention_out: (Vec<f32>, Vec<f32>),
-    /// `[h]`, `[h]`.
-    pub norm2: (Vec<f32>, Vec<f32>),
-    /// `[m,h]`, `[m]`.
-    pub mlp1: (Vec<f32>, Vec<f32>),
-    /// `[h,m]`, `[h]`.
-    pub mlp2: (Vec<f32>, Vec<f32>),
-    /// `[h]`, `[h]`.
-    pub norm3: (Vec<f32>, Vec<f32>),
-    /// `[3,h]`, `[3]`.
-    pub head: (Vec<f32>, Vec<f32>),
-}
-
 /// Everything that depends on the mesh alone.
 #[derive(Debug)]
 pub struct UptTables {
@@ -37,6 +21,8 @@ pub struct UptTables {
     pub graph: SupernodeGraph,
     /// Supernodes and their neighbours, ascending: the rows of the two encoder tables.
     pub encode_nodes: Vec<u32>,
+    /// Row of each node in the encoder tables `[K]`; `u32::MAX` where it has none.
+    pub row_of_node: Vec<u32>,
     /// Supernodes as rows of the encoder tables.
     pub supernode_rows: Vec<u32>,
     /// The graph's neighbours as rows of the encoder tables.
@@ -53,6 +39,7 @@ impl UptTables {
     /// Bytes held.
     pub fn memory_bytes(&self) -> usize {
         4 * (self.encode_nodes.len()
+            + self.row_of_node.len()
             + self.supernode_rows.len()
             + self.neighbour_rows.len()
             + self.graph.supernodes.len()
@@ -72,8 +59,8 @@ pub struct UptModel {
     pub source_weight: Vec<f32>,
     /// `[f,d]`, transposed for the kernels.
     pub target_weight: Vec<f32>,
-    /// Decoder weights.
-    pub decoder: DecoderTensors,
+    /// Decoder, packed for the native kernel.
+    pub decoder: PackedDecoder,
     /// Tables of the bundle's mesh.
     pub tables: Arc<UptTables>,
     embed: Vec<u8>,
@@ -105,7 +92,7 @@ impl UptModel {
         let model = UptModel {
             source_weight,
             target_weight,
-            decoder: decoder_tensors(&weights, &entry)?,
+            decoder: pack_decoder(&weights, &entry)?,
             tables,
             embed,
             latent: files.read("latent.onnx")?,
@@ -193,28 +180,32 @@ impl UptModel {
     }
 }
 
-fn decoder_tensors(file: &TensorFile, entry: &UptEntry) -> Result<DecoderTensors> {
+fn pack_decoder(file: &TensorFile, entry: &UptEntry) -> Result<PackedDecoder> {
     let (h, m) = (entry.dims.decoder, entry.dims.decoder_mlp);
-    let linear = |name: &str, out: usize, input: usize| {
+    let tensors = |name: &str, shape: &[Option<usize>]| {
         Ok::<_, Error>((
-            file.f32(&format!("decoder.{name}.weight"), &[Some(out), Some(input)])?,
-            file.f32(&format!("decoder.{name}.bias"), &[Some(out)])?,
+            file.f32(&format!("decoder.{name}.weight"), shape)?,
+            file.f32(&format!("decoder.{name}.bias"), &shape[..1])?,
         ))
     };
-    let norm = |name: &str| {
-        Ok::<_, Error>((
-            file.f32(&format!("decoder.{name}.weight"), &[Some(h)])?,
-            file.f32(&format!("decoder.{name}.bias"), &[Some(h)])?,
-        ))
-    };
-    Ok(DecoderTensors {
-        attention_out: linear("attention_out", h, h)?,
-        norm2: norm("norm2")?,
-        mlp1: linear("mlp1", m, h)?,
-        mlp2: linear("mlp2", h, m)?,
-        norm3: norm("norm3")?,
-        head: linear("head", 3, h)?,
+    let attention_out = tensors("attention_out", &[Some(h), Some(h)])?;
+    let norm2 = tensors("norm2", &[Some(h)])?;
+    let mlp1 = tensors("mlp1", &[Some(m), Some(h)])?;
+    let mlp2 = tensors("mlp2", &[Some(h), Some(m)])?;
+    let norm3 = tensors("norm3", &[Some(h)])?;
+    let head = tensors("head", &[Some(3), Some(h)])?;
+    PackedDecoder::new(&DecoderWeights {
+        hidden: h,
+        heads: entry.dims.decoder_heads,
+        mlp: m,
+        attention_out: (&attention_out.0, &attention_out.1),
+        norm2: (&norm2.0, &norm2.1),
+        mlp1: (&mlp1.0, &mlp1.1),
+        mlp2: (&mlp2.0, &mlp2.1),
+        norm3: (&norm3.0, &norm3.1),
+        head: (&head.0, &head.1),
     })
+    .map_err(|message| Error::bundle(file.name(), message))
 }
 
 fn make_tables(
@@ -256,6 +247,7 @@ fn make_tables(
         source_table: pick(&source),
         target_table: pick(&target),
         query_table,
+        row_of_node: row,
         encode_nodes,
         graph,
     })

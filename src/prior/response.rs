@@ -17,8 +17,6 @@ pub struct SolveReport {
     pub outside: bool,
     /// The contact block was near singular and a Tikhonov term was added.
     pub regularised: bool,
-    /// The set of columns differs from the last one solved for.
-    pub refactored: bool,
 }
 
 /// Contact forces, and the factor that is kept while the contact nodes stay the same.
@@ -107,7 +105,6 @@ impl ContactResponse {
             self.own[slot] = false;
         }
         if self.rows != self.factored {
-            report.refactored = true;
             self.factored.clear();
             self.regularised = false;
             if !self.rows.is_empty() {

@@ -1,12 +1,38 @@
-//! [`Scene`]: a tissue that is stepped. One thread at a time; a call while another thread steps it is [`Error::Busy`].
+//! [`Scene`]: a tissue that is stepped. One thread at a time; a call while another thread steps it is
+//! [`Error::Busy`]. Reading the published states (`read`, `sample`, their points, `stats`) is allowed from any thread
+//! at any time, also while a submitted step is in flight, and never waits for a step.
+
+mod contact;
+mod core;
+mod engine;
+mod plan;
+mod points;
+mod published;
+mod reduced;
+mod shared;
+mod snapshot;
+mod timing;
+mod upt;
+mod worker;
 
 use std::sync::Arc;
 use std::time::Duration;
 
+pub use contact::{ContactSet, INPUT_LIMIT};
+pub use core::{QUIET_DISPLACEMENT, QUIET_STEPS};
+
+use crate::bundle::{Mesh, TensorFile};
 use crate::error::{Error, Result};
-use crate::model::Model;
-use crate::options::SceneOptions;
+use crate::kernels::Pool;
+use crate::model::{KindModel, Model};
+use crate::options::{DecoderKernel, Precision, Provider, SceneOptions};
 use crate::stats::SceneStats;
+use core::{Core, CoreParts, check_nodes, lock_read};
+use engine::Engine;
+use points::AttachedPoints;
+use published::{Frame, Published, Values};
+use shared::Shared;
+use worker::Worker;
 
 /// The collision field `c` of a step: what the instruments impose at its end.
 #[derive(Debug, Clone, Copy)]
@@ -27,9 +53,10 @@ pub enum Contact<'a> {
 /// Inputs of a step.
 #[derive(Debug, Clone, Copy)]
 pub struct StepInput<'a> {
-    /// Current displacement `[K,3]`, mm; `None` takes the scene's own state.
+    /// Current displacement `[K,3]`, mm; `None` takes the scene's own state. A field that equals the scene's last
+    /// state at its decoded nodes is taken as that state.
     pub displacement: Option<&'a [f32]>,
-    /// Collision field.
+    /// Collision field. A node that the boundary condition holds stays held.
     pub contact: Contact<'a>,
 }
 
@@ -43,103 +70,267 @@ pub enum Progress {
 }
 
 /// A tissue that is stepped. All methods take `&self`; concurrent use gives [`Error::Busy`], never a wait.
-pub struct Scene {}
+pub struct Scene {
+    // Dropped first: it stops the worker, which uses the rest.
+    worker: Worker,
+    shared: Arc<Shared>,
+    model: Arc<Model>,
+    mesh: Arc<Mesh>,
+    latest_wins: bool,
+}
 
 impl Scene {
     /// Makes a scene at rest.
+    ///
+    /// # Errors
+    /// What [`Model::open`] says of sessions; [`Error::Unsupported`] for a mesh of the scene's own with a bundle that
+    /// has a prior; [`Error::Io`] and [`Error::Bundle`] for that mesh.
     pub fn new(model: Arc<Model>, options: &SceneOptions) -> Result<Scene> {
-        let _ = (model, options);
-        Err(Error::Unsupported("scene".into()))
+        let _span = tracing::info_span!("scene").entered();
+        let core = build(&model, options)?;
+        let mesh = Arc::clone(&core.mesh);
+        let frame = Frame {
+            field: vec![0.0; 3 * mesh.node_count()],
+            points: Vec::new(),
+        };
+        let published = Published {
+            last: frame.clone(),
+            before: frame.clone(),
+            earlier: options.cubic_sampling.then_some(frame),
+            region: None,
+            stats: core.blank_stats(),
+            contact_nodes: Vec::with_capacity(mesh.node_count()),
+            contact_vectors: Vec::with_capacity(3 * mesh.node_count()),
+        };
+        Ok(Scene {
+            worker: Worker::default(),
+            shared: Arc::new(Shared::new(core, published)),
+            model,
+            mesh,
+            latest_wins: options.latest_wins,
+        })
     }
+
     /// The model of this scene.
     pub fn model(&self) -> &Arc<Model> {
-        unreachable!("a scene cannot be made yet")
+        &self.model
     }
-    /// Back to rest.
-    pub fn reset(&self) -> Result<()> {
-        Ok(())
+
+    /// The scene's mesh: the bundle's, or its own.
+    pub fn mesh(&self) -> &Arc<Mesh> {
+        &self.mesh
     }
-    /// One step of `dt`; `out` is `[n,3]` (n: `K`, or the region's count).
-    pub fn step(&self, input: StepInput<'_>, out: Option<&mut [f32]>) -> Result<()> {
-        let _ = (input, out);
-        Ok(())
-    }
-    /// The last published state, `[n,3]`, mm, region order.
-    pub fn read(&self, out: &mut [f32]) -> Result<()> {
-        let _ = out;
-        Ok(())
-    }
+
     /// Nodes of the scene's mesh, `K`.
     pub fn node_count(&self) -> usize {
-        0
+        self.mesh.node_count()
     }
+
+    fn with<T>(
+        &self,
+        call: impl FnOnce(&mut Core, &std::sync::RwLock<Published>) -> Result<T>,
+    ) -> Result<T> {
+        if self.worker.in_flight() {
+            return Err(Error::Busy(
+                "a submitted step is in flight; poll or wait first".into(),
+            ));
+        }
+        self.shared.with(call)
+    }
+
+    /// Back to rest; region and points stay.
+    pub fn reset(&self) -> Result<()> {
+        self.with(|core, published| {
+            core.reset(published);
+            Ok(())
+        })
+    }
+
+    /// One step of `dt`; `out` is `[n,3]` (n: `K`, or the region's count).
+    ///
+    /// # Errors
+    /// [`Error::Argument`], [`Error::NonFinite`] for inputs, [`Error::Guard`] for a refused state: the last good state
+    /// stays.
+    pub fn step(&self, input: StepInput<'_>, out: Option<&mut [f32]>) -> Result<()> {
+        self.with(|core, published| core.step(published, input, out))
+    }
+
+    /// The last published state, `[n,3]`, mm, region order.
+    pub fn read(&self, out: &mut [f32]) -> Result<()> {
+        lock_read(&self.shared.published).read(Values::Region, out)
+    }
+
     /// Nodes of `read` (`K`, or the region's count).
     pub fn region_count(&self) -> usize {
-        0
+        lock_read(&self.shared.published).count(Values::Region)
     }
-    /// Restricts output to these nodes (any order); `None` is all nodes.
+
+    /// Restricts output to these nodes (any order); `None` is all nodes. Both published states are decoded for the new
+    /// region at once, to the bits that a full decode would have given.
     pub fn set_region(&self, nodes: Option<&[u32]>) -> Result<()> {
-        let _ = nodes;
-        Ok(())
+        self.with(|core, published| {
+            if let Some(nodes) = nodes {
+                check_nodes(nodes, core.mesh.node_count())?;
+            }
+            let points = core.points.clone();
+            core.set_plan(published, nodes.map(<[u32]>::to_vec), points)
+        })
     }
+
     /// Displacement `[n,3]` of any nodes in the last state.
+    ///
+    /// # Errors
+    /// [`Error::State`] before the first step.
     pub fn decode(&self, nodes: &[u32], out: &mut [f32]) -> Result<()> {
-        let _ = (nodes, out);
-        Ok(())
+        self.with(|core, published| core.decode(published, nodes, out))
     }
+
     /// Attaches points `[n,3]` in rest mm; `None` detaches.
     pub fn attach_points(&self, points: Option<&[f32]>) -> Result<()> {
-        let _ = points;
-        Ok(())
+        self.with(|core, published| {
+            let points = match points {
+                Some(points) => AttachedPoints::new(&core.mesh, points)?,
+                None => AttachedPoints::default(),
+            };
+            let region = lock_read(published).region.clone();
+            core.set_plan(published, region, points)
+        })
     }
+
     /// Number of attached points.
     pub fn point_count(&self) -> usize {
-        0
+        lock_read(&self.shared.published).count(Values::Points)
     }
+
     /// Displacement `[n,3]` at the attached points in the last state.
     pub fn read_points(&self, out: &mut [f32]) -> Result<()> {
-        let _ = out;
-        Ok(())
+        lock_read(&self.shared.published).read(Values::Points, out)
     }
-    /// Between the state before (`alpha` 0) and the last state (1), region order.
+
+    /// Between the state before (`alpha` 0) and the last state (1), region order. `alpha` is clamped to `[0, 1]`.
+    ///
+    /// What is shown is up to one `dt` old: at `alpha` 0 the state before, at 1 the newest.
     pub fn sample(&self, alpha: f64, out: &mut [f32]) -> Result<()> {
-        let _ = (alpha, out);
-        Ok(())
+        lock_read(&self.shared.published).sample(Values::Region, alpha, out)
     }
+
     /// As [`Scene::sample`], at the attached points.
     pub fn sample_points(&self, alpha: f64, out: &mut [f32]) -> Result<()> {
-        let _ = (alpha, out);
-        Ok(())
+        lock_read(&self.shared.published).sample(Values::Points, alpha, out)
     }
+
     /// Starts a step on the scene's worker.
+    ///
+    /// # Errors
+    /// [`Error::Busy`] while a submitted step has not finished, unless the scene was made with `latest_wins`: then an
+    /// input that has not started is replaced. Bad inputs are reported by [`Scene::poll`] or [`Scene::wait`].
     pub fn submit(&self, nodes: &[u32], vectors: &[f32]) -> Result<()> {
-        let _ = (nodes, vectors);
-        Ok(())
+        if vectors.len() != 3 * nodes.len() {
+            return Err(Error::Argument(format!(
+                "contact_vectors has {} floats, must have {}",
+                vectors.len(),
+                3 * nodes.len()
+            )));
+        }
+        self.worker
+            .submit(&self.shared, nodes, vectors, self.latest_wins)
     }
+
     /// Whether the submitted step has finished; its error, once.
     pub fn poll(&self) -> Result<Progress> {
-        Ok(Progress::Done)
+        self.worker.poll()
     }
+
     /// Waits for the submitted step at most `timeout`.
     pub fn wait(&self, timeout: Duration) -> Result<Progress> {
-        let _ = timeout;
-        Ok(Progress::Done)
+        self.worker.wait(timeout)
     }
+
     /// A snapshot from which the scene resumes to the bit.
     pub fn save(&self) -> Result<Vec<u8>> {
-        Ok(Vec::new())
+        self.with(|core, published| Ok(core.save(published)))
     }
+
     /// Restores a snapshot.
+    ///
+    /// # Errors
+    /// [`Error::Snapshot`] when it is damaged or of another model or mesh, [`Error::Version`].
     pub fn restore(&self, bytes: &[u8]) -> Result<()> {
-        let _ = bytes;
-        Ok(())
+        self.with(|core, published| core.restore(published, bytes))
     }
-    /// Statistics of the last step; never blocks on a step in flight.
+
+    /// Statistics of the last step.
     pub fn stats(&self) -> SceneStats {
-        unreachable!("a scene cannot be made yet")
+        let mut stats = lock_read(&self.shared.published).stats;
+        stats.poisoned = self.shared.is_poisoned();
+        stats
     }
+
     /// Nodes in contact in the last step, in the host's order, and `[m,3]` their displacements, mm.
     pub fn last_contacts(&self) -> Result<(Vec<u32>, Vec<f32>)> {
-        Ok((Vec::new(), Vec::new()))
+        let shared = lock_read(&self.shared.published);
+        Ok((shared.contact_nodes.clone(), shared.contact_vectors.clone()))
     }
+}
+
+fn build(model: &Arc<Model>, options: &SceneOptions) -> Result<Core> {
+    let threads = match options.threads {
+        0 => model.threads,
+        threads => threads,
+    };
+    if threads > 1024 {
+        return Err(Error::Argument(format!(
+            "threads is {threads}, must be at most 1024"
+        )));
+    }
+    let pool = Pool::new(threads).map_err(|error| Error::Argument(error.to_string()))?;
+    let own_mesh = match &options.mesh_path {
+        None => None,
+        Some(path) => {
+            if model.prior.is_some() {
+                return Err(Error::Unsupported(
+                    "mesh_path: this bundle has a prior, which holds for its own mesh only".into(),
+                ));
+            }
+            let bytes = std::fs::read(path).map_err(|error| Error::io(path, error))?;
+            let file = TensorFile::parse(&path.display().to_string(), bytes)?;
+            Some(Arc::new(Mesh::parse(&file, model.manifest.boundary)?))
+        }
+    };
+    let engine = match &model.kind {
+        KindModel::Reduced(kind) => {
+            let table = model
+                .prior
+                .as_ref()
+                .ok_or_else(|| Error::bundle("bundle.json", "field `prior` is missing"))?;
+            Engine::Reduced(Box::new(reduced::ReducedEngine::new(model, kind, table)?))
+        }
+        KindModel::Upt(kind) => {
+            let (tables, nodes) = match &own_mesh {
+                None => (Arc::clone(&kind.tables), model.mesh.node_count()),
+                Some(mesh) => (
+                    Arc::new(kind.tables_of(mesh, model.runtime, threads)?),
+                    mesh.node_count(),
+                ),
+            };
+            let kernel = match options.kernel {
+                DecoderKernel::Auto if model.info().provider == Provider::Cpu => {
+                    DecoderKernel::Native
+                }
+                DecoderKernel::Auto => DecoderKernel::Onnx,
+                kernel => kernel,
+            };
+            let precision: Precision = options.precision.unwrap_or(model.precision);
+            let engine =
+                upt::UptEngine::new(model, kind, &tables, &pool, nodes, kernel, precision)?;
+            Engine::Upt(Box::new(engine), tables)
+        }
+    };
+    Ok(Core::new(CoreParts {
+        model: Arc::clone(model),
+        mesh: own_mesh.unwrap_or_else(|| Arc::clone(&model.mesh)),
+        options: options.clone(),
+        pool,
+        engine,
+    }))
 }

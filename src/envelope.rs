@@ -1,0 +1,178 @@
+//! The envelope: whether a step's contact is inside what the model was trained on, as flags and a number.
+
+use crate::bundle::{Envelope, Mesh};
+use crate::scene::ContactSet;
+use crate::stats::flag;
+
+/// Rounding that is no violation, relative.
+const SLACK: f32 = 1.0 + 1e-4;
+const NO_PATCH: u32 = u32::MAX;
+
+/// What a check found.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct EnvelopeReport {
+    /// Bits of [`flag`].
+    pub flags: u32,
+    /// Largest ratio of a quantity to its limit; above 1 is outside.
+    pub ratio: f32,
+    /// Largest `|c|`, mm.
+    pub max_push: f32,
+}
+
+/// Contact patches of a mesh, found by its surface edges; kept while the contact nodes stay the same.
+#[derive(Debug)]
+pub struct EnvelopeCheck {
+    offsets: Vec<u32>,
+    neighbours: Vec<u32>,
+    in_domain: Vec<bool>,
+    patch: Vec<u32>,
+    stack: Vec<u32>,
+    nodes: Vec<u32>,
+    patch_flags: u32,
+    patch_ratio: f32,
+}
+
+impl EnvelopeCheck {
+    /// Surface adjacency of a mesh.
+    pub fn new(mesh: &Mesh) -> EnvelopeCheck {
+        let mut edges: Vec<(u32, u32)> = mesh
+            .surface_faces
+            .chunks_exact(3)
+            .flat_map(|f| {
+                [(f[0], f[1]), (f[1], f[2]), (f[2], f[0])]
+                    .into_iter()
+                    .flat_map(|(a, b)| [(a, b), (b, a)])
+            })
+            .collect();
+        edges.sort_unstable();
+        edges.dedup();
+        let count = mesh.node_count();
+        let mut offsets = vec![0u32; count + 1];
+        for &(a, _) in &edges {
+            offsets[a as usize + 1] += 1;
+        }
+        for i in 0..count {
+            offsets[i + 1] += offsets[i];
+        }
+        let mut in_domain = vec![false; count];
+        for &node in &mesh.domain_nodes {
+            in_domain[node as usize] = true;
+        }
+        EnvelopeCheck {
+            offsets,
+            neighbours: edges.into_iter().map(|(_, b)| b).collect(),
+            in_domain,
+            patch: vec![NO_PATCH; count],
+            stack: Vec::with_capacity(count),
+            nodes: Vec::with_capacity(count),
+            patch_flags: 0,
+            patch_ratio: 0.0,
+        }
+    }
+
+    /// Compares a step's contact, and the one of the step before, with the envelope.
+    pub fn check(
+        &mut self,
+        mesh: &Mesh,
+        envelope: &Envelope,
+        now: &ContactSet,
+        before: &ContactSet,
+    ) -> EnvelopeReport {
+        if now.nodes != self.nodes {
+            self.nodes.clear();
+            self.nodes.extend_from_slice(&now.nodes);
+            self.find_patches(mesh, envelope);
+        }
+        let mut report = EnvelopeReport {
+            flags: self.patch_flags,
+            ratio: self.patch_ratio,
+            max_push: now.max_push(),
+        };
+        let push = report.max_push / envelope.max_push_mm;
+        if push > SLACK {
+            report.flags |= flag::PUSH;
+        }
+        let rate = largest_rate(now, before) / envelope.max_push_rate_mm;
+        if rate > SLACK {
+            report.flags |= flag::RATE;
+        }
+        report.ratio = report.ratio.max(push).max(rate);
+        report
+    }
+
+    /// Flood fill over surface edges: areas of the patches and how many there are.
+    fn find_patches(&mut self, mesh: &Mesh, envelope: &Envelope) {
+        self.patch_flags = 0;
+        self.patch_ratio = 0.0;
+        const IN_CONTACT: u32 = u32::MAX - 1;
+        for &node in &self.nodes {
+            self.patch[node as usize] = IN_CONTACT;
+            if !self.in_domain[node as usize] {
+                self.patch_flags |= flag::SITE;
+                self.patch_ratio = self.patch_ratio.max(2.0);
+            }
+        }
+        let mut patches = 0u32;
+        let [low, high] = envelope.contact_area_mm2;
+        for start in 0..self.nodes.len() {
+            let start = self.nodes[start];
+            if self.patch[start as usize] != IN_CONTACT {
+                continue;
+            }
+            let mut area = 0.0;
+            self.patch[start as usize] = patches;
+            self.stack.push(start);
+            while let Some(node) = self.stack.pop() {
+                let node = node as usize;
+                area += mesh.node_area[node];
+                for &other in
+                    &self.neighbours[self.offsets[node] as usize..self.offsets[node + 1] as usize]
+                {
+                    if self.patch[other as usize] == IN_CONTACT {
+                        self.patch[other as usize] = patches;
+                        self.stack.push(other);
+                    }
+                }
+            }
+            patches += 1;
+            if area > high * SLACK || area * SLACK < low {
+                self.patch_flags |= flag::CONTACT_AREA;
+                let ratio = if area > high {
+                    area / high
+                } else {
+                    low / area.max(1e-3 * low)
+                };
+                self.patch_ratio = self.patch_ratio.max(ratio);
+            }
+        }
+        if patches as usize > envelope.max_sites {
+            self.patch_flags |= flag::SITES;
+            self.patch_ratio = self
+                .patch_ratio
+                .max(patches as f32 / envelope.max_sites as f32);
+        }
+        for &node in &self.nodes {
+            self.patch[node as usize] = NO_PATCH;
+        }
+    }
+}
+
+/// Largest `|c[t] - c[t-1]|` of a node in both sets; where no node is in both, the largest `|c[t]|`: a new touch
+/// starts from the undeformed surface.
+fn largest_rate(now: &ContactSet, before: &ContactSet) -> f32 {
+    let mut rate = 0.0f32;
+    let mut shared = false;
+    let mut at = 0;
+    for (&node, c) in now.nodes.iter().zip(now.vectors.chunks_exact(3)) {
+        while at < before.nodes.len() && before.nodes[at] < node {
+            at += 1;
+        }
+        if before.nodes.get(at) == Some(&node) {
+            shared = true;
+            let b = &before.vectors[3 * at..3 * at + 3];
+            let d = [c[0] - b[0], c[1] - b[1], c[2] - b[2]];
+            rate = rate.max(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+        }
+    }
+    if shared { rate.sqrt() } else { now.max_push() }
+}

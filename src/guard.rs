@@ -1,0 +1,133 @@
+//! The guard: what a decoded state must satisfy before it is published. Finite, bounded, no growth without cause,
+//! and by option no inverted element.
+
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+
+use crate::bundle::volume;
+use crate::error::{Error, Result};
+use crate::kernels::Pool;
+use crate::stats::flag;
+
+/// Flags that make the guard refuse a state.
+pub const REFUSED: u32 = flag::BOUND | flag::NON_FINITE | flag::INVERTED | flag::GROWTH;
+
+/// A step may enlarge the largest displacement, or overshoot the largest imposed one, by this factor ...
+const GROWTH_FACTOR: f32 = 1.6;
+/// ... and by this much, mm.
+const GROWTH_FLOOR: f32 = 2.0;
+const CHUNK: usize = 4096;
+
+/// Largest `|u|` over nodes of a field `[K,3]`, mm; not finite when any is not.
+pub fn largest(pool: &Pool, field: &[f32], nodes: &[u32]) -> Result<f32> {
+    // Squares are not negative, so their bits order as they do, infinities and NaN last.
+    let worst = AtomicU32::new(0);
+    pool.run(nodes.len().div_ceil(CHUNK), &|chunk, _| {
+        let mut bits = 0;
+        for &node in &nodes[chunk * CHUNK..((chunk + 1) * CHUNK).min(nodes.len())] {
+            let u = &field[3 * node as usize..3 * node as usize + 3];
+            let square = u[0] * u[0] + u[1] * u[1] + u[2] * u[2];
+            bits = bits.max(square.to_bits() & 0x7fff_ffff);
+        }
+        worst.fetch_max(bits, Ordering::Relaxed);
+    })
+    .map_err(|error| Error::Panic(error.to_string()))?;
+    Ok(f32::from_bits(worst.into_inner()).sqrt())
+}
+
+/// Flags of a state whose largest displacement is `max_now` after one of `max_before`, with `max_push` imposed.
+pub fn judge(bound: f32, max_now: f32, max_before: f32, max_push: f32) -> u32 {
+    if !max_now.is_finite() {
+        return flag::NON_FINITE;
+    }
+    let mut flags = 0;
+    if max_now > bound {
+        flags |= flag::BOUND;
+    }
+    if max_now > GROWTH_FACTOR * max_before.max(max_push) + GROWTH_FLOOR {
+        flags |= flag::GROWTH;
+    }
+    flags
+}
+
+/// Whether any of the tetrahedra `[n,4]` has no positive volume in the deformed state.
+pub fn inverted(pool: &Pool, positions: &[f32], field: &[f32], tets: &[u32]) -> Result<bool> {
+    let found = AtomicBool::new(false);
+    let count = tets.len() / 4;
+    pool.run(count.div_ceil(CHUNK), &|chunk, _| {
+        let mut corners = [0.0f32; 12];
+        for tet in
+            tets[4 * chunk * CHUNK..(4 * (chunk + 1) * CHUNK).min(tets.len())].chunks_exact(4)
+        {
+            for (corner, &node) in corners.chunks_exact_mut(3).zip(tet) {
+                for axis in 0..3 {
+                    let at = 3 * node as usize + axis;
+                    corner[axis] = positions[at] + field[at];
+                }
+            }
+            if volume(&corners, &[0, 1, 2, 3]) <= 0.0 {
+                found.store(true, Ordering::Relaxed);
+            }
+        }
+    })
+    .map_err(|error| Error::Panic(error.to_string()))?;
+    Ok(found.into_inner())
+}
+
+/// What a refusal says.
+pub fn describe(flags: u32, max: f32, bound: f32) -> String {
+    let mut reasons = Vec::new();
+    if flags & flag::NON_FINITE != 0 {
+        reasons.push("a displacement is not finite".to_owned());
+    }
+    if flags & flag::BOUND != 0 {
+        reasons.push(format!(
+            "largest displacement {max} mm is beyond the bound {bound} mm"
+        ));
+    }
+    if flags & flag::GROWTH != 0 {
+        reasons.push(format!(
+            "largest displacement grew to {max} mm without cause"
+        ));
+    }
+    if flags & flag::INVERTED != 0 {
+        reasons.push("an element is inverted".to_owned());
+    }
+    format!("{}; the last good state stays", reasons.join(", "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn largest_finds_the_largest_and_what_is_not_finite() {
+        let pool = Pool::new(2).unwrap();
+        let mut field = vec![0.0f32; 3 * 10_000];
+        field[3 * 9_000 + 1] = -4.0;
+        let nodes: Vec<u32> = (0..10_000).collect();
+        assert_eq!(largest(&pool, &field, &nodes).unwrap(), 4.0);
+        assert_eq!(largest(&pool, &field, &nodes[..9_000]).unwrap(), 0.0);
+        for bad in [f32::NAN, -f32::NAN, f32::INFINITY, 1e30] {
+            field[7] = bad;
+            assert!(!largest(&pool, &field, &nodes).unwrap().is_finite());
+        }
+    }
+
+    #[test]
+    fn judge_allows_a_push_and_refuses_growth() {
+        assert_eq!(judge(30.0, 15.0, 0.0, 15.0), 0);
+        assert_eq!(judge(30.0, 31.0, 29.0, 0.0), flag::BOUND);
+        assert_eq!(judge(30.0, 9.0, 1.0, 0.0), flag::GROWTH);
+        assert_eq!(judge(30.0, f32::NAN, 1.0, 0.0), flag::NON_FINITE);
+    }
+
+    #[test]
+    fn an_inverted_element_is_found() {
+        let pool = Pool::new(1).unwrap();
+        let positions = [0., 0., 0., 1., 0., 0., 0., 1., 0., 0., 0., 1.];
+        let mut field = [0.0; 12];
+        assert!(!inverted(&pool, &positions, &field, &[0, 1, 2, 3]).unwrap());
+        field[11] = -1.5;
+        assert!(inverted(&pool, &positions, &field, &[0, 1, 2, 3]).unwrap());
+    }
+}

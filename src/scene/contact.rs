@@ -1,0 +1,235 @@
+//! The collision field of a step, as a sparse set in ascending node order, checked.
+
+use super::Contact;
+use crate::error::{Error, Result};
+
+/// Displacements beyond this are refused as input, mm.
+pub const INPUT_LIMIT: f32 = 1e6;
+
+/// Nodes in contact and what is imposed there.
+#[derive(Debug, Clone, Default)]
+pub struct ContactSet {
+    /// Ascending.
+    pub nodes: Vec<u32>,
+    /// `[m,3]`, mm.
+    pub vectors: Vec<f32>,
+    /// Place of each entry in the host's list.
+    pub order: Vec<u32>,
+}
+
+impl ContactSet {
+    /// Room for every node of the mesh, so that a step allocates nothing.
+    pub fn with_capacity(node_count: usize) -> ContactSet {
+        ContactSet {
+            nodes: Vec::with_capacity(node_count),
+            vectors: Vec::with_capacity(3 * node_count),
+            order: Vec::with_capacity(node_count),
+        }
+    }
+
+    /// Nodes in contact.
+    pub fn len(&self) -> usize {
+        self.nodes.len()
+    }
+
+    /// No contact.
+    pub fn is_empty(&self) -> bool {
+        self.nodes.is_empty()
+    }
+
+    /// Empties the set.
+    pub fn clear(&mut self) {
+        self.nodes.clear();
+        self.vectors.clear();
+        self.order.clear();
+    }
+
+    /// Copies another set.
+    pub fn copy_from(&mut self, other: &ContactSet) {
+        self.clear();
+        self.nodes.extend_from_slice(&other.nodes);
+        self.vectors.extend_from_slice(&other.vectors);
+        self.order.extend_from_slice(&other.order);
+    }
+
+    /// What is imposed at a node.
+    pub fn at(&self, node: u32) -> Option<[f32; 3]> {
+        let i = self.nodes.binary_search(&node).ok()?;
+        Some([
+            self.vectors[3 * i],
+            self.vectors[3 * i + 1],
+            self.vectors[3 * i + 2],
+        ])
+    }
+
+    /// Largest `|c|`, mm.
+    pub fn max_push(&self) -> f32 {
+        self.vectors
+            .chunks_exact(3)
+            .map(|c| c[0] * c[0] + c[1] * c[1] + c[2] * c[2])
+            .fold(0.0, f32::max)
+            .sqrt()
+    }
+
+    /// Takes a step's collision field over a mesh of `node_count` nodes.
+    pub fn gather(&mut self, contact: Contact<'_>, node_count: usize) -> Result<()> {
+        self.clear();
+        match contact {
+            Contact::None => Ok(()),
+            Contact::Dense(field) => self.gather_dense(field, node_count),
+            Contact::Sparse { nodes, vectors } => self.gather_sparse(nodes, vectors, node_count),
+        }
+    }
+
+    fn gather_dense(&mut self, field: &[f32], node_count: usize) -> Result<()> {
+        if field.len() != 3 * node_count {
+            return Err(Error::Argument(format!(
+                "collision has {} floats, must have 3 K = {}",
+                field.len(),
+                3 * node_count
+            )));
+        }
+        for (node, c) in field.chunks_exact(3).enumerate() {
+            if c[0] != 0.0 || c[1] != 0.0 || c[2] != 0.0 {
+                check("collision", node, c)?;
+                self.order.push(self.nodes.len() as u32);
+                self.nodes.push(node as u32);
+                self.vectors.extend_from_slice(c);
+            }
+        }
+        Ok(())
+    }
+
+    fn gather_sparse(&mut self, nodes: &[u32], vectors: &[f32], node_count: usize) -> Result<()> {
+        if vectors.len() != 3 * nodes.len() {
+            return Err(Error::Argument(format!(
+                "contact_vectors has {} floats, must have 3 per node, {}",
+                vectors.len(),
+                3 * nodes.len()
+            )));
+        }
+        if nodes.len() > node_count {
+            return Err(Error::Argument(format!(
+                "{} contact nodes, the mesh has {node_count}",
+                nodes.len()
+            )));
+        }
+        for (at, (&node, c)) in nodes.iter().zip(vectors.chunks_exact(3)).enumerate() {
+            if node as usize >= node_count {
+                return Err(Error::Argument(format!(
+                    "contact_nodes[{at}] is {node}, the mesh has {node_count} nodes"
+                )));
+            }
+            check("contact_vectors", at, c)?;
+            self.order.push(at as u32);
+        }
+        if nodes.windows(2).any(|pair| pair[0] >= pair[1]) {
+            self.order.sort_unstable_by_key(|&at| nodes[at as usize]);
+        }
+        for &at in &self.order {
+            let at = at as usize;
+            if self.nodes.last() == Some(&nodes[at]) {
+                return Err(Error::Argument(format!(
+                    "contact_nodes holds node {} twice",
+                    nodes[at]
+                )));
+            }
+            self.nodes.push(nodes[at]);
+            self.vectors.extend_from_slice(&vectors[3 * at..3 * at + 3]);
+        }
+        Ok(())
+    }
+}
+
+/// Finite and of a size that can be a displacement.
+fn check(what: &str, at: usize, c: &[f32]) -> Result<()> {
+    if !(c[0].is_finite() && c[1].is_finite() && c[2].is_finite()) {
+        return Err(Error::NonFinite(format!(
+            "{what}: element {at} is not finite"
+        )));
+    }
+    if c.iter().any(|x| x.abs() > INPUT_LIMIT) {
+        return Err(Error::Argument(format!(
+            "{what}: element {at} is larger than {INPUT_LIMIT} mm; units are mm"
+        )));
+    }
+    Ok(())
+}
+
+/// Checks a displacement field `[K,3]` given by the host.
+pub fn check_displacement(field: &[f32], node_count: usize) -> Result<()> {
+    if field.len() != 3 * node_count {
+        return Err(Error::Argument(format!(
+            "displacement has {} floats, must have 3 K = {}",
+            field.len(),
+            3 * node_count
+        )));
+    }
+    // One pass that vectorises; the place is only looked for when something is wrong.
+    let worst = field
+        .iter()
+        .fold(0u32, |m, x| m.max(x.to_bits() & 0x7fff_ffff));
+    if worst > INPUT_LIMIT.to_bits() {
+        for (node, u) in field.chunks_exact(3).enumerate() {
+            check("displacement", node, u)?;
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sparse_input_is_sorted_and_its_order_kept() {
+        let mut set = ContactSet::default();
+        let contact = Contact::Sparse {
+            nodes: &[5, 2, 9],
+            vectors: &[5., 0., 0., 2., 0., 0., 9., 0., 0.],
+        };
+        set.gather(contact, 10).unwrap();
+        assert_eq!(set.nodes, [2, 5, 9]);
+        assert_eq!(set.order, [1, 0, 2]);
+        assert_eq!(set.at(5), Some([5.0, 0.0, 0.0]));
+        assert_eq!(set.at(3), None);
+        assert_eq!(set.max_push(), 9.0);
+    }
+
+    #[test]
+    fn dense_and_sparse_input_give_the_same_set() {
+        let mut dense = vec![0.0; 12];
+        dense[4] = -0.0;
+        dense[9] = 1.0;
+        let (mut a, mut b) = (ContactSet::default(), ContactSet::default());
+        a.gather(Contact::Dense(&dense), 4).unwrap();
+        let contact = Contact::Sparse {
+            nodes: &[3],
+            vectors: &[1.0, 0.0, 0.0],
+        };
+        b.gather(contact, 4).unwrap();
+        assert_eq!((a.nodes, a.vectors), (b.nodes, b.vectors));
+    }
+
+    #[test]
+    fn bad_input_is_named() {
+        let mut set = ContactSet::default();
+        let mut status = |nodes: &[u32], vectors: &[f32]| {
+            set.gather(Contact::Sparse { nodes, vectors }, 4)
+                .unwrap_err()
+                .status()
+        };
+        assert_eq!(status(&[4], &[0.0; 3]), -2);
+        assert_eq!(status(&[1, 1], &[0.0; 6]), -2);
+        assert_eq!(status(&[1], &[0.0; 2]), -2);
+        assert_eq!(status(&[1], &[f32::NAN, 0.0, 0.0]), -6);
+        assert_eq!(status(&[1], &[1e30, 0.0, 0.0]), -2);
+        assert_eq!(
+            check_displacement(&[0.0, f32::INFINITY, 0.0], 1)
+                .unwrap_err()
+                .status(),
+            -6
+        );
+        assert!(check_displacement(&[0.0, 1.0, -3.0], 1).is_ok());
+    }
+}

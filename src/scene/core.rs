@@ -1,0 +1,607 @@
+//! The step itself: check, predict, decode, boundary conditions, guard, publish (design: the paper's Eq. 2).
+
+use std::sync::{Arc, PoisonError, RwLock};
+use std::time::Instant;
+
+use super::StepInput;
+use super::contact::{ContactSet, check_displacement};
+use super::engine::{Engine, Which};
+use super::plan::NodePlan;
+use super::points::AttachedPoints;
+use super::published::{Frame, Published, Values};
+use super::timing::Stopwatch;
+use crate::bundle::Mesh;
+use crate::envelope::EnvelopeCheck;
+use crate::error::{Error, Result};
+use crate::guard;
+use crate::kernels::{FlushToZero, Isa, Pool};
+use crate::model::Model;
+use crate::options::{GuardPolicy, SceneOptions};
+use crate::stats::{SceneStats, flag};
+
+/// A scene is asleep after this many steps without contact ...
+pub const QUIET_STEPS: u32 = 4;
+/// ... in which no decoded node is displaced by more than this, mm.
+pub const QUIET_DISPLACEMENT: f32 = 0.02;
+
+/// Where a published state came from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Source {
+    /// Rest: zero everywhere.
+    Rest,
+    /// The model.
+    Model,
+    /// The linear response alone, or the imposed contact alone (the guard's blend).
+    Fallback,
+}
+
+/// Everything of a scene that only its stepping thread touches.
+pub struct Core {
+    pub(super) model: Arc<Model>,
+    pub(super) mesh: Arc<Mesh>,
+    pub(super) options: SceneOptions,
+    pub(super) pool: Pool,
+    pub(super) isa: Isa,
+    pub(super) engine: Engine,
+    pub(super) held: Vec<bool>,
+    pub(super) plan: NodePlan,
+    pub(super) points: AttachedPoints,
+    pub(super) planned_tets: Vec<u32>,
+    pub(super) incoming: ContactSet,
+    pub(super) contact: ContactSet,
+    pub(super) contact_before: ContactSet,
+    pub(super) source: Source,
+    pub(super) source_before: Source,
+    pub(super) step_count: u64,
+    pub(super) quiet: u32,
+    pub(super) sleeping: bool,
+    /// Published frames that hold exactly rest since the scene fell asleep.
+    pub(super) rest_frames: u32,
+    pub(super) max_displacement: f32,
+    envelope: EnvelopeCheck,
+    next: Frame,
+}
+
+/// Parts made by [`super::build`].
+pub struct CoreParts {
+    pub model: Arc<Model>,
+    pub mesh: Arc<Mesh>,
+    pub options: SceneOptions,
+    pub pool: Pool,
+    pub engine: Engine,
+}
+
+pub(super) fn lock_read(
+    published: &RwLock<Published>,
+) -> std::sync::RwLockReadGuard<'_, Published> {
+    published.read().unwrap_or_else(PoisonError::into_inner)
+}
+
+pub(super) fn lock_write(
+    published: &RwLock<Published>,
+) -> std::sync::RwLockWriteGuard<'_, Published> {
+    published.write().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Core {
+    pub(super) fn new(parts: CoreParts) -> Core {
+        let count = parts.mesh.node_count();
+        let mut held = vec![false; count];
+        for &node in &parts.mesh.held_nodes {
+            held[node as usize] = true;
+        }
+        let plan = NodePlan::all(count, parts.engine.planned_prior(&parts.model));
+        let contact = ContactSet::with_capacity(count);
+        Core {
+            envelope: EnvelopeCheck::new(&parts.mesh),
+            planned_tets: if parts.options.check_inversion {
+                parts.mesh.tets.clone()
+            } else {
+                Vec::new()
+            },
+            isa: Isa::detect(),
+            held,
+            plan,
+            points: AttachedPoints::default(),
+            incoming: ContactSet::with_capacity(count),
+            contact_before: ContactSet::with_capacity(count),
+            contact,
+            source: Source::Rest,
+            source_before: Source::Rest,
+            step_count: 0,
+            quiet: 0,
+            sleeping: false,
+            rest_frames: 0,
+            max_displacement: 0.0,
+            next: Frame {
+                field: vec![0.0; 3 * count],
+                points: Vec::new(),
+            },
+            model: parts.model,
+            mesh: parts.mesh,
+            options: parts.options,
+            pool: parts.pool,
+            engine: parts.engine,
+        }
+    }
+
+    /// A blank account of a step.
+    pub(super) fn blank_stats(&self) -> SceneStats {
+        SceneStats {
+            flags: 0,
+            step_count: self.step_count,
+            step_ms: 0.0,
+            check_ms: 0.0,
+            prior_ms: 0.0,
+            encode_ms: 0.0,
+            aggregate_ms: 0.0,
+            latent_ms: 0.0,
+            decode_ms: 0.0,
+            guard_ms: 0.0,
+            decoded_node_count: 0,
+            contact_count: 0,
+            memory_bytes: self.memory_bytes() as u64,
+            threads: self.pool.threads() as u32,
+            kernel: self.engine.kernel(),
+            provider: self.engine.provider(),
+            precision: self.engine.precision(),
+            max_displacement_mm: self.max_displacement,
+            indicator: 0.0,
+            sleeping: self.sleeping,
+            poisoned: false,
+        }
+    }
+
+    /// One step. On error nothing that a caller can see has changed but the statistics of a guard refusal.
+    pub(super) fn step(
+        &mut self,
+        published: &RwLock<Published>,
+        input: StepInput<'_>,
+        out: Option<&mut [f32]>,
+    ) -> Result<()> {
+        let _flush = FlushToZero::enter();
+        let start = Instant::now();
+        let _span = tracing::debug_span!("step", step = self.step_count).entered();
+        let mut stats = self.blank_stats();
+        let mut watch = Stopwatch::start();
+        let count = self.mesh.node_count();
+        if let Some(out) = &out {
+            lock_read(published).check_len(Values::Region, out.len())?;
+        }
+        self.incoming.gather(input.contact, count)?;
+        let given = match input.displacement {
+            Some(field) => {
+                check_displacement(field, count)?;
+                (!self.is_own_state(published, field)).then_some(field)
+            }
+            None => None,
+        };
+        stats.check_ms = watch.lap();
+
+        if self.sleeping && given.is_none() && self.incoming.is_empty() {
+            self.publish_rest(published);
+        } else {
+            self.predict_and_decode(published, given, &mut stats)?;
+            let verdict = self.judge(&mut stats)?;
+            if verdict & guard::REFUSED != 0 {
+                self.refuse(published, verdict, &mut stats)?;
+            }
+            self.publish(published, given.is_some(), &stats);
+        }
+        self.step_count += 1;
+        stats.step_count = self.step_count;
+        stats.sleeping = self.sleeping;
+        stats.max_displacement_mm = self.max_displacement;
+        stats.contact_count = self.contact.len() as u64;
+        if let Some(out) = out {
+            lock_read(published).read(Values::Region, out)?;
+        }
+        stats.step_ms = start.elapsed().as_secs_f64() * 1e3;
+        lock_write(published).stats = stats;
+        Ok(())
+    }
+
+    /// Whether a host's displacement is the scene's own last state, at the nodes that the scene knows.
+    fn is_own_state(&self, published: &RwLock<Published>, field: &[f32]) -> bool {
+        let shared = lock_read(published);
+        let own = &shared.last.field;
+        if self.plan.nodes().len() == self.mesh.node_count() {
+            return own == field;
+        }
+        self.plan.nodes().iter().all(|&node| {
+            let at = 3 * node as usize;
+            own[at..at + 3] == field[at..at + 3]
+        })
+    }
+
+    fn predict_and_decode(
+        &mut self,
+        published: &RwLock<Published>,
+        given: Option<&[f32]>,
+        stats: &mut SceneStats,
+    ) -> Result<()> {
+        let envelope = self.envelope.check(
+            &self.mesh,
+            &self.model.manifest.envelope,
+            &self.incoming,
+            &self.contact,
+        );
+        stats.flags |= envelope.flags;
+        stats.indicator = envelope.ratio;
+        let shared = lock_read(published);
+        self.engine.predict(
+            self.isa,
+            &self.pool,
+            &self.model,
+            &super::engine::Inputs {
+                given,
+                displacement: given.unwrap_or(&shared.last.field),
+                previous: &shared.before.field,
+                contact: &self.incoming,
+                contact_changed: self.incoming.nodes != self.contact.nodes,
+                held: &self.held,
+                plan: &self.plan,
+            },
+            stats,
+        )?;
+        let mut watch = Stopwatch::start();
+        let displacement = given.unwrap_or(&shared.last.field);
+        self.engine.decode(
+            self.isa,
+            &self.pool,
+            &self.model,
+            Which::Next,
+            &self.plan,
+            displacement,
+            &mut self.next.field,
+        )?;
+        drop(shared);
+        stats.decoded_node_count = self.plan.nodes().len() as u64;
+        self.enforce_next();
+        stats.decode_ms = watch.lap();
+        Ok(())
+    }
+
+    /// Held nodes to zero, contact nodes to what is imposed; a held node stays held in contact.
+    fn enforce_next(&mut self) {
+        if !self.options.free_boundary {
+            enforce(
+                &self.mesh.held_nodes,
+                &self.held,
+                &self.incoming,
+                &mut self.next.field,
+            );
+        }
+    }
+
+    fn judge(&mut self, stats: &mut SceneStats) -> Result<u32> {
+        let mut watch = Stopwatch::start();
+        let max = guard::largest(&self.pool, &self.next.field, self.plan.nodes())?;
+        let bound = self.model.manifest.envelope.displacement_bound_mm;
+        let mut verdict = guard::judge(bound, max, self.max_displacement, self.incoming.max_push());
+        if self.options.check_inversion
+            && verdict & flag::NON_FINITE == 0
+            && guard::inverted(
+                &self.pool,
+                &self.mesh.positions,
+                &self.next.field,
+                &self.planned_tets,
+            )?
+        {
+            verdict |= flag::INVERTED;
+        }
+        stats.flags |= verdict;
+        stats.max_displacement_mm = max;
+        stats.guard_ms += watch.lap();
+        Ok(verdict)
+    }
+
+    /// The policy for a refused state. `Ok` means that `next` may be published.
+    fn refuse(
+        &mut self,
+        published: &RwLock<Published>,
+        verdict: u32,
+        stats: &mut SceneStats,
+    ) -> Result<()> {
+        let bound = self.model.manifest.envelope.displacement_bound_mm;
+        let error = Error::Guard(guard::describe(verdict, stats.max_displacement_mm, bound));
+        tracing::warn!(flags = verdict, "{error}");
+        match self.options.guard_policy {
+            GuardPolicy::Report if verdict & flag::NON_FINITE == 0 => return Ok(()),
+            GuardPolicy::Blend => {
+                self.fall_back()?;
+                if guard::largest(&self.pool, &self.next.field, self.plan.nodes())? <= bound {
+                    return Ok(());
+                }
+                // Even the linear response is out of bounds: rest, without this contact.
+                self.engine.rest_next();
+                self.incoming.clear();
+                self.next.field.fill(0.0);
+                return Ok(());
+            }
+            _ => {}
+        }
+        let mut shared = lock_write(published);
+        stats.max_displacement_mm = self.max_displacement;
+        shared.stats = *stats;
+        Err(error)
+    }
+
+    /// Replaces `next` by the linear response, or by the imposed contact alone where the bundle has none.
+    fn fall_back(&mut self) -> Result<()> {
+        self.engine.fall_back(
+            self.isa,
+            &self.pool,
+            &self.model,
+            &self.plan,
+            &mut self.next.field,
+        )?;
+        self.enforce_next();
+        Ok(())
+    }
+
+    fn publish(&mut self, published: &RwLock<Published>, was_given: bool, stats: &SceneStats) {
+        let fell_back =
+            stats.flags & guard::REFUSED != 0 && self.options.guard_policy == GuardPolicy::Blend;
+        self.points
+            .interpolate(&self.next.field, &mut self.next.points);
+        self.engine.commit();
+        self.source_before = self.source;
+        self.source = if fell_back {
+            Source::Fallback
+        } else {
+            Source::Model
+        };
+        std::mem::swap(&mut self.contact_before, &mut self.contact);
+        std::mem::swap(&mut self.contact, &mut self.incoming);
+        self.max_displacement = if fell_back {
+            guard::largest(&self.pool, &self.next.field, self.plan.nodes()).unwrap_or(0.0)
+        } else {
+            stats.max_displacement_mm
+        };
+        let quiet = self.contact.is_empty()
+            && !was_given
+            && self.max_displacement <= QUIET_DISPLACEMENT
+            && self.engine.is_quiet(QUIET_DISPLACEMENT);
+        self.quiet = if quiet { self.quiet + 1 } else { 0 };
+        self.sleeping = !self.options.no_sleep && self.quiet >= QUIET_STEPS;
+        self.rest_frames = 0;
+        self.rotate(published);
+    }
+
+    /// A step of a sleeping scene: exactly rest.
+    fn publish_rest(&mut self, published: &RwLock<Published>) {
+        self.contact_before.clear();
+        self.contact.clear();
+        self.max_displacement = 0.0;
+        let frames = if self.options.cubic_sampling { 4 } else { 3 };
+        if self.rest_frames >= frames {
+            return;
+        }
+        self.rest_frames += 1;
+        self.engine.reset();
+        self.source_before = Source::Rest;
+        self.source = Source::Rest;
+        self.next.field.fill(0.0);
+        self.next.points.fill(0.0);
+        self.rotate(published);
+    }
+
+    /// `next` becomes the last frame, the last the one before.
+    fn rotate(&mut self, published: &RwLock<Published>) {
+        let mut shared = lock_write(published);
+        let shared = &mut *shared;
+        if let Some(earlier) = &mut shared.earlier {
+            std::mem::swap(earlier, &mut shared.before);
+        }
+        std::mem::swap(&mut shared.before, &mut shared.last);
+        std::mem::swap(&mut shared.last, &mut self.next);
+        shared.contact_nodes.clear();
+        shared.contact_vectors.clear();
+        shared.contact_nodes.resize(self.contact.len(), 0);
+        shared.contact_vectors.resize(3 * self.contact.len(), 0.0);
+        for (i, &at) in self.contact.order.iter().enumerate() {
+            let at = at as usize;
+            shared.contact_nodes[at] = self.contact.nodes[i];
+            shared.contact_vectors[3 * at..3 * at + 3]
+                .copy_from_slice(&self.contact.vectors[3 * i..3 * i + 3]);
+        }
+    }
+
+    /// Back to rest.
+    pub(super) fn reset(&mut self, published: &RwLock<Published>) {
+        self.engine.reset();
+        self.contact.clear();
+        self.contact_before.clear();
+        self.source = Source::Rest;
+        self.source_before = Source::Rest;
+        self.step_count = 0;
+        self.quiet = 0;
+        self.sleeping = false;
+        self.rest_frames = 0;
+        self.max_displacement = 0.0;
+        let stats = self.blank_stats();
+        let mut shared = lock_write(published);
+        let shared = &mut *shared;
+        for frame in [&mut shared.last, &mut shared.before]
+            .into_iter()
+            .chain(shared.earlier.as_mut())
+        {
+            frame.field.fill(0.0);
+            frame.points.fill(0.0);
+        }
+        shared.stats = stats;
+        shared.contact_nodes.clear();
+        shared.contact_vectors.clear();
+    }
+
+    /// Decodes any nodes of the last state into `out [n,3]`.
+    pub(super) fn decode(
+        &mut self,
+        published: &RwLock<Published>,
+        nodes: &[u32],
+        out: &mut [f32],
+    ) -> Result<()> {
+        let count = self.mesh.node_count();
+        check_nodes(nodes, count)?;
+        if out.len() != 3 * nodes.len() {
+            return Err(Error::Argument(format!(
+                "out has {} floats, must have {}",
+                out.len(),
+                3 * nodes.len()
+            )));
+        }
+        if self.step_count == 0 {
+            return Err(Error::State("decode before the first step".into()));
+        }
+        let _flush = FlushToZero::enter();
+        let plan = NodePlan::new(&[nodes], count, self.engine.planned_prior(&self.model));
+        self.decode_published(published, Which::Last, &plan)?;
+        for (out, &node) in out.chunks_exact_mut(3).zip(nodes) {
+            out.copy_from_slice(&self.next.field[3 * node as usize..3 * node as usize + 3]);
+        }
+        Ok(())
+    }
+
+    /// Decodes the nodes of a plan in a published state into the spare frame.
+    pub(super) fn decode_published(
+        &mut self,
+        published: &RwLock<Published>,
+        which: Which,
+        plan: &NodePlan,
+    ) -> Result<()> {
+        let (source, contact) = match which {
+            Which::Last => (self.source, &self.contact),
+            _ => (self.source_before, &self.contact_before),
+        };
+        let shared = lock_read(published);
+        let frame = if which == Which::Last {
+            &shared.last
+        } else {
+            &shared.before
+        };
+        let field = &mut self.next.field;
+        if self.engine.keeps_all_nodes(&self.model) {
+            field.copy_from_slice(&frame.field);
+            return Ok(());
+        }
+        match source {
+            Source::Rest => {
+                field.fill(0.0);
+                return Ok(());
+            }
+            Source::Model => self.engine.decode(
+                self.isa,
+                &self.pool,
+                &self.model,
+                which,
+                plan,
+                &shared.before.field,
+                field,
+            )?,
+            Source::Fallback => self.engine.decode_fallback(
+                self.isa,
+                &self.pool,
+                &self.model,
+                which,
+                plan,
+                field,
+            )?,
+        }
+        if !self.options.free_boundary {
+            enforce(&self.mesh.held_nodes, &self.held, contact, field);
+        }
+        Ok(())
+    }
+
+    /// A new plan: the nodes of both published states are decoded for it at once.
+    pub(super) fn set_plan(
+        &mut self,
+        published: &RwLock<Published>,
+        region: Option<Vec<u32>>,
+        points: AttachedPoints,
+    ) -> Result<()> {
+        let count = self.mesh.node_count();
+        let table = self.engine.planned_prior(&self.model);
+        let plan = match &region {
+            Some(region) if !self.engine.keeps_all_nodes(&self.model) => NodePlan::new(
+                &[
+                    region,
+                    self.engine.recurrence_nodes(),
+                    &points.needed_nodes(),
+                ],
+                count,
+                table,
+            ),
+            _ => NodePlan::all(count, table),
+        };
+        let _flush = FlushToZero::enter();
+        self.engine
+            .replan(self.isa, &self.pool, &self.model, &plan)?;
+        let mut fields = [Vec::new(), Vec::new()];
+        for (which, field) in [Which::Last, Which::Before].into_iter().zip(&mut fields) {
+            self.decode_published(published, which, &plan)?;
+            field.clone_from(&self.next.field);
+        }
+        if self.options.check_inversion {
+            let mut known = vec![false; count];
+            plan.nodes()
+                .iter()
+                .for_each(|&node| known[node as usize] = true);
+            self.planned_tets = self
+                .mesh
+                .tets
+                .chunks_exact(4)
+                .filter(|tet| tet.iter().all(|&node| known[node as usize]))
+                .flatten()
+                .copied()
+                .collect();
+        }
+        let mut shared = lock_write(published);
+        let shared = &mut *shared;
+        let [last, before] = fields;
+        for (frame, field) in [(&mut shared.last, last), (&mut shared.before, before)] {
+            frame.points = vec![0.0; 3 * points.len()];
+            points.interpolate(&field, &mut frame.points);
+            frame.field = field;
+        }
+        if let Some(earlier) = &mut shared.earlier {
+            earlier.clone_from(&shared.before);
+        }
+        self.next.points = vec![0.0; 3 * points.len()];
+        shared.region = region;
+        self.plan = plan;
+        self.points = points;
+        Ok(())
+    }
+
+    /// Bytes of the scene's buffers.
+    pub(super) fn memory_bytes(&self) -> usize {
+        let count = self.mesh.node_count();
+        let frames = if self.options.cubic_sampling { 4 } else { 3 };
+        let contacts = 3 * 20 * count;
+        frames * 12 * count + contacts + 16 * count + self.engine.memory_bytes()
+    }
+}
+
+fn enforce(held_nodes: &[u32], held: &[bool], contact: &ContactSet, field: &mut [f32]) {
+    for (&node, c) in contact.nodes.iter().zip(contact.vectors.chunks_exact(3)) {
+        if !held[node as usize] {
+            field[3 * node as usize..3 * node as usize + 3].copy_from_slice(c);
+        }
+    }
+    for &node in held_nodes {
+        field[3 * node as usize..3 * node as usize + 3].fill(0.0);
+    }
+}
+
+/// All nodes exist.
+pub(super) fn check_nodes(nodes: &[u32], count: usize) -> Result<()> {
+    match nodes.iter().position(|&node| node as usize >= count) {
+        Some(at) => Err(Error::Argument(format!(
+            "nodes[{at}] is {}, the mesh has {count} nodes",
+            nodes[at]
+        ))),
+        None => Ok(()),
+    }
+}

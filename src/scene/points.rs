@@ -1,0 +1,166 @@
+//! Points attached to the tissue: each is a fixed barycentric combination of the nodes of the tetrahedron around it.
+//! A point outside of the mesh takes the closest combination of the nearest tetrahedra, weights clamped to `[0, 1]`.
+
+use crate::bundle::Mesh;
+use crate::error::{Error, Result};
+use crate::grid::PointGrid;
+
+/// Attached points.
+#[derive(Debug, Clone, Default)]
+pub struct AttachedPoints {
+    nodes: Vec<[u32; 4]>,
+    weights: Vec<[f32; 4]>,
+}
+
+impl AttachedPoints {
+    /// Finds the tetrahedra of points `[n,3]`, rest mm.
+    pub fn new(mesh: &Mesh, points: &[f32]) -> Result<AttachedPoints> {
+        if points.len() % 3 != 0 {
+            return Err(Error::Argument(format!(
+                "points has {} floats, must have 3 per point",
+                points.len()
+            )));
+        }
+        if let Some(at) = points.iter().position(|x| !x.is_finite() || x.abs() > 1e6) {
+            return Err(Error::NonFinite(format!(
+                "points: element {} is not finite or beyond 1e6 mm",
+                at / 3
+            )));
+        }
+        let finder = TetFinder::new(mesh);
+        let mut attached = AttachedPoints::default();
+        for p in points.chunks_exact(3) {
+            let (nodes, weights) = finder.locate([p[0], p[1], p[2]]);
+            attached.nodes.push(nodes);
+            attached.weights.push(weights);
+        }
+        Ok(attached)
+    }
+
+    /// Number of points.
+    pub fn len(&self) -> usize {
+        self.nodes.len()
+    }
+
+    /// No points.
+    pub fn is_empty(&self) -> bool {
+        self.nodes.is_empty()
+    }
+
+    /// All nodes that the points need.
+    pub fn needed_nodes(&self) -> Vec<u32> {
+        self.nodes.iter().flatten().copied().collect()
+    }
+
+    /// Displacement at the points `[n,3]` from a field `[K,3]`.
+    pub fn interpolate(&self, field: &[f32], out: &mut [f32]) {
+        for ((nodes, weights), out) in self
+            .nodes
+            .iter()
+            .zip(&self.weights)
+            .zip(out.chunks_exact_mut(3))
+        {
+            for axis in 0..3 {
+                out[axis] = (weights[0] * field[3 * nodes[0] as usize + axis]
+                    + weights[1] * field[3 * nodes[1] as usize + axis])
+                    + (weights[2] * field[3 * nodes[2] as usize + axis]
+                        + weights[3] * field[3 * nodes[3] as usize + axis]);
+            }
+        }
+    }
+}
+
+/// Tetrahedra by the grid of their centres.
+struct TetFinder<'a> {
+    mesh: &'a Mesh,
+    centres: PointGrid,
+    reach: f64,
+}
+
+impl<'a> TetFinder<'a> {
+    fn new(mesh: &'a Mesh) -> TetFinder<'a> {
+        let mut centres = Vec::with_capacity(3 * mesh.tets.len() / 4);
+        let mut reach = 0.0f64;
+        for tet in mesh.tets.chunks_exact(4) {
+            let corners = [0, 1, 2, 3].map(|k| mesh.position(tet[k]));
+            let centre = [0, 1, 2]
+                .map(|a| (corners[0][a] + corners[1][a] + corners[2][a] + corners[3][a]) / 4.0);
+            for corner in corners {
+                reach = reach.max(crate::grid::squared_distance(centre, corner));
+            }
+            centres.extend_from_slice(&centre);
+        }
+        TetFinder {
+            mesh,
+            centres: PointGrid::new(centres),
+            reach: reach.sqrt(),
+        }
+    }
+
+    /// The tetrahedron that holds `p`, or the one whose clamped combination comes closest to it.
+    fn locate(&self, p: [f32; 3]) -> ([u32; 4], [f32; 4]) {
+        let mut best: Option<(f64, u32, [f64; 4])> = None;
+        let mut radius = self.reach * (1.0 + 1e-6);
+        loop {
+            self.centres.within(p, radius, |tet, _| {
+                let weights = clamp(self.barycentric(tet, p));
+                let miss = self.miss(tet, weights, p);
+                if best.is_none_or(|(d, t, _)| (miss, tet) < (d, t)) {
+                    best = Some((miss, tet, weights));
+                }
+            });
+            if let Some((_, tet, weights)) = best {
+                let tet = 4 * tet as usize;
+                let nodes = [0, 1, 2, 3].map(|k| self.mesh.tets[tet + k]);
+                return (nodes, weights.map(|w| w as f32));
+            }
+            let nearest = self.centres.nearest(p);
+            let tet = &self.mesh.tets[4 * nearest as usize..4 * nearest as usize + 4];
+            radius = tet
+                .iter()
+                .map(|&node| crate::grid::squared_distance(p, self.mesh.position(node)).sqrt())
+                .fold(0.0, f64::max)
+                + self.reach;
+        }
+    }
+
+    fn barycentric(&self, tet: u32, p: [f32; 3]) -> [f64; 4] {
+        let corners =
+            [0, 1, 2, 3].map(|k| self.mesh.position(self.mesh.tets[4 * tet as usize + k]));
+        let edge = |k: usize| [0, 1, 2].map(|a| corners[k][a] as f64 - corners[0][a] as f64);
+        let (a, b, c) = (edge(1), edge(2), edge(3));
+        let d = [0, 1, 2].map(|axis| p[axis] as f64 - corners[0][axis] as f64);
+        let det = |x: [f64; 3], y: [f64; 3], z: [f64; 3]| {
+            x[0] * (y[1] * z[2] - y[2] * z[1]) - x[1] * (y[0] * z[2] - y[2] * z[0])
+                + x[2] * (y[0] * z[1] - y[1] * z[0])
+        };
+        let volume = det(a, b, c);
+        let (wa, wb, wc) = (
+            det(d, b, c) / volume,
+            det(a, d, c) / volume,
+            det(a, b, d) / volume,
+        );
+        [1.0 - wa - wb - wc, wa, wb, wc]
+    }
+
+    /// Squared distance from `p` to the combination.
+    fn miss(&self, tet: u32, weights: [f64; 4], p: [f32; 3]) -> f64 {
+        (0..3)
+            .map(|axis| {
+                let x: f64 = (0..4)
+                    .map(|k| {
+                        weights[k]
+                            * self.mesh.position(self.mesh.tets[4 * tet as usize + k])[axis] as f64
+                    })
+                    .sum();
+                (x - p[axis] as f64).powi(2)
+            })
+            .sum()
+    }
+}
+
+fn clamp(weights: [f64; 4]) -> [f64; 4] {
+    let clamped = weights.map(|w| w.max(0.0));
+    let sum: f64 = clamped.iter().sum();
+    clamped.map(|w| w / sum)
+}

@@ -1,0 +1,129 @@
+//! What other threads may read of a scene while a step is in flight: the last states, region order, statistics.
+
+use crate::error::{Error, Result};
+use crate::stats::SceneStats;
+
+/// One published state.
+#[derive(Debug, Clone, Default)]
+pub struct Frame {
+    /// `[K,3]`, mm; valid at the planned nodes.
+    pub field: Vec<f32>,
+    /// `[n,3]`, mm, at the attached points.
+    pub points: Vec<f32>,
+}
+
+impl Frame {
+    fn values(&self, values: Values) -> &[f32] {
+        match values {
+            Values::Points => &self.points,
+            Values::Region => &self.field,
+        }
+    }
+}
+
+/// Which values of a frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Values {
+    /// The region's nodes, in the host's order.
+    Region,
+    /// The attached points.
+    Points,
+}
+
+/// The published part of a scene.
+#[derive(Debug)]
+pub struct Published {
+    /// The last state.
+    pub last: Frame,
+    /// The state before.
+    pub before: Frame,
+    /// The state before that; kept for cubic sampling only.
+    pub earlier: Option<Frame>,
+    /// The host's region in its order; `None` is every node.
+    pub region: Option<Vec<u32>>,
+    /// Statistics of the last step.
+    pub stats: SceneStats,
+    /// Contact nodes of the last step in the host's order.
+    pub contact_nodes: Vec<u32>,
+    /// `[m,3]`, mm.
+    pub contact_vectors: Vec<f32>,
+}
+
+impl Published {
+    /// Items of `values`.
+    pub fn count(&self, values: Values) -> usize {
+        match (values, &self.region) {
+            (Values::Points, _) => self.last.points.len() / 3,
+            (Values::Region, Some(region)) => region.len(),
+            (Values::Region, None) => self.last.field.len() / 3,
+        }
+    }
+
+    /// The size that a host's buffer must have.
+    pub fn check_len(&self, values: Values, len: usize) -> Result<()> {
+        let want = 3 * self.count(values);
+        if len == want {
+            return Ok(());
+        }
+        let what = match values {
+            Values::Region => "the region's nodes",
+            Values::Points => "the attached points",
+        };
+        Err(Error::Argument(format!(
+            "out has {len} floats, must have {want}: 3 for each of {what}"
+        )))
+    }
+
+    /// Copies the last state.
+    pub fn read(&self, values: Values, out: &mut [f32]) -> Result<()> {
+        self.check_len(values, out.len())?;
+        self.each(values, out, |_, _, last| last);
+        Ok(())
+    }
+
+    /// Interpolates between the state before (`alpha` 0) and the last state (1). `alpha` is clamped to `[0, 1]`.
+    pub fn sample(&self, values: Values, alpha: f64, out: &mut [f32]) -> Result<()> {
+        if !alpha.is_finite() {
+            return Err(Error::NonFinite("alpha is not finite".into()));
+        }
+        self.check_len(values, out.len())?;
+        let t = alpha.clamp(0.0, 1.0) as f32;
+        if t == 1.0 {
+            self.each(values, out, |_, _, last| last);
+        } else if t == 0.0 {
+            self.each(values, out, |_, before, _| before);
+        } else if self.earlier.is_none() {
+            self.each(values, out, |_, before, last| before + t * (last - before));
+        } else {
+            // Cubic Hermite: central difference at the state before, one-sided at the last.
+            let (t2, t3) = (t * t, t * t * t);
+            let (h00, h10) = (2.0 * t3 - 3.0 * t2 + 1.0, t3 - 2.0 * t2 + t);
+            let (h01, h11) = (3.0 * t2 - 2.0 * t3, t3 - t2);
+            self.each(values, out, |earlier, before, last| {
+                h00 * before + h10 * 0.5 * (last - earlier) + h01 * last + h11 * (last - before)
+            });
+        }
+        Ok(())
+    }
+
+    fn each(&self, values: Values, out: &mut [f32], combine: impl Fn(f32, f32, f32) -> f32) {
+        let last = self.last.values(values);
+        let before = self.before.values(values);
+        let earlier = self.earlier.as_ref().unwrap_or(&self.before).values(values);
+        match (&self.region, values) {
+            (Some(region), Values::Region) => {
+                for (out, &node) in out.chunks_exact_mut(3).zip(region) {
+                    for (axis, out) in out.iter_mut().enumerate() {
+                        let i = 3 * node as usize + axis;
+                        *out = combine(earlier[i], before[i], last[i]);
+                    }
+                }
+            }
+            _ => {
+                for (((out, &e), &b), &l) in out.iter_mut().zip(earlier).zip(before).zip(last) {
+                    *out = combine(e, b, l);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,306 @@
+//! The step of kind `reduced`: `u' = L(c') + Phi b'`, with `b'` from the correction network, bounded relative to the
+//! linear response and faded out beyond the trained pushes (`docs/formats.md`).
+
+use super::contact::ContactSet;
+use super::timing::Stopwatch;
+use crate::bundle::ReducedInput;
+use crate::error::{Error, Result};
+use crate::kernels::respond::accumulate_rows;
+use crate::kernels::rows::Stored;
+use crate::kernels::{Isa, Pool};
+use crate::model::{Model, ReducedModel};
+use crate::onnx::Stage;
+use crate::prior::{ContactResponse, PriorTable, SolveReport};
+use crate::stats::{SceneStats, flag};
+
+/// The reduced state after one step.
+#[derive(Debug, Clone)]
+pub struct ReducedRecord {
+    /// Residual state `[r]`, mm.
+    pub b: Vec<f32>,
+    /// Linear response in its leading modes `[r_z]`.
+    pub z: Vec<f32>,
+    /// Linear response in the residual modes `[r]`, mm.
+    pub p: Vec<f32>,
+    /// Linear response in block coordinates `[Q]`.
+    pub q_prior: Vec<f32>,
+    /// The whole field in block coordinates `[Q]`.
+    pub q: Vec<f32>,
+    /// `|L|` over all nodes, mm.
+    pub prior_norm: f32,
+    /// Bound of `|b|`, mm.
+    pub bound: f32,
+    /// In contact.
+    pub contact: bool,
+}
+
+impl ReducedRecord {
+    fn new(model: &ReducedModel, table: &PriorTable) -> ReducedRecord {
+        ReducedRecord {
+            b: vec![0.0; model.entry.modes],
+            z: vec![0.0; model.entry.response_modes],
+            p: vec![0.0; model.entry.modes],
+            q_prior: vec![0.0; table.width()],
+            q: vec![0.0; table.width()],
+            prior_norm: 0.0,
+            bound: 0.0,
+            contact: false,
+        }
+    }
+
+    fn clear(&mut self) {
+        for values in [
+            &mut self.b,
+            &mut self.z,
+            &mut self.p,
+            &mut self.q_prior,
+            &mut self.q,
+        ] {
+            values.fill(0.0);
+        }
+        self.prior_norm = 0.0;
+        self.bound = 0.0;
+        self.contact = false;
+    }
+}
+
+/// Buffers and session of a scene of kind `reduced`.
+pub struct ReducedEngine {
+    response: ContactResponse,
+    stage: Stage,
+    mode_rows: Vec<u32>,
+    given_q: Vec<f32>,
+    given_b: Vec<f32>,
+    /// The step being made, the last published one, the one before it.
+    pub next: ReducedRecord,
+    /// Last published.
+    pub last: ReducedRecord,
+    /// The one before.
+    pub before: ReducedRecord,
+}
+
+/// Euclidean norm, summed in f64 in index order.
+fn norm(values: &[f32]) -> f32 {
+    values
+        .iter()
+        .map(|&x| x as f64 * x as f64)
+        .sum::<f64>()
+        .sqrt() as f32
+}
+
+impl ReducedEngine {
+    /// Makes the session and the buffers.
+    pub fn new(model: &Model, kind: &ReducedModel, table: &PriorTable) -> Result<ReducedEngine> {
+        let record = ReducedRecord::new(kind, table);
+        Ok(ReducedEngine {
+            response: ContactResponse::new(table),
+            stage: kind.stage(model.runtime, &model.plan)?,
+            mode_rows: (0..kind.entry.modes as u32).collect(),
+            given_q: vec![0.0; table.width()],
+            given_b: vec![0.0; kind.entry.modes],
+            next: record.clone(),
+            last: record.clone(),
+            before: record,
+        })
+    }
+
+    /// Back to rest.
+    pub fn reset(&mut self) {
+        self.last.clear();
+        self.before.clear();
+    }
+
+    /// What runs the correction network.
+    pub fn stage(&self) -> &Stage {
+        &self.stage
+    }
+
+    /// `contact_changed`: the contact nodes differ from those of the last step.
+    /// Computes `next` from `last`, `before`, the contact and, where given, the host's displacement `[K,3]`.
+    #[allow(clippy::too_many_arguments)]
+    pub fn predict(
+        &mut self,
+        isa: Isa,
+        pool: &Pool,
+        kind: &ReducedModel,
+        table: &PriorTable,
+        held: &[bool],
+        given: Option<&[f32]>,
+        contact: &ContactSet,
+        contact_changed: bool,
+        stats: &mut SceneStats,
+    ) -> Result<()> {
+        let mut watch = Stopwatch::start();
+        let report = self
+            .response
+            .solve(isa, table, held, &contact.nodes, &contact.vectors)?;
+        let next = &mut self.next;
+        self.response.field(isa, pool, table, &mut next.q_prior)?;
+        self.response
+            .expand(isa, pool, Stored::F32(&table.force_to_z), &mut next.z)?;
+        self.response
+            .expand(isa, pool, Stored::F32(&table.force_to_p), &mut next.p)?;
+        next.prior_norm = norm(&next.q_prior);
+        next.contact = !contact.is_empty();
+        stats.flags |= solve_flags(report);
+        let b_now = match given {
+            Some(field) => {
+                self.given_q.fill(0.0);
+                table.project(field, &mut self.given_q);
+                for (q, prior) in self.given_q.iter_mut().zip(&self.last.q_prior) {
+                    *q -= prior;
+                }
+                for (b, mode) in self
+                    .given_b
+                    .iter_mut()
+                    .zip(table.residual.chunks_exact(self.given_q.len()))
+                {
+                    *b = mode.iter().zip(&self.given_q).map(|(m, q)| m * q).sum();
+                }
+                &self.given_b
+            }
+            None => &self.last.b,
+        };
+        stats.prior_ms = watch.lap();
+
+        let input = self.stage.input(0);
+        let mut at = 0;
+        for group in &kind.entry.inputs {
+            let flags =
+                [self.next.contact, self.last.contact].map(|on| if on { 1.0f32 } else { 0.0 });
+            let values: &[f32] = match group {
+                ReducedInput::B => b_now,
+                ReducedInput::BPrev => &self.before.b,
+                ReducedInput::Z => &self.next.z,
+                ReducedInput::ZPrev => &self.last.z,
+                ReducedInput::P => &self.next.p,
+                ReducedInput::PPrev => &self.last.p,
+                ReducedInput::Contact => &flags[..1],
+                ReducedInput::ContactPrev => &flags[1..],
+            };
+            input[at..at + values.len()].copy_from_slice(values);
+            at += values.len();
+        }
+        self.stage.run()?;
+        let next = &mut self.next;
+        next.b.copy_from_slice(self.stage.output(0));
+
+        let energy = if given.is_some() {
+            norm(b_now)
+        } else {
+            self.last.bound
+        };
+        let released = if contact_changed {
+            self.last.prior_norm
+        } else {
+            0.0
+        };
+        let bound = &kind.entry.bound;
+        next.bound = (bound.relative * next.prior_norm).max(bound.decay * (energy + released));
+        let size = norm(&next.b);
+        let mut scale = 1.0;
+        if size > next.bound {
+            scale = next.bound / size;
+            stats.flags |= flag::CLAMPED;
+        }
+        let fade = &kind.entry.fade;
+        let push = contact.max_push();
+        scale *=
+            ((fade.end_push_mm - push) / (fade.end_push_mm - fade.start_push_mm)).clamp(0.0, 1.0);
+        if scale != 1.0 {
+            next.b.iter_mut().for_each(|b| *b *= scale);
+        }
+        stats.latent_ms = watch.lap();
+        Self::combine(isa, pool, table, &self.mode_rows, next)?;
+        stats.prior_ms += watch.lap();
+        Ok(())
+    }
+
+    /// `q = q_prior + sum_j b_j residual[j]`.
+    fn combine(
+        isa: Isa,
+        pool: &Pool,
+        table: &PriorTable,
+        rows: &[u32],
+        record: &mut ReducedRecord,
+    ) -> Result<()> {
+        record.q.copy_from_slice(&record.q_prior);
+        accumulate_rows(
+            isa,
+            pool,
+            Stored::F32(&table.residual),
+            rows,
+            &record.b,
+            true,
+            &mut record.q,
+        )
+        .map_err(|error| Error::Panic(error.to_string()))
+    }
+
+    /// Drops the correction of `next`: the linear response alone.
+    pub fn drop_correction(&mut self) {
+        self.next.b.fill(0.0);
+        self.next.bound = 0.0;
+        let next = &mut self.next;
+        next.q.copy_from_slice(&next.q_prior);
+    }
+
+    /// Makes `next` the state of rest.
+    pub fn rest_next(&mut self) {
+        self.next.clear();
+    }
+
+    /// `next` becomes `last`.
+    pub fn commit(&mut self) {
+        std::mem::swap(&mut self.before, &mut self.last);
+        std::mem::swap(&mut self.last, &mut self.next);
+    }
+
+    /// After a restore: field coordinates from `b` and the contact, with the factor of the last contact.
+    #[allow(clippy::too_many_arguments)]
+    pub fn rebuild(
+        &mut self,
+        isa: Isa,
+        pool: &Pool,
+        table: &PriorTable,
+        held: &[bool],
+        before: &ContactSet,
+        last: &ContactSet,
+    ) -> Result<()> {
+        for (record, contact) in [(&mut self.before, before), (&mut self.last, last)] {
+            self.response
+                .solve(isa, table, held, &contact.nodes, &contact.vectors)?;
+            self.response.field(isa, pool, table, &mut record.q_prior)?;
+            self.response
+                .expand(isa, pool, Stored::F32(&table.force_to_z), &mut record.z)?;
+            self.response
+                .expand(isa, pool, Stored::F32(&table.force_to_p), &mut record.p)?;
+            Self::combine(isa, pool, table, &self.mode_rows, record)?;
+        }
+        Ok(())
+    }
+
+    /// `|b|` of the last state, mm.
+    pub fn last_norm(&self) -> f32 {
+        norm(&self.last.b)
+    }
+
+    /// Bytes of the buffers.
+    pub fn memory_bytes(&self) -> usize {
+        let record = &self.next;
+        let floats = 3 * (record.b.len() * 2 + record.z.len() + record.q.len() * 2);
+        4 * (floats + self.given_q.len() + self.given_b.len())
+    }
+}
+
+/// Envelope flags of a contact solve.
+pub fn solve_flags(report: SolveReport) -> u32 {
+    let mut flags = 0;
+    if report.outside {
+        flags |= flag::SITE;
+    }
+    if report.regularised {
+        flags |= flag::REGULARISED;
+    }
+    flags
+}

@@ -1,0 +1,86 @@
+//! The part of a scene that its handle and its worker share, and the rule that one thread at a time steps it.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError, RwLock, TryLockError};
+
+use super::StepInput;
+use super::core::Core;
+use super::published::Published;
+use crate::error::{Error, Result};
+
+/// Core, published states, and whether a panic was caught.
+pub struct Shared {
+    core: Mutex<Core>,
+    /// The readable part.
+    pub published: RwLock<Published>,
+    poisoned: AtomicBool,
+}
+
+impl Shared {
+    /// Wraps a core.
+    pub fn new(core: Core, published: Published) -> Shared {
+        Shared {
+            core: Mutex::new(core),
+            published: RwLock::new(published),
+            poisoned: AtomicBool::new(false),
+        }
+    }
+
+    /// Whether a panic was caught.
+    pub fn is_poisoned(&self) -> bool {
+        self.poisoned.load(Ordering::Acquire)
+    }
+
+    fn guarded<T>(
+        &self,
+        mut core: MutexGuard<'_, Core>,
+        call: impl FnOnce(&mut Core, &RwLock<Published>) -> Result<T>,
+    ) -> Result<T> {
+        if self.is_poisoned() {
+            return Err(poison_error());
+        }
+        match catch_unwind(AssertUnwindSafe(|| call(&mut core, &self.published))) {
+            Ok(result) => {
+                if matches!(result, Err(Error::Panic(_))) {
+                    self.poisoned.store(true, Ordering::Release);
+                }
+                result
+            }
+            Err(payload) => {
+                self.poisoned.store(true, Ordering::Release);
+                let message = payload
+                    .downcast_ref::<String>()
+                    .cloned()
+                    .or_else(|| payload.downcast_ref::<&str>().map(|text| text.to_string()))
+                    .unwrap_or_else(|| "no message".into());
+                Err(Error::Panic(message))
+            }
+        }
+    }
+
+    /// Calls with the core, or says [`Error::Busy`].
+    pub fn with<T>(
+        &self,
+        call: impl FnOnce(&mut Core, &RwLock<Published>) -> Result<T>,
+    ) -> Result<T> {
+        let core = match self.core.try_lock() {
+            Ok(core) => core,
+            Err(TryLockError::Poisoned(poisoned)) => poisoned.into_inner(),
+            Err(TryLockError::WouldBlock) => {
+                return Err(Error::Busy("another thread is using the scene".into()));
+            }
+        };
+        self.guarded(core, call)
+    }
+
+    /// A step of the scene's worker, which waits for a call in progress.
+    pub fn step_blocking(&self, input: StepInput<'_>) -> Result<()> {
+        let core = self.core.lock().unwrap_or_else(PoisonError::into_inner);
+        self.guarded(core, |core, published| core.step(published, input, None))
+    }
+}
+
+fn poison_error() -> Error {
+    Error::Panic("a panic was caught in this scene; it can only be destroyed".into())
+}

@@ -1,0 +1,270 @@
+//! Snapshots: the state of a scene as bytes, from which it resumes to the bit.
+//!
+//! Little-endian: magic, version, SHA-256 of the bundle's manifest, the mesh hash, counters, both contact sets, both
+//! latent states, and the fields where the prediction is added to them; at the end the SHA-256 of all before it.
+//! Region, attached points and options are the host's and are not part of it.
+
+use std::sync::RwLock;
+
+use sha2::{Digest, Sha256};
+
+use super::contact::ContactSet;
+use super::core::{Core, Source, lock_read, lock_write};
+use super::engine::Engine;
+use super::published::Published;
+use crate::error::{Error, Result};
+use crate::kernels::FlushToZero;
+
+const MAGIC: &[u8; 8] = b"UPTSNAP\0";
+const VERSION: u32 = 1;
+const DIGEST: usize = 32;
+
+struct Writer(Vec<u8>);
+
+impl Writer {
+    fn u32(&mut self, value: u32) {
+        self.0.extend_from_slice(&value.to_le_bytes());
+    }
+
+    fn floats(&mut self, values: &[f32]) {
+        self.u32(values.len() as u32);
+        for value in values {
+            self.0.extend_from_slice(&value.to_le_bytes());
+        }
+    }
+
+    fn indices(&mut self, values: &[u32]) {
+        self.u32(values.len() as u32);
+        values.iter().for_each(|&value| self.u32(value));
+    }
+}
+
+struct Reader<'a>(&'a [u8]);
+
+impl<'a> Reader<'a> {
+    fn take(&mut self, count: usize) -> Result<&'a [u8]> {
+        if count > self.0.len() {
+            return Err(Error::Snapshot("is cut short".into()));
+        }
+        let (head, tail) = self.0.split_at(count);
+        self.0 = tail;
+        Ok(head)
+    }
+
+    fn u32(&mut self) -> Result<u32> {
+        let b = self.take(4)?;
+        Ok(u32::from_le_bytes([b[0], b[1], b[2], b[3]]))
+    }
+
+    fn f32(&mut self) -> Result<f32> {
+        let value = f32::from_bits(self.u32()?);
+        if value.is_finite() {
+            Ok(value)
+        } else {
+            Err(Error::Snapshot("holds a value that is not finite".into()))
+        }
+    }
+
+    /// Floats of exactly this many.
+    fn floats(&mut self, count: usize) -> Result<Vec<f32>> {
+        let stored = self.u32()? as usize;
+        if stored != count {
+            return Err(Error::Snapshot(format!(
+                "holds a list of {stored} numbers, must have {count}"
+            )));
+        }
+        self.take(4 * count)?
+            .chunks_exact(4)
+            .map(|b| Reader(b).f32())
+            .collect()
+    }
+
+    fn contact(&mut self, node_count: usize) -> Result<ContactSet> {
+        let count = self.u32()? as usize;
+        if count > node_count {
+            return Err(Error::Snapshot(
+                "holds more contact nodes than the mesh has nodes".into(),
+            ));
+        }
+        let nodes: Vec<u32> = (0..count).map(|_| self.u32()).collect::<Result<_>>()?;
+        let vectors = self.floats(3 * count)?;
+        let mut set = ContactSet::with_capacity(node_count);
+        set.gather(
+            super::Contact::Sparse {
+                nodes: &nodes,
+                vectors: &vectors,
+            },
+            node_count,
+        )
+        .map_err(|error| Error::Snapshot(error.to_string()))?;
+        Ok(set)
+    }
+
+    fn source(&mut self) -> Result<Source> {
+        match self.u32()? {
+            0 => Ok(Source::Rest),
+            1 => Ok(Source::Model),
+            2 => Ok(Source::Fallback),
+            other => Err(Error::Snapshot(format!(
+                "has an unknown state source {other}"
+            ))),
+        }
+    }
+}
+
+fn source_code(source: Source) -> u32 {
+    match source {
+        Source::Rest => 0,
+        Source::Model => 1,
+        Source::Fallback => 2,
+    }
+}
+
+/// Latent lists of a record, in the order in which they are stored.
+fn lists(engine: &mut Engine) -> Vec<&mut Vec<f32>> {
+    match engine {
+        Engine::Upt(engine, _) => [&mut engine.last, &mut engine.before]
+            .into_iter()
+            .flat_map(|record| [&mut record.keys, &mut record.values, &mut record.q_prior])
+            .collect(),
+        Engine::Reduced(engine) => [&mut engine.last, &mut engine.before]
+            .into_iter()
+            .map(|record| &mut record.b)
+            .collect(),
+    }
+}
+
+impl Core {
+    /// The state as bytes.
+    pub(super) fn save(&mut self, published: &RwLock<Published>) -> Vec<u8> {
+        let mut w = Writer(Vec::new());
+        w.0.extend_from_slice(MAGIC);
+        w.u32(VERSION);
+        w.0.extend_from_slice(&self.model.hash);
+        w.0.extend_from_slice(&Sha256::digest(self.mesh.sha256.as_bytes()));
+        w.u32(self.step_count as u32);
+        w.u32((self.step_count >> 32) as u32);
+        w.u32(self.quiet);
+        w.u32(u32::from(self.sleeping));
+        w.u32(self.rest_frames);
+        w.u32(source_code(self.source));
+        w.u32(source_code(self.source_before));
+        w.u32(self.max_displacement.to_bits());
+        for contact in [&self.contact, &self.contact_before] {
+            w.indices(&contact.nodes);
+            w.floats(&contact.vectors);
+        }
+        for list in lists(&mut self.engine) {
+            w.floats(list);
+        }
+        if let Engine::Reduced(engine) = &self.engine {
+            for record in [&engine.last, &engine.before] {
+                w.floats(&[record.prior_norm, record.bound, f32::from(record.contact)]);
+            }
+        }
+        if self.engine.keeps_all_nodes(&self.model) {
+            let shared = lock_read(published);
+            w.floats(&shared.last.field);
+            w.floats(&shared.before.field);
+        }
+        let digest = Sha256::digest(&w.0);
+        w.0.extend_from_slice(&digest);
+        w.0
+    }
+
+    /// Takes a saved state; on error nothing has changed.
+    pub(super) fn restore(&mut self, published: &RwLock<Published>, bytes: &[u8]) -> Result<()> {
+        if bytes.len() < MAGIC.len() + 4 + DIGEST || &bytes[..MAGIC.len()] != MAGIC {
+            return Err(Error::Snapshot("is not a snapshot of a scene".into()));
+        }
+        let (body, digest) = bytes.split_at(bytes.len() - DIGEST);
+        let mut r = Reader(&body[MAGIC.len()..]);
+        let version = r.u32()?;
+        if version != VERSION {
+            return Err(Error::Version(format!(
+                "snapshot: version {version}, this library reads version {VERSION}"
+            )));
+        }
+        if Sha256::digest(body).as_slice() != digest {
+            return Err(Error::Snapshot(
+                "is damaged: its checksum does not match".into(),
+            ));
+        }
+        if r.take(32)? != self.model.hash {
+            return Err(Error::Snapshot("is of another model".into()));
+        }
+        if r.take(32)? != Sha256::digest(self.mesh.sha256.as_bytes()).as_slice() {
+            return Err(Error::Snapshot("is of another mesh".into()));
+        }
+        let count = self.mesh.node_count();
+        let step_count = u64::from(r.u32()?) | u64::from(r.u32()?) << 32;
+        let quiet = r.u32()?;
+        let sleeping = r.u32()? != 0;
+        let rest_frames = r.u32()?;
+        let (source, source_before) = (r.source()?, r.source()?);
+        let max_displacement = r.f32()?;
+        let contact = r.contact(count)?;
+        let contact_before = r.contact(count)?;
+        let mut latents = Vec::new();
+        for list in lists(&mut self.engine) {
+            latents.push(r.floats(list.len())?);
+        }
+        let mut scalars = Vec::new();
+        if matches!(self.engine, Engine::Reduced(_)) {
+            scalars = vec![r.floats(3)?, r.floats(3)?];
+        }
+        let mut fields = Vec::new();
+        if self.engine.keeps_all_nodes(&self.model) {
+            fields = vec![r.floats(3 * count)?, r.floats(3 * count)?];
+        }
+        if !r.0.is_empty() {
+            return Err(Error::Snapshot(format!("has {} bytes too many", r.0.len())));
+        }
+
+        // Everything is read and checked; from here on nothing of the input can fail.
+        let _flush = FlushToZero::enter();
+        for (list, saved) in lists(&mut self.engine).into_iter().zip(latents) {
+            *list = saved;
+        }
+        if let Engine::Reduced(engine) = &mut self.engine {
+            for (record, saved) in [&mut engine.last, &mut engine.before]
+                .into_iter()
+                .zip(&scalars)
+            {
+                record.prior_norm = saved[0];
+                record.bound = saved[1];
+                record.contact = saved[2] != 0.0;
+            }
+            if let Some(table) = &self.model.prior {
+                engine.rebuild(
+                    self.isa,
+                    &self.pool,
+                    table,
+                    &self.held,
+                    &contact_before,
+                    &contact,
+                )?;
+            }
+        }
+        self.contact = contact;
+        self.contact_before = contact_before;
+        self.source = source;
+        self.source_before = source_before;
+        self.step_count = step_count;
+        self.quiet = quiet;
+        self.sleeping = sleeping;
+        self.rest_frames = rest_frames;
+        self.max_displacement = max_displacement;
+        if let [last, before] = fields.as_slice() {
+            let mut shared = lock_write(published);
+            shared.last.field.copy_from_slice(last);
+            shared.before.field.copy_from_slice(before);
+        }
+        let region = lock_read(published).region.clone();
+        let points = self.points.clone();
+        self.set_plan(published, region, points)?;
+        let stats = self.blank_stats();
+        lock_write(published).stats = stats;
+        Ok(())
+    }
+}
