@@ -1,0 +1,195 @@
+// A simulator with a window: a brain that a spatula presses, stepped by libupt beside the frame.
+//
+//   simulator BUNDLE [--size WxH] [--scale MM]
+//   simulator BUNDLE --headless --frames N [--screenshot OUT.png]
+//
+// Headless, a script plays the mouse: the spatula comes to the middle of the domain and presses;
+// time passes at 60 frames a second whatever the machine does, so that the picture depends on N
+// alone.
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <exception>
+#include <stdexcept>
+
+#include "picture.hpp"
+#include "view.hpp"
+
+struct Options {
+  std::string bundle, screenshot;
+  bool headless = false;
+  long frames = -1;
+  int width = 1280, height = 800;
+  float scale_mm = 10;
+};
+
+static Options parse(int argc, char **argv) {
+  Options options;
+  for (int i = 1; i < argc; i++) {
+    const std::string word = argv[i];
+    const auto value = [&]() -> const char * {
+      if (i + 1 >= argc) {
+        throw std::runtime_error(word + " needs a value");
+      }
+      return argv[++i];
+    };
+    if (word == "--headless") {
+      options.headless = true;
+    } else if (word == "--frames") {
+      options.frames = std::strtol(value(), nullptr, 10);
+    } else if (word == "--screenshot") {
+      options.screenshot = value();
+    } else if (word == "--scale") {
+      options.scale_mm = std::max(std::strtof(value(), nullptr), 0.1F);
+    } else if (word == "--size") {
+      if (std::sscanf(value(), "%dx%d", &options.width, &options.height) != 2) {
+        throw std::runtime_error("--size wants WxH, for instance 1280x800");
+      }
+    } else if (word[0] != '-' && options.bundle.empty()) {
+      options.bundle = word;
+    } else {
+      throw std::runtime_error("unknown argument " + word);
+    }
+  }
+  if (options.bundle.empty()) {
+    throw std::runtime_error("usage: simulator BUNDLE [--size WxH] [--scale MM] [--headless "
+                             "--frames N] [--screenshot OUT.png]");
+  }
+  if (options.headless && options.frames < 1) {
+    throw std::runtime_error("--headless needs --frames N");
+  }
+  return options;
+}
+
+struct Window {
+  GLFWwindow *handle = nullptr;
+  double wheel = 0;
+
+  explicit Window(const Options &options) {
+    if (glfwInit() == GLFW_FALSE) {
+      throw std::runtime_error("GLFW: no display; use xvfb-run for a machine without one");
+    }
+    glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 3);
+    glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 3);
+    glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
+    glfwWindowHint(GLFW_OPENGL_FORWARD_COMPAT, GLFW_TRUE);
+    glfwWindowHint(GLFW_SAMPLES, 4);
+    glfwWindowHint(GLFW_VISIBLE, options.headless ? GLFW_FALSE : GLFW_TRUE);
+    handle = glfwCreateWindow(options.width, options.height, "libupt simulator", nullptr, nullptr);
+    if (handle == nullptr) {
+      glfwTerminate();
+      throw std::runtime_error("GLFW: no OpenGL 3.3 context");
+    }
+    glfwMakeContextCurrent(handle);
+    glfwSwapInterval(options.headless ? 0 : 1);
+    glfwSetWindowUserPointer(handle, this);
+    glfwSetScrollCallback(handle, [](GLFWwindow *window, double, double amount) {
+      static_cast<Window *>(glfwGetWindowUserPointer(window))->wheel += amount;
+    });
+    gl::load();
+  }
+  ~Window() {
+    glfwDestroyWindow(handle);
+    glfwTerminate();
+  }
+  bool button(int which) const { return glfwGetMouseButton(handle, which) == GLFW_PRESS; }
+};
+
+// The mouse's ray; right drag and wheel move the camera.
+static Ray read_mouse(Window &window, Camera &camera) {
+  static double last_x = 0, last_y = 0;
+  double x = 0, y = 0;
+  int width = 1, height = 1;
+  glfwGetCursorPos(window.handle, &x, &y);
+  glfwGetWindowSize(window.handle, &width, &height);
+  if (window.button(GLFW_MOUSE_BUTTON_RIGHT)) {
+    camera.orbit(static_cast<float>(last_x - x) * 0.008F, static_cast<float>(y - last_y) * 0.008F);
+  }
+  camera.zoom(std::pow(0.9F, static_cast<float>(window.wheel)));
+  window.wheel = 0;
+  last_x = x;
+  last_y = y;
+  return camera.ray(static_cast<float>(2 * x / width - 1), static_cast<float>(1 - 2 * y / height));
+}
+
+static void run(const Options &options) {
+  Tissue tissue(options.bundle);
+  Window window(options);
+  View view;
+  view.create(tissue, options.scale_mm);
+  Spatula spatula(std::min(10.0F, tissue.info().max_push_mm));
+
+  const Hit middle = tissue.domain_middle();
+  Camera camera;
+  // From the side of the domain, a little along the surface, so that the dent is seen in profile.
+  const Frame around = frame_around(middle.normal, {0, 0, 1});
+  camera.frame(tissue.centre(), tissue.radius(), around.z + around.x * 0.75F + around.y * 0.25F);
+
+  using Clock = std::chrono::steady_clock;
+  const Clock::time_point start = Clock::now();
+  double last = 0, frame_ms = 0, total_ms = 0;
+  long frame = 0;
+  while (glfwWindowShouldClose(window.handle) == GLFW_FALSE &&
+         (options.frames < 0 || frame < options.frames)) {
+    const Clock::time_point frame_start = Clock::now();
+    int width = options.width, height = options.height;
+    glfwGetFramebufferSize(window.handle, &width, &height);
+    camera.set_size(width, height);
+
+    double now;
+    bool pressed;
+    if (options.headless) {
+      now = static_cast<double>(frame) / 60;
+      pressed = frame >= 15;
+      spatula.hover(middle, Ray{middle.point + middle.normal * 100, -middle.normal});
+    } else {
+      now = std::chrono::duration<double>(frame_start - start).count();
+      const Ray ray = read_mouse(window, camera);
+      pressed = window.button(GLFW_MOUSE_BUTTON_LEFT);
+      spatula.hover(tissue.pick(ray), ray);
+      if (glfwGetKey(window.handle, GLFW_KEY_R) == GLFW_PRESS) {
+        tissue.finish();
+        tissue.scene().reset();
+      }
+    }
+    spatula.move(static_cast<float>(std::min(now - last, 0.1)), pressed);
+    last = now;
+
+    tissue.advance(now, spatula.contacts(tissue));
+    if (options.headless) {
+      tissue.finish();
+    }
+    tissue.sample(now);
+    view.draw(tissue, spatula, camera, width, height, frame_ms);
+    frame++;
+    if (frame == options.frames && !options.screenshot.empty()) {
+      save_picture(options.screenshot, width, height);
+    }
+    glfwSwapBuffers(window.handle);
+    glfwPollEvents();
+    frame_ms = std::chrono::duration<double, std::milli>(Clock::now() - frame_start).count();
+    total_ms += frame_ms;
+  }
+  tissue.finish();
+  const upt_scene_stats stats = tissue.stats();
+  std::printf("%ld frames, mean %.1f ms; %llu steps, median %.2f ms; push %.1f mm, largest "
+              "displacement %.2f mm; contacts by %s\n",
+              frame, total_ms / static_cast<double>(std::max(frame, 1L)),
+              static_cast<unsigned long long>(stats.step_count), tissue.median_step_ms(),
+              static_cast<double>(std::max(spatula.depth(), 0.0F)),
+              static_cast<double>(tissue.max_displacement()),
+              spatula.library_contacts() ? "the library" : "the simulator");
+}
+
+int main(int argc, char **argv) {
+  try {
+    run(parse(argc, argv));
+    upt::shutdown();
+  } catch (const std::exception &error) {
+    std::fprintf(stderr, "simulator: %s\n", error.what());
+    return 1;
+  }
+  return 0;
+}

@@ -1,0 +1,201 @@
+#include "tissue.hpp"
+
+#include <algorithm>
+#include <limits>
+
+static constexpr std::size_t STRIDE = Tissue::VERTEX_FLOATS;
+
+static Vec3 at(const std::vector<float> &values, std::size_t index, std::size_t stride = 3) {
+  return {values[stride * index], values[stride * index + 1], values[stride * index + 2]};
+}
+
+Tissue::Tissue(const std::string &bundle) : model_(upt::Model::open(bundle)), scene_(model_) {
+  info_ = model_.info();
+  surface_ = model_.indices(UPT_SET_SURFACE_NODES);
+  domain_ = model_.indices(UPT_SET_DOMAIN_NODES);
+  const std::vector<float> positions = model_.positions();
+  for (std::size_t node = 0; node < info_.node_count; node++) {
+    rest_.push_back(at(positions, node));
+  }
+
+  // Only the surface is drawn, so only the surface is decoded.
+  scene_.set_region(surface_);
+  std::vector<std::uint32_t> vertex_of(rest_.size(), 0);
+  for (std::size_t vertex = 0; vertex < surface_.size(); vertex++) {
+    vertex_of[surface_[vertex]] = static_cast<std::uint32_t>(vertex);
+  }
+  triangles_ = model_.indices(UPT_SET_SURFACE_FACES);
+  for (std::uint32_t &node : triangles_) {
+    node = vertex_of[node];
+  }
+  vertex_in_domain_.assign(surface_.size(), false);
+  for (const std::uint32_t node : domain_) {
+    vertex_in_domain_[vertex_of[node]] = true;
+  }
+
+  displacement_.assign(3 * surface_.size(), 0);
+  cavity_.assign(surface_.size(), 0);
+  vertices_.assign(STRIDE * surface_.size(), 0);
+  fill(displacement_);
+  for (std::size_t vertex = 0; vertex < surface_.size(); vertex++) {
+    const float *normal = &vertices_[STRIDE * vertex + 3];
+    rest_normals_.push_back(normalized({normal[0], normal[1], normal[2]}));
+  }
+
+  find_cavities();
+  fill(displacement_);
+
+  Vec3 low = rest_[0], high = rest_[0];
+  for (const Vec3 &p : rest_) {
+    low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
+    high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
+  }
+  centre_ = (low + high) * 0.5F;
+  radius_ = 0.5F * length(high - low);
+}
+
+// Where neighbours stand above a vertex's tangent plane there is a sulcus; it is drawn darker. The
+// mean slope over the edges, smoothed once.
+void Tissue::find_cavities() {
+  std::vector<float> slope(surface_.size(), 0), sum(surface_.size(), 0), count(surface_.size(), 0);
+  const auto each_edge = [&](auto visit) {
+    for (std::size_t i = 0; i < triangles_.size(); i += 3) {
+      for (int corner = 0; corner < 3; corner++) {
+        visit(triangles_[i + corner], triangles_[i + (corner + 1) % 3]);
+      }
+    }
+  };
+  each_edge([&](std::uint32_t a, std::uint32_t b) {
+    slope[a] += dot(rest_normals_[a], normalized(rest_[surface_[b]] - rest_[surface_[a]]));
+    count[a] += 1;
+  });
+  for (std::size_t vertex = 0; vertex < surface_.size(); vertex++) {
+    slope[vertex] /= std::max(count[vertex], 1.0F);
+  }
+  each_edge([&](std::uint32_t a, std::uint32_t b) { sum[a] += slope[b]; });
+  for (std::size_t vertex = 0; vertex < surface_.size(); vertex++) {
+    cavity_[vertex] = 0.5F * (slope[vertex] + sum[vertex] / std::max(count[vertex], 1.0F));
+  }
+}
+
+void Tissue::advance(double now, const Contacts &contacts) {
+  if (in_flight_) {
+    if (scene_.poll() == UPT_PENDING) {
+      return; // the frame does not wait
+    }
+    in_flight_ = false;
+    step_ms_.push_back(stats().step_ms);
+  }
+  if (now - last_start_ + 1e-9 >= info_.dt) {
+    scene_.submit(contacts.nodes, contacts.vectors);
+    in_flight_ = true;
+    last_start_ = std::max(last_start_ + info_.dt, now - info_.dt);
+  }
+}
+
+void Tissue::finish() {
+  if (in_flight_) {
+    scene_.wait(60000);
+    in_flight_ = false;
+    step_ms_.push_back(stats().step_ms);
+  }
+}
+
+void Tissue::sample(double now) {
+  if (stats().step_count > 0) {
+    const double alpha = in_flight_ ? 1.0 : (now - last_start_) / info_.dt;
+    scene_.sample(std::clamp(alpha, 0.0, 1.0), displacement_);
+  }
+  fill(displacement_);
+}
+
+void Tissue::fill(const std::vector<float> &displacement) {
+  max_displacement_ = 0;
+  for (std::size_t vertex = 0; vertex < surface_.size(); vertex++) {
+    const Vec3 u = at(displacement, vertex);
+    const Vec3 p = rest_[surface_[vertex]] + u;
+    const float size = length(u);
+    const float values[STRIDE] = {p.x, p.y, p.z, 0, 0, 0, size, cavity_[vertex]};
+    std::copy(values, values + STRIDE, &vertices_[STRIDE * vertex]);
+    max_displacement_ = std::max(max_displacement_, size);
+  }
+  // Vertex normals: the sum of the faces' area vectors.
+  for (std::size_t i = 0; i < triangles_.size(); i += 3) {
+    const Vec3 a = position(triangles_[i]), b = position(triangles_[i + 1]),
+               c = position(triangles_[i + 2]);
+    const Vec3 area = cross(b - a, c - a);
+    for (int corner = 0; corner < 3; corner++) {
+      float *normal = &vertices_[STRIDE * triangles_[i + corner] + 3];
+      normal[0] += area.x;
+      normal[1] += area.y;
+      normal[2] += area.z;
+    }
+  }
+}
+
+Vec3 Tissue::position(std::uint32_t vertex) const { return at(vertices_, vertex, STRIDE); }
+
+std::optional<Hit> Tissue::pick(const Ray &ray) const {
+  float nearest = std::numeric_limits<float>::max();
+  std::optional<Hit> hit;
+  for (std::size_t i = 0; i < triangles_.size(); i += 3) {
+    const std::uint32_t *v = &triangles_[i];
+    const Vec3 a = position(v[0]), e1 = position(v[1]) - a, e2 = position(v[2]) - a;
+    const Vec3 p = cross(ray.direction, e2);
+    const float determinant = dot(e1, p);
+    if (determinant <= 1e-9F) {
+      continue; // from behind, or edge on
+    }
+    const Vec3 s = ray.origin - a;
+    const float beta = dot(s, p) / determinant;
+    const Vec3 q = cross(s, e1);
+    const float gamma = dot(ray.direction, q) / determinant, distance = dot(e2, q) / determinant;
+    if (beta < 0 || gamma < 0 || beta + gamma > 1 || distance <= 0 || distance >= nearest) {
+      continue;
+    }
+    nearest = distance;
+    const float alpha = 1 - beta - gamma;
+    const Vec3 rest = rest_[surface_[v[0]]] * alpha + rest_[surface_[v[1]]] * beta +
+                      rest_[surface_[v[2]]] * gamma;
+    const Vec3 normal = normalized(rest_normals_[v[0]] * alpha + rest_normals_[v[1]] * beta +
+                                   rest_normals_[v[2]] * gamma);
+    const bool domain =
+        vertex_in_domain_[v[0]] && vertex_in_domain_[v[1]] && vertex_in_domain_[v[2]];
+    hit = Hit{ray.origin + ray.direction * distance, rest, normal, domain};
+  }
+  return hit;
+}
+
+Hit Tissue::domain_middle() const {
+  Vec3 mean{}, normal{};
+  for (std::size_t vertex = 0; vertex < surface_.size(); vertex++) {
+    if (vertex_in_domain_[vertex]) {
+      mean = mean + rest_[surface_[vertex]] * (1.0F / static_cast<float>(domain_.size()));
+    }
+  }
+  std::size_t best = 0;
+  float nearest = std::numeric_limits<float>::max();
+  for (std::size_t vertex = 0; vertex < surface_.size(); vertex++) {
+    const float distance = length(rest_[surface_[vertex]] - mean);
+    if (vertex_in_domain_[vertex] && distance < nearest) {
+      nearest = distance;
+      best = vertex;
+    }
+  }
+  const Vec3 point = rest_[surface_[best]];
+  for (std::size_t vertex = 0; vertex < surface_.size(); vertex++) {
+    if (length(rest_[surface_[vertex]] - point) < 12) {
+      normal = normal + rest_normals_[vertex];
+    }
+  }
+  return {point, point, normalized(normal), true};
+}
+
+double Tissue::median_step_ms() const {
+  if (step_ms_.empty()) {
+    return 0;
+  }
+  std::vector<double> sorted = step_ms_;
+  std::sort(sorted.begin(), sorted.end());
+  return sorted[sorted.size() / 2];
+}

@@ -1,0 +1,78 @@
+// The deforming tissue: libupt steps on the scene's own worker, the window samples between steps.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "camera.hpp"
+#include "upt.hpp"
+#include "vec.hpp"
+
+// What the spatula does in the next step: nodes and their displacement, mm.
+struct Contacts {
+  std::vector<std::uint32_t> nodes;
+  std::vector<float> vectors;
+};
+
+// A point of the surface.
+struct Hit {
+  Vec3 point;  // in the deformed surface
+  Vec3 rest;   // the same point at rest
+  Vec3 normal; // outward, at rest, smoothed
+  bool domain; // whether instruments may touch here
+};
+
+class Tissue {
+public:
+  explicit Tissue(const std::string &bundle);
+
+  // Starts a step when the last one has finished and its time has come. `now`: seconds.
+  void advance(double now, const Contacts &contacts);
+  // Waits for the step in flight (for pictures that must not depend on the machine's speed).
+  void finish();
+  // Positions, normals and displacements of the surface at `now`.
+  void sample(double now);
+
+  std::optional<Hit> pick(const Ray &ray) const;
+  // The middle of the domain, for a scripted push.
+  Hit domain_middle() const;
+  Vec3 centre() const { return centre_; }
+  float radius() const { return radius_; }
+
+  upt::Scene &scene() { return scene_; }
+  const upt_model_info &info() const { return info_; }
+  upt_scene_stats stats() const { return scene_.stats(); }
+
+  // Per surface vertex: position 3, normal 3, displacement 1, cavity 1 (above 0 in a sulcus).
+  static constexpr std::size_t VERTEX_FLOATS = 8;
+  const std::vector<float> &vertices() const { return vertices_; }
+  // Three a triangle, indices of surface vertices.
+  const std::vector<std::uint32_t> &triangles() const { return triangles_; }
+  const std::vector<Vec3> &rest() const { return rest_; }
+  const std::vector<std::uint32_t> &domain() const { return domain_; }
+  float max_displacement() const { return max_displacement_; }
+  double median_step_ms() const;
+
+private:
+  Vec3 position(std::uint32_t vertex) const;
+  void find_cavities();
+  void fill(const std::vector<float> &displacement);
+
+  upt::Model model_;
+  upt::Scene scene_;
+  upt_model_info info_{};
+  std::vector<Vec3> rest_;             // all nodes
+  std::vector<std::uint32_t> surface_; // node of each surface vertex
+  std::vector<std::uint32_t> domain_;  // nodes that instruments may touch
+  std::vector<bool> vertex_in_domain_; // per surface vertex
+  std::vector<std::uint32_t> triangles_;
+  std::vector<Vec3> rest_normals_;
+  std::vector<float> displacement_, vertices_, cavity_;
+  std::vector<double> step_ms_;
+  Vec3 centre_;
+  float radius_ = 0, max_displacement_ = 0;
+  bool in_flight_ = false;
+  double last_start_ = -1e9;
+};
