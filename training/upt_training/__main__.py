@@ -1,4 +1,4 @@
-"""`python -m upt_training train | evaluate | export`; `--help` on each.
+"""`python -m upt_training train | evaluate | export | ablate`; `--help` on each.
 
 Wrong input ends with a message and exit code 2.
 """
@@ -57,6 +57,20 @@ def parser() -> argparse.ArgumentParser:
     export.add_argument("--step", action="store_true", help="also the whole step in one graph")
     export.add_argument("--f16", action="store_true", help="also half-precision graphs")
     export.add_argument("--int8", action="store_true", help="also dynamically quantised graphs")
+
+    ablate = commands.add_parser("ablate", help="variants of a configuration at one small budget: tables and plots")
+    ablate.add_argument("suite", choices=["windows", "tricks"])
+    ablate.add_argument("--config", type=Path, required=True)
+    ablate.add_argument("--data", type=Path, required=True)
+    ablate.add_argument("--mesh", type=Path)
+    ablate.add_argument("--prior", type=Path)
+    ablate.add_argument("--out", type=Path, required=True)
+    ablate.add_argument("--steps", type=int, default=2000, help="optimiser steps of each variant")
+    ablate.add_argument("--max-minutes", type=float, default=0.0, help="time limit of each variant")
+    ablate.add_argument("--cases", type=int, default=10, help="held-out cases scored")
+    ablate.add_argument("--only", nargs="*", help="only these variants")
+    ablate.add_argument("--device", default="auto")
+    ablate.add_argument("--threads", type=int, default=1)
     return top
 
 
@@ -71,6 +85,10 @@ def main(arguments: list[str] | None = None) -> int:
             from upt_training.evaluate import evaluate_command
 
             return evaluate_command(options)
+        if options.command == "ablate":
+            from upt_training.ablate import ablate_command
+
+            return ablate_command(options)
         from upt_training.export import export_command
 
         return export_command(options)
