@@ -6,7 +6,7 @@ import numpy as np
 
 
 def partition(positions: np.ndarray, surface_nodes: np.ndarray, size: int = 256) -> tuple[np.ndarray, np.ndarray]:
-    """`block_nodes [K]` and `block_offsets [B+1]`: blocks of at most `size` nodes, cut at the median of the longest axis.
+    """`block_nodes [K]` and `block_offsets [B+1]`: blocks of at most `size` nodes, cut at medians of the longest axis.
 
     In a block the surface nodes come first (they are what renderers need), each group ascending.
     """

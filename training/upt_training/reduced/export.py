@@ -69,7 +69,8 @@ def tables_of(mesh: Mesh, columns: Columns, modes: Modes, tolerance_mm: float, p
     basis, info = block_basis_of(mesh, columns, modes.residual, amplitudes, tolerance_mm, progress)
     prior = residual_prior(mesh, columns, modes, basis)
     lost = 1.0 - (prior.residual.astype(np.float64) ** 2).sum(1)
-    info["residual_rms_mm"] = float(np.sqrt(np.maximum(lost, 0.0) @ amplitudes.astype(np.float64) ** 2 / mesh.node_count))
+    energy = np.maximum(lost, 0.0) @ amplitudes.astype(np.float64) ** 2
+    info["residual_rms_mm"] = float(np.sqrt(energy / mesh.node_count))
     return prior, info
 
 

@@ -1,4 +1,4 @@
-"""Residual modes: the leading right singular vectors of `R = u - L(c)` over training frames (proper orthogonal decomposition).
+"""Residual modes: proper orthogonal decomposition of `R = u - L(c)` over training frames.
 
 The SVD is randomised (Halko, Martinsson and Tropp 2011): two products with the sampled frames per power iteration.
 """

@@ -39,10 +39,10 @@ class Correction(nn.Module):
 
     def forward(self, state: Tensor) -> Tensor:
         r, rz = self.modes, self.response_modes
-        contact, before = state[:, -2:-1], state[:, -1:]
-        free_inputs = torch.cat([state[:, : 2 * r], state[:, 2 * r + rz : 2 * r + 2 * rz], state[:, 3 * r + 2 * rz : -2]], 1)
+        contact = state[:, -2:-1]
+        states, z_prev, p_prev = state[:, : 2 * r], state[:, 2 * r + rz : 2 * r + 2 * rz], state[:, 3 * r + 2 * rz : -2]
+        free_inputs = torch.cat([states, z_prev, p_prev], dim=1)
         linear = contact * (state[:, :-2] @ self.contact_base) + (1 - contact) * (free_inputs @ self.free_base)
-        del before
         return linear + self.output_scale * self.mlp(state * self.input_scale)
 
 
@@ -61,7 +61,7 @@ def fade(push: Tensor, start: float, end: float) -> Tensor:
 
 
 def ridge_base(model: Correction, inputs: np.ndarray, targets: np.ndarray, noise: np.ndarray, ridge: float) -> None:
-    """Fit both linear maps on one-step pairs. `noise [n_in]` is the standard deviation of noise on each input (a ridge)."""
+    """Fit both linear maps on one-step pairs; `noise [n_in]`, a standard deviation for each input, acts as a ridge."""
     r, rz = model.modes, model.response_modes
     touching = inputs[:, -2] > 0.5
     free_columns = np.r_[0 : 2 * r, 2 * r + rz : 2 * r + 2 * rz, 3 * r + 2 * rz : 4 * r + 2 * rz]

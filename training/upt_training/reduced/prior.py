@@ -62,7 +62,7 @@ class Prior:
         return out.reshape(*q.shape[:-1], self.node_count, 3)
 
     def linear_response(self, nodes: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-        """`L(c)` at all nodes, `[..., K, 3]` mm, for `vectors [..., m, 3]` at `nodes [m]`. Contact nodes are not overwritten."""
+        """`L(c)` at all nodes, `[..., K, 3]` mm, for `vectors [..., m, 3]` at `nodes [m]`; nothing is overwritten."""
         return self.field(self.coordinates(self.forces(nodes, vectors)))
 
     def trajectory_response(self, offsets: np.ndarray, nodes: np.ndarray, vectors: np.ndarray) -> np.ndarray:
@@ -82,7 +82,7 @@ class Prior:
 def trajectory_forces(
     contact_nodes: np.ndarray, compliance: np.ndarray, offsets: np.ndarray, nodes: np.ndarray, vectors: np.ndarray
 ) -> np.ndarray:
-    """Contact forces `[F, 3D]` (float32, mN) of a trajectory's contact rows; equal consecutive contact sets share a factor."""
+    """Contact forces `[F, 3D]` (float32, mN) of a trajectory's rows; equal consecutive contact sets share a factor."""
     frames = len(offsets) - 1
     out = np.zeros((frames, len(contact_nodes), 3), np.float32)
     start = 0

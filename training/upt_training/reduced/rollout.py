@@ -107,7 +107,7 @@ def field_mse(states: States, b: np.ndarray) -> np.ndarray:
 
 
 def release_frames(states: States, seconds: float = 1.0, dt_s: float = 0.05, least_push_mm: float = 2.0) -> np.ndarray:
-    """Frames within `seconds` after an abrupt release (contact ends while pushed by `least_push_mm`), `[cases, frames]`."""
+    """Frames within `seconds` after contact ends while pushed by `least_push_mm`, `[cases, frames]`."""
     out = np.zeros(states.contact.shape, bool)
     for case, t in np.argwhere(states.contact[:, :-1] & ~states.contact[:, 1:]):
         if states.push[case, t] >= least_push_mm:

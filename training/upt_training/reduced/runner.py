@@ -1,4 +1,4 @@
-"""Runs a reduced bundle as the runtime does (numpy and ONNX Runtime): the reference of the Rust scene and of evaluation."""
+"""Runs a reduced bundle as the runtime does (numpy and ONNX Runtime): the reference of the Rust scene."""
 
 from __future__ import annotations
 
@@ -23,7 +23,8 @@ class ReducedRunner:
         self.prior = load_prior(folder / self.manifest["prior"]["file"])
         options = onnxruntime.SessionOptions()
         options.intra_op_num_threads = 1
-        self.session = onnxruntime.InferenceSession(str(folder / "latent.onnx"), options, providers=["CPUExecutionProvider"])
+        graph = str(folder / "latent.onnx")
+        self.session = onnxruntime.InferenceSession(graph, options, providers=["CPUExecutionProvider"])
         self.correct = True
         self.reset()
 

@@ -33,7 +33,7 @@ class States:
     field_square: np.ndarray
     scheme: np.ndarray
     split: np.ndarray
-    file: np.ndarray
+    source: np.ndarray
     nodes: np.ndarray
 
     @property
@@ -50,12 +50,15 @@ class States:
 
     def pick(self, mask: np.ndarray) -> States:
         """The cases where `mask` holds."""
-        return States(**{f.name: getattr(self, f.name)[mask] if f.name != "nodes" else self.nodes for f in fields(self)})
+        return States(**{name: getattr(self, name)[mask] for name in _PER_CASE}, nodes=self.nodes)
 
     def save(self, path: Path) -> None:
         temporary = path.with_suffix(".partial.npz")
         np.savez(temporary, **{f.name: getattr(self, f.name) for f in fields(self)})
         temporary.rename(path)
+
+
+_PER_CASE = tuple(f.name for f in fields(States) if f.name != "nodes")
 
 
 def load_states(path: Path) -> States:
@@ -65,7 +68,7 @@ def load_states(path: Path) -> States:
 
 def join_states(parts: list[States]) -> States:
     """Datasets of the same mesh and modes behind one another (shorter ones are refused by numpy)."""
-    joined = {f.name: np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(States) if f.name != "nodes"}
+    joined = {name: np.concatenate([getattr(part, name) for part in parts]) for name in _PER_CASE}
     return States(**joined, nodes=parts[0].nodes)
 
 
@@ -77,14 +80,14 @@ def project_cases(
 ) -> States:
     """Every frame of `cases` in reduced coordinates."""
     frames = cases[0].frames
-    collected: dict[str, list] = {f.name: [] for f in fields(States) if f.name != "nodes"}
+    collected: dict[str, list] = {name: [] for name in _PER_CASE}
     for index, case in enumerate(cases):
         linear = linear_fields(columns, case.forces(columns))
         field = case.fields()
         jump = np.zeros(frames, np.float32)
         jump[1:] = np.sqrt([np.dot(d, d) for d in (b - a for a, b in zip(linear[:-1], linear[1:], strict=True))])
         collected["field_square"].append(_squares(field))
-        residual = np.subtract(field, linear, out=field)
+        residual = field - linear
         collected["b"].append(residual @ modes.residual.T)
         collected["z"].append(linear @ modes.response.T)
         collected["p"].append(linear @ modes.residual.T)
@@ -96,7 +99,7 @@ def project_cases(
         collected["residual_square"].append(_squares(residual))
         collected["scheme"].append(case.scheme)
         collected["split"].append(case.split)
-        collected["file"].append(case.path.name)
+        collected["source"].append(case.path.name)
         progress(index + 1, len(cases))
     arrays = {name: np.array(values) for name, values in collected.items()}
     return States(**arrays, nodes=np.array(columns.node_count))

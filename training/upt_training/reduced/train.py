@@ -126,7 +126,8 @@ def train(
             done += 1
             if done <= first:
                 continue
-            rate = settings.learning_rate * min(1.0, done / 100) * 0.5 * (1 + math.cos(math.pi * done / (settings.updates + 1)))
+            cosine = 0.5 * (1 + math.cos(math.pi * done / (settings.updates + 1)))
+            rate = settings.learning_rate * min(1.0, done / 100) * cosine
             for group in optimiser.param_groups:
                 group["lr"] = rate
             cases = torch.from_numpy(rng.integers(states.cases, size=batch))
@@ -145,7 +146,7 @@ def train(
             loss.backward()
             torch.nn.utils.clip_grad_norm_(model.mlp.parameters(), 1.0)
             optimiser.step()
-            running.append(float(loss))
+            running.append(loss.item())
             decay = min(settings.ema, (done + 1) / (done + 10))
             with torch.no_grad():
                 for kept, current in zip(average.mlp.parameters(), model.mlp.parameters(), strict=True):
@@ -158,7 +159,8 @@ def train(
                     best.load_state_dict(average.state_dict())
                 left = (time.monotonic() - started) / max(done - first, 1) * (settings.updates - done)
                 text = ", ".join(f"{k} {v:.5f}" for k, v in now.items())
-                report(f"update {done}/{settings.updates} ({steps} steps): loss {np.mean(running):.5f}, {text}, {left:.0f} s left")
+                place = f"update {done}/{settings.updates} ({steps} steps)"
+                report(f"{place}: loss {np.mean(running):.5f}, {text}, {left:.0f} s left")
                 running = []
                 if checkpoint:
                     saved = {

@@ -56,7 +56,8 @@ class Case:
     def largest_push(self) -> np.ndarray:
         """Largest `|c|` of each frame, mm, `[F]`."""
         length = np.linalg.norm(self.vectors, axis=1)
-        return np.array([length[a:b].max(initial=0.0) for a, b in zip(self.offsets[:-1], self.offsets[1:], strict=True)])
+        bounds = zip(self.offsets[:-1], self.offsets[1:], strict=True)
+        return np.array([length[a:b].max(initial=0.0) for a, b in bounds])
 
 
 def open_case(path: Path, scheme: str, split: str, mesh_sha256: str) -> Case:

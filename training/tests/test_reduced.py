@@ -1,0 +1,264 @@
+"""Reduced models on a phantom: the response against a direct dense solve, the bound, the whole build and its export."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from safetensors.numpy import save_file
+
+from upt_training.box_mesh import box_mesh
+from upt_training.errors import InputError
+from upt_training.mesh_file import Mesh
+from upt_training.reduced.blocks import partition
+from upt_training.reduced.build import Options, build, split_states
+from upt_training.reduced.columns import Columns, contact_forces, load_columns
+from upt_training.reduced.evaluate import evaluate
+from upt_training.reduced.make_prior import make_prior, prior_error
+from upt_training.reduced.network import Correction
+from upt_training.reduced.prior import load_prior, save_prior
+from upt_training.reduced.rollout import Limits, drive_of, rollout, rollout_from_rest, true_limits
+from upt_training.reduced.runner import ReducedRunner
+from upt_training.reduced.states import load_states
+from upt_training.reduced.train import Settings
+from upt_training.reduced.trajectories import open_dataset
+
+FRAMES = 41
+
+
+def dense_stiffness(mesh: Mesh, young_pa: float = 3000.0, poisson: float = 0.49) -> np.ndarray:
+    """Stiffness `[3K,3K]` of linear tets in mN/mm, element by element as `B^T D B V` (Voigt notation)."""
+    young = young_pa * 1e-3
+    mu, lam = young / (2 * (1 + poisson)), young * poisson / ((1 + poisson) * (1 - 2 * poisson))
+    elastic = np.diag([2 * mu] * 3 + [mu] * 3)
+    elastic[:3, :3] += lam
+    out = np.zeros((3 * mesh.node_count,) * 2)
+    for tet in mesh.tets:
+        corner = mesh.positions[tet].astype(np.float64)
+        edges = corner[1:] - corner[0]
+        gradient = np.linalg.inv(edges).T
+        gradient = np.concatenate([-gradient.sum(0, keepdims=True), gradient])
+        strain = np.zeros((6, 12))
+        for node, (x, y, z) in enumerate(gradient):
+            strain[:, 3 * node : 3 * node + 3] = [[x, 0, 0], [0, y, 0], [0, 0, z], [y, x, 0], [0, z, y], [z, 0, x]]
+        dofs = (3 * tet[:, None] + np.arange(3)).ravel()
+        out[np.ix_(dofs, dofs)] += strain.T @ elastic @ strain * (np.linalg.det(edges) / 6)
+    return out
+
+
+def write_columns(mesh: Mesh, path: Path) -> Columns:
+    """The file that `upt prior` writes, from a dense inverse."""
+    stiffness = dense_stiffness(mesh)
+    free = np.setdiff1d(np.arange(mesh.node_count), mesh.fixed)
+    dofs = (3 * free[:, None] + np.arange(3)).ravel()
+    full = np.zeros_like(stiffness)
+    full[np.ix_(dofs, dofs)] = np.linalg.inv(stiffness[np.ix_(dofs, dofs)])
+    nodes = np.setdiff1d(mesh.domain_nodes, mesh.fixed)
+    rows = (3 * nodes[:, None] + np.arange(3)).ravel()
+    tensors = {
+        "columns": full[rows].astype(np.float32),
+        "compliance": full[np.ix_(rows, rows)].astype(np.float32),
+        "contact_nodes": nodes.astype(np.int32),
+    }
+    metadata = {"mesh_name": "box", "mesh_sha256": mesh.sha256, "boundary": "fixed"}
+    save_file(tensors, str(path), metadata={**metadata, "young_pa": "3000", "poisson": "0.49"})
+    return load_columns(path)
+
+
+def write_dataset(mesh: Mesh, columns: Columns, folder: Path, count: int) -> None:
+    """Trajectories with a made-up law: the residual is quadratic in `L` and decays after release."""
+    folder.mkdir()
+    rng = np.random.default_rng(0)
+    points = mesh.positions[columns.contact_nodes]
+    cases = []
+    for index in range(count):
+        seed = rng.integers(len(points))
+        rows = np.sort(np.argsort(np.linalg.norm(points - points[seed], axis=1), kind="stable")[:4])
+        direction = np.array([*rng.normal(size=2) * 0.3, -1.0])
+        push = np.sin(np.pi * np.arange(FRAMES) / 30.0)[:, None, None] * direction * rng.uniform(2, 5)
+        push = np.tile(push, (1, 4, 1)).astype(np.float32)
+        push[0] = push[22:] = 0.0
+        forces = np.zeros((FRAMES, len(points), 3))
+        forces[:, rows] = contact_forces(columns.compliance, rows, push)
+        linear = forces.reshape(FRAMES, -1) @ np.asarray(columns.columns)
+        u = np.zeros_like(linear)
+        residual = np.zeros(linear.shape[1])
+        for t in range(1, FRAMES):
+            if t < 22:
+                residual = 0.5 * residual + 0.05 * linear[t] * np.abs(linear[t])
+                dofs = (3 * columns.contact_nodes[rows][:, None] + np.arange(3)).ravel()
+                residual[dofs] = 0.0
+            else:
+                residual = 0.75 * (residual + linear[t - 1])
+            u[t] = linear[t] + residual
+        counts = np.where(np.arange(FRAMES) == 0, 0, np.where(np.arange(FRAMES) < 22, 4, 0))
+        tensors = {
+            "displacement": u.reshape(FRAMES, -1, 3).astype(np.float32),
+            "contact_offsets": np.concatenate([[0], np.cumsum(counts)]).astype(np.int32),
+            "contact_nodes": np.tile(columns.contact_nodes[rows], 21).astype(np.int32),
+            "contact_vectors": push[1:22].reshape(-1, 3),
+        }
+        name = f"case-{index:05d}.trajectory.safetensors"
+        metadata = {"mesh_sha256": mesh.sha256, "site": "[0,0,0]"}
+        save_file(tensors, str(folder / name), metadata=metadata)
+        split = "test" if (index // 4) % 5 == 4 else "train"
+        cases.append({"index": index, "file": name, "scheme": str(index % 4 + 1), "split": split, "status": "done"})
+    (folder / "manifest.json").write_text(json.dumps({"cases": cases}))
+
+
+@pytest.fixture(scope="module")
+def phantom(tmp_path_factory) -> tuple[Mesh, Columns, Path]:
+    folder = tmp_path_factory.mktemp("reduced")
+    mesh = box_mesh()
+    mesh.save(folder / "box.mesh.safetensors")
+    return mesh, write_columns(mesh, folder / "box.columns.safetensors"), folder
+
+
+@pytest.fixture(scope="module")
+def bundle(phantom) -> tuple[Path, Path]:
+    """A bundle built by the command's own path, and its work folder."""
+    mesh, columns, folder = phantom
+    write_dataset(mesh, columns, folder / "data", 24)
+    options = Options(
+        mesh=folder / "box.mesh.safetensors",
+        columns=columns.path,
+        data=[folder / "data"],
+        out=folder / "bundle",
+        work=folder / "work",
+        name="box-reduced",
+        modes=12,
+        response_modes=12,
+        tolerance_mm=1e-3,
+    )
+    settings = Settings(hidden=48, updates=300, stages=[(4, 32, 0.5), (12, 16, 0.5)], validate_every=100)
+    build(options, settings, "phantom")
+    return options.out, options.work
+
+
+def patch(columns: Columns, mesh: Mesh, count: int = 5) -> tuple[np.ndarray, np.ndarray]:
+    points = mesh.positions[columns.contact_nodes]
+    rows = np.sort(np.argsort(np.linalg.norm(points - points[len(points) // 2], axis=1), kind="stable")[:count])
+    rng = np.random.default_rng(4)
+    return columns.contact_nodes[rows], rng.normal(size=(count, 3)) + [0.5, 0.0, -3.0]
+
+
+def test_blocks_hold_every_node_once_with_the_surface_first(phantom):
+    mesh = phantom[0]
+    surface = np.unique(mesh.surface)
+    nodes, offsets = partition(mesh.positions, surface, 20)
+    assert np.array_equal(np.sort(nodes), np.arange(mesh.node_count))
+    assert np.diff(offsets).max() <= 20
+    for start, end in zip(offsets[:-1], offsets[1:], strict=True):
+        on_surface = np.isin(nodes[start:end], surface)
+        assert np.array_equal(on_surface, np.sort(on_surface)[::-1])
+
+
+def test_response_equals_a_direct_solve_with_prescribed_displacements(phantom, tmp_path):
+    mesh, columns, _ = phantom
+    prior, _ = make_prior(mesh, columns, tolerance_mm=1e-5)
+    save_prior(tmp_path / "prior.safetensors", prior, np.float32)
+    prior = load_prior(tmp_path / "prior.safetensors")
+    nodes, vectors = patch(columns, mesh)
+    found = prior.linear_response(nodes, vectors)
+
+    stiffness = dense_stiffness(mesh)
+    known = np.concatenate([nodes, mesh.fixed])
+    values = np.concatenate([vectors, np.zeros((len(mesh.fixed), 3))]).ravel()
+    known_dofs = (3 * known[:, None] + np.arange(3)).ravel()
+    unknown = np.setdiff1d(np.arange(3 * mesh.node_count), known_dofs)
+    exact = np.zeros(3 * mesh.node_count)
+    exact[known_dofs] = values
+    right = -stiffness[np.ix_(unknown, known_dofs)] @ values
+    exact[unknown] = np.linalg.solve(stiffness[np.ix_(unknown, unknown)], right)
+    assert np.abs(exact).max() > 1.0
+    assert np.abs(found - exact.reshape(-1, 3)).max() < 2e-3
+    assert np.abs(found[nodes] - vectors).max() < 2e-3
+
+
+def test_block_basis_error_follows_the_tolerance_and_half_precision_is_enough(phantom, tmp_path):
+    mesh, columns, _ = phantom
+    errors, sizes = [], []
+    for tolerance in (3e-2, 1e-3):
+        prior, info = make_prior(mesh, columns, tolerance)
+        errors.append(prior_error(mesh, columns, prior)["rms_mm"])
+        sizes.append(info["coordinates"])
+    assert errors[1] < 5e-3 and errors[1] < errors[0] and sizes[1] >= sizes[0]
+    save_prior(tmp_path / "half.safetensors", prior, np.float16)
+    assert prior_error(mesh, columns, load_prior(tmp_path / "half.safetensors"))["rms_mm"] < 1e-2
+
+
+def test_columns_of_another_mesh_are_refused(phantom):
+    mesh, columns, _ = phantom
+    moved = Mesh(mesh.positions + 1.0, mesh.tets, mesh.surface, mesh.domain, mesh.fixed, mesh.supported)
+    with pytest.raises(InputError, match="another mesh"):
+        make_prior(moved, columns)
+
+
+def test_any_correction_stays_inside_the_bound(bundle):
+    states = load_states(bundle[1] / "states-0.npz")
+    model = Correction(states.modes, states.z.shape[2], 16)
+    torch.manual_seed(0)
+    with torch.no_grad():
+        model.contact_base.normal_(0, 3.0)
+        model.free_base.normal_(0, 3.0)
+    limits = Limits(relative=0.4, decay=0.8)
+    norm = np.linalg.norm(rollout_from_rest(model, states, limits), axis=2)
+    assert norm.max() > 0.1
+    assert (norm <= true_limits(states, limits) * (1 + 1e-5) + 1e-6).all()
+    assert norm[:, -1].max() < 0.8**15 * norm.max() * 20
+
+
+def test_the_fade_ends_in_the_prior(bundle):
+    states = load_states(bundle[1] / "states-0.npz")
+    model = Correction(states.modes, states.z.shape[2], 16)
+    with torch.no_grad():
+        model.contact_base.fill_(0.1)
+    drive = drive_of(states)
+    drive.push = torch.full_like(drive.push, 70.0)
+    zero = torch.zeros(states.cases, states.modes)
+    assert rollout(model, drive, zero, zero, torch.zeros(states.cases), Limits()).abs().max() == 0.0
+
+
+def test_the_bundle_runs_as_it_was_trained(phantom, bundle):
+    mesh, _, folder = phantom
+    out, work = bundle
+    states = load_states(work / "states-0.npz")
+    saved = torch.load(work / "training-1.pt", weights_only=False)["best"]
+    model = Correction(states.modes, states.z.shape[2], 48)
+    model.load_state_dict(saved)
+    manifest = json.loads((out / "bundle.json").read_text())
+    bound = manifest["reduced"]["bound"]
+    expected = rollout_from_rest(
+        model, states.pick(np.arange(states.cases) == 0), Limits(bound["relative"], bound["decay"])
+    )
+    runner = ReducedRunner(out)
+    case = open_dataset(folder / "data", mesh.sha256)[0]
+    for t in range(1, FRAMES):
+        rows = slice(case.offsets[t], case.offsets[t + 1])
+        field = runner.step(case.nodes[rows], case.vectors[rows])
+        assert np.abs(runner.b - expected[0, t]).max() < 2e-3
+        if rows.stop > rows.start:
+            assert np.array_equal(field[case.nodes[rows]], case.vectors[rows])
+        assert np.abs(field[mesh.fixed]).max() == 0.0
+
+
+def test_the_correction_beats_the_prior_on_unseen_cases(phantom, bundle):
+    mesh, _, folder = phantom
+    cases = open_dataset(folder / "data", mesh.sha256, "test")
+    result = evaluate(bundle[0], cases)
+    prior, reduced = result["prior"]["schemes_1_4"], result["reduced"]["schemes_1_4"]
+    assert reduced["mse_mm2"] < 0.5 * prior["mse_mm2"]
+    assert prior["mse_mm2"] < result["zero"]["schemes_1_4"]["mse_mm2"]
+
+
+def test_test_cases_and_scheme_5_are_never_trained_on(bundle):
+    states = load_states(bundle[1] / "states-0.npz")
+    states.scheme[0] = "5"
+    fit, validation, tested = split_states(states)
+    assert fit.cases + validation.cases + tested.cases == states.cases
+    assert (fit.split == "train").all() and (fit.scheme != "5").all()
+    assert (validation.split == "train").all() and (validation.scheme != "5").all()
+    assert "5" in tested.scheme

@@ -1,0 +1,110 @@
+"""Command line: `python -m upt_training.reduced prior | build | evaluate` (each with `--help`)."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from upt_training.errors import InputError
+from upt_training.mesh_file import load_mesh
+from upt_training.reduced.build import Options, Progress, build
+from upt_training.reduced.columns import load_columns
+from upt_training.reduced.evaluate import evaluate, table
+from upt_training.reduced.make_prior import make_prior, prior_error
+from upt_training.reduced.prior import load_prior, save_prior
+from upt_training.reduced.train import Settings
+from upt_training.reduced.trajectories import open_dataset
+
+
+def arguments() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="python -m upt_training.reduced", description=__doc__)
+    commands = parser.add_subparsers(dest="command", required=True)
+
+    prior = commands.add_parser("prior", help="prior.safetensors with the linear response alone")
+    prior.add_argument("--mesh", type=Path, required=True)
+    prior.add_argument("--columns", type=Path, required=True, help="file of `upt prior`")
+    prior.add_argument("--out", type=Path, required=True)
+    prior.add_argument("--tolerance", type=float, default=3e-3, help="RMS truncation error of the block basis, mm")
+    prior.add_argument("--tables", choices=("f16", "f32"), default="f16")
+
+    whole = commands.add_parser("build", help="a reduced bundle: modes, training, tables, evaluation; resumes")
+    whole.add_argument("--mesh", type=Path, required=True)
+    whole.add_argument("--columns", type=Path, required=True, help="file of `upt prior` for the wanted boundary")
+    whole.add_argument("--data", type=Path, action="append", required=True, help="dataset folder; may be repeated")
+    whole.add_argument("--out", type=Path, required=True, help="bundle folder")
+    whole.add_argument("--work", type=Path, required=True, help="folder of intermediate results")
+    whole.add_argument("--name", default="brain-reduced")
+    whole.add_argument("--description", default="Linear-elastic response with a learned correction")
+    whole.add_argument("--modes", type=int, default=120)
+    whole.add_argument("--response-modes", type=int, default=80)
+    whole.add_argument("--tolerance", type=float, default=3e-3)
+    whole.add_argument("--tables", choices=("f16", "f32"), default="f16")
+    whole.add_argument("--hidden", type=int, default=384)
+    whole.add_argument("--updates", type=int, default=4000)
+    whole.add_argument("--noise", type=float, default=0.05)
+    whole.add_argument("--seeds", type=int, default=1, help="trainings to choose from by validation error")
+
+    check = commands.add_parser("evaluate", help="errors of a bundle over full rollouts")
+    check.add_argument("--bundle", type=Path, required=True)
+    check.add_argument("--data", type=Path, action="append", required=True)
+    check.add_argument("--all", action="store_true", help="every case, not only the split `test` and scheme 5")
+    check.add_argument("--json", type=Path, help="also write the result here")
+    return parser
+
+
+def run_prior(args: argparse.Namespace) -> None:
+    mesh, columns = load_mesh(args.mesh), load_columns(args.columns)
+    prior, info = make_prior(mesh, columns, args.tolerance, Progress("block basis"))
+    save_prior(args.out, prior, np.float16 if args.tables == "f16" else np.float32)
+    error = prior_error(mesh, columns, load_prior(args.out))
+    print(json.dumps({"file": str(args.out), "bytes": args.out.stat().st_size, "basis": info, "error": error}))
+
+
+def run_evaluate(args: argparse.Namespace) -> None:
+    mesh = load_mesh(args.bundle / "mesh.safetensors")
+    cases = [case for folder in args.data for case in open_dataset(folder, mesh.sha256)]
+    if not args.all:
+        cases = [case for case in cases if case.split == "test" or case.scheme == "5"]
+    if not cases:
+        raise InputError("no case to evaluate: the datasets have no finished test case (use --all for every case)")
+    result = evaluate(args.bundle, cases, Progress("evaluation"))
+    if args.json:
+        args.json.write_text(json.dumps(result, indent=2))
+    print(table(result))
+
+
+def main() -> int:
+    args = arguments().parse_args()
+    try:
+        if args.command == "prior":
+            run_prior(args)
+        elif args.command == "build":
+            options = Options(
+                args.mesh,
+                args.columns,
+                args.data,
+                args.out,
+                args.work,
+                args.name,
+                args.modes,
+                args.response_modes,
+                args.tolerance,
+                args.tables,
+                args.seeds,
+            )
+            settings = Settings(hidden=args.hidden, updates=args.updates, noise=args.noise)
+            build(options, settings, args.description)
+        else:
+            run_evaluate(args)
+    except InputError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

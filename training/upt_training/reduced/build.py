@@ -1,0 +1,204 @@
+"""Builds a reduced bundle from a mesh, its compliance columns and datasets; every stage is kept in a work folder.
+
+Stages: modes (SVD), states (projection of every case), training, tables (block basis), bundle, evaluation. A stage
+whose file exists is not repeated, so an interrupted build resumes; training resumes at its last checkpoint.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import sys
+import time
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from upt_training.errors import InputError
+from upt_training.mesh_file import Mesh, load_mesh
+from upt_training.reduced.columns import Columns, load_columns
+from upt_training.reduced.evaluate import evaluate, table
+from upt_training.reduced.export import Description, tables_of, write_manifest, write_reduced_bundle
+from upt_training.reduced.make_prior import check_columns
+from upt_training.reduced.modes import Modes, learn_modes
+from upt_training.reduced.network import Correction
+from upt_training.reduced.prior import Prior, load_prior, save_prior
+from upt_training.reduced.rollout import Limits
+from upt_training.reduced.states import States, join_states, load_states, project_cases
+from upt_training.reduced.train import Settings, train
+from upt_training.reduced.trajectories import Case, open_dataset
+
+
+@dataclass
+class Options:
+    """What the command line gives."""
+
+    mesh: Path
+    columns: Path
+    data: list[Path]
+    out: Path
+    work: Path
+    name: str
+    modes: int = 120
+    response_modes: int = 80
+    tolerance_mm: float = 3e-3
+    tables: str = "f16"
+    seeds: int = 1
+
+
+class Progress:
+    """One line on stderr with the share done and the time left, at most twice a second."""
+
+    def __init__(self, label: str) -> None:
+        self.label, self.started, self.printed = label, time.monotonic(), 0.0
+
+    def __call__(self, done: int, total: int) -> None:
+        now = time.monotonic()
+        if now - self.printed < 0.5 and done < total:
+            return
+        self.printed = now
+        left = (now - self.started) / max(done, 1) * (total - done)
+        end = "\n" if done == total else ""
+        print(f"\r{self.label}: {done}/{total}, {left:.0f} s left   ", end=end, file=sys.stderr, flush=True)
+
+
+def learned_modes(options: Options, columns: Columns, cases: list[Case]) -> Modes:
+    """Residual and response modes of the training cases, from the work folder where they were made before."""
+    path = options.work / "modes.npz"
+    if path.exists():
+        with np.load(path) as file:
+            return Modes(**{name: file[name] for name in file.files})
+    modes = learn_modes(columns, cases, options.modes, options.response_modes, progress=Progress("modes"))
+    np.savez(path.with_suffix(".partial.npz"), **vars(modes))
+    path.with_suffix(".partial.npz").rename(path)
+    return modes
+
+
+def projected(options: Options, columns: Columns, modes: Modes, mesh: Mesh) -> States:
+    """States of every case of every dataset; cases that were added since the last build are projected."""
+    parts = []
+    for index, folder in enumerate(options.data):
+        path = options.work / f"states-{index}.npz"
+        cases = open_dataset(folder, mesh.sha256)
+        kept = [load_states(path)] if path.exists() else []
+        known = set(kept[0].source) if kept else set()
+        new = [case for case in cases if case.path.name not in known]
+        if new:
+            label = f"states of {folder.name}"
+            join_states([*kept, project_cases(columns, modes, new, Progress(label))]).save(path)
+        parts.append(load_states(path))
+    return join_states(parts)
+
+
+def training_cases(options: Options, mesh: Mesh) -> list[Case]:
+    """Cases that modes are learned from: the split `train`, scheme 5 never."""
+    cases = [c for folder in options.data for c in open_dataset(folder, mesh.sha256, "train") if c.scheme != "5"]
+    if not cases:
+        raise InputError("no finished case of the split 'train': make the dataset with `upt dataset`")
+    return cases
+
+
+def split_states(states: States) -> tuple[States, States, States]:
+    """Training, validation (every eighth training case) and test states; scheme 5 is only ever tested."""
+    trainable = (states.split == "train") & (states.scheme != "5")
+    held_out = np.zeros(states.cases, bool)
+    held_out[np.flatnonzero(trainable)[5::8]] = True
+    return states.pick(trainable & ~held_out), states.pick(held_out), states.pick(~trainable)
+
+
+def bound_limits(states: States) -> Limits:
+    """`relative` that leaves the true residuals of training inside the bound with a half to spare."""
+    pressed = states.contact & (states.push > 1.0)
+    norm = np.linalg.norm(states.b, axis=2)
+    share = norm[pressed] / np.maximum(states.response_norm[pressed], 1e-6)
+    return Limits(relative=float(np.clip(1.5 * np.quantile(share, 0.999), 0.2, 1.5)))
+
+
+def trained(options: Options, states: States, settings: Settings) -> tuple[Correction, Limits, dict]:
+    """The best of `seeds` trainings by validation error."""
+    fit, validation, _ = split_states(states)
+    limits = bound_limits(fit)
+    best: tuple[Correction, dict] | None = None
+    for seed in range(1, options.seeds + 1):
+        settings.seed = seed
+        model, history = train(fit, validation, limits, settings, print, options.work / f"training-{seed}.pt")
+        if best is None or history["validation_mse"] < best[1]["validation_mse"]:
+            best = (model, {**history, "seed": seed})
+    assert best is not None
+    return best[0], limits, best[1]
+
+
+def tables(options: Options, mesh: Mesh, columns: Columns, modes: Modes) -> tuple[Prior, dict]:
+    """Bundle tables, from the work folder where they were made before."""
+    path, info_path = options.work / "tables.safetensors", options.work / "tables.json"
+    if path.exists() and info_path.exists():
+        return load_prior(path), json.loads(info_path.read_text())
+    prior, info = tables_of(mesh, columns, modes, options.tolerance_mm, Progress("block basis"))
+    save_prior(path, prior, np.float32)
+    info_path.write_text(json.dumps(info))
+    return prior, info
+
+
+def envelope_of(cases: list[Case], mesh: Mesh) -> dict:
+    """What the training cases cover: pushes, their rate, contact areas."""
+    areas = mesh.node_areas()
+    push, rate, area = 0.0, 0.0, []
+    for case in cases:
+        for t in range(1, case.frames):
+            row, before = case.contact_row(t), case.contact_row(t - 1)
+            if not len(row):
+                continue
+            vectors = case.vectors[case.offsets[t] : case.offsets[t + 1]]
+            push = max(push, float(np.linalg.norm(vectors, axis=1).max()))
+            area.append(float(areas[row].sum()))
+            if np.array_equal(row, before):
+                earlier = case.vectors[case.offsets[t - 1] : case.offsets[t]]
+                rate = max(rate, float(np.linalg.norm(vectors - earlier, axis=1).max()))
+    return {
+        "max_push_mm": round(push, 2),
+        "max_push_rate_mm": round(rate, 2),
+        "contact_area_mm2": [round(min(area), 1), round(max(area), 1)],
+        "max_sites": 1,
+        "displacement_bound_mm": round(2.0 * push, 1),
+    }
+
+
+def build(options: Options, settings: Settings, description: str) -> dict:
+    """Everything; returns the manifest."""
+    torch.set_num_threads(1)
+    options.work.mkdir(parents=True, exist_ok=True)
+    mesh, columns = load_mesh(options.mesh), load_columns(options.columns)
+    check_columns(mesh, columns)
+    cases = training_cases(options, mesh)
+    modes = learned_modes(options, columns, cases)
+    states = projected(options, columns, modes, mesh)
+    model, limits, history = trained(options, states, settings)
+    prior, info = tables(options, mesh, columns, modes)
+    digest = hashlib.sha256("".join(sorted(states.source)).encode()).hexdigest()[:12]
+    provenance = {
+        "data": [folder.name for folder in options.data],
+        "cases": {"train": len(cases), "all": states.cases, "files_sha256": digest},
+        "training": {**asdict(settings), "validation_mse_mm2": history["validation_mse"]},
+        "block_basis": info,
+        "tables": options.tables,
+        "date": datetime.now(UTC).strftime("%Y-%m-%d"),
+        "command": "python -m upt_training.reduced build",
+    }
+    about = Description(options.name, description, envelope_of(cases, mesh), provenance)
+    dtype = np.float16 if options.tables == "f16" else np.float32
+    manifest = write_reduced_bundle(options.out, mesh, columns, prior, model, limits, about, dtype)
+    listed = [case for folder in options.data for case in open_dataset(folder, mesh.sha256)]
+    tested = [case for case in listed if case.split == "test" or case.scheme == "5"]
+    result = evaluate(options.out, tested, Progress("evaluation"))
+    manifest["errors"] = {group: _published(e) for group, e in result["reduced"].items()}
+    write_manifest(options.out, manifest)
+    (options.work / "errors.json").write_text(json.dumps(result, indent=2))
+    print(table(result))
+    return manifest
+
+
+def _published(errors: dict) -> dict:
+    return {name: float(f"{value:.4g}") for name, value in errors.items()}
