@@ -88,6 +88,15 @@ fn norm(values: &[f32]) -> f32 {
         .sqrt() as f32
 }
 
+/// Euclidean distance, summed in f64 in index order.
+fn distance(a: &[f32], b: &[f32]) -> f32 {
+    a.iter()
+        .zip(b)
+        .map(|(&x, &y)| (x as f64 - y as f64).powi(2))
+        .sum::<f64>()
+        .sqrt() as f32
+}
+
 impl ReducedEngine {
     /// Makes the session and the buffers.
     pub fn new(model: &Model, kind: &ReducedModel, table: &PriorTable) -> Result<ReducedEngine> {
@@ -190,13 +199,13 @@ impl ReducedEngine {
         } else {
             self.last.bound
         };
-        let released = if contact_changed {
-            self.last.prior_norm
+        let jump = if contact_changed {
+            distance(&next.q_prior, &self.last.q_prior)
         } else {
             0.0
         };
         let bound = &kind.entry.bound;
-        next.bound = (bound.relative * next.prior_norm).max(bound.decay * (energy + released));
+        next.bound = (bound.relative * next.prior_norm).max(bound.decay * (energy + jump));
         let size = norm(&next.b);
         let mut scale = 1.0;
         if size > next.bound {

@@ -305,7 +305,8 @@ impl UptEngine {
             Which::Before => &self.before,
         };
         if self.decoder_stages.is_empty() {
-            self.tokens.set(self.precision, &record.keys, &record.values);
+            self.tokens
+                .set(self.precision, &record.keys, &record.values);
             return decode(
                 isa,
                 pool,
