@@ -9,6 +9,8 @@ pub mod bundle;
 pub mod envelope;
 pub mod error;
 pub mod ffi;
+#[cfg(feature = "forces")]
+pub mod forces;
 pub mod graph;
 pub mod grid;
 pub mod guard;
