@@ -91,13 +91,13 @@ def run_variant(settings: Settings, options, mesh, folder: Path) -> dict:
 
 def reference_scores(trainer_cache, cases: np.ndarray) -> dict[str, float]:
     """MSE of predicting zero, of the response and of copying the true last frame, on the cache's nodes."""
-    u = trainer_cache.displacement[cases].astype(np.float32)
+    u = np.stack([trainer_cache.displacement[c] for c in cases]).astype(np.float32)
     out = {
         "predict zero": float((u[:, 2:] ** 2).sum(-1).mean()),
         "copy the true last frame": float(((u[:, 2:] - u[:, 1:-1]) ** 2).sum(-1).mean()),
     }
     if trainer_cache.prior is not None:
-        prior = trainer_cache.prior[cases].astype(np.float32)
+        prior = np.stack([trainer_cache.prior[c] for c in cases]).astype(np.float32)
         out["linear response, quasi-static"] = float(((u - prior)[:, 2:] ** 2).sum(-1).mean())
     return out
 

@@ -1,15 +1,15 @@
 """What training reads: displacement, linear response and contact mask of a node subset, half precision, memory-mapped.
 
 The recurrence and the loss touch only a subset of the nodes (the encoder's needed nodes and the scored ones), so each
-dataset is reduced to `[cases, frames, n]` arrays once; 200 cases at 6,000 nodes are 2.3 GB on disk and the operating
-system pages in what is used. The collision field needs no array: at contact nodes it is the displacement itself.
+case is reduced to `[frames, n]` arrays once; 200 cases at 6,000 nodes are 2.3 GB on disk and the operating system
+pages in what is used. Cases that are added to a dataset later are added to its cache. The collision field needs no
+array: at contact nodes it is the displacement itself.
 """
 
 from __future__ import annotations
 
 import hashlib
-import json
-import shutil
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -20,16 +20,17 @@ from upt_training.mesh_file import Mesh
 from upt_training.prior_table import PriorTable
 
 
+@dataclass
 class FieldCache:
-    """Arrays over `cases` x `frames` x `nodes` (`nodes` ascending mesh indices)."""
+    """A list of cases; each `displacement [F, n, 3]` and `prior [F, n, 3]` f16 mm, `contact [F, n]` u8.
 
-    def __init__(self, folder: Path):
-        self.folder = Path(folder)
-        self.header = json.loads((self.folder / "cache.json").read_text())
-        self.nodes = np.load(self.folder / "nodes.npy")
-        self.displacement = np.load(self.folder / "displacement.npy", mmap_mode="r")
-        self.mask = np.load(self.folder / "contact.npy", mmap_mode="r")
-        self.prior = np.load(self.folder / "prior.npy", mmap_mode="r") if self.header["prior"] else None
+    `nodes`: ascending mesh indices of the `n` nodes.
+    """
+
+    nodes: np.ndarray
+    displacement: list[np.ndarray]
+    contact: list[np.ndarray]
+    prior: list[np.ndarray] | None
 
     @property
     def case_count(self) -> int:
@@ -37,60 +38,70 @@ class FieldCache:
 
     @property
     def frame_count(self) -> int:
-        return self.displacement.shape[1]
+        return len(self.displacement[0])
 
     def fields(self, case: np.ndarray, frame: np.ndarray) -> dict[str, torch.Tensor]:
         """Truth at `frame` (`[B]`, -1 is rest): `u`, `c`, `prior` `[B, n, 3]` mm, `contact` `[B, n, 1]`."""
-        frame = np.maximum(frame, 0)
-        u = torch.from_numpy(self.displacement[case, frame].astype(np.float32))
-        contact = torch.from_numpy(self.mask[case, frame].astype(np.float32))[..., None]
+        at = list(zip(case, np.maximum(frame, 0), strict=True))
+
+        def read(arrays: list[np.ndarray]) -> torch.Tensor:
+            return torch.from_numpy(np.stack([arrays[c][t] for c, t in at]).astype(np.float32))
+
+        u, contact = read(self.displacement), read(self.contact)[..., None]
         out = {"u": u, "contact": contact, "c": u * contact}
         if self.prior is not None:
-            out["prior"] = torch.from_numpy(self.prior[case, frame].astype(np.float32))
+            out["prior"] = read(self.prior)
         return out
 
 
 def build_cache(folder: Path, mesh: Mesh, cases: list[Case], nodes: np.ndarray, prior: PriorTable | None) -> FieldCache:
-    """Open the cache of these cases and nodes under `folder`, or make it (complete before it gets its name)."""
+    """Open the cached arrays of these cases and nodes under `folder`; make those that are missing."""
     key = hashlib.sha256()
     for part in (mesh.sha256.encode(), nodes.astype(np.int64).tobytes()):
         key.update(part)
-    for case in cases:
-        key.update(f"{case.path.resolve()}:{case.path.stat().st_size}".encode())
     if prior is not None:
         key.update(f"{prior.path.resolve()}:{prior.path.stat().st_size}".encode())
     out = Path(folder) / key.hexdigest()[:16]
-    if (out / "cache.json").exists():
-        return FieldCache(out)
-    staging = out.with_name(out.name + ".new")
-    shutil.rmtree(staging, ignore_errors=True)
-    staging.mkdir(parents=True)
-    frames = open_trajectory(cases[0].path, mesh).frame_count
-    shape = (len(cases), frames, len(nodes))
-    new = np.lib.format.open_memmap
-    displacement = new(staging / "displacement.npy", "w+", np.float16, (*shape, 3))
-    contact = new(staging / "contact.npy", "w+", np.uint8, shape)
-    response = new(staging / "prior.npy", "w+", np.float16, (*shape, 3)) if prior is not None else None
-    local = prior.restrict(nodes) if prior is not None else None
+    local = None
+    displacement, contact, response = [], [], []
+    for case in cases:
+        status = case.path.stat()
+        stamp = hashlib.sha256(f"{case.path.resolve()}:{status.st_size}:{status.st_mtime_ns}".encode()).hexdigest()[:12]
+        stem = out / f"{case.index:05d}-{stamp}"
+        if not stem.with_suffix(".contact.npy").exists():
+            if local is None and prior is not None:
+                local = prior.restrict(nodes)
+            out.mkdir(parents=True, exist_ok=True)
+            _write_case(stem, mesh, case, nodes, local)
+        displacement.append(np.load(stem.with_suffix(".displacement.npy"), mmap_mode="r"))
+        contact.append(np.load(stem.with_suffix(".contact.npy"), mmap_mode="r"))
+        if prior is not None:
+            response.append(np.load(stem.with_suffix(".prior.npy"), mmap_mode="r"))
+    return FieldCache(nodes, displacement, contact, response if prior is not None else None)
+
+
+def _write_case(stem: Path, mesh: Mesh, case: Case, nodes: np.ndarray, prior: PriorTable | None) -> None:
+    """The contact array is moved into place last: its presence says that the case is complete."""
+    trajectory = open_trajectory(case.path, mesh)
     place = np.full(mesh.node_count, -1)
     place[nodes] = np.arange(len(nodes))
-    for i, case in enumerate(cases):
-        trajectory = open_trajectory(case.path, mesh)
-        displacement[i] = trajectory.read(nodes)
-        for t in range(frames):
-            touched, vectors = trajectory.contact(t)
-            at = place[touched]
-            contact[i, t, at[at >= 0]] = 1
-            displacement[i, t, at[at >= 0]] = vectors[at >= 0]
-            if local is not None and len(touched):
-                response[i, t] = local.response(touched, vectors)
-    np.save(staging / "nodes.npy", nodes)
-    header = {
-        "prior": prior is not None,
-        "schemes": [c.scheme for c in cases],
-        "index": [c.index for c in cases],
-    }
-    (staging / "cache.json").write_text(json.dumps(header))
-    del displacement, contact, response
-    staging.rename(out)
-    return FieldCache(out)
+    u = trajectory.read(nodes)
+    contact = np.zeros(u.shape[:2], np.uint8)
+    response = np.zeros_like(u)
+    for t in range(len(u)):
+        touched, vectors = trajectory.contact(t)
+        at = place[touched]
+        contact[t, at[at >= 0]] = 1
+        u[t, at[at >= 0]] = vectors[at >= 0]
+        if prior is not None and len(touched):
+            response[t] = prior.response(touched, vectors)
+    if prior is not None:
+        _save(stem.with_suffix(".prior.npy"), response.astype(np.float16))
+    _save(stem.with_suffix(".displacement.npy"), u.astype(np.float16))
+    _save(stem.with_suffix(".contact.npy"), contact)
+
+
+def _save(path: Path, array: np.ndarray) -> None:
+    staging = path.with_suffix(".tmp.npy")
+    np.save(staging, array)
+    staging.rename(path)
