@@ -179,7 +179,11 @@ impl Lattice {
             let mut nearest = f64::INFINITY;
             let mut target = origin;
             for &(offset, reach) in &offsets {
-                let at = [here[0] + offset[0], here[1] + offset[1], here[2] + offset[2]];
+                let at = [
+                    here[0] + offset[0],
+                    here[1] + offset[1],
+                    here[2] + offset[2],
+                ];
                 let Some(neighbour) = self.node_at(at) else {
                     continue;
                 };

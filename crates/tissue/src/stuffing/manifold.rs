@@ -154,10 +154,7 @@ fn smaller_groups(tets: &[[u32; 4]], members: &[u32], through: &[u32]) -> Vec<us
                 continue;
             }
             if let Some(&other) = seen.get(&face) {
-                let (a, b) = (
-                    root(&mut parents, other),
-                    root(&mut parents, local as u32),
-                );
+                let (a, b) = (root(&mut parents, other), root(&mut parents, local as u32));
                 parents[a.max(b) as usize] = a.min(b);
             } else {
                 seen.insert(face, local as u32);

@@ -71,7 +71,7 @@ pub fn stuff(field: &impl Field, spacing: f64) -> Result<Stuffed, StuffError> {
 }
 
 /// Six times the signed volume of the tetrahedron `a b c d`.
-fn volume6(a: [f64; 3], b: [f64; 3], c: [f64; 3], d: [f64; 3]) -> f64 {
+pub(crate) fn volume6(a: [f64; 3], b: [f64; 3], c: [f64; 3], d: [f64; 3]) -> f64 {
     let [u, v, w] = [b, c, d].map(|p| [p[0] - a[0], p[1] - a[1], p[2] - a[2]]);
     u[0] * (v[1] * w[2] - v[2] * w[1])
         + u[1] * (v[2] * w[0] - v[0] * w[2])

@@ -1,0 +1,144 @@
+//! What can be wrong with a file to import, and what a repair did about it.
+
+use crate::mesh::MeshError;
+use crate::stuffing::StuffError;
+use std::path::PathBuf;
+
+/// A file that cannot become a mesh.
+#[derive(Debug, thiserror::Error)]
+pub enum ImportError {
+    #[error("{path}: {source}")]
+    Io {
+        path: PathBuf,
+        source: std::io::Error,
+    },
+    #[error(
+        "{path}: unknown extension; use .vtk, .vtu, .msh (tetrahedra), .stl, .obj or .ply (closed surface)"
+    )]
+    Extension { path: PathBuf },
+    #[error("{path}: {reason}")]
+    Format { path: PathBuf, reason: String },
+    #[error(
+        "{path}: element {element} is {kind}; only linear tetrahedra can be imported, re-mesh or export with first-order tetrahedra"
+    )]
+    ElementKind {
+        path: PathBuf,
+        element: usize,
+        kind: String,
+    },
+    #[error(
+        "a surface must be filled; give the number of nodes (--nodes) or a spacing in mm (--spacing)"
+    )]
+    NoResolution,
+    #[error(
+        "scale {0} is not a positive number; give millimetres a unit of the file, such as 1000 for metres"
+    )]
+    Scale(f64),
+    #[error("no lattice spacing gives about {wanted} nodes; give --spacing")]
+    NodeCount { wanted: usize },
+    #[error(
+        "node {node} has a non-finite coordinate; repair the file, or drop its elements with --repair"
+    )]
+    NonFinite { node: usize },
+    #[error("{element} {index} names node {node}, but there are {count} nodes")]
+    NodeOutOfRange {
+        element: &'static str,
+        index: usize,
+        node: u32,
+        count: usize,
+    },
+    #[error(
+        "tet {tet} is inverted (volume {volume_mm3:.3e} mm³), {count} in all; --repair swaps two of its nodes"
+    )]
+    Inverted {
+        tet: usize,
+        volume_mm3: f64,
+        count: usize,
+    },
+    #[error(
+        "tet {tet} is degenerate (volume {volume_mm3:.3e} mm³), {count} in all; --repair drops it, re-meshing is better"
+    )]
+    Degenerate {
+        tet: usize,
+        volume_mm3: f64,
+        count: usize,
+    },
+    #[error("node {node} belongs to no tetrahedron, {count} in all; --repair drops them")]
+    Unreferenced { node: usize, count: usize },
+    #[error(
+        "the mesh has {count} parts that share no node; tet {tet} (at {at:?} mm) starts the second; --repair keeps the largest"
+    )]
+    Components {
+        count: usize,
+        tet: usize,
+        at: [f64; 3],
+    },
+    #[error("tets {first} and {second} have the same four nodes; --repair drops the second")]
+    Duplicate { first: usize, second: usize },
+    #[error(
+        "the surface is open: edge {edge:?} of face {face} (at {at:?} mm) has no other face, {count} such edges; close it in a mesh editor"
+    )]
+    Open {
+        edge: [u32; 2],
+        face: usize,
+        at: [f64; 3],
+        count: usize,
+    },
+    #[error(
+        "edge {edge:?} of face {face} (at {at:?} mm) has {faces} faces; a closed surface has two at each edge"
+    )]
+    SurfaceEdge {
+        edge: [u32; 2],
+        face: usize,
+        at: [f64; 3],
+        faces: usize,
+    },
+    #[error(
+        "faces {first} and {second} run along edge {edge:?} in the same direction: one is turned inside out; orient the surface in a mesh editor"
+    )]
+    Orientation {
+        first: usize,
+        second: usize,
+        edge: [u32; 2],
+    },
+    #[error("the surface is inside out (volume {volume_mm3:.3e} mm³); --repair turns it")]
+    InsideOut { volume_mm3: f64 },
+    #[error(
+        "face {face} is degenerate: it names the same point twice, {count} in all; --repair drops it"
+    )]
+    DegenerateFace { face: usize, count: usize },
+    #[error(
+        "the surface has {count} parts; face {face} starts the second; --repair keeps the largest by volume"
+    )]
+    SurfaceParts { count: usize, face: usize },
+    #[error(
+        "the selection of `{set}` is empty: no {what} in the given balls; the mesh spans {low:?} to {high:?} mm"
+    )]
+    EmptySelection {
+        set: &'static str,
+        what: &'static str,
+        low: [f32; 3],
+        high: [f32; 3],
+    },
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+    #[error(transparent)]
+    Stuffing(#[from] StuffError),
+}
+
+/// A change that made a file importable; printed by `upt mesh import`.
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
+pub struct Repair {
+    /// What was done, in words.
+    pub what: &'static str,
+    /// How many elements.
+    pub count: usize,
+    /// The first of them, by its number in the file.
+    pub first: usize,
+}
+
+impl std::fmt::Display for Repair {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}: {}, first {}", self.what, self.count, self.first)
+    }
+}

@@ -1,0 +1,208 @@
+//! Meshes from other programs: tetrahedra as they are, closed surfaces through [`crate::stuffing`].
+//!
+//! | extension | read as |
+//! |---|---|
+//! | `.vtk`, `.vtu` | linear tetrahedra of a VTK legacy or XML unstructured grid |
+//! | `.msh` | linear tetrahedra of a Gmsh file, version 2.2 or 4.1, text or binary |
+//! | `.stl`, `.obj`, `.ply` | a closed surface, filled with tetrahedra of a chosen spacing |
+//!
+//! Coordinates are taken as millimetres times [`ImportOptions::scale`]. What is wrong with a file is
+//! an [`ImportError`] that names the element; with [`ImportOptions::repair`] the fault is removed
+//! where that is safe and listed in [`Imported::repairs`].
+
+mod closed_surface;
+mod distance;
+mod error;
+mod gmsh;
+mod repair;
+mod sets;
+mod surface_files;
+mod vtk;
+
+pub use distance::SurfaceDistance;
+pub use error::{ImportError, Repair};
+pub use sets::Ball;
+
+use crate::mesh::Mesh;
+use crate::stuffing;
+use std::path::Path;
+
+/// How large the elements of a filled surface are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Resolution {
+    /// Lattice spacing, mm.
+    Spacing(f64),
+    /// Wanted number of nodes, met within 2 % where the shape allows.
+    Nodes(usize),
+}
+
+/// What to do with a file.
+#[derive(Clone, Debug)]
+pub struct ImportOptions {
+    /// Name of the mesh. Default: the file's stem.
+    pub name: Option<String>,
+    /// Millimetres a unit of the file. Default 1.
+    pub scale: f64,
+    /// For surfaces only, and needed there.
+    pub resolution: Option<Resolution>,
+    /// Remove faults that can be removed safely, instead of failing. Default false.
+    pub repair: bool,
+    /// Nodes in any of these balls are held: the set `fixed`.
+    pub fixed: Vec<Ball>,
+    /// Surface faces with their centroid in any of these balls may be touched: the set `domain`.
+    pub domain: Vec<Ball>,
+    /// Surface nodes outside all of these balls, and not in `fixed`, are the set `supported`;
+    /// empty: none.
+    pub window: Vec<Ball>,
+}
+
+impl Default for ImportOptions {
+    fn default() -> Self {
+        Self {
+            name: None,
+            scale: 1.0,
+            resolution: None,
+            repair: false,
+            fixed: Vec::new(),
+            domain: Vec::new(),
+            window: Vec::new(),
+        }
+    }
+}
+
+/// A mesh that passed every check, and what was changed on the way.
+#[derive(Clone, Debug)]
+pub struct Imported {
+    pub mesh: Mesh,
+    pub repairs: Vec<Repair>,
+}
+
+/// Tetrahedra as a file holds them, unchecked.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RawTets {
+    /// `[K, 3]`, mm.
+    pub positions: Vec<[f64; 3]>,
+    /// `[T, 4]`.
+    pub tets: Vec<[u32; 4]>,
+}
+
+/// Triangles as a file holds them, unchecked; coinciding points are one.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RawSurface {
+    /// `[V, 3]`, mm.
+    pub positions: Vec<[f64; 3]>,
+    /// `[F, 3]`.
+    pub faces: Vec<[u32; 3]>,
+}
+
+/// Reads `path` by its extension, checks it, fills it if it is a surface, and selects the sets.
+///
+/// # Errors
+/// [`ImportError`], naming the file's element or field and what to do.
+pub fn import(path: &Path, options: &ImportOptions) -> Result<Imported, ImportError> {
+    if !(options.scale.is_finite() && options.scale > 0.0) {
+        return Err(ImportError::Scale(options.scale));
+    }
+    let extension = path
+        .extension()
+        .map(|e| e.to_string_lossy().to_lowercase())
+        .unwrap_or_default();
+    let mut repairs = Vec::new();
+    let mut raw = match extension.as_str() {
+        "vtk" | "vtu" => vtk::read(path)?,
+        "msh" => gmsh::read(path)?,
+        "stl" | "obj" | "ply" => {
+            let resolution = options.resolution.ok_or(ImportError::NoResolution)?;
+            let mut surface = surface_files::read(path, &extension)?;
+            scale(&mut surface.positions, options.scale);
+            closed_surface::check(&mut surface, options.repair, &mut repairs)?;
+            fill(surface, resolution)?
+        }
+        _ => return Err(ImportError::Extension { path: path.into() }),
+    };
+    if !matches!(extension.as_str(), "stl" | "obj" | "ply") {
+        scale(&mut raw.positions, options.scale);
+    }
+    let mut mesh = from_tets(raw, options.repair, &mut repairs)?;
+    let file = path.file_name().unwrap_or_default().to_string_lossy();
+    mesh.source = format!("imported from {file}");
+    mesh.license = "as the source file's".into();
+    mesh.name = options.name.clone().unwrap_or_else(|| {
+        path.file_stem()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned()
+    });
+    sets::select(&mut mesh, &options.fixed, &options.domain, &options.window)?;
+    mesh.validate()?;
+    Ok(Imported { mesh, repairs })
+}
+
+/// Checks tetrahedra and makes them a mesh without named sets.
+///
+/// With `repair`, faults are removed and listed in `repairs`; without, the first is an error.
+pub fn from_tets(
+    mut raw: RawTets,
+    repair: bool,
+    repairs: &mut Vec<Repair>,
+) -> Result<Mesh, ImportError> {
+    repair::tets(&mut raw, repair, repairs)?;
+    let mesh = Mesh {
+        surface: crate::mesh::boundary_faces(&raw.tets)?,
+        positions: raw.positions.iter().map(|p| p.map(|x| x as f32)).collect(),
+        tets: raw.tets,
+        ..Mesh::default()
+    };
+    mesh.validate()?;
+    Ok(mesh)
+}
+
+fn scale(positions: &mut [[f64; 3]], factor: f64) {
+    if factor != 1.0 {
+        positions.iter_mut().flatten().for_each(|x| *x *= factor);
+    }
+}
+
+/// Fills a checked closed surface with tetrahedra.
+fn fill(surface: RawSurface, resolution: Resolution) -> Result<RawTets, ImportError> {
+    let volume = closed_surface::volume(&surface);
+    let field = SurfaceDistance::new(surface)?;
+    let made = match resolution {
+        Resolution::Spacing(spacing) => stuffing::stuff(&field, spacing)?,
+        Resolution::Nodes(wanted) => stuff_to_count(&field, volume, wanted)?,
+    };
+    Ok(RawTets {
+        positions: made.positions,
+        tets: made.tets,
+    })
+}
+
+/// Node counts within this part of the wanted one are accepted.
+const COUNT_TOLERANCE: f64 = 0.02;
+
+fn stuff_to_count(
+    field: &SurfaceDistance,
+    volume: f64,
+    wanted: usize,
+) -> Result<stuffing::Stuffed, ImportError> {
+    // A BCC lattice has two nodes a cube; a body has some more on its surface.
+    let mut spacing = (2.0 * volume / wanted.max(8) as f64).cbrt();
+    let mut best: Option<(f64, stuffing::Stuffed)> = None;
+    for _ in 0..6 {
+        let Ok(made) = stuffing::stuff(field, spacing) else {
+            spacing *= 0.7;
+            continue;
+        };
+        let ratio = made.positions.len() as f64 / wanted as f64;
+        let miss = (ratio - 1.0).abs();
+        if best.as_ref().is_none_or(|(least, _)| miss < *least) {
+            best = Some((miss, made));
+        }
+        if miss <= COUNT_TOLERANCE {
+            break;
+        }
+        spacing *= ratio.cbrt();
+    }
+    best.map(|(_, made)| made)
+        .ok_or(ImportError::NodeCount { wanted })
+}
