@@ -3,7 +3,7 @@
 //   simulator BUNDLE [--size WxH] [--scale MM]
 //   simulator BUNDLE --headless --frames N [--screenshot OUT.png]
 //
-// Headless, a script plays the mouse: the spatula comes to the middle of the domain and presses;
+// Headless, a script plays the mouse: the spatula comes to a flat place of the domain and presses;
 // time passes at 60 frames a second whatever the machine does, so that the picture depends on N
 // alone.
 #include <algorithm>
@@ -121,11 +121,12 @@ static void run(const Options &options) {
   view.create(tissue, options.scale_mm);
   Spatula spatula(std::min(10.0F, tissue.info().max_push_mm));
 
-  const Hit middle = tissue.domain_middle();
+  const Hit site = tissue.flat_site();
   Camera camera;
-  // From the side of the domain, a little along the surface, so that the dent is seen in profile.
-  const Frame around = frame_around(middle.normal, {0, 0, 1});
-  camera.frame(tissue.centre(), tissue.radius(), around.z + around.x * 0.75F + around.y * 0.25F);
+  // From the side of the site, along the surface a little, so that the dent is seen in profile.
+  const Frame around = frame_around(site.normal, {0, 0, 1});
+  camera.frame(tissue.centre() * 0.7F + site.point * 0.3F, 0.70F * tissue.radius(),
+               around.z + around.x * 0.75F + around.y * 0.35F);
 
   using Clock = std::chrono::steady_clock;
   const Clock::time_point start = Clock::now();
@@ -143,7 +144,7 @@ static void run(const Options &options) {
     if (options.headless) {
       now = static_cast<double>(frame) / 60;
       pressed = frame >= 15;
-      spatula.hover(middle, Ray{middle.point + middle.normal * 100, -middle.normal});
+      spatula.hover(site, Ray{site.point + site.normal * 100, -site.normal});
     } else {
       now = std::chrono::duration<double>(frame_start - start).count();
       const Ray ray = read_mouse(window, camera);

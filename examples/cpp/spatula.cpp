@@ -3,7 +3,10 @@
 #include <algorithm>
 
 // Speeds, mm/s, and heights over the surface, mm.
-static constexpr float DOWN = 14, UP = 40, HOVER = 4, DRAG_LIMIT = 5, REACH = 9;
+static constexpr float DOWN = 14, UP = 40, HOVER = 4, DRAG_LIMIT = 5;
+// Nodes this far over or under the touched point, along the blade's normal, belong to the same
+// patch, mm. Those over it are pushed further than the blade's depth.
+static constexpr float OVER = 2, UNDER = 9;
 
 void Spatula::hover(const std::optional<Hit> &hit, const Ray &ray) {
   if (engaged_) {
@@ -103,8 +106,8 @@ void Spatula::own(const Tissue &tissue, Contacts &out) const {
     const float across = dot(from_anchor, frame_.x), along = dot(from_anchor, frame_.y),
                 height = dot(from_anchor, frame_.z);
     const float below = height + depth_; // how far the blade has gone past the node
-    if (std::abs(across) <= HALF.x && std::abs(along) <= HALF.y && std::abs(height) < REACH &&
-        below > 0) {
+    if (std::abs(across) <= HALF.x && std::abs(along) <= HALF.y && height < OVER &&
+        height > -UNDER && below > 0) {
       const Vec3 c = drag_ - frame_.z * below;
       out.nodes.push_back(node);
       out.vectors.insert(out.vectors.end(), {c.x, c.y, c.z});

@@ -166,29 +166,42 @@ std::optional<Hit> Tissue::pick(const Ray &ray) const {
   return hit;
 }
 
-Hit Tissue::domain_middle() const {
-  Vec3 mean{}, normal{};
-  for (std::size_t vertex = 0; vertex < surface_.size(); vertex++) {
-    if (vertex_in_domain_[vertex]) {
-      mean = mean + rest_[surface_[vertex]] * (1.0F / static_cast<float>(domain_.size()));
+// A flat crown near the domain's middle: many touchable nodes just under its tangent plane and
+// nothing of the surface above it.
+Hit Tissue::flat_site() const {
+  Hit best{};
+  Vec3 middle{};
+  for (const std::uint32_t node : domain_) {
+    middle = middle + rest_[node] * (1.0F / static_cast<float>(domain_.size()));
+  }
+  float best_score = -std::numeric_limits<float>::max();
+  for (std::size_t seed = 0; seed < surface_.size(); seed++) {
+    if (!vertex_in_domain_[seed]) {
+      continue;
+    }
+    const Vec3 point = rest_[surface_[seed]];
+    Vec3 normal{};
+    for (std::size_t vertex = 0; vertex < surface_.size(); vertex++) {
+      if (length(rest_[surface_[vertex]] - point) < 8) {
+        normal = normal + rest_normals_[vertex];
+      }
+    }
+    normal = normalized(normal);
+    float score = -0.25F * length(point - middle);
+    for (std::size_t vertex = 0; vertex < surface_.size(); vertex++) {
+      const Vec3 offset = rest_[surface_[vertex]] - point;
+      if (length(offset) < 16) {
+        const float height = dot(offset, normal);
+        const bool near = length(offset) < 8 && vertex_in_domain_[vertex] && height > -3;
+        score += (near ? 1.0F : 0.0F) - std::max(height, 0.0F);
+      }
+    }
+    if (score > best_score) {
+      best_score = score;
+      best = {point, point, normal, true};
     }
   }
-  std::size_t best = 0;
-  float nearest = std::numeric_limits<float>::max();
-  for (std::size_t vertex = 0; vertex < surface_.size(); vertex++) {
-    const float distance = length(rest_[surface_[vertex]] - mean);
-    if (vertex_in_domain_[vertex] && distance < nearest) {
-      nearest = distance;
-      best = vertex;
-    }
-  }
-  const Vec3 point = rest_[surface_[best]];
-  for (std::size_t vertex = 0; vertex < surface_.size(); vertex++) {
-    if (length(rest_[surface_[vertex]] - point) < 12) {
-      normal = normal + rest_normals_[vertex];
-    }
-  }
-  return {point, point, normalized(normal), true};
+  return best;
 }
 
 double Tissue::median_step_ms() const {

@@ -36,8 +36,8 @@ public:
   void sample(double now);
 
   std::optional<Hit> pick(const Ray &ray) const;
-  // The middle of the domain, for a scripted push.
-  Hit domain_middle() const;
+  // A good place for a scripted push.
+  Hit flat_site() const;
   Vec3 centre() const { return centre_; }
   float radius() const { return radius_; }
 

@@ -128,11 +128,11 @@ void View::create(const Tissue &tissue, float scale_mm) {
   std::vector<float> metal;
   const Frame straight = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   add_box(metal, {}, Spatula::HALF, straight);
-  const Vec3 rise = normalized({0, 0.80F, 0.60F});
+  const Vec3 rise = normalized({0, 0.62F, 0.78F});
   const Frame tilted = {{1, 0, 0}, rise, cross({1, 0, 0}, rise)};
   const Vec3 root = {0, Spatula::HALF.y - 0.5F, 0};
-  add_box(metal, root + rise * 16, {2.6F, 17, 0.7F}, tilted);
-  add_box(metal, root + rise * 62, {3.2F, 32, 2.4F}, tilted);
+  add_box(metal, root + rise * 12, {2.4F, 13, 0.7F}, tilted);
+  add_box(metal, root + rise * 52, {3.0F, 28, 2.2F}, tilted);
   metal_.create({3, 3});
   metal_.upload(metal.data(), metal.size() * sizeof metal[0]);
   metal_count_ = static_cast<GLsizei>(metal.size() / 6);

@@ -1,0 +1,59 @@
+/* A picture of pressed tissue is not empty and differs from the one at rest where the spatula
+ * presses.
+ *
+ *   compare_pictures REST.png PRESSED.png
+ */
+#include <math.h>
+#include <png.h>
+#include <stdlib.h>
+
+#include "expect.h"
+
+static unsigned char *read_picture(const char *path, png_image *image) {
+  unsigned char *pixels;
+  memset(image, 0, sizeof *image);
+  image->version = PNG_IMAGE_VERSION;
+  if (!png_image_begin_read_from_file(image, path)) {
+    fprintf(stderr, "%s: %s\n", path, image->message);
+    exit(1);
+  }
+  image->format = PNG_FORMAT_RGB;
+  pixels = malloc(PNG_IMAGE_SIZE(*image));
+  if (pixels == NULL || !png_image_finish_read(image, NULL, pixels, 0, NULL)) {
+    fprintf(stderr, "%s: %s\n", path, image->message);
+    exit(1);
+  }
+  return pixels;
+}
+
+/* Tissue is warm: red stands clearly over blue. Background, metal and text are grey or blue. */
+static int is_tissue(const unsigned char *pixel) { return pixel[0] > pixel[2] + 12; }
+
+int main(int argc, char **argv) {
+  png_image rest_image, pressed_image;
+  unsigned char *rest, *pressed;
+  size_t i, count, tissue = 0, differing = 0, dark_red_rest = 0, dark_red_pressed = 0;
+  if (argc != 3) {
+    return 2;
+  }
+  rest = read_picture(argv[1], &rest_image);
+  pressed = read_picture(argv[2], &pressed_image);
+  EXPECT_TRUE(rest_image.width == pressed_image.width && rest_image.height == pressed_image.height);
+  count = (size_t)rest_image.width * rest_image.height;
+  for (i = 0; i < count && expect_failures == 0; i++) {
+    const unsigned char *a = rest + 3 * i, *b = pressed + 3 * i;
+    tissue += (size_t)is_tissue(a);
+    differing += abs(a[0] - b[0]) + abs(a[1] - b[1]) + abs(a[2] - b[2]) > 60;
+    dark_red_rest += a[0] > 60 && a[0] > 2 * a[1] + 30;
+    dark_red_pressed += b[0] > 60 && b[0] > 2 * b[1] + 30;
+  }
+  printf("tissue %.1f %%, differing %.2f %%, strongly displaced: %lu pixels at rest, %lu pressed\n",
+         100.0 * (double)tissue / (double)count, 100.0 * (double)differing / (double)count,
+         (unsigned long)dark_red_rest, (unsigned long)dark_red_pressed);
+  EXPECT_TRUE(tissue > count / 20);
+  EXPECT_TRUE(differing > count / 500);
+  EXPECT_TRUE(dark_red_pressed > dark_red_rest + 100);
+  free(rest);
+  free(pressed);
+  return expect_result("compare_pictures");
+}
