@@ -5,11 +5,15 @@
 //! input, with a message on stderr that says what to do. A closed pipe ends the program quietly.
 
 mod completions;
+mod dataset;
 mod doctor;
+mod export;
 mod host;
 mod machine;
+mod mesh;
 mod prior;
 mod render;
+mod simulate;
 
 use std::process::ExitCode;
 
@@ -32,8 +36,16 @@ struct Arguments {
 enum Command {
     /// What was found on this machine: ONNX Runtime, providers, CPU features, bundles.
     Doctor(doctor::Options),
+    /// Meshes: quality, import, stuffing.
+    Mesh(mesh::Options),
+    /// A trajectory for ParaView, or a frame's surface as PLY or glTF.
+    Export(export::Options),
     /// Linear-elastic compliance columns of a mesh, the raw material of priors and reduced bundles.
     Prior(prior::Options),
+    /// One reference simulation: a scheme on a mesh, as a trajectory file.
+    Simulate(simulate::Options),
+    /// Many reference simulations in a folder, resumable and shardable.
+    Dataset(dataset::Options),
     /// Shell completions, on stdout.
     Completions(completions::Options),
 }
@@ -42,7 +54,11 @@ fn main() -> ExitCode {
     end_quietly_on_closed_pipe();
     let outcome = match Arguments::parse().command {
         Command::Doctor(options) => doctor::run(&options),
+        Command::Mesh(options) => mesh::run(&options),
+        Command::Export(options) => export::run(&options),
         Command::Prior(options) => prior::run(&options),
+        Command::Simulate(options) => simulate::run(&options),
+        Command::Dataset(options) => dataset::run(&options),
         Command::Completions(options) => completions::run::<Arguments>(&options),
     };
     outcome.unwrap_or_else(|error| {

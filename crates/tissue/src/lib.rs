@@ -4,6 +4,18 @@
 //! Units throughout: millimetre, gram, second. Stress and moduli then come out
 //! in pascal, forces in micronewton and energies in nanojoule; files hold mN and mJ.
 
+pub mod baselines;
+pub mod contact;
+pub mod dataset;
+pub mod export;
 pub mod linear;
+pub mod material;
 pub mod mesh;
+pub mod mesh_import;
+pub mod mesh_quality;
+pub mod schemes;
+pub mod simulate;
+pub mod solver;
+pub mod stuffing;
 pub mod tensors;
+pub mod trajectory;

@@ -1,0 +1,130 @@
+//! `upt dataset`: many cases in a folder, resumable and shardable (docs/datasets.md).
+
+use crate::simulate::SolverArguments;
+use anyhow::{Context, bail};
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use tissue::dataset::{Dataset, DatasetPlan};
+use tissue::mesh::{Boundary, Mesh};
+use tissue::schemes::{FRAMES, Scheme};
+
+#[derive(clap::Args)]
+pub struct Options {
+    /// Mesh file (*.mesh.safetensors).
+    #[arg(long)]
+    mesh: PathBuf,
+    /// Held nodes: `fixed` or `supported`.
+    #[arg(long, default_value = "fixed")]
+    boundary: Boundary,
+    /// Schemes: `1-4`, `5`, `1,3`, `hard`, or a regime's name.
+    #[arg(long, value_parser = Scheme::parse_list)]
+    schemes: std::vec::Vec<Scheme>,
+    /// Number of cases over all shards.
+    #[arg(long)]
+    count: usize,
+    /// Seed of the dataset.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Folder; an interrupted run goes on where it stopped.
+    #[arg(long)]
+    out: PathBuf,
+    /// Cases computed at a time, one thread each.
+    #[arg(long, default_value_t = 1)]
+    jobs: usize,
+    /// Compute only the cases of shard `i/n`, counted from 0.
+    #[arg(long, value_parser = parse_shard, default_value = "0/1")]
+    shard: (usize, usize),
+    /// Store displacements as f16.
+    #[arg(long)]
+    half: bool,
+    #[command(flatten)]
+    solver: SolverArguments,
+}
+
+fn parse_shard(text: &str) -> Result<(usize, usize), String> {
+    text.split_once('/')
+        .and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)))
+        .filter(|(i, n)| i < n)
+        .ok_or_else(|| format!("shard `{text}`: write i/n with i from 0 to n - 1"))
+}
+
+pub fn run(options: &Options) -> anyhow::Result<ExitCode> {
+    if options.jobs == 0 {
+        bail!("--jobs must be at least 1");
+    }
+    let mesh = Mesh::read(&options.mesh)?;
+    let plan = DatasetPlan {
+        boundary: options.boundary,
+        schemes: options.schemes.clone(),
+        count: options.count,
+        seed: options.seed,
+        half: options.half,
+        options: options.solver.options(1),
+    };
+    let dataset = Dataset::open(&plan, &mesh, &options.out)?;
+    let pending = dataset.pending(options.shard.0, options.shard.1);
+    let frames = FRAMES as u64 - 1;
+    let bar = indicatif::ProgressBar::new(pending.len() as u64 * frames).with_style(
+        indicatif::ProgressStyle::with_template(
+            "{bar:40} {msg}, {percent} %, {elapsed} gone, {eta} left",
+        )?,
+    );
+    bar.set_message(format!("0/{} cases", pending.len()));
+    let next = AtomicUsize::new(0);
+    let finished = AtomicUsize::new(0);
+    let failure = Mutex::new(None);
+    let manifest_turn = Mutex::new(());
+    std::thread::scope(|scope| {
+        for _ in 0..options.jobs.min(pending.len()) {
+            scope.spawn(|| {
+                while let Some(case) = pending.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    let mut reached = 0;
+                    let outcome = dataset.compute(case, |_| {
+                        reached += 1;
+                        bar.inc(1);
+                    });
+                    let written = outcome.and_then(|record| {
+                        let _turn = manifest_turn.lock();
+                        dataset.write_manifest().map(|_| record)
+                    });
+                    match written {
+                        Ok(record) => {
+                            bar.inc(frames - reached);
+                            let count = finished.fetch_add(1, Ordering::Relaxed) + 1;
+                            bar.set_message(format!("{count}/{} cases", pending.len()));
+                            if let Some(cause) = record.cause {
+                                bar.suspend(|| {
+                                    eprintln!("case {} failed: {cause}", record.case.index)
+                                });
+                            }
+                        }
+                        Err(error) => {
+                            // Nothing more can be written: let the others finish their case.
+                            next.store(pending.len(), Ordering::Relaxed);
+                            if let Ok(mut slot) = failure.lock() {
+                                *slot = Some(error);
+                            }
+                        }
+                    }
+                }
+            });
+        }
+    });
+    bar.finish_and_clear();
+    if let Some(error) = failure.into_inner().ok().flatten() {
+        return Err(error).context("the dataset is incomplete; run the same command to go on");
+    }
+    let manifest = dataset.write_manifest()?;
+    let with = |status: &str| manifest.cases.iter().filter(|c| c.status == status).count();
+    println!(
+        "{}: {} done, {} failed, {} pending of {} cases",
+        options.out.display(),
+        with("done"),
+        with("failed"),
+        with("pending"),
+        manifest.cases.len()
+    );
+    Ok(ExitCode::SUCCESS)
+}

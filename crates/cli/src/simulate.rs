@@ -1,0 +1,115 @@
+//! `upt simulate`: one case of a scheme on a mesh, as a trajectory file.
+
+use anyhow::Context;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use tissue::mesh::{Boundary, Mesh};
+use tissue::schemes::{FRAMES, Scheme};
+use tissue::solver::{Pressure, SolverOptions};
+
+#[derive(clap::Args)]
+pub struct Options {
+    /// Mesh file (*.mesh.safetensors).
+    #[arg(long)]
+    mesh: PathBuf,
+    /// Scheme: 1 to 5, or a hard regime (hard-deep, hard-fast, hard-two, hard-slide, hard-ring).
+    #[arg(long)]
+    scheme: Scheme,
+    /// Seed of the contact site.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Held nodes: `fixed`, or `supported` (also the surface outside the craniotomy window).
+    #[arg(long, default_value = "fixed")]
+    boundary: Boundary,
+    /// Trajectory to write (*.trajectory.safetensors).
+    #[arg(long)]
+    out: PathBuf,
+    /// Threads inside the simulation; the result has the same bits for any number.
+    #[arg(long, default_value_t = 1)]
+    threads: usize,
+    /// Store displacements as f16.
+    #[arg(long)]
+    half: bool,
+    #[command(flatten)]
+    solver: SolverArguments,
+}
+
+/// Settings of the solver that `simulate` and `dataset` share.
+#[derive(clap::Args)]
+pub struct SolverArguments {
+    /// Young's modulus, Pa.
+    #[arg(long, default_value_t = 3000.0)]
+    young: f64,
+    /// Poisson's ratio.
+    #[arg(long, default_value_t = 0.49)]
+    poisson: f64,
+    /// Density, kg/m³.
+    #[arg(long, default_value_t = 1000.0)]
+    density: f64,
+    /// Mass-proportional damping, 1/s.
+    #[arg(long, default_value_t = 20.0)]
+    damping: f64,
+    /// Asked inner step, ms; cut automatically where the mesh needs a shorter one.
+    #[arg(long, default_value_t = 0.1)]
+    inner_step_ms: f64,
+    /// Average nodal pressure instead of one pressure an element (less locking, slower).
+    #[arg(long)]
+    average_pressure: bool,
+}
+
+impl SolverArguments {
+    pub fn options(&self, threads: usize) -> SolverOptions {
+        let mut options = SolverOptions {
+            inner_step_s: self.inner_step_ms * 1e-3,
+            threads,
+            ..SolverOptions::default()
+        };
+        options.material.young_pa = self.young;
+        options.material.poisson = self.poisson;
+        options.material.density_kg_m3 = self.density;
+        options.material.damping_per_s = self.damping;
+        if self.average_pressure {
+            options.pressure = Pressure::AverageNodal;
+        }
+        options
+    }
+}
+
+pub fn run(options: &Options) -> anyhow::Result<ExitCode> {
+    let mesh = Mesh::read(&options.mesh)?;
+    let bar = indicatif::ProgressBar::new(FRAMES as u64 - 1).with_style(
+        indicatif::ProgressStyle::with_template("{bar:40} frame {pos}/{len}, {eta} left")?,
+    );
+    let start = std::time::Instant::now();
+    let trajectory = tissue::simulate::simulate(
+        &mesh,
+        options.boundary,
+        options.scheme,
+        options.seed,
+        &options.solver.options(options.threads),
+        |frame| bar.set_position(frame as u64),
+    )
+    .with_context(|| format!("scheme {}, seed {}", options.scheme.name(), options.seed))?;
+    bar.finish_and_clear();
+    let seconds = start.elapsed().as_secs_f64();
+    trajectory.write(&options.out, options.half)?;
+    let largest = trajectory
+        .displacement
+        .iter()
+        .map(|u| u.iter().map(|v| v * v).sum::<f32>())
+        .fold(0.0, f32::max)
+        .sqrt();
+    let smallest = trajectory.min_det_f.iter().copied().fold(1.0, f32::min);
+    println!(
+        "{}: {} nodes, scheme {}, seed {}, site [{:.1}, {:.1}, {:.1}] mm, largest displacement {largest:.2} mm, min det F {smallest:.3}, {seconds:.1} s ({:.1} ms a frame)",
+        options.out.display(),
+        mesh.node_count(),
+        options.scheme.name(),
+        options.seed,
+        trajectory.header.site[0],
+        trajectory.header.site[1],
+        trajectory.header.site[2],
+        seconds * 1e3 / (FRAMES - 1) as f64,
+    );
+    Ok(ExitCode::SUCCESS)
+}

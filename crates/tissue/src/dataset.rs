@@ -1,0 +1,272 @@
+//! A folder of simulated cases (docs/formats.md, "Dataset"; use in docs/datasets.md).
+//!
+//! Case `i` follows from the plan and `i` alone, so any process may compute any
+//! case: shards share a folder, an interrupted run goes on where it stopped, and
+//! the trajectories have the same bytes either way. Each finished or failed case
+//! leaves a small record beside its trajectory; the manifest is put together from
+//! the records, so it is right whoever writes it last.
+
+use crate::material::Material;
+use crate::mesh::{Boundary, Mesh};
+use crate::schemes::{Scheme, SplitMix};
+use crate::simulate::{SOLVER_NAME, simulate};
+use crate::solver::SolverOptions;
+use crate::tensors::write_whole;
+use crate::trajectory::TrajectoryError;
+use serde::{Deserialize, Serialize};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// What a dataset holds.
+#[derive(Clone, Debug)]
+pub struct DatasetPlan {
+    pub boundary: Boundary,
+    pub schemes: Vec<Scheme>,
+    pub count: usize,
+    pub seed: u64,
+    /// Store displacements as f16.
+    pub half: bool,
+    pub options: SolverOptions,
+}
+
+/// One case of a plan.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Case {
+    pub index: usize,
+    pub file: String,
+    pub scheme: String,
+    pub seed: u64,
+    /// `train` or `test`.
+    pub split: String,
+}
+
+/// Outcome of a case, beside its trajectory as `case-….record.json`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CaseRecord {
+    #[serde(flatten)]
+    pub case: Case,
+    /// `done`, `failed`, or (in a manifest) `pending`.
+    pub status: String,
+    /// Why it failed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cause: Option<String>,
+    /// Seconds on the machine that computed it.
+    pub wall_time_s: f64,
+    /// Mesh, boundary, material, seed and solver that it belongs to.
+    pub plan_key: String,
+}
+
+/// `manifest.json`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Manifest {
+    pub format: String,
+    pub version: u32,
+    pub mesh_name: String,
+    pub mesh_sha256: String,
+    pub boundary: Boundary,
+    pub material: Material,
+    pub seed: u64,
+    pub cases: Vec<CaseRecord>,
+}
+
+/// A dataset folder that cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum DatasetError {
+    #[error("{path}: {source}")]
+    Io {
+        path: PathBuf,
+        source: std::io::Error,
+    },
+    #[error("{path}: {reason}; choose another folder or remove it")]
+    Foreign { path: PathBuf, reason: String },
+    #[error("the plan has no schemes or no cases")]
+    EmptyPlan,
+    #[error(transparent)]
+    Trajectory(#[from] TrajectoryError),
+}
+
+impl DatasetPlan {
+    /// Case `index`: scheme `index mod |schemes|`, group `index div |schemes|`; every fifth group is held out.
+    pub fn case(&self, index: usize) -> Case {
+        let group = index / self.schemes.len();
+        let mut random = SplitMix(self.seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ index as u64);
+        Case {
+            index,
+            file: format!("case-{index:05}.trajectory.safetensors"),
+            scheme: self.schemes[index % self.schemes.len()].name().into(),
+            // 53 bits: exact in every JSON reader.
+            seed: random.next() >> 11,
+            split: if group % 5 == 4 { "test" } else { "train" }.into(),
+        }
+    }
+
+    /// Identifies everything that the trajectories' bytes depend on.
+    fn key(&self, mesh: &Mesh) -> String {
+        let schemes: Vec<&str> = self.schemes.iter().map(|s| s.name()).collect();
+        format!(
+            "{SOLVER_NAME}; mesh {}; {}; schemes {}; seed {}; {}; inner step {}; {:?}; {}",
+            &mesh.hash()[..16],
+            self.boundary.as_str(),
+            schemes.join(","),
+            self.seed,
+            serde_json::json!(self.options.material),
+            self.options.inner_step_s,
+            self.options.pressure,
+            if self.half { "f16" } else { "f32" },
+        )
+    }
+}
+
+/// A plan bound to a mesh and a folder.
+pub struct Dataset<'a> {
+    plan: &'a DatasetPlan,
+    mesh: &'a Mesh,
+    folder: PathBuf,
+    key: String,
+}
+
+impl<'a> Dataset<'a> {
+    /// Creates the folder, or takes up one that an equal plan began.
+    pub fn open(
+        plan: &'a DatasetPlan,
+        mesh: &'a Mesh,
+        folder: &Path,
+    ) -> Result<Self, DatasetError> {
+        if plan.schemes.is_empty() || plan.count == 0 {
+            return Err(DatasetError::EmptyPlan);
+        }
+        std::fs::create_dir_all(folder).map_err(|source| DatasetError::Io {
+            path: folder.into(),
+            source,
+        })?;
+        let dataset = Self {
+            plan,
+            mesh,
+            folder: folder.into(),
+            key: plan.key(mesh),
+        };
+        for index in 0..plan.count {
+            if let Some(record) = dataset.record(index)
+                && record.plan_key != dataset.key
+            {
+                return Err(DatasetError::Foreign {
+                    path: dataset.record_path(index),
+                    reason: format!(
+                        "belongs to another dataset ({}); this one is {}",
+                        record.plan_key, dataset.key
+                    ),
+                });
+            }
+        }
+        Ok(dataset)
+    }
+
+    /// Cases of shard `shard` of `shards` (counted from 0) that have no outcome yet.
+    pub fn pending(&self, shard: usize, shards: usize) -> Vec<Case> {
+        (0..self.plan.count)
+            .filter(|index| index % shards == shard)
+            .filter(|index| self.record(*index).is_none())
+            .map(|index| self.plan.case(index))
+            .collect()
+    }
+
+    /// Simulates a case and writes its trajectory and record.
+    ///
+    /// A simulation that fails is an outcome (`failed`, with the cause), not an
+    /// error; errors are a disk that is full, or the like.
+    pub fn compute(
+        &self,
+        case: &Case,
+        progress: impl FnMut(usize),
+    ) -> Result<CaseRecord, DatasetError> {
+        self.remove_leftovers(case);
+        let scheme = self.plan.schemes[case.index % self.plan.schemes.len()];
+        let start = std::time::Instant::now();
+        let outcome = simulate(
+            self.mesh,
+            self.plan.boundary,
+            scheme,
+            case.seed,
+            &self.plan.options,
+            progress,
+        );
+        let cause = match outcome {
+            Ok(trajectory) => {
+                trajectory.write(&self.folder.join(&case.file), self.plan.half)?;
+                None
+            }
+            Err(error) => Some(error.to_string()),
+        };
+        let record = CaseRecord {
+            case: case.clone(),
+            status: if cause.is_none() { "done" } else { "failed" }.into(),
+            cause,
+            wall_time_s: (start.elapsed().as_secs_f64() * 1e3).round() / 1e3,
+            plan_key: self.key.clone(),
+        };
+        self.write_json(&self.record_path(case.index), &record)?;
+        Ok(record)
+    }
+
+    /// Writes `manifest.json` from the records that exist now.
+    pub fn write_manifest(&self) -> Result<Manifest, DatasetError> {
+        let cases = (0..self.plan.count)
+            .map(|index| {
+                self.record(index).unwrap_or_else(|| CaseRecord {
+                    case: self.plan.case(index),
+                    status: "pending".into(),
+                    cause: None,
+                    wall_time_s: 0.0,
+                    plan_key: self.key.clone(),
+                })
+            })
+            .collect();
+        let manifest = Manifest {
+            format: "upt-dataset".into(),
+            version: 1,
+            mesh_name: self.mesh.name.clone(),
+            mesh_sha256: self.mesh.hash(),
+            boundary: self.plan.boundary,
+            material: self.plan.options.material,
+            seed: self.plan.seed,
+            cases,
+        };
+        self.write_json(&self.folder.join("manifest.json"), &manifest)?;
+        Ok(manifest)
+    }
+
+    fn record_path(&self, index: usize) -> PathBuf {
+        self.folder.join(format!("case-{index:05}.record.json"))
+    }
+
+    /// The record of a case whose outcome is complete on disk.
+    fn record(&self, index: usize) -> Option<CaseRecord> {
+        let bytes = std::fs::read(self.record_path(index)).ok()?;
+        let record: CaseRecord = serde_json::from_slice(&bytes).ok()?;
+        let whole = record.status != "done" || self.folder.join(&record.case.file).exists();
+        whole.then_some(record)
+    }
+
+    /// Removes temporary files that a killed run left of this case.
+    fn remove_leftovers(&self, case: &Case) {
+        let Ok(entries) = std::fs::read_dir(&self.folder) else {
+            return;
+        };
+        let stem = format!("case-{:05}.", case.index);
+        for entry in entries.flatten() {
+            let name = entry.file_name().to_string_lossy().into_owned();
+            if name.starts_with(&stem) && name.ends_with(".tmp") {
+                // Another process cannot own it: a case belongs to one shard.
+                let _ = std::fs::remove_file(entry.path());
+            }
+        }
+    }
+
+    fn write_json(&self, path: &Path, value: &impl Serialize) -> Result<(), DatasetError> {
+        let text = serde_json::to_vec_pretty(value).unwrap_or_default();
+        write_whole(path, |file| file.write_all(&text)).map_err(|source| DatasetError::Io {
+            path: path.into(),
+            source,
+        })
+    }
+}

@@ -1,0 +1,209 @@
+//! What a frame reports, and why it failed: f64 passes over the elements, once a frame.
+
+use super::{ContactNode, FrameReport, PADDING, Solver, SolverError};
+use crate::solver::partition::Batch;
+
+/// Sums and extremes over the elements of the present state.
+pub(super) struct Diagnosis {
+    /// nJ.
+    pub strain_energy: f64,
+    pub min_det_f: f64,
+    /// Mesh element with the smallest det F.
+    pub worst_element: usize,
+    /// Largest `sum_a |cof F dN_a/dX|²`, 1/mm²: proportional to the largest eigenvalue bound.
+    pub largest_bound: f64,
+}
+
+impl Solver {
+    /// Visits all elements in a fixed order.
+    pub(super) fn diagnose(&self) -> Diagnosis {
+        let (shear, bulk) = (
+            self.options.material.shear_pa(),
+            self.options.material.bulk_pa(),
+        );
+        let mut result = Diagnosis {
+            strain_energy: 0.0,
+            min_det_f: f64::INFINITY,
+            worst_element: 0,
+            largest_bound: 0.0,
+        };
+        for chunk in &self.partition.chunks {
+            let displacement = |corner: u16| {
+                // Ghosts may be a step behind: read the owner.
+                let local = corner as usize / 2;
+                let slot = match local.checked_sub(chunk.owned) {
+                    None => chunk.first + local,
+                    Some(ghost) => chunk.ghosts[ghost] as usize,
+                };
+                self.fields.displacement[slot].0
+            };
+            for index in chunk.batches.clone() {
+                let batch = &self.partition.batches[index];
+                for (lane, element) in self.partition.element_of_lane[index].iter().enumerate() {
+                    if *element == PADDING {
+                        continue;
+                    }
+                    let corners = [0, 1, 2, 3].map(|a| displacement(batch.corners[a][lane]));
+                    let state = element_state(batch, lane, corners);
+                    let determinant = state.determinant;
+                    if !(determinant >= result.min_det_f) {
+                        result.min_det_f = determinant;
+                        result.worst_element = *element as usize;
+                    }
+                    result.largest_bound = result.largest_bound.max(state.bound);
+                    let isochoric = state.invariant * inverse_cube_root(determinant).powi(2);
+                    let volume = f64::from(batch.volume[lane]);
+                    result.strain_energy += volume
+                        * 0.5
+                        * (shear * (isochoric - 3.0) + bulk * (determinant - 1.0).powi(2));
+                }
+            }
+        }
+        result
+    }
+
+    /// The report of the frame that just ended.
+    pub(super) fn report(&mut self, contact: &[ContactNode], steps: u32) -> FrameReport {
+        let diagnosis = self.diagnose();
+        self.critical_now =
+            self.critical_at_rest * (self.bound_at_rest / diagnosis.largest_bound).sqrt();
+        if !contact.is_empty() {
+            self.update_forces();
+        }
+        let reaction = contact
+            .iter()
+            .map(|entry| {
+                let slot = self.partition.slot_of_node[entry.node as usize] as usize;
+                let [x, y, z, _] = self.fields.force[slot].0;
+                [x * 1e-3, y * 1e-3, z * 1e-3]
+            })
+            .collect();
+        FrameReport {
+            time_s: self.time_s,
+            strain_energy: diagnosis.strain_energy * 1e-6,
+            kinetic_energy: self.kinetic_energy() * 1e-6,
+            external_work: self.external_work,
+            min_det_f: diagnosis.min_det_f,
+            reaction,
+            inner_steps: steps,
+            critical_step_s: self.critical_now,
+        }
+    }
+
+    /// `1/2 sum m |d / dt|²`, nJ.
+    fn kinetic_energy(&self) -> f64 {
+        let mut sum = 0.0;
+        for chunk in &self.partition.chunks {
+            for slot in chunk.first..chunk.first + chunk.owned {
+                let d = self.fields.increment[slot].0;
+                let squared: f64 = d[..3].iter().map(|v| f64::from(*v).powi(2)).sum();
+                sum += f64::from(self.mass[slot]) * squared;
+            }
+        }
+        0.5 * sum / (self.dt * self.dt)
+    }
+
+    /// Runs the failed frame again up to the fault, to name time, element and cause.
+    ///
+    /// The caller restores the state afterwards.
+    pub(super) fn explain(&mut self, inverted_at: Option<u32>, steps: u32, dt: f64) -> SolverError {
+        let step_ms = dt * 1e3;
+        let Some(step) = inverted_at else {
+            let node = self
+                .partition
+                .slot_of_node
+                .iter()
+                .position(|slot| {
+                    let u = self.fields.displacement[*slot as usize].0;
+                    !u[..3].iter().all(|v| v.abs() < 1e5)
+                })
+                .unwrap_or(0);
+            let element = self
+                .tets
+                .iter()
+                .position(|tet| tet.contains(&(node as u32)))
+                .unwrap_or(0);
+            return SolverError::Diverged {
+                time_s: self.time_s + dt * f64::from(steps),
+                node,
+                element,
+                cause: "displacement is not finite or above 100 m",
+                step_ms,
+            };
+        };
+        self.fields.clone_from(&self.backup);
+        let targets = self.paths.clone();
+        for path in &mut self.paths {
+            path.target = path.at(step - 1, steps);
+        }
+        self.dt = self.backup_dt;
+        self.set_step(dt);
+        if step > 1 {
+            self.run(step - 1);
+        }
+        self.paths = targets;
+        let diagnosis = self.diagnose();
+        SolverError::Inverted {
+            time_s: self.time_s + dt * f64::from(step - 1),
+            element: diagnosis.worst_element,
+            det_f: diagnosis.min_det_f,
+            step_ms,
+        }
+    }
+}
+
+struct ElementState {
+    determinant: f64,
+    /// `tr F^T F`
+    invariant: f64,
+    bound: f64,
+}
+
+fn element_state(batch: &Batch, lane: usize, corners: [[f32; 4]; 4]) -> ElementState {
+    let mut f = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let mut gradients = [[0.0; 3]; 4];
+    for a in 0..3 {
+        for j in 0..3 {
+            let slope = f64::from(batch.gradient[3 * a + j][lane]);
+            gradients[a + 1][j] = slope;
+            gradients[0][j] -= slope;
+            for i in 0..3 {
+                f[i][j] += slope * (f64::from(corners[a + 1][i]) - f64::from(corners[0][i]));
+            }
+        }
+    }
+    let cross = |a: [f64; 3], b: [f64; 3]| {
+        [
+            a[1] * b[2] - a[2] * b[1],
+            a[2] * b[0] - a[0] * b[2],
+            a[0] * b[1] - a[1] * b[0],
+        ]
+    };
+    let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    let cofactor = [cross(f[1], f[2]), cross(f[2], f[0]), cross(f[0], f[1])];
+    ElementState {
+        determinant: dot(f[0], cofactor[0]),
+        invariant: f.iter().map(|row| dot(*row, *row)).sum(),
+        bound: gradients
+            .iter()
+            .map(|g| {
+                cofactor
+                    .iter()
+                    .map(|row| dot(*row, *g).powi(2))
+                    .sum::<f64>()
+            })
+            .sum(),
+    }
+}
+
+/// `x^(-1/3)` in f64 without the library's slow cube root: an f32 guess and three corrections.
+fn inverse_cube_root(x: f64) -> f64 {
+    let clamped = x.max(1e-3);
+    let bits = (clamped as f32).to_bits() / 3;
+    let mut y = f64::from(f32::from_bits(0x54A2_FA8C - bits));
+    for _ in 0..3 {
+        let e = 1.0 - clamped * y * y * y;
+        y += y * e * (1.0 / 3.0 + e * (2.0 / 9.0));
+    }
+    y
+}

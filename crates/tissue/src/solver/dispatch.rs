@@ -1,0 +1,132 @@
+//! Run-time choice of the instruction set, and the kernels compiled for each.
+
+use super::kernel::{Law, add_forces, add_volumes};
+use super::lanes::Scalar;
+use super::partition::Batch;
+
+/// Instruction set of the element kernels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Simd {
+    /// Portable code; the readable reference.
+    Scalar,
+    /// AVX2 with FMA, 2 registers of 8.
+    Avx2,
+    /// AVX-512 (F, VL), one register of 16.
+    Avx512,
+    /// NEON, 4 registers of 4.
+    Neon,
+}
+
+impl Simd {
+    /// All sets, best first.
+    pub const ALL: [Simd; 4] = [Simd::Avx512, Simd::Avx2, Simd::Neon, Simd::Scalar];
+
+    /// The best set of this processor.
+    pub fn detect() -> Self {
+        Self::ALL
+            .into_iter()
+            .find(|simd| simd.is_available())
+            .unwrap_or(Simd::Scalar)
+    }
+
+    /// Whether this processor has the set.
+    pub fn is_available(self) -> bool {
+        match self {
+            Simd::Scalar => true,
+            #[cfg(target_arch = "x86_64")]
+            Simd::Avx2 => is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma"),
+            #[cfg(target_arch = "x86_64")]
+            Simd::Avx512 => {
+                is_x86_feature_detected!("avx512f")
+                    && is_x86_feature_detected!("avx512vl")
+                    && is_x86_feature_detected!("fma")
+            }
+            Simd::Neon => cfg!(target_arch = "aarch64"),
+            #[cfg(not(target_arch = "x86_64"))]
+            Simd::Avx2 | Simd::Avx512 => false,
+        }
+    }
+}
+
+type ForceKernel = unsafe fn(&[Batch], *const [f32; 4], *mut [f32; 4], Law) -> f32;
+type VolumeKernel = unsafe fn(&[Batch], *const [f32; 4], *mut [f32; 4]);
+
+/// The kernels of one instruction set.
+#[derive(Clone, Copy)]
+pub(crate) struct Kernels {
+    pub forces: ForceKernel,
+    pub averaged_forces: ForceKernel,
+    pub volumes: VolumeKernel,
+}
+
+/// Compiles the kernels for one `Lanes` type under the given target features.
+macro_rules! kernels {
+    ($module:ident, $lanes:ty $(, $feature:literal)?) => {
+        mod $module {
+            use super::*;
+
+            $(#[target_feature(enable = $feature)])?
+            unsafe fn forces(
+                b: &[Batch],
+                n: *const [f32; 4],
+                f: *mut [f32; 4],
+                law: Law,
+            ) -> f32 {
+                unsafe { add_forces::<$lanes, false>(b, n, f, law) }
+            }
+
+            $(#[target_feature(enable = $feature)])?
+            unsafe fn averaged_forces(
+                b: &[Batch],
+                n: *const [f32; 4],
+                f: *mut [f32; 4],
+                law: Law,
+            ) -> f32 {
+                unsafe { add_forces::<$lanes, true>(b, n, f, law) }
+            }
+
+            $(#[target_feature(enable = $feature)])?
+            unsafe fn volumes(b: &[Batch], n: *const [f32; 4], f: *mut [f32; 4]) {
+                unsafe { add_volumes::<$lanes>(b, n, f) }
+            }
+
+            pub(super) const KERNELS: Kernels = Kernels {
+                forces,
+                averaged_forces,
+                volumes,
+            };
+        }
+    };
+}
+
+kernels!(scalar, Scalar);
+#[cfg(target_arch = "x86_64")]
+kernels!(avx2, crate::solver::lanes::Avx2, "avx2,fma");
+#[cfg(target_arch = "x86_64")]
+kernels!(
+    avx512,
+    crate::solver::lanes::Avx512,
+    "avx512f,avx512vl,avx2,fma"
+);
+#[cfg(target_arch = "aarch64")]
+kernels!(neon, crate::solver::lanes::Neon, "neon");
+
+impl Kernels {
+    /// The kernels of `simd`; `None` where this processor lacks it.
+    pub fn of(simd: Simd) -> Option<Self> {
+        if !simd.is_available() {
+            return None;
+        }
+        match simd {
+            Simd::Scalar => Some(scalar::KERNELS),
+            #[cfg(target_arch = "x86_64")]
+            Simd::Avx2 => Some(avx2::KERNELS),
+            #[cfg(target_arch = "x86_64")]
+            Simd::Avx512 => Some(avx512::KERNELS),
+            #[cfg(target_arch = "aarch64")]
+            Simd::Neon => Some(neon::KERNELS),
+            #[allow(unreachable_patterns)]
+            _ => None,
+        }
+    }
+}

@@ -1,0 +1,55 @@
+//! Sixteen elements at a time: the few vector operations that the element
+//! kernel needs, and one type a processor family that provides them.
+//!
+//! Nodes are `[x, y, z, w]` in memory. A gather loads one corner of each of the
+//! 16 elements and transposes to four vectors; a scatter adds back in element
+//! order, so corners that share a node are summed one after the other. Indices
+//! count half nodes (8 bytes): the largest step that x86 addressing scales by itself.
+
+#[cfg(target_arch = "x86_64")]
+mod avx2;
+#[cfg(target_arch = "x86_64")]
+mod avx512;
+#[cfg(target_arch = "aarch64")]
+mod neon;
+mod scalar;
+
+#[cfg(target_arch = "x86_64")]
+pub(crate) use avx2::Avx2;
+#[cfg(target_arch = "x86_64")]
+pub(crate) use avx512::Avx512;
+#[cfg(target_arch = "aarch64")]
+pub(crate) use neon::Neon;
+pub(crate) use scalar::Scalar;
+
+/// Elements in a batch.
+pub(crate) const WIDTH: usize = 16;
+
+/// Constant of the inverse cube root's first guess, `bits(y) = GUESS - bits(x) / 3`.
+pub(crate) const CUBE_ROOT_GUESS: f32 = 1_419_967_116.0;
+
+/// Sixteen f32 lanes.
+///
+/// # Safety
+/// Every method needs the instruction set of its type; the pointers of `load`,
+/// `store`, `gather` and `scatter_add` must be valid for 16 values, or for the
+/// nodes that the indices name. The callers are `target_feature` functions that
+/// are reached only after run-time detection.
+pub(crate) trait Lanes: Copy {
+    unsafe fn splat(value: f32) -> Self;
+    unsafe fn load(source: *const f32) -> Self;
+    unsafe fn store(self, target: *mut f32);
+    unsafe fn add(self, other: Self) -> Self;
+    unsafe fn sub(self, other: Self) -> Self;
+    unsafe fn mul(self, other: Self) -> Self;
+    /// `self * b + c`
+    unsafe fn mul_add(self, b: Self, c: Self) -> Self;
+    /// `c - self * b`
+    unsafe fn neg_mul_add(self, b: Self, c: Self) -> Self;
+    unsafe fn min(self, other: Self) -> Self;
+    unsafe fn max(self, other: Self) -> Self;
+    /// First guess of `self^(-1/3)` for positive values, within 4 %.
+    unsafe fn inverse_cube_root_guess(self) -> Self;
+    unsafe fn gather(nodes: *const [f32; 4], index: &[u16; WIDTH]) -> [Self; 4];
+    unsafe fn scatter_add(nodes: *mut [f32; 4], index: &[u16; WIDTH], value: [Self; 4]);
+}

@@ -1,0 +1,185 @@
+//! NEON: four registers of 4 lanes.
+
+use super::{CUBE_ROOT_GUESS, Lanes, WIDTH};
+use std::arch::aarch64::*;
+
+#[derive(Clone, Copy)]
+pub(crate) struct Neon([float32x4_t; 4]);
+
+/// Transposes four rows `[x y z w]` to columns, and back.
+#[inline(always)]
+unsafe fn transpose(rows: [float32x4_t; 4]) -> [float32x4_t; 4] {
+    unsafe {
+        let a = vreinterpretq_f64_f32(vtrn1q_f32(rows[0], rows[1]));
+        let b = vreinterpretq_f64_f32(vtrn2q_f32(rows[0], rows[1]));
+        let c = vreinterpretq_f64_f32(vtrn1q_f32(rows[2], rows[3]));
+        let d = vreinterpretq_f64_f32(vtrn2q_f32(rows[2], rows[3]));
+        [
+            vreinterpretq_f32_f64(vtrn1q_f64(a, c)),
+            vreinterpretq_f32_f64(vtrn1q_f64(b, d)),
+            vreinterpretq_f32_f64(vtrn2q_f64(a, c)),
+            vreinterpretq_f32_f64(vtrn2q_f64(b, d)),
+        ]
+    }
+}
+
+// SAFETY: see the trait; NEON is part of every aarch64 target.
+impl Lanes for Neon {
+    #[inline(always)]
+    unsafe fn splat(value: f32) -> Self {
+        unsafe { Self([vdupq_n_f32(value); 4]) }
+    }
+
+    #[inline(always)]
+    unsafe fn load(source: *const f32) -> Self {
+        unsafe {
+            Self([
+                vld1q_f32(source),
+                vld1q_f32(source.add(4)),
+                vld1q_f32(source.add(8)),
+                vld1q_f32(source.add(12)),
+            ])
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn store(self, target: *mut f32) {
+        for i in 0..4 {
+            unsafe { vst1q_f32(target.add(4 * i), self.0[i]) }
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn add(self, other: Self) -> Self {
+        unsafe {
+            Self([
+                vaddq_f32(self.0[0], other.0[0]),
+                vaddq_f32(self.0[1], other.0[1]),
+                vaddq_f32(self.0[2], other.0[2]),
+                vaddq_f32(self.0[3], other.0[3]),
+            ])
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn sub(self, other: Self) -> Self {
+        unsafe {
+            Self([
+                vsubq_f32(self.0[0], other.0[0]),
+                vsubq_f32(self.0[1], other.0[1]),
+                vsubq_f32(self.0[2], other.0[2]),
+                vsubq_f32(self.0[3], other.0[3]),
+            ])
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn mul(self, other: Self) -> Self {
+        unsafe {
+            Self([
+                vmulq_f32(self.0[0], other.0[0]),
+                vmulq_f32(self.0[1], other.0[1]),
+                vmulq_f32(self.0[2], other.0[2]),
+                vmulq_f32(self.0[3], other.0[3]),
+            ])
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn mul_add(self, b: Self, c: Self) -> Self {
+        unsafe {
+            Self([
+                vfmaq_f32(c.0[0], self.0[0], b.0[0]),
+                vfmaq_f32(c.0[1], self.0[1], b.0[1]),
+                vfmaq_f32(c.0[2], self.0[2], b.0[2]),
+                vfmaq_f32(c.0[3], self.0[3], b.0[3]),
+            ])
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn neg_mul_add(self, b: Self, c: Self) -> Self {
+        unsafe {
+            Self([
+                vfmsq_f32(c.0[0], self.0[0], b.0[0]),
+                vfmsq_f32(c.0[1], self.0[1], b.0[1]),
+                vfmsq_f32(c.0[2], self.0[2], b.0[2]),
+                vfmsq_f32(c.0[3], self.0[3], b.0[3]),
+            ])
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn min(self, other: Self) -> Self {
+        unsafe {
+            Self([
+                vminq_f32(self.0[0], other.0[0]),
+                vminq_f32(self.0[1], other.0[1]),
+                vminq_f32(self.0[2], other.0[2]),
+                vminq_f32(self.0[3], other.0[3]),
+            ])
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn max(self, other: Self) -> Self {
+        unsafe {
+            Self([
+                vmaxq_f32(self.0[0], other.0[0]),
+                vmaxq_f32(self.0[1], other.0[1]),
+                vmaxq_f32(self.0[2], other.0[2]),
+                vmaxq_f32(self.0[3], other.0[3]),
+            ])
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn inverse_cube_root_guess(self) -> Self {
+        unsafe {
+            let mut guess = self.0;
+            for part in &mut guess {
+                let bits = vcvtq_f32_s32(vreinterpretq_s32_f32(*part));
+                let value = vfmsq_f32(vdupq_n_f32(CUBE_ROOT_GUESS), bits, vdupq_n_f32(1.0 / 3.0));
+                *part = vreinterpretq_f32_s32(vcvtq_s32_f32(value));
+            }
+            Self(guess)
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn gather(nodes: *const [f32; 4], index: &[u16; WIDTH]) -> [Self; 4] {
+        unsafe {
+            let mut axes = [[vdupq_n_f32(0.0); 4]; 4];
+            for part in 0..4 {
+                let mut rows = [vdupq_n_f32(0.0); 4];
+                for (i, row) in rows.iter_mut().enumerate() {
+                    *row = vld1q_f32(nodes.cast::<f64>().add(index[4 * part + i] as usize).cast());
+                }
+                let columns = transpose(rows);
+                for axis in 0..4 {
+                    axes[axis][part] = columns[axis];
+                }
+            }
+            [Self(axes[0]), Self(axes[1]), Self(axes[2]), Self(axes[3])]
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn scatter_add(nodes: *mut [f32; 4], index: &[u16; WIDTH], value: [Self; 4]) {
+        unsafe {
+            for part in 0..4 {
+                let rows = transpose([
+                    value[0].0[part],
+                    value[1].0[part],
+                    value[2].0[part],
+                    value[3].0[part],
+                ]);
+                for (i, row) in rows.into_iter().enumerate() {
+                    let target: *mut f32 =
+                        nodes.cast::<f64>().add(index[4 * part + i] as usize).cast();
+                    vst1q_f32(target, vaddq_f32(vld1q_f32(target), row));
+                }
+            }
+        }
+    }
+}
