@@ -13,7 +13,7 @@ static int expect_count = 0;
 /* Statuses that any expectation saw, by -status (0 to 99); [99] is UPT_PENDING. */
 static int expect_seen[100];
 
-static void expect_true_at(int holds, const char *what, const char *file, int line) {
+static inline void expect_true_at(int holds, const char *what, const char *file, int line) {
   expect_count++;
   if (!holds) {
     expect_failures++;
@@ -21,7 +21,7 @@ static void expect_true_at(int holds, const char *what, const char *file, int li
   }
 }
 
-static void expect_status_at(upt_status found, upt_status wanted, const char *what,
+static inline void expect_status_at(upt_status found, upt_status wanted, const char *what,
                              const char *file, int line) {
   expect_count++;
   if (found > 0) {
@@ -39,7 +39,7 @@ static void expect_status_at(upt_status found, upt_status wanted, const char *wh
   }
 }
 
-static int expect_result(const char *name) {
+static inline int expect_result(const char *name) {
   printf("%s: %d expectations, %d failed\n", name, expect_count, expect_failures);
   return expect_failures == 0 ? 0 : 1;
 }
