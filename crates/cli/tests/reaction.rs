@@ -1,5 +1,4 @@
 //! The runtime's reaction forces against those of the reference solver, on the same displacement.
-#![cfg(feature = "forces")]
 
 use tissue::mesh::{Boundary, box_phantom};
 use tissue::solver::{ContactNode, Solver, SolverOptions};
