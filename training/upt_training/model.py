@@ -128,7 +128,8 @@ class Upt(nn.Module):
         """Features `[..., n, f]` of the table's nodes -> `[..., m, 3]` mm for the rows of `query`.
 
         `tables` = (source `[n, d]`, target `[n, d]`); `neighbours [n_S, degree]` and `supernodes [n_S]` index `n`.
-        `scored`: rows of `query` through which gradients flow; the others are decoded without (training only).
+        `scored` (training only): rows of `query` through which gradients flow, and the rows that are decoded without
+        (what the next step reads); all other rows stay zero.
         """
         with torch.autocast(features.device.type, enabled=False):  # differences of the features need float32
             w_source, w_target = self.encoder_weights()
@@ -137,9 +138,11 @@ class Upt(nn.Module):
         k, v = self.latent(self.aggregate(source, target, neighbours, mask))
         if scored is None:
             return self.decode(query, k, v)
+        rows, read = scored
         with torch.no_grad():
-            out = self.decode(query, k, v)
-        return out.index_copy(-2, scored, self.decode(query[scored], k, v).to(out.dtype))
+            out = torch.zeros(*k.shape[:-2], len(query), 3, device=k.device)
+            out[..., read, :] = self.decode(query[read], k, v).float()
+        return out.index_copy(-2, rows, self.decode(query[rows], k, v).float())
 
     def forward_unfactored(self, features, positions, neighbours, mask, supernodes) -> torch.Tensor:
         """The paper's layout, edge by edge, all nodes decoded; for the export's self-check."""

@@ -55,6 +55,7 @@ class Stepper:
         self.supernodes = torch.from_numpy(place[graph.supernodes]).to(to)
         self.positions = torch.from_numpy(mesh.positions[nodes].astype(np.float32)).to(to)
         self.free = torch.from_numpy(~held[nodes]).to(to, torch.float32)[:, None]
+        self.read = torch.from_numpy(place[graph.needed_nodes()]).to(to)
         self.node_count = len(nodes)
 
     def tables(self) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
@@ -76,7 +77,8 @@ class Stepper:
         }
         source, key, query = tables
         features = self.model.normalise(fields)
-        out = self.model(features, (source, key), self.neighbours, self.mask, self.supernodes, query, scored).float()
+        rows = None if scored is None else (scored, self.read)
+        out = self.model(features, (source, key), self.neighbours, self.mask, self.supernodes, query, rows).float()
         base = self.model.settings.base
         if base == "displacement":
             out = out + state.u
