@@ -80,7 +80,20 @@ fn load(explicit: Option<&Path>) -> Result<Runtime> {
     )))
 }
 
+/// Microsoft's builds of ONNX Runtime from 1.29 on write a device identifier and upload a process event while the
+/// environment is made, before the API can turn telemetry off; only this variable stops it. A host that wants telemetry
+/// sets it to 0 itself.
+fn refuse_telemetry() {
+    const VARIABLE: &str = "ORT_DISABLE_TELEMETRY";
+    if std::env::var_os(VARIABLE).is_none() {
+        // SAFETY: sound unless another thread of the host reads or writes the environment without Rust's lock at this
+        // moment; docs/abi.md tells hosts that do so to set the variable themselves, and then nothing is written here.
+        unsafe { std::env::set_var(VARIABLE, "1") };
+    }
+}
+
 fn open(path: &Path) -> std::result::Result<Runtime, String> {
+    refuse_telemetry();
     let builder = ort::init_from(path).map_err(|error| error.to_string())?;
     let environment = builder
         .with_name("upt")
