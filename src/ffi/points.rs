@@ -1,6 +1,5 @@
 //! `upt_scene`: points that move with the tissue, such as a render mesh's vertices.
 
-use super::call::fail;
 use super::pointers::{optional, place, slice_mut};
 use super::registry::call_scene;
 use super::status::*;
@@ -55,9 +54,6 @@ pub unsafe extern "C" fn upt_scene_sample_points(
 ) -> upt_status {
     call_scene("upt_scene_sample_points", scene, |scene| {
         place(out, "out")?;
-        if !alpha.is_finite() {
-            return fail(UPT_ERR_NON_FINITE, format!("alpha is {alpha}"));
-        }
         scene.sample_points(alpha, unsafe { slice_mut(out, out_count, "out") }?)?;
         Ok(UPT_OK)
     })

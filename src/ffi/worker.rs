@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::call::{Answer, fail};
+use super::call::Answer;
 use super::pointers::{place, slice_mut};
 use super::registry::call_scene;
 use super::scene::contacts;
@@ -65,9 +65,6 @@ pub unsafe extern "C" fn upt_scene_sample(
 ) -> upt_status {
     call_scene("upt_scene_sample", scene, |scene| {
         place(out, "out")?;
-        if !alpha.is_finite() {
-            return fail(UPT_ERR_NON_FINITE, format!("alpha is {alpha}"));
-        }
         scene.sample(alpha, unsafe { slice_mut(out, out_count, "out") }?)?;
         Ok(UPT_OK)
     })

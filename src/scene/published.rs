@@ -62,6 +62,11 @@ impl Published {
     /// The size that a host's buffer must have.
     pub fn check_len(&self, values: Values, len: usize) -> Result<()> {
         let want = 3 * self.count(values);
+        if values == Values::Points && want == 0 {
+            return Err(Error::State(
+                "no points are attached; attach them first".into(),
+            ));
+        }
         if len == want {
             return Ok(());
         }

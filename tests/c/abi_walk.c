@@ -185,8 +185,9 @@ static void walk_model(void) {
   EXPECT_TRUE(set_sizes[UPT_SET_FIXED_NODES] == info.held_node_count);
 }
 
-static void walk_scene_create(void) {
+static void walk_scene_create(const char *reduced_bundle) {
   upt_scene *scene = NULL;
+  upt_model *reduced = NULL;
   upt_scene_options options;
   memset(&options, 0, sizeof options);
   EXPECT(upt_scene_create(NULL, NULL, &scene), UPT_ERR_NULL);
@@ -204,10 +205,11 @@ static void walk_scene_create(void) {
   options.reserved[2] = 0;
   options.mesh_path = "no/such.mesh.safetensors";
   EXPECT_TRUE(upt_scene_create(model, &options, &scene) < 0);
+  /* A reduced bundle's tables belong to its own mesh. */
+  EXPECT(upt_model_open(reduced_bundle, NULL, &reduced), UPT_OK);
+  EXPECT(upt_scene_create(reduced, &options, &scene), UPT_ERR_UNSUPPORTED);
+  EXPECT(upt_model_close(reduced), UPT_OK);
   options.mesh_path = NULL;
-  options.precision = UPT_PRECISION_INT8;
-  EXPECT(upt_scene_create(model, &options, &scene), UPT_ERR_UNSUPPORTED);
-  options.precision = UPT_PRECISION_F32;
   EXPECT_TRUE(scene == NULL);
   EXPECT(upt_scene_create(model, &options, &scene), UPT_OK);
   EXPECT(upt_scene_destroy(scene), UPT_OK);
@@ -559,8 +561,8 @@ int main(int argc, char **argv) {
   upt_model *closed;
   size_t i;
   int panics;
-  if (argc != 3) {
-    fprintf(stderr, "usage: %s BUNDLE DAMAGED\n", argv[0]);
+  if (argc != 4) {
+    fprintf(stderr, "usage: %s BUNDLE DAMAGED REDUCED\n", argv[0]);
     return 2;
   }
   walk_library();
@@ -569,7 +571,7 @@ int main(int argc, char **argv) {
     return expect_result("abi_walk");
   }
   walk_model();
-  walk_scene_create();
+  walk_scene_create(argv[3]);
   walk_step();
   walk_worker();
   walk_region_and_points();
