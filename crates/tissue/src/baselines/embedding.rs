@@ -152,17 +152,17 @@ impl Embedding {
         let mut middle = vec![[0.0f64; 3]; fine.node_count()];
         let mut count = vec![0.0f64; fine.node_count()];
         for tet in &fine.tets {
-            for axis in 0..3 {
-                let centre = tet
+            let centre: [f64; 3] = std::array::from_fn(|axis| {
+                let sum: f64 = tet
                     .iter()
                     .map(|&n| f64::from(fine.positions[n as usize][axis]))
-                    .sum::<f64>()
-                    / 4.0;
-                for &node in tet {
-                    middle[node as usize][axis] += centre;
-                }
-            }
+                    .sum();
+                sum / 4.0
+            });
             for &node in tet {
+                for (sum, value) in middle[node as usize].iter_mut().zip(centre) {
+                    *sum += value;
+                }
                 count[node as usize] += 1.0;
             }
         }
