@@ -30,11 +30,18 @@ static void on_log(int32_t level, const char *message, void *user) {
   ++*(int *)user;
 }
 
-static upt_scene *make_scene(void) {
+static upt_scene *make_scene_with(int32_t guard_policy) {
   upt_scene *scene = NULL;
-  EXPECT(upt_scene_create(model, NULL, &scene), UPT_OK);
+  upt_scene_options options;
+  memset(&options, 0, sizeof options);
+  options.struct_size = sizeof options;
+  options.guard_policy = guard_policy;
+  EXPECT(upt_scene_create(model, &options, &scene), UPT_OK);
   return scene;
 }
+
+/* The fixtures' weights are random: their states are not refused, but flagged. */
+static upt_scene *make_scene(void) { return make_scene_with(UPT_GUARD_REPORT); }
 
 /* The scene's state is what it was when `before` was read. */
 static void expect_unchanged(upt_scene *scene) {
@@ -216,7 +223,7 @@ static void walk_scene_create(const char *reduced_bundle) {
 }
 
 static void walk_step(void) {
-  upt_scene *scene = make_scene(), *twin = make_scene();
+  upt_scene *scene = make_scene(), *twin = make_scene(), *held = make_scene_with(UPT_GUARD_HOLD);
   float *field = calloc((size_t)floats, sizeof *field);
   uint32_t far[1];
   int i;
@@ -254,10 +261,16 @@ static void walk_step(void) {
   contact_vectors[5] = INFINITY;
   EXPECT(upt_scene_step_contacts(scene, contact_nodes, contact_vectors, 4, NULL, 0),
          UPT_ERR_NON_FINITE);
-  contact_vectors[5] = 1000.0F;
-  EXPECT(upt_scene_step_contacts(scene, contact_nodes, contact_vectors, 4, NULL, 0), UPT_ERR_GUARD);
   contact_vectors[5] = -2.0F;
   expect_unchanged(scene);
+
+  /* So does one that the guard refuses. */
+  EXPECT(upt_scene_read(held, before, floats), UPT_OK);
+  contact_vectors[5] = 1000.0F;
+  EXPECT(upt_scene_step_contacts(held, contact_nodes, contact_vectors, 4, NULL, 0), UPT_ERR_GUARD);
+  contact_vectors[5] = -2.0F;
+  expect_unchanged(held);
+  EXPECT(upt_scene_destroy(held), UPT_OK);
 
   EXPECT(upt_scene_read(NULL, after, floats), UPT_ERR_NULL);
   EXPECT(upt_scene_read(scene, NULL, 0), UPT_ERR_NULL);
@@ -286,7 +299,7 @@ static void walk_step(void) {
 }
 
 static void walk_worker(void) {
-  upt_scene *scene = make_scene(), *twin = make_scene();
+  upt_scene *scene = make_scene(), *twin = make_scene(), *held = make_scene_with(UPT_GUARD_HOLD);
   int i;
   EXPECT(upt_scene_submit(NULL, contact_nodes, contact_vectors, 4), UPT_ERR_NULL);
   EXPECT(upt_scene_submit(scene, NULL, contact_vectors, 4), UPT_ERR_NULL);
@@ -321,8 +334,9 @@ static void walk_worker(void) {
 
   /* The error of a submitted step is given once. */
   contact_vectors[5] = 1000.0F;
-  EXPECT(upt_scene_submit(scene, contact_nodes, contact_vectors, 4), UPT_OK);
-  EXPECT(upt_scene_wait(scene, 60000), UPT_ERR_GUARD);
+  EXPECT(upt_scene_submit(held, contact_nodes, contact_vectors, 4), UPT_OK);
+  EXPECT(upt_scene_wait(held, 60000), UPT_ERR_GUARD);
+  EXPECT(upt_scene_destroy(held), UPT_OK);
   contact_vectors[5] = -2.0F;
 
   EXPECT(upt_scene_sample(NULL, 0.5, after, floats), UPT_ERR_NULL);
