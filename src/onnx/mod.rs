@@ -10,3 +10,13 @@ mod stage;
 pub use providers::{ProviderChoice, ProviderPlan, providers_json};
 pub use runtime::Runtime;
 pub use stage::{Stage, StageOptions};
+
+use std::path::PathBuf;
+
+use crate::error::Result;
+
+/// File and build description of ONNX Runtime; loads it when needed.
+pub fn loaded() -> Result<(PathBuf, String)> {
+    let runtime = Runtime::get(crate::library::current().onnxruntime_path.as_deref())?;
+    Ok((runtime.path().to_owned(), runtime.version().to_owned()))
+}
