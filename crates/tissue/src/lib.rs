@@ -13,6 +13,7 @@ pub mod material;
 pub mod mesh;
 pub mod mesh_import;
 pub mod mesh_quality;
+pub mod metrics;
 pub mod schemes;
 pub mod simulate;
 pub mod solver;
