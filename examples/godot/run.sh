@@ -32,6 +32,12 @@ if ! godot=$("$here/fetch_godot.sh" "$build/engine"); then
 fi
 echo "Godot $("$godot" --version | tail -n 1), bundle $(basename "$bundle")"
 
+# The library under its soname, as an installed prefix has it.
+mkdir -p "$build/lib"
+ln -sf "$libraries/libupt.so" "$build/lib/libupt.so"
+ln -sf "$libraries/libupt.so" "$build/lib/libupt.so.0"
+libraries=$build/lib
+
 project=$build/project
 rm -rf "$project"
 mkdir -p "$project/bin"

@@ -31,6 +31,11 @@ export UPT_TEST_BUNDLE=$bundle
 
 rm -rf "$build"
 mkdir -p "$build"
+# The library under its soname, as an installed prefix has it.
+mkdir -p "$build/lib"
+ln -sf "$libraries/libupt.so" "$build/lib/libupt.so"
+ln -sf "$libraries/libupt.so" "$build/lib/libupt.so.0"
+libraries=$build/lib
 plugin=$root/unity-plugin
 mcs_flags=(-langversion:7.2 -unsafe -warnaserror -warn:4 -nologo -debug- -optimize+)
 # 0649: fields that Unity's inspector sets.

@@ -238,7 +238,6 @@ namespace Upt.Tests
             {
                 uint[] nodes = new uint[model.NodeCount];
                 float[] vectors = new float[3 * model.NodeCount];
-                float[] u = new float[3 * model.NodeCount];
                 scene.SetRegion(model.Indices(Native.UPT_SET_DOMAIN_NODES));
                 float[] region = new float[3 * scene.RegionCount];
                 int count = Push(model, 20, nodes, vectors);

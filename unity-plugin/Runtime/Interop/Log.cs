@@ -35,12 +35,12 @@ namespace Upt.Interop
             Library.Verify();
             if (target == null)
             {
-                Status.Check(Native.upt_set_log(IntPtr.Zero, null, Native.UPT_LOG_OFF));
+                Status.Check(Native.upt_set_log(IntPtr.Zero, IntPtr.Zero, Native.UPT_LOG_OFF));
                 receiver = null;
                 return;
             }
             receiver = target;
-            Status.Check(Native.upt_set_log(Marshal.GetFunctionPointerForDelegate(Callback), null, level));
+            Status.Check(Native.upt_set_log(Marshal.GetFunctionPointerForDelegate(Callback), IntPtr.Zero, level));
         }
 
         [MonoPInvokeCallback(typeof(NativeLog))]
