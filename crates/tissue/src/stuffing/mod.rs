@@ -10,6 +10,7 @@
 //! A field is positive inside, negative outside, in the unit of length of the positions (mm here).
 
 mod field;
+mod grid_file;
 mod lattice;
 mod manifold;
 mod stencils;

@@ -1,0 +1,311 @@
+//! Import: files of Gmsh and VTK (fixtures/import/make.py), and each fault by hand.
+
+use std::path::{Path, PathBuf};
+use tissue::mesh::Mesh;
+use tissue::mesh_import::{
+    Ball, ImportError, ImportOptions, Imported, RawTets, Repair, Resolution, from_tets, import,
+};
+use tissue::mesh_quality::measure;
+
+fn fixture(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("tests/fixtures/import")
+        .join(name)
+}
+
+fn read(name: &str, options: &ImportOptions) -> Result<Imported, ImportError> {
+    import(&fixture(name), options)
+}
+
+/// Writes `text` as a file with `extension` and imports it.
+fn read_text(
+    text: &str,
+    extension: &str,
+    options: &ImportOptions,
+) -> Result<Imported, ImportError> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(format!("case.{extension}"));
+    std::fs::write(&path, text).unwrap();
+    import(&path, options)
+}
+
+fn repairing() -> ImportOptions {
+    ImportOptions {
+        repair: true,
+        ..ImportOptions::default()
+    }
+}
+
+fn sorted_positions(mesh: &Mesh) -> Vec<[i64; 3]> {
+    let mut rows: Vec<[i64; 3]> = mesh
+        .positions
+        .iter()
+        .map(|p| p.map(|x| (f64::from(x) * 1e4).round() as i64))
+        .collect();
+    rows.sort_unstable();
+    rows
+}
+
+#[test]
+fn every_file_of_the_gmsh_box_gives_the_same_body() {
+    let mut reference = None;
+    for name in [
+        "box-22-text.msh",
+        "box-22-binary.msh",
+        "box-41-text.msh",
+        "box-41-binary.msh",
+        "box.vtk",
+        "box-binary.vtk",
+        "box.vtu",
+        "box-text.vtu",
+    ] {
+        let imported = read(name, &ImportOptions::default()).unwrap_or_else(|e| panic!("{name}: {e}"));
+        assert!(imported.repairs.is_empty(), "{name}");
+        let mesh = imported.mesh;
+        assert!((measure(&mesh).volume_mm3 - 1000.0).abs() < 1e-3, "{name}");
+        let found = (mesh.tets.len(), mesh.surface.len(), sorted_positions(&mesh));
+        assert_eq!(*reference.get_or_insert(found.clone()), found, "{name}");
+    }
+}
+
+#[test]
+fn second_order_elements_are_refused_by_name() {
+    let error = read("box-second-order.msh", &ImportOptions::default()).unwrap_err();
+    assert!(error.to_string().contains("element type 11"), "{error}");
+}
+
+#[test]
+fn surfaces_are_filled_to_a_node_count() {
+    for name in [
+        "box.stl",
+        "box-text.stl",
+        "box.ply",
+        "box-text.ply",
+        "box.obj",
+    ] {
+        let options = ImportOptions {
+            resolution: Some(Resolution::Nodes(800)),
+            ..ImportOptions::default()
+        };
+        let mesh = read(name, &options).unwrap_or_else(|e| panic!("{name}: {e}")).mesh;
+        let quality = measure(&mesh);
+        assert!(quality.nodes.abs_diff(800) <= 60, "{name}: {} nodes", quality.nodes);
+        // Sharp edges are cut off at the scale of the lattice.
+        assert!((quality.volume_mm3 / 1000.0 - 1.0).abs() < 0.05, "{name}: {quality:?}");
+        assert!(quality.min_dihedral_deg > 8.0, "{name}: {quality:?}");
+        assert_eq!((quality.components, quality.euler_characteristic), (1, 2));
+    }
+}
+
+#[test]
+fn spacing_and_scale_are_in_millimetres() {
+    let options = ImportOptions {
+        resolution: Some(Resolution::Spacing(15.0)),
+        scale: 10.0,
+        ..ImportOptions::default()
+    };
+    let quality = measure(&read("box.stl", &options).unwrap().mesh);
+    assert!((quality.volume_mm3 / 1e6 - 1.0).abs() < 0.1, "{quality:?}");
+    assert!(quality.max_edge_mm < 30.0);
+}
+
+#[test]
+fn a_surface_needs_a_resolution_and_a_known_extension() {
+    let error = read("box.stl", &ImportOptions::default()).unwrap_err();
+    assert!(matches!(error, ImportError::NoResolution));
+    let error = read_text("", "step", &ImportOptions::default()).unwrap_err();
+    assert!(error.to_string().contains(".vtu"), "{error}");
+    let error = import(Path::new("missing.vtu"), &ImportOptions::default()).unwrap_err();
+    assert!(matches!(error, ImportError::Io { .. }), "{error}");
+}
+
+const TETRAHEDRON_OBJ: &str = "v 0 0 0\nv 9 0 0\nv 0 9 0\nv 0 0 9\n";
+
+fn obj(faces: &str, repair: bool) -> Result<Imported, ImportError> {
+    let options = ImportOptions {
+        resolution: Some(Resolution::Spacing(1.5)),
+        repair,
+        ..ImportOptions::default()
+    };
+    read_text(&format!("{TETRAHEDRON_OBJ}{faces}"), "obj", &options)
+}
+
+#[test]
+fn open_and_turned_surfaces_name_the_place() {
+    let error = obj("f 1 3 2\nf 1 2 4\nf 1 4 3\n", true).unwrap_err();
+    assert!(matches!(error, ImportError::Open { count: 3, .. }), "{error}");
+    let error = obj("f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 4 3\n", true).unwrap_err();
+    assert!(matches!(error, ImportError::Orientation { .. }), "{error}");
+    let doubled = "f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\nf 2 3 4\n";
+    let error = obj(doubled, true).unwrap_err();
+    assert!(matches!(error, ImportError::SurfaceEdge { faces: 3, .. }), "{error}");
+}
+
+#[test]
+fn an_inside_out_surface_is_turned_on_request() {
+    let faces = "f 1 2 3\nf 1 4 2\nf 1 3 4\nf 2 4 3\n";
+    assert!(matches!(
+        obj(faces, false).unwrap_err(),
+        ImportError::InsideOut { .. }
+    ));
+    let imported = obj(faces, true).unwrap();
+    assert_eq!(imported.repairs[0].count, 4);
+    assert!(measure(&imported.mesh).volume_mm3 > 90.0);
+}
+
+#[test]
+fn smaller_parts_of_a_surface_are_dropped_on_request() {
+    let second = "v 20 0 0\nv 22 0 0\nv 20 2 0\nv 20 0 2\n";
+    let faces = "f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\nf 5 7 6\nf 5 6 8\nf 5 8 7\nf 6 7 8\n";
+    let both = format!("{second}{faces}");
+    let error = obj(&both, false).unwrap_err();
+    assert!(matches!(error, ImportError::SurfaceParts { count: 2, face: 4 }), "{error}");
+    let imported = obj(&both, true).unwrap();
+    assert!(measure(&imported.mesh).high_mm[0] < 10.0);
+}
+
+/// Two tetrahedra on one face.
+fn pair() -> RawTets {
+    RawTets {
+        positions: vec![
+            [0.0, 0.0, 0.0],
+            [3.0, 0.0, 0.0],
+            [0.0, 3.0, 0.0],
+            [0.0, 0.0, 3.0],
+            [3.0, 3.0, 3.0],
+        ],
+        tets: vec![[0, 1, 2, 3], [1, 2, 3, 4]],
+    }
+}
+
+/// The error without repair, and the repairs and the mesh with it.
+fn both(raw: RawTets) -> (ImportError, Vec<Repair>, Mesh) {
+    let error = from_tets(raw.clone(), false, &mut Vec::new()).unwrap_err();
+    let mut repairs = Vec::new();
+    let mesh = from_tets(raw, true, &mut repairs).unwrap();
+    (error, repairs, mesh)
+}
+
+#[test]
+fn a_sound_pair_passes_untouched() {
+    let mesh = from_tets(pair(), false, &mut Vec::new()).unwrap();
+    assert_eq!((mesh.tets.len(), mesh.surface.len()), (2, 6));
+}
+
+#[test]
+fn inverted_tets_are_named_and_turned() {
+    let mut raw = pair();
+    raw.tets[1].swap(0, 1);
+    let (error, repairs, mesh) = both(raw);
+    assert!(matches!(error, ImportError::Inverted { tet: 1, count: 1, .. }), "{error}");
+    assert_eq!((repairs.len(), repairs[0].first), (1, 1));
+    assert_eq!(mesh.tets.len(), 2);
+}
+
+#[test]
+fn degenerate_tets_are_named_and_dropped() {
+    let mut raw = pair();
+    raw.positions.push([1.0, 1.0, 0.0]);
+    raw.tets.insert(1, [0, 1, 2, 5]);
+    let (error, repairs, mesh) = both(raw);
+    assert!(matches!(error, ImportError::Degenerate { tet: 1, .. }), "{error}");
+    // The node of the dropped tetrahedron goes with it.
+    assert_eq!(repairs.len(), 2);
+    assert_eq!((mesh.node_count(), mesh.tets.len()), (5, 2));
+}
+
+#[test]
+fn repeated_tets_are_named_and_dropped() {
+    let mut raw = pair();
+    raw.tets.push([1, 0, 3, 2]);
+    let (error, repairs, mesh) = both(raw);
+    assert!(matches!(error, ImportError::Duplicate { first: 0, second: 2 }), "{error}");
+    assert_eq!(repairs[0].first, 2);
+    assert_eq!(mesh.tets.len(), 2);
+}
+
+#[test]
+fn unreferenced_nodes_are_named_and_dropped() {
+    let mut raw = pair();
+    raw.positions.insert(0, [50.0; 3]);
+    raw.tets.iter_mut().flatten().for_each(|node| *node += 1);
+    let (error, repairs, mesh) = both(raw);
+    assert!(matches!(error, ImportError::Unreferenced { node: 0, count: 1 }), "{error}");
+    assert_eq!(repairs.len(), 1);
+    assert_eq!(mesh.positions[0], [0.0; 3]);
+}
+
+#[test]
+fn parts_are_named_and_the_largest_kept() {
+    let mut raw = pair();
+    for p in [[9.0, 0.0, 0.0], [10.0, 0.0, 0.0], [9.0, 1.0, 0.0], [9.0, 0.0, 1.0]] {
+        raw.positions.push(p);
+    }
+    raw.tets.insert(0, [5, 6, 7, 8]);
+    let (error, repairs, mesh) = both(raw);
+    assert!(matches!(error, ImportError::Components { count: 2, tet: 1, .. }), "{error}");
+    assert_eq!(repairs[0].count, 1);
+    assert_eq!((mesh.node_count(), mesh.tets.len()), (5, 2));
+}
+
+#[test]
+fn non_finite_nodes_are_named_and_dropped_with_their_tets() {
+    let mut raw = pair();
+    raw.positions[4][1] = f64::NAN;
+    let (error, repairs, mesh) = both(raw);
+    assert!(matches!(error, ImportError::NonFinite { node: 4 }), "{error}");
+    assert_eq!(repairs.len(), 2);
+    assert_eq!((mesh.node_count(), mesh.tets.len()), (4, 1));
+}
+
+#[test]
+fn a_node_out_of_range_is_never_repaired() {
+    let mut raw = pair();
+    raw.tets[1][3] = 7;
+    let error = from_tets(raw, true, &mut Vec::new()).unwrap_err();
+    assert!(
+        matches!(error, ImportError::NodeOutOfRange { index: 1, node: 7, count: 5, .. }),
+        "{error}"
+    );
+}
+
+#[test]
+fn damaged_gmsh_files_say_where() {
+    let sound = std::fs::read_to_string(fixture("box-41-text.msh")).unwrap();
+    let cases = [
+        (sound.replace("4.1 0 8", "4.0 0 8"), "version 4.0"),
+        (sound.replace("$EndNodes", "$EndNode"), "$EndNode"),
+        (sound[..sound.len() / 2].to_string(), "ends too early"),
+        (sound.replace("$Nodes", "$Comments\n$EndComments\n$Other"), "$Other has no"),
+    ];
+    for (text, expected) in cases {
+        let error = read_text(&text, "msh", &ImportOptions::default()).unwrap_err();
+        assert!(error.to_string().contains(expected), "{error}");
+    }
+}
+
+#[test]
+fn balls_select_the_sets() {
+    let ball = |text: &str| text.parse::<Ball>().unwrap();
+    let options = ImportOptions {
+        fixed: vec![ball("0,5,2.5,6")],
+        domain: vec![ball("20, 5, 2.5, 7")],
+        window: vec![ball("20,5,2.5,12")],
+        ..repairing()
+    };
+    let mesh = read("box-41-text.msh", &options).unwrap().mesh;
+    let at = |node: u32| mesh.positions[node as usize];
+    assert!(!mesh.fixed.is_empty() && mesh.fixed.iter().all(|&n| at(n)[0] <= 6.0));
+    assert!(!mesh.supported.is_empty() && mesh.supported.iter().all(|&n| at(n)[0] < 20.0));
+    let touched = |&row: &u32| mesh.surface[row as usize].iter().any(|&n| at(n)[0] > 13.0);
+    assert!(!mesh.domain.is_empty() && mesh.domain.iter().all(touched));
+
+    let nowhere = ImportOptions {
+        fixed: vec![ball("100,0,0,1")],
+        ..ImportOptions::default()
+    };
+    let error = read("box-41-text.msh", &nowhere).unwrap_err();
+    assert!(error.to_string().contains("`fixed` is empty"), "{error}");
+    assert!("1,2,3".parse::<Ball>().is_err());
+    assert!("1,2,3,-4".parse::<Ball>().is_err());
+}
