@@ -14,6 +14,8 @@ pub mod forces;
 pub mod graph;
 pub mod grid;
 pub mod guard;
+#[cfg(feature = "contact")]
+pub mod instrument;
 pub mod kernels;
 pub mod library;
 pub mod model;

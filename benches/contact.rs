@@ -1,0 +1,92 @@
+//! Instrument poses to contacts, and contact forces, on a slab as large as the surface and the
+//! contact patches of K = 21,670: about 16,000 surface nodes, 60 nodes in contact.
+
+use criterion::{Criterion, criterion_group, criterion_main};
+use upt::forces::{Moduli, ReactionForces};
+use upt::instrument::{Instrument, InstrumentContacts, Shape};
+
+/// A slab of `n x n x layers` cells of 4 mm: positions, tetrahedra (six a cell), top and bottom faces.
+fn slab(n: u32, layers: u32) -> (Vec<f32>, Vec<u32>, Vec<u32>) {
+    let node = |x: u32, y: u32, z: u32| x + (n + 1) * (y + (n + 1) * z);
+    let (mut positions, mut tets, mut faces) = (Vec::new(), Vec::new(), Vec::new());
+    for z in 0..=layers {
+        for y in 0..=n {
+            for x in 0..=n {
+                positions.extend([4.0 * x as f32, 4.0 * y as f32, 4.0 * z as f32]);
+            }
+        }
+    }
+    for y in 0..n {
+        for x in 0..n {
+            for z in 0..layers {
+                let corner = |i: u32| node(x + (i & 1), y + (i >> 1 & 1), z + (i >> 2));
+                for path in [[1, 3], [3, 2], [2, 6], [6, 4], [4, 5], [5, 1]] {
+                    tets.extend([0, path[0], path[1], 7].map(corner));
+                }
+            }
+            let top = [(0, 0), (1, 0), (1, 1), (0, 1)].map(|(i, j)| node(x + i, y + j, layers));
+            let bottom = [(0, 0), (0, 1), (1, 1), (1, 0)].map(|(i, j)| node(x + i, y + j, 0));
+            for [a, b, c, d] in [top, bottom] {
+                faces.extend([a, b, c, a, c, d]);
+            }
+        }
+    }
+    (positions, tets, faces)
+}
+
+fn contact(c: &mut Criterion) {
+    let (positions, tets, faces) = slab(89, 3);
+    let displacement = vec![0.0; positions.len()];
+    let mut contacts = InstrumentContacts::new(&positions, &faces, &[]);
+    let shapes = [
+        Shape::Capsule {
+            half_length: 20.0,
+            radius: 9.0,
+        },
+        Shape::Box {
+            half_extents: [16.0, 14.0, 3.0],
+        },
+        Shape::Spatula {
+            half_extents: [16.0, 14.0, 3.0],
+            radius: 1.5,
+        },
+    ];
+    for (name, shape) in ["capsule", "box", "spatula"].into_iter().zip(shapes) {
+        let instrument = Instrument {
+            shape,
+            position: [170.0, 170.0, 14.0],
+            rotation: [0.0, 0.0, 0.0, 1.0],
+            sticking: false,
+        };
+        let touched = contacts
+            .find(&[instrument], &displacement)
+            .map(|(nodes, _)| nodes.len());
+        println!(
+            "{name}: {} of {} surface nodes touched",
+            touched.unwrap_or(0),
+            2 * 90 * 90
+        );
+        c.bench_function(&format!("instrument/{name}, 16,200 surface nodes"), |b| {
+            b.iter(|| {
+                contacts.reset();
+                contacts
+                    .find(&[instrument], &displacement)
+                    .map(|(nodes, _)| nodes.len())
+            });
+        });
+    }
+    for side in [8, 11] {
+        let nodes: Vec<u32> = (0..side * side)
+            .map(|i| 40 + i % side + 90 * (40 + i / side) + 3 * 90 * 90)
+            .collect();
+        let moduli = Moduli::from_young(3000.0, 0.49);
+        let mut forces = ReactionForces::new(&positions, &tets, &nodes, moduli);
+        let mut out = vec![0.0; 3 * nodes.len()];
+        c.bench_function(&format!("forces/{} contact nodes", nodes.len()), |b| {
+            b.iter(|| forces.reaction(&displacement, &nodes, &mut out));
+        });
+    }
+}
+
+criterion_group!(benches, contact);
+criterion_main!(benches);

@@ -1,0 +1,233 @@
+use super::*;
+
+/// A slab of `n x n` squares of 2 mm, 20 mm thick, with only its top and bottom faces: top nodes
+/// first (z = 0, outward +z), then bottom nodes (z = -20, outward -z).
+fn slab(n: u32) -> (Vec<f32>, Vec<u32>) {
+    let (mut positions, mut faces) = (Vec::new(), Vec::new());
+    for z in [0.0, -20.0] {
+        for y in 0..=n {
+            for x in 0..=n {
+                positions.extend([2.0 * x as f32, 2.0 * y as f32, z]);
+            }
+        }
+    }
+    let side = (n + 1) * (n + 1);
+    for y in 0..n {
+        for x in 0..n {
+            let a = x + (n + 1) * y;
+            let (b, c, d) = (a + 1, a + n + 2, a + n + 1);
+            faces.extend([a, b, c, a, c, d]);
+            faces.extend([a, c, b, a, d, c].map(|node| node + side));
+        }
+    }
+    (positions, faces)
+}
+
+const LEVEL: [f32; 4] = [0.0, 0.0, 0.0, 1.0];
+
+fn capsule(z: f32, sticking: bool) -> Instrument {
+    Instrument {
+        shape: Shape::Capsule {
+            half_length: 6.0,
+            radius: 4.0,
+        },
+        position: [20.0, 20.0, z],
+        rotation: LEVEL,
+        sticking,
+    }
+}
+
+/// The state that a step gives back: contact nodes are at `c`, others spring back to rest.
+fn follow(count: usize, nodes: &[u32], vectors: &[f32]) -> Vec<f32> {
+    let mut u = vec![0.0; count];
+    for (&node, c) in nodes.iter().zip(vectors.chunks_exact(3)) {
+        u[3 * node as usize..][..3].copy_from_slice(c);
+    }
+    u
+}
+
+#[test]
+fn touched_nodes_end_on_the_surface_and_no_other_moves() {
+    let (positions, faces) = slab(20);
+    let mut contacts = InstrumentContacts::new(&positions, &faces, &[]);
+    let instruments = [
+        capsule(2.5, false),
+        Instrument {
+            shape: Shape::Box {
+                half_extents: [4.5, 3.0, 1.0],
+            },
+            position: [8.0, 34.0, 0.3],
+            rotation: [0.0, 0.0, 0.38268343, 0.92387953],
+            sticking: false,
+        },
+        Instrument {
+            shape: Shape::Spatula {
+                half_extents: [3.0, 5.0, 1.5],
+                radius: 1.0,
+            },
+            position: [33.0, 8.0, 0.5],
+            rotation: [0.1736482, 0.0, 0.0, 0.9848078],
+            sticking: false,
+        },
+    ];
+    let zero = vec![0.0; positions.len()];
+    let (nodes, vectors) = contacts.find(&instruments, &zero).unwrap();
+    assert!(nodes.is_sorted() && nodes.len() > 20);
+    let placed: Vec<Placed> = instruments
+        .iter()
+        .map(|i| Placed::new(i, 0).unwrap())
+        .collect();
+    let mut each = [0; 3];
+    for node in 0..positions.len() as u32 / 3 {
+        let p = Vector::from(triple(&positions, node));
+        let inside = placed
+            .iter()
+            .position(|i| i.nearest(p, Vector::Z).distance < 0.0);
+        let found = nodes.binary_search(&node);
+        assert_eq!(inside.is_some(), found.is_ok(), "node {node}");
+        if let (Some(by), Ok(at)) = (inside, found) {
+            each[by] += 1;
+            let c = Vector::from_slice(&vectors[3 * at..]);
+            let left = placed[by].nearest(p + c, Vector::Z).distance;
+            assert!(left.abs() < 1e-3, "node {node}: {left}");
+            assert!(c.z < 1e-3, "pushed into the tissue: {c}");
+        }
+    }
+    assert!(each.iter().all(|&count| count > 3), "{each:?}");
+}
+
+#[test]
+fn a_held_instrument_keeps_its_contacts_and_a_leaving_one_lets_go() {
+    let (positions, faces) = slab(20);
+    for sticking in [false, true] {
+        let mut contacts = InstrumentContacts::new(&positions, &faces, &[]);
+        let mut u = vec![0.0; positions.len()];
+        let mut counts = Vec::new();
+        let mut lowest = Vec::new();
+        for z in [4.5, 3.5, 2.5, 1.5, 1.5, 1.5, 1.9, 2.3, 3.2, 4.1, 5.0] {
+            let (nodes, vectors) = contacts.find(&[capsule(z, sticking)], &u).unwrap();
+            counts.push(nodes.len());
+            lowest.push(vectors.iter().copied().fold(0.0, f32::min));
+            // Never pulled out; nodes on the flank ride along it, within the skin.
+            assert!(
+                vectors.chunks_exact(3).all(|c| c[2] < SKIN_MM),
+                "{vectors:?}"
+            );
+            u = follow(u.len(), nodes, vectors);
+        }
+        assert_eq!(counts[0], 0, "not there yet");
+        assert!(counts[3] > counts[1] && counts[1] > 0, "{counts:?}");
+        assert_eq!(counts[3], counts[5], "held: {counts:?}");
+        assert!((lowest[5] + 2.5).abs() < 0.05, "{lowest:?}");
+        assert!(
+            counts[7] > 0 && (lowest[7] + 1.7).abs() < 0.05,
+            "follows: {lowest:?}"
+        );
+        assert_eq!(counts[10], 0, "left: {counts:?}");
+    }
+}
+
+#[test]
+fn sticking_drags_and_sliding_does_not() {
+    let (positions, faces) = slab(20);
+    let mut drag = [0.0; 2];
+    for (drag, sticking) in drag.iter_mut().zip([false, true]) {
+        let mut contacts = InstrumentContacts::new(&positions, &faces, &[]);
+        let mut u = vec![0.0; positions.len()];
+        for shift in [0.0, 0.4, 0.8, 1.2] {
+            let flat = Instrument {
+                shape: Shape::Spatula {
+                    half_extents: [6.0, 6.0, 2.0],
+                    radius: 0.5,
+                },
+                position: [20.0 + shift, 20.0, 0.5],
+                rotation: LEVEL,
+                sticking,
+            };
+            let (nodes, vectors) = contacts.find(&[flat], &u).unwrap();
+            u = follow(u.len(), nodes, vectors);
+        }
+        // The node below the middle.
+        *drag = u[3 * (10 + 21 * 10)];
+    }
+    assert!(drag[0].abs() < 1e-4, "{drag:?}");
+    assert!((drag[1] - 1.2).abs() < 1e-4, "{drag:?}");
+}
+
+#[test]
+fn a_thin_instrument_that_moved_past_the_surface_pushes_inwards() {
+    let (positions, faces) = slab(20);
+    let blade = |z| Instrument {
+        shape: Shape::Spatula {
+            half_extents: [5.0, 5.0, 0.8],
+            radius: 0.4,
+        },
+        position: [20.0, 20.0, z],
+        rotation: LEVEL,
+        sticking: false,
+    };
+    let zero = vec![0.0; positions.len()];
+    let mut contacts = InstrumentContacts::new(&positions, &faces, &[]);
+    assert!(contacts.find(&[blade(2.0)], &zero).unwrap().0.is_empty());
+    // Its middle is 0.5 mm below the surface: the shortest way out would be up.
+    let (nodes, vectors) = contacts.find(&[blade(-0.5)], &zero).unwrap();
+    assert!(!nodes.is_empty());
+    for c in vectors.chunks_exact(3) {
+        assert!(c[2] < -0.5, "{c:?}");
+    }
+}
+
+#[test]
+fn contact_from_the_inside_is_ignored() {
+    let (positions, faces) = slab(20);
+    let mut contacts = InstrumentContacts::new(&positions, &faces, &[]);
+    let zero = vec![0.0; positions.len()];
+    let side = 21 * 21;
+    contacts.find(&[capsule(-10.0, false)], &zero).unwrap();
+    // Downwards, until the bottom nodes are inside it: they are reached from within the tissue.
+    let (nodes, _) = contacts.find(&[capsule(-18.0, false)], &zero).unwrap();
+    assert!(nodes.iter().all(|&node| node < side), "{nodes:?}");
+}
+
+#[test]
+fn held_nodes_are_never_touched_and_bad_input_changes_nothing() {
+    let (positions, faces) = slab(20);
+    let held: Vec<u32> = (0..441).filter(|i| i % 2 == 0).collect();
+    let mut contacts = InstrumentContacts::new(&positions, &faces, &held);
+    let zero = vec![0.0; positions.len()];
+    let good = capsule(2.5, false);
+    let before: Vec<u32> = contacts.find(&[good], &zero).unwrap().0.to_vec();
+    assert!(!before.is_empty() && before.iter().all(|node| node % 2 == 1));
+    let with = |change: fn(&mut Instrument)| {
+        let mut instrument = good;
+        change(&mut instrument);
+        instrument
+    };
+    for (bad, word) in [
+        (with(|i| i.position[1] = f32::NAN), "finite"),
+        (with(|i| i.rotation = [0.0; 4]), "rotation"),
+        (
+            with(|i| {
+                i.shape = Shape::Box {
+                    half_extents: [1.0, 0.0, 1.0],
+                }
+            }),
+            "half_extents",
+        ),
+        (
+            with(|i| {
+                i.shape = Shape::Spatula {
+                    half_extents: [1.0; 3],
+                    radius: 2.0,
+                }
+            }),
+            "radius",
+        ),
+    ] {
+        let message = contacts.find(&[bad], &zero).unwrap_err().to_string();
+        assert!(message.contains(word), "{message}");
+    }
+    assert!(contacts.find(&[good], &zero[3..]).is_err());
+    assert_eq!(contacts.find(&[good], &zero).unwrap().0, before);
+    assert!(contacts.find(&[], &zero).unwrap().0.is_empty());
+}
