@@ -161,15 +161,10 @@ impl InstrumentContacts {
                 continue;
             }
             let before = std::mem::replace(&mut self.touched_by[i], 0);
-            let target = match before {
-                0 => self.touch(i, Vector::from(p), displacement, placed),
-                by => {
-                    let by = usize::from(by) - 1;
-                    placed[by]
-                        .as_ref()
-                        .and_then(|instrument| self.keep(i, Vector::from(p), instrument))
-                        .map(|target| (by, target))
-                }
+            let point = Vector::from(p);
+            let target = match self.holder(i, point, before, placed) {
+                Some((by, instrument)) => self.keep(i, point, instrument).map(|to| (by, to)),
+                None => self.touch(i, point, displacement, placed, before),
             };
             if let Some((by, target)) = target {
                 self.touched_by[i] = by as u8 + 1;
@@ -182,6 +177,22 @@ impl InstrumentContacts {
         self.centres
             .extend(placed.iter().flatten().map(Placed::centre));
         Ok((&self.nodes, &self.vectors))
+    }
+
+    /// The instrument that a touched node is to follow; none where the node is (again) inside a
+    /// sliding one, because the tissue has not followed yet: that is a touch like the first.
+    fn holder<'a>(
+        &self,
+        i: usize,
+        point: Vector,
+        before: u8,
+        placed: &'a [Option<Placed>],
+    ) -> Option<(usize, &'a Placed)> {
+        let by = usize::from(before.checked_sub(1)?);
+        let instrument = placed.get(by)?.as_ref()?;
+        let hint = point - Vector::from(self.rest[i]);
+        let follows = instrument.sticking || instrument.nearest(point, hint).distance > -1e-3;
+        follows.then_some((by, instrument))
     }
 
     /// Where a node goes that was touched before, or `None` where the instrument has left it.
@@ -197,13 +208,15 @@ impl InstrumentContacts {
         (nearest.distance <= SKIN_MM && pushed).then_some(nearest.point)
     }
 
-    /// Where a node goes that was free, and by which instrument; `None` where none touches it.
+    /// Where a node inside an instrument goes, and by which; `None` where none touches it. An
+    /// instrument that touched it `before` is known to come from outside.
     fn touch(
         &mut self,
         i: usize,
         point: Vector,
         displacement: &[f32],
         placed: &[Option<Placed>],
+        before: u8,
     ) -> Option<(usize, Vector)> {
         let mut normal = None;
         let mut deepest: Option<(f32, usize, Vector)> = None;
@@ -222,11 +235,9 @@ impl InstrumentContacts {
             }
             let mut target = nearest.point;
             if nearest.normal.dot(outward) > 0.0 {
-                let motion = self
-                    .centres
-                    .get(by)
-                    .map(|before| instrument.centre() - *before);
-                if motion.is_some_and(|motion| motion.dot(outward) >= 0.0) {
+                let motion = self.centres.get(by).map(|from| instrument.centre() - *from);
+                let known = usize::from(before) == by + 1;
+                if !known && motion.is_some_and(|motion| motion.dot(outward) >= 0.0) {
                     continue;
                 }
                 match instrument.way_out(point, -outward, SHELL_MM) {

@@ -175,6 +175,10 @@ fn a_thin_instrument_that_moved_past_the_surface_pushes_inwards() {
     for c in vectors.chunks_exact(3) {
         assert!(c[2] < -0.5, "{c:?}");
     }
+    // Asked again before the tissue has moved, the answer is the same.
+    let first = (nodes.to_vec(), vectors.to_vec());
+    let (nodes, vectors) = contacts.find(&[blade(-0.5)], &zero).unwrap();
+    assert_eq!((nodes.to_vec(), vectors.to_vec()), first);
 }
 
 #[test]
