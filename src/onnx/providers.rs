@@ -169,7 +169,12 @@ fn missing(provider: Provider) -> Option<String> {
         #[cfg(feature = "tensorrt-rtx")]
         Provider::TensorRtRtx => ep::NVRTX::is_available(),
         #[cfg(not(all(feature = "cuda", feature = "tensorrt", feature = "tensorrt-rtx")))]
-        _ => return Some(format!("this build lacks the feature `{}`", provider.name())),
+        _ => {
+            return Some(format!(
+                "this build lacks the feature `{}`",
+                provider.name()
+            ));
+        }
     };
     match available {
         Ok(true) => None,

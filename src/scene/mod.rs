@@ -12,6 +12,7 @@ mod reduced;
 mod shared;
 mod snapshot;
 mod timing;
+mod tools;
 mod upt;
 mod worker;
 
@@ -77,6 +78,7 @@ pub struct Scene {
     model: Arc<Model>,
     mesh: Arc<Mesh>,
     latest_wins: bool,
+    tools: tools::Tools,
 }
 
 impl Scene {
@@ -108,6 +110,7 @@ impl Scene {
             model,
             mesh,
             latest_wins: options.latest_wins,
+            tools: tools::Tools::default(),
         })
     }
 
@@ -142,6 +145,7 @@ impl Scene {
     pub fn reset(&self) -> Result<()> {
         self.with(|core, published| {
             core.reset(published);
+            self.tools.reset();
             Ok(())
         })
     }

@@ -1,0 +1,256 @@
+//! Every damage of a bundle is an error that names file and field, never a crash.
+
+mod fixture;
+
+use std::path::Path;
+
+use fixture::{BUNDLES, copy_of, find_runtime};
+use sha2::{Digest, Sha256};
+use upt::{Error, Model, ModelOptions};
+
+fn open(path: &Path) -> Result<(), Error> {
+    Model::open(path, &ModelOptions::default()).map(|_| ())
+}
+
+/// Opens a copy whose manifest was changed.
+fn with_manifest(name: &str, change: impl Fn(&mut serde_json::Value)) -> Error {
+    find_runtime();
+    let folder = copy_of(name);
+    let path = folder.path().join("bundle.json");
+    let mut manifest: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
+    change(&mut manifest);
+    std::fs::write(&path, manifest.to_string()).unwrap();
+    open(folder.path()).unwrap_err()
+}
+
+/// Opens a copy in which a file was changed and its hash in the manifest renewed.
+fn with_file(name: &str, file: &str, change: impl Fn(&mut Vec<u8>)) -> Result<(), Error> {
+    find_runtime();
+    let folder = copy_of(name);
+    let mut bytes = std::fs::read(folder.path().join(file)).unwrap();
+    change(&mut bytes);
+    std::fs::write(folder.path().join(file), &bytes).unwrap();
+    let path = folder.path().join("bundle.json");
+    let mut manifest: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
+    let digest: String = Sha256::digest(&bytes)
+        .iter()
+        .map(|b| format!("{b:02x}"))
+        .collect();
+    manifest["files"][file] = serde_json::json!({"bytes": bytes.len(), "sha256": digest});
+    std::fs::write(&path, manifest.to_string()).unwrap();
+    open(folder.path())
+}
+
+#[test]
+fn manifest_errors_name_the_field() {
+    let set = |pointer: &'static str, value: serde_json::Value| {
+        move |manifest: &mut serde_json::Value| {
+            *manifest.pointer_mut(pointer).unwrap() = value.clone()
+        }
+    };
+    for (bundle, pointer, value, field) in [
+        ("tiny-upt", "/format", "zip".into(), "format"),
+        ("tiny-upt", "/dt_s", serde_json::json!(-1), "dt_s"),
+        ("tiny-upt", "/length_unit", "m".into(), "length_unit"),
+        ("tiny-upt", "/kind", "other".into(), "kind"),
+        ("tiny-upt", "/boundary", "free".into(), "boundary"),
+        (
+            "tiny-upt",
+            "/mesh/nodes",
+            serde_json::json!(211),
+            "mesh.nodes",
+        ),
+        (
+            "tiny-upt",
+            "/mesh/mesh_sha256",
+            "00".into(),
+            "mesh.mesh_sha256",
+        ),
+        (
+            "tiny-upt",
+            "/mesh/file",
+            "../mesh.safetensors".into(),
+            "mesh.file",
+        ),
+        (
+            "tiny-upt",
+            "/upt/graph/radius_mm",
+            serde_json::json!("x"),
+            "upt.graph.radius_mm",
+        ),
+        (
+            "tiny-upt",
+            "/upt/graph/max_degree",
+            serde_json::json!(0),
+            "upt.graph.max_degree",
+        ),
+        (
+            "tiny-upt",
+            "/upt/normalisation/std",
+            serde_json::json!([1, 0, 1]),
+            "upt.normalisation.std",
+        ),
+        (
+            "tiny-upt",
+            "/upt/dims/query",
+            serde_json::json!(31),
+            "upt.dims.query",
+        ),
+        (
+            "tiny-upt",
+            "/upt/features",
+            serde_json::json!(["prior"]),
+            "prior",
+        ),
+        (
+            "tiny-upt",
+            "/upt/weights",
+            "none.safetensors".into(),
+            "upt.weights",
+        ),
+        (
+            "tiny-upt",
+            "/envelope/max_push_mm",
+            serde_json::json!(0),
+            "envelope.max_push_mm",
+        ),
+        (
+            "tiny-reduced",
+            "/reduced/bound/decay",
+            serde_json::json!(1),
+            "reduced.bound.decay",
+        ),
+        (
+            "tiny-reduced",
+            "/reduced/fade/end_push_mm",
+            serde_json::json!(1),
+            "reduced.fade",
+        ),
+        (
+            "tiny-reduced",
+            "/reduced/inputs",
+            serde_json::json!(["q"]),
+            "reduced.inputs",
+        ),
+        (
+            "tiny-reduced",
+            "/material/poisson",
+            serde_json::json!(0.5),
+            "material.poisson",
+        ),
+    ] {
+        let error = with_manifest(bundle, set(pointer, value));
+        assert_eq!(error.status(), -31, "{pointer}: {error}");
+        let text = error.to_string();
+        assert!(
+            text.contains("bundle.json") && text.contains(field),
+            "{pointer}: {text}"
+        );
+    }
+    let missing = with_manifest("tiny-reduced", |manifest| {
+        manifest.as_object_mut().unwrap().remove("reduced");
+    });
+    assert!(missing.to_string().contains("`reduced`"));
+    assert_eq!(
+        with_manifest("tiny-upt", set("/version", serde_json::json!(2))).status(),
+        -32
+    );
+}
+
+#[test]
+fn missing_short_and_altered_files_are_named() {
+    find_runtime();
+    assert_eq!(open(Path::new("no/such/bundle")).unwrap_err().status(), -30);
+    for bundle in BUNDLES {
+        for file in ["latent.onnx", "mesh.safetensors"] {
+            let folder = copy_of(bundle);
+            let path = folder.path().join(file);
+            let bytes = std::fs::read(&path).unwrap();
+            std::fs::remove_file(&path).unwrap();
+            let error = open(folder.path()).unwrap_err();
+            assert_eq!(error.status(), -30);
+            assert!(error.to_string().contains(file));
+            std::fs::write(&path, &bytes[1..]).unwrap();
+            let error = open(folder.path()).unwrap_err();
+            assert_eq!(error.status(), -31);
+            let mut altered = bytes.clone();
+            altered[bytes.len() / 2] ^= 1;
+            std::fs::write(&path, altered).unwrap();
+            let error = open(folder.path()).unwrap_err();
+            assert!(error.to_string().contains("SHA-256"), "{error}");
+        }
+    }
+}
+
+#[test]
+fn graphs_and_tensors_that_do_not_fit_are_refused() {
+    for (bundle, file) in [
+        ("tiny-reduced", "latent.onnx"),
+        ("tiny-upt", "latent.onnx"),
+        ("tiny-upt", "embed.onnx"),
+    ] {
+        let error = with_file(bundle, file, |bytes| bytes.truncate(40)).unwrap_err();
+        assert!(matches!(error.status(), -31 | -21), "{error}");
+        assert!(!error.to_string().is_empty());
+    }
+    // A graph of another model: names and shapes are checked.
+    let other = std::fs::read(fixture::path("tiny-upt/latent.onnx")).unwrap();
+    let error = with_file("tiny-reduced", "latent.onnx", |bytes| {
+        bytes.clone_from(&other)
+    })
+    .unwrap_err();
+    assert_eq!(error.status(), -31);
+    assert!(error.to_string().contains("state"), "{error}");
+    for (bundle, file) in [
+        ("tiny-reduced", "prior.safetensors"),
+        ("tiny-upt", "weights.safetensors"),
+        ("tiny-upt", "mesh.safetensors"),
+    ] {
+        let error = with_file(bundle, file, |bytes| {
+            let at = bytes.len() - 4;
+            bytes[at..].copy_from_slice(&f32::NAN.to_le_bytes());
+        })
+        .unwrap_err();
+        assert_eq!(error.status(), -31, "{file}: {error}");
+    }
+}
+
+#[test]
+fn mutated_bytes_give_an_error_or_a_model_never_a_crash() {
+    let mut state = 88172645463325252u64;
+    let mut random = move || {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        state
+    };
+    for (bundle, file) in [
+        ("tiny-reduced", "prior.safetensors"),
+        ("tiny-reduced", "mesh.safetensors"),
+        ("tiny-reduced", "latent.onnx"),
+        ("tiny-upt", "weights.safetensors"),
+        ("tiny-upt", "decoder.onnx"),
+    ] {
+        for _ in 0..25 {
+            let (place, value) = (random(), random() as u8);
+            // Half of the hits go to the header, where they hurt most.
+            let _ = with_file(bundle, file, |bytes| {
+                let limit = if place % 2 == 0 {
+                    bytes.len().min(600)
+                } else {
+                    bytes.len()
+                };
+                bytes[(place / 2) as usize % limit] = value;
+            });
+        }
+    }
+    let manifest = std::fs::read(fixture::path("tiny-upt/bundle.json")).unwrap();
+    for _ in 0..300 {
+        let mut bytes = manifest.clone();
+        let at = random() as usize % bytes.len();
+        bytes[at] = random() as u8;
+        let _ = upt::bundle::Manifest::parse(&bytes);
+    }
+}

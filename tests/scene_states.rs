@@ -1,0 +1,304 @@
+//! Sleep, sampling, points, snapshots and the worker.
+
+mod fixture;
+
+use std::time::Duration;
+
+use fixture::{BUNDLES, bits, largest_difference, model, plain, push, rollout, scene, sparse};
+use upt::scene::{QUIET_DISPLACEMENT, QUIET_STEPS};
+use upt::{Contact, Error, Progress, SceneOptions, StepInput};
+
+const FREE: StepInput<'static> = StepInput {
+    displacement: None,
+    contact: Contact::None,
+};
+
+#[test]
+fn a_reduced_scene_falls_asleep_and_wakes_at_once() {
+    let model = model("tiny-reduced");
+    let options = SceneOptions {
+        no_sleep: false,
+        ..plain()
+    };
+    let scene = scene(&model, &options);
+    let contact = push(&model, 2);
+    scene.step(sparse(&contact), None).unwrap();
+    let mut out = vec![1.0; 3 * scene.node_count()];
+    let mut before = f32::INFINITY;
+    let fell_asleep = (0..400)
+        .find(|_| {
+            scene.step(FREE, Some(&mut out)).unwrap();
+            let stats = scene.stats();
+            if !stats.sleeping {
+                before = stats.max_displacement_mm;
+            }
+            stats.sleeping
+        })
+        .expect("the bound of the correction decays, so the scene must come to rest");
+    assert!(fell_asleep as u32 >= QUIET_STEPS);
+    assert!(before <= QUIET_DISPLACEMENT);
+    scene.step(FREE, Some(&mut out)).unwrap();
+    assert!(
+        out.iter().all(|&u| u == 0.0),
+        "a sleeping scene is exactly at rest"
+    );
+    assert_eq!(scene.stats().decoded_node_count, 0);
+    scene.step(sparse(&contact), Some(&mut out)).unwrap();
+    assert!(!scene.stats().sleeping);
+    // Waking from exact rest gives what a new scene gives.
+    let fresh = fixture::scene(&model, &options);
+    let mut first = out.clone();
+    fresh.step(sparse(&contact), Some(&mut first)).unwrap();
+    assert_eq!(bits(&out), bits(&first));
+}
+
+#[test]
+fn sampling_passes_through_both_states() {
+    for name in BUNDLES {
+        for cubic_sampling in [false, true] {
+            let model = model(name);
+            let scene = scene(
+                &model,
+                &SceneOptions {
+                    cubic_sampling,
+                    ..plain()
+                },
+            );
+            let states = rollout(&scene, 5);
+            let mut out = vec![0.0; states[0].len()];
+            scene.sample(0.0, &mut out).unwrap();
+            assert_eq!(bits(&out), bits(&states[3]));
+            scene.sample(1.0, &mut out).unwrap();
+            assert_eq!(bits(&out), bits(&states[4]));
+            scene.sample(7.0, &mut out).unwrap();
+            assert_eq!(bits(&out), bits(&states[4]), "alpha is clamped");
+            scene.sample(0.5, &mut out).unwrap();
+            let spread = largest_difference(&states[3], &states[4]);
+            assert!(largest_difference(&out, &states[3]) <= 1.3 * spread);
+            assert!(largest_difference(&out, &states[4]) <= 1.3 * spread);
+            assert!(largest_difference(&out, &states[3]) > 0.0);
+            assert_eq!(scene.sample(f64::NAN, &mut out).unwrap_err().status(), -6);
+            assert_eq!(scene.sample(0.5, &mut out[1..]).unwrap_err().status(), -2);
+        }
+    }
+}
+
+#[test]
+fn attached_points_follow_the_tetrahedra_around_them() {
+    for name in BUNDLES {
+        let model = model(name);
+        let scene = scene(&model, &plain());
+        // Nodes, and the centre of a tetrahedron, whose displacement is the mean of its corners'.
+        let tet: Vec<u32> = model.indices(upt::IndexSet::Tets)[400..404].to_vec();
+        let p = |node: u32| &model.positions()[3 * node as usize..3 * node as usize + 3];
+        let mut points: Vec<f32> = [7u32, 150, 33]
+            .iter()
+            .flat_map(|&n| p(n).to_vec())
+            .collect();
+        points.extend((0..3).map(|axis| tet.iter().map(|&n| p(n)[axis]).sum::<f32>() / 4.0));
+        points.extend([1e4, 0.0, 0.0]);
+        let region: Vec<u32> = vec![3, 5];
+        scene.set_region(Some(&region)).unwrap();
+        scene.attach_points(Some(&points)).unwrap();
+        assert_eq!(scene.point_count(), 5);
+        rollout(&scene, 5);
+        let mut at_points = vec![0.0; 15];
+        scene.read_points(&mut at_points).unwrap();
+        let mut nodes = vec![0.0; 9];
+        scene.decode(&[7, 150, 33], &mut nodes).unwrap();
+        assert!(largest_difference(&at_points[..9], &nodes) < 1e-4);
+        let mut corners = vec![0.0; 12];
+        scene.decode(&tet, &mut corners).unwrap();
+        for axis in 0..3 {
+            let mean = (0..4).map(|k| corners[3 * k + axis]).sum::<f32>() / 4.0;
+            assert!((at_points[9 + axis] - mean).abs() < 1e-4);
+        }
+        assert!(at_points.iter().all(|u| u.is_finite()));
+        scene.sample_points(0.5, &mut at_points).unwrap();
+        assert_eq!(
+            scene
+                .attach_points(Some(&[f32::NAN; 3]))
+                .unwrap_err()
+                .status(),
+            -6
+        );
+        assert_eq!(scene.point_count(), 5, "a failed call changes nothing");
+        scene.attach_points(None).unwrap();
+        assert_eq!(scene.point_count(), 0);
+    }
+}
+
+#[test]
+fn a_snapshot_resumes_to_the_bit() {
+    for name in BUNDLES {
+        let model = model(name);
+        for at in [0, 1, 8, 12] {
+            let original = scene(&model, &plain());
+            rollout(&original, at);
+            let snapshot = original.save().unwrap();
+            let resumed = scene(
+                &model,
+                &SceneOptions {
+                    threads: 2,
+                    ..plain()
+                },
+            );
+            rollout(&resumed, 3);
+            resumed.restore(&snapshot).unwrap();
+            for t in at..at + 8 {
+                let contact = push(&model, t);
+                let mut a = vec![0.0; 3 * original.node_count()];
+                let mut b = a.clone();
+                original.step(sparse(&contact), Some(&mut a)).unwrap();
+                resumed.step(sparse(&contact), Some(&mut b)).unwrap();
+                assert_eq!(bits(&a), bits(&b), "{name}: saved after {at}, step {t}");
+            }
+            assert_eq!(original.stats().step_count, resumed.stats().step_count);
+        }
+    }
+}
+
+#[test]
+fn a_bad_snapshot_is_refused_and_changes_nothing() {
+    let [reduced, upt] = BUNDLES.map(model);
+    let scene = scene(&reduced, &plain());
+    rollout(&scene, 5);
+    let mut state = vec![0.0; 3 * scene.node_count()];
+    scene.read(&mut state).unwrap();
+    let snapshot = scene.save().unwrap();
+    let other = fixture::scene(&upt, &plain());
+    rollout(&other, 2);
+    assert_eq!(
+        scene.restore(&other.save().unwrap()).unwrap_err().status(),
+        -33
+    );
+    assert_eq!(scene.restore(&[]).unwrap_err().status(), -33);
+    for at in (0..snapshot.len()).step_by(7) {
+        let mut damaged = snapshot.clone();
+        damaged[at] ^= 0x41;
+        let status = scene.restore(&damaged).unwrap_err().status();
+        assert!(status == -33 || status == -32, "byte {at}: {status}");
+    }
+    for length in [1, 8, 40, snapshot.len() - 1] {
+        assert_eq!(
+            scene.restore(&snapshot[..length]).unwrap_err().status(),
+            -33
+        );
+    }
+    let mut after = state.clone();
+    scene.read(&mut after).unwrap();
+    assert_eq!(bits(&state), bits(&after));
+    scene.restore(&snapshot).unwrap();
+}
+
+#[test]
+fn the_worker_gives_what_the_host_would_get() {
+    for name in BUNDLES {
+        let model = model(name);
+        let (direct, background) = (scene(&model, &plain()), scene(&model, &plain()));
+        assert_eq!(
+            background.poll().unwrap_err().status(),
+            -7,
+            "nothing submitted"
+        );
+        for t in 0..12 {
+            let (nodes, vectors) = push(&model, t);
+            background.submit(&nodes, &vectors).unwrap();
+            // Reading is allowed at any time and never waits for the step.
+            let mut seen = vec![0.0; 3 * background.node_count()];
+            background.read(&mut seen).unwrap();
+            background.sample(0.5, &mut seen).unwrap();
+            background.stats();
+            assert_eq!(
+                background.wait(Duration::from_secs(60)).unwrap(),
+                Progress::Done
+            );
+            assert_eq!(background.poll().unwrap(), Progress::Done);
+            let mut want = seen.clone();
+            direct
+                .step(sparse(&(nodes, vectors)), Some(&mut want))
+                .unwrap();
+            background.read(&mut seen).unwrap();
+            assert_eq!(bits(&seen), bits(&want), "{name} step {t}");
+        }
+        // The error of a submitted step is told once.
+        background.submit(&[u32::MAX], &[0.0; 3]).unwrap();
+        assert!(matches!(
+            background.wait(Duration::from_secs(60)),
+            Err(Error::Argument(_))
+        ));
+        assert_eq!(background.poll().unwrap(), Progress::Done);
+    }
+}
+
+#[test]
+fn the_latest_input_wins_where_asked() {
+    let model = model("tiny-upt");
+    let scene = scene(
+        &model,
+        &SceneOptions {
+            latest_wins: true,
+            ..plain()
+        },
+    );
+    let (nodes, _) = push(&model, 0);
+    for k in 0..200 {
+        let vectors: Vec<f32> = nodes
+            .iter()
+            .flat_map(|_| [0.0, 0.0, -0.01 * k as f32])
+            .collect();
+        scene.submit(&nodes, &vectors).unwrap();
+    }
+    assert_eq!(scene.wait(Duration::from_secs(60)).unwrap(), Progress::Done);
+    let mut out = vec![0.0; 3 * scene.node_count()];
+    scene.read(&mut out).unwrap();
+    assert_eq!(out[3 * nodes[0] as usize + 2], -1.99);
+    assert!(scene.stats().step_count <= 200);
+}
+
+#[test]
+fn many_scenes_on_one_model_all_make_progress() {
+    let model = model("tiny-reduced");
+    let scenes: Vec<_> = (0..8).map(|_| scene(&model, &plain())).collect();
+    let (nodes, vectors) = push(&model, 3);
+    for _ in 0..20 {
+        for scene in &scenes {
+            scene.submit(&nodes, &vectors).unwrap();
+        }
+        for scene in &scenes {
+            assert_eq!(scene.wait(Duration::from_secs(60)).unwrap(), Progress::Done);
+        }
+    }
+    for scene in &scenes {
+        assert_eq!(scene.stats().step_count, 20);
+    }
+    assert_eq!(
+        upt::shutdown().unwrap_err().status(),
+        -7,
+        "models are alive"
+    );
+}
+
+#[test]
+fn concurrent_use_is_busy_and_never_waits() {
+    let model = model("tiny-upt");
+    let scene = scene(&model, &plain());
+    let busy = std::sync::atomic::AtomicUsize::new(0);
+    std::thread::scope(|threads| {
+        for _ in 0..4 {
+            threads.spawn(|| {
+                for _ in 0..200 {
+                    match scene.step(FREE, None) {
+                        Ok(()) => {}
+                        Err(Error::Busy(_)) => {
+                            busy.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+                        }
+                        Err(error) => panic!("{error}"),
+                    }
+                }
+            });
+        }
+    });
+    let busy = busy.into_inner() as u64;
+    assert_eq!(scene.stats().step_count + busy, 800);
+}
