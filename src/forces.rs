@@ -105,6 +105,23 @@ impl ReactionForces {
         }
     }
 
+    /// Appends the nodes of the elements around `nodes` (whose displacement [`Self::reaction`] reads) to
+    /// `out`, ascending, each once. A node that is out of range is skipped.
+    pub fn neighbourhood(&self, nodes: &[u32], out: &mut Vec<u32>) {
+        for &node in nodes {
+            if let Some(row) = self.offsets.get(node as usize..node as usize + 2) {
+                let around = &self.around[row[0] as usize..row[1] as usize];
+                out.extend(
+                    around
+                        .iter()
+                        .flat_map(|&e| self.elements[e as usize].corners),
+                );
+            }
+        }
+        out.sort_unstable();
+        out.dedup();
+    }
+
     /// Force of the tissue on the instrument at each of `nodes`, mN, to `out [m,3]`.
     ///
     /// `displacement [K,3]` mm. Elements are summed in a fixed order. No allocation.
@@ -419,6 +436,28 @@ mod tests {
         }
         forces.reaction(&vec![0.0; 192], &some, &mut part).unwrap();
         assert!(part.iter().all(|f| f.abs() < 1e-6));
+    }
+
+    #[test]
+    fn the_neighbourhood_is_what_the_forces_depend_on() {
+        let (positions, tets) = cube(3);
+        let nodes = [21, 63];
+        let mut forces = ReactionForces::new(&positions, &tets, &nodes, UNIT);
+        let mut around = Vec::new();
+        forces.neighbourhood(&nodes, &mut around);
+        assert!(around.is_sorted() && around.contains(&21) && around.len() < 64);
+        let u = wavy(&positions, 0.1);
+        let mut reaction = |u: &[f32]| {
+            let mut out = vec![0.0; 6];
+            forces.reaction(u, &nodes, &mut out).map(|_| out)
+        };
+        let want = reaction(&u).unwrap();
+        for node in 0..64u32 {
+            let mut other = u.clone();
+            other[3 * node as usize] += 0.05;
+            let same = reaction(&other).unwrap() == want;
+            assert_eq!(same, !around.contains(&node), "node {node}");
+        }
     }
 
     #[test]
