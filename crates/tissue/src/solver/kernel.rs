@@ -6,11 +6,18 @@
 //! and a corner's force is `f_a = -V P dN_a/dX`. `J^(-1/3)` comes from an integer
 //! guess and two polynomial corrections, to f32 accuracy, without log or division.
 //!
+//! A block of batches goes through three short loops (deformation, stress, forces)
+//! with a buffer between them: the iterations of each are independent and overlap,
+//! where one long loop would wait for its own cube root.
+//!
 //! No closures here or in `lanes`: a closure does not take on its caller's
 //! instruction set, and every vector operation in it would become a call.
 
 use super::lanes::{Lanes, WIDTH};
 use super::partition::Batch;
+
+/// Batches that go through the loops together; their tensors fill 5 kB of the first-level cache.
+const BLOCK: usize = 8;
 
 /// Moduli in the solver's units, Pa.
 #[derive(Clone, Copy, Debug)]
@@ -40,13 +47,49 @@ pub(crate) unsafe fn inverse_cube_root<L: Lanes>(x: L) -> L {
     }
 }
 
-/// The deformation gradient, its cofactor matrix and its determinant.
-struct Deformation<L> {
-    gradient: [[L; 3]; 3],
-    cofactor: [[L; 3]; 3],
-    determinant: L,
-    /// Mean of the corners' fourth component (nodal pressure, where it is used).
-    scalar: L,
+/// A second-order tensor of 16 elements, row-major, and one scalar.
+#[repr(C, align(64))]
+#[derive(Clone, Copy)]
+struct Tensors {
+    entry: [[f32; WIDTH]; 9],
+    /// Mean of the corners' fourth component: nodal pressure, where it is used.
+    scalar: [f32; WIDTH],
+}
+
+const EMPTY: Tensors = Tensors {
+    entry: [[0.0; WIDTH]; 9],
+    scalar: [0.0; WIDTH],
+};
+
+/// Deformation gradients of a batch.
+#[inline(always)]
+unsafe fn deformation<L: Lanes>(batch: &Batch, nodes: *const [f32; 4], out: &mut Tensors) {
+    unsafe {
+        let zero = L::splat(0.0);
+        let origin = L::gather(nodes, &batch.corners[0]);
+        let mut f = [[zero; 3]; 3];
+        let mut scalar = origin[3];
+        for i in 0..3 {
+            f[i][i] = L::splat(1.0);
+        }
+        for a in 0..3 {
+            let corner = L::gather(nodes, &batch.corners[a + 1]);
+            scalar = scalar.add(corner[3]);
+            for i in 0..3 {
+                let difference = corner[i].sub(origin[i]);
+                for j in 0..3 {
+                    let slope = L::load(batch.gradient[3 * a + j].as_ptr());
+                    f[i][j] = difference.mul_add(slope, f[i][j]);
+                }
+            }
+        }
+        for i in 0..3 {
+            for j in 0..3 {
+                f[i][j].store(out.entry[3 * i + j].as_mut_ptr());
+            }
+        }
+        scalar.mul(L::splat(0.25)).store(out.scalar.as_mut_ptr());
+    }
 }
 
 #[inline(always)]
@@ -60,41 +103,85 @@ unsafe fn cross<L: Lanes>(a: [L; 3], b: [L; 3]) -> [L; 3] {
     }
 }
 
+/// Loads `F`; returns it, its cofactor matrix and its determinant.
 #[inline(always)]
-unsafe fn deformation<L: Lanes>(batch: &Batch, nodes: *const [f32; 4]) -> Deformation<L> {
+unsafe fn cofactors<L: Lanes>(tensors: &Tensors) -> ([[L; 3]; 3], [[L; 3]; 3], L) {
     unsafe {
-        let origin = L::gather(nodes, &batch.corners[0]);
         let mut f = [[L::splat(0.0); 3]; 3];
-        let mut scalar = origin[3];
-        for a in 0..3 {
-            let corner = L::gather(nodes, &batch.corners[a + 1]);
-            scalar = scalar.add(corner[3]);
-            for i in 0..3 {
-                let difference = corner[i].sub(origin[i]);
-                for (j, entry) in f[i].iter_mut().enumerate() {
-                    let slope = L::load(batch.gradient[3 * a + j].as_ptr());
-                    *entry = if a == 0 {
-                        difference.mul(slope)
-                    } else {
-                        difference.mul_add(slope, *entry)
-                    };
-                }
+        for i in 0..3 {
+            for j in 0..3 {
+                f[i][j] = L::load(tensors.entry[3 * i + j].as_ptr());
             }
-        }
-        for (i, row) in f.iter_mut().enumerate() {
-            row[i] = row[i].add(L::splat(1.0));
         }
         let cofactor = [cross(f[1], f[2]), cross(f[2], f[0]), cross(f[0], f[1])];
         let determinant = f[0][2].mul_add(
             cofactor[0][2],
             f[0][1].mul_add(cofactor[0][1], f[0][0].mul(cofactor[0][0])),
         );
-        Deformation {
-            gradient: f,
-            cofactor,
-            determinant,
-            scalar: scalar.mul(L::splat(0.25)),
+        (f, cofactor, determinant)
+    }
+}
+
+/// Replaces `F` by `-V P`; returns det F.
+#[inline(always)]
+unsafe fn stress<L: Lanes, const AVERAGED: bool>(
+    batch: &Batch,
+    tensors: &mut Tensors,
+    law: Law,
+) -> L {
+    unsafe {
+        let (f, cofactor, determinant) = cofactors::<L>(tensors);
+        let root = inverse_cube_root(determinant.max(L::splat(1e-3)));
+        let root2 = root.mul(root);
+        // Three sums of three: a shorter chain than one of nine.
+        let mut invariant = L::splat(0.0);
+        for row in f {
+            let part = row[2].mul_add(row[2], row[1].mul_add(row[1], row[0].mul(row[0])));
+            invariant = invariant.add(part);
         }
+        let volume = L::load(batch.volume.as_ptr());
+        let deviatoric = volume.mul(L::splat(-law.shear)).mul(root2);
+        let pressure = if AVERAGED {
+            L::load(tensors.scalar.as_ptr()).mul(volume)
+        } else {
+            volume
+                .mul(L::splat(law.bulk))
+                .mul(determinant.sub(L::splat(1.0)))
+        };
+        let inverse = root2.mul(root).mul(L::splat(-1.0 / 3.0));
+        let spherical = deviatoric.mul(inverse).mul(invariant).sub(pressure);
+        for i in 0..3 {
+            for j in 0..3 {
+                spherical
+                    .mul_add(cofactor[i][j], deviatoric.mul(f[i][j]))
+                    .store(tensors.entry[3 * i + j].as_mut_ptr());
+            }
+        }
+        determinant
+    }
+}
+
+/// Adds `-V P dN_a/dX` to the corners.
+#[inline(always)]
+unsafe fn scatter<L: Lanes>(batch: &Batch, tensors: &Tensors, forces: *mut [f32; 4]) {
+    unsafe {
+        let zero = L::splat(0.0);
+        let mut sum = [zero; 4];
+        for a in 0..3 {
+            let slope: *const f32 = batch.gradient[3 * a].as_ptr();
+            let mut force = [zero; 4];
+            for i in 0..3 {
+                let row = tensors.entry[3 * i].as_ptr();
+                force[i] = L::load(row).mul(L::load(slope));
+                for j in 1..3 {
+                    let entry = L::load(row.add(j * WIDTH));
+                    force[i] = entry.mul_add(L::load(slope.add(j * WIDTH)), force[i]);
+                }
+                sum[i] = sum[i].sub(force[i]);
+            }
+            L::scatter_add(forces, &batch.corners[a + 1], force);
+        }
+        L::scatter_add(forces, &batch.corners[0], sum);
     }
 }
 
@@ -110,61 +197,18 @@ pub(crate) unsafe fn add_forces<L: Lanes, const AVERAGED: bool>(
     law: Law,
 ) -> f32 {
     unsafe {
-        let zero = L::splat(0.0);
         let mut smallest = L::splat(f32::MAX);
-        for batch in batches {
-            let Deformation {
-                gradient: f,
-                cofactor,
-                determinant,
-                scalar,
-            } = deformation::<L>(batch, nodes);
-            smallest = smallest.min(determinant);
-
-            let root = inverse_cube_root(determinant.max(L::splat(1e-3)));
-            let root2 = root.mul(root);
-            let mut invariant = f[0][0].mul(f[0][0]);
-            for (i, row) in f.iter().enumerate() {
-                for (j, entry) in row.iter().enumerate() {
-                    if i + j > 0 {
-                        invariant = entry.mul_add(*entry, invariant);
-                    }
-                }
+        let mut buffer = [EMPTY; BLOCK];
+        for block in batches.chunks(BLOCK) {
+            for (batch, tensors) in block.iter().zip(&mut buffer) {
+                deformation::<L>(batch, nodes, tensors);
             }
-            let volume = L::load(batch.volume.as_ptr());
-            // Both with the minus sign of f = -V P dN/dX.
-            let deviatoric = volume.mul(L::splat(-law.shear)).mul(root2);
-            let pressure = if AVERAGED {
-                scalar.mul(volume)
-            } else {
-                volume
-                    .mul(L::splat(law.bulk))
-                    .mul(determinant.sub(L::splat(1.0)))
-            };
-            let inverse = root2.mul(root).mul(L::splat(-1.0 / 3.0));
-            let spherical = deviatoric.mul(inverse).mul(invariant).sub(pressure);
-
-            let mut sum = [zero; 3];
-            let mut stress = [[zero; 3]; 3];
-            for i in 0..3 {
-                for j in 0..3 {
-                    stress[i][j] = spherical.mul_add(cofactor[i][j], deviatoric.mul(f[i][j]));
-                }
+            for (batch, tensors) in block.iter().zip(&mut buffer) {
+                smallest = smallest.min(stress::<L, AVERAGED>(batch, tensors, law));
             }
-            for a in 0..3 {
-                let slope: *const f32 = batch.gradient[3 * a].as_ptr();
-                let mut force = [zero; 4];
-                for i in 0..3 {
-                    force[i] = stress[i][0].mul(L::load(slope));
-                    for j in 1..3 {
-                        force[i] = stress[i][j].mul_add(L::load(slope.add(j * WIDTH)), force[i]);
-                    }
-                    sum[i] = sum[i].sub(force[i]);
-                }
-                L::scatter_add(forces, &batch.corners[a + 1], force);
+            for (batch, tensors) in block.iter().zip(&buffer) {
+                scatter::<L>(batch, tensors, forces);
             }
-            let [x, y, z] = sum;
-            L::scatter_add(forces, &batch.corners[0], [x, y, z, zero]);
         }
         let mut lanes = [0.0; WIDTH];
         smallest.store(lanes.as_mut_ptr());
@@ -181,8 +225,10 @@ pub(crate) unsafe fn add_volumes<L: Lanes>(
 ) {
     unsafe {
         let zero = L::splat(0.0);
+        let mut tensors = EMPTY;
         for batch in batches {
-            let determinant = deformation::<L>(batch, nodes).determinant;
+            deformation::<L>(batch, nodes, &mut tensors);
+            let (_, _, determinant) = cofactors::<L>(&tensors);
             let volume = determinant.mul(L::load(batch.volume.as_ptr()));
             for corners in &batch.corners {
                 L::scatter_add(forces, corners, [zero, zero, zero, volume]);

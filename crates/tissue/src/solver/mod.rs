@@ -54,7 +54,7 @@ pub struct SolverOptions {
     pub material: Material,
     /// Asked inner step, s. Default 1e-4.
     pub inner_step_s: f64,
-    /// Part of the estimated critical step that is used. Default 0.75.
+    /// Part of the estimated critical step that is used. Default 0.8.
     pub safety: f64,
     /// Default [`Substep::Automatic`].
     pub substep: Substep,
@@ -71,7 +71,7 @@ impl Default for SolverOptions {
         Self {
             material: Material::default(),
             inner_step_s: 1e-4,
-            safety: 0.75,
+            safety: 0.8,
             substep: Substep::Automatic,
             pressure: Pressure::Element,
             threads: 1,
@@ -264,7 +264,7 @@ impl Solver {
                     critical_ms: self.critical_now * 1e3,
                 });
             }
-            steps = asked * (duration_s / f64::from(asked) / allowed).ceil() as u32;
+            steps = (duration_s / allowed).ceil() as u32;
         }
         self.backup.clone_from(&self.fields);
         self.backup_dt = self.dt;
