@@ -44,9 +44,7 @@ def describe(brain):
         "non-manifold edges": len(tetrahedra.non_manifold_edges(brain.surface)),
         "non-manifold nodes": len(tetrahedra.non_manifold_nodes(brain.surface)),
         "dihedral angles, degrees": f"{angles.min():.2f} to {angles.max():.2f}",
-        "smallest inscribed radius, mm": (
-            f"{tetrahedra.inscribed_radii(positions, brain.tets).min():.4f}"
-        ),
+        "smallest inscribed radius, mm": (f"{tetrahedra.inscribed_radii(positions, brain.tets).min():.4f}"),
         "volume, ml": f"{volumes.sum() / 1000:.1f}",
         "smallest volume, mm3": f"{volumes.min():.4f}",
     }

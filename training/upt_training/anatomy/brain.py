@@ -72,10 +72,7 @@ class Anatomy:
     def __init__(self):
         surfaces = pial_surfaces()
         box = grid_box(np.concatenate([vertices for vertices, _ in surfaces.values()]))
-        self.grids = {
-            side: hemisphere_distance(vertices, faces, *box)
-            for side, (vertices, faces) in surfaces.items()
-        }
+        self.grids = {side: hemisphere_distance(vertices, faces, *box) for side, (vertices, faces) in surfaces.items()}
         whole = (self.grids["left"].values > 0) | (self.grids["right"].values > 0)
         envelope = close(np.pad(whole, 20), ENVELOPE_CLOSING)
         depth = ndimage.distance_transform_edt(envelope) * VOXEL
@@ -140,6 +137,10 @@ def weld(left, right, radius):
     centroids = right[0][common].mean(axis=1)
     patch = np.zeros(len(common), dtype=bool)
     inner = np.flatnonzero(distance_to_callosum(centroids) <= radius)
+    if not len(inner):
+        raise ValueError(
+            f"no midplane triangle lies within {radius} mm of the callosal arc; use a smaller lattice spacing"
+        )
     patch[inner[tetrahedra.largest_part(common[inner])]] = True
     patch = fill_patch(common, patch)
 

@@ -27,9 +27,7 @@ class Grid:
 
     def coordinates(self):
         """Sample coordinates along each axis, mm: three 1-D arrays."""
-        return [
-            self.origin[axis] + VOXEL * np.arange(self.values.shape[axis]) for axis in range(3)
-        ]
+        return [self.origin[axis] + VOXEL * np.arange(self.values.shape[axis]) for axis in range(3)]
 
 
 def inside_mask(vertices, faces, origin, shape):
@@ -45,12 +43,8 @@ def inside_mask(vertices, faces, origin, shape):
     for a, b, c in corners:
         low = np.minimum(np.minimum(a, b), c)
         high = np.maximum(np.maximum(a, b), c)
-        rows = np.arange(
-            max(int(np.ceil(low[1] - y0)), 0), min(int(np.floor(high[1] - y0)), shape[1] - 1) + 1
-        )
-        columns = np.arange(
-            max(int(np.ceil(low[2] - z0)), 0), min(int(np.floor(high[2] - z0)), shape[2] - 1) + 1
-        )
+        rows = np.arange(max(int(np.ceil(low[1] - y0)), 0), min(int(np.floor(high[1] - y0)), shape[1] - 1) + 1)
+        columns = np.arange(max(int(np.ceil(low[2] - z0)), 0), min(int(np.floor(high[2] - z0)), shape[2] - 1) + 1)
         if not len(rows) or not len(columns):
             continue
         y, z = np.meshgrid(y0 + rows, z0 + columns, indexing="ij")

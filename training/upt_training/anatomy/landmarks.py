@@ -21,9 +21,7 @@ CALLOSUM = np.array(
 CALLOSUM_RADIUS = 4.5
 
 # The left Sylvian fissure on the lateral surface, front to back: (x, y, z).
-SYLVIAN = np.array(
-    [(-44, 22, -14), (-54, 2, -2), (-60, -20, 10), (-60, -42, 22)], dtype=np.float64
-)
+SYLVIAN = np.array([(-44, 22, -14), (-54, 2, -2), (-60, -20, 10), (-60, -42, 22)], dtype=np.float64)
 SYLVIAN_RADIUS = 25.0
 
 

@@ -57,8 +57,7 @@ def main():
                 part = part.extract_cells(np.flatnonzero(centre > cut))
                 if part.n_cells == 0:
                     continue
-            plotter.add_mesh(part, color=COLOURS[name], show_edges=True, edge_color="#404040",
-                             line_width=0.3)
+            plotter.add_mesh(part, color=COLOURS[name], show_edges=True, edge_color="#404040", line_width=0.3)
         plotter.add_text(title, font_size=9)
         if index == 0:
             legend = [[name, COLOURS[name]] for name in parts]

@@ -17,9 +17,7 @@ def volumes(positions, tets):
 def boundary(tets):
     """Outward boundary triangles `[F, 3]`, in order of tetrahedron and face."""
     faces = tets[:, FACES].reshape(-1, 3)
-    _, first, counts = np.unique(
-        np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True
-    )
+    _, first, counts = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
     return faces[np.sort(first[counts == 1])]
 
 
@@ -47,9 +45,7 @@ def non_manifold_nodes(surface):
     order = np.lexsort((spokes[:, 1], spokes[:, 0]))
     spokes, ends = spokes[order], ends[order]
     same = np.all(spokes[1:] == spokes[:-1], axis=1)
-    graph = sparse.coo_matrix(
-        (np.ones(same.sum()), (ends[:-1][same], ends[1:][same])), shape=(surface.size,) * 2
-    )
+    graph = sparse.coo_matrix((np.ones(same.sum()), (ends[:-1][same], ends[1:][same])), shape=(surface.size,) * 2)
     _, labels = csgraph.connected_components(graph, directed=False)
     pairs = np.unique(np.column_stack([surface.ravel(), labels[corner.ravel()]]), axis=0)
     nodes, fans = np.unique(pairs[:, 0], return_counts=True)
@@ -59,9 +55,7 @@ def non_manifold_nodes(surface):
 def components(node_count, elements):
     """Number of parts of the graph in which the nodes of each element are joined."""
     first = np.repeat(elements[:, 0], elements.shape[1] - 1)
-    graph = sparse.coo_matrix(
-        (np.ones(len(first)), (first, elements[:, 1:].ravel())), shape=(node_count, node_count)
-    )
+    graph = sparse.coo_matrix((np.ones(len(first)), (first, elements[:, 1:].ravel())), shape=(node_count, node_count))
     return csgraph.connected_components(graph, directed=False)[0]
 
 
@@ -73,9 +67,7 @@ def largest_part(faces):
     order = np.argsort(edge.ravel(), kind="stable")
     edge, owner = edge.ravel()[order], owner[order]
     same = edge[1:] == edge[:-1]
-    graph = sparse.coo_matrix(
-        (np.ones(same.sum()), (owner[:-1][same], owner[1:][same])), shape=(len(faces),) * 2
-    )
+    graph = sparse.coo_matrix((np.ones(same.sum()), (owner[:-1][same], owner[1:][same])), shape=(len(faces),) * 2)
     _, labels = csgraph.connected_components(graph, directed=False)
     return np.flatnonzero(labels == np.bincount(labels).argmax())
 
@@ -94,9 +86,7 @@ def dihedral_angles(positions, tets):
         edge = positions[tets[:, j]] - positions[tets[:, i]]
         one = np.cross(edge, positions[tets[:, k]] - positions[tets[:, i]])
         two = np.cross(edge, positions[tets[:, m]] - positions[tets[:, i]])
-        cosine = np.einsum("ij,ij->i", one, two) / (
-            np.linalg.norm(one, axis=1) * np.linalg.norm(two, axis=1)
-        )
+        cosine = np.einsum("ij,ij->i", one, two) / (np.linalg.norm(one, axis=1) * np.linalg.norm(two, axis=1))
         angles.append(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
     return np.column_stack(angles)
 
