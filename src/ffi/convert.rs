@@ -67,6 +67,25 @@ pub(super) fn index_set(value: i32) -> Result<IndexSet, Failure> {
     })
 }
 
+/// The shape of an instrument; sizes are checked where it is placed.
+#[cfg(feature = "contact")]
+pub(super) fn shape(raw: &upt_instrument) -> Result<crate::instrument::Shape, Failure> {
+    use crate::instrument::Shape;
+    let half_extents = raw.half_extents;
+    Ok(match raw.shape {
+        UPT_SHAPE_CAPSULE => Shape::Capsule {
+            half_length: half_extents[1],
+            radius: raw.radius,
+        },
+        UPT_SHAPE_BOX => Shape::Box { half_extents },
+        UPT_SHAPE_SPATULA => Shape::Spatula {
+            half_extents,
+            radius: raw.radius,
+        },
+        value => return unknown("instruments[].shape", value),
+    })
+}
+
 pub(super) fn flag(field: &str, value: u8) -> Result<bool, Failure> {
     match value {
         0 => Ok(false),

@@ -1,14 +1,23 @@
 //! `upt_scene`: instruments -> contacts, displacement -> forces.
 
+#[cfg(feature = "contact")]
+use super::call::Failure;
+#[cfg(any(not(feature = "contact"), not(feature = "forces")))]
 use super::call::fail;
 use super::convert;
 use super::pointers::{place, required, slice_mut};
 use super::registry::call_scene;
 use super::status::*;
 use super::structs::*;
+#[cfg(feature = "contact")]
+use crate::error::Error;
+#[cfg(feature = "contact")]
+use crate::instrument::{Instrument, MAX_INSTRUMENTS, Shape};
 
 /// Finds the nodes that rigid instruments touch and the displacement that they impose: the input of a step.
 ///
+/// The scene remembers what each place of the array touches, until the array's length changes or upt_scene_reset:
+/// pass every instrument every time, in the same order. At most 64 instruments; NULL with count 0 lets go of all.
 /// instruments: array; every element has its `struct_size` set. contact_nodes: `[capacity]`, contact_vectors:
 /// `[capacity,3]`, mm; both may be NULL with capacity 0, which only asks. contact_count: contacts found, always written.
 /// Threads: one at a time. Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "contact", `UPT_ERR_NULL`,
@@ -25,27 +34,83 @@ pub unsafe extern "C" fn upt_scene_contacts_from_instruments(
     contact_count: *mut u64,
 ) -> upt_status {
     call_scene("upt_scene_contacts_from_instruments", scene, |_scene| {
-        let _count = place(contact_count, "contact_count")?;
-        for index in 0..instrument_count {
-            let raw = instruments.wrapping_add(index as usize);
-            let raw = unsafe { required(raw, "instruments[]") }?;
-            convert::flag("sticking", raw.sticking)?;
-            convert::reserved(&raw.reserved)?;
+        let count_out = place(contact_count, "contact_count")?;
+        let capacity_floats = capacity.saturating_mul(3);
+        let nodes_out = unsafe { slice_mut(contact_nodes, capacity, "contact_nodes") }?;
+        let vectors_out =
+            unsafe { slice_mut(contact_vectors, capacity_floats, "contact_vectors") }?;
+        #[cfg(feature = "contact")]
+        {
+            let list = unsafe { read_instruments(instruments, instrument_count) }?;
+            let list = &list.0[..list.1];
+            _scene.contacts_from_instruments(list, |nodes, vectors| {
+                unsafe { count_out.write(nodes.len() as u64) };
+                if capacity == 0 {
+                    return Ok(());
+                }
+                if nodes_out.len() < nodes.len() {
+                    return Err(Error::Argument(format!(
+                        "capacity is {capacity}, {} are needed",
+                        nodes.len()
+                    )));
+                }
+                nodes_out[..nodes.len()].copy_from_slice(nodes);
+                vectors_out[..vectors.len()].copy_from_slice(vectors);
+                Ok(())
+            })?;
+            Ok(UPT_OK)
         }
-        unsafe { slice_mut(contact_nodes, capacity, "contact_nodes") }?;
-        unsafe {
-            slice_mut(
-                contact_vectors,
-                capacity.saturating_mul(3),
-                "contact_vectors",
-            )
-        }?;
-        fail(UPT_ERR_UNSUPPORTED, "this build has no feature \"contact\"")
+        #[cfg(not(feature = "contact"))]
+        {
+            for index in 0..instrument_count {
+                let raw = instruments.wrapping_add(index as usize);
+                let raw = unsafe { required(raw, "instruments[]") }?;
+                convert::flag("sticking", raw.sticking)?;
+                convert::reserved(&raw.reserved)?;
+            }
+            let _ = (count_out, nodes_out, vectors_out);
+            fail(UPT_ERR_UNSUPPORTED, "this build has no feature \"contact\"")
+        }
     })
+}
+
+/// The host's instruments, and how many there are.
+#[cfg(feature = "contact")]
+unsafe fn read_instruments(
+    instruments: *const upt_instrument,
+    count: u64,
+) -> Result<([Instrument; MAX_INSTRUMENTS], usize), Failure> {
+    if count > MAX_INSTRUMENTS as u64 {
+        return Err(Error::Argument(format!(
+            "instrument_count is {count}, must be at most {MAX_INSTRUMENTS}"
+        ))
+        .into());
+    }
+    let blank = Instrument {
+        shape: Shape::Box {
+            half_extents: [1.0; 3],
+        },
+        position: [0.0; 3],
+        rotation: [0.0, 0.0, 0.0, 1.0],
+        sticking: false,
+    };
+    let mut list = [blank; MAX_INSTRUMENTS];
+    for (index, place) in list.iter_mut().enumerate().take(count as usize) {
+        let raw = unsafe { required(instruments.wrapping_add(index), "instruments[]") }?;
+        convert::reserved(&raw.reserved)?;
+        *place = Instrument {
+            shape: convert::shape(&raw)?,
+            position: raw.position,
+            rotation: raw.rotation,
+            sticking: convert::flag("sticking", raw.sticking)?,
+        };
+    }
+    Ok((list, count as usize))
 }
 
 /// Copies the reaction of the tissue at the last step's contact nodes, in their order.
 ///
+/// The elastic force of the elements around each node at the last state; inertia and damping are left out.
 /// out: `[m,3]`, mN, the force on the instrument. out_count: floats in out, 3 m.
 /// Threads: one at a time. Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "forces", `UPT_ERR_NULL`,
 /// `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_STATE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_PANIC`.
@@ -57,7 +122,13 @@ pub unsafe extern "C" fn upt_scene_contact_force(
 ) -> upt_status {
     call_scene("upt_scene_contact_force", scene, |_scene| {
         place(out, "out")?;
-        unsafe { slice_mut(out, out_count, "out") }?;
+        let _out = unsafe { slice_mut(out, out_count, "out") }?;
+        #[cfg(feature = "forces")]
+        {
+            _scene.contact_force(_out)?;
+            Ok(UPT_OK)
+        }
+        #[cfg(not(feature = "forces"))]
         fail(UPT_ERR_UNSUPPORTED, "this build has no feature \"forces\"")
     })
 }

@@ -4,14 +4,17 @@
 use super::Scene;
 #[cfg(feature = "forces")]
 use super::core::Core;
+#[cfg(any(feature = "contact", feature = "forces"))]
 use super::core::lock_read;
 #[cfg(feature = "forces")]
 use super::published::Published;
+#[cfg(any(feature = "contact", feature = "forces"))]
 use crate::error::{Error, Result};
 #[cfg(feature = "forces")]
 use crate::forces::{Moduli, ReactionForces};
 #[cfg(feature = "contact")]
 use crate::instrument::{Instrument, InstrumentContacts};
+#[cfg(any(feature = "contact", feature = "forces"))]
 use std::sync::{Mutex, MutexGuard, TryLockError};
 
 /// What the first use makes.
