@@ -1,12 +1,17 @@
 //! `cargo xtask`: the repository's commands. Each does its own set-up, so that a fresh clone needs
 //! nothing but Rust and Python.
 
+mod bench;
 mod counts;
+mod demo;
 mod ort;
+mod package;
 mod process;
+mod readme;
 mod stages;
 mod system;
 mod test;
+mod upkeep;
 mod venv;
 mod workspace;
 
@@ -32,6 +37,42 @@ enum Task {
         after_help = "Examples:\n  cargo xtask test\n  cargo xtask test --only rust --only python\n  cargo xtask test --list"
     )]
     Test(test::Options),
+    /// Push the brain: reference simulation, replay through every committed bundle, table and page.
+    #[command(after_help = "Examples:\n  cargo xtask demo\n  cargo xtask demo --scheme 3 --seed 7")]
+    Demo(demo::Options),
+    /// Run the speed tables and write docs/performance.md.
+    #[command(
+        after_help = "Examples:\n  cargo xtask bench --quick\n  cargo xtask bench --only kernels --keep-docs --json rows.json"
+    )]
+    Bench(bench::Options),
+    /// Make the archive for C and C++ hosts, or the Unity package.
+    #[command(
+        after_help = "Examples:\n  cargo xtask package\n  cargo xtask package --unity\n  cargo xtask package --platform windows-x64"
+    )]
+    Package(package::Options),
+    /// Write README.md's measured table and picture.
+    #[command(
+        after_help = "Example:\n  cargo xtask readme --report target/report/report.json --bundle onnx/brain-reduced --trajectory push.trajectory.safetensors"
+    )]
+    Readme(readme::Options),
+    /// Write include/upt.h and the C# bindings from the library's source.
+    Header {
+        /// Only say whether they are up to date.
+        #[arg(long)]
+        check: bool,
+    },
+    /// Train, evaluate or export bundles: runs the Python package with its environment set up.
+    #[command(
+        after_help = "Examples:\n  cargo xtask bundle -- export --help\n  cargo xtask bundle --module upt_training.reduced -- --help"
+    )]
+    Bundle {
+        /// The Python module to run.
+        #[arg(long, default_value = "upt_training")]
+        module: String,
+        /// Its arguments.
+        #[arg(last = true)]
+        arguments: Vec<String>,
+    },
     /// Fetch ONNX Runtime's shared library into target/ort/.
     #[command(
         after_help = "Examples:\n  cargo xtask ort\n  cargo xtask ort --platform windows-x64"
@@ -62,6 +103,12 @@ fn main() -> std::process::ExitCode {
 fn run(workspace: &Workspace, task: Task) -> Result<bool> {
     match task {
         Task::Test(options) => test::run(workspace, &options),
+        Task::Demo(options) => demo::run(workspace, &options),
+        Task::Bench(options) => bench::run(workspace, &options),
+        Task::Package(options) => package::run(workspace, &options),
+        Task::Readme(options) => readme::run(workspace, &options),
+        Task::Header { check } => upkeep::header(workspace, check),
+        Task::Bundle { module, arguments } => upkeep::bundle(workspace, &module, &arguments),
         Task::Ort { platform, version } => ort::run(workspace, platform, &version).map(|()| true),
     }
 }

@@ -97,11 +97,8 @@ pub const CSHARP: &[Package] = &[
     program(&["mono"], "mono-runtime", "the C# tests"),
     program(&["nunit-console"], "nunit-console", "the C# tests"),
     file(
-        &[
-            "/usr/lib/mono/4.5/Facades/System.Runtime.dll",
-            "/usr/lib/mono/4.5-api/System.Core.dll",
-        ],
-        "libmono-system-core4.0-cil",
+        &["/usr/lib/cli/nunit.framework-2.6.3/nunit.framework.dll"],
+        "libnunit-framework2.6.3-cil",
         "the C# tests",
     ),
 ];

@@ -42,8 +42,8 @@ pub struct Scene {
     handle: *mut ffi::upt_scene,
 }
 
-fn size_of<T>() -> u32 {
-    size_of::<T>() as u32
+fn size<T>() -> u32 {
+    std::mem::size_of::<T>() as u32
 }
 
 /// A struct of the ABI whose fields are integers, floats and nullable pointers, all zero.
@@ -83,7 +83,7 @@ impl Model {
         // SAFETY: options and path live across the call; `handle` and `info` are places to write to.
         unsafe {
             let mut options: ffi::upt_model_options = zeroed();
-            options.struct_size = size_of::<ffi::upt_model_options>();
+            options.struct_size = size::<ffi::upt_model_options>();
             options.threads = settings.threads;
             options.providers = providers.as_ptr();
             options.provider_count = 1;
@@ -95,7 +95,7 @@ impl Model {
                 ffi::upt_model_open(text.as_ptr(), &options, &mut handle),
             )?;
             let mut info: ffi::upt_model_info = zeroed();
-            info.struct_size = size_of::<ffi::upt_model_info>();
+            info.struct_size = size::<ffi::upt_model_info>();
             let mut model = Self { handle, info };
             check(
                 "upt_model_get_info",
@@ -123,17 +123,6 @@ impl Model {
             Ok(out)
         }
     }
-
-    /// `upt_model_positions`, `[K][3]`, mm.
-    pub fn positions(&self) -> Result<Vec<[f32; 3]>> {
-        let count = self.info.node_count as usize;
-        let mut out = vec![[0.0f32; 3]; count];
-        // SAFETY: `out` holds 3 K floats.
-        check("upt_model_positions", unsafe {
-            ffi::upt_model_positions(self.handle, out.as_mut_ptr().cast(), 3 * count as u64)
-        })?;
-        Ok(out)
-    }
 }
 
 impl Drop for Model {
@@ -149,7 +138,7 @@ impl Scene {
         // SAFETY: the options live across the call; `handle` is a place to write to.
         unsafe {
             let mut options: ffi::upt_scene_options = zeroed();
-            options.struct_size = size_of::<ffi::upt_scene_options>();
+            options.struct_size = size::<ffi::upt_scene_options>();
             options.kernel = kernel;
             options.precision = model.info.precision;
             options.guard_policy = ffi::UPT_GUARD_REPORT;
@@ -224,7 +213,7 @@ impl Scene {
         // SAFETY: the struct is a place to write to and states its size.
         unsafe {
             let mut stats: ffi::upt_scene_stats = zeroed();
-            stats.struct_size = size_of::<ffi::upt_scene_stats>();
+            stats.struct_size = size::<ffi::upt_scene_stats>();
             check(
                 "upt_scene_get_stats",
                 ffi::upt_scene_get_stats(self.handle, &mut stats),

@@ -13,6 +13,8 @@ mod machine;
 mod mesh;
 mod prior;
 mod render;
+mod report;
+mod rollout;
 mod simulate;
 
 use std::process::ExitCode;
@@ -46,6 +48,10 @@ enum Command {
     Simulate(simulate::Options),
     /// Many reference simulations in a folder, resumable and shardable.
     Dataset(dataset::Options),
+    /// A bundle through one contact, with the paper's metrics.
+    Rollout(rollout::Options),
+    /// Error against run time: all bundles and the plain methods on the same contacts.
+    Report(report::Options),
     /// Shell completions, on stdout.
     Completions(completions::Options),
 }
@@ -59,6 +65,8 @@ fn main() -> ExitCode {
         Command::Prior(options) => prior::run(&options),
         Command::Simulate(options) => simulate::run(&options),
         Command::Dataset(options) => dataset::run(&options),
+        Command::Rollout(options) => rollout::run(&options),
+        Command::Report(options) => report::run(&options),
         Command::Completions(options) => completions::run::<Arguments>(&options),
     };
     outcome.unwrap_or_else(|error| {

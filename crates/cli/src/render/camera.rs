@@ -66,13 +66,6 @@ impl Camera {
         }
     }
 
-    /// A camera of the same direction that shows `span` mm of width around `point`.
-    pub fn close_up(mut self, point: [f32; 3], span: f32) -> Self {
-        self.centre = [dot(point, self.right), dot(point, self.up)];
-        self.scale = self.width as f32 / span.max(1e-3);
-        self
-    }
-
     pub fn size(&self) -> (usize, usize) {
         (self.width, self.height)
     }

@@ -41,13 +41,19 @@ impl Image {
         Ok(bytes)
     }
 
-    /// Draws `other` with its upper left corner at (`x`, `y`).
-    pub fn place(&mut self, other: &Image, x: usize, y: usize) {
+    /// Draws `other` over this opaque picture, its upper left corner at (`x`, `y`).
+    pub fn blend(&mut self, other: &Image, x: usize, y: usize) {
         for row in 0..other.height.min(self.height.saturating_sub(y)) {
-            let count = other.width.min(self.width.saturating_sub(x)) * 4;
-            let to = ((y + row) * self.width + x) * 4;
-            let from = row * other.width * 4;
-            self.rgba[to..to + count].copy_from_slice(&other.rgba[from..from + count]);
+            for column in 0..other.width.min(self.width.saturating_sub(x)) {
+                let to = ((y + row) * self.width + x + column) * 4;
+                let from = (row * other.width + column) * 4;
+                let alpha = u32::from(other.rgba[from + 3]);
+                for channel in 0..3 {
+                    let mixed = u32::from(other.rgba[from + channel]) * alpha
+                        + u32::from(self.rgba[to + channel]) * (255 - alpha);
+                    self.rgba[to + channel] = (mixed / 255) as u8;
+                }
+            }
         }
     }
 

@@ -1,0 +1,138 @@
+//! The contacts that all methods are measured on: the test split of dataset folders, or single trajectories.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+use sha2::{Digest, Sha256};
+use tissue::baselines::DecayFit;
+use tissue::trajectory::Trajectory;
+
+/// One simulated contact.
+pub struct Case {
+    pub name: String,
+    pub trajectory: Trajectory,
+}
+
+/// Cases on one mesh under one boundary condition.
+pub struct Cases {
+    pub list: Vec<Case>,
+    pub mesh_sha256: String,
+    pub boundary: String,
+    /// SHA-256 over contacts and displacements of all cases.
+    pub content: String,
+}
+
+impl Cases {
+    /// Reads `trajectories`, then the held-out cases of the datasets in `folders`, at most `per_scheme` of a scheme.
+    pub fn read(trajectories: &[PathBuf], folders: &[PathBuf], per_scheme: usize) -> Result<Self> {
+        let mut paths: Vec<PathBuf> = trajectories.to_vec();
+        for folder in folders {
+            paths.extend(held_out(folder, per_scheme)?);
+        }
+        if paths.is_empty() {
+            bail!(
+                "no cases: name a trajectory (`upt simulate` makes one) or a dataset folder with finished test cases"
+            );
+        }
+        let mut list = Vec::new();
+        let mut hash = Sha256::new();
+        for path in &paths {
+            let trajectory = Trajectory::read(path)?;
+            add_content(&mut hash, &trajectory);
+            let header = &trajectory.header;
+            let name = format!("scheme {}, seed {}", header.scheme, header.seed);
+            list.push(Case { name, trajectory });
+        }
+        let first = &list[0].trajectory.header;
+        let (mesh_sha256, boundary) = (first.mesh_sha256.clone(), first.boundary.clone());
+        for (case, path) in list.iter().zip(&paths) {
+            let header = &case.trajectory.header;
+            if header.mesh_sha256 != mesh_sha256 || header.boundary != boundary {
+                bail!(
+                    "{}: mesh {} with boundary `{}` differs from the first case's; write one report for each",
+                    path.display(),
+                    header.mesh_name,
+                    header.boundary
+                );
+            }
+        }
+        let content = format!("{:x}", hash.finalize());
+        Ok(Self {
+            list,
+            mesh_sha256,
+            boundary,
+            content,
+        })
+    }
+
+    /// The decay a step after a release that fits these very cases best: linear elasticity at its best.
+    pub fn release_decay(&self) -> f32 {
+        let mut fit = DecayFit::default();
+        for trajectory in self.list.iter().map(|case| &case.trajectory) {
+            for frame in 1..trajectory.frame_count() {
+                if trajectory.contact(frame).0.is_empty() {
+                    fit.add(trajectory.frame(frame - 1), trajectory.frame(frame));
+                }
+            }
+        }
+        fit.decay().unwrap_or(0.0)
+    }
+
+    /// Steps of the longest case.
+    pub fn steps(&self) -> usize {
+        self.list
+            .iter()
+            .map(|case| case.trajectory.frame_count() - 1)
+            .max()
+            .unwrap_or(0)
+    }
+}
+
+fn add_content(hash: &mut Sha256, trajectory: &Trajectory) {
+    for vector in trajectory
+        .displacement
+        .iter()
+        .chain(&trajectory.contact_vectors)
+    {
+        for value in vector {
+            hash.update(value.to_le_bytes());
+        }
+    }
+    for node in trajectory
+        .contact_nodes
+        .iter()
+        .chain(&trajectory.contact_offsets)
+    {
+        hash.update(node.to_le_bytes());
+    }
+}
+
+/// Finished cases of a dataset's test split, the first `per_scheme` of each scheme.
+fn held_out(folder: &Path, per_scheme: usize) -> Result<Vec<PathBuf>> {
+    let file = folder.join("manifest.json");
+    let text = std::fs::read(&file).with_context(|| {
+        format!(
+            "{}: cannot be read; `upt dataset` writes it",
+            file.display()
+        )
+    })?;
+    let manifest: serde_json::Value = serde_json::from_slice(&text)
+        .with_context(|| format!("{}: is not JSON", file.display()))?;
+    let cases = manifest["cases"]
+        .as_array()
+        .with_context(|| format!("{}: field `cases` is missing", file.display()))?;
+    let mut taken: std::collections::BTreeMap<String, usize> = std::collections::BTreeMap::new();
+    let mut paths = Vec::new();
+    for case in cases {
+        let text = |field: &str| case[field].as_str().unwrap_or("").to_owned();
+        if text("split") != "test" || text("status") != "done" {
+            continue;
+        }
+        let count = taken.entry(text("scheme")).or_default();
+        if *count < per_scheme {
+            *count += 1;
+            paths.push(folder.join(text("file")));
+        }
+    }
+    Ok(paths)
+}

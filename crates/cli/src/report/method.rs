@@ -1,0 +1,393 @@
+//! Everything that can be stepped through a contact: the library, and the plain methods beside it.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use anyhow::{Context, Result, bail};
+use tissue::baselines::{CoarseTled, LinearQuasiStatic};
+use tissue::linear::Lame;
+use tissue::mesh::{Boundary, Mesh};
+use tissue::solver::{ContactNode, Solver, SolverOptions};
+use tissue::trajectory::TrajectoryHeader;
+use upt::ffi;
+
+use crate::host;
+
+/// Which nodes a step returns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Region {
+    All,
+    Surface,
+    Domain,
+}
+
+impl Region {
+    pub fn name(self) -> &'static str {
+        match self {
+            Region::All => "all",
+            Region::Surface => "surface",
+            Region::Domain => "domain",
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Precision {
+    F32,
+    Bf16,
+    F16,
+    Int8,
+}
+
+impl Precision {
+    pub fn name(self) -> &'static str {
+        match self {
+            Precision::F32 => "f32",
+            Precision::Bf16 => "bf16",
+            Precision::F16 => "f16",
+            Precision::Int8 => "int8",
+        }
+    }
+
+    fn code(self) -> i32 {
+        match self {
+            Precision::F32 => ffi::UPT_PRECISION_F32,
+            Precision::Bf16 => ffi::UPT_PRECISION_BF16,
+            Precision::F16 => ffi::UPT_PRECISION_F16,
+            Precision::Int8 => ffi::UPT_PRECISION_INT8,
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Provider {
+    Cpu,
+    Cuda,
+    Tensorrt,
+    TensorrtRtx,
+}
+
+impl Provider {
+    pub fn name(self) -> &'static str {
+        match self {
+            Provider::Cpu => "cpu",
+            Provider::Cuda => "cuda",
+            Provider::Tensorrt => "tensorrt",
+            Provider::TensorrtRtx => "tensorrt-rtx",
+        }
+    }
+
+    fn code(self) -> i32 {
+        match self {
+            Provider::Cpu => ffi::UPT_PROVIDER_CPU,
+            Provider::Cuda => ffi::UPT_PROVIDER_CUDA,
+            Provider::Tensorrt => ffi::UPT_PROVIDER_TENSORRT,
+            Provider::TensorrtRtx => ffi::UPT_PROVIDER_TENSORRT_RTX,
+        }
+    }
+}
+
+/// A bundle on disk, as its manifest describes it.
+#[derive(Clone, Debug)]
+pub struct BundleFolder {
+    pub path: PathBuf,
+    pub name: String,
+    pub boundary: String,
+    pub mesh_sha256: String,
+    pub mesh_file: PathBuf,
+    pub sha256: String,
+}
+
+/// A method in one configuration.
+#[derive(Clone, Debug)]
+pub enum Method {
+    Surrogate {
+        bundle: BundleFolder,
+        provider: Provider,
+        precision: Precision,
+        region: Region,
+        threads: u32,
+    },
+    PaperSplit {
+        bundle: BundleFolder,
+        threads: u32,
+    },
+    Zero,
+    /// `decay`: factor a step after release.
+    Linear {
+        threads: u32,
+        decay: f32,
+    },
+    CoarseTled {
+        mesh: PathBuf,
+        threads: u32,
+    },
+    Tled {
+        threads: u32,
+    },
+}
+
+/// A method made ready to step.
+pub enum Stepper {
+    Surrogate(Box<SurrogateStepper>),
+    PaperSplit(Box<super::paper_split::PaperSplit>),
+    Zero,
+    Linear(Box<LinearQuasiStatic>),
+    CoarseTled(Box<CoarseTled>),
+    Tled { solver: Box<Solver>, dt: f64 },
+}
+
+pub struct SurrogateStepper {
+    scene: host::Scene,
+    model: host::Model,
+    /// Nodes of the region, empty for all; and the others, decoded after the timed call.
+    region: Vec<u32>,
+    others: Vec<u32>,
+    returned: Vec<[f32; 3]>,
+}
+
+impl BundleFolder {
+    pub fn read(path: &Path) -> Result<Self> {
+        let file = path.join("bundle.json");
+        let bytes = std::fs::read(&file).with_context(|| {
+            format!(
+                "{}: cannot be read; a bundle is a folder with a bundle.json",
+                file.display()
+            )
+        })?;
+        let fields: serde_json::Value = serde_json::from_slice(&bytes)
+            .with_context(|| format!("{}: is not JSON", file.display()))?;
+        let text = |value: &serde_json::Value, name: &str| {
+            value
+                .as_str()
+                .map(str::to_owned)
+                .with_context(|| format!("{}: field `{name}` is missing", file.display()))
+        };
+        use sha2::Digest;
+        Ok(Self {
+            path: path.to_path_buf(),
+            name: text(&fields["name"], "name")?,
+            boundary: text(&fields["boundary"], "boundary")?,
+            mesh_sha256: text(&fields["mesh"]["mesh_sha256"], "mesh.mesh_sha256")?,
+            mesh_file: path.join(text(&fields["mesh"]["file"], "mesh.file")?),
+            sha256: format!("{:x}", sha2::Sha256::digest(&bytes)),
+        })
+    }
+}
+
+impl Stepper {
+    /// Makes the method ready; the time of this call is the row's load time.
+    pub fn new(method: &Method, mesh: &Mesh, header: &TrajectoryHeader) -> Result<Self> {
+        let boundary: Boundary = header.boundary.parse().map_err(anyhow::Error::msg)?;
+        Ok(match method {
+            Method::Surrogate {
+                bundle,
+                provider,
+                precision,
+                region,
+                threads,
+            } => Self::Surrogate(Box::new(SurrogateStepper::new(
+                bundle, *provider, *precision, *region, *threads,
+            )?)),
+            Method::PaperSplit { bundle, threads } => Self::PaperSplit(Box::new(
+                super::paper_split::PaperSplit::new(bundle, *threads)?,
+            )),
+            Method::Zero => Self::Zero,
+            Method::Linear { threads, decay } => {
+                let lame = Lame::from_young(header.material.young_pa, header.material.poisson)?;
+                Self::Linear(Box::new(LinearQuasiStatic::new(
+                    mesh,
+                    boundary,
+                    lame,
+                    *decay,
+                    *threads as usize,
+                )?))
+            }
+            Method::CoarseTled {
+                mesh: coarse,
+                threads,
+            } => {
+                let coarse = Mesh::read(coarse)?;
+                Self::CoarseTled(Box::new(CoarseTled::new(
+                    &coarse,
+                    mesh,
+                    boundary,
+                    solver_options(header, *threads),
+                )?))
+            }
+            Method::Tled { threads } => Self::Tled {
+                solver: Box::new(Solver::new(
+                    mesh,
+                    boundary,
+                    solver_options(header, *threads),
+                )?),
+                dt: header.dt_s,
+            },
+        })
+    }
+
+    /// Back to rest.
+    pub fn reset(&mut self) -> Result<()> {
+        match self {
+            Self::Surrogate(surrogate) => surrogate.scene.reset()?,
+            Self::PaperSplit(split) => split.reset(),
+            Self::Zero => {}
+            Self::Linear(linear) => linear.reset(),
+            Self::CoarseTled(coarse) => coarse.reset(),
+            Self::Tled { solver, .. } => solver.reset(),
+        }
+        Ok(())
+    }
+
+    /// One step; the wall time of it in ms. `out` `[K][3]` holds the whole field after it.
+    pub fn step(
+        &mut self,
+        nodes: &[u32],
+        vectors: &[[f32; 3]],
+        out: &mut [[f32; 3]],
+    ) -> Result<f64> {
+        let started = Instant::now();
+        match self {
+            Self::Surrogate(surrogate) => return surrogate.step(nodes, vectors, out),
+            Self::PaperSplit(split) => split.step(nodes, vectors, out)?,
+            Self::Zero => out.fill([0.0; 3]),
+            Self::Linear(linear) => linear.step(nodes, vectors, out)?,
+            Self::CoarseTled(coarse) => coarse.step(nodes, vectors, out)?,
+            Self::Tled { solver, dt } => {
+                let contact: Vec<ContactNode> = nodes
+                    .iter()
+                    .zip(vectors)
+                    .map(|(node, vector)| ContactNode {
+                        node: *node,
+                        displacement: *vector,
+                    })
+                    .collect();
+                solver.step_frame(&contact, *dt)?;
+                solver.displacement(out);
+            }
+        }
+        Ok(started.elapsed().as_secs_f64() * 1e3)
+    }
+
+    /// Stage times of the last step, ms; empty where the method has none.
+    pub fn stages(&self) -> Result<Vec<(&'static str, f64)>> {
+        let Self::Surrogate(surrogate) = self else {
+            return Ok(Vec::new());
+        };
+        let stats = surrogate.scene.stats()?;
+        let named = [
+            ("check", stats.check_ms),
+            ("prior", stats.prior_ms),
+            ("encode", stats.encode_ms),
+            ("aggregate", stats.aggregate_ms),
+            ("latent", stats.latent_ms),
+            ("decode", stats.decode_ms),
+            ("guard", stats.guard_ms),
+        ];
+        let other = stats.step_ms - named.iter().map(|stage| stage.1).sum::<f64>();
+        Ok(named
+            .into_iter()
+            .chain([("other", other.max(0.0))])
+            .collect())
+    }
+
+    /// Host memory of the method, MB; 0 where it is not known.
+    pub fn memory_mb(&self) -> Result<f64> {
+        let Self::Surrogate(surrogate) = self else {
+            return Ok(0.0);
+        };
+        Ok(
+            (surrogate.model.info().memory_bytes + surrogate.scene.stats()?.memory_bytes) as f64
+                / 1e6,
+        )
+    }
+}
+
+fn solver_options(header: &TrajectoryHeader, threads: u32) -> SolverOptions {
+    SolverOptions {
+        material: header.material,
+        inner_step_s: header.inner_dt_s,
+        threads: threads as usize,
+        ..SolverOptions::default()
+    }
+}
+
+impl SurrogateStepper {
+    fn new(
+        bundle: &BundleFolder,
+        provider: Provider,
+        precision: Precision,
+        region: Region,
+        threads: u32,
+    ) -> Result<Self> {
+        let settings = host::ModelSettings {
+            threads,
+            provider: provider.code(),
+            precision: precision.code(),
+            exact: true,
+        };
+        let model = host::Model::open(&bundle.path, &settings)?;
+        let mut scene = host::Scene::create(&model, ffi::UPT_KERNEL_AUTO)?;
+        let count = model.info().node_count as usize;
+        let region = match region {
+            Region::All => Vec::new(),
+            Region::Surface => model.indices(ffi::UPT_SET_SURFACE_NODES)?,
+            Region::Domain => model.indices(ffi::UPT_SET_DOMAIN_NODES)?,
+        };
+        if !region.is_empty() {
+            scene.set_region(&region)?;
+        }
+        let stats = scene.stats()?;
+        if stats.precision != precision.code() {
+            bail!(
+                "{}: precision {} is not available here (the library would run another)",
+                bundle.name,
+                precision.name()
+            );
+        }
+        let inside: std::collections::HashSet<u32> = region.iter().copied().collect();
+        let others = if region.is_empty() {
+            Vec::new()
+        } else {
+            (0..count as u32)
+                .filter(|node| !inside.contains(node))
+                .collect()
+        };
+        let returned = vec![[0.0; 3]; region.len()];
+        Ok(Self {
+            scene,
+            model,
+            region,
+            others,
+            returned,
+        })
+    }
+
+    /// Nodes that a step returns.
+    pub fn decoded(&self) -> usize {
+        if self.region.is_empty() {
+            self.model.info().node_count as usize
+        } else {
+            self.region.len()
+        }
+    }
+
+    fn step(&mut self, nodes: &[u32], vectors: &[[f32; 3]], out: &mut [[f32; 3]]) -> Result<f64> {
+        let started = Instant::now();
+        if self.region.is_empty() {
+            self.scene.step(nodes, vectors, out)?;
+            return Ok(started.elapsed().as_secs_f64() * 1e3);
+        }
+        self.scene.step(nodes, vectors, &mut self.returned)?;
+        let elapsed = started.elapsed().as_secs_f64() * 1e3;
+        // The rest of the field is decoded outside the timed call, so that all rows are judged on all nodes.
+        let mut rest = vec![[0.0; 3]; self.others.len()];
+        self.scene.decode(&self.others, &mut rest)?;
+        for (list, values) in [(&self.region, &self.returned), (&self.others, &rest)] {
+            for (node, value) in list.iter().zip(values) {
+                out[*node as usize] = *value;
+            }
+        }
+        Ok(elapsed)
+    }
+}

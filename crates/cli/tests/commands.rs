@@ -1,0 +1,202 @@
+//! The command `upt` as a user runs it: exit codes, JSON, and a small report from simulation to page.
+//!
+//! ONNX Runtime is found by `ORT_DYLIB_PATH`, else in `target/ort/` where `cargo xtask ort` puts it.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+fn upt(arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_upt"));
+    command.current_dir(root()).args(arguments);
+    if std::env::var_os("ORT_DYLIB_PATH").is_none() {
+        command.env(
+            "ORT_DYLIB_PATH",
+            root().join("target/ort/libonnxruntime.so"),
+        );
+    }
+    command
+}
+
+fn run(arguments: &[&str]) -> Output {
+    upt(arguments).output().expect("upt starts")
+}
+
+fn json(output: &Output) -> serde_json::Value {
+    serde_json::from_slice(&output.stdout).unwrap_or_else(|error| {
+        panic!(
+            "{error}: {}{}",
+            String::from_utf8_lossy(&output.stdout),
+            String::from_utf8_lossy(&output.stderr)
+        )
+    })
+}
+
+#[test]
+fn doctor_opens_a_bundle_and_says_what_it_found() {
+    let output = run(&["doctor", "--json", "tests/fixtures/tiny-upt"]);
+    let findings = json(&output);
+    assert_eq!(output.status.code(), Some(0), "{findings}");
+    assert_eq!(findings["onnxruntime"]["loaded"], true);
+    assert_eq!(findings["bundles"][0]["kind"], "upt");
+    assert_eq!(
+        findings["bundles"][0]["sha256"].as_str().map(str::len),
+        Some(64)
+    );
+    assert!(
+        findings["providers"]
+            .as_array()
+            .is_some_and(|list| list.len() >= 2)
+    );
+}
+
+#[test]
+fn doctor_fails_with_1_and_names_the_broken_bundle() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("bundle.json"), "{}").unwrap();
+    let output = run(&["doctor", "--json", folder.path().to_str().unwrap()]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(
+        json(&output)["bundles"][0]["problem"]
+            .as_str()
+            .unwrap()
+            .contains("bundle.json")
+    );
+}
+
+#[test]
+fn wrong_input_is_exit_code_2_with_a_message() {
+    let output = run(&["rollout", "no-such-bundle", "no-such-trajectory"]);
+    assert_eq!(output.status.code(), Some(2));
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(
+        message.contains("no-such-bundle") && message.contains("bundle.json"),
+        "{message}"
+    );
+    assert_eq!(
+        run(&["report", "--plain", "nonsense"]).status.code(),
+        Some(2)
+    );
+    assert_eq!(run(&["no-such-command"]).status.code(), Some(2));
+}
+
+#[test]
+fn a_closed_pipe_is_not_a_panic() {
+    let mut child = upt(&["completions", "zsh"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    let output = child.wait_with_output().unwrap();
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(!message.contains("panicked"), "{message}");
+}
+
+/// Simulates a contact on the fixture's mesh, replays it, and writes a report twice.
+#[test]
+fn a_contact_goes_from_simulation_to_a_page() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let trajectory = path("push.trajectory.safetensors");
+    let output = run(&[
+        "simulate",
+        "--mesh",
+        "tests/fixtures/box.mesh.safetensors",
+        "--scheme",
+        "1",
+        "--seed",
+        "3",
+        "--out",
+        &trajectory,
+    ]);
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+
+    let bundle = "tests/fixtures/tiny-upt";
+    let picture = path("push.png");
+    let output = run(&[
+        "rollout",
+        bundle,
+        &trajectory,
+        "--json",
+        "--png",
+        &picture,
+        "--vtu",
+        &path("vtu"),
+    ]);
+    let rollout = json(&output);
+    assert_eq!(rollout["steps"].as_array().unwrap().len(), 160);
+    let mse = rollout["overall"]["mse_mm2"].as_f64().unwrap();
+    assert!(
+        mse > 0.0 && mse.is_finite(),
+        "random weights cannot be right: {mse}"
+    );
+    assert_eq!(&std::fs::read(&picture).unwrap()[1..4], b"PNG");
+    assert!(
+        Path::new(&path("vtu/rollout.pvd")).exists()
+            && Path::new(&path("vtu/frame-0160.vtu")).exists()
+    );
+
+    let out = path("report");
+    let arguments = [
+        "report",
+        "--trajectory",
+        &trajectory,
+        "--bundle",
+        bundle,
+        "--out",
+        &out,
+        "--plain",
+        "zero,linear,tled",
+        "--threads",
+        "1",
+        "--json",
+    ];
+    let report = json(&run(&arguments));
+    let rows = report["rows"].as_array().unwrap();
+    let row = |method: &str, region: &str| {
+        rows.iter()
+            .find(|row| row["method"] == method && row["region"] == region)
+            .unwrap_or_else(|| panic!("no row {method}: {report}"))
+    };
+    // The same rollout by another command, and the region's rows are judged on all nodes.
+    assert!((row("surrogate", "all")["mse_mm2"].as_f64().unwrap() - mse).abs() <= 1e-9 * mse);
+    assert!((row("surrogate", "surface")["mse_mm2"].as_f64().unwrap() - mse).abs() <= 1e-6 * mse);
+    assert_eq!(
+        row("surrogate", "surface")["deviation"],
+        0.0,
+        "a region equals the full decode to the bit"
+    );
+    // The reference solver reproduces its own trajectory.
+    assert_eq!(row("TLED", "all")["mse_mm2"], 0.0);
+    let zero = row("predict zero", "all")["mse_mm2"].as_f64().unwrap();
+    assert!(row("linear elastic", "all")["mse_mm2"].as_f64().unwrap() < zero);
+
+    let page = std::fs::read_to_string(Path::new(&out).join("report.html")).unwrap();
+    assert!(page.contains("<svg") && page.contains("data:image/png;base64,"));
+    assert!(
+        !page.contains("src=\"http") && !page.contains("href=\"http"),
+        "the page must hold everything itself"
+    );
+
+    let stored = |folder: &str| -> Vec<std::time::SystemTime> {
+        std::fs::read_dir(Path::new(folder).join("rows"))
+            .unwrap()
+            .map(|entry| entry.unwrap().metadata().unwrap().modified().unwrap())
+            .collect()
+    };
+    let before = stored(&out);
+    assert_eq!(
+        json(&run(&arguments))["rows"],
+        report["rows"],
+        "finished rows are kept"
+    );
+    assert_eq!(stored(&out), before);
+}

@@ -1,0 +1,77 @@
+#!/usr/bin/env bash
+# Makes the archive and the Unity package, unpacks them in an empty folder, and uses the archive as an outsider would:
+# the C example by find_package and by pkg-config, the command, all with nothing of this repository on any path.
+# Environment: UPT_ROOT, UPT_BUILD_DIR (cargo xtask test sets them). Last line: "N passed, N failed, N skipped".
+set -uo pipefail
+root="${UPT_ROOT:-$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)}"
+work="${UPT_BUILD_DIR:-$root/target}/package-test"
+passed=0
+failed=0
+
+check() {
+  local name="$1"
+  shift
+  if "$@" >"$work/$name.log" 2>&1; then
+    passed=$((passed + 1))
+    echo "ok $name"
+  else
+    failed=$((failed + 1))
+    echo "FAILED $name; the end of $work/$name.log:"
+    tail -n 20 "$work/$name.log"
+  fi
+}
+
+rm -rf "$work"
+mkdir -p "$work/elsewhere"
+cd "$root" || exit 1
+check archive cargo xtask package --out "$work/dist"
+check unity_package cargo xtask package --unity --out "$work/dist"
+archive="$(find "$work/dist" -name 'libupt-*.tar.gz' | head -n 1)"
+check unpack tar -xzf "${archive:-none}" -C "$work/elsewhere"
+# Nothing may depend on where the archive was made.
+rm -rf "$work"/dist/libupt-*/
+prefix="$(find "$work/elsewhere" -mindepth 1 -maxdepth 1 -type d | head -n 1)"
+unset ORT_DYLIB_PATH LD_LIBRARY_PATH UPT_LIB_DIR UPT_INCLUDE_DIR UPT_BUNDLES
+cd "$work/elsewhere" || exit 1
+
+complete() {
+  local file
+  for file in lib/libupt.so lib/libonnxruntime.so lib/libupt.a lib/pkgconfig/upt.pc include/upt.h include/upt.hpp bin/upt \
+    share/doc/upt/LICENSE-APACHE share/doc/upt/LICENSE-MIT share/doc/upt/NOTICE share/doc/upt/THIRD-PARTY.txt \
+    share/doc/upt/onnxruntime/LICENSE; do
+    [ -e "$prefix/$file" ] || { echo "$file is missing"; return 1; }
+  done
+  grep -q '^ort v' "$prefix/share/doc/upt/THIRD-PARTY.txt"
+}
+check complete complete
+
+no_build_paths() {
+  ! grep -rlF "$root" "$prefix/lib/cmake" "$prefix/lib/pkgconfig" "$prefix/share/doc"
+}
+check no_build_paths no_build_paths
+
+bundle="$(find "$prefix/share/upt/bundles" -mindepth 1 -maxdepth 1 -type d 2>/dev/null | sort | head -n 1)"
+check cmake_configure cmake -S "$prefix/share/upt/examples/c" -B "$work/c" -DCMAKE_PREFIX_PATH="$prefix" -DCMAKE_BUILD_TYPE=Release
+check cmake_build cmake --build "$work/c"
+check c_example "$work/c/minimal" "$bundle" 20
+pkg_config_build() {
+  # shellcheck disable=SC2046 # the flags are words
+  PKG_CONFIG_PATH="$prefix/lib/pkgconfig" cc "$prefix/share/upt/examples/c/minimal.c" -o "$work/minimal-pc" \
+    $(PKG_CONFIG_PATH="$prefix/lib/pkgconfig" pkg-config --cflags --libs upt) -lm "-Wl,-rpath,$prefix/lib"
+}
+check pkg_config_build pkg_config_build
+check pkg_config_example "$work/minimal-pc" "$bundle" 20
+check doctor "$prefix/bin/upt" doctor "$bundle"
+
+unity_complete() {
+  local listing
+  listing="$(tar -tzf "$(find "$work/dist" -name 'org.libupt.*.tgz' | head -n 1)")" || return 1
+  local name
+  for name in package/package.json package/Runtime/Interop/Native.g.cs libupt.so libupt.so.meta libonnxruntime.so; do
+    grep -q "$name\$" <<<"$listing" || { echo "$name is missing"; return 1; }
+  done
+}
+check unity_complete unity_complete
+
+echo "$passed passed, $failed failed, 0 skipped"
+[ "$failed" -eq 0 ]

@@ -1,0 +1,285 @@
+//! `cargo xtask demo`: a brain pushed by libupt beside the reference solver, from a fresh clone.
+//!
+//! Set-up; one contact of scheme 5, which no bundle was trained on, simulated by the reference solver
+//! (kept by content); the same contact replayed through every committed brain bundle; a table and a page.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use anyhow::{Context, Result, bail};
+use clap::Args;
+use sha2::{Digest, Sha256};
+
+use crate::workspace::Workspace;
+use crate::{ort, stages, system, venv};
+
+#[derive(Args)]
+pub struct Options {
+    /// Install no system packages.
+    #[arg(long)]
+    no_install: bool,
+    /// Contact scheme: 1 to 5, or a hard regime. The bundles were trained on 1 to 4.
+    #[arg(long, default_value = "5")]
+    scheme: String,
+    /// Seed of the contact site.
+    #[arg(long, default_value_t = 2026)]
+    seed: u64,
+}
+
+const MESH: &str = "onnx/meshes/brain.mesh.safetensors";
+
+/// A bundle that the demo shows: name, boundary condition.
+struct Bundle {
+    path: PathBuf,
+    boundary: String,
+}
+
+pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
+    let missing = system::provide(workspace, &[system::BASE], !options.no_install)?;
+    if !missing.is_empty() {
+        bail!("install {} first", missing.join(", "));
+    }
+    eprintln!("1/4 set-up");
+    venv::create(workspace)?;
+    let library = ort::host_library(workspace)?;
+    stages::build(workspace)?;
+
+    let bundles = brain_bundles(workspace)?;
+    let mut boundaries: Vec<&str> = bundles
+        .iter()
+        .map(|bundle| bundle.boundary.as_str())
+        .collect();
+    boundaries.sort_unstable();
+    boundaries.dedup();
+    let folder = workspace.path("target/demo");
+    std::fs::create_dir_all(&folder)?;
+    for boundary in &boundaries {
+        let trajectory = simulate(workspace, options, boundary, &folder)?;
+        let own: Vec<&Bundle> = bundles
+            .iter()
+            .filter(|bundle| bundle.boundary == *boundary)
+            .collect();
+        // The paper's boundary condition gets the plain names; another one its own folder.
+        let out = if *boundary == boundaries[0] {
+            folder.clone()
+        } else {
+            folder.join(boundary)
+        };
+        report(workspace, options, &library, &trajectory, &own, &out)?;
+    }
+    Ok(true)
+}
+
+/// The committed bundles whose mesh is the brain that the demo simulates.
+fn brain_bundles(workspace: &Workspace) -> Result<Vec<Bundle>> {
+    let mut found = Vec::new();
+    let mut left_out = Vec::new();
+    let nodes = mesh_nodes(workspace)?;
+    for entry in std::fs::read_dir(workspace.path("onnx"))? {
+        let path = entry?.path();
+        let Ok(text) = std::fs::read_to_string(path.join("bundle.json")) else {
+            continue;
+        };
+        let manifest: serde_json::Value = serde_json::from_str(&text)
+            .with_context(|| format!("{}/bundle.json", path.display()))?;
+        let name = manifest["name"].as_str().unwrap_or("?").to_owned();
+        if manifest["mesh"]["nodes"].as_u64() != Some(nodes) {
+            left_out.push(format!("{name} (another mesh)"));
+            continue;
+        }
+        found.push(Bundle {
+            path,
+            boundary: manifest["boundary"].as_str().unwrap_or("fixed").to_owned(),
+        });
+    }
+    found.sort_by(|a, b| a.path.cmp(&b.path));
+    if !left_out.is_empty() {
+        eprintln!("left out: {}", left_out.join(", "));
+    }
+    if found.is_empty() {
+        bail!("no bundle below onnx/ fits {MESH}");
+    }
+    Ok(found)
+}
+
+/// Node count of the demo's mesh, from the header of its file.
+fn mesh_nodes(workspace: &Workspace) -> Result<u64> {
+    let path = workspace.path(MESH);
+    let bytes = std::fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
+    let length = u64::from_le_bytes(
+        bytes
+            .get(..8)
+            .context("the mesh file is cut short")?
+            .try_into()?,
+    ) as usize;
+    let header: serde_json::Value = serde_json::from_slice(
+        bytes
+            .get(8..8 + length)
+            .context("the mesh file is cut short")?,
+    )?;
+    header["positions"]["shape"][0]
+        .as_u64()
+        .context("the mesh file has no `positions`")
+}
+
+/// The reference simulation, made once for each mesh, scheme, seed, boundary and version of the solver's source.
+fn simulate(
+    workspace: &Workspace,
+    options: &Options,
+    boundary: &str,
+    folder: &Path,
+) -> Result<PathBuf> {
+    let mut hash = Sha256::new();
+    hash.update(std::fs::read(workspace.path(MESH))?);
+    for folder in ["crates/tissue/src/solver", "crates/tissue/src"] {
+        let mut files: Vec<PathBuf> = std::fs::read_dir(workspace.path(folder))?
+            .filter_map(|entry| entry.ok().map(|entry| entry.path()))
+            .collect();
+        files.sort();
+        for file in files.iter().filter(|file| file.is_file()) {
+            hash.update(std::fs::read(file)?);
+        }
+    }
+    hash.update(format!("{} {} {boundary}", options.scheme, options.seed));
+    let key = format!("{:x}", hash.finalize());
+    let file = folder.join(format!("contact-{}.trajectory.safetensors", &key[..16]));
+    if file.is_file() {
+        eprintln!(
+            "2/4 the reference simulation is there already: {}",
+            file.display()
+        );
+        return Ok(file);
+    }
+    eprintln!(
+        "2/4 simulating scheme {}, seed {}, boundary `{boundary}` with the reference solver: 160 frames of 50 ms",
+        options.scheme, options.seed
+    );
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    let mut command = Command::new(workspace.upt());
+    command
+        .current_dir(&workspace.root)
+        .args([
+            "simulate",
+            "--mesh",
+            MESH,
+            "--scheme",
+            &options.scheme,
+            "--seed",
+            &options.seed.to_string(),
+            "--boundary",
+            boundary,
+        ])
+        .args(["--threads", &threads.to_string(), "--out"])
+        .arg(&file);
+    run_visibly(&mut command, "upt simulate")?;
+    Ok(file)
+}
+
+fn report(
+    workspace: &Workspace,
+    options: &Options,
+    library: &Path,
+    trajectory: &Path,
+    bundles: &[&Bundle],
+    out: &Path,
+) -> Result<()> {
+    eprintln!(
+        "3/4 replaying the contact through {} bundle(s) and the plain methods",
+        bundles.len()
+    );
+    let mut command = Command::new(workspace.upt());
+    command
+        .current_dir(&workspace.root)
+        .arg("report")
+        .arg("--trajectory")
+        .arg(trajectory)
+        .arg("--out")
+        .arg(out);
+    for bundle in bundles {
+        command.arg("--bundle").arg(&bundle.path);
+    }
+    command
+        .args([
+            "--region",
+            "all,surface",
+            "--plain",
+            "zero,linear,coarse,tled",
+            "--tled-frames",
+            "20",
+        ])
+        .args([
+            "--title",
+            &format!(
+                "A brain pushed by libupt: scheme {}, seed {}",
+                options.scheme, options.seed
+            ),
+        ]);
+    ort::set_environment(&mut command, library);
+    run_visibly(command.stdout(Stdio::null()), "upt report")?;
+    print_table(&out.join("report.json"))?;
+    println!(
+        "4/4 pictures and curves: {}",
+        out.join("report.html").display()
+    );
+    Ok(())
+}
+
+/// Error, time and speed-up over the reference solver, from the rows of a report.
+fn print_table(path: &Path) -> Result<()> {
+    let report: serde_json::Value = serde_json::from_slice(&std::fs::read(path)?)?;
+    let rows = report["rows"]
+        .as_array()
+        .context("report.json has no rows")?;
+    let number = |row: &serde_json::Value, field: &str| row[field].as_f64().unwrap_or(f64::NAN);
+    let reference = rows
+        .iter()
+        .filter(|row| row["method"] == "TLED")
+        .map(|row| number(row, "ms_p50"))
+        .fold(f64::INFINITY, f64::min);
+    println!();
+    println!(
+        "{:<28} {:<26} {:>10} {:>8} {:>10} {:>12}",
+        "method", "configuration", "MSE mm²", "max mm", "ms a step", "x reference"
+    );
+    for row in rows {
+        let method = if row["bundle"] == "" {
+            &row["method"]
+        } else {
+            &row["bundle"]
+        };
+        let configuration = format!(
+            "{} {}, {} thread(s)",
+            row["precision"].as_str().unwrap_or(""),
+            row["region"].as_str().unwrap_or(""),
+            row["threads"]
+        );
+        let speed = reference / number(row, "ms_p50");
+        let speed = if speed.is_finite() && speed < 1e6 {
+            format!("{speed:.1}")
+        } else {
+            "-".into()
+        };
+        println!(
+            "{:<28} {configuration:<26} {:>10.4} {:>8.2} {:>10.3} {speed:>12}",
+            method.as_str().unwrap_or("?"),
+            number(row, "mse_mm2"),
+            number(row, "max_mm"),
+            number(row, "ms_p50")
+        );
+    }
+    for note in report["left_out"].as_array().into_iter().flatten() {
+        println!("left out: {}", note.as_str().unwrap_or("?"));
+    }
+    println!();
+    Ok(())
+}
+
+fn run_visibly(command: &mut Command, name: &str) -> Result<()> {
+    let status = command
+        .status()
+        .with_context(|| format!("cannot start {name}"))?;
+    if !status.success() {
+        bail!("{name} failed");
+    }
+    Ok(())
+}

@@ -1,0 +1,333 @@
+//! `cargo xtask package`: a relocatable archive for C and C++ hosts, and the Unity package.
+//!
+//! ```text
+//! libupt-VERSION-PLATFORM/
+//!   bin/upt                            the command
+//!   lib/libupt.so -> .so.0 -> .so.V    the library; libupt.a; libonnxruntime.so beside it
+//!   lib/cmake/upt/, lib/pkgconfig/     find_package(upt), pkg-config upt
+//!   include/upt.h, upt.hpp
+//!   share/upt/bundles/, examples/
+//!   share/doc/upt/                     licences, notices, README, CHANGELOG
+//! ```
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use anyhow::{Context, Result, bail};
+use clap::Args;
+
+use crate::ort::{self, Platform};
+use crate::process::{has_program, run_checked};
+use crate::stages;
+use crate::workspace::Workspace;
+
+#[derive(Args)]
+pub struct Options {
+    /// Make the Unity package (.tgz with the native plugins) instead of the archive.
+    #[arg(long)]
+    unity: bool,
+    /// Lay out the archive for another platform, with its ONNX Runtime; libupt must be built there.
+    #[arg(long)]
+    platform: Option<Platform>,
+    /// Folder for the result.
+    #[arg(long, default_value = "target/package")]
+    out: PathBuf,
+}
+
+pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
+    let out = if options.out.is_absolute() {
+        options.out.clone()
+    } else {
+        workspace.root.join(&options.out)
+    };
+    std::fs::create_dir_all(&out)?;
+    let made = if options.unity {
+        unity(workspace, &out)?
+    } else {
+        let host = Platform::host()?;
+        match options.platform {
+            Some(platform) if platform != host => foreign(workspace, platform, &out)?,
+            _ => native(workspace, host, &out)?,
+        }
+    };
+    println!("{}", made.display());
+    Ok(true)
+}
+
+fn version(workspace: &Workspace) -> Result<String> {
+    let text = std::fs::read_to_string(workspace.path("Cargo.toml"))?;
+    let line = text
+        .lines()
+        .find_map(|line| line.strip_prefix("version = \""))
+        .context("Cargo.toml: no workspace version")?;
+    Ok(line.trim_end_matches('"').to_owned())
+}
+
+/// Copies a file or a folder; links are followed.
+fn copy(from: &Path, to: &Path) -> Result<()> {
+    let context = || format!("cannot copy {} to {}", from.display(), to.display());
+    if from.is_dir() {
+        std::fs::create_dir_all(to).with_context(context)?;
+        for entry in std::fs::read_dir(from).with_context(context)? {
+            let entry = entry?;
+            copy(&entry.path(), &to.join(entry.file_name()))?;
+        }
+        return Ok(());
+    }
+    if let Some(folder) = to.parent() {
+        std::fs::create_dir_all(folder)?;
+    }
+    std::fs::copy(from, to).with_context(context)?;
+    Ok(())
+}
+
+/// What is the same on every platform: bundles, examples, licences.
+fn shared(workspace: &Workspace, root: &Path, ort_folder: &Path) -> Result<()> {
+    for entry in std::fs::read_dir(workspace.path("onnx"))? {
+        let path = entry?.path();
+        if path.join("bundle.json").is_file() {
+            copy(
+                &path,
+                &root
+                    .join("share/upt/bundles")
+                    .join(path.file_name().context("a bundle has a name")?),
+            )?;
+        }
+    }
+    for example in ["examples/c", "examples/cpp"] {
+        copy(
+            &workspace.path(example),
+            &root.join("share/upt").join(example),
+        )?;
+    }
+    let doc = root.join("share/doc/upt");
+    for name in [
+        "LICENSE-APACHE",
+        "LICENSE-MIT",
+        "NOTICE",
+        "README.md",
+        "CHANGELOG.md",
+        "docs/abi.md",
+        "docs/formats.md",
+    ] {
+        let file = Path::new(name)
+            .file_name()
+            .context("a document has a name")?;
+        copy(&workspace.path(name), &doc.join(file))?;
+    }
+    copy(
+        &ort_folder.join("LICENSE"),
+        &doc.join("onnxruntime/LICENSE"),
+    )?;
+    copy(
+        &ort_folder.join("ThirdPartyNotices.txt"),
+        &doc.join("onnxruntime/ThirdPartyNotices.txt"),
+    )?;
+    std::fs::write(doc.join("THIRD-PARTY.txt"), third_party(workspace)?)?;
+    Ok(())
+}
+
+/// The crates that libupt and the command link, with versions and licences, from `cargo metadata`.
+fn third_party(workspace: &Workspace) -> Result<String> {
+    let output = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
+        .current_dir(&workspace.root)
+        .args([
+            "tree", "-p", "upt", "-p", "upt-cli", "--edges", "normal", "--prefix", "none",
+            "--format", "{p} {l}",
+        ])
+        .output()?;
+    if !output.status.success() {
+        bail!("cargo tree: {}", String::from_utf8_lossy(&output.stderr));
+    }
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    // Paths of workspace members and the mark of repeated entries are of no interest.
+    let mut lines: Vec<String> = text
+        .lines()
+        .map(|line| line.trim_end_matches(" (*)"))
+        .filter(|line| !line.is_empty() && !line.contains(" (/") && !line.contains("(proc-macro)"))
+        .map(str::to_owned)
+        .collect();
+    lines.sort();
+    lines.dedup();
+    Ok(format!(
+        "Rust crates linked into libupt and the command upt: name, version, licence.\n\n{}\n",
+        lines.join("\n")
+    ))
+}
+
+fn native(workspace: &Workspace, host: Platform, out: &Path) -> Result<PathBuf> {
+    if !has_program("cmake") {
+        bail!(
+            "cmake is missing: it writes the find_package and pkg-config files (Debian: apt-get install cmake)"
+        );
+    }
+    let ort_folder = ort::fetch(workspace, host, ort::VERSION)?;
+    stages::build(workspace)?;
+    let name = format!("libupt-{}-{}", version(workspace)?, host.name());
+    let root = out.join(&name);
+    std::fs::remove_dir_all(&root).ok();
+    let build = workspace.path("target/package-cmake");
+    let log = workspace.logs().join("package.log");
+    let mut configure = Command::new("cmake");
+    configure
+        .arg("-S")
+        .arg(workspace.path("cmake"))
+        .arg("-B")
+        .arg(&build)
+        .arg(format!("-DUPT_LIB_DIR={}", workspace.release().display()))
+        .arg(format!("-DCMAKE_INSTALL_PREFIX={}", root.display()))
+        .arg("-DCMAKE_INSTALL_LIBDIR=lib");
+    run_checked("cmake", &mut configure, &log)?;
+    run_checked(
+        "cmake --install",
+        Command::new("cmake").arg("--install").arg(&build),
+        &log,
+    )?;
+    let library = if cfg!(target_os = "macos") {
+        "libonnxruntime.dylib"
+    } else {
+        "libonnxruntime.so"
+    };
+    copy(&ort_folder.join(library), &root.join("lib").join(library))?;
+    copy(&workspace.upt(), &root.join("bin/upt"))?;
+    #[cfg(unix)]
+    std::os::unix::fs::symlink(format!("../lib/{library}"), root.join("bin").join(library))?;
+    shared(workspace, &root, &ort_folder)?;
+    archive(out, &name)
+}
+
+/// The layout for a platform that this machine does not build for.
+fn foreign(workspace: &Workspace, platform: Platform, out: &Path) -> Result<PathBuf> {
+    let ort_folder = ort::fetch(workspace, platform, ort::VERSION)?;
+    let name = format!("libupt-{}-{}", version(workspace)?, platform.name());
+    let root = out.join(&name);
+    std::fs::remove_dir_all(&root).ok();
+    let (folder, library, built) = match platform {
+        Platform::WindowsX64 => (
+            "bin",
+            "onnxruntime.dll",
+            "upt.dll (and upt.dll.lib in lib/)",
+        ),
+        Platform::MacosArm64 => ("lib", "libonnxruntime.dylib", "libupt.dylib"),
+        Platform::LinuxX64 | Platform::LinuxArm64 => ("lib", "libonnxruntime.so", "libupt.so"),
+    };
+    copy(&ort_folder.join(library), &root.join(folder).join(library))?;
+    for header in ["include/upt.h", "include/upt.hpp"] {
+        copy(&workspace.path(header), &root.join(header))?;
+    }
+    shared(workspace, &root, &ort_folder)?;
+    std::fs::write(
+        root.join("INCOMPLETE.txt"),
+        format!(
+            "This archive was laid out on another platform and holds no libupt.\n\
+             On {}: run `cargo build --release` and put {built} into {folder}/, or run `cargo xtask package` there.\n\
+             The library has not been run on this platform by its authors.\n",
+            platform.name()
+        ),
+    )?;
+    archive(out, &name)
+}
+
+/// A .tar.gz by the system's tar, names sorted and owner removed so that it can be compared.
+fn archive(out: &Path, name: &str) -> Result<PathBuf> {
+    let file = out.join(format!("{name}.tar.gz"));
+    let status = Command::new("tar")
+        .current_dir(out)
+        .arg("-czf")
+        .arg(&file)
+        .arg(name)
+        .status()
+        .context("tar is missing")?;
+    if !status.success() {
+        bail!("tar failed for {}", file.display());
+    }
+    Ok(file)
+}
+
+/// The Unity package with the native plugins: this platform's libupt, and ONNX Runtime of every platform
+/// whose libupt is there.
+fn unity(workspace: &Workspace, out: &Path) -> Result<PathBuf> {
+    let host = Platform::host()?;
+    let ort_folder = ort::fetch(workspace, host, ort::VERSION)?;
+    stages::build(workspace)?;
+    let name = "package";
+    let staging = out.join("unity");
+    let root = staging.join(name);
+    std::fs::remove_dir_all(&staging).ok();
+    copy(&workspace.path("unity-plugin"), &root)?;
+    let (folder, libraries): (&str, &[&str]) = match host {
+        Platform::LinuxX64 => ("Linux/x86_64", &["libupt.so", "libonnxruntime.so"]),
+        Platform::LinuxArm64 => ("Linux/arm64", &["libupt.so", "libonnxruntime.so"]),
+        Platform::WindowsX64 => ("Windows/x86_64", &["upt.dll", "onnxruntime.dll"]),
+        Platform::MacosArm64 => ("macOS/arm64", &["libupt.dylib", "libonnxruntime.dylib"]),
+    };
+    let plugins = root.join("Runtime/Plugins").join(folder);
+    for library in libraries {
+        let from = if library.contains("onnxruntime") {
+            ort_folder.join(library)
+        } else {
+            workspace.release().join(library)
+        };
+        copy(&from, &plugins.join(library))?;
+    }
+    // Unity leaves folders whose names end in ~ alone, so these need no .meta files.
+    for entry in std::fs::read_dir(workspace.path("onnx"))? {
+        let path = entry?.path();
+        if path.join("bundle.json").is_file()
+            && path.file_name().is_some_and(|name| name == "brain-reduced")
+        {
+            copy(&path, &root.join("Bundles~/brain-reduced"))?;
+        }
+    }
+    std::fs::write(
+        root.join("Documentation~/third-party-crates.txt"),
+        third_party(workspace)?,
+    )?;
+    without_empty_plugins(&root)?;
+    let file = out.join(format!(
+        "org.libupt.soft-tissue-{}.tgz",
+        version(workspace)?
+    ));
+    let status = Command::new("tar")
+        .current_dir(&staging)
+        .arg("-czf")
+        .arg(&file)
+        .arg(name)
+        .status()
+        .context("tar is missing")?;
+    if !status.success() {
+        bail!("tar failed for {}", file.display());
+    }
+    Ok(file)
+}
+
+/// Removes the settings of plugins that are not in the package: Unity warns about them otherwise.
+fn without_empty_plugins(root: &Path) -> Result<()> {
+    let mut folders = vec![root.join("Runtime/Plugins")];
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(&folder)? {
+            let path = entry?.path();
+            if path.is_dir() {
+                folders.push(path);
+                continue;
+            }
+            let asset = path.with_extension("");
+            let is_library = asset.extension().is_some_and(|extension| {
+                extension == "so" || extension == "dll" || extension == "dylib"
+            });
+            if path
+                .extension()
+                .is_some_and(|extension| extension == "meta")
+                && is_library
+                && !asset.exists()
+            {
+                println!(
+                    "left out (not built on this platform): {}",
+                    asset.strip_prefix(root).unwrap_or(&asset).display()
+                );
+                std::fs::remove_file(&path)?;
+            }
+        }
+    }
+    Ok(())
+}
