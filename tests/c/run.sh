@@ -20,8 +20,8 @@ if [ ! -e "$libraries/libupt.so" ]; then
   exit 1
 fi
 
-# A library that can be made to panic, in a folder of its own so that it is never packaged.
-cargo build --release --quiet --manifest-path "$root/Cargo.toml" -p upt --features fault \
+# A library that can be made to panic and has no optional features, in a folder of its own so that it is never packaged.
+cargo build --release --quiet --manifest-path "$root/Cargo.toml" -p upt --no-default-features --features fault \
   --target-dir "$build/fault"
 ln -sf libupt.so "$build/fault/release/libupt.so.0"
 
@@ -31,7 +31,7 @@ cmake -S "$root/cmake" -B "$build/install" -DUPT_LIB_DIR="$libraries" \
 cmake --install "$build/install" >>"$build/install.log"
 
 brain=""
-for name in brain-fast brain brain-reduced brain-coarse; do
+for name in brain-reduced brain-fast brain-coarse brain; do
   if [ -e "$bundles/$name/bundle.json" ]; then
     brain="$bundles/$name"
     break
