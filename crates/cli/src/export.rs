@@ -113,7 +113,9 @@ fn export_frames(options: &Options, mesh: &Mesh, trajectory: &Trajectory) -> any
     }
     std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
     let body = Body::new(mesh, options.skin);
-    let frames: Vec<usize> = (0..trajectory.frame_count()).step_by(options.every).collect();
+    let frames: Vec<usize> = (0..trajectory.frame_count())
+        .step_by(options.every)
+        .collect();
     let bar = ProgressBar::new(frames.len() as u64).with_style(ProgressStyle::with_template(
         "{bar:40} {pos}/{len} frames, {eta} left",
     )?);

@@ -1,7 +1,7 @@
 //! `upt mesh`: what a mesh is (`info`), a mesh from another program (`import`), a mesh from a
 //! distance field (`stuff`).
 
-use anyhow::{Context, bail};
+use anyhow::bail;
 use clap::{Args, Subcommand};
 use serde_json::json;
 use std::path::PathBuf;
@@ -202,7 +202,10 @@ fn print_quality(q: &Quality) {
     );
     row(
         "dihedral angles",
-        format!("{:.2} to {:.2} degrees", q.min_dihedral_deg, q.max_dihedral_deg),
+        format!(
+            "{:.2} to {:.2} degrees",
+            q.min_dihedral_deg, q.max_dihedral_deg
+        ),
     );
     row(
         "inscribed radius",
@@ -221,7 +224,10 @@ fn print_quality(q: &Quality) {
     }
     row(
         "boundary",
-        format!("{boundary}, Euler characteristic {}", q.euler_characteristic),
+        format!(
+            "{boundary}, Euler characteristic {}",
+            q.euler_characteristic
+        ),
     );
 }
 
@@ -243,7 +249,10 @@ fn run_import(args: &Import) -> anyhow::Result<ExitCode> {
             window: args.window_sphere.clone(),
         },
     )
-    .with_context(|| args.input.display().to_string())?;
+    .map_err(|error| match error.names_file() {
+        true => anyhow::Error::new(error),
+        false => anyhow::Error::new(error).context(args.input.display().to_string()),
+    })?;
     imported.mesh.write(&args.output)?;
     let quality = measure(&imported.mesh);
     if args.json {
@@ -284,7 +293,11 @@ fn run_stuff(args: &Stuff) -> anyhow::Result<ExitCode> {
     let mut repairs = Vec::new();
     let mut mesh = from_tets(raw, false, &mut repairs)?;
     if !repairs.is_empty() {
-        bail!("{}: {} repairs in a stuffed mesh", args.field.display(), repairs.len());
+        bail!(
+            "{}: {} repairs in a stuffed mesh",
+            args.field.display(),
+            repairs.len()
+        );
     }
     mesh.name = "stuffed".into();
     mesh.source = format!("distance field stuffed at a spacing of {} mm", args.spacing);

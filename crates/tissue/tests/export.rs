@@ -17,7 +17,9 @@ fn body() -> (Mesh, Vec<[f32; 3]>) {
 #[test]
 fn a_frame_reads_back_as_vtk_sees_it() {
     let (mesh, displacement) = body();
-    let contact: Vec<u8> = (0..mesh.node_count()).map(|node| (node % 3 == 0) as u8).collect();
+    let contact: Vec<u8> = (0..mesh.node_count())
+        .map(|node| (node % 3 == 0) as u8)
+        .collect();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("frame.vtu");
     for cells in [Cells::Tets(&mesh.tets), Cells::Triangles(&mesh.surface)] {
@@ -33,7 +35,11 @@ fn a_frame_reads_back_as_vtk_sees_it() {
             Cells::Tets(cells) => cells.as_flattened().iter().map(|&n| n.into()).collect(),
             Cells::Triangles(cells) => cells.as_flattened().iter().map(|&n| n.into()).collect(),
         };
-        let VertexNumbers::XML { connectivity, offsets } = piece.cells.cell_verts else {
+        let VertexNumbers::XML {
+            connectivity,
+            offsets,
+        } = piece.cells.cell_verts
+        else {
             panic!("not XML cells");
         };
         assert_eq!(connectivity, nodes);
@@ -64,7 +70,10 @@ fn a_collection_lists_frames_with_their_times() {
     collection.push(0.05, "frame-00001.vtu");
     collection.write(&path).unwrap();
     let text = std::fs::read_to_string(&path).unwrap();
-    assert!(text.contains("timestep=\"0.05\" part=\"0\" file=\"frame-00001.vtu\""), "{text}");
+    assert!(
+        text.contains("timestep=\"0.05\" part=\"0\" file=\"frame-00001.vtu\""),
+        "{text}"
+    );
     assert_eq!(text.matches("<DataSet").count(), 2);
 }
 
@@ -101,13 +110,16 @@ fn a_gltf_surface_is_valid_and_upright() {
     write_surface(&path, SurfaceFormat::Gltf, &mesh, &displacement).unwrap();
     // Opening validates accessors, views and indices.
     let document = gltf::Gltf::open(&path).unwrap();
-    let primitive = document.meshes().next().unwrap().primitives().next().unwrap();
+    let primitive = document
+        .meshes()
+        .next()
+        .unwrap()
+        .primitives()
+        .next()
+        .unwrap();
     let high = primitive.bounding_box().max;
     // 6 mm tall along z becomes 6 mm along y, less what the deformation takes.
     assert!((high[1] - 6e-3).abs() < 1e-6, "{high:?}");
-    assert_eq!(
-        primitive.indices().unwrap().count(),
-        3 * mesh.surface.len()
-    );
+    assert_eq!(primitive.indices().unwrap().count(), 3 * mesh.surface.len());
     assert_eq!(SurfaceFormat::of(&path), Some(SurfaceFormat::Gltf));
 }

@@ -59,7 +59,8 @@ fn every_file_of_the_gmsh_box_gives_the_same_body() {
         "box.vtu",
         "box-text.vtu",
     ] {
-        let imported = read(name, &ImportOptions::default()).unwrap_or_else(|e| panic!("{name}: {e}"));
+        let imported =
+            read(name, &ImportOptions::default()).unwrap_or_else(|e| panic!("{name}: {e}"));
         assert!(imported.repairs.is_empty(), "{name}");
         let mesh = imported.mesh;
         assert!((measure(&mesh).volume_mm3 - 1000.0).abs() < 1e-3, "{name}");
@@ -87,11 +88,20 @@ fn surfaces_are_filled_to_a_node_count() {
             resolution: Some(Resolution::Nodes(800)),
             ..ImportOptions::default()
         };
-        let mesh = read(name, &options).unwrap_or_else(|e| panic!("{name}: {e}")).mesh;
+        let mesh = read(name, &options)
+            .unwrap_or_else(|e| panic!("{name}: {e}"))
+            .mesh;
         let quality = measure(&mesh);
-        assert!(quality.nodes.abs_diff(800) <= 60, "{name}: {} nodes", quality.nodes);
+        assert!(
+            quality.nodes.abs_diff(800) <= 60,
+            "{name}: {} nodes",
+            quality.nodes
+        );
         // Sharp edges are cut off at the scale of the lattice.
-        assert!((quality.volume_mm3 / 1000.0 - 1.0).abs() < 0.05, "{name}: {quality:?}");
+        assert!(
+            (quality.volume_mm3 / 1000.0 - 1.0).abs() < 0.05,
+            "{name}: {quality:?}"
+        );
         assert!(quality.min_dihedral_deg > 8.0, "{name}: {quality:?}");
         assert_eq!((quality.components, quality.euler_characteristic), (1, 2));
     }
@@ -133,12 +143,18 @@ fn obj(faces: &str, repair: bool) -> Result<Imported, ImportError> {
 #[test]
 fn open_and_turned_surfaces_name_the_place() {
     let error = obj("f 1 3 2\nf 1 2 4\nf 1 4 3\n", true).unwrap_err();
-    assert!(matches!(error, ImportError::Open { count: 3, .. }), "{error}");
+    assert!(
+        matches!(error, ImportError::Open { count: 3, .. }),
+        "{error}"
+    );
     let error = obj("f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 4 3\n", true).unwrap_err();
     assert!(matches!(error, ImportError::Orientation { .. }), "{error}");
     let doubled = "f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\nf 2 3 4\n";
     let error = obj(doubled, true).unwrap_err();
-    assert!(matches!(error, ImportError::SurfaceEdge { faces: 3, .. }), "{error}");
+    assert!(
+        matches!(error, ImportError::SurfaceEdge { faces: 3, .. }),
+        "{error}"
+    );
 }
 
 #[test]
@@ -159,7 +175,10 @@ fn smaller_parts_of_a_surface_are_dropped_on_request() {
     let faces = "f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\nf 5 7 6\nf 5 6 8\nf 5 8 7\nf 6 7 8\n";
     let both = format!("{second}{faces}");
     let error = obj(&both, false).unwrap_err();
-    assert!(matches!(error, ImportError::SurfaceParts { count: 2, face: 4 }), "{error}");
+    assert!(
+        matches!(error, ImportError::SurfaceParts { count: 2, face: 4 }),
+        "{error}"
+    );
     let imported = obj(&both, true).unwrap();
     assert!(measure(&imported.mesh).high_mm[0] < 10.0);
 }
@@ -197,7 +216,17 @@ fn inverted_tets_are_named_and_turned() {
     let mut raw = pair();
     raw.tets[1].swap(0, 1);
     let (error, repairs, mesh) = both(raw);
-    assert!(matches!(error, ImportError::Inverted { tet: 1, count: 1, .. }), "{error}");
+    assert!(
+        matches!(
+            error,
+            ImportError::Inverted {
+                tet: 1,
+                count: 1,
+                ..
+            }
+        ),
+        "{error}"
+    );
     assert_eq!((repairs.len(), repairs[0].first), (1, 1));
     assert_eq!(mesh.tets.len(), 2);
 }
@@ -208,7 +237,10 @@ fn degenerate_tets_are_named_and_dropped() {
     raw.positions.push([1.0, 1.0, 0.0]);
     raw.tets.insert(1, [0, 1, 2, 5]);
     let (error, repairs, mesh) = both(raw);
-    assert!(matches!(error, ImportError::Degenerate { tet: 1, .. }), "{error}");
+    assert!(
+        matches!(error, ImportError::Degenerate { tet: 1, .. }),
+        "{error}"
+    );
     // The node of the dropped tetrahedron goes with it.
     assert_eq!(repairs.len(), 2);
     assert_eq!((mesh.node_count(), mesh.tets.len()), (5, 2));
@@ -219,7 +251,16 @@ fn repeated_tets_are_named_and_dropped() {
     let mut raw = pair();
     raw.tets.push([1, 0, 3, 2]);
     let (error, repairs, mesh) = both(raw);
-    assert!(matches!(error, ImportError::Duplicate { first: 0, second: 2 }), "{error}");
+    assert!(
+        matches!(
+            error,
+            ImportError::Duplicate {
+                first: 0,
+                second: 2
+            }
+        ),
+        "{error}"
+    );
     assert_eq!(repairs[0].first, 2);
     assert_eq!(mesh.tets.len(), 2);
 }
@@ -230,7 +271,10 @@ fn unreferenced_nodes_are_named_and_dropped() {
     raw.positions.insert(0, [50.0; 3]);
     raw.tets.iter_mut().flatten().for_each(|node| *node += 1);
     let (error, repairs, mesh) = both(raw);
-    assert!(matches!(error, ImportError::Unreferenced { node: 0, count: 1 }), "{error}");
+    assert!(
+        matches!(error, ImportError::Unreferenced { node: 0, count: 1 }),
+        "{error}"
+    );
     assert_eq!(repairs.len(), 1);
     assert_eq!(mesh.positions[0], [0.0; 3]);
 }
@@ -238,12 +282,27 @@ fn unreferenced_nodes_are_named_and_dropped() {
 #[test]
 fn parts_are_named_and_the_largest_kept() {
     let mut raw = pair();
-    for p in [[9.0, 0.0, 0.0], [10.0, 0.0, 0.0], [9.0, 1.0, 0.0], [9.0, 0.0, 1.0]] {
+    for p in [
+        [9.0, 0.0, 0.0],
+        [10.0, 0.0, 0.0],
+        [9.0, 1.0, 0.0],
+        [9.0, 0.0, 1.0],
+    ] {
         raw.positions.push(p);
     }
     raw.tets.insert(0, [5, 6, 7, 8]);
     let (error, repairs, mesh) = both(raw);
-    assert!(matches!(error, ImportError::Components { count: 2, tet: 1, .. }), "{error}");
+    assert!(
+        matches!(
+            error,
+            ImportError::Components {
+                count: 2,
+                tet: 1,
+                ..
+            }
+        ),
+        "{error}"
+    );
     assert_eq!(repairs[0].count, 1);
     assert_eq!((mesh.node_count(), mesh.tets.len()), (5, 2));
 }
@@ -253,7 +312,10 @@ fn non_finite_nodes_are_named_and_dropped_with_their_tets() {
     let mut raw = pair();
     raw.positions[4][1] = f64::NAN;
     let (error, repairs, mesh) = both(raw);
-    assert!(matches!(error, ImportError::NonFinite { node: 4 }), "{error}");
+    assert!(
+        matches!(error, ImportError::NonFinite { node: 4 }),
+        "{error}"
+    );
     assert_eq!(repairs.len(), 2);
     assert_eq!((mesh.node_count(), mesh.tets.len()), (4, 1));
 }
@@ -264,7 +326,15 @@ fn a_node_out_of_range_is_never_repaired() {
     raw.tets[1][3] = 7;
     let error = from_tets(raw, true, &mut Vec::new()).unwrap_err();
     assert!(
-        matches!(error, ImportError::NodeOutOfRange { index: 1, node: 7, count: 5, .. }),
+        matches!(
+            error,
+            ImportError::NodeOutOfRange {
+                index: 1,
+                node: 7,
+                count: 5,
+                ..
+            }
+        ),
         "{error}"
     );
 }
@@ -276,7 +346,10 @@ fn damaged_gmsh_files_say_where() {
         (sound.replace("4.1 0 8", "4.0 0 8"), "version 4.0"),
         (sound.replace("$EndNodes", "$EndNode"), "$EndNode"),
         (sound[..sound.len() / 2].to_string(), "ends too early"),
-        (sound.replace("$Nodes", "$Comments\n$EndComments\n$Other"), "$Other has no"),
+        (
+            sound.replace("$Nodes", "$Comments\n$EndComments\n$Other"),
+            "$Other has no",
+        ),
     ];
     for (text, expected) in cases {
         let error = read_text(&text, "msh", &ImportOptions::default()).unwrap_err();

@@ -126,6 +126,19 @@ pub enum ImportError {
     Stuffing(#[from] StuffError),
 }
 
+impl ImportError {
+    /// Whether the message names the file; the other faults are found after reading.
+    pub fn names_file(&self) -> bool {
+        matches!(
+            self,
+            Self::Io { .. }
+                | Self::Extension { .. }
+                | Self::Format { .. }
+                | Self::ElementKind { .. }
+        )
+    }
+}
+
 /// A change that made a file importable; printed by `upt mesh import`.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct Repair {
