@@ -1,0 +1,102 @@
+//! Static solutions of CalculiX on the same meshes with the same elements and law
+//! (fixture: tests/fixtures/make_calculix.py).
+
+use safetensors::SafeTensors;
+use tissue::mesh::{Boundary, Mesh, regular_box};
+use tissue::solver::{ContactNode, Solver, SolverOptions};
+use tissue::tensors::{f32_values, i32_values};
+
+struct Case {
+    displacement: Vec<[f32; 3]>,
+    reaction: Vec<[f32; 3]>,
+    contact: Vec<ContactNode>,
+}
+
+fn case(name: &str) -> Case {
+    let path = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/tests/fixtures/calculix.safetensors"
+    );
+    let bytes = std::fs::read(path).unwrap();
+    let file = SafeTensors::deserialize(&bytes).unwrap();
+    let vectors = |field: &str| -> Vec<[f32; 3]> {
+        let tensor = file.tensor(&format!("{name}.{field}")).unwrap();
+        let values: Vec<f32> = f32_values(tensor.data()).collect();
+        values.as_chunks().0.to_vec()
+    };
+    let nodes = file.tensor(&format!("{name}.nodes")).unwrap();
+    let contact = i32_values(nodes.data())
+        .zip(vectors("vectors"))
+        .map(|(node, displacement)| ContactNode {
+            node: node as u32,
+            displacement,
+        })
+        .collect();
+    Case {
+        displacement: vectors("displacement"),
+        reaction: vectors("reaction"),
+        contact,
+    }
+}
+
+/// Pushes to the case's contact and waits until nothing moves; returns displacement and reaction.
+fn settle(mesh: &Mesh, case: &Case, frames: u32) -> (Vec<[f32; 3]>, Vec<[f32; 3]>) {
+    let mut options = SolverOptions::default();
+    // The static end is the same for any damping; 40 /s gets there soon.
+    options.material.damping_per_s = 40.0;
+    options.inner_step_s = 2e-4;
+    let mut solver = Solver::new(mesh, Boundary::Fixed, options).unwrap();
+    let mut report = None;
+    for frame in 1..=frames {
+        let part = (frame as f32 / 10.0).min(1.0);
+        let contact: Vec<ContactNode> = case
+            .contact
+            .iter()
+            .map(|c| ContactNode {
+                node: c.node,
+                displacement: c.displacement.map(|v| v * part),
+            })
+            .collect();
+        report = Some(solver.step_frame(&contact, 0.05).unwrap());
+    }
+    let mut u = vec![[0.0; 3]; mesh.node_count()];
+    solver.displacement(&mut u);
+    (u, report.unwrap().reaction)
+}
+
+fn compare(mesh: &Mesh, case: &Case, frames: u32) {
+    let (u, reaction) = settle(mesh, case, frames);
+    let worst = u
+        .as_flattened()
+        .iter()
+        .zip(case.displacement.as_flattened())
+        .fold(0.0f32, |m, (a, b)| m.max((a - b).abs()));
+    assert!(worst < 0.02, "largest difference {worst} mm");
+    // CalculiX prints the force on the tissue.
+    let (mut difference, mut norm) = (0.0, 0.0);
+    for (a, b) in reaction
+        .as_flattened()
+        .iter()
+        .zip(case.reaction.as_flattened())
+    {
+        difference += f64::from(a + b).powi(2);
+        norm += f64::from(*b).powi(2);
+    }
+    let relative = (difference / norm).sqrt();
+    assert!(relative < 5e-3, "reactions differ by {relative}");
+}
+
+#[test]
+fn a_sheared_and_pressed_cube_agrees_with_calculix() {
+    compare(&regular_box([40.0; 3], [5; 3]).unwrap(), &case("cube"), 40);
+}
+
+#[test]
+fn a_pushed_brain_agrees_with_calculix() {
+    let path = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../onnx/meshes/brain-coarse.mesh.safetensors"
+    );
+    let mesh = Mesh::read(std::path::Path::new(path)).unwrap();
+    compare(&mesh, &case("brain"), 80);
+}

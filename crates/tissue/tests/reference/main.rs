@@ -1,0 +1,11 @@
+//! The reference solver against what others computed: closed forms, conservation,
+//! wave speed, refinement, CalculiX; and the promises of the files it writes.
+
+mod calculix;
+mod closed_forms;
+mod contact;
+mod dataset;
+mod determinism;
+mod dynamics;
+mod failures;
+mod metrics;
