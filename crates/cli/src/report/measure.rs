@@ -49,7 +49,10 @@ pub fn measure(
         stepper.reset()?;
         let trajectory = &case.trajectory;
         let mut steps: Vec<StepErrors> = Vec::new();
-        for frame in 1..trajectory.frame_count().min(plan.step_limit + 1) {
+        for frame in 1..trajectory
+            .frame_count()
+            .min(plan.step_limit.saturating_add(1))
+        {
             let (nodes, vectors) = trajectory.contact(frame);
             let elapsed = stepper.step(nodes, vectors, &mut field)?;
             if index == 0 && frame == 1 {
