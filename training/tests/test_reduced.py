@@ -198,7 +198,7 @@ def test_columns_of_another_mesh_are_refused(phantom):
 
 
 def test_any_correction_stays_inside_the_bound(bundle):
-    states = load_states(bundle[1] / "states-0.npz")
+    states = load_states(bundle[1] / "states-data.npz")
     model = Correction(states.modes, states.z.shape[2], 16)
     torch.manual_seed(0)
     with torch.no_grad():
@@ -212,7 +212,7 @@ def test_any_correction_stays_inside_the_bound(bundle):
 
 
 def test_the_fade_ends_in_the_prior(bundle):
-    states = load_states(bundle[1] / "states-0.npz")
+    states = load_states(bundle[1] / "states-data.npz")
     model = Correction(states.modes, states.z.shape[2], 16)
     with torch.no_grad():
         model.contact_base.fill_(0.1)
@@ -225,7 +225,7 @@ def test_the_fade_ends_in_the_prior(bundle):
 def test_the_bundle_runs_as_it_was_trained(phantom, bundle):
     mesh, _, folder = phantom
     out, work = bundle
-    states = load_states(work / "states-0.npz")
+    states = load_states(work / "states-data.npz")
     saved = torch.load(work / "training-1.pt", weights_only=False)["best"]
     model = Correction(states.modes, states.z.shape[2], 48)
     model.load_state_dict(saved)
@@ -255,7 +255,7 @@ def test_the_correction_beats_the_prior_on_unseen_cases(phantom, bundle):
 
 
 def test_test_cases_and_scheme_5_are_never_trained_on(bundle):
-    states = load_states(bundle[1] / "states-0.npz")
+    states = load_states(bundle[1] / "states-data.npz")
     states.scheme[0] = "5"
     fit, validation, tested = split_states(states)
     assert fit.cases + validation.cases + tested.cases == states.cases

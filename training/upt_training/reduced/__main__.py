@@ -39,13 +39,18 @@ def arguments() -> argparse.ArgumentParser:
     whole.add_argument("--work", type=Path, required=True, help="folder of intermediate results")
     whole.add_argument("--name", default="brain-reduced")
     whole.add_argument("--description", default="Linear-elastic response with a learned correction")
+    whole.add_argument("--coarse-mesh", type=Path, help="mesh of --coarse-data")
+    whole.add_argument("--coarse-columns", type=Path, help="file of `upt prior` for --coarse-mesh")
+    whole.add_argument(
+        "--coarse-data", type=Path, action="append", default=[], help="interpolated to --mesh for training"
+    )
     whole.add_argument("--modes", type=int, default=120)
     whole.add_argument("--response-modes", type=int, default=80)
     whole.add_argument("--tolerance", type=float, default=3e-3)
     whole.add_argument("--tables", choices=("f16", "f32"), default="f16")
-    whole.add_argument("--hidden", type=int, default=384)
-    whole.add_argument("--updates", type=int, default=4000)
-    whole.add_argument("--noise", type=float, default=0.05)
+    whole.add_argument("--hidden", type=int, default=256)
+    whole.add_argument("--updates", type=int, default=800)
+    whole.add_argument("--noise", type=float, default=0.03)
     whole.add_argument("--seeds", type=int, default=1, help="trainings to choose from by validation error")
 
     check = commands.add_parser("evaluate", help="errors of a bundle over full rollouts")
@@ -90,6 +95,9 @@ def main() -> int:
                 args.out,
                 args.work,
                 args.name,
+                args.coarse_mesh,
+                args.coarse_columns,
+                args.coarse_data,
                 args.modes,
                 args.response_modes,
                 args.tolerance,

@@ -10,7 +10,7 @@ import hashlib
 import json
 import sys
 import time
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -30,6 +30,7 @@ from upt_training.reduced.rollout import Limits
 from upt_training.reduced.states import States, join_states, load_states, project_cases
 from upt_training.reduced.train import Settings, train
 from upt_training.reduced.trajectories import Case, open_dataset
+from upt_training.reduced.transfer import Source, interpolation
 
 
 @dataclass
@@ -42,6 +43,9 @@ class Options:
     out: Path
     work: Path
     name: str
+    coarse_mesh: Path | None = None
+    coarse_columns: Path | None = None
+    coarse_data: list[Path] = field(default_factory=list)
     modes: int = 120
     response_modes: int = 80
     tolerance_mm: float = 3e-3
@@ -65,48 +69,78 @@ class Progress:
         print(f"\r{self.label}: {done}/{total}, {left:.0f} s left   ", end=end, file=sys.stderr, flush=True)
 
 
-def learned_modes(options: Options, columns: Columns, cases: list[Case]) -> Modes:
+def sources_of(options: Options, mesh: Mesh, columns: Columns) -> list[tuple[str, Source]]:
+    """Each dataset with the columns of its mesh; those of the coarse mesh with the interpolation to `mesh`."""
+    out = [(folder.name, Source(columns, open_dataset(folder, mesh.sha256))) for folder in options.data]
+    if options.coarse_data:
+        if options.coarse_mesh is None or options.coarse_columns is None:
+            raise InputError("--coarse-data needs --coarse-mesh and --coarse-columns")
+        coarse, coarse_columns = load_mesh(options.coarse_mesh), load_columns(options.coarse_columns)
+        check_columns(coarse, coarse_columns)
+        transfer = interpolation(coarse, mesh)
+        for folder in options.coarse_data:
+            out.append((f"coarse-{folder.name}", Source(coarse_columns, open_dataset(folder, coarse.sha256), transfer)))
+    return out
+
+
+def learned_modes(options: Options, sources: list[tuple[str, Source]]) -> Modes:
     """Residual and response modes of the training cases, from the work folder where they were made before."""
     path = options.work / "modes.npz"
     if path.exists():
         with np.load(path) as file:
             return Modes(**{name: file[name] for name in file.files})
-    modes = learn_modes(columns, cases, options.modes, options.response_modes, progress=Progress("modes"))
+    training = [Source(s.columns, trainable(s.cases), s.transfer) for _, s in sources]
+    modes = learn_modes(training, options.modes, options.response_modes, progress=Progress("modes"))
     np.savez(path.with_suffix(".partial.npz"), **vars(modes))
     path.with_suffix(".partial.npz").rename(path)
     return modes
 
 
-def projected(options: Options, columns: Columns, modes: Modes, mesh: Mesh) -> States:
+def projected(options: Options, sources: list[tuple[str, Source]], modes: Modes) -> States:
     """States of every case of every dataset; cases that were added since the last build are projected."""
     parts = []
-    for index, folder in enumerate(options.data):
-        path = options.work / f"states-{index}.npz"
-        cases = open_dataset(folder, mesh.sha256)
+    for name, source in sources:
+        path = options.work / f"states-{name}.npz"
         kept = [load_states(path)] if path.exists() else []
         known = set(kept[0].source) if kept else set()
-        new = [case for case in cases if case.path.name not in known]
+        new = [case for case in source.cases if case.path.name not in known]
         if new:
-            label = f"states of {folder.name}"
-            join_states([*kept, project_cases(columns, modes, new, Progress(label))]).save(path)
-        parts.append(load_states(path))
+            part = project_cases(Source(source.columns, new, source.transfer), modes, Progress(f"states of {name}"))
+            if source.transfer is not None:
+                part.split = np.where(part.split == "train", "coarse", "coarse-test")
+            join_states([*kept, part]).save(path)
+        if path.exists():
+            parts.append(load_states(path))
     return join_states(parts)
 
 
-def training_cases(options: Options, mesh: Mesh) -> list[Case]:
-    """Cases that modes are learned from: the split `train`, scheme 5 never."""
-    cases = [c for folder in options.data for c in open_dataset(folder, mesh.sha256, "train") if c.scheme != "5"]
-    if not cases:
-        raise InputError("no finished case of the split 'train': make the dataset with `upt dataset`")
-    return cases
+def trainable(cases: list[Case]) -> list[Case]:
+    """Cases of the split `train`, scheme 5 never."""
+    return [case for case in cases if case.split == "train" and case.scheme != "5"]
 
 
 def split_states(states: States) -> tuple[States, States, States]:
-    """Training, validation (every eighth training case) and test states; scheme 5 is only ever tested."""
-    trainable = (states.split == "train") & (states.scheme != "5")
+    """Training, validation (every ninth training case, so schemes alternate) and test states.
+
+    Scheme 5 is only ever tested. Interpolated coarse cases (split `coarse`; their test cases are not used at all) are
+    trained on, but for those of the same index as a validation case: equal seeds may choose the same site.
+    """
+    own = np.flatnonzero((states.split == "train") & (states.scheme != "5"))
+    coarse = (states.split == "coarse") & (states.scheme != "5")
     held_out = np.zeros(states.cases, bool)
-    held_out[np.flatnonzero(trainable)[5::8]] = True
-    return states.pick(trainable & ~held_out), states.pick(held_out), states.pick(~trainable)
+    held_out[own[3::5] if coarse.any() else own[5::9]] = True
+    fit = coarse & ~np.isin(states.source, states.source[held_out])
+    fit[own] = True
+    return (
+        states.pick(fit & ~held_out),
+        states.pick(held_out),
+        states.pick((states.split == "test") | own_scheme_5(states)),
+    )
+
+
+def own_scheme_5(states: States) -> np.ndarray:
+    """Cases of scheme 5 on the model's own mesh."""
+    return (states.scheme == "5") & ~np.char.startswith(states.split, "coarse")
 
 
 def bound_limits(states: States) -> Limits:
@@ -172,14 +206,18 @@ def build(options: Options, settings: Settings, description: str) -> dict:
     options.work.mkdir(parents=True, exist_ok=True)
     mesh, columns = load_mesh(options.mesh), load_columns(options.columns)
     check_columns(mesh, columns)
-    cases = training_cases(options, mesh)
-    modes = learned_modes(options, columns, cases)
-    states = projected(options, columns, modes, mesh)
+    sources = sources_of(options, mesh, columns)
+    own = [case for _, source in sources if source.transfer is None for case in source.cases]
+    cases = trainable([case for _, source in sources for case in source.cases])
+    if not cases:
+        raise InputError("no finished case of the split 'train': make the dataset with `upt dataset`")
+    modes = learned_modes(options, sources)
+    states = projected(options, sources, modes)
     model, limits, history = trained(options, states, settings)
     prior, info = tables(options, mesh, columns, modes)
     digest = hashlib.sha256("".join(sorted(states.source)).encode()).hexdigest()[:12]
     provenance = {
-        "data": [folder.name for folder in options.data],
+        "data": [name for name, _ in sources],
         "cases": {"train": len(cases), "all": states.cases, "files_sha256": digest},
         "training": {**asdict(settings), "validation_mse_mm2": history["validation_mse"]},
         "block_basis": info,
@@ -187,11 +225,10 @@ def build(options: Options, settings: Settings, description: str) -> dict:
         "date": datetime.now(UTC).strftime("%Y-%m-%d"),
         "command": "python -m upt_training.reduced build",
     }
-    about = Description(options.name, description, envelope_of(cases, mesh), provenance)
+    about = Description(options.name, description, envelope_of(trainable(own) or cases, mesh), provenance)
     dtype = np.float16 if options.tables == "f16" else np.float32
     manifest = write_reduced_bundle(options.out, mesh, columns, prior, model, limits, about, dtype)
-    listed = [case for folder in options.data for case in open_dataset(folder, mesh.sha256)]
-    tested = [case for case in listed if case.split == "test" or case.scheme == "5"]
+    tested = [case for case in own if case.split == "test" or case.scheme == "5"]
     result = evaluate(options.out, tested, Progress("evaluation"))
     manifest["errors"] = {group: _published(e) for group, e in result["reduced"].items()}
     write_manifest(options.out, manifest)

@@ -7,11 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from upt_training.reduced.columns import Columns
-from upt_training.reduced.trajectories import Case
+
+if TYPE_CHECKING:
+    from upt_training.reduced.transfer import Source
 
 
 @dataclass
@@ -49,28 +52,28 @@ def leading_modes(frames: np.ndarray, count: int, seed: int = 3, iterations: int
 
 
 def learn_modes(
-    columns: Columns,
-    cases: list[Case],
+    sources: list[Source],
     residual_count: int,
     response_count: int,
-    memory_gib: float = 1.5,
+    memory_gib: float = 1.0,
     seed: int = 1,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Modes:
     """Modes of frames drawn at random from every case; two sets of sampled frames stay within `memory_gib` each."""
     rng = np.random.default_rng(seed)
-    width = columns.columns.shape[1]
-    share = int(memory_gib * 2**30 / (4 * width * max(len(cases), 1)))
-    share = max(1, min(share, 48, *(case.frames - 1 for case in cases)))
-    residual = np.zeros((share * len(cases), width), np.float32)
-    response = np.zeros((share * len(cases), width), np.float32)
-    for index, case in enumerate(cases):
+    pairs = [(source, case) for source in sources for case in source.cases]
+    width = sources[0].columns.columns.shape[1]
+    share = int(memory_gib * 2**30 / (4 * width * max(len(pairs), 1)))
+    share = max(1, min(share, 48, *(case.frames - 1 for _, case in pairs)))
+    residual = np.zeros((share * len(pairs), width), np.float32)
+    response = np.zeros((share * len(pairs), width), np.float32)
+    for index, (source, case) in enumerate(pairs):
         picked = np.sort(rng.choice(np.arange(1, case.frames), share, replace=False))
-        linear = linear_fields(columns, case.forces(columns)[picked])
+        linear, field = source.fields(case, picked)
         rows = slice(index * share, (index + 1) * share)
         response[rows] = linear
-        residual[rows] = np.asarray(case.displacement[picked], np.float32).reshape(share, -1) - linear
-        progress(index + 1, len(cases))
+        residual[rows] = field - linear
+        progress(index + 1, len(pairs))
     phi, phi_amplitude = leading_modes(residual, residual_count)
     del residual
     psi, psi_amplitude = leading_modes(response, response_count)

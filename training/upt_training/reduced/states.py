@@ -12,9 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from upt_training.reduced.columns import Columns
-from upt_training.reduced.modes import Modes, linear_fields
-from upt_training.reduced.trajectories import Case
+from upt_training.reduced.modes import Modes
+from upt_training.reduced.transfer import Source
 
 
 @dataclass
@@ -73,17 +72,16 @@ def join_states(parts: list[States]) -> States:
 
 
 def project_cases(
-    columns: Columns,
+    source: Source,
     modes: Modes,
-    cases: list[Case],
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> States:
-    """Every frame of `cases` in reduced coordinates."""
+    """Every frame of a source's cases in reduced coordinates."""
+    cases = source.cases
     frames = cases[0].frames
     collected: dict[str, list] = {name: [] for name in _PER_CASE}
     for index, case in enumerate(cases):
-        linear = linear_fields(columns, case.forces(columns))
-        field = case.fields()
+        linear, field = source.fields(case)
         jump = np.zeros(frames, np.float32)
         jump[1:] = np.sqrt([np.dot(d, d) for d in (b - a for a, b in zip(linear[:-1], linear[1:], strict=True))])
         collected["field_square"].append(_squares(field))
@@ -102,7 +100,7 @@ def project_cases(
         collected["source"].append(case.path.name)
         progress(index + 1, len(cases))
     arrays = {name: np.array(values) for name, values in collected.items()}
-    return States(**arrays, nodes=np.array(columns.node_count))
+    return States(**arrays, nodes=np.array(modes.residual.shape[1] // 3))
 
 
 def _squares(fields_: np.ndarray) -> np.ndarray:

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from upt_training.reduced.network import Correction, ridge_base
+from upt_training.reduced.network import Correction, fit_base
 from upt_training.reduced.rollout import (
     Limits,
     drive_of,
@@ -30,17 +30,18 @@ from upt_training.reduced.states import States
 class Settings:
     """`stages` are `(steps of a rollout, batch, share of the updates)`."""
 
-    hidden: int = 384
+    hidden: int = 256
     depth: int = 2
-    updates: int = 4000
-    stages: list[tuple[int, int, float]] = field(default_factory=lambda: [(4, 256, 0.3), (16, 96, 0.4), (40, 48, 0.3)])
-    learning_rate: float = 1.5e-3
+    updates: int = 800
+    stages: list[tuple[int, int, float]] = field(default_factory=lambda: [(8, 96, 0.4), (24, 48, 0.6)])
+    learning_rate: float = 1e-3
     weight_decay: float = 0.02
-    noise: float = 0.05
-    ridge: float = 1e-6
+    noise: float = 0.03
+    quadratic_modes: int = 24
+    quadratic_ridge: float = 1e-2
     ema: float = 0.998
     seed: int = 1
-    validate_every: int = 250
+    validate_every: int = 100
 
 
 def state_pairs(states: States) -> tuple[np.ndarray, np.ndarray]:
@@ -57,17 +58,19 @@ def state_pairs(states: States) -> tuple[np.ndarray, np.ndarray]:
 def prepare(states: States, settings: Settings) -> Correction:
     """A model with its scales and its ridge base fitted to `states`; the MLP adds nothing yet."""
     torch.manual_seed(settings.seed)
-    model = Correction(states.modes, states.z.shape[2], settings.hidden, settings.depth)
+    model = Correction(states.modes, states.z.shape[2], settings.hidden, settings.depth, settings.quadratic_modes)
     inputs, targets = state_pairs(states)
     rms = {name: math.sqrt(float((getattr(states, name) ** 2).sum(2).mean())) + 1e-9 for name in ("b", "z", "p")}
     r, rz = states.modes, states.z.shape[2]
     groups = [(2 * r, rms["b"]), (2 * rz, rms["z"]), (2 * r, rms["p"])]
     spread = math.sqrt(32.0)
     scale = np.concatenate([np.full(count, spread / value) for count, value in groups] + [np.ones(2)])
+    # The MLP sees the leading response modes only: sites are few, and p repeats what z says.
+    for start in (2 * r, 2 * r + rz):
+        scale[start + settings.quadratic_modes : start + rz] = 0.0
+    scale[2 * r + 2 * rz : -2] = 0.0
     model.input_scale.copy_(torch.from_numpy(scale.astype(np.float32)))
-    deviation = states.b.reshape(-1, r).std(0) * settings.noise
-    noise = np.concatenate([deviation, deviation, np.zeros(2 * rz + 2 * r + 2)])
-    ridge_base(model, inputs, targets, noise, settings.ridge)
+    fit_base(model, inputs, targets, settings.noise, settings.quadratic_ridge)
     with torch.no_grad():
         error = targets - model(torch.from_numpy(inputs)).numpy()
     output = error.std(0) + 1e-3 * error.std()

@@ -1,0 +1,77 @@
+"""Fields of one tetrahedral mesh at the nodes of another of the same body (barycentric interpolation).
+
+Trajectories of a coarse mesh cost a tenth of those of the fine one and hold the same physics in the leading modes:
+interpolated, they add contact sites to the training of a fine model.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse
+from scipy.spatial import cKDTree
+
+from upt_training.mesh_file import Mesh
+from upt_training.reduced.columns import Columns
+from upt_training.reduced.modes import linear_fields
+from upt_training.reduced.trajectories import Case
+
+INWARD = 0.2
+
+
+def interpolation(coarse: Mesh, fine: Mesh, candidates: int = 32) -> scipy.sparse.csr_matrix:
+    """`[K_fine, K_coarse]` weights, rows summing to 1.
+
+    Each fine node is searched a little towards the middle of its own elements, so that coincident nodes on either
+    side of the midline find their own hemisphere; weights outside of an element are clamped.
+    """
+    centres = fine.positions[fine.tets].mean(axis=1, dtype=np.float64)
+    count = np.bincount(fine.tets.ravel(), minlength=fine.node_count)
+    middle = (
+        np.stack(
+            [np.bincount(fine.tets.ravel(), np.repeat(centres[:, a], 4), fine.node_count) for a in range(3)], axis=1
+        )
+        / np.maximum(count, 1)[:, None]
+    )
+    own = fine.positions.astype(np.float64)
+    inner = own + INWARD * (middle - own)
+    corner = coarse.positions[coarse.tets].astype(np.float64)
+    inverse = np.linalg.inv((corner[:, 1:] - corner[:, :1]).transpose(0, 2, 1))
+    _, near = cKDTree(corner.mean(axis=1)).query(inner, k=min(candidates, len(corner)))
+
+    def barycentric(points: np.ndarray, tets: np.ndarray) -> np.ndarray:
+        part = np.einsum("...ij,...j->...i", inverse[tets], points - corner[tets, 0])
+        return np.concatenate([1.0 - part.sum(-1, keepdims=True), part], axis=-1)
+
+    inside = barycentric(inner[:, None], near).min(axis=-1)
+    best = near[np.arange(len(near)), inside.argmax(axis=1)]
+    weights = np.maximum(barycentric(own, best), 0.0)
+    weights /= weights.sum(axis=1, keepdims=True)
+    rows = np.repeat(np.arange(fine.node_count), 4)
+    shape = (fine.node_count, coarse.node_count)
+    return scipy.sparse.csr_matrix((weights.ravel().astype(np.float32), (rows, coarse.tets[best].ravel())), shape)
+
+
+@dataclass
+class Source:
+    """Trajectories of one mesh with its compliance columns, and the interpolation to the model's mesh if it differs."""
+
+    columns: Columns
+    cases: list[Case]
+    transfer: scipy.sparse.csr_matrix | None = None
+
+    def fields(self, case: Case, frames: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Linear response and displacement on the model's mesh, each `[n, 3K]` float32, mm."""
+        picked = np.arange(case.frames) if frames is None else frames
+        linear = linear_fields(self.columns, case.forces(self.columns)[picked])
+        field = np.asarray(case.displacement[picked], np.float32).reshape(len(picked), -1)
+        return self._moved(linear), self._moved(field)
+
+    def _moved(self, fields: np.ndarray) -> np.ndarray:
+        if self.transfer is None:
+            return fields
+        count = len(fields)
+        by_node = fields.reshape(count, -1, 3).transpose(1, 0, 2).reshape(self.transfer.shape[1], -1)
+        out = (self.transfer @ by_node).reshape(-1, count, 3).transpose(1, 0, 2)
+        return np.ascontiguousarray(out).reshape(count, -1)
