@@ -1,10 +1,10 @@
 //! Analytic bodies for tests and demonstrations: a box and an ellipsoid.
 //!
-//! A regular grid of cubes, each split into six tetrahedra along the same
-//! diagonal, so that neighbours agree; the ellipsoid is the cube under a smooth
-//! map that keeps every element's orientation.
+//! The box is a regular grid of cubes, each split into six tetrahedra along the
+//! same diagonal, so that neighbours agree; the ellipsoid is stuffed.
 
 use super::{Mesh, MeshError, boundary_faces};
+use crate::stuffing::{Field, stuff};
 
 /// A box of `size` mm with `cells` cubes an axis, its minimum corner at the origin. No set is filled.
 pub fn regular_box(size: [f32; 3], cells: [usize; 3]) -> Result<Mesh, MeshError> {
@@ -70,35 +70,59 @@ pub fn box_phantom(size: [f32; 3], cells: [usize; 3]) -> Result<Mesh, MeshError>
     Ok(mesh)
 }
 
-/// An ellipsoid with half axes `radii` mm about the origin, `cells` cells an axis.
+/// Positive inside: a distance for a sphere, close to one near the surface of an ellipsoid.
+struct Ellipsoid {
+    radii: [f64; 3],
+}
+
+impl Field for Ellipsoid {
+    fn value(&self, point: [f64; 3]) -> f64 {
+        let scaled: f64 = (0..3).map(|k| (point[k] / self.radii[k]).powi(2)).sum();
+        (1.0 - scaled.sqrt()) * self.radii.iter().copied().fold(f64::INFINITY, f64::min)
+    }
+
+    fn bounds(&self) -> ([f64; 3], [f64; 3]) {
+        (self.radii.map(|r| -r), self.radii)
+    }
+}
+
+/// An ellipsoid with half axes `radii` mm about the origin, stuffed with `cells` lattice cells
+/// across its shortest axis.
 ///
 /// Held at the bottom cap (`fixed`); touched on the cap above 0.6 of the height
 /// (`domain`); the rest of the lower half's surface is `supported`.
 pub fn ellipsoid_phantom(radii: [f32; 3], cells: usize) -> Result<Mesh, MeshError> {
-    let mut mesh = regular_box([2.0; 3], [cells; 3])?;
-    mesh.name = "ellipsoid".into();
-    mesh.source = format!("ellipsoid, half axes {radii:?} mm, {cells} cells an axis");
-    let mut unit = Vec::with_capacity(mesh.positions.len());
-    for p in &mut mesh.positions {
-        let q = p.map(|v| v - 1.0);
-        // Maps the cube's shells to spheres (Nowell): smooth and one to one.
-        let ball = [0, 1, 2].map(|k| {
-            let (a, b) = (q[(k + 1) % 3], q[(k + 2) % 3]);
-            q[k] * (1.0 - a * a / 2.0 - b * b / 2.0 + a * a * b * b / 3.0)
-                .max(0.0)
-                .sqrt()
-        });
-        // Soften towards the centre, where the plain cube has the better elements.
-        let shell = q.iter().fold(0.0f32, |m, v| m.max(v.abs()));
-        let blend = [0, 1, 2].map(|k| 0.85 * q[k] * (1.0 - shell) + ball[k] * shell);
-        unit.push((blend, shell >= 1.0 - 1e-5));
-        *p = [0, 1, 2].map(|k| blend[k] * radii[k]);
-    }
-    for (node, (p, outside)) in unit.iter().enumerate() {
-        if *outside && p[2] < -0.7 {
-            mesh.fixed.push(node as u32);
-        } else if *outside && p[2] < 0.0 {
-            mesh.supported.push(node as u32);
+    let field = Ellipsoid {
+        radii: radii.map(f64::from),
+    };
+    let shortest = radii.iter().copied().fold(f32::INFINITY, f32::min);
+    let spacing = 2.0 * f64::from(shortest) / cells.max(2) as f64;
+    let Ok(stuffed) = stuff(&field, spacing) else {
+        return Err(MeshError::Empty { what: "tetrahedra" });
+    };
+    let surface = boundary_faces(&stuffed.tets)?;
+    let mut mesh = Mesh {
+        name: "ellipsoid".into(),
+        source: format!("ellipsoid, half axes {radii:?} mm, {cells} cells an axis"),
+        license: "CC0-1.0".into(),
+        positions: stuffed
+            .positions
+            .iter()
+            .map(|p| p.map(|v| v as f32))
+            .collect(),
+        tets: stuffed.tets,
+        surface,
+        ..Mesh::default()
+    };
+    let mut outside: Vec<u32> = mesh.surface.iter().flatten().copied().collect();
+    outside.sort_unstable();
+    outside.dedup();
+    for node in outside {
+        let height = mesh.positions[node as usize][2] / radii[2];
+        if height < -0.7 {
+            mesh.fixed.push(node);
+        } else if height < 0.0 {
+            mesh.supported.push(node);
         }
     }
     mesh.domain = rows_where(&mesh, |corners| {
