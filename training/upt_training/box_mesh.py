@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import argparse
 import itertools
+from pathlib import Path
 
 import numpy as np
 
@@ -46,3 +48,20 @@ def box_mesh(cells: tuple[int, int, int] = (6, 5, 4), spacing_mm: float = 10.0, 
         side.astype(np.int32),
         {"name": "box", "source": "upt_training.box_mesh", "license": "MIT OR Apache-2.0"},
     )
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """`python -m upt_training.box_mesh OUT.mesh.safetensors`: the box as a file, for a first try."""
+    parser = argparse.ArgumentParser(prog="python -m upt_training.box_mesh", description=main.__doc__)
+    parser.add_argument("out", type=Path)
+    parser.add_argument("--cells", type=int, nargs=3, default=(6, 5, 4))
+    parser.add_argument("--spacing-mm", type=float, default=10.0)
+    options = parser.parse_args(arguments)
+    mesh = box_mesh(tuple(options.cells), options.spacing_mm)
+    mesh.save(options.out)
+    print(f"{options.out}: {mesh.node_count} nodes, {len(mesh.tets)} tets, mesh hash {mesh.sha256[:12]}")
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -86,6 +86,7 @@ class TrainSettings:
     input_noise_mm: float = 0.0
     corrupt_contact: float = 0.0  # probability that a contact state is replaced by a corrupted one (replay)
     loss_nodes: int = 0  # nodes decoded and scored a step besides the needed ones; 0: all nodes
+    balance_mm2: float = 0.0  # >0: a sample weighs balance / (balance + MSE of its base), so that releases do not drown
     scored_rows: int = 0  # rows a one-step window is scored on (drawn anew each time); 0: all of the subset
     exact_boundary: bool = False  # held nodes 0 and contact nodes c inside the training rollout
     bf16: bool = False
@@ -93,7 +94,6 @@ class TrainSettings:
     evaluate_every: int = 5
     evaluate_cases: int = 10
     patience: int = 0  # evaluations without improvement before stopping; 0: never
-    release_weight: float = 1.0
     schemes: list[str] = field(default_factory=list)  # empty: all schemes of the data
     train_cases: int = 0  # 0: all
 

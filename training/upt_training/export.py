@@ -83,6 +83,9 @@ def export_command(options) -> int:
     dataset = open_dataset(options.data, mesh) if options.data else None
     if model.settings.uses_prior and options.prior is None:
         raise InputError("the model uses the linear response: pass --prior prior.safetensors of this mesh")
+    for name in ("radius_mm", "max_degree", "supernodes"):
+        if getattr(options, name) is not None:
+            setattr(model.settings.graph, name, getattr(options, name))
     provenance = {
         "configuration": settings["name"],
         "train": settings["train"],

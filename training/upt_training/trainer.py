@@ -88,7 +88,8 @@ class Trainer:
         )
         return State(u, previous, state.prior)
 
-    def window_loss(self, p: float) -> torch.Tensor:
+    def window_loss(self, p: float) -> tuple[torch.Tensor, float]:
+        """The loss to minimise, and the MSE in mm² that it stands for."""
         t = self.settings.train
         slots = None
         if self.pool is not None:
@@ -103,7 +104,7 @@ class Trainer:
             if p >= 1.0:  # the first prediction would be thrown away: start at the second's true input
                 frame, first, window = frame + 1, 1, window - 1
             state = truth_state(self.train_cache, case, frame, self.device)
-        tables, loss, scored = self.stepper.tables(), 0.0, 0
+        tables, loss, true_loss, scored = self.stepper.tables(), 0.0, 0.0, 0
         rows = None
         if t.scored_rows and window == 1:
             rows = torch.randperm(self.stepper.node_count, generator=self.draw)[: t.scored_rows].to(self.device)
@@ -114,16 +115,28 @@ class Trainer:
             target = self._target(case, frame)
             if t.corrupt_contact > 0 or t.input_noise_mm > 0:
                 state = corrupt(state, target["contact"], t.corrupt_contact, t.input_noise_mm, self.draw)
+            plain = self._base(state, target)
             with torch.autocast(self.device.type, torch.bfloat16, enabled=t.bf16):
                 state = self.stepper.step(state, target, tables, rows if window == 1 else None)
             if i >= first:
                 a, b = (
                     (state.u, target["u"]) if window > 1 or rows is None else (state.u[:, rows], target["u"][:, rows])
                 )
-                loss, scored = loss + squared_error(a, b).mean(), scored + 1
+                error = squared_error(a, b)
+                true_loss += float(error.detach().mean())
+                if t.balance_mm2 > 0:
+                    error = error * t.balance_mm2 / (t.balance_mm2 + squared_error(plain, target["u"]))
+                loss, scored = loss + error.mean(), scored + 1
         if slots is not None:
             self.pool.put(slots, frame, state)
-        return loss / scored
+        return loss / scored, true_loss / scored
+
+    def _base(self, state: State, target: dict[str, torch.Tensor]) -> torch.Tensor:
+        """What the network adds to: its error is a sample's scale."""
+        base = self.settings.model.base
+        if base == "prior":
+            return target["prior"]
+        return state.u.detach() if base == "displacement" else torch.zeros_like(target["u"])
 
     def train_step(self) -> tuple[float, float]:
         """One optimiser step over `accumulate` windows: mean loss in mm² and the gradient norm before clipping."""
@@ -135,9 +148,9 @@ class Trainer:
         self.optimiser.zero_grad(set_to_none=True)
         p, total = self.teacher_probability(), 0.0
         for _ in range(t.accumulate):
-            loss = self.window_loss(p)
+            loss, mse = self.window_loss(p)
             (loss * self.loss_scale / t.accumulate).backward()
-            total += float(loss.detach()) / t.accumulate
+            total += mse / t.accumulate
         if self.world > 1:
             for parameter in self.model.parameters():
                 distributed.all_reduce(parameter.grad)
