@@ -22,7 +22,7 @@ static inline void expect_true_at(int holds, const char *what, const char *file,
 }
 
 static inline void expect_status_at(upt_status found, upt_status wanted, const char *what,
-                             const char *file, int line) {
+                                    const char *file, int line) {
   expect_count++;
   if (found > 0) {
     expect_seen[99] = 1;

@@ -1,5 +1,6 @@
-/* The C host whose rollout the C# tests must equal to the bit: the push of InteropTests.Push over 160
- * steps on the bundle argv[1]; the last displacement, [K,3] float32, goes to the file argv[2]. */
+/* The C host whose rollout the C# tests must equal to the bit: the push of InteropTests.Push over
+ * 160 steps on the bundle argv[1]; the last displacement, [K,3] float32, goes to the file argv[2].
+ */
 #include "upt.h"
 
 #include <stdio.h>

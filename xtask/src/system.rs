@@ -54,7 +54,7 @@ pub const BASE: &[Package] = &[
         "build-essential",
         "the C compiler and linker",
     ),
-    program(&["python3"], "python3", "Python 3.10 or later"),
+    program(&["python3"], "python3", "Python 3.11 or later"),
     program(
         &["python3-venv-module"],
         "python3-venv",

@@ -10,7 +10,7 @@ use crate::process::run_checked;
 use crate::workspace::Workspace;
 
 /// Formatters pinned to one version, so that every machine agrees.
-const TOOLS: &[&str] = &["ruff==0.14.5", "clang-format==14.0.6"];
+const TOOLS: &[&str] = &["ruff==0.17.5", "clang-format==14.0.6"];
 
 /// Makes the environment where it is absent. Only pip is in it then.
 pub fn create(workspace: &Workspace) -> Result<()> {
@@ -26,7 +26,7 @@ pub fn create(workspace: &Workspace) -> Result<()> {
         &mut command,
         &workspace.logs().join("venv.log"),
     )
-    .context("install Python 3.10 or later with its venv module (Debian: python3-venv)")?;
+    .context("install Python 3.11 or later with its venv module (Debian: python3-venv)")?;
     Ok(())
 }
 

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use sha2::{Digest, Sha256};
 use tissue::baselines::DecayFit;
-use tissue::trajectory::Trajectory;
+use tissue::trajectory::{Trajectory, TrajectoryHeader};
 
 /// One simulated contact.
 pub struct Case {
@@ -40,7 +40,7 @@ impl Cases {
             let trajectory = Trajectory::read(path)?;
             add_content(&mut hash, &trajectory);
             let header = &trajectory.header;
-            let name = format!("scheme {}, seed {}", header.scheme, header.seed);
+            let name = title(path, header);
             list.push(Case { name, trajectory });
         }
         let first = &list[0].trajectory.header;
@@ -85,6 +85,20 @@ impl Cases {
             .map(|case| case.trajectory.frame_count() - 1)
             .max()
             .unwrap_or(0)
+    }
+}
+
+/// `scheme 5, seed 7`; a dataset's derived seeds mean nothing to a reader, its file names do.
+fn title(path: &Path, header: &TrajectoryHeader) -> String {
+    let file = path
+        .file_name()
+        .map(|name| name.to_string_lossy().into_owned())
+        .unwrap_or_default();
+    let stem = file.trim_end_matches(".trajectory.safetensors").to_owned();
+    if header.seed < 1_000_000 {
+        format!("scheme {}, seed {}", header.scheme, header.seed)
+    } else {
+        format!("scheme {}, {stem}", header.scheme)
     }
 }
 

@@ -17,10 +17,10 @@ pub struct Picture {
     pub png: Vec<u8>,
 }
 
-/// Pictures of one moment: truth first, then each method's prediction and error.
+/// Pictures of one moment, a column a method: the truth first, then each prediction above its error.
 pub struct Gallery {
     pub title: String,
-    pub pictures: Vec<Picture>,
+    pub columns: Vec<Vec<Picture>>,
     /// Legends of the two colour scales, already as HTML.
     pub legend: String,
 }
@@ -42,7 +42,7 @@ pub struct Page<'a> {
 const STYLE: &str = "
 :root{color-scheme:light}
 body{font:15px/1.5 system-ui,-apple-system,'Segoe UI',Roboto,'DejaVu Sans',sans-serif;color:#1d2733;background:#f6f7f9;margin:0}
-main{max-width:1120px;margin:0 auto;padding:32px 24px 64px}
+main{max-width:1280px;margin:0 auto;padding:32px 24px 64px}
 h1{font-size:28px;margin:0 0 4px}h2{font-size:19px;margin:0 0 4px}
 p{margin:4px 0 12px;color:#44505c;max-width:80ch}
 section{background:#fff;border:1px solid #e1e5ea;border-radius:8px;padding:20px 24px;margin:20px 0;overflow-x:auto}
@@ -61,8 +61,8 @@ svg .inbar{fill:#fff;font-size:11px}
 .legend{display:flex;flex-wrap:wrap;gap:4px 18px;font-size:13px;margin:6px 0 8px}
 .legend i{display:inline-block;width:12px;height:12px;border-radius:3px;margin-right:6px;vertical-align:-1px}
 .legend .ramp{width:150px}
-.gallery{display:grid;grid-template-columns:repeat(auto-fill,minmax(300px,1fr));gap:14px}
-figure{margin:0}figure img{width:100%;background:#fbfbfc;border:1px solid #eef0f3;border-radius:6px;display:block}
+.gallery{display:grid;grid-template-columns:repeat(auto-fit,minmax(200px,1fr));gap:14px}
+figure{margin:0 0 10px}figure img{width:100%;background:#fbfbfc;border:1px solid #eef0f3;border-radius:6px;display:block}
 figcaption{font-size:13px;color:#44505c;margin-top:4px}
 ul{margin:8px 0 0;padding-left:20px;color:#44505c;font-size:14px}
 ";
@@ -248,13 +248,17 @@ fn table(page: &Page<'_>, points: &[Point]) -> String {
 
 fn gallery_section(gallery: &Gallery) -> String {
     let mut body = String::new();
-    for picture in &gallery.pictures {
-        let data = base64::engine::general_purpose::STANDARD.encode(&picture.png);
-        let caption = escape(&picture.caption);
-        let _ = write!(
-            body,
-            "<figure><img alt=\"{caption}\" src=\"data:image/png;base64,{data}\"><figcaption>{caption}</figcaption></figure>"
-        );
+    for column in &gallery.columns {
+        body.push_str("<div>");
+        for picture in column {
+            let data = base64::engine::general_purpose::STANDARD.encode(&picture.png);
+            let caption = escape(&picture.caption);
+            let _ = write!(
+                body,
+                "<figure><img alt=\"{caption}\" src=\"data:image/png;base64,{data}\"><figcaption>{caption}</figcaption></figure>"
+            );
+        }
+        body.push_str("</div>");
     }
     format!(
         "<section><h2>{}</h2>{}<div class=\"gallery\">{body}</div></section>",

@@ -194,8 +194,8 @@ fn mesh_of(cases: &Cases, bundles: &[BundleFolder]) -> Result<Mesh> {
 /// Every configuration asked for.
 fn methods(
     options: &Options,
+    cases: &Cases,
     bundles: &[BundleFolder],
-    decay: f32,
     notes: &mut Vec<String>,
 ) -> Result<Vec<Method>> {
     let most = options.threads.iter().copied().max().unwrap_or(1);
@@ -222,9 +222,13 @@ fn methods(
             "zero" => methods.push(Method::Zero),
             "linear" => methods.push(Method::Linear {
                 threads: most,
-                decay,
+                decay: cases.release_decay(),
             }),
             "coarse" if options.coarse_mesh.is_file() => {
+                if Mesh::read(&options.coarse_mesh)?.hash() == cases.mesh_sha256 {
+                    notes.push("coarse TLED: the cases are on the coarse mesh themselves".into());
+                    continue;
+                }
                 methods.extend(options.threads.iter().map(|threads| Method::CoarseTled {
                     mesh: options.coarse_mesh.clone(),
                     threads: *threads,

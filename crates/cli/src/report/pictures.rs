@@ -32,7 +32,7 @@ pub fn moments(case: &Case) -> Vec<usize> {
     });
     if let Some(frame) = released
         .map(|frame| frame + 4)
-        .filter(|frame| *frame < frames && *frame != deepest)
+        .filter(|frame| *frame < frames && *frame != deepest && largest(*frame) > 0.25)
     {
         moments.push(frame);
     }
@@ -132,9 +132,9 @@ pub fn galleries(
             .iter()
             .map(|values| largest(values))
             .fold(0.1f32, f32::max);
-        let mut pictures = vec![Picture {
+        let mut columns = vec![vec![Picture {
             caption: format!(
-                "Truth: the reference solver (largest displacement {} mm)",
+                "The truth, by the reference solver: {} mm at most",
                 label(f64::from(largest(&lengths_of_truth)))
             ),
             png: render(
@@ -145,10 +145,10 @@ pub fn galleries(
                 displacement_scale,
                 &camera,
             )?,
-        }];
+        }]];
         for ((one, field), error) in kept.iter().zip(&errors) {
-            pictures.push(Picture {
-                caption: format!("{}: prediction", one.row.family()),
+            let prediction = Picture {
+                caption: one.row.family(),
                 png: render(
                     mesh,
                     field,
@@ -157,15 +157,12 @@ pub fn galleries(
                     displacement_scale,
                     &camera,
                 )?,
-            });
-            pictures.push(Picture {
-                caption: format!(
-                    "{}: error (largest {} mm)",
-                    one.row.family(),
-                    label(f64::from(largest(error)))
-                ),
+            };
+            let error = Picture {
+                caption: format!("its error: {} mm at most", label(f64::from(largest(error)))),
                 png: render(mesh, field, error, Palette::Error, error_scale, &camera)?,
-            });
+            };
+            columns.push(vec![prediction, error]);
         }
         let legend = format!(
             "<div class=\"legend\">{}{}</div>",
@@ -175,7 +172,7 @@ pub fn galleries(
         let time = *frame as f64 * case.trajectory.header.dt_s;
         galleries.push(Gallery {
             title: format!("{}: {time:.2} s", capitalised(&case.name)),
-            pictures,
+            columns,
             legend,
         });
     }

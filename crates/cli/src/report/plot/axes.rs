@@ -111,7 +111,7 @@ pub fn label(value: f64) -> String {
         return "0".into();
     }
     let magnitude = value.abs();
-    if !(1e-4..1e5).contains(&magnitude) {
+    if !(1e-3..1e5).contains(&magnitude) {
         return format!("{value:.0e}");
     }
     let digits = (2 - magnitude.log10().floor() as i32).clamp(0, 6) as usize;
@@ -132,7 +132,7 @@ pub struct Axes {
     body: String,
 }
 
-const LEFT: f64 = 64.0;
+const LEFT: f64 = 70.0;
 const RIGHT: f64 = 16.0;
 const TOP: f64 = 14.0;
 const BOTTOM: f64 = 46.0;
@@ -174,7 +174,7 @@ impl Axes {
             "label",
             x_label,
         );
-        let (ly, middle) = (16.0, 0.5 * (TOP + bottom));
+        let (ly, middle) = (14.0, 0.5 * (TOP + bottom));
         let _ = write!(
             axes.body,
             "<text class=\"label\" text-anchor=\"middle\" transform=\"translate({ly} {middle}) rotate(-90)\">{}</text>",

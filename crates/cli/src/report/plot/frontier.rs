@@ -1,6 +1,9 @@
 //! The frontier: error against run time, both logarithmic, with the Pareto front drawn.
 
 use super::axes::{Axes, Scale, label, legend};
+
+/// Below this an error is round-off of the reference itself, mm².
+const EXACT: f64 = 1e-7;
 use super::colour;
 
 /// One row of the report in the plane of time and error.
@@ -36,9 +39,14 @@ pub fn pareto_front(points: &[Point]) -> Vec<usize> {
 
 pub fn frontier(points: &[Point]) -> String {
     let x = Scale::log(points.iter().map(|point| point.milliseconds));
-    let y = Scale::log(points.iter().map(|point| point.mse));
+    let y = Scale::log(
+        points
+            .iter()
+            .map(|point| point.mse)
+            .filter(|mse| *mse > EXACT),
+    );
     // Room below the smallest error for the methods whose error is zero.
-    let y = if points.iter().any(|point| point.mse <= 0.0) {
+    let y = if points.iter().any(|point| point.mse <= EXACT) {
         Scale::log([y.low() / 4.0, y.high()].into_iter())
     } else {
         y
@@ -51,7 +59,7 @@ pub fn frontier(points: &[Point]) -> String {
         "ms a step of 50 ms of tissue (median)",
         "MSE, mm²",
     );
-    let drawn = |mse: f64| if mse > 0.0 { mse } else { y.low() };
+    let drawn = |mse: f64| if mse > EXACT { mse } else { y.low() };
 
     let front = pareto_front(points);
     let mut stairs: Vec<(f64, f64)> = Vec::new();
@@ -78,7 +86,7 @@ pub fn frontier(points: &[Point]) -> String {
             .iter()
             .position(|family| *family == point.family)
             .unwrap_or(0);
-        let error = if point.mse > 0.0 {
+        let error = if point.mse > EXACT {
             label(point.mse)
         } else {
             "0 (the reference)".into()
