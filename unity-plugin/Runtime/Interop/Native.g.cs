@@ -573,6 +573,8 @@ namespace Upt.Interop
         /// <summary>
         /// Finds the nodes that rigid instruments touch and the displacement that they impose: the input of a step.
         ///
+        /// The scene remembers what each place of the array touches, until the array's length changes or upt_scene_reset:
+        /// pass every instrument every time, in the same order. At most 64 instruments; NULL with count 0 lets go of all.
         /// instruments: array; every element has its `struct_size` set. contact_nodes: `[capacity]`, contact_vectors:
         /// `[capacity,3]`, mm; both may be NULL with capacity 0, which only asks. contact_count: contacts found, always written.
         /// Threads: one at a time. Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "contact", `UPT_ERR_NULL`,
@@ -585,6 +587,7 @@ namespace Upt.Interop
         /// <summary>
         /// Copies the reaction of the tissue at the last step's contact nodes, in their order.
         ///
+        /// The elastic force of the elements around each node at the last state; inertia and damping are left out.
         /// out: `[m,3]`, mN, the force on the instrument. out_count: floats in out, 3 m.
         /// Threads: one at a time. Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "forces", `UPT_ERR_NULL`,
         /// `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_STATE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_PANIC`.
