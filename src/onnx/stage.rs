@@ -30,6 +30,7 @@ pub struct Stage {
     session: Session,
     input_names: Vec<String>,
     inputs: Vec<Tensor<f32>>,
+    indices: Vec<(String, Tensor<i64>)>,
     outputs: Vec<Tensor<f32>>,
     choice: ProviderChoice,
     file: String,
@@ -46,6 +47,19 @@ impl Stage {
         file: &str,
         bytes: &[u8],
         inputs: &[(&str, &[usize])],
+        outputs: &[(&str, &[usize])],
+        options: &StageOptions,
+    ) -> Result<Stage> {
+        Stage::with_indices(runtime, file, bytes, inputs, &[], outputs, options)
+    }
+
+    /// As [`Stage::new`], with further int64 inputs `[n]` that stay the same in every run.
+    pub fn with_indices(
+        runtime: &'static Runtime,
+        file: &str,
+        bytes: &[u8],
+        inputs: &[(&str, &[usize])],
+        indices: &[(&str, &[i64])],
         outputs: &[(&str, &[usize])],
         options: &StageOptions,
     ) -> Result<Stage> {
@@ -79,8 +93,8 @@ impl Stage {
             return Err(Error::bundle(file, format!("not a valid graph: {cause}")));
         }
         let (session, choice) = made?;
-        check_names(file, "input", session.inputs(), inputs)?;
-        check_names(file, "output", session.outputs(), outputs)?;
+        check_names(file, "input", session.inputs(), inputs, indices.len())?;
+        check_names(file, "output", session.outputs(), outputs, 0)?;
         let tensors = |list: &[(&str, &[usize])]| {
             list.iter()
                 .map(|(_, shape)| Tensor::<f32>::new(&Allocator::default(), shape.to_vec()))
@@ -93,6 +107,16 @@ impl Stage {
                 .map_err(|error| Error::Runtime(error.to_string()))?,
             input_names: inputs.iter().map(|(name, _)| name.to_string()).collect(),
             inputs: tensors(inputs)?,
+            indices: indices
+                .iter()
+                .map(|(name, values)| {
+                    let tensor = Tensor::from_array(([values.len()], values.to_vec()));
+                    Ok((
+                        name.to_string(),
+                        tensor.map_err(|error| Error::Runtime(error.to_string()))?,
+                    ))
+                })
+                .collect::<Result<_>>()?,
             outputs: tensors(outputs)?,
             session,
             choice,
@@ -113,6 +137,11 @@ impl Stage {
 
     fn bind_inputs(&mut self) -> Result<()> {
         for (name, tensor) in self.input_names.iter().zip(&self.inputs) {
+            self.binding
+                .bind_input(name.as_str(), tensor)
+                .map_err(|error| Error::Runtime(format!("{}: {error}", self.file)))?;
+        }
+        for (name, tensor) in &self.indices {
             self.binding
                 .bind_input(name.as_str(), tensor)
                 .map_err(|error| Error::Runtime(format!("{}: {error}", self.file)))?;
@@ -175,6 +204,7 @@ fn check_names(
     what: &str,
     have: &[ort::value::Outlet],
     want: &[(&str, &[usize])],
+    others: usize,
 ) -> Result<()> {
     let names: Vec<&str> = have.iter().map(|outlet| outlet.name()).collect();
     for (name, shape) in want {
@@ -213,7 +243,7 @@ fn check_names(
             ));
         }
     }
-    if what == "input" && have.len() != want.len() {
+    if what == "input" && have.len() != want.len() + others {
         return Err(Error::bundle(
             file,
             format!("the graph has inputs {names:?}, must have {}", want.len()),

@@ -245,6 +245,7 @@ impl Core {
             stats,
         )?;
         let mut watch = Stopwatch::start();
+        let _span = tracing::trace_span!("decode").entered();
         let displacement = given.unwrap_or(&shared.last.field);
         self.engine.decode(
             self.isa,
@@ -276,6 +277,7 @@ impl Core {
 
     fn judge(&mut self, stats: &mut SceneStats) -> Result<u32> {
         let mut watch = Stopwatch::start();
+        let _span = tracing::trace_span!("guard").entered();
         let max = guard::largest(&self.pool, &self.next.field, self.plan.nodes())?;
         let bound = self.model.manifest.envelope.displacement_bound_mm;
         let mut verdict = guard::judge(bound, max, self.max_displacement, self.incoming.max_push());

@@ -42,11 +42,6 @@ impl AttachedPoints {
         self.nodes.len()
     }
 
-    /// No points.
-    pub fn is_empty(&self) -> bool {
-        self.nodes.is_empty()
-    }
-
     /// All nodes that the points need.
     pub fn needed_nodes(&self) -> Vec<u32> {
         self.nodes.iter().flatten().copied().collect()

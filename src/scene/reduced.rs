@@ -140,6 +140,7 @@ impl ReducedEngine {
         stats: &mut SceneStats,
     ) -> Result<()> {
         let mut watch = Stopwatch::start();
+        let span = tracing::trace_span!("prior").entered();
         let report = self
             .response
             .solve(isa, table, held, &contact.nodes, &contact.vectors)?;
@@ -170,7 +171,9 @@ impl ReducedEngine {
             }
             None => &self.last.b,
         };
+        drop(span);
         stats.prior_ms = watch.lap();
+        let span = tracing::trace_span!("latent").entered();
 
         let input = self.stage.input(0);
         let mut at = 0;
@@ -219,6 +222,7 @@ impl ReducedEngine {
         if scale != 1.0 {
             next.b.iter_mut().for_each(|b| *b *= scale);
         }
+        drop(span);
         stats.latent_ms = watch.lap();
         Self::combine(isa, pool, table, &self.mode_rows, next)?;
         stats.prior_ms += watch.lap();

@@ -177,6 +177,7 @@ impl UptEngine {
         stats: &mut SceneStats,
     ) -> Result<()> {
         let mut watch = Stopwatch::start();
+        let span = tracing::trace_span!("prior").entered();
         if let (Some(response), Some(table)) = (&mut self.response, &model.prior) {
             let contact = input.contact;
             let report =
@@ -185,9 +186,13 @@ impl UptEngine {
             response.field(isa, pool, table, &mut self.next.q_prior)?;
             self.prior_field_of_next(isa, pool, table, input.plan)?;
         }
+        drop(span);
         stats.prior_ms = watch.lap();
+        let span = tracing::trace_span!("encode").entered();
         self.fill_features(kind, tables, input);
+        drop(span);
         stats.encode_ms = watch.lap();
+        let span = tracing::trace_span!("aggregate").entered();
         let (d, f) = (kind.entry.dims.encoder, kind.entry.feature_width());
         encode_aggregate(
             isa,
@@ -204,7 +209,9 @@ impl UptEngine {
             self.latent.input(0),
         )
         .map_err(internal)?;
+        drop(span);
         stats.aggregate_ms = watch.lap();
+        let _span = tracing::trace_span!("latent").entered();
         self.latent.run()?;
         self.next.keys.copy_from_slice(self.latent.output(0));
         self.next.values.copy_from_slice(self.latent.output(1));
