@@ -6,6 +6,7 @@ mod locate;
 mod providers;
 mod runtime;
 mod stage;
+mod version;
 
 pub use providers::{ProviderChoice, ProviderPlan, providers_json};
 pub use runtime::Runtime;

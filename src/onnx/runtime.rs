@@ -8,6 +8,7 @@ use ort::environment::Environment;
 use ort::logging::LogLevel;
 
 use super::locate;
+use super::version::version_of;
 use crate::error::{Error, Result};
 
 /// The loaded library.
@@ -48,7 +49,7 @@ impl Runtime {
         &self.path
     }
 
-    /// Build description of the library.
+    /// Version of the library, for instance `1.31.1`; its build description where it does not tell.
     pub fn version(&self) -> &str {
         &self.version
     }
@@ -105,7 +106,7 @@ fn open(path: &Path) -> std::result::Result<Runtime, String> {
     Ok(Runtime {
         environment,
         path: path.to_owned(),
-        version: ort::info().to_owned(),
+        version: version_of(path).unwrap_or_else(|| ort::info().to_owned()),
     })
 }
 

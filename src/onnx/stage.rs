@@ -2,8 +2,6 @@
 //!
 //! On the CPU the host writes the bound input tensors in place and a run copies nothing and allocates nothing of ours.
 
-use std::sync::Arc;
-
 use ort::AsPointer;
 use ort::memory::Allocator;
 use ort::session::{IoBinding, Session};
@@ -184,7 +182,7 @@ impl Stage {
                 AsPointer::ptr(&self.binding),
             )
         };
-        drop::<Arc<_>>(session);
+        drop(session);
         if status.0.is_null() {
             return Ok(());
         }

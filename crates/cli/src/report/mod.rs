@@ -99,7 +99,7 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     let mut notes = Vec::new();
     let bundles = fitting_bundles(options, &cases, &mut notes)?;
     let mesh = mesh_of(&cases, &bundles)?;
-    let methods = methods(options, &bundles, cases.release_decay(), &mut notes)?;
+    let methods = methods(options, &cases, &bundles, &mut notes)?;
     let moments: Vec<(usize, usize)> = pictures::moments(&cases.list[0])
         .into_iter()
         .map(|frame| (0, frame))
