@@ -241,9 +241,9 @@ impl Element {
         let mut f = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         for a in 0..3 {
             let relative = sub(u[a + 1], u[0]);
-            for i in 0..3 {
-                for j in 0..3 {
-                    f[i][j] += relative[i] * self.gradients[a][j];
+            for (row, relative) in f.iter_mut().zip(relative) {
+                for (f, gradient) in row.iter_mut().zip(self.gradients[a]) {
+                    *f += relative * gradient;
                 }
             }
         }
@@ -346,13 +346,11 @@ mod tests {
                 let edges = [1, 2, 3].map(|a| sub(x(a), x(0)));
                 let det = dot(edges[0], cross(edges[1], edges[2])) / (6.0 * element.volume);
                 // I1 = |F|², F = sum edge_a (outer) gradient_a.
-                let mut invariant = 0.0;
-                for i in 0..3 {
-                    for j in 0..3 {
-                        let f: f64 = (0..3).map(|a| edges[a][i] * element.gradients[a][j]).sum();
-                        invariant += f * f;
-                    }
-                }
+                let f = |i: usize, j: usize| -> f64 {
+                    let pairs = edges.iter().zip(&element.gradients);
+                    pairs.map(|(edge, gradient)| edge[i] * gradient[j]).sum()
+                };
+                let invariant: f64 = (0..9).map(|k| f(k / 3, k % 3).powi(2)).sum();
                 let shear = moduli.shear_pa / 2.0 * (invariant / det.powf(2.0 / 3.0) - 3.0);
                 element.volume * (shear + moduli.bulk_pa / 2.0 * (det - 1.0).powi(2))
             })

@@ -57,7 +57,7 @@ fn touched_nodes_end_on_the_surface_and_no_other_moves() {
                 half_extents: [4.5, 3.0, 1.0],
             },
             position: [8.0, 34.0, 0.3],
-            rotation: [0.0, 0.0, 0.38268343, 0.92387953],
+            rotation: [0.0, 0.0, 0.382_683_43, 0.923_879_5],
             sticking: false,
         },
         Instrument {
