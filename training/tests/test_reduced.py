@@ -25,6 +25,7 @@ from upt_training.reduced.runner import ReducedRunner
 from upt_training.reduced.states import load_states
 from upt_training.reduced.train import Settings
 from upt_training.reduced.trajectories import open_dataset
+from upt_training.reduced.transfer import interpolation
 
 FRAMES = 41
 
@@ -188,6 +189,15 @@ def test_block_basis_error_follows_the_tolerance_and_half_precision_is_enough(ph
     assert errors[1] < 5e-3 and errors[1] < errors[0] and sizes[1] >= sizes[0]
     save_prior(tmp_path / "half.safetensors", prior, np.float16)
     assert prior_error(mesh, columns, load_prior(tmp_path / "half.safetensors"))["rms_mm"] < 1e-2
+
+
+def test_interpolation_between_meshes_is_exact_for_linear_fields():
+    coarse, fine = box_mesh((3, 3, 2), 20.0), box_mesh((5, 4, 3), 10.0)
+    weights = interpolation(coarse, fine)
+    gradient = np.array([[0.1, -0.2, 0.05], [0.0, 0.3, 0.1], [0.2, 0.0, -0.1]])
+    field = coarse.positions @ gradient
+    assert np.abs(weights @ field - fine.positions @ gradient).max() < 1e-3
+    assert np.abs(np.asarray(weights.sum(axis=1)) - 1.0).max() < 1e-5
 
 
 def test_columns_of_another_mesh_are_refused(phantom):

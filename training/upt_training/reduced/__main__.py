@@ -13,7 +13,7 @@ from upt_training.errors import InputError
 from upt_training.mesh_file import load_mesh
 from upt_training.reduced.build import Options, Progress, build
 from upt_training.reduced.columns import load_columns
-from upt_training.reduced.evaluate import evaluate, table
+from upt_training.reduced.evaluate import evaluate, insert_table, table
 from upt_training.reduced.make_prior import make_prior, prior_error
 from upt_training.reduced.prior import load_prior, save_prior
 from upt_training.reduced.train import Settings
@@ -51,6 +51,7 @@ def arguments() -> argparse.ArgumentParser:
     whole.add_argument("--hidden", type=int, default=256)
     whole.add_argument("--updates", type=int, default=800)
     whole.add_argument("--noise", type=float, default=0.03)
+    whole.add_argument("--quadratic-modes", type=int, default=24, help="response modes in the second-order term")
     whole.add_argument("--seeds", type=int, default=1, help="trainings to choose from by validation error")
 
     check = commands.add_parser("evaluate", help="errors of a bundle over full rollouts")
@@ -58,6 +59,7 @@ def arguments() -> argparse.ArgumentParser:
     check.add_argument("--data", type=Path, action="append", required=True)
     check.add_argument("--all", action="store_true", help="every case, not only the split `test` and scheme 5")
     check.add_argument("--json", type=Path, help="also write the result here")
+    check.add_argument("--into", type=Path, help="also write the table into this page, between its table markers")
     return parser
 
 
@@ -79,6 +81,9 @@ def run_evaluate(args: argparse.Namespace) -> None:
     result = evaluate(args.bundle, cases, Progress("evaluation"))
     if args.json:
         args.json.write_text(json.dumps(result, indent=2))
+    if args.into:
+        manifest = json.loads((args.bundle / "bundle.json").read_text())
+        insert_table(args.into, manifest["name"], table(result))
     print(table(result))
 
 
@@ -104,7 +109,9 @@ def main() -> int:
                 args.tables,
                 args.seeds,
             )
-            settings = Settings(hidden=args.hidden, updates=args.updates, noise=args.noise)
+            settings = Settings(
+                hidden=args.hidden, updates=args.updates, noise=args.noise, quadratic_modes=args.quadratic_modes
+            )
             build(options, settings, args.description)
         else:
             run_evaluate(args)

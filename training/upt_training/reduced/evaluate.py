@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from upt_training.errors import InputError
 from upt_training.reduced.runner import ReducedRunner
 from upt_training.reduced.trajectories import Case
 
@@ -114,6 +115,16 @@ def evaluate(
         rows["reduced"].append(roll_case(runner, case))
         progress(index + 1, len(cases))
     return {name: summarise(errors) for name, errors in rows.items()}
+
+
+def insert_table(page: Path, name: str, text: str) -> None:
+    """Replace what stands between `<!-- table NAME -->` and `<!-- end NAME -->` of a page."""
+    start, end = f"<!-- table {name} -->", f"<!-- end {name} -->"
+    content = page.read_text(encoding="utf-8")
+    if start not in content or end not in content:
+        raise InputError(f"{page}: the markers {start} and {end} are missing")
+    before, rest = content.split(start, 1)
+    page.write_text(f"{before}{start}\n{text}\n{end}{rest.split(end, 1)[1]}", encoding="utf-8")
 
 
 def table(result: dict[str, dict]) -> str:

@@ -24,7 +24,7 @@ def interpolation(coarse: Mesh, fine: Mesh, candidates: int = 32) -> scipy.spars
     """`[K_fine, K_coarse]` weights, rows summing to 1.
 
     Each fine node is searched a little towards the middle of its own elements, so that coincident nodes on either
-    side of the midline find their own hemisphere; weights outside of an element are clamped.
+    side of the midline find their own hemisphere. Outside of its element a node is extrapolated (weights above -1).
     """
     centres = fine.positions[fine.tets].mean(axis=1, dtype=np.float64)
     count = np.bincount(fine.tets.ravel(), minlength=fine.node_count)
@@ -46,7 +46,7 @@ def interpolation(coarse: Mesh, fine: Mesh, candidates: int = 32) -> scipy.spars
 
     inside = barycentric(inner[:, None], near).min(axis=-1)
     best = near[np.arange(len(near)), inside.argmax(axis=1)]
-    weights = np.maximum(barycentric(own, best), 0.0)
+    weights = np.maximum(barycentric(own, best), -1.0)
     weights /= weights.sum(axis=1, keepdims=True)
     rows = np.repeat(np.arange(fine.node_count), 4)
     shape = (fine.node_count, coarse.node_count)
