@@ -55,6 +55,7 @@ def parser() -> argparse.ArgumentParser:
     export.add_argument("--radius-mm", type=float, help="another radius of the graph (for another mesh)")
     export.add_argument("--max-degree", type=int, help="another largest number of neighbours")
     export.add_argument("--supernodes", type=int, help="another number of supernodes")
+    export.add_argument("--envelope", type=Path, help="bundle whose envelope to take (weights trained on its data)")
     export.add_argument("--errors", type=Path, help="JSON of `evaluate` to put into bundle.json")
     export.add_argument("--paper-split", action="store_true", help="also the paper's two halves")
     export.add_argument("--step", action="store_true", help="also the whole step in one graph")

@@ -97,6 +97,9 @@ def export_command(options) -> int:
     }
     if dataset is not None:
         provenance["data"] = {"seed": dataset.manifest.get("seed"), "cases": len(dataset.cases)}
+    envelope = measure_envelope(mesh, dataset.select("train")) if dataset else None
+    if options.envelope:
+        envelope = json.loads((Path(options.envelope) / "bundle.json").read_text())["envelope"]
     manifest = write_bundle(
         model,
         mesh,
@@ -105,7 +108,7 @@ def export_command(options) -> int:
         description=options.description or settings["description"],
         boundary=checkpoint.get("boundary", "fixed"),
         material=dataset.manifest.get("material", MATERIAL) if dataset else None,
-        envelope=measure_envelope(mesh, dataset.select("train")) if dataset else None,
+        envelope=envelope,
         prior=options.prior,
         provenance=provenance,
         errors=bundle_errors(options.errors) if options.errors else None,
