@@ -49,7 +49,9 @@ def arguments() -> argparse.ArgumentParser:
     whole.add_argument("--tolerance", type=float, default=3e-3)
     whole.add_argument("--tables", choices=("f16", "f32"), default="f16")
     whole.add_argument("--hidden", type=int, default=256)
-    whole.add_argument("--updates", type=int, default=800)
+    whole.add_argument(
+        "--updates", type=int, default=800, help="0: the ridge regressions alone, on every training case"
+    )
     whole.add_argument("--noise", type=float, default=0.03)
     whole.add_argument("--quadratic-modes", type=int, default=24, help="response modes in the second-order term")
     whole.add_argument("--seeds", type=int, default=1, help="trainings to choose from by validation error")

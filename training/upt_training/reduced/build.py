@@ -154,11 +154,14 @@ def bound_limits(states: States) -> Limits:
 def trained(options: Options, states: States, settings: Settings) -> tuple[Correction, Limits, dict]:
     """The best of `seeds` trainings by validation error."""
     fit, validation, _ = split_states(states)
+    if settings.updates == 0:  # Nothing is chosen by validation: the ridge regressions take every training case.
+        fit = join_states([fit, validation])
     limits = bound_limits(fit)
     best: tuple[Correction, dict] | None = None
     for seed in range(1, options.seeds + 1):
         settings.seed = seed
         model, history = train(fit, validation, limits, settings, print, options.work / f"training-{seed}.pt")
+        history["training_cases"] = fit.cases
         if best is None or history["validation_mse"] < best[1]["validation_mse"]:
             best = (model, {**history, "seed": seed})
     assert best is not None
@@ -219,7 +222,7 @@ def build(options: Options, settings: Settings, description: str) -> dict:
     provenance = {
         "data": [name for name, _ in sources],
         "cases": {"train": len(cases), "all": states.cases, "files_sha256": digest},
-        "training": {**asdict(settings), "validation_mse_mm2": history["validation_mse"]},
+        "training": {**asdict(settings), "validation_mse_mm2": history["validation_mse"] if settings.updates else None},
         "block_basis": info,
         "tables": options.tables,
         "date": datetime.now(UTC).strftime("%Y-%m-%d"),
