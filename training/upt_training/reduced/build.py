@@ -241,4 +241,4 @@ def build(options: Options, settings: Settings, description: str) -> dict:
 
 
 def _published(errors: dict) -> dict:
-    return {name: float(f"{value:.4g}") for name, value in errors.items()}
+    return {name: value if isinstance(value, int) else float(f"{value:.4g}") for name, value in errors.items()}
