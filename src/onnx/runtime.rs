@@ -44,6 +44,11 @@ impl Runtime {
         RUNTIME.get().is_some()
     }
 
+    /// The process's one environment, for sessions beside the library's own (measurements of rivals).
+    pub fn environment(&self) -> &Environment {
+        &self.environment
+    }
+
     /// File that was loaded.
     pub fn path(&self) -> &Path {
         &self.path

@@ -68,7 +68,11 @@ pub const NATIVE: &[Package] = &[
     program(&["c++", "g++", "clang++"], "g++", "the C++ tests"),
     program(&["pkg-config"], "pkg-config", "the packaging tests"),
     program(&["Xvfb"], "xvfb", "the simulator's window without a screen"),
-    program(&["xauth"], "xauth", "the simulator's window without a screen"),
+    program(
+        &["xauth"],
+        "xauth",
+        "the simulator's window without a screen",
+    ),
     program(&["valgrind"], "valgrind", "the memory check of the C host"),
     file(
         &["/usr/include/png.h"],

@@ -465,8 +465,11 @@ fn write(
     let page = html::Page {
         title: &options.title,
         lead: format!(
-            "{} contacts on {} ({} nodes), replayed autoregressively by every method on {}.",
-            cases.list.len(),
+            "{} on {} ({} nodes), replayed autoregressively by every method on {}.",
+            match cases.list.len() {
+                1 => "One contact".to_owned(),
+                count => format!("{count} contacts"),
+            },
             header.mesh_name,
             mesh.node_count(),
             machine.cpu

@@ -98,12 +98,8 @@ impl PaperSplit {
         }
         let session = |file: &str| -> Result<Session> {
             let runtime = upt::onnx::Runtime::get(None)?;
-            let environment = ort::init_from(runtime.path())?
-                .with_name("paper-split")
-                .with_telemetry(false)
-                .build()?;
             let failed = |error: String| anyhow::anyhow!("{file}: {error}");
-            let mut builder = Session::builder(&environment)
+            let mut builder = Session::builder(runtime.environment())
                 .map_err(|error| failed(error.to_string()))?
                 .with_intra_threads(threads as usize)
                 .map_err(|error| failed(error.to_string()))?
