@@ -15,6 +15,9 @@ use tissue::tensors::{f32_values, i32_values};
 
 type Outcome<T> = Result<T, Box<dyn Error>>;
 
+/// `[K,3]` mm or mN.
+type Vectors = Vec<[f32; 3]>;
+
 fn main() -> Outcome<()> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let page = root.join("docs/reference-solver.md");
@@ -45,7 +48,7 @@ fn settle(
     material: Material,
     pressure: Pressure,
     frames: u32,
-) -> Outcome<(Vec<[f32; 3]>, Vec<[f32; 3]>, f64)> {
+) -> Outcome<(Vectors, Vectors, f64)> {
     let options = SolverOptions {
         material,
         pressure,
@@ -125,7 +128,7 @@ fn largest(a: &[[f32; 3]], b: &[[f32; 3]]) -> f32 {
     pairs.fold(0.0, |m, (a, b)| m.max((a - b).abs()))
 }
 
-type Static = (Vec<ContactNode>, Vec<[f32; 3]>, Vec<[f32; 3]>, String);
+type Static = (Vec<ContactNode>, Vectors, Vectors, String);
 
 /// Contact, displacement and forces of a case in the CalculiX fixture.
 fn calculix(name: &str) -> Outcome<Static> {

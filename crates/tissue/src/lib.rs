@@ -4,6 +4,11 @@
 //! Units throughout: millimetre, gram, second. Stress and moduli then come out
 //! in pascal, forces in micronewton and energies in nanojoule; files hold mN and mJ.
 
+#![allow(
+    clippy::needless_range_loop,
+    reason = "components of vectors and tensors read best by index"
+)]
+
 pub mod baselines;
 pub mod contact;
 pub mod dataset;

@@ -46,7 +46,7 @@ impl Solver {
                     let corners = [0, 1, 2, 3].map(|a| displacement(batch.corners[a][lane]));
                     let state = element_state(batch, lane, corners);
                     let determinant = state.determinant;
-                    if !(determinant >= result.min_det_f) {
+                    if determinant < result.min_det_f || determinant.is_nan() {
                         result.min_det_f = determinant;
                         result.worst_element = *element as usize;
                     }
