@@ -240,7 +240,11 @@ fn site_change(model: &Arc<Model>, name: &str) -> upt::Result<()> {
             },
             None,
         )?;
-        let times = if t % 2 == 0 { &mut new } else { &mut same };
+        let times = if t.is_multiple_of(2) {
+            &mut new
+        } else {
+            &mut same
+        };
         times.push(scene.stats().prior_ms);
     }
     let extra = median(&mut new) - median(&mut same);

@@ -59,9 +59,12 @@ pub fn inverted(pool: &Pool, positions: &[f32], field: &[f32], tets: &[u32]) -> 
             tets[4 * chunk * CHUNK..(4 * (chunk + 1) * CHUNK).min(tets.len())].chunks_exact(4)
         {
             for (corner, &node) in corners.chunks_exact_mut(3).zip(tet) {
-                for axis in 0..3 {
-                    let at = 3 * node as usize + axis;
-                    corner[axis] = positions[at] + field[at];
+                let at = 3 * node as usize;
+                for (x, (p, u)) in corner
+                    .iter_mut()
+                    .zip(positions[at..].iter().zip(&field[at..]))
+                {
+                    *x = p + u;
                 }
             }
             if volume(&corners, &[0, 1, 2, 3]) <= 0.0 {

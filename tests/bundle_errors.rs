@@ -237,7 +237,7 @@ fn mutated_bytes_give_an_error_or_a_model_never_a_crash() {
             let (place, value) = (random(), random() as u8);
             // Half of the hits go to the header, where they hurt most.
             let _ = with_file(bundle, file, |bytes| {
-                let limit = if place % 2 == 0 {
+                let limit = if place.is_multiple_of(2) {
                     bytes.len().min(600)
                 } else {
                     bytes.len()

@@ -1,5 +1,6 @@
 //! Bundles: bytes on disk -> checked values. The format is `docs/formats.md`.
 
+mod checks;
 mod files;
 mod manifest;
 mod mesh;

@@ -3,7 +3,9 @@
 //! On the CPU the host writes the bound input tensors in place and a run copies nothing and allocates nothing of ours.
 
 use ort::AsPointer;
+use ort::ep::ExecutionProviderDispatch;
 use ort::memory::Allocator;
+use ort::session::builder::SessionBuilder;
 use ort::session::{IoBinding, Session};
 use ort::value::{Tensor, ValueType};
 
@@ -64,20 +66,7 @@ impl Stage {
         let _span = tracing::debug_span!("session", file).entered();
         let mut invalid = None;
         let made = options.plan.choose(|_, dispatch| {
-            let mut builder = Session::builder(&runtime.environment).map_err(|e| e.to_string())?;
-            let configured = (|| {
-                builder = builder
-                    .clone()
-                    .with_intra_threads(options.threads.max(1))?
-                    .with_inter_threads(1)?
-                    .with_config_entry("session.force_spinning_stop", "1")?
-                    .with_config_entry("session.set_denormal_as_zero", "1")?;
-                if let Some(dispatch) = dispatch {
-                    builder = builder.clone().with_execution_providers([dispatch])?;
-                }
-                Ok::<(), ort::Error<ort::session::builder::SessionBuilder>>(())
-            })();
-            configured.map_err(|e| e.to_string())?;
+            let mut builder = configure(runtime, options, dispatch)?;
             builder.commit_from_memory(bytes).map_err(|error| {
                 if error.code() == ort::ErrorCode::InvalidProtobuf
                     || error.code() == ort::ErrorCode::InvalidGraph
@@ -194,6 +183,29 @@ impl Stage {
             text
         };
         Err(Error::Runtime(format!("{}: {message}", self.file)))
+    }
+}
+
+/// A session's options: its threads do not spin between runs and flush denormals.
+fn configure(
+    runtime: &'static Runtime,
+    options: &StageOptions,
+    dispatch: Option<ExecutionProviderDispatch>,
+) -> std::result::Result<SessionBuilder, String> {
+    let text = |error: ort::Error<SessionBuilder>| error.to_string();
+    let builder = Session::builder(&runtime.environment)
+        .map_err(|error| error.to_string())?
+        .with_intra_threads(options.threads.max(1))
+        .map_err(text)?
+        .with_inter_threads(1)
+        .map_err(text)?
+        .with_config_entry("session.force_spinning_stop", "1")
+        .map_err(text)?
+        .with_config_entry("session.set_denormal_as_zero", "1")
+        .map_err(text)?;
+    match dispatch {
+        Some(dispatch) => builder.with_execution_providers([dispatch]).map_err(text),
+        None => Ok(builder),
     }
 }
 

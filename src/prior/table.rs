@@ -121,7 +121,7 @@ impl PriorTable {
         }
         if let Some(at) = rank_offsets
             .windows(2)
-            .position(|pair| (pair[1] - pair[0]) % 8 != 0)
+            .position(|pair| !(pair[1] - pair[0]).is_multiple_of(8))
         {
             return Err(file.bad(
                 "rank_offsets",

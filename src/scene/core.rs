@@ -59,7 +59,7 @@ pub struct Core {
     pub(super) rest_frames: u32,
     pub(super) max_displacement: f32,
     envelope: EnvelopeCheck,
-    next: Frame,
+    pub(super) next: Frame,
 }
 
 /// Parts made by [`super::build`].
@@ -410,173 +410,6 @@ impl Core {
         }
     }
 
-    /// Back to rest.
-    pub(super) fn reset(&mut self, published: &RwLock<Published>) {
-        self.engine.reset();
-        self.contact.clear();
-        self.contact_before.clear();
-        self.source = Source::Rest;
-        self.source_before = Source::Rest;
-        self.step_count = 0;
-        self.quiet = 0;
-        self.sleeping = false;
-        self.rest_frames = 0;
-        self.max_displacement = 0.0;
-        let stats = self.blank_stats();
-        let mut shared = lock_write(published);
-        let shared = &mut *shared;
-        for frame in [&mut shared.last, &mut shared.before]
-            .into_iter()
-            .chain(shared.earlier.as_mut())
-        {
-            frame.field.fill(0.0);
-            frame.points.fill(0.0);
-        }
-        shared.stats = stats;
-        shared.contact_nodes.clear();
-        shared.contact_vectors.clear();
-    }
-
-    /// Decodes any nodes of the last state into `out [n,3]`.
-    pub(super) fn decode(
-        &mut self,
-        published: &RwLock<Published>,
-        nodes: &[u32],
-        out: &mut [f32],
-    ) -> Result<()> {
-        let count = self.mesh.node_count();
-        check_nodes(nodes, count)?;
-        if out.len() != 3 * nodes.len() {
-            return Err(Error::Argument(format!(
-                "out has {} floats, must have {}",
-                out.len(),
-                3 * nodes.len()
-            )));
-        }
-        if self.step_count == 0 {
-            return Err(Error::State("decode before the first step".into()));
-        }
-        let _flush = FlushToZero::enter();
-        let plan = NodePlan::new(&[nodes], count, self.engine.planned_prior(&self.model));
-        self.decode_published(published, Which::Last, &plan)?;
-        for (out, &node) in out.chunks_exact_mut(3).zip(nodes) {
-            out.copy_from_slice(&self.next.field[3 * node as usize..3 * node as usize + 3]);
-        }
-        Ok(())
-    }
-
-    /// Decodes the nodes of a plan in a published state into the spare frame.
-    pub(super) fn decode_published(
-        &mut self,
-        published: &RwLock<Published>,
-        which: Which,
-        plan: &NodePlan,
-    ) -> Result<()> {
-        let (source, contact) = match which {
-            Which::Last => (self.source, &self.contact),
-            _ => (self.source_before, &self.contact_before),
-        };
-        let shared = lock_read(published);
-        let frame = if which == Which::Last {
-            &shared.last
-        } else {
-            &shared.before
-        };
-        let field = &mut self.next.field;
-        if self.engine.keeps_all_nodes(&self.model) {
-            field.copy_from_slice(&frame.field);
-            return Ok(());
-        }
-        match source {
-            Source::Rest => {
-                field.fill(0.0);
-                return Ok(());
-            }
-            Source::Model => self.engine.decode(
-                self.isa,
-                &self.pool,
-                &self.model,
-                which,
-                plan,
-                &shared.before.field,
-                field,
-            )?,
-            Source::Fallback => self.engine.decode_fallback(
-                self.isa,
-                &self.pool,
-                &self.model,
-                which,
-                plan,
-                field,
-            )?,
-        }
-        if !self.options.free_boundary {
-            enforce(&self.mesh.held_nodes, &self.held, contact, field);
-        }
-        Ok(())
-    }
-
-    /// A new plan: the nodes of both published states are decoded for it at once.
-    pub(super) fn set_plan(
-        &mut self,
-        published: &RwLock<Published>,
-        region: Option<Vec<u32>>,
-        points: AttachedPoints,
-    ) -> Result<()> {
-        let count = self.mesh.node_count();
-        let table = self.engine.planned_prior(&self.model);
-        let plan = match &region {
-            Some(region) if !self.engine.keeps_all_nodes(&self.model) => NodePlan::new(
-                &[
-                    region,
-                    self.engine.recurrence_nodes(),
-                    &points.needed_nodes(),
-                ],
-                count,
-                table,
-            ),
-            _ => NodePlan::all(count, table),
-        };
-        let _flush = FlushToZero::enter();
-        self.engine
-            .replan(self.isa, &self.pool, &self.model, &plan)?;
-        let mut fields = [Vec::new(), Vec::new()];
-        for (which, field) in [Which::Last, Which::Before].into_iter().zip(&mut fields) {
-            self.decode_published(published, which, &plan)?;
-            field.clone_from(&self.next.field);
-        }
-        if self.options.check_inversion {
-            let mut known = vec![false; count];
-            plan.nodes()
-                .iter()
-                .for_each(|&node| known[node as usize] = true);
-            self.planned_tets = self
-                .mesh
-                .tets
-                .chunks_exact(4)
-                .filter(|tet| tet.iter().all(|&node| known[node as usize]))
-                .flatten()
-                .copied()
-                .collect();
-        }
-        let mut shared = lock_write(published);
-        let shared = &mut *shared;
-        let [last, before] = fields;
-        for (frame, field) in [(&mut shared.last, last), (&mut shared.before, before)] {
-            frame.points = vec![0.0; 3 * points.len()];
-            points.interpolate(&field, &mut frame.points);
-            frame.field = field;
-        }
-        if let Some(earlier) = &mut shared.earlier {
-            earlier.clone_from(&shared.before);
-        }
-        self.next.points = vec![0.0; 3 * points.len()];
-        shared.region = region;
-        self.plan = plan;
-        self.points = points;
-        Ok(())
-    }
-
     /// Bytes of the scene's buffers.
     pub(super) fn memory_bytes(&self) -> usize {
         let count = self.mesh.node_count();
@@ -586,7 +419,7 @@ impl Core {
     }
 }
 
-fn enforce(held_nodes: &[u32], held: &[bool], contact: &ContactSet, field: &mut [f32]) {
+pub(super) fn enforce(held_nodes: &[u32], held: &[bool], contact: &ContactSet, field: &mut [f32]) {
     for (&node, c) in contact.nodes.iter().zip(contact.vectors.chunks_exact(3)) {
         if !held[node as usize] {
             field[3 * node as usize..3 * node as usize + 3].copy_from_slice(c);
@@ -594,16 +427,5 @@ fn enforce(held_nodes: &[u32], held: &[bool], contact: &ContactSet, field: &mut 
     }
     for &node in held_nodes {
         field[3 * node as usize..3 * node as usize + 3].fill(0.0);
-    }
-}
-
-/// All nodes exist.
-pub(super) fn check_nodes(nodes: &[u32], count: usize) -> Result<()> {
-    match nodes.iter().position(|&node| node as usize >= count) {
-        Some(at) => Err(Error::Argument(format!(
-            "nodes[{at}] is {}, the mesh has {count} nodes",
-            nodes[at]
-        ))),
-        None => Ok(()),
     }
 }

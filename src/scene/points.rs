@@ -15,7 +15,7 @@ pub struct AttachedPoints {
 impl AttachedPoints {
     /// Finds the tetrahedra of points `[n,3]`, rest mm.
     pub fn new(mesh: &Mesh, points: &[f32]) -> Result<AttachedPoints> {
-        if points.len() % 3 != 0 {
+        if !points.len().is_multiple_of(3) {
             return Err(Error::Argument(format!(
                 "points has {} floats, must have 3 per point",
                 points.len()

@@ -197,7 +197,7 @@ impl Core {
             return Err(Error::Snapshot("is of another mesh".into()));
         }
         let count = self.mesh.node_count();
-        let step_count = u64::from(r.u32()?) | u64::from(r.u32()?) << 32;
+        let step_count = u64::from(r.u32()?) | (u64::from(r.u32()?) << 32);
         let quiet = r.u32()?;
         let sleeping = r.u32()? != 0;
         let rest_frames = r.u32()?;

@@ -39,10 +39,10 @@ impl Tools {
     /// Forgets which nodes instruments touch.
     pub fn reset(&self) {
         #[cfg(feature = "contact")]
-        if let Ok(mut contacts) = self.contacts.lock() {
-            if let Some(contacts) = contacts.as_mut() {
-                contacts.reset();
-            }
+        if let Ok(mut contacts) = self.contacts.lock()
+            && let Some(contacts) = contacts.as_mut()
+        {
+            contacts.reset();
         }
     }
 }

@@ -166,6 +166,7 @@ impl UptEngine {
     }
 
     /// Computes the latent state `next`.
+    #[allow(clippy::too_many_arguments)]
     pub fn predict(
         &mut self,
         isa: Isa,
@@ -296,6 +297,7 @@ impl UptEngine {
     }
 
     /// Decodes rows `nodes` of a query table into the same rows of `out`, before the base is added.
+    #[allow(clippy::too_many_arguments)]
     pub fn decode_network(
         &mut self,
         isa: Isa,

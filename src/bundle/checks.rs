@@ -1,0 +1,246 @@
+//! What the values of a manifest must satisfy; every failure names the field.
+
+use super::manifest::{Envelope, Manifest, ManifestKind, ReducedEntry, UptEntry};
+use crate::error::{Error, Result};
+
+/// File that the messages name.
+pub(super) const FILE: &str = "bundle.json";
+
+pub(super) fn bad(field: &str, message: impl std::fmt::Display) -> Error {
+    Error::bundle(FILE, format!("field `{field}`: {message}"))
+}
+
+pub(super) fn check(ok: bool, field: &str, message: &str) -> Result<()> {
+    if ok { Ok(()) } else { Err(bad(field, message)) }
+}
+
+impl Manifest {
+    pub(super) fn check(&self) -> Result<()> {
+        check(
+            self.dt_s.is_finite() && self.dt_s > 0.0,
+            "dt_s",
+            "must be positive",
+        )?;
+        check(self.length_unit == "mm", "length_unit", "must be `mm`")?;
+        check(self.force_unit == "mN", "force_unit", "must be `mN`")?;
+        check(
+            self.material.young_pa > 0.0 && self.material.young_pa.is_finite(),
+            "material.young_pa",
+            "must be positive",
+        )?;
+        check(
+            self.material.poisson > -1.0 && self.material.poisson < 0.5,
+            "material.poisson",
+            "must be in (-1, 0.5)",
+        )?;
+        check(
+            self.mesh.nodes >= 4 && self.mesh.nodes < i32::MAX as usize,
+            "mesh.nodes",
+            "must be at least 4",
+        )?;
+        self.envelope.check()?;
+        for (name, entry) in &self.files {
+            check_name(name, &format!("files.{name}"))?;
+            check(
+                entry.sha256.len() == 64 && entry.sha256.bytes().all(|b| b.is_ascii_hexdigit()),
+                &format!("files.{name}.sha256"),
+                "must be 64 hex digits",
+            )?;
+        }
+        self.listed(&self.mesh.file, "mesh.file")?;
+        if let Some(prior) = &self.prior {
+            self.listed(&prior.file, "prior.file")?;
+        }
+        match self.kind {
+            ManifestKind::Upt => {
+                let upt = self
+                    .upt
+                    .as_ref()
+                    .ok_or_else(|| bad("upt", "is missing, kind `upt` needs it"))?;
+                upt.check()?;
+                for file in ["embed.onnx", "latent.onnx", "decoder.onnx"] {
+                    self.listed(file, "files")?;
+                }
+                self.listed(&upt.weights, "upt.weights")?;
+                check(
+                    !upt.needs_prior() || self.prior.is_some(),
+                    "prior",
+                    "is missing, the features or the base need it",
+                )
+            }
+            ManifestKind::Reduced => {
+                let reduced = self
+                    .reduced
+                    .as_ref()
+                    .ok_or_else(|| bad("reduced", "is missing, kind `reduced` needs it"))?;
+                reduced.check()?;
+                self.listed("latent.onnx", "files")?;
+                check(
+                    self.prior.is_some(),
+                    "prior",
+                    "is missing, kind `reduced` needs it",
+                )
+            }
+        }
+    }
+
+    fn listed(&self, file: &str, field: &str) -> Result<()> {
+        check_name(file, field)?;
+        check(
+            self.files.contains_key(file),
+            field,
+            &format!("names `{file}`, which is not in `files`"),
+        )
+    }
+}
+
+/// A file of a bundle lies in its folder: one plain name.
+fn check_name(name: &str, field: &str) -> Result<()> {
+    let plain =
+        !name.is_empty() && !name.contains(['/', '\\', ':', '\0']) && name != "." && name != "..";
+    check(plain, field, "must be a plain file name")
+}
+
+impl Envelope {
+    fn check(&self) -> Result<()> {
+        let positive = |x: f32| x.is_finite() && x > 0.0;
+        check(
+            positive(self.max_push_mm),
+            "envelope.max_push_mm",
+            "must be positive",
+        )?;
+        check(
+            positive(self.max_push_rate_mm),
+            "envelope.max_push_rate_mm",
+            "must be positive",
+        )?;
+        let [low, high] = self.contact_area_mm2;
+        check(
+            low >= 0.0 && high.is_finite() && low <= high,
+            "envelope.contact_area_mm2",
+            "must be a range [low, high]",
+        )?;
+        check(
+            self.max_sites >= 1,
+            "envelope.max_sites",
+            "must be at least 1",
+        )?;
+        check(
+            positive(self.displacement_bound_mm),
+            "envelope.displacement_bound_mm",
+            "must be positive",
+        )
+    }
+}
+
+impl UptEntry {
+    fn check(&self) -> Result<()> {
+        check(
+            !self.features.is_empty(),
+            "upt.features",
+            "must not be empty",
+        )?;
+        for (i, feature) in self.features.iter().enumerate() {
+            check(
+                !self.features[..i].contains(feature),
+                "upt.features",
+                "holds a feature twice",
+            )?;
+        }
+        for axis in 0..3 {
+            check(
+                self.normalisation.mean[axis].is_finite(),
+                "upt.normalisation.mean",
+                "must be finite",
+            )?;
+            check(
+                self.normalisation.std[axis].is_finite() && self.normalisation.std[axis] > 0.0,
+                "upt.normalisation.std",
+                "must be positive",
+            )?;
+        }
+        let graph = &self.graph;
+        check(
+            graph.radius_mm.is_finite() && graph.radius_mm > 0.0,
+            "upt.graph.radius_mm",
+            "must be positive",
+        )?;
+        check(
+            (1..=4096).contains(&graph.max_degree),
+            "upt.graph.max_degree",
+            "must be in 1..=4096",
+        )?;
+        check(
+            (1..=1 << 20).contains(&graph.supernodes),
+            "upt.graph.supernodes",
+            "must be in 1..=1048576",
+        )?;
+        check(
+            (0.0..=1.0).contains(&graph.domain_fraction),
+            "upt.graph.domain_fraction",
+            "must be in [0, 1]",
+        )?;
+        let dims = &self.dims;
+        for (name, value) in [
+            ("encoder", dims.encoder),
+            ("latent_tokens", dims.latent_tokens),
+            ("decoder", dims.decoder),
+            ("decoder_heads", dims.decoder_heads),
+            ("decoder_mlp", dims.decoder_mlp),
+        ] {
+            check(
+                (1..=65536).contains(&value),
+                &format!("upt.dims.{name}"),
+                "must be in 1..=65536",
+            )?;
+        }
+        check(
+            dims.query == 2 * dims.decoder,
+            "upt.dims.query",
+            "must be twice `upt.dims.decoder`",
+        )?;
+        check(
+            dims.decoder.is_multiple_of(dims.decoder_heads),
+            "upt.dims.decoder_heads",
+            "must divide `upt.dims.decoder`",
+        )
+    }
+}
+
+impl ReducedEntry {
+    fn check(&self) -> Result<()> {
+        check(
+            (1..=65536).contains(&self.modes),
+            "reduced.modes",
+            "must be in 1..=65536",
+        )?;
+        check(
+            self.response_modes <= 65536,
+            "reduced.response_modes",
+            "must be at most 65536",
+        )?;
+        check(
+            !self.inputs.is_empty(),
+            "reduced.inputs",
+            "must not be empty",
+        )?;
+        check(
+            self.bound.relative.is_finite() && self.bound.relative >= 0.0,
+            "reduced.bound.relative",
+            "must not be negative",
+        )?;
+        check(
+            (0.0..1.0).contains(&self.bound.decay),
+            "reduced.bound.decay",
+            "must be in [0, 1)",
+        )?;
+        let fade = &self.fade;
+        check(
+            fade.start_push_mm.is_finite()
+                && fade.start_push_mm >= 0.0
+                && fade.end_push_mm > fade.start_push_mm,
+            "reduced.fade",
+            "must have 0 <= start_push_mm < end_push_mm",
+        )
+    }
+}
