@@ -56,12 +56,7 @@ impl CaseErrors {
             &steps[..]
         };
         let mean = |value: fn(&StepErrors) -> f64| {
-            let values: Vec<f64> = counted
-                .iter()
-                .map(value)
-                .filter(|value| value.is_finite())
-                .collect();
-            values.iter().sum::<f64>() / values.len().max(1) as f64
+            counted.iter().map(value).sum::<f64>() / counted.len().max(1) as f64
         };
         let overall = StepErrors {
             mse_mm2: mean(|step| step.mse_mm2),

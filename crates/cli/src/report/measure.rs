@@ -183,7 +183,9 @@ fn fill_errors(row: &mut Row, cases: &[CaseErrors]) {
     };
     (row.mse_mm2, row.mse_std) = over(|errors| errors.mse_mm2);
     (row.relative_l2, _) = over(|errors| errors.relative_l2);
-    (row.hausdorff_mm, row.hausdorff_std) = over(|errors| errors.hausdorff_mm);
+    let (mean, deviation) = over(|errors| errors.hausdorff_mm);
+    row.hausdorff_mm = mean.is_finite().then_some(mean);
+    row.hausdorff_std = deviation.is_finite().then_some(deviation);
     (row.max_mm, row.max_std) = over(|errors| errors.max_mm);
 }
 

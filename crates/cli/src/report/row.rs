@@ -26,8 +26,9 @@ pub struct Row {
     pub mse_mm2: f64,
     pub mse_std: f64,
     pub relative_l2: f64,
-    pub hausdorff_mm: f64,
-    pub hausdorff_std: f64,
+    /// None where it was left out.
+    pub hausdorff_mm: Option<f64>,
+    pub hausdorff_std: Option<f64>,
     pub max_mm: f64,
     pub max_std: f64,
     /// Of single steps of 50 ms of tissue, wall time.

@@ -3,14 +3,20 @@
 use super::plot::label;
 use super::row::Row;
 
+/// What a column shows of a row.
+type Cell = fn(&Row) -> String;
+
 /// Column titles and the cell of a row.
-pub const COLUMNS: &[(&str, fn(&Row) -> String)] = &[
+pub const COLUMNS: &[(&str, Cell)] = &[
     ("method", |row| row.family()),
     ("configuration", |row| row.variant()),
     ("MSE mm²", |row| spread(row.mse_mm2, row.mse_std)),
     ("rel. L2", |row| label(row.relative_l2)),
     ("Hausdorff mm", |row| {
-        spread(row.hausdorff_mm, row.hausdorff_std)
+        row.hausdorff_mm.map_or_else(
+            || "-".into(),
+            |mean| spread(mean, row.hausdorff_std.unwrap_or(0.0)),
+        )
     }),
     ("max mm", |row| spread(row.max_mm, row.max_std)),
     ("p50 ms", |row| label(row.ms_p50)),
