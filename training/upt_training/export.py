@@ -92,7 +92,7 @@ def export_command(options) -> int:
         "architecture": settings["model"],
         "steps": checkpoint["step_count"],
         "trained_on_mesh_sha256": checkpoint["mesh_sha256"],
-        "validation_mse_mm2": checkpoint["best"],
+        "validation_mse_mm2": checkpoint["best"] if np.isfinite(checkpoint["best"]) else None,
         "date": datetime.now(UTC).date().isoformat(),
     }
     if dataset is not None:

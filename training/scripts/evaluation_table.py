@@ -1,0 +1,44 @@
+"""A Markdown table of results of `evaluate`: `python training/scripts/evaluation_table.py A.json ...`."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+NAMES = {
+    "bundle": "",
+    "linear": "linear elasticity",
+    "linear_decay": "linear elasticity, decay",
+    "zero": "predict zero",
+}
+
+
+def rows(path: Path) -> list[str]:
+    result = json.loads(path.read_text())
+    groups = {f"scheme {k}": v for k, v in result["schemes"].items()}
+    if len(groups) > 1:
+        groups = {"schemes " + "-".join((min(result["schemes"]), max(result["schemes"]))): result["all"], **groups}
+    out = []
+    for group, table in groups.items():
+        count = sum(group.endswith(c["scheme"]) for c in result["cases"])
+        count = len(result["cases"]) if group.startswith("schemes") else count
+        for method, scores in table.items():
+            cells = [f"{scores[k]['mean']:.3f} ± {scores[k]['std']:.3f}" for k in ("mse_mm2", "hausdorff_mm", "max_mm")]
+            span = f"{scores['mse_mm2']['min']:.3f} to {scores['mse_mm2']['max']:.3f}"
+            name = NAMES[method] or f"**{result['bundle']}**"
+            relative = f"{scores['relative_l2']['mean']:.3f}"
+            row = (f"{group}, K = {result['nodes']} ({count})", name, cells[0], span, cells[1], cells[2], relative)
+            out.append("| " + " | ".join(row) + " |")
+    return out
+
+
+def main() -> None:
+    print("| cases (number) | method | MSE, mm² | range | Hausdorff, mm | max error, mm | relative L2 |")
+    print("|---|---|---|---|---|---|---|")
+    for name in sys.argv[1:]:
+        print("\n".join(rows(Path(name))))
+
+
+if __name__ == "__main__":
+    main()
