@@ -1,9 +1,13 @@
 //! Points attached to the tissue: each is a fixed barycentric combination of the nodes of the tetrahedron around it.
-//! A point outside of the mesh takes the closest combination of the nearest tetrahedra, weights clamped to `[0, 1]`.
+//! A point outside of the mesh takes the closest combination of the nearest tetrahedra, weights clamped to `[0, 1]`; one
+//! that is [`REACH`] or more away is refused, because a mesh in other axes or units is a mistake, not a surface.
 
 use crate::bundle::Mesh;
 use crate::error::{Error, Result};
 use crate::grid::PointGrid;
+
+/// Farthest that an attached point may lie outside of the mesh, mm.
+pub const REACH: f64 = 25.0;
 
 /// Attached points.
 #[derive(Debug, Clone, Default)]
@@ -29,8 +33,14 @@ impl AttachedPoints {
         }
         let finder = TetFinder::new(mesh);
         let mut attached = AttachedPoints::default();
-        for p in points.chunks_exact(3) {
-            let (nodes, weights) = finder.locate([p[0], p[1], p[2]]);
+        for (index, p) in points.chunks_exact(3).enumerate() {
+            let (nodes, weights, miss) = finder.locate([p[0], p[1], p[2]]);
+            if miss >= REACH {
+                return Err(Error::Argument(format!(
+                    "points: point {index} at ({}, {}, {}) lies {miss:.0} mm outside the mesh; check axes (RAS) and units (mm)",
+                    p[0], p[1], p[2]
+                )));
+            }
             attached.nodes.push(nodes);
             attached.weights.push(weights);
         }
@@ -93,7 +103,7 @@ impl<'a> TetFinder<'a> {
     }
 
     /// The tetrahedron that holds `p`, or the one whose clamped combination comes closest to it.
-    fn locate(&self, p: [f32; 3]) -> ([u32; 4], [f32; 4]) {
+    fn locate(&self, p: [f32; 3]) -> ([u32; 4], [f32; 4], f64) {
         let mut best: Option<(f64, u32, [f64; 4])> = None;
         let mut radius = self.reach * (1.0 + 1e-6);
         loop {
@@ -104,10 +114,10 @@ impl<'a> TetFinder<'a> {
                     best = Some((miss, tet, weights));
                 }
             });
-            if let Some((_, tet, weights)) = best {
+            if let Some((miss, tet, weights)) = best {
                 let tet = 4 * tet as usize;
                 let nodes = [0, 1, 2, 3].map(|k| self.mesh.tets[tet + k]);
-                return (nodes, weights.map(|w| w as f32));
+                return (nodes, weights.map(|w| w as f32), miss.sqrt());
             }
             let nearest = self.centres.nearest(p);
             let tet = &self.mesh.tets[4 * nearest as usize..4 * nearest as usize + 4];
