@@ -16,6 +16,7 @@ mod render;
 mod report;
 mod rollout;
 mod simulate;
+mod stress;
 
 use std::process::ExitCode;
 
@@ -52,6 +53,8 @@ enum Command {
     Rollout(rollout::Options),
     /// Error against run time: all bundles and the plain methods on the same contacts.
     Report(report::Options),
+    /// Stiff and extreme cases, with what happened and whether it is what must happen.
+    Stress(stress::Options),
     /// Shell completions, on stdout.
     Completions(completions::Options),
 }
@@ -67,6 +70,7 @@ fn main() -> ExitCode {
         Command::Dataset(options) => dataset::run(&options),
         Command::Rollout(options) => rollout::run(&options),
         Command::Report(options) => report::run(&options),
+        Command::Stress(options) => stress::run(&options),
         Command::Completions(options) => completions::run::<Arguments>(&options),
     };
     outcome.unwrap_or_else(|error| {

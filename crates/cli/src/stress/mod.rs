@@ -1,0 +1,171 @@
+//! `upt stress`: a fixed suite of stiff and extreme cases for the reference solver and for bundles, as a table: what was
+//! done, what happened, and whether that is what must happen. Exit code 1 when a verdict is bad.
+
+mod reference;
+mod surrogate;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::{Context, Result};
+use indicatif::ProgressBar;
+use serde::Serialize;
+
+#[derive(clap::Args)]
+#[command(
+    after_help = "Examples:\n  upt stress --quick\n  upt stress --bundle onnx/brain-reduced --bundle onnx/brain-fast --markdown docs/stability.md"
+)]
+pub struct Options {
+    /// Bundle folders to stress; none: the reference solver only.
+    #[arg(long = "bundle")]
+    bundles: Vec<PathBuf>,
+    /// Mesh of the reference cases; none: an ellipsoid phantom.
+    #[arg(long)]
+    mesh: Option<PathBuf>,
+    /// Leave the reference solver out.
+    #[arg(long)]
+    no_reference: bool,
+    /// A twentieth of the steps, for tests.
+    #[arg(long)]
+    quick: bool,
+    /// Rows as JSON.
+    #[arg(long)]
+    json: Option<PathBuf>,
+    /// The tables as a page; text outside of the markers in it is kept.
+    #[arg(long)]
+    markdown: Option<PathBuf>,
+}
+
+/// What a case came to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Verdict {
+    /// What must happen happened.
+    Good,
+    /// It did not.
+    Bad,
+    /// The case does not apply; `happened` says why.
+    Left,
+}
+
+/// A row of the table.
+#[derive(Clone, Debug, Serialize)]
+pub struct Row {
+    pub subject: String,
+    pub case: String,
+    pub happened: String,
+    pub verdict: Verdict,
+}
+
+impl Row {
+    pub fn new(subject: &str, case: &str, happened: String, good: bool) -> Self {
+        Self {
+            subject: subject.into(),
+            case: case.into(),
+            happened,
+            verdict: if good { Verdict::Good } else { Verdict::Bad },
+        }
+    }
+
+    pub fn left(subject: &str, case: &str, why: &str) -> Self {
+        Self {
+            verdict: Verdict::Left,
+            ..Self::new(subject, case, why.into(), true)
+        }
+    }
+}
+
+/// Runs `case` for each entry with a progress bar; `None` is a case whose row was pushed elsewhere.
+pub fn progress(count: usize, label: &str) -> ProgressBar {
+    let bar = ProgressBar::new(count as u64);
+    bar.set_style(
+        indicatif::ProgressStyle::with_template("{msg} {bar:30} {pos}/{len} {eta}")
+            .expect("the template is valid"),
+    );
+    bar.set_message(label.to_string());
+    bar
+}
+
+pub fn run(options: &Options) -> Result<ExitCode> {
+    let mut rows = Vec::new();
+    if !options.no_reference {
+        rows.extend(reference::rows(options.mesh.as_deref(), options.quick)?);
+    }
+    for bundle in &options.bundles {
+        let found = surrogate::rows(bundle, options.quick)
+            .with_context(|| format!("{}", bundle.display()))?;
+        rows.extend(found);
+    }
+    print!("{}", table(&rows));
+    if let Some(path) = &options.json {
+        std::fs::write(path, serde_json::to_string_pretty(&rows)?)
+            .with_context(|| format!("{}", path.display()))?;
+    }
+    if let Some(path) = &options.markdown {
+        write_page(path, &rows)?;
+    }
+    let bad = rows.iter().filter(|r| r.verdict == Verdict::Bad).count();
+    let left = rows.iter().filter(|r| r.verdict == Verdict::Left).count();
+    println!(
+        "{} cases: {} as they must be, {bad} not, {left} left out",
+        rows.len(),
+        rows.len() - bad - left
+    );
+    Ok(ExitCode::from(u8::from(bad > 0)))
+}
+
+fn word(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Good => "good",
+        Verdict::Bad => "BAD",
+        Verdict::Left => "left out",
+    }
+}
+
+fn table(rows: &[Row]) -> String {
+    let wide = |f: fn(&Row) -> usize| rows.iter().map(f).max().unwrap_or(0);
+    let (a, b) = (wide(|r| r.subject.len()), wide(|r| r.case.len()));
+    rows.iter()
+        .map(|r| {
+            format!(
+                "{:a$}  {:b$}  {:8}  {}\n",
+                r.subject,
+                r.case,
+                word(r.verdict),
+                r.happened
+            )
+        })
+        .collect()
+}
+
+const BEGIN: &str = "<!-- begin: upt stress -->";
+const END: &str = "<!-- end: upt stress -->";
+
+fn write_page(path: &std::path::Path, rows: &[Row]) -> Result<()> {
+    let mut text = String::from(BEGIN);
+    let mut subject = "";
+    for row in rows {
+        if row.subject != subject {
+            subject = &row.subject;
+            text +=
+                &format!("\n### {subject}\n\n| case | what happened | verdict |\n|---|---|---|\n");
+        }
+        text += &format!(
+            "| {} | {} | {} |\n",
+            row.case,
+            row.happened.replace('|', "\\|"),
+            word(row.verdict)
+        );
+    }
+    text += "\n";
+    text += END;
+    let page = std::fs::read_to_string(path).unwrap_or_else(|_| format!("{BEGIN}\n{END}\n"));
+    let (begin, end) = page.find(BEGIN).zip(page.find(END)).with_context(|| {
+        format!(
+            "{}: the markers {BEGIN} and {END} are missing",
+            path.display()
+        )
+    })?;
+    let page = format!("{}{text}{}", &page[..begin], &page[end + END.len()..]);
+    std::fs::write(path, page).with_context(|| format!("{}", path.display()))
+}
