@@ -364,12 +364,12 @@ fn long_runs(bench: &Bench) -> Result<Vec<Row>> {
         finite: true,
         ..Run::default()
     };
-    let free = bench.run(&scene, 200, |_| (Vec::new(), Vec::new()));
+    let free = bench.run(&scene, 400, |_| (Vec::new(), Vec::new()));
     run.largest = free.largest;
     scene.read(&mut late)?;
     let rest = largest(&late);
     let good = free.sound(bench.bound) && rest == 0.0 && scene.stats().sleeping;
-    let row = bench.row("abrupt release, then 10 s", &run, good);
+    let row = bench.row("abrupt release, then 20 s", &run, good);
     rows.push(Row {
         happened: format!(
             "{}, {rest:.4} mm left, asleep: {}",
@@ -605,7 +605,7 @@ fn bad_inputs(bench: &Bench) -> Result<Vec<Row>> {
         vectors.iter_mut().for_each(|v| *v *= 1e-41);
         (nodes, vectors)
     });
-    rows.push(bench.row("denormals as contact", &run, run.sound(1e-3)));
+    rows.push(bench.row("denormals as contact", &run, run.sound(0.1)));
 
     // The host's own state: with noise of 0.1 mm, and 20 mm off.
     for (name, amplitude, offset) in [
