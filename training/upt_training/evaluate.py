@@ -17,7 +17,7 @@ from upt_training.dataset import open_dataset, open_trajectory
 from upt_training.mesh_file import load_mesh
 from upt_training.metrics import RolloutMetrics, summary
 
-DECAY = 0.68  # share of the response kept a step after release: the best of a coarse grid on 60 coarse cases, ten frames
+DECAY = 0.68  # share of the response kept a step after release: best of a coarse grid on 60 cases, ten frames
 
 
 def evaluate_case(runner: BundleRunner, trajectory, baselines: bool, with_hausdorff: bool) -> dict[str, RolloutMetrics]:
