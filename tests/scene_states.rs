@@ -96,7 +96,9 @@ fn attached_points_follow_the_tetrahedra_around_them() {
             .flat_map(|&n| p(n).to_vec())
             .collect();
         points.extend((0..3).map(|axis| tet.iter().map(|&n| p(n)[axis]).sum::<f32>() / 4.0));
-        points.extend([1e4, 0.0, 0.0]);
+        // A little outside of the mesh: follows its surface.
+        let outside = model.positions()[..3].iter().map(|x| x - 2.0);
+        points.extend(outside);
         let region: Vec<u32> = vec![3, 5];
         scene.set_region(Some(&region)).unwrap();
         scene.attach_points(Some(&points)).unwrap();
@@ -122,6 +124,9 @@ fn attached_points_follow_the_tetrahedra_around_them() {
                 .status(),
             -6
         );
+        let far = scene.attach_points(Some(&[1e4, 0.0, 0.0])).unwrap_err();
+        assert_eq!(far.status(), -2);
+        assert!(far.to_string().contains("point 0"), "{far}");
         assert_eq!(scene.point_count(), 5, "a failed call changes nothing");
         scene.attach_points(None).unwrap();
         assert_eq!(scene.point_count(), 0);
