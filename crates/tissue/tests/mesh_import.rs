@@ -58,6 +58,8 @@ fn every_file_of_the_gmsh_box_gives_the_same_body() {
         "box-binary.vtk",
         "box.vtu",
         "box-text.vtu",
+        "box-raw.vtu",
+        "box-raw-zlib.vtu",
     ] {
         let imported =
             read(name, &ImportOptions::default()).unwrap_or_else(|e| panic!("{name}: {e}"));

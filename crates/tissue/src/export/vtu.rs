@@ -1,7 +1,8 @@
-//! ParaView files: one VTU (XML unstructured grid, raw appended data) a frame and a PVD that gives
-//! each its time. Layout: VTK file formats, "XML file formats", unstructured grid, header UInt64.
+//! ParaView files: one VTU (XML unstructured grid, base64 arrays) a frame and a PVD that gives each
+//! its time. Layout: VTK file formats, "XML file formats", unstructured grid, header UInt64.
 
 use crate::tensors::write_whole;
+use base64::Engine;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
@@ -63,25 +64,23 @@ pub fn write_frame(
             .flat_map(|value| (value as i32).to_le_bytes())
             .collect()
     };
-    let blocks = [
-        floats(displacement),
-        contact.to_vec(),
-        floats(points),
-        integers(&mut cells.nodes().iter().copied()),
-        integers(&mut (1..=cells.count() as u32).map(|cell| cell * width as u32)),
-        vec![kind; cells.count()],
-    ];
-    let mut offsets = [0; 6];
-    for index in 1..6 {
-        offsets[index] = offsets[index - 1] + 8 + blocks[index - 1].len();
-    }
-    let array = |kind: &str, name: &str, components: usize, block: usize| {
+    let array = |kind: &str, name: &str, components: usize, data: Vec<u8>| {
+        let mut bytes = (data.len() as u64).to_le_bytes().to_vec();
+        bytes.extend(data);
         format!(
             "<DataArray type=\"{kind}\" Name=\"{name}\" NumberOfComponents=\"{components}\" \
-             format=\"appended\" offset=\"{}\"/>",
-            offsets[block]
+             format=\"binary\">{}</DataArray>",
+            base64::engine::general_purpose::STANDARD.encode(bytes)
         )
     };
+    let moved = array("Float32", "displacement", 3, floats(displacement));
+    let touched = array("UInt8", "contact", 1, contact.to_vec());
+    let places = array("Float32", "Points", 3, floats(points));
+    let nodes = integers(&mut cells.nodes().iter().copied());
+    let nodes = array("Int32", "connectivity", 1, nodes);
+    let ends = integers(&mut (1..=cells.count() as u32).map(|cell| cell * width as u32));
+    let ends = array("Int32", "offsets", 1, ends);
+    let types = array("UInt8", "types", 1, vec![kind; cells.count()]);
     write_whole(path, |file| {
         writeln!(file, "<?xml version=\"1.0\"?>")?;
         writeln!(
@@ -97,25 +96,10 @@ pub fn write_frame(
             cells.count()
         )?;
         writeln!(file, "<PointData Vectors=\"displacement\">")?;
-        writeln!(file, "{}", array("Float32", "displacement", 3, 0))?;
-        writeln!(file, "{}", array("UInt8", "contact", 1, 1))?;
-        writeln!(file, "</PointData>")?;
-        writeln!(
-            file,
-            "<Points>{}</Points>",
-            array("Float32", "Points", 3, 2)
-        )?;
-        writeln!(file, "<Cells>")?;
-        writeln!(file, "{}", array("Int32", "connectivity", 1, 3))?;
-        writeln!(file, "{}", array("Int32", "offsets", 1, 4))?;
-        writeln!(file, "{}", array("UInt8", "types", 1, 5))?;
-        writeln!(file, "</Cells>\n</Piece>\n</UnstructuredGrid>")?;
-        write!(file, "<AppendedData encoding=\"raw\">_")?;
-        for block in &blocks {
-            file.write_all(&(block.len() as u64).to_le_bytes())?;
-            file.write_all(block)?;
-        }
-        writeln!(file, "\n</AppendedData>\n</VTKFile>")
+        writeln!(file, "{moved}\n{touched}\n</PointData>")?;
+        writeln!(file, "<Points>\n{places}\n</Points>")?;
+        writeln!(file, "<Cells>\n{nodes}\n{ends}\n{types}\n</Cells>")?;
+        writeln!(file, "</Piece>\n</UnstructuredGrid>\n</VTKFile>")
     })
 }
 

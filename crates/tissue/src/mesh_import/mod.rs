@@ -18,6 +18,7 @@ mod repair;
 mod sets;
 mod surface_files;
 mod vtk;
+mod vtk_raw;
 
 pub use distance::SurfaceDistance;
 pub use error::{ImportError, Repair};

@@ -1,6 +1,6 @@
 //! Tetrahedra of a VTK unstructured grid: legacy `.vtk` and XML `.vtu`, text, binary or appended.
 
-use super::{ImportError, RawTets};
+use super::{ImportError, RawTets, vtk_raw};
 use std::path::Path;
 use vtkio::model::{CellType, DataSet, UnstructuredGridPiece};
 
@@ -16,7 +16,14 @@ pub fn read(path: &Path) -> Result<RawTets, ImportError> {
         path: path.into(),
         reason,
     };
-    let file = vtkio::Vtk::import(path).map_err(|error| format(error.to_string()))?;
+    let file = match std::fs::read(path)
+        .ok()
+        .and_then(|b| vtk_raw::to_base64(&b))
+    {
+        Some(text) => vtkio::Vtk::parse_xml(text.as_bytes()),
+        None => vtkio::Vtk::import(path),
+    }
+    .map_err(|error| format(error.to_string()))?;
     let source = file.file_path.clone();
     let DataSet::UnstructuredGrid { pieces, .. } = file.data else {
         return Err(format(
