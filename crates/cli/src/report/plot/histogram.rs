@@ -43,11 +43,7 @@ pub fn latency_histogram(series: &[Latencies]) -> String {
         let area: Vec<(f64, f64, f64)> = (0..BINS)
             .flat_map(|bin| [(edge(bin), 0.0, bins[bin]), (edge(bin + 1), 0.0, bins[bin])])
             .collect();
-        let line: Vec<(f64, f64)> = area
-            .iter()
-            .filter(|row| row.2 > 0.0)
-            .map(|row| (row.0, row.2))
-            .collect();
+        let line: Vec<(f64, f64)> = area.iter().map(|row| (row.0, row.2)).collect();
         axes.area(&area, colour(index));
         if line.len() > 1 {
             axes.line(&line, colour(index), 1.5, false);
