@@ -62,7 +62,7 @@ cd "$build"
 passed=0
 failed=0
 # Without the library: a message that says what to do, from a process of its own.
-if message=$(mono MissingLibrary.exe 2>&1) && grep -q "cargo xtask package --unity" <<<"$message"; then
+if message=$(env -u LD_LIBRARY_PATH mono MissingLibrary.exe 2>&1) && grep -q "cargo xtask package --unity" <<<"$message"; then
   passed=$((passed + 1))
 else
   echo "a missing library gave no useful message: $message"
