@@ -26,7 +26,7 @@ pub struct Options {
     /// Every how many frames one is written.
     #[arg(long, default_value_t = 1)]
     every: usize,
-    /// Triangles of the surface only: files a sixth as large.
+    /// Triangles of the surface only, for smaller files.
     #[arg(long)]
     skin: bool,
     /// Keep the rest positions as points (warp by `displacement` in ParaView).
