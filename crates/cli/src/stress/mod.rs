@@ -1,6 +1,9 @@
 //! `upt stress`: a fixed suite of stiff and extreme cases for the reference solver and for bundles, as a table: what was
 //! done, what happened, and whether that is what must happen. Exit code 1 when a verdict is bad.
 
+mod bench;
+mod inputs;
+mod outside;
 mod reference;
 mod surrogate;
 

@@ -1,0 +1,238 @@
+//! A bundle on the bench of `upt stress`: its scenes, contact patches, and runs of steps with what they came to.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use anyhow::{Context, Result};
+use tissue::contact::{ContactDomain, Patch};
+use tissue::mesh::{Boundary, Mesh};
+use upt::{Contact, Error, Model, ModelOptions, Scene, SceneOptions, StepInput, flag};
+
+use super::Row;
+
+/// A bundle on the bench.
+pub(super) struct Bench {
+    pub(super) subject: String,
+    pub(super) model: Arc<Model>,
+    pub(super) mesh: Mesh,
+    pub(super) boundary: Boundary,
+    pub(super) domain: ContactDomain,
+    pub(super) max_push: f32,
+    pub(super) bound: f32,
+    pub(super) area: f64,
+    pub(super) quick: bool,
+}
+
+/// Nodes and vectors of a step's contact.
+pub(super) type Touch = (Vec<u32>, Vec<f32>);
+
+/// What a run of steps came to.
+#[derive(Default)]
+pub(super) struct Run {
+    pub(super) flags: u32,
+    pub(super) largest: f32,
+    pub(super) refused: usize,
+    pub(super) finite: bool,
+    pub(super) other: Option<String>,
+}
+
+impl Run {
+    pub(super) fn text(&self) -> String {
+        let mut text = format!(
+            "|u| at most {:.2} mm, flags {}",
+            self.largest,
+            names(self.flags)
+        );
+        if self.refused > 0 {
+            text += &format!(", {} steps refused by the guard", self.refused);
+        }
+        if let Some(error) = &self.other {
+            text += &format!("; error: {error}");
+        }
+        text
+    }
+
+    pub(super) fn sound(&self, bound: f32) -> bool {
+        self.finite && self.other.is_none() && self.largest <= bound
+    }
+}
+
+pub(super) fn names(flags: u32) -> String {
+    const NAMES: [(u32, &str); 11] = [
+        (flag::PUSH, "push"),
+        (flag::CONTACT_AREA, "area"),
+        (flag::SITE, "site"),
+        (flag::RATE, "rate"),
+        (flag::SITES, "sites"),
+        (flag::BOUND, "bound"),
+        (flag::NON_FINITE, "non-finite"),
+        (flag::INVERTED, "inverted"),
+        (flag::GROWTH, "growth"),
+        (flag::CLAMPED, "clamped"),
+        (flag::REGULARISED, "regularised"),
+    ];
+    let set: Vec<&str> = NAMES
+        .iter()
+        .filter(|(bit, _)| flags & bit != 0)
+        .map(|(_, n)| *n)
+        .collect();
+    if set.is_empty() {
+        "none".into()
+    } else {
+        set.join("+")
+    }
+}
+
+pub(super) fn largest(field: &[f32]) -> f32 {
+    field.iter().fold(
+        0.0,
+        |m, v| if v.is_nan() { f32::NAN } else { m.max(v.abs()) },
+    )
+}
+
+impl Bench {
+    pub(super) fn open(path: &Path, quick: bool) -> Result<Self> {
+        let model = Model::open(
+            path,
+            &ModelOptions {
+                threads: 1,
+                ..Default::default()
+            },
+        )?;
+        let text = std::fs::read_to_string(path.join("bundle.json"))?;
+        let manifest: serde_json::Value = serde_json::from_str(&text)?;
+        let mesh = Mesh::read(&path.join("mesh.safetensors"))?;
+        let boundary = match manifest["boundary"].as_str() {
+            Some("supported") => Boundary::Supported,
+            _ => Boundary::Fixed,
+        };
+        let number = |pointer: &str| {
+            manifest
+                .pointer(pointer)
+                .and_then(serde_json::Value::as_f64)
+                .with_context(|| {
+                    format!(
+                        "{}: field `{pointer}` is missing",
+                        path.join("bundle.json").display()
+                    )
+                })
+        };
+        let (low, high) = (
+            number("/envelope/contact_area_mm2/0")?,
+            number("/envelope/contact_area_mm2/1")?,
+        );
+        Ok(Self {
+            subject: manifest["name"].as_str().unwrap_or("bundle").to_string(),
+            domain: ContactDomain::new(&mesh, boundary)?,
+            max_push: number("/envelope/max_push_mm")? as f32,
+            bound: number("/envelope/displacement_bound_mm")? as f32,
+            area: 0.4 * (low + high),
+            model,
+            mesh,
+            boundary,
+            quick,
+        })
+    }
+
+    pub(super) fn scene(&self) -> Result<Scene> {
+        Ok(Scene::new(
+            Arc::clone(&self.model),
+            &SceneOptions::default(),
+        )?)
+    }
+
+    pub(super) fn steps(&self, full: usize) -> usize {
+        if self.quick {
+            (full / 20).max(40)
+        } else {
+            full
+        }
+    }
+
+    pub(super) fn row(&self, case: &str, run: &Run, good: bool) -> Row {
+        Row::new(&self.subject, case, run.text(), good)
+    }
+
+    pub(super) fn patch(&self, seed: usize, area: f64) -> Result<Patch> {
+        let count = self.domain.face_count();
+        for offset in 0..count {
+            if let Ok(patch) = self.domain.grow((seed + 7 * offset) % count, area) {
+                return Ok(patch);
+            }
+        }
+        anyhow::bail!("no patch of {area:.0} mm² fits into the domain")
+    }
+
+    pub(super) fn central(&self) -> Result<Patch> {
+        let centroids = self.domain.centroids();
+        let n = centroids.len() as f64;
+        let middle = [0, 1, 2].map(|k| centroids.iter().map(|c| c[k]).sum::<f64>() / n);
+        let distance = |c: &[f64; 3]| (0..3).map(|k| (c[k] - middle[k]).powi(2)).sum::<f64>();
+        let seed = (0..centroids.len())
+            .min_by(|&a, &b| distance(&centroids[a]).total_cmp(&distance(&centroids[b])))
+            .context("the bundle's mesh has no domain")?;
+        self.patch(seed, self.area)
+    }
+
+    /// Steps a scene; the guard's refusals count, other errors end the run.
+    pub(super) fn run(
+        &self,
+        scene: &Scene,
+        steps: usize,
+        mut touch: impl FnMut(usize) -> Touch,
+    ) -> Run {
+        let mut run = Run {
+            finite: true,
+            ..Run::default()
+        };
+        let mut field = vec![0.0; 3 * self.mesh.node_count()];
+        for step in 1..=steps {
+            let (nodes, vectors) = touch(step);
+            let contact = Contact::Sparse {
+                nodes: &nodes,
+                vectors: &vectors,
+            };
+            match scene.step(
+                StepInput {
+                    displacement: None,
+                    contact,
+                },
+                Some(&mut field),
+            ) {
+                Ok(()) => {
+                    let size = largest(&field);
+                    run.finite &= size.is_finite();
+                    run.largest = run.largest.max(size);
+                    run.flags |= scene.stats().flags;
+                }
+                Err(Error::Guard(_)) => run.refused += 1,
+                Err(error) => {
+                    run.other = Some(error.to_string());
+                    break;
+                }
+            }
+        }
+        run
+    }
+
+    /// After any case: without contact the tissue comes back to rest, and a reset scene repeats a fresh one.
+    pub(super) fn recovers(&self, scene: &Scene) -> Result<bool> {
+        let run = self.run(scene, 400, |_| (Vec::new(), Vec::new()));
+        let mut field = vec![0.0; 3 * self.mesh.node_count()];
+        scene.read(&mut field)?;
+        Ok(run.finite && run.other.is_none() && largest(&field) < 0.05)
+    }
+}
+
+pub(super) fn push(patch: &Patch, direction: [f64; 3], depth: f64) -> Touch {
+    let c = direction.map(|v| (v * depth) as f32);
+    (
+        patch.nodes.clone(),
+        patch.nodes.iter().flat_map(|_| c).collect(),
+    )
+}
+
+/// A depth that rises within ten steps, as slowly as the envelope allows.
+pub(super) fn ramp(step: usize, depth: f64) -> f64 {
+    depth * (step as f64 / 10.0).min(1.0)
+}
