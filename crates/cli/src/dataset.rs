@@ -9,6 +9,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use tissue::dataset::{Dataset, DatasetPlan};
 use tissue::mesh::{Boundary, Mesh};
 use tissue::schemes::{FRAMES, Scheme};
+use tissue::solver::SolverOptions;
 
 #[derive(clap::Args)]
 pub struct Options {
@@ -39,8 +40,26 @@ pub struct Options {
     /// Store displacements as f16.
     #[arg(long)]
     half: bool,
+    /// Inner step of the split `train`, ms; held-out cases keep `--inner-step-ms`. Needs `--train-mass-scaling-ms`.
+    #[arg(long, requires = "train_mass_scaling_ms")]
+    train_inner_step_ms: Option<f64>,
+    /// Mass scaling of the split `train`, ms; held-out cases keep `--mass-scaling-ms`.
+    #[arg(long, requires = "train_inner_step_ms")]
+    train_mass_scaling_ms: Option<f64>,
     #[command(flatten)]
     solver: SolverArguments,
+}
+
+impl Options {
+    /// Solver settings of the split `train`, where they differ.
+    fn training(&self) -> Option<SolverOptions> {
+        let (step, scaling) = (self.train_inner_step_ms?, self.train_mass_scaling_ms?);
+        Some(SolverOptions {
+            inner_step_s: step * 1e-3,
+            mass_scaling_s: scaling * 1e-3,
+            ..self.solver.options(1)
+        })
+    }
 }
 
 fn parse_shard(text: &str) -> Result<(usize, usize), String> {
@@ -61,6 +80,7 @@ pub fn run(options: &Options) -> anyhow::Result<ExitCode> {
         count: options.count,
         seed: options.seed,
         half: options.half,
+        training: options.training(),
         options: options.solver.options(1),
     };
     let dataset = Dataset::open(&plan, &mesh, &options.out)?;

@@ -46,6 +46,9 @@ struct Info {
     /// Density, kg/m³.
     #[arg(long, default_value_t = Material::default().density_kg_m3)]
     density: f64,
+    /// Selective mass scaling, ms: the critical step that it gives, and the mass that it adds.
+    #[arg(long, default_value_t = 0.0)]
+    mass_scaling_ms: f64,
     /// Print the result as JSON.
     #[arg(long)]
     json: bool,
@@ -136,11 +139,14 @@ fn run_info(args: &Info) -> anyhow::Result<ExitCode> {
             density_kg_m3: args.density,
             ..Material::default()
         },
+        mass_scaling_s: args.mass_scaling_ms * 1e-3,
         ..SolverOptions::default()
     };
     let wave_speed = options.material.wave_speed_mm_s();
     let safety = options.safety;
-    let critical = Solver::new(&mesh, args.boundary, options)?.critical_step_at_rest_s();
+    let solver = Solver::new(&mesh, args.boundary, options)?;
+    let critical = solver.critical_step_at_rest_s();
+    let added_mass = solver.added_mass();
     if args.json {
         let mut value = serde_json::to_value(&quality)?;
         value["name"] = json!(mesh.name);
@@ -149,6 +155,7 @@ fn run_info(args: &Info) -> anyhow::Result<ExitCode> {
         value["sha256"] = json!(mesh.hash());
         value["boundary"] = json!(args.boundary.as_str());
         value["critical_step_s"] = json!(critical);
+        value["added_mass"] = json!(added_mass);
         println!("{value:#}");
         return Ok(ExitCode::SUCCESS);
     }
@@ -167,6 +174,13 @@ fn run_info(args: &Info) -> anyhow::Result<ExitCode> {
         args.boundary.as_str(),
         critical * safety * 1e3,
     );
+    if args.mass_scaling_ms > 0.0 {
+        println!(
+            "{:24}{:.3} % of the mass added",
+            "mass scaling",
+            100.0 * added_mass
+        );
+    }
     println!("{:24}{:.2} m/s at rest", "pressure wave", wave_speed * 1e-3);
     Ok(ExitCode::SUCCESS)
 }

@@ -52,6 +52,10 @@ pub struct SolverArguments {
     /// Asked inner step, ms; cut automatically where the mesh needs a shorter one.
     #[arg(long, default_value_t = 0.1)]
     inner_step_ms: f64,
+    /// Selective mass scaling: elements with a shorter critical step of their own get mass until it is this long,
+    /// ms; 0 for none.
+    #[arg(long, default_value_t = 0.0)]
+    mass_scaling_ms: f64,
     /// Average nodal pressure instead of one pressure an element (less locking, slower).
     #[arg(long)]
     average_pressure: bool,
@@ -61,6 +65,7 @@ impl SolverArguments {
     pub fn options(&self, threads: usize) -> SolverOptions {
         let mut options = SolverOptions {
             inner_step_s: self.inner_step_ms * 1e-3,
+            mass_scaling_s: self.mass_scaling_ms * 1e-3,
             threads,
             ..SolverOptions::default()
         };

@@ -27,6 +27,8 @@ pub struct DatasetPlan {
     /// Store displacements as f16.
     pub half: bool,
     pub options: SolverOptions,
+    /// Settings for the split `train` where they differ: longer inner steps with mass scaling.
+    pub training: Option<SolverOptions>,
 }
 
 /// One case of a plan.
@@ -103,7 +105,7 @@ impl DatasetPlan {
     /// Identifies everything that the trajectories' bytes depend on.
     fn key(&self, mesh: &Mesh) -> String {
         let schemes: Vec<&str> = self.schemes.iter().map(|s| s.name()).collect();
-        format!(
+        let mut key = format!(
             "{SOLVER_NAME}; mesh {}; {}; schemes {}; seed {}; {}; inner step {}; {:?}; {}",
             &mesh.hash()[..16],
             self.boundary.as_str(),
@@ -113,7 +115,17 @@ impl DatasetPlan {
             self.options.inner_step_s,
             self.options.pressure,
             if self.half { "f16" } else { "f32" },
-        )
+        );
+        if self.options.mass_scaling_s > 0.0 {
+            key += &format!("; mass scaling {}", self.options.mass_scaling_s);
+        }
+        if let Some(training) = &self.training {
+            key += &format!(
+                "; training with inner step {}, mass scaling {}",
+                training.inner_step_s, training.mass_scaling_s
+            );
+        }
+        key
     }
 }
 
@@ -182,12 +194,16 @@ impl<'a> Dataset<'a> {
         self.remove_leftovers(case);
         let scheme = self.plan.schemes[case.index % self.plan.schemes.len()];
         let start = std::time::Instant::now();
+        let options = match &self.plan.training {
+            Some(training) if case.split == "train" => training,
+            _ => &self.plan.options,
+        };
         let outcome = simulate(
             self.mesh,
             self.plan.boundary,
             scheme,
             case.seed,
-            &self.plan.options,
+            options,
             progress,
         );
         let cause = match outcome {

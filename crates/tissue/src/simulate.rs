@@ -47,6 +47,7 @@ pub fn simulate(
             material: options.material,
             dt_s: FRAME_S,
             inner_dt_s: options.inner_step_s,
+            mass_scaling_s: options.mass_scaling_s,
             solver: SOLVER_NAME.into(),
         },
         displacement: vec![[0.0; 3]; FRAMES * nodes],

@@ -47,6 +47,8 @@ pub struct TrajectoryHeader {
     pub dt_s: f64,
     /// Asked inner step, s.
     pub inner_dt_s: f64,
+    /// Selective mass scaling: shortest critical step of an element, s; 0 for none.
+    pub mass_scaling_s: f64,
     /// Solver name and version.
     pub solver: String,
 }
@@ -260,6 +262,7 @@ impl TrajectoryHeader {
             ("material", serde_json::json!(self.material).to_string()),
             ("dt_s", self.dt_s.to_string()),
             ("inner_dt_s", self.inner_dt_s.to_string()),
+            ("mass_scaling_s", self.mass_scaling_s.to_string()),
             ("solver", self.solver.clone()),
         ]
         .map(|(key, value)| (key.to_string(), value))
@@ -300,6 +303,10 @@ impl TrajectoryHeader {
             material: json("material", text("material")?, field)?,
             dt_s: json("dt_s", text("dt_s")?, field)?,
             inner_dt_s: json("inner_dt_s", text("inner_dt_s")?, field)?,
+            mass_scaling_s: match metadata.get("mass_scaling_s") {
+                Some(value) => json("mass_scaling_s", value.clone(), field)?,
+                None => 0.0,
+            },
             solver: text("solver")?,
         })
     }

@@ -307,6 +307,7 @@ fn solver_options(header: &TrajectoryHeader, threads: u32) -> SolverOptions {
     SolverOptions {
         material: header.material,
         inner_step_s: header.inner_dt_s,
+        mass_scaling_s: header.mass_scaling_s,
         threads: threads as usize,
         ..SolverOptions::default()
     }

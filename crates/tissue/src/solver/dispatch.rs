@@ -9,7 +9,7 @@ use super::partition::Batch;
 pub enum Simd {
     /// Portable code; the readable reference.
     Scalar,
-    /// AVX2 with FMA, 2 registers of 8.
+    /// AVX2 with FMA, registers of 8.
     Avx2,
     /// AVX-512 (F, VL), one register of 16.
     Avx512,

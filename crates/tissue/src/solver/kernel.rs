@@ -1,4 +1,4 @@
-//! The element law on 16 tetrahedra: displacements in, nodal forces added.
+//! The element law on batches of 16 tetrahedra: displacements in, nodal forces added.
 //!
 //! With `F = I + sum_a (u_a - u_0) (x) dN_a/dX` the first Piola stress of the
 //! neo-Hookean law is
@@ -61,34 +61,41 @@ const EMPTY: Tensors = Tensors {
     scalar: [0.0; WIDTH],
 };
 
-/// Deformation gradients of a batch.
+/// Deformation gradients of the elements of a batch from lane `first` on.
 #[inline(always)]
-unsafe fn deformation<L: Lanes>(batch: &Batch, nodes: *const [f32; 4], out: &mut Tensors) {
+unsafe fn deformation<L: Lanes>(
+    batch: &Batch,
+    first: usize,
+    nodes: *const [f32; 4],
+    out: &mut Tensors,
+) {
     unsafe {
         let zero = L::splat(0.0);
-        let origin = L::gather(nodes, &batch.corners[0]);
+        let origin = L::gather(nodes, batch.corners[0].as_ptr().add(first));
         let mut f = [[zero; 3]; 3];
         let mut scalar = origin[3];
         for i in 0..3 {
             f[i][i] = L::splat(1.0);
         }
         for a in 0..3 {
-            let corner = L::gather(nodes, &batch.corners[a + 1]);
+            let corner = L::gather(nodes, batch.corners[a + 1].as_ptr().add(first));
             scalar = scalar.add(corner[3]);
             for i in 0..3 {
                 let difference = corner[i].sub(origin[i]);
                 for j in 0..3 {
-                    let slope = L::load(batch.gradient[3 * a + j].as_ptr());
+                    let slope = L::load(batch.gradient[3 * a + j].as_ptr().add(first));
                     f[i][j] = difference.mul_add(slope, f[i][j]);
                 }
             }
         }
         for i in 0..3 {
             for j in 0..3 {
-                f[i][j].store(out.entry[3 * i + j].as_mut_ptr());
+                f[i][j].store(out.entry[3 * i + j].as_mut_ptr().add(first));
             }
         }
-        scalar.mul(L::splat(0.25)).store(out.scalar.as_mut_ptr());
+        scalar
+            .mul(L::splat(0.25))
+            .store(out.scalar.as_mut_ptr().add(first));
     }
 }
 
@@ -105,12 +112,12 @@ unsafe fn cross<L: Lanes>(a: [L; 3], b: [L; 3]) -> [L; 3] {
 
 /// Loads `F`; returns it, its cofactor matrix and its determinant.
 #[inline(always)]
-unsafe fn cofactors<L: Lanes>(tensors: &Tensors) -> ([[L; 3]; 3], [[L; 3]; 3], L) {
+unsafe fn cofactors<L: Lanes>(tensors: &Tensors, first: usize) -> ([[L; 3]; 3], [[L; 3]; 3], L) {
     unsafe {
         let mut f = [[L::splat(0.0); 3]; 3];
         for i in 0..3 {
             for j in 0..3 {
-                f[i][j] = L::load(tensors.entry[3 * i + j].as_ptr());
+                f[i][j] = L::load(tensors.entry[3 * i + j].as_ptr().add(first));
             }
         }
         let cofactor = [cross(f[1], f[2]), cross(f[2], f[0]), cross(f[0], f[1])];
@@ -126,11 +133,12 @@ unsafe fn cofactors<L: Lanes>(tensors: &Tensors) -> ([[L; 3]; 3], [[L; 3]; 3], L
 #[inline(always)]
 unsafe fn stress<L: Lanes, const AVERAGED: bool>(
     batch: &Batch,
+    first: usize,
     tensors: &mut Tensors,
     law: Law,
 ) -> L {
     unsafe {
-        let (f, cofactor, determinant) = cofactors::<L>(tensors);
+        let (f, cofactor, determinant) = cofactors::<L>(tensors, first);
         let root = inverse_cube_root(determinant.max(L::splat(1e-3)));
         let root2 = root.mul(root);
         // Three sums of three: a shorter chain than one of nine.
@@ -139,10 +147,10 @@ unsafe fn stress<L: Lanes, const AVERAGED: bool>(
             let part = row[2].mul_add(row[2], row[1].mul_add(row[1], row[0].mul(row[0])));
             invariant = invariant.add(part);
         }
-        let volume = L::load(batch.volume.as_ptr());
+        let volume = L::load(batch.volume.as_ptr().add(first));
         let deviatoric = volume.mul(L::splat(-law.shear)).mul(root2);
         let pressure = if AVERAGED {
-            L::load(tensors.scalar.as_ptr()).mul(volume)
+            L::load(tensors.scalar.as_ptr().add(first)).mul(volume)
         } else {
             volume
                 .mul(L::splat(law.bulk))
@@ -154,7 +162,7 @@ unsafe fn stress<L: Lanes, const AVERAGED: bool>(
             for j in 0..3 {
                 spherical
                     .mul_add(cofactor[i][j], deviatoric.mul(f[i][j]))
-                    .store(tensors.entry[3 * i + j].as_mut_ptr());
+                    .store(tensors.entry[3 * i + j].as_mut_ptr().add(first));
             }
         }
         determinant
@@ -163,15 +171,15 @@ unsafe fn stress<L: Lanes, const AVERAGED: bool>(
 
 /// Adds `-V P dN_a/dX` to the corners.
 #[inline(always)]
-unsafe fn scatter<L: Lanes>(batch: &Batch, tensors: &Tensors, forces: *mut [f32; 4]) {
+unsafe fn scatter<L: Lanes>(batch: &Batch, first: usize, tensors: &Tensors, forces: *mut [f32; 4]) {
     unsafe {
         let zero = L::splat(0.0);
         let mut sum = [zero; 4];
         for a in 0..3 {
-            let slope: *const f32 = batch.gradient[3 * a].as_ptr();
+            let slope: *const f32 = batch.gradient[3 * a].as_ptr().add(first);
             let mut force = [zero; 4];
             for i in 0..3 {
-                let row = tensors.entry[3 * i].as_ptr();
+                let row = tensors.entry[3 * i].as_ptr().add(first);
                 force[i] = L::load(row).mul(L::load(slope));
                 for j in 1..3 {
                     let entry = L::load(row.add(j * WIDTH));
@@ -179,9 +187,9 @@ unsafe fn scatter<L: Lanes>(batch: &Batch, tensors: &Tensors, forces: *mut [f32;
                 }
                 sum[i] = sum[i].sub(force[i]);
             }
-            L::scatter_add(forces, &batch.corners[a + 1], force);
+            L::scatter_add(forces, batch.corners[a + 1].as_ptr().add(first), force);
         }
-        L::scatter_add(forces, &batch.corners[0], sum);
+        L::scatter_add(forces, batch.corners[0].as_ptr().add(first), sum);
     }
 }
 
@@ -201,16 +209,22 @@ pub(crate) unsafe fn add_forces<L: Lanes, const AVERAGED: bool>(
         let mut buffer = [EMPTY; BLOCK];
         for block in batches.chunks(BLOCK) {
             for (batch, tensors) in block.iter().zip(&mut buffer) {
-                deformation::<L>(batch, nodes, tensors);
+                for first in (0..WIDTH).step_by(L::COUNT) {
+                    deformation::<L>(batch, first, nodes, tensors);
+                }
             }
             for (batch, tensors) in block.iter().zip(&mut buffer) {
-                smallest = smallest.min(stress::<L, AVERAGED>(batch, tensors, law));
+                for first in (0..WIDTH).step_by(L::COUNT) {
+                    smallest = smallest.min(stress::<L, AVERAGED>(batch, first, tensors, law));
+                }
             }
             for (batch, tensors) in block.iter().zip(&buffer) {
-                scatter::<L>(batch, tensors, forces);
+                for first in (0..WIDTH).step_by(L::COUNT) {
+                    scatter::<L>(batch, first, tensors, forces);
+                }
             }
         }
-        let mut lanes = [0.0; WIDTH];
+        let mut lanes = [f32::MAX; WIDTH];
         smallest.store(lanes.as_mut_ptr());
         lanes.into_iter().fold(f32::MAX, f32::min)
     }
@@ -227,11 +241,14 @@ pub(crate) unsafe fn add_volumes<L: Lanes>(
         let zero = L::splat(0.0);
         let mut tensors = EMPTY;
         for batch in batches {
-            deformation::<L>(batch, nodes, &mut tensors);
-            let (_, _, determinant) = cofactors::<L>(&tensors);
-            let volume = determinant.mul(L::load(batch.volume.as_ptr()));
-            for corners in &batch.corners {
-                L::scatter_add(forces, corners, [zero, zero, zero, volume]);
+            for first in (0..WIDTH).step_by(L::COUNT) {
+                deformation::<L>(batch, first, nodes, &mut tensors);
+                let (_, _, determinant) = cofactors::<L>(&tensors, first);
+                let volume = determinant.mul(L::load(batch.volume.as_ptr().add(first)));
+                for corners in &batch.corners {
+                    let corners = corners.as_ptr().add(first);
+                    L::scatter_add(forces, corners, [zero, zero, zero, volume]);
+                }
             }
         }
     }

@@ -13,6 +13,7 @@ mod error;
 mod kernel;
 mod lanes;
 mod march;
+mod mass;
 mod partition;
 mod stability;
 
@@ -24,6 +25,7 @@ use crate::mesh::{Boundary, Mesh};
 use dispatch::Kernels;
 use kernel::Law;
 use march::{Fields, March, Node, Path};
+use mass::LumpedMass;
 use partition::{PADDING, Partition};
 
 /// How the pressure of an element is found.
@@ -56,6 +58,9 @@ pub struct SolverOptions {
     pub inner_step_s: f64,
     /// Part of the estimated critical step that is used. Default 0.8.
     pub safety: f64,
+    /// Selective mass scaling: elements whose own critical step is shorter get mass until it is this long, s.
+    /// Default 0: none. See [`Solver::added_mass`].
+    pub mass_scaling_s: f64,
     /// Default [`Substep::Automatic`].
     pub substep: Substep,
     /// Default [`Pressure::Element`].
@@ -72,6 +77,7 @@ impl Default for SolverOptions {
             material: Material::default(),
             inner_step_s: 1e-4,
             safety: 0.8,
+            mass_scaling_s: 0.0,
             substep: Substep::Automatic,
             pressure: Pressure::Element,
             threads: 1,
@@ -124,6 +130,9 @@ pub struct Solver {
     mass: Vec<f32>,
     /// By slot: four times the nodal rest volume, mm³.
     rest_volume: Vec<f32>,
+    /// By mesh element: density over the material's (mass scaling).
+    density_factor: Vec<f32>,
+    added_mass: f64,
     /// By slot: held at zero.
     held: Vec<bool>,
     fields: Fields,
@@ -153,6 +162,13 @@ impl Solver {
         options.material.validate()?;
         check_positive("inner_step_s", options.inner_step_s)?;
         check_positive("safety", options.safety)?;
+        if !(options.mass_scaling_s.is_finite() && options.mass_scaling_s >= 0.0) {
+            return Err(SolverError::Option {
+                field: "mass_scaling_s",
+                value: options.mass_scaling_s,
+                wanted: "zero or positive",
+            });
+        }
         let simd = options.simd.unwrap_or_else(Simd::detect);
         let kernels = Kernels::of(simd).ok_or(SolverError::SimdUnavailable(simd))?;
         let pool = match options.threads {
@@ -169,19 +185,12 @@ impl Solver {
         };
         let partition = Partition::new(&mesh.positions, &mesh.tets);
         let slots = partition.node_of_slot.len();
-        let mut volume = vec![0.0; mesh.node_count()];
-        for tet in &mesh.tets {
-            let quarter = crate::mesh::tet_volume(&mesh.positions, *tet) / 4.0;
-            for node in tet {
-                volume[*node as usize] += quarter;
-            }
-        }
-        let density = options.material.density_g_mm3();
+        let lumped = LumpedMass::new(mesh, &options.material, options.mass_scaling_s);
         let mut mass = vec![0.0; slots];
         let mut rest_volume = vec![0.0; slots];
         for (node, slot) in partition.slot_of_node.iter().enumerate() {
-            mass[*slot as usize] = (density * volume[node]) as f32;
-            rest_volume[*slot as usize] = (4.0 * volume[node]) as f32;
+            mass[*slot as usize] = lumped.mass[node] as f32;
+            rest_volume[*slot as usize] = (4.0 * lumped.volume[node]) as f32;
         }
         let mut held = vec![false; slots];
         for node in mesh.held_nodes(boundary) {
@@ -204,6 +213,8 @@ impl Solver {
             partition,
             mass,
             rest_volume,
+            density_factor: lumped.factor,
+            added_mass: lumped.added,
             held,
             backup: fields.clone(),
             fields,
@@ -306,6 +317,11 @@ impl Solver {
     /// Estimated critical step at rest, s.
     pub fn critical_step_at_rest_s(&self) -> f64 {
         self.critical_at_rest
+    }
+
+    /// Mass that scaling added, over the body's own.
+    pub fn added_mass(&self) -> f64 {
+        self.added_mass
     }
 
     /// Seconds since rest.

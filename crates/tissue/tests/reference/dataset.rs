@@ -13,6 +13,7 @@ fn phantom() -> Mesh {
 
 fn plan(schemes: &[Scheme]) -> DatasetPlan {
     DatasetPlan {
+        training: None,
         boundary: Boundary::Fixed,
         schemes: schemes.to_vec(),
         count: 4,

@@ -1,10 +1,10 @@
-//! AVX2 and FMA: two registers of 8 lanes.
+//! AVX2 and FMA: one register of 8 lanes; of the 16 registers a tensor takes nine.
 
-use super::{CUBE_ROOT_GUESS, Lanes, WIDTH};
+use super::{CUBE_ROOT_GUESS, Lanes};
 use std::arch::x86_64::*;
 
 #[derive(Clone, Copy)]
-pub(crate) struct Avx2([__m256; 2]);
+pub(crate) struct Avx2(__m256);
 
 /// One node.
 #[inline(always)]
@@ -23,172 +23,126 @@ pub(super) unsafe fn add_row(nodes: *mut [f32; 4], index: u16, value: __m128) {
 
 /// Rows `first` and `first + 4` in the two 128-bit halves.
 #[inline(always)]
-unsafe fn rows(nodes: *const [f32; 4], index: &[u16; WIDTH], first: usize) -> __m256 {
+unsafe fn rows(nodes: *const [f32; 4], index: *const u16, first: usize) -> __m256 {
     unsafe {
-        let low = _mm256_castps128_ps256(row(nodes, index[first]));
-        _mm256_insertf128_ps(low, row(nodes, index[first + 4]), 1)
+        let low = _mm256_castps128_ps256(row(nodes, *index.add(first)));
+        _mm256_insertf128_ps(low, row(nodes, *index.add(first + 4)), 1)
     }
 }
 
 #[inline(always)]
-unsafe fn add_rows(nodes: *mut [f32; 4], index: &[u16; WIDTH], first: usize, value: __m256) {
+unsafe fn add_rows(nodes: *mut [f32; 4], index: *const u16, first: usize, value: __m256) {
     unsafe {
-        add_row(nodes, index[first], _mm256_castps256_ps128(value));
-        add_row(nodes, index[first + 4], _mm256_extractf128_ps(value, 1));
+        add_row(nodes, *index.add(first), _mm256_castps256_ps128(value));
+        add_row(
+            nodes,
+            *index.add(first + 4),
+            _mm256_extractf128_ps(value, 1),
+        );
     }
 }
 
 // SAFETY: see the trait; all intrinsics are AVX2 or FMA.
 impl Lanes for Avx2 {
+    const COUNT: usize = 8;
+
     #[inline(always)]
     unsafe fn splat(value: f32) -> Self {
-        unsafe { Self([_mm256_set1_ps(value); 2]) }
+        unsafe { Self(_mm256_set1_ps(value)) }
     }
 
     #[inline(always)]
     unsafe fn load(source: *const f32) -> Self {
-        unsafe { Self([_mm256_loadu_ps(source), _mm256_loadu_ps(source.add(8))]) }
+        unsafe { Self(_mm256_loadu_ps(source)) }
     }
 
     #[inline(always)]
     unsafe fn store(self, target: *mut f32) {
-        unsafe {
-            _mm256_storeu_ps(target, self.0[0]);
-            _mm256_storeu_ps(target.add(8), self.0[1]);
-        }
+        unsafe { _mm256_storeu_ps(target, self.0) }
     }
 
     #[inline(always)]
     unsafe fn add(self, other: Self) -> Self {
-        unsafe {
-            Self([
-                _mm256_add_ps(self.0[0], other.0[0]),
-                _mm256_add_ps(self.0[1], other.0[1]),
-            ])
-        }
+        unsafe { Self(_mm256_add_ps(self.0, other.0)) }
     }
 
     #[inline(always)]
     unsafe fn sub(self, other: Self) -> Self {
-        unsafe {
-            Self([
-                _mm256_sub_ps(self.0[0], other.0[0]),
-                _mm256_sub_ps(self.0[1], other.0[1]),
-            ])
-        }
+        unsafe { Self(_mm256_sub_ps(self.0, other.0)) }
     }
 
     #[inline(always)]
     unsafe fn mul(self, other: Self) -> Self {
-        unsafe {
-            Self([
-                _mm256_mul_ps(self.0[0], other.0[0]),
-                _mm256_mul_ps(self.0[1], other.0[1]),
-            ])
-        }
+        unsafe { Self(_mm256_mul_ps(self.0, other.0)) }
     }
 
     #[inline(always)]
     unsafe fn mul_add(self, b: Self, c: Self) -> Self {
-        unsafe {
-            Self([
-                _mm256_fmadd_ps(self.0[0], b.0[0], c.0[0]),
-                _mm256_fmadd_ps(self.0[1], b.0[1], c.0[1]),
-            ])
-        }
+        unsafe { Self(_mm256_fmadd_ps(self.0, b.0, c.0)) }
     }
 
     #[inline(always)]
     unsafe fn neg_mul_add(self, b: Self, c: Self) -> Self {
-        unsafe {
-            Self([
-                _mm256_fnmadd_ps(self.0[0], b.0[0], c.0[0]),
-                _mm256_fnmadd_ps(self.0[1], b.0[1], c.0[1]),
-            ])
-        }
+        unsafe { Self(_mm256_fnmadd_ps(self.0, b.0, c.0)) }
     }
 
     #[inline(always)]
     unsafe fn min(self, other: Self) -> Self {
-        unsafe {
-            Self([
-                _mm256_min_ps(self.0[0], other.0[0]),
-                _mm256_min_ps(self.0[1], other.0[1]),
-            ])
-        }
+        unsafe { Self(_mm256_min_ps(self.0, other.0)) }
     }
 
     #[inline(always)]
     unsafe fn max(self, other: Self) -> Self {
-        unsafe {
-            Self([
-                _mm256_max_ps(self.0[0], other.0[0]),
-                _mm256_max_ps(self.0[1], other.0[1]),
-            ])
-        }
+        unsafe { Self(_mm256_max_ps(self.0, other.0)) }
     }
 
     #[inline(always)]
     unsafe fn inverse_cube_root_guess(self) -> Self {
         unsafe {
-            let mut guess = self.0;
-            for part in &mut guess {
-                let bits = _mm256_cvtepi32_ps(_mm256_castps_si256(*part));
-                let value = _mm256_fnmadd_ps(
-                    bits,
-                    _mm256_set1_ps(1.0 / 3.0),
-                    _mm256_set1_ps(CUBE_ROOT_GUESS),
-                );
-                *part = _mm256_castsi256_ps(_mm256_cvttps_epi32(value));
-            }
-            Self(guess)
+            let bits = _mm256_cvtepi32_ps(_mm256_castps_si256(self.0));
+            let guess = _mm256_fnmadd_ps(
+                bits,
+                _mm256_set1_ps(1.0 / 3.0),
+                _mm256_set1_ps(CUBE_ROOT_GUESS),
+            );
+            Self(_mm256_castsi256_ps(_mm256_cvttps_epi32(guess)))
         }
     }
 
     #[inline(always)]
-    unsafe fn gather(nodes: *const [f32; 4], index: &[u16; WIDTH]) -> [Self; 4] {
+    unsafe fn gather(nodes: *const [f32; 4], index: *const u16) -> [Self; 4] {
         unsafe {
-            let mut axes = [[_mm256_setzero_ps(); 2]; 4];
-            for half in 0..2 {
-                let [r0, r1, r2, r3] = [
-                    rows(nodes, index, 8 * half),
-                    rows(nodes, index, 8 * half + 1),
-                    rows(nodes, index, 8 * half + 2),
-                    rows(nodes, index, 8 * half + 3),
-                ];
-                let xy01 = _mm256_unpacklo_ps(r0, r1);
-                let xy23 = _mm256_unpacklo_ps(r2, r3);
-                let zw01 = _mm256_unpackhi_ps(r0, r1);
-                let zw23 = _mm256_unpackhi_ps(r2, r3);
-                axes[0][half] = _mm256_shuffle_ps(xy01, xy23, 0x44);
-                axes[1][half] = _mm256_shuffle_ps(xy01, xy23, 0xEE);
-                axes[2][half] = _mm256_shuffle_ps(zw01, zw23, 0x44);
-                axes[3][half] = _mm256_shuffle_ps(zw01, zw23, 0xEE);
-            }
-            [Self(axes[0]), Self(axes[1]), Self(axes[2]), Self(axes[3])]
+            let [r0, r1, r2, r3] = [
+                rows(nodes, index, 0),
+                rows(nodes, index, 1),
+                rows(nodes, index, 2),
+                rows(nodes, index, 3),
+            ];
+            let xy01 = _mm256_unpacklo_ps(r0, r1);
+            let xy23 = _mm256_unpacklo_ps(r2, r3);
+            let zw01 = _mm256_unpackhi_ps(r0, r1);
+            let zw23 = _mm256_unpackhi_ps(r2, r3);
+            [
+                Self(_mm256_shuffle_ps(xy01, xy23, 0x44)),
+                Self(_mm256_shuffle_ps(xy01, xy23, 0xEE)),
+                Self(_mm256_shuffle_ps(zw01, zw23, 0x44)),
+                Self(_mm256_shuffle_ps(zw01, zw23, 0xEE)),
+            ]
         }
     }
 
     #[inline(always)]
-    unsafe fn scatter_add(nodes: *mut [f32; 4], index: &[u16; WIDTH], value: [Self; 4]) {
+    unsafe fn scatter_add(nodes: *mut [f32; 4], index: *const u16, value: [Self; 4]) {
         unsafe {
-            for half in 0..2 {
-                let [x, y, z, w] = [
-                    value[0].0[half],
-                    value[1].0[half],
-                    value[2].0[half],
-                    value[3].0[half],
-                ];
-                let xy01 = _mm256_unpacklo_ps(x, y);
-                let xy23 = _mm256_unpackhi_ps(x, y);
-                let zw01 = _mm256_unpacklo_ps(z, w);
-                let zw23 = _mm256_unpackhi_ps(z, w);
-                let first = 8 * half;
-                add_rows(nodes, index, first, _mm256_shuffle_ps(xy01, zw01, 0x44));
-                add_rows(nodes, index, first + 1, _mm256_shuffle_ps(xy01, zw01, 0xEE));
-                add_rows(nodes, index, first + 2, _mm256_shuffle_ps(xy23, zw23, 0x44));
-                add_rows(nodes, index, first + 3, _mm256_shuffle_ps(xy23, zw23, 0xEE));
-            }
+            let [Self(x), Self(y), Self(z), Self(w)] = value;
+            let xy01 = _mm256_unpacklo_ps(x, y);
+            let xy23 = _mm256_unpackhi_ps(x, y);
+            let zw01 = _mm256_unpacklo_ps(z, w);
+            let zw23 = _mm256_unpackhi_ps(z, w);
+            add_rows(nodes, index, 0, _mm256_shuffle_ps(xy01, zw01, 0x44));
+            add_rows(nodes, index, 1, _mm256_shuffle_ps(xy01, zw01, 0xEE));
+            add_rows(nodes, index, 2, _mm256_shuffle_ps(xy23, zw23, 0x44));
+            add_rows(nodes, index, 3, _mm256_shuffle_ps(xy23, zw23, 0xEE));
         }
     }
 }

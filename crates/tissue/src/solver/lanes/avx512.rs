@@ -9,16 +9,16 @@ pub(crate) struct Avx512(__m512);
 
 /// Rows `i`, `i + 4`, `i + 8`, `i + 12` in the four 128-bit parts.
 #[inline(always)]
-unsafe fn rows(nodes: *const [f32; 4], index: &[u16; WIDTH], first: usize) -> __m512 {
+unsafe fn rows(nodes: *const [f32; 4], index: *const u16, first: usize) -> __m512 {
     unsafe {
         let low = _mm256_insertf128_ps(
-            _mm256_castps128_ps256(row(nodes, index[first])),
-            row(nodes, index[first + 4]),
+            _mm256_castps128_ps256(row(nodes, *index.add(first))),
+            row(nodes, *index.add(first + 4)),
             1,
         );
         let high = _mm256_insertf128_ps(
-            _mm256_castps128_ps256(row(nodes, index[first + 8])),
-            row(nodes, index[first + 12]),
+            _mm256_castps128_ps256(row(nodes, *index.add(first + 8))),
+            row(nodes, *index.add(first + 12)),
             1,
         );
         _mm512_castpd_ps(_mm512_insertf64x4(
@@ -31,17 +31,31 @@ unsafe fn rows(nodes: *const [f32; 4], index: &[u16; WIDTH], first: usize) -> __
 
 /// Adds the four 128-bit parts to the nodes of elements `first`, `first + 4`, ...
 #[inline(always)]
-unsafe fn add_rows(nodes: *mut [f32; 4], index: &[u16; WIDTH], first: usize, value: __m512) {
+unsafe fn add_rows(nodes: *mut [f32; 4], index: *const u16, first: usize, value: __m512) {
     unsafe {
-        add_row(nodes, index[first], _mm512_castps512_ps128(value));
-        add_row(nodes, index[first + 4], _mm512_extractf32x4_ps(value, 1));
-        add_row(nodes, index[first + 8], _mm512_extractf32x4_ps(value, 2));
-        add_row(nodes, index[first + 12], _mm512_extractf32x4_ps(value, 3));
+        add_row(nodes, *index.add(first), _mm512_castps512_ps128(value));
+        add_row(
+            nodes,
+            *index.add(first + 4),
+            _mm512_extractf32x4_ps(value, 1),
+        );
+        add_row(
+            nodes,
+            *index.add(first + 8),
+            _mm512_extractf32x4_ps(value, 2),
+        );
+        add_row(
+            nodes,
+            *index.add(first + 12),
+            _mm512_extractf32x4_ps(value, 3),
+        );
     }
 }
 
 // SAFETY: see the trait; all intrinsics are AVX-512F.
 impl Lanes for Avx512 {
+    const COUNT: usize = WIDTH;
+
     #[inline(always)]
     unsafe fn splat(value: f32) -> Self {
         unsafe { Self(_mm512_set1_ps(value)) }
@@ -106,7 +120,7 @@ impl Lanes for Avx512 {
     }
 
     #[inline(always)]
-    unsafe fn gather(nodes: *const [f32; 4], index: &[u16; WIDTH]) -> [Self; 4] {
+    unsafe fn gather(nodes: *const [f32; 4], index: *const u16) -> [Self; 4] {
         unsafe {
             let [r0, r1, r2, r3] = [
                 rows(nodes, index, 0),
@@ -128,7 +142,7 @@ impl Lanes for Avx512 {
     }
 
     #[inline(always)]
-    unsafe fn scatter_add(nodes: *mut [f32; 4], index: &[u16; WIDTH], value: [Self; 4]) {
+    unsafe fn scatter_add(nodes: *mut [f32; 4], index: *const u16, value: [Self; 4]) {
         unsafe {
             let [Self(x), Self(y), Self(z), Self(w)] = value;
             let xy01 = _mm512_unpacklo_ps(x, y);

@@ -1,8 +1,11 @@
-//! Sixteen elements at a time: the few vector operations that the element
-//! kernel needs, and one type a processor family that provides them.
+//! The few vector operations that the element kernel needs, and one type a
+//! processor family that provides them.
 //!
-//! Nodes are `[x, y, z, w]` in memory. A gather loads one corner of each of the
-//! 16 elements and transposes to four vectors; a scatter adds back in element
+//! A batch of 16 elements goes through in `WIDTH / COUNT` parts. A type is as wide
+//! as lets the nine entries of a tensor stay in registers beside their operands.
+//!
+//! Nodes are `[x, y, z, w]` in memory. A gather loads one corner of each of `COUNT`
+//! elements and transposes to four vectors; a scatter adds back in element
 //! order, so corners that share a node are summed one after the other. Indices
 //! count half nodes (8 bytes): the largest step that x86 addressing scales by itself.
 
@@ -28,14 +31,16 @@ pub(crate) const WIDTH: usize = 16;
 /// Constant of the inverse cube root's first guess, `bits(y) = GUESS - bits(x) / 3`.
 pub(crate) const CUBE_ROOT_GUESS: f32 = 1_419_967_116.0;
 
-/// Sixteen f32 lanes.
+/// `COUNT` f32 lanes.
 ///
 /// # Safety
 /// Every method needs the instruction set of its type; the pointers of `load`,
-/// `store`, `gather` and `scatter_add` must be valid for 16 values, or for the
+/// `store`, `gather` and `scatter_add` must be valid for `COUNT` values, or for the
 /// nodes that the indices name. The callers are `target_feature` functions that
 /// are reached only after run-time detection.
 pub(crate) trait Lanes: Copy {
+    /// Elements that go through together; divides [`WIDTH`].
+    const COUNT: usize;
     unsafe fn splat(value: f32) -> Self;
     unsafe fn load(source: *const f32) -> Self;
     unsafe fn store(self, target: *mut f32);
@@ -50,6 +55,6 @@ pub(crate) trait Lanes: Copy {
     unsafe fn max(self, other: Self) -> Self;
     /// First guess of `self^(-1/3)` for positive values, within 4 %.
     unsafe fn inverse_cube_root_guess(self) -> Self;
-    unsafe fn gather(nodes: *const [f32; 4], index: &[u16; WIDTH]) -> [Self; 4];
-    unsafe fn scatter_add(nodes: *mut [f32; 4], index: &[u16; WIDTH], value: [Self; 4]);
+    unsafe fn gather(nodes: *const [f32; 4], index: *const u16) -> [Self; 4];
+    unsafe fn scatter_add(nodes: *mut [f32; 4], index: *const u16, value: [Self; 4]);
 }

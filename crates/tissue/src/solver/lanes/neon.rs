@@ -25,6 +25,8 @@ unsafe fn transpose(rows: [float32x4_t; 4]) -> [float32x4_t; 4] {
 
 // SAFETY: see the trait; NEON is part of every aarch64 target.
 impl Lanes for Neon {
+    const COUNT: usize = WIDTH;
+
     #[inline(always)]
     unsafe fn splat(value: f32) -> Self {
         unsafe { Self([vdupq_n_f32(value); 4]) }
@@ -147,13 +149,18 @@ impl Lanes for Neon {
     }
 
     #[inline(always)]
-    unsafe fn gather(nodes: *const [f32; 4], index: &[u16; WIDTH]) -> [Self; 4] {
+    unsafe fn gather(nodes: *const [f32; 4], index: *const u16) -> [Self; 4] {
         unsafe {
             let mut axes = [[vdupq_n_f32(0.0); 4]; 4];
             for part in 0..4 {
                 let mut rows = [vdupq_n_f32(0.0); 4];
                 for (i, row) in rows.iter_mut().enumerate() {
-                    *row = vld1q_f32(nodes.cast::<f64>().add(index[4 * part + i] as usize).cast());
+                    *row = vld1q_f32(
+                        nodes
+                            .cast::<f64>()
+                            .add(*index.add(4 * part + i) as usize)
+                            .cast(),
+                    );
                 }
                 let columns = transpose(rows);
                 for axis in 0..4 {
@@ -165,7 +172,7 @@ impl Lanes for Neon {
     }
 
     #[inline(always)]
-    unsafe fn scatter_add(nodes: *mut [f32; 4], index: &[u16; WIDTH], value: [Self; 4]) {
+    unsafe fn scatter_add(nodes: *mut [f32; 4], index: *const u16, value: [Self; 4]) {
         unsafe {
             for part in 0..4 {
                 let rows = transpose([
@@ -175,8 +182,10 @@ impl Lanes for Neon {
                     value[3].0[part],
                 ]);
                 for (i, row) in rows.into_iter().enumerate() {
-                    let target: *mut f32 =
-                        nodes.cast::<f64>().add(index[4 * part + i] as usize).cast();
+                    let target: *mut f32 = nodes
+                        .cast::<f64>()
+                        .add(*index.add(4 * part + i) as usize)
+                        .cast();
                     vst1q_f32(target, vaddq_f32(vld1q_f32(target), row));
                 }
             }

@@ -14,6 +14,8 @@ impl Scalar {
 
 // SAFETY: no instruction set beyond the target's baseline is used.
 impl Lanes for Scalar {
+    const COUNT: usize = WIDTH;
+
     #[inline(always)]
     unsafe fn splat(value: f32) -> Self {
         Self([value; WIDTH])
@@ -73,16 +75,16 @@ impl Lanes for Scalar {
     }
 
     #[inline(always)]
-    unsafe fn gather(nodes: *const [f32; 4], index: &[u16; WIDTH]) -> [Self; 4] {
+    unsafe fn gather(nodes: *const [f32; 4], index: *const u16) -> [Self; 4] {
         let values: [[f32; 4]; WIDTH] =
-            std::array::from_fn(|i| unsafe { *nodes.add(index[i] as usize / 2) });
+            std::array::from_fn(|i| unsafe { *nodes.add(*index.add(i) as usize / 2) });
         [0, 1, 2, 3].map(|axis| Self(std::array::from_fn(|i| values[i][axis])))
     }
 
     #[inline(always)]
-    unsafe fn scatter_add(nodes: *mut [f32; 4], index: &[u16; WIDTH], value: [Self; 4]) {
+    unsafe fn scatter_add(nodes: *mut [f32; 4], index: *const u16, value: [Self; 4]) {
         for i in 0..WIDTH {
-            let node = unsafe { &mut *nodes.add(index[i] as usize / 2) };
+            let node = unsafe { &mut *nodes.add(*index.add(i) as usize / 2) };
             for axis in 0..4 {
                 node[axis] += value[axis].0[i];
             }
