@@ -48,6 +48,7 @@ fn bad_libraries_are_errors_and_a_good_one_loads_after_them() {
     let model = Model::open(&fixture::path("tiny-upt"), &ModelOptions::default()).unwrap();
     let description: serde_json::Value = serde_json::from_str(&model.describe_json()).unwrap();
     assert_eq!(description["stages"]["latent"], "cpu");
+    assert!(description["latent_nodes"]["CPUExecutionProvider"].as_u64() > Some(10));
     assert!(
         description["onnxruntime"]["path"]
             .as_str()
@@ -55,7 +56,10 @@ fn bad_libraries_are_errors_and_a_good_one_loads_after_them() {
             .contains("onnxruntime")
     );
 
-    // Providers: an honest answer, and an honest fallback.
+    // Providers: an honest answer, and an honest fallback. A plugin that is not one is named with its file.
+    let plugin = folder.path().join("broken.so");
+    // SAFETY: this test is the only one of its process and no other thread reads the environment now.
+    unsafe { std::env::set_var("UPT_TENSORRT_RTX_PATH", &plugin) };
     let providers: serde_json::Value =
         serde_json::from_str(&upt::providers_json().unwrap()).unwrap();
     assert_eq!(providers[0]["name"], "cpu");
@@ -69,7 +73,9 @@ fn bad_libraries_are_errors_and_a_good_one_loads_after_them() {
     if model.info().provider == Provider::Cpu {
         let refused = description["providers_refused"].as_array().unwrap();
         assert_eq!(refused.len(), 2);
-        assert!(!refused[0]["reason"].as_str().unwrap().is_empty());
+        let reason = refused[0]["reason"].as_str().unwrap();
+        assert!(reason.contains("broken.so"), "{reason}");
+        assert!(!refused[1]["reason"].as_str().unwrap().is_empty());
         let strict = ModelOptions {
             no_fallback: true,
             ..wish

@@ -222,6 +222,7 @@ impl Model {
             "threads": self.threads,
             "stages": stages,
             "providers_refused": refused,
+            "latent_nodes": self.choice.nodes,
             "instruction_set": format!("{:?}", crate::kernels::Isa::detect()),
             "onnxruntime": {"path": self.runtime.path().display().to_string(), "version": self.runtime.version()},
         })

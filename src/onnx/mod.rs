@@ -3,6 +3,9 @@
 //! Nothing here is touched, and no library is opened, until a model is opened or the providers are asked for.
 
 mod locate;
+mod placement;
+#[cfg(feature = "tensorrt-rtx")]
+mod plugin;
 mod providers;
 mod runtime;
 mod stage;

@@ -1,9 +1,12 @@
 //! Execution providers: an ordered wish, what really runs, and why the others do not.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use ort::ep::{self, ExecutionProvider, ExecutionProviderDispatch};
 
+#[cfg(feature = "tensorrt-rtx")]
+use super::plugin;
 use super::runtime::Runtime;
 use crate::error::{Error, Result};
 use crate::library;
@@ -34,11 +37,25 @@ pub struct ProviderPlan {
     fallback: bool,
 }
 
+/// How a session is told which provider to use.
+pub(super) enum Wish {
+    /// Nothing to tell: the CPU.
+    Cpu,
+    /// A provider of the library.
+    Builtin(ExecutionProviderDispatch),
+    /// The devices that a plugin provider offers, and its options.
+    #[cfg(feature = "tensorrt-rtx")]
+    Plugin(&'static str, Vec<(String, String)>),
+}
+
 /// What runs a session and why providers before it in the list do not.
 #[derive(Debug, Clone)]
 pub struct ProviderChoice {
     /// What runs.
     pub provider: Provider,
+    /// Nodes of the session's graph by ONNX Runtime's name of the provider that runs them: a GPU provider may leave
+    /// some to the CPU. Empty where the library does not tell.
+    pub nodes: BTreeMap<String, usize>,
     /// Provider and reason, for each that was asked for and not taken.
     pub refused: Vec<(Provider, String)>,
 }
@@ -71,18 +88,20 @@ impl ProviderPlan {
     /// Calls `make` with one provider after the other until one works.
     pub(super) fn choose<T>(
         &self,
-        mut make: impl FnMut(
-            Provider,
-            Option<ExecutionProviderDispatch>,
-        ) -> std::result::Result<T, String>,
+        mut make: impl FnMut(Provider, Wish) -> std::result::Result<T, String>,
     ) -> Result<(T, ProviderChoice)> {
         let mut refused = Vec::new();
         for &provider in &self.order {
-            let made = self
-                .dispatch(provider)
-                .and_then(|dispatch| make(provider, dispatch));
+            let made = self.wish(provider).and_then(|wish| make(provider, wish));
             match made {
-                Ok(value) => return Ok((value, ProviderChoice { provider, refused })),
+                Ok(value) => {
+                    let choice = ProviderChoice {
+                        provider,
+                        nodes: BTreeMap::new(),
+                        refused,
+                    };
+                    return Ok((value, choice));
+                }
                 Err(reason) => {
                     tracing::warn!(provider = provider.name(), reason, "provider not taken");
                     refused.push((provider, reason));
@@ -101,10 +120,7 @@ impl ProviderPlan {
         Err(Error::Provider(format!("{}{note}", list.join("; "))))
     }
 
-    fn dispatch(
-        &self,
-        provider: Provider,
-    ) -> std::result::Result<Option<ExecutionProviderDispatch>, String> {
+    fn wish(&self, provider: Provider) -> std::result::Result<Wish, String> {
         if let Some(reason) = missing(provider) {
             return Err(reason);
         }
@@ -114,7 +130,7 @@ impl ProviderPlan {
         }
         let cache = self.cache_dir.as_ref().map(|dir| dir.display().to_string());
         let dispatch: ExecutionProviderDispatch = match provider {
-            Provider::Cpu => return Ok(None),
+            Provider::Cpu => return Ok(Wish::Cpu),
             #[cfg(feature = "cuda")]
             Provider::Cuda => {
                 let mut cuda = ep::CUDA::default()
@@ -142,6 +158,10 @@ impl ProviderPlan {
                 trt.build()
             }
             #[cfg(feature = "tensorrt-rtx")]
+            Provider::TensorRtRtx if !built_in_rtx() => {
+                return Ok(Wish::Plugin(plugin::NAME, self.plugin_options(cache)));
+            }
+            #[cfg(feature = "tensorrt-rtx")]
             Provider::TensorRtRtx => {
                 let mut rtx = ep::NVRTX::default()
                     .with_device_id(self.device_id.max(0) as u32)
@@ -154,7 +174,21 @@ impl ProviderPlan {
             #[cfg(not(all(feature = "cuda", feature = "tensorrt", feature = "tensorrt-rtx")))]
             _ => unreachable!("`missing` refuses providers of features that are off"),
         };
-        Ok(Some(dispatch.error_on_failure()))
+        Ok(Wish::Builtin(dispatch.error_on_failure()))
+    }
+
+    /// Options of the TensorRT-RTX plugin, each with the provider's name before it.
+    #[cfg(feature = "tensorrt-rtx")]
+    fn plugin_options(&self, cache: Option<String>) -> Vec<(String, String)> {
+        let mut options = vec![(
+            "enable_cuda_graph",
+            if self.cuda_graph { "1" } else { "0" }.to_owned(),
+        )];
+        options.extend(cache.map(|folder| ("nv_runtime_cache_path", folder)));
+        options
+            .into_iter()
+            .map(|(key, value)| (format!("{}.{key}", plugin::NAME), value))
+            .collect()
     }
 }
 
@@ -167,7 +201,14 @@ fn missing(provider: Provider) -> Option<String> {
         #[cfg(feature = "tensorrt")]
         Provider::TensorRt => ep::TensorRT::is_available(),
         #[cfg(feature = "tensorrt-rtx")]
-        Provider::TensorRtRtx => ep::NVRTX::is_available(),
+        Provider::TensorRtRtx if built_in_rtx() => return None,
+        #[cfg(feature = "tensorrt-rtx")]
+        Provider::TensorRtRtx => {
+            let registered = Runtime::get(library::current().onnxruntime_path.as_deref())
+                .map_err(|error| error.to_string())
+                .and_then(plugin::available);
+            return registered.err();
+        }
         #[cfg(not(all(feature = "cuda", feature = "tensorrt", feature = "tensorrt-rtx")))]
         _ => {
             return Some(format!(
@@ -184,6 +225,12 @@ fn missing(provider: Provider) -> Option<String> {
         )),
         Err(error) => Some(error.to_string()),
     }
+}
+
+/// Whether the loaded library itself holds TensorRT-RTX; otherwise it is a plugin.
+#[cfg(feature = "tensorrt-rtx")]
+fn built_in_rtx() -> bool {
+    ep::NVRTX::is_available().unwrap_or(false)
 }
 
 /// JSON list of providers: `[{"name","available","reason"}]`. Loads ONNX Runtime.

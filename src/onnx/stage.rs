@@ -3,13 +3,13 @@
 //! On the CPU the host writes the bound input tensors in place and a run copies nothing and allocates nothing of ours.
 
 use ort::AsPointer;
-use ort::ep::ExecutionProviderDispatch;
 use ort::memory::Allocator;
 use ort::session::builder::SessionBuilder;
 use ort::session::{IoBinding, Session};
 use ort::value::{Tensor, ValueType};
 
-use super::providers::{ProviderChoice, ProviderPlan};
+use super::placement;
+use super::providers::{ProviderChoice, ProviderPlan, Wish};
 use super::runtime::Runtime;
 use crate::error::{Error, Result};
 use crate::options::Provider;
@@ -65,8 +65,8 @@ impl Stage {
     ) -> Result<Stage> {
         let _span = tracing::debug_span!("session", file).entered();
         let mut invalid = None;
-        let made = options.plan.choose(|_, dispatch| {
-            let mut builder = configure(runtime, options, dispatch)?;
+        let made = options.plan.choose(|_, wish| {
+            let mut builder = configure(runtime, options, wish)?;
             builder.commit_from_memory(bytes).map_err(|error| {
                 if error.code() == ort::ErrorCode::InvalidProtobuf
                     || error.code() == ort::ErrorCode::InvalidGraph
@@ -79,7 +79,8 @@ impl Stage {
         if let Some(cause) = invalid {
             return Err(Error::bundle(file, format!("not a valid graph: {cause}")));
         }
-        let (session, choice) = made?;
+        let (session, mut choice) = made?;
+        choice.nodes = placement::nodes_by_provider(&session);
         check_names(file, "input", session.inputs(), inputs, indices.len())?;
         check_names(file, "output", session.outputs(), outputs, 0)?;
         let tensors = |list: &[(&str, &[usize])]| {
@@ -113,6 +114,7 @@ impl Stage {
             tensor.extract_tensor_mut().1.fill(0.0);
         }
         stage.bind_inputs()?;
+        stage.bind_indices()?;
         for ((name, _), tensor) in outputs.iter().zip(&mut stage.outputs) {
             stage
                 .binding
@@ -122,12 +124,18 @@ impl Stage {
         Ok(stage)
     }
 
+    /// Binds the inputs that the host writes; on a device this makes the device's copy of each.
     fn bind_inputs(&mut self) -> Result<()> {
         for (name, tensor) in self.input_names.iter().zip(&self.inputs) {
             self.binding
                 .bind_input(name.as_str(), tensor)
                 .map_err(|error| Error::Runtime(format!("{}: {error}", self.file)))?;
         }
+        Ok(())
+    }
+
+    /// Binds the inputs that never change, once: they stay on the device.
+    fn bind_indices(&mut self) -> Result<()> {
         for (name, tensor) in &self.indices {
             self.binding
                 .bind_input(name.as_str(), tensor)
@@ -154,7 +162,6 @@ impl Stage {
     /// Runs the graph.
     pub fn run(&mut self) -> Result<()> {
         if self.choice.provider != Provider::Cpu {
-            // A device's copy of an input is made when it is bound.
             self.bind_inputs()?;
             return match self.session.run_binding(&self.binding) {
                 Ok(_) => Ok(()),
@@ -190,7 +197,7 @@ impl Stage {
 fn configure(
     runtime: &'static Runtime,
     options: &StageOptions,
-    dispatch: Option<ExecutionProviderDispatch>,
+    wish: Wish,
 ) -> std::result::Result<SessionBuilder, String> {
     let text = |error: ort::Error<SessionBuilder>| error.to_string();
     let builder = Session::builder(&runtime.environment)
@@ -202,10 +209,22 @@ fn configure(
         .with_config_entry("session.force_spinning_stop", "1")
         .map_err(text)?
         .with_config_entry("session.set_denormal_as_zero", "1")
+        .map_err(text)?
+        .with_config_entry(placement::RECORD, "1")
         .map_err(text)?;
-    match dispatch {
-        Some(dispatch) => builder.with_execution_providers([dispatch]).map_err(text),
-        None => Ok(builder),
+    match wish {
+        Wish::Cpu => Ok(builder),
+        Wish::Builtin(dispatch) => builder.with_execution_providers([dispatch]).map_err(text),
+        #[cfg(feature = "tensorrt-rtx")]
+        Wish::Plugin(name, settings) => {
+            let devices = runtime.environment.devices();
+            builder
+                .with_devices(
+                    devices.filter(|d| d.ep().is_ok_and(|ep| ep == name)),
+                    Some(&settings),
+                )
+                .map_err(text)
+        }
     }
 }
 
