@@ -1,7 +1,9 @@
 //! Instrument poses to contacts, and contact forces, on a slab as large as the surface and the
 //! contact patches of K = 21,670: about 16,000 surface nodes, 60 nodes in contact.
 
-use criterion::{Criterion, criterion_group, criterion_main};
+mod measure;
+
+use measure::{Row, medians};
 use upt::forces::{Moduli, ReactionForces};
 use upt::instrument::{Instrument, InstrumentContacts, Shape};
 
@@ -34,59 +36,69 @@ fn slab(n: u32, layers: u32) -> (Vec<f32>, Vec<u32>, Vec<u32>) {
     (positions, tets, faces)
 }
 
-fn contact(c: &mut Criterion) {
+fn main() {
     let (positions, tets, faces) = slab(89, 3);
     let displacement = vec![0.0; positions.len()];
-    let mut contacts = InstrumentContacts::new(&positions, &faces, &[]);
+    instruments(&positions, &faces, &displacement);
+    forces(&positions, &tets, &displacement);
+}
+
+fn instruments(positions: &[f32], faces: &[u32], displacement: &[f32]) {
+    let mut contacts = InstrumentContacts::new(positions, faces, &[]);
+    let half_extents = [16.0, 14.0, 3.0];
     let shapes = [
-        Shape::Capsule {
-            half_length: 20.0,
-            radius: 9.0,
-        },
-        Shape::Box {
-            half_extents: [16.0, 14.0, 3.0],
-        },
-        Shape::Spatula {
-            half_extents: [16.0, 14.0, 3.0],
-            radius: 1.5,
-        },
+        (
+            "capsule",
+            Shape::Capsule {
+                half_length: 20.0,
+                radius: 9.0,
+            },
+        ),
+        ("box", Shape::Box { half_extents }),
+        (
+            "spatula",
+            Shape::Spatula {
+                half_extents,
+                radius: 1.5,
+            },
+        ),
     ];
-    for (name, shape) in ["capsule", "box", "spatula"].into_iter().zip(shapes) {
+    for (name, shape) in shapes {
         let instrument = Instrument {
             shape,
             position: [170.0, 170.0, 14.0],
             rotation: [0.0, 0.0, 0.0, 1.0],
             sticking: false,
         };
-        let touched = contacts
-            .find(&[instrument], &displacement)
-            .map(|(nodes, _)| nodes.len());
-        println!(
-            "{name}: {} of {} surface nodes touched",
-            touched.unwrap_or(0),
-            2 * 90 * 90
-        );
-        c.bench_function(&format!("instrument/{name}, 16,200 surface nodes"), |b| {
-            b.iter(|| {
-                contacts.reset();
-                contacts
-                    .find(&[instrument], &displacement)
-                    .map(|(nodes, _)| nodes.len())
-            });
-        });
+        let mut touched = 0;
+        let seconds = medians(&mut [Box::new(|| {
+            contacts.reset();
+            let found = contacts.find(&[instrument], displacement);
+            touched = found.expect("finite values").0.len();
+        })]);
+        let name = format!("{name} on 16,200 surface nodes, {touched} touched");
+        Row::new(name, 1e6 * seconds[0], "us")
+            .limits(Some(50.0), None)
+            .print();
     }
+}
+
+fn forces(positions: &[f32], tets: &[u32], displacement: &[f32]) {
     for side in [8, 11] {
         let nodes: Vec<u32> = (0..side * side)
             .map(|i| 40 + i % side + 90 * (40 + i / side) + 3 * 90 * 90)
             .collect();
         let moduli = Moduli::from_young(3000.0, 0.49);
-        let mut forces = ReactionForces::new(&positions, &tets, &nodes, moduli);
+        let mut forces = ReactionForces::new(positions, tets, &nodes, moduli);
         let mut out = vec![0.0; 3 * nodes.len()];
-        c.bench_function(&format!("forces/{} contact nodes", nodes.len()), |b| {
-            b.iter(|| forces.reaction(&displacement, &nodes, &mut out));
-        });
+        let seconds = medians(&mut [Box::new(|| {
+            forces
+                .reaction(displacement, &nodes, &mut out)
+                .expect("nodes of the slab");
+        })]);
+        let name = format!("reaction at {} contact nodes", nodes.len());
+        Row::new(name, 1e6 * seconds[0], "us")
+            .limits(Some(100.0), None)
+            .print();
     }
 }
-
-criterion_group!(benches, contact);
-criterion_main!(benches);

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -59,7 +60,11 @@ def main(arguments: list[str] | None = None) -> int:
             name=options.name or options.out.name,
             description=f"random weights, seed {options.seed}: shapes only, predicts nothing",
             prior=options.prior,
-            provenance={"random_weights": True, "seed": options.seed},
+            provenance={
+                "random_weights": True,
+                "seed": options.seed,
+                "architecture": asdict(settings.model),
+            },
             paper_split=options.paper_split,
             step=options.step,
         )

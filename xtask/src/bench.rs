@@ -4,20 +4,20 @@
 //! them. A row is {"name","value","unit","against","ratio","error","bar","goal"}; null where it has none.
 
 use std::fmt::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use anyhow::{Context, Result};
 use clap::Args;
 use serde::{Deserialize, Serialize};
 
-use crate::process::run_logged;
+use crate::process::{run_checked, run_logged};
 use crate::workspace::Workspace;
 use crate::{ort, venv};
 
 #[derive(Args)]
 pub struct Options {
-    /// Short runs; the kernels alone take minutes.
+    /// Short runs: 3 minutes after the build, on an idle machine.
     #[arg(long)]
     quick: bool,
     /// Also write the rows to this file.
@@ -53,6 +53,10 @@ struct Target {
 pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
     venv::create(workspace)?;
     let library = ort::host_library(workspace)?;
+    let random = workspace.path("target/bench/bundles");
+    if let Err(error) = random_bundles(workspace, &library, &random) {
+        eprintln!("left out: the rows of `fast` and `paper`: {error:#}");
+    }
     let mut tables: Vec<(String, Vec<Row>)> = Vec::new();
     let mut failed = Vec::new();
     for target in targets(workspace)? {
@@ -74,6 +78,7 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
         if options.quick {
             command.env("UPT_BENCH_QUICK", "1");
         }
+        command.env("UPT_BENCH_BUNDLES", &random);
         ort::set_environment(&mut command, &library);
         let log = workspace
             .logs()
@@ -118,7 +123,51 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
     Ok(failed.is_empty())
 }
 
-/// Files of `benches/` and `crates/tissue/benches/`, by name.
+/// Bundles with random weights of the `fast` and the `paper` configuration on the brain, the second with the graphs of
+/// the paper's split beside it; made again when its configuration is newer.
+fn random_bundles(workspace: &Workspace, library: &Path, folder: &Path) -> Result<()> {
+    for name in ["fast", "paper"] {
+        let out = folder.join(name);
+        let config = workspace.path(&format!("training/configs/{name}.toml"));
+        if is_newer(&out.join("bundle.json"), &config) {
+            continue;
+        }
+        venv::install_training(workspace)?;
+        std::fs::create_dir_all(folder)?;
+        let mut command = Command::new(workspace.python());
+        command
+            .current_dir(&workspace.root)
+            .args(["-m", "upt_training.random_bundle", "--config"])
+            .arg(&config)
+            .arg("--mesh")
+            .arg(workspace.path("onnx/meshes/brain.mesh.safetensors"))
+            .arg("--out")
+            .arg(&out);
+        if name == "paper" {
+            command.arg("--paper-split");
+        }
+        ort::set_environment(&mut command, library);
+        let log = workspace.logs().join(format!("bench-bundle-{name}.log"));
+        run_checked(
+            &format!("bundle {name}, random weights"),
+            &mut command,
+            &log,
+        )?;
+    }
+    Ok(())
+}
+
+/// Whether `made` exists and was written after `source`.
+fn is_newer(made: &Path, source: &Path) -> bool {
+    let written = |path: &Path| {
+        std::fs::metadata(path)
+            .and_then(|file| file.modified())
+            .ok()
+    };
+    written(made).is_some_and(|made| written(source).is_some_and(|source| made > source))
+}
+
+/// Bench targets of `benches/` and `crates/tissue/benches/`: files, and folders with a `main.rs`.
 fn targets(workspace: &Workspace) -> Result<Vec<Target>> {
     let mut found = Vec::new();
     for (package, folder) in [("upt", "benches"), ("tissue", "crates/tissue/benches")] {
@@ -127,9 +176,8 @@ fn targets(workspace: &Workspace) -> Result<Vec<Target>> {
         };
         for entry in entries {
             let path = entry?.path();
-            if path.extension().is_some_and(|extension| extension == "rs")
-                && !is_part_of_another(&path)?
-            {
+            let is_file = path.extension().is_some_and(|extension| extension == "rs");
+            if is_file || path.join("main.rs").exists() {
                 let name = path
                     .file_stem()
                     .unwrap_or_default()
@@ -141,12 +189,6 @@ fn targets(workspace: &Workspace) -> Result<Vec<Target>> {
     }
     found.sort_by(|a, b| (a.package, &a.name).cmp(&(b.package, &b.name)));
     Ok(found)
-}
-
-/// A file without a `main` is a module of a bench.
-fn is_part_of_another(path: &std::path::Path) -> Result<bool> {
-    let text = std::fs::read_to_string(path)?;
-    Ok(!text.contains("fn main") && !text.contains("criterion_main!"))
 }
 
 /// The rows among a bench's output.

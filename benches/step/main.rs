@@ -1,0 +1,148 @@
+//! Whole steps: the table of `docs/performance.md`.
+//!
+//! `cargo bench --bench step` runs every bundle in `onnx/` and in the folder that `UPT_BENCH_BUNDLES` names. A bundle that
+//! carries `paper_encoder.onnx` and `paper_decoder.onnx` is also run through ONNX Runtime as the paper splits it, with
+//! the same weights and threads. `UPT_FINE_MESH=FILE` adds steps on that mesh for bundles without a prior.
+
+mod fine;
+mod floor;
+#[path = "../measure/mod.rs"]
+mod measure;
+mod paper;
+mod reduced;
+mod steady;
+
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
+
+use measure::{Row, quick};
+use upt::bundle::Mesh;
+use upt::model::KindModel;
+use upt::{
+    Contact, GuardPolicy, IndexSet, Kind, Model, ModelOptions, Scene, SceneOptions, StepInput,
+};
+
+fn main() {
+    measure::init_library();
+    let machine = floor::Machine::measure();
+    for bundle in measure::bundles() {
+        if let Err(error) = run(&bundle, &machine) {
+            eprintln!("{}: {error}", bundle.display());
+            std::process::exit(1);
+        }
+    }
+}
+
+fn run(path: &Path, machine: &floor::Machine) -> upt::Result<()> {
+    let start = Instant::now();
+    let model = Model::open(path, &ModelOptions::default())?;
+    let scene = Scene::new(Arc::clone(&model), &options(1))?;
+    scene.step(FREE, None)?;
+    let opened = start.elapsed().as_secs_f64();
+    drop(scene);
+    let name = model.manifest.name.clone();
+    let info = model.info();
+    println!("{name}: K = {}, {:?}", info.node_count, info.kind);
+    Row::new(format!("{name}/open to first step"), opened, "s")
+        .limits(Some(2.0), Some(0.5))
+        .print();
+    let cost = floor::Cost::of(path, &model)?;
+    for threads in [1, 2] {
+        for surface in [false, true] {
+            let scene = Scene::new(Arc::clone(&model), &options(threads))?;
+            if surface {
+                scene.set_region(Some(model.indices(IndexSet::SurfaceNodes)))?;
+            }
+            let part = if surface { "surface" } else { "all" };
+            let row = format!("{name}/{part}/{threads} threads");
+            let ms = steady::measure(&scene, &row, limits(&model, threads, surface))?;
+            cost.print_floor(machine, &scene, &row, ms);
+        }
+    }
+    if info.kind == Kind::Reduced {
+        reduced::site_change(&model, &name)?;
+        reduced::sleeping(&model, &name)?;
+    }
+    if let KindModel::Upt(kind) = &model.kind {
+        if path.join("paper_encoder.onnx").exists() {
+            paper::against_split(path, &model, kind, &name)?;
+        }
+        fine::against_bundle_mesh(&model, &name)?;
+    }
+    Ok(())
+}
+
+/// Bar and goal of a step, ms. Random weights of the paper's size have neither: they stand beside the paper's split.
+fn limits(model: &Model, threads: usize, surface: bool) -> (Option<f64>, Option<f64>) {
+    if threads == 1 || model.manifest.name == "paper" {
+        return (None, None);
+    }
+    match (model.info().kind, surface) {
+        (Kind::Reduced, false) => (Some(3.0), Some(1.0)),
+        (Kind::Reduced, true) => (Some(1.5), Some(0.4)),
+        (Kind::Upt, false) => (Some(10.0), Some(5.0)),
+        (Kind::Upt, true) => (Some(6.0), Some(3.0)),
+    }
+}
+
+/// Measured steps of a row.
+fn steps(kind: Kind) -> usize {
+    match (quick(), kind) {
+        (true, Kind::Upt) => 15,
+        (true, Kind::Reduced) => 1_000,
+        (false, Kind::Upt) => 300,
+        (false, Kind::Reduced) => 10_000,
+    }
+}
+
+const FREE: StepInput<'static> = StepInput {
+    displacement: None,
+    contact: Contact::None,
+};
+
+fn options(threads: usize) -> SceneOptions {
+    SceneOptions {
+        threads,
+        guard_policy: GuardPolicy::Report,
+        no_sleep: true,
+        ..SceneOptions::default()
+    }
+}
+
+/// Nodes of the domain within 8 mm of one of them.
+fn patch(mesh: &Mesh, around: usize) -> Vec<u32> {
+    let domain = &mesh.domain_nodes;
+    let centre = mesh.position(domain[around % domain.len()]);
+    let near = |node: &u32| {
+        let p = mesh.position(*node);
+        (0..3)
+            .map(|axis| (p[axis] - centre[axis]).powi(2))
+            .sum::<f32>()
+            < 64.0
+    };
+    domain.iter().copied().filter(near).collect()
+}
+
+/// A push of 5 mm that moves a little each step.
+fn pushed(nodes: &[u32], t: usize) -> Vec<f32> {
+    let depth = -5.0 + 0.01 * (t % 7) as f32;
+    nodes.iter().flat_map(|_| [0.0, 0.0, depth]).collect()
+}
+
+/// A step with that push.
+fn push(scene: &Scene, nodes: &[u32], t: usize, out: Option<&mut [f32]>) -> upt::Result<()> {
+    let vectors = pushed(nodes, t);
+    let contact = Contact::Sparse {
+        nodes,
+        vectors: &vectors,
+    };
+    let displacement = None;
+    scene.step(
+        StepInput {
+            displacement,
+            contact,
+        },
+        out,
+    )
+}

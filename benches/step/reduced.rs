@@ -1,0 +1,64 @@
+//! What only a reduced bundle has: a contact solve that is new when the contact nodes are, and sleep without cost.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use upt::{Model, Scene, SceneOptions};
+
+use super::measure::{Row, median, quick};
+use super::{FREE, options, patch, push};
+
+fn steps() -> usize {
+    if quick() { 100 } else { 1000 }
+}
+
+/// Extra time of a step whose contact nodes are new, against one whose are not.
+pub fn site_change(model: &Arc<Model>, name: &str) -> upt::Result<()> {
+    let scene = Scene::new(Arc::clone(model), &options(1))?;
+    let patches = [patch(&model.mesh, 300), patch(&model.mesh, 301)];
+    let (mut same, mut new) = (Vec::new(), Vec::new());
+    for t in 0..steps() {
+        push(&scene, &patches[(t / 2) % 2], t, None)?;
+        let times = if t.is_multiple_of(2) {
+            &mut new
+        } else {
+            &mut same
+        };
+        times.push(scene.stats().prior_ms);
+    }
+    let extra = median(&mut new) - median(&mut same);
+    Row::new(
+        format!("{name}/site change, {} nodes", patches[0].len()),
+        extra,
+        "ms",
+    )
+    .limits(Some(5.0), Some(1.0))
+    .print();
+    Ok(())
+}
+
+/// A step of a scene at rest.
+pub fn sleeping(model: &Arc<Model>, name: &str) -> upt::Result<()> {
+    let scene = Scene::new(
+        Arc::clone(model),
+        &SceneOptions {
+            no_sleep: false,
+            ..options(1)
+        },
+    )?;
+    while !scene.stats().sleeping {
+        scene.step(FREE, None)?;
+    }
+    let mut times: Vec<f64> = (0..steps())
+        .map(|_| {
+            let start = Instant::now();
+            scene
+                .step(FREE, None)
+                .map(|()| start.elapsed().as_secs_f64() * 1e6)
+        })
+        .collect::<upt::Result<_>>()?;
+    Row::new(format!("{name}/sleeping step"), median(&mut times), "us")
+        .limits(Some(10.0), None)
+        .print();
+    Ok(())
+}

@@ -1,0 +1,71 @@
+//! Steps of a scene that is being pushed: median, tail, and the part outside kernels and sessions.
+
+use std::time::Instant;
+
+use upt::Scene;
+
+use super::measure::{Row, median};
+use super::{patch, pushed, steps};
+use upt::{Contact, StepInput};
+
+/// Prints the rows of a scene; the median step, ms.
+pub fn measure(
+    scene: &Scene,
+    name: &str,
+    (bar, goal): (Option<f64>, Option<f64>),
+) -> upt::Result<f64> {
+    const WARM_UP: usize = 5;
+    let nodes = patch(scene.mesh(), 300);
+    let vectors: Vec<Vec<f32>> = (0..7).map(|t| pushed(&nodes, t)).collect();
+    let mut out = vec![0.0; 3 * scene.region_count()];
+    let (mut times, mut outside) = (Vec::new(), Vec::new());
+    for t in 0..steps(scene.model().info().kind) + WARM_UP {
+        let contact = Contact::Sparse {
+            nodes: &nodes,
+            vectors: &vectors[t % 7],
+        };
+        let input = StepInput {
+            displacement: None,
+            contact,
+        };
+        let start = Instant::now();
+        scene.step(input, Some(&mut out))?;
+        let ms = start.elapsed().as_secs_f64() * 1e3;
+        if t >= WARM_UP {
+            times.push(ms);
+            let s = scene.stats();
+            let work = s.prior_ms + s.encode_ms + s.aggregate_ms + s.latent_ms + s.decode_ms;
+            outside.push(100.0 * (ms - work) / ms);
+        }
+    }
+    let middle = median(&mut times);
+    let p99 = times[(times.len() * 99).div_ceil(100) - 1];
+    Row::new(format!("{name}/step"), middle, "ms")
+        .limits(bar, goal)
+        .print();
+    Row::new(format!("{name}/p99 over median"), p99 / middle, "")
+        .limits(Some(1.5), Some(1.2))
+        .print();
+    Row::new(
+        format!("{name}/outside kernels and sessions"),
+        median(&mut outside),
+        "%",
+    )
+    .limits(Some(5.0), Some(2.0))
+    .print();
+    let s = scene.stats();
+    println!(
+        "{name}: check {:.3} prior {:.3} encode {:.3} aggregate {:.3} latent {:.3} decode {:.3} guard {:.3} ms, {} nodes, {} in contact, {:.1} MB",
+        s.check_ms,
+        s.prior_ms,
+        s.encode_ms,
+        s.aggregate_ms,
+        s.latent_ms,
+        s.decode_ms,
+        s.guard_ms,
+        s.decoded_node_count,
+        s.contact_count,
+        s.memory_bytes as f64 / 1e6
+    );
+    Ok(middle)
+}
