@@ -1,7 +1,7 @@
 //! The guard: what a decoded state must satisfy before it is published. Finite, bounded, no growth without cause,
 //! and by option no inverted element.
 
-use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::bundle::volume;
 use crate::error::{Error, Result};
@@ -16,23 +16,6 @@ const GROWTH_FACTOR: f32 = 1.6;
 /// ... and by this much, mm.
 const GROWTH_FLOOR: f32 = 2.0;
 const CHUNK: usize = 4096;
-
-/// Largest `|u|` over nodes of a field `[K,3]`, mm; not finite when any is not.
-pub fn largest(pool: &Pool, field: &[f32], nodes: &[u32]) -> Result<f32> {
-    // Squares are not negative, so their bits order as they do, infinities and NaN last.
-    let worst = AtomicU32::new(0);
-    pool.run(nodes.len().div_ceil(CHUNK), &|chunk, _| {
-        let mut bits = 0;
-        for &node in &nodes[chunk * CHUNK..((chunk + 1) * CHUNK).min(nodes.len())] {
-            let u = &field[3 * node as usize..3 * node as usize + 3];
-            let square = u[0] * u[0] + u[1] * u[1] + u[2] * u[2];
-            bits = bits.max(square.to_bits() & 0x7fff_ffff);
-        }
-        worst.fetch_max(bits, Ordering::Relaxed);
-    })
-    .map_err(|error| Error::Panic(error.to_string()))?;
-    Ok(f32::from_bits(worst.into_inner()).sqrt())
-}
 
 /// Flags of a state whose largest displacement is `max_now` after one of `max_before`, with `max_push` imposed.
 pub fn judge(bound: f32, max_now: f32, max_before: f32, max_push: f32) -> u32 {
@@ -101,20 +84,6 @@ pub fn describe(flags: u32, max: f32, bound: f32) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn largest_finds_the_largest_and_what_is_not_finite() {
-        let pool = Pool::new(2).unwrap();
-        let mut field = vec![0.0f32; 3 * 10_000];
-        field[3 * 9_000 + 1] = -4.0;
-        let nodes: Vec<u32> = (0..10_000).collect();
-        assert_eq!(largest(&pool, &field, &nodes).unwrap(), 4.0);
-        assert_eq!(largest(&pool, &field, &nodes[..9_000]).unwrap(), 0.0);
-        for bad in [f32::NAN, -f32::NAN, f32::INFINITY, 1e30] {
-            field[7] = bad;
-            assert!(!largest(&pool, &field, &nodes).unwrap().is_finite());
-        }
-    }
 
     #[test]
     fn judge_allows_a_push_and_refuses_growth() {

@@ -10,7 +10,8 @@ use super::encode::LowRank;
 use super::isa::{Isa, by_isa};
 use super::lanes::Lanes;
 use super::math::{gelu, gelu_lanes};
-use super::pool::{Parts, Pool, PoolError};
+use super::parts::Parts;
+use super::pool::{Pool, PoolError};
 
 /// Rows of a neighbour list: row `i` is `neighbours[offsets[i]..offsets[i + 1]]`.
 #[derive(Debug, Clone, Copy)]

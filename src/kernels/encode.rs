@@ -6,7 +6,8 @@
 use super::aggregate::{load_some, store_some};
 use super::isa::{Isa, by_isa};
 use super::lanes::Lanes;
-use super::pool::{Parts, Pool, PoolError};
+use super::parts::Parts;
+use super::pool::{Pool, PoolError};
 
 /// A table `[n,width]` and its update's weight, transposed: `[rank,width]`.
 #[derive(Debug, Clone, Copy)]

@@ -15,7 +15,9 @@ pub mod encode;
 pub mod flush;
 pub mod isa;
 mod lanes;
+pub mod largest;
 mod math;
+pub(crate) mod parts;
 pub mod pool;
 #[doc(hidden)]
 pub mod random;

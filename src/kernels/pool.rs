@@ -12,6 +12,10 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 
+/// Bytes from which on streaming a table is split over threads. Waking a worker and waiting for its last chunk costs some
+/// 50 to 100 us, in which one core reads some megabytes from cache (`cargo bench --bench kernels -- pool`).
+const SPLIT_BYTES: usize = 8 << 20;
+
 /// Why a pool could not be made or a job not be finished.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum PoolError {
@@ -194,6 +198,26 @@ impl Pool {
     }
 }
 
+impl Pool {
+    /// As [`Pool::run`], for a job that does little but read `bytes` of a table: below [`SPLIT_BYTES`] it stays on the
+    /// calling thread, since waking another costs more than it saves. The same bits either way.
+    ///
+    /// # Errors
+    /// As [`Pool::run`].
+    pub fn run_streaming(
+        &self,
+        bytes: usize,
+        chunk_count: usize,
+        task: &Task<'_>,
+    ) -> Result<(), PoolError> {
+        if bytes >= SPLIT_BYTES {
+            return self.run(chunk_count, task);
+        }
+        let _flush = FlushToZero::enter();
+        run_alone(chunk_count, task)
+    }
+}
+
 impl Drop for Pool {
     fn drop(&mut self) {
         self.shared.lock().closing = true;
@@ -257,45 +281,6 @@ fn panic_message(payload: &(dyn std::any::Any + Send)) -> String {
         .unwrap_or_else(|| "no message".to_owned())
 }
 
-/// A mutable slice that chunks of one job write in disjoint parts.
-pub(crate) struct Parts<T> {
-    address: *mut T,
-    len: usize,
-}
-// SAFETY: `Parts` only hands out parts that its users promise to be disjoint.
-unsafe impl<T: Send> Send for Parts<T> {}
-unsafe impl<T: Send> Sync for Parts<T> {}
-
-impl<T> Parts<T> {
-    pub(crate) fn new(slice: &mut [T]) -> Self {
-        Self {
-            address: slice.as_mut_ptr(),
-            len: slice.len(),
-        }
-    }
-
-    /// The part `start..start + len`.
-    ///
-    /// # Safety
-    /// No two parts alive at once overlap, and the slice given to `new` outlives them.
-    #[allow(clippy::mut_from_ref)]
-    pub(crate) unsafe fn part(&self, start: usize, len: usize) -> &mut [T] {
-        assert!(start <= self.len && len <= self.len - start, "part outside");
-        // SAFETY: inside the slice by the line above; disjoint by the caller's promise.
-        unsafe { std::slice::from_raw_parts_mut(self.address.add(start), len) }
-    }
-
-    /// Writes one element.
-    ///
-    /// # Safety
-    /// No other chunk touches this element during the job, and the slice is still alive.
-    pub(crate) unsafe fn write(&self, index: usize, value: T) {
-        assert!(index < self.len, "write outside");
-        // SAFETY: in bounds by the line above; not shared by the caller's promise.
-        unsafe { self.address.add(index).write(value) };
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -315,6 +300,23 @@ mod tests {
                 assert!(hits.iter().all(|h| h.load(Ordering::Relaxed) == 1));
             }
         }
+    }
+
+    #[test]
+    fn a_small_table_stays_on_the_calling_thread() {
+        let pool = Pool::new(4).unwrap();
+        let caller = std::thread::current().id();
+        let hits = AtomicUsize::new(0);
+        pool.run_streaming(SPLIT_BYTES - 1, 1000, &|_, worker| {
+            assert_eq!((worker, std::thread::current().id()), (0, caller));
+            hits.fetch_add(1, Ordering::Relaxed);
+        })
+        .unwrap();
+        pool.run_streaming(SPLIT_BYTES, 1000, &|_, _| {
+            hits.fetch_add(1, Ordering::Relaxed);
+        })
+        .unwrap();
+        assert_eq!(hits.load(Ordering::Relaxed), 2000);
     }
 
     #[test]

@@ -7,7 +7,8 @@
 
 use super::isa::{Isa, by_isa};
 use super::lanes::Lanes;
-use super::pool::{Parts, Pool, PoolError};
+use super::parts::Parts;
+use super::pool::{Pool, PoolError};
 use super::rows::{Number, Stored};
 use half::f16;
 
@@ -41,7 +42,8 @@ pub fn accumulate_rows(
         );
     }
     let parts = Parts::new(q);
-    pool.run(width.div_ceil(COLUMNS), &|chunk, _| {
+    let bytes = rows.len() * width * table.number_bytes();
+    pool.run_streaming(bytes, width.div_ceil(COLUMNS), &|chunk, _| {
         let start = chunk * COLUMNS;
         // SAFETY: these columns belong to this chunk alone.
         let q = unsafe { parts.part(start, COLUMNS.min(width - start)) };
@@ -158,7 +160,8 @@ mod tests {
     #[test]
     fn every_isa_matches_scalar_and_threads_do_not_matter() {
         let mut random = Random::new(5);
-        for width in [1, 13, 130, 600, 1800] {
+        // The widest table is large enough to be split over threads.
+        for width in [1, 13, 130, 600, 1800, 60_000] {
             let wide = random.normal(40 * width, 1.0);
             let half: Vec<f16> = wide.iter().map(|&x| f16::from_f32(x)).collect();
             let rows: Vec<u32> = (0..70).map(|_| random.below(40) as u32).collect();

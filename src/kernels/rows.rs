@@ -8,7 +8,8 @@
 
 use super::isa::{Isa, by_isa};
 use super::lanes::Lanes;
-use super::pool::{Parts, Pool, PoolError};
+use super::parts::Parts;
+use super::pool::{Pool, PoolError};
 use half::f16;
 
 /// Numbers stored as f32 or f16.
@@ -24,6 +25,14 @@ impl Stored<'_> {
         match self {
             Stored::F32(x) => x.len(),
             Stored::F16(x) => x.len(),
+        }
+    }
+
+    /// Bytes of one.
+    pub(super) fn number_bytes(&self) -> usize {
+        match self {
+            Stored::F32(_) => 4,
+            Stored::F16(_) => 2,
         }
     }
 
@@ -191,7 +200,9 @@ pub fn decode_rows(
     // Bound by memory, and ranks are multiples of 8: 256 bits measure as fast as 512 and leave no tail.
     let isa = if isa == Isa::Avx512 { Isa::Avx2 } else { isa };
     let parts = Parts::new(out);
-    pool.run(plan.runs.len(), &|chunk, _| {
+    let all = basis.basis.len() * basis.basis.number_bytes();
+    let bytes = all / basis.block_nodes.len().max(1) * plan.nodes();
+    pool.run_streaming(bytes, plan.runs.len(), &|chunk, _| {
         let run = plan.runs[chunk];
         let (k, items) = (run.block as usize, run.start as usize..run.end as usize);
         let q = &q[ranks[k] as usize..ranks[k + 1] as usize];
@@ -380,6 +391,28 @@ mod tests {
             let got = run(isa, 1, &case, true, &plan);
             let error = max_error(&exact, &got);
             assert!(error > 0.0 && error < 2e-2, "storage error {error:e}");
+        }
+    }
+
+    #[test]
+    fn a_table_that_is_split_over_threads_gives_the_same_bits() {
+        let mut random = Random::new(21);
+        let (count, rank) = (12_000u32, 128u32);
+        let wide = random.normal((3 * count * rank) as usize, 0.3);
+        let case = Case {
+            nodes: (0..count).rev().collect(),
+            blocks: vec![0, count / 3, count],
+            ranks: vec![0, rank, 2 * rank],
+            half: wide.iter().map(|&x| f16::from_f32(x)).collect(),
+            wide,
+            q: random.normal(2 * rank as usize, 2.0),
+        };
+        for f16 in [false, true] {
+            let plan = RowPlan::full(&case.basis(f16));
+            let alone = run(Isa::detect(), 1, &case, f16, &plan);
+            for threads in [2, 4] {
+                assert_eq!(alone, run(Isa::detect(), threads, &case, f16, &plan));
+            }
         }
     }
 

@@ -14,6 +14,7 @@ use crate::bundle::Mesh;
 use crate::envelope::EnvelopeCheck;
 use crate::error::{Error, Result};
 use crate::guard;
+use crate::kernels::largest::largest;
 use crate::kernels::{FlushToZero, Isa, Pool};
 use crate::model::Model;
 use crate::options::{GuardPolicy, SceneOptions};
@@ -275,10 +276,15 @@ impl Core {
         }
     }
 
+    /// Largest displacement of the planned nodes in `next`, mm.
+    fn largest_of_next(&self) -> f32 {
+        largest(self.isa, &self.next.field, self.plan.nodes())
+    }
+
     fn judge(&mut self, stats: &mut SceneStats) -> Result<u32> {
         let mut watch = Stopwatch::start();
         let _span = tracing::trace_span!("guard").entered();
-        let max = guard::largest(&self.pool, &self.next.field, self.plan.nodes())?;
+        let max = self.largest_of_next();
         let bound = self.model.manifest.envelope.displacement_bound_mm;
         let mut verdict = guard::judge(bound, max, self.max_displacement, self.incoming.max_push());
         if self.options.check_inversion
@@ -312,7 +318,7 @@ impl Core {
             GuardPolicy::Report if verdict & flag::NON_FINITE == 0 => return Ok(()),
             GuardPolicy::Blend => {
                 self.fall_back()?;
-                if guard::largest(&self.pool, &self.next.field, self.plan.nodes())? <= bound {
+                if self.largest_of_next() <= bound {
                     return Ok(());
                 }
                 // Even the linear response is out of bounds: rest, without this contact.
@@ -357,7 +363,7 @@ impl Core {
         std::mem::swap(&mut self.contact_before, &mut self.contact);
         std::mem::swap(&mut self.contact, &mut self.incoming);
         self.max_displacement = if fell_back {
-            guard::largest(&self.pool, &self.next.field, self.plan.nodes()).unwrap_or(0.0)
+            self.largest_of_next()
         } else {
             stats.max_displacement_mm
         };

@@ -19,6 +19,20 @@ impl Frame {
             Values::Region => &self.field,
         }
     }
+
+    /// Copies the points, or the nodes of `region` (`None`: all), to `out`.
+    fn copy(&self, values: Values, region: Option<&[u32]>, out: &mut [f32]) {
+        let from = self.values(values);
+        match region {
+            Some(region) if values == Values::Region => {
+                for (out, &node) in out.chunks_exact_mut(3).zip(region) {
+                    let at = 3 * node as usize;
+                    out.copy_from_slice(&from[at..at + 3]);
+                }
+            }
+            _ => out.copy_from_slice(from),
+        }
+    }
 }
 
 /// Which values of a frame.
@@ -82,7 +96,7 @@ impl Published {
     /// Copies the last state.
     pub fn read(&self, values: Values, out: &mut [f32]) -> Result<()> {
         self.check_len(values, out.len())?;
-        self.each(values, out, |_, _, last| last);
+        self.last.copy(values, self.region.as_deref(), out);
         Ok(())
     }
 
@@ -94,9 +108,9 @@ impl Published {
         self.check_len(values, out.len())?;
         let t = alpha.clamp(0.0, 1.0) as f32;
         if t == 1.0 {
-            self.each(values, out, |_, _, last| last);
+            self.last.copy(values, self.region.as_deref(), out);
         } else if t == 0.0 {
-            self.each(values, out, |_, before, _| before);
+            self.before.copy(values, self.region.as_deref(), out);
         } else if self.earlier.is_none() {
             self.each(values, out, |_, before, last| before + t * (last - before));
         } else {

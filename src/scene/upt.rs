@@ -394,7 +394,7 @@ fn decode_tiles(
     out: &mut [f32],
 ) -> Result<()> {
     let failed: Mutex<Option<Error>> = Mutex::new(None);
-    let parts = crate::kernels::pool::Parts::new(out);
+    let parts = crate::kernels::parts::Parts::new(out);
     for stage in stages {
         let mut stage = stage.lock().map_err(internal)?;
         stage.input(1).copy_from_slice(&record.keys);

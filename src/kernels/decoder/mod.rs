@@ -18,7 +18,8 @@ mod weights;
 pub use weights::{DecoderTokens, DecoderWeights, PackedDecoder};
 
 use super::isa::Isa;
-use super::pool::{Parts, Pool, PoolError};
+use super::parts::Parts;
+use super::pool::{Pool, PoolError};
 
 /// Arithmetic of the matrix products.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
