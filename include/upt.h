@@ -170,12 +170,12 @@
 #define UPT_PRECISION_BF16 1
 
 /**
- * 16-bit floats (GPU providers).
+ * 16-bit floats: the bundle's `*.f16.onnx`, or a GPU provider's own.
  */
 #define UPT_PRECISION_F16 2
 
 /**
- * 8-bit integers, where the bundle carries them.
+ * 8-bit integers: the bundle's `*.int8.onnx`.
  */
 #define UPT_PRECISION_INT8 3
 

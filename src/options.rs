@@ -90,7 +90,8 @@ pub struct ModelOptions {
     pub providers: Vec<Provider>,
     /// GPU to use.
     pub device_id: i32,
-    /// Precision asked for; what runs is in the stats. Default float32.
+    /// Precision asked for; what runs is in the stats. Default float32. Float16 and int8 need the bundle's variants of the
+    /// graphs ([`crate::Error::Unsupported`] without), but for float16 on TensorRT, which narrows the graph itself.
     pub precision: Option<Precision>,
     /// Bytes a GPU provider may allocate; 0 means no limit.
     pub gpu_memory_limit: u64,

@@ -2,7 +2,7 @@
 //!
 //! `cargo bench --bench step` runs every bundle in `onnx/` and in the folder that `UPT_BENCH_BUNDLES` names. A bundle that
 //! carries `paper_encoder.onnx` and `paper_decoder.onnx` is also run through ONNX Runtime as the paper splits it, with
-//! the same weights and threads. `UPT_FINE_MESH=FILE` adds steps on that mesh for bundles without a prior.
+//! the same weights and threads; `cargo bench --bench step -- reduced` runs the bundles with that name only. `UPT_FINE_MESH=FILE` adds steps on that mesh for bundles without a prior.
 
 mod fine;
 mod floor;
@@ -27,6 +27,10 @@ fn main() {
     measure::init_library();
     let machine = floor::Machine::measure();
     for bundle in measure::bundles() {
+        let name = bundle.file_name().unwrap_or_default().to_string_lossy();
+        if !measure::wanted(&name) {
+            continue;
+        }
         if let Err(error) = run(&bundle, &machine) {
             eprintln!("{}: {error}", bundle.display());
             std::process::exit(1);

@@ -8,6 +8,7 @@ use sha2::{Digest, Sha256};
 use super::manifest::Manifest;
 use super::tensors::TensorFile;
 use crate::error::{Error, Result};
+use crate::options::Precision;
 
 /// An opened bundle folder.
 #[derive(Debug)]
@@ -72,6 +73,30 @@ impl BundleFiles {
             ));
         }
         Ok(bytes)
+    }
+
+    /// The file of the graph `name` in a precision: `latent.onnx`, `latent.f16.onnx`, `latent.int8.onnx`. bfloat16 is
+    /// an arithmetic of the native kernels and has no graphs of its own.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] when the manifest does not list the variant.
+    pub fn graph_file(&self, name: &str, precision: Precision) -> Result<String> {
+        let variant = match precision {
+            Precision::F32 | Precision::Bf16 => return Ok(format!("{name}.onnx")),
+            Precision::F16 => "f16",
+            Precision::Int8 => "int8",
+        };
+        let file = format!("{name}.{variant}.onnx");
+        let stated = &self.manifest.precisions;
+        if stated.iter().any(|one| one == variant) && self.has(&file) {
+            return Ok(file);
+        }
+        Err(Error::Unsupported(format!(
+            "precision {variant}: {} has no {file} (bundle.json field `precisions` is [{}]); export it with \
+             `python -m upt_training export --{variant}`, or open the bundle with float32",
+            self.manifest.name,
+            stated.join(", ")
+        )))
     }
 
     /// A listed safetensors file.

@@ -71,9 +71,9 @@ pub const UPT_LOG_TRACE: i32 = 5;
 pub const UPT_PRECISION_F32: i32 = 0;
 /// bfloat16 products where the CPU has them.
 pub const UPT_PRECISION_BF16: i32 = 1;
-/// 16-bit floats (GPU providers).
+/// 16-bit floats: the bundle's `*.f16.onnx`, or a GPU provider's own.
 pub const UPT_PRECISION_F16: i32 = 2;
-/// 8-bit integers, where the bundle carries them.
+/// 8-bit integers: the bundle's `*.int8.onnx`.
 pub const UPT_PRECISION_INT8: i32 = 3;
 
 /// The library chooses the decoder.

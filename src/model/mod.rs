@@ -50,7 +50,7 @@ pub struct ModelInfo {
     pub max_push_mm: f32,
     /// Where the latent stage runs.
     pub provider: Provider,
-    /// Precision that runs.
+    /// Precision of the graphs that run: float32, float16 or int8.
     pub precision: Precision,
     /// Bytes held by the model.
     pub memory_bytes: u64,
@@ -136,13 +136,15 @@ impl Model {
             (0, n) => n,
             (n, _) => n,
         };
+        let graphs = graph_precision(&files, options);
         let (kind, choice) = match manifest.kind {
             ManifestKind::Reduced => {
-                let (model, choice) = ReducedModel::open(&files, runtime, &plan)?;
+                let (model, choice) = ReducedModel::open(&files, runtime, &plan, graphs)?;
                 (KindModel::Reduced(model), choice)
             }
             ManifestKind::Upt => {
-                let (model, choice) = UptModel::open(&files, &mesh, runtime, &plan, threads)?;
+                let (model, choice) =
+                    UptModel::open(&files, &mesh, runtime, &plan, threads, graphs)?;
                 (KindModel::Upt(Box::new(model)), choice)
             }
         };
@@ -186,7 +188,10 @@ impl Model {
             dt: self.manifest.dt_s as f32,
             max_push_mm: self.manifest.envelope.max_push_mm,
             provider: self.choice.provider,
-            precision: Precision::F32,
+            precision: match &self.kind {
+                KindModel::Upt(upt) => upt.precision,
+                KindModel::Reduced(reduced) => reduced.precision,
+            },
             memory_bytes: (own + prior + self.mesh.memory_bytes()) as u64,
             load_seconds: self.load_seconds,
         }
@@ -251,5 +256,23 @@ impl Model {
             IndexSet::DomainFaces => &self.mesh.domain_faces,
             IndexSet::Tets => &self.mesh.tets,
         }
+    }
+}
+
+/// Which variant of the graphs to read. TensorRT narrows a float32 graph itself, so float16 there needs no variant.
+fn graph_precision(files: &BundleFiles, options: &ModelOptions) -> Precision {
+    let narrows =
+        |provider: &Provider| matches!(provider, Provider::TensorRt | Provider::TensorRtRtx);
+    match options.precision {
+        Some(Precision::F16) => {
+            let has = files.graph_file("latent", Precision::F16).is_ok();
+            if !has && options.providers.iter().any(narrows) {
+                Precision::F32
+            } else {
+                Precision::F16
+            }
+        }
+        Some(Precision::Int8) => Precision::Int8,
+        Some(Precision::F32 | Precision::Bf16) | None => Precision::F32,
     }
 }

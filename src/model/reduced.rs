@@ -3,11 +3,15 @@
 use crate::bundle::{BundleFiles, ReducedEntry};
 use crate::error::{Error, Result};
 use crate::onnx::{ProviderChoice, ProviderPlan, Runtime, Stage, StageOptions};
+use crate::options::Precision;
 
 /// The part of a model that only kind `reduced` has; the tables are in [`crate::prior::PriorTable`].
 pub struct ReducedModel {
     /// The manifest's entry.
     pub entry: ReducedEntry,
+    /// Precision of the graph: float32, float16 or int8.
+    pub precision: Precision,
+    file: String,
     latent: Vec<u8>,
 }
 
@@ -17,15 +21,19 @@ impl ReducedModel {
         files: &BundleFiles,
         runtime: &'static Runtime,
         plan: &ProviderPlan,
+        precision: Precision,
     ) -> Result<(ReducedModel, ProviderChoice)> {
         let entry = files
             .manifest
             .reduced
             .clone()
             .ok_or_else(|| Error::bundle("bundle.json", "field `reduced` is missing"))?;
+        let file = files.graph_file("latent", precision)?;
         let model = ReducedModel {
             entry,
-            latent: files.read("latent.onnx")?,
+            precision,
+            latent: files.read(&file)?,
+            file,
         };
         let stage = model.stage(runtime, plan)?;
         Ok((model, stage.choice().clone()))
@@ -35,7 +43,7 @@ impl ReducedModel {
     pub fn stage(&self, runtime: &'static Runtime, plan: &ProviderPlan) -> Result<Stage> {
         Stage::new(
             runtime,
-            "latent.onnx",
+            &self.file,
             &self.latent,
             &[("state", &[1, self.entry.input_width()])],
             &[("b_next", &[1, self.entry.modes])],

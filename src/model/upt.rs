@@ -8,6 +8,7 @@ use crate::graph::SupernodeGraph;
 use crate::kernels::decoder::{DecoderWeights, PackedDecoder};
 use crate::kernels::encode::transpose_weight;
 use crate::onnx::{ProviderChoice, ProviderPlan, Runtime, Stage, StageOptions};
+use crate::options::Precision;
 
 /// Nodes a run of `embed.onnx`.
 const EMBED_TILE: usize = 2048;
@@ -63,8 +64,12 @@ pub struct UptModel {
     pub decoder: PackedDecoder,
     /// Tables of the bundle's mesh.
     pub tables: Arc<UptTables>,
+    /// Precision of the graphs `latent` and `decoder`: float32, float16 or int8.
+    pub precision: Precision,
     embed: Vec<u8>,
+    latent_file: String,
     latent: Vec<u8>,
+    decoder_file: String,
     decoder_graph: Vec<u8>,
 }
 
@@ -76,7 +81,10 @@ impl UptModel {
         runtime: &'static Runtime,
         plan: &ProviderPlan,
         threads: usize,
+        precision: Precision,
     ) -> Result<(UptModel, ProviderChoice)> {
+        let latent_file = files.graph_file("latent", precision)?;
+        let decoder_file = files.graph_file("decoder", precision)?;
         let entry = files
             .manifest
             .upt
@@ -95,8 +103,11 @@ impl UptModel {
             decoder: pack_decoder(&weights, &entry)?,
             tables,
             embed,
-            latent: files.read("latent.onnx")?,
-            decoder_graph: files.read("decoder.onnx")?,
+            precision,
+            latent: files.read(&latent_file)?,
+            latent_file,
+            decoder_graph: files.read(&decoder_file)?,
+            decoder_file,
             entry,
         };
         let choice = model
@@ -126,7 +137,7 @@ impl UptModel {
         Ok(embed_points(&self.entry, &self.embed, points, runtime, threads)?.2)
     }
 
-    /// A session of `latent.onnx`: `supernodes [n_S,d]` -> `keys [L,h]`, `values [L,h]`.
+    /// A session of the latent graph: `supernodes [n_S,d]` -> `keys [L,h]`, `values [L,h]`.
     pub fn latent_stage(
         &self,
         runtime: &'static Runtime,
@@ -138,7 +149,7 @@ impl UptModel {
         let kv: &[usize] = &[dims.latent_tokens, dims.decoder];
         Stage::new(
             runtime,
-            "latent.onnx",
+            &self.latent_file,
             &self.latent,
             &[("supernodes", &[supernodes, dims.encoder])],
             &[("keys", kv), ("values", kv)],
@@ -149,14 +160,14 @@ impl UptModel {
         )
     }
 
-    /// A session of `decoder.onnx` for tiles of [`DECODER_TILE`] nodes:
+    /// A session of the decoder graph for tiles of [`DECODER_TILE`] nodes:
     /// `queries [n,2h]`, `keys`, `values` -> `displacement [n,3]`.
     pub fn decoder_stage(&self, runtime: &'static Runtime, plan: &ProviderPlan) -> Result<Stage> {
         let dims = &self.entry.dims;
         let kv: &[usize] = &[dims.latent_tokens, dims.decoder];
         Stage::new(
             runtime,
-            "decoder.onnx",
+            &self.decoder_file,
             &self.decoder_graph,
             &[
                 ("queries", &[DECODER_TILE, dims.query]),

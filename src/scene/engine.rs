@@ -278,7 +278,7 @@ impl Engine {
     pub fn precision(&self) -> Precision {
         match self {
             Engine::Upt(engine, _) => engine.precision(),
-            Engine::Reduced(_) => Precision::F32,
+            Engine::Reduced(engine) => engine.precision(),
         }
     }
 

@@ -320,7 +320,11 @@ fn build(model: &Arc<Model>, options: &SceneOptions) -> Result<Core> {
                 ),
             };
             let kernel = match options.kernel {
-                DecoderKernel::Auto if model.info().provider == Provider::Cpu => {
+                // The native kernel has float32 and bfloat16 only.
+                DecoderKernel::Auto
+                    if model.info().provider == Provider::Cpu
+                        && kind.precision == Precision::F32 =>
+                {
                     DecoderKernel::Native
                 }
                 DecoderKernel::Auto => DecoderKernel::Onnx,

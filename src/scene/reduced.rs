@@ -10,6 +10,7 @@ use crate::kernels::rows::Stored;
 use crate::kernels::{Isa, Pool};
 use crate::model::{Model, ReducedModel};
 use crate::onnx::Stage;
+use crate::options::Precision;
 use crate::prior::{ContactResponse, PriorTable, SolveReport};
 use crate::stats::{SceneStats, flag};
 
@@ -68,6 +69,7 @@ impl ReducedRecord {
 pub struct ReducedEngine {
     response: ContactResponse,
     stage: Stage,
+    precision: Precision,
     mode_rows: Vec<u32>,
     given_q: Vec<f32>,
     given_b: Vec<f32>,
@@ -104,6 +106,7 @@ impl ReducedEngine {
         Ok(ReducedEngine {
             response: ContactResponse::new(table),
             stage: kind.stage(model.runtime, &model.plan)?,
+            precision: kind.precision,
             mode_rows: (0..kind.entry.modes as u32).collect(),
             given_q: vec![0.0; table.width()],
             given_b: vec![0.0; kind.entry.modes],
@@ -117,6 +120,11 @@ impl ReducedEngine {
     pub fn reset(&mut self) {
         self.last.clear();
         self.before.clear();
+    }
+
+    /// Precision of the correction network.
+    pub fn precision(&self) -> Precision {
+        self.precision
     }
 
     /// What runs the correction network.

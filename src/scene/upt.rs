@@ -45,6 +45,7 @@ pub struct UptEngine {
     decoder_scratch: DecoderScratch,
     decoder_stages: Vec<Mutex<Stage>>,
     precision: DecoderPrecision,
+    graphs: Precision,
     /// The step being made.
     pub next: UptRecord,
     /// Last published.
@@ -131,6 +132,7 @@ impl UptEngine {
             } else {
                 DecoderPrecision::F32
             },
+            graphs: kind.precision,
             next: record.clone(),
             last: record.clone(),
             before: record,
@@ -140,8 +142,9 @@ impl UptEngine {
     /// Precision that the decoder runs in.
     pub fn precision(&self) -> Precision {
         match self.precision {
-            DecoderPrecision::Bf16 if self.decoder_stages.is_empty() => Precision::Bf16,
-            _ => Precision::F32,
+            _ if !self.decoder_stages.is_empty() => self.graphs,
+            DecoderPrecision::Bf16 => Precision::Bf16,
+            DecoderPrecision::F32 => Precision::F32,
         }
     }
 

@@ -254,9 +254,9 @@ namespace Upt.Interop
         public const int UPT_PRECISION_F32 = 0;
         /// <summary>bfloat16 products where the CPU has them.</summary>
         public const int UPT_PRECISION_BF16 = 1;
-        /// <summary>16-bit floats (GPU providers).</summary>
+        /// <summary>16-bit floats: the bundle's `*.f16.onnx`, or a GPU provider's own.</summary>
         public const int UPT_PRECISION_F16 = 2;
-        /// <summary>8-bit integers, where the bundle carries them.</summary>
+        /// <summary>8-bit integers: the bundle's `*.int8.onnx`.</summary>
         public const int UPT_PRECISION_INT8 = 3;
         /// <summary>The library chooses the decoder.</summary>
         public const int UPT_KERNEL_AUTO = 0;
