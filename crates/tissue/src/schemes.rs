@@ -1,4 +1,4 @@
-//! The five simulation schemes and the `hard` regimes.
+//! The five simulation schemes, the `hard` regimes, and `probe`, which only serves training.
 //!
 //! A scheme fixes the magnitude, the number of collision faces and three functions
 //! of time on [0, 8 s]: the push factor `p(t)` in [0, 1], the tilt `phi(t)` from the
@@ -42,6 +42,9 @@ pub enum Scheme {
     HardSlide,
     /// Scheme 3's load with a tenth of the damping.
     HardRing,
+    /// For training: five sites in a row, each pushed, tilted and let go within 1.6 s. Sites are what a learned
+    /// correction lacks, and 160 frames at one site say little more about it than 32.
+    Probe,
 }
 
 impl Scheme {
@@ -75,6 +78,7 @@ impl Scheme {
             Scheme::HardTwo => "hard-two",
             Scheme::HardSlide => "hard-slide",
             Scheme::HardRing => "hard-ring",
+            Scheme::Probe => "probe",
         }
     }
 
@@ -115,10 +119,11 @@ impl std::str::FromStr for Scheme {
         Self::NUMBERED
             .into_iter()
             .chain(Self::HARD)
+            .chain([Scheme::Probe])
             .find(|scheme| scheme.name() == text)
             .ok_or_else(|| {
                 format!(
-                    "scheme `{text}` is unknown; use 1 to 5, a range such as 1-4, `hard`, or one of {}",
+                    "scheme `{text}` is unknown; use 1 to 5, a range such as 1-4, `hard`, `probe`, or one of {}",
                     Self::HARD.map(Scheme::name).join(", ")
                 )
             })
@@ -161,6 +166,16 @@ pub struct Draw {
     pub angle: f64,
 }
 
+impl Draw {
+    fn new(random: &mut SplitMix) -> Self {
+        Self {
+            depth: random.unit(),
+            size: random.unit(),
+            angle: random.unit(),
+        }
+    }
+}
+
 impl Scheme {
     /// Largest displacement, mm.
     pub fn magnitude_mm(self, draw: Draw) -> f64 {
@@ -173,6 +188,7 @@ impl Scheme {
             Scheme::HardDeep => 20.0 + 20.0 * draw.depth,
             Scheme::HardFast | Scheme::HardTwo => 10.0 + 5.0 * draw.depth,
             Scheme::HardSlide => 8.0 + 4.0 * draw.depth,
+            Scheme::Probe => 8.0 + 7.0 * draw.depth,
         }
     }
 
@@ -187,6 +203,7 @@ impl Scheme {
             // Deep pushes on few faces would only tear the mesh.
             Scheme::HardDeep => 60.0 + 40.0 * draw.size,
             Scheme::HardFast | Scheme::HardTwo | Scheme::HardSlide => 25.0 + 50.0 * draw.size,
+            Scheme::Probe => 25.0 + 75.0 * draw.size,
         }
     }
 
@@ -256,15 +273,35 @@ impl Scheme {
                 phi: 0.0,
                 theta: spin,
             },
+            Scheme::Probe => {
+                let since = t % PROBE_S;
+                Pose {
+                    push: if since < PROBE_LIFT_S {
+                        rise(since, 0.0, 0.6)
+                    } else {
+                        0.0
+                    },
+                    phi: PI / 6.0 * (7.0 * draw.angle).fract() + PI / 12.0 * rise(since, 0.3, 0.75),
+                    theta: spin,
+                }
+            }
         }
     }
 }
 
+/// One site of `probe` takes this long, s.
+const PROBE_S: f64 = 1.6;
+/// When the contact of a probe is lifted, s.
+const PROBE_LIFT_S: f64 = 0.8;
+/// Sites of `probe`.
+const PROBE_SITES: usize = 5;
+
 /// A case: a scheme at a site, ready to say what touches at each frame.
 pub struct Programme {
     scheme: Scheme,
-    draw: Draw,
-    /// One patch, two (`hard-two`), or one a waypoint (`hard-slide`).
+    /// One, or one a site (`probe`).
+    draws: Vec<Draw>,
+    /// One patch, two (`hard-two`), one a waypoint (`hard-slide`), or one a site (`probe`).
     patches: Vec<Patch>,
 }
 
@@ -279,13 +316,9 @@ impl Programme {
     /// A seed face whose part of `domain` is too small is passed over for the next draw.
     pub fn new(scheme: Scheme, domain: &ContactDomain, seed: u64) -> Result<Self, ContactError> {
         let mut random = SplitMix(seed);
-        let draw = Draw {
-            depth: random.unit(),
-            size: random.unit(),
-            angle: random.unit(),
-        };
+        let draw = Draw::new(&mut random);
         let area = scheme.face_count(draw) * FACE_AREA_MM2;
-        let mut place = || -> Result<Patch, ContactError> {
+        let mut place = |area: f64| -> Result<Patch, ContactError> {
             let mut outcome = Err(ContactError::EmptyDomain);
             for _ in 0..64 {
                 let face = (random.unit() * domain.face_count() as f64) as usize;
@@ -296,26 +329,35 @@ impl Programme {
             }
             outcome
         };
-        let first = place()?;
-        let mut patches = vec![first];
+        let mut patches = vec![place(area)?];
+        let mut draws = vec![draw];
         match scheme {
             Scheme::HardTwo => {
                 // Far enough apart that the patches share no node.
-                let mut second = place()?;
+                let mut second = place(area)?;
                 for _ in 0..64 {
                     if !shares_node(&patches[0], &second) {
                         break;
                     }
-                    second = place()?;
+                    second = place(area)?;
                 }
                 patches.push(second);
             }
             Scheme::HardSlide => patches = slide(domain, &patches[0], draw, area)?,
+            Scheme::Probe => {
+                // Seeds of their own: `place` holds the case's.
+                let mut others = SplitMix(seed ^ 0x5EED);
+                for _ in 1..PROBE_SITES {
+                    let draw = Draw::new(&mut others);
+                    patches.push(place(scheme.face_count(draw) * FACE_AREA_MM2)?);
+                    draws.push(draw);
+                }
+            }
             _ => {}
         }
         Ok(Self {
             scheme,
-            draw,
+            draws,
             patches,
         })
     }
@@ -328,17 +370,28 @@ impl Programme {
     /// Contact nodes and their displacement at the end of frame `frame` (0 is rest), ascending, mm.
     pub fn contact(&self, frame: usize) -> Vec<ContactNode> {
         let t = frame as f64 * FRAME_S;
-        let pose = self.scheme.pose(t, self.draw);
+        let site = match self.scheme {
+            Scheme::Probe => ((t / PROBE_S + 1e-9) as usize).min(PROBE_SITES - 1),
+            _ => 0,
+        };
+        let draw = self.draws[site];
+        // Whole frames: 1.6 s is a multiple of them, and the remainder of a rounded time is not.
+        let since = match self.scheme {
+            Scheme::Probe => (t - site as f64 * PROBE_S).clamp(0.0, PROBE_S - 1e-9),
+            _ => t,
+        };
+        let pose = self.scheme.pose(since, draw);
         if frame == 0 || pose.push <= 1e-6 {
             return Vec::new();
         }
-        let length = self.scheme.magnitude_mm(self.draw) * pose.push;
+        let length = self.scheme.magnitude_mm(draw) * pose.push;
         let active: &[Patch] = match self.scheme {
             Scheme::HardSlide => {
                 let stop = (t / 7.5 * SLIDE_STOPS as f64) as usize;
                 let stop = stop.min(self.patches.len() - 1);
                 &self.patches[stop..=stop]
             }
+            Scheme::Probe => &self.patches[site..=site],
             _ => &self.patches,
         };
         let mut contact: Vec<ContactNode> = Vec::new();
