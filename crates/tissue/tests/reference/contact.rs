@@ -158,6 +158,38 @@ fn programmes_follow_their_seed_and_hard_regimes_do_what_their_names_say() {
 }
 
 #[test]
+fn a_probe_visits_five_sites_and_lets_go_of_each() {
+    let mesh = box_phantom([80.0, 80.0, 40.0], [16, 16, 6]).unwrap();
+    let domain = ContactDomain::new(&mesh, Boundary::Fixed).unwrap();
+    let programme = Programme::new(Scheme::Probe, &domain, 4).unwrap();
+    let length = |frame: usize| {
+        let contact = programme.contact(frame);
+        let nodes: Vec<u32> = contact.iter().map(|c| c.node).collect();
+        let squared = contact
+            .first()
+            .map_or(0.0, |c| c.displacement.iter().map(|v| v * v).sum::<f32>());
+        (nodes, squared.sqrt())
+    };
+    let mut sites = std::collections::HashSet::new();
+    for start in (0..160).step_by(32) {
+        assert!(
+            programme.contact(start).is_empty(),
+            "rest before site {start}"
+        );
+        let (nodes, first) = length(start + 1);
+        let (same, deepest) = length(start + 15);
+        assert_eq!(nodes, same, "one site while it is pushed");
+        assert!(first > 0.0 && first < 2.0, "{first} mm in the first frame");
+        assert!((8.0..=15.001).contains(&deepest), "{deepest} mm");
+        for frame in start + 16..start + 32 {
+            assert!(programme.contact(frame).is_empty(), "free at frame {frame}");
+        }
+        sites.insert(nodes);
+    }
+    assert_eq!(sites.len(), 5);
+}
+
+#[test]
 fn scheme_lists_parse() {
     let names = |text: &str| {
         Scheme::parse_list(text).map(|s| s.into_iter().map(Scheme::name).collect::<Vec<_>>())
@@ -167,5 +199,6 @@ fn scheme_lists_parse() {
     assert_eq!(names("1,3").unwrap(), ["1", "3"]);
     assert_eq!(names("hard").unwrap().len(), 5);
     assert_eq!(names("hard-two").unwrap(), ["hard-two"]);
+    assert_eq!(names("probe").unwrap(), ["probe"]);
     assert!(names("6").is_err() && names("4-1").is_err() && names("").is_err());
 }

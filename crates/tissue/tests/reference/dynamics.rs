@@ -171,3 +171,42 @@ fn the_asked_step_is_cut_where_the_mesh_needs_it() {
     let report = solver.step_frame(&[], 0.05).unwrap();
     assert!(f64::from(report.inner_steps) >= 0.05 / critical);
 }
+
+#[test]
+fn mass_scaling_lengthens_the_step_and_leaves_statics_alone() {
+    // Layers of 1 mm set the step of a body of 5 mm elements.
+    let mut mesh = box_phantom([30.0, 30.0, 30.0], [6, 6, 6]).unwrap();
+    for position in &mut mesh.positions {
+        if (position[2] - 25.0).abs() < 1e-3 {
+            position[2] = 29.0;
+        }
+    }
+    let settle = |mass_scaling_s: f64| {
+        let options = SolverOptions {
+            mass_scaling_s,
+            ..SolverOptions::default()
+        };
+        let mut solver = Solver::new(&mesh, Boundary::Fixed, options).unwrap();
+        let contact = push(&top_nodes(&mesh, 30.0), [1.0, 0.0, -3.0]);
+        for _ in 0..40 {
+            solver.step_frame(&contact, 0.05).unwrap();
+        }
+        let mut u = vec![[0.0; 3]; mesh.node_count()];
+        solver.displacement(&mut u);
+        (u, solver.critical_step_at_rest_s(), solver.added_mass())
+    };
+    let (plain, short, nothing) = settle(0.0);
+    let (scaled, long, added) = settle(2e-4);
+    assert_eq!(nothing, 0.0);
+    assert!(added > 0.01 && added < 1.0, "added {added}");
+    assert!(
+        long > 1.5 * short,
+        "critical step {short} s, scaled {long} s"
+    );
+    let worst = plain
+        .iter()
+        .flatten()
+        .zip(scaled.iter().flatten())
+        .fold(0.0f32, |m, (a, b)| m.max((a - b).abs()));
+    assert!(worst < 2e-3, "statics differ by {worst} mm");
+}
