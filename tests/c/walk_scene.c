@@ -1,0 +1,157 @@
+/* What a scene offers beside the step: regions, points, instruments, forces, statistics, snapshots.
+ */
+#include <math.h>
+#include <stdlib.h>
+
+#include "walk.h"
+
+void walk_region_and_points(void) {
+  upt_scene *scene = make_scene();
+  const uint32_t far = (uint32_t)info.node_count;
+  float few[12], points[6] = {0};
+  float *positions = calloc((size_t)floats, sizeof *positions);
+  upt_status status;
+  int i;
+  EXPECT(upt_scene_step_contacts(scene, contact_nodes, contact_vectors, 4, before, floats), UPT_OK);
+
+  EXPECT(upt_scene_decode(NULL, contact_nodes, 4, few, 12), UPT_ERR_NULL);
+  EXPECT(upt_scene_decode(scene, NULL, 4, few, 12), UPT_ERR_NULL);
+  EXPECT(upt_scene_decode(scene, contact_nodes, 4, NULL, 12), UPT_ERR_NULL);
+  EXPECT(upt_scene_decode(scene, contact_nodes, 4, few, 9), UPT_ERR_ARGUMENT);
+  EXPECT(upt_scene_decode(scene, &far, 1, few, 3), UPT_ERR_ARGUMENT);
+  EXPECT(upt_scene_decode(scene, contact_nodes, 4, few, 12), UPT_OK);
+  for (i = 0; i < 12; i++) {
+    EXPECT_TRUE(few[i] == before[3 * contact_nodes[i / 3] + (uint32_t)(i % 3)]);
+  }
+
+  EXPECT(upt_scene_set_region(NULL, contact_nodes, 4), UPT_ERR_NULL);
+  EXPECT(upt_scene_set_region(scene, NULL, 4), UPT_ERR_NULL);
+  EXPECT(upt_scene_set_region(scene, &far, 1), UPT_ERR_ARGUMENT);
+  EXPECT(upt_scene_set_region(scene, contact_nodes, 4), UPT_OK);
+  EXPECT(upt_scene_step_contacts(scene, contact_nodes, contact_vectors, 4, before, floats),
+         UPT_ERR_ARGUMENT);
+  EXPECT(upt_scene_step_contacts(scene, contact_nodes, contact_vectors, 4, few, 12), UPT_OK);
+  EXPECT(upt_scene_set_region(scene, NULL, 0), UPT_OK);
+
+  EXPECT(upt_model_positions(model, positions, floats), UPT_OK);
+  memcpy(points, positions + 3 * contact_nodes[0], 3 * sizeof *points);
+  memcpy(points + 3, positions + 3 * contact_nodes[1], 3 * sizeof *points);
+  EXPECT(upt_scene_read_points(scene, points, 6), UPT_ERR_STATE);
+  EXPECT(upt_scene_sample_points(scene, 0.5, points, 6), UPT_ERR_STATE);
+  EXPECT(upt_scene_attach_points(NULL, points, 2), UPT_ERR_NULL);
+  EXPECT(upt_scene_attach_points(scene, NULL, 2), UPT_ERR_NULL);
+  points[1] = NAN;
+  EXPECT(upt_scene_attach_points(scene, points, 2), UPT_ERR_NON_FINITE);
+  points[1] = positions[3 * contact_nodes[0] + 1];
+  EXPECT(upt_scene_attach_points(scene, points, 2), UPT_OK);
+  EXPECT(upt_scene_step_contacts(scene, contact_nodes, contact_vectors, 4, before, floats), UPT_OK);
+  EXPECT(upt_scene_read_points(NULL, few, 6), UPT_ERR_NULL);
+  EXPECT(upt_scene_read_points(scene, NULL, 6), UPT_ERR_NULL);
+  EXPECT(upt_scene_read_points(scene, few, 3), UPT_ERR_ARGUMENT);
+  EXPECT(upt_scene_read_points(scene, few, 6), UPT_OK);
+  EXPECT_TRUE(isfinite(few[0]) && isfinite(few[5]));
+  EXPECT(upt_scene_sample_points(NULL, 1.0, few, 6), UPT_ERR_NULL);
+  EXPECT(upt_scene_sample_points(scene, INFINITY, few, 6), UPT_ERR_NON_FINITE);
+  EXPECT(upt_scene_sample_points(scene, 1.0, few, 3), UPT_ERR_ARGUMENT);
+  EXPECT(upt_scene_sample_points(scene, 1.0, few, 6), UPT_OK);
+  status = upt_scene_attach_points(scene, NULL, 0);
+  EXPECT(status, UPT_OK);
+  EXPECT(upt_scene_destroy(scene), UPT_OK);
+  free(positions);
+}
+
+void walk_instrument(void) {
+  upt_scene *scene = make_scene();
+  upt_instrument instrument;
+  uint32_t *nodes = calloc((size_t)info.node_count, sizeof *nodes);
+  float *vectors = calloc((size_t)floats, sizeof *vectors), few[12];
+  uint64_t count = 0;
+  upt_status status;
+  memset(&instrument, 0, sizeof instrument);
+  EXPECT(upt_model_positions(model, before, floats), UPT_OK);
+
+  EXPECT(upt_scene_contacts_from_instruments(NULL, &instrument, 1, NULL, NULL, 0, &count),
+         UPT_ERR_NULL);
+  EXPECT(upt_scene_contacts_from_instruments(scene, &instrument, 1, NULL, NULL, 0, NULL),
+         UPT_ERR_NULL);
+  EXPECT(upt_scene_contacts_from_instruments(scene, NULL, 1, NULL, NULL, 0, &count), UPT_ERR_NULL);
+  EXPECT(upt_scene_contacts_from_instruments(scene, &instrument, 1, nodes, vectors, info.node_count,
+                                             &count),
+         UPT_ERR_STRUCT_SIZE);
+  instrument.struct_size = sizeof instrument;
+  instrument.rotation[3] = 1.0F;
+  instrument.radius = 3.0F;
+  instrument.half_extents[1] = 5.0F;
+  memcpy(instrument.position, before + 3 * contact_nodes[0], sizeof instrument.position);
+  instrument.sticking = 4;
+  EXPECT(upt_scene_contacts_from_instruments(scene, &instrument, 1, nodes, vectors, info.node_count,
+                                             &count),
+         UPT_ERR_ARGUMENT);
+  instrument.sticking = 0;
+  status = upt_scene_contacts_from_instruments(scene, &instrument, 1, nodes, vectors,
+                                               info.node_count, &count);
+  if (status == UPT_ERR_UNSUPPORTED) {
+    EXPECT(status, UPT_ERR_UNSUPPORTED);
+  } else {
+    EXPECT(status, UPT_OK);
+    EXPECT_TRUE(count > 0);
+    instrument.position[0] = NAN;
+    EXPECT(upt_scene_contacts_from_instruments(scene, &instrument, 1, nodes, vectors,
+                                               info.node_count, &count),
+           UPT_ERR_NON_FINITE);
+  }
+
+  EXPECT(upt_scene_contact_force(NULL, few, 12), UPT_ERR_NULL);
+  EXPECT(upt_scene_contact_force(scene, NULL, 12), UPT_ERR_NULL);
+  EXPECT(upt_scene_step_contacts(scene, contact_nodes, contact_vectors, 4, NULL, 0), UPT_OK);
+  status = upt_scene_contact_force(scene, few, 12);
+  if (status == UPT_ERR_UNSUPPORTED) {
+    EXPECT(status, UPT_ERR_UNSUPPORTED);
+  } else {
+    EXPECT(status, UPT_OK);
+    EXPECT_TRUE(isfinite(few[0]) && isfinite(few[11]));
+    EXPECT(upt_scene_contact_force(scene, few, 9), UPT_ERR_ARGUMENT);
+  }
+  EXPECT(upt_scene_destroy(scene), UPT_OK);
+  free(nodes);
+  free(vectors);
+}
+
+void walk_state(void) {
+  upt_scene *scene = make_scene();
+  upt_scene_stats stats;
+  uint64_t needed = 0;
+  uint8_t *bytes;
+  int i;
+  memset(&stats, 0, sizeof stats);
+  for (i = 0; i < 3; i++) {
+    EXPECT(upt_scene_step_contacts(scene, contact_nodes, contact_vectors, 4, NULL, 0), UPT_OK);
+  }
+  EXPECT(upt_scene_get_stats(NULL, &stats), UPT_ERR_NULL);
+  EXPECT(upt_scene_get_stats(scene, NULL), UPT_ERR_NULL);
+  EXPECT(upt_scene_get_stats(scene, &stats), UPT_ERR_STRUCT_SIZE);
+  stats.struct_size = sizeof stats;
+  EXPECT(upt_scene_get_stats(scene, &stats), UPT_OK);
+  EXPECT_TRUE(stats.step_count == 3 && stats.contact_count == 4);
+  EXPECT_TRUE(stats.step_ms > 0.0 && stats.max_displacement_mm > 1.0F);
+  EXPECT_TRUE(stats.poisoned == 0 && stats.sleeping == 0);
+
+  EXPECT(upt_scene_save(NULL, NULL, 0, &needed), UPT_ERR_NULL);
+  EXPECT(upt_scene_save(scene, NULL, 0, NULL), UPT_ERR_NULL);
+  EXPECT(upt_scene_save(scene, NULL, 0, &needed), UPT_OK);
+  bytes = malloc((size_t)needed);
+  EXPECT(upt_scene_save(scene, bytes, needed - 1, NULL), UPT_ERR_ARGUMENT);
+  EXPECT(upt_scene_save(scene, bytes, needed, NULL), UPT_OK);
+  EXPECT(upt_scene_read(scene, before, floats), UPT_OK);
+  EXPECT(upt_scene_step(scene, NULL, NULL, NULL, 0), UPT_OK);
+  EXPECT(upt_scene_restore(NULL, bytes, needed), UPT_ERR_NULL);
+  EXPECT(upt_scene_restore(scene, NULL, needed), UPT_ERR_NULL);
+  EXPECT(upt_scene_restore(scene, bytes, needed), UPT_OK);
+  expect_unchanged(scene);
+  EXPECT(upt_scene_restore(scene, bytes, needed / 2), UPT_ERR_SNAPSHOT);
+  bytes[needed - 1] ^= 0x55;
+  EXPECT(upt_scene_restore(scene, bytes, needed), UPT_ERR_SNAPSHOT);
+  expect_unchanged(scene);
+  EXPECT(upt_scene_destroy(scene), UPT_OK);
+  free(bytes);
+}

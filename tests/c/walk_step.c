@@ -1,0 +1,165 @@
+/* Scenes and steps: options, dense and sparse contact, refused steps, the worker, sampling. */
+#include <math.h>
+#include <stdlib.h>
+
+#include "walk.h"
+
+#define MANY 20000
+
+void walk_scene_create(const char *reduced_bundle) {
+  upt_scene *scene = NULL;
+  upt_model *reduced = NULL;
+  upt_scene_options options;
+  memset(&options, 0, sizeof options);
+  EXPECT(upt_scene_create(NULL, NULL, &scene), UPT_ERR_NULL);
+  EXPECT(upt_scene_create(model, NULL, NULL), UPT_ERR_NULL);
+  EXPECT(upt_scene_create(model, &options, &scene), UPT_ERR_STRUCT_SIZE);
+  options.struct_size = sizeof options;
+  options.kernel = 9;
+  EXPECT(upt_scene_create(model, &options, &scene), UPT_ERR_ARGUMENT);
+  options.kernel = UPT_KERNEL_AUTO;
+  options.guard_policy = -1;
+  EXPECT(upt_scene_create(model, &options, &scene), UPT_ERR_ARGUMENT);
+  options.guard_policy = UPT_GUARD_HOLD;
+  options.reserved[2] = 1;
+  EXPECT(upt_scene_create(model, &options, &scene), UPT_ERR_ARGUMENT);
+  options.reserved[2] = 0;
+  options.mesh_path = "no/such.mesh.safetensors";
+  EXPECT_TRUE(upt_scene_create(model, &options, &scene) < 0);
+  /* A reduced bundle's tables belong to its own mesh. */
+  EXPECT(upt_model_open(reduced_bundle, NULL, &reduced), UPT_OK);
+  EXPECT(upt_scene_create(reduced, &options, &scene), UPT_ERR_UNSUPPORTED);
+  EXPECT(upt_model_close(reduced), UPT_OK);
+  options.mesh_path = NULL;
+  EXPECT_TRUE(scene == NULL);
+  EXPECT(upt_scene_create(model, &options, &scene), UPT_OK);
+  EXPECT(upt_scene_destroy(scene), UPT_OK);
+}
+
+void walk_step(void) {
+  upt_scene *scene = make_scene(), *twin = make_scene(), *held = make_scene_with(UPT_GUARD_HOLD);
+  float *field = calloc((size_t)floats, sizeof *field);
+  uint32_t far[1];
+  int i;
+  far[0] = (uint32_t)info.node_count;
+  for (i = 0; i < 12; i++) {
+    contact_vectors[i] = i % 3 == 2 ? -2.0F : 0.5F;
+  }
+  for (i = 0; i < 12; i++) {
+    field[3 * contact_nodes[i / 3] + (uint32_t)(i % 3)] = contact_vectors[i];
+  }
+
+  EXPECT(upt_scene_step(NULL, NULL, NULL, NULL, 0), UPT_ERR_NULL);
+  EXPECT(upt_scene_step(scene, NULL, field, NULL, floats), UPT_ERR_NULL);
+  EXPECT(upt_scene_step(scene, NULL, field, after, floats - 3), UPT_ERR_ARGUMENT);
+  EXPECT(upt_scene_step(scene, NULL, field, before, floats), UPT_OK);
+  for (i = 0; i < 12; i++) {
+    EXPECT_TRUE(before[3 * contact_nodes[i / 3] + (uint32_t)(i % 3)] == contact_vectors[i]);
+  }
+  expect_unchanged(scene);
+
+  /* The sparse form is the same step. */
+  EXPECT(upt_scene_step_contacts(twin, contact_nodes, contact_vectors, 4, after, floats), UPT_OK);
+  EXPECT_TRUE(memcmp(before, after, (size_t)floats * sizeof *before) == 0);
+
+  /* A refused step leaves the state. */
+  field[0] = NAN;
+  EXPECT(upt_scene_step(scene, NULL, field, NULL, 0), UPT_ERR_NON_FINITE);
+  EXPECT(upt_scene_step(scene, field, NULL, NULL, 0), UPT_ERR_NON_FINITE);
+  EXPECT(upt_scene_step_contacts(NULL, NULL, NULL, 0, NULL, 0), UPT_ERR_NULL);
+  EXPECT(upt_scene_step_contacts(scene, NULL, contact_vectors, 4, NULL, 0), UPT_ERR_NULL);
+  EXPECT(upt_scene_step_contacts(scene, contact_nodes, NULL, 4, NULL, 0), UPT_ERR_NULL);
+  EXPECT(upt_scene_step_contacts(scene, far, contact_vectors, 1, NULL, 0), UPT_ERR_ARGUMENT);
+  EXPECT(upt_scene_step_contacts(scene, contact_nodes, contact_vectors, UINT64_MAX, NULL, 0),
+         UPT_ERR_ARGUMENT);
+  contact_vectors[5] = INFINITY;
+  EXPECT(upt_scene_step_contacts(scene, contact_nodes, contact_vectors, 4, NULL, 0),
+         UPT_ERR_NON_FINITE);
+  contact_vectors[5] = -2.0F;
+  expect_unchanged(scene);
+
+  /* So does one that the guard refuses. */
+  EXPECT(upt_scene_read(held, before, floats), UPT_OK);
+  contact_vectors[5] = 1000.0F;
+  EXPECT(upt_scene_step_contacts(held, contact_nodes, contact_vectors, 4, NULL, 0), UPT_ERR_GUARD);
+  contact_vectors[5] = -2.0F;
+  expect_unchanged(held);
+  EXPECT(upt_scene_destroy(held), UPT_OK);
+
+  EXPECT(upt_scene_read(NULL, after, floats), UPT_ERR_NULL);
+  EXPECT(upt_scene_read(scene, NULL, 0), UPT_ERR_NULL);
+  EXPECT(upt_scene_read(scene, after, 3), UPT_ERR_ARGUMENT);
+
+  /* The output may be the memory of an input. */
+  field[0] = 0.0F;
+  memset(field, 0, (size_t)floats * sizeof *field);
+  EXPECT(upt_scene_step(scene, field, NULL, field, floats), UPT_OK);
+  memset(after, 0, (size_t)floats * sizeof *after);
+  EXPECT(upt_scene_reset(twin), UPT_OK);
+  EXPECT(upt_scene_step(twin, after, NULL, before, floats), UPT_OK);
+
+  EXPECT(upt_scene_reset(NULL), UPT_ERR_NULL);
+  EXPECT(upt_scene_reset(scene), UPT_OK);
+  EXPECT(upt_scene_read(scene, after, floats), UPT_OK);
+  for (i = 0; i < (int)floats; i++) {
+    if (after[i] != 0.0F) {
+      EXPECT_TRUE(after[i] == 0.0F);
+      break;
+    }
+  }
+  EXPECT(upt_scene_destroy(scene), UPT_OK);
+  EXPECT(upt_scene_destroy(twin), UPT_OK);
+  free(field);
+}
+
+void walk_worker(void) {
+  upt_scene *scene = make_scene(), *twin = make_scene(), *held = make_scene_with(UPT_GUARD_HOLD);
+  int i;
+  EXPECT(upt_scene_submit(NULL, contact_nodes, contact_vectors, 4), UPT_ERR_NULL);
+  EXPECT(upt_scene_submit(scene, NULL, contact_vectors, 4), UPT_ERR_NULL);
+  EXPECT(upt_scene_poll(NULL), UPT_ERR_NULL);
+  EXPECT(upt_scene_wait(NULL, 0), UPT_ERR_NULL);
+  EXPECT(upt_scene_wait(scene, 0), UPT_ERR_STATE);
+  EXPECT(upt_scene_submit(scene, contact_nodes, contact_vectors, 4), UPT_OK);
+  EXPECT(upt_scene_wait(scene, 60000), UPT_OK);
+  EXPECT(upt_scene_read(scene, before, floats), UPT_OK);
+  EXPECT(upt_scene_step_contacts(twin, contact_nodes, contact_vectors, 4, after, floats), UPT_OK);
+  EXPECT_TRUE(memcmp(before, after, (size_t)floats * sizeof *before) == 0);
+
+  /* A step in flight: pending, busy, and reads of published states go on. */
+  for (i = 0; i < MANY && !(expect_seen[99] && expect_seen[-UPT_ERR_BUSY]); i++) {
+    upt_status status;
+    EXPECT(upt_scene_submit(scene, contact_nodes, contact_vectors, 4), UPT_OK);
+    status = upt_scene_step(scene, NULL, NULL, NULL, 0);
+    if (status == UPT_ERR_BUSY) {
+      EXPECT(status, UPT_ERR_BUSY);
+    }
+    EXPECT(upt_scene_read(scene, after, floats), UPT_OK);
+    status = upt_scene_poll(scene);
+    if (status == UPT_PENDING) {
+      EXPECT(status, UPT_PENDING);
+    }
+    if (status == UPT_PENDING) {
+      EXPECT(upt_scene_wait(scene, 60000), UPT_OK);
+    }
+  }
+  EXPECT_TRUE(expect_seen[99]);
+  EXPECT_TRUE(expect_seen[-UPT_ERR_BUSY]);
+
+  /* The error of a submitted step is given once. */
+  contact_vectors[5] = 1000.0F;
+  EXPECT(upt_scene_submit(held, contact_nodes, contact_vectors, 4), UPT_OK);
+  EXPECT(upt_scene_wait(held, 60000), UPT_ERR_GUARD);
+  EXPECT(upt_scene_destroy(held), UPT_OK);
+  contact_vectors[5] = -2.0F;
+
+  EXPECT(upt_scene_sample(NULL, 0.5, after, floats), UPT_ERR_NULL);
+  EXPECT(upt_scene_sample(scene, 0.5, NULL, floats), UPT_ERR_NULL);
+  EXPECT(upt_scene_sample(scene, NAN, after, floats), UPT_ERR_NON_FINITE);
+  EXPECT(upt_scene_sample(scene, 0.5, after, 6), UPT_ERR_ARGUMENT);
+  EXPECT(upt_scene_sample(scene, 1.0, after, floats), UPT_OK);
+  EXPECT(upt_scene_read(scene, before, floats), UPT_OK);
+  EXPECT_TRUE(memcmp(before, after, (size_t)floats * sizeof *before) == 0);
+  EXPECT(upt_scene_destroy(scene), UPT_OK);
+  EXPECT(upt_scene_destroy(twin), UPT_OK);
+}
