@@ -69,6 +69,19 @@ else
   failed=$((failed + 1))
 fi
 
+# A library of another architecture: the same, since the loader refuses it. The copy's ELF header names another machine.
+mkdir -p "$build/foreign"
+cp -L "$libraries/libupt.so" "$build/foreign/libupt.so"
+machine='\xb7'
+[ "$(uname -m)" = x86_64 ] || machine='\x3e'
+printf "$machine" | dd of="$build/foreign/libupt.so" bs=1 seek=18 conv=notrunc status=none
+if message=$(LD_LIBRARY_PATH="$build/foreign" mono MissingLibrary.exe 2>&1) && grep -q "cargo xtask package --unity" <<<"$message"; then
+  passed=$((passed + 1))
+else
+  echo "a library of another architecture gave no useful message: $message"
+  failed=$((failed + 1))
+fi
+
 if python3 "$root/tests/csharp/meta.py" --check; then passed=$((passed + 1)); else failed=$((failed + 1)); fi
 
 export LD_LIBRARY_PATH=$libraries${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}
@@ -85,6 +98,25 @@ else
   failures=$(sed -E 's/.*Failures: ([0-9]+).*/\1/' <<<"$summary")
   passed=$((passed + run - errors - failures))
   failed=$((failed + errors + failures))
+fi
+# The interop layer under Roslyn for netstandard2.1, where a .NET SDK is at hand.
+if command -v dotnet >/dev/null; then
+  mkdir -p "$build/roslyn"
+  cat >"$build/roslyn/Upt.Interop.csproj" <<PROJECT
+<Project Sdk="Microsoft.NET.Sdk">
+  <PropertyGroup>
+    <TargetFramework>netstandard2.1</TargetFramework>
+    <LangVersion>7.2</LangVersion>
+    <AllowUnsafeBlocks>true</AllowUnsafeBlocks>
+    <TreatWarningsAsErrors>true</TreatWarningsAsErrors>
+    <EnableDefaultCompileItems>false</EnableDefaultCompileItems>
+  </PropertyGroup>
+  <ItemGroup><Compile Include="$plugin/Runtime/Interop/*.cs" /></ItemGroup>
+</Project>
+PROJECT
+  if dotnet build --nologo -v quiet "$build/roslyn/Upt.Interop.csproj"; then passed=$((passed + 1)); else failed=$((failed + 1)); fi
+else
+  echo "left out: the netstandard2.1 build by Roslyn; no dotnet SDK is installed"
 fi
 echo "$passed passed, $failed failed, 0 skipped"
 [ "$failed" -eq 0 ]

@@ -291,6 +291,31 @@ namespace Unity.Collections.LowLevel.Unsafe
 
 namespace Unity.Profiling
 {
+    public struct ProfilerCategory { public static ProfilerCategory Scripts { get { return default(ProfilerCategory); } } }
+    public enum ProfilerMarkerDataUnit { TimeNanoseconds = 1 }
+    [Flags]
+    public enum ProfilerCounterOptions { None = 0, FlushOnEndOfFrame = 2, ResetToZeroOnFlush = 4 }
+
+    /// <summary>The counters made so far, by name; the stub never flushes them.</summary>
+    public static class StubCounters
+    {
+        public static readonly Dictionary<string, object> Cells = new Dictionary<string, object>();
+        public static long Read(string name) { return ((ProfilerCounterValue<long>.Cell)Cells[name]).Value; }
+    }
+
+    public struct ProfilerCounterValue<T> where T : struct
+    {
+        public sealed class Cell { public T Value; }
+        private readonly Cell cell;
+        public ProfilerCounterValue(ProfilerCategory category, string name, ProfilerMarkerDataUnit unit,
+                                    ProfilerCounterOptions options)
+        {
+            cell = new Cell();
+            StubCounters.Cells[name] = cell;
+        }
+        public T Value { get { return cell.Value; } set { cell.Value = value; } }
+    }
+
     public struct ProfilerMarker
     {
         public ProfilerMarker(string name) { }

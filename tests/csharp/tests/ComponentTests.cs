@@ -2,6 +2,7 @@ using System;
 using System.IO;
 using System.Threading;
 using NUnit.Framework;
+using Unity.Profiling;
 using Upt.Interop;
 using Upt.Samples;
 using UnityEngine;
@@ -102,6 +103,37 @@ namespace Upt.Tests
                 Time.deltaTime = 1f / 60f;
             }
             Assert.That(Debug.Errors, Is.Empty);
+        }
+
+        [Test]
+        public void FinishedStepsAreCountedInTheProfiler()
+        {
+            GameObject item = new GameObject("sample");
+            PushedBrain sample = item.AddComponent<PushedBrain>();
+            sample.model = Asset(Bundle.Path);
+            item.SetActive(true);
+            long before = StepsCounted();
+            double told = 0.0;
+            ulong last = 0;
+            for (int frame = 0; frame < 60; frame++)
+            {
+                item.Send("Update");
+                sample.Tissue.gameObject.Send("Update");
+                Thread.Sleep(2);
+                if (sample.Tissue.LastStats.step_count == last) continue;
+                last = sample.Tissue.LastStats.step_count;
+                told += sample.Tissue.LastStats.step_ms;
+            }
+            item.SetActive(false);
+            Assert.That(told, Is.GreaterThan(0.0));
+            Assert.That(1e-6 * (StepsCounted() - before), Is.EqualTo(told).Within(1e-3 * told));
+            Assert.That(StubCounters.Read("libupt Decode"), Is.GreaterThan(0));
+            Assert.That(StubCounters.Read("libupt Latent"), Is.GreaterThan(0));
+        }
+
+        private static long StepsCounted()
+        {
+            return StubCounters.Cells.ContainsKey("libupt Step") ? StubCounters.Read("libupt Step") : 0;
         }
 
         [Test]

@@ -171,6 +171,7 @@ namespace Upt
             {
                 inFlight = false;
                 LastStats = scene.Stats();
+                StepCounters.Add(LastStats);
             }
             if (!inFlight && clock >= dt)
             {

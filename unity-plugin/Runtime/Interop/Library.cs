@@ -23,7 +23,7 @@ namespace Upt.Interop
             catch (DllNotFoundException error)
             {
                 throw new UptException(Native.UPT_ERR_RUNTIME,
-                    "the native library 'upt' was not found: in Unity, fill Runtime/Plugins with " +
+                    "the native library 'upt' was not found, or is not for this processor: in Unity, fill Runtime/Plugins with " +
                     "`cargo xtask package --unity`; elsewhere put libupt.so (upt.dll, libupt.dylib) on the " +
                     "library path. " + error.Message);
             }

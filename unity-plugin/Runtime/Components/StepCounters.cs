@@ -1,0 +1,45 @@
+using Unity.Profiling;
+using Upt.Interop;
+
+namespace Upt
+{
+    /// <summary>
+    /// Stage times of the steps that finished in a frame, over all tissues, as counters of Unity's profiler
+    /// (category Scripts). The steps run on libupt's workers: this is their time, not the frame's.
+    /// </summary>
+    internal static class StepCounters
+    {
+        // Not readonly: their values are set.
+        private static ProfilerCounterValue<long> step = Counter("libupt Step");
+        private static ProfilerCounterValue<long> prior = Counter("libupt Prior");
+        private static ProfilerCounterValue<long> encode = Counter("libupt Encode");
+        private static ProfilerCounterValue<long> aggregate = Counter("libupt Aggregate");
+        private static ProfilerCounterValue<long> latent = Counter("libupt Latent");
+        private static ProfilerCounterValue<long> decode = Counter("libupt Decode");
+        private static ProfilerCounterValue<long> guard = Counter("libupt Guard");
+
+        /// <summary>Adds a finished step. Allocates nothing.</summary>
+        public static void Add(upt_scene_stats stats)
+        {
+            step.Value += Nanoseconds(stats.step_ms);
+            prior.Value += Nanoseconds(stats.prior_ms);
+            encode.Value += Nanoseconds(stats.encode_ms);
+            aggregate.Value += Nanoseconds(stats.aggregate_ms);
+            latent.Value += Nanoseconds(stats.latent_ms);
+            decode.Value += Nanoseconds(stats.decode_ms);
+            guard.Value += Nanoseconds(stats.guard_ms);
+        }
+
+        private static ProfilerCounterValue<long> Counter(string name)
+        {
+            return new ProfilerCounterValue<long>(
+                ProfilerCategory.Scripts, name, ProfilerMarkerDataUnit.TimeNanoseconds,
+                ProfilerCounterOptions.FlushOnEndOfFrame | ProfilerCounterOptions.ResetToZeroOnFlush);
+        }
+
+        private static long Nanoseconds(double milliseconds)
+        {
+            return (long)(milliseconds * 1e6);
+        }
+    }
+}
