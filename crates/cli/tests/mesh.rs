@@ -1,4 +1,4 @@
-//! `upt mesh` and `upt export` as a user calls them.
+//! `upt mesh` as a user calls it.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

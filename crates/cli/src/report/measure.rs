@@ -7,6 +7,7 @@ use tissue::mesh::Mesh;
 
 use super::cases::Cases;
 use super::errors::{CaseErrors, StepErrors, step_errors};
+use super::memory::Resident;
 use super::method::{Method, Stepper};
 use super::row::{Measurement, Pictured, Row, mean_and_deviation, quantile};
 
@@ -33,6 +34,7 @@ pub fn measure(
     progress: &dyn Fn(usize, usize),
 ) -> Result<Measurement> {
     let header = &plan.cases.list[0].trajectory.header;
+    let resident = Resident::now();
     let started = Instant::now();
     let mut stepper = Stepper::new(method, plan.mesh, header)?;
     let load_s = started.elapsed().as_secs_f64();
@@ -102,7 +104,10 @@ pub fn measure(
     };
     row.load_s = load_s;
     row.first_step_ms = first_step_ms;
-    row.memory_mb = stepper.memory_mb()?;
+    row.memory_mb = match stepper.memory_mb()? {
+        Some(told) => told,
+        None => resident.growth_mb(),
+    };
     let is_surrogate = matches!(method, Method::Surrogate { .. });
     row.deviation = is_surrogate.then_some(if reference.is_some() { deviation } else { 0.0 });
     fill_errors(&mut row, &cases);

@@ -96,6 +96,8 @@ pub struct BundleFolder {
     pub mesh_sha256: String,
     pub mesh_file: PathBuf,
     pub sha256: String,
+    /// Float32, the variants of the graphs that the manifest lists, and bfloat16 where kind and CPU have it.
+    pub precisions: Vec<Precision>,
 }
 
 /// A method in one configuration.
@@ -163,8 +165,22 @@ impl BundleFolder {
                 .map(str::to_owned)
                 .with_context(|| format!("{}: field `{name}` is missing", file.display()))
         };
+        let listed = |name: &str| {
+            let list = fields["precisions"].as_array();
+            list.is_some_and(|list| list.iter().any(|one| one == name))
+        };
+        let mut precisions = vec![Precision::F32];
+        if fields["kind"] == "upt" && upt::kernels::Isa::has_bf16() {
+            precisions.push(Precision::Bf16);
+        }
+        for narrow in [Precision::F16, Precision::Int8] {
+            if listed(narrow.name()) {
+                precisions.push(narrow);
+            }
+        }
         use sha2::Digest;
         Ok(Self {
+            precisions,
             path: path.to_path_buf(),
             name: text(&fields["name"], "name")?,
             boundary: text(&fields["boundary"], "boundary")?,
@@ -291,15 +307,13 @@ impl Stepper {
             .collect())
     }
 
-    /// Host memory of the method, MB; 0 where it is not known.
-    pub fn memory_mb(&self) -> Result<f64> {
+    /// Host memory that the library says it holds, MB; none for other methods.
+    pub fn memory_mb(&self) -> Result<Option<f64>> {
         let Self::Surrogate(surrogate) = self else {
-            return Ok(0.0);
+            return Ok(None);
         };
-        Ok(
-            (surrogate.model.info().memory_bytes + surrogate.scene.stats()?.memory_bytes) as f64
-                / 1e6,
-        )
+        let bytes = surrogate.model.info().memory_bytes + surrogate.scene.stats()?.memory_bytes;
+        Ok(Some(bytes as f64 / 1e6))
     }
 }
 

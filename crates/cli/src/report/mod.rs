@@ -5,29 +5,31 @@
 
 mod cache;
 mod cases;
+mod choose;
 pub mod errors;
 mod html;
 mod measure;
+mod memory;
 pub mod method;
 mod paper_split;
 pub mod pictures;
 mod plot;
 mod row;
 mod table;
+mod write;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, bail};
 use clap::Args;
-use serde_json::json;
 use tissue::mesh::Mesh;
 
 use crate::machine::Machine;
 use cache::Cache;
 use cases::Cases;
 use measure::Plan;
-use method::{BundleFolder, Method, Precision, Provider, Region};
+use method::{Method, Precision, Provider, Region};
 use row::Measurement;
 
 #[derive(Args)]
@@ -57,7 +59,8 @@ pub struct Options {
     threads: Vec<u32>,
     #[arg(long, value_delimiter = ',', default_value = "all,surface")]
     region: Vec<Region>,
-    #[arg(long, value_delimiter = ',', default_value = "f32")]
+    /// Default: float32 and what else a bundle and this CPU have.
+    #[arg(long, value_delimiter = ',')]
     precision: Vec<Precision>,
     #[arg(long, value_delimiter = ',', default_value = "cpu")]
     provider: Vec<Provider>,
@@ -97,9 +100,9 @@ fn default_threads() -> Vec<u32> {
 pub fn run(options: &Options) -> Result<ExitCode> {
     let cases = Cases::read(&options.trajectories, &options.data, options.cases)?;
     let mut notes = Vec::new();
-    let bundles = fitting_bundles(options, &cases, &mut notes)?;
-    let mesh = mesh_of(&cases, &bundles)?;
-    let methods = methods(options, &cases, &bundles, &mut notes)?;
+    let bundles = choose::fitting_bundles(options, &cases, &mut notes)?;
+    let mesh = choose::mesh_of(&cases, &bundles)?;
+    let methods = choose::methods(options, &cases, &bundles, &mut notes)?;
     let moments: Vec<(usize, usize)> = pictures::moments(&cases.list[0])
         .into_iter()
         .map(|frame| (0, frame))
@@ -112,7 +115,7 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     if measurements.is_empty() {
         bail!("nothing could be measured: {}", notes.join("; "));
     }
-    let report = write(
+    let report = write::write(
         options,
         &cases,
         &mesh,
@@ -132,134 +135,6 @@ pub fn run(options: &Options) -> Result<ExitCode> {
         println!("{}", options.out.join("report.html").display());
     }
     Ok(ExitCode::SUCCESS)
-}
-
-/// The bundles whose mesh and boundary are the cases'; the others are named in `notes`.
-fn fitting_bundles(
-    options: &Options,
-    cases: &Cases,
-    notes: &mut Vec<String>,
-) -> Result<Vec<BundleFolder>> {
-    let paths = if options.bundles.is_empty() {
-        crate::doctor::bundles_below("onnx".as_ref())
-    } else {
-        options.bundles.clone()
-    };
-    let mut fitting = Vec::new();
-    for path in &paths {
-        let bundle = BundleFolder::read(path)?;
-        if bundle.mesh_sha256 != cases.mesh_sha256 {
-            notes.push(format!(
-                "{}: made for another mesh than the cases'",
-                bundle.name
-            ));
-        } else if bundle.boundary != cases.boundary {
-            notes.push(format!(
-                "{}: made for the boundary `{}`, the cases have `{}`",
-                bundle.name, bundle.boundary, cases.boundary
-            ));
-        } else {
-            fitting.push(bundle);
-        }
-    }
-    Ok(fitting)
-}
-
-/// The cases' mesh: out of a fitting bundle, or of onnx/meshes.
-fn mesh_of(cases: &Cases, bundles: &[BundleFolder]) -> Result<Mesh> {
-    let mut candidates: Vec<PathBuf> = bundles
-        .iter()
-        .map(|bundle| bundle.mesh_file.clone())
-        .collect();
-    if let Ok(entries) = std::fs::read_dir("onnx/meshes") {
-        candidates.extend(entries.filter_map(|entry| entry.ok().map(|entry| entry.path())));
-    }
-    for path in candidates {
-        if path
-            .extension()
-            .is_some_and(|extension| extension == "safetensors")
-        {
-            let mesh = Mesh::read(&path)?;
-            if mesh.hash() == cases.mesh_sha256 {
-                return Ok(mesh);
-            }
-        }
-    }
-    bail!(
-        "no bundle and no file of onnx/meshes has the cases' mesh ({}); name a bundle with --bundle",
-        cases.mesh_sha256
-    )
-}
-
-/// Every configuration asked for.
-fn methods(
-    options: &Options,
-    cases: &Cases,
-    bundles: &[BundleFolder],
-    notes: &mut Vec<String>,
-) -> Result<Vec<Method>> {
-    let most = options.threads.iter().copied().max().unwrap_or(1);
-    let mut methods = Vec::new();
-    for bundle in bundles {
-        for provider in &options.provider {
-            for precision in &options.precision {
-                for region in &options.region {
-                    for threads in &options.threads {
-                        methods.push(Method::Surrogate {
-                            bundle: bundle.clone(),
-                            provider: *provider,
-                            precision: *precision,
-                            region: *region,
-                            threads: *threads,
-                        });
-                    }
-                }
-            }
-        }
-    }
-    for plain in &options.plain {
-        match plain.as_str() {
-            "zero" => methods.push(Method::Zero),
-            "linear" => methods.push(Method::Linear {
-                threads: most,
-                decay: cases.release_decay(),
-            }),
-            "coarse" if options.coarse_mesh.is_file() => {
-                if Mesh::read(&options.coarse_mesh)?.hash() == cases.mesh_sha256 {
-                    notes.push("coarse TLED: the cases are on the coarse mesh themselves".into());
-                    continue;
-                }
-                methods.extend(options.threads.iter().map(|threads| Method::CoarseTled {
-                    mesh: options.coarse_mesh.clone(),
-                    threads: *threads,
-                }));
-            }
-            "coarse" => notes.push(format!(
-                "coarse TLED: {} does not exist",
-                options.coarse_mesh.display()
-            )),
-            "tled" => methods.extend(
-                options
-                    .threads
-                    .iter()
-                    .map(|threads| Method::Tled { threads: *threads }),
-            ),
-            "paper" => {
-                let with_split = bundles
-                    .iter()
-                    .filter(|bundle| paper_split::available(bundle));
-                for bundle in with_split {
-                    methods.extend(options.threads.iter().map(|threads| Method::PaperSplit {
-                        bundle: bundle.clone(),
-                        threads: *threads,
-                    }));
-                }
-            }
-            "none" => {}
-            other => bail!("--plain {other}: known are zero, linear, coarse, tled, paper, none"),
-        }
-    }
-    Ok(methods)
 }
 
 /// Measures what is not stored yet, one row after the other (two at once would steal each other's cores).
@@ -371,164 +246,4 @@ fn float32_frames(method: &Method, plan: &Plan<'_>) -> Result<Option<Vec<Vec<[f3
     let mut keep = Some(Vec::new());
     measure::measure(&plain, &quick, None, &mut keep, &|_, _| ())?;
     Ok(keep)
-}
-
-/// Writes report.json and report.html; returns the former.
-fn write(
-    options: &Options,
-    cases: &Cases,
-    mesh: &Mesh,
-    measurements: &[Measurement],
-    moments: &[(usize, usize)],
-    machine: &Machine,
-    notes: &[String],
-) -> Result<serde_json::Value> {
-    std::fs::create_dir_all(&options.out)
-        .with_context(|| format!("cannot make {}", options.out.display()))?;
-    let header = &cases.list[0].trajectory.header;
-    let runtime = upt::onnx::Runtime::get(None).map_or_else(
-        |error| error.to_string(),
-        |runtime| runtime.version().to_owned(),
-    );
-    let date = date();
-    let rows: Vec<&row::Row> = measurements.iter().map(|one| &one.row).collect();
-    let report = json!({
-        "machine": machine,
-        "date": date,
-        "versions": {"upt": env!("CARGO_PKG_VERSION"), "onnxruntime": runtime, "solver": header.solver},
-        "mesh": {"name": header.mesh_name, "sha256": cases.mesh_sha256, "nodes": mesh.node_count(), "boundary": cases.boundary},
-        "cases": cases.list.iter().map(|case| case.name.as_str()).collect::<Vec<_>>(),
-        "left_out": notes,
-        "rows": rows,
-    });
-    std::fs::write(
-        options.out.join("report.json"),
-        serde_json::to_string_pretty(&report)? + "\n",
-    )?;
-
-    let shown = one_a_family(measurements);
-    let shown_measurements: Vec<&Measurement> =
-        shown.iter().map(|index| &measurements[*index]).collect();
-    let in_pictures: Vec<&Measurement> = shown_measurements
-        .iter()
-        .copied()
-        .filter(|one| !matches!(one.row.method.as_str(), "TLED" | "predict zero"))
-        .collect();
-    let mut facts: html::Facts = vec![
-        (
-            "machine".into(),
-            format!(
-                "{}, {} cores, {} GB, {}",
-                machine.cpu, machine.cores, machine.memory_gb, machine.os
-            ),
-        ),
-        ("features".into(), machine.features.join(" ")),
-        ("date".into(), date),
-        (
-            "versions".into(),
-            format!(
-                "upt {}, ONNX Runtime {runtime}, reference {}",
-                env!("CARGO_PKG_VERSION"),
-                header.solver
-            ),
-        ),
-        (
-            "mesh".into(),
-            format!(
-                "{}, {} nodes, boundary `{}`, {}",
-                header.mesh_name,
-                mesh.node_count(),
-                cases.boundary,
-                cases.mesh_sha256
-            ),
-        ),
-        (
-            "cases".into(),
-            cases
-                .list
-                .iter()
-                .map(|case| case.name.as_str())
-                .collect::<Vec<_>>()
-                .join("; "),
-        ),
-    ];
-    let mut seen = Vec::new();
-    for one in measurements.iter().filter(|one| !one.row.bundle.is_empty()) {
-        if !seen.contains(&&one.row.bundle_sha256) {
-            seen.push(&one.row.bundle_sha256);
-            facts.push((
-                format!("bundle {}", one.row.bundle),
-                one.row.bundle_sha256.clone(),
-            ));
-        }
-    }
-    let page = html::Page {
-        title: &options.title,
-        lead: format!(
-            "{} on {} ({} nodes), replayed autoregressively by every method on {}.",
-            match cases.list.len() {
-                1 => "One contact".to_owned(),
-                count => format!("{count} contacts"),
-            },
-            header.mesh_name,
-            mesh.node_count(),
-            machine.cpu
-        ),
-        facts,
-        measurements,
-        galleries: pictures::galleries(mesh, &cases.list, moments, &in_pictures)?,
-        shown,
-        dt: header.dt_s,
-        notes: notes
-            .iter()
-            .map(|note| format!("Left out: {note}"))
-            .collect(),
-    };
-    std::fs::write(options.out.join("report.html"), html::page(&page))?;
-    Ok(report)
-}
-
-/// One row a family for the curves: float32, all nodes, most threads.
-fn one_a_family(measurements: &[Measurement]) -> Vec<usize> {
-    let mut shown: Vec<usize> = Vec::new();
-    let rank = |one: &Measurement| {
-        (
-            one.row.precision == "f32",
-            one.row.region == "all",
-            one.row.threads,
-        )
-    };
-    for (index, one) in measurements.iter().enumerate() {
-        match shown
-            .iter_mut()
-            .find(|at| measurements[**at].row.family() == one.row.family())
-        {
-            Some(at) if rank(one) > rank(&measurements[*at]) => *at = index,
-            Some(_) => {}
-            None => shown.push(index),
-        }
-    }
-    shown
-}
-
-/// Today in UTC, `YYYY-MM-DD` (Howard Hinnant's civil-from-days).
-fn date() -> String {
-    let seconds = std::time::SystemTime::now()
-        .duration_since(std::time::UNIX_EPOCH)
-        .map_or(0, |since| since.as_secs());
-    let days = (seconds / 86_400) as i64 + 719_468;
-    let era = days / 146_097;
-    let day_of_era = days - era * 146_097;
-    let year_of_era =
-        (day_of_era - day_of_era / 1460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
-    let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
-    let shifted = (5 * day_of_year + 2) / 153;
-    let day = day_of_year - (153 * shifted + 2) / 5 + 1;
-    let month = if shifted < 10 {
-        shifted + 3
-    } else {
-        shifted - 9
-    };
-    let year = year_of_era + era * 400 + i64::from(month <= 2);
-    format!("{year:04}-{month:02}-{day:02}")
 }

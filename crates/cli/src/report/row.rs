@@ -39,6 +39,8 @@ pub struct Row {
     pub first_step_ms: f64,
     /// Opening and making ready to step.
     pub load_s: f64,
+    /// What the library says it holds; for other methods the growth of resident memory from before loading to after the
+    /// last step (0 where the system does not tell).
     pub memory_mb: f64,
     /// Largest difference from the float32 path of the same bundle over a rollout, mm; none for plain methods.
     pub deviation: Option<f64>,

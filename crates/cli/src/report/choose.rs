@@ -1,0 +1,143 @@
+//! What a report compares: the bundles that fit the cases, their mesh, and every configuration asked for.
+
+use std::path::PathBuf;
+
+use anyhow::{Result, bail};
+use tissue::mesh::Mesh;
+
+use super::cases::Cases;
+use super::method::{BundleFolder, Method};
+use super::{Options, paper_split};
+
+/// The bundles whose mesh and boundary are the cases'; the others are named in `notes`.
+pub fn fitting_bundles(
+    options: &Options,
+    cases: &Cases,
+    notes: &mut Vec<String>,
+) -> Result<Vec<BundleFolder>> {
+    let paths = if options.bundles.is_empty() {
+        crate::doctor::bundles_below("onnx".as_ref())
+    } else {
+        options.bundles.clone()
+    };
+    let mut fitting = Vec::new();
+    for path in &paths {
+        let bundle = BundleFolder::read(path)?;
+        if bundle.mesh_sha256 != cases.mesh_sha256 {
+            notes.push(format!(
+                "{}: made for another mesh than the cases'",
+                bundle.name
+            ));
+        } else if bundle.boundary != cases.boundary {
+            notes.push(format!(
+                "{}: made for the boundary `{}`, the cases have `{}`",
+                bundle.name, bundle.boundary, cases.boundary
+            ));
+        } else {
+            fitting.push(bundle);
+        }
+    }
+    Ok(fitting)
+}
+
+/// The cases' mesh: out of a fitting bundle, or of onnx/meshes.
+pub fn mesh_of(cases: &Cases, bundles: &[BundleFolder]) -> Result<Mesh> {
+    let mut candidates: Vec<PathBuf> = bundles
+        .iter()
+        .map(|bundle| bundle.mesh_file.clone())
+        .collect();
+    if let Ok(entries) = std::fs::read_dir("onnx/meshes") {
+        candidates.extend(entries.filter_map(|entry| entry.ok().map(|entry| entry.path())));
+    }
+    for path in candidates {
+        if path
+            .extension()
+            .is_some_and(|extension| extension == "safetensors")
+        {
+            let mesh = Mesh::read(&path)?;
+            if mesh.hash() == cases.mesh_sha256 {
+                return Ok(mesh);
+            }
+        }
+    }
+    bail!(
+        "no bundle and no file of onnx/meshes has the cases' mesh ({}); name a bundle with --bundle",
+        cases.mesh_sha256
+    )
+}
+
+/// Every configuration asked for.
+pub fn methods(
+    options: &Options,
+    cases: &Cases,
+    bundles: &[BundleFolder],
+    notes: &mut Vec<String>,
+) -> Result<Vec<Method>> {
+    let most = options.threads.iter().copied().max().unwrap_or(1);
+    let mut methods = Vec::new();
+    for bundle in bundles {
+        for provider in &options.provider {
+            let precisions = if options.precision.is_empty() {
+                &bundle.precisions
+            } else {
+                &options.precision
+            };
+            for precision in precisions {
+                for region in &options.region {
+                    for threads in &options.threads {
+                        methods.push(Method::Surrogate {
+                            bundle: bundle.clone(),
+                            provider: *provider,
+                            precision: *precision,
+                            region: *region,
+                            threads: *threads,
+                        });
+                    }
+                }
+            }
+        }
+    }
+    for plain in &options.plain {
+        match plain.as_str() {
+            "zero" => methods.push(Method::Zero),
+            "linear" => methods.push(Method::Linear {
+                threads: most,
+                decay: cases.release_decay(),
+            }),
+            "coarse" if options.coarse_mesh.is_file() => {
+                if Mesh::read(&options.coarse_mesh)?.hash() == cases.mesh_sha256 {
+                    notes.push("coarse TLED: the cases are on the coarse mesh themselves".into());
+                    continue;
+                }
+                methods.extend(options.threads.iter().map(|threads| Method::CoarseTled {
+                    mesh: options.coarse_mesh.clone(),
+                    threads: *threads,
+                }));
+            }
+            "coarse" => notes.push(format!(
+                "coarse TLED: {} does not exist",
+                options.coarse_mesh.display()
+            )),
+            "tled" => methods.extend(
+                options
+                    .threads
+                    .iter()
+                    .map(|threads| Method::Tled { threads: *threads }),
+            ),
+            "paper" => {
+                let with_split = bundles
+                    .iter()
+                    .filter(|bundle| paper_split::available(bundle));
+                for bundle in with_split {
+                    methods.extend(options.threads.iter().map(|threads| Method::PaperSplit {
+                        bundle: bundle.clone(),
+                        threads: *threads,
+                    }));
+                }
+            }
+            "none" => {}
+            other => bail!("--plain {other}: known are zero, linear, coarse, tled, paper, none"),
+        }
+    }
+    Ok(methods)
+}
