@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::process::{run_checked, run_logged};
 use crate::workspace::Workspace;
-use crate::{ort, venv};
+use crate::{ort, stages, venv};
 
 #[derive(Args)]
 pub struct Options {
@@ -50,6 +50,31 @@ struct Target {
     name: String,
 }
 
+/// The part of the tables that is no Rust: `tests/csharp/overhead.sh`.
+const UNITY: &str = "unity-plugin";
+
+impl Target {
+    fn command(&self, workspace: &Workspace, library: &Path) -> Result<Command> {
+        if self.package == UNITY {
+            stages::build(workspace)?;
+            let mut command = Command::new("bash");
+            command.arg(workspace.path("tests/csharp/overhead.sh"));
+            stages::set_test_environment(workspace, &mut command, library);
+            return Ok(command);
+        }
+        let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+        command.current_dir(&workspace.root).args([
+            "bench",
+            "-p",
+            self.package,
+            "--bench",
+            &self.name,
+        ]);
+        ort::set_environment(&mut command, library);
+        Ok(command)
+    }
+}
+
 pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
     venv::create(workspace)?;
     let library = ort::host_library(workspace)?;
@@ -58,7 +83,7 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
         eprintln!("left out: the rows of `fast` and `paper`: {error:#}");
     }
     let mut tables: Vec<(String, Vec<Row>)> = Vec::new();
-    let mut failed = Vec::new();
+    let (mut failed, mut notes) = (Vec::new(), Vec::new());
     for target in targets(workspace)? {
         if options
             .only
@@ -67,19 +92,11 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
         {
             continue;
         }
-        let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-        command.current_dir(&workspace.root).args([
-            "bench",
-            "-p",
-            target.package,
-            "--bench",
-            &target.name,
-        ]);
+        let mut command = target.command(workspace, &library)?;
         if options.quick {
             command.env("UPT_BENCH_QUICK", "1");
         }
         command.env("UPT_BENCH_BUNDLES", &random);
-        ort::set_environment(&mut command, &library);
         let log = workspace
             .logs()
             .join(format!("bench-{}-{}.log", target.package, target.name));
@@ -98,6 +115,10 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
             );
             failed.push(format!("{}/{}", target.package, target.name));
             continue;
+        }
+        for line in left_out(&finished.text) {
+            eprintln!("{}/{}: {line}", target.package, target.name);
+            notes.push(line.to_owned());
         }
         let rows = rows(&finished.text)?;
         if rows.is_empty() {
@@ -118,7 +139,7 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
             .with_context(|| format!("cannot write {}", path.display()))?;
     }
     if !options.keep_docs {
-        write_document(workspace, options, &tables, &failed)?;
+        write_document(workspace, options, &tables, &failed, &notes)?;
     }
     Ok(failed.is_empty())
 }
@@ -167,7 +188,7 @@ fn is_newer(made: &Path, source: &Path) -> bool {
     written(made).is_some_and(|made| written(source).is_some_and(|source| made > source))
 }
 
-/// Bench targets of `benches/` and `crates/tissue/benches/`: files, and folders with a `main.rs`.
+/// Bench targets of `benches/` and `crates/tissue/benches/` (files, and folders with a `main.rs`), and the C# side.
 fn targets(workspace: &Workspace) -> Result<Vec<Target>> {
     let mut found = Vec::new();
     for (package, folder) in [("upt", "benches"), ("tissue", "crates/tissue/benches")] {
@@ -187,6 +208,10 @@ fn targets(workspace: &Workspace) -> Result<Vec<Target>> {
             }
         }
     }
+    found.push(Target {
+        package: UNITY,
+        name: "overhead".into(),
+    });
     found.sort_by(|a, b| (a.package, &a.name).cmp(&(b.package, &b.name)));
     Ok(found)
 }
@@ -196,6 +221,14 @@ fn rows(text: &str) -> Result<Vec<Row>> {
     text.lines()
         .filter_map(|line| line.trim().strip_prefix("ROW "))
         .map(|json| serde_json::from_str(json).with_context(|| format!("not a row: {json}")))
+        .collect()
+}
+
+/// What a bench says that it did not measure, and why.
+fn left_out(text: &str) -> Vec<&str> {
+    text.lines()
+        .filter_map(|line| line.trim().split_once("left out: "))
+        .map(|(_, reason)| reason)
         .collect()
 }
 
@@ -274,6 +307,7 @@ fn write_document(
     options: &Options,
     tables: &[(String, Vec<Row>)],
     failed: &[String],
+    notes: &[String],
 ) -> Result<()> {
     const BEGIN: &str = "<!-- cargo xtask bench: begin -->";
     const END: &str = "<!-- cargo xtask bench: end -->";
@@ -291,6 +325,9 @@ fn write_document(
     }
     for name in failed {
         let _ = write!(body, "\nNot measured: {name} (failed).\n");
+    }
+    for note in notes {
+        let _ = write!(body, "\nNot measured: {note}\n");
     }
     let path = workspace.path("docs/performance.md");
     let text = std::fs::read_to_string(&path)
@@ -332,5 +369,9 @@ mod tests {
         assert_eq!((verdict(&rows[0]), verdict(&rows[1])), ("bar", "goal"));
         assert!(table(&rows).contains("| step | 7.90 ms |"));
         assert!(super::rows("ROW {\"nam\":1}").is_err());
+        assert_eq!(
+            left_out("fast: left out: the floor\nleft over"),
+            ["the floor"]
+        );
     }
 }

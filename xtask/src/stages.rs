@@ -302,7 +302,7 @@ pub fn build(workspace: &Workspace) -> Result<()> {
 }
 
 /// What the test scripts of the other languages find their parts by.
-fn set_test_environment(workspace: &Workspace, command: &mut Command, library: &Path) {
+pub fn set_test_environment(workspace: &Workspace, command: &mut Command, library: &Path) {
     ort::set_environment(command, library);
     command
         .env("UPT_ROOT", &workspace.root)
