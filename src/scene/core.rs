@@ -12,13 +12,12 @@ use super::published::{Frame, Published, Values};
 use super::timing::Stopwatch;
 use crate::bundle::Mesh;
 use crate::envelope::EnvelopeCheck;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::guard;
-use crate::kernels::largest::largest;
 use crate::kernels::{FlushToZero, Isa, Pool};
 use crate::model::Model;
 use crate::options::{GuardPolicy, SceneOptions};
-use crate::stats::{SceneStats, flag};
+use crate::stats::SceneStats;
 
 /// A scene is asleep after this many steps without contact ...
 pub const QUIET_STEPS: u32 = 4;
@@ -264,90 +263,6 @@ impl Core {
         Ok(())
     }
 
-    /// Held nodes to zero, contact nodes to what is imposed; a held node stays held in contact.
-    fn enforce_next(&mut self) {
-        if !self.options.free_boundary {
-            enforce(
-                &self.mesh.held_nodes,
-                &self.held,
-                &self.incoming,
-                &mut self.next.field,
-            );
-        }
-    }
-
-    /// Largest displacement of the planned nodes in `next`, mm.
-    fn largest_of_next(&self) -> f32 {
-        largest(self.isa, &self.next.field, self.plan.nodes())
-    }
-
-    fn judge(&mut self, stats: &mut SceneStats) -> Result<u32> {
-        let mut watch = Stopwatch::start();
-        let _span = tracing::trace_span!("guard").entered();
-        let max = self.largest_of_next();
-        let bound = self.model.manifest.envelope.displacement_bound_mm;
-        let mut verdict = guard::judge(bound, max, self.max_displacement, self.incoming.max_push());
-        if self.options.check_inversion
-            && verdict & flag::NON_FINITE == 0
-            && guard::inverted(
-                &self.pool,
-                &self.mesh.positions,
-                &self.next.field,
-                &self.planned_tets,
-            )?
-        {
-            verdict |= flag::INVERTED;
-        }
-        stats.flags |= verdict;
-        stats.max_displacement_mm = max;
-        stats.guard_ms += watch.lap();
-        Ok(verdict)
-    }
-
-    /// The policy for a refused state. `Ok` means that `next` may be published.
-    fn refuse(
-        &mut self,
-        published: &RwLock<Published>,
-        verdict: u32,
-        stats: &mut SceneStats,
-    ) -> Result<()> {
-        let bound = self.model.manifest.envelope.displacement_bound_mm;
-        let error = Error::Guard(guard::describe(verdict, stats.max_displacement_mm, bound));
-        tracing::warn!(flags = verdict, "{error}");
-        match self.options.guard_policy {
-            GuardPolicy::Report if verdict & flag::NON_FINITE == 0 => return Ok(()),
-            GuardPolicy::Blend => {
-                self.fall_back()?;
-                if self.largest_of_next() <= bound {
-                    return Ok(());
-                }
-                // Even the linear response is out of bounds: rest, without this contact.
-                self.engine.rest_next();
-                self.incoming.clear();
-                self.next.field.fill(0.0);
-                return Ok(());
-            }
-            _ => {}
-        }
-        let mut shared = lock_write(published);
-        stats.max_displacement_mm = self.max_displacement;
-        shared.stats = *stats;
-        Err(error)
-    }
-
-    /// Replaces `next` by the linear response, or by the imposed contact alone where the bundle has none.
-    fn fall_back(&mut self) -> Result<()> {
-        self.engine.fall_back(
-            self.isa,
-            &self.pool,
-            &self.model,
-            &self.plan,
-            &mut self.next.field,
-        )?;
-        self.enforce_next();
-        Ok(())
-    }
-
     fn publish(&mut self, published: &RwLock<Published>, was_given: bool, stats: &SceneStats) {
         let fell_back =
             stats.flags & guard::REFUSED != 0 && self.options.guard_policy == GuardPolicy::Blend;
@@ -422,16 +337,5 @@ impl Core {
         let frames = if self.options.cubic_sampling { 4 } else { 3 };
         let contacts = 3 * 20 * count;
         frames * 12 * count + contacts + 16 * count + self.engine.memory_bytes()
-    }
-}
-
-pub(super) fn enforce(held_nodes: &[u32], held: &[bool], contact: &ContactSet, field: &mut [f32]) {
-    for (&node, c) in contact.nodes.iter().zip(contact.vectors.chunks_exact(3)) {
-        if !held[node as usize] {
-            field[3 * node as usize..3 * node as usize + 3].copy_from_slice(c);
-        }
-    }
-    for &node in held_nodes {
-        field[3 * node as usize..3 * node as usize + 3].fill(0.0);
     }
 }

@@ -15,6 +15,7 @@ mod snapshot;
 mod timing;
 mod tools;
 mod upt;
+mod verdict;
 mod worker;
 
 use std::sync::Arc;

@@ -2,11 +2,12 @@
 
 use std::sync::RwLock;
 
-use super::core::{Core, Source, enforce, lock_read, lock_write};
+use super::core::{Core, Source, lock_read, lock_write};
 use super::engine::Which;
 use super::plan::NodePlan;
 use super::points::AttachedPoints;
 use super::published::Published;
+use super::verdict::enforce;
 use crate::error::{Error, Result};
 use crate::kernels::FlushToZero;
 

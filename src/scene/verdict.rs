@@ -1,0 +1,112 @@
+//! Between decode and publish: boundary conditions, the guard's verdict on the new state, and what its policy makes of a
+//! state that it refuses.
+
+use std::sync::RwLock;
+
+use super::contact::ContactSet;
+use super::core::{Core, lock_write};
+use super::published::Published;
+use super::timing::Stopwatch;
+use crate::error::{Error, Result};
+use crate::guard;
+use crate::kernels::largest::largest;
+use crate::options::GuardPolicy;
+use crate::stats::{SceneStats, flag};
+
+impl Core {
+    /// Held nodes to zero, contact nodes to what is imposed; a held node stays held in contact.
+    pub(super) fn enforce_next(&mut self) {
+        if !self.options.free_boundary {
+            enforce(
+                &self.mesh.held_nodes,
+                &self.held,
+                &self.incoming,
+                &mut self.next.field,
+            );
+        }
+    }
+
+    /// Largest displacement of the planned nodes in `next`, mm.
+    pub(super) fn largest_of_next(&self) -> f32 {
+        largest(self.isa, &self.next.field, self.plan.nodes())
+    }
+
+    pub(super) fn judge(&mut self, stats: &mut SceneStats) -> Result<u32> {
+        let mut watch = Stopwatch::start();
+        let _span = tracing::trace_span!("guard").entered();
+        let max = self.largest_of_next();
+        let bound = self.model.manifest.envelope.displacement_bound_mm;
+        let mut verdict = guard::judge(bound, max, self.max_displacement, self.incoming.max_push());
+        if self.options.check_inversion
+            && verdict & flag::NON_FINITE == 0
+            && guard::inverted(
+                &self.pool,
+                &self.mesh.positions,
+                &self.next.field,
+                &self.planned_tets,
+            )?
+        {
+            verdict |= flag::INVERTED;
+        }
+        stats.flags |= verdict;
+        stats.max_displacement_mm = max;
+        stats.guard_ms += watch.lap();
+        Ok(verdict)
+    }
+
+    /// The policy for a refused state. `Ok` means that `next` may be published.
+    pub(super) fn refuse(
+        &mut self,
+        published: &RwLock<Published>,
+        verdict: u32,
+        stats: &mut SceneStats,
+    ) -> Result<()> {
+        let bound = self.model.manifest.envelope.displacement_bound_mm;
+        let error = Error::Guard(guard::describe(verdict, stats.max_displacement_mm, bound));
+        tracing::warn!(flags = verdict, "{error}");
+        match self.options.guard_policy {
+            GuardPolicy::Report if verdict & flag::NON_FINITE == 0 => return Ok(()),
+            GuardPolicy::Blend => {
+                self.fall_back()?;
+                if self.largest_of_next() <= bound {
+                    return Ok(());
+                }
+                // Even the linear response is out of bounds: rest, without this contact.
+                self.engine.rest_next();
+                self.incoming.clear();
+                self.next.field.fill(0.0);
+                return Ok(());
+            }
+            _ => {}
+        }
+        let mut shared = lock_write(published);
+        stats.max_displacement_mm = self.max_displacement;
+        shared.stats = *stats;
+        Err(error)
+    }
+
+    /// Replaces `next` by the linear response, or by the imposed contact alone where the bundle has none.
+    fn fall_back(&mut self) -> Result<()> {
+        self.engine.fall_back(
+            self.isa,
+            &self.pool,
+            &self.model,
+            &self.plan,
+            &mut self.next.field,
+        )?;
+        self.enforce_next();
+        Ok(())
+    }
+}
+
+/// Held nodes of `field` to zero, contact nodes to what is imposed.
+pub(super) fn enforce(held_nodes: &[u32], held: &[bool], contact: &ContactSet, field: &mut [f32]) {
+    for (&node, c) in contact.nodes.iter().zip(contact.vectors.chunks_exact(3)) {
+        if !held[node as usize] {
+            field[3 * node as usize..3 * node as usize + 3].copy_from_slice(c);
+        }
+    }
+    for &node in held_nodes {
+        field[3 * node as usize..3 * node as usize + 3].fill(0.0);
+    }
+}
