@@ -91,14 +91,17 @@ impl DatasetPlan {
     /// Case `index`: scheme `index mod |schemes|`, group `index div |schemes|`; every fifth group is held out.
     pub fn case(&self, index: usize) -> Case {
         let group = index / self.schemes.len();
+        let scheme = self.schemes[index % self.schemes.len()];
+        // A probe serves training and is never held out.
+        let held_out = group % 5 == 4 && scheme != Scheme::Probe;
         let mut random = SplitMix(self.seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ index as u64);
         Case {
             index,
             file: format!("case-{index:05}.trajectory.safetensors"),
-            scheme: self.schemes[index % self.schemes.len()].name().into(),
+            scheme: scheme.name().into(),
             // 53 bits: exact in every JSON reader.
             seed: random.next() >> 11,
-            split: if group % 5 == 4 { "test" } else { "train" }.into(),
+            split: if held_out { "test" } else { "train" }.into(),
         }
     }
 
