@@ -906,7 +906,8 @@ upt_status upt_scene_set_region(struct upt_scene *scene,
  * Decodes any nodes of the last state, whatever the region is.
  *
  * nodes: `[n]` indices. out: `[n,3]`, mm. out_count: floats in out, 3 n.
- * Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`, `UPT_ERR_PANIC`.
+ * Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`,
+ * `UPT_ERR_STATE` before the first step, `UPT_ERR_PANIC`.
  */
 upt_status upt_scene_decode(struct upt_scene *scene,
                             const uint32_t *nodes,
@@ -1003,8 +1004,8 @@ upt_status upt_scene_save(struct upt_scene *scene,
 /**
  * Restores a snapshot of the same model.
  *
- * Threads: one at a time. Errors: `UPT_ERR_SNAPSHOT`, `UPT_ERR_VERSION`, `UPT_ERR_NULL`, `UPT_ERR_HANDLE`,
- * `UPT_ERR_BUSY`, `UPT_ERR_PANIC`; the state stays.
+ * Threads: one at a time. Errors: `UPT_ERR_SNAPSHOT`, `UPT_ERR_VERSION`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NULL`,
+ * `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_PANIC`; the state stays.
  */
 upt_status upt_scene_restore(struct upt_scene *scene,
                              const uint8_t *bytes,

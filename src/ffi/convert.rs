@@ -107,9 +107,22 @@ pub(super) fn reserved(bytes: &[u8]) -> Result<(), Failure> {
     }
 }
 
+/// A step has no use for more threads, and a field that was never set must not start them.
+const MOST_THREADS: u32 = 1024;
+
+fn threads(value: u32) -> Result<usize, Failure> {
+    match value {
+        0..=MOST_THREADS => Ok(value as usize),
+        _ => fail(
+            UPT_ERR_ARGUMENT,
+            format!("threads is {value}; at most {MOST_THREADS} are started, 0 is the default"),
+        ),
+    }
+}
+
 pub(super) unsafe fn init_options(raw: &upt_init_options) -> Result<InitOptions, Failure> {
     Ok(InitOptions {
-        threads: raw.threads as usize,
+        threads: threads(raw.threads)?,
         onnxruntime_path: unsafe { optional_path(raw.onnxruntime_path, "onnxruntime_path") }?,
     })
 }
@@ -118,7 +131,7 @@ pub(super) unsafe fn model_options(raw: &upt_model_options) -> Result<ModelOptio
     reserved(&[raw.reserved])?;
     let providers = unsafe { slice(raw.providers, raw.provider_count, "providers") }?;
     Ok(ModelOptions {
-        threads: raw.threads as usize,
+        threads: threads(raw.threads)?,
         providers: providers
             .iter()
             .map(|&value| provider(value))
@@ -136,7 +149,7 @@ pub(super) unsafe fn model_options(raw: &upt_model_options) -> Result<ModelOptio
 pub(super) unsafe fn scene_options(raw: &upt_scene_options) -> Result<SceneOptions, Failure> {
     reserved(&raw.reserved)?;
     Ok(SceneOptions {
-        threads: raw.threads as usize,
+        threads: threads(raw.threads)?,
         kernel: kernel(raw.kernel)?,
         precision: precision(raw.precision)?,
         guard_policy: guard_policy(raw.guard_policy)?,

@@ -25,7 +25,8 @@ pub unsafe extern "C" fn upt_scene_set_region(
 /// Decodes any nodes of the last state, whatever the region is.
 ///
 /// nodes: `[n]` indices. out: `[n,3]`, mm. out_count: floats in out, 3 n.
-/// Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`, `UPT_ERR_PANIC`.
+/// Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`,
+/// `UPT_ERR_STATE` before the first step, `UPT_ERR_PANIC`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_scene_decode(
     scene: *mut upt_scene,

@@ -76,8 +76,8 @@ pub unsafe extern "C" fn upt_scene_save(
 
 /// Restores a snapshot of the same model.
 ///
-/// Threads: one at a time. Errors: `UPT_ERR_SNAPSHOT`, `UPT_ERR_VERSION`, `UPT_ERR_NULL`, `UPT_ERR_HANDLE`,
-/// `UPT_ERR_BUSY`, `UPT_ERR_PANIC`; the state stays.
+/// Threads: one at a time. Errors: `UPT_ERR_SNAPSHOT`, `UPT_ERR_VERSION`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NULL`,
+/// `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_PANIC`; the state stays.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_scene_restore(
     scene: *mut upt_scene,

@@ -536,7 +536,8 @@ namespace Upt.Interop
         /// Decodes any nodes of the last state, whatever the region is.
         ///
         /// nodes: `[n]` indices. out: `[n,3]`, mm. out_count: floats in out, 3 n.
-        /// Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`, `UPT_ERR_PANIC`.
+        /// Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`,
+        /// `UPT_ERR_STATE` before the first step, `UPT_ERR_PANIC`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_scene_decode(IntPtr scene, uint* nodes, ulong count, float* @out, ulong out_count);
@@ -618,8 +619,8 @@ namespace Upt.Interop
         /// <summary>
         /// Restores a snapshot of the same model.
         ///
-        /// Threads: one at a time. Errors: `UPT_ERR_SNAPSHOT`, `UPT_ERR_VERSION`, `UPT_ERR_NULL`, `UPT_ERR_HANDLE`,
-        /// `UPT_ERR_BUSY`, `UPT_ERR_PANIC`; the state stays.
+        /// Threads: one at a time. Errors: `UPT_ERR_SNAPSHOT`, `UPT_ERR_VERSION`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NULL`,
+        /// `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_PANIC`; the state stays.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_scene_restore(IntPtr scene, byte* bytes, ulong count);
