@@ -47,7 +47,8 @@ fn with_file(name: &str, file: &str, change: impl Fn(&mut Vec<u8>)) -> Result<()
 fn manifest_errors_name_the_field() {
     let set = |pointer: &'static str, value: serde_json::Value| {
         move |manifest: &mut serde_json::Value| {
-            *manifest.pointer_mut(pointer).unwrap() = value.clone()
+            let (parent, key) = pointer.rsplit_once('/').unwrap();
+            manifest.pointer_mut(parent).unwrap()[key] = value.clone()
         }
     };
     for (bundle, pointer, value, field) in [
@@ -109,6 +110,18 @@ fn manifest_errors_name_the_field() {
             "/upt/weights",
             "none.safetensors".into(),
             "upt.weights",
+        ),
+        (
+            "tiny-upt-prior",
+            "/prior/vibration",
+            "none.safetensors".into(),
+            "prior.vibration",
+        ),
+        (
+            "tiny-reduced",
+            "/prior/vibration",
+            "latent.onnx".into(),
+            "prior.vibration",
         ),
         (
             "tiny-upt",
@@ -207,6 +220,7 @@ fn graphs_and_tensors_that_do_not_fit_are_refused() {
         ("tiny-reduced", "prior.safetensors"),
         ("tiny-upt", "weights.safetensors"),
         ("tiny-upt", "mesh.safetensors"),
+        ("tiny-upt-prior", "vibration.safetensors"),
     ] {
         let error = with_file(bundle, file, |bytes| {
             let at = bytes.len() - 4;

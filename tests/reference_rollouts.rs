@@ -1,4 +1,5 @@
-//! A scene against independent references: numpy for kind `reduced`, the bundle's own graphs for kind `upt`.
+//! A scene against independent references: numpy for kind `reduced`, the bundle's own graphs and the rollout of the
+//! Python evaluation for kind `upt`.
 
 mod fixture;
 
@@ -11,11 +12,11 @@ fn tensors(name: &str) -> TensorFile {
     TensorFile::parse(name, std::fs::read(path(name)).unwrap()).unwrap()
 }
 
-#[test]
-fn a_reduced_scene_follows_the_numpy_rollout() {
-    let model = model("tiny-reduced");
+/// The scene against a stored rollout of the bundle; the flags that were set.
+fn follow(name: &str) -> u32 {
+    let model = model(name);
     let scene = scene(&model, &plain());
-    let reference = tensors("tiny-reduced-rollout.safetensors");
+    let reference = tensors(&format!("{name}-rollout.safetensors"));
     let count = scene.node_count();
     let fields = reference
         .f32("displacement", &[None, Some(count), Some(3)])
@@ -37,13 +38,24 @@ fn a_reduced_scene_follows_the_numpy_rollout() {
         scene.step(input, Some(&mut out)).unwrap();
         flags |= scene.stats().flags;
         let difference = largest_difference(&out, want);
-        assert!(difference < 2e-4, "step {t}: {difference} mm");
+        assert!(difference < 1e-4, "{name}, step {t}: {difference} mm");
     }
+    flags
+}
+
+#[test]
+fn a_reduced_scene_follows_the_numpy_rollout() {
     assert_ne!(
-        flags & flag::CLAMPED,
+        follow("tiny-reduced") & flag::CLAMPED,
         0,
         "the rollout is made to reach the bound"
     );
+}
+
+/// What `python -m upt_training evaluate` computes: linear response, free vibration, network, boundary conditions.
+#[test]
+fn a_upt_scene_with_a_prior_follows_the_rollout_of_the_evaluation() {
+    follow("tiny-upt-prior");
 }
 
 /// One graph of the bundle with fixed shapes.

@@ -165,7 +165,7 @@ fn a_snapshot_resumes_to_the_bit() {
 
 #[test]
 fn a_bad_snapshot_is_refused_and_changes_nothing() {
-    let [reduced, upt] = BUNDLES.map(model);
+    let (reduced, upt) = (model("tiny-reduced"), model("tiny-upt"));
     let scene = scene(&reduced, &plain());
     rollout(&scene, 5);
     let mut state = vec![0.0; 3 * scene.node_count()];

@@ -50,6 +50,14 @@ impl Manifest {
         self.listed(&self.mesh.file, "mesh.file")?;
         if let Some(prior) = &self.prior {
             self.listed(&prior.file, "prior.file")?;
+            if let Some(vibration) = &prior.vibration {
+                self.listed(vibration, "prior.vibration")?;
+                check(
+                    self.kind == ManifestKind::Upt,
+                    "prior.vibration",
+                    "only kind `upt` has it",
+                )?;
+            }
         }
         match self.kind {
             ManifestKind::Upt => {

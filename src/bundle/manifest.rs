@@ -73,6 +73,8 @@ pub struct Envelope {
 pub struct PriorEntry {
     /// File of the bundle.
     pub file: String,
+    /// File with the free vibration that follows a release; kind `upt` only.
+    pub vibration: Option<String>,
 }
 
 /// One group of node features, in the order of the encoder's input.
@@ -85,9 +87,9 @@ pub enum Feature {
     Collision,
     /// `u[t-1]` (3).
     PreviousDisplacement,
-    /// Linear response to `c[t+1]` (3).
+    /// Linear response to `c[t+1]`, or its free vibration without contact (3).
     Prior,
-    /// Linear response to `c[t]` (3).
+    /// The same of the step before (3).
     PreviousPrior,
     /// 1 at nodes in contact (1).
     Contact,
@@ -108,7 +110,7 @@ pub enum Base {
     None,
     /// `u[t]`.
     Displacement,
-    /// The linear response to `c[t+1]`.
+    /// The linear response to `c[t+1]`, or its free vibration without contact.
     Prior,
 }
 

@@ -122,11 +122,7 @@ impl Model {
             ));
         }
         let prior = match &manifest.prior {
-            Some(entry) => Some(PriorTable::parse(
-                &files.tensors(&entry.file)?,
-                &manifest,
-                &mesh,
-            )?),
+            Some(entry) => Some(PriorTable::open(&files, entry, &mesh)?),
             None => None,
         };
         let runtime = Runtime::get(process.onnxruntime_path.as_deref())?;

@@ -2,10 +2,13 @@
 //! (`prior.safetensors` of `docs/formats.md`), shared by both bundle kinds.
 //!
 //! Contact forces `f = A_CC^-1 c` from the exact compliance `A` between contact degrees of freedom, then the field in
-//! block coordinates `q = sum_i f_i response[i]`, `u_k = U_k q_k`.
+//! block coordinates `q = sum_i f_i response[i]`, `u_k = U_k q_k`. With `vibration.safetensors` the response swings on
+//! when the contact is gone.
 
 mod response;
 mod table;
+mod vibration;
 
 pub use response::{ContactResponse, SolveReport};
 pub use table::{Numbers, PriorTable};
+pub use vibration::FreeVibration;

@@ -2,7 +2,8 @@
 
 use half::f16;
 
-use crate::bundle::{Manifest, Mesh, TensorFile};
+use super::vibration::FreeVibration;
+use crate::bundle::{BundleFiles, Manifest, Mesh, PriorEntry, TensorFile};
 use crate::error::Result;
 use crate::grid::{PointGrid, squared_distance};
 use crate::kernels::rows::{BlockBasis, Stored};
@@ -76,11 +77,27 @@ pub struct PriorTable {
     /// For each node the column (index into `contact_nodes`) of itself or of the nearest contact node within
     /// [`REACH`] typical edges of the domain; [`NO_COLUMN`] for nodes farther away.
     pub nearest_column: Vec<u32>,
+    /// What the response does when the contact is gone; without it the response is zero then.
+    pub vibration: Option<FreeVibration>,
 }
 
 impl PriorTable {
-    /// Reads and checks the tables for a mesh.
-    pub fn parse(file: &TensorFile, manifest: &Manifest, mesh: &Mesh) -> Result<PriorTable> {
+    /// Reads and checks the tables that the manifest's entry names.
+    pub fn open(files: &BundleFiles, entry: &PriorEntry, mesh: &Mesh) -> Result<PriorTable> {
+        let manifest = &files.manifest;
+        let mut table = PriorTable::parse(&files.tensors(&entry.file)?, manifest, mesh)?;
+        if let Some(name) = &entry.vibration {
+            table.vibration = Some(FreeVibration::parse(
+                &files.tensors(name)?,
+                &table,
+                manifest.material.damping_per_s,
+                manifest.dt_s,
+            )?);
+        }
+        Ok(table)
+    }
+
+    fn parse(file: &TensorFile, manifest: &Manifest, mesh: &Mesh) -> Result<PriorTable> {
         let count = mesh.node_count();
         let contact_nodes = file.ascending("contact_nodes", count)?;
         if contact_nodes.is_empty() {
@@ -162,6 +179,7 @@ impl PriorTable {
             },
             force_to_z: optional("force_to_z", [dofs, response_modes])?,
             force_to_p: optional("force_to_p", [dofs, modes])?,
+            vibration: None,
         })
     }
 
@@ -226,6 +244,10 @@ impl PriorTable {
             + self.nearest_column.len())
             + self.basis.bytes()
             + self.response.bytes()
+            + self
+                .vibration
+                .as_ref()
+                .map_or(0, FreeVibration::memory_bytes)
     }
 }
 

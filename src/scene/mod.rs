@@ -15,6 +15,7 @@ mod snapshot;
 mod timing;
 mod tools;
 mod upt;
+mod upt_prior;
 mod verdict;
 mod worker;
 

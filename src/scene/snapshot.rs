@@ -16,7 +16,7 @@ use crate::error::{Error, Result};
 use crate::kernels::FlushToZero;
 
 const MAGIC: &[u8; 8] = b"UPTSNAP\0";
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 const DIGEST: usize = 32;
 
 struct Writer(Vec<u8>);
@@ -125,7 +125,14 @@ fn lists(engine: &mut Engine) -> Vec<&mut Vec<f32>> {
     match engine {
         Engine::Upt(engine, _) => [&mut engine.last, &mut engine.before]
             .into_iter()
-            .flat_map(|record| [&mut record.keys, &mut record.values, &mut record.q_prior])
+            .flat_map(|record| {
+                [
+                    &mut record.keys,
+                    &mut record.values,
+                    &mut record.q_prior,
+                    &mut record.vibration,
+                ]
+            })
             .collect(),
         Engine::Reduced(engine) => [&mut engine.last, &mut engine.before]
             .into_iter()

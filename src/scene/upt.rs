@@ -7,6 +7,7 @@ use super::engine::Which;
 use super::plan::NodePlan;
 use super::reduced::solve_flags;
 use super::timing::Stopwatch;
+use super::upt_prior::{decode_prior, respond};
 use crate::bundle::Feature;
 use crate::error::{Error, Result};
 use crate::kernels::aggregate::{Csr, encode_aggregate};
@@ -14,7 +15,6 @@ use crate::kernels::decoder::{
     DecoderPrecision, DecoderRows, DecoderScratch, DecoderTokens, decode,
 };
 use crate::kernels::encode::LowRank;
-use crate::kernels::rows::decode_rows;
 use crate::kernels::{Isa, Pool};
 use crate::model::{DECODER_TILE, Model, UptModel, UptTables};
 use crate::onnx::Stage;
@@ -29,10 +29,12 @@ pub struct UptRecord {
     pub keys: Vec<f32>,
     /// Decoder values `[L,h]`.
     pub values: Vec<f32>,
-    /// Linear response in block coordinates; empty where the bundle does not use it.
+    /// Linear response, or its free vibration without contact, in block coordinates; empty where the bundle does not use it.
     pub q_prior: Vec<f32>,
-    /// Linear response at the plan's nodes `[K,3]`; empty where the bundle does not use it.
+    /// The same at the plan's nodes `[K,3]`; empty where the bundle does not use it.
     pub prior_field: Vec<f32>,
+    /// Amplitudes `[m]` of the free modes, mm, and their velocities times the step `[m]`; empty where there are none.
+    pub vibration: Vec<f32>,
 }
 
 /// Buffers and sessions of a scene of kind `upt`.
@@ -80,6 +82,7 @@ impl UptRecord {
             &mut self.values,
             &mut self.q_prior,
             &mut self.prior_field,
+            &mut self.vibration,
         ] {
             values.fill(0.0);
         }
@@ -106,6 +109,12 @@ impl UptEngine {
             values: vec![0.0; kv],
             q_prior: vec![0.0; table.map_or(0, PriorTable::width)],
             prior_field: vec![0.0; table.map_or(0, |_| 3 * node_count)],
+            vibration: vec![
+                0.0;
+                table
+                    .and_then(|table| table.vibration.as_ref())
+                    .map_or(0, |vibration| 2 * vibration.count())
+            ],
         };
         let decoder_stages = if kernel == DecoderKernel::Onnx {
             (0..pool.threads())
@@ -183,12 +192,26 @@ impl UptEngine {
         let mut watch = Stopwatch::start();
         let span = tracing::trace_span!("prior").entered();
         if let (Some(response), Some(table)) = (&mut self.response, &model.prior) {
-            let contact = input.contact;
-            let report =
-                response.solve(isa, table, input.held, &contact.nodes, &contact.vectors)?;
+            let report = respond(
+                isa,
+                pool,
+                table,
+                response,
+                input.held,
+                input.contact,
+                &self.last,
+                &mut self.next,
+            )?;
             stats.flags |= solve_flags(report);
-            response.field(isa, pool, table, &mut self.next.q_prior)?;
-            self.prior_field_of_next(isa, pool, table, input.plan)?;
+            let next = &mut self.next;
+            decode_prior(
+                isa,
+                pool,
+                table,
+                input.plan,
+                &next.q_prior,
+                &mut next.prior_field,
+            )?;
         }
         drop(span);
         stats.prior_ms = watch.lap();
@@ -221,28 +244,6 @@ impl UptEngine {
         self.next.values.copy_from_slice(self.latent.output(1));
         stats.latent_ms = watch.lap();
         Ok(())
-    }
-
-    fn prior_field_of_next(
-        &mut self,
-        isa: Isa,
-        pool: &Pool,
-        table: &PriorTable,
-        plan: &NodePlan,
-    ) -> Result<()> {
-        let rows = plan
-            .rows()
-            .ok_or_else(|| internal("a plan without rows of the prior"))?;
-        let next = &mut self.next;
-        decode_rows(
-            isa,
-            pool,
-            &table.basis(),
-            rows,
-            &next.q_prior,
-            &mut next.prior_field,
-        )
-        .map_err(internal)
     }
 
     fn fill_features(&mut self, kind: &UptModel, tables: &UptTables, input: &UptInput<'_>) {
@@ -357,20 +358,18 @@ impl UptEngine {
         table: Option<&PriorTable>,
         plan: &NodePlan,
     ) -> Result<()> {
-        let (Some(table), Some(rows)) = (table.filter(|_| self.response.is_some()), plan.rows())
-        else {
+        let Some(table) = table.filter(|_| self.response.is_some()) else {
             return Ok(());
         };
         for record in [&mut self.last, &mut self.before] {
-            decode_rows(
+            decode_prior(
                 isa,
                 pool,
-                &table.basis(),
-                rows,
+                table,
+                plan,
                 &record.q_prior,
                 &mut record.prior_field,
-            )
-            .map_err(internal)?;
+            )?;
         }
         Ok(())
     }
@@ -381,7 +380,8 @@ impl UptEngine {
         let floats = record.keys.len()
             + record.values.len()
             + record.q_prior.len()
-            + record.prior_field.len();
+            + record.prior_field.len()
+            + record.vibration.len();
         4 * (3 * floats + self.features.len() + self.scratch.len())
     }
 }

@@ -79,6 +79,7 @@ def test_difference_mixing_gives_residual_velocity_and_change_of_response():
         ({"model": {"fearures": []}}, "fearures"),
         ({"model": {"features": ["speed"]}}, "speed"),
         ({"model": {"base": "zero"}}, "base"),
+        ({"model": {"vibration": True}}, "vibration"),
         ({"model": {"encoder": 30, "encoder_heads": 4}}, "multiple"),
         ({"train": {"epochs": "many"}}, "epochs"),
     ],

@@ -25,6 +25,7 @@ def parser() -> argparse.ArgumentParser:
         type=Path,
         help="prior.safetensors, for configurations that use the linear response",
     )
+    train.add_argument("--vibration", type=Path, help="vibration.safetensors, for configurations with `vibration`")
     train.add_argument("--out", type=Path, default=Path("runs/last"), help="run folder")
     train.add_argument("--resume", action="store_true", help="continue the run in --out, exactly")
     train.add_argument("--init", type=Path, help="checkpoint whose weights to start from")
@@ -37,6 +38,7 @@ def parser() -> argparse.ArgumentParser:
     evaluate.add_argument("--data", type=Path, required=True)
     evaluate.add_argument("--mesh", type=Path, help="another mesh than the bundle's (the data's)")
     evaluate.add_argument("--prior", type=Path, help="prior of that mesh")
+    evaluate.add_argument("--vibration", type=Path, help="vibration tables of that mesh")
     evaluate.add_argument("--split", default="test", choices=["train", "test", "all"])
     evaluate.add_argument("--schemes", nargs="*", help="only these")
     evaluate.add_argument("--count", type=int, default=0, help="at most this many cases")
@@ -50,6 +52,7 @@ def parser() -> argparse.ArgumentParser:
     export.add_argument("--mesh", type=Path, required=True)
     export.add_argument("--data", type=Path, help="dataset: envelope, material and real inputs for the self-check")
     export.add_argument("--prior", type=Path)
+    export.add_argument("--vibration", type=Path)
     export.add_argument("--name")
     export.add_argument("--description", default="")
     export.add_argument("--radius-mm", type=float, help="another radius of the graph (for another mesh)")
@@ -68,6 +71,7 @@ def parser() -> argparse.ArgumentParser:
     ablate.add_argument("--data", type=Path, required=True)
     ablate.add_argument("--mesh", type=Path)
     ablate.add_argument("--prior", type=Path)
+    ablate.add_argument("--vibration", type=Path)
     ablate.add_argument("--out", type=Path, required=True)
     ablate.add_argument("--steps", type=int, default=2000, help="optimiser steps of each variant")
     ablate.add_argument("--max-minutes", type=float, default=0.0, help="time limit of each variant")

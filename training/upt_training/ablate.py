@@ -17,7 +17,7 @@ import torch
 
 from upt_training.config import Settings, load_settings
 from upt_training.rollout import autoregressive_scores, cache_rollout
-from upt_training.run import choose_device, find_mesh, make_trainer
+from upt_training.run import choose_device, find_mesh, make_trainer, open_prior
 
 
 def variants(suite: str, base: Settings) -> dict[str, Settings]:
@@ -41,7 +41,8 @@ def variants(suite: str, base: Settings) -> dict[str, Settings]:
     add("no linear response at the step before", features=without(base, "previous_prior"))
     add("linear response as base only", features=without(base, "prior", "previous_prior"))
     add("linear response as input only", base="displacement")
-    add("no linear response", features=without(base, "prior", "previous_prior"), base="displacement")
+    add("no linear response", features=without(base, "prior", "previous_prior"), base="displacement", vibration=False)
+    add("no vibration after a release", vibration=False)
     add("no previous state", features=without(base, "previous_displacement"))
     add("features as they are (no differences)", mixing="plain")
     add("no corrupted states", corrupt_contact=0.0)
@@ -65,7 +66,8 @@ def _uniform(base: Settings):
 def run_variant(settings: Settings, options, mesh, folder: Path) -> dict:
     """Train for the budget, then score full rollouts of the held-out cases."""
     folder.mkdir(parents=True, exist_ok=True)
-    trainer = make_trainer(settings, options.data, mesh, options.prior, folder, choose_device(options.device))
+    table = open_prior(settings.model, mesh, options.prior, options.vibration)
+    trainer = make_trainer(settings, options.data, mesh, table, folder, choose_device(options.device))
     t = settings.train
     trainer.steps_per_epoch = max(1, options.steps // (t.epochs + t.autoregressive_epochs))
     trainer.total_steps = trainer.steps_per_epoch * (t.epochs + t.autoregressive_epochs)
@@ -165,7 +167,9 @@ def ablate_command(options) -> int:
         results["variants"][name] = run_variant(settings, options, mesh, out / "work")
         print(name, {k: v for k, v in results["variants"][name].items() if not isinstance(v, list)}, flush=True)
         path.write_text(json.dumps(results))
-    trainer = make_trainer(base, options.data, mesh, options.prior, out / "work", "cpu")
+    trainer = make_trainer(
+        base, options.data, mesh, open_prior(base.model, mesh, options.prior, options.vibration), out / "work", "cpu"
+    )
     count = min(options.cases, trainer.test_cache.case_count)
     cases = np.unique(np.linspace(0, trainer.test_cache.case_count - 1, count).round().astype(int))
     results["references"] = reference_scores(trainer.test_cache, cases)

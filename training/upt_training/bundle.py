@@ -190,6 +190,7 @@ def write_bundle(
     material: dict | None = None,
     envelope: dict | None = None,
     prior: Path | None = None,
+    vibration: Path | None = None,
     provenance: dict | None = None,
     errors: dict | None = None,
     paper_split: bool = False,
@@ -201,6 +202,8 @@ def write_bundle(
     out = Path(out)
     if model.settings.uses_prior and prior is None:
         raise InputError(f"{out}: the model's features or base use the prior: pass --prior prior.safetensors")
+    if model.settings.vibration and vibration is None:
+        raise InputError(f"{out}: the model uses free vibration: pass --vibration vibration.safetensors")
     model = model.eval().float().cpu()
     s = model.settings
     graph = build_graph(mesh, s.graph)
@@ -215,6 +218,8 @@ def write_bundle(
         mesh.save(staging / "mesh.safetensors")
         if prior is not None and s.uses_prior:
             shutil.copyfile(prior, staging / "prior.safetensors")
+        if s.vibration:
+            shutil.copyfile(vibration, staging / "vibration.safetensors")
         generator = np.random.default_rng(0)
         random = generator.standard_normal((mesh.node_count, s.feature_count)).astype(np.float32)
         check = self_check(model, staging, mesh, graph, [random, *(check_features or [])])
@@ -275,6 +280,8 @@ def write_bundle(
         }
         if prior is not None and s.uses_prior:
             manifest["prior"] = {"file": "prior.safetensors"}
+        if s.vibration:
+            manifest["prior"]["vibration"] = "vibration.safetensors"
         manifest["files"] = file_table(staging)
         (staging / "bundle.json").write_text(json.dumps(manifest, indent=1) + "\n")
         for file in staging.iterdir():

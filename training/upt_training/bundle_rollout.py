@@ -27,6 +27,7 @@ class BundleRunner:
         mesh: Mesh | None = None,
         prior: Path | None = None,
         precision: str = "f32",
+        vibration: Path | None = None,
     ):
         folder = Path(folder)
         path = folder / "bundle.json"
@@ -46,8 +47,16 @@ class BundleRunner:
         if "prior" in self.manifest:
             if prior is None and mesh is not None and mesh.sha256 != self.manifest["mesh"]["mesh_sha256"]:
                 raise InputError(f"{path}: the bundle uses a prior; pass --prior with the prior of the other mesh")
-            table = PriorTable(prior or folder / self.manifest["prior"]["file"], self.mesh.node_count)
-            self.prior = table.restrict(None)
+            swings = self.manifest["prior"].get("vibration")
+            if swings and prior is not None and vibration is None:
+                raise InputError(f"{path}: the bundle uses free vibration; pass --vibration with the tables of {prior}")
+            self.prior = PriorTable(
+                prior or folder / self.manifest["prior"]["file"],
+                self.mesh.node_count,
+                (vibration or folder / swings) if swings else None,
+                self.manifest["material"]["damping_per_s"],
+                self.manifest["dt_s"],
+            ).sequence()
         self.mean = np.asarray(self.settings["normalisation"]["mean"], np.float32)
         self.std = np.asarray(self.settings["normalisation"]["std"], np.float32)
         self.held = self.mesh.held_nodes(self.manifest["boundary"])
@@ -56,12 +65,8 @@ class BundleRunner:
     def reset(self) -> None:
         zero = np.zeros((self.mesh.node_count, 3), np.float32)
         self.u, self.previous, self.prior_now = zero, zero, zero
-
-    def response(self, nodes: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-        """`L(c)` on all nodes; zero without a prior."""
-        if self.prior is None:
-            return np.zeros_like(self.u)
-        return self.prior.response(nodes, vectors)
+        if self.prior is not None:
+            self.prior.reset()
 
     def features(self, nodes: np.ndarray, vectors: np.ndarray, prior_next: np.ndarray) -> np.ndarray:
         """Normalised features `[K, f]` of the step that ends with this contact."""
@@ -82,7 +87,7 @@ class BundleRunner:
         return np.ascontiguousarray(np.concatenate(parts, axis=1), np.float32)
 
     def step(self, nodes: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-        prior_next = self.response(nodes, vectors)
+        prior_next = np.zeros_like(self.u) if self.prior is None else self.prior.step(nodes, vectors)
         out = self.session(self.features(nodes, vectors, prior_next))
         if self.settings["base"] == "displacement":
             out = out + self.u

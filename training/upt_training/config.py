@@ -42,6 +42,7 @@ class ModelSettings:
 
     features: list[str] = field(default_factory=lambda: ["displacement", "collision"])
     base: str = "none"
+    vibration: bool = False  # the linear response goes on swinging when the contact is gone
     mixing: str = "plain"  # "plain", or "differences": the first Linear sees u - L_prev, u - u_prev, L - L_prev
     encoder: int = 96
     encoder_depth: int = 4
@@ -150,6 +151,8 @@ def settings_from_dict(values: dict, where: str = "configuration") -> Settings:
             raise InputError(f"{where}.model.features: {name!r} is not one of {', '.join(FEATURE_WIDTH)}")
     if model.base not in BASES:
         raise InputError(f"{where}.model.base: {model.base!r} is not one of {', '.join(BASES)}")
+    if model.vibration and not model.uses_prior:
+        raise InputError(f"{where}.model.vibration: needs the linear response as base or among the features")
     for width, heads in (
         ("encoder", "encoder_heads"),
         ("latent", "latent_heads"),

@@ -1,7 +1,7 @@
 """`python -m upt_training evaluate BUNDLE --data DIR`: all steps of held-out cases, autoregressive from rest, as JSON.
 
 Beside the bundle, on the same cases: predict zero, and (where the bundle has a prior) the linear-elastic quasi-static
-response alone and with a fitted decay after release.
+response alone, with a fitted decay after release, and with the free vibration of linear elasticity.
 """
 
 from __future__ import annotations
@@ -26,21 +26,23 @@ def evaluate_case(runner: BundleRunner, trajectory, baselines: bool, with_hausdo
     site = np.asarray(json.loads(site)) if site else None
     names = ["bundle"] + (["zero"] if baselines else [])
     if baselines and runner.prior is not None:
-        names += ["linear", "linear_decay"]
+        names += ["linear", "linear_decay"] + (["linear_vibration"] if runner.prior.table.vibration else [])
     metrics = {n: RolloutMetrics(runner.mesh.positions, site, with_hausdorff) for n in names}
     runner.reset()
     truth = trajectory.read()
-    free = np.zeros_like(runner.u)
+    static, free = np.zeros_like(runner.u), np.zeros_like(runner.u)
     for t in range(1, trajectory.frame_count):
         nodes, vectors = trajectory.contact(t)
-        before = runner.prior_now
         metrics["bundle"].add(runner.step(nodes, vectors), truth[t])
         if "zero" in metrics:
             metrics["zero"].add(np.zeros_like(free), truth[t])
         if "linear" in metrics:
-            metrics["linear"].add(runner.prior_now, truth[t])
-            free = DECAY * (before if before.any() else free) if len(nodes) == 0 else np.zeros_like(free)
-            metrics["linear_decay"].add(runner.prior_now + free, truth[t])
+            free = DECAY * (static + free) if len(nodes) == 0 else np.zeros_like(free)
+            static = runner.prior_now if len(nodes) else np.zeros_like(free)
+            metrics["linear"].add(static, truth[t])
+            metrics["linear_decay"].add(static + free, truth[t])
+        if "linear_vibration" in metrics:
+            metrics["linear_vibration"].add(runner.prior_now, truth[t])
     return metrics
 
 
@@ -75,7 +77,7 @@ def evaluate_bundle(
 
 def evaluate_command(options) -> int:
     mesh = load_mesh(options.mesh) if options.mesh else None
-    runner = BundleRunner(options.bundle, mesh, options.prior, options.precision)
+    runner = BundleRunner(options.bundle, mesh, options.prior, options.precision, options.vibration)
     dataset = open_dataset(options.data, runner.mesh)
     cases = dataset.select(options.split, options.schemes, options.count)
     import sys

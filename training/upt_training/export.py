@@ -12,10 +12,10 @@ from upt_training.bundle import MATERIAL, write_bundle
 from upt_training.config import settings_from_dict
 from upt_training.dataset import Dataset, open_dataset, open_trajectory
 from upt_training.envelope import measure_envelope
-from upt_training.errors import InputError
 from upt_training.mesh_file import Mesh, load_mesh
 from upt_training.model import Upt, load_state
 from upt_training.prior_table import PriorTable
+from upt_training.run import open_prior
 from upt_training.trainer import load_checkpoint
 
 
@@ -32,11 +32,13 @@ def load_model(run: Path) -> tuple[Upt, dict]:
     return model.eval(), checkpoint
 
 
-def real_features(model: Upt, mesh: Mesh, dataset: Dataset, prior: Path | None, count: int = 3) -> list[np.ndarray]:
+def real_features(
+    model: Upt, mesh: Mesh, dataset: Dataset, prior: PriorTable | None, count: int = 3
+) -> list[np.ndarray]:
     """Normalised features of true states, for the self-check."""
     import torch
 
-    table = PriorTable(prior, mesh.node_count).restrict(None) if model.settings.uses_prior else None
+    table = None if prior is None else prior.restrict(None)
     out = []
     for case in dataset.select("test")[:count]:
         trajectory = open_trajectory(case.path, mesh)
@@ -54,8 +56,9 @@ def real_features(model: Upt, mesh: Mesh, dataset: Dataset, prior: Path | None, 
             "contact": contact,
         }
         if table is not None:
-            fields["prior"] = table.response(nodes, vectors)
-            fields["previous_prior"] = table.response(*trajectory.contact(t - 1))
+            sequence = table.sequence()
+            fields["previous_prior"] = sequence.step(*trajectory.contact(t - 1))
+            fields["prior"] = sequence.step(nodes, vectors)
         fields = {k: torch.from_numpy(np.array(v)) for k, v in fields.items()}
         out.append(model.normalise(fields).numpy())
     return out
@@ -81,8 +84,7 @@ def export_command(options) -> int:
     model, checkpoint = load_model(options.run)
     settings = checkpoint["settings"]
     dataset = open_dataset(options.data, mesh) if options.data else None
-    if model.settings.uses_prior and options.prior is None:
-        raise InputError("the model uses the linear response: pass --prior prior.safetensors of this mesh")
+    prior = open_prior(model.settings, mesh, options.prior, options.vibration)
     for name in ("radius_mm", "max_degree", "supernodes"):
         if getattr(options, name) is not None:
             setattr(model.settings.graph, name, getattr(options, name))
@@ -110,12 +112,13 @@ def export_command(options) -> int:
         material=dataset.manifest.get("material", MATERIAL) if dataset else None,
         envelope=envelope,
         prior=options.prior,
+        vibration=options.vibration,
         provenance=provenance,
         errors=bundle_errors(options.errors) if options.errors else None,
         paper_split=options.paper_split,
         step=options.step,
         precisions=("f32", *(["f16"] if options.f16 else []), *(["int8"] if options.int8 else [])),
-        check_features=real_features(model, mesh, dataset, options.prior) if dataset else None,
+        check_features=real_features(model, mesh, dataset, prior) if dataset else None,
     )
     check = {k: f"{v:.1e}" for k, v in manifest["provenance"]["export_check"].items()}
     size = sum(f["bytes"] for f in manifest["files"].values())

@@ -59,8 +59,8 @@ def build_cache(folder: Path, mesh: Mesh, cases: list[Case], nodes: np.ndarray, 
     key = hashlib.sha256()
     for part in (mesh.sha256.encode(), nodes.astype(np.int64).tobytes()):
         key.update(part)
-    if prior is not None:
-        key.update(f"{prior.path.resolve()}:{prior.path.stat().st_size}".encode())
+    for path in [] if prior is None else prior.files:
+        key.update(f"{path.resolve()}:{path.stat().st_size}".encode())
     out = Path(folder) / key.hexdigest()[:16]
     local = None
     displacement, contact, response = [], [], []
@@ -88,13 +88,14 @@ def _write_case(stem: Path, mesh: Mesh, case: Case, nodes: np.ndarray, prior: Pr
     u = trajectory.read(nodes)
     contact = np.zeros(u.shape[:2], np.uint8)
     response = np.zeros_like(u)
+    sequence = None if prior is None else prior.sequence()
     for t in range(len(u)):
         touched, vectors = trajectory.contact(t)
         at = place[touched]
         contact[t, at[at >= 0]] = 1
         u[t, at[at >= 0]] = vectors[at >= 0]
-        if prior is not None and len(touched):
-            response[t] = prior.response(touched, vectors)
+        if sequence is not None:
+            response[t] = sequence.step(touched, vectors)
     if prior is not None:
         _save(stem.with_suffix(".prior.npy"), response.astype(np.float16))
     _save(stem.with_suffix(".displacement.npy"), u.astype(np.float16))

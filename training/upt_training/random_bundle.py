@@ -42,6 +42,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--name")
     parser.add_argument("--prior", type=Path)
+    parser.add_argument("--vibration", type=Path)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument(
         "--paper-split",
@@ -60,6 +61,7 @@ def main(arguments: list[str] | None = None) -> int:
             name=options.name or options.out.name,
             description=f"random weights, seed {options.seed}: shapes only, predicts nothing",
             prior=options.prior,
+            vibration=options.vibration,
             provenance={
                 "random_weights": True,
                 "seed": options.seed,

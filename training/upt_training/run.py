@@ -10,7 +10,7 @@ import numpy as np
 import torch
 import torch.distributed as distributed
 
-from upt_training.config import Settings, load_settings
+from upt_training.config import ModelSettings, Settings, load_settings
 from upt_training.dataset import open_dataset
 from upt_training.errors import InputError
 from upt_training.field_cache import build_cache
@@ -58,12 +58,23 @@ def training_nodes(mesh: Mesh, graph, loss_nodes: int) -> np.ndarray:
     return np.union1d(needed, extra)
 
 
-def make_trainer(settings: Settings, data: Path, mesh: Mesh, prior: Path | None, out: Path, device: str) -> Trainer:
+def open_prior(model: ModelSettings, mesh: Mesh, prior: Path | None, vibration: Path | None) -> PriorTable | None:
+    """The response tables that a configuration uses; None where it uses none."""
+    if not model.uses_prior:
+        return None
+    if prior is None:
+        raise InputError("the configuration uses the linear response: pass --prior prior.safetensors")
+    if model.vibration and vibration is None:
+        raise InputError("the configuration uses free vibration: pass --vibration vibration.safetensors")
+    return PriorTable(prior, mesh.node_count, vibration if model.vibration else None)
+
+
+def make_trainer(
+    settings: Settings, data: Path, mesh: Mesh, table: PriorTable | None, out: Path, device: str
+) -> Trainer:
+    """`table`: what `open_prior` gave for the configuration."""
     dataset = open_dataset(data, mesh)
     boundary = dataset.manifest.get("boundary", "fixed")
-    if settings.model.uses_prior and prior is None:
-        raise InputError("the configuration uses the linear response: pass --prior prior.safetensors")
-    table = PriorTable(prior, mesh.node_count) if settings.model.uses_prior else None
     graph = build_graph(mesh, settings.model.graph)
     t = settings.train
     nodes = training_nodes(mesh, graph, t.loss_nodes)
@@ -95,7 +106,8 @@ def train_command(options) -> int:
     mesh = find_mesh(options.mesh, options.data)
     if ranks > 1 and distributed.get_rank() > 0:
         distributed.barrier()  # rank 0 makes the cache
-    trainer = make_trainer(settings, options.data, mesh, options.prior, out, device)
+    table = open_prior(settings.model, mesh, options.prior, options.vibration)
+    trainer = make_trainer(settings, options.data, mesh, table, out, device)
     if ranks > 1 and distributed.get_rank() == 0:
         distributed.barrier()
     out.mkdir(parents=True, exist_ok=True)
