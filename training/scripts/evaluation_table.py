@@ -10,6 +10,7 @@ NAMES = {
     "bundle": "",
     "linear": "linear elasticity",
     "linear_decay": "linear elasticity, decay",
+    "linear_vibration": "linear elasticity, free vibration",
     "zero": "predict zero",
 }
 
@@ -24,13 +25,18 @@ def rows(path: Path) -> list[str]:
         count = sum(group.endswith(c["scheme"]) for c in result["cases"])
         count = len(result["cases"]) if group.startswith("schemes") else count
         for method, scores in table.items():
-            cells = [f"{scores[k]['mean']:.3f} ± {scores[k]['std']:.3f}" for k in ("mse_mm2", "hausdorff_mm", "max_mm")]
+            cells = [cell(scores, k) for k in ("mse_mm2", "hausdorff_mm", "max_mm")]
             span = f"{scores['mse_mm2']['min']:.3f} to {scores['mse_mm2']['max']:.3f}"
             name = NAMES[method] or f"**{result['bundle']}**"
             relative = f"{scores['relative_l2']['mean']:.3f}"
             row = (f"{group}, K = {result['nodes']} ({count})", name, cells[0], span, cells[1], cells[2], relative)
             out.append("| " + " | ".join(row) + " |")
     return out
+
+
+def cell(scores: dict, name: str) -> str:
+    """Mean and deviation; `-` where the score was left out (`--no-hausdorff`)."""
+    return f"{scores[name]['mean']:.3f} ± {scores[name]['std']:.3f}" if name in scores else "-"
 
 
 def main() -> None:
