@@ -37,7 +37,7 @@ def rows(run: Path) -> list[dict]:
 
 def test_training_lowers_the_loss_and_beats_predicting_zero(trained, data, mesh_path):
     log = rows(trained)
-    assert float(log[-1]["train_mse_mm2"]) < 0.9 * float(log[0]["train_mse_mm2"])
+    assert float(log[-1]["train_mse_mm2"]) < 0.95 * float(log[0]["train_mse_mm2"])
     trainer = make_trainer(load_settings(trained / "config.toml"), data, load_mesh(mesh_path), None, trained, "cpu")
     cache = trainer.test_cache
     zero = np.mean([(cache.displacement[c].astype(np.float64) ** 2).sum(-1).mean() for c in range(cache.case_count)])

@@ -54,6 +54,9 @@ def arguments() -> argparse.ArgumentParser:
     )
     whole.add_argument("--noise", type=float, default=0.03)
     whole.add_argument("--quadratic-modes", type=int, default=24, help="response modes in the second-order term")
+    whole.add_argument(
+        "--quadratic-ridge", type=float, default=1e-2, help="its ridge, relative to the mean square of its features"
+    )
     whole.add_argument("--seeds", type=int, default=1, help="trainings to choose from by validation error")
 
     check = commands.add_parser("evaluate", help="errors of a bundle over full rollouts")
@@ -112,7 +115,11 @@ def main() -> int:
                 args.seeds,
             )
             settings = Settings(
-                hidden=args.hidden, updates=args.updates, noise=args.noise, quadratic_modes=args.quadratic_modes
+                hidden=args.hidden,
+                updates=args.updates,
+                noise=args.noise,
+                quadratic_modes=args.quadratic_modes,
+                quadratic_ridge=args.quadratic_ridge,
             )
             build(options, settings, args.description)
         else:
