@@ -85,7 +85,6 @@ fn largest_eigenvalue(a: [[f64; 3]; 3]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::phantom;
 
     #[test]
     fn eigenvalue_of_known_matrices() {
