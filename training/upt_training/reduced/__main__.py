@@ -57,6 +57,8 @@ def arguments() -> argparse.ArgumentParser:
     whole.add_argument(
         "--quadratic-ridge", type=float, default=1e-2, help="its ridge, relative to the mean square of its features"
     )
+    whole.add_argument("--refit", action="store_true", help="train once more on every training case, validation too")
+    whole.add_argument("--weight-decay", type=float, default=0.02, help="of the network")
     whole.add_argument("--seeds", type=int, default=1, help="trainings to choose from by validation error")
 
     check = commands.add_parser("evaluate", help="errors of a bundle over full rollouts")
@@ -113,11 +115,13 @@ def main() -> int:
                 args.tolerance,
                 args.tables,
                 args.seeds,
+                args.refit,
             )
             settings = Settings(
                 hidden=args.hidden,
                 updates=args.updates,
                 noise=args.noise,
+                weight_decay=args.weight_decay,
                 quadratic_modes=args.quadratic_modes,
                 quadratic_ridge=args.quadratic_ridge,
             )

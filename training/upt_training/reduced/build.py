@@ -51,6 +51,7 @@ class Options:
     tolerance_mm: float = 3e-3
     tables: str = "f16"
     seeds: int = 1
+    refit: bool = False
 
 
 class Progress:
@@ -165,6 +166,13 @@ def trained(options: Options, states: States, settings: Settings) -> tuple[Corre
         if best is None or history["validation_mse"] < best[1]["validation_mse"]:
             best = (model, {**history, "seed": seed})
     assert best is not None
+    if options.refit and settings.updates:
+        # What was set aside for the choice is too dear to leave out: once more on every training case.
+        settings.seed = best[1]["seed"]
+        everything = join_states([fit, validation])
+        checkpoint = options.work / f"training-{settings.seed}-all.pt"
+        model, _ = train(everything, validation, limits, settings, print, checkpoint)
+        return model, limits, {**best[1], "training_cases": everything.cases}
     return best[0], limits, best[1]
 
 
@@ -223,7 +231,11 @@ def build(options: Options, settings: Settings, description: str) -> dict:
     provenance = {
         "data": [name for name, _ in sources],
         "cases": {"train": len(cases), "all": states.cases, "files_sha256": digest},
-        "training": {**asdict(settings), "validation_mse_mm2": history["validation_mse"] if settings.updates else None},
+        "training": {
+            **asdict(settings),
+            "refit": options.refit,
+            "validation_mse_mm2": history["validation_mse"] if settings.updates else None,
+        },
         "block_basis": info,
         "tables": options.tables,
         "date": datetime.now(UTC).strftime("%Y-%m-%d"),
