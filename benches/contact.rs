@@ -89,7 +89,7 @@ fn forces(positions: &[f32], tets: &[u32], displacement: &[f32]) {
             .map(|i| 40 + i % side + 90 * (40 + i / side) + 3 * 90 * 90)
             .collect();
         let moduli = Moduli::from_young(3000.0, 0.49);
-        let mut forces = ReactionForces::new(positions, tets, &nodes, moduli);
+        let mut forces = ReactionForces::new(positions, tets, &[], &nodes, moduli);
         let mut out = vec![0.0; 3 * nodes.len()];
         let seconds = medians(&mut [Box::new(|| {
             forces

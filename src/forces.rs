@@ -28,7 +28,7 @@ impl Moduli {
     }
 }
 
-/// A tetrahedron's corners, rest volume (mm³) and gradients of its shape functions 1, 2, 3 (1/mm);
+/// A tetrahedron's corners, rest volume (mm³) times its stiffness over the material's, and gradients of its shape functions 1, 2, 3 (1/mm);
 /// the gradient of shape function 0 is minus their sum.
 #[derive(Debug, Clone, Copy)]
 struct Element {
@@ -67,15 +67,29 @@ const SMALLEST_DET: f64 = 0.05;
 impl ReactionForces {
     /// Adjacency and gradients of the elements that touch `nodes` (the surface's, say).
     ///
-    /// `positions [K,3]` mm, `tets [T,4]` of positive volume, `nodes` below `K`.
-    pub fn new(positions: &[f32], tets: &[u32], nodes: &[u32], moduli: Moduli) -> Self {
+    /// `positions [K,3]` mm, `tets [T,4]` of positive volume, `stiffness [T]` their Young's moduli over the
+    /// material's or empty for a uniform body, `nodes` below `K`.
+    pub fn new(
+        positions: &[f32],
+        tets: &[u32],
+        stiffness: &[f32],
+        nodes: &[u32],
+        moduli: Moduli,
+    ) -> Self {
         let node_count = positions.len() / 3;
         let mut wanted = vec![false; node_count];
         nodes.iter().for_each(|&node| wanted[node as usize] = true);
         let elements: Vec<Element> = tets
             .chunks_exact(4)
-            .filter(|tet| tet.iter().any(|&node| wanted[node as usize]))
-            .map(|tet| Element::new(positions, [tet[0], tet[1], tet[2], tet[3]]))
+            .enumerate()
+            .filter(|(_, tet)| tet.iter().any(|&node| wanted[node as usize]))
+            .map(|(index, tet)| {
+                let mut element = Element::new(positions, [tet[0], tet[1], tet[2], tet[3]]);
+                element.volume *= stiffness
+                    .get(index)
+                    .map_or(1.0, |&factor| f64::from(factor));
+                element
+            })
             .collect();
         let mut offsets = vec![0u32; node_count + 1];
         let touches = || {
@@ -367,7 +381,7 @@ mod tests {
     fn forces_are_the_derivative_of_the_energy() {
         let (positions, tets) = cube(3);
         let nodes: Vec<u32> = (0..positions.len() as u32 / 3).collect();
-        let mut forces = ReactionForces::new(&positions, &tets, &nodes, UNIT);
+        let mut forces = ReactionForces::new(&positions, &tets, &[], &nodes, UNIT);
         let mut u = wavy(&positions, 0.08);
         let mut out = vec![0.0; positions.len()];
         let report = forces.reaction(&u, &nodes, &mut out).unwrap();
@@ -402,7 +416,7 @@ mod tests {
         }
         let face: Vec<u32> = (0..27).filter(|i| i % 3 == 2).collect();
         let mut out = vec![0.0; 27];
-        let mut forces = ReactionForces::new(&positions, &tets, &face, UNIT);
+        let mut forces = ReactionForces::new(&positions, &tets, &[], &face, UNIT);
         forces.reaction(&u, &face, &mut out).unwrap();
         let (det, invariant) = (a * b * b, a * a + 2.0 * b * b);
         let stress = UNIT.shear_pa * det.powf(-2.0 / 3.0) * (a - invariant / (3.0 * a))
@@ -419,10 +433,10 @@ mod tests {
         let some = [3, 0, 17, 60];
         let u = wavy(&positions, 0.1);
         let (mut whole, mut part) = (vec![0.0; 192], vec![0.0; 12]);
-        ReactionForces::new(&positions, &tets, &all, UNIT)
+        ReactionForces::new(&positions, &tets, &[], &all, UNIT)
             .reaction(&u, &all, &mut whole)
             .unwrap();
-        let mut forces = ReactionForces::new(&positions, &tets, &some, UNIT);
+        let mut forces = ReactionForces::new(&positions, &tets, &[], &some, UNIT);
         for _ in 0..3 {
             forces.reaction(&u, &some, &mut part).unwrap();
             for (entry, &node) in some.iter().enumerate() {
@@ -440,7 +454,7 @@ mod tests {
     fn the_neighbourhood_is_what_the_forces_depend_on() {
         let (positions, tets) = cube(3);
         let nodes = [21, 63];
-        let mut forces = ReactionForces::new(&positions, &tets, &nodes, UNIT);
+        let mut forces = ReactionForces::new(&positions, &tets, &[], &nodes, UNIT);
         let mut around = Vec::new();
         forces.neighbourhood(&nodes, &mut around);
         assert!(around.is_sorted() && around.contains(&21) && around.len() < 64);
@@ -461,7 +475,7 @@ mod tests {
     #[test]
     fn wrong_input_is_an_error_and_the_next_call_works() {
         let (positions, tets) = cube(2);
-        let mut forces = ReactionForces::new(&positions, &tets, &[0, 1, 2], UNIT);
+        let mut forces = ReactionForces::new(&positions, &tets, &[], &[0, 1, 2], UNIT);
         let u = vec![0.0; 81];
         let mut out = [0.0; 6];
         assert!(matches!(

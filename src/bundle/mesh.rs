@@ -15,6 +15,8 @@ pub struct Mesh {
     pub positions: Vec<f32>,
     /// Tetrahedra `[T,4]`.
     pub tets: Vec<u32>,
+    /// Young's modulus of each tetrahedron over the material's `[T]`; empty where the body is uniform.
+    pub stiffness: Vec<f32>,
     /// Boundary triangles `[F,3]`, outward.
     pub surface_faces: Vec<u32>,
     /// Triangles of the domain `[D,3]`.
@@ -60,6 +62,15 @@ impl Mesh {
         {
             return Err(file.bad("tets", format!("element {at} has no positive volume")));
         }
+        let stiffness = if file.has("stiffness") {
+            file.f32("stiffness", &[Some(tets.len() / 4)])?
+        } else {
+            Vec::new()
+        };
+        if let Some(tet) = stiffness.iter().position(|&factor| factor <= 0.0) {
+            let problem = format!("element {tet} is {}, must be positive", stiffness[tet]);
+            return Err(file.bad("stiffness", problem));
+        }
         let surface_faces = file.indices("surface", &[None, Some(3)], count)?;
         let domain = if file.has("domain") {
             file.indices("domain", &[None], surface_faces.len() / 3)?
@@ -91,6 +102,9 @@ impl Mesh {
                 hash.update(file.raw(name, Dtype::I32, &[None])?);
             }
         }
+        if file.has("stiffness") {
+            hash.update(file.raw("stiffness", Dtype::F32, &[None])?);
+        }
         let mut held_nodes = fixed;
         if boundary == Boundary::Supported {
             held_nodes.extend(supported);
@@ -102,6 +116,7 @@ impl Mesh {
             held_nodes: unique(held_nodes),
             positions,
             tets,
+            stiffness,
             surface_faces,
             domain_faces,
             sha256: hex(&hash.finalize()),
@@ -127,6 +142,7 @@ impl Mesh {
     pub fn memory_bytes(&self) -> usize {
         4 * (self.positions.len()
             + self.tets.len()
+            + self.stiffness.len()
             + self.surface_faces.len()
             + self.domain_faces.len()
             + self.surface_nodes.len()

@@ -99,6 +99,7 @@ impl Scene {
                     forces: ReactionForces::new(
                         &mesh.positions,
                         &mesh.tets,
+                        &mesh.stiffness,
                         &mesh.surface_nodes,
                         moduli,
                     ),

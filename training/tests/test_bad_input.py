@@ -11,6 +11,8 @@ from safetensors.numpy import load_file, save_file
 
 from upt_training.__main__ import main
 from upt_training.box_mesh import box_mesh
+from upt_training.errors import InputError
+from upt_training.mesh_file import load_mesh
 
 
 def run(data, mesh, out, *more):
@@ -108,3 +110,21 @@ def test_broken_checkpoint(tmp_path, mesh_path, capsys):
     code = main(["export", str(tmp_path), "--out", str(tmp_path / "bundle"), "--mesh", str(mesh_path)])
     expect(capsys, code, "last.pt")
     assert not (tmp_path / "bundle").exists()
+
+
+def test_element_stiffness_is_kept_hashed_and_checked(tmp_path):
+    mesh = box_mesh((2, 2, 2))
+    uniform = mesh.sha256
+    mesh.stiffness = np.full(len(mesh.tets), 3, np.float32)
+    path = tmp_path / "stiff.mesh.safetensors"
+    mesh.save(path)
+    assert load_mesh(path).sha256 == mesh.sha256 != uniform
+    for bad in (np.nan, 0.0, -1.0):
+        mesh.stiffness[4] = bad
+        mesh.save(path)
+        with pytest.raises(InputError, match="stiffness"):
+            load_mesh(path)
+    mesh.stiffness = np.ones(1, np.float32)
+    mesh.save(path)
+    with pytest.raises(InputError, match="stiffness"):
+        load_mesh(path)

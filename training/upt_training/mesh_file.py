@@ -1,7 +1,8 @@
 """Mesh files (`*.mesh.safetensors`, docs/formats.md): read, write, hash.
 
 `positions` are rest positions in mm, `[K, 3]` float32; `tets` `[T, 4]` int32; `surface` `[F, 3]` int32, outward;
-`domain` `[D]` rows of `surface` that instruments may touch; `fixed` and `supported` are ascending node sets.
+`domain` `[D]` rows of `surface` that instruments may touch; `fixed` and `supported` are ascending node sets;
+`stiffness` `[T]` float32 is Young's modulus of each tetrahedron over the material's, empty for a uniform body.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ class Mesh:
     domain: np.ndarray
     fixed: np.ndarray
     supported: np.ndarray
+    stiffness: np.ndarray = field(default_factory=lambda: np.zeros(0, np.float32))
     metadata: dict = field(default_factory=dict)
 
     @property
@@ -35,9 +37,9 @@ class Mesh:
 
     @property
     def sha256(self) -> str:
-        """The mesh hash: SHA-256 of the bytes of positions, tets, fixed, supported."""
+        """The mesh hash: SHA-256 of the bytes of positions, tets, fixed, supported and, if any, stiffness."""
         digest = hashlib.sha256()
-        for array in (self.positions, self.tets, self.fixed, self.supported):
+        for array in (self.positions, self.tets, self.fixed, self.supported, self.stiffness):
             digest.update(np.ascontiguousarray(array).tobytes())
         return digest.hexdigest()
 
@@ -73,6 +75,8 @@ class Mesh:
             "fixed": np.ascontiguousarray(self.fixed, np.int32),
             "supported": np.ascontiguousarray(self.supported, np.int32),
         }
+        if len(self.stiffness):
+            tensors["stiffness"] = np.ascontiguousarray(self.stiffness, np.float32)
         save_file(tensors, str(path), metadata={k: str(v) for k, v in metadata.items()})
         Path(path).chmod(0o644)
 
@@ -91,12 +95,15 @@ def load_mesh(path: Path | str) -> Mesh:
                 raise InputError(f"{path}: tensor {sorted(missing)[0]!r} is missing; this is not a mesh file")
             empty = np.zeros(0, np.int32)
             get = {n: file.get_tensor(n) if n in names else empty for n in _TENSORS}
+            stiffness = file.get_tensor("stiffness") if "stiffness" in names else np.zeros(0, np.float32)
     except SafetensorError as error:
         raise InputError(f"{path}: not a readable safetensors file ({error}); make the mesh again") from error
-    mesh = Mesh(**get, metadata=metadata)
+    mesh = Mesh(**get, stiffness=stiffness, metadata=metadata)
     if not np.isfinite(mesh.positions).all():
         node = int(np.argwhere(~np.isfinite(mesh.positions))[0, 0])
         raise InputError(f"{path}: positions of node {node} are not finite")
+    if len(stiffness) and (len(stiffness) != len(mesh.tets) or not (np.isfinite(stiffness) & (stiffness > 0)).all()):
+        raise InputError(f"{path}: stiffness must hold a finite positive number for each of the {len(mesh.tets)} tets")
     for name in ("tets", "surface", "fixed", "supported"):
         array = getattr(mesh, name)
         if array.size and (array.min() < 0 or array.max() >= mesh.node_count):

@@ -104,7 +104,7 @@ pub fn run(args: &Options) -> anyhow::Result<ExitCode> {
     }
     let lame = Lame::from_young(args.young, args.poisson)?;
     let started = Instant::now();
-    let stiffness = Stiffness::assemble(&mesh.positions, &mesh.tets, &held, lame)?;
+    let stiffness = Stiffness::assemble(&mesh, &held, lame)?;
     let factor = Factor::new(&stiffness, &mesh.positions, args.threads)?;
     let stats = factor.stats(&stiffness);
     let factor_seconds = started.elapsed().as_secs_f64();

@@ -6,7 +6,14 @@ use upt::forces::{Moduli, ReactionForces};
 
 #[test]
 fn reaction_equals_the_reference_solvers() {
-    let mesh = box_phantom([40.0, 40.0, 24.0], [10, 10, 6]).unwrap();
+    let mut mesh = box_phantom([40.0, 40.0, 24.0], [10, 10, 6]).unwrap();
+    // A stiff half, so that the elements' own moduli take part.
+    mesh.stiffness = (mesh.tets.iter())
+        .map(|tet| {
+            let x: f32 = tet.iter().map(|&n| mesh.positions[n as usize][0]).sum();
+            if x < 4.0 * 18.0 { 5.0 } else { 1.0 }
+        })
+        .collect();
     let nodes: Vec<u32> = (0..mesh.node_count() as u32)
         .filter(|&i| {
             let [x, y, z] = mesh.positions[i as usize];
@@ -20,6 +27,7 @@ fn reaction_equals_the_reference_solvers() {
     let mut forces = ReactionForces::new(
         mesh.positions.as_flattened(),
         mesh.tets.as_flattened(),
+        &mesh.stiffness,
         &nodes,
         Moduli::from_young(material.young_pa, material.poisson),
     );

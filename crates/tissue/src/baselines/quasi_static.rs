@@ -61,7 +61,7 @@ impl LinearQuasiStatic {
         threads: usize,
     ) -> Result<Self, LinearError> {
         let held = mesh.held_nodes(boundary);
-        let stiffness = Stiffness::assemble(&mesh.positions, &mesh.tets, &held, lame)?;
+        let stiffness = Stiffness::assemble(mesh, &held, lame)?;
         let factor = Factor::new(&stiffness, &mesh.positions, threads)?;
         Ok(Self {
             stiffness,

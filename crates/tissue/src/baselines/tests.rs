@@ -50,7 +50,7 @@ fn quasi_static_steps_equal_the_linear_response_then_decay() {
         .map(|&n| [0.2, 0.01 * n as f32, -3.0])
         .collect();
     let held = mesh.held_nodes(Boundary::Fixed);
-    let elastic = LinearElastic::new(&mesh.positions, &mesh.tets, &held, &nodes, lame, 1).unwrap();
+    let elastic = LinearElastic::new(&mesh, &held, &nodes, lame, 1).unwrap();
     let (expected, _) = elastic.response(&nodes, &vectors).unwrap();
 
     let mut method = LinearQuasiStatic::new(&mesh, Boundary::Fixed, lame, 0.5, 1).unwrap();

@@ -1,5 +1,7 @@
 //! The quasi-static response `L(c)` of a mesh to prescribed contact displacements.
 
+use crate::mesh::Mesh;
+
 use super::{Compliance, Factor, Lame, LinearError, Stiffness, compliance_columns};
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
@@ -69,15 +71,14 @@ impl LinearElastic {
     /// # Errors
     /// See [`LinearError`].
     pub fn new(
-        positions: &[[f32; 3]],
-        tets: &[[u32; 4]],
+        mesh: &Mesh,
         held: &[u32],
         contact_nodes: &[u32],
         lame: Lame,
         threads: usize,
     ) -> Result<Self, LinearError> {
-        let stiffness = Stiffness::assemble(positions, tets, held, lame)?;
-        let factor = Factor::new(&stiffness, positions, threads)?;
+        let stiffness = Stiffness::assemble(mesh, held, lame)?;
+        let factor = Factor::new(&stiffness, &mesh.positions, threads)?;
         let compliance = compliance_columns(&stiffness, &factor, contact_nodes, 48, |_, _| Ok(()))?;
         Ok(Self {
             stiffness,

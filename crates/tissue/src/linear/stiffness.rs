@@ -1,9 +1,10 @@
 //! Stiffness of linear tetrahedra, held nodes removed.
 //!
 //! `K[a i, b j] = sum_e V (lambda g_a,i g_b,j + mu g_a,j g_b,i + mu delta_ij g_a . g_b)`
-//! with the shape gradients `g` `[4,3]` of an element and its volume `V`.
+//! with the shape gradients `g` `[4,3]` of an element and its volume `V`, times its stiffness over the material's.
 
 use super::{Lame, LinearError};
+use crate::mesh::Mesh;
 
 /// Numbering of the nodes that are not held.
 #[derive(Debug, Clone)]
@@ -103,16 +104,13 @@ fn upper_neighbours(free: &FreeNodes, tets: &[[u32; 4]]) -> Vec<Vec<u32>> {
 }
 
 impl Stiffness {
-    /// Assembles the stiffness of `tets` over `positions` (mm) with the nodes `held` removed.
+    /// Assembles the stiffness of `mesh` with the nodes `held` removed; reads its positions, tetrahedra and
+    /// element stiffness.
     ///
     /// # Errors
     /// A node index out of range, a flat or inverted element, nothing held, a node without element.
-    pub fn assemble(
-        positions: &[[f32; 3]],
-        tets: &[[u32; 4]],
-        held: &[u32],
-        lame: Lame,
-    ) -> Result<Self, LinearError> {
+    pub fn assemble(mesh: &Mesh, held: &[u32], lame: Lame) -> Result<Self, LinearError> {
+        let (positions, tets) = (&mesh.positions, &mesh.tets);
         if held.is_empty() {
             return Err(LinearError::NothingHeld);
         }
@@ -156,6 +154,7 @@ impl Stiffness {
             if volume <= 0.0 || !volume.is_finite() {
                 return Err(LinearError::Volume { tet, volume });
             }
+            let weight = volume * f64::from(mesh.stiffness_of(tet));
             for (p, &node_b) in nodes.iter().enumerate() {
                 let Some(b) = free.get(node_b) else {
                     continue;
@@ -183,7 +182,7 @@ impl Stiffness {
                                 start + (3 - j) + 3 * (slot - 1) + i
                             };
                             let identity = if i == j { dot } else { 0.0 };
-                            values[at] += volume
+                            values[at] += weight
                                 * (lame.lambda * g[q][i] * g[p][j]
                                     + lame.mu * (g[q][j] * g[p][i] + identity));
                         }

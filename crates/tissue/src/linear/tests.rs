@@ -1,6 +1,7 @@
 //! Linear elasticity against closed forms and against its own residual.
 
 use super::*;
+use crate::mesh::{Mesh, regular_box};
 
 /// A box of `n` cells a side of length `size`, five or six tets a cell (Kuhn's six).
 fn block(n: [usize; 3], size: f32) -> (Vec<[f32; 3]>, Vec<[u32; 4]>) {
@@ -42,6 +43,14 @@ fn block(n: [usize; 3], size: f32) -> (Vec<[f32; 3]>, Vec<[u32; 4]>) {
     (positions, tets)
 }
 
+fn mesh(positions: &[[f32; 3]], tets: &[[u32; 4]]) -> Mesh {
+    Mesh {
+        positions: positions.to_vec(),
+        tets: tets.to_vec(),
+        ..Mesh::default()
+    }
+}
+
 fn base(positions: &[[f32; 3]]) -> Vec<u32> {
     (0..positions.len() as u32)
         .filter(|&n| positions[n as usize][2] == 0.0)
@@ -54,7 +63,7 @@ fn a_linear_field_needs_no_inner_forces() {
     let (positions, tets) = block([3, 3, 3], 2.0);
     let held = vec![0u32];
     let lame = Lame::from_young(3000.0, 0.49).unwrap();
-    let stiffness = Stiffness::assemble(&positions, &tets, &held, lame).unwrap();
+    let stiffness = Stiffness::assemble(&mesh(&positions, &tets), &held, lame).unwrap();
     let gradient = [[0.01, 0.02, -0.01], [0.0, -0.03, 0.02], [0.04, 0.0, 0.01]];
     let u: Vec<f64> = stiffness
         .free
@@ -82,7 +91,7 @@ fn uniaxial_stress_has_youngs_modulus() {
     // exact field is taken: u = (-nu e x, -nu e y, e z), W = E e² V / 2.
     let (positions, tets) = block([2, 2, 4], 1.5);
     let lame = Lame::from_young(3000.0, 0.3).unwrap();
-    let stiffness = Stiffness::assemble(&positions, &tets, &[0], lame).unwrap();
+    let stiffness = Stiffness::assemble(&mesh(&positions, &tets), &[0], lame).unwrap();
     let strain = 0.02;
     let u: Vec<f64> = stiffness
         .free
@@ -107,7 +116,7 @@ fn columns_solve_the_stiffness_and_the_block_is_symmetric_positive() {
     let (positions, tets) = block([5, 4, 3], 4.0);
     let lame = Lame::from_young(3000.0, 0.49).unwrap();
     let held = base(&positions);
-    let stiffness = Stiffness::assemble(&positions, &tets, &held, lame).unwrap();
+    let stiffness = Stiffness::assemble(&mesh(&positions, &tets), &held, lame).unwrap();
     let factor = Factor::new(&stiffness, &positions, 1).unwrap();
     let nodes: Vec<u32> = (0..positions.len() as u32)
         .filter(|&n| positions[n as usize][2] == 12.0)
@@ -156,7 +165,7 @@ fn the_response_passes_through_the_contact_and_rests_at_the_held_nodes() {
         .filter(|&n| positions[n as usize][2] == 12.0)
         .collect();
     let lame = Lame::from_young(3000.0, 0.49).unwrap();
-    let elastic = LinearElastic::new(&positions, &tets, &held, &top, lame, 1).unwrap();
+    let elastic = LinearElastic::new(&mesh(&positions, &tets), &held, &top, lame, 1).unwrap();
     let nodes = [top[16], top[17], top[23], top[24]];
     let vectors = [
         [0.3, 0.0, -4.0],
@@ -182,11 +191,44 @@ fn the_response_passes_through_the_contact_and_rests_at_the_held_nodes() {
 }
 
 #[test]
+fn a_bar_of_two_layers_stretches_by_their_compliances() {
+    // nu = 0: no lateral contraction, so the layers are springs in series, 1/10 and 1 of the extension.
+    let mut bar = regular_box([4.0, 4.0, 12.0], [2, 2, 6]).unwrap();
+    bar.stiffness = (bar.tets.iter())
+        .map(|tet| {
+            let height: f32 = tet.iter().map(|n| bar.positions[*n as usize][2]).sum();
+            if height < 4.0 * 6.0 { 10.0 } else { 1.0 }
+        })
+        .collect();
+    let at = |z: f32| -> Vec<u32> {
+        (0..bar.node_count() as u32)
+            .filter(|n| (bar.positions[*n as usize][2] - z).abs() < 1e-4)
+            .collect()
+    };
+    let (held, top) = (at(0.0), at(12.0));
+    let lame = Lame::from_young(3000.0, 0.0).unwrap();
+    let elastic = LinearElastic::new(&bar, &held, &top, lame, 1).unwrap();
+    let (field, _) = elastic
+        .response(&top, &vec![[0.0, 0.0, 1.1]; top.len()])
+        .unwrap();
+    for (position, u) in bar.positions.iter().zip(&field) {
+        let z = position[2];
+        let wanted = if z <= 6.0 {
+            0.1 * z / 6.0
+        } else {
+            0.1 + (z - 6.0) / 6.0
+        };
+        assert!((u[2] - wanted).abs() < 1e-5, "z = {z}: {u:?}");
+        assert!(u[0].abs() + u[1].abs() < 1e-5, "z = {z}: {u:?}");
+    }
+}
+
+#[test]
 fn threads_do_not_change_the_answer_beyond_round_off() {
     let (positions, tets) = block([6, 5, 5], 3.0);
     let held = base(&positions);
     let lame = Lame::from_young(3000.0, 0.45).unwrap();
-    let stiffness = Stiffness::assemble(&positions, &tets, &held, lame).unwrap();
+    let stiffness = Stiffness::assemble(&mesh(&positions, &tets), &held, lame).unwrap();
     let solve = |threads| {
         let factor = Factor::new(&stiffness, &positions, threads).unwrap();
         let mut column = vec![0.0; stiffness.dofs()];
@@ -204,23 +246,23 @@ fn what_cannot_be_solved_is_named() {
     let (positions, mut tets) = block([2, 2, 2], 1.0);
     let lame = Lame::from_young(3000.0, 0.49).unwrap();
     assert!(matches!(
-        Stiffness::assemble(&positions, &tets, &[], lame),
+        Stiffness::assemble(&mesh(&positions, &tets), &[], lame),
         Err(LinearError::NothingHeld)
     ));
     let mut extra = positions.clone();
     extra.push([9.0; 3]);
     assert!(matches!(
-        Stiffness::assemble(&extra, &tets, &[0], lame),
+        Stiffness::assemble(&mesh(&extra, &tets), &[0], lame),
         Err(LinearError::Loose { node: 27 })
     ));
     tets[3].swap(0, 1);
     assert!(matches!(
-        Stiffness::assemble(&positions, &tets, &[0], lame),
+        Stiffness::assemble(&mesh(&positions, &tets), &[0], lame),
         Err(LinearError::Volume { tet: 3, .. })
     ));
     tets[3][0] = 99;
     assert!(matches!(
-        Stiffness::assemble(&positions, &tets, &[0], lame),
+        Stiffness::assemble(&mesh(&positions, &tets), &[0], lame),
         Err(LinearError::Node {
             tet: 3,
             node: 99,

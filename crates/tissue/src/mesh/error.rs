@@ -63,6 +63,14 @@ pub enum MeshError {
     },
     #[error("node {node} is in both `fixed` and `supported`; list it in `fixed` alone")]
     NotDisjoint { node: u32 },
+    #[error(
+        "`stiffness` of tet {tet} is {value}; it must be finite and positive (1 for the material's own)"
+    )]
+    Stiffness { tet: usize, value: f32 },
+    #[error(
+        "`stiffness` has {found} numbers, but there are {expected} tetrahedra; give one a tetrahedron, or none"
+    )]
+    StiffnessCount { expected: usize, found: usize },
     #[error("the mesh has no {what}")]
     Empty { what: &'static str },
 }

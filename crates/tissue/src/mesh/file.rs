@@ -84,6 +84,11 @@ impl Mesh {
             domain: indices("domain", None)?,
             fixed: indices("fixed", None)?,
             supported: indices("supported", None)?,
+            stiffness: match file.tensor("stiffness") {
+                Ok(_) => tensors::f32_values(&tensor("stiffness", safetensors::Dtype::F32, None)?)
+                    .collect(),
+                Err(_) => Vec::new(),
+            },
         })
     }
 
@@ -104,7 +109,7 @@ impl Mesh {
             values.flat_map(|v| (v as i32).to_le_bytes()).collect()
         };
         let rows = |count: usize, width: usize| vec![count, width];
-        let tensors = [
+        let mut tensors = vec![
             Tensor::new(
                 "positions",
                 Dtype::F32,
@@ -146,6 +151,17 @@ impl Mesh {
                 index_bytes(&mut self.supported.iter().copied()),
             ),
         ];
+        if !self.stiffness.is_empty() {
+            tensors.push(Tensor::new(
+                "stiffness",
+                Dtype::F32,
+                vec![self.stiffness.len()],
+                self.stiffness
+                    .iter()
+                    .flat_map(|v| v.to_le_bytes())
+                    .collect(),
+            ));
+        }
         tensors::write_file(path, &metadata, &tensors).map_err(|source| MeshError::Io {
             path: path.into(),
             source,

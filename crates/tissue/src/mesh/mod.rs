@@ -41,6 +41,8 @@ pub struct Mesh {
     pub fixed: Vec<u32>,
     /// Nodes held in addition under [`Boundary::Supported`], ascending, disjoint from `fixed`.
     pub supported: Vec<u32>,
+    /// `[T]` Young's modulus of each tetrahedron over the material's; empty where the body is uniform.
+    pub stiffness: Vec<f32>,
 }
 
 /// Which nodes are held at zero displacement.
@@ -84,6 +86,11 @@ impl Mesh {
         self.positions.len()
     }
 
+    /// Young's modulus of tetrahedron `tet` over the material's.
+    pub fn stiffness_of(&self, tet: usize) -> f32 {
+        self.stiffness.get(tet).copied().unwrap_or(1.0)
+    }
+
     /// Nodes held at zero under `boundary`, ascending, each once.
     pub fn held_nodes(&self, boundary: Boundary) -> Vec<u32> {
         let mut nodes = self.fixed.clone();
@@ -95,8 +102,8 @@ impl Mesh {
         nodes
     }
 
-    /// SHA-256 (lower-case hex) over the bytes of `positions`, `tets`, `fixed` and `supported`
-    /// as the file stores them. Identifies the mesh in trajectories, datasets and bundles.
+    /// SHA-256 (lower-case hex) over the bytes of `positions`, `tets`, `fixed`, `supported` and,
+    /// where there is one, `stiffness` as the file stores them. Identifies the mesh in trajectories, datasets and bundles.
     pub fn hash(&self) -> String {
         let mut digest = Sha256::new();
         for value in self.positions.iter().flatten() {
@@ -107,6 +114,9 @@ impl Mesh {
         }
         for value in self.fixed.iter().chain(&self.supported) {
             digest.update((*value as i32).to_le_bytes());
+        }
+        for value in &self.stiffness {
+            digest.update(value.to_le_bytes());
         }
         digest
             .finalize()

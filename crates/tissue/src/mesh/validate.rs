@@ -4,7 +4,7 @@ use super::{Mesh, MeshError, boundary_faces, tet_volume};
 use std::collections::HashSet;
 
 impl Mesh {
-    /// Checks indices, coordinates, volumes, the surface and the named sets.
+    /// Checks indices, coordinates, volumes, stiffness, the surface and the named sets.
     ///
     /// The first fault is returned, naming the element. `O(K + T)`.
     pub fn validate(&self) -> Result<(), MeshError> {
@@ -31,6 +31,7 @@ impl Mesh {
             count,
         )?;
         self.check_tets()?;
+        self.check_stiffness()?;
         self.check_references()?;
         self.check_surface()?;
         self.check_sets()
@@ -56,6 +57,26 @@ impl Mesh {
             }
         }
         Ok(())
+    }
+
+    fn check_stiffness(&self) -> Result<(), MeshError> {
+        if !self.stiffness.is_empty() && self.stiffness.len() != self.tets.len() {
+            return Err(MeshError::StiffnessCount {
+                expected: self.tets.len(),
+                found: self.stiffness.len(),
+            });
+        }
+        match self
+            .stiffness
+            .iter()
+            .position(|s| !(s.is_finite() && *s > 0.0))
+        {
+            None => Ok(()),
+            Some(tet) => Err(MeshError::Stiffness {
+                tet,
+                value: self.stiffness[tet],
+            }),
+        }
     }
 
     fn longest_edge(&self, nodes: [u32; 4]) -> f64 {

@@ -10,8 +10,8 @@ pub(super) struct Diagnosis {
     pub min_det_f: f64,
     /// Mesh element with the smallest det F.
     pub worst_element: usize,
-    /// Largest `sum_a |cof F dN_a/dX|²` over the element's relative density, 1/mm²: proportional to the
-    /// largest eigenvalue bound.
+    /// Largest `sum_a |cof F dN_a/dX|²` times the square of the element's relative wave speed, 1/mm²:
+    /// proportional to the largest eigenvalue bound.
     pub largest_bound: f64,
 }
 
@@ -51,8 +51,8 @@ impl Solver {
                         result.min_det_f = determinant;
                         result.worst_element = *element as usize;
                     }
-                    let density = f64::from(self.density_factor[*element as usize]);
-                    result.largest_bound = result.largest_bound.max(state.bound / density);
+                    let speed_squared = f64::from(self.speed_squared[*element as usize]);
+                    result.largest_bound = result.largest_bound.max(state.bound * speed_squared);
                     let isochoric = state.invariant * inverse_cube_root(determinant).powi(2);
                     let volume = f64::from(batch.volume[lane]);
                     result.strain_energy += volume

@@ -13,8 +13,8 @@ use crate::mesh::{Mesh, tet_volume};
 pub(super) struct LumpedMass {
     /// By node, g.
     pub mass: Vec<f64>,
-    /// By node, mm³; a quarter of each element around it.
-    pub volume: Vec<f64>,
+    /// By node, mm³; a quarter of each element around it, times its stiffness over the material's.
+    pub stiff_volume: Vec<f64>,
     /// By element: its density over the material's, at least 1.
     pub factor: Vec<f32>,
     /// Added mass over the mass of the body.
@@ -27,20 +27,21 @@ impl LumpedMass {
         let density = material.density_g_mm3();
         let mut result = Self {
             mass: vec![0.0; mesh.node_count()],
-            volume: vec![0.0; mesh.node_count()],
+            stiff_volume: vec![0.0; mesh.node_count()],
             factor: Vec::with_capacity(mesh.tets.len()),
             added: 0.0,
         };
         let (mut plain, mut scaled) = (0.0, 0.0);
-        for tet in &mesh.tets {
+        for (element, tet) in mesh.tets.iter().enumerate() {
             let volume = tet_volume(&mesh.positions, *tet);
-            let step = element_step_s(&mesh.positions, *tet, material);
+            let stiffness = f64::from(mesh.stiffness_of(element));
+            let step = element_step_s(&mesh.positions, *tet, material) / stiffness.sqrt();
             let factor = (shortest_step_s / step).powi(2).max(1.0);
             plain += volume;
             scaled += factor * volume;
             result.factor.push(factor as f32);
             for node in tet {
-                result.volume[*node as usize] += 0.25 * volume;
+                result.stiff_volume[*node as usize] += 0.25 * volume * stiffness;
                 result.mass[*node as usize] += 0.25 * volume * factor * density;
             }
         }
@@ -49,7 +50,7 @@ impl LumpedMass {
     }
 }
 
-/// Critical step of one element with a quarter of its mass at each corner, s:
+/// Critical step of one element of the material's own stiffness with a quarter of its mass at each corner, s:
 /// `2 / omega` with `omega² = 4 (kappa + 4/3 mu) / rho` times the largest eigenvalue of `sum_a g_a (x) g_a`.
 fn element_step_s(positions: &[[f32; 3]], tet: [u32; 4], material: &Material) -> f64 {
     let (slopes, _) = shape_gradients(positions, tet);

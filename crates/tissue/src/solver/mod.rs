@@ -128,10 +128,11 @@ pub struct Solver {
     partition: Partition,
     /// By slot: nodal mass, g (ghosts and padding zero).
     mass: Vec<f32>,
-    /// By slot: four times the nodal rest volume, mm³.
+    /// By slot: four times the nodal rest volume, mm³, elements weighted by their stiffness.
     rest_volume: Vec<f32>,
-    /// By mesh element: density over the material's (mass scaling).
-    density_factor: Vec<f32>,
+    /// By mesh element: square of its wave speed over the material's, that is its stiffness over its
+    /// density (mass scaling).
+    speed_squared: Vec<f32>,
     added_mass: f64,
     /// By slot: held at zero.
     held: Vec<bool>,
@@ -183,14 +184,14 @@ impl Solver {
                     })?,
             ),
         };
-        let partition = Partition::new(&mesh.positions, &mesh.tets);
+        let partition = Partition::new(mesh);
         let slots = partition.node_of_slot.len();
         let lumped = LumpedMass::new(mesh, &options.material, options.mass_scaling_s);
         let mut mass = vec![0.0; slots];
         let mut rest_volume = vec![0.0; slots];
         for (node, slot) in partition.slot_of_node.iter().enumerate() {
             mass[*slot as usize] = lumped.mass[node] as f32;
-            rest_volume[*slot as usize] = (4.0 * lumped.volume[node]) as f32;
+            rest_volume[*slot as usize] = (4.0 * lumped.stiff_volume[node]) as f32;
         }
         let mut held = vec![false; slots];
         for node in mesh.held_nodes(boundary) {
@@ -213,7 +214,9 @@ impl Solver {
             partition,
             mass,
             rest_volume,
-            density_factor: lumped.factor,
+            speed_squared: (0..mesh.tets.len())
+                .map(|tet| mesh.stiffness_of(tet) / lumped.factor[tet])
+                .collect(),
             added_mass: lumped.added,
             held,
             backup: fields.clone(),

@@ -8,6 +8,7 @@
 //! alone: a result has the same bits for any number of threads.
 
 use super::lanes::WIDTH;
+use crate::mesh::Mesh;
 
 /// Target number of elements in a chunk.
 const CHUNK_ELEMENTS: usize = 2048;
@@ -20,7 +21,8 @@ pub(crate) const PADDING: u32 = u32::MAX;
 pub(crate) struct Batch {
     /// `gradient[3 (a - 1) + j]`: derivative of the shape function of corner `a` (1..=3) along axis `j`, 1/mm.
     pub gradient: [[f32; WIDTH]; 9],
-    /// Rest volume, mm³; zero in padding lanes.
+    /// Rest volume, mm³, times the element's stiffness over the material's: the energy density is
+    /// proportional to the modulus. Zero in padding lanes.
     pub volume: [f32; WIDTH],
     /// Twice the chunk-local slot of each corner (see `lanes`).
     pub corners: [[u16; WIDTH]; 4],
@@ -61,7 +63,8 @@ pub(crate) struct Partition {
 
 impl Partition {
     /// Splits a validated mesh. `O(T log T)`.
-    pub fn new(positions: &[[f32; 3]], tets: &[[u32; 4]]) -> Self {
+    pub fn new(mesh: &Mesh) -> Self {
+        let (positions, tets) = (&mesh.positions, &mesh.tets);
         let centroids: Vec<[f32; 3]> = tets
             .iter()
             .map(|tet| {
@@ -89,20 +92,14 @@ impl Partition {
             element_of_lane: Vec::new(),
         };
         for (chunk, leaf) in leaves.iter().enumerate() {
-            partition.push_chunk(chunk as u32, leaf, &owner, positions, tets);
+            partition.push_chunk(chunk as u32, leaf, &owner, mesh);
         }
         partition.connect();
         partition
     }
 
-    fn push_chunk(
-        &mut self,
-        chunk: u32,
-        leaf: &[u32],
-        owner: &[u32],
-        positions: &[[f32; 3]],
-        tets: &[[u32; 4]],
-    ) {
+    fn push_chunk(&mut self, chunk: u32, leaf: &[u32], owner: &[u32], mesh: &Mesh) {
+        let tets = &mesh.tets;
         let first = self.node_of_slot.len();
         let mut nodes: Vec<u32> = leaf.iter().flat_map(|e| tets[*e as usize]).collect();
         nodes.sort_unstable();
@@ -130,11 +127,11 @@ impl Partition {
             let mut lanes = [PADDING; WIDTH];
             for (lane, element) in elements.iter().enumerate() {
                 let tet = tets[*element as usize];
-                let (gradient, volume) = shape_gradients(positions, tet);
+                let (gradient, volume) = shape_gradients(&mesh.positions, tet);
                 for (k, value) in gradient.iter().flatten().enumerate() {
                     batch.gradient[k][lane] = *value as f32;
                 }
-                batch.volume[lane] = volume as f32;
+                batch.volume[lane] = volume as f32 * mesh.stiffness_of(*element as usize);
                 for k in 0..4 {
                     batch.corners[k][lane] = 2 * local(tet[k]);
                 }

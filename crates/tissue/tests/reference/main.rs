@@ -9,3 +9,4 @@ mod determinism;
 mod dynamics;
 mod failures;
 mod metrics;
+mod stiffness;
