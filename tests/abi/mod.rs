@@ -1,0 +1,122 @@
+//! A model of the C ABI for random calls: what can be called with what, and what the header promises.
+
+mod header;
+mod inputs;
+mod library_calls;
+mod scene_calls;
+mod world;
+
+pub use header::{Documented, documented};
+pub use world::World;
+
+use proptest::prelude::{Strategy, any};
+use proptest::prop_oneof;
+
+/// The functions that are called, all that take a handle and those around them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Function {
+    Init,
+    Shutdown,
+    Providers,
+    ModelOpen,
+    ModelClose,
+    ModelInfo,
+    ModelDescribe,
+    ModelPositions,
+    ModelIndices,
+    SceneCreate,
+    SceneDestroy,
+    SceneReset,
+    Step,
+    StepContacts,
+    Read,
+    Submit,
+    Poll,
+    Wait,
+    Sample,
+    SetRegion,
+    Decode,
+    AttachPoints,
+    ReadPoints,
+    SamplePoints,
+    Instruments,
+    ContactForce,
+    Stats,
+    Save,
+    Restore,
+}
+
+use Function::*;
+
+/// What a number of an input becomes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Odd {
+    None,
+    NaN,
+    Infinity,
+    Huge,
+    Denormal,
+    /// An index beyond the end, an unknown enum, a wrong `struct_size`, a damaged byte.
+    Wrong,
+}
+
+/// A count that is passed, compared with the right one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Size {
+    Right,
+    Zero,
+    Short,
+    Long,
+    Absurd,
+}
+
+/// One call; how its parts are read is up to the function.
+#[derive(Debug, Clone)]
+pub struct Call {
+    pub function: Function,
+    /// Chooses the handle.
+    pub handle: u8,
+    /// Bit i: pointer i is NULL.
+    pub null: u8,
+    pub size: Size,
+    pub odd: Odd,
+    pub seed: u64,
+}
+
+/// Calls that mostly make sense, so that sequences reach deep states.
+pub fn call() -> impl Strategy<Value = Call> {
+    let function = prop_oneof![
+        3 => few(&[ModelOpen, Init, Shutdown, Providers, ModelClose]),
+        3 => few(&[ModelInfo, ModelDescribe, ModelPositions, ModelIndices]),
+        8 => few(&[SceneCreate, SceneCreate, SceneDestroy]),
+        30 => few(&[Step, StepContacts, StepContacts, StepContacts]),
+        12 => few(&[Submit, Submit, Poll, Wait, Wait]),
+        30 => few(&[
+            Read, Sample, SetRegion, Decode, AttachPoints, ReadPoints, SamplePoints, Instruments,
+            ContactForce, Stats, Save, Restore, Restore, SceneReset,
+        ]),
+    ];
+    let null = prop_oneof![8 => few(&[0u8]), 1 => few(&[1, 2, 4, 3, 7])];
+    let size = prop_oneof![
+        10 => few(&[Size::Right]),
+        1 => few(&[Size::Zero, Size::Short, Size::Long, Size::Absurd]),
+    ];
+    let odd = prop_oneof![
+        8 => few(&[Odd::None]),
+        1 => few(&[Odd::NaN, Odd::Infinity, Odd::Huge, Odd::Denormal, Odd::Wrong, Odd::Wrong]),
+    ];
+    (function, any::<u8>(), null, size, odd, any::<u64>()).prop_map(
+        |(function, handle, null, size, odd, seed)| Call {
+            function,
+            handle,
+            null,
+            size,
+            odd,
+            seed,
+        },
+    )
+}
+
+fn few<T: Clone + std::fmt::Debug + 'static>(values: &'static [T]) -> impl Strategy<Value = T> {
+    proptest::sample::select(values)
+}

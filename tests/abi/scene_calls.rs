@@ -1,0 +1,271 @@
+//! Calls on a scene.
+
+use std::ptr::null;
+
+use upt::ffi::*;
+
+use super::inputs::*;
+use super::{Call, Function, Odd, Size, World};
+
+impl World<'_> {
+    /// Calls on a scene of `nodes` nodes.
+    pub(super) fn call_scene(
+        &mut self,
+        call: &Call,
+        scene: *mut upt_scene,
+        nodes: usize,
+    ) -> (&'static str, i32) {
+        let mut random = Random(call.seed | 1);
+        let wrong = call.odd == Odd::Wrong;
+        let mut vectors = |length: usize, scale: f32| {
+            let mut values: Vec<f32> = (0..length)
+                .map(|_| scale * (random.next(2001) as f32 / 1000.0 - 1.0))
+                .collect();
+            spoil(&mut values, call.odd, call.seed as usize % 97);
+            values
+        };
+        unsafe {
+            match call.function {
+                Function::SceneReset => ("upt_scene_reset", upt_scene_reset(scene)),
+                Function::Step => {
+                    let displacement = vectors(3 * nodes, 0.5);
+                    let mut collision = vec![0.0; 3 * nodes];
+                    let at = call.seed as usize % (3 * nodes);
+                    collision[at] = 1.5;
+                    spoil(&mut collision, call.odd, at);
+                    // Mostly the scene's own state.
+                    let own = !call.seed.is_multiple_of(4) && call.odd == Odd::None;
+                    let given = if own {
+                        null()
+                    } else {
+                        pointer(&displacement, call, 0)
+                    };
+                    let status = Self::output(call, 2, 3 * nodes, true, |out, count| {
+                        upt_scene_step(scene, given, pointer(&collision, call, 1), out, count)
+                    });
+                    ("upt_scene_step", status)
+                }
+                Function::StepContacts | Function::Submit => {
+                    let contacts = call.seed as usize % 7;
+                    let shift = call.seed as usize / 7;
+                    let mut listed: Vec<u32> = (0..contacts)
+                        .map(|i| ((shift + 5 * i) % nodes) as u32)
+                        .collect();
+                    if let (true, Some(first)) = (wrong, listed.first_mut()) {
+                        *first = if call.seed.is_multiple_of(2) {
+                            nodes as u32
+                        } else {
+                            u32::MAX
+                        };
+                    }
+                    let imposed = vectors(
+                        3 * contacts,
+                        if call.seed.is_multiple_of(5) {
+                            60.0
+                        } else {
+                            2.0
+                        },
+                    );
+                    let (node_pointer, vector_pointer) =
+                        (pointer(&listed, call, 0), pointer(&imposed, call, 1));
+                    if call.function == Function::Submit {
+                        let status =
+                            upt_scene_submit(scene, node_pointer, vector_pointer, contacts as u64);
+                        return ("upt_scene_submit", status);
+                    }
+                    let status = Self::output(call, 2, 3 * nodes, true, |out, count| {
+                        upt_scene_step_contacts(
+                            scene,
+                            node_pointer,
+                            vector_pointer,
+                            contacts as u64,
+                            out,
+                            count,
+                        )
+                    });
+                    ("upt_scene_step_contacts", status)
+                }
+                Function::Read => {
+                    let status = Self::output(call, 0, 3 * nodes, true, |out, count| {
+                        upt_scene_read(scene, out, count)
+                    });
+                    ("upt_scene_read", status)
+                }
+                Function::Poll => ("upt_scene_poll", upt_scene_poll(scene)),
+                Function::Wait => (
+                    "upt_scene_wait",
+                    upt_scene_wait(scene, (call.seed % 50) as u32),
+                ),
+                Function::Sample | Function::SamplePoints => {
+                    let alpha = match call.odd {
+                        Odd::None | Odd::Denormal => (call.seed % 101) as f64 / 100.0,
+                        Odd::NaN => f64::NAN,
+                        Odd::Infinity => f64::INFINITY,
+                        Odd::Huge => 1e300,
+                        Odd::Wrong => -0.5,
+                    };
+                    if call.function == Function::Sample {
+                        let status = Self::output(call, 0, 3 * nodes, true, |out, count| {
+                            upt_scene_sample(scene, alpha, out, count)
+                        });
+                        return ("upt_scene_sample", status);
+                    }
+                    let points = self.points.get(&scene.addr()).copied().unwrap_or(1);
+                    let status = Self::output(call, 0, 3 * points, true, |out, count| {
+                        upt_scene_sample_points(scene, alpha, out, count)
+                    });
+                    ("upt_scene_sample_points", status)
+                }
+                Function::SetRegion => {
+                    // All nodes in another order: outputs keep their length.
+                    let mut region: Vec<u32> = (0..nodes as u32).rev().collect();
+                    if let (true, Some(first)) = (wrong, region.first_mut()) {
+                        *first = u32::MAX;
+                    }
+                    let whole = call.seed.is_multiple_of(2);
+                    let (listed, length) = if whole {
+                        (null(), 0)
+                    } else {
+                        (pointer(&region, call, 0), nodes as u64)
+                    };
+                    (
+                        "upt_scene_set_region",
+                        upt_scene_set_region(scene, listed, length),
+                    )
+                }
+                Function::Decode => {
+                    let listed: Vec<u32> = (0..nodes.min(9) as u32)
+                        .map(|i| {
+                            if wrong {
+                                u32::MAX - i
+                            } else {
+                                (i * 3) % nodes as u32
+                            }
+                        })
+                        .collect();
+                    let status = Self::output(call, 0, 3 * listed.len(), true, |out, count| {
+                        let nodes = pointer(&listed, call, 1);
+                        upt_scene_decode(scene, nodes, listed.len() as u64, out, count)
+                    });
+                    ("upt_scene_decode", status)
+                }
+                Function::AttachPoints => {
+                    let points = call.seed as usize % 5;
+                    let scale = if wrong { 1e7 } else { 20.0 };
+                    let rest = vectors(3 * points, scale);
+                    let status =
+                        upt_scene_attach_points(scene, pointer(&rest, call, 0), points as u64);
+                    if status == UPT_OK {
+                        self.points.insert(scene.addr(), points);
+                    }
+                    ("upt_scene_attach_points", status)
+                }
+                Function::ReadPoints => {
+                    let points = self.points.get(&scene.addr()).copied().unwrap_or(1);
+                    let status = Self::output(call, 0, 3 * points, true, |out, count| {
+                        upt_scene_read_points(scene, out, count)
+                    });
+                    ("upt_scene_read_points", status)
+                }
+                Function::Instruments => (
+                    "upt_scene_contacts_from_instruments",
+                    Self::instruments(call, scene, nodes),
+                ),
+                Function::ContactForce => {
+                    let mut stats: upt_scene_stats = std::mem::zeroed();
+                    stats.struct_size = size_of::<upt_scene_stats>() as u32;
+                    upt_scene_get_stats(scene, &mut stats);
+                    let contacts = stats.contact_count as usize;
+                    let status = Self::output(call, 0, 3 * contacts, false, |out, count| {
+                        upt_scene_contact_force(scene, out, count)
+                    });
+                    ("upt_scene_contact_force", status)
+                }
+                Function::Stats => {
+                    let mut stats: upt_scene_stats = std::mem::zeroed();
+                    stats.struct_size = sized::<upt_scene_stats>(call);
+                    let out = pointer_mut(std::slice::from_mut(&mut stats), call, 0);
+                    let status = upt_scene_get_stats(scene, out);
+                    assert_eq!(stats.poisoned, 0, "a bug poisoned the scene");
+                    ("upt_scene_get_stats", status)
+                }
+                Function::Save => {
+                    let mut bytes = vec![0u8; 1 << 20];
+                    let capacity = match call.size {
+                        Size::Right | Size::Long | Size::Absurd => bytes.len() as u64,
+                        Size::Zero => 0,
+                        Size::Short => 10,
+                    };
+                    let mut needed = 0;
+                    let status = upt_scene_save(
+                        scene,
+                        pointer_mut(&mut bytes, call, 0),
+                        capacity,
+                        &mut needed,
+                    );
+                    if status == UPT_OK && call.null & 1 == 0 && capacity > 0 {
+                        self.snapshot = bytes[..needed as usize].to_vec();
+                    }
+                    ("upt_scene_save", status)
+                }
+                Function::Restore => {
+                    let mut bytes = self.snapshot.clone();
+                    let length = bytes.len().max(1);
+                    if let (true, Some(byte)) = (wrong, bytes.get_mut(call.seed as usize % length))
+                    {
+                        *byte ^= 0x41;
+                    }
+                    let passed = match call.size {
+                        Size::Zero => 0,
+                        Size::Short => bytes.len().saturating_sub(1) as u64,
+                        Size::Absurd => u64::MAX,
+                        Size::Right | Size::Long => bytes.len() as u64,
+                    };
+                    (
+                        "upt_scene_restore",
+                        upt_scene_restore(scene, pointer(&bytes, call, 0), passed),
+                    )
+                }
+                other => unreachable!("{other:?} is not a call on a scene"),
+            }
+        }
+    }
+
+    fn instruments(call: &Call, scene: *mut upt_scene, nodes: usize) -> i32 {
+        let mut instruments = Vec::new();
+        for i in 0..call.seed % 3 {
+            let mut one: upt_instrument = unsafe { std::mem::zeroed() };
+            one.struct_size = sized::<upt_instrument>(call);
+            one.shape = if call.odd == Odd::Wrong {
+                9
+            } else {
+                ((call.seed + i) % 3) as i32
+            };
+            one.position = [10.0, 10.0, 12.0 - (call.seed % 30) as f32];
+            one.rotation = [0.0, 0.0, 0.0, 1.0];
+            one.half_extents = [4.0, 6.0, 3.0];
+            one.radius = 2.0;
+            spoil(&mut one.position, call.odd, call.seed as usize % 3);
+            instruments.push(one);
+        }
+        let mut listed = vec![0u32; nodes];
+        let mut imposed = vec![0f32; 3 * nodes];
+        let capacity = if call.size == Size::Zero {
+            0
+        } else {
+            nodes as u64
+        };
+        let mut found = 0;
+        unsafe {
+            upt_scene_contacts_from_instruments(
+                scene,
+                pointer(&instruments, call, 0),
+                instruments.len() as u64,
+                pointer_mut(&mut listed, call, 1),
+                pointer_mut(&mut imposed, call, 2),
+                capacity,
+                &mut found,
+            )
+        }
+    }
+}

@@ -1,0 +1,23 @@
+//! Random sequences of calls of the C ABI: wrong sizes, NULLs, closed and invented handles, values that are no numbers.
+//!
+//! After each call: the status is one that `include/upt.h` documents for the function, a failed call has written
+//! nothing and left the scene's state to the bit, and what was handed out is finite. At the end all handles close.
+
+mod abi;
+mod explore;
+mod fixture;
+
+use proptest::collection::vec;
+
+#[test]
+fn any_sequence_of_calls_is_answered_as_documented() {
+    fixture::find_runtime();
+    let documented = abi::documented();
+    explore::explore(60, &vec(abi::call(), 1..60), |calls| {
+        let mut world = abi::World::new(&documented);
+        for call in &calls {
+            world.make(call);
+        }
+        world.end();
+    });
+}
