@@ -274,9 +274,10 @@ impl Scheme {
                 theta: spin,
             },
             Scheme::Probe => {
+                // A rounded frame time may lie just below the end of the contact.
                 let since = t % PROBE_S;
                 Pose {
-                    push: if since < PROBE_LIFT_S {
+                    push: if since < PROBE_LIFT_S - 1e-9 {
                         rise(since, 0.0, 0.6)
                     } else {
                         0.0
