@@ -107,6 +107,12 @@ def test_evaluate_reports_the_papers_metrics(bundle, data, tmp_path):
     assert abs(f32 - int8) < 0.05 * f32
 
 
+def test_evaluate_without_a_case_is_an_error(bundle, data, tmp_path, capsys):
+    out = tmp_path / "none.json"
+    assert main(["evaluate", str(bundle), "--data", str(data), "--schemes", "5", "--out", str(out)]) == 2
+    assert "scheme" in capsys.readouterr().err and not out.exists()
+
+
 def test_a_failed_export_leaves_the_old_bundle(bundle, trained, data, mesh_path, tmp_path, monkeypatch):
     before = (bundle / "bundle.json").read_bytes()
     monkeypatch.setattr("upt_training.bundle.TOLERANCE", 0.0)

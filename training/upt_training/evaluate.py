@@ -7,6 +7,7 @@ response alone, with a fitted decay after release, and with the free vibration o
 from __future__ import annotations
 
 import json
+import sys
 import time
 from pathlib import Path
 
@@ -14,6 +15,7 @@ import numpy as np
 
 from upt_training.bundle_rollout import BundleRunner
 from upt_training.dataset import open_dataset, open_trajectory
+from upt_training.errors import InputError
 from upt_training.mesh_file import load_mesh
 from upt_training.metrics import RolloutMetrics, summary
 
@@ -80,8 +82,9 @@ def evaluate_command(options) -> int:
     runner = BundleRunner(options.bundle, mesh, options.prior, options.precision, options.vibration)
     dataset = open_dataset(options.data, runner.mesh)
     cases = dataset.select(options.split, options.schemes, options.count)
-    import sys
-
+    if not cases:
+        wanted = f" of schemes {', '.join(options.schemes)}" if options.schemes else ""
+        raise InputError(f"{options.data}: no finished case in the split '{options.split}'{wanted}; see --split")
     result = evaluate_bundle(
         runner,
         cases,
