@@ -21,8 +21,13 @@ use crate::stats::SceneStats;
 
 /// A scene is asleep after this many steps without contact ...
 pub const QUIET_STEPS: u32 = 4;
-/// ... in which no decoded node is displaced by more than this, mm.
+/// ... in which no decoded node is displaced by more than this, mm, ...
 pub const QUIET_DISPLACEMENT: f32 = 0.02;
+/// ... or, with a model that need not come to rest at zero, in which no decoded node is displaced by more than this
+/// and moves by more than [`STILL_CHANGE`] a step, mm.
+pub const STILL_DISPLACEMENT: f32 = 0.05;
+/// See [`STILL_DISPLACEMENT`], mm a step.
+pub const STILL_CHANGE: f32 = 0.002;
 
 /// Where a published state came from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -284,12 +289,27 @@ impl Core {
         };
         let quiet = self.contact.is_empty()
             && !was_given
-            && self.max_displacement <= QUIET_DISPLACEMENT
+            && (self.max_displacement <= QUIET_DISPLACEMENT || self.is_still(published))
             && self.engine.is_quiet(QUIET_DISPLACEMENT);
         self.quiet = if quiet { self.quiet + 1 } else { 0 };
         self.sleeping = !self.options.no_sleep && self.quiet >= QUIET_STEPS;
         self.rest_frames = 0;
         self.rotate(published);
+    }
+
+    /// Whether `next` is close to rest and to the last state, with a model whose own fixed point may lie beside rest:
+    /// what is left is then that model's bias, not motion.
+    fn is_still(&self, published: &RwLock<Published>) -> bool {
+        if self.max_displacement > STILL_DISPLACEMENT || self.engine.comes_to_rest() {
+            return false;
+        }
+        let shared = lock_read(published);
+        self.plan.nodes().iter().all(|&node| {
+            let at = 3 * node as usize;
+            let (now, last) = (&self.next.field[at..at + 3], &shared.last.field[at..at + 3]);
+            let square: f32 = now.iter().zip(last).map(|(a, b)| (a - b) * (a - b)).sum();
+            square <= STILL_CHANGE * STILL_CHANGE
+        })
     }
 
     /// A step of a sleeping scene: exactly rest.

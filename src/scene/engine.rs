@@ -250,6 +250,12 @@ impl Engine {
         }
     }
 
+    /// Whether the model's free motion is known to end at exactly zero.
+    pub fn comes_to_rest(&self) -> bool {
+        // The bound of a reduced model's correction decays geometrically; a network alone promises nothing.
+        matches!(self, Engine::Reduced(_))
+    }
+
     /// Recomputes what the published records hold per planned node.
     pub fn replan(&mut self, isa: Isa, pool: &Pool, model: &Model, plan: &NodePlan) -> Result<()> {
         match self {
