@@ -16,6 +16,7 @@ mod render;
 mod report;
 mod rollout;
 mod simulate;
+mod soak;
 mod stress;
 
 use std::process::ExitCode;
@@ -55,6 +56,8 @@ enum Command {
     Report(report::Options),
     /// Stiff and extreme cases, with what happened and whether it is what must happen.
     Stress(stress::Options),
+    /// Very many steps on one scene, with the process's memory in a log.
+    Soak(soak::Options),
     /// Shell completions, on stdout.
     Completions(completions::Options),
 }
@@ -71,6 +74,7 @@ fn main() -> ExitCode {
         Command::Rollout(options) => rollout::run(&options),
         Command::Report(options) => report::run(&options),
         Command::Stress(options) => stress::run(&options),
+        Command::Soak(options) => soak::run(&options),
         Command::Completions(options) => completions::run::<Arguments>(&options),
     };
     outcome.unwrap_or_else(|error| {

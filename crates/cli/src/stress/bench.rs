@@ -11,33 +11,33 @@ use upt::{Contact, Error, Model, ModelOptions, Scene, SceneOptions, StepInput, f
 use super::Row;
 
 /// A bundle on the bench.
-pub(super) struct Bench {
-    pub(super) subject: String,
-    pub(super) model: Arc<Model>,
-    pub(super) mesh: Mesh,
-    pub(super) boundary: Boundary,
-    pub(super) domain: ContactDomain,
-    pub(super) max_push: f32,
-    pub(super) bound: f32,
-    pub(super) area: f64,
-    pub(super) quick: bool,
+pub(crate) struct Bench {
+    pub(crate) subject: String,
+    pub(crate) model: Arc<Model>,
+    pub(crate) mesh: Mesh,
+    pub(crate) boundary: Boundary,
+    pub(crate) domain: ContactDomain,
+    pub(crate) max_push: f32,
+    pub(crate) bound: f32,
+    pub(crate) area: f64,
+    pub(crate) quick: bool,
 }
 
 /// Nodes and vectors of a step's contact.
-pub(super) type Touch = (Vec<u32>, Vec<f32>);
+pub(crate) type Touch = (Vec<u32>, Vec<f32>);
 
 /// What a run of steps came to.
 #[derive(Default)]
-pub(super) struct Run {
-    pub(super) flags: u32,
-    pub(super) largest: f32,
-    pub(super) refused: usize,
-    pub(super) finite: bool,
-    pub(super) other: Option<String>,
+pub(crate) struct Run {
+    pub(crate) flags: u32,
+    pub(crate) largest: f32,
+    pub(crate) refused: usize,
+    pub(crate) finite: bool,
+    pub(crate) other: Option<String>,
 }
 
 impl Run {
-    pub(super) fn text(&self) -> String {
+    pub(crate) fn text(&self) -> String {
         let mut text = format!(
             "|u| at most {:.2} mm, flags {}",
             self.largest,
@@ -52,12 +52,12 @@ impl Run {
         text
     }
 
-    pub(super) fn sound(&self, bound: f32) -> bool {
+    pub(crate) fn sound(&self, bound: f32) -> bool {
         self.finite && self.other.is_none() && self.largest <= bound
     }
 }
 
-pub(super) fn names(flags: u32) -> String {
+pub(crate) fn names(flags: u32) -> String {
     const NAMES: [(u32, &str); 11] = [
         (flag::PUSH, "push"),
         (flag::CONTACT_AREA, "area"),
@@ -83,7 +83,7 @@ pub(super) fn names(flags: u32) -> String {
     }
 }
 
-pub(super) fn largest(field: &[f32]) -> f32 {
+pub(crate) fn largest(field: &[f32]) -> f32 {
     field.iter().fold(
         0.0,
         |m, v| if v.is_nan() { f32::NAN } else { m.max(v.abs()) },
@@ -91,7 +91,7 @@ pub(super) fn largest(field: &[f32]) -> f32 {
 }
 
 impl Bench {
-    pub(super) fn open(path: &Path, quick: bool) -> Result<Self> {
+    pub(crate) fn open(path: &Path, quick: bool) -> Result<Self> {
         let model = Model::open(
             path,
             &ModelOptions {
@@ -134,14 +134,14 @@ impl Bench {
         })
     }
 
-    pub(super) fn scene(&self) -> Result<Scene> {
+    pub(crate) fn scene(&self) -> Result<Scene> {
         Ok(Scene::new(
             Arc::clone(&self.model),
             &SceneOptions::default(),
         )?)
     }
 
-    pub(super) fn steps(&self, full: usize) -> usize {
+    pub(crate) fn steps(&self, full: usize) -> usize {
         if self.quick {
             (full / 20).max(40)
         } else {
@@ -149,11 +149,11 @@ impl Bench {
         }
     }
 
-    pub(super) fn row(&self, case: &str, run: &Run, good: bool) -> Row {
+    pub(crate) fn row(&self, case: &str, run: &Run, good: bool) -> Row {
         Row::new(&self.subject, case, run.text(), good)
     }
 
-    pub(super) fn patch(&self, seed: usize, area: f64) -> Result<Patch> {
+    pub(crate) fn patch(&self, seed: usize, area: f64) -> Result<Patch> {
         let count = self.domain.face_count();
         for offset in 0..count {
             if let Ok(patch) = self.domain.grow((seed + 7 * offset) % count, area) {
@@ -163,7 +163,7 @@ impl Bench {
         anyhow::bail!("no patch of {area:.0} mm² fits into the domain")
     }
 
-    pub(super) fn central(&self) -> Result<Patch> {
+    pub(crate) fn central(&self) -> Result<Patch> {
         let centroids = self.domain.centroids();
         let n = centroids.len() as f64;
         let middle = [0, 1, 2].map(|k| centroids.iter().map(|c| c[k]).sum::<f64>() / n);
@@ -175,7 +175,7 @@ impl Bench {
     }
 
     /// Steps a scene; the guard's refusals count, other errors end the run.
-    pub(super) fn run(
+    pub(crate) fn run(
         &self,
         scene: &Scene,
         steps: usize,
@@ -216,7 +216,7 @@ impl Bench {
     }
 
     /// After any case: without contact the tissue comes back to rest, and a reset scene repeats a fresh one.
-    pub(super) fn recovers(&self, scene: &Scene) -> Result<bool> {
+    pub(crate) fn recovers(&self, scene: &Scene) -> Result<bool> {
         let run = self.run(scene, 400, |_| (Vec::new(), Vec::new()));
         let mut field = vec![0.0; 3 * self.mesh.node_count()];
         scene.read(&mut field)?;
@@ -224,7 +224,7 @@ impl Bench {
     }
 }
 
-pub(super) fn push(patch: &Patch, direction: [f64; 3], depth: f64) -> Touch {
+pub(crate) fn push(patch: &Patch, direction: [f64; 3], depth: f64) -> Touch {
     let c = direction.map(|v| (v * depth) as f32);
     (
         patch.nodes.clone(),
@@ -233,6 +233,6 @@ pub(super) fn push(patch: &Patch, direction: [f64; 3], depth: f64) -> Touch {
 }
 
 /// A depth that rises within ten steps, as slowly as the envelope allows.
-pub(super) fn ramp(step: usize, depth: f64) -> f64 {
+pub(crate) fn ramp(step: usize, depth: f64) -> f64 {
     depth * (step as f64 / 10.0).min(1.0)
 }

@@ -1,8 +1,9 @@
 //! `upt stress`: a fixed suite of stiff and extreme cases for the reference solver and for bundles, as a table: what was
 //! done, what happened, and whether that is what must happen. Exit code 1 when a verdict is bad.
 
-mod bench;
+pub(crate) mod bench;
 mod inputs;
+mod jump;
 mod outside;
 mod reference;
 mod surrogate;
@@ -141,11 +142,8 @@ fn table(rows: &[Row]) -> String {
         .collect()
 }
 
-const BEGIN: &str = "<!-- begin: upt stress -->";
-const END: &str = "<!-- end: upt stress -->";
-
 fn write_page(path: &std::path::Path, rows: &[Row]) -> Result<()> {
-    let mut text = String::from(BEGIN);
+    let mut text = String::new();
     let mut subject = "";
     for row in rows {
         if row.subject != subject {
@@ -160,15 +158,22 @@ fn write_page(path: &std::path::Path, rows: &[Row]) -> Result<()> {
             word(row.verdict)
         );
     }
-    text += "\n";
-    text += END;
-    let page = std::fs::read_to_string(path).unwrap_or_else(|_| format!("{BEGIN}\n{END}\n"));
-    let (begin, end) = page.find(BEGIN).zip(page.find(END)).with_context(|| {
+    replace_between(path, "upt stress", &text)
+}
+
+/// Replaces what a page has between the markers `begin: name` and `end: name`; makes the page where there is none.
+pub(crate) fn replace_between(path: &std::path::Path, name: &str, text: &str) -> Result<()> {
+    let (begin, end) = (
+        format!("<!-- begin: {name} -->"),
+        format!("<!-- end: {name} -->"),
+    );
+    let page = std::fs::read_to_string(path).unwrap_or_else(|_| format!("{begin}\n{end}\n"));
+    let (from, to) = page.find(&begin).zip(page.find(&end)).with_context(|| {
         format!(
-            "{}: the markers {BEGIN} and {END} are missing",
+            "{}: the markers {begin} and {end} are missing",
             path.display()
         )
     })?;
-    let page = format!("{}{text}{}", &page[..begin], &page[end + END.len()..]);
+    let page = format!("{}{begin}{text}\n{}", &page[..from], &page[to..]);
     std::fs::write(path, page).with_context(|| format!("{}", path.display()))
 }

@@ -9,14 +9,14 @@ use tissue::material::Material;
 use tissue::mesh::{Boundary, Mesh, ellipsoid_phantom};
 use tissue::solver::{ContactNode, Solver, SolverError, SolverOptions, Substep};
 
-use super::{Row, progress};
+use super::{Row, jump, progress};
 
-const SUBJECT: &str = "reference solver";
+pub(super) const SUBJECT: &str = "reference solver";
 const FRAME_S: f64 = 0.05;
 
 /// One press: ramp, hold, and by option release.
 #[derive(Clone, Copy)]
-struct Press {
+pub(super) struct Press {
     depth_mm: f64,
     area_mm2: f64,
     ramp_frames: usize,
@@ -37,11 +37,11 @@ impl Default for Press {
 }
 
 /// What became of a press.
-struct Outcome {
+pub(super) struct Outcome {
     frames: usize,
     most_steps: u32,
     min_det_f: f64,
-    field: Vec<[f32; 3]>,
+    pub(super) field: Vec<[f32; 3]>,
     largest_mm: f32,
     finite: bool,
     error: Option<SolverError>,
@@ -52,11 +52,11 @@ impl Outcome {
         self.finite
     }
 
-    fn complete(&self) -> bool {
+    pub(super) fn complete(&self) -> bool {
         self.finite && self.error.is_none()
     }
 
-    fn text(&self) -> String {
+    pub(super) fn text(&self) -> String {
         let state = format!(
             "{} frames, at most {} inner steps a frame, |u| at most {:.2} mm, min det F {:.2}",
             self.frames, self.most_steps, self.largest_mm, self.min_det_f
@@ -68,10 +68,10 @@ impl Outcome {
     }
 }
 
-struct Body {
-    mesh: Mesh,
-    domain: ContactDomain,
-    seed: usize,
+pub(super) struct Body {
+    pub(super) mesh: Mesh,
+    pub(super) domain: ContactDomain,
+    pub(super) seed: usize,
 }
 
 impl Body {
@@ -79,7 +79,7 @@ impl Body {
         Ok(self.domain.grow(self.seed, area_mm2)?)
     }
 
-    fn press(&self, options: SolverOptions, press: Press) -> Result<Outcome> {
+    pub(super) fn press(&self, options: SolverOptions, press: Press) -> Result<Outcome> {
         let patch = self.patch(press.area_mm2)?;
         Ok(self.drive(options, &patch, press))
     }
@@ -219,7 +219,7 @@ pub fn rows(mesh: Option<&Path>, quick: bool) -> Result<Vec<Row>> {
     };
     cases.push(("a patch of one face".into(), base.clone(), one_face, false));
 
-    let bar = progress(cases.len() + 5, SUBJECT);
+    let bar = progress(cases.len() + 6, SUBJECT);
     let mut rows = Vec::new();
     for (name, options, press, must_complete) in cases {
         let outcome = body.press(options, press)?;
@@ -233,11 +233,8 @@ pub fn rows(mesh: Option<&Path>, quick: bool) -> Result<Vec<Row>> {
     bar.inc(2);
     rows.extend(bad_elements(&body, &base)?);
     bar.inc(1);
-    rows.push(Row::left(
-        SUBJECT,
-        "stiffness jump of 1000 inside the mesh",
-        "the solver has one material a mesh",
-    ));
+    rows.push(jump::row(&body, &base)?);
+    bar.inc(1);
     bar.finish_and_clear();
     Ok(rows)
 }
