@@ -28,8 +28,8 @@ class Mesh:
     domain: np.ndarray
     fixed: np.ndarray
     supported: np.ndarray
-    stiffness: np.ndarray = field(default_factory=lambda: np.zeros(0, np.float32))
     metadata: dict = field(default_factory=dict)
+    stiffness: np.ndarray = field(default_factory=lambda: np.zeros(0, np.float32))
 
     @property
     def node_count(self) -> int:

@@ -35,7 +35,8 @@ def stiffness(mesh: Mesh, material: dict) -> sparse.csc_matrix:
     inner = np.einsum("tai,tbi->tab", gradients, gradients)
     for axis in range(3):
         element[:, :, axis, :, axis] += mu * inner
-    element *= 1e-3 * volume[:, None, None, None, None]  # Pa mm = 1e-3 mN/mm
+    factor = mesh.stiffness.astype(np.float64) if len(mesh.stiffness) else np.ones(len(volume))
+    element *= 1e-3 * (factor * volume)[:, None, None, None, None]  # Pa mm = 1e-3 mN/mm
     dof = (3 * np.asarray(mesh.tets, np.int64)[:, :, None] + np.arange(3)).reshape(-1, 12)
     rows, columns = np.repeat(dof, 12, axis=1).ravel(), np.tile(dof, (1, 12)).ravel()
     return sparse.csc_matrix((element.ravel(), (rows, columns)), shape=(3 * mesh.node_count,) * 2)
