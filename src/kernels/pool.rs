@@ -12,8 +12,9 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 
-/// Bytes from which on streaming a table is split over threads. Waking a worker and waiting for its last chunk costs some
-/// 50 to 100 us, in which one core reads some megabytes from cache (`cargo bench --bench kernels -- pool`).
+/// Bytes from which on streaming a table is split over threads. An estimate: waking a worker and waiting for its last
+/// chunk costs some 50 to 100 us, in which one core reads some megabytes from cache. To be set by measurement on an idle
+/// machine (`cargo bench --bench kernels -- pool`).
 const SPLIT_BYTES: usize = 8 << 20;
 
 /// Why a pool could not be made or a job not be finished.
