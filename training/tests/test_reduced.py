@@ -16,6 +16,7 @@ from upt_training.mesh_file import Mesh
 from upt_training.reduced.blocks import partition
 from upt_training.reduced.build import Options, build, split_states
 from upt_training.reduced.columns import Columns, contact_forces, load_columns
+from upt_training.reduced.compare import beside_domain, compare
 from upt_training.reduced.evaluate import evaluate
 from upt_training.reduced.make_prior import make_prior, prior_error
 from upt_training.reduced.network import Correction
@@ -23,6 +24,7 @@ from upt_training.reduced.prior import load_prior, save_prior
 from upt_training.reduced.rollout import Limits, drive_of, rollout, rollout_from_rest, true_limits
 from upt_training.reduced.runner import ReducedRunner
 from upt_training.reduced.states import load_states
+from upt_training.reduced.sweep import floor, sweep
 from upt_training.reduced.train import Settings
 from upt_training.reduced.trajectories import open_dataset
 from upt_training.reduced.transfer import interpolation
@@ -272,3 +274,46 @@ def test_test_cases_and_scheme_5_are_never_trained_on(bundle):
     assert (fit.split == "train").all() and (fit.scheme != "5").all()
     assert (validation.split == "train").all() and (validation.scheme != "5").all()
     assert "5" in tested.scheme
+
+
+def test_fewer_modes_are_cut_from_the_same_build_and_floors_fall(phantom, bundle, tmp_path):
+    mesh, columns, folder = phantom
+    options = Options(
+        mesh=folder / "box.mesh.safetensors",
+        columns=columns.path,
+        data=[folder / "data"],
+        out=tmp_path / "cut",
+        work=tmp_path / "work",
+        name="cut",
+        response_modes=12,
+        tolerance_mm=1e-3,
+    )
+    text = sweep(options, Settings(updates=0, hidden=8), "phantom", [8, 4])
+    few, many = ReducedRunner(tmp_path / "cut-4"), ReducedRunner(tmp_path / "cut-8")
+    assert few.manifest["reduced"]["modes"] == 4 and many.manifest["reduced"]["modes"] == 8
+    assert np.array_equal(few.prior.residual, many.prior.residual[:4])
+    lines = text.splitlines()[2:]
+    assert [line.split("|")[1].strip()[:5] for line in lines] == ["prior", "prior", "prior"]
+    assert float(lines[2].split("|")[2]) < float(lines[0].split("|")[2])
+    states = load_states(tmp_path / "work" / "states-data.npz")
+    assert 0.0 < floor(states, 8, "schemes_1_4") < 0.8 * floor(states, 4, "schemes_1_4")
+
+
+def test_compare_lists_every_method_of_every_regime_and_refuses_an_empty_one(phantom, bundle, tmp_path):
+    _, _, folder = phantom
+    regimes = [("seen", folder / "data")]
+    text = compare(bundle[0], None, regimes, False, lambda label: lambda done, total: None)
+    errors = {line.split("|")[3].strip(): float(line.split("|")[4].strip(" *")) for line in text.splitlines()[2:]}
+    assert errors["reduced"] < errors["linear elasticity"] < errors["zero"]
+    (tmp_path / "manifest.json").write_text('{"cases": []}')
+    with pytest.raises(InputError, match="no finished case"):
+        compare(bundle[0], None, [("none", tmp_path)], False, lambda label: lambda done, total: None)
+
+
+def test_the_domain_beside_the_domain_shares_no_node_with_it(phantom):
+    mesh = phantom[0]
+    beside = beside_domain(mesh, 40.0)
+    assert beside.sha256 == mesh.sha256 and len(beside.domain)
+    assert not np.isin(beside.domain_nodes, mesh.domain_nodes).any()
+    with pytest.raises(InputError, match="raise --reach"):
+        beside_domain(mesh, 0.0)

@@ -1,10 +1,11 @@
-"""Command line: `python -m upt_training.reduced prior | build | evaluate` (each with `--help`)."""
+"""Command line: `python -m upt_training.reduced prior | build | modes | evaluate | compare` (each with `--help`)."""
 
 from __future__ import annotations
 
 import argparse
 import json
 import sys
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -13,25 +14,17 @@ from upt_training.errors import InputError
 from upt_training.mesh_file import load_mesh
 from upt_training.reduced.build import Options, Progress, build
 from upt_training.reduced.columns import load_columns
+from upt_training.reduced.compare import beside_domain, compare
 from upt_training.reduced.evaluate import evaluate, insert_table, table
 from upt_training.reduced.make_prior import make_prior, prior_error
 from upt_training.reduced.prior import load_prior, save_prior
+from upt_training.reduced.sweep import sweep
 from upt_training.reduced.train import Settings
 from upt_training.reduced.trajectories import open_dataset
 
 
-def arguments() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="python -m upt_training.reduced", description=__doc__)
-    commands = parser.add_subparsers(dest="command", required=True)
-
-    prior = commands.add_parser("prior", help="prior.safetensors with the linear response alone")
-    prior.add_argument("--mesh", type=Path, required=True)
-    prior.add_argument("--columns", type=Path, required=True, help="file of `upt prior`")
-    prior.add_argument("--out", type=Path, required=True)
-    prior.add_argument("--tolerance", type=float, default=3e-3, help="RMS truncation error of the block basis, mm")
-    prior.add_argument("--tables", choices=("f16", "f32"), default="f16")
-
-    whole = commands.add_parser("build", help="a reduced bundle: modes, training, tables, evaluation; resumes")
+def add_build_arguments(whole: argparse.ArgumentParser) -> None:
+    """What `build` and `modes` share."""
     whole.add_argument("--mesh", type=Path, required=True)
     whole.add_argument("--columns", type=Path, required=True, help="file of `upt prior` for the wanted boundary")
     whole.add_argument("--data", type=Path, action="append", required=True, help="dataset folder; may be repeated")
@@ -44,7 +37,6 @@ def arguments() -> argparse.ArgumentParser:
     whole.add_argument(
         "--coarse-data", type=Path, action="append", default=[], help="interpolated to --mesh for training"
     )
-    whole.add_argument("--modes", type=int, default=120)
     whole.add_argument("--response-modes", type=int, default=80)
     whole.add_argument("--tolerance", type=float, default=3e-3)
     whole.add_argument("--tables", choices=("f16", "f32"), default="f16")
@@ -61,12 +53,49 @@ def arguments() -> argparse.ArgumentParser:
     whole.add_argument("--weight-decay", type=float, default=0.02, help="of the network")
     whole.add_argument("--seeds", type=int, default=1, help="trainings to choose from by validation error")
 
+
+def arguments() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="python -m upt_training.reduced", description=__doc__)
+    commands = parser.add_subparsers(dest="command", required=True)
+
+    prior = commands.add_parser("prior", help="prior.safetensors with the linear response alone")
+    prior.add_argument("--mesh", type=Path, required=True)
+    prior.add_argument("--columns", type=Path, required=True, help="file of `upt prior`")
+    prior.add_argument("--out", type=Path, required=True)
+    prior.add_argument("--tolerance", type=float, default=3e-3, help="RMS truncation error of the block basis, mm")
+    prior.add_argument("--tables", choices=("f16", "f32"), default="f16")
+
+    whole = commands.add_parser("build", help="a reduced bundle: modes, training, tables, evaluation; resumes")
+    add_build_arguments(whole)
+    whole.add_argument("--modes", type=int, default=120)
+
+    counts = commands.add_parser("modes", help="one bundle for each number of modes, and their errors as a table")
+    add_build_arguments(counts)
+    counts.add_argument("--counts", default="60,120,240", help="numbers of modes; bundles are OUT-60, ...")
+    counts.add_argument("--into", type=Path, help="also write the table into this page, at the markers NAME-modes")
+
     check = commands.add_parser("evaluate", help="errors of a bundle over full rollouts")
     check.add_argument("--bundle", type=Path, required=True)
     check.add_argument("--data", type=Path, action="append", required=True)
     check.add_argument("--all", action="store_true", help="every case, not only the split `test` and scheme 5")
     check.add_argument("--json", type=Path, help="also write the result here")
     check.add_argument("--into", type=Path, help="also write the table into this page, between its table markers")
+    check.add_argument("--label", help="name of those markers (default: the bundle's name)")
+
+    regimes = commands.add_parser("compare", help="bundles of both kinds and linear elasticity on several regimes")
+    regimes.add_argument("--reduced", type=Path, required=True, help="bundle of kind reduced")
+    regimes.add_argument("--upt", type=Path, help="bundle of kind upt, same mesh and boundary")
+    regimes.add_argument(
+        "--data", action="append", required=True, metavar="LABEL=FOLDER", help="a regime; may be repeated"
+    )
+    regimes.add_argument("--all", action="store_true", help="every case, not only the split `test` and scheme 5")
+    regimes.add_argument("--into", type=Path, help="also write the table into this page, at the markers of --label")
+    regimes.add_argument("--label", default="compare")
+
+    beside = commands.add_parser("beside", help="a copy of a mesh whose domain is the surface around the domain")
+    beside.add_argument("--mesh", type=Path, required=True)
+    beside.add_argument("--out", type=Path, required=True)
+    beside.add_argument("--reach", type=float, default=25.0, help="largest distance from the domain, mm")
     return parser
 
 
@@ -90,44 +119,66 @@ def run_evaluate(args: argparse.Namespace) -> None:
         args.json.write_text(json.dumps(result, indent=2))
     if args.into:
         manifest = json.loads((args.bundle / "bundle.json").read_text())
-        insert_table(args.into, manifest["name"], table(result))
+        insert_table(args.into, args.label or manifest["name"], table(result))
     print(table(result))
+
+
+def run_build(args: argparse.Namespace) -> None:
+    sweeping = args.command == "modes"
+    names = {field.name for field in fields(Options)} - {"modes", "tolerance_mm"}
+    options = Options(
+        modes=0 if sweeping else args.modes,
+        tolerance_mm=args.tolerance,
+        **{name: getattr(args, name) for name in names},
+    )
+    settings = Settings(
+        hidden=args.hidden,
+        updates=args.updates,
+        noise=args.noise,
+        weight_decay=args.weight_decay,
+        quadratic_modes=args.quadratic_modes,
+        quadratic_ridge=args.quadratic_ridge,
+    )
+    if not sweeping:
+        build(options, settings, args.description)
+        return
+    try:
+        counts = [int(count) for count in args.counts.split(",")]
+    except ValueError:
+        raise InputError(f"--counts {args.counts}: expected whole numbers, such as 60,120,240") from None
+    text = sweep(options, settings, args.description, counts)
+    if args.into:
+        insert_table(args.into, f"{options.name}-modes", text)
+    print(text)
+
+
+def run_compare(args: argparse.Namespace) -> None:
+    regimes = []
+    for entry in args.data:
+        label, _, folder = entry.partition("=")
+        if not folder:
+            raise InputError(f"--data {entry}: expected LABEL=FOLDER")
+        regimes.append((label, Path(folder)))
+    text = compare(args.reduced, args.upt, regimes, args.all, Progress)
+    if args.into:
+        insert_table(args.into, args.label, text)
+    print(text)
+
+
+COMMANDS = {
+    "prior": run_prior,
+    "build": run_build,
+    "modes": run_build,
+    "evaluate": run_evaluate,
+    "compare": run_compare,
+    "beside": lambda args: beside_domain(load_mesh(args.mesh), args.reach).save(args.out),
+}
 
 
 def main() -> int:
     args = arguments().parse_args()
     try:
-        if args.command == "prior":
-            run_prior(args)
-        elif args.command == "build":
-            options = Options(
-                args.mesh,
-                args.columns,
-                args.data,
-                args.out,
-                args.work,
-                args.name,
-                args.coarse_mesh,
-                args.coarse_columns,
-                args.coarse_data,
-                args.modes,
-                args.response_modes,
-                args.tolerance,
-                args.tables,
-                args.seeds,
-                args.refit,
-            )
-            settings = Settings(
-                hidden=args.hidden,
-                updates=args.updates,
-                noise=args.noise,
-                weight_decay=args.weight_decay,
-                quadratic_modes=args.quadratic_modes,
-                quadratic_ridge=args.quadratic_ridge,
-            )
-            build(options, settings, args.description)
-        else:
-            run_evaluate(args)
+        COMMANDS[args.command](args)
     except InputError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2

@@ -212,8 +212,22 @@ def envelope_of(cases: list[Case], mesh: Mesh) -> dict:
     }
 
 
-def build(options: Options, settings: Settings, description: str) -> dict:
-    """Everything; returns the manifest."""
+@dataclass
+class Prepared:
+    """What does not depend on the correction: meshes, cases, modes, states and tables."""
+
+    mesh: Mesh
+    columns: Columns
+    names: list[str]
+    own: list[Case]
+    cases: list[Case]
+    states: States
+    prior: Prior
+    block_basis: dict
+
+
+def prepare(options: Options) -> Prepared:
+    """Everything before the training; what the work folder holds is not made again."""
     torch.set_num_threads(1)
     options.work.mkdir(parents=True, exist_ok=True)
     mesh, columns = load_mesh(options.mesh), load_columns(options.columns)
@@ -225,32 +239,45 @@ def build(options: Options, settings: Settings, description: str) -> dict:
         raise InputError("no finished case of the split 'train': make the dataset with `upt dataset`")
     modes = learned_modes(options, sources)
     states = projected(options, sources, modes)
-    model, limits, history = trained(options, states, settings)
     prior, info = tables(options, mesh, columns, modes)
-    digest = hashlib.sha256("".join(sorted(states.source)).encode()).hexdigest()[:12]
+    return Prepared(mesh, columns, [name for name, _ in sources], own, cases, states, prior, info)
+
+
+def finish(options: Options, settings: Settings, description: str, made: Prepared) -> dict:
+    """Training, bundle and evaluation; returns the errors by method and group."""
+    model, limits, history = trained(options, made.states, settings)
+    digest = hashlib.sha256("".join(sorted(made.states.source)).encode()).hexdigest()[:12]
     provenance = {
-        "data": [name for name, _ in sources],
-        "cases": {"train": len(cases), "all": states.cases, "files_sha256": digest},
+        "data": made.names,
+        "cases": {"train": len(made.cases), "all": made.states.cases, "files_sha256": digest},
         "training": {
             **asdict(settings),
             "refit": options.refit,
             "validation_mse_mm2": history["validation_mse"] if settings.updates else None,
         },
-        "block_basis": info,
+        "block_basis": made.block_basis,
         "tables": options.tables,
         "date": datetime.now(UTC).strftime("%Y-%m-%d"),
         "command": "python -m upt_training.reduced build",
     }
-    about = Description(options.name, description, envelope_of(trainable(own) or cases, mesh), provenance)
+    about = Description(
+        options.name, description, envelope_of(trainable(made.own) or made.cases, made.mesh), provenance
+    )
     dtype = np.float16 if options.tables == "f16" else np.float32
-    manifest = write_reduced_bundle(options.out, mesh, columns, prior, model, limits, about, dtype)
-    tested = [case for case in own if case.split == "test" or case.scheme == "5"]
+    manifest = write_reduced_bundle(options.out, made.mesh, made.columns, made.prior, model, limits, about, dtype)
+    tested = [case for case in made.own if case.split == "test" or case.scheme == "5"]
     result = evaluate(options.out, tested, Progress("evaluation"))
     manifest["errors"] = {group: _published(e) for group, e in result["reduced"].items()}
     write_manifest(options.out, manifest)
     (options.work / "errors.json").write_text(json.dumps(result, indent=2))
+    return result
+
+
+def build(options: Options, settings: Settings, description: str) -> dict:
+    """A bundle from nothing but its inputs; returns the errors by method and group."""
+    result = finish(options, settings, description, prepare(options))
     print(table(result))
-    return manifest
+    return result
 
 
 def _published(errors: dict) -> dict:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
@@ -39,10 +40,17 @@ def released(case: Case, seconds: float = 1.0, dt_s: float = 0.05, least_push_mm
     return out & ~touching
 
 
-def roll_case(runner: ReducedRunner, case: Case, correct: bool = True) -> CaseError:
+class Runner(Protocol):
+    """What steps from contact to contact: the runners of both kinds of bundle."""
+
+    def reset(self) -> None: ...
+
+    def step(self, nodes: np.ndarray, vectors: np.ndarray) -> np.ndarray: ...
+
+
+def roll_case(runner: Runner, case: Case) -> CaseError:
     """Autoregressive rollout of one trajectory from rest."""
     runner.reset()
-    runner.correct = correct
     mse, largest, truth = np.zeros(case.frames), np.zeros(case.frames), np.zeros(case.frames)
     for t in range(1, case.frames):
         rows = slice(case.offsets[t], case.offsets[t + 1])
@@ -111,7 +119,9 @@ def evaluate(
     rows: dict[str, list[CaseError]] = {"zero": [], "prior": [], "reduced": []}
     for index, case in enumerate(cases):
         rows["zero"].append(zero_error(case))
-        rows["prior"].append(roll_case(runner, case, correct=False))
+        runner.correct = False
+        rows["prior"].append(roll_case(runner, case))
+        runner.correct = True
         rows["reduced"].append(roll_case(runner, case))
         progress(index + 1, len(cases))
     return {name: summarise(errors) for name, errors in rows.items()}
