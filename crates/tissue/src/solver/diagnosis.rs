@@ -1,7 +1,7 @@
 //! What a frame reports, and why it failed: f64 passes over the elements, once a frame.
 
-use super::{ContactNode, FrameReport, PADDING, Solver, SolverError};
-use crate::solver::partition::Batch;
+use super::{ContactNode, FrameReport, Solver, SolverError};
+use crate::solver::partition::Element;
 
 /// Sums and extremes over the elements of the present state.
 pub(super) struct Diagnosis {
@@ -38,27 +38,20 @@ impl Solver {
                 };
                 self.fields.displacement[slot].0
             };
-            for index in chunk.batches.clone() {
-                let batch = &self.partition.batches[index];
-                for (lane, element) in self.partition.element_of_lane[index].iter().enumerate() {
-                    if *element == PADDING {
-                        continue;
-                    }
-                    let corners = [0, 1, 2, 3].map(|a| displacement(batch.corners[a][lane]));
-                    let state = element_state(batch, lane, corners);
-                    let determinant = state.determinant;
-                    if determinant < result.min_det_f || determinant.is_nan() {
-                        result.min_det_f = determinant;
-                        result.worst_element = *element as usize;
-                    }
-                    let speed_squared = f64::from(self.speed_squared[*element as usize]);
-                    result.largest_bound = result.largest_bound.max(state.bound * speed_squared);
-                    let isochoric = state.invariant * inverse_cube_root(determinant).powi(2);
-                    let volume = f64::from(batch.volume[lane]);
-                    result.strain_energy += volume
-                        * 0.5
-                        * (shear * (isochoric - 3.0) + bulk * (determinant - 1.0).powi(2));
+            for element in self.partition.elements(chunk) {
+                let number = element.number as usize;
+                let state = element_state(&element, element.slots.map(displacement));
+                let determinant = state.determinant;
+                if determinant < result.min_det_f || determinant.is_nan() {
+                    result.min_det_f = determinant;
+                    result.worst_element = number;
                 }
+                let speed_squared = f64::from(self.speed_squared[number]);
+                result.largest_bound = result.largest_bound.max(state.bound * speed_squared);
+                let isochoric = state.invariant * inverse_cube_root(determinant).powi(2);
+                let volume = f64::from(element.volume);
+                result.strain_energy +=
+                    volume * 0.5 * (shear * (isochoric - 3.0) + bulk * (determinant - 1.0).powi(2));
             }
         }
         result
@@ -161,12 +154,12 @@ struct ElementState {
     bound: f64,
 }
 
-fn element_state(batch: &Batch, lane: usize, corners: [[f32; 4]; 4]) -> ElementState {
+fn element_state(element: &Element, corners: [[f32; 4]; 4]) -> ElementState {
     let mut f = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let mut gradients = [[0.0; 3]; 4];
     for a in 0..3 {
         for j in 0..3 {
-            let slope = f64::from(batch.gradient[3 * a + j][lane]);
+            let slope = f64::from(element.gradient[a][j]);
             gradients[a + 1][j] = slope;
             gradients[0][j] -= slope;
             for i in 0..3 {

@@ -1,8 +1,8 @@
 //! Run-time choice of the instruction set, and the kernels compiled for each.
 
-use super::kernel::{Law, add_forces, add_volumes};
-use super::lanes::Scalar;
-use super::partition::Batch;
+use super::kernel::{BLOCK, EMPTY, Law, add_forces, add_volumes};
+use super::lanes::{Lanes, Scalar};
+use super::partition::{Chunk, Partition};
 
 /// Instruction set of the element kernels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,8 +48,8 @@ impl Simd {
     }
 }
 
-type ForceKernel = unsafe fn(&[Batch], *const [f32; 4], *mut [f32; 4], Law) -> f32;
-type VolumeKernel = unsafe fn(&[Batch], *const [f32; 4], *mut [f32; 4]);
+type ForceKernel = unsafe fn(&Partition, &Chunk, *const [f32; 4], *mut [f32; 4], Law) -> f32;
+type VolumeKernel = unsafe fn(&Partition, &Chunk, *const [f32; 4], *mut [f32; 4]);
 
 /// The kernels of one instruction set.
 #[derive(Clone, Copy)]
@@ -57,6 +57,26 @@ pub(crate) struct Kernels {
     pub forces: ForceKernel,
     pub averaged_forces: ForceKernel,
     pub volumes: VolumeKernel,
+}
+
+/// Forces of all clusters of a chunk; returns the smallest det F.
+#[inline(always)]
+unsafe fn all_forces<L: Lanes, const AVERAGED: bool>(
+    partition: &Partition,
+    chunk: &Chunk,
+    nodes: *const [f32; 4],
+    forces: *mut [f32; 4],
+    law: Law,
+) -> f32 {
+    unsafe {
+        let (octahedra, pairs, singles) = partition.clusters(chunk);
+        let mut buffer = [EMPTY; BLOCK];
+        let buffer = &mut buffer;
+        let a = add_forces::<L, 6, 4, AVERAGED>(octahedra, nodes, forces, law, buffer);
+        let b = add_forces::<L, 5, 2, AVERAGED>(pairs, nodes, forces, law, buffer);
+        let c = add_forces::<L, 4, 1, AVERAGED>(singles, nodes, forces, law, buffer);
+        a.min(b).min(c)
+    }
 }
 
 /// Compiles the kernels for one `Lanes` type under the given target features.
@@ -67,27 +87,39 @@ macro_rules! kernels {
 
             $(#[target_feature(enable = $feature)])?
             unsafe fn forces(
-                b: &[Batch],
+                p: &Partition,
+                chunk: &Chunk,
                 n: *const [f32; 4],
                 f: *mut [f32; 4],
                 law: Law,
             ) -> f32 {
-                unsafe { add_forces::<$lanes, false>(b, n, f, law) }
+                unsafe { all_forces::<$lanes, false>(p, chunk, n, f, law) }
             }
 
             $(#[target_feature(enable = $feature)])?
             unsafe fn averaged_forces(
-                b: &[Batch],
+                p: &Partition,
+                chunk: &Chunk,
                 n: *const [f32; 4],
                 f: *mut [f32; 4],
                 law: Law,
             ) -> f32 {
-                unsafe { add_forces::<$lanes, true>(b, n, f, law) }
+                unsafe { all_forces::<$lanes, true>(p, chunk, n, f, law) }
             }
 
             $(#[target_feature(enable = $feature)])?
-            unsafe fn volumes(b: &[Batch], n: *const [f32; 4], f: *mut [f32; 4]) {
-                unsafe { add_volumes::<$lanes>(b, n, f) }
+            unsafe fn volumes(
+                p: &Partition,
+                chunk: &Chunk,
+                n: *const [f32; 4],
+                f: *mut [f32; 4],
+            ) {
+                unsafe {
+                    let (octahedra, pairs, singles) = p.clusters(chunk);
+                    add_volumes::<$lanes, 6, 4>(octahedra, n, f);
+                    add_volumes::<$lanes, 5, 2>(pairs, n, f);
+                    add_volumes::<$lanes, 4, 1>(singles, n, f);
+                }
             }
 
             pub(super) const KERNELS: Kernels = Kernels {

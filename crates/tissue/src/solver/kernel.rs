@@ -1,10 +1,14 @@
-//! The element law on batches of 16 tetrahedra: displacements in, nodal forces added.
+//! The element law on batches of 16 clusters of tetrahedra: displacements in, nodal forces added.
 //!
 //! With `F = I + sum_a (u_a - u_0) (x) dN_a/dX` the first Piola stress of the
 //! neo-Hookean law is
 //! `P = mu J^(-2/3) F + [kappa (J - 1) - mu/3 J^(-5/3) I1] cof F`
 //! and a corner's force is `f_a = -V P dN_a/dX`. `J^(-1/3)` comes from an integer
 //! guess and two polynomial corrections, to f32 accuracy, without log or division.
+//!
+//! Tetrahedra that share an edge or a face go through together ([`Cluster`]): their
+//! nodes are gathered once and their forces meet in registers, because gathers and
+//! scatters, not arithmetic, are what an element costs.
 //!
 //! A block of batches goes through three short loops (deformation, stress, forces)
 //! with a buffer between them: the iterations of each are independent and overlap,
@@ -13,11 +17,11 @@
 //! No closures here or in `lanes`: a closure does not take on its caller's
 //! instruction set, and every vector operation in it would become a call.
 
+use super::cluster::{Cluster, corners};
 use super::lanes::{Lanes, WIDTH};
-use super::partition::Batch;
 
-/// Batches that go through the loops together; their tensors fill 5 kB of the first-level cache.
-const BLOCK: usize = 8;
+/// Tetrahedra (times 16) that go through the loops together; their tensors fill 5 kB of the first-level cache.
+pub(crate) const BLOCK: usize = 8;
 
 /// Moduli in the solver's units, Pa.
 #[derive(Clone, Copy, Debug)]
@@ -26,9 +30,12 @@ pub(crate) struct Law {
     pub bulk: f32,
 }
 
-/// Floating-point operations of one element in [`add_forces`], a fused multiply-add counted as two:
-/// differences 9, F 48, cofactors 27, det 5, invariant 17, root 21, coefficients 11, stress 27, forces 54, adds 24.
-pub(crate) const FLOPS_PER_ELEMENT: usize = 243;
+/// Floating-point operations of one tetrahedron in [`add_forces`], a fused multiply-add counted as two:
+/// F 54, cofactors 27, det 5, invariant 17, root 21, coefficients 11, stress 27, forces 54.
+pub(crate) const FLOPS_PER_TET: usize = 216;
+
+/// Those of one node of a cluster: difference, balance and addition, three each.
+pub(crate) const FLOPS_PER_CORNER: usize = 9;
 
 /// `x^(-1/3)` for positive `x`, relative error about 1e-7.
 #[inline(always)]
@@ -50,52 +57,68 @@ pub(crate) unsafe fn inverse_cube_root<L: Lanes>(x: L) -> L {
 /// A second-order tensor of 16 elements, row-major, and one scalar.
 #[repr(C, align(64))]
 #[derive(Clone, Copy)]
-struct Tensors {
+pub(crate) struct Tensors {
     entry: [[f32; WIDTH]; 9],
     /// Mean of the corners' fourth component: nodal pressure, where it is used.
     scalar: [f32; WIDTH],
 }
 
-const EMPTY: Tensors = Tensors {
+/// What a block of batches keeps between the loops.
+pub(crate) type Buffer = [Tensors; BLOCK];
+
+pub(crate) const EMPTY: Tensors = Tensors {
     entry: [[0.0; WIDTH]; 9],
     scalar: [0.0; WIDTH],
 };
 
-/// Deformation gradients of the elements of a batch from lane `first` on.
+/// Deformation gradients of the tetrahedra of a batch from lane `first` on.
 #[inline(always)]
-unsafe fn deformation<L: Lanes>(
-    batch: &Batch,
+unsafe fn deformation<L: Lanes, const NODES: usize, const TETS: usize, const AVERAGED: bool>(
+    cluster: &Cluster<NODES, TETS>,
     first: usize,
     nodes: *const [f32; 4],
-    out: &mut Tensors,
+    out: &mut [Tensors],
 ) {
     unsafe {
         let zero = L::splat(0.0);
-        let origin = L::gather(nodes, batch.corners[0].as_ptr().add(first));
-        let mut f = [[zero; 3]; 3];
-        let mut scalar = origin[3];
-        for i in 0..3 {
-            f[i][i] = L::splat(1.0);
+        let mut displacement = [[zero; 4]; NODES];
+        for (node, value) in displacement.iter_mut().enumerate() {
+            *value = L::gather(nodes, cluster.slots[node].as_ptr().add(first));
         }
-        for a in 0..3 {
-            let corner = L::gather(nodes, batch.corners[a + 1].as_ptr().add(first));
-            scalar = scalar.add(corner[3]);
+        let origin = displacement[0];
+        for value in &mut displacement[1..] {
             for i in 0..3 {
-                let difference = corner[i].sub(origin[i]);
-                for j in 0..3 {
-                    let slope = L::load(batch.gradient[3 * a + j].as_ptr().add(first));
-                    f[i][j] = difference.mul_add(slope, f[i][j]);
+                value[i] = value[i].sub(origin[i]);
+            }
+        }
+        for tet in 0..TETS {
+            let mut f = [[zero; 3]; 3];
+            let mut scalar = origin[3];
+            for i in 0..3 {
+                f[i][i] = L::splat(1.0);
+            }
+            for (a, corner) in corners::<NODES>(tet).into_iter().enumerate() {
+                if AVERAGED {
+                    scalar = scalar.add(displacement[corner][3]);
+                }
+                for i in 0..3 {
+                    for j in 0..3 {
+                        let slope = L::load(cluster.gradient[tet][3 * a + j].as_ptr().add(first));
+                        f[i][j] = displacement[corner][i].mul_add(slope, f[i][j]);
+                    }
                 }
             }
-        }
-        for i in 0..3 {
-            for j in 0..3 {
-                f[i][j].store(out.entry[3 * i + j].as_mut_ptr().add(first));
+            for i in 0..3 {
+                for j in 0..3 {
+                    f[i][j].store(out[tet].entry[3 * i + j].as_mut_ptr().add(first));
+                }
+            }
+            if AVERAGED {
+                scalar
+                    .mul(L::splat(0.25))
+                    .store(out[tet].scalar.as_mut_ptr().add(first));
             }
         }
-        scalar
-            .mul(L::splat(0.25))
-            .store(out.scalar.as_mut_ptr().add(first));
     }
 }
 
@@ -132,7 +155,7 @@ unsafe fn cofactors<L: Lanes>(tensors: &Tensors, first: usize) -> ([[L; 3]; 3], 
 /// Replaces `F` by `-V P`; returns det F.
 #[inline(always)]
 unsafe fn stress<L: Lanes, const AVERAGED: bool>(
-    batch: &Batch,
+    volume: &[f32; WIDTH],
     first: usize,
     tensors: &mut Tensors,
     law: Law,
@@ -147,7 +170,7 @@ unsafe fn stress<L: Lanes, const AVERAGED: bool>(
             let part = row[2].mul_add(row[2], row[1].mul_add(row[1], row[0].mul(row[0])));
             invariant = invariant.add(part);
         }
-        let volume = L::load(batch.volume.as_ptr().add(first));
+        let volume = L::load(volume.as_ptr().add(first));
         let deviatoric = volume.mul(L::splat(-law.shear)).mul(root2);
         let pressure = if AVERAGED {
             L::load(tensors.scalar.as_ptr().add(first)).mul(volume)
@@ -171,56 +194,73 @@ unsafe fn stress<L: Lanes, const AVERAGED: bool>(
 
 /// Adds `-V P dN_a/dX` to the corners.
 #[inline(always)]
-unsafe fn scatter<L: Lanes>(batch: &Batch, first: usize, tensors: &Tensors, forces: *mut [f32; 4]) {
+unsafe fn scatter<L: Lanes, const NODES: usize, const TETS: usize>(
+    cluster: &Cluster<NODES, TETS>,
+    first: usize,
+    tensors: &[Tensors],
+    forces: *mut [f32; 4],
+) {
     unsafe {
-        let zero = L::splat(0.0);
-        let mut sum = [zero; 4];
-        for a in 0..3 {
-            let slope: *const f32 = batch.gradient[3 * a].as_ptr().add(first);
-            let mut force = [zero; 4];
-            for i in 0..3 {
-                let row = tensors.entry[3 * i].as_ptr().add(first);
-                force[i] = L::load(row).mul(L::load(slope));
-                for j in 1..3 {
-                    let entry = L::load(row.add(j * WIDTH));
-                    force[i] = entry.mul_add(L::load(slope.add(j * WIDTH)), force[i]);
+        let mut force = [[L::splat(0.0); 4]; NODES];
+        for tet in 0..TETS {
+            for (a, corner) in corners::<NODES>(tet).into_iter().enumerate() {
+                for i in 0..3 {
+                    for j in 0..3 {
+                        let entry = L::load(tensors[tet].entry[3 * i + j].as_ptr().add(first));
+                        let slope = L::load(cluster.gradient[tet][3 * a + j].as_ptr().add(first));
+                        force[corner][i] = entry.mul_add(slope, force[corner][i]);
+                    }
                 }
-                sum[i] = sum[i].sub(force[i]);
             }
-            L::scatter_add(forces, batch.corners[a + 1].as_ptr().add(first), force);
         }
-        L::scatter_add(forces, batch.corners[0].as_ptr().add(first), sum);
+        // The forces of an element are in balance.
+        for node in 1..NODES {
+            for i in 0..3 {
+                force[0][i] = force[0][i].sub(force[node][i]);
+            }
+        }
+        for (node, value) in force.into_iter().enumerate() {
+            L::scatter_add(forces, cluster.slots[node].as_ptr().add(first), value);
+        }
     }
 }
 
-/// Adds the forces (µN) of the batches to `forces`; returns the smallest det F seen.
+/// Adds the forces (µN) of the clusters to `forces`; returns the smallest det F seen.
 ///
 /// With `AVERAGED` the pressure is the mean of the corners' fourth component
 /// instead of `kappa (J - 1)` of the element.
 #[inline(always)]
-pub(crate) unsafe fn add_forces<L: Lanes, const AVERAGED: bool>(
-    batches: &[Batch],
+pub(crate) unsafe fn add_forces<
+    L: Lanes,
+    const NODES: usize,
+    const TETS: usize,
+    const AVERAGED: bool,
+>(
+    clusters: &[Cluster<NODES, TETS>],
     nodes: *const [f32; 4],
     forces: *mut [f32; 4],
     law: Law,
+    buffer: &mut Buffer,
 ) -> f32 {
     unsafe {
         let mut smallest = L::splat(f32::MAX);
-        let mut buffer = [EMPTY; BLOCK];
-        for block in batches.chunks(BLOCK) {
-            for (batch, tensors) in block.iter().zip(&mut buffer) {
+        for block in clusters.chunks(BLOCK / TETS) {
+            for (cluster, tensors) in block.iter().zip(buffer.chunks_exact_mut(TETS)) {
                 for first in (0..WIDTH).step_by(L::COUNT) {
-                    deformation::<L>(batch, first, nodes, tensors);
+                    deformation::<L, NODES, TETS, AVERAGED>(cluster, first, nodes, tensors);
                 }
             }
-            for (batch, tensors) in block.iter().zip(&mut buffer) {
-                for first in (0..WIDTH).step_by(L::COUNT) {
-                    smallest = smallest.min(stress::<L, AVERAGED>(batch, first, tensors, law));
+            for (cluster, tensors) in block.iter().zip(buffer.chunks_exact_mut(TETS)) {
+                for (volume, tensors) in cluster.volume.iter().zip(tensors) {
+                    for first in (0..WIDTH).step_by(L::COUNT) {
+                        let determinant = stress::<L, AVERAGED>(volume, first, tensors, law);
+                        smallest = smallest.min(determinant);
+                    }
                 }
             }
-            for (batch, tensors) in block.iter().zip(&buffer) {
+            for (cluster, tensors) in block.iter().zip(buffer.chunks_exact(TETS)) {
                 for first in (0..WIDTH).step_by(L::COUNT) {
-                    scatter::<L>(batch, first, tensors, forces);
+                    scatter::<L, NODES, TETS>(cluster, first, tensors, forces);
                 }
             }
         }
@@ -232,22 +272,30 @@ pub(crate) unsafe fn add_forces<L: Lanes, const AVERAGED: bool>(
 
 /// Adds each element's current volume to the fourth component of its corners' `forces`.
 #[inline(always)]
-pub(crate) unsafe fn add_volumes<L: Lanes>(
-    batches: &[Batch],
+pub(crate) unsafe fn add_volumes<L: Lanes, const NODES: usize, const TETS: usize>(
+    clusters: &[Cluster<NODES, TETS>],
     nodes: *const [f32; 4],
     forces: *mut [f32; 4],
 ) {
     unsafe {
         let zero = L::splat(0.0);
-        let mut tensors = EMPTY;
-        for batch in batches {
+        let mut buffer = [EMPTY; TETS];
+        for cluster in clusters {
             for first in (0..WIDTH).step_by(L::COUNT) {
-                deformation::<L>(batch, first, nodes, &mut tensors);
-                let (_, _, determinant) = cofactors::<L>(&tensors, first);
-                let volume = determinant.mul(L::load(batch.volume.as_ptr().add(first)));
-                for corners in &batch.corners {
-                    let corners = corners.as_ptr().add(first);
-                    L::scatter_add(forces, corners, [zero, zero, zero, volume]);
+                deformation::<L, NODES, TETS, false>(cluster, first, nodes, &mut buffer);
+                let mut sum = [zero; NODES];
+                for tet in 0..TETS {
+                    let (_, _, determinant) = cofactors::<L>(&buffer[tet], first);
+                    let rest = L::load(cluster.volume[tet].as_ptr().add(first));
+                    let volume = determinant.mul(rest);
+                    sum[0] = sum[0].add(volume);
+                    for corner in corners::<NODES>(tet) {
+                        sum[corner] = sum[corner].add(volume);
+                    }
+                }
+                for (slots, volume) in cluster.slots.iter().zip(sum) {
+                    let slots = slots.as_ptr().add(first);
+                    L::scatter_add(forces, slots, [zero, zero, zero, volume]);
                 }
             }
         }

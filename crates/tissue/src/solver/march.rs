@@ -184,7 +184,8 @@ impl March<'_> {
                     let chunk = &self.partition.chunks[chunk];
                     self.prepare(shared, chunk);
                     (self.kernels.volumes)(
-                        &self.partition.batches[chunk.batches.clone()],
+                        self.partition,
+                        chunk,
                         shared.displacement.add(chunk.first).cast(),
                         shared.force.add(chunk.first).cast(),
                     );
@@ -204,7 +205,8 @@ impl March<'_> {
                     self.kernels.forces
                 };
                 let smallest = kernel(
-                    &self.partition.batches[chunk.batches.clone()],
+                    self.partition,
+                    chunk,
                     shared.displacement.add(chunk.first).cast(),
                     shared.force.add(chunk.first).cast(),
                     self.law,

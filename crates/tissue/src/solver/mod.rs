@@ -7,6 +7,7 @@
 //! bits for any number of threads.
 
 mod barrier;
+mod cluster;
 mod diagnosis;
 mod dispatch;
 mod error;
@@ -26,7 +27,7 @@ use dispatch::Kernels;
 use kernel::Law;
 use march::{Fields, March, Node, Path};
 use mass::LumpedMass;
-use partition::{PADDING, Partition};
+use partition::Partition;
 
 /// How the pressure of an element is found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -335,12 +336,20 @@ impl Solver {
     /// Bytes that an inner step streams through, and its floating-point operations:
     /// the figures behind the roofline in `docs/reference-solver.md`.
     pub fn step_cost(&self) -> StepCost {
-        let batches = self.partition.batches.len();
-        let slots: usize = self.partition.chunks.iter().map(|c| c.slot_count()).sum();
+        let partition = &self.partition;
+        let slots: usize = partition.chunks.iter().map(|c| c.slot_count()).sum();
+        let constants =
+            partition.octahedra.bytes() + partition.pairs.bytes() + partition.singles.bytes();
+        let corners = lanes::WIDTH
+            * (6 * partition.octahedra.batches.len()
+                + 5 * partition.pairs.batches.len()
+                + 4 * partition.singles.batches.len());
         StepCost {
-            bytes: batches * std::mem::size_of::<partition::Batch>()
-                + slots * 6 * std::mem::size_of::<Node>(),
-            flops: self.tets.len() * kernel::FLOPS_PER_ELEMENT + self.positions.len() * 9,
+            bytes: constants + slots * 6 * std::mem::size_of::<Node>(),
+            flops: self.tets.len() * kernel::FLOPS_PER_TET
+                + corners * kernel::FLOPS_PER_CORNER
+                + self.positions.len() * 9,
+            gathers: corners,
         }
     }
 
@@ -471,6 +480,8 @@ pub struct StepCost {
     pub bytes: usize,
     /// Floating-point operations of an inner step.
     pub flops: usize,
+    /// Nodes gathered, and scattered to, by the clusters of an inner step: four a tetrahedron without clusters.
+    pub gathers: usize,
 }
 
 fn check_positive(field: &'static str, value: f64) -> Result<(), SolverError> {

@@ -7,26 +7,16 @@
 //! added to the owner in ascending slot order. The split depends on the mesh
 //! alone: a result has the same bits for any number of threads.
 
+use super::cluster::{Cluster, Group, Groups, Octahedra, Pairs, Singles, corners};
 use super::lanes::WIDTH;
 use crate::mesh::Mesh;
+use std::ops::Range;
 
 /// Target number of elements in a chunk.
 const CHUNK_ELEMENTS: usize = 2048;
 
 /// Marks a slot that only pads a chunk to a cache line.
 pub(crate) const PADDING: u32 = u32::MAX;
-
-/// Sixteen elements, structure of arrays; 768 bytes.
-#[repr(C, align(64))]
-pub(crate) struct Batch {
-    /// `gradient[3 (a - 1) + j]`: derivative of the shape function of corner `a` (1..=3) along axis `j`, 1/mm.
-    pub gradient: [[f32; WIDTH]; 9],
-    /// Rest volume, mm³, times the element's stiffness over the material's: the energy density is
-    /// proportional to the modulus. Zero in padding lanes.
-    pub volume: [f32; WIDTH],
-    /// Twice the chunk-local slot of each corner (see `lanes`).
-    pub corners: [[u16; WIDTH]; 4],
-}
 
 /// A chunk's nodes and elements.
 pub(crate) struct Chunk {
@@ -38,8 +28,12 @@ pub(crate) struct Chunk {
     pub ghosts: Vec<u32>,
     /// `(own slot, ghost slot elsewhere)` whose force is added here, ascending.
     pub contributions: Vec<(u32, u32)>,
-    /// Batches of this chunk.
-    pub batches: std::ops::Range<usize>,
+    /// This chunk's part of [`Partition::octahedra`].
+    pub octahedra: Range<usize>,
+    /// This chunk's part of [`Partition::pairs`].
+    pub pairs: Range<usize>,
+    /// This chunk's part of [`Partition::singles`].
+    pub singles: Range<usize>,
 }
 
 impl Chunk {
@@ -52,13 +46,33 @@ impl Chunk {
 /// All chunks, with the maps between the mesh's nodes and slots.
 pub(crate) struct Partition {
     pub chunks: Vec<Chunk>,
-    pub batches: Vec<Batch>,
+    pub octahedra: Kind<6, 4>,
+    pub pairs: Kind<5, 2>,
+    pub singles: Kind<4, 1>,
     /// Mesh node of each slot, ghosts too; [`PADDING`] where there is none.
     pub node_of_slot: Vec<u32>,
     /// Owned slot of each mesh node.
     pub slot_of_node: Vec<u32>,
-    /// Mesh element of each batch lane; [`PADDING`] in padding lanes.
-    pub element_of_lane: Vec<[u32; WIDTH]>,
+}
+
+/// Batches of one kind of cluster.
+#[derive(Default)]
+pub(crate) struct Kind<const NODES: usize, const TETS: usize> {
+    pub batches: Vec<Cluster<NODES, TETS>>,
+    /// Mesh elements of each batch; [`PADDING`] in padding lanes.
+    pub elements: Vec<[[u32; WIDTH]; TETS]>,
+}
+
+/// One tetrahedron as the kernels see it.
+pub(crate) struct Element {
+    /// Its number in the mesh.
+    pub number: u32,
+    /// Twice the chunk-local slots of its corners.
+    pub slots: [u16; 4],
+    /// Gradients of the shape functions of corners 1 to 3, 1/mm.
+    pub gradient: [[f32; 3]; 3],
+    /// mm³, see [`Cluster::volume`].
+    pub volume: f32,
 }
 
 impl Partition {
@@ -86,10 +100,11 @@ impl Partition {
         }
         let mut partition = Self {
             chunks: Vec::new(),
-            batches: Vec::new(),
+            octahedra: Kind::default(),
+            pairs: Kind::default(),
+            singles: Kind::default(),
             node_of_slot: Vec::new(),
             slot_of_node: vec![PADDING; positions.len()],
-            element_of_lane: Vec::new(),
         };
         for (chunk, leaf) in leaves.iter().enumerate() {
             partition.push_chunk(chunk as u32, leaf, &owner, mesh);
@@ -117,38 +132,36 @@ impl Partition {
                 Err(_) => (own.len() + ghost.partition_point(|g| *g < node)) as u16,
             }
         };
-        let batch_start = self.batches.len();
-        for elements in disjoint_batches(leaf, tets) {
-            let mut batch = Batch {
-                gradient: [[0.0; WIDTH]; 9],
-                volume: [0.0; WIDTH],
-                corners: [[0; WIDTH]; 4],
-            };
-            let mut lanes = [PADDING; WIDTH];
-            for (lane, element) in elements.iter().enumerate() {
-                let tet = tets[*element as usize];
-                let (gradient, volume) = shape_gradients(&mesh.positions, tet);
-                for (k, value) in gradient.iter().flatten().enumerate() {
-                    batch.gradient[k][lane] = *value as f32;
-                }
-                batch.volume[lane] = volume as f32 * mesh.stiffness_of(*element as usize);
-                for k in 0..4 {
-                    batch.corners[k][lane] = 2 * local(tet[k]);
-                }
-                lanes[lane] = *element;
-            }
-            self.batches.push(batch);
-            self.element_of_lane.push(lanes);
-        }
+        let groups = Groups::new(leaf, tets, &mesh.positions);
         self.chunks.push(Chunk {
             first,
             owned: own.len(),
+            octahedra: self.octahedra.push(&groups.octahedra, mesh, local),
+            pairs: self.pairs.push(&groups.pairs, mesh, local),
+            singles: self.singles.push(&groups.singles, mesh, local),
             ghosts: ghost,
             contributions: Vec::new(),
-            batches: batch_start..self.batches.len(),
         });
         let padded = self.node_of_slot.len().next_multiple_of(4);
         self.node_of_slot.resize(padded, PADDING);
+    }
+
+    /// The batches of a chunk.
+    #[inline(always)]
+    pub fn clusters(&self, chunk: &Chunk) -> (&[Octahedra], &[Pairs], &[Singles]) {
+        (
+            &self.octahedra.batches[chunk.octahedra.clone()],
+            &self.pairs.batches[chunk.pairs.clone()],
+            &self.singles.batches[chunk.singles.clone()],
+        )
+    }
+
+    /// The elements of a chunk, always in the same order.
+    pub fn elements(&self, chunk: &Chunk) -> impl Iterator<Item = Element> + '_ {
+        self.octahedra
+            .elements(chunk.octahedra.clone())
+            .chain(self.pairs.elements(chunk.pairs.clone()))
+            .chain(self.singles.elements(chunk.singles.clone()))
     }
 
     /// Turns ghost node numbers into owner slots and lists the forces that each owner collects.
@@ -196,22 +209,87 @@ fn bisect(order: &mut [u32], centroids: &[[f32; 3]], count: usize, leaves: &mut 
     bisect(right, centroids, count - half, leaves);
 }
 
-/// Groups a chunk's elements by 16 so that, while it lasts, no two in a group
-/// share a node: their force additions then do not wait for each other.
-fn disjoint_batches(leaf: &[u32], tets: &[[u32; 4]]) -> Vec<Vec<u32>> {
-    let mut remaining = leaf.to_vec();
-    let mut batches = Vec::with_capacity(leaf.len() / WIDTH + 1);
-    let mut used = std::collections::HashSet::with_capacity(4 * WIDTH);
+impl<const NODES: usize, const TETS: usize> Kind<NODES, TETS> {
+    /// Packs groups into batches; `local` maps a mesh node to its chunk-local slot. Returns where they lie.
+    fn push(
+        &mut self,
+        groups: &[Group<NODES, TETS>],
+        mesh: &Mesh,
+        local: impl Fn(u32) -> u16,
+    ) -> Range<usize> {
+        let start = self.batches.len();
+        for groups in disjoint_batches(groups) {
+            let mut batch = Cluster {
+                gradient: [[[0.0; WIDTH]; 9]; TETS],
+                volume: [[0.0; WIDTH]; TETS],
+                slots: [[0; WIDTH]; NODES],
+            };
+            let mut elements = [[PADDING; WIDTH]; TETS];
+            for (lane, group) in groups.iter().enumerate() {
+                for (slots, node) in batch.slots.iter_mut().zip(group.nodes) {
+                    slots[lane] = 2 * local(node);
+                }
+                for (tet, element) in group.tets.into_iter().enumerate() {
+                    let [a, b, c] = corners::<NODES>(tet).map(|corner| group.nodes[corner]);
+                    let nodes = [group.nodes[0], a, b, c];
+                    let (gradient, volume) = shape_gradients(&mesh.positions, nodes);
+                    for (k, value) in gradient.iter().flatten().enumerate() {
+                        batch.gradient[tet][k][lane] = *value as f32;
+                    }
+                    // The order of the corners in a group may turn the element around.
+                    batch.volume[tet][lane] =
+                        volume.abs() as f32 * mesh.stiffness_of(element as usize);
+                    elements[tet][lane] = element;
+                }
+            }
+            self.batches.push(batch);
+            self.elements.push(elements);
+        }
+        start..self.batches.len()
+    }
+
+    /// The elements of some batches.
+    fn elements(&self, batches: Range<usize>) -> impl Iterator<Item = Element> + '_ {
+        let lanes = (0..TETS).flat_map(|tet| (0..WIDTH).map(move |lane| (tet, lane)));
+        batches
+            .flat_map(move |batch| lanes.clone().map(move |(tet, lane)| (batch, tet, lane)))
+            .filter(|(batch, tet, lane)| self.elements[*batch][*tet][*lane] != PADDING)
+            .map(|(batch, tet, lane)| {
+                let cluster = &self.batches[batch];
+                let [a, b, c] = corners::<NODES>(tet);
+                let slope = |k: usize| cluster.gradient[tet][k][lane];
+                Element {
+                    number: self.elements[batch][tet][lane],
+                    slots: [0, a, b, c].map(|corner| cluster.slots[corner][lane]),
+                    gradient: [0, 3, 6].map(|k| [slope(k), slope(k + 1), slope(k + 2)]),
+                    volume: cluster.volume[tet][lane],
+                }
+            })
+    }
+
+    /// Bytes of the batches.
+    pub fn bytes(&self) -> usize {
+        size_of_val(self.batches.as_slice())
+    }
+}
+
+/// Groups of 16 that, while it lasts, share no node among them: their force
+/// additions then do not wait for each other.
+fn disjoint_batches<const NODES: usize, const TETS: usize>(
+    groups: &[Group<NODES, TETS>],
+) -> Vec<Vec<Group<NODES, TETS>>> {
+    let mut remaining = groups.to_vec();
+    let mut batches = Vec::with_capacity(groups.len() / WIDTH + 1);
+    let mut used = std::collections::HashSet::with_capacity(NODES * WIDTH);
     while !remaining.is_empty() {
         let mut batch = Vec::with_capacity(WIDTH);
         used.clear();
-        remaining.retain(|element| {
-            let nodes = tets[*element as usize];
-            if batch.len() == WIDTH || nodes.iter().any(|n| used.contains(n)) {
+        remaining.retain(|group| {
+            if batch.len() == WIDTH || group.nodes.iter().any(|n| used.contains(n)) {
                 return true;
             }
-            used.extend(nodes);
-            batch.push(*element);
+            used.extend(group.nodes);
+            batch.push(*group);
             false
         });
         let missing = (WIDTH - batch.len()).min(remaining.len());

@@ -1,0 +1,298 @@
+//! Tetrahedra that share nodes, grouped so that a node is gathered once for several of them.
+//!
+//! Three kinds: an *octahedron* is four tetrahedra around an edge (six nodes instead of
+//! sixteen corners; the cells of a BCC lattice, so three quarters of a stuffed mesh), a
+//! *pair* shares a face (five instead of eight), and what is left is single.
+
+use super::lanes::WIDTH;
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+
+/// Sixteen clusters of one kind, structure of arrays.
+#[repr(C, align(64))]
+pub(crate) struct Cluster<const NODES: usize, const TETS: usize> {
+    /// `gradient[t][3 a + j]`: derivative along axis `j` of the shape function of the tetrahedron's corner
+    /// `corners(t)[a]`, 1/mm.
+    pub gradient: [[[f32; WIDTH]; 9]; TETS],
+    /// Rest volume, mm³, times the element's stiffness over the material's: the energy density is
+    /// proportional to the modulus. Zero in padding lanes.
+    pub volume: [[f32; WIDTH]; TETS],
+    /// Twice the chunk-local slot of each node (see `lanes`).
+    pub slots: [[u16; WIDTH]; NODES],
+}
+
+/// Four tetrahedra around the edge of nodes 0 and 1; nodes 2 to 5 are the ring.
+pub(crate) type Octahedra = Cluster<6, 4>;
+/// Two tetrahedra with the common face 0, 1, 2.
+pub(crate) type Pairs = Cluster<5, 2>;
+pub(crate) type Singles = Cluster<4, 1>;
+
+/// Nodes of a cluster that tetrahedron `tet` has beside node 0.
+#[inline(always)]
+pub(crate) const fn corners<const NODES: usize>(tet: usize) -> [usize; 3] {
+    if NODES == 6 {
+        [1, 2 + tet, 2 + (tet + 1) % 4]
+    } else {
+        [1, 2, 3 + tet]
+    }
+}
+
+/// One cluster of a mesh, before it is packed: nodes and elements in the order of [`Cluster`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Group<const NODES: usize, const TETS: usize> {
+    pub nodes: [u32; NODES],
+    pub tets: [u32; TETS],
+}
+
+/// The clusters of some elements of a mesh; each element is in one of them.
+#[derive(Default)]
+pub(crate) struct Groups {
+    pub octahedra: Vec<Group<6, 4>>,
+    pub pairs: Vec<Group<5, 2>>,
+    pub singles: Vec<Group<4, 1>>,
+}
+
+impl Groups {
+    /// Groups `elements`: octahedra around the longest edges first, then pairs, elements with the fewest
+    /// free neighbours first. Depends on the mesh alone.
+    pub fn new(elements: &[u32], tets: &[[u32; 4]], positions: &[[f32; 3]]) -> Self {
+        let mut groups = Self::default();
+        let mut free: BTreeSet<u32> = elements.iter().copied().collect();
+        for (edge, ring) in closed_edges(elements, tets, positions) {
+            if ring.tets.iter().all(|e| free.contains(e)) {
+                for element in ring.tets {
+                    free.remove(&element);
+                }
+                let [a, b] = edge;
+                let [p, q, r, s] = ring.nodes;
+                groups.octahedra.push(Group {
+                    nodes: [a, b, p, q, r, s],
+                    tets: ring.tets,
+                });
+            }
+        }
+        groups.pair_up(free.into_iter().collect(), tets);
+        groups
+    }
+
+    fn pair_up(&mut self, elements: Vec<u32>, tets: &[[u32; 4]]) {
+        let mut of_face: HashMap<[u32; 3], usize> = HashMap::new();
+        let mut neighbours: Vec<Vec<usize>> = vec![Vec::new(); elements.len()];
+        for (index, element) in elements.iter().enumerate() {
+            for skip in 0..4 {
+                let face = face_without(tets[*element as usize], skip);
+                if let Some(other) = of_face.insert(face, index) {
+                    neighbours[index].push(other);
+                    neighbours[other].push(index);
+                }
+            }
+        }
+        let mut order: Vec<usize> = (0..elements.len()).collect();
+        order.sort_by_key(|index| neighbours[*index].len());
+        let mut taken = vec![false; elements.len()];
+        for index in order {
+            if taken[index] {
+                continue;
+            }
+            taken[index] = true;
+            let free = |i: &usize| neighbours[*i].iter().filter(|n| !taken[**n]).count();
+            let partner = neighbours[index]
+                .iter()
+                .copied()
+                .filter(|n| !taken[*n])
+                .min_by_key(|n| (free(n), *n));
+            let first = tets[elements[index] as usize];
+            match partner {
+                None => self.singles.push(Group {
+                    nodes: first,
+                    tets: [elements[index]],
+                }),
+                Some(partner) => {
+                    taken[partner] = true;
+                    let second = tets[elements[partner] as usize];
+                    let [a, b] = [(first, second), (second, first)].map(|(own, other)| {
+                        let apex = own.iter().position(|n| !other.contains(n));
+                        apex.unwrap_or_default()
+                    });
+                    let [p, q, r] = face_without(first, a);
+                    self.pairs.push(Group {
+                        nodes: [p, q, r, first[a], second[b]],
+                        tets: [elements[index], elements[partner]],
+                    });
+                }
+            }
+        }
+    }
+}
+
+/// Four elements around an edge, in the order of the ring's nodes.
+struct Ring {
+    nodes: [u32; 4],
+    tets: [u32; 4],
+}
+
+/// Edges that exactly four of the elements close around, longest first.
+fn closed_edges(
+    elements: &[u32],
+    tets: &[[u32; 4]],
+    positions: &[[f32; 3]],
+) -> Vec<([u32; 2], Ring)> {
+    let mut around: BTreeMap<[u32; 2], Vec<u32>> = BTreeMap::new();
+    for element in elements {
+        let mut nodes = tets[*element as usize];
+        nodes.sort_unstable();
+        for a in 0..3 {
+            for b in a + 1..4 {
+                let list = around.entry([nodes[a], nodes[b]]).or_default();
+                list.push(*element);
+            }
+        }
+    }
+    let length = |[a, b]: [u32; 2]| -> f32 {
+        let (a, b) = (positions[a as usize], positions[b as usize]);
+        (0..3).map(|k| (a[k] - b[k]).powi(2)).sum()
+    };
+    let mut edges: Vec<([u32; 2], Ring)> = around
+        .into_iter()
+        .filter_map(|(edge, elements)| Some((edge, close(edge, &elements, tets)?)))
+        .collect();
+    // Stable: ties stay in ascending order of the edge's nodes.
+    edges.sort_by(|(a, _), (b, _)| length(*b).total_cmp(&length(*a)));
+    edges
+}
+
+/// Walks around the edge; `None` unless four elements close a ring of four nodes.
+fn close(edge: [u32; 2], elements: &[u32], tets: &[[u32; 4]]) -> Option<Ring> {
+    let elements: [u32; 4] = elements.try_into().ok()?;
+    let sides = elements.map(|element| {
+        let mut others = tets[element as usize]
+            .into_iter()
+            .filter(|n| !edge.contains(n));
+        [others.next(), others.next()].map(Option::unwrap_or_default)
+    });
+    let start = sides[0][0];
+    let (mut nodes, mut ring) = ([start; 4], [elements[0]; 4]);
+    let mut at = sides[0][1];
+    let mut left = vec![1, 2, 3];
+    for k in 1..4 {
+        nodes[k] = at;
+        let next = left.iter().position(|i| sides[*i].contains(&at))?;
+        let index = left.remove(next);
+        ring[k] = elements[index];
+        let [p, q] = sides[index];
+        at = if p == at { q } else { p };
+    }
+    (at == start).then_some(Ring { nodes, tets: ring })
+}
+
+/// Nodes of the face opposite corner `skip`, ascending.
+fn face_without(tet: [u32; 4], skip: usize) -> [u32; 3] {
+    let mut face = [
+        tet[(skip + 1) % 4],
+        tet[(skip + 2) % 4],
+        tet[(skip + 3) % 4],
+    ];
+    face.sort_unstable();
+    face
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::{Mesh, box_phantom};
+
+    fn volume(mesh: &Mesh, nodes: [u32; 4]) -> f64 {
+        crate::solver::partition::shape_gradients(&mesh.positions, nodes).1
+    }
+
+    /// Checks one kind: the nodes that [`corners`] names are those of the mesh's element.
+    fn check<const NODES: usize, const TETS: usize>(
+        groups: &[Group<NODES, TETS>],
+        mesh: &Mesh,
+        seen: &mut [bool],
+    ) {
+        for group in groups {
+            for (tet, element) in group.tets.into_iter().enumerate() {
+                assert!(
+                    !seen[element as usize],
+                    "element {element} is in two clusters"
+                );
+                seen[element as usize] = true;
+                let [a, b, c] = corners::<NODES>(tet).map(|corner| group.nodes[corner]);
+                let mut nodes = [group.nodes[0], a, b, c];
+                let difference =
+                    volume(mesh, nodes).abs() - volume(mesh, mesh.tets[element as usize]);
+                assert!(difference.abs() < 1e-6 * volume(mesh, nodes).abs());
+                nodes.sort_unstable();
+                let mut wanted = mesh.tets[element as usize];
+                wanted.sort_unstable();
+                assert_eq!(nodes, wanted, "element {element}");
+            }
+        }
+    }
+
+    #[test]
+    fn every_element_is_in_one_cluster_with_its_own_nodes() {
+        let mesh = box_phantom([30.0, 40.0, 50.0], [5, 6, 7]).unwrap();
+        let elements: Vec<u32> = (0..mesh.tets.len() as u32).collect();
+        let groups = Groups::new(&elements, &mesh.tets, &mesh.positions);
+        let mut seen = vec![false; mesh.tets.len()];
+        check(&groups.octahedra, &mesh, &mut seen);
+        check(&groups.pairs, &mesh, &mut seen);
+        check(&groups.singles, &mesh, &mut seen);
+        assert!(seen.into_iter().all(|seen| seen));
+    }
+
+    #[test]
+    fn four_tets_around_an_edge_are_an_octahedron() {
+        // The edge 0-1 with the ring 2, 3, 4, 5, and one more tet on a face of the ring.
+        let positions = [
+            [0.0, 0.0, -1.0],
+            [0.0, 0.0, 1.0],
+            [1.0, 0.0, 0.0],
+            [0.0, 1.0, 0.0],
+            [-1.0, 0.0, 0.0],
+            [0.0, -1.0, 0.0],
+            [1.0, 1.0, 1.0],
+        ];
+        let tets = [
+            [0, 1, 4, 5],
+            [0, 1, 2, 3],
+            [3, 1, 0, 4],
+            [0, 5, 1, 2],
+            [1, 2, 3, 6],
+        ];
+        let groups = Groups::new(&[0, 1, 2, 3, 4], &tets, &positions);
+        assert_eq!(
+            (
+                groups.octahedra.len(),
+                groups.pairs.len(),
+                groups.singles.len()
+            ),
+            (1, 0, 1)
+        );
+        let nodes = groups.octahedra[0].nodes;
+        assert_eq!(nodes[..2], [0, 1]);
+        for k in 0..4 {
+            // Neighbours in the ring share a tet with the edge; opposite nodes do not.
+            let [p, q] = [nodes[2 + k], nodes[2 + (k + 1) % 4]];
+            assert!(
+                tets.iter()
+                    .any(|tet| [0, 1, p, q].iter().all(|n| tet.contains(n)))
+            );
+        }
+    }
+
+    #[test]
+    fn two_tets_with_a_common_face_are_a_pair() {
+        let tets = [[0, 1, 2, 3], [1, 2, 3, 4]];
+        let positions = [[0.0; 3]; 5];
+        let groups = Groups::new(&[0, 1], &tets, &positions);
+        assert_eq!(
+            groups.pairs,
+            [Group {
+                nodes: [1, 2, 3, 0, 4],
+                tets: [0, 1]
+            }]
+        );
+    }
+}
