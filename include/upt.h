@@ -348,7 +348,8 @@ typedef struct upt_init_options {
 } upt_init_options;
 
 /**
- * Receives log messages (UTF-8, valid during the call). Any thread may call it; it must not call the library.
+ * Receives log messages (UTF-8, valid during the call) on the host's threads, inside of their calls; it must not call
+ * the library.
  */
 typedef void (*upt_log_fn)(int32_t level,
                            const char *message,
@@ -704,7 +705,8 @@ const char *upt_status_name(upt_status status);
 /**
  * Sets the receiver of log messages; NULL ends it. When the call returns, the former receiver is no longer running.
  *
- * user: handed to the receiver. level: `UPT_LOG_*`; less severe messages are not made at all.
+ * user: handed to the receiver. level: `UPT_LOG_*`; less severe messages are not made at all. The receiver runs on
+ * the host's threads only, inside of a call or at its end: what the library's own threads say waits for the next call.
  * Threads: any, but not from inside the receiver. Errors: `UPT_ERR_ARGUMENT` for an unknown level, `UPT_ERR_STATE`
  * when the process is a Rust program that has a `tracing` subscriber of its own.
  */

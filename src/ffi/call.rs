@@ -5,6 +5,7 @@ use std::cell::RefCell;
 use std::ffi::c_char;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
+use super::log;
 use super::status::{UPT_ERR_PANIC, upt_status};
 use crate::error::Error;
 
@@ -45,6 +46,7 @@ pub(super) fn call(
     on_panic: impl FnOnce(),
     body: impl FnOnce() -> Answer,
 ) -> upt_status {
+    let _host = log::HostCall::enter();
     let failure = match catch_unwind(AssertUnwindSafe(body)) {
         Ok(Ok(status)) => return status,
         Ok(Err(failure)) => failure,

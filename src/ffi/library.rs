@@ -70,7 +70,8 @@ pub extern "C" fn upt_status_name(status: upt_status) -> *const c_char {
 
 /// Sets the receiver of log messages; NULL ends it. When the call returns, the former receiver is no longer running.
 ///
-/// user: handed to the receiver. level: `UPT_LOG_*`; less severe messages are not made at all.
+/// user: handed to the receiver. level: `UPT_LOG_*`; less severe messages are not made at all. The receiver runs on
+/// the host's threads only, inside of a call or at its end: what the library's own threads say waits for the next call.
 /// Threads: any, but not from inside the receiver. Errors: `UPT_ERR_ARGUMENT` for an unknown level, `UPT_ERR_STATE`
 /// when the process is a Rust program that has a `tracing` subscriber of its own.
 #[unsafe(no_mangle)]

@@ -1,9 +1,14 @@
 //! The log callback: a `tracing` subscriber that forwards events and the ends of spans of this library and of `ort`.
+//!
+//! The callback runs on the host's threads only, inside of its calls. A managed host (Mono in Unity) takes each native
+//! thread that calls into it for one of its own, and its domain reload then waits for that thread for ever. So what
+//! the library's and ONNX Runtime's threads say waits in a queue for the next call of the host.
 
-use std::collections::HashMap;
+use std::cell::Cell;
+use std::collections::{HashMap, VecDeque};
 use std::ffi::{CString, c_void};
 use std::fmt::{Debug, Write};
-use std::sync::atomic::{AtomicI32, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicI32, AtomicU64, Ordering};
 use std::sync::{LazyLock, Mutex, Once, PoisonError, RwLock};
 use std::time::Instant;
 
@@ -36,6 +41,46 @@ static INSTALL: Once = Once::new();
 static SPANS: LazyLock<Mutex<HashMap<u64, OpenSpan>>> = LazyLock::new(Default::default);
 static NEXT_SPAN: AtomicU64 = AtomicU64::new(1);
 
+/// Messages of threads that are not the host's; the oldest make room.
+static WAITING: Mutex<VecDeque<(i32, String)>> = Mutex::new(VecDeque::new());
+static ANY_WAITING: AtomicBool = AtomicBool::new(false);
+const WAITING_LIMIT: usize = 1024;
+
+thread_local! {
+    /// Exported functions that this thread is inside of.
+    static DEPTH: Cell<u32> = const { Cell::new(0) };
+}
+
+/// Held while an exported function runs; the outermost hands over what waits when it ends.
+pub(super) struct HostCall;
+
+impl HostCall {
+    pub(super) fn enter() -> HostCall {
+        let _ = DEPTH.try_with(|depth| depth.set(depth.get() + 1));
+        HostCall
+    }
+}
+
+impl Drop for HostCall {
+    fn drop(&mut self) {
+        let outermost = DEPTH.try_with(|depth| {
+            depth.set(depth.get() - 1);
+            depth.get() == 0
+        });
+        if outermost == Ok(true) && ANY_WAITING.load(Ordering::Acquire) {
+            for (level, text) in take_waiting() {
+                hand_over(level, text);
+            }
+        }
+    }
+}
+
+fn take_waiting() -> VecDeque<(i32, String)> {
+    let mut waiting = WAITING.lock().unwrap_or_else(PoisonError::into_inner);
+    ANY_WAITING.store(false, Ordering::Release);
+    std::mem::take(&mut *waiting)
+}
+
 struct OpenSpan {
     text: String,
     level: i32,
@@ -58,6 +103,7 @@ pub(super) fn set(callback: upt_log_fn, user: *mut c_void, level: i32) -> Answer
     }
     let mut receiver = RECEIVER.write().unwrap_or_else(PoisonError::into_inner);
     *receiver = Receiver { callback, user };
+    take_waiting(); // said to the former receiver
     let level = if callback.is_some() {
         level
     } else {
@@ -68,6 +114,18 @@ pub(super) fn set(callback: upt_log_fn, user: *mut c_void, level: i32) -> Answer
 }
 
 fn emit(level: i32, text: String) {
+    if DEPTH.try_with(Cell::get).unwrap_or(0) > 0 {
+        return hand_over(level, text);
+    }
+    let mut waiting = WAITING.lock().unwrap_or_else(PoisonError::into_inner);
+    if waiting.len() == WAITING_LIMIT {
+        waiting.pop_front();
+    }
+    waiting.push_back((level, text));
+    ANY_WAITING.store(true, Ordering::Release);
+}
+
+fn hand_over(level: i32, text: String) {
     let receiver = RECEIVER.read().unwrap_or_else(PoisonError::into_inner);
     if let (Some(callback), Ok(text)) = (receiver.callback, CString::new(text.replace('\0', " "))) {
         unsafe { callback(level, text.as_ptr(), receiver.user) };
@@ -176,5 +234,58 @@ impl Subscriber for Forward {
             None => {}
         }
         false
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ffi::call::call;
+    use std::ffi::{CStr, c_char};
+    use std::thread::{self, ThreadId};
+
+    static HEARD: Mutex<Vec<(String, ThreadId)>> = Mutex::new(Vec::new());
+
+    unsafe extern "C" fn hear(_: i32, text: *const c_char, _: *mut c_void) {
+        // SAFETY: the log hands over a NUL-terminated text.
+        let text = unsafe { CStr::from_ptr(text) }.to_str().unwrap().to_owned();
+        HEARD.lock().unwrap().push((text, thread::current().id()));
+    }
+
+    #[test]
+    fn the_librarys_threads_are_heard_on_the_hosts() {
+        // Level off: no other test's events are made.
+        assert!(set(Some(hear), std::ptr::null_mut(), UPT_LOG_OFF).is_ok());
+        let worker = thread::spawn(|| {
+            emit(UPT_LOG_INFO, "from the worker".into());
+            thread::current().id()
+        });
+        let worker = worker.join().unwrap();
+        call(
+            "upt_x",
+            || (),
+            || {
+                emit(UPT_LOG_INFO, "from the host".into());
+                Ok(UPT_OK)
+            },
+        );
+        let heard = HEARD.lock().unwrap();
+        let thread_of = |text| {
+            heard
+                .iter()
+                .find(|(said, _)| said == text)
+                .map(|(_, id)| *id)
+        };
+        assert_eq!(thread_of("from the host"), Some(thread::current().id()));
+        assert!(thread_of("from the worker").is_some_and(|thread| thread != worker));
+        drop(heard);
+
+        for i in 0..WAITING_LIMIT + 5 {
+            emit(UPT_LOG_INFO, i.to_string());
+        }
+        let waiting = take_waiting();
+        assert_eq!(waiting.len(), WAITING_LIMIT);
+        assert_eq!(waiting[0].1, "5");
+        assert!(set(None, std::ptr::null_mut(), UPT_LOG_OFF).is_ok());
     }
 }

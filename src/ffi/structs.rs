@@ -14,7 +14,8 @@ pub struct upt_scene {
     _opaque: [u8; 0],
 }
 
-/// Receives log messages (UTF-8, valid during the call). Any thread may call it; it must not call the library.
+/// Receives log messages (UTF-8, valid during the call) on the host's threads, inside of their calls; it must not call
+/// the library.
 pub type upt_log_fn =
     Option<unsafe extern "C" fn(level: i32, message: *const c_char, user: *mut c_void)>;
 

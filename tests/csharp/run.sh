@@ -45,7 +45,7 @@ mcs "${mcs_flags[@]}" -nowarn:0649 -target:library -out:"$build/Upt.dll" -r:"$bu
   -r:"$build/UnityEngine.Stub.dll" "$plugin"/Runtime/Components/*.cs
 mcs "${mcs_flags[@]}" -nowarn:0649 -target:library -out:"$build/Upt.Editor.dll" -r:"$build/Upt.Interop.dll" \
   -r:"$build/UnityEngine.Stub.dll" -r:"$build/Upt.dll" "$plugin"/Editor/*.cs
-mcs "${mcs_flags[@]}" -nowarn:0649 -target:library -out:"$build/Upt.Samples.dll" -r:"$build/Upt.Interop.dll" \
+mcs "${mcs_flags[@]}" -define:ENABLE_LEGACY_INPUT_MANAGER -nowarn:0649 -target:library -out:"$build/Upt.Samples.dll" -r:"$build/Upt.Interop.dll" \
   -r:"$build/UnityEngine.Stub.dll" -r:"$build/Upt.dll" "$plugin"/Samples~/PushedBrain/*.cs
 mcs "${mcs_flags[@]}" -target:library -out:"$build/Upt.Tests.dll" -r:"$nunit" -r:"$build/Upt.Interop.dll" \
   -r:"$build/UnityEngine.Stub.dll" -r:"$build/Upt.dll" -r:"$build/Upt.Samples.dll" "$root"/tests/csharp/tests/*.cs "$plugin"/Tests/Runtime/*.cs

@@ -41,20 +41,16 @@ namespace Upt.Editor
             return Application.isPlaying;
         }
 
-        /// <summary>The trained domain (green) and, in play mode, a red frame when a flag is set.</summary>
+        /// <summary>In play mode: the border of the trained domain, green, or red when a flag is set, and a yellow cube
+        /// where each node in contact is taken.</summary>
         [DrawGizmo(GizmoType.Selected)]
         private static void DrawDomain(SoftTissue tissue, GizmoType kind)
         {
             if (!tissue.IsRunning) return;
             Gizmos.matrix = tissue.transform.localToWorldMatrix;
             Gizmos.color = tissue.LastStats.flags == 0 ? Color.green : Color.red;
-            Vector3[] outline = tissue.DomainPoints();
-            for (int i = 0; i + 2 < outline.Length; i += 3)
-            {
-                Gizmos.DrawLine(outline[i], outline[i + 1]);
-                Gizmos.DrawLine(outline[i + 1], outline[i + 2]);
-                Gizmos.DrawLine(outline[i + 2], outline[i]);
-            }
+            Vector3[] outline = tissue.DomainOutline();
+            for (int i = 0; i + 1 < outline.Length; i += 2) Gizmos.DrawLine(outline[i], outline[i + 1]);
             Gizmos.color = Color.yellow;
             Vector3[] contacts = tissue.ContactPoints();
             float size = 2f * tissue.unitsPerMillimetre;

@@ -62,7 +62,16 @@ namespace UnityEngine
         }
     }
 
-    public struct Matrix4x4 { }
+    public struct Matrix4x4
+    {
+        public static Matrix4x4 TRS(Vector3 position, Quaternion rotation, Vector3 scale) { return default(Matrix4x4); }
+    }
+
+    public struct Bounds
+    {
+        public Vector3 size;
+        public void Expand(float amount) { size = size + new Vector3(amount, amount, amount); }
+    }
 
     public struct Color
     {
@@ -77,11 +86,21 @@ namespace UnityEngine
     public class Object
     {
         public string name = string.Empty;
+        public bool destroyed;
         public static void Destroy(Object target)
         {
+            target.destroyed = true;
             GameObject item = target as GameObject;
             if (item != null) item.SetActive(false);
         }
+        public static T Instantiate<T>(T original) where T : Object
+        {
+            T copy = (T)original.MemberwiseClone();
+            copy.Separate();
+            return copy;
+        }
+        /// <summary>After a member-wise copy: arrays of its own.</summary>
+        protected virtual void Separate() { }
     }
 
     public class ScriptableObject : Object
@@ -108,6 +127,8 @@ namespace UnityEngine
     {
         public Vector3 position;
         public Quaternion rotation = Quaternion.identity;
+        public Vector3 localScale;
+        public void SetParent(Transform parent, bool worldPositionStays) { }
         public Matrix4x4 localToWorldMatrix { get { return default(Matrix4x4); } }
         public Vector3 InverseTransformPoint(Vector3 world) { return Quaternion.Inverse(rotation) * (world - position); }
         public Vector3 TransformPoint(Vector3 local) { return position + rotation * local; }
@@ -121,7 +142,7 @@ namespace UnityEngine
         public GameObject(string name)
         {
             this.name = name;
-            activeSelf = false;
+            activeSelf = true;
             transform = new Transform();
             transform.gameObject = this;
         }
@@ -131,7 +152,15 @@ namespace UnityEngine
             component.gameObject = this;
             component.name = name;
             components.Add(component);
+            if (activeSelf) Send(component, "OnEnable");
             return component;
+        }
+        public static GameObject CreatePrimitive(PrimitiveType type)
+        {
+            GameObject item = new GameObject("Cube");
+            item.AddComponent<MeshFilter>();
+            item.AddComponent<MeshRenderer>();
+            return item;
         }
         public T GetComponent<T>() where T : Component
         {
@@ -152,13 +181,14 @@ namespace UnityEngine
         /// <summary>Calls a message method of every behaviour, as the engine's loop does.</summary>
         public void Send(string message)
         {
-            foreach (Component component in components)
-            {
-                System.Reflection.MethodInfo method = component.GetType().GetMethod(
-                    message, System.Reflection.BindingFlags.Instance | System.Reflection.BindingFlags.NonPublic |
-                                 System.Reflection.BindingFlags.Public);
-                if (method != null) method.Invoke(component, null);
-            }
+            foreach (Component component in components) Send(component, message);
+        }
+        private static void Send(Component component, string message)
+        {
+            System.Reflection.MethodInfo method = component.GetType().GetMethod(
+                message, System.Reflection.BindingFlags.Instance | System.Reflection.BindingFlags.NonPublic |
+                             System.Reflection.BindingFlags.Public);
+            if (method != null) method.Invoke(component, null);
         }
     }
 
@@ -169,40 +199,13 @@ namespace UnityEngine
     public class Camera : Component
     {
         public static Camera main;
-        public Ray ScreenPointToRay(Vector3 point) { return new Ray(); }
+        public float nearClipPlane;
     }
-    public struct Ray { public Vector3 origin, direction; public Vector3 GetPoint(float t) { return origin + direction * t; } }
     public static class Input
     {
-        public static Vector3 mousePosition { get { return Vector3.zero; } }
         public static bool GetMouseButton(int button) { return false; }
     }
     public enum PrimitiveType { Cube }
-
-    public class Mesh : Object
-    {
-        public Vector3[] vertices = new Vector3[0];
-        public int[] triangles = new int[0];
-        public Rendering.IndexFormat indexFormat;
-        public int vertexCount;
-        public byte[] uploaded;
-        public void MarkDynamic() { }
-        public void RecalculateNormals() { }
-        public void RecalculateBounds() { }
-        public void SetVertexBufferParams(int count, params Rendering.VertexAttributeDescriptor[] layout)
-        {
-            vertexCount = count;
-        }
-        public unsafe void SetVertexBufferData<T>(Unity.Collections.NativeArray<T> data, int dataStart, int meshStart,
-                                                  int count, int stream, Rendering.MeshUpdateFlags flags)
-            where T : struct
-        {
-            int size = Marshal.SizeOf(typeof(T)) * count;
-            if (uploaded == null || uploaded.Length != size) uploaded = new byte[size];
-            Marshal.Copy((IntPtr)Unity.Collections.LowLevel.Unsafe.NativeArrayUnsafeUtility.GetUnsafePtr(data), uploaded, 0,
-                         size);
-        }
-    }
 
     public static class Time { public static float deltaTime = 1f / 60f; }
     public static class Application
@@ -214,13 +217,15 @@ namespace UnityEngine
     {
         public static readonly List<string> Errors = new List<string>();
         public static void Log(object message) { }
-        public static void LogWarning(object message, Object context) { }
+        public static readonly List<string> Warnings = new List<string>();
+        public static void LogWarning(object message, Object context) { Warnings.Add(message.ToString()); }
         public static void LogError(object message, Object context) { Errors.Add(message.ToString()); }
     }
     public static class Gizmos
     {
         public static Matrix4x4 matrix;
         public static Color color;
+        public static void DrawWireSphere(Vector3 center, float radius) { }
         public static void DrawWireCube(Vector3 center, Vector3 size) { }
         public static void DrawLine(Vector3 from, Vector3 to) { }
     }
@@ -228,65 +233,6 @@ namespace UnityEngine
     public sealed class TooltipAttribute : Attribute { public TooltipAttribute(string text) { } }
     public sealed class RequireComponent : Attribute { public RequireComponent(Type type) { } }
     public sealed class CreateAssetMenuAttribute : Attribute { public string fileName, menuName; }
-}
-
-namespace UnityEngine.Rendering
-{
-    public enum IndexFormat { UInt16, UInt32 }
-    public enum VertexAttribute { Position, Normal }
-    public enum VertexAttributeFormat { Float32 }
-    [Flags]
-    public enum MeshUpdateFlags { Default = 0, DontValidateIndices = 1, DontNotifyMeshUsers = 4 }
-    public struct VertexAttributeDescriptor
-    {
-        public VertexAttributeDescriptor(VertexAttribute attribute, VertexAttributeFormat format, int dimension, int stream)
-        {
-        }
-    }
-}
-
-namespace Unity.Collections
-{
-    public enum Allocator { Persistent }
-    public unsafe struct NativeArray<T> : IDisposable where T : struct
-    {
-        internal IntPtr pointer;
-        private int length;
-        public NativeArray(int length, Allocator allocator)
-        {
-            this.length = length;
-            pointer = Marshal.AllocHGlobal(Math.Max(1, length * Marshal.SizeOf(typeof(T))));
-        }
-        public NativeArray(T[] source, Allocator allocator) : this(source.Length, allocator)
-        {
-            int size = Marshal.SizeOf(typeof(T));
-            for (int i = 0; i < source.Length; i++)
-                Marshal.StructureToPtr(source[i], (IntPtr)((long)pointer + (long)i * size), false);
-        }
-        public int Length { get { return length; } }
-        public bool IsCreated { get { return pointer != IntPtr.Zero; } }
-        public T this[int index]
-        {
-            get
-            {
-                return (T)Marshal.PtrToStructure(
-                    (IntPtr)((long)pointer + (long)index * Marshal.SizeOf(typeof(T))), typeof(T));
-            }
-        }
-        public void Dispose()
-        {
-            Marshal.FreeHGlobal(pointer);
-            pointer = IntPtr.Zero;
-        }
-    }
-}
-
-namespace Unity.Collections.LowLevel.Unsafe
-{
-    public static unsafe class NativeArrayUnsafeUtility
-    {
-        public static void* GetUnsafePtr<T>(NativeArray<T> array) where T : struct { return (void*)array.pointer; }
-    }
 }
 
 namespace Unity.Profiling

@@ -21,52 +21,95 @@ namespace Upt.Tests
             return asset;
         }
 
+        /// <summary>An object whose components are still to be filled in.</summary>
+        private static GameObject Inactive()
+        {
+            GameObject item = new GameObject("tissue");
+            item.SetActive(false);
+            return item;
+        }
+
+        /// <summary>A tissue on the test bundle, with a mesh filter, not yet enabled.</summary>
+        private static SoftTissue Tissue()
+        {
+            GameObject item = Inactive();
+            item.AddComponent<MeshFilter>();
+            SoftTissue tissue = item.AddComponent<SoftTissue>();
+            tissue.model = Asset(Bundle.Path);
+            return tissue;
+        }
+
+        /// <summary>Frames of the sample and its tissue at 60 Hz; the worker finishes between them.</summary>
+        private static void Play(GameObject sample, SoftTissue tissue, int frames, Action<int> each)
+        {
+            for (int frame = 0; frame < frames; frame++)
+            {
+                sample.Send("Update");
+                tissue.gameObject.Send("Update");
+                each(frame);
+                Thread.Sleep(2);
+            }
+        }
+
+        private static PushedBrain Sample()
+        {
+            PushedBrain sample = Inactive().AddComponent<PushedBrain>();
+            sample.model = Asset(Bundle.Path);
+            sample.gameObject.SetActive(true);
+            return sample;
+        }
+
         [SetUp]
         public void ForgetErrors()
         {
             Debug.Errors.Clear();
+            Debug.Warnings.Clear();
         }
 
         [Test]
         public void PlayingTheSampleMovesTheBrainUnderTheSpatula()
         {
-            GameObject item = new GameObject("sample");
-            PushedBrain sample = item.AddComponent<PushedBrain>();
-            sample.model = Asset(Bundle.Path);
-            item.SetActive(true);
+            PushedBrain sample = Sample();
             Assert.That(Debug.Errors, Is.Empty);
             SoftTissue tissue = sample.Tissue;
             Mesh mesh = tissue.GetComponent<MeshFilter>().sharedMesh;
-            byte[] rest = (byte[])mesh.uploaded.Clone();
+            Vector3[] rest = mesh.vertices;
             int most = 0;
-            for (int frame = 0; frame < 150; frame++)
-            {
-                item.Send("Update");
-                tissue.gameObject.Send("Update");
-                most = Math.Max(most, tissue.ContactCount);
-                Thread.Sleep(2);
-            }
+            Play(sample.gameObject, tissue, 150, frame => most = Math.Max(most, tissue.ContactCount));
             Assert.That(Debug.Errors, Is.Empty);
             Assert.That(most, Is.GreaterThan(0), "the spatula never touched the tissue");
+            Assert.That(tissue.ContactPoints().Length, Is.EqualTo(tissue.ContactCount));
             float largest = 0f;
-            for (int i = 0; i < rest.Length; i += 4)
-                largest = Math.Max(largest, Math.Abs(BitConverter.ToSingle(mesh.uploaded, i) -
-                                                     BitConverter.ToSingle(rest, i)));
+            for (int i = 0; i < rest.Length; i++) largest = Math.Max(largest, (mesh.Shown(i) - rest[i]).magnitude);
             Assert.That(largest, Is.GreaterThan(0.001f).And.LessThan(0.03f), "vertices moved by 1 to 30 mm");
-            item.SetActive(false);
+            sample.gameObject.SetActive(false);
             Assert.That(tissue.IsRunning, Is.False);
+            Assert.That(mesh.destroyed, "the tissue's mesh is left behind");
+            Assert.That(tissue.GetComponent<MeshFilter>().sharedMesh, Is.Null);
+        }
+
+        [Test]
+        public void TheDomainsBorderIsClosed()
+        {
+            SoftTissue tissue = Tissue();
+            tissue.gameObject.SetActive(true);
+            Vector3[] ends = tissue.DomainOutline();
+            Assert.That(ends.Length, Is.GreaterThan(6).And.LessThan(tissue.DomainPoints().Length));
+            // Each corner of a closed line is met an even number of times.
+            var met = new System.Collections.Generic.Dictionary<Vector3, int>();
+            foreach (Vector3 end in ends) met[end] = met.ContainsKey(end) ? met[end] + 1 : 1;
+            foreach (int times in met.Values) Assert.That(times % 2, Is.EqualTo(0));
+            tissue.gameObject.SetActive(false);
         }
 
         [Test]
         public void AMissingBundleIsOneConsoleErrorAndTheEditorLives()
         {
-            GameObject item = new GameObject("tissue");
-            item.AddComponent<MeshFilter>();
-            SoftTissue tissue = item.AddComponent<SoftTissue>();
+            SoftTissue tissue = Tissue();
             tissue.model = Asset("/no/such/bundle");
-            item.SetActive(true);
-            item.Send("Update");
-            item.SetActive(false);
+            tissue.gameObject.SetActive(true);
+            tissue.gameObject.Send("Update");
+            tissue.gameObject.SetActive(false);
             Assert.That(Debug.Errors.Count, Is.EqualTo(1));
             Assert.That(Debug.Errors[0], Is.StringContaining("/no/such/bundle"));
         }
@@ -74,44 +117,110 @@ namespace Upt.Tests
         [Test]
         public void AMeshOutsideTheBrainIsOneConsoleError()
         {
-            GameObject item = new GameObject("tissue");
-            item.AddComponent<MeshFilter>();
-            SoftTissue tissue = item.AddComponent<SoftTissue>();
-            tissue.model = Asset(Bundle.Path);
+            SoftTissue tissue = Tissue();
             tissue.renderMesh = new Mesh();
             tissue.renderMesh.vertices = new[] { new Vector3(9f, 9f, 9f) };
-            item.SetActive(true);
+            tissue.gameObject.SetActive(true);
             Assert.That(tissue.IsRunning, Is.False);
             Assert.That(Debug.Errors.Count, Is.EqualTo(1), string.Join("; ", Debug.Errors.ToArray()));
-            item.SetActive(false);
+            Assert.That(Debug.Errors[0], Is.StringContaining("point 0"));
+            tissue.gameObject.SetActive(false);
+        }
+
+        [Test]
+        public void AMeshThatScriptsCannotReadIsOneConsoleErrorThatSaysWhatToTurnOn()
+        {
+            SoftTissue tissue = Tissue();
+            tissue.renderMesh = new Mesh();
+            tissue.renderMesh.vertices = new[] { new Vector3(0f, 0f, 0f) };
+            tissue.renderMesh.isReadable = false;
+            tissue.gameObject.SetActive(true);
+            Assert.That(Debug.Errors.Count, Is.EqualTo(1));
+            Assert.That(Debug.Errors[0], Is.StringContaining("Read/Write"));
+            tissue.gameObject.SetActive(false);
+        }
+
+        [Test]
+        public void AMeshOfTheFiltersKeepsItsOtherVertexData()
+        {
+            SoftTissue bare = Tissue();
+            bare.gameObject.SetActive(true);
+            Vector3[] vertices = bare.GetComponent<MeshFilter>().sharedMesh.vertices;
+            bare.gameObject.SetActive(false);
+
+            Mesh own = new Mesh();
+            own.vertices = vertices;
+            PushedBrain sample = Inactive().AddComponent<PushedBrain>();
+            sample.model = Asset(Bundle.Path);
+            sample.gameObject.SetActive(true);
+            SoftTissue tissue = sample.Tissue;
+            tissue.gameObject.SetActive(false);
+            tissue.GetComponent<MeshFilter>().sharedMesh = own;
+            tissue.gameObject.SetActive(true);
+            Assert.That(Debug.Errors, Is.Empty);
+            Mesh shown = tissue.GetComponent<MeshFilter>().sharedMesh;
+            Assert.That(shown, Is.Not.SameAs(own), "an asset must not be deformed");
+            Play(sample.gameObject, tissue, 120, frame => { });
+            float largest = 0f;
+            for (int i = 0; i < vertices.Length; i++)
+            {
+                largest = Math.Max(largest, (shown.Shown(i) - vertices[i]).magnitude);
+                for (int b = 12; b < Mesh.Interleaved; b++)
+                    if (shown.stream[Mesh.Interleaved * i + b] != own.stream[Mesh.Interleaved * i + b])
+                        Assert.Fail("byte " + b + " of vertex " + i + " is not a position and was changed");
+                Assert.That((own.Shown(i) - vertices[i]).magnitude, Is.EqualTo(0f));
+            }
+            Assert.That(largest, Is.GreaterThan(0.001f), "the mesh did not move");
+            sample.gameObject.SetActive(false);
+            Assert.That(tissue.GetComponent<MeshFilter>().sharedMesh, Is.SameAs(own));
         }
 
         [Test]
         public void ComponentDestroyedInFlight()
         {
-            UptModel asset = Asset(Bundle.Path);
             for (int i = 0; i < 10; i++)
             {
-                GameObject item = new GameObject("tissue");
-                item.AddComponent<MeshFilter>();
-                SoftTissue tissue = item.AddComponent<SoftTissue>();
-                tissue.model = asset;
-                item.SetActive(true);
+                SoftTissue tissue = Tissue();
+                tissue.gameObject.SetActive(true);
                 Time.deltaTime = 0.06f;
-                item.Send("Update");
-                item.SetActive(false);
+                tissue.gameObject.Send("Update");
+                tissue.gameObject.SetActive(false);
                 Time.deltaTime = 1f / 60f;
             }
             Assert.That(Debug.Errors, Is.Empty);
         }
 
         [Test]
+        public void TheMotionIsSmoothFromFrameToFrame()
+        {
+            // A steady press of 20 mm/s: no frame may go back, and none may leap by more than a few frames' worth.
+            PushedBrain sample = Sample();
+            SoftTissue tissue = sample.Tissue;
+            sample.depth = 8f;
+            sample.period = 1.6f;
+            Mesh mesh = tissue.GetComponent<MeshFilter>().sharedMesh;
+            Vector3[] rest = mesh.vertices;
+            float before = 0f, back = 0f, leap = 0f, deepest = 0f;
+            Play(sample.gameObject, tissue, 44, frame =>
+            {
+                float depth = 0f;
+                for (int i = 0; i < rest.Length; i++) depth = Math.Max(depth, (mesh.Shown(i) - rest[i]).magnitude);
+                back = Math.Max(back, before - depth);
+                leap = Math.Max(leap, depth - before);
+                deepest = Math.Max(deepest, depth);
+                before = depth;
+            });
+            sample.gameObject.SetActive(false);
+            Assert.That(deepest, Is.GreaterThan(0.004f), "the press reached its depth");
+            Assert.That(back, Is.LessThan(0.0001f), "a frame went back");
+            Assert.That(leap, Is.LessThan(0.0016f), "a frame leapt");
+        }
+
+        [Test]
         public void FinishedStepsAreCountedInTheProfiler()
         {
-            GameObject item = new GameObject("sample");
-            PushedBrain sample = item.AddComponent<PushedBrain>();
-            sample.model = Asset(Bundle.Path);
-            item.SetActive(true);
+            PushedBrain sample = Sample();
+            GameObject item = sample.gameObject;
             long before = StepsCounted();
             double told = 0.0;
             ulong last = 0;
@@ -139,10 +248,8 @@ namespace Upt.Tests
         [Test]
         public void FramesMakeNoGarbage()
         {
-            GameObject item = new GameObject("sample");
-            PushedBrain sample = item.AddComponent<PushedBrain>();
-            sample.model = Asset(Bundle.Path);
-            item.SetActive(true);
+            PushedBrain sample = Sample();
+            GameObject item = sample.gameObject;
             SoftTissue tissue = sample.Tissue;
             System.Reflection.MethodInfo update = typeof(SoftTissue).GetMethod(
                 "Update", System.Reflection.BindingFlags.Instance | System.Reflection.BindingFlags.NonPublic);

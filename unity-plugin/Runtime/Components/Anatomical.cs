@@ -34,17 +34,19 @@ namespace Upt
             ras[3] = local.w;
         }
 
-        /// <summary>vertices[i] = rest[i] + displacement[i] in Unity's axes; displacement is
-        /// <c>[count,3]</c> mm.</summary>
-        public static void Displace(Vector3* rest, float* displacement, Vector3* vertices, int count,
+        /// <summary>vertices[i] = rest[i] + displacement[i] in Unity's axes, <paramref name="stride"/> bytes from
+        /// one vertex to the next; displacement is <c>[count,3]</c> mm.</summary>
+        public static void Displace(Vector3* rest, float* displacement, byte* vertices, int stride, int count,
                                     float unitsPerMillimetre)
         {
             for (int i = 0; i < count; i++)
             {
                 float* u = displacement + 3 * i;
-                vertices[i].x = rest[i].x + u[0] * unitsPerMillimetre;
-                vertices[i].y = rest[i].y + u[2] * unitsPerMillimetre;
-                vertices[i].z = rest[i].z + u[1] * unitsPerMillimetre;
+                Vector3* vertex = (Vector3*)vertices;
+                vertex->x = rest[i].x + u[0] * unitsPerMillimetre;
+                vertex->y = rest[i].y + u[2] * unitsPerMillimetre;
+                vertex->z = rest[i].z + u[1] * unitsPerMillimetre;
+                vertices += stride;
             }
         }
     }

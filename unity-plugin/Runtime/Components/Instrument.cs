@@ -27,9 +27,12 @@ namespace Upt
         [Tooltip("Tissue in contact sticks to the instrument instead of sliding along it.")]
         public bool sticking = false;
 
+        private float shownScale = 0.001f;
+
         /// <summary>The instrument in the axes and units of <paramref name="tissue"/>'s bundle.</summary>
         public unsafe upt_instrument PoseIn(Transform tissue, float unitsPerMillimetre)
         {
+            shownScale = unitsPerMillimetre;
             upt_instrument instrument = default(upt_instrument);
             instrument.struct_size = (uint)sizeof(upt_instrument);
             instrument.shape = (int)shape;
@@ -63,9 +66,26 @@ namespace Upt
 
         private void OnDrawGizmosSelected()
         {
-            Gizmos.matrix = transform.localToWorldMatrix;
+            // Sizes are millimetres of tissue: the transform's own scale has no part in them.
+            Gizmos.matrix = Matrix4x4.TRS(transform.position, transform.rotation, new Vector3(shownScale, shownScale, shownScale));
             Gizmos.color = Color.cyan;
-            Gizmos.DrawWireCube(Vector3.zero, halfExtents * 0.002f);
+            if (shape == InstrumentShape.Capsule)
+            {
+                Vector3 half = new Vector3(0f, halfExtents.y, 0f);
+                Gizmos.DrawWireSphere(half, radius);
+                Gizmos.DrawWireSphere(-half, radius);
+                DrawSide(half, new Vector3(radius, 0f, 0f));
+                DrawSide(half, new Vector3(0f, 0f, radius));
+                return;
+            }
+            float rounding = shape == InstrumentShape.Spatula ? radius : 0f;
+            Gizmos.DrawWireCube(Vector3.zero, (halfExtents + new Vector3(rounding, rounding, rounding)) * 2f);
+        }
+
+        private static void DrawSide(Vector3 half, Vector3 outward)
+        {
+            Gizmos.DrawLine(outward - half, outward + half);
+            Gizmos.DrawLine(-outward - half, half - outward);
         }
     }
 }

@@ -9,7 +9,7 @@ namespace Upt
     /// <summary>
     /// Soft tissue on this object's mesh. Steps run on the scene's worker at the model's own rate (20 Hz);
     /// the frame only samples between the last two states and uploads the vertices. The picture is
-    /// therefore one step (50 ms) behind the instruments.
+    /// therefore one step (50 ms), and the time that a step takes, behind the instruments.
     /// </summary>
     [RequireComponent(typeof(MeshFilter))]
     public sealed class SoftTissue : MonoBehaviour
@@ -17,7 +17,8 @@ namespace Upt
         [Tooltip("The model asset.")]
         public UptModel model;
 
-        [Tooltip("Mesh to deform, in this object's local space, lying in the bundle's volume. None: the bundle's surface.")]
+        [Tooltip("Mesh to deform, in this object's local space, lying in the bundle's volume. None: the MeshFilter's; " +
+                 "where it has none either, the bundle's surface.")]
         public Mesh renderMesh;
 
         [Tooltip("Unity units per millimetre.")]
@@ -33,18 +34,19 @@ namespace Upt
         private static readonly ProfilerMarker ContactMarker = new ProfilerMarker("libupt.Contacts");
         private static readonly ProfilerMarker UploadMarker = new ProfilerMarker("libupt.Upload");
 
-        private Model nativeModel;
-        private float[] restPositions;
+        private bool acquired;
+        private RestGeometry geometry;
         private Scene scene;
         private SurfaceMesh surface;
+        private Mesh shownBefore;
+        private Playhead playhead;
         private upt_instrument[] poses = new upt_instrument[4];
         private uint[] contactNodes;
         private float[] contactVectors;
         private int contactCount;
         private bool inFlight;
+        private bool refused;
         private bool failed;
-        private double clock;
-        private double dt;
 
         /// <summary>Statistics of the last finished step: stage times in ms, envelope flags.</summary>
         public upt_scene_stats LastStats { get; private set; }
@@ -61,23 +63,24 @@ namespace Upt
             get { return scene != null && !failed; }
         }
 
-        /// <summary>Corners of the trained domain's triangles at rest, local space, 3 a triangle. Allocates:
-        /// for gizmos.</summary>
+        /// <summary>Corners of the trained domain's triangles at rest, local space, 3 a triangle.
+        /// Allocates.</summary>
         public Vector3[] DomainPoints()
         {
-            if (scene == null) return new Vector3[0];
-            return RestPoints(nativeModel.Indices(Native.UPT_SET_DOMAIN_FACES), int.MaxValue);
+            return geometry == null ? new Vector3[0] : geometry.DomainCorners();
+        }
+
+        /// <summary>The border of the trained domain at rest, local space, 2 ends a line. The array is the
+        /// component's own: for gizmos.</summary>
+        public Vector3[] DomainOutline()
+        {
+            return geometry == null ? new Vector3[0] : geometry.DomainOutline();
         }
 
         /// <summary>Where the nodes in contact are taken, local space. Allocates: for gizmos.</summary>
         public Vector3[] ContactPoints()
         {
-            if (scene == null) return new Vector3[0];
-            Vector3[] points = RestPoints(contactNodes, contactCount);
-            for (int i = 0; i < points.Length; i++)
-                points[i] += Anatomical.ToUnity(contactVectors[3 * i], contactVectors[3 * i + 1],
-                                                contactVectors[3 * i + 2], unitsPerMillimetre);
-            return points;
+            return geometry == null ? new Vector3[0] : geometry.Displaced(contactNodes, contactVectors, contactCount);
         }
 
         private void OnEnable()
@@ -115,15 +118,24 @@ namespace Upt
             }
         }
 
-        /// <summary>Back to rest.</summary>
+        /// <summary>Back to rest; also starts a tissue again that an error has stopped.</summary>
         public void ResetTissue()
         {
             if (scene == null) return;
-            if (inFlight) scene.Wait(uint.MaxValue);
+            try
+            {
+                if (inFlight) scene.Wait(uint.MaxValue);
+            }
+            catch (UptException)
+            {
+                // The error of a step whose state is thrown away.
+            }
             inFlight = false;
-            scene.Reset();
+            refused = false;
             failed = false;
-            clock = 0.0;
+            scene.Reset();
+            LastStats = scene.Stats();
+            playhead = new Playhead(playhead.Step);
         }
 
         private void Open()
@@ -131,57 +143,93 @@ namespace Upt
             if (model == null)
                 throw new InvalidOperationException("assign a UptModel asset to the field 'Model'");
             Model native = model.Acquire();
-            try
-            {
-                scene = new Scene(native);
-                surface = new SurfaceMesh(native, renderMesh, unitsPerMillimetre);
-                scene.AttachPoints(surface.PointsInBundle());
-                int capacity = native.Indices(Native.UPT_SET_SURFACE_NODES).Length;
-                contactNodes = new uint[capacity];
-                contactVectors = new float[3 * capacity];
-                dt = native.Info.dt;
-                nativeModel = native;
-                GetComponent<MeshFilter>().sharedMesh = surface.Mesh;
-            }
-            catch (Exception)
-            {
-                model.Release();
-                throw;
-            }
+            acquired = true;
+            MeshFilter filter = GetComponent<MeshFilter>();
+            shownBefore = filter.sharedMesh;
+            surface = new SurfaceMesh(native, renderMesh != null ? renderMesh : shownBefore, unitsPerMillimetre);
+            scene = new Scene(native);
+            uint[] touchable = native.Indices(Native.UPT_SET_SURFACE_NODES);
+            // What instruments touch; the attached points' nodes are decoded beside it, the rest of the volume is not.
+            scene.SetRegion(touchable);
+            scene.AttachPoints(surface.PointsInBundle());
+            contactNodes = new uint[touchable.Length];
+            contactVectors = new float[3 * touchable.Length];
+            geometry = new RestGeometry(native, unitsPerMillimetre);
+            playhead = new Playhead(native.Info.dt);
+            LastStats = scene.Stats();
+            filter.sharedMesh = surface.Mesh;
         }
 
         private void Close()
         {
-            bool opened = contactNodes != null;
             if (scene != null) scene.Dispose();
-            if (surface != null) surface.Dispose();
+            if (surface != null)
+            {
+                GetComponent<MeshFilter>().sharedMesh = shownBefore;
+                surface.Dispose();
+            }
+            if (acquired && model != null) model.Release();
             scene = null;
             surface = null;
-            nativeModel = null;
-            restPositions = null;
-            contactNodes = null;
+            shownBefore = null;
+            geometry = null;
+            contactCount = 0;
             inFlight = false;
-            if (opened && model != null) model.Release();
+            refused = false;
+            acquired = false;
         }
 
         private void Advance(float deltaTime)
         {
-            clock += deltaTime;
-            if (inFlight && scene.Poll())
+            playhead.Advance(deltaTime);
+            if (inFlight) Collect();
+            using (UploadMarker.Auto())
+            {
+                surface.Sample(scene, playhead.Alpha);
+                // A step that finished after it was asked for has changed the two states under the sample.
+                if (inFlight && scene.Stats().step_count != LastStats.step_count)
+                {
+                    Collect();
+                    surface.Sample(scene, playhead.Alpha);
+                }
+                surface.Upload(recalculateNormals);
+            }
+            if (inFlight || !playhead.IsDue) return;
+            using (ContactMarker.Auto()) GatherContacts();
+            scene.Submit(contactNodes, contactVectors, contactCount);
+            inFlight = true;
+            playhead.Submitted();
+        }
+
+        /// <summary>Takes the submitted step's result when it is there.</summary>
+        private void Collect()
+        {
+            try
+            {
+                if (!scene.Poll()) return;
+            }
+            catch (UptException error)
             {
                 inFlight = false;
-                LastStats = scene.Stats();
-                StepCounters.Add(LastStats);
+                if (error.Status != Native.UPT_ERR_GUARD) throw;
+                Hold(error);
+                return;
             }
-            if (!inFlight && clock >= dt)
-            {
-                // A frame that took longer than a step does not ask for two: the tissue would run after the clock.
-                clock = Math.Min(clock - dt, dt);
-                using (ContactMarker.Auto()) GatherContacts();
-                scene.Submit(contactNodes, contactVectors, contactCount);
-                inFlight = true;
-            }
-            using (UploadMarker.Auto()) surface.Upload(scene, Math.Min(1.0, clock / dt), recalculateNormals);
+            inFlight = false;
+            refused = false;
+            LastStats = scene.Stats();
+            StepCounters.Add(LastStats);
+            playhead.Landed();
+        }
+
+        /// <summary>The guard refused a state: the tissue stands still in its last good one and goes on from there.
+        /// One line for a run of refusals.</summary>
+        private void Hold(UptException error)
+        {
+            LastStats = scene.Stats();
+            playhead.Refused();
+            if (!refused) Debug.LogWarning("libupt: soft tissue '" + name + "' holds its last state: " + error.Message, this);
+            refused = true;
         }
 
         private void GatherContacts()
@@ -192,19 +240,6 @@ namespace Upt
                 if (instruments[i] != null && instruments[i].isActiveAndEnabled)
                     poses[count++] = instruments[i].PoseIn(transform, unitsPerMillimetre);
             contactCount = count == 0 ? 0 : scene.ContactsFrom(poses, count, contactNodes, contactVectors);
-        }
-
-        private Vector3[] RestPoints(uint[] nodes, int limit)
-        {
-            if (restPositions == null) restPositions = nativeModel.Positions();
-            Vector3[] points = new Vector3[Math.Min(limit, nodes.Length)];
-            for (int i = 0; i < points.Length; i++)
-            {
-                long at = 3L * nodes[i];
-                points[i] = Anatomical.ToUnity(restPositions[at], restPositions[at + 1], restPositions[at + 2],
-                                               unitsPerMillimetre);
-            }
-            return points;
         }
 
         private void Fail(string what, Exception error)

@@ -8,18 +8,27 @@ using UnityEngine.Rendering;
 namespace Upt
 {
     /// <summary>
-    /// The rendered surface of a <see cref="SoftTissue"/>: vertices at rest and displaced, in native memory,
-    /// and their upload. Positions lie in a vertex stream of their own, so an upload moves 12 bytes a
-    /// vertex and nothing else.
+    /// The rendered surface of a <see cref="SoftTissue"/>: a mesh of its own, the vertices at rest, and the
+    /// vertex stream that holds their positions in native memory. An upload writes that stream and
+    /// nothing else: 12 bytes a vertex for the bundle's surface; the source's own layout for a mesh of the host's,
+    /// whose texture coordinates, colours and submeshes stay as they are.
     /// </summary>
     internal sealed unsafe class SurfaceMesh : IDisposable
     {
-        private const MeshUpdateFlags Quiet =
-            MeshUpdateFlags.DontValidateIndices | MeshUpdateFlags.DontNotifyMeshUsers;
+        private const MeshUpdateFlags Quiet = MeshUpdateFlags.DontValidateIndices |
+                                              MeshUpdateFlags.DontNotifyMeshUsers |
+                                              MeshUpdateFlags.DontRecalculateBounds;
+
+        /// <summary>How far a vertex may go from rest before the camera may cull it wrongly, mm: more than any
+        /// bundle's bound on displacements.</summary>
+        private const float Reach = 50f;
 
         private NativeArray<Vector3> rest;
-        private NativeArray<Vector3> vertices;
+        private NativeArray<byte> stream;
         private NativeArray<float> displacement;
+        private readonly int streamIndex;
+        private readonly int stride;
+        private readonly int offset;
         private readonly float scale;
 
         /// <summary>The mesh to show.</summary>
@@ -31,37 +40,25 @@ namespace Upt
             get { return rest.Length; }
         }
 
-        /// <summary>Vertices of <paramref name="source"/> (in the tissue's local space), or the bundle's own
-        /// surface when it is null.</summary>
+        /// <summary>A copy of <paramref name="source"/> (in the tissue's local space), or the bundle's own surface
+        /// when it is null. Throws <see cref="InvalidOperationException"/> for a mesh that scripts cannot read
+        /// or whose positions are compressed.</summary>
         public SurfaceMesh(Model model, Mesh source, float unitsPerMillimetre)
         {
             scale = unitsPerMillimetre;
-            Vector3[] points;
-            int[] triangles;
-            if (source != null)
-            {
-                points = source.vertices;
-                triangles = source.triangles;
-            }
-            else
-            {
-                FromBundle(model, unitsPerMillimetre, out points, out triangles);
-            }
-            rest = new NativeArray<Vector3>(points, Allocator.Persistent);
-            vertices = new NativeArray<Vector3>(points, Allocator.Persistent);
-            displacement = new NativeArray<float>(3 * points.Length, Allocator.Persistent);
-            Mesh = new Mesh();
+            Mesh = source != null ? Copy(source) : FromBundle(model, unitsPerMillimetre);
             Mesh.name = "libupt soft tissue";
             Mesh.MarkDynamic();
-            Mesh.SetVertexBufferParams(
-                points.Length,
-                new VertexAttributeDescriptor(VertexAttribute.Position, VertexAttributeFormat.Float32, 3, 0),
-                new VertexAttributeDescriptor(VertexAttribute.Normal, VertexAttributeFormat.Float32, 3, 1));
-            Mesh.SetVertexBufferData(vertices, 0, 0, points.Length, 0, Quiet);
-            Mesh.indexFormat = points.Length > 65535 ? IndexFormat.UInt32 : IndexFormat.UInt16;
-            Mesh.triangles = triangles;
-            Mesh.RecalculateNormals();
-            Mesh.RecalculateBounds();
+            streamIndex = Mesh.GetVertexAttributeStream(VertexAttribute.Position);
+            offset = Mesh.GetVertexAttributeOffset(VertexAttribute.Position);
+            using (Mesh.MeshDataArray data = Mesh.AcquireReadOnlyMeshData(Mesh))
+                stream = new NativeArray<byte>(data[0].GetVertexData<byte>(streamIndex).ToArray(), Allocator.Persistent);
+            stride = stream.Length / Mesh.vertexCount;
+            rest = new NativeArray<Vector3>(Mesh.vertices, Allocator.Persistent);
+            displacement = new NativeArray<float>(3 * rest.Length, Allocator.Persistent);
+            Bounds bounds = Mesh.bounds;
+            bounds.Expand(2f * Reach * unitsPerMillimetre);
+            Mesh.bounds = bounds;
         }
 
         /// <summary>Rest vertices in the bundle's axes, mm, <c>[Count,3]</c>: the points to attach.</summary>
@@ -75,26 +72,47 @@ namespace Upt
             return points;
         }
 
-        /// <summary>Samples <paramref name="scene"/> at <paramref name="alpha"/> and uploads the vertices. No
-        /// managed memory is allocated.</summary>
-        public void Upload(Scene scene, double alpha, bool normals)
+        /// <summary>Samples <paramref name="scene"/> at <paramref name="alpha"/>. No managed memory is
+        /// allocated.</summary>
+        public void Sample(Scene scene, double alpha)
         {
-            float* u = (float*)NativeArrayUnsafeUtility.GetUnsafePtr(displacement);
-            scene.SamplePoints(alpha, u, displacement.Length);
-            Anatomical.Displace((Vector3*)NativeArrayUnsafeUtility.GetUnsafePtr(rest), u,
-                                (Vector3*)NativeArrayUnsafeUtility.GetUnsafePtr(vertices), Count, scale);
-            Mesh.SetVertexBufferData(vertices, 0, 0, Count, 0, Quiet);
+            scene.SamplePoints(alpha, (float*)NativeArrayUnsafeUtility.GetUnsafePtr(displacement), displacement.Length);
+        }
+
+        /// <summary>Uploads the sampled vertices. No managed memory is allocated.</summary>
+        public void Upload(bool normals)
+        {
+            Anatomical.Displace((Vector3*)NativeArrayUnsafeUtility.GetUnsafePtr(rest),
+                                (float*)NativeArrayUnsafeUtility.GetUnsafePtr(displacement),
+                                (byte*)NativeArrayUnsafeUtility.GetUnsafePtr(stream) + offset, stride, Count, scale);
+            Mesh.SetVertexBufferData(stream, 0, 0, stream.Length, streamIndex, Quiet);
             if (normals) Mesh.RecalculateNormals();
         }
 
         public void Dispose()
         {
             if (rest.IsCreated) rest.Dispose();
-            if (vertices.IsCreated) vertices.Dispose();
+            if (stream.IsCreated) stream.Dispose();
             if (displacement.IsCreated) displacement.Dispose();
+            if (Mesh != null) UnityEngine.Object.Destroy(Mesh);
+            Mesh = null;
         }
 
-        private static void FromBundle(Model model, float scale, out Vector3[] points, out int[] triangles)
+        private static Mesh Copy(Mesh source)
+        {
+            if (source.vertexCount == 0)
+                throw new InvalidOperationException("mesh '" + source.name + "' has no vertices");
+            if (!source.isReadable)
+                throw new InvalidOperationException("mesh '" + source.name +
+                                                    "' is not readable: turn on Read/Write in its import settings");
+            if (source.GetVertexAttributeFormat(VertexAttribute.Position) != VertexAttributeFormat.Float32)
+                throw new InvalidOperationException(
+                    "mesh '" + source.name +
+                    "' has compressed positions: turn off Position in Player Settings > Vertex Compression");
+            return UnityEngine.Object.Instantiate(source);
+        }
+
+        private static Mesh FromBundle(Model model, float scale)
         {
             float[] positions = model.Positions();
             uint[] faces = model.Indices(Native.UPT_SET_SURFACE_FACES);
@@ -103,12 +121,12 @@ namespace Upt
             int count = 0;
             foreach (uint node in faces)
                 if (vertexOf[node] < 0) vertexOf[node] = count++;
-            points = new Vector3[count];
+            Vector3[] points = new Vector3[count];
             for (int node = 0; node < vertexOf.Length; node++)
                 if (vertexOf[node] >= 0)
                     points[vertexOf[node]] = Anatomical.ToUnity(positions[3 * node], positions[3 * node + 1],
                                                                 positions[3 * node + 2], scale);
-            triangles = new int[faces.Length];
+            int[] triangles = new int[faces.Length];
             for (int f = 0; f < faces.Length; f += 3)
             {
                 // The axes change handedness: reverse the winding.
@@ -116,6 +134,16 @@ namespace Upt
                 triangles[f + 1] = vertexOf[faces[f + 2]];
                 triangles[f + 2] = vertexOf[faces[f + 1]];
             }
+            Mesh mesh = new Mesh();
+            mesh.SetVertexBufferParams(
+                count, new VertexAttributeDescriptor(VertexAttribute.Position, VertexAttributeFormat.Float32, 3, 0),
+                new VertexAttributeDescriptor(VertexAttribute.Normal, VertexAttributeFormat.Float32, 3, 1));
+            mesh.vertices = points;
+            mesh.indexFormat = count > 65535 ? IndexFormat.UInt32 : IndexFormat.UInt16;
+            mesh.triangles = triangles;
+            mesh.RecalculateNormals();
+            mesh.RecalculateBounds();
+            return mesh;
         }
     }
 }

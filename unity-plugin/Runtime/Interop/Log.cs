@@ -16,7 +16,8 @@ namespace Upt.Interop
         public Type Type { get; private set; }
     }
 
-    /// <summary>Messages of the native library. They may come from any thread.</summary>
+    /// <summary>Messages of the native library. They come on threads that are inside of a call, at its end where the
+    /// library's own threads made them.</summary>
     public static unsafe class Log
     {
         [UnmanagedFunctionPointer(CallingConvention.Cdecl)]
@@ -25,10 +26,18 @@ namespace Upt.Interop
         private static readonly NativeLog Callback = OnMessage;
         private static volatile Action<int, string> receiver;
 
+        static Log()
+        {
+            // Native code must not call into a scripting domain that is gone: the editor reloads it on each
+            // compilation.
+            AppDomain.CurrentDomain.DomainUnload += TurnOff;
+            AppDomain.CurrentDomain.ProcessExit += TurnOff;
+        }
+
         /// <summary>
         /// Sends messages of at least <paramref name="level"/> (<c>Native.UPT_LOG_*</c>) to
-        /// <paramref name="target"/>, from any thread. A null target turns the log off; do so before the
-        /// scripting domain is unloaded.
+        /// <paramref name="target"/>. A null target turns the log off, and so do the unloading of the scripting domain and
+        /// the end of the process.
         /// </summary>
         public static void Set(Action<int, string> target, int level)
         {
@@ -41,6 +50,13 @@ namespace Upt.Interop
             }
             receiver = target;
             Status.Check(Native.upt_set_log(Marshal.GetFunctionPointerForDelegate(Callback), IntPtr.Zero, level));
+        }
+
+        private static void TurnOff(object sender, EventArgs arguments)
+        {
+            if (receiver == null) return;
+            receiver = null;
+            Native.upt_set_log(IntPtr.Zero, IntPtr.Zero, Native.UPT_LOG_OFF);
         }
 
         [MonoPInvokeCallback(typeof(NativeLog))]

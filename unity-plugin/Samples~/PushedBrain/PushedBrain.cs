@@ -1,12 +1,13 @@
 using Upt.Interop;
 using UnityEngine;
+using UnityEngine.Rendering;
 
 namespace Upt.Samples
 {
     /// <summary>
     /// The whole sample: put this on an empty object in an empty scene, assign a UptModel asset, press play.
-    /// It builds the brain and a spatula. The spatula presses by itself; while the left mouse button is
-    /// held, its depth follows the button and its place the pointer's height.
+    /// It builds the brain and a spatula and looks at them with the scene's camera, or one of its own. The spatula
+    /// presses and lifts by itself; while the left mouse button is held it stays pressed.
     /// </summary>
     public sealed class PushedBrain : MonoBehaviour
     {
@@ -42,9 +43,7 @@ namespace Upt.Samples
             GameObject brain = new GameObject("Brain");
             brain.SetActive(false);
             brain.AddComponent<MeshFilter>();
-            MeshRenderer renderer = brain.AddComponent<MeshRenderer>();
-            renderer.sharedMaterial = new Material(Shader.Find("Standard"));
-            renderer.sharedMaterial.color = new Color(0.86f, 0.62f, 0.58f);
+            brain.AddComponent<MeshRenderer>().sharedMaterial = Paint(new Color(0.86f, 0.62f, 0.58f));
             tissue = brain.AddComponent<SoftTissue>();
             tissue.model = model;
             tissue.unitsPerMillimetre = UnitsPerMillimetre;
@@ -54,9 +53,10 @@ namespace Upt.Samples
             spatula.halfExtents = new Vector3(6f, 8f, 1.5f);
             spatula.radius = 1.5f;
             tissue.instruments.Add(spatula);
-            tool.SetActive(true);
+            ShowBlade(tool.transform);
             brain.SetActive(true);
             FindSite();
+            Look();
         }
 
         private void OnDisable()
@@ -70,11 +70,47 @@ namespace Upt.Samples
             if (tissue == null || !tissue.IsRunning) return;
             time += Time.deltaTime;
             float press = 0.5f - 0.5f * (float)System.Math.Cos(2.0 * System.Math.PI * time / period);
+#if ENABLE_LEGACY_INPUT_MANAGER
             if (Input.GetMouseButton(0)) press = 1f;
+#endif
             float clearance = (spatula.halfExtents.z + spatula.radius) * UnitsPerMillimetre;
             spatula.transform.position =
                 tissue.transform.TransformPoint(site + outward * (clearance - press * depth * UnitsPerMillimetre));
             spatula.transform.rotation = Quaternion.LookRotation(outward, Vector3.up);
+        }
+
+        /// <summary>A plain material of the render pipeline that the project uses.</summary>
+        private static Material Paint(Color color)
+        {
+            Shader shader = GraphicsSettings.currentRenderPipeline != null
+                                ? GraphicsSettings.currentRenderPipeline.defaultShader
+                                : Shader.Find("Standard");
+            Material material = new Material(shader);
+            material.color = color;
+            return material;
+        }
+
+        /// <summary>A box as large as the spatula; the instrument itself has no picture.</summary>
+        private void ShowBlade(Transform tool)
+        {
+            GameObject blade = GameObject.CreatePrimitive(PrimitiveType.Cube);
+            Vector3 rounding = new Vector3(spatula.radius, spatula.radius, spatula.radius);
+            blade.transform.SetParent(tool, false);
+            blade.transform.localScale = (spatula.halfExtents + rounding) * (2f * UnitsPerMillimetre);
+            blade.GetComponent<MeshRenderer>().sharedMaterial = Paint(new Color(0.6f, 0.65f, 0.72f));
+        }
+
+        /// <summary>Turns the scene's camera to the site, 30 cm away; the default camera stands 10 m off and cuts away what is
+        /// nearer than 30 cm.</summary>
+        private void Look()
+        {
+            Camera eye = Camera.main;
+            if (eye == null) eye = new GameObject("Camera").AddComponent<Camera>();
+            eye.nearClipPlane = 0.01f;
+            Vector3 middle = tissue.transform.TransformPoint(site);
+            Vector3 sideways = Vector3.Cross(outward, Vector3.up);
+            eye.transform.position = middle + (outward + sideways + Vector3.up * 0.4f).normalized * 0.3f;
+            eye.transform.rotation = Quaternion.LookRotation(middle - eye.transform.position, Vector3.up);
         }
 
         /// <summary>The middle of the trained domain, and the direction out of the tissue there.</summary>

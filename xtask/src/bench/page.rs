@@ -1,0 +1,124 @@
+//! The measured part of docs/performance.md: a section a bench target, between two markers.
+
+use std::fmt::Write;
+
+use anyhow::{Context, Result, bail};
+
+use super::row::{Row, table};
+use crate::workspace::Workspace;
+
+const BEGIN: &str = "<!-- cargo xtask bench: begin -->";
+const END: &str = "<!-- cargo xtask bench: end -->";
+
+/// Replaces the sections of the tables that were measured; the others stay, with the machine that they name, and so
+/// does what is written by hand around the markers.
+pub fn write(
+    workspace: &Workspace,
+    quick: bool,
+    tables: &[(String, Vec<Row>)],
+    failed: &[String],
+    notes: &[String],
+) -> Result<()> {
+    let path = workspace.path("docs/performance.md");
+    let text = std::fs::read_to_string(&path)
+        .with_context(|| format!("cannot read {}", path.display()))?;
+    let (Some(start), Some(end)) = (text.find(BEGIN), text.find(END)) else {
+        bail!(
+            "{}: the markers `{BEGIN}` and `{END}` are missing",
+            path.display()
+        );
+    };
+    let how = format!(
+        "Measured on {}{}.",
+        machine(),
+        if quick {
+            ", short runs (`--quick`)"
+        } else {
+            ""
+        }
+    );
+    let measured = tables
+        .iter()
+        .map(|(name, rows)| (name.clone(), format!("{how}\n\n{}", table(rows))))
+        .collect();
+    let sections = merge(sections(&text[start + BEGIN.len()..end]), measured);
+    let mut body = String::new();
+    for (name, section) in &sections {
+        let _ = write!(body, "\n### {name}\n\n{}\n", section.trim());
+    }
+    for name in failed {
+        let _ = write!(body, "\nNot measured: {name} (failed).\n");
+    }
+    for note in notes {
+        let _ = write!(body, "\nNot measured: {note}\n");
+    }
+    let page = format!("{}{BEGIN}\n{body}\n{}", &text[..start], &text[end..]);
+    std::fs::write(&path, page)?;
+    println!("{} written", path.display());
+    Ok(())
+}
+
+/// Title and text of each section; remarks of an earlier run on what it did not measure are dropped.
+fn sections(body: &str) -> Vec<(String, String)> {
+    body.split("\n### ")
+        .skip(1)
+        .map(|section| {
+            let (title, text) = section.split_once('\n').unwrap_or((section, ""));
+            let text: Vec<&str> = text
+                .lines()
+                .filter(|line| !line.starts_with("Not measured: "))
+                .collect();
+            (title.to_owned(), text.join("\n"))
+        })
+        .collect()
+}
+
+/// `old` with the sections of `new` in their places, new ones added; by title.
+fn merge(mut old: Vec<(String, String)>, new: Vec<(String, String)>) -> Vec<(String, String)> {
+    for (title, text) in new {
+        match old.iter_mut().find(|section| section.0 == title) {
+            Some(section) => section.1 = text,
+            None => old.push((title, text)),
+        }
+    }
+    old.sort();
+    old
+}
+
+fn machine() -> String {
+    let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let name = text
+        .lines()
+        .find_map(|line| line.strip_prefix("model name"))
+        .map(|rest| rest.trim_start_matches([' ', '\t', ':']).to_owned());
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    format!(
+        "{}, {cores} cores",
+        name.unwrap_or_else(|| std::env::consts::ARCH.into())
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sections_that_were_not_measured_stay() {
+        let body = "\n### upt: step\n\nold step\n\nNot measured: a card\n\n### upt: kernels\n\nold kernels\n";
+        let merged = merge(
+            sections(body),
+            vec![
+                ("upt: step".into(), "new step".into()),
+                ("unity-plugin: overhead".into(), "calls".into()),
+            ],
+        );
+        let titles: Vec<&str> = merged.iter().map(|section| section.0.as_str()).collect();
+        assert_eq!(
+            titles,
+            ["unity-plugin: overhead", "upt: kernels", "upt: step"]
+        );
+        assert_eq!(merged[1].1.trim(), "old kernels");
+        assert_eq!(merged[2].1, "new step");
+        assert!(!sections(body)[0].1.contains("Not measured"));
+    }
+}
