@@ -195,6 +195,31 @@
 #define UPT_KERNEL_ONNX 2
 
 /**
+ * ONNX Runtime, all nodes in one run with the query table resident on the device.
+ */
+#define UPT_KERNEL_RESIDENT 3
+
+/**
+ * Split on the CPU; on a device the faster of split and whole, timed while the scene is made.
+ */
+#define UPT_STEP_AUTO 0
+
+/**
+ * Native encoder and message mean, then `latent.onnx` and the decoder.
+ */
+#define UPT_STEP_SPLIT 1
+
+/**
+ * The bundle's `step.onnx`, which decodes every node in every step.
+ */
+#define UPT_STEP_WHOLE 2
+
+/**
+ * Both are timed while the scene is made, and the faster one stays.
+ */
+#define UPT_STEP_MEASURED 3
+
+/**
  * Keep the last good state and return `UPT_ERR_GUARD`.
  */
 #define UPT_GUARD_HOLD 0
@@ -407,6 +432,10 @@ typedef struct upt_model_options {
    * Zero.
    */
   uint8_t reserved;
+  /**
+   * A `cudaStream_t` of `device_id` to run the graphs on, which outlives the model and its scenes; NULL: one of ONNX Runtime's own.
+   */
+  void *user_stream;
 } upt_model_options;
 
 /**
@@ -523,6 +552,10 @@ typedef struct upt_scene_options {
    * Zero.
    */
   uint8_t reserved[3];
+  /**
+   * `UPT_STEP_*`: who makes a step of a `UPT_KIND_UPT` bundle.
+   */
+  int32_t step_path;
 } upt_scene_options;
 
 /**
@@ -600,7 +633,7 @@ typedef struct upt_scene_stats {
    */
   double aggregate_ms;
   /**
-   * Latent network, ms.
+   * Latent network, or the whole step's graph, ms.
    */
   double latent_ms;
   /**
@@ -659,6 +692,18 @@ typedef struct upt_scene_stats {
    * Zero.
    */
   uint8_t reserved[6];
+  /**
+   * Of the stages' times, copies to a device, ms; 0 on the CPU.
+   */
+  double upload_ms;
+  /**
+   * Of the stages' times, copies back from a device, ms; 0 on the CPU.
+   */
+  double download_ms;
+  /**
+   * `UPT_STEP_SPLIT` or `UPT_STEP_WHOLE`.
+   */
+  int32_t step_path;
 } upt_scene_stats;
 
 #ifdef __cplusplus

@@ -31,7 +31,7 @@ pub use model::{Kind, Model, ModelInfo};
 pub use onnx::providers_json;
 pub use options::{
     DecoderKernel, GuardPolicy, IndexSet, InitOptions, ModelOptions, Precision, Provider,
-    SceneOptions,
+    SceneOptions, StepPath, UserStream,
 };
 pub use scene::{Contact, Progress, Scene, StepInput};
 pub use stats::{SceneStats, flag};

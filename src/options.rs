@@ -34,12 +34,14 @@ pub enum Precision {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(i32)]
 pub enum DecoderKernel {
-    /// The native kernel on the CPU, ONNX Runtime elsewhere.
+    /// The native kernel on the CPU, [`DecoderKernel::Resident`] on a device.
     Auto = 0,
     /// The fused native kernel.
     Native = 1,
     /// ONNX Runtime, in tiles.
     Onnx = 2,
+    /// ONNX Runtime, all nodes in one run with the query table resident on the device.
+    Resident = 3,
 }
 
 /// What happens when the guard refuses a state (values of `UPT_GUARD_*`).
@@ -81,6 +83,44 @@ pub struct InitOptions {
     pub onnxruntime_path: Option<PathBuf>,
 }
 
+/// A `cudaStream_t` of the host's, for the graphs of CUDA, TensorRT and TensorRT-RTX.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct UserStream(usize);
+
+impl UserStream {
+    /// Takes the stream's handle.
+    ///
+    /// # Safety
+    /// `stream` is a CUDA stream of the model's device that outlives the model and all its scenes.
+    pub unsafe fn new(stream: *mut core::ffi::c_void) -> UserStream {
+        UserStream(stream as usize)
+    }
+
+    /// The handle as a number.
+    pub fn address(self) -> usize {
+        self.0
+    }
+
+    #[cfg(any(feature = "cuda", feature = "tensorrt", feature = "tensorrt-rtx"))]
+    pub(crate) fn handle(self) -> *mut () {
+        self.0 as *mut ()
+    }
+}
+
+/// Who makes a step of a `upt` bundle (values of `UPT_STEP_*`).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(i32)]
+pub enum StepPath {
+    /// [`StepPath::Split`] on the CPU provider, [`StepPath::Measured`] on a device.
+    Auto = 0,
+    /// Native encoder and message mean, then `latent.onnx` and the decoder.
+    Split = 1,
+    /// `step.onnx` alone; every node is decoded in every step, whatever the region.
+    Whole = 2,
+    /// Both are timed while the scene is made, and the faster one stays. Without `step.onnx`: [`StepPath::Split`].
+    Measured = 3,
+}
+
 /// Options of [`crate::Model::open`].
 #[derive(Debug, Clone, Default)]
 pub struct ModelOptions {
@@ -101,6 +141,8 @@ pub struct ModelOptions {
     pub allow_tf32: bool,
     /// Capture a CUDA graph where shapes allow it.
     pub cuda_graph: bool,
+    /// Run the graphs on this stream; `None`: one of ONNX Runtime's own. Needs a GPU provider in the list.
+    pub user_stream: Option<UserStream>,
     /// Fail with [`crate::Error::Provider`] instead of falling back to the next provider.
     pub no_fallback: bool,
 }
@@ -112,6 +154,8 @@ pub struct SceneOptions {
     pub threads: usize,
     /// Decoder of a `upt` bundle.
     pub kernel: DecoderKernel,
+    /// Whether `step.onnx` makes the step of a `upt` bundle.
+    pub step_path: StepPath,
     /// Precision of the native kernels; `None` takes the model's.
     pub precision: Option<Precision>,
     /// What happens when the guard refuses a state.
@@ -135,6 +179,7 @@ impl Default for SceneOptions {
         SceneOptions {
             threads: 0,
             kernel: DecoderKernel::Auto,
+            step_path: StepPath::Auto,
             precision: None,
             guard_policy: GuardPolicy::Hold,
             mesh_path: None,

@@ -1,6 +1,6 @@
 //! What a scene tells about its last step: stage times, flags, what ran where.
 
-use crate::options::{DecoderKernel, Precision, Provider};
+use crate::options::{DecoderKernel, Precision, Provider, StepPath};
 
 /// Bits of [`SceneStats::flags`] (values of `UPT_FLAG_*`).
 pub mod flag {
@@ -45,7 +45,7 @@ pub struct SceneStats {
     pub encode_ms: f64,
     /// Mean over the radius graph.
     pub aggregate_ms: f64,
-    /// `latent.onnx`.
+    /// `latent.onnx`, or `step.onnx` on the whole path.
     pub latent_ms: f64,
     /// Decoder or table products.
     pub decode_ms: f64,
@@ -65,6 +65,12 @@ pub struct SceneStats {
     pub provider: Provider,
     /// Precision that runs.
     pub precision: Precision,
+    /// Who makes a step: [`StepPath::Split`] or [`StepPath::Whole`].
+    pub step_path: StepPath,
+    /// Of the stages' times, copies to a device; 0 on the CPU.
+    pub upload_ms: f64,
+    /// Of the stages' times, copies back from a device; 0 on the CPU.
+    pub download_ms: f64,
     /// Largest displacement of the last state, mm.
     pub max_displacement_mm: f32,
     /// Trust indicator, 0 is good, above 1 is outside of what was trained on.

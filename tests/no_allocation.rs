@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use fixture::{BUNDLES, model, plain, push, rollout, scene, sparse};
 use upt::kernels::flush::read_mode;
-use upt::{Contact, DecoderKernel, IndexSet, SceneOptions, StepInput};
+use upt::{Contact, DecoderKernel, IndexSet, SceneOptions, StepInput, StepPath};
 
 struct Counting;
 
@@ -38,12 +38,21 @@ static ALLOCATOR: Counting = Counting;
 #[test]
 fn steps_allocate_nothing_and_keep_the_floating_point_mode() {
     for name in BUNDLES {
-        for kernel in [DecoderKernel::Native, DecoderKernel::Onnx] {
+        for (kernel, step_path) in [
+            (DecoderKernel::Native, StepPath::Split),
+            (DecoderKernel::Onnx, StepPath::Split),
+            (DecoderKernel::Resident, StepPath::Split),
+            (DecoderKernel::Native, StepPath::Whole),
+        ] {
+            if name == "tiny-reduced" && step_path == StepPath::Whole {
+                continue;
+            }
             for threads in [1, 2] {
                 let model = model(name);
                 let options = SceneOptions {
                     threads,
                     kernel,
+                    step_path,
                     ..plain()
                 };
                 let scene = scene(&model, &options);
@@ -74,7 +83,10 @@ fn steps_allocate_nothing_and_keep_the_floating_point_mode() {
                 };
                 scene.step(inputs, Some(&mut out)).unwrap();
                 let count = ALLOCATIONS.load(Ordering::Relaxed) - before;
-                assert_eq!(count, 0, "{name} {kernel:?} {threads} threads");
+                assert_eq!(
+                    count, 0,
+                    "{name} {kernel:?} {step_path:?} {threads} threads"
+                );
                 assert_eq!(read_mode(), mode, "the host's floating-point mode");
             }
         }

@@ -4,12 +4,14 @@
 //! carries `paper_encoder.onnx` and `paper_decoder.onnx` is also run through ONNX Runtime as the paper splits it, with
 //! the same weights and threads; `cargo bench --bench step -- reduced` runs the bundles with that name only. `UPT_FINE_MESH=FILE` adds steps on that mesh for bundles without a prior.
 
+mod cost;
 mod fine;
 mod floor;
 #[path = "../measure/mod.rs"]
 mod measure;
 mod paper;
 mod reduced;
+mod split;
 mod steady;
 
 use std::path::Path;
@@ -51,7 +53,7 @@ fn run(path: &Path, machine: &floor::Machine) -> upt::Result<()> {
     Row::new(format!("{name}/open to first step"), opened, "s")
         .limits(Some(2.0), Some(0.5))
         .print();
-    let cost = floor::Cost::of(path, &model)?;
+    let cost = cost::Cost::of(path, &model)?;
     for threads in [1, 2] {
         for surface in [false, true] {
             let scene = Scene::new(Arc::clone(&model), &options(threads))?;
@@ -61,7 +63,7 @@ fn run(path: &Path, machine: &floor::Machine) -> upt::Result<()> {
             let part = if surface { "surface" } else { "all" };
             let row = format!("{name}/{part}/{threads} threads");
             let ms = steady::measure(&scene, &row, limits(&model, threads, surface))?;
-            cost.print_floor(machine, &scene, &row, ms);
+            machine.print_floor(&cost, &scene, &row, ms);
         }
     }
     if info.kind == Kind::Reduced {
@@ -79,7 +81,7 @@ fn run(path: &Path, machine: &floor::Machine) -> upt::Result<()> {
 
 /// Bar and goal of a step, ms. Random weights of the paper's size have neither: they stand beside the paper's split.
 fn limits(model: &Model, threads: usize, surface: bool) -> (Option<f64>, Option<f64>) {
-    if threads == 1 || model.manifest.name == "paper" {
+    if threads == 1 || model.manifest.name.starts_with("paper") {
         return (None, None);
     }
     match (model.info().kind, surface) {

@@ -6,7 +6,7 @@ use super::status::*;
 use super::structs::*;
 use crate::{
     DecoderKernel, GuardPolicy, IndexSet, InitOptions, ModelOptions, Precision, Provider,
-    SceneOptions,
+    SceneOptions, StepPath, UserStream,
 };
 
 fn unknown<T>(field: &str, value: i32) -> Result<T, Failure> {
@@ -42,7 +42,18 @@ fn kernel(value: i32) -> Result<DecoderKernel, Failure> {
         UPT_KERNEL_AUTO => DecoderKernel::Auto,
         UPT_KERNEL_NATIVE => DecoderKernel::Native,
         UPT_KERNEL_ONNX => DecoderKernel::Onnx,
+        UPT_KERNEL_RESIDENT => DecoderKernel::Resident,
         _ => return unknown("kernel", value),
+    })
+}
+
+fn step_path(value: i32) -> Result<StepPath, Failure> {
+    Ok(match value {
+        UPT_STEP_AUTO => StepPath::Auto,
+        UPT_STEP_SPLIT => StepPath::Split,
+        UPT_STEP_WHOLE => StepPath::Whole,
+        UPT_STEP_MEASURED => StepPath::Measured,
+        _ => return unknown("step_path", value),
     })
 }
 
@@ -142,6 +153,9 @@ pub(super) unsafe fn model_options(raw: &upt_model_options) -> Result<ModelOptio
         cache_dir: unsafe { optional_path(raw.cache_dir, "cache_dir") }?,
         allow_tf32: flag("allow_tf32", raw.allow_tf32)?,
         cuda_graph: flag("cuda_graph", raw.cuda_graph)?,
+        // SAFETY: the host promises that a stream which is not NULL outlives the model and its scenes.
+        user_stream: (!raw.user_stream.is_null())
+            .then(|| unsafe { UserStream::new(raw.user_stream) }),
         no_fallback: flag("no_fallback", raw.no_fallback)?,
     })
 }
@@ -151,6 +165,7 @@ pub(super) unsafe fn scene_options(raw: &upt_scene_options) -> Result<SceneOptio
     Ok(SceneOptions {
         threads: threads(raw.threads)?,
         kernel: kernel(raw.kernel)?,
+        step_path: step_path(raw.step_path)?,
         precision: precision(raw.precision)?,
         guard_policy: guard_policy(raw.guard_policy)?,
         mesh_path: unsafe { optional_path(raw.mesh_path, "mesh_path") }?,

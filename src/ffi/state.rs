@@ -48,6 +48,9 @@ pub unsafe extern "C" fn upt_scene_get_stats(
                     sleeping: stats.sleeping.into(),
                     poisoned: (stats.poisoned || entry.poisoned.load(Ordering::Acquire)).into(),
                     reserved: [0; 6],
+                    upload_ms: stats.upload_ms,
+                    download_ms: stats.download_ms,
+                    step_path: stats.step_path as i32,
                 })
             };
             unsafe { pointers::fill(out, fill) }

@@ -82,6 +82,17 @@ pub const UPT_KERNEL_AUTO: i32 = 0;
 pub const UPT_KERNEL_NATIVE: i32 = 1;
 /// ONNX Runtime sessions in node tiles.
 pub const UPT_KERNEL_ONNX: i32 = 2;
+/// ONNX Runtime, all nodes in one run with the query table resident on the device.
+pub const UPT_KERNEL_RESIDENT: i32 = 3;
+
+/// Split on the CPU; on a device the faster of split and whole, timed while the scene is made.
+pub const UPT_STEP_AUTO: i32 = 0;
+/// Native encoder and message mean, then `latent.onnx` and the decoder.
+pub const UPT_STEP_SPLIT: i32 = 1;
+/// The bundle's `step.onnx`, which decodes every node in every step.
+pub const UPT_STEP_WHOLE: i32 = 2;
+/// Both are timed while the scene is made, and the faster one stays.
+pub const UPT_STEP_MEASURED: i32 = 3;
 
 /// Keep the last good state and return `UPT_ERR_GUARD`.
 pub const UPT_GUARD_HOLD: i32 = 0;

@@ -61,6 +61,8 @@ pub struct upt_model_options {
     pub no_fallback: u8,
     /// Zero.
     pub reserved: u8,
+    /// A `cudaStream_t` of `device_id` to run the graphs on, which outlives the model and its scenes; NULL: one of ONNX Runtime's own.
+    pub user_stream: *mut c_void,
 }
 
 /// What a model is; filled by `upt_model_get_info`.
@@ -127,6 +129,8 @@ pub struct upt_scene_options {
     pub cubic_sampling: u8,
     /// Zero.
     pub reserved: [u8; 3],
+    /// `UPT_STEP_*`: who makes a step of a `UPT_KIND_UPT` bundle.
+    pub step_path: i32,
 }
 
 /// A rigid instrument; the input of `upt_scene_contacts_from_instruments`.
@@ -173,7 +177,7 @@ pub struct upt_scene_stats {
     pub encode_ms: f64,
     /// Message mean, ms.
     pub aggregate_ms: f64,
-    /// Latent network, ms.
+    /// Latent network, or the whole step's graph, ms.
     pub latent_ms: f64,
     /// Decoder, ms.
     pub decode_ms: f64,
@@ -203,4 +207,10 @@ pub struct upt_scene_stats {
     pub poisoned: u8,
     /// Zero.
     pub reserved: [u8; 6],
+    /// Of the stages' times, copies to a device, ms; 0 on the CPU.
+    pub upload_ms: f64,
+    /// Of the stages' times, copies back from a device, ms; 0 on the CPU.
+    pub download_ms: f64,
+    /// `UPT_STEP_SPLIT` or `UPT_STEP_WHOLE`.
+    pub step_path: i32,
 }

@@ -2,13 +2,15 @@
 
 mod reduced;
 mod upt;
+mod upt_stages;
 
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
 pub use reduced::ReducedModel;
-pub use upt::{DECODER_TILE, UptModel, UptTables};
+pub use upt::{UptModel, UptTables};
+pub use upt_stages::DECODER_TILE;
 
 use crate::bundle::{BundleFiles, Manifest, ManifestKind, Mesh};
 use crate::error::Result;
@@ -95,6 +97,11 @@ impl Model {
     /// [`crate::Error::Runtime`], [`crate::Error::Provider`].
     pub fn open(path: &Path, options: &ModelOptions) -> Result<Arc<Model>> {
         let start = Instant::now();
+        if options.user_stream.is_some() && !options.providers.iter().any(|&p| p != Provider::Cpu) {
+            return Err(crate::Error::Argument(
+                "user_stream is set and `providers` names no GPU provider".into(),
+            ));
+        }
         let _span = tracing::info_span!("open", path = %path.display()).entered();
         let process = library::current();
         let files = BundleFiles::open(path)?;
@@ -126,7 +133,7 @@ impl Model {
             None => None,
         };
         let runtime = Runtime::get(process.onnxruntime_path.as_deref())?;
-        let plan = ProviderPlan::new(options, &crate::bundle::hex(&files.hash));
+        let plan = ProviderPlan::new(options);
         let threads = match (options.threads, process.threads) {
             (0, 0) => 1,
             (0, n) => n,
@@ -209,6 +216,7 @@ impl Model {
             Kind::Upt => serde_json::json!({
                 "encode": native, "aggregate": native, "latent": latent,
                 "decode": "native, or onnxruntime where the scene asks for it",
+                "step_graph": matches!(&self.kind, KindModel::Upt(kind) if kind.has_step()),
             }),
             Kind::Reduced => {
                 serde_json::json!({"prior": native, "latent": latent, "decode": native})
@@ -224,6 +232,7 @@ impl Model {
             "stages": stages,
             "providers_refused": refused,
             "latent_nodes": self.choice.nodes,
+            "latent_memory": self.choice.memory,
             "instruction_set": format!("{:?}", crate::kernels::Isa::detect()),
             "onnxruntime": {"path": self.runtime.path().display().to_string(), "version": self.runtime.version()},
         })

@@ -12,8 +12,6 @@ use crate::options::Precision;
 
 /// Nodes a run of `embed.onnx`.
 const EMBED_TILE: usize = 2048;
-/// Nodes a run of `decoder.onnx`: activations stay in cache.
-pub const DECODER_TILE: usize = 1024;
 
 /// Everything that depends on the mesh alone.
 #[derive(Debug)]
@@ -67,10 +65,12 @@ pub struct UptModel {
     /// Precision of the graphs `latent` and `decoder`: float32, float16 or int8.
     pub precision: Precision,
     embed: Vec<u8>,
-    latent_file: String,
-    latent: Vec<u8>,
-    decoder_file: String,
-    decoder_graph: Vec<u8>,
+    pub(super) latent_file: String,
+    pub(super) latent: Vec<u8>,
+    pub(super) decoder_file: String,
+    pub(super) decoder_graph: Vec<u8>,
+    /// File and bytes of the whole step's graph, where the bundle has it in this precision.
+    pub(super) step: Option<(String, Vec<u8>)>,
 }
 
 impl UptModel {
@@ -85,6 +85,10 @@ impl UptModel {
     ) -> Result<(UptModel, ProviderChoice)> {
         let latent_file = files.graph_file("latent", precision)?;
         let decoder_file = files.graph_file("decoder", precision)?;
+        let step = match files.graph_file("step", precision) {
+            Ok(file) if files.has(&file) => Some((file.clone(), files.read(&file)?)),
+            _ => None,
+        };
         let entry = files
             .manifest
             .upt
@@ -108,6 +112,7 @@ impl UptModel {
             latent_file,
             decoder_graph: files.read(&decoder_file)?,
             decoder_file,
+            step,
             entry,
         };
         let choice = model
@@ -137,56 +142,12 @@ impl UptModel {
         Ok(embed_points(&self.entry, &self.embed, points, runtime, threads)?.2)
     }
 
-    /// A session of the latent graph: `supernodes [n_S,d]` -> `keys [L,h]`, `values [L,h]`.
-    pub fn latent_stage(
-        &self,
-        runtime: &'static Runtime,
-        plan: &ProviderPlan,
-        threads: usize,
-        supernodes: usize,
-    ) -> Result<Stage> {
-        let dims = &self.entry.dims;
-        let kv: &[usize] = &[dims.latent_tokens, dims.decoder];
-        Stage::new(
-            runtime,
-            &self.latent_file,
-            &self.latent,
-            &[("supernodes", &[supernodes, dims.encoder])],
-            &[("keys", kv), ("values", kv)],
-            &StageOptions {
-                threads,
-                plan: plan.clone(),
-            },
-        )
-    }
-
-    /// A session of the decoder graph for tiles of [`DECODER_TILE`] nodes:
-    /// `queries [n,2h]`, `keys`, `values` -> `displacement [n,3]`.
-    pub fn decoder_stage(&self, runtime: &'static Runtime, plan: &ProviderPlan) -> Result<Stage> {
-        let dims = &self.entry.dims;
-        let kv: &[usize] = &[dims.latent_tokens, dims.decoder];
-        Stage::new(
-            runtime,
-            &self.decoder_file,
-            &self.decoder_graph,
-            &[
-                ("queries", &[DECODER_TILE, dims.query]),
-                ("keys", kv),
-                ("values", kv),
-            ],
-            &[("displacement", &[DECODER_TILE, 3])],
-            &StageOptions {
-                threads: 1,
-                plan: plan.clone(),
-            },
-        )
-    }
-
     /// Bytes held beside the tables.
     pub fn memory_bytes(&self) -> usize {
         self.embed.len()
             + self.latent.len()
             + self.decoder_graph.len()
+            + self.step.as_ref().map_or(0, |(_, bytes)| bytes.len())
             + 4 * (self.source_weight.len() + self.target_weight.len())
     }
 }

@@ -2,18 +2,23 @@
 //!
 //! Nothing here is touched, and no library is opened, until a model is opened or the providers are asked for.
 
+mod engine_cache;
+mod graph;
 mod locate;
+mod memory;
 mod placement;
 #[cfg(feature = "tensorrt-rtx")]
 mod plugin;
 mod providers;
 mod runtime;
 mod stage;
+mod status;
 mod version;
 
+pub use graph::Tensors;
 pub use providers::{ProviderChoice, ProviderPlan, providers_json};
 pub use runtime::Runtime;
-pub use stage::{Stage, StageOptions};
+pub use stage::{Stage, StageOptions, StageTimes};
 
 use std::path::PathBuf;
 

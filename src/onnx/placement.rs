@@ -6,6 +6,8 @@ use std::ffi::CStr;
 use ort::AsPointer;
 use ort::session::Session;
 
+use super::status;
+
 /// The option that makes a session remember where its nodes went.
 pub(super) const RECORD: &str = "session.record_ep_graph_assignment_info";
 
@@ -22,16 +24,17 @@ pub(super) fn nodes_by_provider(session: &Session) -> BTreeMap<String, usize> {
             &mut parts,
             &mut count,
         );
-        if !done(status) || parts.is_null() {
+        if status::check(status).is_err() || parts.is_null() {
             return counts;
         }
         for &part in std::slice::from_raw_parts(parts, count) {
             let (mut name, mut nodes, mut size) = (std::ptr::null(), std::ptr::null(), 0);
-            if done((api.EpAssignedSubgraph_GetEpName)(part, &mut name))
+            if status::check((api.EpAssignedSubgraph_GetEpName)(part, &mut name)).is_ok()
                 && !name.is_null()
-                && done((api.EpAssignedSubgraph_GetNodes)(
+                && status::check((api.EpAssignedSubgraph_GetNodes)(
                     part, &mut nodes, &mut size,
                 ))
+                .is_ok()
             {
                 let name = CStr::from_ptr(name).to_string_lossy().into_owned();
                 *counts.entry(name).or_default() += size;
@@ -39,17 +42,4 @@ pub(super) fn nodes_by_provider(session: &Session) -> BTreeMap<String, usize> {
         }
     }
     counts
-}
-
-/// Whether a call succeeded; releases the status of one that did not.
-///
-/// # Safety
-/// `status` comes from a call of the API just made.
-unsafe fn done(status: ort::sys::OrtStatusPtr) -> bool {
-    if status.0.is_null() {
-        return true;
-    }
-    // SAFETY: as above; a status that is not null is released once.
-    unsafe { (ort::api().ReleaseStatus)(status.0) };
-    false
 }

@@ -5,12 +5,17 @@ use std::path::PathBuf;
 
 use ort::ep::{self, ExecutionProvider, ExecutionProviderDispatch};
 
+use ort::session::Session;
+
+use super::engine_cache::{engine_folder, engine_key};
+use super::graph::Tensors;
+use super::memory::Memory;
 #[cfg(feature = "tensorrt-rtx")]
 use super::plugin;
 use super::runtime::Runtime;
 use crate::error::{Error, Result};
 use crate::library;
-use crate::options::{ModelOptions, Precision, Provider};
+use crate::options::{ModelOptions, Precision, Provider, UserStream};
 
 impl Provider {
     /// Lower-case name.
@@ -33,6 +38,7 @@ pub struct ProviderPlan {
     cache_dir: Option<PathBuf>,
     allow_tf32: bool,
     cuda_graph: bool,
+    user_stream: Option<UserStream>,
     fp16: bool,
     fallback: bool,
 }
@@ -56,13 +62,28 @@ pub struct ProviderChoice {
     /// Nodes of the session's graph by ONNX Runtime's name of the provider that runs them: a GPU provider may leave
     /// some to the CPU. Empty where the library does not tell.
     pub nodes: BTreeMap<String, usize>,
+    /// Where the stage's tensors lie: `host`, `device`, or `bound anew in each run` where device memory is not to be had.
+    pub memory: &'static str,
     /// Provider and reason, for each that was asked for and not taken.
     pub refused: Vec<(Provider, String)>,
 }
 
+impl ProviderChoice {
+    /// The CPU, which nobody refused.
+    #[cfg(test)]
+    pub(super) fn cpu() -> ProviderChoice {
+        ProviderChoice {
+            provider: Provider::Cpu,
+            nodes: BTreeMap::new(),
+            memory: "host",
+            refused: Vec::new(),
+        }
+    }
+}
+
 impl ProviderPlan {
-    /// The plan of a model's options. The cache folder is keyed by `identity` (the bundle's hash).
-    pub fn new(options: &ModelOptions, identity: &str) -> ProviderPlan {
+    /// The plan of a model's options.
+    pub fn new(options: &ModelOptions) -> ProviderPlan {
         let mut order = options.providers.clone();
         let fallback = !options.no_fallback;
         if order.is_empty() || (fallback && !order.contains(&Provider::Cpu)) {
@@ -72,9 +93,10 @@ impl ProviderPlan {
             order,
             device_id: options.device_id,
             memory_limit: options.gpu_memory_limit,
-            cache_dir: options.cache_dir.as_ref().map(|dir| dir.join(identity)),
+            cache_dir: options.cache_dir.clone(),
             allow_tf32: options.allow_tf32,
             cuda_graph: options.cuda_graph,
+            user_stream: options.user_stream,
             fp16: options.precision == Some(Precision::F16),
             fallback,
         }
@@ -82,22 +104,28 @@ impl ProviderPlan {
 
     /// The CPU alone.
     pub fn cpu() -> ProviderPlan {
-        ProviderPlan::new(&ModelOptions::default(), "")
+        ProviderPlan::new(&ModelOptions::default())
     }
 
     /// Calls `make` with one provider after the other until one works.
     pub(super) fn choose<T>(
         &self,
+        file: &str,
+        graph: &[u8],
+        tensors: &Tensors<'_>,
         mut make: impl FnMut(Provider, Wish) -> std::result::Result<T, String>,
     ) -> Result<(T, ProviderChoice)> {
         let mut refused = Vec::new();
         for &provider in &self.order {
-            let made = self.wish(provider).and_then(|wish| make(provider, wish));
+            let made = self
+                .wish(provider, file, graph, tensors)
+                .and_then(|wish| make(provider, wish));
             match made {
                 Ok(value) => {
                     let choice = ProviderChoice {
                         provider,
                         nodes: BTreeMap::new(),
+                        memory: "host",
                         refused,
                     };
                     return Ok((value, choice));
@@ -120,15 +148,54 @@ impl ProviderPlan {
         Err(Error::Provider(format!("{}{note}", list.join("; "))))
     }
 
-    fn wish(&self, provider: Provider) -> std::result::Result<Wish, String> {
+    /// Where the tensors of a session lie.
+    ///
+    /// # Errors
+    /// A CUDA graph was asked for and the tensors have no fixed addresses on the device.
+    pub(super) fn memory(
+        &self,
+        runtime: &'static Runtime,
+        session: &Session,
+        provider: Provider,
+    ) -> std::result::Result<Memory, String> {
+        let (memory, missing) = Memory::of(runtime, session, provider, self.device_id);
+        match missing {
+            Some(reason) if self.cuda_graph => Err(format!(
+                "cuda_graph needs tensors of fixed address on the card, which are not to be had: {reason}"
+            )),
+            _ => Ok(memory),
+        }
+    }
+
+    fn wish(
+        &self,
+        provider: Provider,
+        file: &str,
+        graph: &[u8],
+        tensors: &Tensors<'_>,
+    ) -> std::result::Result<Wish, String> {
+        if provider == Provider::Cpu {
+            return Ok(Wish::Cpu);
+        }
         if let Some(reason) = missing(provider) {
             return Err(reason);
         }
-        if let Some(dir) = &self.cache_dir {
+        let runtime = Runtime::get(library::current().onnxruntime_path.as_deref())
+            .map_err(|error| error.to_string())?;
+        let folder = self.cache_dir.as_ref().map(|dir| {
+            let key = engine_key(&[
+                provider.name(),
+                runtime.version(),
+                &format!("device {} fp16 {}", self.device_id, self.fp16),
+                &tensors.shapes(),
+            ]);
+            dir.join(engine_folder(file, graph, key))
+        });
+        if let Some(dir) = &folder {
             std::fs::create_dir_all(dir)
                 .map_err(|error| format!("cache_dir {}: {error}", dir.display()))?;
         }
-        let cache = self.cache_dir.as_ref().map(|dir| dir.display().to_string());
+        let cache = folder.map(|dir| dir.display().to_string());
         let dispatch: ExecutionProviderDispatch = match provider {
             Provider::Cpu => return Ok(Wish::Cpu),
             #[cfg(feature = "cuda")]
@@ -139,6 +206,10 @@ impl ProviderPlan {
                     .with_cuda_graph(self.cuda_graph);
                 if self.memory_limit > 0 {
                     cuda = cuda.with_memory_limit(self.memory_limit as usize);
+                }
+                if let Some(stream) = self.user_stream {
+                    // SAFETY: whoever made the `UserStream` promised that the stream outlives the model.
+                    cuda = unsafe { cuda.with_compute_stream(stream.handle()) };
                 }
                 cuda.build()
             }
@@ -155,6 +226,10 @@ impl ProviderPlan {
                         .with_timing_cache(true)
                         .with_timing_cache_path(&cache);
                 }
+                if let Some(stream) = self.user_stream {
+                    // SAFETY: as above.
+                    trt = unsafe { trt.with_compute_stream(stream.handle()) };
+                }
                 trt.build()
             }
             #[cfg(feature = "tensorrt-rtx")]
@@ -168,6 +243,10 @@ impl ProviderPlan {
                     .with_cuda_graph(self.cuda_graph);
                 if let Some(cache) = cache {
                     rtx = rtx.with_runtime_cache_path(cache);
+                }
+                if let Some(stream) = self.user_stream {
+                    // SAFETY: as above.
+                    rtx = unsafe { rtx.with_compute_stream(stream.handle()) };
                 }
                 rtx.build()
             }
@@ -185,6 +264,10 @@ impl ProviderPlan {
             if self.cuda_graph { "1" } else { "0" }.to_owned(),
         )];
         options.extend(cache.map(|folder| ("nv_runtime_cache_path", folder)));
+        if let Some(stream) = self.user_stream {
+            options.push(("has_user_compute_stream", "1".to_owned()));
+            options.push(("user_compute_stream", stream.address().to_string()));
+        }
         options
             .into_iter()
             .map(|(key, value)| (format!("{}.{key}", plugin::NAME), value))

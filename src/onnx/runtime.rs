@@ -49,6 +49,27 @@ impl Runtime {
         &self.environment
     }
 
+    /// Lets the environment copy tensors between host and card: the CUDA provider's library, which lies beside ONNX
+    /// Runtime, is registered once a process.
+    pub(super) fn offer_cuda_copies(&self) -> std::result::Result<(), String> {
+        static OUTCOME: OnceLock<std::result::Result<(), String>> = OnceLock::new();
+        let register = || {
+            let name = if cfg!(windows) {
+                "onnxruntime_providers_cuda.dll"
+            } else {
+                "libonnxruntime_providers_cuda.so"
+            };
+            let path = self.path.with_file_name(name);
+            if !path.is_file() {
+                return Err(format!("{}: no such file", path.display()));
+            }
+            self.environment
+                .register_ep_library("CUDAExecutionProvider", &path)
+                .map_err(|error| format!("{}: {error}", path.display()))
+        };
+        OUTCOME.get_or_init(register).clone()
+    }
+
     /// File that was loaded.
     pub fn path(&self) -> &Path {
         &self.path

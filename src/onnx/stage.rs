@@ -1,18 +1,22 @@
 //! A stage: one graph with tensors of fixed shape, bound once and run many times.
 //!
-//! On the CPU the host writes the bound input tensors in place and a run copies nothing and allocates nothing of ours.
+//! The host writes the inputs in place. On the CPU a run copies nothing; on a device it copies the inputs there and the
+//! outputs back ([`super::memory`]). Neither allocates anything of ours.
+
+use std::time::Instant;
 
 use ort::AsPointer;
 use ort::memory::Allocator;
 use ort::session::builder::SessionBuilder;
 use ort::session::{IoBinding, Session};
-use ort::value::{Tensor, ValueType};
+use ort::value::Tensor;
 
-use super::placement;
+use super::graph::Tensors;
+use super::memory::{Memory, copy};
 use super::providers::{ProviderChoice, ProviderPlan, Wish};
 use super::runtime::Runtime;
+use super::{placement, status};
 use crate::error::{Error, Result};
-use crate::options::Provider;
 
 /// How a stage's session is made.
 #[derive(Debug, Clone)]
@@ -23,16 +27,35 @@ pub struct StageOptions {
     pub plan: ProviderPlan,
 }
 
+/// Wall time of the last run, ms.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct StageTimes {
+    /// Inputs to the device; 0 on the CPU.
+    pub upload: f64,
+    /// The graph. Where tensors are bound anew in each run it holds the way of the outputs back.
+    pub compute: f64,
+    /// Outputs back; 0 on the CPU.
+    pub download: f64,
+}
+
+/// A tensor of the host's and its counterpart on a device.
+struct Buffer {
+    name: String,
+    host: Tensor<f32>,
+    device: Option<Tensor<f32>>,
+}
+
 /// One graph, its session and its bound tensors.
 pub struct Stage {
     // Dropped before the session that it was made from.
     binding: IoBinding,
+    inputs: Vec<Buffer>,
+    outputs: Vec<Buffer>,
     session: Session,
-    input_names: Vec<String>,
-    inputs: Vec<Tensor<f32>>,
-    indices: Vec<(String, Tensor<i64>)>,
-    outputs: Vec<Tensor<f32>>,
+    memory: Memory,
+    runtime: &'static Runtime,
     choice: ProviderChoice,
+    times: StageTimes,
     file: String,
 }
 
@@ -50,108 +73,125 @@ impl Stage {
         outputs: &[(&str, &[usize])],
         options: &StageOptions,
     ) -> Result<Stage> {
-        Stage::with_indices(runtime, file, bytes, inputs, &[], outputs, options)
+        let tensors = Tensors {
+            inputs,
+            outputs,
+            ..Tensors::default()
+        };
+        Stage::with_constants(runtime, file, bytes, &tensors, options)
     }
 
-    /// As [`Stage::new`], with further int64 inputs `[n]` that stay the same in every run.
-    pub fn with_indices(
+    /// As [`Stage::new`], with inputs that stay the same in every run.
+    pub fn with_constants(
         runtime: &'static Runtime,
         file: &str,
         bytes: &[u8],
-        inputs: &[(&str, &[usize])],
-        indices: &[(&str, &[i64])],
-        outputs: &[(&str, &[usize])],
+        tensors: &Tensors<'_>,
         options: &StageOptions,
     ) -> Result<Stage> {
         let _span = tracing::debug_span!("session", file).entered();
         let mut invalid = None;
-        let made = options.plan.choose(|_, wish| {
+        let made = options.plan.choose(file, bytes, tensors, |provider, wish| {
             let mut builder = configure(runtime, options, wish)?;
-            builder.commit_from_memory(bytes).map_err(|error| {
+            let session = builder.commit_from_memory(bytes).map_err(|error| {
                 if error.code() == ort::ErrorCode::InvalidProtobuf
                     || error.code() == ort::ErrorCode::InvalidGraph
                 {
                     invalid = Some(error.to_string());
                 }
                 error.to_string()
-            })
+            })?;
+            let memory = options.plan.memory(runtime, &session, provider)?;
+            Ok((session, memory))
         });
         if let Some(cause) = invalid {
             return Err(Error::bundle(file, format!("not a valid graph: {cause}")));
         }
-        let (session, mut choice) = made?;
+        let ((session, memory), mut choice) = made?;
         choice.nodes = placement::nodes_by_provider(&session);
-        check_names(file, "input", session.inputs(), inputs, indices.len())?;
-        check_names(file, "output", session.outputs(), outputs, 0)?;
-        let tensors = |list: &[(&str, &[usize])]| {
+        choice.memory = memory.name();
+        Stage::bind(runtime, file, tensors, session, memory, choice)
+    }
+
+    fn bind(
+        runtime: &'static Runtime,
+        file: &str,
+        tensors: &Tensors<'_>,
+        session: Session,
+        memory: Memory,
+        choice: ProviderChoice,
+    ) -> Result<Stage> {
+        tensors.check(file, &session)?;
+        let failed = |error: &dyn std::fmt::Display| Error::Runtime(format!("{file}: {error}"));
+        let buffers = |list: &[(&str, &[usize])]| {
             list.iter()
-                .map(|(_, shape)| Tensor::<f32>::new(&Allocator::default(), shape.to_vec()))
-                .collect::<ort::Result<Vec<_>>>()
-                .map_err(|error| Error::Runtime(error.to_string()))
-        };
-        let mut stage = Stage {
-            binding: session
-                .create_binding()
-                .map_err(|error| Error::Runtime(error.to_string()))?,
-            input_names: inputs.iter().map(|(name, _)| name.to_string()).collect(),
-            inputs: tensors(inputs)?,
-            indices: indices
-                .iter()
-                .map(|(name, values)| {
-                    let tensor = Tensor::from_array(([values.len()], values.to_vec()));
-                    Ok((
-                        name.to_string(),
-                        tensor.map_err(|error| Error::Runtime(error.to_string()))?,
-                    ))
+                .map(|(name, shape)| {
+                    let (host, device) = memory.pair(shape).map_err(|error| failed(&error))?;
+                    Ok(Buffer {
+                        name: name.to_string(),
+                        host,
+                        device,
+                    })
                 })
-                .collect::<Result<_>>()?,
-            outputs: tensors(outputs)?,
-            session,
-            choice,
-            file: file.to_owned(),
+                .collect::<Result<Vec<_>>>()
         };
-        for tensor in &mut stage.inputs {
-            tensor.extract_tensor_mut().1.fill(0.0);
+        let (inputs, mut outputs) = (buffers(tensors.inputs)?, buffers(tensors.outputs)?);
+        let mut binding = session.create_binding().map_err(|error| failed(&error))?;
+        for input in &inputs {
+            binding
+                .bind_input(
+                    input.name.as_str(),
+                    input.device.as_ref().unwrap_or(&input.host),
+                )
+                .map_err(|error| failed(&error))?;
         }
-        stage.bind_inputs()?;
-        stage.bind_indices()?;
-        for ((name, _), tensor) in outputs.iter().zip(&mut stage.outputs) {
-            stage
-                .binding
-                .bind_output(*name, tensor)
-                .map_err(|error| Error::Runtime(format!("{file}: {error}")))?;
+        for &(name, shape, values) in tensors.constants {
+            let mut tensor = Tensor::<f32>::new(&Allocator::default(), shape.to_vec())
+                .map_err(|error| failed(&error))?;
+            tensor.extract_tensor_mut().1.copy_from_slice(values);
+            binding
+                .bind_input(name, &tensor)
+                .map_err(|error| failed(&error))?;
         }
-        Ok(stage)
-    }
-
-    /// Binds the inputs that the host writes; on a device this makes the device's copy of each.
-    fn bind_inputs(&mut self) -> Result<()> {
-        for (name, tensor) in self.input_names.iter().zip(&self.inputs) {
-            self.binding
-                .bind_input(name.as_str(), tensor)
-                .map_err(|error| Error::Runtime(format!("{}: {error}", self.file)))?;
+        for &(name, shape, values) in tensors.indices {
+            let mut tensor = Tensor::<i64>::new(&Allocator::default(), shape.to_vec())
+                .map_err(|error| failed(&error))?;
+            tensor.extract_tensor_mut().1.copy_from_slice(values);
+            binding
+                .bind_input(name, &tensor)
+                .map_err(|error| failed(&error))?;
         }
-        Ok(())
-    }
-
-    /// Binds the inputs that never change, once: they stay on the device.
-    fn bind_indices(&mut self) -> Result<()> {
-        for (name, tensor) in &self.indices {
-            self.binding
-                .bind_input(name.as_str(), tensor)
-                .map_err(|error| Error::Runtime(format!("{}: {error}", self.file)))?;
+        for output in &mut outputs {
+            let bound = match &mut output.device {
+                Some(device) => binding.bind_output(output.name.as_str(), device),
+                None => binding.bind_output(output.name.as_str(), &mut output.host),
+            };
+            bound.map_err(|error| failed(&error))?;
         }
-        Ok(())
+        binding
+            .synchronize_inputs()
+            .map_err(|error| failed(&error))?;
+        Ok(Stage {
+            binding,
+            inputs,
+            outputs,
+            session,
+            memory,
+            runtime,
+            choice,
+            times: StageTimes::default(),
+            file: file.to_owned(),
+        })
     }
 
     /// Input `index`, to be written before a run.
     pub fn input(&mut self, index: usize) -> &mut [f32] {
-        self.inputs[index].extract_tensor_mut().1
+        self.inputs[index].host.extract_tensor_mut().1
     }
 
     /// Output `index` of the last run.
     pub fn output(&self, index: usize) -> &[f32] {
-        self.outputs[index].extract_tensor().1
+        self.outputs[index].host.extract_tensor().1
     }
 
     /// What runs this stage.
@@ -159,37 +199,77 @@ impl Stage {
         &self.choice
     }
 
+    /// Wall times of the last run.
+    pub fn times(&self) -> StageTimes {
+        self.times
+    }
+
     /// Runs the graph.
     pub fn run(&mut self) -> Result<()> {
-        if self.choice.provider != Provider::Cpu {
-            self.bind_inputs()?;
-            return match self.session.run_binding(&self.binding) {
-                Ok(_) => Ok(()),
-                Err(error) => Err(Error::Runtime(format!("{}: {error}", self.file))),
-            };
+        let start = Instant::now();
+        let since = |start: Instant| start.elapsed().as_secs_f64() * 1e3;
+        self.upload()?;
+        self.times.upload = since(start);
+        let start = Instant::now();
+        self.compute()?;
+        self.times.compute = since(start);
+        let start = Instant::now();
+        self.download()?;
+        self.times.download = since(start);
+        Ok(())
+    }
+
+    fn failed(&self, cause: impl std::fmt::Display) -> Error {
+        Error::Runtime(format!("{}: {cause}", self.file))
+    }
+
+    fn upload(&mut self) -> Result<()> {
+        match self.memory {
+            Memory::Host => Ok(()),
+            Memory::Rebound => {
+                for input in &self.inputs {
+                    self.binding
+                        .bind_input(input.name.as_str(), &input.host)
+                        .map_err(|error| Error::Runtime(format!("{}: {error}", self.file)))?;
+                }
+                self.binding
+                    .synchronize_inputs()
+                    .map_err(|error| self.failed(error))
+            }
+            Memory::Device { .. } => {
+                for input in &mut self.inputs {
+                    if let Some(device) = &mut input.device {
+                        copy(self.runtime, &input.host, device)
+                            .map_err(|error| Error::Runtime(format!("{}: {error}", self.file)))?;
+                    }
+                }
+                Ok(())
+            }
         }
-        let api = ort::api();
+    }
+
+    fn compute(&mut self) -> Result<()> {
         let session = self.session.inner();
         // SAFETY: session and binding are alive; `&mut self` makes this the only run of the session.
-        let status = unsafe {
-            (api.RunWithBinding)(
+        let outcome = unsafe {
+            status::check((ort::api().RunWithBinding)(
                 AsPointer::ptr(&*session).cast_mut(),
                 std::ptr::null(),
                 AsPointer::ptr(&self.binding),
-            )
+            ))
         };
         drop(session);
-        if status.0.is_null() {
-            return Ok(());
+        outcome.map_err(|error| self.failed(error))
+    }
+
+    fn download(&mut self) -> Result<()> {
+        for output in &mut self.outputs {
+            if let Some(device) = &output.device {
+                copy(self.runtime, device, &mut output.host)
+                    .map_err(|error| Error::Runtime(format!("{}: {error}", self.file)))?;
+            }
         }
-        // SAFETY: a status that is not null holds a message and is released once.
-        let message = unsafe {
-            let text = std::ffi::CStr::from_ptr((api.GetErrorMessage)(status.0));
-            let text = text.to_string_lossy().into_owned();
-            (api.ReleaseStatus)(status.0);
-            text
-        };
-        Err(Error::Runtime(format!("{}: {message}", self.file)))
+        Ok(())
     }
 }
 
@@ -228,55 +308,77 @@ fn configure(
     }
 }
 
-fn check_names(
-    file: &str,
-    what: &str,
-    have: &[ort::value::Outlet],
-    want: &[(&str, &[usize])],
-    others: usize,
-) -> Result<()> {
-    let names: Vec<&str> = have.iter().map(|outlet| outlet.name()).collect();
-    for (name, shape) in want {
-        let Some(outlet) = have.iter().find(|outlet| outlet.name() == *name) else {
-            return Err(Error::bundle(
-                file,
-                format!("{what} `{name}` is missing, the graph has {names:?}"),
-            ));
-        };
-        let ValueType::Tensor {
-            ty,
-            shape: declared,
-            ..
-        } = outlet.dtype()
-        else {
-            return Err(Error::bundle(
-                file,
-                format!("{what} `{name}` is not a tensor"),
-            ));
-        };
-        if *ty != ort::value::TensorElementType::Float32 {
-            return Err(Error::bundle(
-                file,
-                format!("{what} `{name}` has type {ty:?}, must be float32"),
-            ));
-        }
-        let fits = declared.len() == shape.len()
-            && declared
-                .iter()
-                .zip(shape.iter())
-                .all(|(&have, &want)| have < 0 || have == want as i64);
-        if !fits {
-            return Err(Error::bundle(
-                file,
-                format!("{what} `{name}` has shape {declared:?}, must hold {shape:?}"),
-            ));
-        }
+#[cfg(test)]
+mod tests {
+    use super::super::memory::round_trip;
+    use super::*;
+
+    const FILE: &str = "latent.onnx";
+
+    fn runtime() -> &'static Runtime {
+        Runtime::get(None).expect("ONNX Runtime: set ORT_DYLIB_PATH or run `cargo xtask ort`")
     }
-    if what == "input" && have.len() != want.len() + others {
-        return Err(Error::bundle(
-            file,
-            format!("the graph has inputs {names:?}, must have {}", want.len()),
-        ));
+
+    fn stage(memory: Memory) -> Stage {
+        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/fixtures/tiny-reduced/");
+        let manifest = std::fs::read(format!("{folder}bundle.json")).unwrap();
+        let manifest: serde_json::Value = serde_json::from_slice(&manifest).unwrap();
+        let bytes = std::fs::read(format!("{folder}{FILE}")).unwrap();
+        let options = StageOptions {
+            threads: 1,
+            plan: ProviderPlan::cpu(),
+        };
+        let session = configure(runtime(), &options, Wish::Cpu)
+            .unwrap()
+            .commit_from_memory(&bytes)
+            .unwrap();
+        let width = |outlet: &ort::value::Outlet| {
+            let ort::value::ValueType::Tensor { shape, .. } = outlet.dtype() else {
+                panic!("not a tensor")
+            };
+            shape[1] as usize
+        };
+        let (n, r) = (
+            width(&session.inputs()[0]),
+            manifest["reduced"]["modes"].as_u64().unwrap() as usize,
+        );
+        let tensors = Tensors {
+            inputs: &[("state", &[1, n])],
+            outputs: &[("b_next", &[1, r])],
+            ..Tensors::default()
+        };
+        let choice = ProviderChoice::cpu();
+        Stage::bind(runtime(), FILE, &tensors, session, memory, choice).unwrap()
     }
-    Ok(())
+
+    fn outputs(stage: &mut Stage) -> Vec<u32> {
+        let mut bits = Vec::new();
+        for t in 0..4 {
+            for (i, x) in stage.input(0).iter_mut().enumerate() {
+                *x = ((i + 7 * t) as f32 * 0.37).sin();
+            }
+            stage.run().unwrap();
+            bits.extend(stage.output(0).iter().map(|x| x.to_bits()));
+        }
+        bits
+    }
+
+    /// The copies of a device's path, with both sides in the host's memory.
+    #[test]
+    fn staged_and_rebound_tensors_give_the_bits_of_bound_ones() {
+        round_trip(runtime(), &Memory::staged_on_the_host()).unwrap();
+        let want = outputs(&mut stage(Memory::Host));
+        assert!(want.iter().any(|&bits| f32::from_bits(bits).abs() > 1e-3));
+        assert_eq!(outputs(&mut stage(Memory::staged_on_the_host())), want);
+        assert_eq!(outputs(&mut stage(Memory::Rebound)), want);
+    }
+
+    #[test]
+    fn a_copy_into_another_shape_is_an_error() {
+        let host = Memory::Host;
+        let (four, _) = host.pair(&[4]).unwrap();
+        let (mut six, _) = host.pair(&[2, 3]).unwrap();
+        let error = copy(runtime(), &four, &mut six).unwrap_err();
+        assert!(error.contains("[4]"), "{error}");
+    }
 }

@@ -150,6 +150,9 @@ impl Core {
             kernel: self.engine.kernel(),
             provider: self.engine.provider(),
             precision: self.engine.precision(),
+            step_path: self.engine.path(),
+            upload_ms: 0.0,
+            download_ms: 0.0,
             max_displacement_mm: self.max_displacement,
             indicator: 0.0,
             sleeping: self.sleeping,
@@ -187,6 +190,7 @@ impl Core {
             self.publish_rest(published);
         } else {
             self.predict_and_decode(published, given, &mut stats)?;
+            [stats.upload_ms, stats.download_ms] = self.engine.transfer_ms();
             let verdict = self.judge(&mut stats)?;
             if verdict & guard::REFUSED != 0 {
                 self.refuse(published, verdict, &mut stats)?;

@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 use crate::kernels::rows::decode_rows;
 use crate::kernels::{Isa, Pool};
 use crate::model::{KindModel, Model, UptTables};
-use crate::options::{DecoderKernel, Precision, Provider};
+use crate::options::{DecoderKernel, Precision, Provider, StepPath};
 use crate::prior::PriorTable;
 use crate::stats::SceneStats;
 
@@ -68,9 +68,11 @@ impl Engine {
         }
     }
 
-    /// Whether every node is decoded each step because the prediction is added to the displacement.
+    /// Whether every node is decoded in each step, and kept: because the prediction is added to the displacement, or
+    /// because `step.onnx` decodes, whose bits no other path gives again.
     pub fn keeps_all_nodes(&self, model: &Model) -> bool {
-        matches!(&model.kind, KindModel::Upt(kind) if kind.entry.base == Base::Displacement)
+        self.path() == StepPath::Whole
+            || matches!(&model.kind, KindModel::Upt(kind) if kind.entry.base == Base::Displacement)
     }
 
     /// Nodes whose displacement the next step reads.
@@ -141,15 +143,7 @@ impl Engine {
                     .map_err(|error| Error::Panic(error.to_string()))
             }
             (Engine::Upt(engine, tables), KindModel::Upt(kind)) => {
-                engine.decode_network(
-                    isa,
-                    pool,
-                    kind,
-                    which,
-                    &tables.query_table,
-                    plan.nodes(),
-                    field,
-                )?;
+                engine.decode_mesh(isa, pool, kind, tables, which, plan.nodes(), field)?;
                 match kind.entry.base {
                     Base::None => {}
                     Base::Displacement => add(displacement, plan.nodes(), field),
@@ -269,6 +263,25 @@ impl Engine {
         match self {
             Engine::Upt(engine, _) => engine.kernel(),
             Engine::Reduced(_) => DecoderKernel::Native,
+        }
+    }
+
+    /// Who makes a step.
+    pub fn path(&self) -> StepPath {
+        match self {
+            Engine::Upt(engine, _) => engine.path(),
+            Engine::Reduced(_) => StepPath::Split,
+        }
+    }
+
+    /// Wall time of the last step's copies to a device and back, ms.
+    pub fn transfer_ms(&self) -> [f64; 2] {
+        match self {
+            Engine::Upt(engine, _) => engine.transfer_ms(),
+            Engine::Reduced(engine) => {
+                let times = engine.stage().times();
+                [times.upload, times.download]
+            }
         }
     }
 

@@ -4,7 +4,9 @@
 
 mod contact;
 mod core;
+mod decoders;
 mod engine;
+mod features;
 mod plan;
 mod points;
 mod published;
@@ -12,6 +14,7 @@ mod reduced;
 mod region;
 mod shared;
 mod snapshot;
+mod step_path;
 mod timing;
 mod tools;
 mod upt;
@@ -29,7 +32,7 @@ use crate::bundle::{Mesh, TensorFile};
 use crate::error::{Error, Result};
 use crate::kernels::Pool;
 use crate::model::{KindModel, Model};
-use crate::options::{DecoderKernel, Precision, Provider, SceneOptions};
+use crate::options::{SceneOptions, StepPath};
 use crate::stats::SceneStats;
 use core::{Core, CoreParts, lock_read};
 use engine::Engine;
@@ -306,6 +309,11 @@ fn build(model: &Arc<Model>, options: &SceneOptions) -> Result<Core> {
         }
     };
     let engine = match &model.kind {
+        KindModel::Reduced(_) if options.step_path == StepPath::Whole => {
+            return Err(Error::Unsupported(
+                "step_path: bundles of kind reduced have no step.onnx".into(),
+            ));
+        }
         KindModel::Reduced(kind) => {
             let table = model
                 .prior
@@ -321,20 +329,14 @@ fn build(model: &Arc<Model>, options: &SceneOptions) -> Result<Core> {
                     mesh.node_count(),
                 ),
             };
-            let kernel = match options.kernel {
-                // The native kernel has float32 and bfloat16 only.
-                DecoderKernel::Auto
-                    if model.info().provider == Provider::Cpu
-                        && kind.precision == Precision::F32 =>
-                {
-                    DecoderKernel::Native
-                }
-                DecoderKernel::Auto => DecoderKernel::Onnx,
-                kernel => kernel,
+            let parts = step_path::Parts {
+                model,
+                kind,
+                tables: &tables,
+                pool: &pool,
+                node_count: nodes,
             };
-            let precision: Precision = options.precision.unwrap_or(model.precision);
-            let engine =
-                upt::UptEngine::new(model, kind, &tables, &pool, nodes, kernel, precision)?;
+            let engine = parts.engine(options)?;
             Engine::Upt(Box::new(engine), tables)
         }
     };

@@ -1,7 +1,7 @@
 //! Snapshots: the state of a scene as bytes, from which it resumes to the bit.
 //!
 //! Little-endian: magic, version, SHA-256 of the bundle's manifest, the mesh hash, counters, both contact sets, both
-//! latent states, and the fields where the prediction is added to them; at the end the SHA-256 of all before it.
+//! latent states, and the fields where they are kept rather than decoded; at the end the SHA-256 of all before it.
 //! Region, attached points and options are the host's and are not part of it.
 
 use std::sync::RwLock;
@@ -16,7 +16,7 @@ use crate::error::{Error, Result};
 use crate::kernels::FlushToZero;
 
 const MAGIC: &[u8; 8] = b"UPTSNAP\0";
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 const DIGEST: usize = 32;
 
 struct Writer(Vec<u8>);
@@ -169,7 +169,9 @@ impl Core {
                 w.floats(&[record.prior_norm, record.bound, f32::from(record.contact)]);
             }
         }
-        if self.engine.keeps_all_nodes(&self.model) {
+        let keeps = self.engine.keeps_all_nodes(&self.model);
+        w.u32(u32::from(keeps));
+        if keeps {
             let shared = lock_read(published);
             w.floats(&shared.last.field);
             w.floats(&shared.before.field);
@@ -221,8 +223,12 @@ impl Core {
             scalars = vec![r.floats(3)?, r.floats(3)?];
         }
         let mut fields = Vec::new();
-        if self.engine.keeps_all_nodes(&self.model) {
+        if r.u32()? != 0 {
             fields = vec![r.floats(3 * count)?, r.floats(3 * count)?];
+        } else if self.engine.keeps_all_nodes(&self.model) {
+            return Err(Error::Snapshot(
+                "was saved by a scene that steps without step.onnx; restore it in a scene with `step_path` split".into(),
+            ));
         }
         if !r.0.is_empty() {
             return Err(Error::Snapshot(format!("has {} bytes too many", r.0.len())));

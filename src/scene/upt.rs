@@ -1,14 +1,14 @@
-//! The step of kind `upt`: features -> low-rank encoder and message mean (native) -> `latent.onnx` -> decoder tiles.
-
-use std::sync::Mutex;
+//! The step of kind `upt`: features -> low-rank encoder and message mean (native) -> `latent.onnx` -> decoder, or
+//! `step.onnx` for all of it.
 
 use super::contact::ContactSet;
+use super::decoders::{Decoders, decode_resident, decode_tiles, take_rows};
 use super::engine::Which;
+use super::features::fill_features;
 use super::plan::NodePlan;
 use super::reduced::solve_flags;
 use super::timing::Stopwatch;
 use super::upt_prior::{decode_prior, respond};
-use crate::bundle::Feature;
 use crate::error::{Error, Result};
 use crate::kernels::aggregate::{Csr, encode_aggregate};
 use crate::kernels::decoder::{
@@ -16,9 +16,9 @@ use crate::kernels::decoder::{
 };
 use crate::kernels::encode::LowRank;
 use crate::kernels::{Isa, Pool};
-use crate::model::{DECODER_TILE, Model, UptModel, UptTables};
+use crate::model::{Model, UptModel, UptTables};
 use crate::onnx::Stage;
-use crate::options::{DecoderKernel, Precision};
+use crate::options::{DecoderKernel, Precision, StepPath};
 use crate::prior::{ContactResponse, PriorTable};
 use crate::stats::SceneStats;
 
@@ -37,15 +37,36 @@ pub struct UptRecord {
     pub vibration: Vec<f32>,
 }
 
+/// Who makes a step.
+enum Path {
+    /// Native encoder and message mean of `features`, then `latent.onnx`.
+    Split {
+        latent: Box<Stage>,
+        features: Vec<f32>,
+        scratch: Vec<f32>,
+    },
+    /// `step.onnx`, which decodes every node as well.
+    Whole(Box<Stage>),
+}
+
+/// How a scene runs the network.
+#[derive(Debug, Clone, Copy)]
+pub struct Choice {
+    /// `step.onnx` makes the step.
+    pub whole: bool,
+    /// What decodes; not [`DecoderKernel::Auto`].
+    pub kernel: DecoderKernel,
+    /// Precision of the native decoder.
+    pub precision: Precision,
+}
+
 /// Buffers and sessions of a scene of kind `upt`.
 pub struct UptEngine {
     response: Option<ContactResponse>,
-    latent: Stage,
-    features: Vec<f32>,
-    scratch: Vec<f32>,
+    path: Path,
     tokens: DecoderTokens,
     decoder_scratch: DecoderScratch,
-    decoder_stages: Vec<Mutex<Stage>>,
+    decoders: Decoders,
     precision: DecoderPrecision,
     graphs: Precision,
     /// The step being made.
@@ -97,8 +118,7 @@ impl UptEngine {
         tables: &UptTables,
         pool: &Pool,
         node_count: usize,
-        kernel: DecoderKernel,
-        precision: Precision,
+        choice: Choice,
     ) -> Result<UptEngine> {
         let dims = &kind.entry.dims;
         let uses_prior = kind.entry.needs_prior();
@@ -116,27 +136,24 @@ impl UptEngine {
                     .map_or(0, |vibration| 2 * vibration.count())
             ],
         };
-        let decoder_stages = if kernel == DecoderKernel::Onnx {
-            (0..pool.threads())
-                .map(|_| Ok(Mutex::new(kind.decoder_stage(model.runtime, &model.plan)?)))
-                .collect::<Result<_>>()?
+        let (runtime, plan, threads) = (model.runtime, &model.plan, pool.threads());
+        let path = if choice.whole {
+            Path::Whole(Box::new(kind.step_stage(runtime, plan, threads, tables)?))
         } else {
-            Vec::new()
+            let supernodes = tables.graph.supernodes.len();
+            Path::Split {
+                latent: Box::new(kind.latent_stage(runtime, plan, threads, supernodes)?),
+                features: vec![0.0; tables.encode_nodes.len() * kind.entry.feature_width()],
+                scratch: vec![0.0; threads * dims.encoder],
+            }
         };
         Ok(UptEngine {
             response: table.map(ContactResponse::new),
-            latent: kind.latent_stage(
-                model.runtime,
-                &model.plan,
-                pool.threads(),
-                tables.graph.supernodes.len(),
-            )?,
-            features: vec![0.0; tables.encode_nodes.len() * kind.entry.feature_width()],
-            scratch: vec![0.0; pool.threads() * dims.encoder],
+            path,
             tokens: DecoderTokens::new(&kind.decoder, dims.latent_tokens),
             decoder_scratch: DecoderScratch::new(&kind.decoder, dims.latent_tokens, pool.threads()),
-            decoder_stages,
-            precision: if precision == Precision::Bf16 && Isa::has_bf16() {
+            decoders: Decoders::new(model, kind, tables, choice.kernel, threads)?,
+            precision: if choice.precision == Precision::Bf16 && Isa::has_bf16() {
                 DecoderPrecision::Bf16
             } else {
                 DecoderPrecision::F32
@@ -151,7 +168,9 @@ impl UptEngine {
     /// Precision that the decoder runs in.
     pub fn precision(&self) -> Precision {
         match self.precision {
-            _ if !self.decoder_stages.is_empty() => self.graphs,
+            _ if self.path() == StepPath::Whole || self.kernel() != DecoderKernel::Native => {
+                self.graphs
+            }
             DecoderPrecision::Bf16 => Precision::Bf16,
             DecoderPrecision::F32 => Precision::F32,
         }
@@ -159,16 +178,36 @@ impl UptEngine {
 
     /// What decodes.
     pub fn kernel(&self) -> DecoderKernel {
-        if self.decoder_stages.is_empty() {
-            DecoderKernel::Native
-        } else {
-            DecoderKernel::Onnx
+        self.decoders.kernel()
+    }
+
+    /// Who makes a step.
+    pub fn path(&self) -> StepPath {
+        match self.path {
+            Path::Split { .. } => StepPath::Split,
+            Path::Whole(_) => StepPath::Whole,
         }
     }
 
-    /// What runs the latent stage.
+    /// What runs the latent stage, or the whole step.
     pub fn stage(&self) -> &Stage {
-        &self.latent
+        match &self.path {
+            Path::Split { latent, .. } => latent,
+            Path::Whole(stage) => stage,
+        }
+    }
+
+    /// Wall time of the last step's copies to a device and back, ms.
+    pub fn transfer_ms(&self) -> [f64; 2] {
+        let step = self.stage().times();
+        let decoder = match (&self.decoders, &self.path) {
+            (Decoders::Resident(stage), Path::Split { .. }) => stage.times(),
+            _ => Default::default(),
+        };
+        [
+            step.upload + decoder.upload,
+            step.download + decoder.download,
+        ]
     }
 
     /// Back to rest.
@@ -216,88 +255,88 @@ impl UptEngine {
         drop(span);
         stats.prior_ms = watch.lap();
         let span = tracing::trace_span!("encode").entered();
-        self.fill_features(kind, tables, input);
+        let features = match &mut self.path {
+            Path::Split { features, .. } => features.as_mut_slice(),
+            Path::Whole(stage) => stage.input(0),
+        };
+        fill_features(features, kind, tables, input, &self.next, &self.last);
         drop(span);
         stats.encode_ms = watch.lap();
-        let span = tracing::trace_span!("aggregate").entered();
-        let (d, f) = (kind.entry.dims.encoder, kind.entry.feature_width());
-        encode_aggregate(
-            isa,
-            pool,
-            Csr {
-                offsets: &tables.graph.offsets,
-                neighbours: &tables.neighbour_rows,
-            },
-            &tables.supernode_rows,
-            LowRank::new(&tables.source_table, &kind.source_weight, d, f),
-            LowRank::new(&tables.target_table, &kind.target_weight, d, f),
-            &self.features,
-            &mut self.scratch,
-            self.latent.input(0),
-        )
-        .map_err(internal)?;
-        drop(span);
-        stats.aggregate_ms = watch.lap();
-        let _span = tracing::trace_span!("latent").entered();
-        self.latent.run()?;
-        self.next.keys.copy_from_slice(self.latent.output(0));
-        self.next.values.copy_from_slice(self.latent.output(1));
-        stats.latent_ms = watch.lap();
+        [stats.aggregate_ms, stats.latent_ms] = self.network(isa, pool, kind, tables)?;
         Ok(())
     }
 
-    fn fill_features(&mut self, kind: &UptModel, tables: &UptTables, input: &UptInput<'_>) {
-        let width = kind.entry.feature_width();
-        let normalisation = &kind.entry.normalisation;
-        let (mean, std) = (normalisation.mean, normalisation.std);
-        let mut column = 0;
-        for &feature in &kind.entry.features {
-            let field = match feature {
-                Feature::Displacement => Some(input.displacement),
-                Feature::PreviousDisplacement => Some(input.previous),
-                Feature::Prior => Some(self.next.prior_field.as_slice()),
-                Feature::PreviousPrior => Some(self.last.prior_field.as_slice()),
-                Feature::Collision | Feature::Contact => None,
-            };
-            let rows = self.features.chunks_exact_mut(width);
-            match field {
-                Some(field) => {
-                    for (row, &node) in rows.zip(&tables.encode_nodes) {
-                        for axis in 0..3 {
-                            let x = field[3 * node as usize + axis];
-                            row[column + axis] = (x - mean[axis]) / std[axis];
-                        }
-                    }
-                }
-                None if feature == Feature::Collision => {
-                    let zero = [0, 1, 2].map(|axis| (0.0 - mean[axis]) / std[axis]);
-                    rows.for_each(|row| row[column..column + 3].copy_from_slice(&zero));
-                }
-                None => rows.for_each(|row| row[column] = 0.0),
+    /// Keys and values of `next` from the features, and on the whole path its displacements; wall time of the message
+    /// mean and of the graph, ms.
+    pub fn network(
+        &mut self,
+        isa: Isa,
+        pool: &Pool,
+        kind: &UptModel,
+        tables: &UptTables,
+    ) -> Result<[f64; 2]> {
+        let mut watch = Stopwatch::start();
+        let mut aggregate_ms = 0.0;
+        let (stage, first) = match &mut self.path {
+            Path::Split {
+                latent,
+                features,
+                scratch,
+            } => {
+                let _span = tracing::trace_span!("aggregate").entered();
+                let (d, f) = (kind.entry.dims.encoder, kind.entry.feature_width());
+                encode_aggregate(
+                    isa,
+                    pool,
+                    Csr {
+                        offsets: &tables.graph.offsets,
+                        neighbours: &tables.neighbour_rows,
+                    },
+                    &tables.supernode_rows,
+                    LowRank::new(&tables.source_table, &kind.source_weight, d, f),
+                    LowRank::new(&tables.target_table, &kind.target_weight, d, f),
+                    features,
+                    scratch,
+                    latent.input(0),
+                )
+                .map_err(internal)?;
+                aggregate_ms = watch.lap();
+                (latent, 0)
             }
-            if field.is_none() {
-                for (&node, c) in input
-                    .contact
-                    .nodes
-                    .iter()
-                    .zip(input.contact.vectors.chunks_exact(3))
-                {
-                    let row = tables.row_of_node[node as usize];
-                    if row == u32::MAX {
-                        continue;
-                    }
-                    let row = &mut self.features[row as usize * width..(row as usize + 1) * width];
-                    if feature == Feature::Contact {
-                        row[column] = 1.0;
-                    } else {
-                        for axis in 0..3 {
-                            row[column + axis] = (c[axis] - mean[axis]) / std[axis];
-                        }
-                    }
-                }
-            }
-            column += feature.width();
+            Path::Whole(stage) => (stage, 1),
+        };
+        let _span = tracing::trace_span!("latent").entered();
+        stage.run()?;
+        self.next.keys.copy_from_slice(stage.output(first));
+        self.next.values.copy_from_slice(stage.output(first + 1));
+        Ok([aggregate_ms, watch.lap()])
+    }
+
+    /// Decodes nodes of the scene's mesh into a field `[K,3]`, before the base is added.
+    #[allow(clippy::too_many_arguments)]
+    pub fn decode_mesh(
+        &mut self,
+        isa: Isa,
+        pool: &Pool,
+        kind: &UptModel,
+        tables: &UptTables,
+        which: Which,
+        nodes: &[u32],
+        out: &mut [f32],
+    ) -> Result<()> {
+        if let (Path::Whole(stage), Which::Next) = (&self.path, which) {
+            take_rows(stage.output(0), nodes, out);
+            return Ok(());
         }
+        if let Decoders::Resident(stage) = &mut self.decoders {
+            let record = match which {
+                Which::Next => &self.next,
+                Which::Last => &self.last,
+                Which::Before => &self.before,
+            };
+            return decode_resident(stage, record, nodes, out);
+        }
+        self.decode_network(isa, pool, kind, which, &tables.query_table, nodes, out)
     }
 
     /// Decodes rows `nodes` of a query table into the same rows of `out`, before the base is added.
@@ -317,31 +356,24 @@ impl UptEngine {
             Which::Last => &self.last,
             Which::Before => &self.before,
         };
-        if self.decoder_stages.is_empty() {
-            self.tokens
-                .set(self.precision, &record.keys, &record.values);
-            return decode(
-                isa,
-                pool,
-                self.precision,
-                &kind.decoder,
-                &self.tokens,
-                queries,
-                DecoderRows::Scatter(nodes),
-                &mut self.decoder_scratch,
-                out,
-            )
-            .map_err(internal);
+        if let Decoders::Tiles(stages) = &self.decoders {
+            let width = kind.entry.dims.query;
+            return decode_tiles(stages, pool, width, record, queries, nodes, out);
         }
-        decode_tiles(
-            &self.decoder_stages,
+        self.tokens
+            .set(self.precision, &record.keys, &record.values);
+        decode(
+            isa,
             pool,
-            kind.entry.dims.query,
-            record,
+            self.precision,
+            &kind.decoder,
+            &self.tokens,
             queries,
-            nodes,
+            DecoderRows::Scatter(nodes),
+            &mut self.decoder_scratch,
             out,
         )
+        .map_err(internal)
     }
 
     /// `next` becomes `last`.
@@ -382,53 +414,12 @@ impl UptEngine {
             + record.q_prior.len()
             + record.prior_field.len()
             + record.vibration.len();
-        4 * (3 * floats + self.features.len() + self.scratch.len())
-    }
-}
-
-/// The portable path: `decoder.onnx` over tiles of fixed size, one session a thread.
-fn decode_tiles(
-    stages: &[Mutex<Stage>],
-    pool: &Pool,
-    query: usize,
-    record: &UptRecord,
-    queries: &[f32],
-    nodes: &[u32],
-    out: &mut [f32],
-) -> Result<()> {
-    let failed: Mutex<Option<Error>> = Mutex::new(None);
-    let parts = crate::kernels::parts::Parts::new(out);
-    for stage in stages {
-        let mut stage = stage.lock().map_err(internal)?;
-        stage.input(1).copy_from_slice(&record.keys);
-        stage.input(2).copy_from_slice(&record.values);
-    }
-    pool.run(nodes.len().div_ceil(DECODER_TILE), &|chunk, worker| {
-        let tile = &nodes[chunk * DECODER_TILE..((chunk + 1) * DECODER_TILE).min(nodes.len())];
-        let run = || -> Result<()> {
-            let mut stage = stages[worker].lock().map_err(internal)?;
-            let input = stage.input(0);
-            for (row, &node) in input.chunks_exact_mut(query).zip(tile) {
-                row.copy_from_slice(&queries[node as usize * query..(node as usize + 1) * query]);
-            }
-            input[tile.len() * query..].fill(0.0);
-            stage.run()?;
-            for (u, &node) in stage.output(0).chunks_exact(3).zip(tile) {
-                // SAFETY: no node is in the list twice, so its row belongs to this chunk alone.
-                unsafe { parts.part(3 * node as usize, 3) }.copy_from_slice(u);
-            }
-            Ok(())
+        let own = match &self.path {
+            Path::Split {
+                features, scratch, ..
+            } => features.len() + scratch.len(),
+            Path::Whole(_) => 0,
         };
-        if let Err(error) = run() {
-            failed
-                .lock()
-                .unwrap_or_else(|e| e.into_inner())
-                .get_or_insert(error);
-        }
-    })
-    .map_err(internal)?;
-    match failed.into_inner().unwrap_or_else(|e| e.into_inner()) {
-        Some(error) => Err(error),
-        None => Ok(()),
+        4 * (3 * floats + own)
     }
 }

@@ -72,6 +72,10 @@ void walk_model_open(const char *bundle, const char *damaged) {
   EXPECT(upt_model_open(bundle, &options, &model), UPT_ERR_PROVIDER);
   options.provider_count = 0;
   options.providers = NULL;
+  options.user_stream = path;
+  EXPECT(upt_model_open(bundle, &options, &model), UPT_ERR_ARGUMENT);
+  EXPECT_TRUE(strstr(upt_last_error(), "user_stream") != NULL);
+  options.user_stream = NULL;
   options.precision = 12;
   EXPECT(upt_model_open(bundle, &options, &model), UPT_ERR_ARGUMENT);
   /* The fixtures have float32 graphs only. */

@@ -18,6 +18,9 @@ void walk_scene_create(const char *reduced_bundle) {
   options.kernel = 9;
   EXPECT(upt_scene_create(model, &options, &scene), UPT_ERR_ARGUMENT);
   options.kernel = UPT_KERNEL_AUTO;
+  options.step_path = 4;
+  EXPECT(upt_scene_create(model, &options, &scene), UPT_ERR_ARGUMENT);
+  options.step_path = UPT_STEP_AUTO;
   options.guard_policy = -1;
   EXPECT(upt_scene_create(model, &options, &scene), UPT_ERR_ARGUMENT);
   options.guard_policy = UPT_GUARD_HOLD;

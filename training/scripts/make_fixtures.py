@@ -56,7 +56,7 @@ def main() -> None:
         if vibration.main([*arguments, "--out", str(swings)]):
             raise SystemExit(1)
         bundle = fixtures / "tiny-upt-prior"
-        random("tiny-prior", bundle, "--prior", str(prior), "--vibration", str(swings))
+        random("tiny-prior", bundle, "--prior", str(prior), "--vibration", str(swings), "--step")
     save_rollout(bundle, mesh, fixtures / "tiny-upt-prior-rollout.safetensors")
 
 

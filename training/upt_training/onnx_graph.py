@@ -211,13 +211,18 @@ def decoder_graph(model: Upt) -> onnx.ModelProto:
 
 
 def step_graph(model: Upt) -> onnx.ModelProto:
-    """The whole step in one graph: padded gather and masked mean in place of the native aggregation."""
+    """The whole step in one graph: padded gather and masked mean in place of the native aggregation.
+
+    The `e` rows of features and of the two encoder tables are the supernodes and their neighbours (or all nodes); the
+    `n` rows of the query table are the nodes to decode. Keys and values leave the graph too, so that a host can decode
+    more later.
+    """
     s, w = model.settings, Writer("step")
     d, degree = s.encoder, s.graph.max_degree
-    features = w.input("features", ["n", s.feature_count])
+    features = w.input("features", ["e", s.feature_count])
     source_table, target_table = (
-        w.input("source_table", ["n", d]),
-        w.input("target_table", ["n", d]),
+        w.input("source_table", ["e", d]),
+        w.input("target_table", ["e", d]),
     )
     query = w.input("query_table", ["n", 2 * s.decoder])
     neighbours = w.input("neighbours", ["n_S", degree], TensorProto.INT64)
@@ -233,6 +238,8 @@ def step_graph(model: Upt) -> onnx.ModelProto:
     mean = w.op("Div", total, w.op("ReduceSum", mask, middle, keepdims=1))
     k, v = _latent(w, model, mean)
     w.output(_decode(w, model, query, k, v), "displacement", ["n", 3])
+    w.output(k, "keys", [s.latent_tokens, s.decoder])
+    w.output(v, "values", [s.latent_tokens, s.decoder])
     return w.build()
 
 

@@ -10,13 +10,15 @@ from pathlib import Path
 
 import onnx
 
-GRAPHS = ("latent", "decoder")
+GRAPHS = ("latent", "decoder", "step")
 
 
 def write_variant(folder: Path, precision: str) -> None:
-    """Write the variant of every graph in `GRAPHS` beside its float32 file."""
+    """Write the variant of every graph in `GRAPHS` that the folder has beside its float32 file."""
     for name in GRAPHS:
         source, target = folder / f"{name}.onnx", folder / f"{name}.{precision}.onnx"
+        if not source.exists():
+            continue
         if precision == "int8":
             from onnxruntime.quantization import QuantType, quantize_dynamic
 

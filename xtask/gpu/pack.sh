@@ -1,39 +1,69 @@
 #!/usr/bin/env bash
 # Packs what a measurement on a GPU machine without a network needs, in pieces of 60 MiB:
 #   xtask/gpu/pack.sh OUT [--rehearse] [TRAJECTORY...]
-# the command `upt`, ONNX Runtime's GPU build (from the onnxruntime-gpu wheel; --rehearse: the CPU build), the brain bundles, and
-# the trajectories to replay (none given: one of scheme 5 is simulated). There: run.sh. Needs cargo, python3 with pip, xz.
+# the commands `upt` and `gpu-measure` (x86-64), ONNX Runtime's GPU build (of the onnxruntime-gpu wheel), bundles with random
+# weights of the `paper` and `fast` configuration with step.onnx and the paper's split, the brain bundles, the Python
+# package for the PyTorch rows, and the trajectories to replay (none given: one of scheme 5 is simulated).
+#   UPT_FINE_MESH=FILE   adds `paper-fine`, the `paper` configuration on that mesh (K = 151,201)
+#   --rehearse           the CPU's ONNX Runtime (ORT_DYLIB_PATH) and the small bundles of tests/fixtures: minutes, no network
+# There: unpack.sh, then run.sh. Needs cargo, xz, and python3 with pip; PYTHON names the one that has the training package.
 set -euo pipefail
 
 out=${1:?usage: pack.sh OUT [--rehearse] [TRAJECTORY...]}
 shift
-wheel=onnxruntime-gpu==1.31.1
+rehearse=
 if [ "${1:-}" = --rehearse ]; then
-  wheel=onnxruntime==1.31.1
+  rehearse=1
   shift
 fi
 root=$(cd "$(dirname "$0")/../.." && pwd)
 target=${CARGO_TARGET_DIR:-$root/target}
+python=${PYTHON:-python3}
 stage=$(mktemp -d)
 trap 'rm -rf "$stage"' EXIT
-mkdir -p "$out" "$stage/upt/ort" "$stage/upt/bundles" "$stage/upt/cases" "$stage/wheel"
+mkdir -p "$out" "$stage"/upt/{ort,bundles,cases,training} "$stage/wheel"
+out=$(cd "$out" && pwd)
 
-(cd "$root" && cargo build --quiet --release -p upt-cli)
-cp "$target/release/upt" "$stage/upt/"
-python3 -m pip download --quiet --no-deps --only-binary=:all: --dest "$stage/wheel" "$wheel"
-python3 -m zipfile -e "$stage"/wheel/*.whl "$stage/wheel/open"
-cp "$stage"/wheel/open/onnxruntime/capi/libonnxruntime*.so* "$stage/upt/ort/"
-cp -r "$root"/onnx/brain-fast "$root"/onnx/brain-reduced "$stage/upt/bundles/"
-cp "$root/xtask/gpu/run.sh" "$stage/upt/"
-if [ "$#" -eq 0 ]; then
-  "$target/release/upt" simulate --mesh "$root/onnx/meshes/brain.mesh.safetensors" --scheme 5 --seed 2026 --half \
-    --threads "$(nproc)" --out "$stage/upt/cases/scheme5.trajectory.safetensors"
-else
-  cp "$@" "$stage/upt/cases/"
+if [ -z "${UPT_GPU_BINARIES:-}" ]; then
+  (cd "$root" && cargo build --quiet --release -p upt-cli && cargo build --quiet --release -p upt --example gpu-measure)
+  UPT_GPU_BINARIES="$target/release $target/release/examples"
 fi
+for command in upt gpu-measure; do
+  for folder in $UPT_GPU_BINARIES; do
+    if [ -x "$folder/$command" ]; then cp "$folder/$command" "$stage/upt/"; fi
+  done
+done
+[ -x "$stage/upt/gpu-measure" ] || { echo "no gpu-measure in $UPT_GPU_BINARIES" >&2; exit 1; }
+cp -r "$root/training/upt_training" "$stage/upt/training/"
+find "$stage/upt/training" -name __pycache__ -prune -exec rm -rf {} +
+cp "$root"/xtask/gpu/{run.sh,torch_rows.py} "$stage/upt/"
+
+random() { # name, configuration, mesh
+  PYTHONPATH=$root/training "$python" -m upt_training.random_bundle --config "$root/training/configs/$2.toml" \
+    --mesh "$3" --out "$stage/upt/bundles/$1" --name "$1" --step --paper-split
+}
+if [ -n "$rehearse" ]; then
+  cp -L "${ORT_DYLIB_PATH:?set ORT_DYLIB_PATH}" "$stage/upt/ort/libonnxruntime.so"
+  cp -r "$root"/tests/fixtures/tiny-upt "$root"/tests/fixtures/tiny-reduced "$stage/upt/bundles/"
+else
+  "$python" -m pip download --quiet --no-deps --only-binary=:all: --dest "$stage/wheel" onnxruntime-gpu==1.31.1
+  "$python" -m zipfile -e "$stage"/wheel/*.whl "$stage/wheel/open"
+  cp "$stage"/wheel/open/onnxruntime/capi/libonnxruntime*.so* "$stage/upt/ort/"
+  brain=$root/onnx/meshes/brain.mesh.safetensors
+  random paper paper "$brain"
+  random fast fast "$brain"
+  if [ -n "${UPT_FINE_MESH:-}" ]; then random paper-fine paper "$UPT_FINE_MESH"; fi
+  cp -r "$root"/onnx/brain-fast "$root"/onnx/brain-reduced "$stage/upt/bundles/"
+  if [ "$#" -eq 0 ]; then
+    "$stage/upt/upt" simulate --mesh "$brain" --scheme 5 --seed 2026 --half --threads "$(nproc)" \
+      --out "$stage/upt/cases/scheme5.trajectory.safetensors"
+  fi
+fi
+if [ "$#" -gt 0 ]; then cp "$@" "$stage/upt/cases/"; fi
 
 rm -f "$out"/upt-gpu.*
-tar -C "$stage" -c upt | xz -T0 -3 | split -b 60M - "$out/upt-gpu."
-(cd "$out" && sha256sum upt-gpu.* >upt-gpu.sums)
+tar -C "$stage" -c upt | xz -T0 -"${UPT_GPU_XZ:-3}" | split -b "${UPT_GPU_PIECE:-60M}" -a 3 - "$out/upt-gpu."
+(cd "$out" && sha256sum upt-gpu.??? >upt-gpu.sums)
+cp "$root/xtask/gpu/unpack.sh" "$out/"
 ls -l "$out"
-echo "carry all of $out, then: cat upt-gpu.?? | xz -d | tar -x && upt/run.sh OUT"
+echo "carry all of $out; there: ./unpack.sh FOLDER && FOLDER/upt/run.sh OUT"

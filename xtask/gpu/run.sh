@@ -1,25 +1,38 @@
 #!/usr/bin/env bash
-# Runs on the GPU machine, from the unpacked folder of pack.sh:
-#   run.sh OUT [PROVIDERS]      PROVIDERS: a list for `upt report --provider`, default cpu,cuda
-# Writes OUT/doctor.json (what was found, and why a provider is missing), OUT/report.json, OUT/report.html, OUT/log and
-# OUT/machine. The CPU rows are the float32 path that the others' deviation is measured against.
+# Runs on the GPU machine, in the unpacked folder:  run.sh OUT [--rehearse] [PROVIDERS]
+#   PROVIDERS   a list like cpu,cuda,tensorrt,tensorrt-rtx; default cpu,cuda
+#   --rehearse  a few steps on the CPU alone: all parts run, and report.json says what was not measured
+# Writes OUT/report.json (rows, bars, floor, what was not measured and why), OUT/doctor.json, OUT/errors-P/ (`upt report`:
+# errors of rollouts against the reference solver), OUT/log and OUT/machine. Bring back all of OUT. One process a provider
+# and a rival: one that crashes leaves the others' rows. Needs nothing but the folder; PyTorch rows need python3 with torch.
 set -euo pipefail
 
-out=${1:?usage: run.sh OUT [PROVIDERS]}
-providers=${2:-cpu,cuda}
+out=${1:?usage: run.sh OUT [--rehearse] [PROVIDERS]}
+shift
+providers=cpu,cuda
+steps=1000
+scenes=1,2,4,8
+rehearse=
+if [ "${1:-}" = --rehearse ]; then
+  shift
+  rehearse=1 providers=cpu steps=8 scenes=1,2
+fi
+providers=${1:-$providers}
+python=${PYTHON:-python3}
 here=$(cd "$(dirname "$0")" && pwd)
+rm -rf "$out"/rows-*.json "$out/missing" "$out/log"
 mkdir -p "$out"
 out=$(cd "$out" && pwd)
 
 # CUDA's libraries: where the system has them, and where Python's nvidia packages put them.
-libraries=$(python3 - <<'PY' 2>/dev/null || true
+libraries=$("$python" - <<'PY' 2>/dev/null || true
 import glob, site, sys
 roots = site.getsitepackages() + [site.getusersitepackages()] + sys.path
 print(":".join(sorted({p for r in roots for p in glob.glob(r + "/nvidia/**/lib", recursive=True)})))
 PY
 )
 export LD_LIBRARY_PATH=$here/ort:$libraries:${LD_LIBRARY_PATH:-}
-ORT_DYLIB_PATH=$(find "$here/ort" -name 'libonnxruntime.so.*' | sort | tail -n 1)
+ORT_DYLIB_PATH=$(find "$here/ort" -name 'libonnxruntime.so*' | sort | tail -n 1)
 export ORT_DYLIB_PATH ORT_DISABLE_TELEMETRY=1
 {
   uname -a
@@ -27,15 +40,40 @@ export ORT_DYLIB_PATH ORT_DISABLE_TELEMETRY=1
 } >"$out/machine"
 
 cd "$here"
-./upt doctor --json bundles/* >"$out/doctor.json" || true
-cases=()
-for case in cases/*.trajectory.safetensors; do cases+=(--trajectory "$case"); done
-bundles=()
-for bundle in bundles/*; do bundles+=(--bundle "$bundle"); done
-# One process a provider: one that crashes leaves the others' rows, which are stored as they are finished.
-status=0
+missing() { printf '%s: %s\n' "$1" "$2" | tee -a "$out/log" >>"$out/missing"; }
+: >"$out/missing"
+if [ -x upt ]; then ./upt doctor --json bundles/* >"$out/doctor.json" 2>>"$out/log" || true; fi
 for provider in ${providers//,/ }; do
-  ./upt report "${cases[@]}" "${bundles[@]}" --provider "$provider" --threads 1,2 --region all,surface --plain none \
-    --out "$out/$provider" 2>&1 | tee -a "$out/log" || status=1
+  echo "provider $provider" | tee -a "$out/log"
+  ./gpu-measure rows --provider "$provider" --steps "$steps" --scenes "$scenes" --out "$out/rows-$provider.json" bundles/* \
+    >>"$out/log" 2>&1 || missing "rows of $provider" "gpu-measure ended with status $?; see log"
 done
-exit "$status"
+random=()
+for bundle in bundles/*; do
+  if grep -q '"random_weights": *true' "$bundle/bundle.json"; then random+=("$bundle"); fi
+done
+echo PyTorch | tee -a "$out/log"
+PYTHONPATH=$here/training "$python" torch_rows.py "$out/rows-torch.json" "$steps" "${random[@]}" >>"$out/log" 2>&1 ||
+  missing PyTorch "torch_rows.py ended with status $?; see log"
+cases=()
+for case in cases/*.trajectory.safetensors; do
+  if [ -e "$case" ]; then cases+=(--trajectory "$case"); fi
+done
+if [ "${#cases[@]}" -eq 0 ] || [ ! -x upt ]; then
+  missing "errors of rollouts against the reference solver" "no trajectory or no command upt was packed"
+else
+  bundles=()
+  for bundle in bundles/brain-*; do bundles+=(--bundle "$bundle"); done
+  for provider in ${providers//,/ }; do
+    ./upt report "${cases[@]}" "${bundles[@]}" --provider "$provider" --threads 1,2 --region all,surface --plain none \
+      --out "$out/errors-$provider" >>"$out/log" 2>&1 || missing "errors on $provider" "upt report ended with status $?; see log"
+  done
+fi
+for card in cuda tensorrt tensorrt-rtx; do
+  case ",$providers," in
+    *",$card,"*) ;;
+    *) missing "all rows of $card" "${rehearse:+a rehearsal on the CPU; }it was not asked for" ;;
+  esac
+done
+./gpu-measure report "$out"
+echo "report: $out/report.json"

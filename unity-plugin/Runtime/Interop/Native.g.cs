@@ -45,6 +45,8 @@ namespace Upt.Interop
         public byte no_fallback;
         /// <summary>Zero.</summary>
         public byte reserved;
+        /// <summary>A `cudaStream_t` of `device_id` to run the graphs on, which outlives the model and its scenes; NULL: one of ONNX Runtime's own.</summary>
+        public IntPtr user_stream;
     }
 
     /// <summary>What a model is; filled by `upt_model_get_info`.</summary>
@@ -109,6 +111,8 @@ namespace Upt.Interop
         public byte cubic_sampling;
         /// <summary>Zero.</summary>
         public fixed byte reserved[3];
+        /// <summary>`UPT_STEP_*`: who makes a step of a `UPT_KIND_UPT` bundle.</summary>
+        public int step_path;
     }
 
     /// <summary>A rigid instrument; the input of `upt_scene_contacts_from_instruments`.</summary>
@@ -153,7 +157,7 @@ namespace Upt.Interop
         public double encode_ms;
         /// <summary>Message mean, ms.</summary>
         public double aggregate_ms;
-        /// <summary>Latent network, ms.</summary>
+        /// <summary>Latent network, or the whole step's graph, ms.</summary>
         public double latent_ms;
         /// <summary>Decoder, ms.</summary>
         public double decode_ms;
@@ -183,6 +187,12 @@ namespace Upt.Interop
         public byte poisoned;
         /// <summary>Zero.</summary>
         public fixed byte reserved[6];
+        /// <summary>Of the stages' times, copies to a device, ms; 0 on the CPU.</summary>
+        public double upload_ms;
+        /// <summary>Of the stages' times, copies back from a device, ms; 0 on the CPU.</summary>
+        public double download_ms;
+        /// <summary>`UPT_STEP_SPLIT` or `UPT_STEP_WHOLE`.</summary>
+        public int step_path;
     }
 
     /// <summary>The C ABI, as it is.</summary>
@@ -264,6 +274,16 @@ namespace Upt.Interop
         public const int UPT_KERNEL_NATIVE = 1;
         /// <summary>ONNX Runtime sessions in node tiles.</summary>
         public const int UPT_KERNEL_ONNX = 2;
+        /// <summary>ONNX Runtime, all nodes in one run with the query table resident on the device.</summary>
+        public const int UPT_KERNEL_RESIDENT = 3;
+        /// <summary>Split on the CPU; on a device the faster of split and whole, timed while the scene is made.</summary>
+        public const int UPT_STEP_AUTO = 0;
+        /// <summary>Native encoder and message mean, then `latent.onnx` and the decoder.</summary>
+        public const int UPT_STEP_SPLIT = 1;
+        /// <summary>The bundle's `step.onnx`, which decodes every node in every step.</summary>
+        public const int UPT_STEP_WHOLE = 2;
+        /// <summary>Both are timed while the scene is made, and the faster one stays.</summary>
+        public const int UPT_STEP_MEASURED = 3;
         /// <summary>Keep the last good state and return `UPT_ERR_GUARD`.</summary>
         public const int UPT_GUARD_HOLD = 0;
         /// <summary>Publish finite states and set flags.</summary>

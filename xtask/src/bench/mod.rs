@@ -139,12 +139,18 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
 }
 
 /// Bundles with random weights of the `fast` and the `paper` configuration on the brain, the second with the graphs of
-/// the paper's split beside it; made again when its configuration is newer.
+/// the paper's split beside it, and `paper-fine` on the mesh that `UPT_FINE_MESH` names; made again when a bundle's
+/// configuration or mesh is newer.
 fn random_bundles(workspace: &Workspace, library: &Path, folder: &Path) -> Result<()> {
-    for name in ["fast", "paper"] {
+    let brain = workspace.path("onnx/meshes/brain.mesh.safetensors");
+    let fine = std::env::var_os("UPT_FINE_MESH").map(PathBuf::from);
+    let mut wanted = vec![("fast", "fast", &brain), ("paper", "paper", &brain)];
+    wanted.extend(fine.as_ref().map(|mesh| ("paper-fine", "paper", mesh)));
+    for (name, config, mesh) in wanted {
         let out = folder.join(name);
-        let config = workspace.path(&format!("training/configs/{name}.toml"));
-        if is_newer(&out.join("bundle.json"), &config) {
+        let config = workspace.path(&format!("training/configs/{config}.toml"));
+        let made = out.join("bundle.json");
+        if is_newer(&made, &config) && is_newer(&made, mesh) {
             continue;
         }
         venv::install_training(workspace)?;
@@ -155,10 +161,11 @@ fn random_bundles(workspace: &Workspace, library: &Path, folder: &Path) -> Resul
             .args(["-m", "upt_training.random_bundle", "--config"])
             .arg(&config)
             .arg("--mesh")
-            .arg(workspace.path("onnx/meshes/brain.mesh.safetensors"))
+            .arg(mesh)
             .arg("--out")
-            .arg(&out);
-        if name == "paper" {
+            .arg(&out)
+            .args(["--name", name]);
+        if name != "fast" {
             command.arg("--paper-split");
         }
         ort::set_environment(&mut command, library);

@@ -1,0 +1,151 @@
+//! Sessions of a `upt` bundle's graphs, with the shapes of a scene's mesh.
+
+use super::upt::{UptModel, UptTables};
+use crate::error::{Error, Result};
+use crate::onnx::{ProviderPlan, Runtime, Stage, StageOptions, Tensors};
+
+/// Nodes a run of `decoder.onnx`: activations stay in cache.
+pub const DECODER_TILE: usize = 1024;
+
+impl UptModel {
+    /// A session of the latent graph: `supernodes [n_S,d]` -> `keys [L,h]`, `values [L,h]`.
+    pub fn latent_stage(
+        &self,
+        runtime: &'static Runtime,
+        plan: &ProviderPlan,
+        threads: usize,
+        supernodes: usize,
+    ) -> Result<Stage> {
+        let dims = &self.entry.dims;
+        let kv: &[usize] = &[dims.latent_tokens, dims.decoder];
+        Stage::new(
+            runtime,
+            &self.latent_file,
+            &self.latent,
+            &[("supernodes", &[supernodes, dims.encoder])],
+            &[("keys", kv), ("values", kv)],
+            &StageOptions {
+                threads,
+                plan: plan.clone(),
+            },
+        )
+    }
+
+    /// A session of the decoder graph for tiles of [`DECODER_TILE`] nodes:
+    /// `queries [n,2h]`, `keys`, `values` -> `displacement [n,3]`.
+    pub fn decoder_stage(&self, runtime: &'static Runtime, plan: &ProviderPlan) -> Result<Stage> {
+        let dims = &self.entry.dims;
+        let kv: &[usize] = &[dims.latent_tokens, dims.decoder];
+        Stage::new(
+            runtime,
+            &self.decoder_file,
+            &self.decoder_graph,
+            &[
+                ("queries", &[DECODER_TILE, dims.query]),
+                ("keys", kv),
+                ("values", kv),
+            ],
+            &[("displacement", &[DECODER_TILE, 3])],
+            &StageOptions {
+                threads: 1,
+                plan: plan.clone(),
+            },
+        )
+    }
+
+    /// A session of the decoder graph for all nodes, their queries `[K,2h]` bound once: `keys`, `values` -> `displacement [K,3]`.
+    pub fn resident_decoder(
+        &self,
+        runtime: &'static Runtime,
+        plan: &ProviderPlan,
+        threads: usize,
+        queries: &[f32],
+    ) -> Result<Stage> {
+        let dims = &self.entry.dims;
+        let count = queries.len() / dims.query;
+        let kv: &[usize] = &[dims.latent_tokens, dims.decoder];
+        Stage::with_constants(
+            runtime,
+            &self.decoder_file,
+            &self.decoder_graph,
+            &Tensors {
+                inputs: &[("keys", kv), ("values", kv)],
+                constants: &[("queries", &[count, dims.query], queries)],
+                outputs: &[("displacement", &[count, 3])],
+                ..Tensors::default()
+            },
+            &StageOptions {
+                threads,
+                plan: plan.clone(),
+            },
+        )
+    }
+
+    /// Whether the bundle carries `step.onnx` in the precision that runs.
+    pub fn has_step(&self) -> bool {
+        self.step.is_some()
+    }
+
+    /// A session of the whole step, tables and graph bound once: `features [e,f]` -> `displacement [K,3]`, `keys`, `values`.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] when the bundle has no such graph.
+    pub fn step_stage(
+        &self,
+        runtime: &'static Runtime,
+        plan: &ProviderPlan,
+        threads: usize,
+        tables: &UptTables,
+    ) -> Result<Stage> {
+        let Some((file, bytes)) = &self.step else {
+            return Err(Error::Unsupported(format!(
+                "step_path: the bundle has no step graph in precision {:?}; export it with `python -m upt_training export --step`",
+                self.precision
+            )));
+        };
+        let (dims, graph) = (&self.entry.dims, &tables.graph);
+        let (d, q, rows) = (dims.encoder, dims.query, tables.encode_nodes.len());
+        let (supernodes, degree) = (graph.supernodes.len(), self.entry.graph.max_degree);
+        let mut neighbours = vec![0i64; supernodes * degree];
+        let mut mask = vec![0.0f32; supernodes * degree];
+        for row in 0..supernodes {
+            let edges = graph.offsets[row] as usize..graph.offsets[row + 1] as usize;
+            let at = row * degree;
+            for (i, &node) in tables.neighbour_rows[edges].iter().enumerate() {
+                neighbours[at + i] = i64::from(node);
+                mask[at + i] = 1.0;
+            }
+        }
+        let receivers: Vec<i64> = tables
+            .supernode_rows
+            .iter()
+            .map(|&row| row.into())
+            .collect();
+        let count = tables.query_table.len() / q;
+        let kv: &[usize] = &[dims.latent_tokens, dims.decoder];
+        let padded: &[usize] = &[supernodes, degree];
+        Stage::with_constants(
+            runtime,
+            file,
+            bytes,
+            &Tensors {
+                inputs: &[("features", &[rows, self.entry.feature_width()])],
+                constants: &[
+                    ("source_table", &[rows, d], &tables.source_table),
+                    ("target_table", &[rows, d], &tables.target_table),
+                    ("query_table", &[count, q], &tables.query_table),
+                    ("mask", padded, &mask),
+                ],
+                indices: &[
+                    ("neighbours", padded, &neighbours),
+                    ("supernodes", &[supernodes], &receivers),
+                ],
+                outputs: &[("displacement", &[count, 3]), ("keys", kv), ("values", kv)],
+            },
+            &StageOptions {
+                threads,
+                plan: plan.clone(),
+            },
+        )
+    }
+}

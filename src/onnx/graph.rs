@@ -1,0 +1,104 @@
+//! What a stage binds to its graph, and whether the graph has it.
+
+use ort::session::Session;
+use ort::value::{Outlet, TensorElementType, ValueType};
+
+use crate::error::{Error, Result};
+
+/// Names and shapes of a graph's tensors.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Tensors<'a> {
+    /// Float32 inputs that the host writes before a run.
+    pub inputs: &'a [(&'a str, &'a [usize])],
+    /// Float32 inputs that stay the same in every run, with their values: on a device they are copied there once.
+    pub constants: &'a [(&'a str, &'a [usize], &'a [f32])],
+    /// Int64 inputs that stay the same in every run, with their values.
+    pub indices: &'a [(&'a str, &'a [usize], &'a [i64])],
+    /// Float32 outputs.
+    pub outputs: &'a [(&'a str, &'a [usize])],
+}
+
+impl Tensors<'_> {
+    /// Names and shapes of all, as text.
+    pub(super) fn shapes(&self) -> String {
+        let constants: Vec<_> = self.constants.iter().map(|c| (c.0, c.1)).collect();
+        let indices: Vec<_> = self.indices.iter().map(|c| (c.0, c.1)).collect();
+        format!(
+            "{:?}{constants:?}{indices:?}{:?}",
+            self.inputs, self.outputs
+        )
+    }
+
+    /// Compares with the graph of a session that was made of `file`.
+    pub(super) fn check(&self, file: &str, session: &Session) -> Result<()> {
+        let (inputs, float) = (session.inputs(), TensorElementType::Float32);
+        for (name, shape) in self.inputs {
+            find(file, "input", inputs, name, shape, float)?;
+        }
+        for (name, shape, _) in self.constants {
+            find(file, "input", inputs, name, shape, float)?;
+        }
+        for (name, shape, _) in self.indices {
+            find(file, "input", inputs, name, shape, TensorElementType::Int64)?;
+        }
+        for (name, shape) in self.outputs {
+            find(file, "output", session.outputs(), name, shape, float)?;
+        }
+        let count = self.inputs.len() + self.constants.len() + self.indices.len();
+        if inputs.len() != count {
+            let names: Vec<&str> = inputs.iter().map(Outlet::name).collect();
+            return Err(Error::bundle(
+                file,
+                format!("the graph has inputs {names:?}, must have {count}"),
+            ));
+        }
+        Ok(())
+    }
+}
+
+fn find(
+    file: &str,
+    what: &str,
+    have: &[Outlet],
+    name: &str,
+    shape: &[usize],
+    element: TensorElementType,
+) -> Result<()> {
+    let Some(outlet) = have.iter().find(|outlet| outlet.name() == name) else {
+        let names: Vec<&str> = have.iter().map(Outlet::name).collect();
+        return Err(Error::bundle(
+            file,
+            format!("{what} `{name}` is missing, the graph has {names:?}"),
+        ));
+    };
+    let ValueType::Tensor {
+        ty,
+        shape: declared,
+        ..
+    } = outlet.dtype()
+    else {
+        return Err(Error::bundle(
+            file,
+            format!("{what} `{name}` is not a tensor"),
+        ));
+    };
+    if *ty != element {
+        let element = format!("{element:?}").to_lowercase();
+        return Err(Error::bundle(
+            file,
+            format!("{what} `{name}` has type {ty:?}, must be {element}"),
+        ));
+    }
+    let fits = declared.len() == shape.len()
+        && declared
+            .iter()
+            .zip(shape.iter())
+            .all(|(&have, &want)| have < 0 || have == want as i64);
+    if !fits {
+        return Err(Error::bundle(
+            file,
+            format!("{what} `{name}` has shape {declared:?}, must hold {shape:?}"),
+        ));
+    }
+    Ok(())
+}
