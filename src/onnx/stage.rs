@@ -17,6 +17,7 @@ use super::providers::{ProviderChoice, ProviderPlan, Wish};
 use super::runtime::Runtime;
 use super::{placement, status};
 use crate::error::{Error, Result};
+use crate::options::Provider;
 
 /// How a stage's session is made.
 #[derive(Debug, Clone)]
@@ -202,6 +203,14 @@ impl Stage {
     /// Wall times of the last run.
     pub fn times(&self) -> StageTimes {
         self.times
+    }
+
+    /// A device's first runs, on the inputs as they are: kernels are loaded, engines built, a CUDA graph captured.
+    pub fn warm_up(&mut self) -> Result<()> {
+        if self.choice.provider != Provider::Cpu {
+            (0..3).try_for_each(|_| self.run())?;
+        }
+        Ok(())
     }
 
     /// Runs the graph.

@@ -103,9 +103,11 @@ impl ReducedEngine {
     /// Makes the session and the buffers.
     pub fn new(model: &Model, kind: &ReducedModel, table: &PriorTable) -> Result<ReducedEngine> {
         let record = ReducedRecord::new(kind, table);
+        let mut stage = kind.stage(model.runtime, &model.plan)?;
+        stage.warm_up()?;
         Ok(ReducedEngine {
             response: ContactResponse::new(table),
-            stage: kind.stage(model.runtime, &model.plan)?,
+            stage,
             precision: kind.precision,
             mode_rows: (0..kind.entry.modes as u32).collect(),
             given_q: vec![0.0; table.width()],
