@@ -13,7 +13,7 @@ const ROOM: usize = 256;
 /// What a solve met.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct SolveReport {
-    /// A contact node has no column of its own: it is held, or outside of the domain.
+    /// A contact node is held, or outside of the domain and without a column of its own.
     pub outside: bool,
     /// The contact block was near singular and a Tikhonov term was added.
     pub regularised: bool,
@@ -73,7 +73,7 @@ impl ContactResponse {
             }
             let slot = column as usize;
             let own = table.contact_nodes[slot] == node;
-            report.outside |= !own;
+            report.outside |= !own && !table.in_domain[node as usize];
             if self.count[slot] == 0 {
                 self.columns.push(column);
             }

@@ -77,6 +77,8 @@ pub struct PriorTable {
     /// For each node the column (index into `contact_nodes`) of itself or of the nearest contact node within
     /// [`REACH`] typical edges of the domain; [`NO_COLUMN`] for nodes farther away.
     pub nearest_column: Vec<u32>,
+    /// Whether a node belongs to the domain `[K]`. Bundles of large meshes have columns of a part of the domain only.
+    pub in_domain: Vec<bool>,
     /// What the response does when the contact is gone; without it the response is zero then.
     pub vibration: Option<FreeVibration>,
 }
@@ -162,9 +164,14 @@ impl PriorTable {
             .reduced
             .as_ref()
             .map_or((0, 0), |reduced| (reduced.modes, reduced.response_modes));
+        let mut in_domain = vec![false; count];
+        for &node in &mesh.domain_nodes {
+            in_domain[node as usize] = true;
+        }
         let narrow = |values: Vec<usize>| values.into_iter().map(|value| value as u32).collect();
         Ok(PriorTable {
             nearest_column: nearest_columns(mesh, &contact_nodes),
+            in_domain,
             contact_nodes,
             compliance,
             block_nodes,
@@ -242,6 +249,7 @@ impl PriorTable {
             + self.force_to_z.len()
             + self.force_to_p.len()
             + self.nearest_column.len())
+            + self.in_domain.len()
             + self.basis.bytes()
             + self.response.bytes()
             + self
@@ -276,4 +284,57 @@ fn nearest_columns(mesh: &Mesh, contact_nodes: &[u32]) -> Vec<u32> {
             }
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::kernels::Isa;
+    use crate::prior::ContactResponse;
+
+    /// Four nodes; columns at 0 and 1, which node 2 (of the domain) and node 3 (outside) have nearest by.
+    fn table() -> PriorTable {
+        let mut compliance = vec![0.0; 36];
+        (0..6).for_each(|i| compliance[7 * i] = 2.0);
+        PriorTable {
+            contact_nodes: vec![0, 1],
+            compliance,
+            block_nodes: vec![0, 1, 2, 3],
+            block_offsets: vec![0, 4],
+            rank_offsets: vec![0, 8],
+            basis: Numbers::F32(vec![0.0; 96]),
+            response: Numbers::F32(vec![0.0; 48]),
+            residual: Vec::new(),
+            force_to_z: Vec::new(),
+            force_to_p: Vec::new(),
+            nearest_column: vec![0, 1, 1, 1],
+            in_domain: vec![true, true, true, false],
+            vibration: None,
+        }
+    }
+
+    #[test]
+    fn borrowers_share_a_column_and_only_nodes_beyond_the_domain_are_reported() {
+        let table = table();
+        let mut response = ContactResponse::new(&table);
+        let mut solve = |nodes: &[u32], vectors: &[f32]| {
+            let report = response
+                .solve(Isa::Scalar, &table, &[false; 4], nodes, vectors)
+                .unwrap();
+            (report.outside, response.forces().to_vec())
+        };
+        assert_eq!(
+            solve(&[2], &[4.0, 0.0, -2.0]),
+            (false, vec![2.0, 0.0, -1.0])
+        );
+        assert_eq!(
+            solve(&[2, 3], &[4.0, 0.0, 0.0, 0.0, 0.0, 8.0]),
+            (true, vec![1.0, 0.0, 2.0])
+        );
+        // The column's own node goes before those that borrow it.
+        assert_eq!(
+            solve(&[1, 2], &[6.0, 0.0, 0.0, 9.0, 9.0, 9.0]),
+            (false, vec![3.0, 0.0, 0.0])
+        );
+    }
 }

@@ -14,6 +14,7 @@ from upt_training.bundle import BundleSession
 from upt_training.config import FEATURE_WIDTH, GraphSettings
 from upt_training.errors import InputError
 from upt_training.graph import build_graph
+from upt_training.lend import Lender
 from upt_training.mesh_file import Mesh, load_mesh
 from upt_training.prior_table import PriorTable
 
@@ -43,20 +44,22 @@ class BundleRunner:
         self.graph = build_graph(self.mesh, GraphSettings(**self.settings["graph"]))
         suffix = "" if precision == "f32" else f".{precision}"
         self.session = BundleSession(folder, self.mesh, self.graph, suffix)
-        self.prior = None
+        self.prior, self.lender = None, None
         if "prior" in self.manifest:
             if prior is None and mesh is not None and mesh.sha256 != self.manifest["mesh"]["mesh_sha256"]:
                 raise InputError(f"{path}: the bundle uses a prior; pass --prior with the prior of the other mesh")
             swings = self.manifest["prior"].get("vibration")
             if swings and prior is not None and vibration is None:
                 raise InputError(f"{path}: the bundle uses free vibration; pass --vibration with the tables of {prior}")
-            self.prior = PriorTable(
+            table = PriorTable(
                 prior or folder / self.manifest["prior"]["file"],
                 self.mesh.node_count,
                 (vibration or folder / swings) if swings else None,
                 self.manifest["material"]["damping_per_s"],
                 self.manifest["dt_s"],
-            ).sequence()
+            )
+            self.prior = table.sequence()
+            self.lender = Lender(self.mesh, np.flatnonzero(table.row >= 0), self.manifest["boundary"])
         self.mean = np.asarray(self.settings["normalisation"]["mean"], np.float32)
         self.std = np.asarray(self.settings["normalisation"]["std"], np.float32)
         self.held = self.mesh.held_nodes(self.manifest["boundary"])
@@ -87,7 +90,7 @@ class BundleRunner:
         return np.ascontiguousarray(np.concatenate(parts, axis=1), np.float32)
 
     def step(self, nodes: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-        prior_next = np.zeros_like(self.u) if self.prior is None else self.prior.step(nodes, vectors)
+        prior_next = np.zeros_like(self.u) if self.prior is None else self.prior.step(*self.lender(nodes, vectors))
         out = self.session(self.features(nodes, vectors, prior_next))
         if self.settings["base"] == "displacement":
             out = out + self.u

@@ -1,4 +1,4 @@
-"""Command line: `python -m upt_training.reduced prior | build | modes | evaluate | compare` (each with `--help`)."""
+"""Command line of reduced bundles: `python -m upt_training.reduced COMMAND --help`."""
 
 from __future__ import annotations
 
@@ -14,10 +14,12 @@ from upt_training.errors import InputError
 from upt_training.mesh_file import load_mesh
 from upt_training.reduced.build import Options, Progress, build
 from upt_training.reduced.columns import load_columns
-from upt_training.reduced.compare import beside_domain, compare
+from upt_training.reduced.compare import compare
+from upt_training.reduced.domain import beside_domain, patches_of_domain
 from upt_training.reduced.evaluate import evaluate, insert_table, table
-from upt_training.reduced.make_prior import make_prior, prior_error
+from upt_training.reduced.make_prior import check_columns, make_prior, prior_error
 from upt_training.reduced.prior import load_prior, save_prior
+from upt_training.reduced.refine import Refinement, exact_error, refine
 from upt_training.reduced.sweep import sweep
 from upt_training.reduced.train import Settings
 from upt_training.reduced.trajectories import open_dataset
@@ -92,10 +94,26 @@ def arguments() -> argparse.ArgumentParser:
     regimes.add_argument("--into", type=Path, help="also write the table into this page, at the markers of --label")
     regimes.add_argument("--label", default="compare")
 
-    beside = commands.add_parser("beside", help="a copy of a mesh whose domain is the surface around the domain")
-    beside.add_argument("--mesh", type=Path, required=True)
-    beside.add_argument("--out", type=Path, required=True)
-    beside.add_argument("--reach", type=float, default=25.0, help="largest distance from the domain, mm")
+    domain = commands.add_parser("domain", help="a copy of a mesh with another domain; its hash stays")
+    domain.add_argument("--mesh", type=Path, required=True)
+    domain.add_argument("--out", type=Path, required=True)
+    where = domain.add_mutually_exclusive_group(required=True)
+    where.add_argument("--beside", type=float, metavar="MM", help="the free surface around the domain, up to there")
+    where.add_argument("--patches", type=int, metavar="N", help="N patches of the domain")
+
+    finer = commands.add_parser("refine", help="a reduced bundle on a finer mesh, from a bundle of a coarser one")
+    finer.add_argument("--bundle", type=Path, required=True, help="bundle on the coarser mesh")
+    finer.add_argument("--columns", type=Path, required=True, help="file of `upt prior` for the coarser mesh")
+    finer.add_argument("--mesh", type=Path, required=True, help="the finer mesh")
+    finer.add_argument("--out", type=Path, required=True, help="bundle folder")
+    finer.add_argument("--work", type=Path, required=True, help="folder for the interpolated columns while it runs")
+    finer.add_argument("--name", default="brain-fine-reduced")
+    finer.add_argument("--tolerance", type=float, default=5e-3, help="RMS truncation error of the block basis, mm")
+    finer.add_argument("--tables", choices=("f16", "f32"), default="f16")
+
+    exact = commands.add_parser("response-error", help="L(c) of a bundle against exact columns of its mesh")
+    exact.add_argument("--bundle", type=Path, required=True)
+    exact.add_argument("--columns", type=Path, required=True, help="file of `upt prior`, of the domain or a part of it")
     return parser
 
 
@@ -165,13 +183,36 @@ def run_compare(args: argparse.Namespace) -> None:
     print(text)
 
 
+def run_domain(args: argparse.Namespace) -> None:
+    mesh = load_mesh(args.mesh)
+    other = beside_domain(mesh, args.beside) if args.beside else patches_of_domain(mesh, args.patches)
+    other.save(args.out)
+    print(f"{args.out}: {len(other.domain)} faces, {len(other.domain_nodes)} nodes in the domain")
+
+
+def run_refine(args: argparse.Namespace) -> None:
+    options = Refinement(
+        args.bundle, args.columns, args.mesh, args.out, args.work, args.name, args.tolerance, args.tables
+    )
+    manifest = refine(options, Progress("block basis"))
+    print(json.dumps({"bundle": str(args.out), "files": manifest["files"], **manifest["provenance"]["block_basis"]}))
+
+
+def run_response_error(args: argparse.Namespace) -> None:
+    mesh, columns = load_mesh(args.bundle / "mesh.safetensors"), load_columns(args.columns)
+    check_columns(mesh, columns)
+    print(json.dumps(exact_error(args.bundle, columns, mesh)))
+
+
 COMMANDS = {
     "prior": run_prior,
     "build": run_build,
     "modes": run_build,
     "evaluate": run_evaluate,
     "compare": run_compare,
-    "beside": lambda args: beside_domain(load_mesh(args.mesh), args.reach).save(args.out),
+    "domain": run_domain,
+    "refine": run_refine,
+    "response-error": run_response_error,
 }
 
 

@@ -7,35 +7,16 @@ material that it was made for. Linear elasticity is the reduced bundle's prior a
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from upt_training.bundle_rollout import BundleRunner
 from upt_training.errors import InputError
-from upt_training.mesh_file import Mesh, load_mesh
+from upt_training.mesh_file import load_mesh
 from upt_training.reduced.evaluate import CaseError, roll_case, zero_error
 from upt_training.reduced.runner import ReducedRunner
 from upt_training.reduced.trajectories import open_dataset
-
-
-def beside_domain(mesh: Mesh, reach_mm: float) -> Mesh:
-    """The mesh with another domain: free surface faces that touch no node of the domain, at most `reach_mm` from it.
-
-    Hash and simulation are the mesh's own; only contact sites are drawn elsewhere.
-    """
-    inside = mesh.domain_nodes
-    held = np.union1d(mesh.fixed, mesh.supported)
-    centre = mesh.positions[mesh.surface].mean(axis=1)
-    distance, _ = cKDTree(mesh.positions[inside]).query(centre)
-    outside = ~np.isin(mesh.surface, np.union1d(inside, mesh.fixed)).any(axis=1)
-    outside &= ~np.isin(mesh.surface, held).all(axis=1)
-    faces = np.flatnonzero(outside & (distance <= reach_mm)).astype(np.int32)
-    if not len(faces):
-        raise InputError(f"no free face within {reach_mm} mm of the domain; raise --reach")
-    return replace(mesh, domain=faces)
 
 
 def compare(

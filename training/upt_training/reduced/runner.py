@@ -9,6 +9,8 @@ import numpy as np
 import onnxruntime
 
 from upt_training.errors import InputError
+from upt_training.lend import Lender
+from upt_training.mesh_file import load_mesh
 from upt_training.reduced.prior import load_prior
 
 
@@ -21,6 +23,8 @@ class ReducedRunner:
         if self.manifest["kind"] != "reduced":
             raise InputError(f"{folder}/bundle.json: kind is {self.manifest['kind']!r}, expected 'reduced'")
         self.prior = load_prior(folder / self.manifest["prior"]["file"])
+        mesh = load_mesh(folder / self.manifest["mesh"]["file"])
+        self.lender = Lender(mesh, self.prior.contact_nodes, self.manifest["boundary"])
         options = onnxruntime.SessionOptions()
         options.intra_op_num_threads = 1
         graph = str(folder / "latent.onnx")
@@ -39,8 +43,7 @@ class ReducedRunner:
     def step(self, nodes: np.ndarray, vectors: np.ndarray) -> np.ndarray:
         """One 50 ms step: contact `nodes [m]` with displacements `vectors [m,3]` (mm); returns `u' [K,3]`, mm."""
         manifest, prior = self.manifest["reduced"], self.prior
-        _, known = prior.rows(nodes)
-        forces = prior.forces(nodes, vectors)
+        forces = prior.forces(*self.lender(nodes, vectors))
         q, z, p = prior.coordinates(forces), prior.z(forces), prior.p(forces)
         flags = np.array([len(nodes) > 0, len(self.contact_set) > 0], np.float32)
         state = np.concatenate([self.b, self.b_prev, z, self.z, p, self.p, flags])[None]
@@ -59,7 +62,7 @@ class ReducedRunner:
             b = np.zeros_like(b)
 
         field = prior.field(q + b @ prior.residual)
-        if known.any():
-            field[nodes[known]] = vectors[known]
+        free = ~self.lender.held[nodes]
+        field[nodes[free]] = vectors[free]
         self.b_prev, self.b, self.z, self.p, self.q, self.contact_set = self.b, b, z, p, q, np.array(nodes)
         return field
