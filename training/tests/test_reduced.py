@@ -15,7 +15,7 @@ from upt_training.box_mesh import box_mesh
 from upt_training.errors import InputError
 from upt_training.mesh_file import Mesh
 from upt_training.reduced.blocks import partition
-from upt_training.reduced.build import Options, build, split_states
+from upt_training.reduced.build import Options, build, split_states, trainable, training_states
 from upt_training.reduced.columns import Columns, contact_forces, load_columns
 from upt_training.reduced.compare import compare
 from upt_training.reduced.domain import beside_domain, patches_of_domain
@@ -277,6 +277,26 @@ def test_test_cases_and_scheme_5_are_never_trained_on(bundle):
     assert (fit.split == "train").all() and (fit.scheme != "5").all()
     assert (validation.split == "train").all() and (validation.scheme != "5").all()
     assert "5" in tested.scheme
+
+
+def test_trajectories_of_another_damping_are_never_trained_on(phantom, bundle):
+    mesh, _, folder = phantom
+    cases = open_dataset(folder / "data", mesh.sha256, "train")
+    assert len(trainable(cases)) == len(cases)
+    cases[0].damping_per_s = 2.0
+    assert [case.path for case in trainable(cases)] == [case.path for case in cases[1:]]
+    states = load_states(bundle[1] / "states-data.npz")
+    states.split[0] = "other"
+    fit, validation, _ = split_states(states)
+    assert states.source[0] not in [*fit.source, *validation.source, *training_states(states).source]
+
+
+def test_coarse_cases_validate_where_fine_ones_are_too_few(bundle):
+    states = load_states(bundle[1] / "states-data.npz")
+    states.split = np.where(states.split == "train", "coarse", states.split)
+    fit, validation, _ = split_states(states)
+    assert validation.cases >= 2 and fit.cases > validation.cases
+    assert not set(fit.source) & set(validation.source)
 
 
 def test_fewer_modes_are_cut_from_the_same_build_and_floors_fall(phantom, bundle, tmp_path):

@@ -173,8 +173,8 @@ def run_build(args: argparse.Namespace) -> None:
 def run_compare(args: argparse.Namespace) -> None:
     regimes = []
     for entry in args.data:
-        label, _, folder = entry.partition("=")
-        if not folder:
+        label, _, folder = entry.rpartition("=")
+        if not label:
             raise InputError(f"--data {entry}: expected LABEL=FOLDER")
         regimes.append((label, Path(folder)))
     text = compare(args.reduced, args.upt, regimes, args.all, Progress)

@@ -29,7 +29,7 @@ from upt_training.reduced.prior import Prior, load_prior, save_prior
 from upt_training.reduced.rollout import Limits
 from upt_training.reduced.states import States, join_states, load_states, project_cases
 from upt_training.reduced.train import Settings, train
-from upt_training.reduced.trajectories import Case, open_dataset
+from upt_training.reduced.trajectories import DAMPING_PER_S, Case, open_dataset
 from upt_training.reduced.transfer import Source, interpolation
 
 
@@ -107,6 +107,8 @@ def projected(options: Options, sources: list[tuple[str, Source]], modes: Modes)
         new = [case for case in source.cases if case.path.name not in known]
         if new:
             part = project_cases(Source(source.columns, new, source.transfer), modes, Progress(f"states of {name}"))
+            other = np.array([case.damping_per_s != DAMPING_PER_S for case in new])
+            part.split = np.where(other & (part.split == "train"), "other", part.split)
             if source.transfer is not None:
                 part.split = np.where(part.split == "train", "coarse", "coarse-test")
             join_states([*kept, part]).save(path)
@@ -116,20 +118,24 @@ def projected(options: Options, sources: list[tuple[str, Source]], modes: Modes)
 
 
 def trainable(cases: list[Case]) -> list[Case]:
-    """Cases of the split `train`, scheme 5 never."""
-    return [case for case in cases if case.split == "train" and case.scheme != "5"]
+    """Cases of the split `train` with the bundle's own damping, scheme 5 never."""
+    return [
+        case for case in cases if case.split == "train" and case.scheme != "5" and case.damping_per_s == DAMPING_PER_S
+    ]
 
 
 def split_states(states: States) -> tuple[States, States, States]:
     """Training, validation (every ninth training case, so schemes alternate) and test states.
 
-    Scheme 5 is only ever tested. Interpolated coarse cases (split `coarse`; their test cases are not used at all) are
-    trained on, but for those of the same index as a validation case: equal seeds may choose the same site.
+    Scheme 5 is only ever tested. Where there are coarse cases, every fifth validates; with fewer than four fine cases
+    coarse ones do. Interpolated coarse cases (split `coarse`; their test cases are not used at all) are trained on, but
+    for those of the same index as a validation case: equal seeds may choose the same site.
     """
     own = np.flatnonzero((states.split == "train") & (states.scheme != "5"))
     coarse = (states.split == "coarse") & (states.scheme != "5")
+    pool = own if len(own) > 3 else np.flatnonzero(coarse)
     held_out = np.zeros(states.cases, bool)
-    held_out[own[3::5] if coarse.any() else own[5::9]] = True
+    held_out[pool[3::5] if coarse.any() else pool[5::9]] = True
     fit = coarse & ~np.isin(states.source, states.source[held_out])
     fit[own] = True
     return (
@@ -137,6 +143,11 @@ def split_states(states: States) -> tuple[States, States, States]:
         states.pick(held_out),
         states.pick((states.split == "test") | own_scheme_5(states)),
     )
+
+
+def training_states(states: States) -> States:
+    """Every training case, those that validate too."""
+    return states.pick(np.isin(states.split, ["train", "coarse"]) & (states.scheme != "5"))
 
 
 def own_scheme_5(states: States) -> np.ndarray:
@@ -156,7 +167,7 @@ def trained(options: Options, states: States, settings: Settings) -> tuple[Corre
     """The best of `seeds` trainings by validation error."""
     fit, validation, _ = split_states(states)
     if settings.updates == 0:  # Nothing is chosen by validation: the ridge regressions take every training case.
-        fit = join_states([fit, validation])
+        fit = training_states(states)
     limits = bound_limits(fit)
     best: tuple[Correction, dict] | None = None
     for seed in range(1, options.seeds + 1):
@@ -169,7 +180,7 @@ def trained(options: Options, states: States, settings: Settings) -> tuple[Corre
     if options.refit and settings.updates:
         # What was set aside for the choice is too dear to leave out: once more on every training case.
         settings.seed = best[1]["seed"]
-        everything = join_states([fit, validation])
+        everything = training_states(states)
         checkpoint = options.work / f"training-{settings.seed}-all.pt"
         model, _ = train(everything, validation, limits, settings, print, checkpoint)
         return model, limits, {**best[1], "training_cases": everything.cases}
@@ -207,7 +218,7 @@ def envelope_of(cases: list[Case], mesh: Mesh) -> dict:
         "max_push_mm": round(push, 2),
         "max_push_rate_mm": round(1.05 * rate, 2),
         "contact_area_mm2": [round(0.75 * min(area), 1), round(1.25 * max(area), 1)],
-        "max_sites": 1,
+        "max_sites": 2 if any(case.scheme == "hard-two" for case in cases) else 1,
         "displacement_bound_mm": round(2.0 * push, 1),
     }
 

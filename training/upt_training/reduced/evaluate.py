@@ -90,10 +90,11 @@ def group_of(scheme: str) -> str:
 
 
 def summarise(errors: list[CaseError]) -> dict[str, dict]:
-    """Mean and standard deviation over the cases of each group."""
+    """Mean and standard deviation over the cases of each group, and of each hard regime by itself."""
     out = {}
-    for group in ("schemes_1_4", "scheme_5", "hard"):
-        of = [e for e in errors if group_of(e.scheme) == group]
+    regimes = sorted({e.scheme for e in errors if group_of(e.scheme) == "hard"})
+    for group in ("schemes_1_4", "scheme_5", "hard", *regimes):
+        of = [e for e in errors if group in (group_of(e.scheme), e.scheme)]
         if not of:
             continue
         mse, largest = np.array([e.mse for e in of]), np.array([e.max_mm for e in of])

@@ -12,6 +12,8 @@ from upt_training.errors import InputError
 from upt_training.reduced.columns import Columns, map_tensors
 from upt_training.reduced.prior import trajectory_forces
 
+DAMPING_PER_S = 20.0  # What the correction is made for, and what a trajectory without a material has.
+
 
 @dataclass
 class Case:
@@ -25,6 +27,7 @@ class Case:
     nodes: np.ndarray
     vectors: np.ndarray
     site: np.ndarray
+    damping_per_s: float
 
     @property
     def frames(self) -> int:
@@ -74,6 +77,7 @@ def open_case(path: Path, scheme: str, split: str, mesh_sha256: str) -> Case:
         np.array(tensors["contact_nodes"]),
         np.array(tensors["contact_vectors"]),
         np.array(json.loads(metadata.get("site", "[0, 0, 0]"))),
+        float(json.loads(metadata.get("material", "{}")).get("damping_per_s", DAMPING_PER_S)),
     )
 
 
