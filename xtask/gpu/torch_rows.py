@@ -30,6 +30,7 @@ def main(out: str, steps: str, *bundles: str) -> None:
         result["card"] = rates(torch)
     else:
         result["not_measured"].append({"what": "the card's rates", "why": "torch finds no CUDA device"})
+    Path(out).write_text(json.dumps(result))
     for bundle in bundles:
         for kind in ("eager", "compiled"):
             try:
@@ -37,7 +38,8 @@ def main(out: str, steps: str, *bundles: str) -> None:
             except Exception as error:  # a rival that fails leaves the other rows
                 why = f"{type(error).__name__}: {error}".splitlines()[0][:300]
                 result["not_measured"].append({"what": f"{Path(bundle).name}, PyTorch {kind}", "why": why})
-    Path(out).write_text(json.dumps(result))
+            # Compiling may take long or end the process: what was measured before stays.
+            Path(out).write_text(json.dumps(result))
 
 
 def rates(torch) -> dict:
