@@ -53,7 +53,7 @@ for bundle in bundles/*; do
   if grep -q '"random_weights": *true' "$bundle/bundle.json"; then random+=("$bundle"); fi
 done
 echo PyTorch | tee -a "$out/log"
-PYTHONPATH=$here/training "$python" torch_rows.py "$out/rows-torch.json" "$steps" "${random[@]}" >>"$out/log" 2>&1 ||
+PYTHONPATH=$here/training timeout 1200 "$python" torch_rows.py "$out/rows-torch.json" "$steps" "${random[@]}" >>"$out/log" 2>&1 ||
   missing PyTorch "torch_rows.py ended with status $?; see log"
 cases=()
 for case in cases/*.trajectory.safetensors; do
