@@ -220,7 +220,8 @@
 #define UPT_STEP_MEASURED 3
 
 /**
- * Keep the last good state and return `UPT_ERR_GUARD`.
+ * Keep the last good state and return `UPT_ERR_GUARD`; without contact, where no later call could do otherwise, as
+ * `UPT_GUARD_BLEND`.
  */
 #define UPT_GUARD_HOLD 0
 
@@ -549,9 +550,13 @@ typedef struct upt_scene_options {
    */
   uint8_t cubic_sampling;
   /**
+   * 1: attached points are interpolated between nodes, not decoded (kind `upt`).
+   */
+  uint8_t interpolate_points;
+  /**
    * Zero.
    */
-  uint8_t reserved[3];
+  uint8_t reserved[2];
   /**
    * `UPT_STEP_*`: who makes a step of a `UPT_KIND_UPT` bundle.
    */

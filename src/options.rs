@@ -48,7 +48,8 @@ pub enum DecoderKernel {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(i32)]
 pub enum GuardPolicy {
-    /// Keep the last good state and return [`crate::Error::Guard`].
+    /// Keep the last good state and return [`crate::Error::Guard`]; without contact, where no later call could do
+    /// otherwise, as `Blend`.
     Hold = 0,
     /// Publish finite states and set flags.
     Report = 1,
@@ -172,6 +173,8 @@ pub struct SceneOptions {
     pub latest_wins: bool,
     /// Cubic instead of linear [`crate::Scene::sample`].
     pub cubic_sampling: bool,
+    /// Interpolate attached points between nodes instead of decoding them (kind `upt`).
+    pub interpolate_points: bool,
 }
 
 impl Default for SceneOptions {
@@ -188,6 +191,7 @@ impl Default for SceneOptions {
             check_inversion: false,
             latest_wins: false,
             cubic_sampling: false,
+            interpolate_points: false,
         }
     }
 }

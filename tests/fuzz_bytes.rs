@@ -7,7 +7,9 @@ use std::path::Path;
 use std::sync::Arc;
 
 use explore::explore;
-use fixture::{BUNDLES, bits, copy_of, find_runtime, plain, push, rollout, scene, sparse};
+use fixture::{
+    BUNDLES, bits, copy_of, find_runtime, plain, push, renew_hash, rollout, scene, sparse,
+};
 use proptest::collection::vec;
 use proptest::prelude::{Strategy, any};
 use sha2::{Digest, Sha256};
@@ -71,18 +73,6 @@ fn open(folder: &Path) -> upt::Result<Arc<Model>> {
 fn steps(model: &Arc<Model>) -> Vec<Vec<u32>> {
     let fields = rollout(&scene(model, &plain()), 4);
     fields.iter().map(|field| bits(field)).collect()
-}
-
-fn renew_hash(folder: &Path, file: &str, bytes: &[u8]) {
-    let path = folder.join("bundle.json");
-    let mut manifest: serde_json::Value =
-        serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
-    let digest: String = Sha256::digest(bytes)
-        .iter()
-        .map(|b| format!("{b:02x}"))
-        .collect();
-    manifest["files"][file] = serde_json::json!({"bytes": bytes.len(), "sha256": digest});
-    std::fs::write(&path, manifest.to_string()).unwrap();
 }
 
 #[test]

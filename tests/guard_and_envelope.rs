@@ -16,13 +16,17 @@ fn with_policy(guard_policy: GuardPolicy) -> SceneOptions {
 
 /// A bundle whose bound is below what a push gives.
 fn tight(name: &str) -> (tempfile::TempDir, std::sync::Arc<Model>) {
+    bounded(name, 2.5)
+}
+
+fn bounded(name: &str, bound_mm: f32) -> (tempfile::TempDir, std::sync::Arc<Model>) {
     find_runtime();
     let folder = copy_of(name);
     let path = folder.path().join("bundle.json");
     let text = std::fs::read_to_string(&path).unwrap();
     let changed = text.replace(
         "\"displacement_bound_mm\": 30.0",
-        "\"displacement_bound_mm\": 2.5",
+        &format!("\"displacement_bound_mm\": {bound_mm}"),
     );
     assert_ne!(text, changed);
     std::fs::write(&path, changed).unwrap();
@@ -90,6 +94,43 @@ fn blend_stays_within_the_bound_and_recovers() {
         scene.set_region(Some(&[0, 5, 100])).unwrap();
         scene.step(sparse(&push(&model, 0)), None).unwrap();
         assert_eq!(scene.stats().flags & flag::BOUND, 0);
+    }
+}
+
+/// Held, a step without contact would be made and refused again for ever.
+#[test]
+fn a_refused_step_without_contact_is_replaced_under_every_policy() {
+    for name in BUNDLES {
+        // Not one state of these networks is as close to rest as that.
+        let (_folder, model) = bounded(name, 1e-4);
+        let report = scene(&model, &with_policy(GuardPolicy::Report));
+        report.step(sparse(&push(&model, 4)), None).unwrap();
+        let far = report.save().unwrap();
+        for policy in [GuardPolicy::Hold, GuardPolicy::Blend] {
+            let scene = scene(&model, &with_policy(policy));
+            scene.restore(&far).unwrap();
+            let mut out = vec![0.0; 3 * scene.node_count()];
+            let mut replaced = 0;
+            for _ in 0..5 {
+                scene
+                    .step(sparse(&(Vec::new(), Vec::new())), Some(&mut out))
+                    .unwrap();
+                replaced += usize::from(scene.stats().flags & flag::BOUND != 0);
+                assert!(
+                    out.iter().all(|u| u.abs() <= 1e-4),
+                    "{name}: within the bound"
+                );
+            }
+            assert!(replaced > 0, "{name}: nothing was refused");
+        }
+        // A displacement of the host's is the host's to change: held.
+        let held = scene(&model, &with_policy(GuardPolicy::Hold));
+        let given = vec![1.0; 3 * held.node_count()];
+        let input = StepInput {
+            displacement: Some(&given),
+            contact: Contact::None,
+        };
+        assert!(matches!(held.step(input, None), Err(Error::Guard(_))));
     }
 }
 

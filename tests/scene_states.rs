@@ -1,4 +1,4 @@
-//! Sleep, sampling, points, snapshots and the worker.
+//! Sleep, sampling, snapshots and the worker.
 
 mod fixture;
 
@@ -80,56 +80,6 @@ fn sampling_passes_through_both_states() {
             assert_eq!(scene.sample(f64::NAN, &mut out).unwrap_err().status(), -6);
             assert_eq!(scene.sample(0.5, &mut out[1..]).unwrap_err().status(), -2);
         }
-    }
-}
-
-#[test]
-fn attached_points_follow_the_tetrahedra_around_them() {
-    for name in BUNDLES {
-        let model = model(name);
-        let scene = scene(&model, &plain());
-        // Nodes, and the centre of a tetrahedron, whose displacement is the mean of its corners'.
-        let tet: Vec<u32> = model.indices(upt::IndexSet::Tets)[400..404].to_vec();
-        let p = |node: u32| &model.positions()[3 * node as usize..3 * node as usize + 3];
-        let mut points: Vec<f32> = [7u32, 150, 33]
-            .iter()
-            .flat_map(|&n| p(n).to_vec())
-            .collect();
-        points.extend((0..3).map(|axis| tet.iter().map(|&n| p(n)[axis]).sum::<f32>() / 4.0));
-        // A little outside of the mesh: follows its surface.
-        let outside = model.positions()[..3].iter().map(|x| x - 2.0);
-        points.extend(outside);
-        let region: Vec<u32> = vec![3, 5];
-        scene.set_region(Some(&region)).unwrap();
-        scene.attach_points(Some(&points)).unwrap();
-        assert_eq!(scene.point_count(), 5);
-        rollout(&scene, 5);
-        let mut at_points = vec![0.0; 15];
-        scene.read_points(&mut at_points).unwrap();
-        let mut nodes = vec![0.0; 9];
-        scene.decode(&[7, 150, 33], &mut nodes).unwrap();
-        assert!(largest_difference(&at_points[..9], &nodes) < 1e-4);
-        let mut corners = vec![0.0; 12];
-        scene.decode(&tet, &mut corners).unwrap();
-        for axis in 0..3 {
-            let mean = (0..4).map(|k| corners[3 * k + axis]).sum::<f32>() / 4.0;
-            assert!((at_points[9 + axis] - mean).abs() < 1e-4);
-        }
-        assert!(at_points.iter().all(|u| u.is_finite()));
-        scene.sample_points(0.5, &mut at_points).unwrap();
-        assert_eq!(
-            scene
-                .attach_points(Some(&[f32::NAN; 3]))
-                .unwrap_err()
-                .status(),
-            -6
-        );
-        let far = scene.attach_points(Some(&[1e4, 0.0, 0.0])).unwrap_err();
-        assert_eq!(far.status(), -2);
-        assert!(far.to_string().contains("point 0"), "{far}");
-        assert_eq!(scene.point_count(), 5, "a failed call changes nothing");
-        scene.attach_points(None).unwrap();
-        assert_eq!(scene.point_count(), 0);
     }
 }
 

@@ -174,5 +174,6 @@ pub(super) unsafe fn scene_options(raw: &upt_scene_options) -> Result<SceneOptio
         check_inversion: flag("check_inversion", raw.check_inversion)?,
         latest_wins: flag("latest_wins", raw.latest_wins)?,
         cubic_sampling: flag("cubic_sampling", raw.cubic_sampling)?,
+        interpolate_points: flag("interpolate_points", raw.interpolate_points)?,
     })
 }

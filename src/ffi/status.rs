@@ -94,7 +94,8 @@ pub const UPT_STEP_WHOLE: i32 = 2;
 /// Both are timed while the scene is made, and the faster one stays.
 pub const UPT_STEP_MEASURED: i32 = 3;
 
-/// Keep the last good state and return `UPT_ERR_GUARD`.
+/// Keep the last good state and return `UPT_ERR_GUARD`; without contact, where no later call could do otherwise, as
+/// `UPT_GUARD_BLEND`.
 pub const UPT_GUARD_HOLD: i32 = 0;
 /// Publish finite states and set flags.
 pub const UPT_GUARD_REPORT: i32 = 1;

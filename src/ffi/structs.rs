@@ -127,8 +127,10 @@ pub struct upt_scene_options {
     pub latest_wins: u8,
     /// 1: sample with a cubic through the last states instead of a line.
     pub cubic_sampling: u8,
+    /// 1: attached points are interpolated between nodes, not decoded (kind `upt`).
+    pub interpolate_points: u8,
     /// Zero.
-    pub reserved: [u8; 3],
+    pub reserved: [u8; 2],
     /// `UPT_STEP_*`: who makes a step of a `UPT_KIND_UPT` bundle.
     pub step_path: i32,
 }

@@ -16,7 +16,7 @@ use crate::error::Result;
 use crate::guard;
 use crate::kernels::{FlushToZero, Isa, Pool};
 use crate::model::Model;
-use crate::options::{GuardPolicy, SceneOptions};
+use crate::options::SceneOptions;
 use crate::stats::SceneStats;
 
 /// A scene is asleep after this many steps without contact ...
@@ -192,10 +192,9 @@ impl Core {
             self.predict_and_decode(published, given, &mut stats)?;
             [stats.upload_ms, stats.download_ms] = self.engine.transfer_ms();
             let verdict = self.judge(&mut stats)?;
-            if verdict & guard::REFUSED != 0 {
-                self.refuse(published, verdict, &mut stats)?;
-            }
-            self.publish(published, given.is_some(), &stats);
+            let replaced = verdict & guard::REFUSED != 0
+                && self.refuse(published, verdict, given.is_some(), &mut stats)?;
+            self.publish(published, given.is_some(), replaced, &stats);
         }
         self.step_count += 1;
         stats.step_count = self.step_count;
@@ -264,6 +263,8 @@ impl Core {
             &self.plan,
             displacement,
             &mut self.next.field,
+            &self.points,
+            &mut self.next.points,
         )?;
         drop(shared);
         stats.decoded_node_count = self.plan.nodes().len() as u64;
@@ -272,21 +273,25 @@ impl Core {
         Ok(())
     }
 
-    fn publish(&mut self, published: &RwLock<Published>, was_given: bool, stats: &SceneStats) {
-        let fell_back =
-            stats.flags & guard::REFUSED != 0 && self.options.guard_policy == GuardPolicy::Blend;
-        self.points
-            .interpolate(&self.next.field, &mut self.next.points);
+    fn publish(
+        &mut self,
+        published: &RwLock<Published>,
+        was_given: bool,
+        replaced: bool,
+        stats: &SceneStats,
+    ) {
+        let Frame { field, points } = &mut self.next;
+        self.points.add_interpolated(1.0, field, points);
         self.engine.commit();
         self.source_before = self.source;
-        self.source = if fell_back {
+        self.source = if replaced {
             Source::Fallback
         } else {
             Source::Model
         };
         std::mem::swap(&mut self.contact_before, &mut self.contact);
         std::mem::swap(&mut self.contact, &mut self.incoming);
-        self.max_displacement = if fell_back {
+        self.max_displacement = if replaced {
             self.largest_of_next()
         } else {
             stats.max_displacement_mm
@@ -343,6 +348,11 @@ impl Core {
         }
         std::mem::swap(&mut shared.before, &mut shared.last);
         std::mem::swap(&mut shared.last, &mut self.next);
+        self.show_contacts(shared);
+    }
+
+    /// The last step's contacts in the host's order.
+    pub(super) fn show_contacts(&self, shared: &mut Published) {
         shared.contact_nodes.clear();
         shared.contact_vectors.clear();
         shared.contact_nodes.resize(self.contact.len(), 0);
@@ -360,6 +370,10 @@ impl Core {
         let count = self.mesh.node_count();
         let frames = if self.options.cubic_sampling { 4 } else { 3 };
         let contacts = 3 * 20 * count;
-        frames * 12 * count + contacts + 16 * count + self.engine.memory_bytes()
+        frames * 12 * count
+            + contacts
+            + 16 * count
+            + self.points.memory_bytes()
+            + self.engine.memory_bytes()
     }
 }

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::contact::ContactSet;
 use super::plan::NodePlan;
+use super::points::AttachedPoints;
 use super::reduced::{ReducedEngine, ReducedRecord};
 use super::upt::{UptEngine, UptInput, UptRecord};
 use crate::bundle::Base;
@@ -122,7 +123,7 @@ impl Engine {
     }
 
     /// Decodes the nodes of a plan into a field `[K,3]`, boundary conditions not yet enforced. `displacement` is the
-    /// state before the decoded one.
+    /// state before the decoded one. `detail [n,3]` is what the attached points have beside the interpolation of the field.
     #[allow(clippy::too_many_arguments)]
     pub fn decode(
         &mut self,
@@ -133,7 +134,10 @@ impl Engine {
         plan: &NodePlan,
         displacement: &[f32],
         field: &mut [f32],
+        points: &AttachedPoints,
+        detail: &mut [f32],
     ) -> Result<()> {
+        detail.fill(0.0);
         match (self, &model.kind) {
             (Engine::Reduced(engine), _) => {
                 let table = model.prior.as_ref().ok_or_else(mismatch)?;
@@ -144,6 +148,11 @@ impl Engine {
             }
             (Engine::Upt(engine, tables), KindModel::Upt(kind)) => {
                 engine.decode_mesh(isa, pool, kind, tables, which, plan.nodes(), field)?;
+                let (queries, rows) = points.queries();
+                if !rows.is_empty() {
+                    engine.decode_network(isa, pool, kind, which, queries, rows, detail)?;
+                    points.add_interpolated(-1.0, field, detail);
+                }
                 match kind.entry.base {
                     Base::None => {}
                     Base::Displacement => add(displacement, plan.nodes(), field),

@@ -196,13 +196,22 @@ impl Scene {
         self.with(|core, published| core.decode(published, nodes, out))
     }
 
-    /// Attaches points `[n,3]` in rest mm; `None` detaches.
+    /// Attaches points `[n,3]` in rest mm; `None` detaches. A `upt` bundle decodes them, unless the scene was made with
+    /// `interpolate_points`; a `reduced` bundle's modes are interpolated.
     pub fn attach_points(&self, points: Option<&[f32]>) -> Result<()> {
         self.with(|core, published| {
-            let points = match points {
+            let mut points = match points {
                 Some(points) => AttachedPoints::new(&core.mesh, points)?,
                 None => AttachedPoints::default(),
             };
+            if let KindModel::Upt(kind) = &core.model.kind
+                && !core.options.interpolate_points
+                && points.len() > 0
+            {
+                let threads = core.pool.threads();
+                let queries = kind.queries(points.places(), core.model.runtime, threads)?;
+                points.set_queries(queries);
+            }
             let region = lock_read(published).region.clone();
             core.set_plan(published, region, points)
         })

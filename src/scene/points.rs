@@ -1,5 +1,6 @@
-//! Points attached to the tissue: each is a fixed barycentric combination of the nodes of the tetrahedron around it.
-//! A point outside of the mesh takes the closest combination of the nearest tetrahedra, weights clamped to `[0, 1]`; one
+//! Points attached to the tissue: each is a fixed barycentric combination `sum_i w_i u_i` of the nodes of the tetrahedron
+//! around it. Where a network decodes, its own course inside of the tetrahedron is added, `N(p) - sum_i w_i N(p_i)`: at a
+//! node a point moves with the node, boundary conditions included. A point outside of the mesh takes the closest combination of the nearest tetrahedra, weights clamped to `[0, 1]`; one
 //! that is [`REACH`] or more away is refused, because a mesh in other axes or units is a mistake, not a surface.
 
 use crate::bundle::Mesh;
@@ -14,7 +15,15 @@ pub const REACH: f64 = 25.0;
 pub struct AttachedPoints {
     nodes: Vec<[u32; 4]>,
     weights: Vec<[f32; 4]>,
+    /// Where the network is asked, `[n,3]` rest mm: the point, or for one outside of the mesh the closest combination.
+    places: Vec<f32>,
+    /// The decoder's query rows of the places `[n,2h]`, and `0..n`; empty where nothing is added.
+    queries: Vec<f32>,
+    rows: Vec<u32>,
 }
+
+/// A point this close to its combination is inside of the mesh, mm.
+const INSIDE: f64 = 1e-3;
 
 impl AttachedPoints {
     /// Finds the tetrahedra of points `[n,3]`, rest mm.
@@ -41,6 +50,14 @@ impl AttachedPoints {
                     p[0], p[1], p[2]
                 )));
             }
+            if miss < INSIDE {
+                attached.places.extend_from_slice(p);
+            } else {
+                attached.places.extend((0..3).map(|axis| {
+                    let combination = (0..4).map(|k| weights[k] * mesh.position(nodes[k])[axis]);
+                    combination.sum::<f32>()
+                }));
+            }
             attached.nodes.push(nodes);
             attached.weights.push(weights);
         }
@@ -57,8 +74,29 @@ impl AttachedPoints {
         self.nodes.iter().flatten().copied().collect()
     }
 
-    /// Displacement at the points `[n,3]` from a field `[K,3]`.
-    pub fn interpolate(&self, field: &[f32], out: &mut [f32]) {
+    /// Where a network is to be asked, `[n,3]`, rest mm.
+    pub fn places(&self) -> &[f32] {
+        &self.places
+    }
+
+    /// Takes the decoder's query rows of [`AttachedPoints::places`].
+    pub fn set_queries(&mut self, queries: Vec<f32>) {
+        self.queries = queries;
+        self.rows = (0..self.nodes.len() as u32).collect();
+    }
+
+    /// Query rows and their list; both empty where points are interpolated only.
+    pub fn queries(&self) -> (&[f32], &[u32]) {
+        (&self.queries, &self.rows)
+    }
+
+    /// Bytes held.
+    pub fn memory_bytes(&self) -> usize {
+        4 * (8 * self.nodes.len() + self.places.len() + self.queries.len() + self.rows.len())
+    }
+
+    /// Adds `factor` times the interpolation of a field `[K,3]` to `out [n,3]`.
+    pub fn add_interpolated(&self, factor: f32, field: &[f32], out: &mut [f32]) {
         for ((nodes, weights), out) in self
             .nodes
             .iter()
@@ -66,10 +104,11 @@ impl AttachedPoints {
             .zip(out.chunks_exact_mut(3))
         {
             for axis in 0..3 {
-                out[axis] = (weights[0] * field[3 * nodes[0] as usize + axis]
-                    + weights[1] * field[3 * nodes[1] as usize + axis])
-                    + (weights[2] * field[3 * nodes[2] as usize + axis]
-                        + weights[3] * field[3 * nodes[3] as usize + axis]);
+                out[axis] += factor
+                    * ((weights[0] * field[3 * nodes[0] as usize + axis]
+                        + weights[1] * field[3 * nodes[1] as usize + axis])
+                        + (weights[2] * field[3 * nodes[2] as usize + axis]
+                            + weights[3] * field[3 * nodes[3] as usize + axis]));
             }
         }
     }

@@ -6,7 +6,7 @@ use super::core::{Core, Source, lock_read, lock_write};
 use super::engine::Which;
 use super::plan::NodePlan;
 use super::points::AttachedPoints;
-use super::published::Published;
+use super::published::{Frame, Published};
 use super::verdict::enforce;
 use crate::error::{Error, Result};
 use crate::kernels::FlushToZero;
@@ -60,19 +60,22 @@ impl Core {
         }
         let _flush = FlushToZero::enter();
         let plan = NodePlan::new(&[nodes], count, self.engine.planned_prior(&self.model));
-        self.decode_published(published, Which::Last, &plan)?;
+        let points = AttachedPoints::default();
+        self.decode_published(published, Which::Last, &plan, &points, &mut [])?;
         for (out, &node) in out.chunks_exact_mut(3).zip(nodes) {
             out.copy_from_slice(&self.next.field[3 * node as usize..3 * node as usize + 3]);
         }
         Ok(())
     }
 
-    /// Decodes the nodes of a plan in a published state into the spare frame.
+    /// Decodes the nodes of a plan in a published state into the spare frame, and what points have beside them.
     pub(super) fn decode_published(
         &mut self,
         published: &RwLock<Published>,
         which: Which,
         plan: &NodePlan,
+        points: &AttachedPoints,
+        detail: &mut [f32],
     ) -> Result<()> {
         let (source, contact) = match which {
             Which::Last => (self.source, &self.contact),
@@ -85,12 +88,15 @@ impl Core {
             &shared.before
         };
         let field = &mut self.next.field;
-        if self.engine.keeps_all_nodes(&self.model) {
+        let kept = self.engine.keeps_all_nodes(&self.model);
+        if kept && points.queries().1.is_empty() {
+            detail.fill(0.0);
             field.copy_from_slice(&frame.field);
             return Ok(());
         }
         match source {
             Source::Rest => {
+                detail.fill(0.0);
                 field.fill(0.0);
                 return Ok(());
             }
@@ -102,17 +108,24 @@ impl Core {
                 plan,
                 &shared.before.field,
                 field,
+                points,
+                detail,
             )?,
-            Source::Fallback => self.engine.decode_fallback(
-                self.isa,
-                &self.pool,
-                &self.model,
-                which,
-                plan,
-                field,
-            )?,
+            Source::Fallback => {
+                detail.fill(0.0);
+                self.engine.decode_fallback(
+                    self.isa,
+                    &self.pool,
+                    &self.model,
+                    which,
+                    plan,
+                    field,
+                )?;
+            }
         }
-        if !self.options.free_boundary {
+        if kept {
+            field.copy_from_slice(&frame.field);
+        } else if !self.options.free_boundary {
             enforce(&self.mesh.held_nodes, &self.held, contact, field);
         }
         Ok(())
@@ -142,10 +155,12 @@ impl Core {
         let _flush = FlushToZero::enter();
         self.engine
             .replan(self.isa, &self.pool, &self.model, &plan)?;
-        let mut fields = [Vec::new(), Vec::new()];
-        for (which, field) in [Which::Last, Which::Before].into_iter().zip(&mut fields) {
-            self.decode_published(published, which, &plan)?;
-            field.clone_from(&self.next.field);
+        let mut frames = [Frame::default(), Frame::default()];
+        for (which, frame) in [Which::Last, Which::Before].into_iter().zip(&mut frames) {
+            frame.points = vec![0.0; 3 * points.len()];
+            self.decode_published(published, which, &plan, &points, &mut frame.points)?;
+            frame.field.clone_from(&self.next.field);
+            points.add_interpolated(1.0, &frame.field, &mut frame.points);
         }
         if self.options.check_inversion {
             let mut known = vec![false; count];
@@ -163,12 +178,7 @@ impl Core {
         }
         let mut shared = lock_write(published);
         let shared = &mut *shared;
-        let [last, before] = fields;
-        for (frame, field) in [(&mut shared.last, last), (&mut shared.before, before)] {
-            frame.points = vec![0.0; 3 * points.len()];
-            points.interpolate(&field, &mut frame.points);
-            frame.field = field;
-        }
+        [shared.last, shared.before] = frames;
         if let Some(earlier) = &mut shared.earlier {
             earlier.clone_from(&shared.before);
         }

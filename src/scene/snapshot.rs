@@ -12,6 +12,8 @@ use super::contact::ContactSet;
 use super::core::{Core, Source, lock_read, lock_write};
 use super::engine::Engine;
 use super::published::Published;
+use super::reduced::ReducedRecord;
+use super::upt::UptRecord;
 use crate::error::{Error, Result};
 use crate::kernels::FlushToZero;
 
@@ -234,8 +236,9 @@ impl Core {
             return Err(Error::Snapshot(format!("has {} bytes too many", r.0.len())));
         }
 
-        // Everything is read and checked; from here on nothing of the input can fail.
+        // Everything is read and checked. What is computed from it may still fail: the old state is kept until then.
         let _flush = FlushToZero::enter();
+        let old = self.keep(published);
         for (list, saved) in lists(&mut self.engine).into_iter().zip(latents) {
             *list = saved;
         }
@@ -247,16 +250,6 @@ impl Core {
                 record.prior_norm = saved[0];
                 record.bound = saved[1];
                 record.contact = saved[2] != 0.0;
-            }
-            if let Some(table) = &self.model.prior {
-                engine.rebuild(
-                    self.isa,
-                    &self.pool,
-                    table,
-                    &self.held,
-                    &contact_before,
-                    &contact,
-                )?;
             }
         }
         self.contact = contact;
@@ -273,11 +266,103 @@ impl Core {
             shared.last.field.copy_from_slice(last);
             shared.before.field.copy_from_slice(before);
         }
-        let region = lock_read(published).region.clone();
-        let points = self.points.clone();
-        self.set_plan(published, region, points)?;
-        let stats = self.blank_stats();
-        lock_write(published).stats = stats;
+        if let Err(error) = self.recompute(published) {
+            self.take_back(old, published);
+            return Err(error);
+        }
+        let mut shared = lock_write(published);
+        shared.stats = self.blank_stats();
+        self.show_contacts(&mut shared);
         Ok(())
     }
+
+    /// What a snapshot leaves out because it follows from the rest.
+    fn recompute(&mut self, published: &RwLock<Published>) -> Result<()> {
+        if let (Engine::Reduced(engine), Some(table)) = (&mut self.engine, &self.model.prior) {
+            engine.rebuild(
+                self.isa,
+                &self.pool,
+                table,
+                &self.held,
+                &self.contact_before,
+                &self.contact,
+            )?;
+        }
+        let region = lock_read(published).region.clone();
+        let points = self.points.clone();
+        self.set_plan(published, region, points)
+    }
+
+    /// A copy of everything that a restore overwrites.
+    fn keep(&self, published: &RwLock<Published>) -> Kept {
+        let fields = self.engine.keeps_all_nodes(&self.model).then(|| {
+            let shared = lock_read(published);
+            [shared.last.field.clone(), shared.before.field.clone()]
+        });
+        Kept {
+            records: match &self.engine {
+                Engine::Upt(engine, _) => {
+                    Records::Upt(Box::new([engine.last.clone(), engine.before.clone()]))
+                }
+                Engine::Reduced(engine) => {
+                    Records::Reduced(Box::new([engine.last.clone(), engine.before.clone()]))
+                }
+            },
+            contacts: [self.contact.clone(), self.contact_before.clone()],
+            sources: [self.source, self.source_before],
+            step_count: self.step_count,
+            quiet: self.quiet,
+            sleeping: self.sleeping,
+            rest_frames: self.rest_frames,
+            max_displacement: self.max_displacement,
+            fields,
+        }
+    }
+
+    /// Takes a kept state back.
+    fn take_back(&mut self, kept: Kept, published: &RwLock<Published>) {
+        match (&mut self.engine, kept.records) {
+            (Engine::Upt(engine, _), Records::Upt(records)) => {
+                [engine.last, engine.before] = *records;
+            }
+            (Engine::Reduced(engine), Records::Reduced(records)) => {
+                [engine.last, engine.before] = *records;
+            }
+            _ => unreachable!("a scene's engine never changes its kind"),
+        }
+        // Copied, so that the room for every node of the mesh stays.
+        let [contact, contact_before] = &kept.contacts;
+        self.contact.copy_from(contact);
+        self.contact_before.copy_from(contact_before);
+        [self.source, self.source_before] = kept.sources;
+        self.step_count = kept.step_count;
+        self.quiet = kept.quiet;
+        self.sleeping = kept.sleeping;
+        self.rest_frames = kept.rest_frames;
+        self.max_displacement = kept.max_displacement;
+        if let Some([last, before]) = kept.fields {
+            let mut shared = lock_write(published);
+            shared.last.field = last;
+            shared.before.field = before;
+        }
+    }
+}
+
+/// The last and the previous latent state.
+enum Records {
+    Upt(Box<[UptRecord; 2]>),
+    Reduced(Box<[ReducedRecord; 2]>),
+}
+
+/// A scene's state while another one is taken.
+struct Kept {
+    records: Records,
+    contacts: [ContactSet; 2],
+    sources: [Source; 2],
+    step_count: u64,
+    quiet: u32,
+    sleeping: bool,
+    rest_frames: u32,
+    max_displacement: f32,
+    fields: Option<[Vec<f32>; 2]>,
 }

@@ -54,30 +54,36 @@ impl Core {
         Ok(verdict)
     }
 
-    /// The policy for a refused state. `Ok` means that `next` may be published.
+    /// The policy for a refused state. `Ok` means that `next` may be published, and says whether it was replaced.
+    ///
+    /// A step without contact from the scene's own state asks nothing of the host: held, it would be made and refused
+    /// again for ever. Such a step is replaced under every policy, so that the tissue comes back.
     pub(super) fn refuse(
         &mut self,
         published: &RwLock<Published>,
         verdict: u32,
+        was_given: bool,
         stats: &mut SceneStats,
-    ) -> Result<()> {
+    ) -> Result<bool> {
         let bound = self.model.manifest.envelope.displacement_bound_mm;
         let error = Error::Guard(guard::describe(verdict, stats.max_displacement_mm, bound));
         tracing::warn!(flags = verdict, "{error}");
-        match self.options.guard_policy {
-            GuardPolicy::Report if verdict & flag::NON_FINITE == 0 => return Ok(()),
-            GuardPolicy::Blend => {
-                self.fall_back()?;
-                if self.largest_of_next() <= bound {
-                    return Ok(());
-                }
-                // Even the linear response is out of bounds: rest, without this contact.
+        let policy = self.options.guard_policy;
+        if policy == GuardPolicy::Report && verdict & flag::NON_FINITE == 0 {
+            return Ok(false);
+        }
+        let would_repeat = self.incoming.is_empty() && !was_given;
+        if policy == GuardPolicy::Blend || would_repeat {
+            self.fall_back()?;
+            self.next.points.fill(0.0);
+            let sound = self.largest_of_next() <= bound;
+            if !sound {
+                // Even the linear response is out of bounds or not finite: rest, without this contact.
                 self.engine.rest_next();
                 self.incoming.clear();
                 self.next.field.fill(0.0);
-                return Ok(());
             }
-            _ => {}
+            return Ok(true);
         }
         let mut shared = lock_write(published);
         stats.max_displacement_mm = self.max_displacement;

@@ -166,6 +166,7 @@ impl World<'_> {
         options.check_inversion = (call.seed / 9 % 2) as u8;
         options.latest_wins = (call.seed / 18 % 2) as u8;
         options.cubic_sampling = (call.seed / 36 % 2) as u8;
+        options.interpolate_points = (call.seed / 72 % 2) as u8;
         if call.odd == Odd::Wrong {
             options.kernel = (call.seed % 5) as i32;
             options.precision = (call.seed / 5 % 6) as i32;

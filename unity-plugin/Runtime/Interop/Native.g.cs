@@ -109,8 +109,10 @@ namespace Upt.Interop
         public byte latest_wins;
         /// <summary>1: sample with a cubic through the last states instead of a line.</summary>
         public byte cubic_sampling;
+        /// <summary>1: attached points are interpolated between nodes, not decoded (kind `upt`).</summary>
+        public byte interpolate_points;
         /// <summary>Zero.</summary>
-        public fixed byte reserved[3];
+        public fixed byte reserved[2];
         /// <summary>`UPT_STEP_*`: who makes a step of a `UPT_KIND_UPT` bundle.</summary>
         public int step_path;
     }
@@ -284,7 +286,10 @@ namespace Upt.Interop
         public const int UPT_STEP_WHOLE = 2;
         /// <summary>Both are timed while the scene is made, and the faster one stays.</summary>
         public const int UPT_STEP_MEASURED = 3;
-        /// <summary>Keep the last good state and return `UPT_ERR_GUARD`.</summary>
+        /// <summary>
+        /// Keep the last good state and return `UPT_ERR_GUARD`; without contact, where no later call could do otherwise, as
+        /// `UPT_GUARD_BLEND`.
+        /// </summary>
         public const int UPT_GUARD_HOLD = 0;
         /// <summary>Publish finite states and set flags.</summary>
         public const int UPT_GUARD_REPORT = 1;
