@@ -4,6 +4,7 @@
 //! Exit codes: 0 done; 1 the command ran and its finding is bad (`doctor`, `stress`); 2 wrong usage or
 //! input, with a message on stderr that says what to do. A closed pipe ends the program quietly.
 
+mod beside;
 mod completions;
 mod dataset;
 mod doctor;
@@ -56,6 +57,8 @@ enum Command {
     Report(report::Options),
     /// Stiff and extreme cases, with what happened and whether it is what must happen.
     Stress(stress::Options),
+    /// A bundle beside the reference solver: error over random steps, rank of the warnings, force error, release.
+    Beside(beside::Options),
     /// Very many steps on one scene, with the process's memory in a log.
     Soak(soak::Options),
     /// Shell completions, on stdout.
@@ -74,6 +77,7 @@ fn main() -> ExitCode {
         Command::Rollout(options) => rollout::run(&options),
         Command::Report(options) => report::run(&options),
         Command::Stress(options) => stress::run(&options),
+        Command::Beside(options) => beside::run(&options),
         Command::Soak(options) => soak::run(&options),
         Command::Completions(options) => completions::run::<Arguments>(&options),
     };

@@ -27,7 +27,7 @@ impl Cases {
     pub fn read(trajectories: &[PathBuf], folders: &[PathBuf], per_scheme: usize) -> Result<Self> {
         let mut paths: Vec<PathBuf> = trajectories.to_vec();
         for folder in folders {
-            paths.extend(held_out(folder, per_scheme)?);
+            paths.extend(finished(folder, "test", per_scheme)?);
         }
         if paths.is_empty() {
             bail!(
@@ -121,8 +121,8 @@ fn add_content(hash: &mut Sha256, trajectory: &Trajectory) {
     }
 }
 
-/// Finished cases of a dataset's test split, the first `per_scheme` of each scheme.
-fn held_out(folder: &Path, per_scheme: usize) -> Result<Vec<PathBuf>> {
+/// Finished cases of a split of a dataset, the first `per_scheme` of each scheme.
+pub fn finished(folder: &Path, split: &str, per_scheme: usize) -> Result<Vec<PathBuf>> {
     let file = folder.join("manifest.json");
     let text = std::fs::read(&file).with_context(|| {
         format!(
@@ -139,7 +139,7 @@ fn held_out(folder: &Path, per_scheme: usize) -> Result<Vec<PathBuf>> {
     let mut paths = Vec::new();
     for case in cases {
         let text = |field: &str| case[field].as_str().unwrap_or("").to_owned();
-        if text("split") != "test" || text("status") != "done" {
+        if text("split") != split || text("status") != "done" {
             continue;
         }
         let count = taken.entry(text("scheme")).or_default();

@@ -4,7 +4,7 @@
 //! C call. Finished rows are kept by content, so that an interrupted report goes on where it was.
 
 mod cache;
-mod cases;
+pub mod cases;
 mod choose;
 pub mod errors;
 mod html;
@@ -13,7 +13,7 @@ mod memory;
 pub mod method;
 mod paper_split;
 pub mod pictures;
-mod plot;
+pub mod plot;
 mod row;
 mod table;
 mod write;

@@ -5,7 +5,6 @@ use std::path::Path;
 
 use anyhow::Result;
 use tissue::schemes::{Programme, Scheme};
-use upt::flag;
 
 use super::bench::{Bench, Run, Touch, largest, push, ramp};
 use super::{Row, inputs, outside, progress};
@@ -46,8 +45,7 @@ fn inside(bench: &Bench) -> Result<Vec<Row>> {
             worst.other = worst.other.or(run.other);
         }
     }
-    let alarms = worst.flags & !(flag::CLAMPED | flag::REGULARISED);
-    let good = worst.sound(bench.bound) && alarms == 0 && worst.refused == 0;
+    let good = worst.sound(bench.bound) && worst.alarms() == 0 && worst.refused == 0;
     Ok(vec![bench.row(
         &format!("schemes 1 to 4, {} new cases: no alarm", 4 * cases),
         &worst,
@@ -104,7 +102,7 @@ fn long_runs(bench: &Bench) -> Result<Vec<Row>> {
     rows.push(bench.row(
         &format!("{steps} random steps of all schemes"),
         &total,
-        total.sound(bench.bound) && !grown && total.refused == 0,
+        total.sound(bench.bound) && !grown && total.alarms() == 0 && total.refused == 0,
     ));
 
     let patch = bench.central()?;
@@ -129,7 +127,7 @@ fn long_runs(bench: &Bench) -> Result<Vec<Row>> {
     let row = bench.row(
         &format!("hold for {:.0} s", hold as f64 * 0.05),
         &run,
-        run.sound(bench.bound) && drift < 0.5,
+        run.sound(bench.bound) && run.alarms() == 0 && run.refused == 0 && drift < 0.5,
     );
     rows.push(Row {
         happened: format!("{}, drift {drift:.3} mm", row.happened),

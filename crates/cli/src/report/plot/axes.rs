@@ -247,6 +247,30 @@ impl Axes {
         );
     }
 
+    /// The plot as an SVG file of its own, on white, with a row of coloured names above it.
+    pub fn standalone(mut self, keys: &[(&str, &str)]) -> String {
+        const STYLE: &str = ".grid{stroke:#eceff2}.frame{stroke:#9aa5b1;fill:none}\
+            text{font:12px 'DejaVu Sans',sans-serif;fill:#44505c}.label{font-size:13px;fill:#1d2733}";
+        // Height of the row, and the width of a letter at the label's size.
+        const ROW: f64 = 26.0;
+        const LETTER: f64 = 7.6;
+        let mut x = LEFT;
+        for (name, fill) in keys {
+            let _ = write!(
+                self.body,
+                "<rect x=\"{x:.0}\" y=\"-11\" width=\"14\" height=\"4\" fill=\"{fill}\"/>"
+            );
+            self.text(x + 20.0, -5.0, "start", "label", name);
+            x += 20.0 + LETTER * name.chars().count() as f64 + 22.0;
+        }
+        let height = self.height + ROW;
+        format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 -{ROW} {0} {height}\" width=\"{0}\" height=\"{height}\">\
+             <style>{STYLE}</style><rect y=\"-{ROW}\" width=\"{0}\" height=\"{height}\" fill=\"#fff\"/>{1}</svg>\n",
+            self.width, self.body
+        )
+    }
+
     pub fn finish(self) -> String {
         format!(
             "<svg viewBox=\"0 0 {0} {1}\" width=\"{0}\" height=\"{1}\" role=\"img\">{2}</svg>",

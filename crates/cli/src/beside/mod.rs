@@ -1,0 +1,160 @@
+//! `upt beside`: a bundle beside the reference solver on the same contacts: the error over random steps without a reset, what
+//! falling asleep after a release costs, and, on these and on cases from disk that the bundle was not trained on, false
+//! alarms, how well the warnings rank the error, and the error of the contact force and of attached points.
+
+mod observer;
+mod outside;
+mod pair;
+mod picture;
+mod rank;
+mod replay;
+mod tables;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::{Context, Result, ensure};
+use tissue::schemes::{Programme, Scheme};
+
+use crate::stress::bench::{Bench, push, ramp};
+use crate::stress::{progress, replace_between};
+use observer::Moment;
+use pair::Pair;
+
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  upt beside --bundle onnx/brain-coarse-reduced --markdown docs/stability.md --images docs/images
+  upt beside --bundle onnx/brain-fast --steps 0 --held-out DATASET --held-out DATASET-S5/case-00000.trajectory.safetensors --outside DATASET-HARD/case-00000.trajectory.safetensors")]
+pub struct Options {
+    /// Bundle folder.
+    #[arg(long)]
+    bundle: PathBuf,
+    /// Random steps beside the solver, schemes 1 to 5 in turn of 160 steps each, and then contacts outside of the
+    /// envelope and a release; minutes on a coarse mesh, an hour on a fine one; 0 leaves the solver out.
+    #[arg(long, default_value_t = 1600)]
+    steps: usize,
+    /// Cases inside of the envelope that the bundle was not trained on: a dataset folder (its test split) or a
+    /// trajectory; may be given many times.
+    #[arg(long, value_name = "PATH", num_args = 1..)]
+    held_out: Vec<PathBuf>,
+    /// The same outside of the envelope.
+    #[arg(long, value_name = "PATH", num_args = 1..)]
+    outside: Vec<PathBuf>,
+    /// Page whose part between the markers `upt beside NAME` is replaced.
+    #[arg(long)]
+    markdown: Option<PathBuf>,
+    /// Folder for the plots.
+    #[arg(long)]
+    images: Option<PathBuf>,
+}
+
+/// Steps of a scheme.
+const CASE: usize = 160;
+/// Steps in contact before the release.
+const HELD: usize = 20;
+const SCHEMES: [Scheme; 5] = [
+    Scheme::One,
+    Scheme::Two,
+    Scheme::Three,
+    Scheme::Four,
+    Scheme::Five,
+];
+
+/// What a release came to.
+struct Release {
+    moments: Vec<Moment>,
+    /// First step after which the scene sleeps.
+    asleep: Option<usize>,
+}
+
+pub fn run(options: &Options) -> Result<ExitCode> {
+    ensure!(
+        options.steps == 0 || options.steps >= 2 * CASE,
+        "--steps {} is too short to compare a later scheme with the first; give at least {}, or 0 to leave the solver out",
+        options.steps,
+        2 * CASE
+    );
+    ensure!(
+        options.steps > 0 || !options.held_out.is_empty(),
+        "--steps 0 without --held-out leaves nothing to do"
+    );
+    let bench = Bench::open(&options.bundle, false)
+        .with_context(|| format!("{}", options.bundle.display()))?;
+    let mut text = String::new();
+    let (mut inside, mut outside) = (Vec::new(), Vec::new());
+    let mut complaints = Vec::new();
+    if options.steps > 0 {
+        let random = random_steps(&bench, options.steps)?;
+        let release = release(&bench)?;
+        if !tables::schemes(&mut text, &random) {
+            complaints.push("the error GROWS after the first schemes");
+        }
+        tables::release(&mut text, &release);
+        if let Some(folder) = &options.images {
+            let name = &bench.subject;
+            picture::run(&folder.join(format!("{name}-beside.svg")), &random)?;
+            picture::release(
+                &folder.join(format!("{name}-release.svg")),
+                &release.moments,
+            )?;
+        }
+        inside.extend(random);
+        outside.extend(outside::moments(&bench)?);
+    }
+    let held_out = replay::groups(&bench, &options.held_out)?;
+    let far = replay::groups(&bench, &options.outside)?;
+    if !held_out.is_empty() {
+        tables::cases(&mut text, &held_out, &far);
+    }
+    inside.extend(held_out.into_iter().flat_map(|group| group.moments));
+    outside.extend(far.into_iter().flat_map(|group| group.moments));
+    if inside.iter().any(Moment::alarmed) {
+        complaints.push("there are FALSE ALARMS inside of the envelope");
+    }
+    tables::ranks(&mut text, &inside, &outside);
+    tables::points(&mut text, &inside);
+    print!("{text}");
+    if let Some(page) = &options.markdown {
+        let name = format!("upt beside {}", bench.subject);
+        replace_between(page, &name, &format!("\n{text}"))?;
+    }
+    for complaint in &complaints {
+        println!("{complaint}");
+    }
+    Ok(ExitCode::from(u8::from(!complaints.is_empty())))
+}
+
+fn random_steps(bench: &Bench, steps: usize) -> Result<Vec<Moment>> {
+    let bar = progress(steps / CASE, &bench.subject);
+    let mut pair = Pair::new(bench)?;
+    let mut moments = Vec::with_capacity(steps);
+    for case in 0..steps / CASE {
+        let programme = Programme::new(SCHEMES[case % 5], &bench.domain, 70_000 + case as u64)?;
+        for step in 1..=CASE {
+            let contact = programme.contact(step);
+            moments.push(pair.step(&contact)?);
+        }
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    Ok(moments)
+}
+
+fn release(bench: &Bench) -> Result<Release> {
+    let mut pair = Pair::new(bench)?;
+    let patch = bench.central()?;
+    let depth = 0.7 * f64::from(bench.max_push);
+    let mut moments = Vec::new();
+    let mut asleep = None;
+    for step in 1..=4 * HELD {
+        let touch = match step {
+            1..=HELD => push(&patch, patch.inward, ramp(step, depth)),
+            _ => (Vec::new(), Vec::new()),
+        };
+        moments.push(pair.step(&pair::contact(&touch))?);
+        if pair.sleeps() && asleep.is_none() {
+            asleep = Some(step);
+        }
+    }
+    Ok(Release { moments, asleep })
+}

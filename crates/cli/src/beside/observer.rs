@@ -1,0 +1,246 @@
+//! A scene that is watched: each step compared with a true state, and what the scene itself could have known of its error.
+
+use anyhow::{Result, ensure};
+use upt::forces::{Moduli, ReactionForces};
+use upt::{Contact, Error, Scene, StepInput, flag};
+
+use crate::stress::bench::Bench;
+
+/// Attached points that are watched, at most.
+const POINTS: usize = 2000;
+
+/// One step.
+#[derive(Clone, Debug)]
+pub struct Moment {
+    /// mm².
+    pub mse: f64,
+    /// Largest distance of a node to the true one, mm.
+    pub largest_error: f64,
+    /// Largest |u| of the bundle and of the truth, mm.
+    pub size: f64,
+    pub true_size: f64,
+    /// Strain and kinetic energy of the truth, mJ.
+    pub energy: f64,
+    /// RMS of the internal force at nodes that are neither held nor touched, mN.
+    pub residual: f64,
+    /// RMS of the reaction at the contact nodes, mN.
+    pub reaction: f64,
+    /// The envelope ratio of the statistics.
+    pub ratio: f64,
+    /// Flags of the envelope and the guard.
+    pub flags: u32,
+    /// The guard refused the step.
+    pub refused: bool,
+    pub touching: bool,
+    /// Reaction at the contact nodes, and its sum over them; in contact only.
+    pub force: Option<Share>,
+    pub resultant: Option<Share>,
+    pub points: PointErrors,
+}
+
+/// A named number of each step.
+pub type Series = (&'static str, fn(&Moment) -> f64);
+
+/// Squared size of an error and of what it is an error of.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Share {
+    pub wrong: f64,
+    pub all: f64,
+}
+
+/// At points in the middle of surface edges, mm² and mm: decoded at the point against the mean of the edge's nodes.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct PointErrors {
+    /// Mean square of the difference of both.
+    pub difference: f64,
+    pub largest_difference: f64,
+    /// Mean square error of each.
+    pub decoded: f64,
+    pub interpolated: f64,
+}
+
+impl Moment {
+    /// Anything that warns the host.
+    pub fn alarmed(&self) -> bool {
+        self.refused || self.flags != 0
+    }
+}
+
+/// What a step should have come to. Displacement `[K,3]` mm, reaction `[m,3]` mN, energy mJ.
+pub struct Truth<'a> {
+    pub displacement: &'a [[f32; 3]],
+    pub reaction: &'a [[f32; 3]],
+    pub energy: f64,
+}
+
+pub struct Observer {
+    scene: Scene,
+    forces: ReactionForces,
+    free: Vec<u32>,
+    edges: Vec<[u32; 2]>,
+    found: Vec<f32>,
+    at_points: Vec<f32>,
+    internal: Vec<f32>,
+}
+
+impl Observer {
+    pub fn new(bench: &Bench) -> Result<Self> {
+        let material = &bench.model.manifest.material;
+        let mesh = &bench.mesh;
+        let held = mesh.held_nodes(bench.boundary);
+        let free: Vec<u32> = (0..mesh.node_count() as u32)
+            .filter(|node| held.binary_search(node).is_err())
+            .collect();
+        let edges = surface_edges(&mesh.surface);
+        let scene = bench.scene()?;
+        let middles: Vec<f32> = edges
+            .iter()
+            .flat_map(|edge| {
+                let [a, b] = edge.map(|node| mesh.positions[node as usize]);
+                [0, 1, 2].map(|k| 0.5 * (a[k] + b[k]))
+            })
+            .collect();
+        scene.attach_points(Some(&middles))?;
+        Ok(Self {
+            scene,
+            forces: ReactionForces::new(
+                mesh.positions.as_flattened(),
+                mesh.tets.as_flattened(),
+                &mesh.stiffness,
+                &free,
+                Moduli::from_young(material.young_pa, material.poisson),
+            ),
+            internal: vec![0.0; 3 * free.len()],
+            at_points: vec![0.0; middles.len()],
+            free,
+            edges,
+            found: vec![0.0; 3 * mesh.node_count()],
+        })
+    }
+
+    pub fn sleeps(&self) -> bool {
+        self.scene.stats().sleeping
+    }
+
+    /// Steps the scene, contact nodes ascending. A refusal of the guard keeps the scene's state and is an alarm.
+    pub fn step(
+        &mut self,
+        nodes: &[u32],
+        vectors: &[[f32; 3]],
+        truth: &Truth<'_>,
+    ) -> Result<Moment> {
+        let input = StepInput {
+            displacement: None,
+            contact: Contact::Sparse {
+                nodes,
+                vectors: vectors.as_flattened(),
+            },
+        };
+        let refused = match self.scene.step(input, Some(&mut self.found)) {
+            Ok(()) => false,
+            Err(Error::Guard(_)) => {
+                self.scene.read(&mut self.found)?;
+                true
+            }
+            Err(error) => return Err(error.into()),
+        };
+        let stats = self.scene.stats();
+        ensure!(
+            self.found.iter().all(|u| u.is_finite()),
+            "the bundle published a displacement that is not finite"
+        );
+        self.forces
+            .reaction(&self.found, &self.free, &mut self.internal)?;
+        let (mut residual, mut reaction, mut nodal) = (0.0, 0.0, Share::default());
+        let (mut sum, mut true_sum) = ([0.0; 3], [0.0; 3]);
+        for (node, force) in self.free.iter().zip(self.internal.as_chunks::<3>().0) {
+            let size = square(force.map(f64::from));
+            let Ok(entry) = nodes.binary_search(node) else {
+                residual += size;
+                continue;
+            };
+            reaction += size;
+            let (got, want) = (force.map(f64::from), truth.reaction[entry].map(f64::from));
+            nodal.wrong += apart(got, want);
+            nodal.all += square(want);
+            for k in 0..3 {
+                sum[k] += got[k];
+                true_sum[k] += want[k];
+            }
+        }
+        let others = (self.free.len() - nodes.len().min(self.free.len())).max(1);
+        let found = self.found.as_chunks::<3>().0;
+        let largest = |field: &[[f32; 3]]| {
+            let squares = field.iter().map(|u| square(u.map(f64::from)));
+            squares.fold(0.0, f64::max).sqrt()
+        };
+        let compared = !nodes.is_empty() && !refused;
+        let mse = tissue::metrics::mse_mm2(truth.displacement, found);
+        let largest_error = tissue::metrics::max_error_mm(truth.displacement, found);
+        let (size, true_size) = (largest(found), largest(truth.displacement));
+        Ok(Moment {
+            mse,
+            largest_error,
+            size,
+            true_size,
+            energy: truth.energy,
+            residual: (residual / others as f64).sqrt(),
+            reaction: (reaction / nodes.len().max(1) as f64).sqrt(),
+            ratio: f64::from(stats.indicator),
+            flags: stats.flags & !(flag::CLAMPED | flag::REGULARISED),
+            refused,
+            touching: !nodes.is_empty(),
+            force: compared.then_some(nodal),
+            resultant: compared.then_some(Share {
+                wrong: apart(sum, true_sum),
+                all: square(true_sum),
+            }),
+            points: self.points(truth.displacement)?,
+        })
+    }
+
+    fn points(&mut self, truth: &[[f32; 3]]) -> Result<PointErrors> {
+        self.scene.read_points(&mut self.at_points)?;
+        let found = self.found.as_chunks::<3>().0;
+        let middle = |field: &[[f32; 3]], edge: &[u32; 2]| {
+            let [a, b] = edge.map(|node| field[node as usize].map(f64::from));
+            [0, 1, 2].map(|k| 0.5 * (a[k] + b[k]))
+        };
+        let mut errors = PointErrors::default();
+        for (edge, decoded) in self.edges.iter().zip(self.at_points.as_chunks::<3>().0) {
+            let decoded = decoded.map(f64::from);
+            let (interpolated, want) = (middle(found, edge), middle(truth, edge));
+            let difference = apart(decoded, interpolated);
+            errors.difference += difference;
+            errors.largest_difference = errors.largest_difference.max(difference.sqrt());
+            errors.decoded += apart(decoded, want);
+            errors.interpolated += apart(interpolated, want);
+        }
+        let count = self.edges.len().max(1) as f64;
+        errors.difference /= count;
+        errors.decoded /= count;
+        errors.interpolated /= count;
+        Ok(errors)
+    }
+}
+
+fn square(v: [f64; 3]) -> f64 {
+    v.iter().map(|x| x * x).sum()
+}
+
+fn apart(a: [f64; 3], b: [f64; 3]) -> f64 {
+    square([0, 1, 2].map(|k| a[k] - b[k]))
+}
+
+/// Edges of the surface, evenly thinned to [`POINTS`].
+fn surface_edges(faces: &[[u32; 3]]) -> Vec<[u32; 2]> {
+    let mut edges: Vec<[u32; 2]> = faces
+        .iter()
+        .flat_map(|[a, b, c]| [[a, b], [b, c], [c, a]])
+        .map(|[a, b]| [*a.min(b), *a.max(b)])
+        .collect();
+    edges.sort_unstable();
+    edges.dedup();
+    let every = edges.len().div_ceil(POINTS).max(1);
+    edges.into_iter().step_by(every).collect()
+}
