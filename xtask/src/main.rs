@@ -4,6 +4,7 @@
 mod bench;
 mod counts;
 mod demo;
+mod footprint;
 mod ort;
 mod package;
 mod process;
@@ -55,6 +56,9 @@ enum Task {
         after_help = "Example:\n  cargo xtask readme --report target/report/report.json --bundle onnx/brain-reduced --trajectory push.trajectory.safetensors"
     )]
     Readme(readme::Options),
+    /// Build libupt for each cargo feature and write what it adds to docs/footprint.md.
+    #[command(after_help = "Example:\n  cargo xtask footprint")]
+    Footprint(footprint::Options),
     /// Write include/upt.h and the C# bindings from the library's source.
     Header {
         /// Only say whether they are up to date.
@@ -107,6 +111,7 @@ fn run(workspace: &Workspace, task: Task) -> Result<bool> {
         Task::Bench(options) => bench::run(workspace, &options),
         Task::Package(options) => package::run(workspace, &options),
         Task::Readme(options) => readme::run(workspace, &options),
+        Task::Footprint(options) => footprint::run(workspace, &options),
         Task::Header { check } => upkeep::header(workspace, check),
         Task::Bundle { module, arguments } => upkeep::bundle(workspace, &module, &arguments),
         Task::Ort { platform, version } => ort::run(workspace, platform, &version).map(|()| true),
