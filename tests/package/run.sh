@@ -70,6 +70,8 @@ unity_complete() {
   for name in package/package.json package/Runtime/Interop/Native.g.cs libupt.so libupt.so.meta libonnxruntime.so; do
     grep -q "$name\$" <<<"$listing" || { echo "$name is missing"; return 1; }
   done
+  # Nothing of other platforms, whose libraries are not there: Unity would warn about each .meta without its file.
+  ! grep -E 'Plugins/(Windows|macOS)' <<<"$listing"
 }
 check unity_complete unity_complete
 

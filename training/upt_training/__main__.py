@@ -65,6 +65,12 @@ def parser() -> argparse.ArgumentParser:
     export.add_argument("--f16", action="store_true", help="also half-precision graphs")
     export.add_argument("--int8", action="store_true", help="also dynamically quantised graphs")
 
+    variants = commands.add_parser("variants", help="a copy of a bundle with f16 and int8 graphs beside")
+    variants.add_argument("bundle", type=Path)
+    variants.add_argument("--f16", action="store_true", help="half-precision graphs")
+    variants.add_argument("--int8", action="store_true", help="dynamically quantised graphs")
+    variants.add_argument("--out", type=Path, required=True, help="new folder")
+
     ablate = commands.add_parser("ablate", help="variants of a configuration at one small budget: tables and plots")
     ablate.add_argument("suite", choices=["windows", "tricks"])
     ablate.add_argument("--config", type=Path, required=True)
@@ -97,6 +103,10 @@ def main(arguments: list[str] | None = None) -> int:
             from upt_training.ablate import ablate_command
 
             return ablate_command(options)
+        if options.command == "variants":
+            from upt_training.variants import variants_command
+
+            return variants_command(options)
         from upt_training.export import export_command
 
         return export_command(options)

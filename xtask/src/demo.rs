@@ -131,14 +131,21 @@ fn simulate(
 ) -> Result<PathBuf> {
     let mut hash = Sha256::new();
     hash.update(std::fs::read(workspace.path(MESH))?);
-    for folder in ["crates/tissue/src/solver", "crates/tissue/src"] {
-        let mut files: Vec<PathBuf> = std::fs::read_dir(workspace.path(folder))?
-            .filter_map(|entry| entry.ok().map(|entry| entry.path()))
-            .collect();
-        files.sort();
-        for file in files.iter().filter(|file| file.is_file()) {
-            hash.update(std::fs::read(file)?);
+    let mut folders = vec![workspace.path("crates/tissue/src")];
+    let mut files = Vec::new();
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder)? {
+            let path = entry?.path();
+            if path.is_dir() {
+                folders.push(path);
+            } else {
+                files.push(path);
+            }
         }
+    }
+    files.sort();
+    for file in files {
+        hash.update(std::fs::read(file)?);
     }
     hash.update(format!("{} {} {boundary}", options.scheme, options.seed));
     let key = format!("{:x}", hash.finalize());

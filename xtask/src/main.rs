@@ -60,6 +60,7 @@ enum Task {
     #[command(after_help = "Example:\n  cargo xtask footprint")]
     Footprint(footprint::Options),
     /// Write include/upt.h and the C# bindings from the library's source.
+    #[command(after_help = "Examples:\n  cargo xtask header\n  cargo xtask header --check")]
     Header {
         /// Only say whether they are up to date.
         #[arg(long)]

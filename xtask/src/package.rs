@@ -301,33 +301,67 @@ fn unity(workspace: &Workspace, out: &Path) -> Result<PathBuf> {
     Ok(file)
 }
 
-/// Removes the settings of plugins that are not in the package: Unity warns about them otherwise.
+/// Removes the settings of plugins that are not in the package, and folders that hold nothing else: Unity warns about
+/// them otherwise.
 fn without_empty_plugins(root: &Path) -> Result<()> {
-    let mut folders = vec![root.join("Runtime/Plugins")];
-    while let Some(folder) = folders.pop() {
-        for entry in std::fs::read_dir(&folder)? {
-            let path = entry?.path();
-            if path.is_dir() {
-                folders.push(path);
-                continue;
-            }
-            let asset = path.with_extension("");
-            let is_library = asset.extension().is_some_and(|extension| {
-                extension == "so" || extension == "dll" || extension == "dylib"
-            });
-            if path
-                .extension()
-                .is_some_and(|extension| extension == "meta")
-                && is_library
-                && !asset.exists()
-            {
-                println!(
-                    "left out (not built on this platform): {}",
-                    asset.strip_prefix(root).unwrap_or(&asset).display()
-                );
-                std::fs::remove_file(&path)?;
+    remove_orphans(root, &root.join("Runtime/Plugins"))
+}
+
+fn remove_orphans(root: &Path, folder: &Path) -> Result<()> {
+    for entry in std::fs::read_dir(folder)? {
+        let path = entry?.path();
+        if path.is_dir() {
+            remove_orphans(root, &path)?;
+            if std::fs::read_dir(&path)?.next().is_none() {
+                std::fs::remove_dir(&path)?;
             }
         }
     }
+    for entry in std::fs::read_dir(folder)? {
+        let path = entry?.path();
+        let asset = path.with_extension("");
+        if path.extension().is_none_or(|extension| extension != "meta") || asset.exists() {
+            continue;
+        }
+        std::fs::remove_file(&path)?;
+        if asset.extension().is_some() {
+            println!(
+                "left out (not built on this platform): {}",
+                asset.strip_prefix(root).unwrap_or(&asset).display()
+            );
+        }
+    }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn settings_without_their_library_leave_with_their_folders() {
+        let folder = tempfile::tempdir().unwrap();
+        let root = folder.path();
+        let plugins = root.join("Runtime/Plugins");
+        let files = [
+            "Linux.meta",
+            "Linux/x86_64.meta",
+            "Linux/x86_64/libupt.so",
+            "Linux/x86_64/libupt.so.meta",
+            "Windows.meta",
+            "Windows/x86_64.meta",
+            "Windows/x86_64/upt.dll.meta",
+        ];
+        for file in files {
+            let path = plugins.join(file);
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(path, "").unwrap();
+        }
+        without_empty_plugins(root).unwrap();
+        for file in files {
+            let stays = file.starts_with("Linux");
+            assert_eq!(plugins.join(file).exists(), stays, "{file}");
+        }
+        assert!(!plugins.join("Windows").exists());
+    }
 }

@@ -1,0 +1,45 @@
+"""A copy of a bundle with half-precision and int8 graphs beside its float32 ones, to compare precisions.
+
+`python -m upt_training variants onnx/brain-fast --f16 --int8 --out target/narrow`; needs nothing but the bundle.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import shutil
+from pathlib import Path
+
+from upt_training.errors import InputError
+from upt_training.precision import GRAPHS, write_variant
+
+
+def variants_command(options: argparse.Namespace) -> int:
+    wanted = [name for name, asked in (("f16", options.f16), ("int8", options.int8)) if asked]
+    if not wanted:
+        raise InputError("variants: say which, --f16 or --int8 or both")
+    make_variants(options.bundle, options.out, wanted)
+    print(f"{options.out}: {', '.join(['f32', *wanted])}")
+    return 0
+
+
+def make_variants(bundle: Path, out: Path, precisions: list[str]) -> None:
+    """Copy `bundle` to the new folder `out` and add the graphs of `precisions` to it and to its manifest."""
+    manifest_file = bundle / "bundle.json"
+    if not manifest_file.is_file():
+        raise InputError(f"{manifest_file}: is missing; a bundle is a folder with a bundle.json")
+    if out.exists():
+        raise InputError(f"{out}: exists; variants are written to a new folder")
+    manifest = json.loads(manifest_file.read_text())
+    if manifest["kind"] != "upt":
+        raise InputError(f"{manifest_file}: kind `{manifest['kind']}` has no graphs worth narrowing; give a `upt` one")
+    shutil.copytree(bundle, out)
+    for precision in precisions:
+        write_variant(out, precision)
+        for graph in GRAPHS:
+            name = f"{graph}.{precision}.onnx"
+            content = (out / name).read_bytes()
+            manifest["files"][name] = {"bytes": len(content), "sha256": hashlib.sha256(content).hexdigest()}
+    manifest["precisions"] = sorted({"f32", *manifest["precisions"], *precisions})
+    (out / "bundle.json").write_text(json.dumps(manifest, indent=2) + "\n")
