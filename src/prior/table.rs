@@ -77,7 +77,7 @@ pub struct PriorTable {
     /// For each node the column (index into `contact_nodes`) of itself or of the nearest contact node within
     /// [`REACH`] typical edges of the domain; [`NO_COLUMN`] for nodes farther away.
     pub nearest_column: Vec<u32>,
-    /// Whether a node belongs to the domain `[K]`. Bundles of large meshes have columns of a part of the domain only.
+    /// Whether a node belongs to the domain `[K]`. A bundle may have columns of a part of the domain only.
     pub in_domain: Vec<bool>,
     /// What the response does when the contact is gone; without it the response is zero then.
     pub vibration: Option<FreeVibration>,

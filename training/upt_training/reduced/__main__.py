@@ -19,7 +19,7 @@ from upt_training.reduced.domain import beside_domain, patches_of_domain
 from upt_training.reduced.evaluate import evaluate, insert_table, table
 from upt_training.reduced.make_prior import check_columns, make_prior, prior_error
 from upt_training.reduced.prior import load_prior, save_prior
-from upt_training.reduced.refine import Refinement, exact_error, refine
+from upt_training.reduced.response_error import response_error
 from upt_training.reduced.sweep import sweep
 from upt_training.reduced.train import Settings
 from upt_training.reduced.trajectories import open_dataset
@@ -101,16 +101,6 @@ def arguments() -> argparse.ArgumentParser:
     where.add_argument("--beside", type=float, metavar="MM", help="the free surface around the domain, up to there")
     where.add_argument("--patches", type=int, metavar="N", help="N patches of the domain")
 
-    finer = commands.add_parser("refine", help="a reduced bundle on a finer mesh, from a bundle of a coarser one")
-    finer.add_argument("--bundle", type=Path, required=True, help="bundle on the coarser mesh")
-    finer.add_argument("--columns", type=Path, required=True, help="file of `upt prior` for the coarser mesh")
-    finer.add_argument("--mesh", type=Path, required=True, help="the finer mesh")
-    finer.add_argument("--out", type=Path, required=True, help="bundle folder")
-    finer.add_argument("--work", type=Path, required=True, help="folder for the interpolated columns while it runs")
-    finer.add_argument("--name", default="brain-fine-reduced")
-    finer.add_argument("--tolerance", type=float, default=5e-3, help="RMS truncation error of the block basis, mm")
-    finer.add_argument("--tables", choices=("f16", "f32"), default="f16")
-
     exact = commands.add_parser("response-error", help="L(c) of a bundle against exact columns of its mesh")
     exact.add_argument("--bundle", type=Path, required=True)
     exact.add_argument("--columns", type=Path, required=True, help="file of `upt prior`, of the domain or a part of it")
@@ -190,18 +180,10 @@ def run_domain(args: argparse.Namespace) -> None:
     print(f"{args.out}: {len(other.domain)} faces, {len(other.domain_nodes)} nodes in the domain")
 
 
-def run_refine(args: argparse.Namespace) -> None:
-    options = Refinement(
-        args.bundle, args.columns, args.mesh, args.out, args.work, args.name, args.tolerance, args.tables
-    )
-    manifest = refine(options, Progress("block basis"))
-    print(json.dumps({"bundle": str(args.out), "files": manifest["files"], **manifest["provenance"]["block_basis"]}))
-
-
 def run_response_error(args: argparse.Namespace) -> None:
     mesh, columns = load_mesh(args.bundle / "mesh.safetensors"), load_columns(args.columns)
     check_columns(mesh, columns)
-    print(json.dumps(exact_error(args.bundle, columns, mesh)))
+    print(json.dumps(response_error(args.bundle, columns, mesh)))
 
 
 COMMANDS = {
@@ -211,7 +193,6 @@ COMMANDS = {
     "evaluate": run_evaluate,
     "compare": run_compare,
     "domain": run_domain,
-    "refine": run_refine,
     "response-error": run_response_error,
 }
 
