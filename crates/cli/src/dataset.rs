@@ -12,6 +12,9 @@ use tissue::schemes::{FRAMES, Scheme};
 use tissue::solver::SolverOptions;
 
 #[derive(clap::Args)]
+#[command(
+    after_help = "Examples:\n  upt dataset --mesh onnx/meshes/brain-coarse.mesh.safetensors --schemes 1-4 --count 200 --out data/coarse\n  upt dataset --mesh brain.mesh.safetensors --schemes probe --count 40 --shard 0/4 --out data/probe"
+)]
 pub struct Options {
     /// Mesh file (*.mesh.safetensors).
     #[arg(long)]

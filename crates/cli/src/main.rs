@@ -95,3 +95,28 @@ fn end_quietly_on_closed_pipe() {
         libc::signal(libc::SIGPIPE, libc::SIG_DFL);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    fn without_examples(command: &clap::Command, missing: &mut Vec<String>) {
+        for sub in command.get_subcommands() {
+            let help = sub.get_after_help().map(ToString::to_string);
+            if !help.is_some_and(|text| text.contains("Example")) {
+                missing.push(sub.get_name().to_owned());
+            }
+            without_examples(sub, missing);
+        }
+    }
+
+    #[test]
+    fn every_commands_help_has_examples() {
+        let command = Arguments::command();
+        command.clone().debug_assert();
+        let mut missing = Vec::new();
+        without_examples(&command, &mut missing);
+        assert!(missing.is_empty(), "without an example: {missing:?}");
+    }
+}

@@ -14,6 +14,7 @@ use tissue::solver::{Solver, SolverOptions};
 use tissue::stuffing::{GridField, HalfSpace, stuff};
 
 #[derive(Debug, Args)]
+#[command(after_help = "Example:\n  upt mesh info onnx/meshes/brain.mesh.safetensors --json")]
 pub struct Options {
     #[command(subcommand)]
     command: Command,
@@ -93,6 +94,9 @@ struct Import {
 }
 
 #[derive(Debug, Args)]
+#[command(
+    after_help = "Example:\n  upt mesh stuff head.grid.safetensors head.mesh.safetensors --spacing 3.2 --half-space 1,0,0,0"
+)]
 struct Stuff {
     /// Distance field (docs/formats.md), positive inside.
     field: PathBuf,

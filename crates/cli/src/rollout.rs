@@ -11,8 +11,9 @@ use tissue::trajectory::Trajectory;
 
 use crate::render::Palette;
 use crate::report::errors::{CaseErrors, step_errors};
-use crate::report::method::{BundleFolder, Method, Precision, Provider, Region, Stepper};
+use crate::report::method::{BundleFolder, Method, Stepper};
 use crate::report::pictures;
+use crate::report::setting::{Precision, Provider, Region};
 
 #[derive(Args)]
 #[command(after_help = "Examples:

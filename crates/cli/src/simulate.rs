@@ -8,6 +8,9 @@ use tissue::schemes::{FRAMES, Scheme};
 use tissue::solver::{Pressure, SolverOptions};
 
 #[derive(clap::Args)]
+#[command(
+    after_help = "Example:\n  upt simulate --mesh onnx/meshes/brain-coarse.mesh.safetensors --scheme 5 --seed 7 --threads 2 --out push.trajectory.safetensors"
+)]
 pub struct Options {
     /// Mesh file (*.mesh.safetensors).
     #[arg(long)]

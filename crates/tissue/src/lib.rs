@@ -25,3 +25,4 @@ pub mod solver;
 pub mod stuffing;
 pub mod tensors;
 pub mod trajectory;
+mod vector;

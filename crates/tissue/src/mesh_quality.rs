@@ -1,6 +1,7 @@
 //! Measures of a mesh: counts, sizes, angles, inscribed radii, manifoldness.
 
 use crate::mesh::{Mesh, components, tet_volume};
+use crate::vector::{cross, dot, length, subtract};
 use std::collections::BTreeMap;
 
 /// What `upt mesh info` prints, all lengths in mm and angles in degrees.
@@ -48,26 +49,6 @@ const EDGES: [[usize; 4]; 6] = [
     [1, 3, 0, 2],
     [2, 3, 0, 1],
 ];
-
-fn subtract(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn length(a: [f64; 3]) -> f64 {
-    dot(a, a).sqrt()
-}
 
 /// The six dihedral angles of a tetrahedron, degrees.
 pub fn dihedral_angles(corners: [[f64; 3]; 4]) -> [f64; 6] {

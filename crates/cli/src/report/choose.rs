@@ -25,7 +25,7 @@ pub fn fitting_bundles(
         let bundle = BundleFolder::read(path)?;
         if bundle.mesh_sha256 != cases.mesh_sha256 {
             notes.push(format!(
-                "{}: made for another mesh than the cases'",
+                "{}: made for another mesh than that of the cases",
                 bundle.name
             ));
         } else if bundle.boundary != cases.boundary {

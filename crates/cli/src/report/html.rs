@@ -53,7 +53,7 @@ th:nth-child(-n+2),td:nth-child(-n+2){text-align:left}
 tr.plain td{color:#6b5f50}tr.front td:first-child{font-weight:600}
 td i.key{display:inline-block;width:9px;height:9px;border-radius:50%;margin-right:7px}
 dl{display:grid;grid-template-columns:max-content 1fr;gap:2px 18px;margin:0;font-size:14px}dt{color:#6a7683}dd{margin:0;overflow-wrap:anywhere}
-svg{width:100%;max-width:1040px;height:auto;display:block}
+svg{width:100%;max-width:1200px;height:auto;display:block}
 svg .grid{stroke:#eceff2}svg .frame{stroke:#9aa5b1;fill:none}
 svg text{font:12px system-ui,-apple-system,'Segoe UI',Roboto,'DejaVu Sans',sans-serif;fill:#44505c}
 svg .label{font-size:13px;fill:#1d2733}svg .mark{font-weight:600;fill:#1d2733;paint-order:stroke;stroke:#fff;stroke-width:3px}

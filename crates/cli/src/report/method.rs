@@ -11,81 +11,8 @@ use tissue::solver::{ContactNode, Solver, SolverOptions};
 use tissue::trajectory::TrajectoryHeader;
 use upt::ffi;
 
+use super::setting::{Precision, Provider, Region};
 use crate::host;
-
-/// Which nodes a step returns.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum Region {
-    All,
-    Surface,
-    Domain,
-}
-
-impl Region {
-    pub fn name(self) -> &'static str {
-        match self {
-            Region::All => "all",
-            Region::Surface => "surface",
-            Region::Domain => "domain",
-        }
-    }
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum Precision {
-    F32,
-    Bf16,
-    F16,
-    Int8,
-}
-
-impl Precision {
-    pub fn name(self) -> &'static str {
-        match self {
-            Precision::F32 => "f32",
-            Precision::Bf16 => "bf16",
-            Precision::F16 => "f16",
-            Precision::Int8 => "int8",
-        }
-    }
-
-    fn code(self) -> i32 {
-        match self {
-            Precision::F32 => ffi::UPT_PRECISION_F32,
-            Precision::Bf16 => ffi::UPT_PRECISION_BF16,
-            Precision::F16 => ffi::UPT_PRECISION_F16,
-            Precision::Int8 => ffi::UPT_PRECISION_INT8,
-        }
-    }
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum Provider {
-    Cpu,
-    Cuda,
-    Tensorrt,
-    TensorrtRtx,
-}
-
-impl Provider {
-    pub fn name(self) -> &'static str {
-        match self {
-            Provider::Cpu => "cpu",
-            Provider::Cuda => "cuda",
-            Provider::Tensorrt => "tensorrt",
-            Provider::TensorrtRtx => "tensorrt-rtx",
-        }
-    }
-
-    fn code(self) -> i32 {
-        match self {
-            Provider::Cpu => ffi::UPT_PROVIDER_CPU,
-            Provider::Cuda => ffi::UPT_PROVIDER_CUDA,
-            Provider::Tensorrt => ffi::UPT_PROVIDER_TENSORRT,
-            Provider::TensorrtRtx => ffi::UPT_PROVIDER_TENSORRT_RTX,
-        }
-    }
-}
 
 /// A bundle on disk, as its manifest describes it.
 #[derive(Clone, Debug)]

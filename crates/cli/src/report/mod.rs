@@ -15,6 +15,7 @@ mod paper_split;
 pub mod pictures;
 pub mod plot;
 mod row;
+pub mod setting;
 mod table;
 mod write;
 
@@ -29,8 +30,9 @@ use crate::machine::Machine;
 use cache::Cache;
 use cases::Cases;
 use measure::Plan;
-use method::{Method, Precision, Provider, Region};
+use method::Method;
 use row::Measurement;
+use setting::{Precision, Provider, Region};
 
 #[derive(Args)]
 #[command(after_help = "Examples:

@@ -1,27 +1,12 @@
 //! Geometry and connectivity: volumes, boundary faces, face adjacency, components.
 
 use super::MeshError;
+use crate::vector::{cross, dot, subtract};
 use std::collections::HashMap;
 
 /// Rest position of a node in f64, mm.
 fn point(positions: &[[f32; 3]], node: u32) -> [f64; 3] {
     positions[node as usize].map(f64::from)
-}
-
-fn subtract(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// Signed volume of a tetrahedron, mm³; positive when node 3 sees 0, 1, 2 counter-clockwise from outside.

@@ -11,81 +11,26 @@ mod cluster;
 mod diagnosis;
 mod dispatch;
 mod error;
+mod frame;
 mod kernel;
 mod lanes;
 mod march;
 mod mass;
+mod options;
 mod partition;
 mod stability;
 
 pub use dispatch::Simd;
 pub use error::SolverError;
+pub use options::{Pressure, SolverOptions, Substep};
 
-use crate::material::Material;
 use crate::mesh::{Boundary, Mesh};
 use dispatch::Kernels;
 use kernel::Law;
-use march::{Fields, March, Node, Path};
+use march::{Fields, Node, Path};
 use mass::LumpedMass;
+use options::check_positive;
 use partition::Partition;
-
-/// How the pressure of an element is found.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Pressure {
-    /// `kappa (J - 1)` of the element itself; locks near incompressibility.
-    #[default]
-    Element,
-    /// Mean of the corners' average nodal pressure (Bonet and Burton 1998): softer, about twice the cost.
-    AverageNodal,
-}
-
-/// What happens when the asked inner step is above the stable one.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Substep {
-    /// The frame is cut into more inner steps; a frame that fails is repeated with half the step.
-    #[default]
-    Automatic,
-    /// [`SolverError::StepTooLong`].
-    Refuse,
-}
-
-/// Settings of a [`Solver`].
-#[derive(Clone, Debug)]
-pub struct SolverOptions {
-    /// Default: brain tissue, see [`Material`].
-    pub material: Material,
-    /// Asked inner step, s. Default 1e-4.
-    pub inner_step_s: f64,
-    /// Part of the estimated critical step that is used. Default 0.8.
-    pub safety: f64,
-    /// Selective mass scaling: elements whose own critical step is shorter get mass until it is this long, s.
-    /// Default 0: none. See [`Solver::added_mass`].
-    pub mass_scaling_s: f64,
-    /// Default [`Substep::Automatic`].
-    pub substep: Substep,
-    /// Default [`Pressure::Element`].
-    pub pressure: Pressure,
-    /// Default 1.
-    pub threads: usize,
-    /// Default: the best set of this processor.
-    pub simd: Option<Simd>,
-}
-
-impl Default for SolverOptions {
-    fn default() -> Self {
-        Self {
-            material: Material::default(),
-            inner_step_s: 1e-4,
-            safety: 0.8,
-            mass_scaling_s: 0.0,
-            substep: Substep::Automatic,
-            pressure: Pressure::Element,
-            threads: 1,
-            simd: None,
-        }
-    }
-}
 
 /// One prescribed node of a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -161,16 +106,7 @@ impl Solver {
         options: SolverOptions,
     ) -> Result<Self, SolverError> {
         mesh.validate()?;
-        options.material.validate()?;
-        check_positive("inner_step_s", options.inner_step_s)?;
-        check_positive("safety", options.safety)?;
-        if !(options.mass_scaling_s.is_finite() && options.mass_scaling_s >= 0.0) {
-            return Err(SolverError::Option {
-                field: "mass_scaling_s",
-                value: options.mass_scaling_s,
-                wanted: "zero or positive",
-            });
-        }
+        options.validate()?;
         let simd = options.simd.unwrap_or_else(Simd::detect);
         let kernels = Kernels::of(simd).ok_or(SolverError::SimdUnavailable(simd))?;
         let pool = match options.threads {
@@ -377,100 +313,6 @@ impl Solver {
         }
         Ok(())
     }
-
-    /// Sets the frame's contact paths from the present positions.
-    fn lead(&mut self, contact: &[ContactNode]) {
-        self.paths.clear();
-        for entry in contact {
-            let slot = self.partition.slot_of_node[entry.node as usize];
-            let [x, y, z, _] = self.fields.displacement[slot as usize].0;
-            self.paths.push(Path {
-                slot,
-                start: [x, y, z],
-                target: entry.displacement,
-            });
-        }
-        self.paths.sort_unstable_by_key(|path| path.slot);
-    }
-
-    /// Gains `g` for the step, increments rescaled to it.
-    fn set_step(&mut self, dt: f64) {
-        let scale = (dt / self.dt) as f32;
-        let gain = dt * dt / (1.0 + 0.5 * self.options.material.damping_per_s * dt);
-        for chunk in &self.partition.chunks {
-            for slot in chunk.first..chunk.first + chunk.owned {
-                let increment = &mut self.fields.increment[slot].0;
-                if scale != 1.0 {
-                    increment.iter_mut().for_each(|v| *v *= scale);
-                }
-                increment[3] = if self.held[slot] {
-                    0.0
-                } else {
-                    (gain / f64::from(self.mass[slot])) as f32
-                };
-            }
-        }
-        for path in &self.paths {
-            self.fields.increment[path.slot as usize].0[3] = 0.0;
-        }
-        self.dt = dt;
-    }
-
-    /// Runs one attempt at a frame; returns the external work, mJ.
-    fn march(&mut self, steps: u32, duration_s: f64) -> Result<f64, SolverError> {
-        let dt = duration_s / f64::from(steps);
-        self.set_step(dt);
-        let tallies = self.run(steps);
-        let inverted = tallies
-            .iter()
-            .map(|tally| tally.inverted_at)
-            .filter(|step| *step > 0)
-            .min();
-        if inverted.is_some() || !self.is_finite() {
-            return Err(self.explain(inverted, steps, dt));
-        }
-        Ok(tallies.iter().map(|tally| tally.work).sum::<f64>() * 1e-6)
-    }
-
-    fn run(&mut self, steps: u32) -> Vec<march::Tally> {
-        let mut fields = std::mem::take(&mut self.fields);
-        let tallies = self.marcher(steps).run(&mut fields, self.pool.as_ref());
-        self.fields = fields;
-        tallies
-    }
-
-    fn marcher(&self, steps: u32) -> March<'_> {
-        let damping = self.options.material.damping_per_s;
-        March {
-            partition: &self.partition,
-            kernels: self.kernels,
-            law: self.law,
-            averaged: self.options.pressure == Pressure::AverageNodal,
-            rest_volume: &self.rest_volume,
-            mass: &self.mass,
-            beta: ((1.0 - 0.5 * damping * self.dt) / (1.0 + 0.5 * damping * self.dt)) as f32,
-            dt: self.dt,
-            damping,
-            paths: &self.paths,
-            steps,
-        }
-    }
-
-    /// Internal forces of the present state into `fields.force`.
-    fn update_forces(&mut self) {
-        let mut fields = std::mem::take(&mut self.fields);
-        self.marcher(0).forces(&mut fields, self.pool.as_ref());
-        self.fields = fields;
-    }
-
-    /// Every owned displacement is finite and no larger than a hundred metres.
-    fn is_finite(&self) -> bool {
-        self.partition.chunks.iter().all(|chunk| {
-            self.fields.displacement[chunk.first..chunk.first + chunk.owned]
-                .iter()
-                .all(|node| node.0[..3].iter().all(|v| v.abs() < 1e5))
-        })
-    }
 }
 
 /// See [`Solver::step_cost`].
@@ -482,16 +324,4 @@ pub struct StepCost {
     pub flops: usize,
     /// Nodes gathered, and scattered to, by the clusters of an inner step: four a tetrahedron without clusters.
     pub gathers: usize,
-}
-
-fn check_positive(field: &'static str, value: f64) -> Result<(), SolverError> {
-    if value.is_finite() && value > 0.0 {
-        Ok(())
-    } else {
-        Err(SolverError::Option {
-            field,
-            value,
-            wanted: "positive",
-        })
-    }
 }

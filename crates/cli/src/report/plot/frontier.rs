@@ -117,7 +117,7 @@ pub fn frontier(points: &[Point]) -> String {
             .iter()
             .map(|(dx, dy)| {
                 (
-                    (px + dx).clamp(66.0 + half, 842.0 - half),
+                    (px + dx).clamp(78.0 + half, 842.0 - half),
                     (py + dy).clamp(14.0, 420.0),
                 )
             })
