@@ -147,7 +147,8 @@ namespace Upt
             MeshFilter filter = GetComponent<MeshFilter>();
             shownBefore = filter.sharedMesh;
             surface = new SurfaceMesh(native, renderMesh != null ? renderMesh : shownBefore, unitsPerMillimetre);
-            scene = new Scene(native);
+            // Render vertices between nodes are interpolated: decoding them costs a step more and is no more accurate.
+            scene = new Scene(native, new upt_scene_options { interpolate_points = 1 });
             uint[] touchable = native.Indices(Native.UPT_SET_SURFACE_NODES);
             // What instruments touch; the attached points' nodes are decoded beside it, the rest of the volume is not.
             scene.SetRegion(touchable);
