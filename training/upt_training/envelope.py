@@ -29,11 +29,11 @@ def measure_envelope(mesh: Mesh, cases: list[Case]) -> dict:
             largest,
             float(np.abs(trajectory.displacement[:: max(1, trajectory.frame_count // 8)]).max()),
         )
-    # Sites and frames that were not drawn differ a little from those that were: 5 % on the rate, 10 % on the area.
+    # Sites and frames that were not drawn differ a little from those that were: 5 % on the rate, a quarter on the area.
     return {
         "max_push_mm": round(push, 3),
         "max_push_rate_mm": round(1.05 * rate, 3),
-        "contact_area_mm2": [round(0.9 * smallest, 1), round(1.1 * widest, 1)],
+        "contact_area_mm2": [round(0.75 * smallest, 1), round(1.25 * widest, 1)],
         "max_sites": 1,
         "displacement_bound_mm": round(max(2.0 * largest, 30.0), 1),
     }

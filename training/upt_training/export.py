@@ -101,7 +101,11 @@ def export_command(options) -> int:
         provenance["data"] = {"seed": dataset.manifest.get("seed"), "cases": len(dataset.cases)}
     envelope = measure_envelope(mesh, dataset.select("train")) if dataset else None
     if options.envelope:
-        envelope = json.loads((Path(options.envelope) / "bundle.json").read_text())["envelope"]
+        other = json.loads((Path(options.envelope) / "bundle.json").read_text())
+        measured, envelope = envelope, other["envelope"]
+        # A patch's nodal area depends on the mesh that samples it.
+        if measured and other["mesh"]["mesh_sha256"] != mesh.sha256:
+            envelope = {**envelope, "contact_area_mm2": measured["contact_area_mm2"]}
     manifest = write_bundle(
         model,
         mesh,
