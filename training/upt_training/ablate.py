@@ -143,7 +143,8 @@ def write_outputs(suite: str, results: dict, out: Path) -> None:
         figure.savefig(out / "error-accumulation.png", dpi=130)
     else:
         figure, axis = pyplot.subplots(figsize=(7, 0.35 * len(runs) + 1.2), layout="constrained")
-        axis.barh(list(runs), [r["mse_mm2"] for r in runs.values()], color="C0")
+        axis.plot([r["mse_mm2"] for r in runs.values()], list(runs), "o", color="C0")
+        axis.grid(axis="y", lw=0.4)
         linear = results["references"].get("linear response, quasi-static")
         if linear:
             axis.axvline(linear, color="C3", ls="--", label="linear elasticity, quasi-static")
