@@ -18,7 +18,7 @@
 //! instruction set, and every vector operation in it would become a call.
 
 use super::cluster::{Cluster, corners};
-use super::lanes::{Lanes, WIDTH};
+use super::lanes::{Lanes, WIDTH, prefetch};
 
 /// Tetrahedra (times 16) that go through the loops together; their tensors fill 5 kB of the first-level cache.
 pub(crate) const BLOCK: usize = 8;
@@ -251,6 +251,7 @@ pub(crate) unsafe fn add_forces<
                 }
             }
             for (cluster, tensors) in block.iter().zip(buffer.chunks_exact_mut(TETS)) {
+                prefetch(std::ptr::from_ref(cluster).wrapping_add(BLOCK / TETS));
                 for (volume, tensors) in cluster.volume.iter().zip(tensors) {
                     for first in (0..WIDTH).step_by(L::COUNT) {
                         let determinant = stress::<L, AVERAGED>(volume, first, tensors, law);

@@ -272,18 +272,18 @@ impl March<'_> {
             for path in paths {
                 tally.work += self.follow(shared, path, step);
             }
+            // The fourth components, gain and pressure, stay: one and nought there keep whole vectors going.
+            let beta = [self.beta, self.beta, self.beta, 1.0];
+            let moves = [1.0, 1.0, 1.0, 0.0];
             for slot in own {
-                let force = *shared.force.add(slot);
-                let increment = &mut *shared.increment.add(slot);
-                let displacement = &mut *shared.displacement.add(slot);
-                let gain = increment.0[3];
-                let pressure = displacement.0[3];
+                let force = (*shared.force.add(slot)).0;
+                let increment = &mut (*shared.increment.add(slot)).0;
+                let displacement = &mut (*shared.displacement.add(slot)).0;
+                let gain = increment[3];
                 for k in 0..4 {
-                    increment.0[k] = self.beta * increment.0[k] + gain * force.0[k];
-                    displacement.0[k] += increment.0[k];
+                    increment[k] = beta[k] * increment[k] + gain * moves[k] * force[k];
+                    displacement[k] += moves[k] * increment[k];
                 }
-                increment.0[3] = gain;
-                displacement.0[3] = pressure;
             }
             for path in paths {
                 let (increment, displacement) = (

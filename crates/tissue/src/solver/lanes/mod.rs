@@ -58,3 +58,16 @@ pub(crate) trait Lanes: Copy {
     unsafe fn gather(nodes: *const [f32; 4], index: *const u16) -> [Self; 4];
     unsafe fn scatter_add(nodes: *mut [f32; 4], index: *const u16, value: [Self; 4]);
 }
+
+/// Asks for a value's cache lines; the pointer may be beyond any allocation.
+#[inline(always)]
+pub(crate) fn prefetch<T>(value: *const T) {
+    #[cfg(target_arch = "x86_64")]
+    for line in (0..size_of::<T>()).step_by(64) {
+        let line = value.cast::<i8>().wrapping_add(line);
+        // SAFETY: a prefetch does not access memory; SSE is part of the architecture.
+        unsafe { std::arch::x86_64::_mm_prefetch::<{ std::arch::x86_64::_MM_HINT_T0 }>(line) };
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = value;
+}
