@@ -694,9 +694,13 @@ typedef struct upt_scene_stats {
    */
   uint8_t poisoned;
   /**
+   * 1: `upt_scene_contact_force` gives the contact forces of the linear response; 0: the elements' elastic forces.
+   */
+  uint8_t prior_forces;
+  /**
    * Zero.
    */
-  uint8_t reserved[6];
+  uint8_t reserved[5];
   /**
    * Of the stages' times, copies to a device, ms; 0 on the CPU.
    */
@@ -1022,10 +1026,12 @@ upt_status upt_scene_contacts_from_instruments(struct upt_scene *scene,
 /**
  * Copies the reaction of the tissue at the last step's contact nodes, in their order.
  *
- * The elastic force of the elements around each node at the last state; inertia and damping are left out.
+ * With a bundle that uses a linear response (`prior_forces` of the statistics is 1) the contact forces of that response,
+ * `-A_CC^-1 c`: nodes that borrow a column of the compliance share its force, held nodes and nodes far from the domain get
+ * zero. With others the elastic force of the elements around each node at the last state. Both leave out inertia and damping.
  * out: `[m,3]`, mN, the force on the instrument. out_count: floats in out, 3 m.
  * Threads: one at a time. Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "forces", `UPT_ERR_NULL`,
- * `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_STATE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_PANIC`.
+ * `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`, `UPT_ERR_PANIC`.
  */
 upt_status upt_scene_contact_force(struct upt_scene *scene,
                                    float *out,

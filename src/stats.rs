@@ -75,6 +75,8 @@ pub struct SceneStats {
     pub max_displacement_mm: f32,
     /// Trust indicator, 0 is good, above 1 is outside of what was trained on.
     pub indicator: f32,
+    /// [`crate::Scene::contact_force`] gives the contact forces of the linear response, not the elements' elastic forces.
+    pub prior_forces: bool,
     /// The scene is at rest and a step is free.
     pub sleeping: bool,
     /// A panic was caught in the scene; only dropping it is allowed.

@@ -70,12 +70,17 @@ fn steps_allocate_nothing_and_keep_the_floating_point_mode() {
                 let given = vec![0.25; dense.len()];
                 let mut out = vec![0.0; 3 * scene.region_count()];
                 let mut at_points = vec![0.0; 6];
+                let mut forces = vec![0.0; pushes.iter().map(|push| push.1.len()).max().unwrap()];
                 let mode = read_mode();
                 let before = ALLOCATIONS.load(Ordering::Relaxed);
                 for contact in &pushes {
                     scene.step(sparse(contact), Some(&mut out)).unwrap();
                     scene.sample(0.3, &mut out).unwrap();
                     scene.read_points(&mut at_points).unwrap();
+                    if scene.stats().prior_forces {
+                        let forces = &mut forces[..contact.1.len()];
+                        scene.contact_force(forces).unwrap();
+                    }
                 }
                 let inputs = StepInput {
                     displacement: Some(&given),

@@ -110,10 +110,12 @@ unsafe fn read_instruments(
 
 /// Copies the reaction of the tissue at the last step's contact nodes, in their order.
 ///
-/// The elastic force of the elements around each node at the last state; inertia and damping are left out.
+/// With a bundle that uses a linear response (`prior_forces` of the statistics is 1) the contact forces of that response,
+/// `-A_CC^-1 c`: nodes that borrow a column of the compliance share its force, held nodes and nodes far from the domain get
+/// zero. With others the elastic force of the elements around each node at the last state. Both leave out inertia and damping.
 /// out: `[m,3]`, mN, the force on the instrument. out_count: floats in out, 3 m.
 /// Threads: one at a time. Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "forces", `UPT_ERR_NULL`,
-/// `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_STATE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_PANIC`.
+/// `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`, `UPT_ERR_PANIC`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_scene_contact_force(
     scene: *mut upt_scene,

@@ -207,8 +207,10 @@ pub struct upt_scene_stats {
     pub sleeping: u8,
     /// 1: a bug was caught in an earlier call; only destroy is left.
     pub poisoned: u8,
+    /// 1: `upt_scene_contact_force` gives the contact forces of the linear response; 0: the elements' elastic forces.
+    pub prior_forces: u8,
     /// Zero.
-    pub reserved: [u8; 6],
+    pub reserved: [u8; 5],
     /// Of the stages' times, copies to a device, ms; 0 on the CPU.
     pub upload_ms: f64,
     /// Of the stages' times, copies back from a device, ms; 0 on the CPU.

@@ -5,6 +5,8 @@
 //! block coordinates `q = sum_i f_i response[i]`, `u_k = U_k q_k`. With `vibration.safetensors` the response swings on
 //! when the contact is gone.
 
+#[cfg(feature = "forces")]
+mod reaction;
 mod response;
 mod table;
 mod vibration;

@@ -1,6 +1,6 @@
 //! The contact solve: collision field -> contact forces -> linear response in block coordinates.
 
-use super::table::{NO_COLUMN, PriorTable};
+use super::table::PriorTable;
 use crate::error::{Error, Result};
 use crate::kernels::contact::ContactFactor;
 use crate::kernels::respond::accumulate_rows;
@@ -25,14 +25,14 @@ pub struct ContactResponse {
     factor: ContactFactor,
     factored: Vec<u32>,
     regularised: bool,
-    columns: Vec<u32>,
+    pub(super) columns: Vec<u32>,
     rows: Vec<u32>,
     values: Vec<f32>,
-    forces: Vec<f32>,
-    // By column: sum of imposed displacements, how many, whether the column's own node is among them.
+    pub(super) forces: Vec<f32>,
+    // By column, zero between calls: sum of imposed displacements, how many, whether the column's own node is among them.
     sum: Vec<[f32; 3]>,
-    count: Vec<u32>,
-    own: Vec<bool>,
+    pub(super) count: Vec<u32>,
+    pub(super) own: Vec<bool>,
 }
 
 impl ContactResponse {
@@ -66,16 +66,13 @@ impl ContactResponse {
         let mut report = SolveReport::default();
         self.columns.clear();
         for (&node, c) in nodes.iter().zip(vectors.chunks_exact(3)) {
-            let column = table.nearest_column[node as usize];
-            if held[node as usize] || column == NO_COLUMN {
+            let Some((slot, own)) = table.column_for(held, node) else {
                 report.outside = true;
                 continue;
-            }
-            let slot = column as usize;
-            let own = table.contact_nodes[slot] == node;
+            };
             report.outside |= !own && !table.in_domain[node as usize];
             if self.count[slot] == 0 {
-                self.columns.push(column);
+                self.columns.push(slot as u32);
             }
             if self.own[slot] {
                 continue;

@@ -205,10 +205,14 @@ impl PriorTable {
         }
     }
 
-    /// Column of a node that has one.
-    pub fn column(&self, node: u32) -> Option<u32> {
+    /// The column that a contact node acts on, and whether it is the column's own node; none for a node that is held or too
+    /// far from every column.
+    pub fn column_for(&self, held: &[bool], node: u32) -> Option<(usize, bool)> {
         let column = self.nearest_column[node as usize];
-        (column != NO_COLUMN && self.contact_nodes[column as usize] == node).then_some(column)
+        if held[node as usize] || column == NO_COLUMN {
+            return None;
+        }
+        Some((column as usize, self.contact_nodes[column as usize] == node))
     }
 
     /// `q += U^T u` of a field `[K,3]`: its coordinates in the orthonormal block bases.
@@ -336,5 +340,43 @@ mod tests {
             solve(&[1, 2], &[6.0, 0.0, 0.0, 9.0, 9.0, 9.0]),
             (false, vec![3.0, 0.0, 0.0])
         );
+    }
+
+    #[cfg(feature = "forces")]
+    #[test]
+    fn borrowers_share_a_columns_force_and_its_own_node_goes_before_them() {
+        let mut table = table();
+        let mut response = ContactResponse::new(&table);
+        let held = [true, false, false, false];
+        let mut reaction = |table: &PriorTable, nodes: &[u32], vectors: &[f32], places: &[u32]| {
+            response
+                .solve(Isa::Scalar, table, &held, nodes, vectors)
+                .unwrap();
+            let mut out = vec![f32::NAN; 3 * nodes.len()];
+            response.reaction(table, &held, nodes, places, &mut out);
+            out
+        };
+        // The mean of both is imposed on column 1, in the host's order; its compliance is 2 mm/mN.
+        let two = [4.0, 0.0, 0.0, 0.0, 0.0, 8.0];
+        assert_eq!(
+            reaction(&table, &[2, 3], &two, &[1, 0]),
+            [-0.5, 0.0, -1.0, -0.5, 0.0, -1.0]
+        );
+        // Node 0 is held.
+        assert_eq!(
+            reaction(&table, &[0, 1], &two, &[0, 1]),
+            [0.0, 0.0, 0.0, 0.0, 0.0, -4.0]
+        );
+        let both = [0.0, 6.0, 0.0, 9.0, 9.0, 9.0];
+        assert_eq!(
+            reaction(&table, &[1, 2], &both, &[0, 1]),
+            [0.0, -3.0, 0.0, 0.0, 0.0, 0.0]
+        );
+        table.nearest_column[2] = NO_COLUMN;
+        assert_eq!(
+            reaction(&table, &[2, 3], &two, &[0, 1]),
+            [0.0, 0.0, 0.0, 0.0, 0.0, -4.0]
+        );
+        assert_eq!(reaction(&table, &[], &[], &[]), [0.0; 0]);
     }
 }

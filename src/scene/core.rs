@@ -155,6 +155,7 @@ impl Core {
             download_ms: 0.0,
             max_displacement_mm: self.max_displacement,
             indicator: 0.0,
+            prior_forces: self.engine.responds(),
             sleeping: self.sleeping,
             poisoned: false,
         }

@@ -13,6 +13,8 @@ use crate::kernels::rows::decode_rows;
 use crate::kernels::{Isa, Pool};
 use crate::model::{KindModel, Model, UptTables};
 use crate::options::{DecoderKernel, Precision, Provider, StepPath};
+#[cfg(feature = "forces")]
+use crate::prior::ContactResponse;
 use crate::prior::PriorTable;
 use crate::stats::SceneStats;
 
@@ -66,6 +68,23 @@ impl Engine {
                 model.prior.as_ref()
             }
             _ => None,
+        }
+    }
+
+    /// Whether the scene has a linear response.
+    pub fn responds(&self) -> bool {
+        match self {
+            Engine::Reduced(_) => true,
+            Engine::Upt(engine, _) => engine.response.is_some(),
+        }
+    }
+
+    /// Its contact solve.
+    #[cfg(feature = "forces")]
+    pub fn contact_response(&mut self) -> Option<&mut ContactResponse> {
+        match self {
+            Engine::Reduced(engine) => Some(&mut engine.response),
+            Engine::Upt(engine, _) => engine.response.as_mut(),
         }
     }
 

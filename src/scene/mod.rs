@@ -10,6 +10,8 @@ mod features;
 mod plan;
 mod points;
 mod published;
+#[cfg(feature = "forces")]
+mod reaction;
 mod reduced;
 mod region;
 mod shared;

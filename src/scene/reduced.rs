@@ -67,7 +67,8 @@ impl ReducedRecord {
 
 /// Buffers and session of a scene of kind `reduced`.
 pub struct ReducedEngine {
-    response: ContactResponse,
+    /// The contact solve.
+    pub response: ContactResponse,
     stage: Stage,
     precision: Precision,
     mode_rows: Vec<u32>,

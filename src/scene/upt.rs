@@ -62,7 +62,8 @@ pub struct Choice {
 
 /// Buffers and sessions of a scene of kind `upt`.
 pub struct UptEngine {
-    response: Option<ContactResponse>,
+    /// The contact solve; none where the bundle does not use its prior.
+    pub response: Option<ContactResponse>,
     path: Path,
     tokens: DecoderTokens,
     decoder_scratch: DecoderScratch,

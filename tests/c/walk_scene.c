@@ -135,6 +135,7 @@ void walk_state(void) {
   EXPECT_TRUE(stats.step_count == 3 && stats.contact_count == 4);
   EXPECT_TRUE(stats.step_ms > 0.0 && stats.max_displacement_mm > 1.0F);
   EXPECT_TRUE(stats.poisoned == 0 && stats.sleeping == 0);
+  EXPECT_TRUE(stats.prior_forces == (info.kind == UPT_KIND_REDUCED));
 
   EXPECT(upt_scene_save(NULL, NULL, 0, &needed), UPT_ERR_NULL);
   EXPECT(upt_scene_save(scene, NULL, 0, NULL), UPT_ERR_NULL);

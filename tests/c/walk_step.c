@@ -10,7 +10,9 @@ void walk_scene_create(const char *reduced_bundle) {
   upt_scene *scene = NULL;
   upt_model *reduced = NULL;
   upt_scene_options options;
+  upt_scene_stats stats;
   memset(&options, 0, sizeof options);
+  memset(&stats, 0, sizeof stats);
   EXPECT(upt_scene_create(NULL, NULL, &scene), UPT_ERR_NULL);
   EXPECT(upt_scene_create(model, NULL, NULL), UPT_ERR_NULL);
   EXPECT(upt_scene_create(model, &options, &scene), UPT_ERR_STRUCT_SIZE);
@@ -32,6 +34,13 @@ void walk_scene_create(const char *reduced_bundle) {
   /* A reduced bundle's tables belong to its own mesh. */
   EXPECT(upt_model_open(reduced_bundle, NULL, &reduced), UPT_OK);
   EXPECT(upt_scene_create(reduced, &options, &scene), UPT_ERR_UNSUPPORTED);
+  /* Its contact forces are the linear response's. */
+  EXPECT(upt_scene_create(reduced, NULL, &scene), UPT_OK);
+  stats.struct_size = sizeof stats;
+  EXPECT(upt_scene_get_stats(scene, &stats), UPT_OK);
+  EXPECT_TRUE(stats.prior_forces == 1);
+  EXPECT(upt_scene_destroy(scene), UPT_OK);
+  scene = NULL;
   EXPECT(upt_model_close(reduced), UPT_OK);
   options.mesh_path = NULL;
   EXPECT_TRUE(scene == NULL);

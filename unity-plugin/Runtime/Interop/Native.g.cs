@@ -187,8 +187,10 @@ namespace Upt.Interop
         public byte sleeping;
         /// <summary>1: a bug was caught in an earlier call; only destroy is left.</summary>
         public byte poisoned;
+        /// <summary>1: `upt_scene_contact_force` gives the contact forces of the linear response; 0: the elements' elastic forces.</summary>
+        public byte prior_forces;
         /// <summary>Zero.</summary>
-        public fixed byte reserved[6];
+        public fixed byte reserved[5];
         /// <summary>Of the stages' times, copies to a device, ms; 0 on the CPU.</summary>
         public double upload_ms;
         /// <summary>Of the stages' times, copies back from a device, ms; 0 on the CPU.</summary>
@@ -614,10 +616,12 @@ namespace Upt.Interop
         /// <summary>
         /// Copies the reaction of the tissue at the last step's contact nodes, in their order.
         ///
-        /// The elastic force of the elements around each node at the last state; inertia and damping are left out.
+        /// With a bundle that uses a linear response (`prior_forces` of the statistics is 1) the contact forces of that response,
+        /// `-A_CC^-1 c`: nodes that borrow a column of the compliance share its force, held nodes and nodes far from the domain get
+        /// zero. With others the elastic force of the elements around each node at the last state. Both leave out inertia and damping.
         /// out: `[m,3]`, mN, the force on the instrument. out_count: floats in out, 3 m.
         /// Threads: one at a time. Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "forces", `UPT_ERR_NULL`,
-        /// `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_STATE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_PANIC`.
+        /// `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`, `UPT_ERR_PANIC`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_scene_contact_force(IntPtr scene, float* @out, ulong out_count);

@@ -32,9 +32,9 @@ pub struct Moment {
     /// The guard refused the step.
     pub refused: bool,
     pub touching: bool,
-    /// Reaction at the contact nodes, and its sum over them; in contact only.
-    pub force: Option<Share>,
-    pub resultant: Option<Share>,
+    /// Reaction at the contact nodes as the scene gives it, and from the elements at the predicted state; in contact only.
+    pub force: Option<ForceError>,
+    pub element_force: Option<ForceError>,
     pub points: PointErrors,
 }
 
@@ -46,6 +46,37 @@ pub type Series = (&'static str, fn(&Moment) -> f64);
 pub struct Share {
     pub wrong: f64,
     pub all: f64,
+}
+
+/// Error of the forces on the contact nodes, and of their sum.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct ForceError {
+    pub nodal: Share,
+    pub sum: Share,
+}
+
+impl ForceError {
+    /// Over the contact nodes that are free. `[m,3]` mN each.
+    fn new(found: &[[f32; 3]], truth: &[[f32; 3]], is_free: impl Fn(usize) -> bool) -> Self {
+        let mut nodal = Share::default();
+        let (mut sum, mut true_sum) = ([0.0; 3], [0.0; 3]);
+        for entry in (0..truth.len()).filter(|&entry| is_free(entry)) {
+            let (got, want) = (found[entry].map(f64::from), truth[entry].map(f64::from));
+            nodal.wrong += apart(got, want);
+            nodal.all += square(want);
+            for k in 0..3 {
+                sum[k] += got[k];
+                true_sum[k] += want[k];
+            }
+        }
+        Self {
+            nodal,
+            sum: Share {
+                wrong: apart(sum, true_sum),
+                all: square(true_sum),
+            },
+        }
+    }
 }
 
 /// At points in the middle of surface edges, mm² and mm: decoded at the point against the mean of the edge's nodes.
@@ -151,30 +182,33 @@ impl Observer {
         );
         self.forces
             .reaction(&self.found, &self.free, &mut self.internal)?;
-        let (mut residual, mut reaction, mut nodal) = (0.0, 0.0, Share::default());
-        let (mut sum, mut true_sum) = ([0.0; 3], [0.0; 3]);
+        let (mut residual, mut reaction) = (0.0, 0.0);
+        let mut of_elements = vec![[0.0; 3]; nodes.len()];
         for (node, force) in self.free.iter().zip(self.internal.as_chunks::<3>().0) {
             let size = square(force.map(f64::from));
-            let Ok(entry) = nodes.binary_search(node) else {
+            if let Ok(entry) = nodes.binary_search(node) {
+                reaction += size;
+                of_elements[entry] = *force;
+            } else {
                 residual += size;
-                continue;
-            };
-            reaction += size;
-            let (got, want) = (force.map(f64::from), truth.reaction[entry].map(f64::from));
-            nodal.wrong += apart(got, want);
-            nodal.all += square(want);
-            for k in 0..3 {
-                sum[k] += got[k];
-                true_sum[k] += want[k];
             }
         }
+        // A refused step leaves the scene with an earlier contact.
+        let compared = !nodes.is_empty() && !refused && stats.contact_count == nodes.len() as u64;
+        let mut of_scene = vec![[0.0; 3]; nodes.len()];
+        if compared {
+            self.scene.contact_force(of_scene.as_flattened_mut())?;
+        }
+        let is_free = |entry: usize| self.free.binary_search(&nodes[entry]).is_ok();
+        let error =
+            |found: &[[f32; 3]]| compared.then(|| ForceError::new(found, truth.reaction, is_free));
+        let (force, element_force) = (error(&of_scene), error(&of_elements));
         let others = (self.free.len() - nodes.len().min(self.free.len())).max(1);
         let found = self.found.as_chunks::<3>().0;
         let largest = |field: &[[f32; 3]]| {
             let squares = field.iter().map(|u| square(u.map(f64::from)));
             squares.fold(0.0, f64::max).sqrt()
         };
-        let compared = !nodes.is_empty() && !refused;
         let mse = tissue::metrics::mse_mm2(truth.displacement, found);
         let largest_error = tissue::metrics::max_error_mm(truth.displacement, found);
         let (size, true_size) = (largest(found), largest(truth.displacement));
@@ -190,11 +224,8 @@ impl Observer {
             flags: stats.flags & !(flag::CLAMPED | flag::REGULARISED),
             refused,
             touching: !nodes.is_empty(),
-            force: compared.then_some(nodal),
-            resultant: compared.then_some(Share {
-                wrong: apart(sum, true_sum),
-                all: square(true_sum),
-            }),
+            force,
+            element_force,
             points: self.points(truth.displacement)?,
         })
     }

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::observer::{Moment, Series, Share};
+use super::observer::{ForceError, Moment, Series, Share};
 use super::rank::spearman;
 use super::replay::Group;
 use super::{CASE, HELD, Release};
@@ -25,24 +25,30 @@ fn percent(shares: impl Iterator<Item = Share>) -> f64 {
     100.0 * (sum.wrong / sum.all.max(f64::MIN_POSITIVE)).sqrt()
 }
 
-fn forces(moments: &[Moment]) -> [f64; 2] {
-    [
-        percent(moments.iter().filter_map(|m| m.force)),
-        percent(moments.iter().filter_map(|m| m.resultant)),
-    ]
+/// Errors of the nodal forces and of their sum, by the scene and by the elements.
+const FORCES: &str = "force: nodes, sum | by elements: nodes, sum";
+
+/// The two cells under [`FORCES`].
+fn forces(moments: &[Moment]) -> String {
+    let cell = |error: fn(&Moment) -> Option<ForceError>| {
+        let errors = || moments.iter().filter_map(error);
+        let nodal = percent(errors().map(|e| e.nodal));
+        let sum = percent(errors().map(|e| e.sum));
+        format!("{nodal:.0}, {sum:.0} %")
+    };
+    format!("{} | {}", cell(|m| m.force), cell(|m| m.element_force))
 }
 
 /// A row a scheme; true when the later half of the cases is no worse than 1.5 times the first.
 pub fn schemes(text: &mut String, moments: &[Moment]) -> bool {
     let _ = writeln!(
         text,
-        "| steps | scheme | MSE, mm² | largest error, mm | largest \\|u\\| of the solver, mm | of the bundle, mm | error of the nodal forces | of their sum |\n|---|---|---|---|---|---|---|---|"
+        "| steps | scheme | MSE, mm² | largest error, mm | largest \\|u\\| of the solver, mm | of the bundle, mm | {FORCES} |\n|---|---|---|---|---|---|---|---|"
     );
     for (case, block) in moments.chunks(CASE).enumerate() {
-        let [nodal, sum] = forces(block);
         let _ = writeln!(
             text,
-            "| {} to {} | {} | {:.4} | {:.2} | {:.2} | {:.2} | {nodal:.0} % | {sum:.0} % |",
+            "| {} to {} | {} | {:.4} | {:.2} | {:.2} | {:.2} | {} |",
             case * CASE + 1,
             case * CASE + block.len(),
             case % 5 + 1,
@@ -50,6 +56,7 @@ pub fn schemes(text: &mut String, moments: &[Moment]) -> bool {
             most(block, |m| m.largest_error),
             most(block, |m| m.true_size),
             most(block, |m| m.size),
+            forces(block),
         );
     }
     let half = moments.len() / CASE / 2 * CASE;
@@ -84,14 +91,13 @@ pub fn release(text: &mut String, release: &Release) {
 pub fn cases(text: &mut String, inside: &[Group], outside: &[Group]) {
     let _ = writeln!(
         text,
-        "| held-out cases | steps | MSE, mm² | largest error, mm | steps with a flag | refused | error of the nodal forces | of their sum |\n|---|---|---|---|---|---|---|---|"
+        "| held-out cases | steps | MSE, mm² | largest error, mm | steps with a flag | refused | {FORCES} |\n|---|---|---|---|---|---|---|---|"
     );
     for group in inside.iter().chain(outside) {
         let moments = &group.moments;
-        let [nodal, sum] = forces(moments);
         let _ = writeln!(
             text,
-            "| {} of scheme {} | {} | {:.4} | {:.2} | {} | {} | {nodal:.0} % | {sum:.0} % |",
+            "| {} of scheme {} | {} | {:.4} | {:.2} | {} | {} | {} |",
             group.cases,
             group.scheme,
             moments.len(),
@@ -99,6 +105,7 @@ pub fn cases(text: &mut String, inside: &[Group], outside: &[Group]) {
             most(moments, |m| m.largest_error),
             moments.iter().filter(|m| m.flags != 0).count(),
             moments.iter().filter(|m| m.refused).count(),
+            forces(moments),
         );
     }
     text.push('\n');

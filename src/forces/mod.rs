@@ -1,0 +1,198 @@
+//! Reaction at the contact nodes from a displacement field, for haptics of a scene without a prior.
+//!
+//! The tissue pushes an instrument that holds node `a` with `-sum f_a` over the elements around it, `f_a` the derivative of
+//! their strain energy ([`element`]); inertia and damping of the node itself are left out. Forces are mN, lengths mm,
+//! moduli Pa (1 Pa mm² = 1e-3 mN); all arithmetic in f64.
+
+mod element;
+#[cfg(test)]
+mod tests;
+
+use crate::error::{Error, Result};
+use element::Element;
+
+pub use element::Moduli;
+
+/// What is known of the elements around the nodes that can be in contact; made once a mesh.
+#[derive(Debug)]
+pub struct ReactionForces {
+    moduli: Moduli,
+    elements: Vec<Element>,
+    /// Rows of `around`, one a mesh node (empty for nodes that cannot be in contact).
+    offsets: Vec<u32>,
+    around: Vec<u32>,
+    /// Entry in the asked list plus one, for a node that is asked for; 0 otherwise.
+    entry_of_node: Vec<u32>,
+    /// Last call that visited the element.
+    visited: Vec<u32>,
+    call: u32,
+}
+
+/// How the forces came out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ForceReport {
+    /// Elements that were used.
+    pub elements: usize,
+    /// Of these, inverted ones (`det F <= 0`): forces near them mean little.
+    pub inverted: usize,
+}
+
+impl ReactionForces {
+    /// Adjacency and gradients of the elements that touch `nodes` (the surface's, say).
+    ///
+    /// `positions [K,3]` mm, `tets [T,4]` of positive volume, `stiffness [T]` their Young's moduli over the
+    /// material's or empty for a uniform body, `nodes` below `K`.
+    pub fn new(
+        positions: &[f32],
+        tets: &[u32],
+        stiffness: &[f32],
+        nodes: &[u32],
+        moduli: Moduli,
+    ) -> Self {
+        let node_count = positions.len() / 3;
+        let mut wanted = vec![false; node_count];
+        nodes.iter().for_each(|&node| wanted[node as usize] = true);
+        let elements: Vec<Element> = tets
+            .chunks_exact(4)
+            .enumerate()
+            .filter(|(_, tet)| tet.iter().any(|&node| wanted[node as usize]))
+            .map(|(index, tet)| {
+                let mut element = Element::new(positions, [tet[0], tet[1], tet[2], tet[3]]);
+                element.volume *= stiffness
+                    .get(index)
+                    .map_or(1.0, |&factor| f64::from(factor));
+                element
+            })
+            .collect();
+        let mut offsets = vec![0u32; node_count + 1];
+        let touches = || {
+            elements.iter().enumerate().flat_map(|(e, element)| {
+                let nodes = element.corners.into_iter().map(|node| node as usize);
+                nodes.filter(|&n| wanted[n]).map(move |n| (e as u32, n))
+            })
+        };
+        touches().for_each(|(_, node)| offsets[node + 1] += 1);
+        for node in 0..node_count {
+            offsets[node + 1] += offsets[node];
+        }
+        let mut around = vec![0; offsets[node_count] as usize];
+        let mut next = offsets.clone();
+        for (element, node) in touches() {
+            around[next[node] as usize] = element;
+            next[node] += 1;
+        }
+        Self {
+            moduli,
+            visited: vec![0; elements.len()],
+            elements,
+            offsets,
+            around,
+            entry_of_node: vec![0; node_count],
+            call: 0,
+        }
+    }
+
+    /// Appends the nodes of the elements around `nodes` (whose displacement [`Self::reaction`] reads) to
+    /// `out`, ascending, each once. A node that is out of range is skipped.
+    pub fn neighbourhood(&self, nodes: &[u32], out: &mut Vec<u32>) {
+        for &node in nodes {
+            if let Some(row) = self.offsets.get(node as usize..node as usize + 2) {
+                let around = &self.around[row[0] as usize..row[1] as usize];
+                out.extend(
+                    around
+                        .iter()
+                        .flat_map(|&e| self.elements[e as usize].corners),
+                );
+            }
+        }
+        out.sort_unstable();
+        out.dedup();
+    }
+
+    /// Force of the tissue on the instrument at each of `nodes`, mN, to `out [m,3]`.
+    ///
+    /// `displacement [K,3]` mm. Elements are summed in a fixed order. No allocation.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for a wrong length, a node out of range or twice in the list;
+    /// [`Error::NonFinite`] for a displacement that is not finite at an element used; `out` is then unspecified.
+    pub fn reaction(
+        &mut self,
+        displacement: &[f32],
+        nodes: &[u32],
+        out: &mut [f32],
+    ) -> Result<ForceReport> {
+        let node_count = self.entry_of_node.len();
+        if displacement.len() != 3 * node_count || out.len() != 3 * nodes.len() {
+            return Err(Error::Argument(format!(
+                "reaction: displacement has {} numbers and out {}; they must have {} and {}",
+                displacement.len(),
+                out.len(),
+                3 * node_count,
+                3 * nodes.len()
+            )));
+        }
+        let mut listed = 0;
+        let mut result = Ok(());
+        for (entry, &node) in nodes.iter().enumerate() {
+            match self.entry_of_node.get_mut(node as usize) {
+                Some(slot) if *slot == 0 => *slot = entry as u32 + 1,
+                found => {
+                    let cause = if found.is_some() {
+                        "twice"
+                    } else {
+                        "not a node"
+                    };
+                    result = Err(Error::Argument(format!("reaction: node {node} is {cause}")));
+                    break;
+                }
+            }
+            listed += 1;
+        }
+        let report = result.and_then(|()| self.sum(displacement, nodes, out));
+        for &node in &nodes[..listed] {
+            self.entry_of_node[node as usize] = 0;
+        }
+        report
+    }
+
+    fn sum(&mut self, displacement: &[f32], nodes: &[u32], out: &mut [f32]) -> Result<ForceReport> {
+        if self.call == u32::MAX {
+            self.visited.fill(0);
+            self.call = 0;
+        }
+        self.call += 1;
+        out.fill(0.0);
+        let mut report = ForceReport {
+            elements: 0,
+            inverted: 0,
+        };
+        for &node in nodes {
+            let row =
+                self.offsets[node as usize] as usize..self.offsets[node as usize + 1] as usize;
+            for &e in &self.around[row] {
+                if std::mem::replace(&mut self.visited[e as usize], self.call) == self.call {
+                    continue;
+                }
+                let element = &self.elements[e as usize];
+                let (forces, det) = element.forces(displacement, self.moduli);
+                if !det.is_finite() {
+                    return Err(Error::NonFinite(format!(
+                        "reaction: displacement around node {node} is not finite"
+                    )));
+                }
+                report.elements += 1;
+                report.inverted += usize::from(det <= 0.0);
+                for (corner, force) in element.corners.iter().zip(forces) {
+                    let entry = self.entry_of_node[*corner as usize] as usize;
+                    if entry > 0 {
+                        for axis in 0..3 {
+                            out[3 * (entry - 1) + axis] -= (1e-3 * force[axis]) as f32;
+                        }
+                    }
+                }
+            }
+        }
+        Ok(report)
+    }
+}

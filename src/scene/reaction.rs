@@ -1,0 +1,125 @@
+//! The reaction at the contact nodes of the last state, for haptics.
+//!
+//! Where the scene has a linear response, the reaction is that of its contact solve, `-f`, `f = A_CC^-1 c` of the last
+//! published contact ([`ContactResponse::reaction`]): a smooth function of what the instruments impose. A predicted state is
+//! no such function: at a Poisson ratio of 0.49 its small errors of volume are large pressures. Without a prior the reaction
+//! is the elastic force of the elements around the contact nodes at that state all the same ([`crate::forces`]).
+//!
+//! [`ContactResponse::reaction`]: crate::prior::ContactResponse::reaction
+
+use std::sync::RwLock;
+
+use super::Scene;
+use super::core::{Core, lock_read};
+use super::published::Published;
+use super::tools::lock;
+use crate::bundle::Mesh;
+use crate::error::{Error, Result};
+use crate::forces::{Moduli, ReactionForces};
+use crate::kernels::FlushToZero;
+use crate::model::Model;
+
+/// The elements' forces of a scene without a prior.
+pub struct Haptics {
+    forces: ReactionForces,
+    /// Nodes around the contact nodes, and the field they are decoded into.
+    around: Vec<u32>,
+    decoded: Vec<f32>,
+    field: Vec<f32>,
+}
+
+impl Scene {
+    /// Force of the tissue on the instruments at the last step's contact nodes, in their order: `out [m,3]`, mN.
+    ///
+    /// [`SceneStats::prior_forces`] says which: the contact forces of the linear response (zero at a node that is held or
+    /// far from the domain), or the elastic force of the elements around the node; nodes around it that the region left out
+    /// are then decoded. No allocation after the first call of a contact's size. After a refused step the last good one counts.
+    ///
+    /// [`SceneStats::prior_forces`]: crate::SceneStats::prior_forces
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for a wrong length, [`Error::Busy`].
+    pub fn contact_force(&self, out: &mut [f32]) -> Result<()> {
+        self.with(|core, published| {
+            let want = 3 * core.contact.len();
+            if out.len() != want {
+                return Err(Error::Argument(format!(
+                    "out has {} floats, must have {want}: 3 for each contact node of the last step",
+                    out.len()
+                )));
+            }
+            if core.prior_reaction(out)? {
+                return Ok(());
+            }
+            let mut haptics = lock(&self.tools.forces)?;
+            let haptics = haptics.get_or_insert_with(|| Haptics::new(&self.mesh, &self.model));
+            haptics.reaction(core, published, out)
+        })
+    }
+}
+
+impl Core {
+    /// The reaction of the linear response to the last published contact; false where the scene has none.
+    fn prior_reaction(&mut self, out: &mut [f32]) -> Result<bool> {
+        let (Some(response), Some(table)) = (self.engine.contact_response(), &self.model.prior)
+        else {
+            return Ok(false);
+        };
+        let _flush = FlushToZero::enter();
+        let contact = &self.contact;
+        // The last solve may be of a contact that the guard refused, or, after a restore, of another time. The factor is
+        // kept where the nodes are the same.
+        response.solve(
+            self.isa,
+            table,
+            &self.held,
+            &contact.nodes,
+            &contact.vectors,
+        )?;
+        response.reaction(table, &self.held, &contact.nodes, &contact.order, out);
+        Ok(true)
+    }
+}
+
+impl Haptics {
+    fn new(mesh: &Mesh, model: &Model) -> Haptics {
+        let material = &model.manifest.material;
+        Haptics {
+            forces: ReactionForces::new(
+                &mesh.positions,
+                &mesh.tets,
+                &mesh.stiffness,
+                &mesh.surface_nodes,
+                Moduli::from_young(material.young_pa, material.poisson),
+            ),
+            around: Vec::new(),
+            decoded: Vec::new(),
+            field: vec![0.0; mesh.positions.len()],
+        }
+    }
+
+    fn reaction(
+        &mut self,
+        core: &mut Core,
+        published: &RwLock<Published>,
+        out: &mut [f32],
+    ) -> Result<()> {
+        let shared = lock_read(published);
+        if shared.region.is_none() {
+            let (field, nodes) = (&shared.last.field, &shared.contact_nodes);
+            return self.forces.reaction(field, nodes, out).map(|_| ());
+        }
+        let nodes = shared.contact_nodes.clone();
+        drop(shared);
+        self.around.clear();
+        self.forces.neighbourhood(&nodes, &mut self.around);
+        self.decoded.resize(3 * self.around.len(), 0.0);
+        if !self.around.is_empty() {
+            core.decode(published, &self.around, &mut self.decoded)?;
+        }
+        for (&node, u) in self.around.iter().zip(self.decoded.chunks_exact(3)) {
+            self.field[3 * node as usize..][..3].copy_from_slice(u);
+        }
+        self.forces.reaction(&self.field, &nodes, out).map(|_| ())
+    }
+}
