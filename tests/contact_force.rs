@@ -5,7 +5,7 @@ mod fixture;
 use fixture::{BUNDLES, bits, model, path, plain, push, scene, sparse};
 use safetensors::SafeTensors;
 use upt::forces::{Moduli, ReactionForces};
-use upt::{Error, GuardPolicy, IndexSet, Model, Scene, SceneOptions};
+use upt::{Error, GuardPolicy, IndexSet, Model, Scene, SceneOptions, StepInput, flag};
 
 const WITH_PRIOR: [&str; 2] = ["tiny-reduced", "tiny-upt-prior"];
 
@@ -173,6 +173,42 @@ fn borrowers_share_and_nodes_that_the_response_leaves_out_get_nothing() {
             .map(|f| -f)
             .collect();
         assert_close(&got[3..], &want);
+    }
+}
+
+#[test]
+fn a_contact_of_more_nodes_than_columns_and_a_displacement_of_the_host() {
+    for name in WITH_PRIOR {
+        let model = model(name);
+        let table = Compliance::read(name);
+        let scene = scene(&model, &plain());
+        let nodes = model.indices(IndexSet::SurfaceNodes).to_vec();
+        assert!(nodes.len() > table.columns.len());
+        let vectors: Vec<f32> = (nodes.iter())
+            .flat_map(|&n| [0.1, 0.0, -0.5 - 0.01 * model.mesh.position(n)[0]])
+            .collect();
+        touch(&scene, &nodes, &vectors).unwrap();
+        assert_eq!(scene.stats().flags & flag::REGULARISED, 0);
+        let own = |i: usize| nodes.binary_search(&table.columns[i]).unwrap();
+        let columns: Vec<usize> = (0..table.columns.len()).collect();
+        let c: Vec<f32> = (columns.iter())
+            .flat_map(|&i| [0, 1, 2].map(|k| vectors[3 * own(i) + k]))
+            .collect();
+        let mut want = vec![0.0; vectors.len()];
+        for (&i, f) in columns.iter().zip(table.forces(&columns, &c).chunks(3)) {
+            (0..3).for_each(|k| want[3 * own(i) + k] = -f[k]);
+        }
+        let got = force(&scene, nodes.len());
+        assert_close(&got, &want);
+        // The contact decides, not the state that it is pressed into.
+        let given = vec![0.25; 3 * scene.node_count()];
+        let contact = (nodes, vectors);
+        let input = StepInput {
+            displacement: Some(&given),
+            ..sparse(&contact)
+        };
+        scene.step(input, None).unwrap();
+        assert_eq!(bits(&force(&scene, contact.0.len())), bits(&got));
     }
 }
 
