@@ -83,8 +83,7 @@ void Tissue::advance(double now, const Contacts &contacts) {
     if (scene_.poll() == UPT_PENDING) {
       return; // the frame does not wait
     }
-    in_flight_ = false;
-    step_ms_.push_back(stats().step_ms);
+    count_step();
   }
   if (now - last_start_ + 1e-9 >= info_.dt) {
     scene_.submit(contacts.nodes, contacts.vectors);
@@ -96,14 +95,24 @@ void Tissue::advance(double now, const Contacts &contacts) {
 void Tissue::finish() {
   if (in_flight_) {
     scene_.wait(60000);
-    in_flight_ = false;
-    step_ms_.push_back(stats().step_ms);
+    count_step();
   }
 }
 
+void Tissue::count_step() {
+  const auto last = stats();
+  in_flight_ = false;
+  counted_steps_ = last.step_count;
+  step_ms_.push_back(last.step_ms);
+}
+
 void Tissue::sample(double now) {
-  if (stats().step_count > 0) {
-    const double alpha = in_flight_ ? 1.0 : (now - last_start_) / info_.dt;
+  const auto steps = stats().step_count;
+  if (steps > 0) {
+    // While the step runs the last state stays; once it has published, it is approached from the one before,
+    // even if poll() has not told yet.
+    const bool running = in_flight_ && steps == counted_steps_;
+    const double alpha = running ? 1.0 : (now - last_start_) / info_.dt;
     scene_.sample(std::clamp(alpha, 0.0, 1.0), displacement_);
   }
   fill(displacement_);

@@ -74,5 +74,6 @@ private:
   Vec3 centre_;
   float radius_ = 0, max_displacement_ = 0;
   bool in_flight_ = false;
+  std::uint64_t counted_steps_ = 0;
   double last_start_ = -1e9;
 };
