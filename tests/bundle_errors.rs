@@ -118,6 +118,12 @@ fn manifest_errors_name_the_field() {
             "prior.vibration",
         ),
         (
+            "tiny-upt-prior",
+            "/upt/anchors",
+            "none.safetensors".into(),
+            "upt.anchors",
+        ),
+        (
             "tiny-reduced",
             "/prior/vibration",
             "latent.onnx".into(),
@@ -221,6 +227,7 @@ fn graphs_and_tensors_that_do_not_fit_are_refused() {
         ("tiny-upt", "weights.safetensors"),
         ("tiny-upt", "mesh.safetensors"),
         ("tiny-upt-prior", "vibration.safetensors"),
+        ("tiny-upt-prior", "anchors.safetensors"),
     ] {
         let error = with_file(bundle, file, |bytes| {
             let at = bytes.len() - 4;
@@ -229,4 +236,15 @@ fn graphs_and_tensors_that_do_not_fit_are_refused() {
         .unwrap_err();
         assert_eq!(error.status(), -31, "{file}: {error}");
     }
+    // `weights [K,n]` is the file's first tensor: those of node 0 no longer add up to one.
+    let error = with_file("tiny-upt-prior", "anchors.safetensors", |bytes| {
+        let header = u64::from_le_bytes(bytes[..8].try_into().unwrap()) as usize;
+        bytes[8 + header..][..4].copy_from_slice(&7.0f32.to_le_bytes());
+    })
+    .unwrap_err();
+    let text = error.to_string();
+    assert!(
+        text.contains("anchors.safetensors") && text.contains("node 0"),
+        "{text}"
+    );
 }

@@ -70,6 +70,9 @@ impl Manifest {
                     self.listed(file, "files")?;
                 }
                 self.listed(&upt.weights, "upt.weights")?;
+                if let Some(anchors) = &upt.anchors {
+                    self.listed(anchors, "upt.anchors")?;
+                }
                 check(
                     !upt.needs_prior() || self.prior.is_some(),
                     "prior",

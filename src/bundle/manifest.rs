@@ -182,6 +182,8 @@ pub struct UptEntry {
     pub dims: Dims,
     /// File of the native kernels' weights.
     pub weights: String,
+    /// File with the nodes that are decoded, from which the others are interpolated; every node without it.
+    pub anchors: Option<String>,
 }
 
 impl UptEntry {

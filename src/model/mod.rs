@@ -1,5 +1,6 @@
 //! [`Model`]: a bundle made ready to step. Immutable, shared by scenes, safe from any thread.
 
+mod anchors;
 mod reduced;
 mod upt;
 mod upt_stages;
@@ -8,6 +9,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
+pub use anchors::Anchors;
 pub use reduced::ReducedModel;
 pub use upt::{UptModel, UptTables};
 pub use upt_stages::DECODER_TILE;

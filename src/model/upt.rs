@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::anchors::Anchors;
 use crate::bundle::{BundleFiles, Mesh, TensorFile, UptEntry};
 use crate::error::{Error, Result};
 use crate::graph::SupernodeGraph;
@@ -32,6 +33,8 @@ pub struct UptTables {
     pub target_table: Vec<f32>,
     /// `[K,2h]`.
     pub query_table: Vec<f32>,
+    /// Where the bundle has them, and only for its own mesh.
+    pub anchors: Option<Anchors>,
 }
 
 impl UptTables {
@@ -47,6 +50,7 @@ impl UptTables {
             + self.source_table.len()
             + self.target_table.len()
             + self.query_table.len())
+            + self.anchors.as_ref().map_or(0, Anchors::memory_bytes)
     }
 }
 
@@ -100,7 +104,11 @@ impl UptModel {
         let embed = files.read("embed.onnx")?;
         let source_weight = transpose_weight(&matrix("encoder.source")?, d, f);
         let target_weight = transpose_weight(&matrix("encoder.target")?, d, f);
-        let tables = Arc::new(make_tables(&entry, &embed, mesh, runtime, threads)?);
+        let mut tables = make_tables(&entry, &embed, mesh, runtime, threads)?;
+        if let Some(file) = &entry.anchors {
+            tables.anchors = Some(Anchors::parse(&files.tensors(file)?, mesh.node_count())?);
+        }
+        let tables = Arc::new(tables);
         let model = UptModel {
             source_weight,
             target_weight,
@@ -222,6 +230,7 @@ fn make_tables(
         row_of_node: row,
         encode_nodes,
         graph,
+        anchors: None,
     })
 }
 

@@ -2,6 +2,7 @@
 //! [`Error::Busy`]. Reading the published states (`read`, `sample`, their points, `stats`) is allowed from any thread
 //! at any time, also while a submitted step is in flight, and never waits for a step.
 
+mod anchors;
 mod contact;
 mod core;
 mod decoders;
@@ -21,6 +22,7 @@ mod timing;
 mod tools;
 mod upt;
 mod upt_prior;
+mod upt_record;
 mod verdict;
 mod worker;
 
@@ -198,8 +200,8 @@ impl Scene {
         self.with(|core, published| core.decode(published, nodes, out))
     }
 
-    /// Attaches points `[n,3]` in rest mm; `None` detaches. A `upt` bundle decodes them, unless the scene was made with
-    /// `interpolate_points`; a `reduced` bundle's modes are interpolated.
+    /// Attaches points `[n,3]` in rest mm; `None` detaches. A `upt` bundle decodes them, unless it decodes at anchors or the
+    /// scene was made with `interpolate_points`; a `reduced` bundle's modes are interpolated.
     pub fn attach_points(&self, points: Option<&[f32]>) -> Result<()> {
         self.with(|core, published| {
             let mut points = match points {
@@ -208,6 +210,7 @@ impl Scene {
             };
             if let KindModel::Upt(kind) = &core.model.kind
                 && !core.options.interpolate_points
+                && kind.tables.anchors.is_none()
                 && points.len() > 0
             {
                 let threads = core.pool.threads();

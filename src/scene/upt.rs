@@ -1,6 +1,7 @@
 //! The step of kind `upt`: features -> low-rank encoder and message mean (native) -> `latent.onnx` -> decoder, or
 //! `step.onnx` for all of it.
 
+use super::anchors::AnchorField;
 use super::contact::ContactSet;
 use super::decoders::{Decoders, decode_resident, decode_tiles, take_rows};
 use super::engine::Which;
@@ -9,6 +10,7 @@ use super::plan::NodePlan;
 use super::reduced::solve_flags;
 use super::timing::Stopwatch;
 use super::upt_prior::{decode_prior, respond};
+use super::upt_record::UptRecord;
 use crate::error::{Error, Result};
 use crate::kernels::aggregate::{Csr, encode_aggregate};
 use crate::kernels::decoder::{
@@ -21,21 +23,6 @@ use crate::onnx::Stage;
 use crate::options::{DecoderKernel, Precision, StepPath};
 use crate::prior::{ContactResponse, PriorTable};
 use crate::stats::SceneStats;
-
-/// The latent state after one step.
-#[derive(Debug, Clone)]
-pub struct UptRecord {
-    /// Decoder keys `[L,h]`.
-    pub keys: Vec<f32>,
-    /// Decoder values `[L,h]`.
-    pub values: Vec<f32>,
-    /// Linear response, or its free vibration without contact, in block coordinates; empty where the bundle does not use it.
-    pub q_prior: Vec<f32>,
-    /// The same at the plan's nodes `[K,3]`; empty where the bundle does not use it.
-    pub prior_field: Vec<f32>,
-    /// Amplitudes `[m]` of the free modes, mm, and their velocities times the step `[m]`; empty where there are none.
-    pub vibration: Vec<f32>,
-}
 
 /// Who makes a step.
 enum Path {
@@ -68,6 +55,7 @@ pub struct UptEngine {
     tokens: DecoderTokens,
     decoder_scratch: DecoderScratch,
     decoders: Decoders,
+    anchors: AnchorField,
     precision: DecoderPrecision,
     graphs: Precision,
     /// The step being made.
@@ -94,21 +82,6 @@ pub struct UptInput<'a> {
 
 fn internal(error: impl std::fmt::Display) -> Error {
     Error::Panic(error.to_string())
-}
-
-impl UptRecord {
-    /// Rest.
-    pub fn clear(&mut self) {
-        for values in [
-            &mut self.keys,
-            &mut self.values,
-            &mut self.q_prior,
-            &mut self.prior_field,
-            &mut self.vibration,
-        ] {
-            values.fill(0.0);
-        }
-    }
 }
 
 impl UptEngine {
@@ -154,6 +127,11 @@ impl UptEngine {
             tokens: DecoderTokens::new(&kind.decoder, dims.latent_tokens),
             decoder_scratch: DecoderScratch::new(&kind.decoder, dims.latent_tokens, pool.threads()),
             decoders: Decoders::new(model, kind, tables, choice.kernel, threads)?,
+            anchors: tables
+                .anchors
+                .as_ref()
+                .map(|anchors| AnchorField::new(anchors, node_count))
+                .unwrap_or_default(),
             precision: if choice.precision == Precision::Bf16 && Isa::has_bf16() {
                 DecoderPrecision::Bf16
             } else {
@@ -313,9 +291,32 @@ impl UptEngine {
         Ok([aggregate_ms, watch.lap()])
     }
 
-    /// Decodes nodes of the scene's mesh into a field `[K,3]`, before the base is added.
+    /// Decodes nodes of the scene's mesh into a field `[K,3]`, before the base is added; where the bundle has anchors, at
+    /// those that the nodes need, and interpolates.
     #[allow(clippy::too_many_arguments)]
     pub fn decode_mesh(
+        &mut self,
+        isa: Isa,
+        pool: &Pool,
+        kind: &UptModel,
+        tables: &UptTables,
+        which: Which,
+        nodes: &[u32],
+        out: &mut [f32],
+    ) -> Result<()> {
+        let Some(table) = &tables.anchors else {
+            return self.decode_nodes(isa, pool, kind, tables, which, nodes, out);
+        };
+        let mut anchors = std::mem::take(&mut self.anchors);
+        let (needed, field) = anchors.needed(table, nodes);
+        let done = self.decode_nodes(isa, pool, kind, tables, which, needed, field);
+        let done = done.and_then(|()| anchors.interpolate(pool, table, nodes, out));
+        self.anchors = anchors;
+        done
+    }
+
+    #[allow(clippy::too_many_arguments)]
+    fn decode_nodes(
         &mut self,
         isa: Isa,
         pool: &Pool,
@@ -421,6 +422,6 @@ impl UptEngine {
             } => features.len() + scratch.len(),
             Path::Whole(_) => 0,
         };
-        4 * (3 * floats + own)
+        4 * (3 * floats + own) + self.anchors.memory_bytes()
     }
 }

@@ -3,7 +3,7 @@
 
 use super::contact::ContactSet;
 use super::plan::NodePlan;
-use super::upt::UptRecord;
+use super::upt_record::UptRecord;
 use crate::error::{Error, Result};
 use crate::kernels::rows::decode_rows;
 use crate::kernels::{Isa, Pool};

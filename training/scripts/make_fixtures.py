@@ -3,7 +3,7 @@
 tests/fixtures/box.mesh.safetensors   a box of 210 nodes
 tests/fixtures/graph.safetensors      supernodes and radius graphs of that box for three settings
 tests/fixtures/tiny-upt/              a bundle with random weights on the box
-tests/fixtures/tiny-upt-prior/        one that adds to the linear response of tiny-reduced/ and its free vibration
+tests/fixtures/tiny-upt-prior/        one that adds to the linear response of tiny-reduced/, with vibration and anchors
 tests/fixtures/tiny-upt-prior-rollout.safetensors   a rollout of it through ONNX Runtime and numpy
 """
 
@@ -17,11 +17,14 @@ import numpy as np
 from safetensors.numpy import save_file
 
 from upt_training import random_bundle, vibration
+from upt_training.anchors import add_to_bundle
 from upt_training.box_mesh import box_mesh
 from upt_training.bundle_rollout import BundleRunner
 from upt_training.config import GraphSettings
 from upt_training.graph import build_graph, node_keys
 
+# About a third of the box's nodes.
+ANCHOR_SPACING_MM = 12.0
 ROOT = Path(__file__).resolve().parents[2]
 CASES = (
     GraphSettings(radius_mm=14.0, max_degree=8, supernodes=48, seed=7, domain_fraction=0.25),
@@ -57,6 +60,7 @@ def main() -> None:
             raise SystemExit(1)
         bundle = fixtures / "tiny-upt-prior"
         random("tiny-prior", bundle, "--prior", str(prior), "--vibration", str(swings), "--step")
+    add_to_bundle(bundle, spacing_mm=ANCHOR_SPACING_MM, per_node=8)
     save_rollout(bundle, mesh, fixtures / "tiny-upt-prior-rollout.safetensors")
 
 

@@ -71,6 +71,11 @@ def parser() -> argparse.ArgumentParser:
     variants.add_argument("--int8", action="store_true", help="dynamically quantised graphs")
     variants.add_argument("--out", type=Path, required=True, help="new folder")
 
+    anchors = commands.add_parser("anchors", help="decode a bundle's correction at few nodes, interpolate the others")
+    anchors.add_argument("bundle", type=Path, help="bundle folder, changed in place")
+    anchors.add_argument("--spacing", type=float, required=True, help="least distance of two anchors, mm")
+    anchors.add_argument("--neighbours", type=int, default=8, help="anchors that a node follows")
+
     ablate = commands.add_parser("ablate", help="variants of a configuration at one small budget: tables and plots")
     ablate.add_argument("suite", choices=["windows", "tricks"])
     ablate.add_argument("--config", type=Path, required=True)
@@ -103,6 +108,10 @@ def main(arguments: list[str] | None = None) -> int:
             from upt_training.ablate import ablate_command
 
             return ablate_command(options)
+        if options.command == "anchors":
+            from upt_training.anchors import anchors_command
+
+            return anchors_command(options)
         if options.command == "variants":
             from upt_training.variants import variants_command
 

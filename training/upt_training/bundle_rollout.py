@@ -9,7 +9,9 @@ import json
 from pathlib import Path
 
 import numpy as np
+from safetensors.numpy import load_file
 
+from upt_training.anchors import Anchors
 from upt_training.bundle import BundleSession
 from upt_training.config import FEATURE_WIDTH, GraphSettings
 from upt_training.errors import InputError
@@ -44,6 +46,9 @@ class BundleRunner:
         self.graph = build_graph(self.mesh, GraphSettings(**self.settings["graph"]))
         suffix = "" if precision == "f32" else f".{precision}"
         self.session = BundleSession(folder, self.mesh, self.graph, suffix)
+        own_mesh = self.mesh.sha256 == self.manifest["mesh"]["mesh_sha256"]
+        file = self.settings.get("anchors") if own_mesh else None
+        self.anchors = Anchors(**load_file(folder / file)) if file else None
         self.prior, self.lender = None, None
         if "prior" in self.manifest:
             if prior is None and mesh is not None and mesh.sha256 != self.manifest["mesh"]["mesh_sha256"]:
@@ -89,9 +94,16 @@ class BundleRunner:
         ]
         return np.ascontiguousarray(np.concatenate(parts, axis=1), np.float32)
 
+    def network(self, features: np.ndarray) -> np.ndarray:
+        """Normalised features `[K, f]` -> what is added to the base `[K, 3]`, mm."""
+        if self.anchors is None:
+            return self.session(features)
+        at_anchors = self.session.decode(*self.session.keys_values(features), self.anchors.nodes)
+        return self.anchors.interpolate(at_anchors)
+
     def step(self, nodes: np.ndarray, vectors: np.ndarray) -> np.ndarray:
         prior_next = np.zeros_like(self.u) if self.prior is None else self.prior.step(*self.lender(nodes, vectors))
-        out = self.session(self.features(nodes, vectors, prior_next))
+        out = self.network(self.features(nodes, vectors, prior_next))
         if self.settings["base"] == "displacement":
             out = out + self.u
         elif self.settings["base"] == "prior":

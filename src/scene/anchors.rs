@@ -1,0 +1,83 @@
+//! Decoding at anchors: which of them some nodes need, and the interpolation.
+
+use crate::error::{Error, Result};
+use crate::kernels::Pool;
+use crate::kernels::parts::Parts;
+use crate::model::Anchors;
+
+/// Nodes a chunk of the interpolation.
+const CHUNK: usize = 1024;
+
+/// The anchors of the nodes that were asked for last, and a field for them.
+#[derive(Debug, Default)]
+pub struct AnchorField {
+    asked: Vec<u32>,
+    anchors: Vec<u32>,
+    used: Vec<bool>,
+    field: Vec<f32>,
+}
+
+impl AnchorField {
+    /// Room for a mesh of `node_count` nodes.
+    pub fn new(anchors: &Anchors, node_count: usize) -> AnchorField {
+        AnchorField {
+            asked: Vec::with_capacity(node_count),
+            anchors: Vec::with_capacity(anchors.count()),
+            used: vec![false; anchors.count()],
+            field: vec![0.0; 3 * node_count],
+        }
+    }
+
+    /// The mesh nodes to decode, so that `nodes` can be interpolated, ascending, and the field `[K,3]` for them.
+    pub fn needed(&mut self, table: &Anchors, nodes: &[u32]) -> (&[u32], &mut [f32]) {
+        if self.asked != nodes {
+            self.asked.clear();
+            self.asked.extend_from_slice(nodes);
+            self.used.fill(false);
+            for &node in nodes {
+                for &anchor in table.of(node).0 {
+                    self.used[anchor as usize] = true;
+                }
+            }
+            self.anchors.clear();
+            let used = (0..table.count() as u32).filter(|&anchor| self.used[anchor as usize]);
+            self.anchors.extend(used.map(|anchor| table.node(anchor)));
+        }
+        (&self.anchors, &mut self.field)
+    }
+
+    /// Rows `nodes` of `out [K,3]` from the anchors' rows. What a node gets depends on nothing but its anchors.
+    ///
+    /// # Errors
+    /// [`Error::Panic`] where a node lies outside of `out`.
+    pub fn interpolate(
+        &self,
+        pool: &Pool,
+        table: &Anchors,
+        nodes: &[u32],
+        out: &mut [f32],
+    ) -> Result<()> {
+        let parts = Parts::new(out);
+        pool.run(nodes.len().div_ceil(CHUNK), &|chunk, _| {
+            let end = ((chunk + 1) * CHUNK).min(nodes.len());
+            for &node in &nodes[chunk * CHUNK..end] {
+                let (anchors, weights) = table.of(node);
+                let mut sum = [0.0f32; 3];
+                for (&anchor, &weight) in anchors.iter().zip(weights) {
+                    let at = 3 * table.node(anchor) as usize;
+                    for (sum, value) in sum.iter_mut().zip(&self.field[at..at + 3]) {
+                        *sum += weight * value;
+                    }
+                }
+                // SAFETY: no node is in the list twice, so its row belongs to this chunk alone.
+                unsafe { parts.part(3 * node as usize, 3) }.copy_from_slice(&sum);
+            }
+        })
+        .map_err(|error| Error::Panic(error.to_string()))
+    }
+
+    /// Bytes held.
+    pub fn memory_bytes(&self) -> usize {
+        4 * (self.asked.capacity() + self.anchors.capacity() + self.field.len()) + self.used.len()
+    }
+}
