@@ -112,6 +112,7 @@ def add_to_bundle(bundle: Path, spacing_mm: float, per_node: int) -> Anchors:
     anchors = make_anchors(load_mesh(bundle / manifest["mesh"]["file"]), spacing_mm, per_node)
     tensors = {"nodes": anchors.nodes, "neighbours": anchors.neighbours, "weights": anchors.weights}
     save_file(tensors, bundle / FILE, metadata={"spacing_mm": str(spacing_mm)})
+    (bundle / FILE).chmod(0o644)
     content = (bundle / FILE).read_bytes()
     manifest["files"][FILE] = {"bytes": len(content), "sha256": hashlib.sha256(content).hexdigest()}
     manifest["upt"]["anchors"] = FILE
