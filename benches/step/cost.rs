@@ -24,6 +24,9 @@ pub struct Cost {
     bytes: f64,
     flops_a_node: f64,
     bytes_a_node: f64,
+    /// Of the nodes that the network decodes: the anchors where the bundle has them.
+    flops_a_network_node: f64,
+    bytes_a_network_node: f64,
     flops_a_contact: f64,
     bytes_a_contact: f64,
     known: bool,
@@ -68,8 +71,8 @@ impl Cost {
         self.flops += 2.0 * n * d * d + a.encoder_depth as f64 * block(n, d);
         self.flops += 4.0 * n * d * w + l * (4.0 + 4.0 * r) * w * w + 4.0 * l * n * w;
         self.flops += a.approximator_depth as f64 * block(l, w) + 4.0 * l * w * h;
-        self.flops_a_node += kind.decoder.flops(dims.latent_tokens) as f64;
-        self.bytes_a_node += 4.0 * dims.query as f64;
+        self.flops_a_network_node += kind.decoder.flops(dims.latent_tokens) as f64;
+        self.bytes_a_network_node += 4.0 * dims.query as f64;
     }
 
     /// The network's weights are used once each; the residual modes are added to the coordinates.
@@ -90,15 +93,48 @@ impl Cost {
         self.bytes_a_contact += 3.0 * width * response_size;
     }
 
-    /// FLOP and bytes of the last step of a scene; `None` where bundle.json has no `provenance.architecture`.
-    pub fn of_step(&self, scene: &Scene) -> Option<[f64; 2]> {
+    /// FLOP and bytes of the last step of a scene that shows `region`; `None` where bundle.json has no
+    /// `provenance.architecture`.
+    pub fn of_step(&self, scene: &Scene, region: Option<&[u32]>) -> Option<[f64; 2]> {
         let stats = scene.stats();
         let (nodes, contacts) = (stats.decoded_node_count as f64, stats.contact_count as f64);
+        let network = network_nodes(scene.model(), region).unwrap_or(nodes);
+        let sum = |fixed, a_node, a_network_node, a_contact| {
+            fixed + nodes * a_node + network * a_network_node + contacts * a_contact
+        };
         self.known.then_some([
-            self.flops + nodes * self.flops_a_node + contacts * self.flops_a_contact,
-            self.bytes + nodes * self.bytes_a_node + contacts * self.bytes_a_contact,
+            sum(
+                self.flops,
+                self.flops_a_node,
+                self.flops_a_network_node,
+                self.flops_a_contact,
+            ),
+            sum(
+                self.bytes,
+                self.bytes_a_node,
+                self.bytes_a_network_node,
+                self.bytes_a_contact,
+            ),
         ])
     }
+}
+
+/// Anchors that the nodes of a region, or all, follow; `None` for a bundle that decodes every node.
+fn network_nodes(model: &Model, region: Option<&[u32]>) -> Option<f64> {
+    let KindModel::Upt(kind) = &model.kind else {
+        return None;
+    };
+    let anchors = kind.tables.anchors.as_ref()?;
+    let Some(region) = region else {
+        return Some(anchors.count() as f64);
+    };
+    let mut used = vec![false; anchors.count()];
+    for &node in region {
+        for &anchor in anchors.of(node).0 {
+            used[anchor as usize] = true;
+        }
+    }
+    Some(used.into_iter().filter(|&used| used).count() as f64)
 }
 
 fn architecture(path: &Path) -> Option<Architecture> {

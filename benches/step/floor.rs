@@ -29,9 +29,16 @@ impl Machine {
         machine
     }
 
-    /// The row of a scene whose step took `ms`.
-    pub fn print_floor(&self, cost: &Cost, scene: &Scene, name: &str, ms: f64) {
-        let Some([flops, bytes]) = cost.of_step(scene) else {
+    /// The row of a scene that shows `region` and whose step took `ms`.
+    pub fn print_floor(
+        &self,
+        cost: &Cost,
+        scene: &Scene,
+        region: Option<&[u32]>,
+        name: &str,
+        ms: f64,
+    ) {
+        let Some([flops, bytes]) = cost.of_step(scene, region) else {
             println!(
                 "{name}: left out: the floor; bundle.json has no field `provenance.architecture`"
             );

@@ -57,13 +57,12 @@ fn run(path: &Path, machine: &floor::Machine) -> upt::Result<()> {
     for threads in [1, 2] {
         for surface in [false, true] {
             let scene = Scene::new(Arc::clone(&model), &options(threads))?;
-            if surface {
-                scene.set_region(Some(model.indices(IndexSet::SurfaceNodes)))?;
-            }
+            let region = surface.then(|| model.indices(IndexSet::SurfaceNodes));
+            scene.set_region(region)?;
             let part = if surface { "surface" } else { "all" };
             let row = format!("{name}/{part}/{threads} threads");
             let ms = steady::measure(&scene, &row, limits(&model, threads, surface))?;
-            machine.print_floor(&cost, &scene, &row, ms);
+            machine.print_floor(&cost, &scene, region, &row, ms);
         }
     }
     if info.kind == Kind::Reduced {

@@ -8,7 +8,7 @@ use upt::model::UptModel;
 use upt::onnx::ProviderPlan;
 use upt::{Model, Scene, SceneOptions};
 
-use super::measure::{Row, median, quick, relative_error};
+use super::measure::{Row, budget, median, quick, relative_error};
 use super::split::Split;
 use super::{options, patch, push, pushed};
 
@@ -31,7 +31,11 @@ pub fn against_split(
         )?;
         let mut out = vec![0.0; 3 * scene.node_count()];
         let (mut theirs, mut ours) = (Vec::new(), Vec::new());
-        for _ in 0..if quick() { 5 } else { 41 } {
+        let started = Instant::now();
+        for turn in 0..if quick() { 5 } else { 41 } {
+            if turn >= 5 && started.elapsed() > budget() {
+                break;
+            }
             let start = Instant::now();
             split.run()?;
             theirs.push(start.elapsed().as_secs_f64() * 1e3);

@@ -220,7 +220,7 @@ fn of_step(bundle: &Path, model: &Arc<Model>, path: StepPath) -> upt::Result<Opt
     let scene = Scene::new(Arc::clone(model), &options(path))?;
     let mut out = vec![0.0; 3 * scene.node_count()];
     step(&scene, &patch(model), 0, &mut out)?;
-    Ok(Cost::of(bundle, model)?.of_step(&scene))
+    Ok(Cost::of(bundle, model)?.of_step(&scene, None))
 }
 
 /// Steps of `count` scenes at once, a thread each; percentiles over all of them.
