@@ -109,8 +109,8 @@ void Tissue::count_step() {
 void Tissue::sample(double now) {
   const auto steps = stats().step_count;
   if (steps > 0) {
-    // While the step runs the last state stays; once it has published, it is approached from the one before,
-    // even if poll() has not told yet.
+    // While the step runs the last state stays; once it has published, it is approached from the
+    // one before, even if poll() has not told yet.
     const bool running = in_flight_ && steps == counted_steps_;
     const double alpha = running ? 1.0 : (now - last_start_) / info_.dt;
     scene_.sample(std::clamp(alpha, 0.0, 1.0), displacement_);
