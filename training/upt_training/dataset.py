@@ -144,7 +144,7 @@ class Dataset:
 
 
 def open_dataset(folder: Path | str, mesh: Mesh) -> Dataset:
-    """Read `manifest.json`; every case's file must exist, be whole and be of this mesh."""
+    """Read `manifest.json`; every case's file must exist, be whole and be of this mesh. Equilibria are passed over."""
     folder = Path(folder)
     path = folder / "manifest.json"
     if not path.exists():
@@ -162,11 +162,11 @@ def open_dataset(folder: Path | str, mesh: Mesh) -> Dataset:
         )
     cases = []
     for entry in manifest["cases"]:
-        if entry.get("status") != "done":
+        if entry.get("status") != "done" or str(entry["scheme"]).startswith("static"):
             continue
         file = folder / entry["file"]
         open_trajectory(file, mesh)
         cases.append(Case(int(entry["index"]), file, str(entry["scheme"]), entry["split"]))
     if not cases:
-        raise InputError(f"{path}: no finished case; let `upt dataset` finish")
+        raise InputError(f"{path}: no finished case of a moving scheme; let `upt dataset` finish")
     return Dataset(folder, manifest, cases)

@@ -8,12 +8,12 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use tissue::dataset::{Dataset, DatasetPlan};
 use tissue::mesh::{Boundary, Mesh};
-use tissue::schemes::{FRAMES, Scheme};
+use tissue::schemes::Scheme;
 use tissue::solver::SolverOptions;
 
 #[derive(clap::Args)]
 #[command(
-    after_help = "Examples:\n  upt dataset --mesh onnx/meshes/brain-coarse.mesh.safetensors --schemes 1-4 --count 200 --out data/coarse\n  upt dataset --mesh brain.mesh.safetensors --schemes probe --count 40 --shard 0/4 --out data/probe"
+    after_help = "Examples:\n  upt dataset --mesh onnx/meshes/brain-coarse.mesh.safetensors --schemes 1-4 --count 200 --out data/coarse\n  upt dataset --mesh brain.mesh.safetensors --schemes probe --count 40 --shard 0/4 --out data/probe\n  upt dataset --mesh brain.mesh.safetensors --columns brain.columns.safetensors --schemes static,static-two --count 100 --out data/statics"
 )]
 pub struct Options {
     /// Mesh file (*.mesh.safetensors).
@@ -22,7 +22,7 @@ pub struct Options {
     /// Held nodes: `fixed` or `supported`.
     #[arg(long, default_value = "fixed")]
     boundary: Boundary,
-    /// Schemes: `1-4`, `5`, `1,3`, `hard`, or a regime's name.
+    /// Schemes: `1-4`, `5`, `1,3`, `hard`, `probe`, a regime's name; `static`, `static-two`, `static-deep` are equilibria.
     #[arg(long, value_parser = Scheme::parse_list)]
     schemes: std::vec::Vec<Scheme>,
     /// Number of cases over all shards.
@@ -49,6 +49,9 @@ pub struct Options {
     /// Mass scaling of the split `train`, ms; held-out cases keep `--mass-scaling-ms`.
     #[arg(long, requires = "train_inner_step_ms")]
     train_mass_scaling_ms: Option<f64>,
+    /// File of `upt prior` for this mesh and boundary; the static schemes need it.
+    #[arg(long)]
+    columns: Option<PathBuf>,
     #[command(flatten)]
     solver: SolverArguments,
 }
@@ -84,16 +87,18 @@ pub fn run(options: &Options) -> anyhow::Result<ExitCode> {
         seed: options.seed,
         half: options.half,
         training: options.training(),
+        columns: options.columns.clone(),
         options: options.solver.options(1),
     };
     let dataset = Dataset::open(&plan, &mesh, &options.out)?;
     let pending = dataset.pending(options.shard.0, options.shard.1);
-    let frames = FRAMES as u64 - 1;
-    let bar = indicatif::ProgressBar::new(pending.len() as u64 * frames).with_style(
-        indicatif::ProgressStyle::with_template(
+    // A case of equilibria has fewer frames than a motion.
+    let frames = |index: usize| options.schemes[index % options.schemes.len()].frames() as u64 - 1;
+    let total = pending.iter().map(|case| frames(case.index)).sum();
+    let bar =
+        indicatif::ProgressBar::new(total).with_style(indicatif::ProgressStyle::with_template(
             "{bar:40} {msg}, {percent} %, {elapsed} gone, {eta} left",
-        )?,
-    );
+        )?);
     bar.set_message(format!("0/{} cases", pending.len()));
     let next = AtomicUsize::new(0);
     let finished = AtomicUsize::new(0);
@@ -104,9 +109,9 @@ pub fn run(options: &Options) -> anyhow::Result<ExitCode> {
             scope.spawn(|| {
                 while let Some(case) = pending.get(next.fetch_add(1, Ordering::Relaxed)) {
                     let mut reached = 0;
-                    let outcome = dataset.compute(case, |_| {
-                        reached += 1;
-                        bar.inc(1);
+                    let outcome = dataset.compute(case, |frame| {
+                        bar.inc(frame as u64 - reached);
+                        reached = frame as u64;
                     });
                     let written = outcome.and_then(|record| {
                         let _turn = manifest_turn.lock();
@@ -114,13 +119,16 @@ pub fn run(options: &Options) -> anyhow::Result<ExitCode> {
                     });
                     match written {
                         Ok(record) => {
-                            bar.inc(frames - reached);
+                            bar.inc(frames(case.index) - reached);
                             let count = finished.fetch_add(1, Ordering::Relaxed) + 1;
                             bar.set_message(format!("{count}/{} cases", pending.len()));
                             if let Some(cause) = record.cause {
                                 bar.suspend(|| {
                                     eprintln!("case {} failed: {cause}", record.case.index)
                                 });
+                            }
+                            for skipped in &record.skipped {
+                                bar.suspend(|| eprintln!("case {}: {skipped}", record.case.index));
                             }
                         }
                         Err(error) => {

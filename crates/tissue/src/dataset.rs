@@ -10,7 +10,8 @@ use crate::material::Material;
 use crate::mesh::{Boundary, Mesh};
 use crate::schemes::{Scheme, SplitMix};
 use crate::simulate::{SOLVER_NAME, simulate};
-use crate::solver::SolverOptions;
+use crate::solver::{Pressure, SolverOptions};
+use crate::statics::{StaticSolver, StaticsError};
 use crate::tensors::write_whole;
 use crate::trajectory::TrajectoryError;
 use serde::{Deserialize, Serialize};
@@ -29,6 +30,8 @@ pub struct DatasetPlan {
     pub options: SolverOptions,
     /// Settings for the split `train` where they differ: longer inner steps with mass scaling.
     pub training: Option<SolverOptions>,
+    /// File of `upt prior` for the mesh and boundary; static schemes need it.
+    pub columns: Option<PathBuf>,
 }
 
 /// One case of a plan.
@@ -52,6 +55,9 @@ pub struct CaseRecord {
     /// Why it failed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cause: Option<String>,
+    /// Equilibria of a static case that were not found, and why.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub skipped: Vec<String>,
     /// Seconds on the machine that computed it.
     pub wall_time_s: f64,
     /// Mesh, boundary, material, seed and solver that it belongs to.
@@ -83,6 +89,14 @@ pub enum DatasetError {
     Foreign { path: PathBuf, reason: String },
     #[error("the plan has no schemes or no cases")]
     EmptyPlan,
+    #[error(
+        "scheme `{0}` needs the compliance columns of its mesh: make them with `upt prior`, give --columns"
+    )]
+    NoColumns(&'static str),
+    #[error("static schemes know the pressure of an element only, not the average nodal one")]
+    AveragePressure,
+    #[error(transparent)]
+    Statics(#[from] StaticsError),
     #[error(transparent)]
     Trajectory(#[from] TrajectoryError),
 }
@@ -92,8 +106,8 @@ impl DatasetPlan {
     pub fn case(&self, index: usize) -> Case {
         let group = index / self.schemes.len();
         let scheme = self.schemes[index % self.schemes.len()];
-        // A probe serves training and is never held out.
-        let held_out = group % 5 == 4 && scheme != Scheme::Probe;
+        // Probes and equilibria serve training and are never held out.
+        let held_out = group % 5 == 4 && scheme != Scheme::Probe && !scheme.is_static();
         let mut random = SplitMix(self.seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ index as u64);
         Case {
             index,
@@ -138,6 +152,7 @@ pub struct Dataset<'a> {
     mesh: &'a Mesh,
     folder: PathBuf,
     key: String,
+    statics: Option<StaticSolver>,
 }
 
 impl<'a> Dataset<'a> {
@@ -150,6 +165,18 @@ impl<'a> Dataset<'a> {
         if plan.schemes.is_empty() || plan.count == 0 {
             return Err(DatasetError::EmptyPlan);
         }
+        let statics = match plan.schemes.iter().find(|scheme| scheme.is_static()) {
+            Some(scheme) => {
+                let columns = plan.columns.as_deref();
+                let columns = columns.ok_or(DatasetError::NoColumns(scheme.name()))?;
+                if plan.options.pressure != Pressure::Element {
+                    return Err(DatasetError::AveragePressure);
+                }
+                let material = plan.options.material;
+                Some(StaticSolver::new(mesh, plan.boundary, material, columns)?)
+            }
+            None => None,
+        };
         std::fs::create_dir_all(folder).map_err(|source| DatasetError::Io {
             path: folder.into(),
             source,
@@ -159,6 +186,7 @@ impl<'a> Dataset<'a> {
             mesh,
             folder: folder.into(),
             key: plan.key(mesh),
+            statics,
         };
         for index in 0..plan.count {
             if let Some(record) = dataset.record(index)
@@ -185,7 +213,8 @@ impl<'a> Dataset<'a> {
             .collect()
     }
 
-    /// Simulates a case and writes its trajectory and record.
+    /// Simulates a case (or finds its equilibria) and writes its trajectory and record. `progress` hears the frames that
+    /// are finished.
     ///
     /// A simulation that fails is an outcome (`failed`, with the cause), not an
     /// error; errors are a disk that is full, or the like.
@@ -201,25 +230,29 @@ impl<'a> Dataset<'a> {
             Some(training) if case.split == "train" => training,
             _ => &self.plan.options,
         };
-        let outcome = simulate(
-            self.mesh,
-            self.plan.boundary,
-            scheme,
-            case.seed,
-            options,
-            progress,
-        );
-        let cause = match outcome {
-            Ok(trajectory) => {
-                trajectory.write(&self.folder.join(&case.file), self.plan.half)?;
-                None
+        let outcome = match &self.statics {
+            Some(statics) if scheme.is_static() => statics
+                .trajectory(scheme, case.seed, progress)
+                .map_err(|error| error.to_string()),
+            _ => {
+                let (mesh, boundary) = (self.mesh, self.plan.boundary);
+                simulate(mesh, boundary, scheme, case.seed, options, progress)
+                    .map(|trajectory| (trajectory, Vec::new()))
+                    .map_err(|error| error.to_string())
             }
-            Err(error) => Some(error.to_string()),
+        };
+        let (cause, skipped) = match outcome {
+            Ok((trajectory, skipped)) => {
+                trajectory.write(&self.folder.join(&case.file), self.plan.half)?;
+                (None, skipped)
+            }
+            Err(error) => (Some(error), Vec::new()),
         };
         let record = CaseRecord {
             case: case.clone(),
             status: if cause.is_none() { "done" } else { "failed" }.into(),
             cause,
+            skipped,
             wall_time_s: (start.elapsed().as_secs_f64() * 1e3).round() / 1e3,
             plan_key: self.key.clone(),
         };
@@ -235,6 +268,7 @@ impl<'a> Dataset<'a> {
                     case: self.plan.case(index),
                     status: "pending".into(),
                     cause: None,
+                    skipped: Vec::new(),
                     wall_time_s: 0.0,
                     plan_key: self.key.clone(),
                 })

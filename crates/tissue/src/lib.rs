@@ -22,6 +22,7 @@ pub mod metrics;
 pub mod schemes;
 pub mod simulate;
 pub mod solver;
+pub mod statics;
 pub mod stuffing;
 pub mod tensors;
 pub mod trajectory;

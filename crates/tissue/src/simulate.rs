@@ -16,6 +16,8 @@ pub enum SimulationError {
     Contact(#[from] ContactError),
     #[error(transparent)]
     Solver(#[from] SolverError),
+    #[error("scheme `{0}` is a list of equilibria, not a motion: use `upt dataset` with --columns")]
+    Static(&'static str),
 }
 
 /// Simulates `scheme` with `seed` on `mesh`; `progress` hears of each finished frame.
@@ -30,6 +32,9 @@ pub fn simulate(
     options: &SolverOptions,
     mut progress: impl FnMut(usize),
 ) -> Result<Trajectory, SimulationError> {
+    if scheme.is_static() {
+        return Err(SimulationError::Static(scheme.name()));
+    }
     let domain = ContactDomain::new(mesh, boundary)?;
     let programme = Programme::new(scheme, &domain, seed)?;
     let mut options = options.clone();

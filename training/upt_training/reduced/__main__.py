@@ -51,6 +51,8 @@ def add_build_arguments(whole: argparse.ArgumentParser) -> None:
     whole.add_argument(
         "--quadratic-ridge", type=float, default=1e-2, help="its ridge, relative to the mean square of its features"
     )
+    whole.add_argument("--static-hidden", type=int, default=0, help="width of the equilibria's network; 0: none")
+    whole.add_argument("--static-weight", type=float, default=8.0, help="frames that an equilibrium counts for")
     whole.add_argument("--refit", action="store_true", help="train once more on every training case, validation too")
     whole.add_argument("--weight-decay", type=float, default=0.02, help="of the network")
     whole.add_argument("--seeds", type=int, default=1, help="trainings to choose from by validation error")
@@ -146,6 +148,8 @@ def run_build(args: argparse.Namespace) -> None:
         weight_decay=args.weight_decay,
         quadratic_modes=args.quadratic_modes,
         quadratic_ridge=args.quadratic_ridge,
+        static_hidden=args.static_hidden,
+        static_weight=args.static_weight,
     )
     if not sweeping:
         build(options, settings, args.description)

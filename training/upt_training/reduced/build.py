@@ -28,6 +28,7 @@ from upt_training.reduced.network import Correction
 from upt_training.reduced.prior import Prior, load_prior, save_prior
 from upt_training.reduced.rollout import Limits
 from upt_training.reduced.states import States, join_states, load_states, project_cases
+from upt_training.reduced.statics import Statics, join_statics, load_statics, project_statics
 from upt_training.reduced.train import Settings, train
 from upt_training.reduced.trajectories import DAMPING_PER_S, Case, open_dataset
 from upt_training.reduced.transfer import Source, interpolation
@@ -98,13 +99,13 @@ def learned_modes(options: Options, sources: list[tuple[str, Source]]) -> Modes:
 
 
 def projected(options: Options, sources: list[tuple[str, Source]], modes: Modes) -> States:
-    """States of every case of every dataset; cases that were added since the last build are projected."""
+    """States of every moving case of every dataset; cases that were added since the last build are projected."""
     parts = []
     for name, source in sources:
         path = options.work / f"states-{name}.npz"
         kept = [load_states(path)] if path.exists() else []
         known = set(kept[0].source) if kept else set()
-        new = [case for case in source.cases if case.path.name not in known]
+        new = [case for case in source.cases if not case.is_static and case.path.name not in known]
         if new:
             part = project_cases(Source(source.columns, new, source.transfer), modes, Progress(f"states of {name}"))
             other = np.array([case.damping_per_s != DAMPING_PER_S for case in new])
@@ -114,7 +115,28 @@ def projected(options: Options, sources: list[tuple[str, Source]], modes: Modes)
             join_states([*kept, part]).save(path)
         if path.exists():
             parts.append(load_states(path))
+    if not parts:
+        raise InputError("no moving case: equilibria say nothing of a release; add a dataset of schemes or probes")
     return join_states(parts)
+
+
+def projected_statics(options: Options, sources: list[tuple[str, Source]], modes: Modes) -> Statics | None:
+    """Equilibria of every dataset, projected where they are new; None where there are none."""
+    parts = []
+    for name, source in sources:
+        path = options.work / f"statics-{name}.npz"
+        kept = [load_statics(path)] if path.exists() else []
+        known = set(kept[0].source) if kept else set()
+        new = [case for case in source.cases if case.is_static and case.path.name not in known]
+        if new:
+            source = Source(source.columns, new, source.transfer)
+            part = project_statics(source, modes, Progress(f"equilibria of {name}"))
+            joined = join_statics([*kept, part])
+            assert joined is not None
+            joined.save(path)
+        if path.exists():
+            parts.append(load_statics(path))
+    return join_statics(parts)
 
 
 def trainable(cases: list[Case]) -> list[Case]:
@@ -155,24 +177,29 @@ def own_scheme_5(states: States) -> np.ndarray:
     return (states.scheme == "5") & ~np.char.startswith(states.split, "coarse")
 
 
-def bound_limits(states: States) -> Limits:
+def bound_limits(states: States, statics: Statics | None = None) -> Limits:
     """`relative` that leaves the true residuals of training inside the bound with a half to spare."""
     pressed = states.contact & (states.push > 1.0)
     norm = np.linalg.norm(states.b, axis=2)
     share = norm[pressed] / np.maximum(states.response_norm[pressed], 1e-6)
+    if statics is not None:
+        at_rest = np.linalg.norm(statics.b, axis=1) / np.maximum(statics.response_norm, 1e-6)
+        share = np.concatenate([share, at_rest[statics.push > 1.0]])
     return Limits(relative=float(np.clip(1.5 * np.quantile(share, 0.999), 0.2, 1.5)))
 
 
-def trained(options: Options, states: States, settings: Settings) -> tuple[Correction, Limits, dict]:
+def trained(
+    options: Options, states: States, statics: Statics | None, settings: Settings
+) -> tuple[Correction, Limits, dict]:
     """The best of `seeds` trainings by validation error."""
     fit, validation, _ = split_states(states)
     if settings.updates == 0:  # Nothing is chosen by validation: the ridge regressions take every training case.
         fit = training_states(states)
-    limits = bound_limits(fit)
+    limits = bound_limits(fit, statics)
     best: tuple[Correction, dict] | None = None
     for seed in range(1, options.seeds + 1):
         settings.seed = seed
-        model, history = train(fit, validation, limits, settings, print, options.work / f"training-{seed}.pt")
+        model, history = train(fit, validation, limits, settings, print, options.work / f"training-{seed}.pt", statics)
         history["training_cases"] = fit.cases
         if best is None or history["validation_mse"] < best[1]["validation_mse"]:
             best = (model, {**history, "seed": seed})
@@ -182,7 +209,7 @@ def trained(options: Options, states: States, settings: Settings) -> tuple[Corre
         settings.seed = best[1]["seed"]
         everything = training_states(states)
         checkpoint = options.work / f"training-{settings.seed}-all.pt"
-        model, _ = train(everything, validation, limits, settings, print, checkpoint)
+        model, _ = train(everything, validation, limits, settings, print, checkpoint, statics)
         return model, limits, {**best[1], "training_cases": everything.cases}
     return best[0], limits, best[1]
 
@@ -210,7 +237,7 @@ def envelope_of(cases: list[Case], mesh: Mesh) -> dict:
             vectors = case.vectors[case.offsets[t] : case.offsets[t + 1]]
             push = max(push, float(np.linalg.norm(vectors, axis=1).max()))
             area.append(float(areas[row].sum()))
-            if np.array_equal(row, before):
+            if np.array_equal(row, before) and not case.is_static:
                 earlier = case.vectors[case.offsets[t - 1] : case.offsets[t]]
                 rate = max(rate, float(np.linalg.norm(vectors - earlier, axis=1).max()))
     # Sites and frames that were not drawn differ a little from those that were: 5 % on the rate, a quarter on the area.
@@ -218,7 +245,7 @@ def envelope_of(cases: list[Case], mesh: Mesh) -> dict:
         "max_push_mm": round(push, 2),
         "max_push_rate_mm": round(1.05 * rate, 2),
         "contact_area_mm2": [round(0.75 * min(area), 1), round(1.25 * max(area), 1)],
-        "max_sites": 2 if any(case.scheme == "hard-two" for case in cases) else 1,
+        "max_sites": 2 if any(case.scheme in ("hard-two", "static-two") for case in cases) else 1,
         "displacement_bound_mm": round(2.0 * push, 1),
     }
 
@@ -233,6 +260,7 @@ class Prepared:
     own: list[Case]
     cases: list[Case]
     states: States
+    statics: Statics | None
     prior: Prior
     block_basis: dict
 
@@ -249,18 +277,19 @@ def prepare(options: Options) -> Prepared:
     if not cases:
         raise InputError("no finished case of the split 'train': make the dataset with `upt dataset`")
     modes = learned_modes(options, sources)
-    states = projected(options, sources, modes)
+    states, statics = projected(options, sources, modes), projected_statics(options, sources, modes)
     prior, info = tables(options, mesh, columns, modes)
-    return Prepared(mesh, columns, [name for name, _ in sources], own, cases, states, prior, info)
+    return Prepared(mesh, columns, [name for name, _ in sources], own, cases, states, statics, prior, info)
 
 
 def finish(options: Options, settings: Settings, description: str, made: Prepared) -> dict:
     """Training, bundle and evaluation; returns the errors by method and group."""
-    model, limits, history = trained(options, made.states, settings)
+    model, limits, history = trained(options, made.states, made.statics, settings)
     digest = hashlib.sha256("".join(sorted(made.states.source)).encode()).hexdigest()[:12]
     provenance = {
         "data": made.names,
         "cases": {"train": len(made.cases), "all": made.states.cases, "files_sha256": digest},
+        "equilibria": made.statics.count if made.statics else 0,
         "training": {
             **asdict(settings),
             "refit": options.refit,

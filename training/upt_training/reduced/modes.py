@@ -64,13 +64,15 @@ def learn_modes(
     pairs = [(source, case) for source in sources for case in source.cases]
     width = sources[0].columns.columns.shape[1]
     share = int(memory_gib * 2**30 / (4 * width * max(len(pairs), 1)))
-    share = max(1, min(share, 48, *(case.frames - 1 for _, case in pairs)))
-    residual = np.zeros((share * len(pairs), width), np.float32)
-    response = np.zeros((share * len(pairs), width), np.float32)
+    share = max(1, min(share, 48))
+    shares = [min(share, case.frames - 1) for _, case in pairs]
+    ends = np.cumsum(shares)
+    residual = np.zeros((ends[-1], width), np.float32)
+    response = np.zeros((ends[-1], width), np.float32)
     for index, (source, case) in enumerate(pairs):
-        picked = np.sort(rng.choice(np.arange(1, case.frames), share, replace=False))
+        picked = np.sort(rng.choice(np.arange(1, case.frames), shares[index], replace=False))
         linear, field = source.fields(case, picked)
-        rows = slice(index * share, (index + 1) * share)
+        rows = slice(ends[index] - shares[index], ends[index])
         response[rows] = linear
         residual[rows] = field - linear
         progress(index + 1, len(pairs))

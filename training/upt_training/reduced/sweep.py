@@ -16,6 +16,7 @@ from upt_training.reduced.build import Options, Prepared, finish, prepare
 from upt_training.reduced.evaluate import group_of
 from upt_training.reduced.prior import Prior
 from upt_training.reduced.states import States
+from upt_training.reduced.statics import Statics
 from upt_training.reduced.train import Settings
 
 GROUPS = ("schemes_1_4", "scheme_5")
@@ -24,6 +25,11 @@ GROUPS = ("schemes_1_4", "scheme_5")
 def leading_states(states: States, modes: int) -> States:
     """The same trajectories in the first `modes` residual modes."""
     return replace(states, b=states.b[:, :, :modes], p=states.p[:, :, :modes])
+
+
+def leading_statics(statics: Statics | None, modes: int) -> Statics | None:
+    """The same equilibria in the first `modes` residual modes."""
+    return replace(statics, b=statics.b[:, :modes], p=statics.p[:, :modes]) if statics else None
 
 
 def leading_prior(prior: Prior, modes: int) -> Prior:
@@ -56,7 +62,12 @@ def sweep(
             options, name=name, out=options.out.with_name(f"{options.out.name}-{count}"), work=options.work / str(count)
         )
         own.work.mkdir(exist_ok=True)
-        cut: Prepared = replace(made, states=leading_states(made.states, count), prior=leading_prior(made.prior, count))
+        cut: Prepared = replace(
+            made,
+            states=leading_states(made.states, count),
+            statics=leading_statics(made.statics, count),
+            prior=leading_prior(made.prior, count),
+        )
         report(f"{count} modes")
         found = finish(own, settings, description, cut)
         if not results:

@@ -12,8 +12,10 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from upt_training.reduced.network import Correction, fit_base
+from upt_training.reduced.base import Equilibria, fit_base
+from upt_training.reduced.network import Correction
 from upt_training.reduced.rollout import (
+    Drive,
     Limits,
     drive_of,
     field_mse,
@@ -24,6 +26,7 @@ from upt_training.reduced.rollout import (
     windows,
 )
 from upt_training.reduced.states import States
+from upt_training.reduced.statics import Statics
 
 
 @dataclass
@@ -39,6 +42,9 @@ class Settings:
     noise: float = 0.03
     quadratic_modes: int = 24
     quadratic_ridge: float = 1e-2
+    static_hidden: int = 0
+    static_updates: int = 3000
+    static_weight: float = 8.0
     ema: float = 0.998
     seed: int = 1
     validate_every: int = 100
@@ -55,10 +61,13 @@ def state_pairs(states: States) -> tuple[np.ndarray, np.ndarray]:
     return inputs.reshape(-1, inputs.shape[2]), b[:, 1:].reshape(-1, b.shape[2])
 
 
-def prepare(states: States, settings: Settings) -> Correction:
-    """A model with its scales and its ridge base fitted to `states`; the MLP adds nothing yet."""
+def prepare(states: States, settings: Settings, statics: Statics | None = None) -> Correction:
+    """A model with its scales and its base fitted to `states` and equilibria; the MLP adds nothing yet."""
     torch.manual_seed(settings.seed)
-    model = Correction(states.modes, states.z.shape[2], settings.hidden, settings.depth, settings.quadratic_modes)
+    static_hidden = settings.static_hidden if statics is not None else 0
+    model = Correction(
+        states.modes, states.z.shape[2], settings.hidden, settings.depth, settings.quadratic_modes, static_hidden
+    )
     inputs, targets = state_pairs(states)
     rms = {name: math.sqrt(float((getattr(states, name) ** 2).sum(2).mean())) + 1e-9 for name in ("b", "z", "p")}
     r, rz = states.modes, states.z.shape[2]
@@ -70,12 +79,33 @@ def prepare(states: States, settings: Settings) -> Correction:
         scale[start + settings.quadratic_modes : start + rz] = 0.0
     scale[2 * r + 2 * rz : -2] = 0.0
     model.input_scale.copy_(torch.from_numpy(scale.astype(np.float32)))
-    fit_base(model, inputs, targets, settings.noise, settings.quadratic_ridge)
+    equilibria = Equilibria(statics, settings.static_weight, settings.static_updates) if statics is not None else None
+    fit_base(model, inputs, targets, settings.noise, settings.quadratic_ridge, equilibria)
     with torch.no_grad():
         error = targets - model(torch.from_numpy(inputs)).numpy()
     output = error.std(0) + 1e-3 * error.std()
     model.output_scale.copy_(torch.from_numpy(output.astype(np.float32)))
     return model
+
+
+def holds(statics: Statics, rows: np.ndarray, steps: int, limits: Limits) -> tuple[Drive, torch.Tensor, torch.Tensor]:
+    """Equilibria held for `steps`: what the host imposes, the state `[n, r]` and the bound there `[n]`."""
+
+    def repeated(values: np.ndarray) -> torch.Tensor:
+        out = torch.from_numpy(np.ascontiguousarray(values[rows], np.float32)).unsqueeze(1)
+        return out.expand(-1, steps + 1, *out.shape[2:])
+
+    norm = repeated(statics.response_norm)
+    drive = Drive(
+        z=repeated(statics.z),
+        p=repeated(statics.p),
+        contact=torch.ones_like(norm),
+        changed=torch.zeros_like(norm),
+        push=repeated(statics.push),
+        response_norm=norm,
+        response_jump=torch.zeros_like(norm),
+    )
+    return drive, torch.from_numpy(np.float32(statics.b[rows])), limits.relative * norm[:, 0]
 
 
 def summary(states: States, b: np.ndarray) -> dict[str, float]:
@@ -99,9 +129,13 @@ def train(
     settings: Settings,
     report: Callable[[str], None] = print,
     checkpoint: Path | None = None,
+    statics: Statics | None = None,
 ) -> tuple[Correction, dict]:
-    """Train on `states`; the model returned is the EMA copy with the smallest validation error over full rollouts."""
-    model = prepare(states, settings)
+    """Train on `states` and held equilibria, half a batch of these to one of motion.
+
+    The model returned is the EMA copy with the smallest validation error over full rollouts.
+    """
+    model = prepare(states, settings, statics)
     base = summary(validation, rollout_from_rest(model, validation, limits))
     report("ridge base alone: " + ", ".join(f"{k} {v:.5f}" for k, v in base.items()))
     average = copy.deepcopy(model)
@@ -135,15 +169,20 @@ def train(
                 group["lr"] = rate
             cases = torch.from_numpy(rng.integers(states.cases, size=batch))
             starts = torch.from_numpy(rng.integers(states.frames - steps, size=batch))
-            pieces = type(drive)(**{k: windows(v, cases, starts, steps + 1) for k, v in vars(drive).items()})
+            pieces = Drive(**{k: windows(v, cases, starts, steps + 1) for k, v in vars(drive).items()})
             target = windows(true_b, cases, starts, steps + 1)
-            b = target[:, 0]
+            b, bounds = target[:, 0], limit[cases, starts]
             b_prev = true_b[cases, (starts - 1).clamp_min(0)]
+            if statics is not None:
+                held, rest, rest_bounds = holds(statics, rng.integers(statics.count, size=batch // 2), steps, limits)
+                pieces = Drive(**{k: torch.cat([v, getattr(held, k)]) for k, v in vars(pieces).items()})
+                target = torch.cat([target, rest.unsqueeze(1).expand(-1, steps + 1, -1)])
+                b, b_prev, bounds = torch.cat([b, rest]), torch.cat([b_prev, rest]), torch.cat([bounds, rest_bounds])
             common = torch.randn_like(b) * deviation * settings.noise
             b = b + common + 0.5 * torch.randn_like(b) * deviation * settings.noise
             b_prev = b_prev + common
             model.train()
-            found = rollout(model, pieces, b, b_prev, limit[cases, starts], limits)
+            found = rollout(model, pieces, b, b_prev, bounds, limits)
             loss = ((found - target[:, 1:]) ** 2).sum(2).mean() / float(states.nodes)
             optimiser.zero_grad()
             loss.backward()

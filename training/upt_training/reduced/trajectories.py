@@ -33,6 +33,11 @@ class Case:
     def frames(self) -> int:
         return len(self.offsets) - 1
 
+    @property
+    def is_static(self) -> bool:
+        """Whether the frames are equilibria without an order in time."""
+        return self.scheme.startswith("static")
+
     def contact_row(self, frame: int) -> np.ndarray:
         return self.nodes[self.offsets[frame] : self.offsets[frame + 1]]
 

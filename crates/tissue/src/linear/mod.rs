@@ -14,6 +14,7 @@
 //!
 //! Units: mm, mN, so stresses are mN/mm² (1 Pa = 1e-3 mN/mm²) and compliances mm/mN.
 
+mod columns_file;
 mod compliance;
 mod error;
 mod factor;
@@ -22,12 +23,13 @@ mod ordering;
 mod response;
 mod stiffness;
 
+pub use columns_file::{ColumnsError, ColumnsFile};
 pub use compliance::{Compliance, compliance_columns};
 pub use error::LinearError;
 pub use factor::{Factor, FactorStats};
 pub use material::Lame;
 pub use ordering::nested_dissection;
-pub use response::{ContactForces, LinearElastic, contact_forces};
+pub use response::{ContactFactor, ContactForces, LinearElastic, contact_forces};
 pub use stiffness::{FreeNodes, Stiffness};
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use crate::mesh::Mesh;
 
 use super::{Compliance, Factor, Lame, LinearError, Stiffness, compliance_columns};
-use faer::linalg::solvers::Solve;
+use faer::linalg::solvers::{Llt, Solve};
 use faer::{Mat, Side};
 
 /// Forces that produce prescribed displacements.
@@ -15,12 +15,63 @@ pub struct ContactForces {
     pub regularisation: f64,
 }
 
+/// Factor of the compliance of a contact set with itself, `A_CC`.
+#[derive(Debug, Clone)]
+pub struct ContactFactor {
+    llt: Llt<f64>,
+    size: usize,
+    /// Added to the diagonal, relative to its mean, because the block was singular (0 if it was not).
+    pub regularisation: f64,
+}
+
+impl ContactFactor {
+    /// Factorises the block of `rows` (indices into the compliance's nodes).
+    ///
+    /// A block that is not positive definite gets `1e-9 .. 1e-3` of its mean diagonal added.
+    ///
+    /// # Errors
+    /// The block stays singular.
+    pub fn new(compliance: &Compliance, rows: &[usize]) -> Result<Self, LinearError> {
+        let stride = 3 * compliance.nodes.len();
+        let size = 3 * rows.len();
+        let dof = |i: usize| 3 * rows[i / 3] + i % 3;
+        let mean = (0..size)
+            .map(|i| compliance.block[dof(i) * stride + dof(i)])
+            .sum::<f64>()
+            / size.max(1) as f64;
+        for regularisation in [0.0, 1e-9, 1e-6, 1e-3] {
+            let block = Mat::from_fn(size, size, |i, j| {
+                let diagonal = if i == j { regularisation * mean } else { 0.0 };
+                compliance.block[dof(i) * stride + dof(j)] + diagonal
+            });
+            if let Ok(llt) = block.llt(Side::Lower) {
+                return Ok(Self {
+                    llt,
+                    size,
+                    regularisation,
+                });
+            }
+        }
+        Err(LinearError::Indefinite {
+            cause: "the compliance of the contact nodes is singular".to_string(),
+        })
+    }
+
+    /// Forces `[3m]` (mN) that move the contact nodes by `vectors [3m]` (mm).
+    ///
+    /// # Panics
+    /// If `vectors` is shorter than the block.
+    pub fn forces(&self, vectors: &[f64]) -> Vec<f64> {
+        let right = Mat::from_fn(self.size, 1, |i, _| vectors[i]);
+        let solved = self.llt.solve(&right);
+        (0..self.size).map(|i| solved[(i, 0)]).collect()
+    }
+}
+
 /// `f = A_CC^-1 c` for `rows` of the compliance (indices into its nodes) and vectors `c` `[m,3]`, mm.
 ///
-/// A block that is not positive definite gets `1e-9 .. 1e-3` of its mean diagonal added; the amount is reported.
-///
 /// # Errors
-/// Numbers of rows and vectors differ; the block stays singular.
+/// Numbers of rows and vectors differ; the block stays singular (see [`ContactFactor::new`]).
 pub fn contact_forces(
     compliance: &Compliance,
     rows: &[usize],
@@ -32,29 +83,10 @@ pub fn contact_forces(
             vectors: vectors.len(),
         });
     }
-    let stride = 3 * compliance.nodes.len();
-    let size = 3 * rows.len();
-    let dof = |i: usize| 3 * rows[i / 3] + i % 3;
-    let mean = (0..size)
-        .map(|i| compliance.block[dof(i) * stride + dof(i)])
-        .sum::<f64>()
-        / size.max(1) as f64;
-    let right = Mat::from_fn(size, 1, |i, _| vectors[i / 3][i % 3]);
-    for regularisation in [0.0, 1e-9, 1e-6, 1e-3] {
-        let block = Mat::from_fn(size, size, |i, j| {
-            let diagonal = if i == j { regularisation * mean } else { 0.0 };
-            compliance.block[dof(i) * stride + dof(j)] + diagonal
-        });
-        if let Ok(llt) = block.llt(Side::Lower) {
-            let solved = llt.solve(&right);
-            return Ok(ContactForces {
-                forces: (0..size).map(|i| solved[(i, 0)]).collect(),
-                regularisation,
-            });
-        }
-    }
-    Err(LinearError::Indefinite {
-        cause: "the compliance of the contact nodes is singular".to_string(),
+    let factor = ContactFactor::new(compliance, rows)?;
+    Ok(ContactForces {
+        forces: factor.forces(vectors.as_flattened()),
+        regularisation: factor.regularisation,
     })
 }
 

@@ -12,6 +12,11 @@ pub(super) const PROBE_LIFT_S: f64 = 0.8;
 /// Sites of `probe`.
 pub(super) const PROBE_SITES: usize = 5;
 
+/// Sites of a static case: they are solved together, so a case's bytes do not depend on what else is computed.
+pub(super) const STATIC_SITES: usize = 8;
+/// Depths at each of them, equally spaced.
+pub(super) const STATIC_DEPTHS: usize = 4;
+
 /// Push factor and angles at one time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
@@ -71,6 +76,9 @@ impl Scheme {
             Scheme::HardFast | Scheme::HardTwo => 10.0 + 5.0 * draw.depth,
             Scheme::HardSlide => 8.0 + 4.0 * draw.depth,
             Scheme::Probe => 8.0 + 7.0 * draw.depth,
+            Scheme::Static => 8.0 + 8.0 * draw.depth,
+            Scheme::StaticTwo => 5.0 + 11.0 * draw.depth,
+            Scheme::StaticDeep => 20.0 + 20.0 * draw.depth,
         }
     }
 
@@ -85,11 +93,12 @@ impl Scheme {
             // Deep pushes on few faces would only tear the mesh.
             Scheme::HardDeep => 60.0 + 40.0 * draw.size,
             Scheme::HardFast | Scheme::HardTwo | Scheme::HardSlide => 25.0 + 50.0 * draw.size,
-            Scheme::Probe => 25.0 + 75.0 * draw.size,
+            Scheme::Probe | Scheme::Static | Scheme::StaticTwo => 25.0 + 75.0 * draw.size,
+            Scheme::StaticDeep => 50.0 + 50.0 * draw.size,
         }
     }
 
-    /// Push factor and angles at `t` seconds.
+    /// Push factor and angles at `t` seconds. At a site of a static scheme frame `k` is its `k`-th depth.
     pub fn pose(self, t: f64, draw: Draw) -> Pose {
         let spin = 2.0 * PI * draw.angle;
         match self {
@@ -166,6 +175,20 @@ impl Scheme {
                     },
                     phi: PI / 6.0 * (7.0 * draw.angle).fract() + PI / 12.0 * rise(since, 0.3, 0.75),
                     theta: spin,
+                }
+            }
+            Scheme::Static | Scheme::StaticTwo | Scheme::StaticDeep => {
+                // Each depth with a direction of its own: neighbours on the path stay good guesses of each other.
+                let depth = t / FRAME_S;
+                let widest = if self == Scheme::StaticDeep {
+                    PI / 6.0
+                } else {
+                    PI / 4.0
+                };
+                Pose {
+                    push: (depth / STATIC_DEPTHS as f64).min(1.0),
+                    phi: widest * (7.0 * draw.angle + 0.31 * depth).fract(),
+                    theta: spin + 0.5 * depth,
                 }
             }
         }

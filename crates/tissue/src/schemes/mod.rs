@@ -1,4 +1,5 @@
-//! The five simulation schemes, the `hard` regimes, and `probe`, which only serves training.
+//! The five simulation schemes, the `hard` regimes, and those that only serve training: `probe`, and the `static`
+//! ones, which are lists of equilibria rather than motions (see [`crate::statics`]).
 //!
 //! A scheme fixes the magnitude, the number of collision faces and three functions
 //! of time on [0, 8 s]: the push factor `p(t)` in [0, 1], the tilt `phi(t)` from the
@@ -50,6 +51,12 @@ pub enum Scheme {
     /// For training: five sites in a row, each pushed, tilted and let go within 1.6 s. Sites are what a learned
     /// correction lacks, and 160 frames at one site say little more about it than 32.
     Probe,
+    /// For training: static equilibria, eight sites with four depths each, up to 8 to 16 mm.
+    Static,
+    /// The same with two instruments at once.
+    StaticTwo,
+    /// The same with one instrument, up to 20 to 40 mm.
+    StaticDeep,
 }
 
 impl Scheme {
@@ -70,6 +77,23 @@ impl Scheme {
         Scheme::HardRing,
     ];
 
+    /// Lists of static equilibria.
+    pub const STATIC: [Scheme; 3] = [Scheme::Static, Scheme::StaticTwo, Scheme::StaticDeep];
+
+    /// Whether its frames are equilibria of their own, found without time ([`crate::statics`]).
+    pub fn is_static(self) -> bool {
+        Self::STATIC.contains(&self)
+    }
+
+    /// Frames of a case, rest included.
+    pub fn frames(self) -> usize {
+        if self.is_static() {
+            1 + load::STATIC_SITES * load::STATIC_DEPTHS
+        } else {
+            FRAMES
+        }
+    }
+
     /// Name in files and on the command line.
     pub fn name(self) -> &'static str {
         match self {
@@ -84,6 +108,9 @@ impl Scheme {
             Scheme::HardSlide => "hard-slide",
             Scheme::HardRing => "hard-ring",
             Scheme::Probe => "probe",
+            Scheme::Static => "static",
+            Scheme::StaticTwo => "static-two",
+            Scheme::StaticDeep => "static-deep",
         }
     }
 
@@ -125,11 +152,13 @@ impl std::str::FromStr for Scheme {
             .into_iter()
             .chain(Self::HARD)
             .chain([Scheme::Probe])
+            .chain(Self::STATIC)
             .find(|scheme| scheme.name() == text)
             .ok_or_else(|| {
                 format!(
-                    "scheme `{text}` is unknown; use 1 to 5, a range such as 1-4, `hard`, `probe`, or one of {}",
-                    Self::HARD.map(Scheme::name).join(", ")
+                    "scheme `{text}` is unknown; use 1 to 5, a range such as 1-4, `hard`, `probe`, or one of {}, {}",
+                    Self::HARD.map(Scheme::name).join(", "),
+                    Self::STATIC.map(Scheme::name).join(", ")
                 )
             })
     }

@@ -1,6 +1,8 @@
 //! A case of a scheme: its site or sites, drawn from a seed, and what touches at each frame.
 
-use super::load::{Draw, PROBE_S, PROBE_SITES};
+use std::ops::Range;
+
+use super::load::{Draw, PROBE_S, PROBE_SITES, STATIC_DEPTHS, STATIC_SITES};
 use super::random::SplitMix;
 use super::slide::{SLIDE_STOPS, slide};
 use super::{FRAME_S, Scheme};
@@ -10,9 +12,10 @@ use crate::solver::ContactNode;
 /// A case: a scheme at a site, ready to say what touches at each frame.
 pub struct Programme {
     scheme: Scheme,
-    /// One, or one a site (`probe`).
+    /// One a patch for `probe` and the static schemes, one for all patches else.
     draws: Vec<Draw>,
-    /// One patch, two (`hard-two`), one a waypoint (`hard-slide`), or one a site (`probe`).
+    /// One patch, two (`hard-two`), one a waypoint (`hard-slide`), one a site (`probe`, `static`, `static-deep`), or two
+    /// a site (`static-two`).
     patches: Vec<Patch>,
 }
 
@@ -35,27 +38,44 @@ impl Programme {
             }
             outcome
         };
+        // Far enough apart that two patches share no node, if 64 draws find such a place.
+        fn beside(
+            first: &Patch,
+            mut place: impl FnMut() -> Result<Patch, ContactError>,
+        ) -> Result<Patch, ContactError> {
+            let mut second = place()?;
+            for _ in 0..64 {
+                if !shares_node(first, &second) {
+                    break;
+                }
+                second = place()?;
+            }
+            Ok(second)
+        }
         let mut patches = vec![place(area)?];
         let mut draws = vec![draw];
+        // Seeds of their own: `place` holds the case's.
+        let mut others = SplitMix(seed ^ 0x5EED);
         match scheme {
             Scheme::HardTwo => {
-                // Far enough apart that the patches share no node.
-                let mut second = place(area)?;
-                for _ in 0..64 {
-                    if !shares_node(&patches[0], &second) {
-                        break;
-                    }
-                    second = place(area)?;
-                }
+                let second = beside(&patches[0], || place(area))?;
                 patches.push(second);
             }
             Scheme::HardSlide => patches = slide(domain, &patches[0], draw, area)?,
-            Scheme::Probe => {
-                // Seeds of their own: `place` holds the case's.
-                let mut others = SplitMix(seed ^ 0x5EED);
-                for _ in 1..PROBE_SITES {
+            Scheme::Probe | Scheme::Static | Scheme::StaticDeep | Scheme::StaticTwo => {
+                let count = match scheme {
+                    Scheme::Probe => PROBE_SITES,
+                    Scheme::StaticTwo => 2 * STATIC_SITES,
+                    _ => STATIC_SITES,
+                };
+                for at in 1..count {
                     let draw = Draw::new(&mut others);
-                    patches.push(place(scheme.face_count(draw) * FACE_AREA_MM2)?);
+                    let area = scheme.face_count(draw) * FACE_AREA_MM2;
+                    patches.push(if scheme == Scheme::StaticTwo && at % 2 == 1 {
+                        beside(&patches[at - 1], || place(area))?
+                    } else {
+                        place(area)?
+                    });
                     draws.push(draw);
                 }
             }
@@ -73,35 +93,46 @@ impl Programme {
         self.patches[0].site
     }
 
-    /// Contact nodes and their displacement at the end of frame `frame` (0 is rest), ascending, mm.
-    pub fn contact(&self, frame: usize) -> Vec<ContactNode> {
+    /// Patches that touch at `frame`, and the time since the contact with their site began, s.
+    fn active(&self, frame: usize) -> (Range<usize>, f64) {
         let t = frame as f64 * FRAME_S;
-        let site = match self.scheme {
-            Scheme::Probe => ((t / PROBE_S + 1e-9) as usize).min(PROBE_SITES - 1),
-            _ => 0,
-        };
-        let draw = self.draws[site];
-        // Whole frames: 1.6 s is a multiple of them, and the remainder of a rounded time is not.
-        let since = match self.scheme {
-            Scheme::Probe => (t - site as f64 * PROBE_S).clamp(0.0, PROBE_S - 1e-9),
-            _ => t,
-        };
-        let pose = self.scheme.pose(since, draw);
-        if frame == 0 || pose.push <= 1e-6 {
-            return Vec::new();
-        }
-        let length = self.scheme.magnitude_mm(draw) * pose.push;
-        let active: &[Patch] = match self.scheme {
+        match self.scheme {
             Scheme::HardSlide => {
                 let stop = (t / 7.5 * SLIDE_STOPS as f64) as usize;
                 let stop = stop.min(self.patches.len() - 1);
-                &self.patches[stop..=stop]
+                (stop..stop + 1, t)
             }
-            Scheme::Probe => &self.patches[site..=site],
-            _ => &self.patches,
-        };
+            Scheme::Probe => {
+                let site = ((t / PROBE_S + 1e-9) as usize).min(PROBE_SITES - 1);
+                // Whole frames: 1.6 s is a multiple of them, and the remainder of a rounded time is not.
+                let since = (t - site as f64 * PROBE_S).clamp(0.0, PROBE_S - 1e-9);
+                (site..site + 1, since)
+            }
+            Scheme::Static | Scheme::StaticTwo | Scheme::StaticDeep => {
+                let at = frame.saturating_sub(1);
+                let (site, depth) = (at / STATIC_DEPTHS, at % STATIC_DEPTHS + 1);
+                let each = self.patches.len() / STATIC_SITES;
+                let end = ((site + 1) * each).min(self.patches.len());
+                ((site * each).min(end)..end, depth as f64 * FRAME_S)
+            }
+            _ => (0..self.patches.len(), t),
+        }
+    }
+
+    /// Contact nodes and their displacement at the end of frame `frame` (0 is rest), ascending, mm.
+    pub fn contact(&self, frame: usize) -> Vec<ContactNode> {
         let mut contact: Vec<ContactNode> = Vec::new();
-        for patch in active {
+        if frame == 0 {
+            return contact;
+        }
+        let (active, since) = self.active(frame);
+        for at in active {
+            let (patch, draw) = (&self.patches[at], self.draws[at.min(self.draws.len() - 1)]);
+            let pose = self.scheme.pose(since, draw);
+            if pose.push <= 1e-6 {
+                continue;
+            }
+            let length = self.scheme.magnitude_mm(draw) * pose.push;
             let direction = patch.direction(pose.phi, pose.theta);
             let displacement = direction.map(|v| (v * length) as f32);
             contact.extend(patch.nodes.iter().map(|node| ContactNode {

@@ -14,6 +14,7 @@ fn phantom() -> Mesh {
 fn plan(schemes: &[Scheme]) -> DatasetPlan {
     DatasetPlan {
         training: None,
+        columns: None,
         boundary: Boundary::Fixed,
         schemes: schemes.to_vec(),
         count: 4,
@@ -181,4 +182,17 @@ fn every_fifth_group_is_held_out() {
     }
     let seeds: std::collections::HashSet<u64> = cases.iter().map(|c| c.seed).collect();
     assert_eq!(seeds.len(), 200);
+}
+
+#[test]
+fn equilibria_without_compliance_columns_are_refused() {
+    let (mesh, plan) = (phantom(), plan(&[Scheme::One, Scheme::StaticTwo]));
+    let folder = tempfile::tempdir().unwrap();
+    let error = Dataset::open(&plan, &mesh, folder.path()).err().unwrap();
+    assert!(
+        error
+            .to_string()
+            .contains("`static-two` needs the compliance columns")
+    );
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
 }
