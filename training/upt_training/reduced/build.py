@@ -225,8 +225,14 @@ def tables(options: Options, mesh: Mesh, columns: Columns, modes: Modes) -> tupl
     return prior, info
 
 
+TWO_INSTRUMENTS = ("hard-two", "static-two")
+
+
 def envelope_of(cases: list[Case], mesh: Mesh) -> dict:
-    """What the training cases cover: pushes, their rate, contact areas."""
+    """What the training cases cover: pushes, their rate, and areas of a patch, those of one instrument.
+
+    Two instruments that adjoin make a patch larger than any that was pushed as a whole.
+    """
     areas = mesh.node_areas()
     push, rate, area = 0.0, 0.0, []
     for case in cases:
@@ -236,16 +242,19 @@ def envelope_of(cases: list[Case], mesh: Mesh) -> dict:
                 continue
             vectors = case.vectors[case.offsets[t] : case.offsets[t + 1]]
             push = max(push, float(np.linalg.norm(vectors, axis=1).max()))
-            area.append(float(areas[row].sum()))
+            if case.scheme not in TWO_INSTRUMENTS:
+                area.append(float(areas[row].sum()))
             if np.array_equal(row, before) and not case.is_static:
                 earlier = case.vectors[case.offsets[t - 1] : case.offsets[t]]
                 rate = max(rate, float(np.linalg.norm(vectors - earlier, axis=1).max()))
+    if not area:
+        raise InputError("every training case has two instruments: the area of one patch is not known; add others")
     # Sites and frames that were not drawn differ a little from those that were: 5 % on the rate, a quarter on the area.
     return {
         "max_push_mm": round(push, 2),
         "max_push_rate_mm": round(1.05 * rate, 2),
         "contact_area_mm2": [round(0.75 * min(area), 1), round(1.25 * max(area), 1)],
-        "max_sites": 2 if any(case.scheme in ("hard-two", "static-two") for case in cases) else 1,
+        "max_sites": 2 if any(case.scheme in TWO_INSTRUMENTS for case in cases) else 1,
         "displacement_bound_mm": round(2.0 * push, 1),
     }
 

@@ -20,6 +20,8 @@ pub(crate) struct Bench {
     pub(crate) max_push: f32,
     pub(crate) bound: f32,
     pub(crate) area: f64,
+    /// Patches at once that the bundle was trained on.
+    pub(crate) max_sites: usize,
     pub(crate) quick: bool,
 }
 
@@ -132,6 +134,7 @@ impl Bench {
             max_push: number("/envelope/max_push_mm")? as f32,
             bound: number("/envelope/displacement_bound_mm")? as f32,
             area: 0.4 * (low + high),
+            max_sites: number("/envelope/max_sites")? as usize,
             model,
             mesh,
             boundary,
