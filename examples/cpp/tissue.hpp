@@ -58,6 +58,7 @@ public:
 private:
   Vec3 position(std::uint32_t vertex) const;
   void find_cavities();
+  void count_step();
   void fill(const std::vector<float> &displacement);
 
   upt::Model model_;
