@@ -6,7 +6,7 @@
 //! on the energy and the pairs of earlier steps, which are kept from one depth to the next, deal with it.
 
 use super::energy::{Energy, StrainEnergy};
-use super::quasi_newton::Pairs;
+use super::quasi_newton::{Pairs, product};
 use crate::linear::{ContactFactor, FreeNodes};
 
 /// On the way from one asked displacement to the next at most so many halves are taken.
@@ -331,10 +331,6 @@ impl<'a> Path<'a> {
         }
         false
     }
-}
-
-fn product(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
 
 fn of_nodes(field: &[f64], nodes: &[u32]) -> Vec<f64> {

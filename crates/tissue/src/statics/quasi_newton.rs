@@ -14,7 +14,7 @@ pub(super) struct Pairs {
     weights: Vec<f64>,
 }
 
-fn product(a: &[f64], b: &[f64]) -> f64 {
+pub(super) fn product(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
 
