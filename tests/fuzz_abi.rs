@@ -13,7 +13,13 @@ use proptest::collection::vec;
 fn any_sequence_of_calls_is_answered_as_documented() {
     fixture::find_runtime();
     let documented = abi::documented();
-    explore::explore(60, &vec(abi::call(), 1..60), |calls| {
+    let budget = explore::Budget {
+        share: 1.0,
+        round: 20,
+        least_rounds: 3,
+    };
+    let sequence = vec(abi::call(), 1..60);
+    explore::explore("sequences of calls", budget, &sequence, |calls| {
         let mut world = abi::World::new(&documented);
         for call in &calls {
             world.make(call);

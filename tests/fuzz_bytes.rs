@@ -6,7 +6,7 @@ mod fixture;
 use std::path::Path;
 use std::sync::Arc;
 
-use explore::explore;
+use explore::{Budget, explore};
 use fixture::{
     BUNDLES, bits, copy_of, find_runtime, plain, push, renew_hash, rollout, scene, sparse,
 };
@@ -23,6 +23,15 @@ struct Damage {
     byte: u8,
     /// 0: overwrite; 1: cut off from here; 2: insert.
     how: u8,
+}
+
+/// The three tests together take about half the time that the calls of `fuzz_abi.rs` take.
+fn budget(round: u32) -> Budget {
+    Budget {
+        share: 1.0 / 6.0,
+        round,
+        least_rounds: 3,
+    }
 }
 
 fn damages() -> impl Strategy<Value = Vec<Damage>> {
@@ -87,7 +96,8 @@ fn a_damaged_file_of_a_bundle_is_refused_or_gives_the_same_steps() {
                 .map(move |file| (bundle, file, wanted.clone()))
         })
         .collect();
-    explore(400, &(0..targets.len(), damages()), |(target, damages)| {
+    let cases = (0..targets.len(), damages());
+    explore("damaged files", budget(100), &cases, |(target, damages)| {
         let (bundle, file, wanted) = &targets[target];
         let folder = copy_of(bundle);
         let path = folder.path().join(file);
@@ -112,19 +122,25 @@ fn damage_that_the_hash_does_not_show_is_an_error_or_a_model_that_steps() {
         .flat_map(|&bundle| files(bundle).into_iter().map(move |file| (bundle, file)))
         .filter(|(_, file)| file.ends_with(".safetensors"))
         .collect();
-    explore(300, &(0..targets.len(), damages()), |(target, damages)| {
-        let (bundle, file) = &targets[target];
-        let folder = copy_of(bundle);
-        let path = folder.path().join(file);
-        let mut bytes = std::fs::read(&path).unwrap();
-        apply(&damages, &mut bytes);
-        std::fs::write(&path, &bytes).unwrap();
-        renew_hash(folder.path(), file, &bytes);
-        match open(folder.path()) {
-            Err(error) => assert!(matches!(error.status(), -39..=-20), "{file}: {error}"),
-            Ok(model) => drop(steps_or_error(&model)),
-        }
-    });
+    let cases = (0..targets.len(), damages());
+    explore(
+        "damaged tensors",
+        budget(100),
+        &cases,
+        |(target, damages)| {
+            let (bundle, file) = &targets[target];
+            let folder = copy_of(bundle);
+            let path = folder.path().join(file);
+            let mut bytes = std::fs::read(&path).unwrap();
+            apply(&damages, &mut bytes);
+            std::fs::write(&path, &bytes).unwrap();
+            renew_hash(folder.path(), file, &bytes);
+            match open(folder.path()) {
+                Err(error) => assert!(matches!(error.status(), -39..=-20), "{file}: {error}"),
+                Ok(model) => drop(steps_or_error(&model)),
+            }
+        },
+    );
 }
 
 /// Steps a model of unknown worth: what is published is finite, what fails has a typed error.
@@ -154,9 +170,11 @@ fn a_damaged_snapshot_is_refused_or_restores_what_it_holds() {
             (scene, snapshot)
         })
         .collect();
+    let cases = (0..subjects.len(), damages(), any::<bool>());
     explore(
-        1500,
-        &(0..subjects.len(), damages(), any::<bool>()),
+        "damaged snapshots",
+        budget(500),
+        &cases,
         |(subject, damages, renew)| {
             let (scene, good) = &subjects[subject];
             scene.restore(good).unwrap();
