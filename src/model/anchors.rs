@@ -11,6 +11,7 @@ const SUM_TOLERANCE: f32 = 1e-3;
 #[derive(Debug)]
 pub struct Anchors {
     nodes: Vec<u32>,
+    /// Nodes of the mesh `[K,n]`.
     neighbours: Vec<u32>,
     weights: Vec<f32>,
     per_node: usize,
@@ -25,7 +26,7 @@ impl Anchors {
     pub fn parse(file: &TensorFile, node_count: usize) -> Result<Anchors> {
         let nodes = file.ascending("nodes", node_count)?;
         let shape = [Some(node_count), None];
-        let neighbours = file.indices("neighbours", &shape, nodes.len())?;
+        let mut neighbours = file.indices("neighbours", &shape, nodes.len())?;
         let weights = file.f32("weights", &shape)?;
         let per_node = neighbours.len() / node_count;
         if per_node == 0 || weights.len() != neighbours.len() {
@@ -41,6 +42,9 @@ impl Anchors {
                 format!("those of node {node} do not add up to 1"),
             ));
         }
+        for neighbour in &mut neighbours {
+            *neighbour = nodes[*neighbour as usize];
+        }
         Ok(Anchors {
             nodes,
             neighbours,
@@ -49,17 +53,12 @@ impl Anchors {
         })
     }
 
-    /// Nodes that are decoded, `M`.
-    pub fn count(&self) -> usize {
-        self.nodes.len()
+    /// The nodes that are decoded `[M]`, ascending.
+    pub fn nodes(&self) -> &[u32] {
+        &self.nodes
     }
 
-    /// The mesh node of an anchor.
-    pub fn node(&self, anchor: u32) -> u32 {
-        self.nodes[anchor as usize]
-    }
-
-    /// The anchors that a node follows, and their weights.
+    /// The anchors that a node follows, as nodes of the mesh, and their weights.
     pub fn of(&self, node: u32) -> (&[u32], &[f32]) {
         let row = node as usize * self.per_node..(node as usize + 1) * self.per_node;
         (&self.neighbours[row.clone()], &self.weights[row])

@@ -3,6 +3,7 @@
 //! Nothing here is touched, and no library is opened, until a model is opened or the providers are asked for.
 
 mod engine_cache;
+mod gpu;
 mod graph;
 mod locate;
 mod memory;

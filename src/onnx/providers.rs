@@ -1,21 +1,19 @@
 //! Execution providers: an ordered wish, what really runs, and why the others do not.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
 
-use ort::ep::{self, ExecutionProvider, ExecutionProviderDispatch};
-
+#[cfg(any(feature = "cuda", feature = "tensorrt", feature = "tensorrt-rtx"))]
+use ort::ep::ExecutionProviderDispatch;
 use ort::session::Session;
 
 use super::engine_cache::{engine_folder, engine_key};
+use super::gpu;
 use super::graph::Tensors;
 use super::memory::Memory;
-#[cfg(feature = "tensorrt-rtx")]
-use super::plugin;
 use super::runtime::Runtime;
 use crate::error::{Error, Result};
 use crate::library;
-use crate::options::{ModelOptions, Precision, Provider, UserStream};
+use crate::options::{ModelOptions, Precision, Provider};
 
 impl Provider {
     /// Lower-case name.
@@ -29,18 +27,10 @@ impl Provider {
     }
 }
 
-/// Which providers to try for a session, with their options.
+/// Which providers to try for a session, in order, with their options.
 #[derive(Debug, Clone)]
 pub struct ProviderPlan {
-    order: Vec<Provider>,
-    device_id: i32,
-    memory_limit: u64,
-    cache_dir: Option<PathBuf>,
-    allow_tf32: bool,
-    cuda_graph: bool,
-    user_stream: Option<UserStream>,
-    fp16: bool,
-    fallback: bool,
+    options: ModelOptions,
 }
 
 /// How a session is told which provider to use.
@@ -48,6 +38,7 @@ pub(super) enum Wish {
     /// Nothing to tell: the CPU.
     Cpu,
     /// A provider of the library.
+    #[cfg(any(feature = "cuda", feature = "tensorrt", feature = "tensorrt-rtx"))]
     Builtin(ExecutionProviderDispatch),
     /// The devices that a plugin provider offers, and its options.
     #[cfg(feature = "tensorrt-rtx")]
@@ -84,22 +75,12 @@ impl ProviderChoice {
 impl ProviderPlan {
     /// The plan of a model's options.
     pub fn new(options: &ModelOptions) -> ProviderPlan {
-        let mut order = options.providers.clone();
-        let fallback = !options.no_fallback;
-        if order.is_empty() || (fallback && !order.contains(&Provider::Cpu)) {
+        let mut options = options.clone();
+        let order = &mut options.providers;
+        if order.is_empty() || (!options.no_fallback && !order.contains(&Provider::Cpu)) {
             order.push(Provider::Cpu);
         }
-        ProviderPlan {
-            order,
-            device_id: options.device_id,
-            memory_limit: options.gpu_memory_limit,
-            cache_dir: options.cache_dir.clone(),
-            allow_tf32: options.allow_tf32,
-            cuda_graph: options.cuda_graph,
-            user_stream: options.user_stream,
-            fp16: options.precision == Some(Precision::F16),
-            fallback,
-        }
+        ProviderPlan { options }
     }
 
     /// The CPU alone.
@@ -116,7 +97,7 @@ impl ProviderPlan {
         mut make: impl FnMut(Provider, Wish) -> std::result::Result<T, String>,
     ) -> Result<(T, ProviderChoice)> {
         let mut refused = Vec::new();
-        for &provider in &self.order {
+        for &provider in &self.options.providers {
             let made = self
                 .wish(provider, file, graph, tensors)
                 .and_then(|wish| make(provider, wish));
@@ -140,10 +121,10 @@ impl ProviderPlan {
             .iter()
             .map(|(provider, reason)| format!("{}: {reason}", provider.name()))
             .collect();
-        let note = if self.fallback {
-            ""
-        } else {
+        let note = if self.options.no_fallback {
             " (no_fallback is set)"
+        } else {
+            ""
         };
         Err(Error::Provider(format!("{}{note}", list.join("; "))))
     }
@@ -158,13 +139,39 @@ impl ProviderPlan {
         session: &Session,
         provider: Provider,
     ) -> std::result::Result<Memory, String> {
-        let (memory, missing) = Memory::of(runtime, session, provider, self.device_id);
+        let (memory, missing) = Memory::of(runtime, session, provider, self.options.device_id);
         match missing {
-            Some(reason) if self.cuda_graph => Err(format!(
+            Some(reason) if self.options.cuda_graph => Err(format!(
                 "cuda_graph needs tensors of fixed address on the card, which are not to be had: {reason}"
             )),
             _ => Ok(memory),
         }
+    }
+
+    /// Folder of this session's compiled engines, which is made.
+    fn engine_cache(
+        &self,
+        provider: Provider,
+        file: &str,
+        graph: &[u8],
+        tensors: &Tensors<'_>,
+    ) -> std::result::Result<Option<String>, String> {
+        let Some(dir) = &self.options.cache_dir else {
+            return Ok(None);
+        };
+        let runtime = Runtime::get(library::current().onnxruntime_path.as_deref())
+            .map_err(|error| error.to_string())?;
+        let fp16 = self.options.precision == Some(Precision::F16);
+        let key = engine_key(&[
+            provider.name(),
+            runtime.version(),
+            &format!("device {} fp16 {fp16}", self.options.device_id),
+            &tensors.shapes(),
+        ]);
+        let folder = dir.join(engine_folder(file, graph, key));
+        std::fs::create_dir_all(&folder)
+            .map_err(|error| format!("cache_dir {}: {error}", folder.display()))?;
+        Ok(Some(folder.display().to_string()))
     }
 
     fn wish(
@@ -174,146 +181,17 @@ impl ProviderPlan {
         graph: &[u8],
         tensors: &Tensors<'_>,
     ) -> std::result::Result<Wish, String> {
-        if provider == Provider::Cpu {
-            return Ok(Wish::Cpu);
-        }
-        if let Some(reason) = missing(provider) {
+        if let Some(reason) = gpu::missing(provider) {
             return Err(reason);
         }
-        let runtime = Runtime::get(library::current().onnxruntime_path.as_deref())
-            .map_err(|error| error.to_string())?;
-        let folder = self.cache_dir.as_ref().map(|dir| {
-            let key = engine_key(&[
-                provider.name(),
-                runtime.version(),
-                &format!("device {} fp16 {}", self.device_id, self.fp16),
-                &tensors.shapes(),
-            ]);
-            dir.join(engine_folder(file, graph, key))
-        });
-        if let Some(dir) = &folder {
-            std::fs::create_dir_all(dir)
-                .map_err(|error| format!("cache_dir {}: {error}", dir.display()))?;
-        }
-        let cache = folder.map(|dir| dir.display().to_string());
-        let dispatch: ExecutionProviderDispatch = match provider {
-            Provider::Cpu => return Ok(Wish::Cpu),
-            #[cfg(feature = "cuda")]
-            Provider::Cuda => {
-                let mut cuda = ep::CUDA::default()
-                    .with_device_id(self.device_id)
-                    .with_tf32(self.allow_tf32)
-                    .with_cuda_graph(self.cuda_graph);
-                if self.memory_limit > 0 {
-                    cuda = cuda.with_memory_limit(self.memory_limit as usize);
-                }
-                if let Some(stream) = self.user_stream {
-                    // SAFETY: whoever made the `UserStream` promised that the stream outlives the model.
-                    cuda = unsafe { cuda.with_compute_stream(stream.handle()) };
-                }
-                cuda.build()
+        let cache = match provider {
+            Provider::Cpu | Provider::Cuda => None,
+            Provider::TensorRt | Provider::TensorRtRtx => {
+                self.engine_cache(provider, file, graph, tensors)?
             }
-            #[cfg(feature = "tensorrt")]
-            Provider::TensorRt => {
-                let mut trt = ep::TensorRT::default()
-                    .with_device_id(self.device_id)
-                    .with_fp16(self.fp16)
-                    .with_cuda_graph(self.cuda_graph);
-                if let Some(cache) = cache {
-                    trt = trt
-                        .with_engine_cache(true)
-                        .with_engine_cache_path(&cache)
-                        .with_timing_cache(true)
-                        .with_timing_cache_path(&cache);
-                }
-                if let Some(stream) = self.user_stream {
-                    // SAFETY: as above.
-                    trt = unsafe { trt.with_compute_stream(stream.handle()) };
-                }
-                trt.build()
-            }
-            #[cfg(feature = "tensorrt-rtx")]
-            Provider::TensorRtRtx if !built_in_rtx() => {
-                return Ok(Wish::Plugin(plugin::NAME, self.plugin_options(cache)));
-            }
-            #[cfg(feature = "tensorrt-rtx")]
-            Provider::TensorRtRtx => {
-                let mut rtx = ep::NVRTX::default()
-                    .with_device_id(self.device_id.max(0) as u32)
-                    .with_cuda_graph(self.cuda_graph);
-                if let Some(cache) = cache {
-                    rtx = rtx.with_runtime_cache_path(cache);
-                }
-                if let Some(stream) = self.user_stream {
-                    // SAFETY: as above.
-                    rtx = unsafe { rtx.with_compute_stream(stream.handle()) };
-                }
-                rtx.build()
-            }
-            #[cfg(not(all(feature = "cuda", feature = "tensorrt", feature = "tensorrt-rtx")))]
-            _ => unreachable!("`missing` refuses providers of features that are off"),
         };
-        Ok(Wish::Builtin(dispatch.error_on_failure()))
+        gpu::wish(&self.options, provider, cache)
     }
-
-    /// Options of the TensorRT-RTX plugin, each with the provider's name before it.
-    #[cfg(feature = "tensorrt-rtx")]
-    fn plugin_options(&self, cache: Option<String>) -> Vec<(String, String)> {
-        let mut options = vec![(
-            "enable_cuda_graph",
-            if self.cuda_graph { "1" } else { "0" }.to_owned(),
-        )];
-        options.extend(cache.map(|folder| ("nv_runtime_cache_path", folder)));
-        if let Some(stream) = self.user_stream {
-            options.push(("has_user_compute_stream", "1".to_owned()));
-            options.push(("user_compute_stream", stream.address().to_string()));
-        }
-        options
-            .into_iter()
-            .map(|(key, value)| (format!("{}.{key}", plugin::NAME), value))
-            .collect()
-    }
-}
-
-/// Why this build or the loaded library cannot offer a provider; `None` when they may.
-fn missing(provider: Provider) -> Option<String> {
-    let available: ort::Result<bool> = match provider {
-        Provider::Cpu => return None,
-        #[cfg(feature = "cuda")]
-        Provider::Cuda => ep::CUDA::is_available(),
-        #[cfg(feature = "tensorrt")]
-        Provider::TensorRt => ep::TensorRT::is_available(),
-        #[cfg(feature = "tensorrt-rtx")]
-        Provider::TensorRtRtx if built_in_rtx() => return None,
-        #[cfg(feature = "tensorrt-rtx")]
-        Provider::TensorRtRtx => {
-            let registered = Runtime::get(library::current().onnxruntime_path.as_deref())
-                .map_err(|error| error.to_string())
-                .and_then(plugin::available);
-            return registered.err();
-        }
-        #[cfg(not(all(feature = "cuda", feature = "tensorrt", feature = "tensorrt-rtx")))]
-        _ => {
-            return Some(format!(
-                "this build lacks the feature `{}`",
-                provider.name()
-            ));
-        }
-    };
-    match available {
-        Ok(true) => None,
-        Ok(false) => Some(format!(
-            "the loaded ONNX Runtime was built without the {} provider",
-            provider.name()
-        )),
-        Err(error) => Some(error.to_string()),
-    }
-}
-
-/// Whether the loaded library itself holds TensorRT-RTX; otherwise it is a plugin.
-#[cfg(feature = "tensorrt-rtx")]
-fn built_in_rtx() -> bool {
-    ep::NVRTX::is_available().unwrap_or(false)
 }
 
 /// JSON list of providers: `[{"name","available","reason"}]`. Loads ONNX Runtime.
@@ -327,7 +205,7 @@ pub fn providers_json() -> Result<String> {
     ]
     .into_iter()
     .map(|provider| {
-        let reason = missing(provider);
+        let reason = gpu::missing(provider);
         serde_json::json!({
             "name": provider.name(),
             "available": reason.is_none(),

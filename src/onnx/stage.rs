@@ -303,6 +303,7 @@ fn configure(
         .map_err(text)?;
     match wish {
         Wish::Cpu => Ok(builder),
+        #[cfg(any(feature = "cuda", feature = "tensorrt", feature = "tensorrt-rtx"))]
         Wish::Builtin(dispatch) => builder.with_execution_providers([dispatch]).map_err(text),
         #[cfg(feature = "tensorrt-rtx")]
         Wish::Plugin(name, settings) => {

@@ -6,8 +6,7 @@ use super::contact::ContactSet;
 use super::plan::NodePlan;
 use super::points::AttachedPoints;
 use super::reduced::{ReducedEngine, ReducedRecord};
-use super::upt::{UptEngine, UptInput};
-use super::upt_record::UptRecord;
+use super::upt::{Means, UptEngine, UptInput};
 use crate::bundle::Base;
 use crate::error::{Error, Result};
 use crate::kernels::rows::decode_rows;
@@ -136,7 +135,13 @@ impl Engine {
                     held: inputs.held,
                     plan: inputs.plan,
                 };
-                engine.predict(isa, pool, model, kind, tables, &input, stats)
+                let means = Means {
+                    isa,
+                    pool,
+                    kind,
+                    tables,
+                };
+                engine.predict(means, model, &input, stats)
             }
             _ => Err(mismatch()),
         }
@@ -167,10 +172,16 @@ impl Engine {
                     .map_err(|error| Error::Panic(error.to_string()))
             }
             (Engine::Upt(engine, tables), KindModel::Upt(kind)) => {
-                engine.decode_mesh(isa, pool, kind, tables, which, plan.nodes(), field)?;
+                let means = Means {
+                    isa,
+                    pool,
+                    kind,
+                    tables,
+                };
+                engine.decode_mesh(means, which, plan.nodes(), field)?;
                 let (queries, rows) = points.queries();
                 if !rows.is_empty() {
-                    engine.decode_network(isa, pool, kind, which, queries, rows, detail)?;
+                    engine.decode_queries(means, which, queries, rows, detail)?;
                     points.add_interpolated(-1.0, field, detail);
                 }
                 match kind.entry.base {
@@ -335,17 +346,6 @@ impl Engine {
         match self {
             Engine::Upt(engine, _) => engine.memory_bytes(),
             Engine::Reduced(engine) => engine.memory_bytes(),
-        }
-    }
-}
-
-impl UptEngine {
-    /// A record.
-    pub fn record(&self, which: Which) -> &UptRecord {
-        match which {
-            Which::Next => &self.next,
-            Which::Last => &self.last,
-            Which::Before => &self.before,
         }
     }
 }

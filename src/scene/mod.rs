@@ -2,12 +2,9 @@
 //! [`Error::Busy`]. Reading the published states (`read`, `sample`, their points, `stats`) is allowed from any thread
 //! at any time, also while a submitted step is in flight, and never waits for a step.
 
-mod anchors;
 mod contact;
 mod core;
-mod decoders;
 mod engine;
-mod features;
 mod plan;
 mod points;
 mod published;
@@ -17,12 +14,9 @@ mod reduced;
 mod region;
 mod shared;
 mod snapshot;
-mod step_path;
 mod timing;
 mod tools;
 mod upt;
-mod upt_prior;
-mod upt_record;
 mod verdict;
 mod worker;
 
@@ -200,8 +194,8 @@ impl Scene {
         self.with(|core, published| core.decode(published, nodes, out))
     }
 
-    /// Attaches points `[n,3]` in rest mm; `None` detaches. A `upt` bundle decodes them, unless it decodes at anchors or the
-    /// scene was made with `interpolate_points`; a `reduced` bundle's modes are interpolated.
+    /// Attaches points `[n,3]` in rest mm; `None` detaches. A `upt` bundle decodes them, unless the scene was made with
+    /// `interpolate_points`; a `reduced` bundle has no network in space: its tables are interpolated.
     pub fn attach_points(&self, points: Option<&[f32]>) -> Result<()> {
         self.with(|core, published| {
             let mut points = match points {
@@ -210,7 +204,6 @@ impl Scene {
             };
             if let KindModel::Upt(kind) = &core.model.kind
                 && !core.options.interpolate_points
-                && kind.tables.anchors.is_none()
                 && points.len() > 0
             {
                 let threads = core.pool.threads();
@@ -343,7 +336,7 @@ fn build(model: &Arc<Model>, options: &SceneOptions) -> Result<Core> {
                     mesh.node_count(),
                 ),
             };
-            let parts = step_path::Parts {
+            let parts = upt::step_path::Parts {
                 model,
                 kind,
                 tables: &tables,

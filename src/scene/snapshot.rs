@@ -13,7 +13,7 @@ use super::core::{Core, Source, lock_read, lock_write};
 use super::engine::Engine;
 use super::published::Published;
 use super::reduced::ReducedRecord;
-use super::upt_record::UptRecord;
+use super::upt::UptRecord;
 use crate::error::{Error, Result};
 use crate::kernels::FlushToZero;
 

@@ -22,26 +22,27 @@ impl AnchorField {
     pub fn new(anchors: &Anchors, node_count: usize) -> AnchorField {
         AnchorField {
             asked: Vec::with_capacity(node_count),
-            anchors: Vec::with_capacity(anchors.count()),
-            used: vec![false; anchors.count()],
+            anchors: Vec::with_capacity(anchors.nodes().len()),
+            used: vec![false; node_count],
             field: vec![0.0; 3 * node_count],
         }
     }
 
-    /// The mesh nodes to decode, so that `nodes` can be interpolated, ascending, and the field `[K,3]` for them.
+    /// The nodes to decode, so that `nodes` can be interpolated, ascending, and the field `[K,3]` for them.
     pub fn needed(&mut self, table: &Anchors, nodes: &[u32]) -> (&[u32], &mut [f32]) {
         if self.asked != nodes {
             self.asked.clear();
             self.asked.extend_from_slice(nodes);
             self.used.fill(false);
-            for &node in nodes {
-                for &anchor in table.of(node).0 {
-                    self.used[anchor as usize] = true;
-                }
+            for &anchor in nodes.iter().flat_map(|&node| table.of(node).0) {
+                self.used[anchor as usize] = true;
             }
             self.anchors.clear();
-            let used = (0..table.count() as u32).filter(|&anchor| self.used[anchor as usize]);
-            self.anchors.extend(used.map(|anchor| table.node(anchor)));
+            let used = table
+                .nodes()
+                .iter()
+                .filter(|&&node| self.used[node as usize]);
+            self.anchors.extend(used);
         }
         (&self.anchors, &mut self.field)
     }
@@ -64,7 +65,7 @@ impl AnchorField {
                 let (anchors, weights) = table.of(node);
                 let mut sum = [0.0f32; 3];
                 for (&anchor, &weight) in anchors.iter().zip(weights) {
-                    let at = 3 * table.node(anchor) as usize;
+                    let at = 3 * anchor as usize;
                     for (sum, value) in sum.iter_mut().zip(&self.field[at..at + 3]) {
                         *sum += weight * value;
                     }

@@ -2,7 +2,7 @@
 
 use std::sync::Mutex;
 
-use super::upt_record::UptRecord;
+use super::record::UptRecord;
 use crate::error::{Error, Result};
 use crate::kernels::Pool;
 use crate::model::{DECODER_TILE, Model, UptModel, UptTables};

@@ -5,12 +5,12 @@
 
 use std::time::Instant;
 
-use super::engine::Which;
-use super::upt::{Choice, UptEngine};
+use super::{Choice, Means, UptEngine};
 use crate::error::Result;
 use crate::kernels::{Isa, Pool};
 use crate::model::{Model, UptModel, UptTables};
 use crate::options::{DecoderKernel, Precision, Provider, SceneOptions, StepPath};
+use crate::scene::engine::Which;
 
 /// Runs before the timed ones: a CUDA graph is captured in the second.
 const WARM_UP: usize = 3;
@@ -115,19 +115,16 @@ impl Parts<'_> {
 
     /// Milliseconds of the network and of decoding every node, at rest.
     fn time(&self, engine: &mut UptEngine, field: &mut [f32]) -> Result<f64> {
-        let isa = Isa::detect();
+        let means = Means {
+            isa: Isa::detect(),
+            pool: self.pool,
+            kind: self.kind,
+            tables: self.tables,
+        };
         let nodes: Vec<u32> = (0..self.node_count as u32).collect();
         let start = Instant::now();
-        engine.network(isa, self.pool, self.kind, self.tables)?;
-        engine.decode_mesh(
-            isa,
-            self.pool,
-            self.kind,
-            self.tables,
-            Which::Next,
-            &nodes,
-            field,
-        )?;
+        engine.network(means)?;
+        engine.decode_mesh(means, Which::Next, &nodes, field)?;
         Ok(start.elapsed().as_secs_f64() * 1e3)
     }
 }

@@ -1,7 +1,7 @@
 //! The encoder's node features of kind `upt`, normalised as the bundle says: `[encode_nodes, f]`.
 
-use super::upt::UptInput;
-use super::upt_record::UptRecord;
+use super::UptInput;
+use super::record::UptRecord;
 use crate::bundle::Feature;
 use crate::model::{UptModel, UptTables};
 

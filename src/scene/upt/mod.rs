@@ -1,21 +1,28 @@
 //! The step of kind `upt`: features -> low-rank encoder and message mean (native) -> `latent.onnx` -> decoder, or
 //! `step.onnx` for all of it.
 
-use super::anchors::AnchorField;
+mod anchors;
+mod decode;
+mod decoders;
+mod features;
+mod prior;
+mod record;
+pub mod step_path;
+
+pub use record::UptRecord;
+
 use super::contact::ContactSet;
-use super::decoders::{Decoders, decode_resident, decode_tiles, take_rows};
-use super::engine::Which;
-use super::features::fill_features;
 use super::plan::NodePlan;
 use super::reduced::solve_flags;
 use super::timing::Stopwatch;
-use super::upt_prior::{decode_prior, respond};
-use super::upt_record::UptRecord;
+use anchors::AnchorField;
+use decoders::Decoders;
+use features::fill_features;
+use prior::{decode_prior, respond};
+
 use crate::error::{Error, Result};
 use crate::kernels::aggregate::{Csr, encode_aggregate};
-use crate::kernels::decoder::{
-    DecoderPrecision, DecoderRows, DecoderScratch, DecoderTokens, decode,
-};
+use crate::kernels::decoder::{DecoderPrecision, DecoderScratch, DecoderTokens};
 use crate::kernels::encode::LowRank;
 use crate::kernels::{Isa, Pool};
 use crate::model::{Model, UptModel, UptTables};
@@ -64,6 +71,19 @@ pub struct UptEngine {
     pub last: UptRecord,
     /// The one before.
     pub before: UptRecord,
+}
+
+/// What the network runs on and with.
+#[derive(Clone, Copy)]
+pub struct Means<'a> {
+    /// Instruction set of the kernels.
+    pub isa: Isa,
+    /// Threads.
+    pub pool: &'a Pool,
+    /// Weights.
+    pub kind: &'a UptModel,
+    /// Tables of the scene's mesh.
+    pub tables: &'a UptTables,
 }
 
 /// What a step of this kind reads.
@@ -196,17 +216,14 @@ impl UptEngine {
     }
 
     /// Computes the latent state `next`.
-    #[allow(clippy::too_many_arguments)]
     pub fn predict(
         &mut self,
-        isa: Isa,
-        pool: &Pool,
+        means: Means<'_>,
         model: &Model,
-        kind: &UptModel,
-        tables: &UptTables,
         input: &UptInput<'_>,
         stats: &mut SceneStats,
     ) -> Result<()> {
+        let Means { isa, pool, .. } = means;
         let mut watch = Stopwatch::start();
         let span = tracing::trace_span!("prior").entered();
         if let (Some(response), Some(table)) = (&mut self.response, &model.prior) {
@@ -238,22 +255,29 @@ impl UptEngine {
             Path::Split { features, .. } => features.as_mut_slice(),
             Path::Whole(stage) => stage.input(0),
         };
-        fill_features(features, kind, tables, input, &self.next, &self.last);
+        fill_features(
+            features,
+            means.kind,
+            means.tables,
+            input,
+            &self.next,
+            &self.last,
+        );
         drop(span);
         stats.encode_ms = watch.lap();
-        [stats.aggregate_ms, stats.latent_ms] = self.network(isa, pool, kind, tables)?;
+        [stats.aggregate_ms, stats.latent_ms] = self.network(means)?;
         Ok(())
     }
 
     /// Keys and values of `next` from the features, and on the whole path its displacements; wall time of the message
     /// mean and of the graph, ms.
-    pub fn network(
-        &mut self,
-        isa: Isa,
-        pool: &Pool,
-        kind: &UptModel,
-        tables: &UptTables,
-    ) -> Result<[f64; 2]> {
+    pub fn network(&mut self, means: Means<'_>) -> Result<[f64; 2]> {
+        let Means {
+            isa,
+            pool,
+            kind,
+            tables,
+        } = means;
         let mut watch = Stopwatch::start();
         let mut aggregate_ms = 0.0;
         let (stage, first) = match &mut self.path {
@@ -291,121 +315,10 @@ impl UptEngine {
         Ok([aggregate_ms, watch.lap()])
     }
 
-    /// Decodes nodes of the scene's mesh into a field `[K,3]`, before the base is added; where the bundle has anchors, at
-    /// those that the nodes need, and interpolates.
-    #[allow(clippy::too_many_arguments)]
-    pub fn decode_mesh(
-        &mut self,
-        isa: Isa,
-        pool: &Pool,
-        kind: &UptModel,
-        tables: &UptTables,
-        which: Which,
-        nodes: &[u32],
-        out: &mut [f32],
-    ) -> Result<()> {
-        let Some(table) = &tables.anchors else {
-            return self.decode_nodes(isa, pool, kind, tables, which, nodes, out);
-        };
-        let mut anchors = std::mem::take(&mut self.anchors);
-        let (needed, field) = anchors.needed(table, nodes);
-        let done = self.decode_nodes(isa, pool, kind, tables, which, needed, field);
-        let done = done.and_then(|()| anchors.interpolate(pool, table, nodes, out));
-        self.anchors = anchors;
-        done
-    }
-
-    #[allow(clippy::too_many_arguments)]
-    fn decode_nodes(
-        &mut self,
-        isa: Isa,
-        pool: &Pool,
-        kind: &UptModel,
-        tables: &UptTables,
-        which: Which,
-        nodes: &[u32],
-        out: &mut [f32],
-    ) -> Result<()> {
-        if let (Path::Whole(stage), Which::Next) = (&self.path, which) {
-            take_rows(stage.output(0), nodes, out);
-            return Ok(());
-        }
-        if let Decoders::Resident(stage) = &mut self.decoders {
-            let record = match which {
-                Which::Next => &self.next,
-                Which::Last => &self.last,
-                Which::Before => &self.before,
-            };
-            return decode_resident(stage, record, nodes, out);
-        }
-        self.decode_network(isa, pool, kind, which, &tables.query_table, nodes, out)
-    }
-
-    /// Decodes rows `nodes` of a query table into the same rows of `out`, before the base is added.
-    #[allow(clippy::too_many_arguments)]
-    pub fn decode_network(
-        &mut self,
-        isa: Isa,
-        pool: &Pool,
-        kind: &UptModel,
-        which: Which,
-        queries: &[f32],
-        nodes: &[u32],
-        out: &mut [f32],
-    ) -> Result<()> {
-        let record = match which {
-            Which::Next => &self.next,
-            Which::Last => &self.last,
-            Which::Before => &self.before,
-        };
-        if let Decoders::Tiles(stages) = &self.decoders {
-            let width = kind.entry.dims.query;
-            return decode_tiles(stages, pool, width, record, queries, nodes, out);
-        }
-        self.tokens
-            .set(self.precision, &record.keys, &record.values);
-        decode(
-            isa,
-            pool,
-            self.precision,
-            &kind.decoder,
-            &self.tokens,
-            queries,
-            DecoderRows::Scatter(nodes),
-            &mut self.decoder_scratch,
-            out,
-        )
-        .map_err(internal)
-    }
-
     /// `next` becomes `last`.
     pub fn commit(&mut self) {
         std::mem::swap(&mut self.before, &mut self.last);
         std::mem::swap(&mut self.last, &mut self.next);
-    }
-
-    /// Recomputes the prior fields of the published records at a new plan's nodes.
-    pub fn replan(
-        &mut self,
-        isa: Isa,
-        pool: &Pool,
-        table: Option<&PriorTable>,
-        plan: &NodePlan,
-    ) -> Result<()> {
-        let Some(table) = table.filter(|_| self.response.is_some()) else {
-            return Ok(());
-        };
-        for record in [&mut self.last, &mut self.before] {
-            decode_prior(
-                isa,
-                pool,
-                table,
-                plan,
-                &record.q_prior,
-                &mut record.prior_field,
-            )?;
-        }
-        Ok(())
     }
 
     /// Bytes of the buffers.

@@ -1,13 +1,14 @@
 //! The linear response inside a step of kind `upt`: static while in contact, free vibration without (where the bundle
 //! has it), and its field at the planned nodes.
 
-use super::contact::ContactSet;
-use super::plan::NodePlan;
-use super::upt_record::UptRecord;
+use super::UptEngine;
+use super::record::UptRecord;
 use crate::error::{Error, Result};
 use crate::kernels::rows::decode_rows;
 use crate::kernels::{Isa, Pool};
 use crate::prior::{ContactResponse, PriorTable, SolveReport};
+use crate::scene::contact::ContactSet;
+use crate::scene::plan::NodePlan;
 
 /// Fills the response of `next`, in block coordinates, from the contact at the end of the step and the record before.
 #[allow(clippy::too_many_arguments)]
@@ -54,4 +55,30 @@ pub(super) fn decode_prior(
         .ok_or_else(|| Error::Panic("a plan without rows of the prior".into()))?;
     decode_rows(isa, pool, &table.basis(), rows, q, field)
         .map_err(|error| Error::Panic(error.to_string()))
+}
+
+impl UptEngine {
+    /// Recomputes the prior fields of the published records at a new plan's nodes.
+    pub fn replan(
+        &mut self,
+        isa: Isa,
+        pool: &Pool,
+        table: Option<&PriorTable>,
+        plan: &NodePlan,
+    ) -> Result<()> {
+        let Some(table) = table.filter(|_| self.response.is_some()) else {
+            return Ok(());
+        };
+        for record in [&mut self.last, &mut self.before] {
+            decode_prior(
+                isa,
+                pool,
+                table,
+                plan,
+                &record.q_prior,
+                &mut record.prior_field,
+            )?;
+        }
+        Ok(())
+    }
 }

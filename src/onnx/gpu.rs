@@ -1,0 +1,152 @@
+//! ONNX Runtime's GPU providers, a cargo feature each: whether the loaded library offers one, and what it is told.
+
+#[cfg(any(feature = "cuda", feature = "tensorrt", feature = "tensorrt-rtx"))]
+use ort::ep::{self, ExecutionProvider};
+
+#[cfg(feature = "tensorrt-rtx")]
+use super::plugin;
+use super::providers::Wish;
+#[cfg(feature = "tensorrt-rtx")]
+use super::runtime::Runtime;
+#[cfg(feature = "tensorrt")]
+use crate::options::Precision;
+use crate::options::{ModelOptions, Provider};
+
+/// Why this build or the loaded library cannot offer a provider; `None` when they may.
+pub(super) fn missing(provider: Provider) -> Option<String> {
+    match provider {
+        Provider::Cpu => None,
+        #[cfg(feature = "cuda")]
+        Provider::Cuda => left_out(provider, ep::CUDA::is_available()),
+        #[cfg(feature = "tensorrt")]
+        Provider::TensorRt => left_out(provider, ep::TensorRT::is_available()),
+        #[cfg(feature = "tensorrt-rtx")]
+        Provider::TensorRtRtx if built_in_rtx() => None,
+        #[cfg(feature = "tensorrt-rtx")]
+        Provider::TensorRtRtx => {
+            let path = crate::library::current().onnxruntime_path;
+            let registered = Runtime::get(path.as_deref())
+                .map_err(|error| error.to_string())
+                .and_then(plugin::available);
+            registered.err()
+        }
+        #[cfg(not(all(feature = "cuda", feature = "tensorrt", feature = "tensorrt-rtx")))]
+        _ => Some(lacks_feature(provider)),
+    }
+}
+
+#[cfg(not(all(feature = "cuda", feature = "tensorrt", feature = "tensorrt-rtx")))]
+fn lacks_feature(provider: Provider) -> String {
+    format!("this build lacks the feature `{}`", provider.name())
+}
+
+#[cfg(any(feature = "cuda", feature = "tensorrt"))]
+fn left_out(provider: Provider, available: ort::Result<bool>) -> Option<String> {
+    match available {
+        Ok(true) => None,
+        Ok(false) => Some(format!(
+            "the loaded ONNX Runtime was built without the {} provider",
+            provider.name()
+        )),
+        Err(error) => Some(error.to_string()),
+    }
+}
+
+/// Whether the loaded library itself holds TensorRT-RTX; otherwise it is a plugin.
+#[cfg(feature = "tensorrt-rtx")]
+fn built_in_rtx() -> bool {
+    ep::NVRTX::is_available().unwrap_or(false)
+}
+
+/// What a provider is told that is not missing; compiled engines are kept in the folder `cache`.
+pub(super) fn wish(
+    options: &ModelOptions,
+    provider: Provider,
+    cache: Option<String>,
+) -> Result<Wish, String> {
+    match (provider, options, cache) {
+        (Provider::Cpu, ..) => Ok(Wish::Cpu),
+        #[cfg(feature = "cuda")]
+        (Provider::Cuda, options, _) => Ok(cuda(options)),
+        #[cfg(feature = "tensorrt")]
+        (Provider::TensorRt, options, cache) => Ok(tensorrt(options, cache)),
+        #[cfg(feature = "tensorrt-rtx")]
+        (Provider::TensorRtRtx, options, cache) if built_in_rtx() => {
+            Ok(tensorrt_rtx(options, cache))
+        }
+        #[cfg(feature = "tensorrt-rtx")]
+        (Provider::TensorRtRtx, options, cache) => {
+            Ok(Wish::Plugin(plugin::NAME, plugin_options(options, cache)))
+        }
+        #[cfg(not(all(feature = "cuda", feature = "tensorrt", feature = "tensorrt-rtx")))]
+        _ => Err(lacks_feature(provider)),
+    }
+}
+
+#[cfg(feature = "cuda")]
+fn cuda(options: &ModelOptions) -> Wish {
+    let mut cuda = ep::CUDA::default()
+        .with_device_id(options.device_id)
+        .with_tf32(options.allow_tf32)
+        .with_cuda_graph(options.cuda_graph);
+    if options.gpu_memory_limit > 0 {
+        cuda = cuda.with_memory_limit(options.gpu_memory_limit as usize);
+    }
+    if let Some(stream) = options.user_stream {
+        // SAFETY: whoever made the `UserStream` promised that the stream outlives the model.
+        cuda = unsafe { cuda.with_compute_stream(stream.handle()) };
+    }
+    Wish::Builtin(cuda.build().error_on_failure())
+}
+
+#[cfg(feature = "tensorrt")]
+fn tensorrt(options: &ModelOptions, cache: Option<String>) -> Wish {
+    let mut trt = ep::TensorRT::default()
+        .with_device_id(options.device_id)
+        .with_fp16(options.precision == Some(Precision::F16))
+        .with_cuda_graph(options.cuda_graph);
+    if let Some(cache) = cache {
+        trt = trt
+            .with_engine_cache(true)
+            .with_engine_cache_path(&cache)
+            .with_timing_cache(true)
+            .with_timing_cache_path(&cache);
+    }
+    if let Some(stream) = options.user_stream {
+        // SAFETY: as for CUDA.
+        trt = unsafe { trt.with_compute_stream(stream.handle()) };
+    }
+    Wish::Builtin(trt.build().error_on_failure())
+}
+
+#[cfg(feature = "tensorrt-rtx")]
+fn tensorrt_rtx(options: &ModelOptions, cache: Option<String>) -> Wish {
+    let mut rtx = ep::NVRTX::default()
+        .with_device_id(options.device_id.max(0) as u32)
+        .with_cuda_graph(options.cuda_graph);
+    if let Some(cache) = cache {
+        rtx = rtx.with_runtime_cache_path(cache);
+    }
+    if let Some(stream) = options.user_stream {
+        // SAFETY: as for CUDA.
+        rtx = unsafe { rtx.with_compute_stream(stream.handle()) };
+    }
+    Wish::Builtin(rtx.build().error_on_failure())
+}
+
+/// Options of the TensorRT-RTX plugin, each with the provider's name before it.
+#[cfg(feature = "tensorrt-rtx")]
+fn plugin_options(options: &ModelOptions, cache: Option<String>) -> Vec<(String, String)> {
+    let mut list = vec![(
+        "enable_cuda_graph",
+        if options.cuda_graph { "1" } else { "0" }.to_owned(),
+    )];
+    list.extend(cache.map(|folder| ("nv_runtime_cache_path", folder)));
+    if let Some(stream) = options.user_stream {
+        list.push(("has_user_compute_stream", "1".to_owned()));
+        list.push(("user_compute_stream", stream.address().to_string()));
+    }
+    list.into_iter()
+        .map(|(key, value)| (format!("{}.{key}", plugin::NAME), value))
+        .collect()
+}

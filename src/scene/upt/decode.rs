@@ -1,0 +1,91 @@
+//! From a latent state to displacements: the decoder at nodes of the mesh, all or at anchors, and at any other points.
+
+use super::decoders::{Decoders, decode_resident, decode_tiles, take_rows};
+use super::{Means, Path, UptEngine, UptRecord, internal};
+use crate::error::Result;
+use crate::kernels::decoder::{DecoderRows, decode};
+use crate::scene::engine::Which;
+
+impl UptEngine {
+    /// A record.
+    pub fn record(&self, which: Which) -> &UptRecord {
+        pick(which, [&self.next, &self.last, &self.before])
+    }
+
+    /// Decodes nodes of the scene's mesh into a field `[K,3]`, before the base is added; where the bundle has anchors, at
+    /// those that the nodes need, and interpolates.
+    pub fn decode_mesh(
+        &mut self,
+        means: Means<'_>,
+        which: Which,
+        nodes: &[u32],
+        out: &mut [f32],
+    ) -> Result<()> {
+        let Some(table) = &means.tables.anchors else {
+            return self.decode_nodes(means, which, nodes, out);
+        };
+        let mut anchors = std::mem::take(&mut self.anchors);
+        let (needed, field) = anchors.needed(table, nodes);
+        let done = self.decode_nodes(means, which, needed, field);
+        let done = done.and_then(|()| anchors.interpolate(means.pool, table, nodes, out));
+        self.anchors = anchors;
+        done
+    }
+
+    fn decode_nodes(
+        &mut self,
+        means: Means<'_>,
+        which: Which,
+        nodes: &[u32],
+        out: &mut [f32],
+    ) -> Result<()> {
+        if let (Path::Whole(stage), Which::Next) = (&self.path, which) {
+            take_rows(stage.output(0), nodes, out);
+            return Ok(());
+        }
+        if let Decoders::Resident(stage) = &mut self.decoders {
+            let record = pick(which, [&self.next, &self.last, &self.before]);
+            return decode_resident(stage, record, nodes, out);
+        }
+        self.decode_queries(means, which, &means.tables.query_table, nodes, out)
+    }
+
+    /// Decodes rows `rows` of a query table into the same rows of `out`, before the base is added.
+    pub fn decode_queries(
+        &mut self,
+        means: Means<'_>,
+        which: Which,
+        queries: &[f32],
+        rows: &[u32],
+        out: &mut [f32],
+    ) -> Result<()> {
+        let record = pick(which, [&self.next, &self.last, &self.before]);
+        if let Decoders::Tiles(stages) = &self.decoders {
+            let width = means.kind.entry.dims.query;
+            return decode_tiles(stages, means.pool, width, record, queries, rows, out);
+        }
+        self.tokens
+            .set(self.precision, &record.keys, &record.values);
+        decode(
+            means.isa,
+            means.pool,
+            self.precision,
+            &means.kind.decoder,
+            &self.tokens,
+            queries,
+            DecoderRows::Scatter(rows),
+            &mut self.decoder_scratch,
+            out,
+        )
+        .map_err(internal)
+    }
+}
+
+/// Of the records `[next, last, before]`.
+fn pick<'a>(which: Which, [next, last, before]: [&'a UptRecord; 3]) -> &'a UptRecord {
+    match which {
+        Which::Next => next,
+        Which::Last => last,
+        Which::Before => before,
+    }
+}
