@@ -212,27 +212,37 @@ fn the_latest_input_wins_where_asked() {
     assert!(scene.stats().step_count <= 200);
 }
 
+/// A host that never waits asks eight scenes in turn and gives those that are done their next step: none falls far behind.
 #[test]
-fn many_scenes_on_one_model_all_make_progress() {
-    let model = model("tiny-reduced");
-    let scenes: Vec<_> = (0..8).map(|_| scene(&model, &plain())).collect();
-    let (nodes, vectors) = push(&model, 3);
-    for _ in 0..20 {
+fn eight_scenes_on_one_model_stay_fair() {
+    const STEPS: u64 = 1000;
+    for name in BUNDLES {
+        let model = model(name);
+        let scenes: Vec<_> = (0..8).map(|_| scene(&model, &plain())).collect();
+        let (nodes, vectors) = push(&model, 3);
         for scene in &scenes {
             scene.submit(&nodes, &vectors).unwrap();
+        }
+        while scenes.iter().any(|scene| scene.stats().step_count < STEPS) {
+            for scene in &scenes {
+                if scene.poll().unwrap() == Progress::Done {
+                    scene.submit(&nodes, &vectors).unwrap();
+                }
+            }
+            std::thread::yield_now();
         }
         for scene in &scenes {
             assert_eq!(scene.wait(Duration::from_secs(60)).unwrap(), Progress::Done);
         }
+        let made: Vec<u64> = scenes.iter().map(|s| s.stats().step_count).collect();
+        let most = made.iter().max().unwrap();
+        assert!(*most <= 5 * STEPS, "{name}: steps of each scene {made:?}");
+        assert_eq!(
+            upt::shutdown().unwrap_err().status(),
+            -7,
+            "models are alive"
+        );
     }
-    for scene in &scenes {
-        assert_eq!(scene.stats().step_count, 20);
-    }
-    assert_eq!(
-        upt::shutdown().unwrap_err().status(),
-        -7,
-        "models are alive"
-    );
 }
 
 #[test]

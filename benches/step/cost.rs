@@ -126,9 +126,9 @@ fn network_nodes(model: &Model, region: Option<&[u32]>) -> Option<f64> {
     };
     let anchors = kind.tables.anchors.as_ref()?;
     let Some(region) = region else {
-        return Some(anchors.count() as f64);
+        return Some(anchors.nodes().len() as f64);
     };
-    let mut used = vec![false; anchors.count()];
+    let mut used = vec![false; model.mesh.node_count()];
     for &node in region {
         for &anchor in anchors.of(node).0 {
             used[anchor as usize] = true;

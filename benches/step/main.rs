@@ -11,6 +11,7 @@ mod floor;
 mod measure;
 mod paper;
 mod reduced;
+mod sleeping;
 mod split;
 mod steady;
 
@@ -67,8 +68,8 @@ fn run(path: &Path, machine: &floor::Machine) -> upt::Result<()> {
     }
     if info.kind == Kind::Reduced {
         reduced::site_change(&model, &name)?;
-        reduced::sleeping(&model, &name)?;
     }
+    sleeping::measure(&model, &name)?;
     if let KindModel::Upt(kind) = &model.kind {
         if path.join("paper_encoder.onnx").exists() {
             paper::against_split(path, &model, kind, &name)?;

@@ -1,12 +1,11 @@
-//! What only a reduced bundle has: a contact solve that is new when the contact nodes are, and sleep without cost.
+//! What only a reduced bundle has: a contact solve that is new when the contact nodes are.
 
 use std::sync::Arc;
-use std::time::Instant;
 
-use upt::{Model, Scene, SceneOptions};
+use upt::{Model, Scene};
 
 use super::measure::{Row, median, quick};
-use super::{FREE, options, patch, push};
+use super::{options, patch, push};
 
 fn steps() -> usize {
     if quick() { 100 } else { 1000 }
@@ -34,31 +33,5 @@ pub fn site_change(model: &Arc<Model>, name: &str) -> upt::Result<()> {
     )
     .limits(Some(5.0), Some(1.0))
     .print();
-    Ok(())
-}
-
-/// A step of a scene at rest.
-pub fn sleeping(model: &Arc<Model>, name: &str) -> upt::Result<()> {
-    let scene = Scene::new(
-        Arc::clone(model),
-        &SceneOptions {
-            no_sleep: false,
-            ..options(1)
-        },
-    )?;
-    while !scene.stats().sleeping {
-        scene.step(FREE, None)?;
-    }
-    let mut times: Vec<f64> = (0..steps())
-        .map(|_| {
-            let start = Instant::now();
-            scene
-                .step(FREE, None)
-                .map(|()| start.elapsed().as_secs_f64() * 1e6)
-        })
-        .collect::<upt::Result<_>>()?;
-    Row::new(format!("{name}/sleeping step"), median(&mut times), "us")
-        .limits(Some(10.0), None)
-        .print();
     Ok(())
 }

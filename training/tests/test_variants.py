@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -36,6 +37,18 @@ def test_variants_are_listed_and_close_to_float32(tmp_path):
         for narrow, wide in zip(outputs(out / f"latent.{precision}.onnx"), plain, strict=True):
             difference = np.abs(narrow - wide).max()
             assert 0 < difference < tolerance * np.abs(wide).max(), precision
+
+
+def test_a_bundle_without_a_whole_step_has_no_narrow_one(tmp_path):
+    bundle, out = tmp_path / "bundle", tmp_path / "narrow"
+    shutil.copytree(BUNDLE, bundle)
+    (bundle / "step.onnx").unlink()
+    manifest = json.loads((bundle / "bundle.json").read_text())
+    del manifest["files"]["step.onnx"]
+    (bundle / "bundle.json").write_text(json.dumps(manifest))
+    assert main(["variants", str(bundle), "--f16", "--out", str(out)]) == 0
+    narrow = {name for name in json.loads((out / "bundle.json").read_text())["files"] if ".f16." in name}
+    assert narrow == {"latent.f16.onnx", "decoder.f16.onnx"} == {path.name for path in out.glob("*.f16.onnx")}
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ import shutil
 from pathlib import Path
 
 from upt_training.errors import InputError
-from upt_training.precision import GRAPHS, write_variant
+from upt_training.precision import write_variant
 
 
 def variants_command(options: argparse.Namespace) -> int:
@@ -36,10 +36,8 @@ def make_variants(bundle: Path, out: Path, precisions: list[str]) -> None:
         raise InputError(f"{manifest_file}: kind `{manifest['kind']}` has no graphs worth narrowing; give a `upt` one")
     shutil.copytree(bundle, out)
     for precision in precisions:
-        write_variant(out, precision)
-        for graph in GRAPHS:
-            name = f"{graph}.{precision}.onnx"
-            content = (out / name).read_bytes()
-            manifest["files"][name] = {"bytes": len(content), "sha256": hashlib.sha256(content).hexdigest()}
+        for graph in write_variant(out, precision):
+            content = graph.read_bytes()
+            manifest["files"][graph.name] = {"bytes": len(content), "sha256": hashlib.sha256(content).hexdigest()}
     manifest["precisions"] = sorted({"f32", *manifest["precisions"], *precisions})
     (out / "bundle.json").write_text(json.dumps(manifest, indent=2) + "\n")

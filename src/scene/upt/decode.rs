@@ -82,7 +82,7 @@ impl UptEngine {
 }
 
 /// Of the records `[next, last, before]`.
-fn pick<'a>(which: Which, [next, last, before]: [&'a UptRecord; 3]) -> &'a UptRecord {
+fn pick(which: Which, [next, last, before]: [&UptRecord; 3]) -> &UptRecord {
     match which {
         Which::Next => next,
         Which::Last => last,

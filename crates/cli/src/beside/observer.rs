@@ -6,7 +6,7 @@ use upt::{Contact, Error, Scene, StepInput, flag};
 
 use crate::stress::bench::Bench;
 
-/// Attached points that are watched, at most.
+/// Attached points of each sort that are watched, at most.
 const POINTS: usize = 2000;
 
 /// One step.
@@ -88,6 +88,9 @@ pub struct PointErrors {
     /// Mean square error of each.
     pub decoded: f64,
     pub interpolated: f64,
+    /// Mean square of the difference of a point at a node from that node.
+    pub at_nodes: f64,
+    pub largest_at_nodes: f64,
 }
 
 impl Moment {
@@ -124,14 +127,13 @@ impl Observer {
             .collect();
         let edges = surface_edges(&mesh.surface);
         let scene = bench.scene()?;
-        let middles: Vec<f32> = edges
-            .iter()
-            .flat_map(|edge| {
-                let [a, b] = edge.map(|node| mesh.positions[node as usize]);
-                [0, 1, 2].map(|k| 0.5 * (a[k] + b[k]))
-            })
-            .collect();
-        scene.attach_points(Some(&middles))?;
+        let middles = edges.iter().map(|edge| {
+            let [a, b] = edge.map(|node| mesh.positions[node as usize]);
+            [0, 1, 2].map(|k| 0.5 * (a[k] + b[k]))
+        });
+        let nodes = edges.iter().map(|[node, _]| mesh.positions[*node as usize]);
+        let points: Vec<f32> = middles.chain(nodes).flatten().collect();
+        scene.attach_points(Some(&points))?;
         Ok(Self {
             scene,
             forces: ReactionForces::new(
@@ -142,7 +144,7 @@ impl Observer {
                 Moduli::from_young(material.young_pa, material.poisson),
             ),
             internal: vec![0.0; 3 * free.len()],
-            at_points: vec![0.0; middles.len()],
+            at_points: vec![0.0; points.len()],
             free,
             edges,
             found: vec![0.0; 3 * mesh.node_count()],
@@ -238,7 +240,8 @@ impl Observer {
             [0, 1, 2].map(|k| 0.5 * (a[k] + b[k]))
         };
         let mut errors = PointErrors::default();
-        for (edge, decoded) in self.edges.iter().zip(self.at_points.as_chunks::<3>().0) {
+        let (middles, nodes) = self.at_points.as_chunks().0.split_at(self.edges.len());
+        for ((edge, decoded), at_node) in self.edges.iter().zip(middles).zip(nodes) {
             let decoded = decoded.map(f64::from);
             let (interpolated, want) = (middle(found, edge), middle(truth, edge));
             let difference = apart(decoded, interpolated);
@@ -246,11 +249,16 @@ impl Observer {
             errors.largest_difference = errors.largest_difference.max(difference.sqrt());
             errors.decoded += apart(decoded, want);
             errors.interpolated += apart(interpolated, want);
+            let node = found[edge[0] as usize].map(f64::from);
+            let difference = apart(at_node.map(f64::from), node);
+            errors.at_nodes += difference;
+            errors.largest_at_nodes = errors.largest_at_nodes.max(difference.sqrt());
         }
         let count = self.edges.len().max(1) as f64;
         errors.difference /= count;
         errors.decoded /= count;
         errors.interpolated /= count;
+        errors.at_nodes /= count;
         Ok(errors)
     }
 }

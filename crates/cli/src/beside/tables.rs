@@ -167,10 +167,13 @@ pub fn points(text: &mut String, moments: &[Moment]) {
     let _ = writeln!(
         text,
         "Attached points (middles of surface edges): as attached they are {:.4} mm (RMS; at most {:.3} mm) from the mean of \
-         the edge's nodes; {:.4} mm (RMS) from the solver, the mean {:.4} mm.",
+         the edge's nodes; {:.4} mm (RMS) from the solver, the mean {:.4} mm. At a node a point is {:.4} mm (RMS; at most \
+         {:.3} mm) from the node.",
         rms(|m| m.points.difference),
         most(moments, |m| m.points.largest_difference),
         rms(|m| m.points.decoded),
-        rms(|m| m.points.interpolated)
+        rms(|m| m.points.interpolated),
+        rms(|m| m.points.at_nodes),
+        most(moments, |m| m.points.largest_at_nodes)
     );
 }

@@ -194,7 +194,7 @@ impl Bench {
         self.patch(seed, self.area)
     }
 
-    /// Steps a scene; the guard's refusals count, other errors end the run.
+    /// Steps a scene; the guard's refusals count, other errors end the run, and so does a refusal that changes the state.
     pub(crate) fn run(
         &self,
         scene: &Scene,
@@ -206,6 +206,11 @@ impl Bench {
             ..Run::default()
         };
         let mut field = vec![0.0; 3 * self.mesh.node_count()];
+        let mut kept = field.clone();
+        if let Err(error) = scene.read(&mut field) {
+            run.other = Some(error.to_string());
+            return run;
+        }
         for step in 1..=steps {
             let (nodes, vectors) = touch(step);
             let contact = Contact::Sparse {
@@ -225,7 +230,13 @@ impl Bench {
                     run.largest = run.largest.max(size);
                     run.flags |= scene.stats().flags;
                 }
-                Err(Error::Guard(_)) => run.refused += 1,
+                Err(Error::Guard(_)) => {
+                    run.refused += 1;
+                    if scene.read(&mut kept).is_err() || kept != field {
+                        run.other = Some("a refused step changed the state".into());
+                        break;
+                    }
+                }
                 Err(error) => {
                     run.other = Some(error.to_string());
                     break;

@@ -129,11 +129,6 @@ pub(super) fn bad_inputs(bench: &Bench) -> Result<Vec<Row>> {
             ..row
         });
     }
-    rows.push(Row::left(
-        &bench.subject,
-        "float16 overflow",
-        "float16 arithmetic runs on GPU providers only; tables in float16 hold at most 65,504",
-    ));
     Ok(rows)
 }
 

@@ -2,6 +2,7 @@
 //! done, what happened, and whether that is what must happen. Exit code 1 when a verdict is bad.
 
 pub(crate) mod bench;
+mod half;
 mod inputs;
 mod jump;
 mod outside;
