@@ -42,7 +42,7 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
     eprintln!("1/4 set-up");
     venv::create(workspace)?;
     let library = ort::host_library(workspace)?;
-    stages::build(workspace)?;
+    stages::build_for_demo(workspace)?;
 
     let bundles = brain_bundles(workspace)?;
     let mut boundaries: Vec<&str> = bundles
@@ -210,7 +210,7 @@ fn report(
             "--region",
             "all,surface",
             "--plain",
-            "zero,linear,coarse,tled",
+            "zero,prior,coarse,tled",
             "--tled-frames",
             "20",
         ])

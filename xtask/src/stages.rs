@@ -301,6 +301,32 @@ pub fn build(workspace: &Workspace) -> Result<()> {
     Ok(())
 }
 
+/// The command `upt` for the demo. On a fresh clone it is built without what the demo does not use (files of other
+/// programs, sparse factorisation: half of a cold build); a whole `upt` that is there is brought up to date instead.
+pub fn build_for_demo(workspace: &Workspace) -> Result<()> {
+    let version = Command::new(workspace.upt()).arg("--version").output();
+    let whole = version.is_ok_and(|output| {
+        output.status.success() && !String::from_utf8_lossy(&output.stdout).contains("without")
+    });
+    if whole {
+        return build(workspace);
+    }
+    let mut command = cargo(workspace);
+    command.args([
+        "build",
+        "--release",
+        "-p",
+        "upt-cli",
+        "--no-default-features",
+    ]);
+    run_checked(
+        "cargo build, without what the demo does not use",
+        &mut command,
+        &workspace.logs().join("cargo-build.log"),
+    )?;
+    Ok(())
+}
+
 /// What the test scripts of the other languages find their parts by.
 pub fn set_test_environment(workspace: &Workspace, command: &mut Command, library: &Path) {
     ort::set_environment(command, library);

@@ -54,7 +54,8 @@ unsafe fn zeroed<T>() -> T {
     unsafe { std::mem::MaybeUninit::zeroed().assume_init() }
 }
 
-fn check(call: &str, status: i32) -> Result<()> {
+/// An error that says what the library said; its message names the call.
+fn check(status: i32) -> Result<()> {
     if status >= 0 {
         return Ok(());
     }
@@ -65,11 +66,7 @@ fn check(call: &str, status: i32) -> Result<()> {
             CStr::from_ptr(ffi::upt_last_error()),
         )
     };
-    bail!(
-        "{call}: {} ({})",
-        message.to_string_lossy(),
-        name.to_string_lossy()
-    )
+    bail!("{} ({})", message.to_string_lossy(), name.to_string_lossy())
 }
 
 impl Model {
@@ -90,17 +87,11 @@ impl Model {
             options.precision = settings.precision;
             options.no_fallback = u8::from(settings.exact);
             let mut handle = std::ptr::null_mut();
-            check(
-                "upt_model_open",
-                ffi::upt_model_open(text.as_ptr(), &options, &mut handle),
-            )?;
+            check(ffi::upt_model_open(text.as_ptr(), &options, &mut handle))?;
             let mut info: ffi::upt_model_info = zeroed();
             info.struct_size = size::<ffi::upt_model_info>();
             let mut model = Self { handle, info };
-            check(
-                "upt_model_get_info",
-                ffi::upt_model_get_info(handle, &mut model.info),
-            )?;
+            check(ffi::upt_model_get_info(handle, &mut model.info))?;
             Ok(model)
         }
     }
@@ -116,10 +107,13 @@ impl Model {
         unsafe {
             ffi::upt_model_indices(self.handle, set, std::ptr::null_mut(), 0, &mut needed);
             let mut out = vec![0u32; needed as usize];
-            check(
-                "upt_model_indices",
-                ffi::upt_model_indices(self.handle, set, out.as_mut_ptr(), needed, &mut needed),
-            )?;
+            check(ffi::upt_model_indices(
+                self.handle,
+                set,
+                out.as_mut_ptr(),
+                needed,
+                &mut needed,
+            ))?;
             Ok(out)
         }
     }
@@ -143,10 +137,7 @@ impl Scene {
             options.precision = model.info.precision;
             options.guard_policy = ffi::UPT_GUARD_REPORT;
             let mut handle = std::ptr::null_mut();
-            check(
-                "upt_scene_create",
-                ffi::upt_scene_create(model.handle, &options, &mut handle),
-            )?;
+            check(ffi::upt_scene_create(model.handle, &options, &mut handle))?;
             Ok(Self { handle })
         }
     }
@@ -154,9 +145,7 @@ impl Scene {
     /// `upt_scene_reset`.
     pub fn reset(&mut self) -> Result<()> {
         // SAFETY: the handle is live.
-        check("upt_scene_reset", unsafe {
-            ffi::upt_scene_reset(self.handle)
-        })
+        check(unsafe { ffi::upt_scene_reset(self.handle) })
     }
 
     /// `upt_scene_set_region`; an empty list means all nodes.
@@ -167,9 +156,7 @@ impl Scene {
             nodes.as_ptr()
         };
         // SAFETY: pointer and count describe `nodes`.
-        check("upt_scene_set_region", unsafe {
-            ffi::upt_scene_set_region(self.handle, pointer, nodes.len() as u64)
-        })
+        check(unsafe { ffi::upt_scene_set_region(self.handle, pointer, nodes.len() as u64) })
     }
 
     /// `upt_scene_step_contacts`: one step from the scene's own state.
@@ -190,7 +177,7 @@ impl Scene {
                 3 * out.len() as u64,
             )
         };
-        check("upt_scene_step_contacts", status)
+        check(status)
     }
 
     /// `upt_scene_decode`: displacement of any nodes in the last state.
@@ -205,7 +192,7 @@ impl Scene {
                 3 * out.len() as u64,
             )
         };
-        check("upt_scene_decode", status)
+        check(status)
     }
 
     /// `upt_scene_get_stats`.
@@ -214,10 +201,7 @@ impl Scene {
         unsafe {
             let mut stats: ffi::upt_scene_stats = zeroed();
             stats.struct_size = size::<ffi::upt_scene_stats>();
-            check(
-                "upt_scene_get_stats",
-                ffi::upt_scene_get_stats(self.handle, &mut stats),
-            )?;
+            check(ffi::upt_scene_get_stats(self.handle, &mut stats))?;
             Ok(stats)
         }
     }

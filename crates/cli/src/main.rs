@@ -8,10 +8,14 @@ mod beside;
 mod completions;
 mod dataset;
 mod doctor;
+#[cfg(feature = "files")]
 mod export;
 mod host;
 mod machine;
 mod mesh;
+#[cfg(feature = "files")]
+mod mesh_files;
+#[cfg(feature = "linear")]
 mod prior;
 mod render;
 mod report;
@@ -24,10 +28,18 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+/// Names what a build leaves out; `cargo xtask demo` builds without what it does not need.
+const VERSION: &str = match (cfg!(feature = "files"), cfg!(feature = "linear")) {
+    (true, true) => env!("CARGO_PKG_VERSION"),
+    (true, false) => concat!(env!("CARGO_PKG_VERSION"), " (without linear)"),
+    (false, true) => concat!(env!("CARGO_PKG_VERSION"), " (without files)"),
+    (false, false) => concat!(env!("CARGO_PKG_VERSION"), " (without files, linear)"),
+};
+
 #[derive(Parser)]
 #[command(
     name = "upt",
-    version,
+    version = VERSION,
     about = "Soft tissue in real time: surrogates of nonlinear FEM, and the solver that they are measured against",
     after_help = "Each command explains itself: `upt report --help`. Most take --json for machine-readable output.",
     arg_required_else_help = true
@@ -44,8 +56,10 @@ enum Command {
     /// Meshes: quality, import, stuffing.
     Mesh(mesh::Options),
     /// A trajectory for ParaView, or a frame's surface as PLY or glTF.
+    #[cfg(feature = "files")]
     Export(export::Options),
     /// Linear-elastic compliance columns of a mesh, the raw material of priors and reduced bundles.
+    #[cfg(feature = "linear")]
     Prior(prior::Options),
     /// One reference simulation: a scheme on a mesh, as a trajectory file.
     Simulate(simulate::Options),
@@ -70,7 +84,9 @@ fn main() -> ExitCode {
     let outcome = match Arguments::parse().command {
         Command::Doctor(options) => doctor::run(&options),
         Command::Mesh(options) => mesh::run(&options),
+        #[cfg(feature = "files")]
         Command::Export(options) => export::run(&options),
+        #[cfg(feature = "linear")]
         Command::Prior(options) => prior::run(&options),
         Command::Simulate(options) => simulate::run(&options),
         Command::Dataset(options) => dataset::run(&options),

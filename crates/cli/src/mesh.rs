@@ -1,17 +1,15 @@
-//! `upt mesh`: what a mesh is (`info`), a mesh from another program (`import`), a mesh from a
-//! distance field (`stuff`).
+//! `upt mesh`: what a mesh is (`info`); `import` and `stuff` are in [`crate::mesh_files`].
 
-use anyhow::bail;
+#[cfg(feature = "files")]
+use crate::mesh_files::{Import, Stuff, run_import, run_stuff};
 use clap::{Args, Subcommand};
 use serde_json::json;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use tissue::material::Material;
 use tissue::mesh::{Boundary, Mesh};
-use tissue::mesh_import::{Ball, ImportOptions, RawTets, Resolution, from_tets, import};
 use tissue::mesh_quality::{Quality, measure};
 use tissue::solver::{Solver, SolverOptions};
-use tissue::stuffing::{GridField, HalfSpace, stuff};
 
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  upt mesh info onnx/meshes/brain.mesh.safetensors --json")]
@@ -24,8 +22,10 @@ pub struct Options {
 enum Command {
     /// Counts, quality, manifoldness and the critical time step of a mesh.
     Info(Info),
+    #[cfg(feature = "files")]
     /// A mesh from tetrahedra (VTK, VTU, MSH) or from a closed surface (STL, OBJ, PLY).
     Import(Import),
+    #[cfg(feature = "files")]
     /// Fill a signed distance grid with tetrahedra; `python -m upt_training.anatomy` calls this.
     Stuff(Stuff),
 }
@@ -55,80 +55,13 @@ struct Info {
     json: bool,
 }
 
-#[derive(Debug, Args)]
-#[command(
-    after_help = "Examples:\n  upt mesh import liver.msh liver.mesh.safetensors --fixed-sphere 0,0,0,20 --domain-sphere 60,0,30,25\n  upt mesh import kidney.stl kidney.mesh.safetensors --nodes 5000 --scale 1000"
-)]
-struct Import {
-    /// File to read: .vtk, .vtu, .msh (2.2 or 4.1), .stl, .obj or .ply.
-    input: PathBuf,
-    /// Mesh file to write (*.mesh.safetensors).
-    output: PathBuf,
-    /// Name in the mesh file; default: the input's.
-    #[arg(long)]
-    name: Option<String>,
-    /// Millimetres a unit of the file: 1000 for metres.
-    #[arg(long, default_value_t = 1.0)]
-    scale: f64,
-    /// Surfaces: wanted number of nodes.
-    #[arg(long, conflicts_with = "spacing")]
-    nodes: Option<usize>,
-    /// Surfaces: lattice spacing, mm.
-    #[arg(long)]
-    spacing: Option<f64>,
-    /// Remove faults that can be removed safely, and report them.
-    #[arg(long)]
-    repair: bool,
-    /// Hold the nodes in this ball (x,y,z,r in mm); may be repeated.
-    #[arg(long, value_name = "X,Y,Z,R", allow_hyphen_values = true)]
-    fixed_sphere: Vec<Ball>,
-    /// Instruments may touch the surface in this ball; may be repeated.
-    #[arg(long, value_name = "X,Y,Z,R", allow_hyphen_values = true)]
-    domain_sphere: Vec<Ball>,
-    /// Under the `supported` boundary condition hold the surface outside this ball; may be repeated.
-    #[arg(long, value_name = "X,Y,Z,R", allow_hyphen_values = true)]
-    window_sphere: Vec<Ball>,
-    /// Print the result as JSON.
-    #[arg(long)]
-    json: bool,
-}
-
-#[derive(Debug, Args)]
-#[command(
-    after_help = "Example:\n  upt mesh stuff head.grid.safetensors head.mesh.safetensors --spacing 3.2 --half-space 1,0,0,0"
-)]
-struct Stuff {
-    /// Distance field (docs/formats.md), positive inside.
-    field: PathBuf,
-    /// Mesh file to write; no set is filled.
-    output: PathBuf,
-    /// Lattice spacing, mm.
-    #[arg(long)]
-    spacing: f64,
-    /// Keep the side of a plane where a x + b y + c z + d > 0.
-    #[arg(long, value_name = "A,B,C,D", allow_hyphen_values = true, value_parser = plane)]
-    half_space: Option<[f64; 4]>,
-}
-
-fn plane(text: &str) -> Result<[f64; 4], String> {
-    let numbers: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse()).collect();
-    let plane: [f64; 4] = numbers
-        .ok()
-        .and_then(|numbers| numbers.try_into().ok())
-        .ok_or("write a,b,c,d")?;
-    let length = plane[..3].iter().map(|x| x * x).sum::<f64>().sqrt();
-    if length.is_finite() && length > 0.0 && plane[3].is_finite() {
-        Ok(plane.map(|x| x / length))
-    } else {
-        Err("the normal a,b,c must not be zero".into())
-    }
-}
-
 /// Runs the command.
 pub fn run(options: &Options) -> anyhow::Result<ExitCode> {
     match &options.command {
         Command::Info(info) => run_info(info),
+        #[cfg(feature = "files")]
         Command::Import(import) => run_import(import),
+        #[cfg(feature = "files")]
         Command::Stuff(stuff) => run_stuff(stuff),
     }
 }
@@ -189,7 +122,8 @@ fn run_info(args: &Info) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn print_quality(q: &Quality) {
+/// The lines of `upt mesh info` that are about shape.
+pub fn print_quality(q: &Quality) {
     let row = |label: &str, text: String| println!("{label:24}{text}");
     row("nodes", q.nodes.to_string());
     row("tetrahedra", q.tets.to_string());
@@ -247,85 +181,4 @@ fn print_quality(q: &Quality) {
             q.euler_characteristic
         ),
     );
-}
-
-fn run_import(args: &Import) -> anyhow::Result<ExitCode> {
-    let resolution = match (args.nodes, args.spacing) {
-        (Some(nodes), _) => Some(Resolution::Nodes(nodes)),
-        (_, Some(spacing)) => Some(Resolution::Spacing(spacing)),
-        _ => None,
-    };
-    let imported = import(
-        &args.input,
-        &ImportOptions {
-            name: args.name.clone(),
-            scale: args.scale,
-            resolution,
-            repair: args.repair,
-            fixed: args.fixed_sphere.clone(),
-            domain: args.domain_sphere.clone(),
-            window: args.window_sphere.clone(),
-        },
-    )
-    .map_err(|error| match error.names_file() {
-        true => anyhow::Error::new(error),
-        false => anyhow::Error::new(error).context(args.input.display().to_string()),
-    })?;
-    imported.mesh.write(&args.output)?;
-    let quality = measure(&imported.mesh);
-    if args.json {
-        let mut value = serde_json::to_value(&quality)?;
-        value["repairs"] = serde_json::to_value(&imported.repairs)?;
-        value["sha256"] = json!(imported.mesh.hash());
-        println!("{value:#}");
-        return Ok(ExitCode::SUCCESS);
-    }
-    for repair in &imported.repairs {
-        println!("{:24}{repair}", "repaired");
-    }
-    print_quality(&quality);
-    if imported.mesh.fixed.is_empty() {
-        println!("no node is held; name some with --fixed-sphere before simulating");
-    }
-    println!("{:24}{}", "written", args.output.display());
-    Ok(ExitCode::SUCCESS)
-}
-
-fn run_stuff(args: &Stuff) -> anyhow::Result<ExitCode> {
-    let field = GridField::read(&args.field)?;
-    let made = match args.half_space {
-        Some([a, b, c, offset]) => stuff(
-            &HalfSpace {
-                inner: field,
-                normal: [a, b, c],
-                offset,
-            },
-            args.spacing,
-        ),
-        None => stuff(&field, args.spacing),
-    }?;
-    let raw = RawTets {
-        positions: made.positions,
-        tets: made.tets,
-    };
-    let mut repairs = Vec::new();
-    let mut mesh = from_tets(raw, false, &mut repairs)?;
-    if !repairs.is_empty() {
-        bail!(
-            "{}: {} repairs in a stuffed mesh",
-            args.field.display(),
-            repairs.len()
-        );
-    }
-    mesh.name = "stuffed".into();
-    mesh.source = format!("distance field stuffed at a spacing of {} mm", args.spacing);
-    mesh.license = "as the distance field's".into();
-    mesh.write(&args.output)?;
-    println!(
-        "{} nodes, {} tetrahedra, {} dropped for a manifold boundary",
-        mesh.node_count(),
-        mesh.tets.len(),
-        made.dropped
-    );
-    Ok(ExitCode::SUCCESS)
 }

@@ -10,8 +10,9 @@ use crate::material::Material;
 use crate::mesh::{Boundary, Mesh};
 use crate::schemes::{Scheme, SplitMix};
 use crate::simulate::{SOLVER_NAME, simulate};
-use crate::solver::{Pressure, SolverOptions};
-use crate::statics::{StaticSolver, StaticsError};
+use crate::solver::SolverOptions;
+#[cfg(feature = "linear")]
+use crate::statics::StaticSolver;
 use crate::tensors::write_whole;
 use crate::trajectory::TrajectoryError;
 use serde::{Deserialize, Serialize};
@@ -95,8 +96,12 @@ pub enum DatasetError {
     NoColumns(&'static str),
     #[error("static schemes know the pressure of an element only, not the average nodal one")]
     AveragePressure,
+    #[cfg(feature = "linear")]
     #[error(transparent)]
-    Statics(#[from] StaticsError),
+    Statics(#[from] crate::statics::StaticsError),
+    #[cfg(not(feature = "linear"))]
+    #[error("scheme `{0}` needs the feature `linear`, which this build leaves out")]
+    NoLinear(&'static str),
     #[error(transparent)]
     Trajectory(#[from] TrajectoryError),
 }
@@ -146,6 +151,46 @@ impl DatasetPlan {
     }
 }
 
+#[cfg(feature = "linear")]
+fn static_solver(
+    plan: &DatasetPlan,
+    mesh: &Mesh,
+    scheme: &'static str,
+) -> Result<StaticSolver, DatasetError> {
+    let columns = plan.columns.as_deref();
+    let columns = columns.ok_or(DatasetError::NoColumns(scheme))?;
+    if plan.options.pressure != crate::solver::Pressure::Element {
+        return Err(DatasetError::AveragePressure);
+    }
+    let material = plan.options.material;
+    Ok(StaticSolver::new(mesh, plan.boundary, material, columns)?)
+}
+
+/// Without the feature `linear` there is none.
+#[cfg(not(feature = "linear"))]
+enum StaticSolver {}
+
+#[cfg(not(feature = "linear"))]
+impl StaticSolver {
+    fn trajectory(
+        &self,
+        _: Scheme,
+        _: u64,
+        _: impl FnMut(usize),
+    ) -> Result<(crate::trajectory::Trajectory, Vec<String>), std::convert::Infallible> {
+        match *self {}
+    }
+}
+
+#[cfg(not(feature = "linear"))]
+fn static_solver(
+    _: &DatasetPlan,
+    _: &Mesh,
+    scheme: &'static str,
+) -> Result<StaticSolver, DatasetError> {
+    Err(DatasetError::NoLinear(scheme))
+}
+
 /// A plan bound to a mesh and a folder.
 pub struct Dataset<'a> {
     plan: &'a DatasetPlan,
@@ -166,15 +211,7 @@ impl<'a> Dataset<'a> {
             return Err(DatasetError::EmptyPlan);
         }
         let statics = match plan.schemes.iter().find(|scheme| scheme.is_static()) {
-            Some(scheme) => {
-                let columns = plan.columns.as_deref();
-                let columns = columns.ok_or(DatasetError::NoColumns(scheme.name()))?;
-                if plan.options.pressure != Pressure::Element {
-                    return Err(DatasetError::AveragePressure);
-                }
-                let material = plan.options.material;
-                Some(StaticSolver::new(mesh, plan.boundary, material, columns)?)
-            }
+            Some(scheme) => Some(static_solver(plan, mesh, scheme.name())?),
             None => None,
         };
         std::fs::create_dir_all(folder).map_err(|source| DatasetError::Io {

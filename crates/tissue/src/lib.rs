@@ -3,6 +3,9 @@
 //!
 //! Units throughout: millimetre, gram, second. Stress and moduli then come out
 //! in pascal, forces in micronewton and energies in nanojoule; files hold mN and mJ.
+//!
+//! Features, both default: `files` (`mesh_import`, surface export), `linear` (`linear`, `statics`,
+//! `baselines::LinearQuasiStatic`). Without them a build takes half the time.
 
 #![allow(
     clippy::needless_range_loop,
@@ -13,15 +16,18 @@ pub mod baselines;
 pub mod contact;
 pub mod dataset;
 pub mod export;
+#[cfg(feature = "linear")]
 pub mod linear;
 pub mod material;
 pub mod mesh;
+#[cfg(feature = "files")]
 pub mod mesh_import;
 pub mod mesh_quality;
 pub mod metrics;
 pub mod schemes;
 pub mod simulate;
 pub mod solver;
+#[cfg(feature = "linear")]
 pub mod statics;
 pub mod stuffing;
 pub mod tensors;

@@ -7,6 +7,7 @@ use tissue::mesh::Mesh;
 
 use super::cases::Cases;
 use super::method::{BundleFolder, Method};
+use super::prior_alone::PriorAlone;
 use super::{Options, paper_split};
 
 /// The bundles whose mesh and boundary are the cases'; the others are named in `notes`.
@@ -73,7 +74,6 @@ pub fn methods(
     bundles: &[BundleFolder],
     notes: &mut Vec<String>,
 ) -> Result<Vec<Method>> {
-    let most = options.threads.iter().copied().max().unwrap_or(1);
     let mut methods = Vec::new();
     for bundle in bundles {
         for provider in &options.provider {
@@ -100,10 +100,24 @@ pub fn methods(
     for plain in &options.plain {
         match plain.as_str() {
             "zero" => methods.push(Method::Zero),
+            #[cfg(not(feature = "linear"))]
+            "linear" => bail!(
+                "--plain linear: this build leaves out the feature `linear`; --plain prior computes the same from a bundle's tables"
+            ),
+            #[cfg(feature = "linear")]
             "linear" => methods.push(Method::Linear {
-                threads: most,
+                threads: options.threads.iter().copied().max().unwrap_or(1),
                 decay: cases.release_decay(),
             }),
+            "prior" => {
+                for bundle in bundles.iter().filter(|one| PriorAlone::available(one)) {
+                    methods.extend(options.threads.iter().map(|threads| Method::Prior {
+                        bundle: bundle.clone(),
+                        threads: *threads,
+                        decay: cases.release_decay(),
+                    }));
+                }
+            }
             "coarse" if options.coarse_mesh.is_file() => {
                 if Mesh::read(&options.coarse_mesh)?.hash() == cases.mesh_sha256 {
                     notes.push("coarse TLED: the cases are on the coarse mesh themselves".into());
@@ -136,7 +150,9 @@ pub fn methods(
                 }
             }
             "none" => {}
-            other => bail!("--plain {other}: known are zero, linear, coarse, tled, paper, none"),
+            other => {
+                bail!("--plain {other}: known are zero, linear, prior, coarse, tled, paper, none")
+            }
         }
     }
     Ok(methods)

@@ -161,10 +161,18 @@ pub fn describe(method: &Method, mesh: &Mesh) -> Row {
             named(&mut row, bundle);
             row.threads = *threads;
         }
+        Method::Prior {
+            bundle, threads, ..
+        } => {
+            row.method = "linear response alone".into();
+            named(&mut row, bundle);
+            row.threads = *threads;
+        }
         Method::Zero => {
             row.method = "predict zero".into();
             row.threads = 1;
         }
+        #[cfg(feature = "linear")]
         Method::Linear { threads, .. } => {
             row.method = "linear elastic".into();
             row.threads = *threads;

@@ -4,11 +4,12 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
-use tissue::baselines::{CoarseTled, LinearQuasiStatic};
-use tissue::linear::Lame;
+use tissue::baselines::CoarseTled;
 use tissue::mesh::{Boundary, Mesh};
 use tissue::solver::{ContactNode, Solver, SolverOptions};
 use tissue::trajectory::TrajectoryHeader;
+#[cfg(feature = "linear")]
+use tissue::{baselines::LinearQuasiStatic, linear::Lame};
 use upt::ffi;
 
 use super::setting::{Precision, Provider, Region};
@@ -41,8 +42,15 @@ pub enum Method {
         bundle: BundleFolder,
         threads: u32,
     },
+    /// A bundle's linear response alone. `decay`: factor a step after release.
+    Prior {
+        bundle: BundleFolder,
+        threads: u32,
+        decay: f32,
+    },
     Zero,
     /// `decay`: factor a step after release.
+    #[cfg(feature = "linear")]
     Linear {
         threads: u32,
         decay: f32,
@@ -60,10 +68,15 @@ pub enum Method {
 pub enum Stepper {
     Surrogate(Box<SurrogateStepper>),
     PaperSplit(Box<super::paper_split::PaperSplit>),
+    Prior(Box<super::prior_alone::PriorAlone>),
     Zero,
+    #[cfg(feature = "linear")]
     Linear(Box<LinearQuasiStatic>),
     CoarseTled(Box<CoarseTled>),
-    Tled { solver: Box<Solver>, dt: f64 },
+    Tled {
+        solver: Box<Solver>,
+        dt: f64,
+    },
 }
 
 pub struct SurrogateStepper {
@@ -135,7 +148,15 @@ impl Stepper {
             Method::PaperSplit { bundle, threads } => Self::PaperSplit(Box::new(
                 super::paper_split::PaperSplit::new(bundle, *threads)?,
             )),
+            Method::Prior {
+                bundle,
+                threads,
+                decay,
+            } => Self::Prior(Box::new(super::prior_alone::PriorAlone::new(
+                bundle, *decay, *threads,
+            )?)),
             Method::Zero => Self::Zero,
+            #[cfg(feature = "linear")]
             Method::Linear { threads, decay } => {
                 let lame = Lame::from_young(header.material.young_pa, header.material.poisson)?;
                 Self::Linear(Box::new(LinearQuasiStatic::new(
@@ -174,7 +195,9 @@ impl Stepper {
         match self {
             Self::Surrogate(surrogate) => surrogate.scene.reset()?,
             Self::PaperSplit(split) => split.reset(),
+            Self::Prior(prior) => prior.reset(),
             Self::Zero => {}
+            #[cfg(feature = "linear")]
             Self::Linear(linear) => linear.reset(),
             Self::CoarseTled(coarse) => coarse.reset(),
             Self::Tled { solver, .. } => solver.reset(),
@@ -193,7 +216,9 @@ impl Stepper {
         match self {
             Self::Surrogate(surrogate) => return surrogate.step(nodes, vectors, out),
             Self::PaperSplit(split) => split.step(nodes, vectors, out)?,
+            Self::Prior(prior) => prior.step(nodes, vectors, out)?,
             Self::Zero => out.fill([0.0; 3]),
+            #[cfg(feature = "linear")]
             Self::Linear(linear) => linear.step(nodes, vectors, out)?,
             Self::CoarseTled(coarse) => coarse.step(nodes, vectors, out)?,
             Self::Tled { solver, dt } => {

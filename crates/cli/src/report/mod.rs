@@ -14,6 +14,7 @@ pub mod method;
 mod paper_split;
 pub mod pictures;
 pub mod plot;
+mod prior_alone;
 mod row;
 pub mod setting;
 mod table;
@@ -66,11 +67,11 @@ pub struct Options {
     precision: Vec<Precision>,
     #[arg(long, value_delimiter = ',', default_value = "cpu")]
     provider: Vec<Provider>,
-    /// Plain methods beside the library: zero, linear, coarse, tled, paper; or none.
+    /// Plain methods beside the library: zero, linear, prior (a bundle's linear response alone), coarse, tled, paper; or none.
     #[arg(
         long,
         value_delimiter = ',',
-        default_value = "zero,linear,coarse,tled,paper"
+        default_value = DEFAULT_PLAIN
     )]
     plain: Vec<String>,
     /// The mesh of `coarse`.
@@ -92,6 +93,13 @@ pub struct Options {
     #[arg(long)]
     json: bool,
 }
+
+/// All that this build has.
+const DEFAULT_PLAIN: &str = if cfg!(feature = "linear") {
+    "zero,linear,prior,coarse,tled,paper"
+} else {
+    "zero,prior,coarse,tled,paper"
+};
 
 /// One thread, and all of them.
 fn default_threads() -> Vec<u32> {

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 /// One line of `report.json`: a method in one configuration, over all cases.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Row {
-    /// `surrogate`, `paper split`, `predict zero`, `linear elastic`, `coarse TLED`, `TLED`.
+    /// `surrogate`, `paper split in ONNX Runtime`, `linear response alone`, `predict zero`, `linear elastic`, `coarse TLED`, `TLED`.
     pub method: String,
     /// The bundle's name; empty for plain methods.
     pub bundle: String,

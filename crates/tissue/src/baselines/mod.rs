@@ -5,12 +5,16 @@
 //! Fields are `[K,3]`, mm. Each step reports its own run time where it is more than a copy.
 
 mod coarse_tled;
+mod decay;
 mod embedding;
+#[cfg(feature = "linear")]
 mod quasi_static;
 
 pub use coarse_tled::{CoarseTled, CoarseTledError};
+pub use decay::DecayFit;
 pub use embedding::Embedding;
-pub use quasi_static::{DecayFit, LinearQuasiStatic};
+#[cfg(feature = "linear")]
+pub use quasi_static::LinearQuasiStatic;
 
 /// Predicts rest, but for the contact nodes.
 pub fn predict_zero(nodes: &[u32], vectors: &[[f32; 3]], out: &mut [[f32; 3]]) {
@@ -36,5 +40,5 @@ fn prescribe(nodes: &[u32], vectors: &[[f32; 3]], out: &mut [[f32; 3]]) {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "linear"))]
 mod tests;
