@@ -84,6 +84,19 @@ pub fn relative_error(got: &[f32], want: &[f32]) -> f64 {
     difference / largest
 }
 
+/// Root mean square of the difference, relative to that of `want`: relative L2.
+pub fn relative_l2(got: &[f32], want: &[f32]) -> f64 {
+    assert_eq!(got.len(), want.len(), "rivals' outputs differ in length");
+    let square = |value: f64| value * value;
+    let (difference, size) = got.iter().zip(want).fold((0.0, 0.0), |(d, s), (&a, &b)| {
+        (
+            d + square(f64::from(a) - f64::from(b)),
+            s + square(f64::from(b)),
+        )
+    });
+    (difference / size).sqrt()
+}
+
 /// A line of the speed tables.
 #[derive(Serialize)]
 pub struct Row {

@@ -4,6 +4,7 @@
 //! carries `paper_encoder.onnx` and `paper_decoder.onnx` is also run through ONNX Runtime as the paper splits it, with
 //! the same weights and threads; `cargo bench --bench step -- reduced` runs the bundles with that name only. `UPT_FINE_MESH=FILE` adds steps on that mesh for bundles without a prior.
 
+mod bare;
 mod cost;
 mod fine;
 mod floor;

@@ -8,7 +8,7 @@ use upt::model::UptModel;
 use upt::onnx::ProviderPlan;
 use upt::{Model, Scene, SceneOptions};
 
-use super::measure::{Row, budget, median, quick, relative_error};
+use super::measure::{Row, budget, median, quick, relative_error, relative_l2};
 use super::split::Split;
 use super::{options, patch, push, pushed};
 
@@ -45,6 +45,7 @@ pub fn against_split(
             ours.push(start.elapsed().as_secs_f64() * 1e3);
         }
         let error = relative_error(&out, split.displacement());
+        let l2 = relative_l2(&out, split.displacement());
         let (ours, theirs) = (median(&mut ours), median(&mut theirs));
         println!(
             "{name}, {threads} threads: {ours:.1} ms, the paper's split in ONNX Runtime {theirs:.1} ms"
@@ -61,6 +62,13 @@ pub fn against_split(
         .print();
         Row::new(
             format!("{name}/error against the paper's split/{threads} threads"),
+            l2,
+            "relative L2",
+        )
+        .limits(Some(1e-6), None)
+        .print();
+        Row::new(
+            format!("{name}/largest difference from the paper's split/{threads} threads"),
             error,
             "of the largest",
         )

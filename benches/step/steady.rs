@@ -4,6 +4,7 @@ use std::time::Instant;
 
 use upt::Scene;
 
+use super::bare::BareLoop;
 use super::measure::{Row, budget, median};
 use super::{patch, pushed, steps};
 use upt::{Contact, StepInput};
@@ -19,7 +20,8 @@ pub fn measure(
     let nodes = patch(scene.mesh(), 300);
     let vectors: Vec<Vec<f32>> = (0..7).map(|t| pushed(&nodes, t)).collect();
     let mut out = vec![0.0; 3 * scene.region_count()];
-    let (mut times, mut outside) = (Vec::new(), Vec::new());
+    let (mut times, mut outside, mut bare) = (Vec::new(), Vec::new(), Vec::new());
+    let mut idle: Option<BareLoop> = None;
     let started = Instant::now();
     for t in 0..steps(scene.model().info().kind) + WARM_UP {
         if times.len() >= LEAST && started.elapsed() > budget() {
@@ -43,16 +45,24 @@ pub fn measure(
             let work =
                 s.prior_ms + s.encode_ms + s.aggregate_ms + s.latent_ms + s.decode_ms + s.guard_ms;
             outside.push(100.0 * (ms - work) / ms);
+            bare.push(idle.get_or_insert_with(|| BareLoop::of(ms)).run());
         }
     }
     let middle = median(&mut times);
-    let p99 = times[(times.len() * 99).div_ceil(100) - 1];
+    let tail = |sorted: &[f64]| sorted[(sorted.len() * 99).div_ceil(100) - 1];
+    let bare_middle = median(&mut bare);
     Row::new(format!("{name}/step"), middle, "ms")
         .limits(bar, goal)
         .print();
-    Row::new(format!("{name}/p99 over median"), p99 / middle, "")
+    Row::new(format!("{name}/p99 over median"), tail(&times) / middle, "")
         .limits(Some(1.5), Some(1.2))
         .print();
+    Row::new(
+        format!("{name}/p99 over median, a bare loop taking turns with it"),
+        tail(&bare) / bare_middle,
+        "",
+    )
+    .print();
     Row::new(
         format!("{name}/outside kernels and sessions"),
         median(&mut outside),
