@@ -573,7 +573,8 @@ namespace Upt.Interop
         /// <summary>
         /// Attaches points to the tissue; they replace those attached before.
         ///
-        /// points: `[n,3]`, rest positions, mm; NULL with count 0 detaches. count: points, n.
+        /// points: `[n,3]`, rest positions, mm; NULL with count 0 detaches. count: points, n. A bundle of kind `upt` decodes each where it
+        /// is, in every step (unless the scene was made with `interpolate_points`); one of kind `reduced` interpolates between nodes.
         /// Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_NON_FINITE`,
         /// `UPT_ERR_ARGUMENT`, `UPT_ERR_UNSUPPORTED`, `UPT_ERR_PANIC`.
         /// </summary>
