@@ -180,7 +180,25 @@ fn clippy(workspace: &Workspace) -> Result<Outcome> {
         "-D",
         "warnings",
     ]);
-    check(workspace, "cargo clippy", &mut command)
+    let whole = check(workspace, "cargo clippy", &mut command)?;
+    // As the demo builds it.
+    let mut command = cargo(workspace);
+    command.args([
+        "clippy",
+        "--release",
+        "--package",
+        "upt-cli",
+        "--no-default-features",
+        "--",
+        "-D",
+        "warnings",
+    ]);
+    let least = check(
+        workspace,
+        "cargo clippy, upt-cli without its features",
+        &mut command,
+    )?;
+    Ok(joined(vec![whole, least]))
 }
 
 fn style(workspace: &Workspace) -> Result<Outcome> {

@@ -11,6 +11,8 @@ mod doctor;
 #[cfg(feature = "files")]
 mod export;
 mod host;
+#[cfg(not(all(feature = "files", feature = "linear")))]
+mod left_out;
 mod machine;
 mod mesh;
 #[cfg(feature = "files")]
@@ -58,9 +60,15 @@ enum Command {
     /// A trajectory for ParaView, or a frame's surface as PLY or glTF.
     #[cfg(feature = "files")]
     Export(export::Options),
+    /// Left out of this build.
+    #[cfg(not(feature = "files"))]
+    Export(left_out::Options),
     /// Linear-elastic compliance columns of a mesh, the raw material of priors and reduced bundles.
     #[cfg(feature = "linear")]
     Prior(prior::Options),
+    /// Left out of this build.
+    #[cfg(not(feature = "linear"))]
+    Prior(left_out::Options),
     /// One reference simulation: a scheme on a mesh, as a trajectory file.
     Simulate(simulate::Options),
     /// Many reference simulations in a folder, resumable and shardable.
@@ -86,8 +94,12 @@ fn main() -> ExitCode {
         Command::Mesh(options) => mesh::run(&options),
         #[cfg(feature = "files")]
         Command::Export(options) => export::run(&options),
+        #[cfg(not(feature = "files"))]
+        Command::Export(options) => left_out::run("files", &options),
         #[cfg(feature = "linear")]
         Command::Prior(options) => prior::run(&options),
+        #[cfg(not(feature = "linear"))]
+        Command::Prior(options) => left_out::run("linear", &options),
         Command::Simulate(options) => simulate::run(&options),
         Command::Dataset(options) => dataset::run(&options),
         Command::Rollout(options) => rollout::run(&options),

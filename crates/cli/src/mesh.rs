@@ -28,6 +28,12 @@ enum Command {
     #[cfg(feature = "files")]
     /// Fill a signed distance grid with tetrahedra; `python -m upt_training.anatomy` calls this.
     Stuff(Stuff),
+    /// Left out of this build.
+    #[cfg(not(feature = "files"))]
+    Import(crate::left_out::Options),
+    /// Left out of this build.
+    #[cfg(not(feature = "files"))]
+    Stuff(crate::left_out::Options),
 }
 
 #[derive(Debug, Args)]
@@ -63,6 +69,10 @@ pub fn run(options: &Options) -> anyhow::Result<ExitCode> {
         Command::Import(import) => run_import(import),
         #[cfg(feature = "files")]
         Command::Stuff(stuff) => run_stuff(stuff),
+        #[cfg(not(feature = "files"))]
+        Command::Import(options) | Command::Stuff(options) => {
+            crate::left_out::run("files", options)
+        }
     }
 }
 

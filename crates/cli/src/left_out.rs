@@ -1,0 +1,22 @@
+//! Commands that this build of `upt` does not have: they say how to get them.
+
+use std::process::ExitCode;
+
+use anyhow::bail;
+use clap::Args;
+
+/// Takes anything.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  cargo build --release -p upt-cli")]
+pub struct Options {
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true, hide = true)]
+    rest: Vec<String>,
+}
+
+/// Always an error.
+pub fn run(feature: &str, options: &Options) -> anyhow::Result<ExitCode> {
+    let _ = &options.rest;
+    bail!(
+        "this `upt` was built without the feature `{feature}` (as `cargo xtask demo` does it); `cargo build --release -p upt-cli` makes the whole command"
+    )
+}
