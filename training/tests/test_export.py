@@ -15,6 +15,7 @@ from upt_training.bundle_rollout import BundleRunner
 from upt_training.config import load_settings
 from upt_training.dataset import open_dataset, open_trajectory
 from upt_training.mesh_file import load_mesh
+from upt_training.random_bundle import main as write_random
 from upt_training.run import make_trainer
 
 
@@ -130,3 +131,16 @@ def test_a_failed_export_leaves_the_old_bundle(bundle, trained, data, mesh_path,
     )
     assert code == 2 and (bundle / "bundle.json").read_bytes() == before
     assert load_settings(CONFIGS / "tiny.toml").name == "tiny"
+
+
+def test_relative_positions_go_into_the_tables(mesh_path, tmp_path):
+    """Writing a bundle checks the graphs against the unfactored network; the tables must have changed."""
+    text, tables = (CONFIGS / "tiny.toml").read_text(), []
+    for name, line in (("plain", ""), ("relative", "relative_positions = true\n")):
+        config = tmp_path / f"{name}.toml"
+        config.write_text(text.replace("[model]\n", "[model]\n" + line))
+        arguments = ["--config", str(config), "--mesh", str(mesh_path), "--out", str(tmp_path / name)]
+        assert write_random([*arguments, "--step", "--paper-split"]) == 0
+        tables.append(BundleRunner(tmp_path / name).session.tables)
+    assert not np.allclose(tables[0][0], tables[1][0], atol=1e-3)
+    assert tables[0][2].shape == tables[1][2].shape

@@ -28,8 +28,10 @@ def test_sincos_layout():
     assert torch.allclose(e[m + 2], torch.cos(torch.tensor(2.0))) and (e[12:] == 0).all()
 
 
-def test_factored_equals_unfactored_in_float64():
+@pytest.mark.parametrize("relative", [False, True])
+def test_factored_equals_unfactored_in_float64(relative):
     mesh, settings = box_mesh(), load_settings(CONFIGS / "tiny-replay.toml")
+    settings.model.relative_positions = relative
     model = random_model(settings, mesh, 3)
     model.mixing.copy_(difference_mixing(settings.model.features, 5.0))
     model = model.double()
@@ -45,6 +47,15 @@ def test_factored_equals_unfactored_in_float64():
         a = model(x, (source, target), neighbours, mask.double(), supernodes, query)
         b = model.forward_unfactored(x, positions, neighbours, mask.double(), supernodes)
     assert (a - b).abs().max() < 1e-12 * b.abs().max()
+
+
+def test_a_scaled_start_passes_the_input_on():
+    torch.manual_seed(0)
+    model = Upt(load_settings(CONFIGS / "window.toml").model)
+    x = torch.randn(1000, 48)
+    narrow = model.message2(x).std()
+    model.scale_start()
+    assert narrow < 0.2 and 0.9 < model.message2(x).std() < 1.1
 
 
 def test_drop_path_drops_at_micro_batch_one():

@@ -87,7 +87,8 @@ def parser() -> argparse.ArgumentParser:
     ablate.add_argument("--steps", type=int, default=2000, help="optimiser steps of each variant")
     ablate.add_argument("--max-minutes", type=float, default=0.0, help="time limit of each variant")
     ablate.add_argument("--cases", type=int, default=10, help="held-out cases scored")
-    ablate.add_argument("--only", nargs="*", help="only these variants")
+    ablate.add_argument("--only", nargs="*", help="only these variants, by name")
+    ablate.add_argument("--page", type=Path, help="page to write into: docs/training.md and its images")
     ablate.add_argument("--device", default="auto")
     ablate.add_argument("--threads", type=int, default=1)
     return top

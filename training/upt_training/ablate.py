@@ -2,7 +2,8 @@
 
 Suites: `windows` (pure teacher forcing and stochastic teacher forcing with windows 2 to 8, the paper's Fig. "window
 size" and Fig. "error accumulation") and `tricks` (each departure from the paper's recipe, taken away one at a time).
-Results go to `OUT/SUITE.json`, `OUT/SUITE.md` and `OUT/*.png`; finished variants are not run again.
+Results go to `OUT/SUITE.json`, `OUT/SUITE.md` and `OUT/*.png`, and with `--page docs/training.md` into the page and the
+images beside it; finished variants are not run again.
 """
 
 from __future__ import annotations
@@ -15,7 +16,9 @@ from pathlib import Path
 import numpy as np
 import torch
 
+from upt_training.ablation_report import replaced, write_report
 from upt_training.config import Settings, load_settings
+from upt_training.errors import InputError
 from upt_training.rollout import autoregressive_scores, cache_rollout
 from upt_training.run import choose_device, find_mesh, make_trainer, open_prior
 
@@ -38,10 +41,14 @@ def variants(suite: str, base: Settings) -> dict[str, Settings]:
             add(f"stochastic, window {window}", strategy="stf", window=window)
         return out
     add("as shipped")
+    add("as shipped, another seed", seed=base.train.seed + 1)
     add("no linear response at the step before", features=without(base, "previous_prior"))
     add("linear response as base only", features=without(base, "prior", "previous_prior"))
     add("linear response as input only", base="displacement")
-    add("no linear response", features=without(base, "prior", "previous_prior"), base="displacement", vibration=False)
+    add("linear response as input only, no increment", base="none")
+    alone = {"features": without(base, "prior", "previous_prior"), "vibration": False}
+    add("no linear response", base="displacement", **alone)
+    add("no linear response, no increment", base="none", **alone)
     add("no vibration after a release", vibration=False)
     add("no previous state", features=without(base, "previous_displacement"))
     add("features as they are (no differences)", mixing="plain")
@@ -49,7 +56,12 @@ def variants(suite: str, base: Settings) -> dict[str, Settings]:
     add("no averaged weights", ema=0.0)
     add("supernodes not denser in the domain", graph=_uniform(base))
     add("free boundary in training", exact_boundary=False)
-    add("true states instead of replay", strategy="stf", window=2, scored_rows=0)
+    add("true states instead of replay", strategy="teacher")
+    add("windows of 2 from the truth instead of replay", strategy="stf", window=2)
+    add("noise of 0.2 mm on the inputs", input_noise_mm=0.2)
+    add("relative positions in the messages", relative_positions=True)
+    add("all nodes decoded and scored", loss_nodes=0, scored_rows=0)
+    add("weights start at fan-in scale", scaled_start=True)
     return out
 
 
@@ -104,56 +116,6 @@ def reference_scores(trainer_cache, cases: np.ndarray) -> dict[str, float]:
     return out
 
 
-def write_outputs(suite: str, results: dict, out: Path) -> None:
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-
-    (out / f"{suite}.json").write_text(json.dumps(results, indent=1) + "\n")
-    lines = ["| variant | MSE, mm² | max error, mm | steps | CPU s |", "|---|---|---|---|---|"]
-    for name, r in results["variants"].items():
-        lines.append(f"| {name} | {r['mse_mm2']:.4f} | {r['max_mm']:.2f} | {r['steps']} | {r['cpu_seconds']:.0f} |")
-    for name, value in results["references"].items():
-        lines.append(f"| *{name}* | {value:.4f} | | | |")
-    (out / f"{suite}.md").write_text("\n".join(lines) + "\n")
-    runs = results["variants"]
-    if suite == "windows":
-        figure, axis = pyplot.subplots(figsize=(6, 3.6), layout="constrained")
-        names = [n for n in runs if n.startswith("stochastic")]
-        sizes = [int(n.split()[-1]) for n in names]
-        axis.plot(sizes, [runs[n]["mse_mm2"] for n in names], "o-", color="C0")
-        if "teacher forcing" in runs:
-            axis.plot([2], [runs["teacher forcing"]["mse_mm2"]], "s", color="C1", label="pure teacher forcing")
-            axis.legend(frameon=False)
-        axis.set(xlabel="rollout window in training", ylabel="autoregressive MSE, mm²", xticks=sizes)
-        twin = axis.twinx()
-        twin.plot(sizes, [runs[n]["max_mm"] for n in names], "^--", color="C2")
-        twin.set_ylabel("max error, mm (dashed)")
-        figure.savefig(out / "window-size.png", dpi=130)
-        figure, axis = pyplot.subplots(figsize=(6, 3.6), layout="constrained")
-        best = min(names, key=lambda n: runs[n]["mse_mm2"])
-        for name, colour in (("teacher forcing", "C1"), (best, "C0")):
-            if name in runs:
-                steps = np.arange(1, len(runs[name]["mse_per_step"]) + 1)
-                axis.plot(steps, runs[name]["mse_per_step"], color=colour, label=name)
-                axis.fill_between(steps, runs[name]["mse_min"], runs[name]["mse_max"], color=colour, alpha=0.2, lw=0)
-        axis.set(xlabel="step", ylabel="MSE, mm²", yscale="log")
-        axis.legend(frameon=False)
-        figure.savefig(out / "error-accumulation.png", dpi=130)
-    else:
-        figure, axis = pyplot.subplots(figsize=(7, 0.35 * len(runs) + 1.2), layout="constrained")
-        axis.plot([r["mse_mm2"] for r in runs.values()], list(runs), "o", color="C0")
-        axis.grid(axis="y", lw=0.4)
-        linear = results["references"].get("linear response, quasi-static")
-        if linear:
-            axis.axvline(linear, color="C3", ls="--", label="linear elasticity, quasi-static")
-            axis.legend(frameon=False)
-        axis.set(xlabel="autoregressive MSE, mm²", xscale="log")
-        axis.invert_yaxis()
-        figure.savefig(out / f"{suite}.png", dpi=130)
-
-
 def ablate_command(options) -> int:
     torch.set_num_threads(options.threads)
     base = load_settings(options.config)
@@ -162,7 +124,13 @@ def ablate_command(options) -> int:
     out.mkdir(parents=True, exist_ok=True)
     path = out / f"{options.suite}.json"
     results = json.loads(path.read_text()) if path.exists() else {"variants": {}, "references": {}}
-    for name, settings in variants(options.suite, base).items():
+    suite = variants(options.suite, base)
+    unknown = [n for n in options.only or [] if n not in suite]
+    if unknown:
+        raise InputError(f"--only: {unknown[0]!r} is not a variant of {options.suite}; known are {', '.join(suite)}")
+    if options.page:  # a page without marks fails before hours of work
+        replaced(options.page.read_text(), options.suite, [], options.page)
+    for name, settings in suite.items():
         if name in results["variants"] or (options.only and name not in options.only):
             continue
         results["variants"][name] = run_variant(settings, options, mesh, out / "work")
@@ -179,6 +147,7 @@ def ablate_command(options) -> int:
         "config": base.name,
         "train_cases": trainer.train_cache.case_count,
     }
-    write_outputs(options.suite, results, out)
+    results["variants"] = {n: results["variants"][n] for n in suite if n in results["variants"]}
+    write_report(options.suite, results, out, options.page)
     print((out / f"{options.suite}.md").read_text())
     return 0

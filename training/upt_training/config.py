@@ -56,6 +56,7 @@ class ModelSettings:
     mlp_ratio: int = 4
     decoder_mlp_ratio: int = 2
     drop_path: float = 0.0
+    relative_positions: bool = False  # a message also sees where its sender lies, seen from the supernode
     graph: GraphSettings = field(default_factory=GraphSettings)
 
     @property
@@ -84,6 +85,7 @@ class TrainSettings:
     accumulate: int = 4
     clip: float = 1.0
     ema: float = 0.0
+    scaled_start: bool = False  # Linear weights start with std fan_in^-1/2; 0.02 is made for wide networks
     input_noise_mm: float = 0.0
     corrupt_contact: float = 0.0  # probability that a contact state is replaced by a corrupted one (replay)
     loss_nodes: int = 0  # nodes decoded and scored a step besides the needed ones; 0: all nodes

@@ -17,6 +17,9 @@ from upt_training.config import FEATURE_WIDTH, ModelSettings
 from upt_training.errors import InputError
 from upt_training.layers import Block, Decoder, PerceiverPool, sincos
 
+START_STD = 0.02
+RELATIVE_SCALE = 0.1  # model coordinates reach 200, a neighbour lies some tens away
+
 
 @dataclass
 class Tables:
@@ -38,6 +41,7 @@ class Upt(nn.Module):
         self.embed = nn.Linear(settings.feature_count, d)
         self.message1 = nn.Linear(2 * d, d)
         self.message2 = nn.Linear(d, d)
+        self.relative = nn.Linear(3, d, bias=False) if settings.relative_positions else None
         self.encoder = nn.ModuleList(
             Block(d, settings.encoder_heads, settings.mlp_ratio, settings.drop_path)
             for _ in range(settings.encoder_depth)
@@ -72,6 +76,16 @@ class Upt(nn.Module):
         self.coordinate_offset.copy_(torch.as_tensor(low, dtype=torch.float32))
         self.coordinate_scale.fill_(float(200.0 / (high - low).max()))
 
+    def scale_start(self) -> None:
+        """Widen fresh Linear weights from std 0.02 to one over the root of the number of inputs.
+
+        With 0.02 a layer of width 48 passes on a seventh of its input: small networks then stand still for long.
+        """
+        with torch.no_grad():
+            for module in self.modules():
+                if isinstance(module, nn.Linear):
+                    module.weight.mul_(module.in_features**-0.5 / START_STD)
+
     def parameter_count(self) -> int:
         return sum(p.numel() for p in self.parameters())
 
@@ -101,6 +115,9 @@ class Upt(nn.Module):
         x = self.embed.bias + sincos(p, d)
         source = x @ self.message1.weight[:, :d].T
         target = x @ self.message1.weight[:, d:].T + self.message1.bias
+        if self.relative is not None:
+            place = self.relative(RELATIVE_SCALE * p)
+            source, target = source + place, target - place
         return source, target, self.decoder.queries(sincos(p, self.settings.decoder))
 
     def aggregate(self, source, target, neighbours, mask) -> torch.Tensor:
@@ -148,7 +165,11 @@ class Upt(nn.Module):
         """The paper's layout, edge by edge, all nodes decoded; for the export's self-check."""
         x = self.embed(features @ self.mixing.T) + sincos(self.coordinates(positions), self.settings.encoder)
         xi = x[supernodes][:, None, :].expand(-1, neighbours.shape[1], -1)
-        message = self.message2(functional.gelu(self.message1(torch.cat([x[neighbours], xi], dim=-1))))
+        edge = self.message1(torch.cat([x[neighbours], xi], dim=-1))
+        if self.relative is not None:
+            p = RELATIVE_SCALE * self.coordinates(positions)
+            edge = edge + self.relative(p[neighbours] - p[supernodes][:, None, :])
+        message = self.message2(functional.gelu(edge))
         s = (message * mask[..., None]).sum(-2) / mask.sum(-1, keepdim=True)
         for block in self.encoder:
             s = block(s)
@@ -188,8 +209,9 @@ def difference_mixing(features: list[str], scale: float) -> torch.Tensor:
 
 def _initialise(module: nn.Module) -> None:
     if isinstance(module, nn.Linear):
-        nn.init.trunc_normal_(module.weight, std=0.02)
-        nn.init.zeros_(module.bias)
+        nn.init.trunc_normal_(module.weight, std=START_STD)
+        if module.bias is not None:
+            nn.init.zeros_(module.bias)
 
 
 def load_state(model: Upt, state: dict, where: str) -> None:

@@ -12,7 +12,7 @@ import torch
 from onnx import TensorProto, helper, numpy_helper
 
 from upt_training.layers import EPS, sincos_frequencies
-from upt_training.model import Upt
+from upt_training.model import RELATIVE_SCALE, Upt
 
 OPSET = 17
 
@@ -173,8 +173,13 @@ def embed_graph(model: Upt) -> onnx.ModelProto:
     p = _coordinates(w, model, w.input("positions", ["n", 3]))
     d = s.encoder
     x = w.op("Add", w.sincos(p, d), w.constant(model.embed.bias))
-    w.output(w.linear(x, model.message1.weight[:, :d]), "source_table", ["n", d])
-    w.output(w.linear(x, model.message1.weight[:, d:], model.message1.bias), "target_table", ["n", d])
+    source = w.linear(x, model.message1.weight[:, :d])
+    target = w.linear(x, model.message1.weight[:, d:], model.message1.bias)
+    if model.relative is not None:
+        place = w.linear(p, RELATIVE_SCALE * model.relative.weight)
+        source, target = w.op("Add", source, place), w.op("Sub", target, place)
+    w.output(source, "source_table", ["n", d])
+    w.output(target, "target_table", ["n", d])
     w.output(_query_table(w, model, p), "query_table", ["n", 2 * s.decoder])
     return w.build()
 
@@ -253,7 +258,11 @@ def paper_encoder_graph(model: Upt) -> onnx.ModelProto:
     x = w.linear(features, model.embed.weight @ model.mixing, model.embed.bias)
     x = w.op("Add", x, w.sincos(p, s.encoder))
     pair = w.op("Concat", w.op("Gather", x, sender, axis=0), w.op("Gather", x, receiver, axis=0), axis=-1)
-    message = w.layer(w.gelu(w.layer(pair, model.message1)), model.message2)
+    edge = w.layer(pair, model.message1)
+    if model.relative is not None:
+        apart = w.op("Sub", w.op("Gather", p, sender, axis=0), w.op("Gather", p, receiver, axis=0))
+        edge = w.op("Add", edge, w.linear(apart, RELATIVE_SCALE * model.relative.weight))
+    message = w.layer(w.gelu(edge), model.message2)
     w.output(message, "messages", ["edges", s.encoder])
     return w.build()
 

@@ -47,6 +47,8 @@ class Trainer:
         t = settings.train
         torch.manual_seed(t.seed)
         self.model = Upt(settings.model)
+        if t.scaled_start:
+            self.model.scale_start()
         self.model.set_coordinates(mesh.positions)
         self.model.set_normalisation(*normalisation(train, settings.model))
         self.model.to(self.device)
@@ -57,6 +59,8 @@ class Trainer:
         self.rank = distributed.get_rank() if distributed.is_initialized() else 0
         self.generator = np.random.default_rng([t.seed, self.rank])
         self.draw = torch.Generator().manual_seed(t.seed + 7919 * self.rank)
+        if self.rank > 0:  # drop path differs too
+            torch.manual_seed(t.seed + 7919 * self.rank)
         self.pool = ReplayPool(train, POOL_SLOTS, self.generator) if t.strategy == "replay" else None
         self.step_count, self.best, self.stale = 0, float("inf"), 0
         self.loss_scale = 1.0 / float((self.model.output_scale**2).sum())
@@ -195,10 +199,18 @@ class Trainer:
                 if self._evaluate_and_save(running, norms, elapsed, report):
                     return "stopped early"
                 running, norms = [], []
-            if max_minutes and elapsed > 60 * max_minutes:
+            if max_minutes and self._any_process(elapsed > 60 * max_minutes):
                 self.save("last.pt")
                 return "time limit"
         return "finished"
+
+    def _any_process(self, here: bool) -> bool:
+        """True in all processes if it is true in one: they must leave the loop at the same step."""
+        if self.world == 1:
+            return here
+        flag = torch.tensor(float(here), device=self.device)
+        distributed.all_reduce(flag)
+        return bool(flag > 0)
 
     def _evaluate_and_save(self, running, norms, elapsed, report) -> bool:
         t = self.settings.train
@@ -259,7 +271,10 @@ class Trainer:
         (self.folder / (name + ".tmp")).rename(self.folder / name)
 
     def resume(self, path: Path) -> None:
-        """Continue from `last.pt` of the same configuration."""
+        """Continue from `last.pt` of the same configuration, exactly in one process.
+
+        The file holds the first process's random state and pool; the others start on draws of their own.
+        """
         state = load_checkpoint(path)
         if state["model_hash"] != self.settings.model_hash():
             raise InputError(f"{path}: checkpoint of another configuration; resume with the one in its run folder")
@@ -269,12 +284,18 @@ class Trainer:
         if self.ema is not None and state["ema"] is not None:
             load_state(self.ema, state["ema"], str(path))
         self.optimiser.load_state_dict(state["optimiser"])
+        self.step_count, self.best, self.stale = state["step_count"], state["best"], state["stale"]
+        if self.rank > 0:
+            seeds = np.random.SeedSequence([self.settings.train.seed, self.rank, self.step_count])
+            self.generator.bit_generator.state = np.random.PCG64(seeds).state
+            self.draw.manual_seed(int(seeds.generate_state(1)[0]))
+            torch.manual_seed(int(seeds.generate_state(2)[1]))
+            return
         if self.pool is not None and state["pool"] is not None:
             self.pool.load_state_dict(state["pool"])
         torch.set_rng_state(state["random"]["torch"])
         self.draw.set_state(state["random"]["draw"])
         self.generator.bit_generator.state = state["random"]["numpy"]
-        self.step_count, self.best, self.stale = state["step_count"], state["best"], state["stale"]
 
     def start_from(self, path: Path) -> None:
         """Take the weights (and the normalisation) of another run, for transfer to another mesh or recipe."""

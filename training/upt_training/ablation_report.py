@@ -1,0 +1,98 @@
+"""Tables and plots of `ablate`, and their place in a page between `<!-- ablate SUITE: begin -->` and its end mark."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from upt_training.errors import InputError
+
+TEACHER = "teacher forcing"
+
+
+def table(results: dict) -> list[str]:
+    """Markdown: a row a variant, then the reference scores."""
+    lines = ["| variant | MSE, mm² | max error, mm | steps | CPU s |", "|---|---|---|---|---|"]
+    for name, r in results["variants"].items():
+        lines.append(f"| {name} | {r['mse_mm2']:.4f} | {r['max_mm']:.2f} | {r['steps']} | {r['cpu_seconds']:.0f} |")
+    for name, value in results["references"].items():
+        lines.append(f"| *{name}* | {value:.4f} | | | |")
+    return lines
+
+
+def write_report(suite: str, results: dict, out: Path, page: Path | None) -> None:
+    """`OUT/SUITE.json`, `OUT/SUITE.md`, plots in `OUT`; with `page`, also into it and into `images/` beside it."""
+    (out / f"{suite}.json").write_text(json.dumps(results, indent=1) + "\n")
+    lines = table(results)
+    (out / f"{suite}.md").write_text("\n".join(lines) + "\n")
+    folders = [out] if page is None else [out, page.parent / "images"]
+    plots = window_plots(results) if suite == "windows" else {"ablation": trick_plot(results)}
+    for name, figure in plots.items():
+        for folder in folders:
+            figure.savefig(folder / f"{name}.png", dpi=130)
+    if page is not None:
+        page.write_text(replaced(page.read_text(), suite, lines, page))
+
+
+def replaced(text: str, suite: str, lines: list[str], page: Path) -> str:
+    """`text` with the lines between the suite's marks exchanged."""
+    begin, end = f"<!-- ablate {suite}: begin -->\n", f"<!-- ablate {suite}: end -->"
+    if text.count(begin) != 1 or text.count(end) != 1 or text.index(begin) > text.index(end):
+        raise InputError(f"{page}: needs one line '{begin.strip()}' and after it one line '{end}'")
+    return text[: text.index(begin) + len(begin)] + "\n".join(lines) + "\n" + text[text.index(end) :]
+
+
+def _pyplot():
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    return pyplot
+
+
+def window_plots(results: dict) -> dict:
+    """The paper's Fig. "window size" and Fig. "error accumulation"."""
+    pyplot, runs = _pyplot(), results["variants"]
+    names = [n for n in runs if n != TEACHER]
+    sizes = [int(n.split()[-1]) for n in names]
+    zero = results["references"].get("predict zero")
+    size, axes = pyplot.subplots(1, 2, figsize=(8, 3.2), layout="constrained")
+    for axis, key, label in zip(axes, ("mse_mm2", "max_mm"), ("MSE, mm²", "max error, mm"), strict=True):
+        axis.plot(sizes, [runs[n][key] for n in names], "o-", color="C0", label="stochastic teacher forcing")
+        if TEACHER in runs:
+            axis.plot([2], [runs[TEACHER][key]], "s", color="C1", label="pure teacher forcing")
+        if zero and key == "mse_mm2":
+            axis.axhline(zero, color="0.5", lw=0.8, ls=":", label="predict zero")
+        axis.set(xlabel="rollout window in training", ylabel=f"autoregressive {label}", xticks=sorted(sizes))
+        axis.set_ylim(bottom=0)
+    axes[0].legend(frameon=False, fontsize=8)
+    growth, axis = pyplot.subplots(figsize=(6, 3.6), layout="constrained")
+    best = sorted(names, key=lambda n: runs[n]["mse_mm2"])[:1]
+    for name in [TEACHER] * (TEACHER in runs) + best:
+        r, colour = runs[name], "C1" if name == TEACHER else "C0"
+        steps = np.arange(1, len(r["mse_per_step"]) + 1)
+        label = f"{name}: MSE {r['mse_mm2']:.2f} mm², max error {r['max_mm']:.1f} mm"
+        axis.plot(steps, r["mse_per_step"], color=colour, label=label)
+        axis.fill_between(steps, r["mse_min"], r["mse_max"], color=colour, alpha=0.2, lw=0)
+    axis.set(xlabel="step", ylabel="MSE, mm² (mean, lowest and highest case)")
+    axis.set_ylim(bottom=0)
+    axis.legend(frameon=False, fontsize=8, loc="upper left")
+    return {"window-size": size, "error-accumulation": growth}
+
+
+def trick_plot(results: dict):
+    """A dot a variant."""
+    pyplot, runs = _pyplot(), results["variants"]
+    figure, axis = pyplot.subplots(figsize=(7, 0.3 * len(runs) + 1.2), layout="constrained")
+    axis.plot([r["mse_mm2"] for r in runs.values()], list(runs), "o", color="C0")
+    axis.grid(axis="y", lw=0.4)
+    linear = results["references"].get("linear response, quasi-static")
+    if linear:
+        axis.axvline(linear, color="C3", ls="--", label="linear elasticity, quasi-static")
+        axis.legend(frameon=False)
+    axis.set(xlabel="autoregressive MSE, mm²", xscale="log")
+    axis.invert_yaxis()
+    return figure
