@@ -67,7 +67,7 @@ def window_plots(results: dict) -> dict:
         if zero and key == "mse_mm2":
             axis.axhline(zero, color="0.5", lw=0.8, ls=":", label="predict zero")
         axis.set(xlabel="rollout window in training", ylabel=f"autoregressive {label}", xticks=sorted(sizes))
-        axis.set_ylim(bottom=0)
+        axis.set_ylim(0, 1.1 * max(r[key] for r in runs.values()))
     axes[0].legend(frameon=False, fontsize=8)
     growth, axis = pyplot.subplots(figsize=(6, 3.6), layout="constrained")
     best = sorted(names, key=lambda n: runs[n]["mse_mm2"])[:1]
