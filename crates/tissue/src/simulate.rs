@@ -41,30 +41,21 @@ pub fn simulate(
     options.material.damping_per_s *= scheme.damping_factor();
     let mut solver = Solver::new(mesh, boundary, options.clone())?;
     let nodes = mesh.node_count();
-    let mut trajectory = Trajectory {
-        header: TrajectoryHeader {
-            mesh_name: mesh.name.clone(),
-            mesh_sha256: mesh.hash(),
-            boundary: boundary.as_str().into(),
-            scheme: scheme.name().into(),
-            seed,
-            site: programme.site(),
-            material: options.material,
-            dt_s: FRAME_S,
-            inner_dt_s: options.inner_step_s,
-            mass_scaling_s: options.mass_scaling_s,
-            solver: SOLVER_NAME.into(),
-        },
-        displacement: vec![[0.0; 3]; FRAMES * nodes],
-        contact_offsets: vec![0, 0],
-        contact_nodes: Vec::new(),
-        contact_vectors: Vec::new(),
-        reaction: Vec::new(),
-        strain_energy: vec![0.0],
-        kinetic_energy: vec![0.0],
-        external_work: vec![0.0],
-        min_det_f: vec![1.0],
+    let header = TrajectoryHeader {
+        mesh_name: mesh.name.clone(),
+        mesh_sha256: mesh.hash(),
+        boundary: boundary.as_str().into(),
+        scheme: scheme.name().into(),
+        seed,
+        site: programme.site(),
+        material: options.material,
+        dt_s: FRAME_S,
+        inner_dt_s: options.inner_step_s,
+        mass_scaling_s: options.mass_scaling_s,
+        solver: SOLVER_NAME.into(),
     };
+    let mut trajectory = Trajectory::at_rest(header, nodes);
+    trajectory.displacement.resize(FRAMES * nodes, [0.0; 3]);
     for frame in 1..FRAMES {
         let contact = programme.contact(frame);
         let report = solver.step_frame(&contact, FRAME_S)?;

@@ -72,6 +72,22 @@ pub enum TrajectoryError {
 }
 
 impl Trajectory {
+    /// A single frame: a body of `nodes` nodes at rest, without contact.
+    pub fn at_rest(header: TrajectoryHeader, nodes: usize) -> Self {
+        Self {
+            header,
+            displacement: vec![[0.0; 3]; nodes],
+            contact_offsets: vec![0, 0],
+            contact_nodes: Vec::new(),
+            contact_vectors: Vec::new(),
+            reaction: Vec::new(),
+            strain_energy: vec![0.0],
+            kinetic_energy: vec![0.0],
+            external_work: vec![0.0],
+            min_det_f: vec![1.0],
+        }
+    }
+
     /// Number of frames, `F`.
     pub fn frame_count(&self) -> usize {
         self.min_det_f.len()

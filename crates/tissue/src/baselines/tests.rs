@@ -71,7 +71,8 @@ fn quasi_static_steps_equal_the_linear_response_then_decay() {
     assert_eq!(out, before);
     method.reset();
     method.step(&[], &[], &mut out).unwrap();
-    assert!(out.iter().flatten().all(|&u| u == 0.0));
+    // At rest, but for the rounding of f32 positions.
+    assert!(out.iter().flatten().all(|&u| u.abs() < 1e-5));
 }
 
 #[test]
@@ -135,5 +136,6 @@ fn a_patch_between_coarse_nodes_still_moves_the_coarse_mesh() {
     assert!(out.iter().filter(|u| u[2] < -0.05).count() > 20);
     method.reset();
     method.step(&[], &[], &mut out).unwrap();
-    assert!(out.iter().flatten().all(|&u| u == 0.0));
+    // At rest, but for the rounding of f32 positions.
+    assert!(out.iter().flatten().all(|&u| u.abs() < 1e-5));
 }

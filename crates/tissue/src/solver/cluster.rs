@@ -7,16 +7,19 @@
 use super::lanes::WIDTH;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-/// Sixteen clusters of one kind, structure of arrays.
+/// Sixteen clusters of one kind, structure of arrays. All tetrahedra of a cluster share the edge of its nodes 0 and 1.
 #[repr(C, align(64))]
 pub(crate) struct Cluster<const NODES: usize, const TETS: usize> {
-    /// `gradient[t][3 a + j]`: derivative along axis `j` of the shape function of the tetrahedron's corner
-    /// `corners(t)[a]`, 1/mm.
-    pub gradient: [[[f32; WIDTH]; 9]; TETS],
-    /// Rest volume, mm³, times the element's stiffness over the material's: the energy density is
-    /// proportional to the modulus. Zero in padding lanes.
-    pub volume: [[f32; WIDTH]; TETS],
-    /// Twice the chunk-local slot of each node (see `lanes`).
+    /// `springs[t]`: `-mu V G`, µN/mm, entries 11, 12, 13, 22, 23, 33 in the order of `corners(t)`, with the rest
+    /// volume `V` and `G = (D0^T D0)^-1` of the rest edges from node 0. Zero in padding lanes.
+    pub springs: [[[f32; WIDTH]; 6]; TETS],
+    /// `1 / det D0`, 1/mm³; negative where the corners turn the other way.
+    pub inverse: [[f32; WIDTH]; TETS],
+    /// `kappa / 6`, Pa, with the sign of det D0. Zero in padding lanes.
+    ///
+    /// Both moduli carry the element's stiffness over the material's.
+    pub bulk: [[f32; WIDTH]; TETS],
+    /// Twice the chunk-local slot of each node (see `lanes`). Padding lanes repeat another lane's.
     pub slots: [[u16; WIDTH]; NODES],
 }
 
@@ -201,7 +204,7 @@ mod tests {
     use crate::mesh::{Mesh, box_phantom};
 
     fn volume(mesh: &Mesh, nodes: [u32; 4]) -> f64 {
-        crate::solver::partition::shape_gradients(&mesh.positions, nodes).1
+        crate::solver::batches::shape_gradients(nodes.map(|n| mesh.positions[n as usize])).1
     }
 
     /// Checks one kind: the nodes that [`corners`] names are those of the mesh's element.

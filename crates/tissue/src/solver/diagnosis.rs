@@ -1,7 +1,10 @@
 //! What a frame reports, and why it failed: f64 passes over the elements, once a frame.
 
 use super::{ContactNode, FrameReport, Solver, SolverError};
-use crate::solver::partition::Element;
+use crate::solver::batches::shape_gradients;
+use crate::solver::partition::Chunk;
+use crate::vector::{cross, dot};
+use rayon::prelude::*;
 
 /// Sums and extremes over the elements of the present state.
 pub(super) struct Diagnosis {
@@ -15,45 +18,79 @@ pub(super) struct Diagnosis {
     pub largest_bound: f64,
 }
 
+impl Diagnosis {
+    const NONE: Self = Self {
+        strain_energy: 0.0,
+        min_det_f: f64::INFINITY,
+        worst_element: 0,
+        largest_bound: 0.0,
+    };
+
+    /// Of this and the chunk after it.
+    fn and(mut self, next: &Self) -> Self {
+        self.strain_energy += next.strain_energy;
+        self.largest_bound = self.largest_bound.max(next.largest_bound);
+        self.note(next.min_det_f, next.worst_element);
+        self
+    }
+
+    fn note(&mut self, determinant: f64, element: usize) {
+        if determinant < self.min_det_f || determinant.is_nan() {
+            self.min_det_f = determinant;
+            self.worst_element = element;
+        }
+    }
+}
+
 impl Solver {
-    /// Visits all elements in a fixed order.
+    /// Visits all elements; the same bits for any number of threads.
     pub(super) fn diagnose(&self) -> Diagnosis {
-        let (shear, bulk) = (
-            self.options.material.shear_pa(),
-            self.options.material.bulk_pa(),
-        );
-        let mut result = Diagnosis {
-            strain_energy: 0.0,
-            min_det_f: f64::INFINITY,
-            worst_element: 0,
-            largest_bound: 0.0,
+        let chunks = &self.partition.chunks;
+        let parts: Vec<Diagnosis> = match &self.pool {
+            None => chunks
+                .iter()
+                .map(|chunk| self.diagnose_chunk(chunk))
+                .collect(),
+            Some(pool) => pool.install(|| {
+                let chunks = chunks.par_iter();
+                chunks.map(|chunk| self.diagnose_chunk(chunk)).collect()
+            }),
         };
-        for chunk in &self.partition.chunks {
-            let displacement = |corner: u16| {
-                // Ghosts may be a step behind: read the owner.
-                let local = corner as usize / 2;
+        parts.iter().fold(Diagnosis::NONE, Diagnosis::and)
+    }
+
+    fn diagnose_chunk(&self, chunk: &Chunk) -> Diagnosis {
+        let mut result = Diagnosis::NONE;
+        let bulk = self.options.material.bulk_pa();
+        let shear_over_bulk = self.options.material.shear_pa() / bulk;
+        self.partition.elements(chunk).for_each(|element| {
+            let number = element.number as usize;
+            let (mut rest, mut displacement) = ([[0.0; 3]; 4], [[0.0; 3]; 4]);
+            for corner in 0..4 {
+                let local = element.slots[corner] as usize / 2;
                 let slot = match local.checked_sub(chunk.owned) {
                     None => chunk.first + local,
                     Some(ghost) => chunk.ghosts[ghost] as usize,
                 };
-                self.fields.displacement[slot].0
-            };
-            for element in self.partition.elements(chunk) {
-                let number = element.number as usize;
-                let state = element_state(&element, element.slots.map(displacement));
-                let determinant = state.determinant;
-                if determinant < result.min_det_f || determinant.is_nan() {
-                    result.min_det_f = determinant;
-                    result.worst_element = number;
+                let (at, moved) = (
+                    &self.partition.rest[chunk.first + local],
+                    &self.fields.displacement[slot].0,
+                );
+                for k in 0..3 {
+                    rest[corner][k] = at[k];
+                    displacement[corner][k] = f64::from(moved[k]);
                 }
-                let speed_squared = f64::from(self.speed_squared[number]);
-                result.largest_bound = result.largest_bound.max(state.bound * speed_squared);
-                let isochoric = state.invariant * inverse_cube_root(determinant).powi(2);
-                let volume = f64::from(element.volume);
-                result.strain_energy +=
-                    volume * 0.5 * (shear * (isochoric - 3.0) + bulk * (determinant - 1.0).powi(2));
             }
-        }
+            let state = element_state(rest, displacement);
+            let determinant = state.determinant;
+            result.note(determinant, number);
+            let speed_squared = f64::from(self.speed_squared[number]);
+            result.largest_bound = result.largest_bound.max(state.bound * speed_squared);
+            let isochoric = state.invariant * inverse_cube_root(determinant).powi(2);
+            let density = shear_over_bulk * (isochoric - 3.0) + (determinant - 1.0).powi(2);
+            // `bulk` is a sixth of the element's modulus.
+            result.strain_energy += 3.0 * f64::from(element.bulk.abs()) * state.volume * density;
+        });
         result
     }
 
@@ -148,46 +185,42 @@ impl Solver {
 }
 
 struct ElementState {
+    /// At rest, mm³.
+    volume: f64,
     determinant: f64,
     /// `tr F^T F`
     invariant: f64,
     bound: f64,
 }
 
-fn element_state(element: &Element, corners: [[f32; 4]; 4]) -> ElementState {
+#[inline]
+fn element_state(rest: [[f32; 3]; 4], displacement: [[f64; 3]; 4]) -> ElementState {
+    let (slopes, volume) = shape_gradients(rest);
     let mut f = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let mut gradients = [[0.0; 3]; 4];
     for a in 0..3 {
         for j in 0..3 {
-            let slope = f64::from(element.gradient[a][j]);
+            let slope = slopes[a][j];
             gradients[a + 1][j] = slope;
             gradients[0][j] -= slope;
             for i in 0..3 {
-                f[i][j] += slope * (f64::from(corners[a + 1][i]) - f64::from(corners[0][i]));
+                f[i][j] += slope * (displacement[a + 1][i] - displacement[0][i]);
             }
         }
     }
-    let cross = |a: [f64; 3], b: [f64; 3]| {
-        [
-            a[1] * b[2] - a[2] * b[1],
-            a[2] * b[0] - a[0] * b[2],
-            a[0] * b[1] - a[1] * b[0],
-        ]
-    };
-    let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     let cofactor = [cross(f[1], f[2]), cross(f[2], f[0]), cross(f[0], f[1])];
+    let mut bound = 0.0;
+    for gradient in gradients {
+        for row in cofactor {
+            let image = dot(row, gradient);
+            bound += image * image;
+        }
+    }
     ElementState {
+        volume: volume.abs(),
         determinant: dot(f[0], cofactor[0]),
-        invariant: f.iter().map(|row| dot(*row, *row)).sum(),
-        bound: gradients
-            .iter()
-            .map(|g| {
-                cofactor
-                    .iter()
-                    .map(|row| dot(*row, *g).powi(2))
-                    .sum::<f64>()
-            })
-            .sum(),
+        invariant: dot(f[0], f[0]) + dot(f[1], f[1]) + dot(f[2], f[2]),
+        bound,
     }
 }
 

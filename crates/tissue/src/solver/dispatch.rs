@@ -1,8 +1,9 @@
 //! Run-time choice of the instruction set, and the kernels compiled for each.
 
-use super::kernel::{BLOCK, EMPTY, Law, add_forces, add_volumes};
+use super::kernel::{Shape, add_forces, add_volumes};
 use super::lanes::{Lanes, Scalar};
 use super::partition::{Chunk, Partition};
+use super::slots::{advance, place};
 
 /// Instruction set of the element kernels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,8 +49,10 @@ impl Simd {
     }
 }
 
-type ForceKernel = unsafe fn(&Partition, &Chunk, *const [f32; 4], *mut [f32; 4], Law) -> f32;
+type ForceKernel = unsafe fn(&Partition, &Chunk, *const [f32; 4], *mut [f32; 4]) -> f32;
 type VolumeKernel = unsafe fn(&Partition, &Chunk, *const [f32; 4], *mut [f32; 4]);
+type PlaceKernel = unsafe fn(usize, *const [f32; 4], *const [f32; 4], *mut [f32; 4]);
+type AdvanceKernel = unsafe fn(usize, f32, *const [f32; 4], *mut [f32; 4], *mut [f32; 4]);
 
 /// The kernels of one instruction set.
 #[derive(Clone, Copy)]
@@ -57,6 +60,8 @@ pub(crate) struct Kernels {
     pub forces: ForceKernel,
     pub averaged_forces: ForceKernel,
     pub volumes: VolumeKernel,
+    pub place: PlaceKernel,
+    pub advance: AdvanceKernel,
 }
 
 /// Forces of all clusters of a chunk; returns the smallest det F.
@@ -66,15 +71,14 @@ unsafe fn all_forces<L: Lanes, const AVERAGED: bool>(
     chunk: &Chunk,
     nodes: *const [f32; 4],
     forces: *mut [f32; 4],
-    law: Law,
 ) -> f32 {
     unsafe {
         let (octahedra, pairs, singles) = partition.clusters(chunk);
-        let mut buffer = [EMPTY; BLOCK];
-        let buffer = &mut buffer;
-        let a = add_forces::<L, 6, 4, AVERAGED>(octahedra, nodes, forces, law, buffer);
-        let b = add_forces::<L, 5, 2, AVERAGED>(pairs, nodes, forces, law, buffer);
-        let c = add_forces::<L, 4, 1, AVERAGED>(singles, nodes, forces, law, buffer);
+        let mut shape = Shape::EMPTY;
+        let shape = &mut shape;
+        let a = add_forces::<L, 6, 4, AVERAGED>(octahedra, nodes, forces, shape);
+        let b = add_forces::<L, 5, 2, AVERAGED>(pairs, nodes, forces, shape);
+        let c = add_forces::<L, 4, 1, AVERAGED>(singles, nodes, forces, shape);
         a.min(b).min(c)
     }
 }
@@ -91,9 +95,8 @@ macro_rules! kernels {
                 chunk: &Chunk,
                 n: *const [f32; 4],
                 f: *mut [f32; 4],
-                law: Law,
             ) -> f32 {
-                unsafe { all_forces::<$lanes, false>(p, chunk, n, f, law) }
+                unsafe { all_forces::<$lanes, false>(p, chunk, n, f) }
             }
 
             $(#[target_feature(enable = $feature)])?
@@ -102,9 +105,8 @@ macro_rules! kernels {
                 chunk: &Chunk,
                 n: *const [f32; 4],
                 f: *mut [f32; 4],
-                law: Law,
             ) -> f32 {
-                unsafe { all_forces::<$lanes, true>(p, chunk, n, f, law) }
+                unsafe { all_forces::<$lanes, true>(p, chunk, n, f) }
             }
 
             $(#[target_feature(enable = $feature)])?
@@ -122,10 +124,33 @@ macro_rules! kernels {
                 }
             }
 
+            $(#[target_feature(enable = $feature)])?
+            unsafe fn place_nodes(
+                count: usize,
+                rest: *const [f32; 4],
+                u: *const [f32; 4],
+                x: *mut [f32; 4],
+            ) {
+                unsafe { place::<$lanes>(count, rest, u, x) }
+            }
+
+            $(#[target_feature(enable = $feature)])?
+            unsafe fn advance_nodes(
+                count: usize,
+                beta: f32,
+                f: *const [f32; 4],
+                d: *mut [f32; 4],
+                u: *mut [f32; 4],
+            ) {
+                unsafe { advance::<$lanes>(count, beta, f, d, u) }
+            }
+
             pub(super) const KERNELS: Kernels = Kernels {
                 forces,
                 averaged_forces,
                 volumes,
+                place: place_nodes,
+                advance: advance_nodes,
             };
         }
     };

@@ -71,7 +71,6 @@ impl Solver {
         March {
             partition: &self.partition,
             kernels: self.kernels,
-            law: self.law,
             averaged: self.options.pressure == Pressure::AverageNodal,
             rest_volume: &self.rest_volume,
             mass: &self.mass,

@@ -1,18 +1,20 @@
-//! The element law on batches of 16 clusters of tetrahedra: displacements in, nodal forces added.
+//! The element law on batches of 16 clusters of tetrahedra: positions in, nodal forces added.
 //!
-//! With `F = I + sum_a (u_a - u_0) (x) dN_a/dX` the first Piola stress of the
-//! neo-Hookean law is
+//! With the deformed edges `e_k = x_k - x_0` of a tetrahedron as columns of `D`, those at rest of `D0`, and
+//! `G = (D0^T D0)^-1`, the neo-Hookean law
 //! `P = mu J^(-2/3) F + [kappa (J - 1) - mu/3 J^(-5/3) I1] cof F`
-//! and a corner's force is `f_a = -V P dN_a/dX`. `J^(-1/3)` comes from an integer
-//! guess and two polynomial corrections, to f32 accuracy, without log or division.
+//! needs no deformation gradient: `J = det D / det D0`, `I1 = sum_jk G_jk e_j . e_k`, and the forces on corners
+//! 1 to 3 are the columns of
+//! `-V mu J^(-2/3) D G - V / det D0 [kappa (J - 1) - mu/3 J^(-5/3) I1] cof D`:
+//! springs along the edges and a pressure on the faces.
 //!
-//! Tetrahedra that share an edge or a face go through together ([`Cluster`]): their
-//! nodes are gathered once and their forces meet in registers, because gathers and
-//! scatters, not arithmetic, are what an element costs.
+//! All tetrahedra of a cluster share the edge of its nodes 0 and 1 ([`Cluster`]), so edges, their dot products and
+//! most cross products serve two or more of them, spring constants of a pair of nodes add up before they meet
+//! the edge, each node is gathered once and its forces meet in registers.
 //!
-//! A block of batches goes through three short loops (deformation, stress, forces)
-//! with a buffer between them: the iterations of each are independent and overlap,
-//! where one long loop would wait for its own cube root.
+//! `J^(-1/3)` comes from an integer guess and a polynomial, to f32 accuracy, without log or division.
+//! A batch goes through three short loops (shape, moduli, forces) with a buffer between them: the iterations of
+//! each are independent and overlap, where one long loop would wait for its own cube root.
 //!
 //! No closures here or in `lanes`: a closure does not take on its caller's
 //! instruction set, and every vector operation in it would become a call.
@@ -20,104 +22,83 @@
 use super::cluster::{Cluster, corners};
 use super::lanes::{Lanes, WIDTH, prefetch};
 
-/// Tetrahedra (times 16) that go through the loops together; their tensors fill 5 kB of the first-level cache.
-pub(crate) const BLOCK: usize = 8;
-
-/// Moduli in the solver's units, Pa.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Law {
-    pub shear: f32,
-    pub bulk: f32,
+/// Floating-point operations of one cluster in [`add_forces`], a fused multiply-add counted as two.
+pub(crate) const fn flops(nodes: usize, tets: usize) -> usize {
+    let ring = nodes - 2;
+    // Edges, their squares and what they share with the edge 0-1: cross and dot products.
+    let shape = 3 * (nodes - 1) + 5 * (nodes - 1) + 14 * ring;
+    // A face's cross and dot product, determinant, invariant; root 15, coefficients 11; spring constants 12.
+    let tet = 9 + 5 + 5 + 12 + 15 + 11 + 12;
+    // Springs along the edges from nodes 0 and 1, along the face's third edge, pressure on three corners.
+    let forces = 6 * (nodes - 1) + 12 * ring + tets * (12 + 18);
+    // Balance and addition to the nodes.
+    shape + tets * tet + forces + 3 * (nodes - 1) + 3 * nodes
 }
-
-/// Floating-point operations of one tetrahedron in [`add_forces`], a fused multiply-add counted as two:
-/// F 54, cofactors 27, det 5, invariant 17, root 21, coefficients 11, stress 27, forces 54.
-pub(crate) const FLOPS_PER_TET: usize = 216;
-
-/// Those of one node of a cluster: difference, balance and addition, three each.
-pub(crate) const FLOPS_PER_CORNER: usize = 9;
 
 /// `x^(-1/3)` for positive `x`, relative error about 1e-7.
 #[inline(always)]
 pub(crate) unsafe fn inverse_cube_root<L: Lanes>(x: L) -> L {
     unsafe {
-        let one = L::splat(1.0);
         let y = x.inverse_cube_root_guess();
-        // y (1 - e)^(-1/3) with e = 1 - x y^3: third order, then first order.
-        let e = y.mul(y).neg_mul_add(y.mul(x), one);
+        // y (1 - e)^(-1/3) with e = 1 - x y^3: a Chebyshev fit over -0.121..0.091, the guess's whole range.
+        let e = y.mul(y).neg_mul_add(y.mul(x), L::splat(1.0));
         let series = e
-            .mul_add(L::splat(14.0 / 81.0), L::splat(2.0 / 9.0))
-            .mul_add(e, L::splat(1.0 / 3.0));
-        let y = y.mul(e).mul_add(series, y);
-        let e = y.mul(y).neg_mul_add(y.mul(x), one);
-        y.mul(e).mul_add(L::splat(1.0 / 3.0), y)
+            .mul_add(L::splat(0.117_032_66), L::splat(0.145_538_02))
+            .mul_add(e, L::splat(0.172_930_58))
+            .mul_add(e, L::splat(0.222_216_78))
+            .mul_add(e, L::splat(0.333_333_13))
+            .mul_add(e, L::splat(1.0));
+        y.mul(series)
     }
 }
 
-/// A second-order tensor of 16 elements, row-major, and one scalar.
+/// A vector of 16 elements.
+type Vectors = [[f32; WIDTH]; 3];
+
+/// What a batch keeps between the loops; a cluster of few nodes leaves the ends unused.
 #[repr(C, align(64))]
 #[derive(Clone, Copy)]
-pub(crate) struct Tensors {
-    entry: [[f32; WIDTH]; 9],
-    /// Mean of the corners' fourth component: nodal pressure, where it is used.
-    scalar: [f32; WIDTH],
+pub(crate) struct Shape {
+    /// `e_k`, mm; row `k - 1`.
+    edge: [Vectors; 5],
+    /// `e_1 x e_k`, mm²; row `k - 2`.
+    across: [Vectors; 4],
+    /// `e_b x e_c` of a tetrahedron's corners, mm².
+    face: [Vectors; 4],
+    /// det D, mm³; then the springs' factor `J^(-2/3)`.
+    determinant: [[f32; WIDTH]; 4],
+    /// `-mu V I1`, nJ; then the factor of cof D, Pa.
+    invariant: [[f32; WIDTH]; 4],
+    /// Sum of the corners' fourth component: nodal dilatation, where it is used.
+    dilatation: [[f32; WIDTH]; 4],
 }
 
-/// What a block of batches keeps between the loops.
-pub(crate) type Buffer = [Tensors; BLOCK];
+impl Shape {
+    pub const EMPTY: Self = Self {
+        edge: [[[0.0; WIDTH]; 3]; 5],
+        across: [[[0.0; WIDTH]; 3]; 4],
+        face: [[[0.0; WIDTH]; 3]; 4],
+        determinant: [[0.0; WIDTH]; 4],
+        invariant: [[0.0; WIDTH]; 4],
+        dilatation: [[0.0; WIDTH]; 4],
+    };
+}
 
-pub(crate) const EMPTY: Tensors = Tensors {
-    entry: [[0.0; WIDTH]; 9],
-    scalar: [0.0; WIDTH],
-};
-
-/// Deformation gradients of the tetrahedra of a batch from lane `first` on.
 #[inline(always)]
-unsafe fn deformation<L: Lanes, const NODES: usize, const TETS: usize, const AVERAGED: bool>(
-    cluster: &Cluster<NODES, TETS>,
-    first: usize,
-    nodes: *const [f32; 4],
-    out: &mut [Tensors],
-) {
+unsafe fn load<L: Lanes>(row: &[f32; WIDTH], first: usize) -> L {
+    unsafe { L::load(row.as_ptr().add(first)) }
+}
+
+#[inline(always)]
+unsafe fn store<L: Lanes>(value: L, row: &mut [f32; WIDTH], first: usize) {
+    unsafe { value.store(row.as_mut_ptr().add(first)) }
+}
+
+#[inline(always)]
+unsafe fn store_vector<L: Lanes>(value: [L; 3], rows: &mut Vectors, first: usize) {
     unsafe {
-        let zero = L::splat(0.0);
-        let mut displacement = [[zero; 4]; NODES];
-        for (node, value) in displacement.iter_mut().enumerate() {
-            *value = L::gather(nodes, cluster.slots[node].as_ptr().add(first));
-        }
-        let origin = displacement[0];
-        for value in &mut displacement[1..] {
-            for i in 0..3 {
-                value[i] = value[i].sub(origin[i]);
-            }
-        }
-        for tet in 0..TETS {
-            let mut f = [[zero; 3]; 3];
-            let mut scalar = origin[3];
-            for i in 0..3 {
-                f[i][i] = L::splat(1.0);
-            }
-            for (a, corner) in corners::<NODES>(tet).into_iter().enumerate() {
-                if AVERAGED {
-                    scalar = scalar.add(displacement[corner][3]);
-                }
-                for i in 0..3 {
-                    for j in 0..3 {
-                        let slope = L::load(cluster.gradient[tet][3 * a + j].as_ptr().add(first));
-                        f[i][j] = displacement[corner][i].mul_add(slope, f[i][j]);
-                    }
-                }
-            }
-            for i in 0..3 {
-                for j in 0..3 {
-                    f[i][j].store(out[tet].entry[3 * i + j].as_mut_ptr().add(first));
-                }
-            }
-            if AVERAGED {
-                scalar
-                    .mul(L::splat(0.25))
-                    .store(out[tet].scalar.as_mut_ptr().add(first));
-            }
+        for i in 0..3 {
+            store(value[i], &mut rows[i], first);
         }
     }
 }
@@ -133,102 +114,210 @@ unsafe fn cross<L: Lanes>(a: [L; 3], b: [L; 3]) -> [L; 3] {
     }
 }
 
-/// Loads `F`; returns it, its cofactor matrix and its determinant.
 #[inline(always)]
-unsafe fn cofactors<L: Lanes>(tensors: &Tensors, first: usize) -> ([[L; 3]; 3], [[L; 3]; 3], L) {
+unsafe fn dot<L: Lanes>(a: [L; 3], b: [L; 3]) -> L {
+    unsafe { a[2].mul_add(b[2], a[1].mul_add(b[1], a[0].mul(b[0]))) }
+}
+
+/// Edges from node 0 of the clusters from lane `first` on (entry 0 is zero), and the nodes' fourth components.
+#[inline(always)]
+unsafe fn edges<L: Lanes, const NODES: usize, const TETS: usize>(
+    cluster: &Cluster<NODES, TETS>,
+    first: usize,
+    nodes: *const [f32; 4],
+) -> ([[L; 3]; NODES], [L; NODES]) {
     unsafe {
-        let mut f = [[L::splat(0.0); 3]; 3];
-        for i in 0..3 {
-            for j in 0..3 {
-                f[i][j] = L::load(tensors.entry[3 * i + j].as_ptr().add(first));
-            }
+        let zero = L::splat(0.0);
+        let mut edge = [[zero; 3]; NODES];
+        let mut fourth = [zero; NODES];
+        let [x, y, z, w] = L::gather(nodes, cluster.slots[0].as_ptr().add(first));
+        fourth[0] = w;
+        for node in 1..NODES {
+            let value = L::gather(nodes, cluster.slots[node].as_ptr().add(first));
+            edge[node] = [value[0].sub(x), value[1].sub(y), value[2].sub(z)];
+            fourth[node] = value[3];
         }
-        let cofactor = [cross(f[1], f[2]), cross(f[2], f[0]), cross(f[0], f[1])];
-        let determinant = f[0][2].mul_add(
-            cofactor[0][2],
-            f[0][1].mul_add(cofactor[0][1], f[0][0].mul(cofactor[0][0])),
-        );
-        (f, cofactor, determinant)
+        (edge, fourth)
     }
 }
 
-/// Replaces `F` by `-V P`; returns det F.
+/// Gathers the nodes and fills `out`.
 #[inline(always)]
-unsafe fn stress<L: Lanes, const AVERAGED: bool>(
-    volume: &[f32; WIDTH],
+unsafe fn shape<L: Lanes, const NODES: usize, const TETS: usize, const AVERAGED: bool>(
+    cluster: &Cluster<NODES, TETS>,
     first: usize,
-    tensors: &mut Tensors,
-    law: Law,
+    nodes: *const [f32; 4],
+    out: &mut Shape,
+) {
+    unsafe {
+        let zero = L::splat(0.0);
+        let (edge, fourth) = edges::<L, NODES, TETS>(cluster, first, nodes);
+        let mut square = [zero; NODES];
+        let mut along = [zero; NODES];
+        for k in 1..NODES {
+            store_vector(edge[k], &mut out.edge[k - 1], first);
+            square[k] = dot(edge[k], edge[k]);
+        }
+        for k in 2..NODES {
+            store_vector(cross(edge[1], edge[k]), &mut out.across[k - 2], first);
+            along[k] = dot(edge[1], edge[k]);
+        }
+        for tet in 0..TETS {
+            let [_, b, c] = corners::<NODES>(tet);
+            let face = cross(edge[b], edge[c]);
+            store_vector(face, &mut out.face[tet], first);
+            store(dot(edge[1], face), &mut out.determinant[tet], first);
+            let m = &cluster.springs[tet];
+            let mixed = load::<L>(&m[4], first).mul(dot(edge[b], edge[c]));
+            let mixed = load::<L>(&m[2], first).mul_add(along[c], mixed);
+            let mixed = load::<L>(&m[1], first).mul_add(along[b], mixed);
+            let own = load::<L>(&m[5], first).mul(square[c]);
+            let own = load::<L>(&m[3], first).mul_add(square[b], own);
+            let own = load::<L>(&m[0], first).mul_add(square[1], own);
+            let invariant = mixed.mul_add(L::splat(2.0), own);
+            store(invariant, &mut out.invariant[tet], first);
+            if AVERAGED {
+                let sum = fourth[0].add(fourth[1]).add(fourth[b]).add(fourth[c]);
+                store(sum, &mut out.dilatation[tet], first);
+            }
+        }
+    }
+}
+
+/// Turns determinant and invariant into the factors of springs and pressure; returns det F.
+#[inline(always)]
+unsafe fn moduli<L: Lanes, const NODES: usize, const TETS: usize, const AVERAGED: bool>(
+    cluster: &Cluster<NODES, TETS>,
+    tet: usize,
+    first: usize,
+    shape: &mut Shape,
 ) -> L {
     unsafe {
-        let (f, cofactor, determinant) = cofactors::<L>(tensors, first);
-        let root = inverse_cube_root(determinant.max(L::splat(1e-3)));
+        let determinant = load::<L>(&shape.determinant[tet], first);
+        let inverse = load::<L>(&cluster.inverse[tet], first);
+        let ratio = determinant.mul(inverse);
+        let root = inverse_cube_root(ratio.max(L::splat(1e-3)));
         let root2 = root.mul(root);
-        // Three sums of three: a shorter chain than one of nine.
-        let mut invariant = L::splat(0.0);
-        for row in f {
-            let part = row[2].mul_add(row[2], row[1].mul_add(row[1], row[0].mul(row[0])));
-            invariant = invariant.add(part);
-        }
-        let volume = L::load(volume.as_ptr().add(first));
-        let deviatoric = volume.mul(L::splat(-law.shear)).mul(root2);
-        let pressure = if AVERAGED {
-            L::load(tensors.scalar.as_ptr().add(first)).mul(volume)
+        let loss = if AVERAGED {
+            load::<L>(&shape.dilatation[tet], first).mul(L::splat(-0.25))
         } else {
-            volume
-                .mul(L::splat(law.bulk))
-                .mul(determinant.sub(L::splat(1.0)))
+            determinant.neg_mul_add(inverse, L::splat(1.0))
         };
-        let inverse = root2.mul(root).mul(L::splat(-1.0 / 3.0));
-        let spherical = deviatoric.mul(inverse).mul(invariant).sub(pressure);
-        for i in 0..3 {
-            for j in 0..3 {
-                spherical
-                    .mul_add(cofactor[i][j], deviatoric.mul(f[i][j]))
-                    .store(tensors.entry[3 * i + j].as_mut_ptr().add(first));
-            }
-        }
-        determinant
+        let pressure = load::<L>(&cluster.bulk[tet], first).mul(loss);
+        let root5 = root2.mul(root2).mul(root.mul(L::splat(1.0 / 3.0)));
+        let invariant = load::<L>(&shape.invariant[tet], first);
+        let factor = root5.neg_mul_add(inverse.mul(invariant), pressure);
+        store(root2, &mut shape.determinant[tet], first);
+        store(factor, &mut shape.invariant[tet], first);
+        ratio
     }
 }
 
-/// Adds `-V P dN_a/dX` to the corners.
+/// What pulls at the nodes of a cluster: spring constants (µN/mm) summed over its tetrahedra, and the factors of cof D (Pa).
+struct Pull<L, const NODES: usize, const TETS: usize> {
+    /// Node 1 with itself (entry 1), and of the others each with itself.
+    own: [L; NODES],
+    /// Of each node with node 1.
+    along: [L; NODES],
+    /// Of a tetrahedron's corners b and c.
+    face: [L; TETS],
+    factor: [L; TETS],
+}
+
+/// Adds the forces to the nodes.
 #[inline(always)]
 unsafe fn scatter<L: Lanes, const NODES: usize, const TETS: usize>(
     cluster: &Cluster<NODES, TETS>,
     first: usize,
-    tensors: &[Tensors],
+    shape: &Shape,
     forces: *mut [f32; 4],
 ) {
     unsafe {
-        let mut force = [[L::splat(0.0); 4]; NODES];
+        let zero = L::splat(0.0);
+        let mut pull = Pull {
+            own: [zero; NODES],
+            along: [zero; NODES],
+            face: [zero; TETS],
+            factor: [zero; TETS],
+        };
         for tet in 0..TETS {
-            for (a, corner) in corners::<NODES>(tet).into_iter().enumerate() {
-                for i in 0..3 {
-                    for j in 0..3 {
-                        let entry = L::load(tensors[tet].entry[3 * i + j].as_ptr().add(first));
-                        let slope = L::load(cluster.gradient[tet][3 * a + j].as_ptr().add(first));
-                        force[corner][i] = entry.mul_add(slope, force[corner][i]);
-                    }
-                }
-            }
+            let [_, b, c] = corners::<NODES>(tet);
+            let root2 = load::<L>(&shape.determinant[tet], first);
+            let m = &cluster.springs[tet];
+            pull.own[1] = root2.mul_add(load(&m[0], first), pull.own[1]);
+            pull.along[b] = root2.mul_add(load(&m[1], first), pull.along[b]);
+            pull.along[c] = root2.mul_add(load(&m[2], first), pull.along[c]);
+            pull.own[b] = root2.mul_add(load(&m[3], first), pull.own[b]);
+            pull.face[tet] = root2.mul(load(&m[4], first));
+            pull.own[c] = root2.mul_add(load(&m[5], first), pull.own[c]);
+            pull.factor[tet] = load(&shape.invariant[tet], first);
         }
-        // The forces of an element are in balance.
-        for node in 1..NODES {
-            for i in 0..3 {
-                force[0][i] = force[0][i].sub(force[node][i]);
-            }
+        // The forces of an element are in balance: what the other nodes get is taken from node 0.
+        let mut rest = [zero; 3];
+        add_node::<L, NODES, TETS, 1>(cluster, first, shape, &pull, forces, &mut rest);
+        add_node::<L, NODES, TETS, 2>(cluster, first, shape, &pull, forces, &mut rest);
+        add_node::<L, NODES, TETS, 3>(cluster, first, shape, &pull, forces, &mut rest);
+        if NODES > 4 {
+            add_node::<L, NODES, TETS, 4>(cluster, first, shape, &pull, forces, &mut rest);
         }
-        for (node, value) in force.into_iter().enumerate() {
-            L::scatter_add(forces, cluster.slots[node].as_ptr().add(first), value);
+        if NODES > 5 {
+            add_node::<L, NODES, TETS, 5>(cluster, first, shape, &pull, forces, &mut rest);
         }
+        L::scatter_add(forces, cluster.slots[0].as_ptr().add(first), rest);
     }
 }
 
-/// Adds the forces (µN) of the clusters to `forces`; returns the smallest det F seen.
+/// Adds the force on one node, and takes it from `rest`. The node is a constant so that its neighbours are, too.
+#[inline(always)]
+unsafe fn add_node<L: Lanes, const NODES: usize, const TETS: usize, const NODE: usize>(
+    cluster: &Cluster<NODES, TETS>,
+    first: usize,
+    shape: &Shape,
+    pull: &Pull<L, NODES, TETS>,
+    forces: *mut [f32; 4],
+    rest: &mut [L; 3],
+) {
+    unsafe {
+        let mut force = [L::splat(0.0); 3];
+        for i in 0..3 {
+            force[i] = pull.own[NODE].mul(load(&shape.edge[NODE - 1][i], first));
+            if NODE == 1 {
+                for k in 2..NODES {
+                    let edge = load::<L>(&shape.edge[k - 1][i], first);
+                    force[i] = pull.along[k].mul_add(edge, force[i]);
+                }
+            } else {
+                let edge = load::<L>(&shape.edge[0][i], first);
+                force[i] = pull.along[NODE].mul_add(edge, force[i]);
+            }
+            for tet in 0..TETS {
+                let [_, b, c] = corners::<NODES>(tet);
+                let factor = pull.factor[tet];
+                if NODE == 1 {
+                    force[i] = factor.mul_add(load(&shape.face[tet][i], first), force[i]);
+                }
+                if NODE == b {
+                    let edge = load::<L>(&shape.edge[c - 1][i], first);
+                    force[i] = pull.face[tet].mul_add(edge, force[i]);
+                    force[i] = factor.neg_mul_add(load(&shape.across[c - 2][i], first), force[i]);
+                }
+                if NODE == c {
+                    let edge = load::<L>(&shape.edge[b - 1][i], first);
+                    force[i] = pull.face[tet].mul_add(edge, force[i]);
+                    force[i] = factor.mul_add(load(&shape.across[b - 2][i], first), force[i]);
+                }
+            }
+            rest[i] = rest[i].sub(force[i]);
+        }
+        L::scatter_add(forces, cluster.slots[NODE].as_ptr().add(first), force);
+    }
+}
+
+/// Adds the forces (µN) of the clusters to `forces`, given positions (mm, from any origin); returns the smallest det F
+/// seen.
 ///
-/// With `AVERAGED` the pressure is the mean of the corners' fourth component
-/// instead of `kappa (J - 1)` of the element.
+/// With `AVERAGED` the relative change of volume is the mean of the corners' fourth component
+/// instead of the element's `J - 1`.
 #[inline(always)]
 pub(crate) unsafe fn add_forces<
     L: Lanes,
@@ -239,30 +328,23 @@ pub(crate) unsafe fn add_forces<
     clusters: &[Cluster<NODES, TETS>],
     nodes: *const [f32; 4],
     forces: *mut [f32; 4],
-    law: Law,
-    buffer: &mut Buffer,
+    buffer: &mut Shape,
 ) -> f32 {
     unsafe {
         let mut smallest = L::splat(f32::MAX);
-        for block in clusters.chunks(BLOCK / TETS) {
-            for (cluster, tensors) in block.iter().zip(buffer.chunks_exact_mut(TETS)) {
+        for cluster in clusters {
+            for first in (0..WIDTH).step_by(L::COUNT) {
+                shape::<L, NODES, TETS, AVERAGED>(cluster, first, nodes, buffer);
+            }
+            prefetch(std::ptr::from_ref(cluster).wrapping_add(1));
+            for tet in 0..TETS {
                 for first in (0..WIDTH).step_by(L::COUNT) {
-                    deformation::<L, NODES, TETS, AVERAGED>(cluster, first, nodes, tensors);
+                    let ratio = moduli::<L, NODES, TETS, AVERAGED>(cluster, tet, first, buffer);
+                    smallest = smallest.min(ratio);
                 }
             }
-            for (cluster, tensors) in block.iter().zip(buffer.chunks_exact_mut(TETS)) {
-                prefetch(std::ptr::from_ref(cluster).wrapping_add(BLOCK / TETS));
-                for (volume, tensors) in cluster.volume.iter().zip(tensors) {
-                    for first in (0..WIDTH).step_by(L::COUNT) {
-                        let determinant = stress::<L, AVERAGED>(volume, first, tensors, law);
-                        smallest = smallest.min(determinant);
-                    }
-                }
-            }
-            for (cluster, tensors) in block.iter().zip(buffer.chunks_exact(TETS)) {
-                for first in (0..WIDTH).step_by(L::COUNT) {
-                    scatter::<L, NODES, TETS>(cluster, first, tensors, forces);
-                }
+            for first in (0..WIDTH).step_by(L::COUNT) {
+                scatter::<L, NODES, TETS>(cluster, first, buffer, forces);
             }
         }
         let mut lanes = [f32::MAX; WIDTH];
@@ -271,7 +353,7 @@ pub(crate) unsafe fn add_forces<
     }
 }
 
-/// Adds each element's current volume to the fourth component of its corners' `forces`.
+/// Adds each element's current volume times its bulk modulus (nJ) to the third component of its corners' `forces`.
 #[inline(always)]
 pub(crate) unsafe fn add_volumes<L: Lanes, const NODES: usize, const TETS: usize>(
     clusters: &[Cluster<NODES, TETS>],
@@ -280,23 +362,21 @@ pub(crate) unsafe fn add_volumes<L: Lanes, const NODES: usize, const TETS: usize
 ) {
     unsafe {
         let zero = L::splat(0.0);
-        let mut buffer = [EMPTY; TETS];
         for cluster in clusters {
             for first in (0..WIDTH).step_by(L::COUNT) {
-                deformation::<L, NODES, TETS, false>(cluster, first, nodes, &mut buffer);
+                let (edge, _) = edges::<L, NODES, TETS>(cluster, first, nodes);
                 let mut sum = [zero; NODES];
                 for tet in 0..TETS {
-                    let (_, _, determinant) = cofactors::<L>(&buffer[tet], first);
-                    let rest = L::load(cluster.volume[tet].as_ptr().add(first));
-                    let volume = determinant.mul(rest);
-                    sum[0] = sum[0].add(volume);
-                    for corner in corners::<NODES>(tet) {
+                    let [a, b, c] = corners::<NODES>(tet);
+                    let determinant = dot(edge[a], cross(edge[b], edge[c]));
+                    let volume = determinant.mul(load(&cluster.bulk[tet], first));
+                    for corner in [0, a, b, c] {
                         sum[corner] = sum[corner].add(volume);
                     }
                 }
                 for (slots, volume) in cluster.slots.iter().zip(sum) {
                     let slots = slots.as_ptr().add(first);
-                    L::scatter_add(forces, slots, [zero, zero, zero, volume]);
+                    L::scatter_add(forces, slots, [zero, zero, volume]);
                 }
             }
         }

@@ -9,8 +9,8 @@
 
 use super::barrier::{FlushDenormals, SpinBarrier};
 use super::dispatch::Kernels;
-use super::kernel::Law;
 use super::partition::{Chunk, Partition};
+use super::slots::PADDED;
 use rayon::ThreadPool;
 
 /// Four floats on a 16-byte boundary.
@@ -21,11 +21,12 @@ pub(crate) struct Node(pub [f32; 4]);
 /// Slot arrays (owned and ghost), see `partition`.
 #[derive(Clone, Default)]
 pub(crate) struct Fields {
-    /// Displacement, mm; fourth component: nodal pressure, Pa (averaged elements only).
+    /// Displacement, mm; fourth component: nodal dilatation `J - 1` (averaged elements only).
     pub displacement: Vec<Node>,
     /// Displacement over the last inner step, mm; fourth component: `g`, mm/µN.
     pub increment: Vec<Node>,
-    /// Internal force, µN; fourth component: current nodal volume × 4, mm³ (averaged only).
+    /// Internal force, µN. Averaged elements first have the current nodal volume × 4 times bulk modulus, nJ, in the
+    /// third component. The fourth holds nothing.
     pub force: Vec<Node>,
 }
 
@@ -38,7 +39,7 @@ pub(crate) struct Path {
 }
 
 /// What one chunk reports from a march.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 pub(crate) struct Tally {
     /// Work done by contact nodes on the tissue, nJ.
     pub work: f64,
@@ -50,9 +51,8 @@ pub(crate) struct Tally {
 pub(crate) struct March<'a> {
     pub partition: &'a Partition,
     pub kernels: Kernels,
-    pub law: Law,
     pub averaged: bool,
-    /// Four times the nodal rest volume by slot, mm³ (averaged only).
+    /// Four times the nodal rest volume times the bulk modulus by slot, nJ (averaged only).
     pub rest_volume: &'a [f32],
     /// Nodal mass by slot, g.
     pub mass: &'a [f32],
@@ -66,9 +66,10 @@ pub(crate) struct March<'a> {
 
 /// Raw views of the slot arrays that threads share.
 ///
-/// In the element phase a thread writes the forces and ghost displacements of its
-/// own chunks and reads owned displacements; in the node phase it writes owned
-/// displacements, increments and forces of its own chunks and reads ghost forces.
+/// In the element phase a thread writes the forces of its own chunks (with averaged
+/// elements also their dilatations, between two barriers) and reads owned displacements;
+/// in the node phase it writes displacements, increments and owned forces of its own
+/// chunks (of ghosts only what no one reads) and reads ghost forces.
 /// Barriers separate the phases, so no location is written by one thread while
 /// another touches it.
 #[derive(Clone, Copy)]
@@ -79,6 +80,17 @@ struct Shared {
     tallies: *mut Tally,
 }
 
+impl Shared {
+    fn new(fields: &mut Fields, tallies: &mut [Tally]) -> Self {
+        Self {
+            displacement: fields.displacement.as_mut_ptr(),
+            increment: fields.increment.as_mut_ptr(),
+            force: fields.force.as_mut_ptr(),
+            tallies: tallies.as_mut_ptr(),
+        }
+    }
+}
+
 // SAFETY: see the type's description.
 unsafe impl Send for Shared {}
 // SAFETY: see the type's description.
@@ -87,24 +99,14 @@ unsafe impl Sync for Shared {}
 impl March<'_> {
     /// Runs all inner steps; one tally a chunk. The same bits for any pool.
     pub fn run(&self, fields: &mut Fields, pool: Option<&ThreadPool>) -> Vec<Tally> {
-        let mut tallies = vec![
-            Tally {
-                work: 0.0,
-                inverted_at: 0
-            };
-            self.partition.chunks.len()
-        ];
-        let shared = Shared {
-            displacement: fields.displacement.as_mut_ptr(),
-            increment: fields.increment.as_mut_ptr(),
-            force: fields.force.as_mut_ptr(),
-            tallies: tallies.as_mut_ptr(),
-        };
+        let mut tallies = vec![Tally::default(); self.partition.chunks.len()];
+        let shared = Shared::new(fields, &mut tallies);
         self.on_threads(pool, |mine, barrier| {
+            let mut positions = self.positions();
             for step in 1..=self.steps {
                 // SAFETY: phases and barriers as `Shared` demands; `mine` is disjoint a thread.
                 unsafe {
-                    self.element_phase(shared, mine.clone(), barrier, step);
+                    self.element_phase(shared, mine.clone(), barrier, &mut positions, step);
                     barrier.wait();
                     for chunk in mine.clone() {
                         self.node_phase(shared, chunk, step);
@@ -118,29 +120,25 @@ impl March<'_> {
 
     /// Computes the forces of the present state into `fields.force` (owned slots complete).
     pub fn forces(&self, fields: &mut Fields, pool: Option<&ThreadPool>) {
-        let mut tallies = vec![
-            Tally {
-                work: 0.0,
-                inverted_at: 0
-            };
-            self.partition.chunks.len()
-        ];
-        let shared = Shared {
-            displacement: fields.displacement.as_mut_ptr(),
-            increment: fields.increment.as_mut_ptr(),
-            force: fields.force.as_mut_ptr(),
-            tallies: tallies.as_mut_ptr(),
-        };
+        let mut tallies = vec![Tally::default(); self.partition.chunks.len()];
+        let shared = Shared::new(fields, &mut tallies);
         self.on_threads(pool, |mine, barrier| {
+            let mut positions = self.positions();
             // SAFETY: as in `run`.
             unsafe {
-                self.element_phase(shared, mine.clone(), barrier, 1);
+                self.element_phase(shared, mine.clone(), barrier, &mut positions, 1);
                 barrier.wait();
                 for chunk in mine {
                     self.collect(shared, &self.partition.chunks[chunk]);
                 }
             }
         });
+    }
+
+    /// Room for the node positions of any chunk.
+    fn positions(&self) -> Vec<Node> {
+        let sizes = self.partition.chunks.iter().map(Chunk::slot_count);
+        vec![Node::default(); sizes.max().unwrap_or(0).next_multiple_of(PADDED)]
     }
 
     /// Calls `work` with each thread's chunks.
@@ -170,35 +168,36 @@ impl March<'_> {
         }
     }
 
-    /// Element forces of the chunks in `mine` into their own slots.
+    /// Element forces of the chunks in `mine` into their own slots; `positions` is scratch.
     unsafe fn element_phase(
         &self,
         shared: Shared,
         mine: std::ops::Range<usize>,
         barrier: &SpinBarrier,
+        positions: &mut [Node],
         step: u32,
     ) {
         unsafe {
             if self.averaged {
                 for chunk in mine.clone() {
                     let chunk = &self.partition.chunks[chunk];
-                    self.prepare(shared, chunk);
+                    self.prepare(shared, chunk, positions);
                     (self.kernels.volumes)(
                         self.partition,
                         chunk,
-                        shared.displacement.add(chunk.first).cast(),
+                        positions.as_ptr().cast(),
                         shared.force.add(chunk.first).cast(),
                     );
                 }
                 barrier.wait();
                 for chunk in mine.clone() {
-                    self.nodal_pressure(shared, &self.partition.chunks[chunk]);
+                    self.nodal_dilatation(shared, &self.partition.chunks[chunk]);
                 }
                 barrier.wait();
             }
             for index in mine {
                 let chunk = &self.partition.chunks[index];
-                self.prepare(shared, chunk);
+                self.prepare(shared, chunk, positions);
                 let kernel = if self.averaged {
                     self.kernels.averaged_forces
                 } else {
@@ -207,9 +206,8 @@ impl March<'_> {
                 let smallest = kernel(
                     self.partition,
                     chunk,
-                    shared.displacement.add(chunk.first).cast(),
+                    positions.as_ptr().cast(),
                     shared.force.add(chunk.first).cast(),
-                    self.law,
                 );
                 let tally = &mut *shared.tallies.add(index);
                 if smallest <= 0.0 && tally.inverted_at == 0 {
@@ -219,12 +217,22 @@ impl March<'_> {
         }
     }
 
-    /// Copies owners' displacements to the chunk's ghosts and clears its forces.
-    unsafe fn prepare(&self, shared: Shared, chunk: &Chunk) {
+    /// Puts the chunk's nodes where they are now, from its centre, and clears its forces.
+    unsafe fn prepare(&self, shared: Shared, chunk: &Chunk, positions: &mut [Node]) {
         unsafe {
-            let ghosts = shared.displacement.add(chunk.first + chunk.owned);
-            for (offset, owner) in chunk.ghosts.iter().enumerate() {
-                *ghosts.add(offset) = *shared.displacement.add(*owner as usize);
+            let rest = &self.partition.rest[chunk.first..chunk.first + chunk.slot_count()];
+            (self.kernels.place)(
+                chunk.owned,
+                rest.as_ptr(),
+                shared.displacement.add(chunk.first).cast(),
+                positions.as_mut_ptr().cast(),
+            );
+            let ghosts = positions[chunk.owned..]
+                .iter_mut()
+                .zip(&rest[chunk.owned..]);
+            for ((position, rest), owner) in ghosts.zip(&chunk.ghosts) {
+                let displacement = (*shared.displacement.add(*owner as usize)).0;
+                *position = Node(std::array::from_fn(|k| rest[k] + displacement[k]));
             }
             std::ptr::write_bytes(shared.force.add(chunk.first), 0, chunk.slot_count());
         }
@@ -243,14 +251,13 @@ impl March<'_> {
         }
     }
 
-    /// Nodal pressure `kappa (J - 1)` from the nodal volumes, for average-pressure elements.
-    unsafe fn nodal_pressure(&self, shared: Shared, chunk: &Chunk) {
+    /// Nodal `J - 1` from the nodal volumes, for average-pressure elements.
+    unsafe fn nodal_dilatation(&self, shared: Shared, chunk: &Chunk) {
         unsafe {
             self.collect(shared, chunk);
             for slot in chunk.first..chunk.first + chunk.owned {
-                let volume = (*shared.force.add(slot)).0[3];
-                (*shared.displacement.add(slot)).0[3] =
-                    self.law.bulk * (volume / self.rest_volume[slot] - 1.0);
+                let volume = (*shared.force.add(slot)).0[2];
+                (*shared.displacement.add(slot)).0[3] = volume / self.rest_volume[slot] - 1.0;
             }
         }
     }
@@ -272,19 +279,13 @@ impl March<'_> {
             for path in paths {
                 tally.work += self.follow(shared, path, step);
             }
-            // The fourth components, gain and pressure, stay: one and nought there keep whole vectors going.
-            let beta = [self.beta, self.beta, self.beta, 1.0];
-            let moves = [1.0, 1.0, 1.0, 0.0];
-            for slot in own {
-                let force = (*shared.force.add(slot)).0;
-                let increment = &mut (*shared.increment.add(slot)).0;
-                let displacement = &mut (*shared.displacement.add(slot)).0;
-                let gain = increment[3];
-                for k in 0..4 {
-                    increment[k] = beta[k] * increment[k] + gain * moves[k] * force[k];
-                    displacement[k] += moves[k] * increment[k];
-                }
-            }
+            (self.kernels.advance)(
+                chunk.owned,
+                self.beta,
+                shared.force.add(chunk.first).cast(),
+                shared.increment.add(chunk.first).cast(),
+                shared.displacement.add(chunk.first).cast(),
+            );
             for path in paths {
                 let (increment, displacement) = (
                     &mut *shared.increment.add(path.slot as usize),

@@ -5,7 +5,7 @@
 //! (selective mass scaling; Olovsson, Simonsson and Unosson 2005): statics stay
 //! as they are, and dynamics change by the mass that is added.
 
-use super::partition::shape_gradients;
+use super::batches::shape_gradients;
 use crate::material::Material;
 use crate::mesh::{Mesh, tet_volume};
 
@@ -53,7 +53,7 @@ impl LumpedMass {
 /// Critical step of one element of the material's own stiffness with a quarter of its mass at each corner, s:
 /// `2 / omega` with `omega² = 4 (kappa + 4/3 mu) / rho` times the largest eigenvalue of `sum_a g_a (x) g_a`.
 fn element_step_s(positions: &[[f32; 3]], tet: [u32; 4], material: &Material) -> f64 {
-    let (slopes, _) = shape_gradients(positions, tet);
+    let (slopes, _) = shape_gradients(tet.map(|node| positions[node as usize]));
     let first = [0, 1, 2].map(|j| -(slopes[0][j] + slopes[1][j] + slopes[2][j]));
     let mut sum = [[0.0; 3]; 3];
     for g in slopes.iter().chain([&first]) {

@@ -7,6 +7,7 @@
 //! bits for any number of threads.
 
 mod barrier;
+mod batches;
 mod cluster;
 mod diagnosis;
 mod dispatch;
@@ -18,7 +19,11 @@ mod march;
 mod mass;
 mod options;
 mod partition;
+mod slots;
 mod stability;
+// Against the energy of `statics`.
+#[cfg(all(test, feature = "linear"))]
+mod tests;
 
 pub use dispatch::Simd;
 pub use error::SolverError;
@@ -26,7 +31,6 @@ pub use options::{Pressure, SolverOptions, Substep};
 
 use crate::mesh::{Boundary, Mesh};
 use dispatch::Kernels;
-use kernel::Law;
 use march::{Fields, Node, Path};
 use mass::LumpedMass;
 use options::check_positive;
@@ -70,11 +74,10 @@ pub struct Solver {
     tets: Vec<[u32; 4]>,
     options: SolverOptions,
     kernels: Kernels,
-    law: Law,
     partition: Partition,
     /// By slot: nodal mass, g (ghosts and padding zero).
     mass: Vec<f32>,
-    /// By slot: four times the nodal rest volume, mm³, elements weighted by their stiffness.
+    /// By slot: four times the nodal rest volume times the bulk modulus, nJ, elements weighted by their stiffness.
     rest_volume: Vec<f32>,
     /// By mesh element: square of its wave speed over the material's, that is its stiffness over its
     /// density (mass scaling).
@@ -121,14 +124,15 @@ impl Solver {
                     })?,
             ),
         };
-        let partition = Partition::new(mesh);
+        let partition = Partition::new(mesh, &options.material);
         let slots = partition.node_of_slot.len();
         let lumped = LumpedMass::new(mesh, &options.material, options.mass_scaling_s);
         let mut mass = vec![0.0; slots];
         let mut rest_volume = vec![0.0; slots];
+        let bulk = options.material.bulk_pa();
         for (node, slot) in partition.slot_of_node.iter().enumerate() {
             mass[*slot as usize] = lumped.mass[node] as f32;
-            rest_volume[*slot as usize] = (4.0 * lumped.stiff_volume[node]) as f32;
+            rest_volume[*slot as usize] = (4.0 * bulk * lumped.stiff_volume[node]) as f32;
         }
         let mut held = vec![false; slots];
         for node in mesh.held_nodes(boundary) {
@@ -144,10 +148,6 @@ impl Solver {
             positions: mesh.positions.clone(),
             tets: mesh.tets.clone(),
             kernels,
-            law: Law {
-                shear: options.material.shear_pa() as f32,
-                bulk: options.material.bulk_pa() as f32,
-            },
             partition,
             mass,
             rest_volume,
@@ -274,19 +274,27 @@ impl Solver {
     pub fn step_cost(&self) -> StepCost {
         let partition = &self.partition;
         let slots: usize = partition.chunks.iter().map(|c| c.slot_count()).sum();
-        let constants =
-            partition.octahedra.bytes() + partition.pairs.bytes() + partition.singles.bytes();
-        let corners = lanes::WIDTH
-            * (6 * partition.octahedra.batches.len()
-                + 5 * partition.pairs.batches.len()
-                + 4 * partition.singles.batches.len());
-        StepCost {
-            bytes: constants + slots * 6 * std::mem::size_of::<Node>(),
-            flops: self.tets.len() * kernel::FLOPS_PER_TET
-                + corners * kernel::FLOPS_PER_CORNER
-                + self.positions.len() * 9,
-            gathers: corners,
+        let (octahedra, pairs, singles) =
+            (&partition.octahedra, &partition.pairs, &partition.singles);
+        let kinds = [
+            (6, 4, octahedra.count(), octahedra.batches.len()),
+            (5, 2, pairs.count(), pairs.batches.len()),
+            (4, 1, singles.count(), singles.batches.len()),
+        ];
+        let mut cost = StepCost {
+            // Displacement, increment and force both ways, rest positions.
+            bytes: slots * 7 * std::mem::size_of::<Node>()
+                + octahedra.bytes()
+                + pairs.bytes()
+                + singles.bytes(),
+            flops: slots * slots::FLOPS_PER_NODE,
+            gathers: 0,
+        };
+        for (nodes, tets, clusters, batches) in kinds {
+            cost.flops += clusters * kernel::flops(nodes, tets);
+            cost.gathers += lanes::WIDTH * batches * nodes;
         }
+        cost
     }
 
     fn check_contact(&self, contact: &[ContactNode]) -> Result<(), SolverError> {

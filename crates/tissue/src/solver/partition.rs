@@ -7,8 +7,9 @@
 //! added to the owner in ascending slot order. The split depends on the mesh
 //! alone: a result has the same bits for any number of threads.
 
-use super::cluster::{Cluster, Group, Groups, Octahedra, Pairs, Singles, corners};
-use super::lanes::WIDTH;
+use super::batches::{Element, Kind, Source};
+use super::cluster::{Groups, Octahedra, Pairs, Singles};
+use crate::material::Material;
 use crate::mesh::Mesh;
 use std::ops::Range;
 
@@ -53,31 +54,14 @@ pub(crate) struct Partition {
     pub node_of_slot: Vec<u32>,
     /// Owned slot of each mesh node.
     pub slot_of_node: Vec<u32>,
-}
-
-/// Batches of one kind of cluster.
-#[derive(Default)]
-pub(crate) struct Kind<const NODES: usize, const TETS: usize> {
-    pub batches: Vec<Cluster<NODES, TETS>>,
-    /// Mesh elements of each batch; [`PADDING`] in padding lanes.
-    pub elements: Vec<[[u32; WIDTH]; TETS]>,
-}
-
-/// One tetrahedron as the kernels see it.
-pub(crate) struct Element {
-    /// Its number in the mesh.
-    pub number: u32,
-    /// Twice the chunk-local slots of its corners.
-    pub slots: [u16; 4],
-    /// Gradients of the shape functions of corners 1 to 3, 1/mm.
-    pub gradient: [[f32; 3]; 3],
-    /// mm³, see [`Cluster::volume`].
-    pub volume: f32,
+    /// Rest position of each slot from its chunk's centre, mm, and a zero: small numbers, so that a sum with the
+    /// displacement keeps its last bits.
+    pub rest: Vec<[f32; 4]>,
 }
 
 impl Partition {
-    /// Splits a validated mesh. `O(T log T)`.
-    pub fn new(mesh: &Mesh) -> Self {
+    /// Splits a validated mesh of a material. `O(T log T)`.
+    pub fn new(mesh: &Mesh, material: &Material) -> Self {
         let (positions, tets) = (&mesh.positions, &mesh.tets);
         let centroids: Vec<[f32; 3]> = tets
             .iter()
@@ -105,15 +89,23 @@ impl Partition {
             singles: Kind::default(),
             node_of_slot: Vec::new(),
             slot_of_node: vec![PADDING; positions.len()],
+            rest: Vec::new(),
         };
         for (chunk, leaf) in leaves.iter().enumerate() {
-            partition.push_chunk(chunk as u32, leaf, &owner, mesh);
+            partition.push_chunk(chunk as u32, leaf, &owner, mesh, material);
         }
         partition.connect();
         partition
     }
 
-    fn push_chunk(&mut self, chunk: u32, leaf: &[u32], owner: &[u32], mesh: &Mesh) {
+    fn push_chunk(
+        &mut self,
+        chunk: u32,
+        leaf: &[u32],
+        owner: &[u32],
+        mesh: &Mesh,
+        material: &Material,
+    ) {
         let tets = &mesh.tets;
         let first = self.node_of_slot.len();
         let mut nodes: Vec<u32> = leaf.iter().flat_map(|e| tets[*e as usize]).collect();
@@ -132,18 +124,27 @@ impl Partition {
                 Err(_) => (own.len() + ghost.partition_point(|g| *g < node)) as u16,
             }
         };
+        let here = self.node_of_slot[first..].iter();
+        let rest = from_centre(here.map(|node| mesh.positions[*node as usize]).collect());
         let groups = Groups::new(leaf, tets, &mesh.positions);
+        let source = Source {
+            rest: &rest,
+            mesh,
+            material,
+        };
         self.chunks.push(Chunk {
             first,
             owned: own.len(),
-            octahedra: self.octahedra.push(&groups.octahedra, mesh, local),
-            pairs: self.pairs.push(&groups.pairs, mesh, local),
-            singles: self.singles.push(&groups.singles, mesh, local),
+            octahedra: self.octahedra.push(&groups.octahedra, source, local),
+            pairs: self.pairs.push(&groups.pairs, source, local),
+            singles: self.singles.push(&groups.singles, source, local),
             ghosts: ghost,
             contributions: Vec::new(),
         });
         let padded = self.node_of_slot.len().next_multiple_of(4);
         self.node_of_slot.resize(padded, PADDING);
+        self.rest.extend(rest);
+        self.rest.resize(padded, [0.0; 4]);
     }
 
     /// The batches of a chunk.
@@ -184,6 +185,23 @@ impl Partition {
     }
 }
 
+/// Positions from the middle of their box.
+fn from_centre(positions: Vec<[f32; 3]>) -> Vec<[f32; 4]> {
+    let centre = [0, 1, 2].map(|k| {
+        let values = positions.iter().map(|p| p[k]);
+        let (low, high) = (
+            values.clone().fold(f32::MAX, f32::min),
+            values.fold(f32::MIN, f32::max),
+        );
+        0.5 * (f64::from(low) + f64::from(high))
+    });
+    let local = |p: &[f32; 3]| {
+        let [x, y, z] = [0, 1, 2].map(|k| (f64::from(p[k]) - centre[k]) as f32);
+        [x, y, z, 0.0]
+    };
+    positions.iter().map(local).collect()
+}
+
 /// Splits `order` into `count` spatially compact leaves of nearly equal size.
 fn bisect(order: &mut [u32], centroids: &[[f32; 3]], count: usize, leaves: &mut Vec<Vec<u32>>) {
     if count <= 1 {
@@ -207,121 +225,4 @@ fn bisect(order: &mut [u32], centroids: &[[f32; 3]], count: usize, leaves: &mut 
     let (left, right) = order.split_at_mut(order.len() * half / count);
     bisect(left, centroids, half, leaves);
     bisect(right, centroids, count - half, leaves);
-}
-
-impl<const NODES: usize, const TETS: usize> Kind<NODES, TETS> {
-    /// Packs groups into batches; `local` maps a mesh node to its chunk-local slot. Returns where they lie.
-    fn push(
-        &mut self,
-        groups: &[Group<NODES, TETS>],
-        mesh: &Mesh,
-        local: impl Fn(u32) -> u16,
-    ) -> Range<usize> {
-        let start = self.batches.len();
-        for groups in disjoint_batches(groups) {
-            let mut batch = Cluster {
-                gradient: [[[0.0; WIDTH]; 9]; TETS],
-                volume: [[0.0; WIDTH]; TETS],
-                slots: [[0; WIDTH]; NODES],
-            };
-            let mut elements = [[PADDING; WIDTH]; TETS];
-            for (lane, group) in groups.iter().enumerate() {
-                for (slots, node) in batch.slots.iter_mut().zip(group.nodes) {
-                    slots[lane] = 2 * local(node);
-                }
-                for (tet, element) in group.tets.into_iter().enumerate() {
-                    let [a, b, c] = corners::<NODES>(tet).map(|corner| group.nodes[corner]);
-                    let nodes = [group.nodes[0], a, b, c];
-                    let (gradient, volume) = shape_gradients(&mesh.positions, nodes);
-                    for (k, value) in gradient.iter().flatten().enumerate() {
-                        batch.gradient[tet][k][lane] = *value as f32;
-                    }
-                    // The order of the corners in a group may turn the element around.
-                    batch.volume[tet][lane] =
-                        volume.abs() as f32 * mesh.stiffness_of(element as usize);
-                    elements[tet][lane] = element;
-                }
-            }
-            self.batches.push(batch);
-            self.elements.push(elements);
-        }
-        start..self.batches.len()
-    }
-
-    /// The elements of some batches.
-    fn elements(&self, batches: Range<usize>) -> impl Iterator<Item = Element> + '_ {
-        let lanes = (0..TETS).flat_map(|tet| (0..WIDTH).map(move |lane| (tet, lane)));
-        batches
-            .flat_map(move |batch| lanes.clone().map(move |(tet, lane)| (batch, tet, lane)))
-            .filter(|(batch, tet, lane)| self.elements[*batch][*tet][*lane] != PADDING)
-            .map(|(batch, tet, lane)| {
-                let cluster = &self.batches[batch];
-                let [a, b, c] = corners::<NODES>(tet);
-                let slope = |k: usize| cluster.gradient[tet][k][lane];
-                Element {
-                    number: self.elements[batch][tet][lane],
-                    slots: [0, a, b, c].map(|corner| cluster.slots[corner][lane]),
-                    gradient: [0, 3, 6].map(|k| [slope(k), slope(k + 1), slope(k + 2)]),
-                    volume: cluster.volume[tet][lane],
-                }
-            })
-    }
-
-    /// Bytes of the batches.
-    pub fn bytes(&self) -> usize {
-        size_of_val(self.batches.as_slice())
-    }
-}
-
-/// Groups of 16 that, while it lasts, share no node among them: their force
-/// additions then do not wait for each other.
-fn disjoint_batches<const NODES: usize, const TETS: usize>(
-    groups: &[Group<NODES, TETS>],
-) -> Vec<Vec<Group<NODES, TETS>>> {
-    let mut remaining = groups.to_vec();
-    let mut batches = Vec::with_capacity(groups.len() / WIDTH + 1);
-    let mut used = std::collections::HashSet::with_capacity(NODES * WIDTH);
-    while !remaining.is_empty() {
-        let mut batch = Vec::with_capacity(WIDTH);
-        used.clear();
-        remaining.retain(|group| {
-            if batch.len() == WIDTH || group.nodes.iter().any(|n| used.contains(n)) {
-                return true;
-            }
-            used.extend(group.nodes);
-            batch.push(*group);
-            false
-        });
-        let missing = (WIDTH - batch.len()).min(remaining.len());
-        batch.extend(remaining.drain(..missing));
-        batches.push(batch);
-    }
-    batches
-}
-
-/// Gradients of the shape functions of corners 1..=3 (1/mm) and the rest volume (mm³), in f64.
-pub(crate) fn shape_gradients(positions: &[[f32; 3]], tet: [u32; 4]) -> ([[f64; 3]; 3], f64) {
-    let corner = |k: usize| positions[tet[k] as usize].map(f64::from);
-    let origin = corner(0);
-    let edge = [1, 2, 3].map(|k| {
-        let p = corner(k);
-        [p[0] - origin[0], p[1] - origin[1], p[2] - origin[2]]
-    });
-    let cross = |a: [f64; 3], b: [f64; 3]| {
-        [
-            a[1] * b[2] - a[2] * b[1],
-            a[2] * b[0] - a[0] * b[2],
-            a[0] * b[1] - a[1] * b[0],
-        ]
-    };
-    let normals = [
-        cross(edge[1], edge[2]),
-        cross(edge[2], edge[0]),
-        cross(edge[0], edge[1]),
-    ];
-    let determinant: f64 = (0..3).map(|k| edge[0][k] * normals[0][k]).sum();
-    (
-        normals.map(|n| n.map(|v| v / determinant)),
-        determinant / 6.0,
-    )
 }

@@ -17,7 +17,7 @@ struct Element {
 }
 
 /// The energy of a body as a function of its displacement.
-pub(super) struct StrainEnergy {
+pub(crate) struct StrainEnergy {
     elements: Vec<Element>,
     shear: f64,
     bulk: f64,
@@ -25,7 +25,7 @@ pub(super) struct StrainEnergy {
 
 /// The energy and its least volume ratio at one displacement.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Energy {
+pub(crate) struct Energy {
     /// mN mm; infinite where an element is flat or inverted.
     pub value: f64,
     /// Smallest det F.

@@ -8,7 +8,7 @@
 //! The result has no damping, no inertia and no history. It equals the end of a long hold where the equilibrium is unique,
 //! as it is for pushes of the size of instruments.
 
-mod energy;
+pub(crate) mod energy;
 mod path;
 mod quasi_newton;
 
@@ -147,7 +147,13 @@ impl StaticSolver {
         if outcomes.iter().all(|outcome| outcome.found.is_empty()) {
             return Err(StaticsError::None(skipped.join("; ")));
         }
-        let mut trajectory = self.rest(scheme, seed, programme.site());
+        let header = TrajectoryHeader {
+            scheme: scheme.name().into(),
+            seed,
+            site: programme.site(),
+            ..self.header.clone()
+        };
+        let mut trajectory = Trajectory::at_rest(header, self.stiffness.free.index.len());
         outcomes
             .iter()
             .for_each(|outcome| append(&mut trajectory, outcome));
@@ -211,27 +217,6 @@ impl StaticSolver {
             failure: path.failure,
         });
         Ok(outcomes.collect())
-    }
-
-    /// A trajectory that holds rest alone.
-    fn rest(&self, scheme: Scheme, seed: u64, site: [f64; 3]) -> Trajectory {
-        Trajectory {
-            header: TrajectoryHeader {
-                scheme: scheme.name().into(),
-                seed,
-                site,
-                ..self.header.clone()
-            },
-            displacement: vec![[0.0; 3]; self.stiffness.free.index.len()],
-            contact_offsets: vec![0, 0],
-            contact_nodes: Vec::new(),
-            contact_vectors: Vec::new(),
-            reaction: Vec::new(),
-            strain_energy: vec![0.0],
-            kinetic_energy: vec![0.0],
-            external_work: vec![0.0],
-            min_det_f: vec![1.0],
-        }
     }
 }
 

@@ -120,6 +120,11 @@ impl Lanes for Avx512 {
     }
 
     #[inline(always)]
+    unsafe fn fourth(self) -> Self {
+        unsafe { Self(_mm512_permute_ps(self.0, 0xFF)) }
+    }
+
+    #[inline(always)]
     unsafe fn gather(nodes: *const [f32; 4], index: *const u16) -> [Self; 4] {
         unsafe {
             let [r0, r1, r2, r3] = [
@@ -142,17 +147,15 @@ impl Lanes for Avx512 {
     }
 
     #[inline(always)]
-    unsafe fn scatter_add(nodes: *mut [f32; 4], index: *const u16, value: [Self; 4]) {
+    unsafe fn scatter_add(nodes: *mut [f32; 4], index: *const u16, value: [Self; 3]) {
         unsafe {
-            let [Self(x), Self(y), Self(z), Self(w)] = value;
+            let [Self(x), Self(y), Self(z)] = value;
             let xy01 = _mm512_unpacklo_ps(x, y);
             let xy23 = _mm512_unpackhi_ps(x, y);
-            let zw01 = _mm512_unpacklo_ps(z, w);
-            let zw23 = _mm512_unpackhi_ps(z, w);
-            add_rows(nodes, index, 0, _mm512_shuffle_ps(xy01, zw01, 0x44));
-            add_rows(nodes, index, 1, _mm512_shuffle_ps(xy01, zw01, 0xEE));
-            add_rows(nodes, index, 2, _mm512_shuffle_ps(xy23, zw23, 0x44));
-            add_rows(nodes, index, 3, _mm512_shuffle_ps(xy23, zw23, 0xEE));
+            add_rows(nodes, index, 0, _mm512_shuffle_ps(xy01, z, 0x04));
+            add_rows(nodes, index, 1, _mm512_shuffle_ps(xy01, z, 0x5E));
+            add_rows(nodes, index, 2, _mm512_shuffle_ps(xy23, z, 0xA4));
+            add_rows(nodes, index, 3, _mm512_shuffle_ps(xy23, z, 0xFE));
         }
     }
 }

@@ -2,7 +2,7 @@
 //! processor family that provides them.
 //!
 //! A batch of 16 elements goes through in `WIDTH / COUNT` parts. A type is as wide
-//! as lets the nine entries of a tensor stay in registers beside their operands.
+//! as lets the operands of a tetrahedron stay in registers.
 //!
 //! Nodes are `[x, y, z, w]` in memory. A gather loads one corner of each of `COUNT`
 //! elements and transposes to four vectors; a scatter adds back in element
@@ -55,8 +55,11 @@ pub(crate) trait Lanes: Copy {
     unsafe fn max(self, other: Self) -> Self;
     /// First guess of `self^(-1/3)` for positive values, within 4 %.
     unsafe fn inverse_cube_root_guess(self) -> Self;
+    /// Of nodes that follow each other in memory, their fourth components in place of all four.
+    unsafe fn fourth(self) -> Self;
     unsafe fn gather(nodes: *const [f32; 4], index: *const u16) -> [Self; 4];
-    unsafe fn scatter_add(nodes: *mut [f32; 4], index: *const u16, value: [Self; 4]);
+    /// Adds three components; the fourth is left with anything.
+    unsafe fn scatter_add(nodes: *mut [f32; 4], index: *const u16, value: [Self; 3]);
 }
 
 /// Asks for a value's cache lines; the pointer may be beyond any allocation.

@@ -149,6 +149,18 @@ impl Lanes for Neon {
     }
 
     #[inline(always)]
+    unsafe fn fourth(self) -> Self {
+        unsafe {
+            Self([
+                vdupq_laneq_f32::<3>(self.0[0]),
+                vdupq_laneq_f32::<3>(self.0[1]),
+                vdupq_laneq_f32::<3>(self.0[2]),
+                vdupq_laneq_f32::<3>(self.0[3]),
+            ])
+        }
+    }
+
+    #[inline(always)]
     unsafe fn gather(nodes: *const [f32; 4], index: *const u16) -> [Self; 4] {
         unsafe {
             let mut axes = [[vdupq_n_f32(0.0); 4]; 4];
@@ -172,14 +184,14 @@ impl Lanes for Neon {
     }
 
     #[inline(always)]
-    unsafe fn scatter_add(nodes: *mut [f32; 4], index: *const u16, value: [Self; 4]) {
+    unsafe fn scatter_add(nodes: *mut [f32; 4], index: *const u16, value: [Self; 3]) {
         unsafe {
             for part in 0..4 {
                 let rows = transpose([
                     value[0].0[part],
                     value[1].0[part],
                     value[2].0[part],
-                    value[3].0[part],
+                    value[2].0[part],
                 ]);
                 for (i, row) in rows.into_iter().enumerate() {
                     let target: *mut f32 = nodes

@@ -75,6 +75,11 @@ impl Lanes for Scalar {
     }
 
     #[inline(always)]
+    unsafe fn fourth(self) -> Self {
+        Self(std::array::from_fn(|i| self.0[i | 3]))
+    }
+
+    #[inline(always)]
     unsafe fn gather(nodes: *const [f32; 4], index: *const u16) -> [Self; 4] {
         let values: [[f32; 4]; WIDTH] =
             std::array::from_fn(|i| unsafe { *nodes.add(*index.add(i) as usize / 2) });
@@ -82,10 +87,10 @@ impl Lanes for Scalar {
     }
 
     #[inline(always)]
-    unsafe fn scatter_add(nodes: *mut [f32; 4], index: *const u16, value: [Self; 4]) {
+    unsafe fn scatter_add(nodes: *mut [f32; 4], index: *const u16, value: [Self; 3]) {
         for i in 0..WIDTH {
             let node = unsafe { &mut *nodes.add(*index.add(i) as usize / 2) };
-            for axis in 0..4 {
+            for axis in 0..3 {
                 node[axis] += value[axis].0[i];
             }
         }

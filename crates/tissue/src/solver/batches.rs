@@ -1,0 +1,173 @@
+//! Clusters packed into batches of 16, with the constants of their tetrahedra.
+
+use super::cluster::{Cluster, Group, corners};
+use super::lanes::WIDTH;
+use super::partition::PADDING;
+use crate::material::Material;
+use crate::mesh::Mesh;
+use crate::vector::{cross, dot};
+use std::ops::Range;
+
+/// Batches of one kind of cluster.
+#[derive(Default)]
+pub(crate) struct Kind<const NODES: usize, const TETS: usize> {
+    pub batches: Vec<Cluster<NODES, TETS>>,
+    /// Mesh elements of each batch; [`PADDING`] in padding lanes.
+    pub elements: Vec<[[u32; WIDTH]; TETS]>,
+}
+
+/// One tetrahedron as the kernels see it.
+pub(crate) struct Element {
+    /// Its number in the mesh.
+    pub number: u32,
+    /// Twice the chunk-local slots of its corners.
+    pub slots: [u16; 4],
+    /// See [`Cluster::bulk`].
+    pub bulk: f32,
+}
+
+/// What the constants of a chunk's clusters are made from.
+#[derive(Clone, Copy)]
+pub(crate) struct Source<'a> {
+    /// By chunk-local slot, see `Partition::rest`.
+    pub rest: &'a [[f32; 4]],
+    pub mesh: &'a Mesh,
+    pub material: &'a Material,
+}
+
+impl<const NODES: usize, const TETS: usize> Kind<NODES, TETS> {
+    /// Packs groups into batches; `local` maps a mesh node to its chunk-local slot. Returns where they lie.
+    pub fn push(
+        &mut self,
+        groups: &[Group<NODES, TETS>],
+        source: Source,
+        local: impl Fn(u32) -> u16,
+    ) -> Range<usize> {
+        let start = self.batches.len();
+        for groups in disjoint_batches(groups) {
+            let mut batch = Cluster {
+                springs: [[[0.0; WIDTH]; 6]; TETS],
+                inverse: [[0.0; WIDTH]; TETS],
+                bulk: [[0.0; WIDTH]; TETS],
+                slots: [[0; WIDTH]; NODES],
+            };
+            let mut elements = [[PADDING; WIDTH]; TETS];
+            for lane in 0..WIDTH {
+                // Beyond the last group its shape alone, without stiffness.
+                let group = groups[lane.min(groups.len() - 1)];
+                let slots = group.nodes.map(&local);
+                for (row, slot) in batch.slots.iter_mut().zip(slots) {
+                    row[lane] = 2 * slot;
+                }
+                for (tet, element) in group.tets.into_iter().enumerate() {
+                    let [a, b, c] = corners::<NODES>(tet);
+                    let [x, y, z] =
+                        [0, 1, 2].map(|k| [0, a, b, c].map(|n| source.rest[slots[n] as usize][k]));
+                    let (gradient, volume) =
+                        shape_gradients([0, 1, 2, 3].map(|n| [x[n], y[n], z[n]]));
+                    batch.inverse[tet][lane] = (1.0 / (6.0 * volume)) as f32;
+                    if lane >= groups.len() {
+                        continue;
+                    }
+                    let stiffness = f64::from(source.mesh.stiffness_of(element as usize));
+                    // The order of the corners in a group may turn the element around.
+                    let factor = -source.material.shear_pa() * volume.abs() * stiffness;
+                    for (row, [j, k]) in batch.springs[tet].iter_mut().zip(PAIRS) {
+                        row[lane] = (factor * dot(gradient[j], gradient[k])) as f32;
+                    }
+                    let bulk = source.material.bulk_pa() / 6.0 * stiffness;
+                    batch.bulk[tet][lane] = bulk.copysign(volume) as f32;
+                    elements[tet][lane] = element;
+                }
+            }
+            self.batches.push(batch);
+            self.elements.push(elements);
+        }
+        start..self.batches.len()
+    }
+
+    /// The elements of some batches.
+    pub fn elements(&self, batches: Range<usize>) -> impl Iterator<Item = Element> + '_ {
+        let lanes = (0..TETS).flat_map(|tet| (0..WIDTH).map(move |lane| (tet, lane)));
+        batches
+            .flat_map(move |batch| lanes.clone().map(move |(tet, lane)| (batch, tet, lane)))
+            .filter(|(batch, tet, lane)| self.elements[*batch][*tet][*lane] != PADDING)
+            .map(|(batch, tet, lane)| {
+                let cluster = &self.batches[batch];
+                let [a, b, c] = corners::<NODES>(tet);
+                let slots = &cluster.slots;
+                Element {
+                    number: self.elements[batch][tet][lane],
+                    slots: [
+                        slots[0][lane],
+                        slots[a][lane],
+                        slots[b][lane],
+                        slots[c][lane],
+                    ],
+                    bulk: cluster.bulk[tet][lane],
+                }
+            })
+    }
+
+    /// Clusters in the batches.
+    pub fn count(&self) -> usize {
+        let lanes = self.elements.iter().flat_map(|batch| batch[0]);
+        lanes.filter(|element| *element != PADDING).count()
+    }
+
+    /// Bytes of the batches.
+    pub fn bytes(&self) -> usize {
+        size_of_val(self.batches.as_slice())
+    }
+}
+
+/// Groups of 16 that, while it lasts, share no node among them: their force
+/// additions then do not wait for each other.
+fn disjoint_batches<const NODES: usize, const TETS: usize>(
+    groups: &[Group<NODES, TETS>],
+) -> Vec<Vec<Group<NODES, TETS>>> {
+    let mut remaining = groups.to_vec();
+    let mut batches = Vec::with_capacity(groups.len() / WIDTH + 1);
+    let mut used = std::collections::HashSet::with_capacity(NODES * WIDTH);
+    while !remaining.is_empty() {
+        let mut batch = Vec::with_capacity(WIDTH);
+        used.clear();
+        remaining.retain(|group| {
+            if batch.len() == WIDTH || group.nodes.iter().any(|n| used.contains(n)) {
+                return true;
+            }
+            used.extend(group.nodes);
+            batch.push(*group);
+            false
+        });
+        let missing = (WIDTH - batch.len()).min(remaining.len());
+        batch.extend(remaining.drain(..missing));
+        batches.push(batch);
+    }
+    batches
+}
+
+/// Entries of a symmetric matrix, in the order of [`Cluster::springs`].
+const PAIRS: [[usize; 2]; 6] = [[0, 0], [0, 1], [0, 2], [1, 1], [1, 2], [2, 2]];
+
+/// Gradients of the shape functions of corners 1..=3 (1/mm) and the rest volume (mm³), in f64.
+#[inline]
+pub(crate) fn shape_gradients(corners: [[f32; 3]; 4]) -> ([[f64; 3]; 3], f64) {
+    let mut edge = [[0.0; 3]; 3];
+    for a in 0..3 {
+        for k in 0..3 {
+            edge[a][k] = f64::from(corners[a + 1][k]) - f64::from(corners[0][k]);
+        }
+    }
+    let mut gradients = [
+        cross(edge[1], edge[2]),
+        cross(edge[2], edge[0]),
+        cross(edge[0], edge[1]),
+    ];
+    let determinant = dot(edge[0], gradients[0]);
+    let inverse = 1.0 / determinant;
+    for value in gradients.as_flattened_mut() {
+        *value *= inverse;
+    }
+    (gradients, determinant / 6.0)
+}
