@@ -18,9 +18,12 @@ import torch
 
 from upt_training.ablation_report import replaced, write_report
 from upt_training.config import Settings, load_settings
+from upt_training.dataset import open_dataset
 from upt_training.errors import InputError
-from upt_training.rollout import autoregressive_scores, cache_rollout
-from upt_training.run import choose_device, find_mesh, make_trainer, open_prior
+from upt_training.field_cache import build_cache
+from upt_training.graph import build_graph
+from upt_training.rollout import Stepper, autoregressive_scores, cache_rollout
+from upt_training.run import choose_device, find_mesh, make_trainer, open_prior, training_nodes
 
 
 def variants(suite: str, base: Settings) -> dict[str, Settings]:
@@ -75,8 +78,8 @@ def _uniform(base: Settings):
     return graph
 
 
-def run_variant(settings: Settings, options, mesh, folder: Path) -> dict:
-    """Train for the budget, then score full rollouts of the held-out cases."""
+def run_variant(settings: Settings, base: Settings, options, mesh, folder: Path) -> dict:
+    """Train for the budget, then score full rollouts of the held-out cases on the nodes of the configuration `base`."""
     folder.mkdir(parents=True, exist_ok=True)
     table = open_prior(settings.model, mesh, options.prior, options.vibration)
     trainer = make_trainer(settings, options.data, mesh, table, folder, choose_device(options.device))
@@ -89,8 +92,15 @@ def run_variant(settings: Settings, options, mesh, folder: Path) -> dict:
     seconds = time.process_time() - began
     count = min(options.cases, trainer.test_cache.case_count)
     cases = np.unique(np.linspace(0, trainer.test_cache.case_count - 1, count).round().astype(int))
-    trainer.stepper.model = trainer.ema if trainer.ema is not None else trainer.model
-    result = cache_rollout(trainer.stepper, trainer.test_cache, cases)
+    model = trainer.ema if trainer.ema is not None else trainer.model
+    scored = training_nodes(mesh, build_graph(mesh, base.model.graph), base.train.loss_nodes)
+    graph = build_graph(mesh, settings.model.graph)
+    nodes = np.union1d(scored, graph.needed_nodes())
+    cache = build_cache(
+        folder / "cache", mesh, open_dataset(options.data, mesh).select("test", t.schemes), nodes, table
+    )
+    stepper = Stepper(model, mesh, graph, nodes, trainer.boundary, t.exact_boundary, trainer.device)
+    result = cache_rollout(stepper, cache, cases, np.searchsorted(nodes, scored))
     return {
         **autoregressive_scores(result),
         "mse_per_step": result["mse"].mean(axis=0).tolist(),
@@ -133,7 +143,7 @@ def ablate_command(options) -> int:
     for name, settings in suite.items():
         if name in results["variants"] or (options.only and name not in options.only):
             continue
-        results["variants"][name] = run_variant(settings, options, mesh, out / "work")
+        results["variants"][name] = run_variant(settings, base, options, mesh, out / "work")
         print(name, {k: v for k, v in results["variants"][name].items() if not isinstance(v, list)}, flush=True)
         path.write_text(json.dumps(results))
     trainer = make_trainer(
