@@ -245,14 +245,15 @@ fn print_table(path: &Path) -> Result<()> {
         .fold(f64::INFINITY, f64::min);
     println!();
     println!(
-        "{:<28} {:<26} {:>10} {:>8} {:>10} {:>12}",
+        "{:<38} {:<26} {:>10} {:>8} {:>10} {:>12}",
         "method", "configuration", "MSE mm²", "max mm", "ms a step", "x reference"
     );
     for row in rows {
-        let method = if row["bundle"] == "" {
-            &row["method"]
-        } else {
-            &row["bundle"]
+        let text = |field: &str| row[field].as_str().unwrap_or("?");
+        let method = match (text("method"), text("bundle")) {
+            ("surrogate", bundle) => bundle.to_owned(),
+            (method, "") => method.to_owned(),
+            (method, bundle) => format!("{bundle}, {method}"),
         };
         let configuration = format!(
             "{} {}, {} thread(s)",
@@ -267,8 +268,7 @@ fn print_table(path: &Path) -> Result<()> {
             "-".into()
         };
         println!(
-            "{:<28} {configuration:<26} {:>10.4} {:>8.2} {:>10.3} {speed:>12}",
-            method.as_str().unwrap_or("?"),
+            "{method:<38} {configuration:<26} {:>10.4} {:>8.2} {:>10.3} {speed:>12}",
             number(row, "mse_mm2"),
             number(row, "max_mm"),
             number(row, "ms_p50")

@@ -9,7 +9,7 @@ use super::cases::Cases;
 use super::errors::{CaseErrors, StepErrors, step_errors};
 use super::memory::Resident;
 use super::method::{Method, Stepper};
-use super::row::{Measurement, Pictured, Row, mean_and_deviation, quantile};
+use super::row::{Measurement, PRIOR_ALONE, Pictured, Row, mean_and_deviation, quantile};
 
 /// What a measurement is asked to do.
 pub struct Plan<'a> {
@@ -164,7 +164,7 @@ pub fn describe(method: &Method, mesh: &Mesh) -> Row {
         Method::Prior {
             bundle, threads, ..
         } => {
-            row.method = "linear response alone".into();
+            row.method = PRIOR_ALONE.into();
             named(&mut row, bundle);
             row.threads = *threads;
         }

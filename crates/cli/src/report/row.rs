@@ -2,6 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
+/// The method of rows that run a bundle's linear response without what the bundle learned.
+pub const PRIOR_ALONE: &str = "linear response alone";
+
 /// One line of `report.json`: a method in one configuration, over all cases.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Row {
@@ -85,7 +88,7 @@ impl Row {
         } else {
             format!("{} threads", self.threads)
         };
-        if self.bundle.is_empty() {
+        if self.is_plain() {
             return threads;
         }
         format!(
@@ -94,8 +97,9 @@ impl Row {
         )
     }
 
+    /// Nothing learned is in it.
     pub fn is_plain(&self) -> bool {
-        self.bundle.is_empty()
+        self.bundle.is_empty() || self.method == PRIOR_ALONE
     }
 }
 
