@@ -110,7 +110,8 @@ pub fn methods(
                 decay: cases.release_decay(),
             }),
             "prior" => {
-                for bundle in bundles.iter().filter(|one| PriorAlone::available(one)) {
+                // Bundles of one mesh and boundary share it: the first that has one.
+                if let Some(bundle) = bundles.iter().find(|one| PriorAlone::available(one)) {
                     methods.extend(options.threads.iter().map(|threads| Method::Prior {
                         bundle: bundle.clone(),
                         threads: *threads,

@@ -67,7 +67,7 @@ pub struct Options {
     precision: Vec<Precision>,
     #[arg(long, value_delimiter = ',', default_value = "cpu")]
     provider: Vec<Provider>,
-    /// Plain methods beside the library: zero, linear, prior (a bundle's linear response alone), coarse, tled, paper; or none.
+    /// Plain methods beside the library: zero, linear, prior (the bundles' linear response alone), coarse, tled, paper; or none.
     #[arg(
         long,
         value_delimiter = ',',
