@@ -10,6 +10,7 @@ from __future__ import annotations
 import copy
 import csv
 import time
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -311,18 +312,29 @@ def normalisation(cache: FieldCache, model) -> tuple[np.ndarray, np.ndarray, np.
     """Per-axis mean and std of `u`, std of what the network adds to its base, and the mixing scale."""
     cases = np.unique(np.linspace(0, cache.case_count - 1, min(40, cache.case_count)).astype(int))
     frames = np.arange(0, cache.frame_count, 2)
-    u = np.concatenate([cache.displacement[c][frames].astype(np.float32).reshape(-1, 3) for c in cases])
-    mean, std = u.mean(axis=0), u.std(axis=0)
+
+    def read(arrays: list[np.ndarray], case: int) -> np.ndarray:
+        return arrays[case][frames].astype(np.float64)
+
+    mean, std = spread(read(cache.displacement, c) for c in cases)
     if model.base == "displacement":
-        step = [np.diff(cache.displacement[c].astype(np.float32), axis=0).reshape(-1, 3) for c in cases]
-        out = np.concatenate(step).std(axis=0)
+        out = spread(np.diff(cache.displacement[c].astype(np.float64), axis=0) for c in cases)[1]
     elif model.base == "prior":
-        prior = np.concatenate([cache.prior[c][frames].astype(np.float32).reshape(-1, 3) for c in cases])
-        out = (u - prior).std(axis=0)
+        out = spread(read(cache.displacement, c) - read(cache.prior, c) for c in cases)[1]
     else:
         out = std
     scale = float(np.clip(std.mean() / max(1e-6, out.mean()), 1.0, 5.0))
-    return mean, np.maximum(std, 1e-6), np.maximum(out, 1e-6), scale
+    return mean.astype(np.float32), *(np.maximum(s, 1e-6).astype(np.float32) for s in (std, out)), scale
+
+
+def spread(fields: Iterable[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Mean and standard deviation of each axis of `[..., 3]` f64 arrays, one of them in memory at a time."""
+    count, total, squares = 0, np.zeros(3), np.zeros(3)
+    for field in fields:
+        rows = field.reshape(-1, 3)
+        count, total, squares = count + len(rows), total + rows.sum(axis=0), squares + (rows**2).sum(axis=0)
+    mean = total / count
+    return mean, np.sqrt(np.maximum(squares / count - mean**2, 0.0))
 
 
 def load_checkpoint(path: Path) -> dict:
