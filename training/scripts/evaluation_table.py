@@ -1,13 +1,22 @@
-"""A Markdown table of results of `evaluate`: `python training/scripts/evaluation_table.py A.json ...`."""
+"""A Markdown table of results of `evaluate`, printed or written into a page:
+
+python training/scripts/evaluation_table.py A.json ... [--page docs/training.md]
+"""
 
 from __future__ import annotations
 
+import argparse
 import json
 import sys
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from upt_training.page import write_table  # noqa: E402
+
 NAMES = {
     "bundle": "",
+    "coarse_fem": "coarse FEM, embedded",
     "linear": "linear elasticity",
     "linear_decay": "linear elasticity, decay",
     "linear_vibration": "linear elasticity, free vibration",
@@ -40,10 +49,20 @@ def cell(scores: dict, name: str) -> str:
 
 
 def main() -> None:
-    print("| cases (number) | method | MSE, mm² | range | Hausdorff, mm | max error, mm | relative L2 |")
-    print("|---|---|---|---|---|---|---|")
-    for name in sys.argv[1:]:
-        print("\n".join(rows(Path(name))))
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("results", type=Path, nargs="+")
+    parser.add_argument("--page", type=Path, help="page whose table `evaluation` to exchange")
+    options = parser.parse_args()
+    lines = [
+        "| cases (number) | method | MSE, mm² | range | Hausdorff, mm | max error, mm | relative L2 |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for path in options.results:
+        lines += rows(path)
+    if options.page:
+        write_table(options.page, "evaluation", lines)
+    else:
+        print("\n".join(lines))
 
 
 if __name__ == "__main__":

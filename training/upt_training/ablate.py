@@ -16,12 +16,13 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from upt_training.ablation_report import replaced, write_report
+from upt_training.ablation_report import write_report
 from upt_training.config import Settings, load_settings
 from upt_training.dataset import open_dataset
 from upt_training.errors import InputError
 from upt_training.field_cache import build_cache
 from upt_training.graph import build_graph
+from upt_training.page import replaced
 from upt_training.rollout import Stepper, autoregressive_scores, cache_rollout
 from upt_training.run import choose_device, find_mesh, make_trainer, open_prior, training_nodes
 
@@ -139,7 +140,7 @@ def ablate_command(options) -> int:
     if unknown:
         raise InputError(f"--only: {unknown[0]!r} is not a variant of {options.suite}; known are {', '.join(suite)}")
     if options.page:  # a page without marks fails before hours of work
-        replaced(options.page.read_text(), options.suite, [], options.page)
+        replaced(options.page.read_text(), f"ablate {options.suite}", [], options.page)
     for name, settings in suite.items():
         if name in results["variants"] or (options.only and name not in options.only):
             continue

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from upt_training.errors import InputError
+from upt_training.page import write_table
 
 TEACHER = "teacher forcing"
 
@@ -33,15 +33,7 @@ def write_report(suite: str, results: dict, out: Path, page: Path | None) -> Non
         for folder in folders:
             figure.savefig(folder / f"{name}.png", dpi=130)
     if page is not None:
-        page.write_text(replaced(page.read_text(), suite, lines, page))
-
-
-def replaced(text: str, suite: str, lines: list[str], page: Path) -> str:
-    """`text` with the lines between the suite's marks exchanged."""
-    begin, end = f"<!-- ablate {suite}: begin -->\n", f"<!-- ablate {suite}: end -->"
-    if text.count(begin) != 1 or text.count(end) != 1 or text.index(begin) > text.index(end):
-        raise InputError(f"{page}: needs one line '{begin.strip()}' and after it one line '{end}'")
-    return text[: text.index(begin) + len(begin)] + "\n".join(lines) + "\n" + text[text.index(end) :]
+        write_table(page, f"ablate {suite}", lines)
 
 
 def _pyplot():
