@@ -168,10 +168,10 @@ impl<'a> Native<'a> {
     }
 }
 
-/// Random weights of the `fast` and the `paper` configuration.
+/// Random weights of the `wide` and the `paper` configuration.
 pub fn against_references() {
     for (name, decoder) in [
-        ("fast", Decoder::new(64, 2, 64, 128)),
+        ("wide", Decoder::new(64, 2, 64, 128)),
         ("paper", Decoder::new(128, 4, 256, 256)),
     ] {
         let packed = decoder.packed();

@@ -26,7 +26,8 @@ pub fn against_scalar() {
     let target = random.normal(supernodes * width, 1.0);
     let weight = random.normal(width * rank, 0.2);
     let features = random.normal(NODES * rank, 1.0);
-    let low_rank = LowRank::new(&table, &weight, width, rank);
+    let source = LowRank::new(&table, &weight, width, rank);
+    let receiver = LowRank::new(&target, &weight, width, rank);
     let pool = Pool::new(1).expect("threads");
     // The scalar reference comes first.
     let sets = Isa::available();
@@ -41,7 +42,7 @@ pub fn against_scalar() {
                 if encode {
                     let scratch = &mut scratch;
                     encode_aggregate(
-                        isa, pool, csr, nodes, low_rank, low_rank, features, scratch, out,
+                        isa, pool, csr, nodes, source, receiver, features, scratch, out,
                     )
                 } else {
                     aggregate(isa, pool, csr, width, table, target, out)

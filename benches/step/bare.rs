@@ -1,35 +1,96 @@
-//! A loop in registers, about as long as a step: its own tail is the machine's, not the library's.
+//! A loop without any of the library's work, timed between two steps: its own tail is the machine's, not the library's.
+//!
+//! For a step that is bound by the processor it runs in registers, about as long as the step. For a reduced bundle, whose step
+//! mostly reads tables, it reads as many bytes of the same tables on one thread: what others on the machine do to the
+//! shared cache and memory meets both.
 
 use std::hint::black_box;
 use std::time::Instant;
 
-/// Longest loop, ms: beyond it the tail of a step is long against any neighbour's slice.
+use upt::kernels::rows::Stored;
+use upt::prior::PriorTable;
+
+/// Longest loop in registers, ms: beyond it the tail of a step is long against any neighbour's slice.
 const LONGEST_MS: f64 = 5.0;
 
-pub struct BareLoop {
-    turns: u64,
+pub enum BareLoop<'a> {
+    Registers {
+        turns: u64,
+    },
+    Reading {
+        tables: [Stored<'a>; 2],
+        bytes: usize,
+    },
 }
 
-impl BareLoop {
-    /// A loop of `ms` on this core.
-    pub fn of(ms: f64) -> Self {
+impl<'a> BareLoop<'a> {
+    /// A loop in registers of `ms` on this core.
+    pub fn in_registers(ms: f64) -> Self {
         const TRIAL: u64 = 200_000;
-        let trial = Self { turns: TRIAL };
+        let trial = Self::Registers { turns: TRIAL };
         let fastest = (0..5).map(|_| trial.run()).fold(f64::INFINITY, f64::min);
         let turns = (TRIAL as f64 * ms.min(LONGEST_MS) / fastest).max(1.0);
-        Self {
+        Self::Registers {
             turns: turns as u64,
+        }
+    }
+
+    /// A loop over the first `bytes` of a bundle's basis and response.
+    pub fn over_tables(table: &'a PriorTable, bytes: f64) -> Self {
+        Self::Reading {
+            tables: [table.basis().basis, table.response.stored()],
+            bytes: bytes as usize,
+        }
+    }
+
+    /// Name for a row.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Registers { .. } => "a bare loop taking turns with it",
+            Self::Reading { .. } => "a loop that reads its tables, taking turns with it",
         }
     }
 
     /// Runs it once; wall time, ms.
     pub fn run(&self) -> f64 {
         let start = Instant::now();
-        let mut x = black_box(0.5f32);
-        for _ in 0..self.turns {
-            x = x * 0.999 + 0.001;
+        match self {
+            Self::Registers { turns } => {
+                let mut x = black_box(0.5f32);
+                for _ in 0..*turns {
+                    x = x * 0.999 + 0.001;
+                }
+                black_box(x);
+            }
+            Self::Reading { tables, bytes } => {
+                let mut left = *bytes;
+                for table in tables {
+                    left -= read(table, left);
+                }
+            }
         }
-        black_box(x);
         start.elapsed().as_secs_f64() * 1e3
+    }
+}
+
+/// Reads at most `bytes` of a table; how many it were.
+fn read(table: &Stored<'_>, bytes: usize) -> usize {
+    match table {
+        Stored::F32(values) => {
+            let part = &values[..values.len().min(bytes / 4)];
+            black_box(
+                part.iter()
+                    .fold(0u32, |sum, x| sum.wrapping_add(x.to_bits())),
+            );
+            4 * part.len()
+        }
+        Stored::F16(values) => {
+            let part = &values[..values.len().min(bytes / 2)];
+            black_box(
+                part.iter()
+                    .fold(0u16, |sum, x| sum.wrapping_add(x.to_bits())),
+            );
+            2 * part.len()
+        }
     }
 }

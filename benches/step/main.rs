@@ -15,6 +15,7 @@ mod reduced;
 mod sleeping;
 mod split;
 mod steady;
+mod tail;
 
 use std::path::Path;
 use std::sync::Arc;
@@ -63,7 +64,13 @@ fn run(path: &Path, machine: &floor::Machine) -> upt::Result<()> {
             scene.set_region(region)?;
             let part = if surface { "surface" } else { "all" };
             let row = format!("{name}/{part}/{threads} threads");
-            let ms = steady::measure(&scene, &row, limits(&model, threads, surface))?;
+            let ms = steady::measure(
+                &scene,
+                region,
+                &cost,
+                &row,
+                limits(&model, threads, surface),
+            )?;
             machine.print_floor(&cost, &scene, region, &row, ms);
         }
     }
@@ -80,9 +87,9 @@ fn run(path: &Path, machine: &floor::Machine) -> upt::Result<()> {
     Ok(())
 }
 
-/// Bar and goal of a step, ms. Random weights of the paper's size have neither: they stand beside the paper's split.
+/// Bar and goal of a step, ms, for what ships. Random weights have neither.
 fn limits(model: &Model, threads: usize, surface: bool) -> (Option<f64>, Option<f64>) {
-    if threads == 1 || model.manifest.name.starts_with("paper") {
+    if threads == 1 || !model.manifest.name.starts_with("brain-") {
         return (None, None);
     }
     match (model.info().kind, surface) {

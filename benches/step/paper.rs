@@ -1,16 +1,45 @@
-//! The paper's split in ONNX Runtime, taking turns with a scene: the same weights, input and threads.
+//! The paper's split in ONNX Runtime, taking turns with a scene: the same weights, input and threads; and how far both are
+//! from the same step in float64, `reference.safetensors` of the bundle.
 
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
+use upt::bundle::TensorFile;
 use upt::model::UptModel;
 use upt::onnx::ProviderPlan;
-use upt::{Model, Scene, SceneOptions};
+use upt::{Contact, Error, Model, Scene, SceneOptions, StepInput};
 
 use super::measure::{Row, budget, median, quick, relative_error, relative_l2};
+use super::options;
 use super::split::Split;
-use super::{options, patch, push, pushed};
+
+/// A step from rest in float64 (`python -m upt_training.random_bundle --paper-split`).
+struct Reference {
+    nodes: Vec<u32>,
+    vectors: Vec<f32>,
+    /// `[K,3]`, mm, rounded to float32 once.
+    displacement: Vec<f32>,
+}
+
+impl Reference {
+    fn read(path: &Path, count: usize) -> upt::Result<Reference> {
+        let file = path.join("reference.safetensors");
+        let bytes = std::fs::read(&file).map_err(|error| {
+            Error::State(format!(
+                "{}: {error}; make it again with --paper-split",
+                file.display()
+            ))
+        })?;
+        let tensors = TensorFile::parse("reference.safetensors", bytes)?;
+        let nodes = tensors.indices("contact_nodes", &[None], count)?;
+        Ok(Reference {
+            vectors: tensors.f32("contact_vectors", &[Some(nodes.len()), Some(3)])?,
+            displacement: tensors.f32("displacement", &[Some(count), Some(3)])?,
+            nodes,
+        })
+    }
+}
 
 pub fn against_split(
     path: &Path,
@@ -18,10 +47,10 @@ pub fn against_split(
     kind: &UptModel,
     name: &str,
 ) -> upt::Result<()> {
-    let nodes = patch(&model.mesh, 300);
+    let exact = Reference::read(path, model.mesh.node_count())?;
     for threads in [1, 2] {
         let mut split = Split::new(path, model, kind, threads, ProviderPlan::cpu())?;
-        split.set_contact(kind, &nodes, &pushed(&nodes, 0));
+        split.set_contact(kind, &exact.nodes, &exact.vectors);
         let scene = Scene::new(
             Arc::clone(model),
             &SceneOptions {
@@ -41,11 +70,20 @@ pub fn against_split(
             theirs.push(start.elapsed().as_secs_f64() * 1e3);
             scene.reset()?;
             let start = Instant::now();
-            push(&scene, &nodes, 0, Some(&mut out))?;
+            let contact = Contact::Sparse {
+                nodes: &exact.nodes,
+                vectors: &exact.vectors,
+            };
+            let displacement = None;
+            scene.step(
+                StepInput {
+                    displacement,
+                    contact,
+                },
+                Some(&mut out),
+            )?;
             ours.push(start.elapsed().as_secs_f64() * 1e3);
         }
-        let error = relative_error(&out, split.displacement());
-        let l2 = relative_l2(&out, split.displacement());
         let (ours, theirs) = (median(&mut ours), median(&mut theirs));
         println!(
             "{name}, {threads} threads: {ours:.1} ms, the paper's split in ONNX Runtime {theirs:.1} ms"
@@ -57,23 +95,36 @@ pub fn against_split(
             "times",
         )
         .against(rival, theirs / ours)
-        .error(error)
+        .error(relative_error(&out, &exact.displacement))
         .limits(Some(1.6), Some(3.0))
         .print();
-        Row::new(
-            format!("{name}/error against the paper's split/{threads} threads"),
-            l2,
-            "relative L2",
-        )
-        .limits(Some(1e-6), None)
-        .print();
-        Row::new(
-            format!("{name}/largest difference from the paper's split/{threads} threads"),
-            error,
-            "of the largest",
-        )
-        .limits(Some(1e-6), None)
-        .print();
+        let found = [
+            (
+                "libupt from float64",
+                &out[..],
+                &exact.displacement[..],
+                Some(1e-6),
+            ),
+            (
+                "the paper's split from float64",
+                split.displacement(),
+                &exact.displacement,
+                None,
+            ),
+            (
+                "libupt from the paper's split",
+                &out,
+                split.displacement(),
+                None,
+            ),
+        ];
+        for (pair, got, want, bar) in found {
+            let row = format!("{name}/error of {pair}/{threads} threads");
+            Row::new(row, relative_l2(got, want), "relative L2")
+                .error(relative_error(got, want))
+                .limits(bar, None)
+                .print();
+        }
     }
     Ok(())
 }

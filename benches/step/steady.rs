@@ -5,13 +5,17 @@ use std::time::Instant;
 use upt::Scene;
 
 use super::bare::BareLoop;
+use super::cost::Cost;
 use super::measure::{Row, budget, median};
+use super::tail::Tail;
 use super::{patch, pushed, steps};
-use upt::{Contact, StepInput};
+use upt::{Contact, Kind, StepInput};
 
-/// Prints the rows of a scene; the median step, ms.
+/// Prints the rows of a scene that shows `region`; the median step, ms.
 pub fn measure(
     scene: &Scene,
+    region: Option<&[u32]>,
+    cost: &Cost,
     name: &str,
     (bar, goal): (Option<f64>, Option<f64>),
 ) -> upt::Result<f64> {
@@ -21,7 +25,8 @@ pub fn measure(
     let vectors: Vec<Vec<f32>> = (0..7).map(|t| pushed(&nodes, t)).collect();
     let mut out = vec![0.0; 3 * scene.region_count()];
     let (mut times, mut outside, mut bare) = (Vec::new(), Vec::new(), Vec::new());
-    let mut idle: Option<BareLoop> = None;
+    let mut idle: Option<BareLoop<'_>> = None;
+    let mut slow = Tail::default();
     let started = Instant::now();
     for t in 0..steps(scene.model().info().kind) + WARM_UP {
         if times.len() >= LEAST && started.elapsed() > budget() {
@@ -45,7 +50,14 @@ pub fn measure(
             let work =
                 s.prior_ms + s.encode_ms + s.aggregate_ms + s.latent_ms + s.decode_ms + s.guard_ms;
             outside.push(100.0 * (ms - work) / ms);
-            bare.push(idle.get_or_insert_with(|| BareLoop::of(ms)).run());
+            slow.push(ms, &s);
+            let table = scene.model().prior.as_ref();
+            let table = table.filter(|_| scene.model().info().kind == Kind::Reduced);
+            let idle = idle.get_or_insert_with(|| match (table, cost.of_step(scene, region)) {
+                (Some(table), Some([_, bytes])) => BareLoop::over_tables(table, bytes),
+                _ => BareLoop::in_registers(ms),
+            });
+            bare.push(idle.run());
         }
     }
     let middle = median(&mut times);
@@ -58,7 +70,10 @@ pub fn measure(
         .limits(Some(1.5), Some(1.2))
         .print();
     Row::new(
-        format!("{name}/p99 over median, a bare loop taking turns with it"),
+        format!(
+            "{name}/p99 over median, {}",
+            idle.map_or("", |bare| bare.name())
+        ),
         tail(&bare) / bare_middle,
         "",
     )
@@ -70,6 +85,7 @@ pub fn measure(
     )
     .limits(Some(5.0), Some(2.0))
     .print();
+    println!("{name}: {}", slow.text());
     let s = scene.stats();
     println!(
         "{name}: check {:.3} prior {:.3} encode {:.3} aggregate {:.3} latent {:.3} decode {:.3} guard {:.3} ms, {} nodes, {} in contact, {:.1} MB",

@@ -67,10 +67,10 @@ pub fn aggregate(
     })
 }
 
-/// [`aggregate`] of `source_j = source_table_j + W_s f_j`, `target_i = target_table_{s_i} + W_t f_{s_i}`
+/// [`aggregate`] of `source_j = source_table_j + W_s f_j`, `target_i = target_table_i + W_t f_{s_i}`
 /// for supernodes `s`, without storing either.
 ///
-/// `source_table`, `target_table` `[n,d]`, `features [n,f]`, `supernodes [n_S]`, `out [n_S,d]`.
+/// `source_table [n,d]`, `target_table [n_S,d]`, `features [n,f]`, `supernodes [n_S]`, `out [n_S,d]`.
 /// `scratch [threads * d]` holds a target row a thread. Only features of supernodes and their
 /// neighbours are read.
 ///
@@ -91,10 +91,18 @@ pub fn encode_aggregate(
     scratch: &mut [f32],
     out: &mut [f32],
 ) -> Result<(), PoolError> {
-    let (rows, width) = (csr.rows(), source.width);
+    let (rows, width, rank) = (csr.rows(), source.width, source.rank);
     source.check(features);
-    target.check(features);
-    assert_eq!(target.width, width, "source and target widths differ");
+    assert_eq!(
+        (target.width, target.rank),
+        (width, rank),
+        "source and target differ in width or features"
+    );
+    assert_eq!(
+        target.table.len(),
+        rows * width,
+        "target table must be [n_S, width]"
+    );
     assert_eq!(supernodes.len(), rows, "one supernode a row");
     assert_eq!(out.len(), rows * width, "out must be [n_S, width]");
     assert!(scratch.len() >= pool.threads() * width, "scratch too small");
@@ -106,7 +114,12 @@ pub fn encode_aggregate(
         for i in chunk * ROWS..((chunk + 1) * ROWS).min(rows) {
             // SAFETY: row i belongs to this chunk alone.
             let out = unsafe { parts.part(i * width, width) };
-            super::encode::row(isa, target, features, supernodes[i] as usize, target_row);
+            let own = LowRank {
+                table: &target.table[i * width..][..width],
+                ..target
+            };
+            let features_of_own = &features[supernodes[i] as usize * rank..][..rank];
+            super::encode::row(isa, own, features_of_own, 0, target_row);
             fused_row(isa, csr.row(i), source, features, target_row, out);
         }
     })
@@ -276,134 +289,4 @@ pub(super) unsafe fn store_some<V: Lanes>(x: V, to: *mut f32, count: usize) {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::super::random::Random;
-    use super::*;
-
-    struct Case {
-        offsets: Vec<u32>,
-        neighbours: Vec<u32>,
-        nodes: usize,
-        rows: usize,
-    }
-
-    fn case(random: &mut Random, nodes: usize, rows: usize) -> Case {
-        let (mut offsets, mut neighbours) = (vec![0], Vec::new());
-        for i in 0..rows {
-            for _ in 0..(i % 9) {
-                neighbours.push(random.below(nodes) as u32);
-            }
-            offsets.push(neighbours.len() as u32);
-        }
-        Case {
-            offsets,
-            neighbours,
-            nodes,
-            rows,
-        }
-    }
-
-    impl Case {
-        fn csr(&self) -> Csr<'_> {
-            Csr {
-                offsets: &self.offsets,
-                neighbours: &self.neighbours,
-            }
-        }
-    }
-
-    #[test]
-    fn every_isa_matches_scalar_and_threads_do_not_matter() {
-        let mut random = Random::new(3);
-        for width in [1, 7, 16, 40, 96, 128] {
-            let case = case(&mut random, 200, 61);
-            let source = random.normal(case.nodes * width, 2.0);
-            let target = random.normal(case.rows * width, 2.0);
-            let run = |isa, threads| {
-                let mut out = vec![f32::NAN; case.rows * width];
-                let pool = Pool::new(threads).unwrap();
-                aggregate(isa, &pool, case.csr(), width, &source, &target, &mut out).unwrap();
-                out
-            };
-            let want = run(Isa::Scalar, 1);
-            assert!(want[..width].iter().all(|&x| x == 0.0), "row 0 is empty");
-            for isa in Isa::available() {
-                let got = run(isa, 1);
-                let worst = super::super::random::max_error(&want, &got);
-                assert!(worst < 2e-6, "{} width {width}: {worst:e}", isa.name());
-                assert_eq!(got, run(isa, 2));
-                assert_eq!(got, run(isa, 4));
-            }
-        }
-    }
-
-    #[test]
-    fn fused_equals_encode_then_aggregate() {
-        let mut random = Random::new(4);
-        for (width, rank) in [(5, 3), (96, 6), (128, 16), (24, 10)] {
-            let case = case(&mut random, 150, 33);
-            let features = random.normal(case.nodes * rank, 1.0);
-            let tables = [0, 1].map(|_| random.normal(case.nodes * width, 1.0));
-            let weights = [0, 1].map(|_| random.normal(width * rank, 0.5));
-            let supernodes: Vec<u32> = (0..case.rows)
-                .map(|_| random.below(case.nodes) as u32)
-                .collect();
-            let packed: Vec<_> = weights
-                .iter()
-                .map(|w| super::super::encode::transpose_weight(w, width, rank))
-                .collect();
-            let low_rank = |k: usize| LowRank::new(&tables[k], &packed[k], width, rank);
-            for isa in Isa::available() {
-                let pool = Pool::new(2).unwrap();
-                let mut source = vec![0.0; case.nodes * width];
-                let all: Vec<u32> = (0..case.nodes as u32).collect();
-                super::super::encode::encode(isa, &pool, low_rank(0), &features, &all, &mut source)
-                    .unwrap();
-                let mut target = vec![0.0; case.rows * width];
-                super::super::encode::encode(
-                    isa,
-                    &pool,
-                    low_rank(1),
-                    &features,
-                    &supernodes,
-                    &mut target,
-                )
-                .unwrap();
-                let mut want = vec![0.0; case.rows * width];
-                aggregate(isa, &pool, case.csr(), width, &source, &target, &mut want).unwrap();
-                let mut got = vec![f32::NAN; case.rows * width];
-                let mut scratch = vec![0.0; pool.threads() * width];
-                encode_aggregate(
-                    isa,
-                    &pool,
-                    case.csr(),
-                    &supernodes,
-                    low_rank(0),
-                    low_rank(1),
-                    &features,
-                    &mut scratch,
-                    &mut got,
-                )
-                .unwrap();
-                assert_eq!(want, got, "{} width {width}", isa.name());
-            }
-        }
-    }
-
-    #[test]
-    fn a_neighbour_outside_is_an_error() {
-        let pool = Pool::new(2).unwrap();
-        let csr = Csr {
-            offsets: &[0, 1],
-            neighbours: &[5],
-        };
-        let hook = std::panic::take_hook();
-        std::panic::set_hook(Box::new(|_| {}));
-        for isa in Isa::available() {
-            let mut out = [0.0; 16];
-            let result = aggregate(isa, &pool, csr, 16, &[0.0; 80], &[0.0; 16], &mut out);
-            assert!(result.is_err(), "{}", isa.name());
-        }
-        std::panic::set_hook(hook);
-    }
-}
+mod tests;

@@ -19,17 +19,17 @@ const EMBED_TILE: usize = 2048;
 pub struct UptTables {
     /// Supernodes and radius graph, in nodes of the mesh.
     pub graph: SupernodeGraph,
-    /// Supernodes and their neighbours, ascending: the rows of the two encoder tables.
+    /// Supernodes and their neighbours, ascending: the rows of the source table and of the features.
     pub encode_nodes: Vec<u32>,
-    /// Row of each node in the encoder tables `[K]`; `u32::MAX` where it has none.
+    /// Row of each node in the source table `[K]`; `u32::MAX` where it has none.
     pub row_of_node: Vec<u32>,
-    /// Supernodes as rows of the encoder tables.
+    /// Supernodes as rows of the source table.
     pub supernode_rows: Vec<u32>,
-    /// The graph's neighbours as rows of the encoder tables.
+    /// The graph's neighbours as rows of the source table.
     pub neighbour_rows: Vec<u32>,
     /// `[encode_nodes,d]`.
     pub source_table: Vec<f32>,
-    /// `[encode_nodes,d]`.
+    /// `[n_S,d]`: only supernodes receive.
     pub target_table: Vec<f32>,
     /// `[K,2h]`.
     pub query_table: Vec<f32>,
@@ -147,7 +147,19 @@ impl UptModel {
         runtime: &'static Runtime,
         threads: usize,
     ) -> Result<Vec<f32>> {
-        Ok(embed_points(&self.entry, &self.embed, points, runtime, threads)?.2)
+        let count = points.len() / 3;
+        let mut queries = Vec::with_capacity(count * self.entry.dims.query);
+        embed_points(
+            &self.entry,
+            &self.embed,
+            points,
+            runtime,
+            threads,
+            |_, _, tile| {
+                queries.extend_from_slice(tile.query);
+            },
+        )?;
+        Ok(queries)
     }
 
     /// Bytes held beside the tables.
@@ -208,24 +220,33 @@ fn make_tables(
             .map(|&node| row[node as usize])
             .collect::<Vec<u32>>()
     };
-    let (source, target, query_table) =
-        embed_points(entry, embed, &mesh.positions, runtime, threads)?;
     let d = entry.dims.encoder;
-    let pick = |table: &[f32]| {
-        encode_nodes
-            .iter()
-            .flat_map(|&node| {
-                table[node as usize * d..(node as usize + 1) * d]
-                    .iter()
-                    .copied()
-            })
-            .collect::<Vec<f32>>()
-    };
+    let mut source_table = Vec::with_capacity(encode_nodes.len() * d);
+    let mut target_table = Vec::with_capacity(graph.supernodes.len() * d);
+    let mut query_table = Vec::with_capacity(mesh.node_count() * entry.dims.query);
+    embed_points(
+        entry,
+        embed,
+        &mesh.positions,
+        runtime,
+        threads,
+        |first, end, tile| {
+            for (nodes, from, to) in [
+                (&encode_nodes, tile.source, &mut source_table),
+                (&graph.supernodes, tile.target, &mut target_table),
+            ] {
+                for &node in within(nodes, first, end) {
+                    to.extend_from_slice(&from[(node as usize - first) * d..][..d]);
+                }
+            }
+            query_table.extend_from_slice(tile.query);
+        },
+    )?;
     Ok(UptTables {
         supernode_rows: rows(&graph.supernodes),
         neighbour_rows: rows(&graph.neighbours),
-        source_table: pick(&source),
-        target_table: pick(&target),
+        source_table,
+        target_table,
         query_table,
         row_of_node: row,
         encode_nodes,
@@ -234,14 +255,32 @@ fn make_tables(
     })
 }
 
-/// `embed.onnx` over points `[n,3]`: source `[n,d]`, target `[n,d]`, query `[n,2h]`.
+/// The ascending `nodes` in `first..end`.
+fn within(nodes: &[u32], first: usize, end: usize) -> &[u32] {
+    let at = |limit: usize| nodes.partition_point(|&node| (node as usize) < limit);
+    &nodes[at(first)..at(end)]
+}
+
+/// What `embed.onnx` gives for some points.
+struct Embedded<'a> {
+    /// `[n,d]`.
+    source: &'a [f32],
+    /// `[n,d]`.
+    target: &'a [f32],
+    /// `[n,2h]`.
+    query: &'a [f32],
+}
+
+/// `embed.onnx` over points `[n,3]`, a tile after another: `take(first, end, rows)` gets the rows of points
+/// `first..end`, so that tables of all points need not be held at once.
 fn embed_points(
     entry: &UptEntry,
     embed: &[u8],
     points: &[f32],
     runtime: &'static Runtime,
     threads: usize,
-) -> Result<(Vec<f32>, Vec<f32>, Vec<f32>)> {
+    mut take: impl FnMut(usize, usize, Embedded<'_>),
+) -> Result<()> {
     let (d, q) = (entry.dims.encoder, entry.dims.query);
     let mut stage = Stage::new(
         runtime,
@@ -258,31 +297,28 @@ fn embed_points(
             plan: ProviderPlan::cpu(),
         },
     )?;
-    let count = points.len() / 3;
-    let mut tables = [
-        Vec::with_capacity(count * d),
-        Vec::with_capacity(count * d),
-        Vec::with_capacity(count * q),
-    ];
-    for tile in points.chunks(3 * EMBED_TILE) {
+    for (at, tile) in points.chunks(3 * EMBED_TILE).enumerate() {
+        let (first, count) = (at * EMBED_TILE, tile.len() / 3);
         let input = stage.input(0);
         input.fill(0.0);
         input[..tile.len()].copy_from_slice(tile);
         stage.run()?;
-        for (index, (table, width)) in tables.iter_mut().zip([d, d, q]).enumerate() {
-            table.extend_from_slice(&stage.output(index)[..tile.len() / 3 * width]);
+        let outputs = [("source_table", d), ("target_table", d), ("query_table", q)];
+        for (index, (name, width)) in outputs.into_iter().enumerate() {
+            let values = &stage.output(index)[..count * width];
+            if values.iter().any(|x| !x.is_finite()) {
+                return Err(Error::bundle(
+                    "embed.onnx",
+                    format!("output `{name}` holds values that are not finite"),
+                ));
+            }
         }
+        let rows = Embedded {
+            source: &stage.output(0)[..count * d],
+            target: &stage.output(1)[..count * d],
+            query: &stage.output(2)[..count * q],
+        };
+        take(first, first + count, rows);
     }
-    if let Some(name) = ["source_table", "target_table", "query_table"]
-        .iter()
-        .zip(&tables)
-        .find_map(|(name, table)| table.iter().any(|x| !x.is_finite()).then_some(name))
-    {
-        return Err(Error::bundle(
-            "embed.onnx",
-            format!("output `{name}` holds values that are not finite"),
-        ));
-    }
-    let [source, target, query] = tables;
-    Ok((source, target, query))
+    Ok(())
 }

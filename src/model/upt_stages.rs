@@ -121,6 +121,15 @@ impl UptModel {
             .iter()
             .map(|&row| row.into())
             .collect();
+        // The graph takes a target row for each row of the features, and reads the receivers'.
+        let mut targets = vec![0.0f32; rows * d];
+        for (row, target) in tables
+            .supernode_rows
+            .iter()
+            .zip(tables.target_table.chunks_exact(d))
+        {
+            targets[*row as usize * d..][..d].copy_from_slice(target);
+        }
         let count = tables.query_table.len() / q;
         let kv: &[usize] = &[dims.latent_tokens, dims.decoder];
         let padded: &[usize] = &[supernodes, degree];
@@ -132,7 +141,7 @@ impl UptModel {
                 inputs: &[("features", &[rows, self.entry.feature_width()])],
                 constants: &[
                     ("source_table", &[rows, d], &tables.source_table),
-                    ("target_table", &[rows, d], &tables.target_table),
+                    ("target_table", &[rows, d], &targets),
                     ("query_table", &[count, q], &tables.query_table),
                     ("mask", padded, &mask),
                 ],

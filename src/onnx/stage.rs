@@ -302,7 +302,8 @@ fn configure(
         .with_config_entry(placement::RECORD, "1")
         .map_err(text)?;
     match wish {
-        Wish::Cpu => Ok(builder),
+        // With the shapes of a stage fixed, the arena finds its own blocks again; a pattern would hold as much once more.
+        Wish::Cpu => builder.with_memory_pattern(false).map_err(text),
         #[cfg(any(feature = "cuda", feature = "tensorrt", feature = "tensorrt-rtx"))]
         Wish::Builtin(dispatch) => builder.with_execution_providers([dispatch]).map_err(text),
         #[cfg(feature = "tensorrt-rtx")]

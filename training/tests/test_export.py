@@ -4,16 +4,19 @@ import hashlib
 import json
 
 import numpy as np
+import onnxruntime
 import pytest
 import torch
 from conftest import CONFIGS
 from safetensors.numpy import load_file
 
+from upt_training import onnx_graph
 from upt_training.__main__ import main
 from upt_training.bundle import TOLERANCE
 from upt_training.bundle_rollout import BundleRunner
 from upt_training.config import load_settings
 from upt_training.dataset import open_dataset, open_trajectory
+from upt_training.export import load_model
 from upt_training.mesh_file import load_mesh
 from upt_training.random_bundle import main as write_random
 from upt_training.run import make_trainer
@@ -144,3 +147,38 @@ def test_relative_positions_go_into_the_tables(mesh_path, tmp_path):
         tables.append(BundleRunner(tmp_path / name).session.tables)
     assert not np.allclose(tables[0][0], tables[1][0], atol=1e-3)
     assert tables[0][2].shape == tables[1][2].shape
+
+
+def test_tables_are_exact_to_float32(bundle, trained, mesh_path):
+    """embed.onnx has its angles in float64: in float32 the tables would be off by 1e-6."""
+    model, _ = load_model(trained)
+    mesh = load_mesh(mesh_path)
+    with torch.no_grad():
+        exact = model.double().tables(torch.from_numpy(mesh.positions.astype(np.float64)))
+    session = onnxruntime.InferenceSession(str(bundle / "embed.onnx"), providers=["CPUExecutionProvider"])
+    for found, table in zip(session.run(None, {"positions": mesh.positions}), exact, strict=True):
+        assert np.linalg.norm(found - table.numpy()) < 4e-7 * np.linalg.norm(table.numpy())
+
+
+def test_the_reference_step_is_the_split_in_float64(bundle, mesh_path):
+    reference = load_file(str(bundle / "reference.safetensors"))
+    runner = BundleRunner(bundle)
+    features = runner.features(reference["contact_nodes"], reference["contact_vectors"], runner.u)
+    found = runner.network(features)
+    largest = np.abs(reference["displacement"]).max()
+    assert largest > 1e-3 and np.abs(found - reference["displacement"]).max() < 1e-5 * largest
+
+
+def test_heads_one_after_another_are_the_same_attention(trained, monkeypatch):
+    model, _ = load_model(trained)
+    supernodes = np.random.default_rng(2).standard_normal((48, model.settings.encoder)).astype(np.float32)
+    found = []
+    for limit in (1e9, 0.0):
+        monkeypatch.setattr(onnx_graph, "CACHE_BYTES", limit)
+        with torch.no_grad():
+            graph = onnx_graph.latent_graph(model)
+        found.append((len(graph.graph.node), onnxruntime.InferenceSession(graph.SerializeToString())))
+    (nodes, together), (more, apart) = found
+    assert more > nodes
+    for a, b in zip(*(s.run(None, {"supernodes": supernodes}) for s in (together, apart)), strict=True):
+        assert np.abs(a - b).max() < 1e-6 * np.abs(a).max()

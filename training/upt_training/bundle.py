@@ -6,6 +6,7 @@ graphs in ONNX Runtime on the same inputs; their relative difference must stay b
 
 from __future__ import annotations
 
+import copy
 import hashlib
 import json
 import shutil
@@ -23,6 +24,7 @@ from upt_training.errors import InputError
 from upt_training.graph import Graph, build_graph
 from upt_training.mesh_file import Mesh
 from upt_training.model import Upt
+from upt_training.reference_step import write_reference
 
 TOLERANCE = 1e-5
 MATERIAL = {"young_pa": 3000.0, "poisson": 0.49, "density_kg_m3": 1000.0, "damping_per_s": 20.0}
@@ -212,9 +214,12 @@ def write_bundle(
     staging.mkdir(parents=True)
     try:
         with torch.no_grad():
-            for file, proto in graphs_of(model, paper_split, step).items():
+            exact = copy.deepcopy(model).double()
+            for file, proto in graphs_of(exact, paper_split, step).items():
                 onnx.save(proto, str(staging / file))
-            save_file(kernel_weights(model), str(staging / "weights.safetensors"))
+            save_file(kernel_weights(exact), str(staging / "weights.safetensors"))
+        if paper_split and not s.uses_prior:
+            write_reference(staging, model, mesh, graph)
         mesh.save(staging / "mesh.safetensors")
         if prior is not None and s.uses_prior:
             shutil.copyfile(prior, staging / "prior.safetensors")

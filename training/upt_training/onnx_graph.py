@@ -1,5 +1,9 @@
 """The bundle's ONNX graphs, written node by node (opset 17, float32, MatMul + Add so that the quantiser can read them).
 
+Give a float64 copy of the model: what is multiplied out here is then rounded once. `embed.onnx`, which runs once a mesh
+and always on the CPU, has the angles of the sincos embedding in float64 and is float32 behind them: an angle of 200 in
+float32 is off by 1e-5, which would be the largest error of the whole network.
+
 Only plain operators are used (no scatter, no control flow, no shape arithmetic beyond the dynamic node count), so that
 the CPU, CUDA, TensorRT and TensorRT-RTX providers all take them. GELU is the exact one, `0.5 x (1 + erf(x / sqrt 2))`.
 """
@@ -15,6 +19,7 @@ from upt_training.layers import EPS, sincos_frequencies
 from upt_training.model import RELATIVE_SCALE, Upt
 
 OPSET = 17
+CACHE_BYTES = 16e6  # of a CPU's last level, roughly
 
 
 class Writer:
@@ -24,10 +29,10 @@ class Writer:
         self.name, self.nodes, self.constants = name, [], {}
         self.inputs, self.outputs, self.count = [], [], 0
 
-    def constant(self, value, hint: str = "w") -> str:
+    def constant(self, value, hint: str = "w", double: bool = False) -> str:
         array = value.detach().cpu().numpy() if isinstance(value, torch.Tensor) else np.asarray(value)
-        if array.dtype == np.float64:
-            array = array.astype(np.float32)
+        if array.dtype.kind == "f":
+            array = array.astype(np.float64 if double else np.float32)
         name = f"{hint}_{len(self.constants)}"
         self.constants[name] = numpy_helper.from_array(np.ascontiguousarray(array), name)
         return name
@@ -86,23 +91,33 @@ class Writer:
     def mlp(self, x: str, module) -> str:
         return self.layer(self.gelu(self.layer(x, module.fc1)), module.fc2)
 
-    def attention(self, q: str, k: str, v: str, heads: int, width: int) -> str:
-        """`q [n, w]`, `k, v [L, w]` -> `[n, w]`; the scale is applied to the (static or small) queries."""
+    def attention(self, q: str, k: str, v: str, heads: int, width: int, apart: bool = False) -> str:
+        """`q [n, w]`, `k, v [L, w]` -> `[n, w]`; the scale is applied to the (static or small) queries.
+
+        `apart`: one head after another, so that only one head's weights `[n, L]` are in memory.
+        """
+        q = self.op("Mul", q, self.constant(np.float32((width // heads) ** -0.5)))
+        if apart and heads > 1:
+            one = zip(self.split(q, heads), self.split(k, heads), self.split(v, heads), strict=True)
+            return self.op("Concat", *[self._head(*head) for head in one], axis=-1)
         shape = self.constant(np.asarray([-1, heads, width // heads], np.int64))
         merged = self.constant(np.asarray([-1, width], np.int64))
-        scale = self.constant(np.float32((width // heads) ** -0.5))
-        qh = self.op("Transpose", self.op("Reshape", self.op("Mul", q, scale), shape), perm=[1, 0, 2])
+        qh = self.op("Transpose", self.op("Reshape", q, shape), perm=[1, 0, 2])
         kh = self.op("Transpose", self.op("Reshape", k, shape), perm=[1, 2, 0])
         vh = self.op("Transpose", self.op("Reshape", v, shape), perm=[1, 0, 2])
         weight = self.op("Softmax", self.op("MatMul", qh, kh), axis=-1)
         return self.op("Reshape", self.op("Transpose", self.op("MatMul", weight, vh), perm=[1, 0, 2]), merged)
 
+    def _head(self, q: str, k: str, v: str) -> str:
+        score = self.op("MatMul", q, self.op("Transpose", k, perm=[1, 0]))
+        return self.op("MatMul", self.op("Softmax", score, axis=-1), v)
+
     def split(self, x: str, parts: int) -> list[str]:
         return self.op("Split", x, outputs=parts, axis=-1)
 
-    def block(self, x: str, module, width: int) -> str:
+    def block(self, x: str, module, width: int, apart: bool = False) -> str:
         q, k, v = self.split(self.layer(self.norm(x, module.norm1), module.qkv), 3)
-        x = self.op("Add", x, self.layer(self.attention(q, k, v, module.heads, width), module.proj))
+        x = self.op("Add", x, self.layer(self.attention(q, k, v, module.heads, width, apart), module.proj))
         return self.op("Add", x, self.mlp(self.norm(x, module.norm2), module.mlp))
 
     def pool(self, context: str, module, width: int) -> str:
@@ -112,31 +127,43 @@ class Writer:
         x = self.op("Add", tokens, self.layer(self.attention(q, k, v, module.heads, width), module.proj))
         return self.op("Add", x, self.mlp(self.norm(x, module.norm2), module.mlp))
 
-    def sincos(self, coordinates: str, width: int) -> str:
-        frequency = sincos_frequencies(width)
+    def sincos(self, coordinates: str, width: int, double: bool = False) -> str:
+        """`[n, 3]` -> `[n, width]` float32; `double`: the coordinates are float64, and so are the angles' turns."""
+        frequency = sincos_frequencies(width).reshape(1, 1, -1)
         angle = self.op("Mul", self.op("Unsqueeze", coordinates, self.constant(np.asarray([-1], np.int64))),
-                        self.constant(frequency.reshape(1, 1, -1)))  # fmt: skip
+                        self.constant(frequency, double=double))  # fmt: skip
+        if double:
+            angle = self.cast(self._without_turns(angle), TensorProto.FLOAT)
         wave = self.op("Concat", self.op("Sin", angle), self.op("Cos", angle), axis=-1)
-        used = 6 * len(frequency)
+        used = frequency.size * 6
         flat = self.op("Reshape", wave, self.constant(np.asarray([-1, used], np.int64)))
         if used == width:
             return flat
         return self.op("Pad", flat, self.constant(np.asarray([0, 0, 0, width - used], np.int64)))
 
+    def _without_turns(self, angle: str) -> str:
+        """The same angle (float64) within half a turn of 0."""
+        turn = self.constant(np.float64(2.0 * np.pi), double=True)
+        return self.op("Sub", angle, self.op("Mul", self.op("Round", self.op("Div", angle, turn)), turn))
+
+    def cast(self, x: str, kind: int) -> str:
+        return self.op("Cast", x, to=kind)
+
 
 # -- pieces shared by the graphs ----------------------------------------------------------------------------------
 
 
-def _coordinates(w: Writer, model: Upt, positions: str) -> str:
-    shifted = w.op("Sub", positions, w.constant(model.coordinate_offset.reshape(1, 3)))
-    return w.op("Mul", shifted, w.constant(model.coordinate_scale))
+def _coordinates(w: Writer, model: Upt, positions: str, double: bool = False) -> str:
+    """Model coordinates of positions, both in the precision asked for."""
+    shifted = w.op("Sub", positions, w.constant(model.coordinate_offset.reshape(1, 3), double=double))
+    return w.op("Mul", shifted, w.constant(model.coordinate_scale, double=double))
 
 
-def _latent(w: Writer, model: Upt, aggregated: str, message2: bool = True) -> tuple[str, str]:
+def _latent(w: Writer, model: Upt, aggregated: str, message2: bool = True, apart: bool = False) -> tuple[str, str]:
     s = model.settings
     x = w.layer(aggregated, model.message2) if message2 else aggregated
     for block in model.encoder:
-        x = w.block(x, block, s.encoder)
+        x = w.block(x, block, s.encoder, apart)
     z = w.pool(x, model.pool, s.latent)
     for block in model.approximator:
         z = w.block(z, block, s.latent)
@@ -144,9 +171,10 @@ def _latent(w: Writer, model: Upt, aggregated: str, message2: bool = True) -> tu
     return k, v
 
 
-def _query_table(w: Writer, model: Upt, coordinates: str) -> str:
+def _query_table(w: Writer, model: Upt, coordinates: str, double: bool = False) -> str:
     d = model.decoder
-    x = w.layer(w.gelu(w.layer(w.sincos(coordinates, model.settings.decoder), d.query1)), d.query2)
+    embedding = w.sincos(coordinates, model.settings.decoder, double)
+    x = w.layer(w.gelu(w.layer(embedding, d.query1)), d.query2)
     return w.op("Concat", x, w.layer(w.norm(x, d.norm1), d.q), axis=-1)
 
 
@@ -170,17 +198,17 @@ def scaled_head(model: Upt) -> tuple[torch.Tensor, torch.Tensor]:
 
 def embed_graph(model: Upt) -> onnx.ModelProto:
     s, w = model.settings, Writer("embed")
-    p = _coordinates(w, model, w.input("positions", ["n", 3]))
+    p = _coordinates(w, model, w.cast(w.input("positions", ["n", 3]), TensorProto.DOUBLE), double=True)
     d = s.encoder
-    x = w.op("Add", w.sincos(p, d), w.constant(model.embed.bias))
+    x = w.op("Add", w.sincos(p, d, double=True), w.constant(model.embed.bias))
     source = w.linear(x, model.message1.weight[:, :d])
     target = w.linear(x, model.message1.weight[:, d:], model.message1.bias)
     if model.relative is not None:
-        place = w.linear(p, RELATIVE_SCALE * model.relative.weight)
+        place = w.linear(w.cast(p, TensorProto.FLOAT), RELATIVE_SCALE * model.relative.weight)
         source, target = w.op("Add", source, place), w.op("Sub", target, place)
     w.output(source, "source_table", ["n", d])
     w.output(target, "target_table", ["n", d])
-    w.output(_query_table(w, model, p), "query_table", ["n", 2 * s.decoder])
+    w.output(_query_table(w, model, p, double=True), "query_table", ["n", 2 * s.decoder])
     return w.build()
 
 
@@ -199,8 +227,11 @@ def encoder_graph(model: Upt) -> onnx.ModelProto:
 
 
 def latent_graph(model: Upt) -> onnx.ModelProto:
+    """The network between mean and decoder. Where the encoder's attention is larger than a cache, its heads are apart:
+    less memory, and on the CPU faster."""
     s, w = model.settings, Writer("latent")
-    k, v = _latent(w, model, w.input("supernodes", ["n_S", s.encoder]))
+    weights = 4 * s.encoder_heads * s.graph.supernodes**2
+    k, v = _latent(w, model, w.input("supernodes", ["n_S", s.encoder]), apart=weights > CACHE_BYTES)
     w.output(k, "keys", [s.latent_tokens, s.decoder])
     w.output(v, "values", [s.latent_tokens, s.decoder])
     return w.build()

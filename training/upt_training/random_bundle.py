@@ -47,7 +47,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument(
         "--paper-split",
         action="store_true",
-        help="also write paper_encoder.onnx, paper_decoder.onnx",
+        help="also write paper_encoder.onnx, paper_decoder.onnx and, in float64, reference.safetensors",
     )
     parser.add_argument("--step", action="store_true", help="also write step.onnx")
     options = parser.parse_args(arguments)

@@ -2,7 +2,7 @@
 # Packs what a measurement on a GPU machine without a network needs, in pieces of 60 MiB:
 #   xtask/gpu/pack.sh OUT [--rehearse] [TRAJECTORY...]
 # the commands `upt` and `gpu-measure` (x86-64), ONNX Runtime's GPU build (of the onnxruntime-gpu wheel), bundles with random
-# weights of the `paper` and `fast` configuration with step.onnx and the paper's split, the brain bundles, the Python
+# weights of the `paper` and `wide` configuration with step.onnx and the paper's split, the brain bundles, the Python
 # package for the PyTorch rows, and the trajectories to replay (none given: one of scheme 5 is simulated).
 #   UPT_FINE_MESH=FILE   adds `paper-fine`, the `paper` configuration on that mesh (K = 151,201)
 #   --rehearse           the CPU's ONNX Runtime (ORT_DYLIB_PATH) and the small bundles of tests/fixtures: minutes, no network
@@ -51,7 +51,7 @@ else
   cp "$stage"/wheel/open/onnxruntime/capi/libonnxruntime*.so* "$stage/upt/ort/"
   brain=$root/onnx/meshes/brain.mesh.safetensors
   random paper paper "$brain"
-  random fast fast "$brain"
+  random wide wide "$brain"
   if [ -n "${UPT_FINE_MESH:-}" ]; then random paper-fine paper "$UPT_FINE_MESH"; fi
   cp -r "$root"/onnx/brain-fast "$root"/onnx/brain-reduced "$stage/upt/bundles/"
   if [ "$#" -eq 0 ]; then

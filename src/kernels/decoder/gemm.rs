@@ -1,12 +1,16 @@
 //! The micro-kernel: `y [out][nodes] = W x [in][nodes]` with nodes in the lanes.
 //!
 //! `R` outputs by `C` registers of nodes stay in registers while the depth runs by: a step of the
-//! depth is `C` loads, `R` broadcasts and `R C` fused multiply-adds. Each output is one chain of
-//! multiply-adds in the order of the depth, whatever `R` and `C` are.
+//! depth is `C` loads, `R` broadcasts and `R C` fused multiply-adds. Each output is a sum of chains of
+//! [`BLOCK`] multiply-adds in the order of the depth, whatever `R` and `C` are: rounding grows with the
+//! length of a chain.
 
 use super::weights::GROUP;
 use crate::kernels::lanes::Lanes;
 use crate::kernels::math::gelu_lanes;
+
+/// Multiply-adds of a chain.
+pub(super) const BLOCK: usize = 32;
 
 /// What happens to a sum before it is stored.
 #[derive(Clone, Copy)]
@@ -38,27 +42,52 @@ pub(super) unsafe fn multiply<V: Lanes, const R: usize, const C: usize>(
         for part in (0..GROUP).step_by(R) {
             // SAFETY: the caller's.
             unsafe {
-                let mut sum = [[V::splat(0.0); C]; R];
                 let mut weight = panel.as_ptr().add(part);
                 let mut from = x;
-                for _ in 0..depth {
-                    let mut column = [V::splat(0.0); C];
-                    for c in 0..C {
-                        column[c] = V::load(from.add(c * V::N));
-                    }
+                let mut sum = chain::<V, R, C>(&mut weight, &mut from, depth.min(BLOCK));
+                for start in (BLOCK..depth).step_by(BLOCK) {
+                    let more = chain::<V, R, C>(&mut weight, &mut from, BLOCK.min(depth - start));
                     for r in 0..R {
-                        let w = V::splat(*weight.add(r));
                         for c in 0..C {
-                            sum[r][c] = column[c].mul_add(w, sum[r][c]);
+                            sum[r][c] = sum[r][c].add(more[r][c]);
                         }
                     }
-                    weight = weight.add(GROUP);
-                    from = from.add(stride);
                 }
                 let row = group * GROUP + part;
                 store::<V, R, C>(sum, y.add(row * stride), row, finish);
             }
         }
+    }
+}
+
+/// `length` multiply-adds on zeros; the pointers move on behind them.
+///
+/// # Safety
+/// As [`multiply`].
+#[inline(always)]
+unsafe fn chain<V: Lanes, const R: usize, const C: usize>(
+    weight: &mut *const f32,
+    from: &mut *const f32,
+    length: usize,
+) -> [[V; C]; R] {
+    // SAFETY: the caller's.
+    unsafe {
+        let mut sum = [[V::splat(0.0); C]; R];
+        for _ in 0..length {
+            let mut column = [V::splat(0.0); C];
+            for c in 0..C {
+                column[c] = V::load(from.add(c * V::N));
+            }
+            for r in 0..R {
+                let w = V::splat(*weight.add(r));
+                for c in 0..C {
+                    sum[r][c] = column[c].mul_add(w, sum[r][c]);
+                }
+            }
+            *weight = weight.add(GROUP);
+            *from = from.add(C * V::N);
+        }
+        sum
     }
 }
 

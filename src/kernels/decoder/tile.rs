@@ -1,6 +1,6 @@
 //! The layers of the decoder for one tile of nodes: features in rows, nodes in lanes.
 
-use super::gemm::{Finish, multiply};
+use super::gemm::{BLOCK, Finish, multiply};
 use super::scalar;
 use super::weights::{DecoderTokens, GROUP, PackedDecoder, panel_floats};
 use crate::kernels::isa::{Isa, by_isa};
@@ -193,12 +193,18 @@ pub(super) unsafe fn exponentials<V: Lanes, const C: usize>(
             }
         }
         let mut sum = [V::splat(0.0); C];
-        for l in 0..tokens {
+        for start in (0..tokens).step_by(BLOCK) {
+            let mut part = [V::splat(0.0); C];
+            for l in start..(start + BLOCK).min(tokens) {
+                for c in 0..C {
+                    let at = scores.add(l * stride + c * V::N);
+                    let weight = exp2_lanes(V::load(at).sub(largest[c]));
+                    weight.store(at);
+                    part[c] = part[c].add(weight);
+                }
+            }
             for c in 0..C {
-                let at = scores.add(l * stride + c * V::N);
-                let weight = exp2_lanes(V::load(at).sub(largest[c]));
-                weight.store(at);
-                sum[c] = sum[c].add(weight);
+                sum[c] = sum[c].add(part[c]);
             }
         }
         for c in 0..C {
@@ -215,19 +221,31 @@ pub(super) unsafe fn normalise<V: Lanes, const C: usize>(x: *const f32, h: usize
     // SAFETY: the caller's.
     unsafe {
         let mut mean = [V::splat(0.0); C];
-        for k in 0..h {
+        for start in (0..h).step_by(BLOCK) {
+            let mut part = [V::splat(0.0); C];
+            for k in start..(start + BLOCK).min(h) {
+                for c in 0..C {
+                    part[c] = part[c].add(V::load(x.add(k * stride + c * V::N)));
+                }
+            }
             for c in 0..C {
-                mean[c] = mean[c].add(V::load(x.add(k * stride + c * V::N)));
+                mean[c] = mean[c].add(part[c]);
             }
         }
-        let mut variance = [V::splat(0.0); C];
         for c in 0..C {
             mean[c] = mean[c].mul(V::splat(share));
         }
-        for k in 0..h {
+        let mut variance = [V::splat(0.0); C];
+        for start in (0..h).step_by(BLOCK) {
+            let mut part = [V::splat(0.0); C];
+            for k in start..(start + BLOCK).min(h) {
+                for c in 0..C {
+                    let d = V::load(x.add(k * stride + c * V::N)).sub(mean[c]);
+                    part[c] = d.mul_add(d, part[c]);
+                }
+            }
             for c in 0..C {
-                let d = V::load(x.add(k * stride + c * V::N)).sub(mean[c]);
-                variance[c] = d.mul_add(d, variance[c]);
+                variance[c] = variance[c].add(part[c]);
             }
         }
         let mut scale = variance;

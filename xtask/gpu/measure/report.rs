@@ -10,7 +10,7 @@ const MID: [u64; 2] = [20_000, 24_000];
 const FINE: [u64; 2] = [140_000, 160_000];
 const BARS: [Bar; 4] = [
     ("paper, K = 21,670, all nodes", "paper", MID, 3.0, 1.0),
-    ("fast, K = 21,670, all nodes", "fast", MID, 1.0, 0.4),
+    ("fast, K = 21,670, all nodes", "brain-fast", MID, 1.0, 0.4),
     ("paper, K = 151,201", "paper-fine", FINE, 8.0, 3.0),
     (
         "reduced, K = 21,670, all nodes",

@@ -69,7 +69,7 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
     let library = ort::host_library(workspace)?;
     let random = workspace.path("target/bench/bundles");
     if let Err(error) = random_bundles(workspace, &library, &random) {
-        eprintln!("left out: the rows of `fast` and `paper`: {error:#}");
+        eprintln!("left out: the rows of `wide` and `paper`: {error:#}");
     }
     let mut chosen = targets(workspace)?;
     if let Some(part) = &options.only {
@@ -171,18 +171,23 @@ fn build(workspace: &Workspace, targets: &[Target]) -> Result<()> {
     Ok(())
 }
 
-/// Bundles with random weights of the `fast` and the `paper` configuration on the brain, the second with the graphs of
+/// Bundles with random weights of the `wide` and the `paper` configuration on the brain, the second with the graphs of
 /// the paper's split beside it, and `paper-fine` on the mesh that `UPT_FINE_MESH` names; made again when a bundle's
 /// configuration or mesh is newer.
 fn random_bundles(workspace: &Workspace, library: &Path, folder: &Path) -> Result<()> {
     let brain = workspace.path("onnx/meshes/brain.mesh.safetensors");
     let fine = std::env::var_os("UPT_FINE_MESH").map(PathBuf::from);
-    let mut wanted = vec![("fast", "fast", &brain), ("paper", "paper", &brain)];
+    let mut wanted = vec![("wide", "wide", &brain), ("paper", "paper", &brain)];
     wanted.extend(fine.as_ref().map(|mesh| ("paper-fine", "paper", mesh)));
     for (name, config, mesh) in wanted {
         let out = folder.join(name);
         let config = workspace.path(&format!("training/configs/{config}.toml"));
-        let made = out.join("bundle.json");
+        let split = name != "wide";
+        let made = out.join(if split {
+            "reference.safetensors"
+        } else {
+            "bundle.json"
+        });
         if is_newer(&made, &config) && is_newer(&made, mesh) {
             continue;
         }
@@ -198,7 +203,7 @@ fn random_bundles(workspace: &Workspace, library: &Path, folder: &Path) -> Resul
             .arg("--out")
             .arg(&out)
             .args(["--name", name]);
-        if name != "fast" {
+        if split {
             command.arg("--paper-split");
         }
         ort::set_environment(&mut command, library);
