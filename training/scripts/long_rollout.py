@@ -1,20 +1,24 @@
 """Ten cases in a row without a reset, 1,600 steps: does the error grow?
 
-    python training/scripts/long_rollout.py BUNDLE --data DATA [--count 10]
+    python training/scripts/long_rollout.py BUNDLE --data DATA [--count 10] [--page docs/training.md]
 
-Prints a Markdown table: MSE of each case inside the long rollout and of the same case from rest, and the largest
-displacement of its last frame. Each case ends without contact, so the truth of the next one starts (nearly) at rest.
+Prints or writes a Markdown table: MSE of each case inside the long rollout and of the same case from rest, and the
+largest displacement of its last frame. Each case ends without contact, so the next one starts (nearly) at rest.
 """
 
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 
 import numpy as np
 
-from upt_training.bundle_rollout import BundleRunner
-from upt_training.dataset import Trajectory, open_dataset, open_trajectory
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from upt_training.bundle_rollout import BundleRunner  # noqa: E402
+from upt_training.dataset import Trajectory, open_dataset, open_trajectory  # noqa: E402
+from upt_training.page import write_table  # noqa: E402
 
 
 def roll(runner: BundleRunner, trajectory: Trajectory) -> tuple[float, float]:
@@ -32,12 +36,15 @@ def main() -> None:
     parser.add_argument("bundle", type=Path)
     parser.add_argument("--data", type=Path, required=True)
     parser.add_argument("--count", type=int, default=10)
+    parser.add_argument("--page", type=Path, help="page whose table `long rollout` to exchange")
     options = parser.parse_args()
     runner = BundleRunner(options.bundle)
     fresh = BundleRunner(options.bundle)
     cases = open_dataset(options.data, runner.mesh).select("test", count=options.count)
-    print("| steps | case | scheme | MSE in a row, mm² | MSE from rest, mm² | largest displacement at the end, mm |")
-    print("|---|---|---|---|---|---|")
+    lines = [
+        "| steps | case | scheme | MSE in a row, mm² | MSE from rest, mm² | largest displacement at the end, mm |",
+        "|---|---|---|---|---|---|",
+    ]
     step = 0
     for case in cases:
         trajectory = open_trajectory(case.path, runner.mesh)
@@ -45,10 +52,13 @@ def main() -> None:
         fresh.reset()
         alone, _ = roll(fresh, trajectory)
         last = step + trajectory.frame_count - 1
-        print(
-            f"| {step + 1} to {last} | {case.index} | {case.scheme} | {row:.4f} | {alone:.4f} | {end:.3f} |", flush=True
-        )
+        lines.append(f"| {step + 1} to {last} | {case.index} | {case.scheme} | {row:.4f} | {alone:.4f} | {end:.3f} |")
+        print(lines[-1], file=sys.stderr, flush=True)
         step = last
+    if options.page:
+        write_table(options.page, "long rollout", lines)
+    else:
+        print("\n".join(lines))
 
 
 if __name__ == "__main__":

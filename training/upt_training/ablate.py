@@ -44,8 +44,8 @@ def variants(suite: str, base: Settings) -> dict[str, Settings]:
         for window in range(2, 9):
             add(f"stochastic, window {window}", strategy="stf", window=window)
         return out
-    add("as shipped")
-    add("as shipped, another seed", seed=base.train.seed + 1)
+    add("base recipe")
+    add("base recipe, another seed", seed=base.train.seed + 1)
     add("no linear response at the step before", features=without(base, "previous_prior"))
     add("linear response as base only", features=without(base, "prior", "previous_prior"))
     add("linear response as input only", base="displacement")
