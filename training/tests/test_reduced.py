@@ -14,6 +14,7 @@ from upt_training.box_mesh import box_mesh
 from upt_training.errors import InputError
 from upt_training.lend import Lender
 from upt_training.mesh_file import Mesh
+from upt_training.reduced.block_basis import build_block_basis, groups
 from upt_training.reduced.blocks import partition
 from upt_training.reduced.build import Options, build, split_states, trainable, training_states
 from upt_training.reduced.columns import Columns
@@ -22,6 +23,7 @@ from upt_training.reduced.domain import beside_domain, patches_of_domain
 from upt_training.reduced.evaluate import evaluate
 from upt_training.reduced.make_prior import make_prior, prior_error
 from upt_training.reduced.network import Correction
+from upt_training.reduced.patches import sample_forces
 from upt_training.reduced.prior import load_prior, save_prior
 from upt_training.reduced.response_error import response_error
 from upt_training.reduced.rollout import Limits, drive_of, rollout, rollout_from_rest, true_limits
@@ -112,6 +114,50 @@ def test_block_basis_error_follows_the_tolerance_and_half_precision_is_enough(ph
     assert errors[1] < 5e-3 and errors[1] < errors[0] and sizes[1] >= sizes[0]
     save_prior(tmp_path / "half.safetensors", prior, np.float16)
     assert prior_error(mesh, columns, load_prior(tmp_path / "half.safetensors"))["rms_mm"] < 1e-2
+
+
+def test_a_basis_made_in_parts_is_the_one_made_at_once(phantom):
+    mesh, columns, _ = phantom
+    forces = sample_forces(mesh, columns, 200)
+    none, amplitudes = np.zeros((0, 3 * mesh.node_count), np.float32), np.zeros(0)
+    made = [
+        build_block_basis(mesh, columns, forces, none, amplitudes, size=24, memory_gib=memory)[0]
+        for memory in (1.0, 12 * 200 * 50 / 2**30)
+    ]
+    assert len(groups(made[0], 200, 1.0)) == 1 < len(groups(made[0], 200, 12 * 200 * 50 / 2**30))
+    dense = forces @ columns.columns
+    for block, (whole, part) in enumerate(zip(made[0].bases, made[1].bases, strict=True)):
+        field = dense[:, made[0].dofs(block)]
+        assert whole.shape == part.shape
+        for vectors in (whole, part):
+            left = field - (field @ vectors) @ vectors.T
+            assert np.sqrt((left**2).sum() / field.size * 3) < 4e-3  # the tolerance: 3e-3 mm a node
+        assert np.allclose((field @ whole) @ whole.T, (field @ part) @ part.T, atol=1e-3)
+
+
+def test_a_model_from_another_meshs_cases_alone(phantom, tmp_path):
+    mesh, columns, folder = phantom
+    fine = box_mesh(cells=(12, 10, 8), spacing_mm=5.0)
+    fine.save(tmp_path / "fine.mesh.safetensors")
+    fine_columns = write_columns(fine, tmp_path / "fine.columns.safetensors")
+    write_dataset(mesh, columns, tmp_path / "coarse", 12)
+    options = Options(
+        mesh=tmp_path / "fine.mesh.safetensors",
+        columns=fine_columns.path,
+        data=[],
+        out=tmp_path / "bundle",
+        work=tmp_path / "work",
+        name="fine",
+        modes=8,
+        response_modes=8,
+        coarse_mesh=folder / "box.mesh.safetensors",
+        coarse_columns=columns.path,
+        coarse_data=[tmp_path / "coarse"],
+    )
+    build(options, Settings(updates=0, hidden=8, quadratic_modes=4), "from coarse cases")
+    write_dataset(fine, fine_columns, tmp_path / "data", 4)
+    errors = evaluate(options.out, open_dataset(tmp_path / "data", fine.sha256))
+    assert errors["reduced"]["schemes_1_4"]["mse_mm2"] < errors["prior"]["schemes_1_4"]["mse_mm2"]
 
 
 def test_interpolation_between_meshes_is_exact_for_linear_fields():

@@ -7,13 +7,14 @@ import pytest
 import scipy.linalg
 import torch
 from conftest import CONFIGS
+from safetensors.numpy import save_file
 from test_reduced import dense_stiffness
 
 from upt_training import vibration
 from upt_training.__main__ import main
 from upt_training.bundle_rollout import BundleRunner
 from upt_training.config import load_settings
-from upt_training.dataset import open_dataset, open_trajectory
+from upt_training.dataset import map_safetensors, open_dataset, open_trajectory
 from upt_training.errors import InputError
 from upt_training.mesh_file import load_mesh
 from upt_training.prior_table import PriorTable, propagator
@@ -41,6 +42,23 @@ def test_eigenmodes_equal_a_dense_solver(mesh_path):
     assert np.allclose(frequency**2, exact[:6], rtol=1e-6)
     assert np.allclose((modes[:, dofs] * mass) @ modes[:, dofs].T, np.eye(6), atol=1e-9)
     assert np.abs(modes[:, np.setdiff1d(np.arange(3 * mesh.node_count), dofs)]).max() == 0.0
+
+
+def test_modes_of_a_file_are_taken_and_those_of_another_body_refused(mesh_path, swings, tmp_path, capsys):
+    mesh = load_mesh(mesh_path)
+    frequency, modes = eigenmodes(mesh, "fixed", MATERIAL, 12)
+    metadata = {"mesh_sha256": mesh.sha256, "boundary": "fixed", **{k: str(v) for k, v in MATERIAL.items()}}
+    tensors = {"frequency": np.float32(frequency), "modes": np.ascontiguousarray(modes, np.float32)}
+    save_file(tensors, str(tmp_path / "modes.safetensors"), metadata=metadata)
+    arguments = ["--mesh", str(mesh_path), "--prior", str(PRIOR), "--natural", str(tmp_path / "modes.safetensors")]
+    assert vibration.main([*arguments, "--out", str(tmp_path / "out.safetensors")]) == 0
+    found, own = map_safetensors(tmp_path / "out.safetensors")[0], map_safetensors(swings)[0]
+    for name in ("frequency", "modes", "force_to_mode"):
+        assert np.allclose(found[name], own[name], atol=1e-5 * np.abs(own[name]).max())
+    save_file(tensors, str(tmp_path / "modes.safetensors"), metadata={**metadata, "poisson": "0.45"})
+    assert vibration.main([*arguments, "--out", str(tmp_path / "other.safetensors")]) == 2
+    assert "poisson is 0.45, not 0.49" in capsys.readouterr().err
+    assert not (tmp_path / "other.safetensors").exists()
 
 
 @pytest.mark.parametrize("frequency", [6.0, 10.0, 70.0])

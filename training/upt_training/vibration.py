@@ -17,6 +17,7 @@ import scipy.sparse as sparse
 from safetensors.numpy import save_file
 from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
+from upt_training.dataset import map_safetensors
 from upt_training.errors import InputError
 from upt_training.mesh_file import Mesh, load_mesh
 from upt_training.prior_table import PriorTable
@@ -99,9 +100,20 @@ def eigenmodes(mesh: Mesh, boundary: str, material: dict, count: int) -> tuple[n
     return np.sqrt(squared[rank]), modes
 
 
-def make_vibration(mesh: Mesh, prior: PriorTable, boundary: str, material: dict, count: int) -> tuple[dict, float]:
+def read_modes(path: Path, mesh: Mesh, boundary: str, material: dict) -> tuple[np.ndarray, np.ndarray]:
+    """Frequencies and modes of a file of `upt modes`; refuses one of another mesh, boundary or material."""
+    tensors, metadata = map_safetensors(path)
+    for name, wanted in {"mesh_sha256": mesh.sha256, "boundary": boundary, **material}.items():
+        found = metadata.get(name, "nothing")
+        if (found != wanted) if isinstance(wanted, str) else (float(found) != wanted):
+            raise InputError(f"{path}: {name} is {found}, not {wanted}; make the file again with `upt modes`")
+    return np.asarray(tensors["frequency"], np.float64), np.asarray(tensors["modes"], np.float64)
+
+
+def make_vibration(
+    mesh: Mesh, prior: PriorTable, material: dict, frequency: np.ndarray, modes: np.ndarray
+) -> tuple[dict, float]:
     """The tensors of `vibration.safetensors`, and the part of the modes' squared norm that the bases cannot hold."""
-    frequency, modes = eigenmodes(mesh, boundary, material, count)
     mass = np.repeat(lumped_mass(mesh, material["density_kg_m3"]), 3)
     size = np.abs(modes).max(axis=1, keepdims=True)  # modes of largest component 1: amplitudes are mm
     kept = prior.project(modes / size)
@@ -117,19 +129,26 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--prior", type=Path, required=True, help="prior.safetensors of the mesh")
     parser.add_argument("--boundary", default="fixed", choices=["fixed", "supported"])
     parser.add_argument("--modes", type=int, default=64)
+    parser.add_argument(
+        "--natural", type=Path, help="file of `upt modes`: for meshes that SciPy's factorisation has no memory for"
+    )
     parser.add_argument("--out", type=Path, required=True)
     options = parser.parse_args(arguments)
     try:
         mesh = load_mesh(options.mesh)
         prior = PriorTable(options.prior, mesh.node_count)
-        tensors, lost = make_vibration(mesh, prior, options.boundary, MATERIAL, options.modes)
+        if options.natural:
+            frequency, modes = read_modes(options.natural, mesh, options.boundary, MATERIAL)
+        else:
+            frequency, modes = eigenmodes(mesh, options.boundary, MATERIAL, options.modes)
+        tensors, lost = make_vibration(mesh, prior, MATERIAL, frequency, modes)
     except InputError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
     save_file(tensors, str(options.out))
     options.out.chmod(0o644)
     hertz = tensors["frequency"] / (2 * np.pi)
-    print(json.dumps({"file": str(options.out), "modes": options.modes, "hertz": [hertz[0], hertz[-1]],
+    print(json.dumps({"file": str(options.out), "modes": len(hertz), "hertz": [hertz[0], hertz[-1]],
                       "lost_in_block_coordinates": lost}, default=float))  # fmt: skip
     return 0
 

@@ -18,6 +18,8 @@ mod mesh;
 #[cfg(feature = "files")]
 mod mesh_files;
 #[cfg(feature = "linear")]
+mod modes;
+#[cfg(feature = "linear")]
 mod prior;
 mod render;
 mod report;
@@ -69,6 +71,12 @@ enum Command {
     /// Left out of this build.
     #[cfg(not(feature = "linear"))]
     Prior(left_out::Options),
+    /// Natural modes of a held mesh: how linear elasticity swings after a release.
+    #[cfg(feature = "linear")]
+    Modes(modes::Options),
+    /// Left out of this build.
+    #[cfg(not(feature = "linear"))]
+    Modes(left_out::Options),
     /// One reference simulation: a scheme on a mesh, as a trajectory file.
     Simulate(simulate::Options),
     /// Many reference simulations in a folder, resumable and shardable.
@@ -100,6 +108,10 @@ fn main() -> ExitCode {
         Command::Prior(options) => prior::run(&options),
         #[cfg(not(feature = "linear"))]
         Command::Prior(options) => left_out::run("linear", &options),
+        #[cfg(feature = "linear")]
+        Command::Modes(options) => modes::run(&options),
+        #[cfg(not(feature = "linear"))]
+        Command::Modes(options) => left_out::run("linear", &options),
         Command::Simulate(options) => simulate::run(&options),
         Command::Dataset(options) => dataset::run(&options),
         Command::Rollout(options) => rollout::run(&options),

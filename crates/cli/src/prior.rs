@@ -63,7 +63,7 @@ fn contact_nodes(mesh: &Mesh, held: &[u32]) -> Vec<u32> {
 }
 
 /// Header of a safetensors file whose tensors follow in the given order (name, dtype, shape).
-fn header(tensors: &[(&str, &str, [usize; 2])], metadata: serde_json::Value) -> Vec<u8> {
+pub fn header(tensors: &[(&str, &str, [usize; 2])], metadata: serde_json::Value) -> Vec<u8> {
     let mut object = serde_json::Map::new();
     object.insert("__metadata__".to_string(), metadata);
     let mut offset = 0usize;
@@ -87,7 +87,7 @@ fn header(tensors: &[(&str, &str, [usize; 2])], metadata: serde_json::Value) -> 
     bytes
 }
 
-fn floats(values: impl Iterator<Item = f32>) -> Vec<u8> {
+pub fn floats(values: impl Iterator<Item = f32>) -> Vec<u8> {
     values.flat_map(f32::to_le_bytes).collect()
 }
 

@@ -29,7 +29,9 @@ def add_build_arguments(whole: argparse.ArgumentParser) -> None:
     """What `build` and `modes` share."""
     whole.add_argument("--mesh", type=Path, required=True)
     whole.add_argument("--columns", type=Path, required=True, help="file of `upt prior` for the wanted boundary")
-    whole.add_argument("--data", type=Path, action="append", required=True, help="dataset folder; may be repeated")
+    whole.add_argument(
+        "--data", type=Path, action="append", default=[], help="dataset folder of --mesh; may be repeated"
+    )
     whole.add_argument("--out", type=Path, required=True, help="bundle folder")
     whole.add_argument("--work", type=Path, required=True, help="folder of intermediate results")
     whole.add_argument("--name", default="brain-reduced")

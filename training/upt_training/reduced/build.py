@@ -106,12 +106,14 @@ def projected(options: Options, sources: list[tuple[str, Source]], modes: Modes)
         kept = [load_states(path)] if path.exists() else []
         known = set(kept[0].source) if kept else set()
         new = [case for case in source.cases if not case.is_static and case.path.name not in known]
+        if source.transfer is not None:  # unseen cases of another mesh are not used at all
+            new = [case for case in new if case.split == "train"]
         if new:
             part = project_cases(Source(source.columns, new, source.transfer), modes, Progress(f"states of {name}"))
             other = np.array([case.damping_per_s != DAMPING_PER_S for case in new])
             part.split = np.where(other & (part.split == "train"), "other", part.split)
             if source.transfer is not None:
-                part.split = np.where(part.split == "train", "coarse", "coarse-test")
+                part.split = np.where(part.split == "train", "coarse", part.split)
             join_states([*kept, part]).save(path)
         if path.exists():
             parts.append(load_states(path))
@@ -315,7 +317,7 @@ def finish(options: Options, settings: Settings, description: str, made: Prepare
     dtype = np.float16 if options.tables == "f16" else np.float32
     manifest = write_reduced_bundle(options.out, made.mesh, made.columns, made.prior, model, limits, about, dtype)
     tested = [case for case in made.own if case.split == "test" or case.scheme == "5"]
-    result = evaluate(options.out, tested, Progress("evaluation"))
+    result = evaluate(options.out, tested, Progress("evaluation")) if tested else {"reduced": {}}
     manifest["errors"] = {group: _published(e) for group, e in result["reduced"].items()}
     write_manifest(options.out, manifest)
     (options.work / "errors.json").write_text(json.dumps(result, indent=2))

@@ -23,7 +23,7 @@ from upt_training.reduced.block_basis import BlockBasis
 from upt_training.reduced.columns import Columns
 from upt_training.reduced.latent_graph import latent_graph
 from upt_training.reduced.make_prior import block_basis_of
-from upt_training.reduced.modes import Modes
+from upt_training.reduced.modes import Modes, linear_fields
 from upt_training.reduced.network import INPUTS, Correction
 from upt_training.reduced.prior import Prior, response_in_blocks, save_prior
 from upt_training.reduced.rollout import Limits
@@ -165,7 +165,7 @@ def self_check(folder: Path, mesh: Mesh, columns: Columns, model: Correction) ->
     vectors = np.tile(np.array([[6.0, -4.0, 6.9]], np.float32), (len(nodes), 1))
     field_ = runner.step(nodes, vectors)
     forces = runner.prior.forces(nodes, vectors)
-    exact = (forces.astype(np.float32) @ np.asarray(columns.columns)).reshape(-1, 3)
+    exact = linear_fields(columns, forces[None])[0].reshape(-1, 3)
     exact[nodes] = vectors
     error = float(np.sqrt(((field_ - exact) ** 2).sum(1).mean()))
     if not error < 0.05:

@@ -9,7 +9,7 @@ import numpy as np
 
 from upt_training.errors import InputError
 from upt_training.mesh_file import Mesh
-from upt_training.reduced.block_basis import BlockBasis, build_block_basis
+from upt_training.reduced.block_basis import BlockBasis, build_block_basis, response_fields
 from upt_training.reduced.columns import Columns
 from upt_training.reduced.patches import sample_forces
 from upt_training.reduced.prior import Prior, response_in_blocks
@@ -30,7 +30,7 @@ def block_basis_of(
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> tuple[BlockBasis, dict]:
     """Block basis for sampled patches and for `modes [r, 3K]` with their `amplitudes [r]` (mm)."""
-    forces = sample_forces(mesh, columns, max(1024, 3 * len(columns.contact_nodes)))
+    forces = sample_forces(mesh, columns, int(np.clip(3 * len(columns.contact_nodes), 1024, 4096)))
     return build_block_basis(mesh, columns, forces, modes, amplitudes, tolerance_mm, progress=progress)
 
 
@@ -54,7 +54,7 @@ def make_prior(
 def prior_error(mesh: Mesh, columns: Columns, prior: Prior, samples: int = 64, seed: int = 5) -> dict:
     """Error of a prior's block basis against the exact columns on fresh patches (10 mm pushes): RMS and largest, mm."""
     forces = sample_forces(mesh, columns, samples, seed=seed)
-    exact = (forces @ np.asarray(columns.columns)).reshape(samples, -1, 3)
+    exact = response_fields(mesh, columns, forces, np.arange(3 * mesh.node_count)).reshape(samples, -1, 3)
     found = prior.field(prior.coordinates(forces))
     error = np.linalg.norm(found - exact, axis=2)
     return {

@@ -62,7 +62,7 @@ def learn_modes(
     """Modes of frames drawn at random from every case; two sets of sampled frames stay within `memory_gib` each."""
     rng = np.random.default_rng(seed)
     pairs = [(source, case) for source in sources for case in source.cases]
-    width = sources[0].columns.columns.shape[1]
+    width = sources[0].width
     share = int(memory_gib * 2**30 / (4 * width * max(len(pairs), 1)))
     share = max(1, min(share, 48))
     shares = [min(share, case.frames - 1) for _, case in pairs]

@@ -61,6 +61,11 @@ class Source:
     cases: list[Case]
     transfer: scipy.sparse.csr_matrix | None = None
 
+    @property
+    def width(self) -> int:
+        """Degrees of freedom of the model's mesh, `3K`."""
+        return self.columns.columns.shape[1] if self.transfer is None else 3 * self.transfer.shape[0]
+
     def fields(self, case: Case, frames: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Linear response and displacement on the model's mesh, each `[n, 3K]` float32, mm."""
         picked = np.arange(case.frames) if frames is None else frames

@@ -40,6 +40,12 @@ pub enum LinearError {
     /// Prescribed displacements and nodes differ in number.
     #[error("{nodes} contact nodes but {vectors} contact vectors")]
     Count { nodes: usize, vectors: usize },
+    /// More natural modes than the mesh can have.
+    #[error("{asked} natural modes asked of {dofs} free degrees of freedom: ask for fewer than half as many")]
+    Modes { asked: usize, dofs: usize },
+    /// The iteration for the natural modes ended early.
+    #[error("{found} of {asked} natural modes converged: ask for fewer")]
+    NotConverged { asked: usize, found: usize },
     /// A sink of columns failed.
     #[error("writing compliance columns: {0}")]
     Sink(#[from] std::io::Error),

@@ -270,3 +270,54 @@ fn what_cannot_be_solved_is_named() {
         })
     ));
 }
+
+#[test]
+fn natural_modes_are_the_lowest_of_the_dense_problem() {
+    let (positions, tets) = block([2, 2, 4], 3.0);
+    let (mesh, held) = (mesh(&positions, &tets), base(&positions));
+    let lame = Lame::from_young(3000.0, 0.45).unwrap();
+    let stiffness = Stiffness::assemble(&mesh, &held, lame).unwrap();
+    let factor = Factor::new(&stiffness, &positions, 1).unwrap();
+    let found = natural_modes(&mesh, &stiffness, &factor, 1000.0, 6, &|| ()).unwrap();
+
+    // Density 1000 kg/m³ is 1e-6 kg/mm³.
+    let mut mass = vec![0.0; mesh.node_count()];
+    for tet in &tets {
+        for &node in tet {
+            mass[node as usize] += 0.25e-6 * crate::mesh::tet_volume(&positions, *tet);
+        }
+    }
+    let n = stiffness.dofs();
+    let root: Vec<f64> = (stiffness.free.nodes.iter())
+        .flat_map(|&node| [mass[node as usize].sqrt(); 3])
+        .collect();
+    let mut dense = vec![0.0; n * n];
+    for (column, values) in dense.chunks_exact_mut(n).enumerate() {
+        values[column] = root[column];
+        factor.solve(values);
+    }
+    let flexibility = faer::Mat::from_fn(n, n, |i, j| root[i] * dense[j * n + i]);
+    let values = flexibility
+        .self_adjoint_eigenvalues(faer::Side::Lower)
+        .unwrap();
+    for (mode, frequency) in found.frequency.iter().enumerate() {
+        let wanted = values[n - 1 - mode].powf(-0.5);
+        assert!(
+            (frequency / wanted - 1.0).abs() < 1e-6,
+            "mode {mode}: {frequency} rad/s, {wanted} by the dense solution"
+        );
+    }
+    let width = 3 * mesh.node_count();
+    for (a, first) in found.modes.chunks_exact(width).enumerate() {
+        assert!(held.iter().all(|&node| first[3 * node as usize] == 0.0));
+        for (b, second) in found.modes.chunks_exact(width).enumerate() {
+            let product: f64 = (0..width).map(|i| first[i] * mass[i / 3] * second[i]).sum();
+            let wanted = if a == b { 1.0 } else { 0.0 };
+            assert!((product - wanted).abs() < 1e-6, "{a}, {b}: {product}");
+        }
+    }
+    assert!(matches!(
+        natural_modes(&mesh, &stiffness, &factor, 1000.0, n, &|| ()),
+        Err(LinearError::Modes { .. })
+    ));
+}
