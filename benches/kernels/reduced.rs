@@ -83,7 +83,12 @@ pub fn contact() {
         for (&isa, factor) in sets.iter().zip(&mut factors) {
             let (a, dofs) = (&a, &dofs);
             rivals.push(Box::new(move || {
-                factor.factor(isa, a, n, dofs).expect("positive definite");
+                let fill = |upper: &mut [f64]| {
+                    for (to, &from) in upper.iter_mut().zip(a) {
+                        *to = f64::from(from);
+                    }
+                };
+                factor.factor(isa, dofs, fill).expect("positive definite");
             }));
         }
         let factor_seconds = medians(&mut rivals);

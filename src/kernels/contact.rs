@@ -1,6 +1,5 @@
-//! Contact forces of the linear-elastic prior: `f = A_CC^-1 c`, where `A_CC [3m,3m]` is gathered
-//! from the compliance `A` (mm/mN) at the degrees of freedom in contact and `c` is the displacement
-//! there (mm).
+//! Contact forces of the linear-elastic prior: `f = A_CC^-1 c`, where `A_CC [3m,3m]` is the part of the
+//! compliance `A` (mm/mN) at the degrees of freedom in contact and `c` is the displacement there (mm).
 //!
 //! Dense Cholesky `A_CC = U^T U` in f64, in place, upper triangle, row-major; blocks of rows are
 //! factored and then subtracted from the rest by a register-tiled product. f64 because neighbouring
@@ -74,43 +73,36 @@ impl ContactFactor {
         if self.ready { self.order } else { 0 }
     }
 
-    /// Gathers rows and columns `dofs` of `compliance [n,n]` and factors the block.
+    /// Factors the block of the degrees of freedom `dofs`: `fill` writes its upper triangle into `[3m,3m]` row-major, and is
+    /// called again where a Tikhonov term has to be added.
     ///
     /// # Errors
     /// See [`FactorError`]; there is no factor then ([`ContactFactor::order`] is 0).
-    ///
-    /// # Panics
-    /// If a dof is not below `n` or `compliance` is not `[n,n]`.
     pub fn factor(
         &mut self,
         isa: Isa,
-        compliance: &[f32],
-        n: usize,
         dofs: &[u32],
+        mut fill: impl FnMut(&mut [f64]),
     ) -> Result<FactorReport, FactorError> {
-        assert_eq!(compliance.len(), n * n, "compliance must be [n, n]");
         let order = dofs.len();
         self.ready = false;
         self.order = order;
         self.upper.resize(order * order, 0.0);
         self.right.resize(order, 0.0);
-        let mut mean = 0.0;
-        for &dof in dofs {
-            let value = compliance[dof as usize * (n + 1)];
-            if !(value > 0.0 && value.is_finite()) {
-                return Err(FactorError::Diagonal { dof, value });
-            }
-            mean += f64::from(value) / order as f64;
-        }
-        let mut term = 0.0;
+        let (mut term, mut mean) = (0.0, 0.0);
         for attempt in 0..ATTEMPTS {
-            for (i, &row) in dofs.iter().enumerate() {
-                let from = &compliance[row as usize * n..][..n];
-                let to = &mut self.upper[i * order..][..order];
-                for (to, &column) in to[i..].iter_mut().zip(&dofs[i..]) {
-                    *to = f64::from(from[column as usize]);
+            fill(&mut self.upper);
+            if attempt == 0 {
+                for (&dof, value) in dofs.iter().zip(self.upper.iter().step_by(order + 1)) {
+                    if !(*value > 0.0 && value.is_finite()) {
+                        let value = *value as f32;
+                        return Err(FactorError::Diagonal { dof, value });
+                    }
+                    mean += value / order as f64;
                 }
-                to[i] += term * mean;
+            }
+            for value in self.upper.iter_mut().step_by(order + 1) {
+                *value += term * mean;
             }
             let mut positive = true;
             factor_upper(isa, &mut self.upper, order, &mut positive);

@@ -28,6 +28,7 @@ pub struct ContactResponse {
     pub(super) columns: Vec<u32>,
     rows: Vec<u32>,
     values: Vec<f32>,
+    widened: Vec<f32>,
     pub(super) forces: Vec<f32>,
     // By column, zero between calls: sum of imposed displacements, how many, whether the column's own node is among them.
     sum: Vec<[f32; 3]>,
@@ -46,6 +47,7 @@ impl ContactResponse {
             columns: Vec::with_capacity(columns),
             rows: Vec::with_capacity(3 * columns),
             values: Vec::with_capacity(3 * columns),
+            widened: vec![0.0; 6 * table.widest_block()],
             forces: Vec::with_capacity(3 * columns),
             sum: vec![[0.0; 3]; columns],
             count: vec![0; columns],
@@ -107,12 +109,9 @@ impl ContactResponse {
             if !self.rows.is_empty() {
                 let made = self
                     .factor
-                    .factor(
-                        isa,
-                        &table.compliance,
-                        3 * table.contact_nodes.len(),
-                        &self.rows,
-                    )
+                    .factor(isa, &self.rows, |upper| {
+                        table.gather_compliance(&self.columns, upper, &mut self.widened);
+                    })
                     .map_err(|error| Error::bundle("prior.safetensors", error.to_string()))?;
                 self.regularised = made.regularised();
             }

@@ -2,6 +2,7 @@
 
 use half::f16;
 
+use super::compliance::{Bases, Compliance};
 use super::vibration::FreeVibration;
 use crate::bundle::{BundleFiles, Manifest, Mesh, PriorEntry, TensorFile};
 use crate::error::Result;
@@ -60,8 +61,7 @@ const REACH: f64 = 4.0;
 pub struct PriorTable {
     /// Nodes with compliance columns `[D]`, ascending.
     pub contact_nodes: Vec<u32>,
-    /// Compliance `[3D,3D]`, mm/mN.
-    pub compliance: Vec<f32>,
+    compliance: Compliance,
     block_nodes: Vec<u32>,
     block_offsets: Vec<u32>,
     rank_offsets: Vec<u32>,
@@ -106,13 +106,6 @@ impl PriorTable {
             return Err(file.bad("contact_nodes", "must not be empty"));
         }
         let dofs = 3 * contact_nodes.len();
-        let compliance = file.f32("compliance", &[Some(dofs), Some(dofs)])?;
-        if let Some(at) = (0..dofs).find(|&i| compliance[i * dofs + i] <= 0.0) {
-            return Err(file.bad(
-                "compliance",
-                format!("diagonal element {at} is not positive"),
-            ));
-        }
         let block_nodes = file.indices("block_nodes", &[Some(count)], count)?;
         let mut seen = vec![false; count];
         for (at, &node) in block_nodes.iter().enumerate() {
@@ -153,6 +146,10 @@ impl PriorTable {
             .zip(rank_offsets.windows(2))
             .map(|(nodes, ranks)| 3 * (nodes[1] - nodes[0]) * (ranks[1] - ranks[0]))
             .sum();
+        let places = basis_places(&block_nodes, &block_offsets, &rank_offsets);
+        let compliance = Compliance::read(file, contact_nodes.len(), |i| {
+            places[contact_nodes[i] as usize]
+        })?;
         let optional = |name: &str, shape: [usize; 2]| {
             if shape[1] > 0 {
                 file.float(name, &[Some(shape[0]), Some(shape[1])])
@@ -193,6 +190,23 @@ impl PriorTable {
     /// Length of `q`.
     pub fn width(&self) -> usize {
         self.rank_offsets.last().map_or(0, |&width| width as usize)
+    }
+
+    /// Writes the upper triangle of the compliance of `columns` (indices into `contact_nodes`, ascending) with themselves,
+    /// `[3m,3m]`, mm/mN. `scratch` is kept between calls.
+    pub fn gather_compliance(&self, columns: &[u32], upper: &mut [f64], scratch: &mut Vec<f32>) {
+        let bases = Bases {
+            basis: &self.basis,
+            response: &self.response,
+            width: self.width(),
+        };
+        self.compliance.gather(bases, columns, upper, scratch);
+    }
+
+    /// Largest rank of a block.
+    pub fn widest_block(&self) -> usize {
+        let ranks = self.rank_offsets.windows(2);
+        ranks.map(|pair| pair[1] - pair[0]).max().unwrap_or(0) as usize
     }
 
     /// The block-wise basis as the kernels take it.
@@ -245,7 +259,6 @@ impl PriorTable {
     /// Bytes held.
     pub fn memory_bytes(&self) -> usize {
         4 * (self.contact_nodes.len()
-            + self.compliance.len()
             + self.block_nodes.len()
             + self.block_offsets.len()
             + self.rank_offsets.len()
@@ -253,6 +266,7 @@ impl PriorTable {
             + self.force_to_z.len()
             + self.force_to_p.len()
             + self.nearest_column.len())
+            + self.compliance.memory_bytes()
             + self.in_domain.len()
             + self.basis.bytes()
             + self.response.bytes()
@@ -261,6 +275,24 @@ impl PriorTable {
                 .as_ref()
                 .map_or(0, FreeVibration::memory_bytes)
     }
+}
+
+/// By node: where its three rows in the basis start, where the coordinates of its block start, and how many.
+fn basis_places(
+    block_nodes: &[u32],
+    block_offsets: &[usize],
+    rank_offsets: &[usize],
+) -> Vec<(u32, u32, u32)> {
+    let mut places = vec![(0, 0, 0); block_nodes.len()];
+    let mut start = 0;
+    for (nodes, ranks) in block_offsets.windows(2).zip(rank_offsets.windows(2)) {
+        let rank = ranks[1] - ranks[0];
+        for &node in &block_nodes[nodes[0]..nodes[1]] {
+            places[node as usize] = (start as u32, ranks[0] as u32, rank as u32);
+            start += 3 * rank;
+        }
+    }
+    places
 }
 
 /// For each node the nearest of `contact_nodes` (ties: the smallest index), by a cell grid.
@@ -302,7 +334,7 @@ mod tests {
         (0..6).for_each(|i| compliance[7 * i] = 2.0);
         PriorTable {
             contact_nodes: vec![0, 1],
-            compliance,
+            compliance: Compliance::Whole(compliance),
             block_nodes: vec![0, 1, 2, 3],
             block_offsets: vec![0, 4],
             rank_offsets: vec![0, 8],

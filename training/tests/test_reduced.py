@@ -22,6 +22,7 @@ from upt_training.reduced.compare import compare
 from upt_training.reduced.domain import beside_domain, patches_of_domain
 from upt_training.reduced.evaluate import evaluate
 from upt_training.reduced.make_prior import make_prior, prior_error
+from upt_training.reduced.near import near_tensors
 from upt_training.reduced.network import Correction
 from upt_training.reduced.patches import sample_forces
 from upt_training.reduced.prior import load_prior, save_prior
@@ -114,6 +115,27 @@ def test_block_basis_error_follows_the_tolerance_and_half_precision_is_enough(ph
     assert errors[1] < 5e-3 and errors[1] < errors[0] and sizes[1] >= sizes[0]
     save_prior(tmp_path / "half.safetensors", prior, np.float16)
     assert prior_error(mesh, columns, load_prior(tmp_path / "half.safetensors"))["rms_mm"] < 1e-2
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float16])
+def test_far_compliance_comes_out_of_the_response(phantom, tmp_path, dtype):
+    mesh, columns, _ = phantom
+    prior, _ = make_prior(mesh, columns, tolerance_mm=1e-3)
+    points = mesh.positions[columns.contact_nodes].astype(np.float64)
+    near = near_tensors(prior.compliance, points, 15.0)
+    save_prior(tmp_path / "near.safetensors", prior, dtype, near)
+    save_prior(tmp_path / "whole.safetensors", prior, dtype)
+    assert (tmp_path / "near.safetensors").stat().st_size < (tmp_path / "whole.safetensors").stat().st_size
+    found, whole = load_prior(tmp_path / "near.safetensors"), load_prior(tmp_path / "whole.safetensors")
+    distance = np.linalg.norm(points[:, None] - points[None], axis=2)
+    apart = (found.compliance - whole.compliance).reshape(len(points), 3, len(points), 3)
+    assert np.abs(apart).max(axis=(1, 3))[distance <= 15.0].max() == 0.0
+    assert 0.0 < np.abs(apart).max() < 2e-3 * whole.compliance.max()
+    # Two patches at a time: one is inside the radius, the other is not.
+    rows = np.unique([*np.argsort(distance[0])[:4], *np.argsort(distance[-1])[:4]])
+    vectors = np.random.default_rng(1).normal(size=(len(rows), 3)) * [1.0, 1.0, 0.3] - [0.0, 0.0, 5.0]
+    fields = [p.linear_response(columns.contact_nodes[rows], vectors) for p in (found, whole)]
+    assert np.sqrt(((fields[0] - fields[1]) ** 2).sum(1).mean()) < 0.02
 
 
 def test_a_basis_made_in_parts_is_the_one_made_at_once(phantom):

@@ -71,6 +71,14 @@ def parser() -> argparse.ArgumentParser:
     variants.add_argument("--int8", action="store_true", help="dynamically quantised graphs")
     variants.add_argument("--out", type=Path, required=True, help="new folder")
 
+    transfer = commands.add_parser("transfer", help="a bundle's weights as a bundle of another mesh")
+    transfer.add_argument("bundle", type=Path)
+    transfer.add_argument("--mesh", type=Path, required=True)
+    transfer.add_argument("--prior", type=Path, help="linear response of that mesh")
+    transfer.add_argument("--vibration", type=Path, help="vibration tables of that mesh")
+    transfer.add_argument("--name", help="default: that of the folder")
+    transfer.add_argument("--out", type=Path, required=True, help="new folder")
+
     anchors = commands.add_parser("anchors", help="decode a bundle's correction at few nodes, interpolate the others")
     anchors.add_argument("bundle", type=Path, help="bundle folder, changed in place")
     anchors.add_argument("--spacing", type=float, required=True, help="least distance of two anchors, mm")
@@ -109,6 +117,10 @@ def main(arguments: list[str] | None = None) -> int:
             from upt_training.ablate import ablate_command
 
             return ablate_command(options)
+        if options.command == "transfer":
+            from upt_training.transfer import transfer_command
+
+            return transfer_command(options)
         if options.command == "anchors":
             from upt_training.anchors import anchors_command
 

@@ -14,6 +14,7 @@ from scipy.linalg import cho_factor, cho_solve
 
 from upt_training.dataset import map_safetensors
 from upt_training.errors import InputError
+from upt_training.reduced.near import whole_compliance
 
 DENSE_LIMIT = 1 << 30  # bytes of a dense table made by `restrict`
 
@@ -32,7 +33,6 @@ class PriorTable:
         tensors, _ = map_safetensors(Path(path))
         for name in (
             "contact_nodes",
-            "compliance",
             "block_nodes",
             "block_offsets",
             "rank_offsets",
@@ -46,7 +46,7 @@ class PriorTable:
         self.path, self.node_count = Path(path), node_count
         self.row = np.full(node_count, -1)
         self.row[tensors["contact_nodes"]] = np.arange(len(tensors["contact_nodes"]))
-        self.compliance = np.asarray(tensors["compliance"], np.float64)
+        self.compliance = whole_compliance(tensors, path).astype(np.float64)
         self.response_q = np.asarray(tensors["response"], np.float32)
         self.blocks = []
         basis, at = np.asarray(tensors["basis"], np.float32), 0

@@ -64,9 +64,14 @@ pub fn run(args: &Options) -> anyhow::Result<ExitCode> {
     } else {
         ProgressBar::new_spinner().with_message("solves with the factor")
     };
-    let found = natural_modes(&mesh, &stiffness, &factor, args.density, args.count, &|| {
-        bar.inc(1)
-    })?;
+    let found = natural_modes(
+        &mesh,
+        &stiffness,
+        &factor,
+        args.density,
+        args.count,
+        &|| bar.inc(1),
+    )?;
     let solves = bar.position();
     bar.finish_and_clear();
 

@@ -17,6 +17,7 @@ from upt_training.reduced.columns import load_columns
 from upt_training.reduced.compare import compare
 from upt_training.reduced.domain import beside_domain, patches_of_domain
 from upt_training.reduced.evaluate import evaluate, insert_table, table
+from upt_training.reduced.export import near_of
 from upt_training.reduced.make_prior import check_columns, make_prior, prior_error
 from upt_training.reduced.prior import load_prior, save_prior
 from upt_training.reduced.response_error import response_error
@@ -44,6 +45,9 @@ def add_build_arguments(whole: argparse.ArgumentParser) -> None:
     whole.add_argument("--response-modes", type=int, default=80)
     whole.add_argument("--tolerance", type=float, default=3e-3)
     whole.add_argument("--tables", choices=("f16", "f32"), default="f16")
+    whole.add_argument(
+        "--near-mm", type=float, help="keep the compliance of contact nodes this near only, the rest from the response"
+    )
     whole.add_argument("--hidden", type=int, default=256)
     whole.add_argument(
         "--updates", type=int, default=800, help="0: the ridge regressions alone, on every training case"
@@ -70,6 +74,9 @@ def arguments() -> argparse.ArgumentParser:
     prior.add_argument("--out", type=Path, required=True)
     prior.add_argument("--tolerance", type=float, default=3e-3, help="RMS truncation error of the block basis, mm")
     prior.add_argument("--tables", choices=("f16", "f32"), default="f16")
+    prior.add_argument(
+        "--near-mm", type=float, help="keep the compliance of contact nodes this near only, the rest from the response"
+    )
 
     whole = commands.add_parser("build", help="a reduced bundle: modes, training, tables, evaluation; resumes")
     add_build_arguments(whole)
@@ -108,13 +115,15 @@ def arguments() -> argparse.ArgumentParser:
     exact = commands.add_parser("response-error", help="L(c) of a bundle against exact columns of its mesh")
     exact.add_argument("--bundle", type=Path, required=True)
     exact.add_argument("--columns", type=Path, required=True, help="file of `upt prior`, of the domain or a part of it")
+    exact.add_argument("--sites", type=int, default=1, help="patches pushed at a time")
     return parser
 
 
 def run_prior(args: argparse.Namespace) -> None:
     mesh, columns = load_mesh(args.mesh), load_columns(args.columns)
     prior, info = make_prior(mesh, columns, args.tolerance, Progress("block basis"))
-    save_prior(args.out, prior, np.float16 if args.tables == "f16" else np.float32)
+    dtype = np.float16 if args.tables == "f16" else np.float32
+    save_prior(args.out, prior, dtype, near_of(mesh, prior, args.near_mm))
     error = prior_error(mesh, columns, load_prior(args.out))
     print(json.dumps({"file": str(args.out), "bytes": args.out.stat().st_size, "basis": info, "error": error}))
 
@@ -189,7 +198,7 @@ def run_domain(args: argparse.Namespace) -> None:
 def run_response_error(args: argparse.Namespace) -> None:
     mesh, columns = load_mesh(args.bundle / "mesh.safetensors"), load_columns(args.columns)
     check_columns(mesh, columns)
-    print(json.dumps(response_error(args.bundle, columns, mesh)))
+    print(json.dumps(response_error(args.bundle, columns, mesh, sites=args.sites)))
 
 
 COMMANDS = {

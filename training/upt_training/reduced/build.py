@@ -51,6 +51,7 @@ class Options:
     response_modes: int = 80
     tolerance_mm: float = 3e-3
     tables: str = "f16"
+    near_mm: float | None = None
     seeds: int = 1
     refit: bool = False
 
@@ -315,7 +316,9 @@ def finish(options: Options, settings: Settings, description: str, made: Prepare
         options.name, description, envelope_of(trainable(made.own) or made.cases, made.mesh), provenance
     )
     dtype = np.float16 if options.tables == "f16" else np.float32
-    manifest = write_reduced_bundle(options.out, made.mesh, made.columns, made.prior, model, limits, about, dtype)
+    manifest = write_reduced_bundle(
+        options.out, made.mesh, made.columns, made.prior, model, limits, about, dtype, options.near_mm
+    )
     tested = [case for case in made.own if case.split == "test" or case.scheme == "5"]
     result = evaluate(options.out, tested, Progress("evaluation")) if tested else {"reduced": {}}
     manifest["errors"] = {group: _published(e) for group, e in result["reduced"].items()}

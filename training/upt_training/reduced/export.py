@@ -24,6 +24,7 @@ from upt_training.reduced.columns import Columns
 from upt_training.reduced.latent_graph import latent_graph
 from upt_training.reduced.make_prior import block_basis_of
 from upt_training.reduced.modes import Modes, linear_fields
+from upt_training.reduced.near import near_tensors
 from upt_training.reduced.network import INPUTS, Correction
 from upt_training.reduced.prior import Prior, response_in_blocks, save_prior
 from upt_training.reduced.rollout import Limits
@@ -83,15 +84,20 @@ def write_reduced_bundle(
     limits: Limits,
     description: Description,
     table_dtype: type = np.float16,
+    near_mm: float | None = None,
 ) -> dict:
-    """Write the folder `out` (made beside it, then moved into place) and return its manifest."""
+    """Write the folder `out` (made beside it, then moved into place) and return its manifest.
+
+    With `near_mm` the compliance of contact nodes farther apart is left to the response (`near.py`).
+    """
     out = Path(out)
     staging = out.with_name(out.name + ".new")
     shutil.rmtree(staging, ignore_errors=True)
     staging.mkdir(parents=True)
     try:
         onnx.save(latent_graph(model.eval()), str(staging / "latent.onnx"))
-        save_prior(staging / "prior.safetensors", prior, table_dtype)
+        near = near_of(mesh, prior, near_mm)
+        save_prior(staging / "prior.safetensors", prior, table_dtype, near)
         mesh.save(staging / "mesh.safetensors")
         manifest = {
             "format": "upt-bundle",
@@ -130,6 +136,13 @@ def write_reduced_bundle(
     finally:
         shutil.rmtree(staging, ignore_errors=True)
     return manifest
+
+
+def near_of(mesh: Mesh, prior: Prior, near_mm: float | None) -> dict[str, np.ndarray] | None:
+    """The compressed compliance of a prior on its mesh; None where it stays whole."""
+    if near_mm is None:
+        return None
+    return near_tensors(prior.compliance, mesh.positions[prior.contact_nodes].astype(np.float64), near_mm)
 
 
 def listing(path: Path) -> dict:

@@ -15,6 +15,7 @@ from safetensors.numpy import save_file
 from upt_training.errors import InputError
 from upt_training.reduced.block_basis import BlockBasis
 from upt_training.reduced.columns import contact_forces, map_tensors, rows_of
+from upt_training.reduced.near import whole_compliance
 
 
 @dataclass
@@ -104,7 +105,7 @@ def trajectory_forces(
 def load_prior(path: Path | str) -> Prior:
     """Read a prior file into memory; raises `InputError` naming the missing tensor."""
     tensors, metadata = map_tensors(path)
-    names = ("contact_nodes", "compliance", "block_nodes", "block_offsets", "rank_offsets", "basis", "response")
+    names = ("contact_nodes", "block_nodes", "block_offsets", "rank_offsets", "basis", "response")
     for name in names:
         if name not in tensors:
             raise InputError(f"{path}: tensor {name!r} is missing; build it with `python -m upt_training.reduced`")
@@ -121,7 +122,7 @@ def load_prior(path: Path | str) -> Prior:
     empty = np.zeros((len(response), 0), np.float32)
     return Prior(
         np.array(tensors["contact_nodes"]),
-        np.array(tensors["compliance"]),
+        whole_compliance(tensors, path),
         basis,
         response,
         np.array(tensors.get("residual", np.zeros((0, response.shape[1]), np.float32))),
@@ -131,12 +132,17 @@ def load_prior(path: Path | str) -> Prior:
     )
 
 
-def save_prior(path: Path | str, prior: Prior, table_dtype: type = np.float16) -> None:
-    """Write a prior file; `basis` and `response` in `table_dtype` (float16 or float32), the rest float32."""
+def save_prior(
+    path: Path | str, prior: Prior, table_dtype: type = np.float16, near: dict[str, np.ndarray] | None = None
+) -> None:
+    """Write a prior file; `basis` and `response` in `table_dtype` (float16 or float32), the rest float32.
+
+    `near` (of `near_tensors`) takes the place of the whole compliance.
+    """
     basis = prior.basis
     tensors = {
         "contact_nodes": prior.contact_nodes.astype(np.int32),
-        "compliance": prior.compliance.astype(np.float32),
+        **(near or {"compliance": prior.compliance.astype(np.float32)}),
         "block_nodes": basis.block_nodes.astype(np.int32),
         "block_offsets": basis.block_offsets.astype(np.int32),
         "rank_offsets": basis.rank_offsets,

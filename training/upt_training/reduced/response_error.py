@@ -11,10 +11,12 @@ from upt_training.reduced.columns import Columns, contact_forces
 from upt_training.reduced.runner import ReducedRunner
 
 
-def response_error(folder: Path, exact: Columns, mesh: Mesh, samples: int = 24, seed: int = 5) -> dict[str, float]:
+def response_error(
+    folder: Path, exact: Columns, mesh: Mesh, samples: int = 24, seed: int = 5, sites: int = 1
+) -> dict[str, float]:
     """Error of the bundle's `L(c)` against columns of its own mesh on patches pushed as one by 10 mm, mm.
 
-    `exact` may hold columns of a part of the domain only: patches are drawn there.
+    `exact` may hold columns of a part of the domain only: patches are drawn there, `sites` of them at a time.
     """
     runner = ReducedRunner(folder)
     runner.correct = False
@@ -22,11 +24,15 @@ def response_error(folder: Path, exact: Columns, mesh: Mesh, samples: int = 24, 
     points = mesh.positions[exact.contact_nodes].astype(np.float64)
     square, truth, largest = 0.0, 0.0, 0.0
     for _ in range(samples):
-        centre = points[rng.integers(len(points))]
-        distance = np.linalg.norm(points - centre, axis=1)
-        rows = np.flatnonzero(distance <= np.sqrt(rng.uniform(60.0, 280.0) / np.pi))
-        direction = rng.normal(size=3)
-        vectors = np.tile(10.0 * direction / np.linalg.norm(direction), (len(rows), 1)).astype(np.float32)
+        pushed = np.zeros_like(points)
+        for _ in range(sites):
+            centre = points[rng.integers(len(points))]
+            distance = np.linalg.norm(points - centre, axis=1)
+            direction = rng.normal(size=3)
+            near = distance <= np.sqrt(rng.uniform(60.0, 280.0) / np.pi)
+            pushed[near] = 10.0 * direction / np.linalg.norm(direction)
+        rows = np.flatnonzero(pushed.any(axis=1))
+        vectors = pushed[rows].astype(np.float32)
         forces = contact_forces(exact.compliance, rows, vectors).ravel().astype(np.float32)
         dofs = (3 * rows[:, None] + np.arange(3)).ravel()
         field = (forces @ exact.columns[dofs]).reshape(-1, 3)

@@ -41,7 +41,9 @@ pub enum LinearError {
     #[error("{nodes} contact nodes but {vectors} contact vectors")]
     Count { nodes: usize, vectors: usize },
     /// More natural modes than the mesh can have.
-    #[error("{asked} natural modes asked of {dofs} free degrees of freedom: ask for fewer than half as many")]
+    #[error(
+        "{asked} natural modes asked of {dofs} free degrees of freedom: ask for fewer than half as many"
+    )]
     Modes { asked: usize, dofs: usize },
     /// The iteration for the natural modes ended early.
     #[error("{found} of {asked} natural modes converged: ask for fewer")]
