@@ -22,6 +22,7 @@ from upt_training.reduced.compare import compare
 from upt_training.reduced.domain import beside_domain, patches_of_domain
 from upt_training.reduced.evaluate import evaluate
 from upt_training.reduced.make_prior import make_prior, prior_error
+from upt_training.reduced.modes import Modes
 from upt_training.reduced.near import near_tensors
 from upt_training.reduced.network import Correction
 from upt_training.reduced.patches import sample_forces
@@ -29,11 +30,11 @@ from upt_training.reduced.prior import load_prior, save_prior
 from upt_training.reduced.response_error import response_error
 from upt_training.reduced.rollout import Limits, drive_of, rollout, rollout_from_rest, true_limits
 from upt_training.reduced.runner import ReducedRunner
-from upt_training.reduced.states import load_states
+from upt_training.reduced.states import load_states, project_cases
 from upt_training.reduced.sweep import floor, sweep
 from upt_training.reduced.train import Settings
 from upt_training.reduced.trajectories import open_dataset
-from upt_training.reduced.transfer import interpolation
+from upt_training.reduced.transfer import Source, interpolation
 
 
 @pytest.fixture(scope="module")
@@ -189,6 +190,22 @@ def test_interpolation_between_meshes_is_exact_for_linear_fields():
     field = coarse.positions @ gradient
     assert np.abs(weights @ field - fine.positions @ gradient).max() < 1e-3
     assert np.abs(np.asarray(weights.sum(axis=1)) - 1.0).max() < 1e-5
+
+
+def test_states_of_another_meshs_cases_are_those_of_the_moved_fields(phantom, tmp_path):
+    mesh, columns, _ = phantom
+    fine = box_mesh(cells=(9, 8, 6), spacing_mm=6.5)
+    write_dataset(mesh, columns, tmp_path / "coarse", 2)
+    source = Source(columns, open_dataset(tmp_path / "coarse", mesh.sha256), interpolation(mesh, fine))
+    rng = np.random.default_rng(2)
+    modes = Modes(rng.normal(size=(5, source.width)), np.ones(5), rng.normal(size=(4, source.width)), np.ones(4))
+    states = project_cases(source, modes)
+    for at, case in enumerate(source.cases):
+        linear, field = source.fields(case)
+        assert np.allclose(states.b[at], (field - linear) @ modes.residual.T, atol=1e-3)
+        assert np.allclose(states.z[at], linear @ modes.response.T, atol=1e-3)
+        assert np.allclose(states.response_norm[at] ** 2, (linear**2).sum(1), rtol=1e-4, atol=1e-6)
+        assert np.allclose(states.field_square[at], (field**2).sum(1), rtol=1e-4, atol=1e-6)
 
 
 def test_columns_of_another_mesh_are_refused(phantom):

@@ -145,8 +145,10 @@ def main(arguments: list[str] | None = None) -> int:
     except InputError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
-    save_file(tensors, str(options.out))
-    options.out.chmod(0o644)
+    partial = options.out.with_suffix(".partial")
+    save_file(tensors, str(partial))
+    partial.chmod(0o644)
+    partial.rename(options.out)
     hertz = tensors["frequency"] / (2 * np.pi)
     print(json.dumps({"file": str(options.out), "modes": len(hertz), "hertz": [hertz[0], hertz[-1]],
                       "lost_in_block_coordinates": lost}, default=float))  # fmt: skip

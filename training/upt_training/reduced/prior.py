@@ -154,12 +154,14 @@ def save_prior(
         tensors["force_to_z"] = prior.force_to_z.astype(np.float32)
         tensors["force_to_p"] = prior.force_to_p.astype(np.float32)
     metadata = {"format": "upt-prior", "version": "1", **prior.metadata}
+    partial = Path(path).with_suffix(".partial")
     save_file(
         {name: np.ascontiguousarray(tensor) for name, tensor in tensors.items()},
-        str(path),
+        str(partial),
         metadata={key: str(value) for key, value in metadata.items()},
     )
-    Path(path).chmod(0o644)
+    partial.chmod(0o644)
+    partial.rename(path)
 
 
 def response_in_blocks(columns: np.ndarray, basis: BlockBasis, chunk: int = 64) -> np.ndarray:

@@ -76,33 +76,29 @@ def project_cases(
     modes: Modes,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> States:
-    """Every frame of a source's cases in reduced coordinates."""
+    """Every frame of a source's cases in reduced coordinates, computed on the cases' own mesh."""
     cases = source.cases
+    residual_modes, response_modes = source.adjoint(modes.residual), source.adjoint(modes.response)
     frames = cases[0].frames
     collected: dict[str, list] = {name: [] for name in _PER_CASE}
     for index, case in enumerate(cases):
-        linear, field = source.fields(case)
+        linear, field = source.own_fields(case)
         jump = np.zeros(frames, np.float32)
-        jump[1:] = np.sqrt([np.dot(d, d) for d in (b - a for a, b in zip(linear[:-1], linear[1:], strict=True))])
-        collected["field_square"].append(_squares(field))
+        jump[1:] = np.sqrt(source.squares(np.diff(linear, axis=0)))
+        collected["field_square"].append(source.squares(field))
         residual = field - linear
-        collected["b"].append(residual @ modes.residual.T)
-        collected["z"].append(linear @ modes.response.T)
-        collected["p"].append(linear @ modes.residual.T)
+        collected["b"].append(residual @ residual_modes.T)
+        collected["z"].append(linear @ response_modes.T)
+        collected["p"].append(linear @ residual_modes.T)
         collected["contact"].append(case.in_contact())
         collected["changed"].append(case.set_changed())
         collected["push"].append(case.largest_push().astype(np.float32))
-        collected["response_norm"].append(np.sqrt(_squares(linear)).astype(np.float32))
+        collected["response_norm"].append(np.sqrt(source.squares(linear)).astype(np.float32))
         collected["response_jump"].append(jump)
-        collected["residual_square"].append(_squares(residual))
+        collected["residual_square"].append(source.squares(residual))
         collected["scheme"].append(case.scheme)
         collected["split"].append(case.split)
         collected["source"].append(case.path.name)
         progress(index + 1, len(cases))
     arrays = {name: np.array(values) for name, values in collected.items()}
     return States(**arrays, nodes=np.array(modes.residual.shape[1] // 3))
-
-
-def _squares(fields_: np.ndarray) -> np.ndarray:
-    """Squared norm of each row, float64."""
-    return np.array([np.dot(row, row) for row in fields_], np.float64)

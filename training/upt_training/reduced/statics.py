@@ -71,21 +71,21 @@ def project_statics(
     modes: Modes,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Statics:
-    """Every equilibrium of a source's cases."""
+    """Every equilibrium of a source's cases, computed on the cases' own mesh."""
     parts = []
+    residual_modes, response_modes = source.adjoint(modes.residual), source.adjoint(modes.response)
     for index, case in enumerate(source.cases):
         frames = np.arange(1, case.frames)
-        linear, field = source.fields(case, frames)
+        linear, field = source.own_fields(case, frames)
         residual = field - linear
-        squares = [np.array([np.dot(row, row) for row in rows], np.float64) for rows in (linear, residual)]
         parts.append(
             Statics(
-                b=residual @ modes.residual.T,
-                z=linear @ modes.response.T,
-                p=linear @ modes.residual.T,
+                b=residual @ residual_modes.T,
+                z=linear @ response_modes.T,
+                p=linear @ residual_modes.T,
                 push=case.largest_push()[1:].astype(np.float32),
-                response_norm=np.sqrt(squares[0]).astype(np.float32),
-                residual_square=squares[1],
+                response_norm=np.sqrt(source.squares(linear)).astype(np.float32),
+                residual_square=source.squares(residual),
                 scheme=np.repeat(case.scheme, len(frames)),
                 source=np.repeat(case.path.name, len(frames)),
                 site=sites_of(case),

@@ -7,6 +7,7 @@ interpolated, they add contact sites to the training of a fine model.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse
@@ -66,17 +67,37 @@ class Source:
         """Degrees of freedom of the model's mesh, `3K`."""
         return self.columns.columns.shape[1] if self.transfer is None else 3 * self.transfer.shape[0]
 
-    def fields(self, case: Case, frames: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """Linear response and displacement on the model's mesh, each `[n, 3K]` float32, mm."""
+    def own_fields(self, case: Case, frames: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Linear response and displacement on the trajectory's own mesh, each `[n, 3K_own]` float32, mm."""
         picked = np.arange(case.frames) if frames is None else frames
         linear = linear_fields(self.columns, case.forces(self.columns)[picked])
-        field = np.asarray(case.displacement[picked], np.float32).reshape(len(picked), -1)
-        return self._moved(linear), self._moved(field)
+        return linear, np.asarray(case.displacement[picked], np.float32).reshape(len(picked), -1)
 
-    def _moved(self, fields: np.ndarray) -> np.ndarray:
+    def fields(self, case: Case, frames: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Linear response and displacement on the model's mesh, each `[n, 3K]` float32, mm."""
+        linear, field = self.own_fields(case, frames)
         if self.transfer is None:
-            return fields
-        count = len(fields)
-        by_node = fields.reshape(count, -1, 3).transpose(1, 0, 2).reshape(self.transfer.shape[1], -1)
-        out = (self.transfer @ by_node).reshape(-1, count, 3).transpose(1, 0, 2)
-        return np.ascontiguousarray(out).reshape(count, -1)
+            return linear, field
+        return node_product(self.transfer, linear), node_product(self.transfer, field)
+
+    def adjoint(self, modes: np.ndarray) -> np.ndarray:
+        """Modes `[r, 3K]` as `[r, 3K_own]`, whose products with own fields are those of the modes with moved fields."""
+        return modes if self.transfer is None else node_product(self.transfer.T.tocsr(), modes)
+
+    def squares(self, fields: np.ndarray) -> np.ndarray:
+        """Squared norm on the model's mesh of each of own `fields [n, 3K_own]`, float64."""
+        other = fields if self.transfer is None else node_product(self._gram, fields)
+        return np.array([np.dot(a, b) for a, b in zip(fields, other, strict=True)], np.float64)
+
+    @cached_property
+    def _gram(self) -> scipy.sparse.csr_matrix:
+        assert self.transfer is not None
+        return (self.transfer.T @ self.transfer).tocsr()
+
+
+def node_product(matrix: scipy.sparse.csr_matrix, fields: np.ndarray) -> np.ndarray:
+    """`matrix [K', K]` applied to every axis of `fields [n, 3K]`: `[n, 3K']`."""
+    count = len(fields)
+    by_node = fields.reshape(count, -1, 3).transpose(1, 0, 2).reshape(matrix.shape[1], -1)
+    out = (matrix @ by_node).reshape(-1, count, 3).transpose(1, 0, 2)
+    return np.ascontiguousarray(out).reshape(count, -1)
