@@ -42,9 +42,9 @@ make "$work/brain-fine-reduced/bundle.json" "$python" -m upt_training.reduced bu
     --coarse-mesh "$middle" --coarse-columns "$work/middle.columns.safetensors" "${data[@]}" --near-mm 20 \
     --work "$work/build" --out "$work/brain-fine-reduced" --name brain-fine-reduced \
     --updates 1200 --hidden 192 --weight-decay 0.1 --quadratic-modes 24 --quadratic-ridge 0.1 --refit
-make "$work/fine.prior.safetensors" "$python" -m upt_training.reduced prior --mesh "$mesh" --columns "$columns" \
-    --near-mm 20 --out "$work/fine.prior.safetensors"
+# The reduced bundle's response tables serve the other kind too.
+prior=$work/brain-fine-reduced/prior.safetensors
 make "$work/fine.vibration.safetensors" "$python" -m upt_training.vibration --mesh "$mesh" \
-    --prior "$work/fine.prior.safetensors" --natural "$work/fine.modes.safetensors" --out "$work/fine.vibration.safetensors"
+    --prior "$prior" --natural "$work/fine.modes.safetensors" --out "$work/fine.vibration.safetensors"
 make "$work/brain-fine/bundle.json" "$python" -m upt_training transfer onnx/brain-fast --mesh "$mesh" \
-    --prior "$work/fine.prior.safetensors" --vibration "$work/fine.vibration.safetensors" --out "$work/brain-fine"
+    --prior "$prior" --vibration "$work/fine.vibration.safetensors" --out "$work/brain-fine"

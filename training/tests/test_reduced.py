@@ -178,6 +178,8 @@ def test_a_model_from_another_meshs_cases_alone(phantom, tmp_path):
         coarse_data=[tmp_path / "coarse"],
     )
     build(options, Settings(updates=0, hidden=8, quadratic_modes=4), "from coarse cases")
+    areas = json.loads((options.out / "bundle.json").read_text())["envelope"]["contact_area_mm2"]
+    assert 0.0 < areas[0] < areas[1] < 1.25 * mesh.node_areas()[mesh.domain_nodes].sum()
     write_dataset(fine, fine_columns, tmp_path / "data", 4)
     errors = evaluate(options.out, open_dataset(tmp_path / "data", fine.sha256))
     assert errors["reduced"]["schemes_1_4"]["mse_mm2"] < errors["prior"]["schemes_1_4"]["mse_mm2"]

@@ -262,6 +262,27 @@ def envelope_of(cases: list[Case], mesh: Mesh) -> dict:
     }
 
 
+def area_on(area_mm2: float, spacing_mm: float, other_mm: float) -> float:
+    """Nodal area of a patch on a mesh of spacing `other_mm` that has `area_mm2` at `spacing_mm`.
+
+    The nodes' areas reach half a spacing beyond the patch, which is taken as round.
+    """
+    radius = np.sqrt(area_mm2 / np.pi) + (other_mm - spacing_mm) / 2.0
+    return float(np.pi * max(radius, other_mm / 2.0) ** 2)
+
+
+def envelope(options: Options, made: Prepared) -> dict:
+    """What the training cases cover; those of another mesh where there are no own ones, their areas sampled anew."""
+    own = trainable(made.own)
+    if own or options.coarse_mesh is None:
+        return envelope_of(own or made.cases, made.mesh)
+    other = load_mesh(options.coarse_mesh)
+    covered = envelope_of(made.cases, other)
+    spacings = [np.sqrt(mesh.node_areas()[mesh.domain_nodes].mean()) for mesh in (other, made.mesh)]
+    covered["contact_area_mm2"] = [round(area_on(area, *spacings), 1) for area in covered["contact_area_mm2"]]
+    return covered
+
+
 @dataclass
 class Prepared:
     """What does not depend on the correction: meshes, cases, modes, states and tables."""
@@ -312,9 +333,7 @@ def finish(options: Options, settings: Settings, description: str, made: Prepare
         "date": datetime.now(UTC).strftime("%Y-%m-%d"),
         "command": "python -m upt_training.reduced build",
     }
-    about = Description(
-        options.name, description, envelope_of(trainable(made.own) or made.cases, made.mesh), provenance
-    )
+    about = Description(options.name, description, envelope(options, made), provenance)
     dtype = np.float16 if options.tables == "f16" else np.float32
     manifest = write_reduced_bundle(
         options.out, made.mesh, made.columns, made.prior, model, limits, about, dtype, options.near_mm
