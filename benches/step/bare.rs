@@ -1,21 +1,25 @@
 //! A loop without any of the library's work, timed between two steps: its own tail is the machine's, not the library's.
 //!
-//! For a step that is bound by the processor it runs in registers, about as long as the step. For a reduced bundle, whose step
-//! mostly reads tables, it reads as many bytes of the same tables on one thread: what others on the machine do to the
-//! shared cache and memory meets both.
+//! For a step that is bound by the processor it is a matrix product in cache, about as long as the step: a neighbour on the
+//! same core takes from its throughput as from the step's. (A chain of dependent operations in registers would not notice.)
+//! For a reduced bundle, whose step mostly reads tables, it reads as many bytes of the same tables: what others do to
+//! the shared cache and memory meets both. Both run on one thread.
 
 use std::hint::black_box;
 use std::time::Instant;
 
+use upt::kernels::Isa;
+use upt::kernels::decoder::probe::GemmProbe;
 use upt::kernels::rows::Stored;
 use upt::prior::PriorTable;
 
-/// Longest loop in registers, ms: beyond it the tail of a step is long against any neighbour's slice.
+/// Longest product, ms: beyond it the tail of a step is long against any neighbour's slice.
 const LONGEST_MS: f64 = 5.0;
 
 pub enum BareLoop<'a> {
-    Registers {
-        turns: u64,
+    Product {
+        probe: GemmProbe,
+        turns: usize,
     },
     Reading {
         tables: [Stored<'a>; 2],
@@ -24,14 +28,18 @@ pub enum BareLoop<'a> {
 }
 
 impl<'a> BareLoop<'a> {
-    /// A loop in registers of `ms` on this core.
-    pub fn in_registers(ms: f64) -> Self {
-        const TRIAL: u64 = 200_000;
-        let trial = Self::Registers { turns: TRIAL };
+    /// Products of `ms` on this core.
+    pub fn product(ms: f64) -> Self {
+        const TRIAL: usize = 100;
+        let mut trial = Self::Product {
+            probe: GemmProbe::default(),
+            turns: TRIAL,
+        };
         let fastest = (0..5).map(|_| trial.run()).fold(f64::INFINITY, f64::min);
         let turns = (TRIAL as f64 * ms.min(LONGEST_MS) / fastest).max(1.0);
-        Self::Registers {
-            turns: turns as u64,
+        Self::Product {
+            probe: GemmProbe::default(),
+            turns: turns as usize,
         }
     }
 
@@ -46,21 +54,20 @@ impl<'a> BareLoop<'a> {
     /// Name for a row.
     pub fn name(&self) -> &'static str {
         match self {
-            Self::Registers { .. } => "a bare loop taking turns with it",
+            Self::Product { .. } => "a matrix product taking turns with it",
             Self::Reading { .. } => "a loop that reads its tables, taking turns with it",
         }
     }
 
     /// Runs it once; wall time, ms.
-    pub fn run(&self) -> f64 {
+    pub fn run(&mut self) -> f64 {
         let start = Instant::now();
         match self {
-            Self::Registers { turns } => {
-                let mut x = black_box(0.5f32);
+            Self::Product { probe, turns } => {
+                let isa = Isa::detect();
                 for _ in 0..*turns {
-                    x = x * 0.999 + 0.001;
+                    black_box(probe.run(isa));
                 }
-                black_box(x);
             }
             Self::Reading { tables, bytes } => {
                 let mut left = *bytes;

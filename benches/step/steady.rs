@@ -55,7 +55,7 @@ pub fn measure(
             let table = table.filter(|_| scene.model().info().kind == Kind::Reduced);
             let idle = idle.get_or_insert_with(|| match (table, cost.of_step(scene, region)) {
                 (Some(table), Some([_, bytes])) => BareLoop::over_tables(table, bytes),
-                _ => BareLoop::in_registers(ms),
+                _ => BareLoop::product(ms),
             });
             bare.push(idle.run());
         }

@@ -51,7 +51,7 @@ impl Tail {
             slowest.iter().map(pick).sum::<f64>() / slowest.len() as f64
         };
         let mut text = format!(
-            "slowest {} of {} steps: +{:.3} ms over the median of {middle:.3}",
+            "slowest {} of {} steps: {:+.3} ms over the median of {middle:.3}",
             slowest.len(),
             self.steps.len(),
             mean(&|step| step.0) - middle
@@ -60,7 +60,7 @@ impl Tail {
             let usual = median(&mut self.steps.iter().map(|step| step.1[at]).collect::<Vec<_>>());
             let excess = mean(&|step| step.1[at]) - usual;
             if excess.abs() > 0.01 * middle {
-                text += &format!(", {name} +{excess:.3}");
+                text += &format!(", {name} {excess:+.3}");
             }
         }
         text
