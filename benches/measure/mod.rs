@@ -165,12 +165,13 @@ pub fn init_library() {
     .expect("first call");
 }
 
-/// The bundles in `onnx/` and in the folder that `UPT_BENCH_BUNDLES` names.
+/// The bundles in `onnx/` and in the folders that `UPT_BENCH_BUNDLES` and `UPT_LARGE_BUNDLES` name.
 pub fn bundles() -> Vec<PathBuf> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let folders = [
         Some(root.join("onnx")),
         std::env::var_os("UPT_BENCH_BUNDLES").map(PathBuf::from),
+        std::env::var_os("UPT_LARGE_BUNDLES").map(PathBuf::from),
     ];
     let mut bundles: Vec<PathBuf> = folders
         .iter()

@@ -2,7 +2,8 @@
 //!
 //! `cargo bench --bench step` runs every bundle in `onnx/` and in the folder that `UPT_BENCH_BUNDLES` names. A bundle that
 //! carries `paper_encoder.onnx` and `paper_decoder.onnx` is also run through ONNX Runtime as the paper splits it, with
-//! the same weights and threads; `cargo bench --bench step -- reduced` runs the bundles with that name only. `UPT_FINE_MESH=FILE` adds steps on that mesh for bundles without a prior.
+//! the same weights and threads; `cargo bench --bench step -- reduced` runs the bundles with that name only. `UPT_FINE_MESH=FILE` adds steps on that mesh for bundles without a prior;
+//! those with one have bundles of their own there (`training/scripts/large_mesh.sh WORK ...`, then `UPT_LARGE_BUNDLES=WORK`).
 
 mod bare;
 mod cost;
@@ -87,12 +88,22 @@ fn run(path: &Path, machine: &floor::Machine) -> upt::Result<()> {
     Ok(())
 }
 
+/// Nodes from which a mesh counts as the large one (150,140 nodes, `training/scripts/large_mesh.sh`).
+const LARGE: u64 = 100_000;
+
 /// Bar and goal of a step, ms, for what ships. Random weights have neither.
 fn limits(model: &Model, threads: usize, surface: bool) -> (Option<f64>, Option<f64>) {
     if threads == 1 || !model.manifest.name.starts_with("brain-") {
         return (None, None);
     }
-    match (model.info().kind, surface) {
+    let info = model.info();
+    if info.node_count >= LARGE {
+        return match (info.kind, surface) {
+            (Kind::Reduced, true) => (Some(6.0), Some(2.0)),
+            _ => (None, None),
+        };
+    }
+    match (info.kind, surface) {
         (Kind::Reduced, false) => (Some(3.0), Some(1.0)),
         (Kind::Reduced, true) => (Some(1.5), Some(0.4)),
         (Kind::Upt, false) => (Some(10.0), Some(5.0)),
