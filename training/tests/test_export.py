@@ -108,7 +108,8 @@ def test_evaluate_reports_the_papers_metrics(bundle, data, tmp_path):
     assert table["bundle"]["mse_mm2"]["mean"] < 0.6 * table["zero"]["mse_mm2"]["mean"]
     assert table["bundle"]["mse_mm2"]["min"] <= table["bundle"]["mse_mm2"]["mean"] <= table["bundle"]["mse_mm2"]["max"]
     f32, int8 = (results[p]["all"]["bundle"]["mse_mm2"]["mean"] for p in ("f32", "int8"))
-    assert abs(f32 - int8) < 0.1 * f32  # a tiny network: one part in a million of its training moves this by a hundredth
+    # A tiny network: one part in a million of its training moves this by a hundredth.
+    assert abs(f32 - int8) < 0.1 * f32
 
 
 def test_evaluate_without_a_case_is_an_error(bundle, data, tmp_path, capsys):
