@@ -2,10 +2,10 @@
 //!
 //! Writes `columns [3D,3K]` (mm/mN, the field of a unit force at each contact degree of freedom),
 //! `compliance [3D,3D]` and `contact_nodes [D]` as one safetensors file, streamed: memory is the
-//! sparse factor and one batch of columns. `python -m upt_training.reduced` builds bundles from it.
+//! sparse factor and one batch of columns. An interrupted run leaves its columns in `*.partial`, and the same command goes on there. `python -m upt_training.reduced` builds bundles from it.
 
 use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::io::{BufReader, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
@@ -14,7 +14,7 @@ use anyhow::{Context, bail};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
-use tissue::linear::{Factor, Lame, Stiffness, compliance_columns};
+use tissue::linear::{Factor, Lame, Stiffness, remaining_columns};
 use tissue::mesh::{Boundary, Mesh};
 
 /// Options of `upt prior`.
@@ -91,6 +91,63 @@ pub fn floats(values: impl Iterator<Item = f32>) -> Vec<u8> {
     values.flat_map(f32::to_le_bytes).collect()
 }
 
+/// A file of columns that is being written.
+struct Partial {
+    path: PathBuf,
+    head: usize,
+    /// Columns that are there, whole batches.
+    done: usize,
+    out: BufWriter<File>,
+}
+
+impl Partial {
+    /// Opens the file behind its last whole batch if it begins with `head`; begins it anew otherwise. `row` is in bytes.
+    fn open(
+        path: &Path,
+        head: &[u8],
+        row: usize,
+        rows: usize,
+        batch: usize,
+    ) -> std::io::Result<Self> {
+        let mut file = File::options()
+            .read(true)
+            .write(true)
+            .create(true)
+            .truncate(false)
+            .open(path)?;
+        let length = file.metadata()?.len() as usize;
+        let mut found = vec![0; head.len().min(length)];
+        file.read_exact(&mut found)?;
+        let done = if found == head {
+            (length - head.len()) / (row * batch.max(1)) * batch.max(1)
+        } else {
+            0
+        };
+        let done = done.min(rows);
+        if done == 0 {
+            file.set_len(0)?;
+            file.rewind()?;
+            file.write_all(head)?;
+        } else {
+            file.set_len((head.len() + done * row) as u64)?;
+            file.seek(SeekFrom::End(0))?;
+        }
+        Ok(Self {
+            path: path.into(),
+            head: head.len(),
+            done,
+            out: BufWriter::with_capacity(1 << 22, file),
+        })
+    }
+
+    /// Reads the columns from the first on.
+    fn reader(&self) -> std::io::Result<BufReader<File>> {
+        let mut file = File::open(&self.path)?;
+        file.seek(SeekFrom::Start(self.head as u64))?;
+        Ok(BufReader::with_capacity(1 << 22, file))
+    }
+}
+
 /// Runs the command.
 pub fn run(args: &Options) -> anyhow::Result<ExitCode> {
     let mesh = Mesh::read(&args.mesh)?;
@@ -122,19 +179,25 @@ pub fn run(args: &Options) -> anyhow::Result<ExitCode> {
         "format": "upt-compliance", "version": "1", "mesh_name": mesh.name, "mesh_sha256": mesh.hash(),
         "boundary": args.boundary.as_str(), "young_pa": args.young.to_string(), "poisson": args.poisson.to_string(),
     });
-    let temporary = args.out.with_extension("partial");
-    let file = File::create(&temporary)
-        .with_context(|| format!("{}: cannot be created", temporary.display()))?;
-    let mut out = BufWriter::with_capacity(1 << 22, file);
     // The compliance block is known last, so it follows the columns.
-    out.write_all(&header(
+    let head = header(
         &[
             ("columns", "F32", [rows, width]),
             ("compliance", "F32", [rows, rows]),
             ("contact_nodes", "I32", [nodes.len(), 1]),
         ],
         metadata,
-    ))?;
+    );
+    let temporary = args.out.with_extension("partial");
+    let mut partial = Partial::open(&temporary, &head, 4 * width, rows, args.batch)
+        .with_context(|| format!("{}: cannot be opened", temporary.display()))?;
+    let done = partial.done;
+    if done > 0 && !args.json {
+        eprintln!(
+            "{}: {done} of {rows} columns are there",
+            temporary.display()
+        );
+    }
     let bar = if args.json {
         ProgressBar::hidden()
     } else {
@@ -144,12 +207,28 @@ pub fn run(args: &Options) -> anyhow::Result<ExitCode> {
         "{bar:40} {pos}/{len} columns, {eta} left",
     )?);
     let started = Instant::now();
-    let compliance =
-        compliance_columns(&stiffness, &factor, &nodes, args.batch, |first, fields| {
-            out.write_all(&floats(fields.iter().copied()))?;
+    let mut bytes = vec![0; 4 * width];
+    let mut source = partial.reader()?;
+    let compliance = remaining_columns(
+        &stiffness,
+        &factor,
+        &nodes,
+        args.batch,
+        done,
+        |_, row| {
+            source.read_exact(&mut bytes)?;
+            for (value, chunk) in row.iter_mut().zip(bytes.as_chunks().0) {
+                *value = f32::from_le_bytes(*chunk);
+            }
+            Ok(())
+        },
+        |first, fields| {
+            partial.out.write_all(&floats(fields.iter().copied()))?;
             bar.set_position((first + fields.len() / width) as u64);
             Ok(())
-        })?;
+        },
+    )?;
+    let mut out = partial.out;
     bar.finish_and_clear();
     let solve_seconds = started.elapsed().as_secs_f64();
     out.write_all(&floats(compliance.block.iter().map(|&a| a as f32)))?;

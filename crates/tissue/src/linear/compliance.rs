@@ -24,6 +24,25 @@ pub fn compliance_columns(
     factor: &Factor,
     nodes: &[u32],
     batch: usize,
+    sink: impl FnMut(usize, &[f32]) -> Result<(), LinearError>,
+) -> Result<Compliance, LinearError> {
+    let none = |_, _: &mut [f32]| Ok(());
+    remaining_columns(stiffness, factor, nodes, batch, 0, none, sink)
+}
+
+/// The same where the first `done` columns are known: `known` writes column `i` into its row `[3K]`.
+///
+/// Solves are made in the same batches as without them if `done` is a multiple of `batch`.
+///
+/// # Errors
+/// A held node among `nodes`; whatever `known` or the sink returns.
+pub fn remaining_columns(
+    stiffness: &Stiffness,
+    factor: &Factor,
+    nodes: &[u32],
+    batch: usize,
+    done: usize,
+    mut known: impl FnMut(usize, &mut [f32]) -> Result<(), LinearError>,
     mut sink: impl FnMut(usize, &[f32]) -> Result<(), LinearError>,
 ) -> Result<Compliance, LinearError> {
     let count = stiffness.free.index.len();
@@ -39,7 +58,16 @@ pub fn compliance_columns(
     let mut block = vec![0.0; dofs.len() * dofs.len()];
     let mut solution = Vec::new();
     let mut field = Vec::new();
-    for first in (0..dofs.len()).step_by(batch.max(1)) {
+    let done = done.min(dofs.len());
+    field.resize(3 * count, 0.0);
+    for column in 0..done {
+        known(column, &mut field)?;
+        for (row, &dof) in dofs.iter().enumerate() {
+            let node = stiffness.free.nodes[dof / 3] as usize;
+            block[row * dofs.len() + column] = f64::from(field[3 * node + dof % 3]);
+        }
+    }
+    for first in (done..dofs.len()).step_by(batch.max(1)) {
         let last = (first + batch.max(1)).min(dofs.len());
         solution.clear();
         solution.resize((last - first) * n, 0.0);

@@ -25,7 +25,7 @@ mod response;
 mod stiffness;
 
 pub use columns_file::{ColumnsError, ColumnsFile};
-pub use compliance::{Compliance, compliance_columns};
+pub use compliance::{Compliance, compliance_columns, remaining_columns};
 pub use error::LinearError;
 pub use factor::{Factor, FactorStats};
 pub use material::Lame;
