@@ -36,7 +36,7 @@ def main() -> None:
     parser.add_argument("bundle", type=Path)
     parser.add_argument("--data", type=Path, required=True)
     parser.add_argument("--count", type=int, default=10)
-    parser.add_argument("--page", type=Path, help="page whose table `long rollout` to exchange")
+    parser.add_argument("--page", type=Path, help="page whose table `long rollout NAME` to exchange")
     options = parser.parse_args()
     runner = BundleRunner(options.bundle)
     fresh = BundleRunner(options.bundle)
@@ -56,7 +56,7 @@ def main() -> None:
         print(lines[-1], file=sys.stderr, flush=True)
         step = last
     if options.page:
-        write_table(options.page, "long rollout", lines)
+        write_table(options.page, f"long rollout {options.bundle.name}", lines)
     else:
         print("\n".join(lines))
 
