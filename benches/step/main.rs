@@ -7,6 +7,7 @@
 
 mod bare;
 mod cost;
+mod crew;
 mod fine;
 mod floor;
 #[path = "../measure/mod.rs"]
@@ -17,12 +18,13 @@ mod sleeping;
 mod split;
 mod steady;
 mod tail;
+mod windows;
 
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-use measure::{Row, quick};
+use measure::Row;
 use upt::bundle::Mesh;
 use upt::model::KindModel;
 use upt::{
@@ -54,8 +56,9 @@ fn run(path: &Path, machine: &floor::Machine) -> upt::Result<()> {
     let name = model.manifest.name.clone();
     let info = model.info();
     println!("{name}: K = {}, {:?}", info.node_count, info.kind);
+    let small = info.node_count < LARGE;
     Row::new(format!("{name}/open to first step"), opened, "s")
-        .limits(Some(2.0), Some(0.5))
+        .limits(small.then_some(2.0), small.then_some(0.5))
         .print();
     let cost = cost::Cost::of(path, &model)?;
     for threads in [1, 2] {
@@ -108,16 +111,6 @@ fn limits(model: &Model, threads: usize, surface: bool) -> (Option<f64>, Option<
         (Kind::Reduced, true) => (Some(1.5), Some(0.4)),
         (Kind::Upt, false) => (Some(10.0), Some(5.0)),
         (Kind::Upt, true) => (Some(6.0), Some(3.0)),
-    }
-}
-
-/// Measured steps of a row.
-fn steps(kind: Kind) -> usize {
-    match (quick(), kind) {
-        (true, Kind::Upt) => 15,
-        (true, Kind::Reduced) => 1_000,
-        (false, Kind::Upt) => 300,
-        (false, Kind::Reduced) => 10_000,
     }
 }
 

@@ -1,15 +1,33 @@
 //! Steps of a scene that is being pushed: median, tail, and the part outside kernels and sessions.
 
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use upt::Scene;
 
 use super::bare::BareLoop;
 use super::cost::Cost;
-use super::measure::{Row, budget, median};
+use super::measure::{Row, budget, median, quick};
 use super::tail::Tail;
-use super::{patch, pushed, steps};
+use super::windows::{Steady, p99};
+use super::{patch, pushed};
 use upt::{Contact, Kind, StepInput};
+
+/// Steps of a row, where the time suffices for them.
+fn steps(kind: Kind) -> usize {
+    match (quick(), kind) {
+        (true, Kind::Upt) => 15,
+        (true, Kind::Reduced) => 1_000,
+        (false, _) => 10_000,
+    }
+}
+
+/// Time for a row's steps: those of what ships, whose tail has a bar, are all taken.
+fn time(ships: bool) -> Duration {
+    match ships && !quick() {
+        true => Duration::from_secs(150),
+        false => budget(),
+    }
+}
 
 /// Prints the rows of a scene that shows `region`; the median step, ms.
 pub fn measure(
@@ -29,7 +47,7 @@ pub fn measure(
     let mut slow = Tail::default();
     let started = Instant::now();
     for t in 0..steps(scene.model().info().kind) + WARM_UP {
-        if times.len() >= LEAST && started.elapsed() > budget() {
+        if times.len() >= LEAST && started.elapsed() > time(bar.is_some()) {
             break;
         }
         let contact = Contact::Sparse {
@@ -55,29 +73,43 @@ pub fn measure(
             let table = table.filter(|_| scene.model().info().kind == Kind::Reduced);
             let idle = idle.get_or_insert_with(|| match (table, cost.of_step(scene, region)) {
                 (Some(table), Some([_, bytes])) => BareLoop::over_tables(table, bytes),
-                _ => BareLoop::product(ms),
+                _ => BareLoop::product(ms, scene.stats().threads as usize),
             });
             bare.push(idle.run());
         }
     }
+    let steady = Steady::of(&times, &bare);
     let middle = median(&mut times);
-    let tail = |sorted: &[f64]| sorted[(sorted.len() * 99).div_ceil(100) - 1];
     let bare_middle = median(&mut bare);
+    let rival = idle.as_ref().map_or("", |bare| bare.name());
     Row::new(format!("{name}/step"), middle, "ms")
         .limits(bar, goal)
         .print();
-    Row::new(format!("{name}/p99 over median"), tail(&times) / middle, "")
-        .limits(Some(1.5), Some(1.2))
-        .print();
     Row::new(
-        format!(
-            "{name}/p99 over median, {}",
-            idle.map_or("", |bare| bare.name())
-        ),
-        tail(&bare) / bare_middle,
+        format!("{name}/p99 over median"),
+        p99(&mut times) / middle,
+        "",
+    )
+    .limits(Some(1.5), Some(1.2))
+    .print();
+    Row::new(
+        format!("{name}/p99 over median, {rival}"),
+        p99(&mut bare) / bare_middle,
         "",
     )
     .print();
+    if let Some(ratio) = steady.p99 {
+        let name = format!("{name}/p99 over median while that loop was steady");
+        Row::new(name, ratio, "")
+            .limits(Some(1.5), Some(1.2))
+            .print();
+    }
+    println!(
+        "{name}: {} steps; the loop was steady in {} of {} windows",
+        times.len(),
+        steady.counted,
+        steady.windows
+    );
     Row::new(
         format!("{name}/outside kernels and sessions"),
         median(&mut outside),
