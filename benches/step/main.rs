@@ -94,13 +94,18 @@ fn run(path: &Path, machine: &floor::Machine) -> upt::Result<()> {
 /// Nodes from which a mesh counts as the large one (150,140 nodes, `training/scripts/large_mesh.sh`).
 const LARGE: u64 = 100_000;
 
-/// Bar and goal of a step, ms, for what ships. Random weights have neither.
+/// Whether a bundle is one of `onnx/`: trained, and of a mesh that is not the large one.
+fn ships(model: &Model) -> bool {
+    model.manifest.name.starts_with("brain-") && model.info().node_count < LARGE
+}
+
+/// Bar and goal of a step, ms, for trained weights. Random ones have neither.
 fn limits(model: &Model, threads: usize, surface: bool) -> (Option<f64>, Option<f64>) {
     if threads == 1 || !model.manifest.name.starts_with("brain-") {
         return (None, None);
     }
     let info = model.info();
-    if info.node_count >= LARGE {
+    if !ships(model) {
         return match (info.kind, surface) {
             (Kind::Reduced, true) => (Some(6.0), Some(2.0)),
             _ => (None, None),

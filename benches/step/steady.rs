@@ -21,10 +21,10 @@ fn steps(kind: Kind) -> usize {
     }
 }
 
-/// Time for a row's steps: those of what ships, whose tail has a bar, are all taken.
-fn time(ships: bool) -> Duration {
-    match ships && !quick() {
-        true => Duration::from_secs(150),
+/// Time for a row's steps: of a bundle that ships all are taken.
+fn time(scene: &Scene) -> Duration {
+    match super::ships(scene.model()) && !quick() {
+        true => Duration::from_secs(200),
         false => budget(),
     }
 }
@@ -47,7 +47,7 @@ pub fn measure(
     let mut slow = Tail::default();
     let started = Instant::now();
     for t in 0..steps(scene.model().info().kind) + WARM_UP {
-        if times.len() >= LEAST && started.elapsed() > time(bar.is_some()) {
+        if times.len() >= LEAST && started.elapsed() > time(scene) {
             break;
         }
         let contact = Contact::Sparse {

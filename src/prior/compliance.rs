@@ -6,7 +6,7 @@
 
 use half::slice::HalfFloatSliceExt;
 
-use super::table::Numbers;
+use super::numbers::Numbers;
 use crate::bundle::TensorFile;
 use crate::error::Result;
 

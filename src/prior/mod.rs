@@ -6,12 +6,14 @@
 //! when the contact is gone.
 
 mod compliance;
+mod numbers;
 #[cfg(feature = "forces")]
 mod reaction;
 mod response;
 mod table;
 mod vibration;
 
+pub use numbers::Numbers;
 pub use response::{ContactResponse, SolveReport};
-pub use table::{Numbers, PriorTable};
+pub use table::PriorTable;
 pub use vibration::FreeVibration;

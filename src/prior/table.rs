@@ -1,55 +1,12 @@
 //! `prior.safetensors`, checked: compliance, block-wise basis, response, residual modes.
 
-use half::f16;
-
 use super::compliance::{Bases, Compliance};
+use super::numbers::Numbers;
 use super::vibration::FreeVibration;
 use crate::bundle::{BundleFiles, Manifest, Mesh, PriorEntry, TensorFile};
 use crate::error::Result;
 use crate::grid::{PointGrid, squared_distance};
-use crate::kernels::rows::{BlockBasis, Stored};
-
-/// Numbers kept at the width in which they are stored.
-#[derive(Debug)]
-pub enum Numbers {
-    /// float32.
-    F32(Vec<f32>),
-    /// float16.
-    F16(Vec<f16>),
-}
-
-impl Numbers {
-    fn read(file: &TensorFile, tensor: &str, shape: &[Option<usize>]) -> Result<Numbers> {
-        Ok(if file.is_f16(tensor) {
-            Numbers::F16(file.f16(tensor, shape)?)
-        } else {
-            Numbers::F32(file.f32(tensor, shape)?)
-        })
-    }
-
-    /// As the kernels take it.
-    pub fn stored(&self) -> Stored<'_> {
-        match self {
-            Numbers::F32(values) => Stored::F32(values),
-            Numbers::F16(values) => Stored::F16(values),
-        }
-    }
-
-    /// Element `index`, widened.
-    pub fn at(&self, index: usize) -> f32 {
-        match self {
-            Numbers::F32(values) => values[index],
-            Numbers::F16(values) => values[index].to_f32(),
-        }
-    }
-
-    fn bytes(&self) -> usize {
-        match self {
-            Numbers::F32(values) => 4 * values.len(),
-            Numbers::F16(values) => 2 * values.len(),
-        }
-    }
-}
+use crate::kernels::rows::BlockBasis;
 
 /// A node without a column near it.
 pub const NO_COLUMN: u32 = u32::MAX;

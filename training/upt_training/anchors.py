@@ -10,8 +10,6 @@ around a node lie in a line or a plane, a small ridge keeps the weights bounded.
 from __future__ import annotations
 
 import argparse
-import hashlib
-import json
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,6 +18,7 @@ from safetensors.numpy import save_file
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
+from upt_training.bundle_folder import MANIFEST, read_manifest, write_manifest
 from upt_training.errors import InputError
 from upt_training.mesh_file import Mesh, load_mesh
 
@@ -101,24 +100,17 @@ def moving_least_squares(positions: np.ndarray, nodes: np.ndarray, neighbours: n
 
 def add_to_bundle(bundle: Path, spacing_mm: float, per_node: int) -> Anchors:
     """Write `anchors.safetensors` into a bundle and name it in bundle.json."""
-    manifest_file = bundle / "bundle.json"
-    if not manifest_file.is_file():
-        raise InputError(f"{manifest_file}: is missing; a bundle is a folder with a bundle.json")
-    manifest = json.loads(manifest_file.read_text())
+    manifest = read_manifest(bundle)
     if manifest["kind"] != "upt" or manifest["upt"]["base"] != "prior":
-        raise InputError(f"{manifest_file}: anchors are for kind `upt` with base `prior`")
+        raise InputError(f"{bundle / MANIFEST}: anchors are for kind `upt` with base `prior`")
     if not spacing_mm > 0.0 or per_node < 4:
         raise InputError("anchors: --spacing must be positive and --neighbours at least 4")
     anchors = make_anchors(load_mesh(bundle / manifest["mesh"]["file"]), spacing_mm, per_node)
     tensors = {"nodes": anchors.nodes, "neighbours": anchors.neighbours, "weights": anchors.weights}
     save_file(tensors, bundle / FILE, metadata={"spacing_mm": str(spacing_mm)})
     (bundle / FILE).chmod(0o644)
-    content = (bundle / FILE).read_bytes()
-    manifest["files"][FILE] = {"bytes": len(content), "sha256": hashlib.sha256(content).hexdigest()}
     manifest["upt"]["anchors"] = FILE
-    partial = manifest_file.with_suffix(".json.partial")
-    partial.write_text(json.dumps(manifest, indent=2) + "\n")
-    partial.replace(manifest_file)
+    write_manifest(bundle, manifest)
     return anchors
 
 

@@ -7,8 +7,6 @@ graphs in ONNX Runtime on the same inputs; their relative difference must stay b
 from __future__ import annotations
 
 import copy
-import hashlib
-import json
 import shutil
 from dataclasses import asdict
 from pathlib import Path
@@ -20,6 +18,7 @@ import torch
 from safetensors.numpy import save_file
 
 from upt_training import onnx_graph
+from upt_training.bundle_folder import new_bundle, write_manifest
 from upt_training.errors import InputError
 from upt_training.graph import Graph, build_graph
 from upt_training.mesh_file import Mesh
@@ -209,31 +208,28 @@ def write_bundle(
     model = model.eval().float().cpu()
     s = model.settings
     graph = build_graph(mesh, s.graph)
-    staging = out.with_name(out.name + ".new")
-    shutil.rmtree(staging, ignore_errors=True)
-    staging.mkdir(parents=True)
-    try:
+    with new_bundle(out) as folder:
         with torch.no_grad():
             exact = copy.deepcopy(model).double()
             for file, proto in graphs_of(exact, paper_split, step).items():
-                onnx.save(proto, str(staging / file))
-            save_file(kernel_weights(exact), str(staging / "weights.safetensors"))
+                onnx.save(proto, str(folder / file))
+            save_file(kernel_weights(exact), str(folder / "weights.safetensors"))
         if paper_split and not s.uses_prior:
-            write_reference(staging, model, mesh, graph)
-        mesh.save(staging / "mesh.safetensors")
+            write_reference(folder, model, mesh, graph)
+        mesh.save(folder / "mesh.safetensors")
         if prior is not None and s.uses_prior:
-            shutil.copyfile(prior, staging / "prior.safetensors")
+            shutil.copyfile(prior, folder / "prior.safetensors")
         if s.vibration:
-            shutil.copyfile(vibration, staging / "vibration.safetensors")
+            shutil.copyfile(vibration, folder / "vibration.safetensors")
         generator = np.random.default_rng(0)
         random = generator.standard_normal((mesh.node_count, s.feature_count)).astype(np.float32)
-        check = self_check(model, staging, mesh, graph, [random, *(check_features or [])])
+        check = self_check(model, folder, mesh, graph, [random, *(check_features or [])])
         written = ["f32"]
         for precision in precisions:
             if precision != "f32":
                 from upt_training.precision import write_variant
 
-                write_variant(staging, precision)
+                write_variant(folder, precision)
                 written.append(precision)
         manifest = {
             "format": "upt-bundle",
@@ -287,23 +283,5 @@ def write_bundle(
             manifest["prior"] = {"file": "prior.safetensors"}
         if s.vibration:
             manifest["prior"]["vibration"] = "vibration.safetensors"
-        manifest["files"] = file_table(staging)
-        (staging / "bundle.json").write_text(json.dumps(manifest, indent=1) + "\n")
-        for file in staging.iterdir():
-            file.chmod(0o644)
-        if out.exists():
-            shutil.rmtree(out)
-        staging.rename(out)
-    finally:
-        shutil.rmtree(staging, ignore_errors=True)
+        write_manifest(folder, manifest)
     return manifest
-
-
-def file_table(folder: Path) -> dict:
-    """`{"file": {"bytes", "sha256"}}` of every file but bundle.json."""
-    table = {}
-    for path in sorted(folder.iterdir()):
-        if path.name != "bundle.json":
-            data = path.read_bytes()
-            table[path.name] = {"bytes": len(data), "sha256": hashlib.sha256(data).hexdigest()}
-    return table

@@ -7,11 +7,10 @@ vibration are the new mesh's own. Errors measured on the old mesh and its anchor
 from __future__ import annotations
 
 import argparse
-import json
 import shutil
 from pathlib import Path
 
-from upt_training.bundle import file_table
+from upt_training.bundle_folder import MANIFEST, new_bundle, read_manifest, write_manifest
 from upt_training.dataset import map_safetensors
 from upt_training.errors import InputError
 from upt_training.mesh_file import load_mesh
@@ -22,12 +21,9 @@ def transfer(
     bundle: Path, mesh_file: Path, out: Path, prior: Path | None, vibration: Path | None, name: str | None = None
 ) -> dict:
     """Write the folder `out` (made beside it, then moved into place) and return its manifest."""
-    manifest_file = bundle / "bundle.json"
-    if not manifest_file.is_file():
-        raise InputError(f"{manifest_file}: is missing; a bundle is a folder with a bundle.json")
-    manifest = json.loads(manifest_file.read_text())
+    manifest = read_manifest(bundle)
     if manifest["kind"] != "upt":
-        raise InputError(f"{manifest_file}: kind is {manifest['kind']!r}; only `upt` weights fit other meshes")
+        raise InputError(f"{bundle / MANIFEST}: kind is {manifest['kind']!r}; only `upt` weights fit other meshes")
     tables = {"prior": prior, "vibration": vibration}
     entries = manifest.get("prior", {})
     needed = [entry for entry, key in (("prior", "file"), ("vibration", "vibration")) if key in entries]
@@ -47,26 +43,15 @@ def transfer(
     manifest["mesh"] = {"file": "mesh.safetensors", "nodes": mesh.node_count, "mesh_sha256": mesh.sha256}
     manifest["errors"] = {}
     manifest["upt"].pop("anchors", None)
-    staging = out.with_name(out.name + ".new")
-    shutil.rmtree(staging, ignore_errors=True)
-    staging.mkdir(parents=True)
-    try:
+    with new_bundle(out) as folder:
         for file in [*bundle.glob("*.onnx"), bundle / manifest["upt"]["weights"]]:
-            shutil.copyfile(file, staging / file.name)
-        mesh.save(staging / "mesh.safetensors")
+            shutil.copyfile(file, folder / file.name)
+        mesh.save(folder / "mesh.safetensors")
         if "prior" in needed:
             manifest["prior"] = {entry if entry != "prior" else "file": f"{entry}.safetensors" for entry in needed}
         for entry in needed:
-            shutil.copyfile(tables[entry], staging / f"{entry}.safetensors")
-        manifest["files"] = file_table(staging)
-        (staging / "bundle.json").write_text(json.dumps(manifest, indent=1) + "\n")
-        for file in staging.iterdir():
-            file.chmod(0o644)
-        if out.exists():
-            shutil.rmtree(out)
-        staging.rename(out)
-    finally:
-        shutil.rmtree(staging, ignore_errors=True)
+            shutil.copyfile(tables[entry], folder / f"{entry}.safetensors")
+        write_manifest(folder, manifest)
     return manifest
 
 

@@ -6,11 +6,10 @@
 from __future__ import annotations
 
 import argparse
-import hashlib
-import json
 import shutil
 from pathlib import Path
 
+from upt_training.bundle_folder import MANIFEST, read_manifest, write_manifest
 from upt_training.errors import InputError
 from upt_training.precision import write_variant
 
@@ -26,18 +25,15 @@ def variants_command(options: argparse.Namespace) -> int:
 
 def make_variants(bundle: Path, out: Path, precisions: list[str]) -> None:
     """Copy `bundle` to the new folder `out` and add the graphs of `precisions` to it and to its manifest."""
-    manifest_file = bundle / "bundle.json"
-    if not manifest_file.is_file():
-        raise InputError(f"{manifest_file}: is missing; a bundle is a folder with a bundle.json")
+    manifest = read_manifest(bundle)
     if out.exists():
         raise InputError(f"{out}: exists; variants are written to a new folder")
-    manifest = json.loads(manifest_file.read_text())
     if manifest["kind"] != "upt":
-        raise InputError(f"{manifest_file}: kind `{manifest['kind']}` has no graphs worth narrowing; give a `upt` one")
+        raise InputError(
+            f"{bundle / MANIFEST}: kind `{manifest['kind']}` has no graphs worth narrowing; give a `upt` one"
+        )
     shutil.copytree(bundle, out)
     for precision in precisions:
-        for graph in write_variant(out, precision):
-            content = graph.read_bytes()
-            manifest["files"][graph.name] = {"bytes": len(content), "sha256": hashlib.sha256(content).hexdigest()}
+        write_variant(out, precision)
     manifest["precisions"] = sorted({"f32", *manifest["precisions"], *precisions})
-    (out / "bundle.json").write_text(json.dumps(manifest, indent=2) + "\n")
+    write_manifest(out, manifest)

@@ -1,4 +1,5 @@
-//! `cargo xtask readme`: the measured table and the picture of README.md, out of `upt report` and `upt rollout`.
+//! `cargo xtask readme`: the measured table and the picture of README.md, out of `upt report` and `upt rollout`, and such
+//! tables on other pages.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -15,6 +16,9 @@ pub struct Options {
     /// report.json files of `upt report`, in the order in which they should appear.
     #[arg(long = "report", value_name = "FILE")]
     reports: Vec<PathBuf>,
+    /// The page that takes their table, between its markers; from the repository's root.
+    #[arg(long, value_name = "FILE", default_value = "README.md")]
+    page: PathBuf,
     /// Render docs/images/pushed-brain.png with this bundle ...
     #[arg(long, requires = "trajectory")]
     bundle: Option<PathBuf>,
@@ -32,10 +36,13 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
         for path in &options.reports {
             body.push_str(&section(path)?);
         }
-        let path = workspace.path("README.md");
+        let path = workspace.path(&options.page.to_string_lossy());
         let text = std::fs::read_to_string(&path)?;
         let (Some(start), Some(end)) = (text.find(BEGIN), text.find(END)) else {
-            bail!("README.md: the markers `{BEGIN}` and `{END}` are missing");
+            bail!(
+                "{}: the markers `{BEGIN}` and `{END}` are missing",
+                path.display()
+            );
         };
         std::fs::write(
             &path,
@@ -85,10 +92,7 @@ fn section(path: &Path) -> Result<String> {
         text(&report["date"])
     );
     out.push_str("| method | threads | MSE, mm² | largest error, mm | ms a step (median) | p99 |\n|---|---:|---:|---:|---:|---:|\n");
-    let mut order: Vec<&serde_json::Value> = rows
-        .iter()
-        .filter(|row| row["method"] != "predict zero")
-        .collect();
+    let mut order: Vec<&serde_json::Value> = rows.iter().collect();
     order.sort_by(|a, b| number(a, "ms_p50").total_cmp(&number(b, "ms_p50")));
     for row in order {
         let bundle = text(&row["bundle"]);

@@ -17,11 +17,12 @@ from pathlib import Path
 import numpy as np
 import torch
 
+from upt_training.bundle_folder import write_manifest
 from upt_training.errors import InputError
 from upt_training.mesh_file import Mesh, load_mesh
 from upt_training.reduced.columns import Columns, load_columns
 from upt_training.reduced.evaluate import evaluate, table
-from upt_training.reduced.export import Description, tables_of, write_manifest, write_reduced_bundle
+from upt_training.reduced.export import Description, tables_of, write_reduced_bundle
 from upt_training.reduced.make_prior import check_columns
 from upt_training.reduced.modes import Modes, learn_modes
 from upt_training.reduced.network import Correction

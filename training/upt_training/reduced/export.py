@@ -6,9 +6,6 @@ against the compliance columns: contact nodes at `c`, and `L(c)` within the bloc
 
 from __future__ import annotations
 
-import hashlib
-import json
-import shutil
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -17,6 +14,7 @@ import onnx
 import onnxruntime
 import torch
 
+from upt_training.bundle_folder import new_bundle, write_manifest
 from upt_training.errors import InputError
 from upt_training.mesh_file import Mesh
 from upt_training.reduced.block_basis import BlockBasis
@@ -91,14 +89,11 @@ def write_reduced_bundle(
     With `near_mm` the compliance of contact nodes farther apart is left to the response (`near.py`).
     """
     out = Path(out)
-    staging = out.with_name(out.name + ".new")
-    shutil.rmtree(staging, ignore_errors=True)
-    staging.mkdir(parents=True)
-    try:
-        onnx.save(latent_graph(model.eval()), str(staging / "latent.onnx"))
+    with new_bundle(out) as folder:
+        onnx.save(latent_graph(model.eval()), str(folder / "latent.onnx"))
         near = near_of(mesh, prior, near_mm)
-        save_prior(staging / "prior.safetensors", prior, table_dtype, near)
-        mesh.save(staging / "mesh.safetensors")
+        save_prior(folder / "prior.safetensors", prior, table_dtype, near)
+        mesh.save(folder / "mesh.safetensors")
         manifest = {
             "format": "upt-bundle",
             "version": 1,
@@ -125,16 +120,9 @@ def write_reduced_bundle(
             "provenance": description.provenance,
             "errors": description.errors,
         }
-        names = ("latent.onnx", "mesh.safetensors", "prior.safetensors")
-        manifest["files"] = {name: listing(staging / name) for name in names}
-        write_manifest(staging, manifest)
-        manifest["provenance"]["self_check"] = self_check(staging, mesh, columns, model)
-        write_manifest(staging, manifest)
-        if out.exists():
-            shutil.rmtree(out)
-        staging.rename(out)
-    finally:
-        shutil.rmtree(staging, ignore_errors=True)
+        write_manifest(folder, manifest)
+        manifest["provenance"]["self_check"] = self_check(folder, mesh, columns, model)
+        write_manifest(folder, manifest)
     return manifest
 
 
@@ -143,16 +131,6 @@ def near_of(mesh: Mesh, prior: Prior, near_mm: float | None) -> dict[str, np.nda
     if near_mm is None:
         return None
     return near_tensors(prior.compliance, mesh.positions[prior.contact_nodes].astype(np.float64), near_mm)
-
-
-def listing(path: Path) -> dict:
-    """Size and SHA-256 of a file, as the manifest lists them."""
-    data = path.read_bytes()
-    return {"bytes": len(data), "sha256": hashlib.sha256(data).hexdigest()}
-
-
-def write_manifest(folder: Path, manifest: dict) -> None:
-    (folder / "bundle.json").write_text(json.dumps(manifest, indent=2) + "\n", encoding="utf-8")
 
 
 def self_check(folder: Path, mesh: Mesh, columns: Columns, model: Correction) -> dict[str, float]:

@@ -1,0 +1,53 @@
+//! A table's numbers at the width in which its file holds them.
+
+use half::f16;
+
+use crate::bundle::TensorFile;
+use crate::error::Result;
+use crate::kernels::rows::Stored;
+
+/// Numbers kept at the width in which they are stored.
+#[derive(Debug)]
+pub enum Numbers {
+    /// float32.
+    F32(Vec<f32>),
+    /// float16.
+    F16(Vec<f16>),
+}
+
+impl Numbers {
+    pub(super) fn read(
+        file: &TensorFile,
+        tensor: &str,
+        shape: &[Option<usize>],
+    ) -> Result<Numbers> {
+        Ok(if file.is_f16(tensor) {
+            Numbers::F16(file.f16(tensor, shape)?)
+        } else {
+            Numbers::F32(file.f32(tensor, shape)?)
+        })
+    }
+
+    /// As the kernels take it.
+    pub fn stored(&self) -> Stored<'_> {
+        match self {
+            Numbers::F32(values) => Stored::F32(values),
+            Numbers::F16(values) => Stored::F16(values),
+        }
+    }
+
+    /// Element `index`, widened.
+    pub fn at(&self, index: usize) -> f32 {
+        match self {
+            Numbers::F32(values) => values[index],
+            Numbers::F16(values) => values[index].to_f32(),
+        }
+    }
+
+    pub(super) fn bytes(&self) -> usize {
+        match self {
+            Numbers::F32(values) => 4 * values.len(),
+            Numbers::F16(values) => 2 * values.len(),
+        }
+    }
+}
