@@ -12,9 +12,10 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 
-/// Bytes from which on streaming a table is split over threads. An estimate: waking a worker and waiting for its last
-/// chunk costs some 50 to 100 us, in which one core reads some megabytes from cache. To be set by measurement on an idle
-/// machine (`cargo bench --bench kernels -- pool`).
+/// Bytes from which on streaming a table is split over threads. Waking a worker and waiting for its last chunk costs what
+/// one core reads in the meantime, some megabytes from cache. Measured (`cargo bench --bench kernels -- pool`, two cores that share
+/// their memory with others): reading alone gains nothing from a second thread up to 32 MB and loses below 4 MB; the products over the
+/// tables of a large mesh, which also compute, take a quarter less time on two (`brain-fine-reduced` in docs/performance.md).
 const SPLIT_BYTES: usize = 8 << 20;
 
 /// Why a pool could not be made or a job not be finished.
