@@ -62,7 +62,7 @@ pub fn against_split(
         let (mut theirs, mut ours) = (Vec::new(), Vec::new());
         let started = Instant::now();
         for turn in 0..if quick() { 5 } else { 41 } {
-            if turn >= 5 && started.elapsed() > budget() {
+            if turn >= 5 && started.elapsed() > 4 * budget() {
                 break;
             }
             let start = Instant::now();

@@ -29,6 +29,9 @@ pub struct Options {
     /// Only bench targets whose name contains this; the page keeps its other tables.
     #[arg(long)]
     only: Option<String>,
+    /// Only what these targets call so (of `step`: bundles whose name contains it); the tables keep their other rows.
+    #[arg(long, requires = "only")]
+    part: Option<String>,
     /// Do not touch docs/performance.md.
     #[arg(long)]
     keep_docs: bool,
@@ -85,6 +88,9 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
             command.env("UPT_BENCH_QUICK", "1");
         }
         command.env("UPT_BENCH_BUNDLES", &random);
+        if let Some(part) = options.part.as_ref().filter(|_| target.package != UNITY) {
+            command.args(["--", part]);
+        }
         let log = workspace
             .logs()
             .join(format!("bench-{}-{}.log", target.package, target.name));
@@ -136,7 +142,8 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
             .with_context(|| format!("cannot write {}", path.display()))?;
     }
     if !options.keep_docs {
-        page::write(workspace, options.quick, &tables, &failed, &notes)?;
+        let partly = options.part.is_some();
+        page::write(workspace, options.quick, partly, &tables, &failed, &notes)?;
     }
     Ok(failed.is_empty())
 }

@@ -11,10 +11,11 @@ const BEGIN: &str = "<!-- cargo xtask bench: begin -->";
 const END: &str = "<!-- cargo xtask bench: end -->";
 
 /// Replaces the sections of the tables that were measured; the others stay, with the machine that they name, and so
-/// does what is written by hand around the markers.
+/// does what is written by hand around the markers. `partly`: rows that were not measured stay too.
 pub fn write(
     workspace: &Workspace,
     quick: bool,
+    partly: bool,
     tables: &[(String, Vec<Row>)],
     failed: &[String],
     notes: &[String],
@@ -41,7 +42,12 @@ pub fn write(
         .iter()
         .map(|(name, rows)| (name.clone(), format!("{how}\n\n{}", table(rows))))
         .collect();
-    let sections = merge(sections(&text[start + BEGIN.len()..end]), measured);
+    let old = sections(&text[start + BEGIN.len()..end]);
+    let measured = match partly {
+        true => rows_into(&old, measured),
+        false => measured,
+    };
+    let sections = merge(old, measured);
     let mut body = String::new();
     for (name, section) in &sections {
         let _ = write!(body, "\n### {name}\n\n{}\n", section.trim());
@@ -73,6 +79,29 @@ fn sections(body: &str) -> Vec<(String, String)> {
         .collect()
 }
 
+/// The sections of `new` as those of `old`, with the rows of `new` in the places of rows with the same name and behind them.
+fn rows_into(old: &[(String, String)], new: Vec<(String, String)>) -> Vec<(String, String)> {
+    let name = |line: &str| line.split('|').nth(1).map(str::to_owned);
+    let is_row = |line: &&str| line.starts_with("| ") && !line.starts_with("| |");
+    let into = |(title, text): (String, String)| {
+        let Some((_, before)) = old.iter().find(|section| section.0 == title) else {
+            return (title, text);
+        };
+        let mut rows: Vec<&str> = text.lines().filter(is_row).collect();
+        let mut lines = Vec::new();
+        for line in before.trim_end().lines() {
+            let same = rows.iter().position(|row| name(row) == name(line));
+            match same.filter(|_| is_row(&line)) {
+                Some(at) => lines.push(rows.remove(at)),
+                None => lines.push(line),
+            }
+        }
+        lines.extend(rows);
+        (title, lines.join("\n"))
+    };
+    new.into_iter().map(into).collect()
+}
+
 /// `old` with the sections of `new` in their places, new ones added; by title.
 fn merge(mut old: Vec<(String, String)>, new: Vec<(String, String)>) -> Vec<(String, String)> {
     for (title, text) in new {
@@ -101,6 +130,20 @@ fn machine() -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn rows_of_a_part_go_to_their_places() {
+        let section = |rows: &str| {
+            (
+                "upt: step".to_owned(),
+                format!("head\n\n| | value |\n|---|---|\n{rows}"),
+            )
+        };
+        let old = [section("| a/step | 1 |\n| b/step | 2 |\n| c/step | 3 |\n")];
+        let merged = rows_into(&old, vec![section("| b/step | 5 |\n| d/step | 6 |\n")]);
+        let want = section("| a/step | 1 |\n| b/step | 5 |\n| c/step | 3 |\n| d/step | 6 |");
+        assert_eq!(merged, [want]);
+    }
 
     #[test]
     fn sections_that_were_not_measured_stay() {
