@@ -13,9 +13,8 @@ import onnx
 GRAPHS = ("latent", "decoder", "step")
 
 
-def write_variant(folder: Path, precision: str) -> list[Path]:
-    """Write the variant of every graph in `GRAPHS` that the folder has beside its float32 file, and say which."""
-    written = []
+def write_variant(folder: Path, precision: str) -> None:
+    """Write the variant of every graph in `GRAPHS` that the folder has beside its float32 file."""
     for name in GRAPHS:
         source, target = folder / f"{name}.onnx", folder / f"{name}.{precision}.onnx"
         if not source.exists():
@@ -37,5 +36,3 @@ def write_variant(folder: Path, precision: str) -> list[Path]:
             onnx.save(convert_float_to_float16(onnx.load(str(source)), keep_io_types=True), str(target))
         else:
             raise ValueError(precision)
-        written.append(target)
-    return written
