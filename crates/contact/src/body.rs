@@ -1,0 +1,163 @@
+//! A tool ready for queries: signed distance and outward normal at any point.
+//!
+//! Each shape is a core rounded by a radius: a point, a segment, a box or a hull. The distance is that to the core
+//! less the radius. Boxes and segments are closed forms that stay exact on the surface itself, where the direction to a
+//! projected point is rounding.
+
+use crate::hull::Hull;
+use crate::shape::{Shape, ShapeError};
+use parry3d::math::{Pose, Vector};
+
+#[derive(Clone, Debug)]
+enum Core {
+    /// Along y; 0 is a point.
+    Segment {
+        half_length: f32,
+    },
+    Cuboid {
+        half: Vector,
+    },
+    Hull(Box<Hull>),
+}
+
+/// A shape ready for queries. Cheap to share, never changes.
+#[derive(Clone, Debug)]
+pub struct Body {
+    core: Core,
+    radius: f32,
+    /// Middle and half sizes of the box around it, in its frame.
+    middle: Vector,
+    half: Vector,
+}
+
+/// The nearest point of a tool's surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Nearest {
+    /// Negative inside, mm.
+    pub distance: f32,
+    /// Out of the tool, unit length.
+    pub normal: Vector,
+}
+
+impl Body {
+    /// Checks a shape and prepares it.
+    ///
+    /// # Errors
+    /// [`ShapeError`] for sizes that no tool has, or a hull without volume.
+    pub fn new(shape: &Shape) -> Result<Self, ShapeError> {
+        shape.check()?;
+        let (core, radius) = match shape {
+            Shape::Sphere { radius } => (Core::Segment { half_length: 0.0 }, *radius),
+            Shape::Capsule {
+                half_length,
+                radius,
+            } => {
+                let half_length = *half_length;
+                (Core::Segment { half_length }, *radius)
+            }
+            Shape::Box { half_extents } => {
+                let half = Vector::from(*half_extents);
+                (Core::Cuboid { half }, 0.0)
+            }
+            Shape::Spatula {
+                half_extents,
+                radius,
+            } => {
+                let half = Vector::from(*half_extents) - Vector::splat(*radius);
+                (Core::Cuboid { half }, *radius)
+            }
+            Shape::Hull { points, margin } => (Core::Hull(Box::new(Hull::new(points)?)), *margin),
+        };
+        let (low, high) = match &core {
+            Core::Segment { half_length } => {
+                let end = Vector::new(0.0, *half_length, 0.0);
+                (-end, end)
+            }
+            Core::Cuboid { half } => (-*half, *half),
+            Core::Hull(hull) => hull.bounds(),
+        };
+        Ok(Self {
+            core,
+            radius,
+            middle: 0.5 * (low + high),
+            half: 0.5 * (high - low) + Vector::splat(radius),
+        })
+    }
+
+    /// Signed distance and outward normal at a point of the tool's own frame.
+    pub fn nearest(&self, point: Vector) -> Nearest {
+        let (distance, normal) = match &self.core {
+            Core::Segment { half_length } => {
+                let on = Vector::new(0.0, point.y.clamp(-half_length, *half_length), 0.0);
+                let away = point - on;
+                let length = away.length();
+                // On the core every direction is as near; x is one that all capsules have.
+                let normal = if length > 0.0 {
+                    away / length
+                } else {
+                    Vector::X
+                };
+                (length, normal)
+            }
+            Core::Cuboid { half } => cuboid(point, *half),
+            Core::Hull(hull) => hull.nearest(point),
+        };
+        Nearest {
+            distance: distance - self.radius,
+            normal,
+        }
+    }
+
+    /// The same at a point of the world, the tool at `pose`.
+    pub fn nearest_at(&self, pose: &Pose, point: Vector) -> Nearest {
+        let local = self.nearest(pose.inverse_transform_point(point));
+        Nearest {
+            distance: local.distance,
+            normal: pose.rotation * local.normal,
+        }
+    }
+
+    /// Corners of the axis-aligned box around the tool at `pose`, widened by `margin`.
+    pub fn bounds(&self, pose: &Pose, margin: f32) -> (Vector, Vector) {
+        let axes = [Vector::X, Vector::Y, Vector::Z].map(|axis| (pose.rotation * axis).abs());
+        let reach = axes[0] * self.half.x + axes[1] * self.half.y + axes[2] * self.half.z;
+        let reach = reach + Vector::splat(margin);
+        let centre = pose.transform_point(self.middle);
+        (centre - reach, centre + reach)
+    }
+
+    /// The longest way that any point of the tool goes from one pose to another, at most, mm.
+    pub fn motion(&self, from: &Pose, to: &Pose) -> f32 {
+        let shift = to.transform_point(self.middle) - from.transform_point(self.middle);
+        let turn = crate::pose::angle(&from.rotation, &to.rotation);
+        shift.length() + turn * self.half.length()
+    }
+
+    /// Points inside the tool, in its frame, by which to see whether it lies in something: the middle, and the middles of
+    /// the faces of the box around it, drawn in to the core.
+    pub fn probes(&self) -> [Vector; 7] {
+        let core = self.half - Vector::splat(self.radius);
+        let [x, y, z] = [Vector::X, Vector::Y, Vector::Z].map(|axis| axis * core);
+        [Vector::ZERO, x, -x, y, -y, z, -z].map(|offset| self.middle + 0.98 * offset)
+    }
+}
+
+/// Signed distance to a box of half sizes `half`, and its gradient.
+fn cuboid(point: Vector, half: Vector) -> (f32, Vector) {
+    let sign = Vector::select(point.cmplt(Vector::ZERO), Vector::NEG_ONE, Vector::ONE);
+    let beyond = point.abs() - half;
+    let outside = beyond.max(Vector::ZERO);
+    let length = outside.length();
+    if length > 0.0 {
+        return (length, sign * outside / length);
+    }
+    let deepest = beyond.max_element();
+    let normal = if beyond.x == deepest {
+        Vector::X
+    } else if beyond.y == deepest {
+        Vector::Y
+    } else {
+        Vector::Z
+    };
+    (deepest, sign * normal)
+}

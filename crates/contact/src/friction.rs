@@ -1,0 +1,61 @@
+//! Force at one contact: Signorini's condition and Coulomb's law in a local frame (normal, two tangents).
+//!
+//! With `r = b + W f`, `r` the gap and the two components of slip under the force `f`, `W` symmetric positive definite:
+//! `0 <= f_n _|_ r_n >= 0`, `|f_t| <= mu f_n`, and `f_t = -mu f_n r_t / |r_t|` where it slips.
+
+use parry3d::math::{Matrix, Vector};
+
+/// Rounds of the slip iteration; the sweeps around it go on from where it stops.
+const ROUNDS: usize = 12;
+
+/// Unit tangents that complete a unit normal to a right-handed frame, the columns of a matrix: normal, tangent, tangent.
+pub fn frame(normal: Vector) -> Matrix {
+    // The axis that the normal is least along keeps the product long.
+    let size = normal.abs();
+    let axis = if size.x <= size.y && size.x <= size.z {
+        Vector::X
+    } else if size.y <= size.z {
+        Vector::Y
+    } else {
+        Vector::Z
+    };
+    let first = axis.cross(normal).normalize();
+    Matrix::from_cols(normal, first, normal.cross(first))
+}
+
+/// The tangential part of a local force, cut to the friction cone.
+pub fn clamp_tangential(force: Vector, friction: f32) -> Vector {
+    let limit = friction * force.x.max(0.0);
+    let size = force.y.hypot(force.z);
+    if size <= limit {
+        return force;
+    }
+    let scale = limit / size;
+    Vector::new(force.x, force.y * scale, force.z * scale)
+}
+
+/// The force at one contact. `inverse` is that of `w`; `guess` is where a slip's direction is searched from.
+pub fn coulomb(w: &Matrix, inverse: &Matrix, b: Vector, friction: f32, guess: Vector) -> Vector {
+    if b.x >= 0.0 {
+        return Vector::ZERO;
+    }
+    if friction <= 0.0 {
+        return Vector::new(-b.x / w.x_axis.x, 0.0, 0.0);
+    }
+    let stick = -(*inverse * b);
+    if stick.x >= 0.0 && stick.y.hypot(stick.z) <= friction * stick.x {
+        return stick;
+    }
+    // A step of one over the trace of the tangential block never overshoots.
+    let rate = 1.0 / (w.y_axis.y + w.z_axis.z);
+    let mut force = clamp_tangential(guess, friction);
+    for _ in 0..ROUNDS {
+        let coupling = w.y_axis.x * force.y + w.z_axis.x * force.z;
+        force.x = (-(b.x + coupling) / w.x_axis.x).max(0.0);
+        let slip = b + *w * force;
+        force.y -= rate * slip.y;
+        force.z -= rate * slip.z;
+        force = clamp_tangential(force, friction);
+    }
+    force
+}

@@ -1,0 +1,31 @@
+//! Contact of rigid tools with soft tissue: one definition for the reference solver and the runtime.
+//!
+//! | module | what |
+//! |---|---|
+//! | [`shape`], [`body`] | a tool's shape; signed distance and outward normal at a point |
+//! | [`pose`] | where a tool is, checked, and the way between two poses |
+//! | [`samples`] | points of the tissue's surface at which contact is looked at: the rows of `B` |
+//! | [`search`] | which samples are near which tool |
+//! | [`friction`], [`sweeps`] | forces: no penetration, Coulomb friction, bound samples |
+//! | [`grasp`] | samples that a tool holds, and when they tear off |
+//!
+//! Lengths are millimetres, single precision throughout. Nothing here knows what tissue does under a force:
+//! the solver brings lumped masses, the runtime a dense compliance.
+
+pub mod body;
+pub mod friction;
+pub mod grasp;
+mod hull;
+pub mod pose;
+pub mod samples;
+pub mod search;
+pub mod shape;
+pub mod sweeps;
+
+pub use body::{Body, Nearest};
+pub use grasp::Grasp;
+pub use parry3d::math::{Matrix, Pose, Rotation, Vector};
+pub use samples::{SPACING_MM, Sample, Samples};
+pub use search::{Candidate, Placed, SKIN_MM, Search};
+pub use shape::{Shape, ShapeError};
+pub use sweeps::{Contact, Law, Limits, Outcome, Sweeps};

@@ -1,0 +1,115 @@
+//! What a tool looks like in its own frame, mm. [`crate::Body`] answers queries about it.
+
+use serde::{Deserialize, Serialize};
+
+/// A rigid tool's shape, centred on its own origin except where points say otherwise.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
+pub enum Shape {
+    /// A ball.
+    Sphere { radius: f32 },
+    /// All points within `radius` of a segment along local y, `half_length` to either side; 0 is a sphere.
+    Capsule { half_length: f32, radius: f32 },
+    /// A box with sharp edges.
+    Box { half_extents: [f32; 3] },
+    /// A box with rounded edges: `half_extents` are those of the whole, `radius` at most the smallest.
+    Spatula { half_extents: [f32; 3], radius: f32 },
+    /// The convex hull of points (of a tool's own STL or OBJ), each point moved out by `margin`.
+    Hull { points: Vec<[f32; 3]>, margin: f32 },
+}
+
+/// A shape that no tool can have.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ShapeError {
+    #[error("{field} is {value} mm; it must be a length {wanted}")]
+    Length {
+        field: &'static str,
+        value: f32,
+        wanted: &'static str,
+    },
+    #[error(
+        "corner radius {radius} mm exceeds the smallest half extent {smallest} mm; make the box thicker or the radius smaller"
+    )]
+    Corner { radius: f32, smallest: f32 },
+    #[error("hull point {index} is not finite or farther than 10 m from the origin")]
+    Point { index: usize },
+    #[error(
+        "the hull of {count} points has no volume ({reason}); give the corners of a solid tool"
+    )]
+    Flat { count: usize, reason: String },
+}
+
+/// No tool is as large, mm.
+const LARGEST: f32 = 1e4;
+
+impl Shape {
+    /// Sizes are finite and positive, a rounded box is as thick as its corners. Hulls are built by [`crate::Body::new`].
+    ///
+    /// # Errors
+    /// [`ShapeError`], naming the field.
+    pub fn check(&self) -> Result<(), ShapeError> {
+        match self {
+            Shape::Sphere { radius } => positive("radius", *radius),
+            Shape::Capsule {
+                half_length,
+                radius,
+            } => {
+                not_negative("half_length", *half_length)?;
+                positive("radius", *radius)
+            }
+            Shape::Box { half_extents } => all_positive(*half_extents),
+            Shape::Spatula {
+                half_extents,
+                radius,
+            } => {
+                all_positive(*half_extents)?;
+                positive("radius", *radius)?;
+                let smallest = half_extents.iter().copied().fold(f32::INFINITY, f32::min);
+                if *radius > smallest {
+                    return Err(ShapeError::Corner {
+                        radius: *radius,
+                        smallest,
+                    });
+                }
+                Ok(())
+            }
+            Shape::Hull { points, margin } => {
+                let far = |p: &[f32; 3]| !p.iter().all(|v| v.abs() < LARGEST);
+                if let Some(index) = points.iter().position(far) {
+                    return Err(ShapeError::Point { index });
+                }
+                not_negative("margin", *margin)
+            }
+        }
+    }
+}
+
+fn positive(field: &'static str, value: f32) -> Result<(), ShapeError> {
+    if value.is_finite() && value > 0.0 && value < LARGEST {
+        Ok(())
+    } else {
+        Err(ShapeError::Length {
+            field,
+            value,
+            wanted: "above 0 mm",
+        })
+    }
+}
+
+fn not_negative(field: &'static str, value: f32) -> Result<(), ShapeError> {
+    if value.is_finite() && (0.0..LARGEST).contains(&value) {
+        Ok(())
+    } else {
+        Err(ShapeError::Length {
+            field,
+            value,
+            wanted: "of 0 mm or more",
+        })
+    }
+}
+
+fn all_positive(half_extents: [f32; 3]) -> Result<(), ShapeError> {
+    half_extents
+        .into_iter()
+        .try_for_each(|value| positive("half_extents", value))
+}

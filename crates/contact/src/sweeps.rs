@@ -1,0 +1,183 @@
+//! Contact forces by projected Gauss-Seidel on a small dense compliance (Delassus) matrix `W = B A B^T`.
+//!
+//! Gaps and slips are given at the forces that come in, so that a solve goes on from the last one (a *warm start*): a
+//! change of force `df` moves the samples by `W df`. Contacts are visited in their order, each with its own 3x3 block
+//! ([`crate::friction`]); the first to be asked is the first to be solved, so the same input gives the same bits. A sweep
+//! costs nothing for contacts whose force does not change.
+
+use crate::friction::{coulomb, frame};
+use parry3d::math::{Matrix, Vector};
+
+/// How a contact may push.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Law {
+    /// Pushes along the normal only, with Coulomb friction across it.
+    Touch { friction: f32 },
+    /// Holds the sample in all directions, as a grasper does.
+    Bound,
+}
+
+/// A contact at the forces that come in.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Contact {
+    pub law: Law,
+    /// Out of the tool, unit length: the direction of the force on the tissue.
+    pub normal: Vector,
+    /// Distance from the tool's surface, negative inside, mm.
+    pub gap: f32,
+    /// The sample's way relative to the tool since the start of the step, mm; only what lies across the normal counts.
+    /// Of a bound sample the way from its place on the tool.
+    pub slip: Vector,
+}
+
+/// When to stop.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
+    /// Largest change of a sample's place by its own force in the last sweep, mm. Default 1e-4.
+    pub tolerance_mm: f32,
+    /// Default 15.
+    pub least_sweeps: u32,
+    /// Default 200.
+    pub most_sweeps: u32,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self {
+            tolerance_mm: 1e-4,
+            least_sweeps: 15,
+            most_sweeps: 200,
+        }
+    }
+}
+
+/// How a solve ended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Outcome {
+    pub sweeps: u32,
+    /// Of the last sweep, see [`Limits::tolerance_mm`].
+    pub change_mm: f32,
+    /// Within the tolerance.
+    pub converged: bool,
+}
+
+/// A contact's own block in its own frame.
+#[derive(Clone, Copy, Debug)]
+struct Block {
+    frame: Matrix,
+    w: Matrix,
+    inverse: Matrix,
+    /// A sample that no force moves takes none.
+    rigid: bool,
+}
+
+/// The solver's buffers. One thread at a time.
+#[derive(Clone, Debug, Default)]
+pub struct Sweeps {
+    blocks: Vec<Block>,
+    /// `W df`, three numbers a contact, mm.
+    shift: Vec<f32>,
+}
+
+impl Sweeps {
+    /// Room for `contacts` contacts without an allocation later.
+    pub fn with_capacity(contacts: usize) -> Self {
+        Self {
+            blocks: Vec::with_capacity(contacts),
+            shift: Vec::with_capacity(3 * contacts),
+        }
+    }
+
+    /// Solves for `forces`, one a contact, on the tissue; they come in as the guess that gaps and slips belong to.
+    /// `delassus` is `[3n,3n]`, row-major, symmetric, in millimetres a unit of force.
+    ///
+    /// Panics when the lengths do not agree.
+    pub fn solve(
+        &mut self,
+        delassus: &[f32],
+        contacts: &[Contact],
+        forces: &mut [Vector],
+        limits: Limits,
+    ) -> Outcome {
+        let n = contacts.len();
+        assert_eq!(forces.len(), n, "one force a contact");
+        assert_eq!(delassus.len(), 9 * n * n, "`delassus` is [3n,3n]");
+        self.shift.clear();
+        self.shift.resize(3 * n, 0.0);
+        self.blocks.clear();
+        for (i, contact) in contacts.iter().enumerate() {
+            self.blocks.push(Block::new(delassus, n, i, contact));
+        }
+        // A guess that the law forbids is put right first: a contact that became another's may pull.
+        let mut outcome = Outcome {
+            sweeps: 0,
+            change_mm: 0.0,
+            converged: true,
+        };
+        while outcome.sweeps < limits.most_sweeps.max(1) {
+            outcome.change_mm = self.sweep(delassus, contacts, forces);
+            outcome.sweeps += 1;
+            outcome.converged = outcome.change_mm <= limits.tolerance_mm;
+            if outcome.converged && outcome.sweeps >= limits.least_sweeps {
+                break;
+            }
+        }
+        outcome
+    }
+
+    /// How the last solve's change of force moves each contact's sample, mm: `W (f' - f)`.
+    pub fn shift(&self, contact: usize) -> Vector {
+        Vector::from_slice(&self.shift[3 * contact..])
+    }
+
+    fn sweep(&mut self, delassus: &[f32], contacts: &[Contact], forces: &mut [Vector]) -> f32 {
+        let n = contacts.len();
+        let mut largest = 0.0f32;
+        for (i, contact) in contacts.iter().enumerate() {
+            let block = &self.blocks[i];
+            let now = contact.slip + Vector::from_slice(&self.shift[3 * i..]);
+            let local = block.frame.transpose() * forces[i];
+            let wanted = match contact.law {
+                _ if block.rigid => Vector::ZERO,
+                Law::Touch { friction } => {
+                    let mut r = block.frame.transpose() * now;
+                    r.x = contact.gap + contact.normal.dot(self.shift(i));
+                    let b = r - block.w * local;
+                    coulomb(&block.w, &block.inverse, b, friction, local)
+                }
+                Law::Bound => local - block.inverse * (block.frame.transpose() * now),
+            };
+            let change = wanted - local;
+            if change == Vector::ZERO {
+                continue;
+            }
+            largest = largest.max((block.w * change).abs().max_element());
+            let change = block.frame * change;
+            forces[i] = block.frame * wanted;
+            for (k, df) in change.to_array().into_iter().enumerate() {
+                let row = &delassus[(3 * i + k) * 3 * n..][..3 * n];
+                for (shift, w) in self.shift.iter_mut().zip(row) {
+                    *shift += w * df;
+                }
+            }
+        }
+        largest
+    }
+}
+
+impl Block {
+    fn new(delassus: &[f32], n: usize, i: usize, contact: &Contact) -> Self {
+        let row = |k: usize| Vector::from_slice(&delassus[(3 * i + k) * 3 * n + 3 * i..]);
+        // Symmetric: rows serve as columns.
+        let w = Matrix::from_cols(row(0), row(1), row(2));
+        let frame = frame(contact.normal);
+        let local = frame.transpose() * w * frame;
+        let inverse = local.inverse();
+        Self {
+            frame,
+            w: local,
+            inverse,
+            rigid: local.x_axis.x <= 0.0 || !inverse.is_finite(),
+        }
+    }
+}
