@@ -8,6 +8,8 @@ use fixture::{BUNDLES, bits, largest_difference, model, plain, push, rollout, sc
 use upt::scene::{QUIET_DISPLACEMENT, QUIET_STEPS};
 use upt::{Contact, Error, Progress, SceneOptions, StepInput};
 
+/// Longer than any machine takes for a step.
+const FOREVER: Duration = Duration::from_secs(86_400);
 const FREE: StepInput<'static> = StepInput {
     displacement: None,
     contact: Contact::None,
@@ -165,10 +167,7 @@ fn the_worker_gives_what_the_host_would_get() {
             background.read(&mut seen).unwrap();
             background.sample(0.5, &mut seen).unwrap();
             background.stats();
-            assert_eq!(
-                background.wait(Duration::from_secs(60)).unwrap(),
-                Progress::Done
-            );
+            assert_eq!(background.wait(FOREVER).unwrap(), Progress::Done);
             assert_eq!(background.poll().unwrap(), Progress::Done);
             let mut want = seen.clone();
             direct
@@ -179,10 +178,7 @@ fn the_worker_gives_what_the_host_would_get() {
         }
         // The error of a submitted step is told once.
         background.submit(&[u32::MAX], &[0.0; 3]).unwrap();
-        assert!(matches!(
-            background.wait(Duration::from_secs(60)),
-            Err(Error::Argument(_))
-        ));
+        assert!(matches!(background.wait(FOREVER), Err(Error::Argument(_))));
         assert_eq!(background.poll().unwrap(), Progress::Done);
     }
 }
@@ -205,38 +201,45 @@ fn the_latest_input_wins_where_asked() {
             .collect();
         scene.submit(&nodes, &vectors).unwrap();
     }
-    assert_eq!(scene.wait(Duration::from_secs(60)).unwrap(), Progress::Done);
+    assert_eq!(scene.wait(FOREVER).unwrap(), Progress::Done);
     let mut out = vec![0.0; 3 * scene.node_count()];
     scene.read(&mut out).unwrap();
     assert_eq!(out[3 * nodes[0] as usize + 2], -1.99);
     assert!(scene.stats().step_count <= 200);
 }
 
-/// A host that never waits asks eight scenes in turn and gives those that are done their next step: none falls far behind.
+/// A host that never waits asks eight scenes in turn and gives those that are done their next step: each goes on, and all
+/// end in the same state. How many steps each has made by then is the system's choice.
 #[test]
-fn eight_scenes_on_one_model_stay_fair() {
+fn eight_scenes_on_one_model_go_on_beside_each_other() {
     const STEPS: u64 = 1000;
     for name in BUNDLES {
         let model = model(name);
         let scenes: Vec<_> = (0..8).map(|_| scene(&model, &plain())).collect();
         let (nodes, vectors) = push(&model, 3);
+        let mut started = [1; 8];
         for scene in &scenes {
             scene.submit(&nodes, &vectors).unwrap();
         }
         while scenes.iter().any(|scene| scene.stats().step_count < STEPS) {
-            for scene in &scenes {
-                if scene.poll().unwrap() == Progress::Done {
+            for (scene, started) in scenes.iter().zip(&mut started) {
+                if scene.poll().unwrap() == Progress::Done && *started < STEPS {
                     scene.submit(&nodes, &vectors).unwrap();
+                    *started += 1;
                 }
             }
             std::thread::yield_now();
         }
-        for scene in &scenes {
-            assert_eq!(scene.wait(Duration::from_secs(60)).unwrap(), Progress::Done);
-        }
-        let made: Vec<u64> = scenes.iter().map(|s| s.stats().step_count).collect();
-        let most = made.iter().max().unwrap();
-        assert!(*most <= 5 * STEPS, "{name}: steps of each scene {made:?}");
+        let ends: Vec<Vec<u32>> = scenes
+            .iter()
+            .map(|scene| {
+                assert_eq!(scene.wait(FOREVER).unwrap(), Progress::Done);
+                let mut out = vec![0.0; 3 * scene.node_count()];
+                scene.read(&mut out).unwrap();
+                bits(&out)
+            })
+            .collect();
+        assert!(ends.iter().all(|end| *end == ends[0]), "{name}");
         assert_eq!(
             upt::shutdown().unwrap_err().status(),
             -7,

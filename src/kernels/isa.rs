@@ -18,7 +18,7 @@ pub enum Isa {
 
 impl Isa {
     /// The best of this machine. The environment variable `UPT_ISA` (`scalar`, `neon`, `avx2`,
-    /// `avx512`) lowers it, for measurements; a set that the machine lacks is ignored.
+    /// `avx512`) lowers it, for comparisons; a set that the machine lacks is ignored. The solver of `tissue` obeys it too.
     pub fn detect() -> Self {
         static BEST: OnceLock<Isa> = OnceLock::new();
         *BEST.get_or_init(|| {
@@ -63,11 +63,11 @@ impl Isa {
         }
     }
 
-    /// Whether the machine multiplies bf16 pairs (`vdpbf16ps`); the bf16 decoder needs it.
+    /// Whether the machine multiplies bf16 pairs (`vdpbf16ps`) and `UPT_ISA` does not forbid it; the bf16 decoder needs it.
     pub fn has_bf16() -> bool {
         #[cfg(target_arch = "x86_64")]
         {
-            Isa::Avx512.is_available() && is_x86_feature_detected!("avx512bf16")
+            Isa::detect() == Isa::Avx512 && is_x86_feature_detected!("avx512bf16")
         }
         #[cfg(not(target_arch = "x86_64"))]
         {

@@ -1,9 +1,9 @@
 /* Walks every function of upt.h and every status code.
  *
- *   abi_walk BUNDLE DAMAGED REDUCED
+ *   abi_walk BUNDLE DAMAGED REDUCED whole|bare
  *
  * DAMAGED: folder with version/, hash/, json/: copies of BUNDLE made wrong. REDUCED: a bundle whose
- * tables belong to its mesh. The parts are walk_*.c.
+ * tables belong to its mesh. bare: the library has no optional features. The parts are walk_*.c.
  *
  * UPT_ERR_RUNTIME needs a process without ONNX Runtime: runtime_missing.c. UPT_ERR_PANIC needs a
  * library built with feature "fault"; without it that part is left out and said.
@@ -19,6 +19,7 @@ float *before, *after;
 uint32_t contact_nodes[4];
 float contact_vectors[12];
 int log_count;
+int bare;
 
 upt_scene *make_scene_with(int32_t guard_policy) {
   upt_scene *scene = NULL;
@@ -47,10 +48,11 @@ int main(int argc, char **argv) {
   upt_model *closed;
   size_t i;
   int panics;
-  if (argc != 4) {
-    fprintf(stderr, "usage: %s BUNDLE DAMAGED REDUCED\n", argv[0]);
+  if (argc != 5) {
+    fprintf(stderr, "usage: %s BUNDLE DAMAGED REDUCED whole|bare\n", argv[0]);
     return 2;
   }
+  bare = strcmp(argv[4], "bare") == 0;
   walk_library();
   walk_model_open(argv[1], argv[2]);
   if (model == NULL) {

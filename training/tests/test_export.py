@@ -23,9 +23,9 @@ from upt_training.run import make_trainer
 
 
 @pytest.fixture(scope="module")
-def bundle(trained, data, mesh_path, tmp_path_factory):
+def bundle(committed, data, mesh_path, tmp_path_factory):
     out = tmp_path_factory.mktemp("bundle") / "tiny"
-    code = main(["export", str(trained), "--out", str(out), "--mesh", str(mesh_path), "--data", str(data),
+    code = main(["export", str(committed), "--out", str(out), "--mesh", str(mesh_path), "--data", str(data),
                  "--step", "--paper-split", "--int8", "--f16"])  # fmt: skip
     assert code == 0
     return out
@@ -43,10 +43,10 @@ def test_self_check_and_hashes(bundle):
         assert len(data) == entry["bytes"] and hashlib.sha256(data).hexdigest() == entry["sha256"]
 
 
-def test_bundle_rollout_equals_the_training_rollout(bundle, trained, data, mesh_path):
+def test_bundle_rollout_equals_the_training_rollout(bundle, committed, data, mesh_path):
     mesh = load_mesh(mesh_path)
-    trainer = make_trainer(load_settings(trained / "config.toml"), data, mesh, None, trained, "cpu")
-    trainer.start_from(trained / "best.pt")
+    trainer = make_trainer(load_settings(committed / "config.toml"), data, mesh, None, committed, "cpu")
+    trainer.start_from(committed / "best.pt")
     trainer.model.eval()
     runner = BundleRunner(bundle)
     case = open_dataset(data, mesh).select("test")[0]
@@ -108,7 +108,6 @@ def test_evaluate_reports_the_papers_metrics(bundle, data, tmp_path):
     assert table["bundle"]["mse_mm2"]["mean"] < 0.6 * table["zero"]["mse_mm2"]["mean"]
     assert table["bundle"]["mse_mm2"]["min"] <= table["bundle"]["mse_mm2"]["mean"] <= table["bundle"]["mse_mm2"]["max"]
     f32, int8 = (results[p]["all"]["bundle"]["mse_mm2"]["mean"] for p in ("f32", "int8"))
-    # A tiny network: one part in a million of its training moves this by a hundredth.
     assert abs(f32 - int8) < 0.1 * f32
 
 
@@ -118,13 +117,13 @@ def test_evaluate_without_a_case_is_an_error(bundle, data, tmp_path, capsys):
     assert "scheme" in capsys.readouterr().err and not out.exists()
 
 
-def test_a_failed_export_leaves_the_old_bundle(bundle, trained, data, mesh_path, tmp_path, monkeypatch):
+def test_a_failed_export_leaves_the_old_bundle(bundle, committed, data, mesh_path, tmp_path, monkeypatch):
     before = (bundle / "bundle.json").read_bytes()
     monkeypatch.setattr("upt_training.bundle.TOLERANCE", 0.0)
     code = main(
         [
             "export",
-            str(trained),
+            str(committed),
             "--out",
             str(bundle),
             "--mesh",
@@ -150,9 +149,9 @@ def test_relative_positions_go_into_the_tables(mesh_path, tmp_path):
     assert tables[0][2].shape == tables[1][2].shape
 
 
-def test_tables_are_exact_to_float32(bundle, trained, mesh_path):
+def test_tables_are_exact_to_float32(bundle, committed, mesh_path):
     """embed.onnx has its angles in float64: in float32 the tables would be off by 1e-6."""
-    model, _ = load_model(trained)
+    model, _ = load_model(committed)
     mesh = load_mesh(mesh_path)
     with torch.no_grad():
         exact = model.double().tables(torch.from_numpy(mesh.positions.astype(np.float64)))
@@ -170,8 +169,8 @@ def test_the_reference_step_is_the_split_in_float64(bundle, mesh_path):
     assert largest > 1e-3 and np.abs(found - reference["displacement"]).max() < 1e-5 * largest
 
 
-def test_heads_one_after_another_are_the_same_attention(trained, monkeypatch):
-    model, _ = load_model(trained)
+def test_heads_one_after_another_are_the_same_attention(committed, monkeypatch):
+    model, _ = load_model(committed)
     supernodes = np.random.default_rng(2).standard_normal((48, model.settings.encoder)).astype(np.float32)
     found = []
     for limit in (1e9, 0.0):

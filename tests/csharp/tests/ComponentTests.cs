@@ -1,6 +1,5 @@
 using System;
 using System.IO;
-using System.Threading;
 using NUnit.Framework;
 using Unity.Profiling;
 using Upt.Interop;
@@ -39,7 +38,8 @@ namespace Upt.Tests
             return tissue;
         }
 
-        /// <summary>Frames of the sample and its tissue at 60 Hz; the worker finishes between them.</summary>
+        /// <summary>Frames of the sample and its tissue at 60 Hz of the stub's clock. A step that a frame submits has
+        /// finished before the next one, however long it takes here.</summary>
         private static void Play(GameObject sample, SoftTissue tissue, int frames, Action<int> each)
         {
             for (int frame = 0; frame < frames; frame++)
@@ -47,8 +47,18 @@ namespace Upt.Tests
                 sample.Send("Update");
                 tissue.gameObject.Send("Update");
                 each(frame);
-                Thread.Sleep(2);
+                FinishStep(tissue);
             }
+        }
+
+        /// <summary>Waits for the step in flight. The component still polls it in its next frame.</summary>
+        private static void FinishStep(SoftTissue tissue)
+        {
+            const System.Reflection.BindingFlags Own =
+                System.Reflection.BindingFlags.Instance | System.Reflection.BindingFlags.NonPublic;
+            bool inFlight = (bool)typeof(SoftTissue).GetField("inFlight", Own).GetValue(tissue);
+            Scene scene = (Scene)typeof(SoftTissue).GetField("scene", Own).GetValue(tissue);
+            if (inFlight) Assert.That(scene.Wait(uint.MaxValue), "a step of the fixture must succeed");
         }
 
         private static PushedBrain Sample()
@@ -228,7 +238,7 @@ namespace Upt.Tests
             {
                 item.Send("Update");
                 sample.Tissue.gameObject.Send("Update");
-                Thread.Sleep(2);
+                FinishStep(sample.Tissue);
                 if (sample.Tissue.LastStats.step_count == last) continue;
                 last = sample.Tissue.LastStats.step_count;
                 told += sample.Tissue.LastStats.step_ms;

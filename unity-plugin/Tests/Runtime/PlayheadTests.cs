@@ -63,6 +63,8 @@ namespace Upt.Tests
             double[] shown = Shown(200, 1.0 / 60.0, 5);
             for (int frame = 1; frame < shown.Length; frame++)
                 Assert.That(shown[frame], Is.GreaterThanOrEqualTo(shown[frame - 1] - 1e-9), "frame " + frame);
+            // A step is asked for in the frame that takes the last one, so one comes every five frames, and that many are shown.
+            Assert.That(shown[199] - shown[49], Is.EqualTo(150 / 5).Within(1.0), "the picture goes on");
         }
 
         [Test]

@@ -22,12 +22,27 @@ impl Simd {
     /// All sets, best first.
     pub const ALL: [Simd; 4] = [Simd::Avx512, Simd::Avx2, Simd::Neon, Simd::Scalar];
 
-    /// The best set of this processor.
+    /// The best set of this processor, or the one that the environment variable `UPT_ISA` names (`scalar`, `avx2`,
+    /// `avx512`, `neon`), where the processor has it.
     pub fn detect() -> Self {
-        Self::ALL
+        let asked = std::env::var("UPT_ISA").ok();
+        let asked = asked.and_then(|name| Self::parse(&name));
+        asked
             .into_iter()
+            .chain(Self::ALL)
             .find(|simd| simd.is_available())
             .unwrap_or(Simd::Scalar)
+    }
+
+    /// The set of that name in `UPT_ISA`.
+    pub fn parse(name: &str) -> Option<Self> {
+        match name.trim().to_ascii_lowercase().as_str() {
+            "scalar" => Some(Simd::Scalar),
+            "avx2" => Some(Simd::Avx2),
+            "avx512" => Some(Simd::Avx512),
+            "neon" => Some(Simd::Neon),
+            _ => None,
+        }
     }
 
     /// Whether this processor has the set.
