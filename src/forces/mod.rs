@@ -1,23 +1,22 @@
 //! Reaction at the contact nodes from a displacement field, for haptics of a scene without a prior.
 //!
 //! The tissue pushes an instrument that holds node `a` with `-sum f_a` over the elements around it, `f_a` the derivative of
-//! their strain energy ([`element`]); inertia and damping of the node itself are left out. Forces are mN, lengths mm,
+//! their strain energy ([`elements::stress`]); inertia and damping of the node itself are left out. Forces are mN, lengths mm,
 //! moduli Pa (1 Pa mm² = 1e-3 mN); all arithmetic in f64.
 
-mod element;
 #[cfg(test)]
 mod tests;
 
 use crate::error::{Error, Result};
-use element::Element;
+use elements::Tetrahedron;
 
-pub use element::Moduli;
+pub use elements::Moduli;
 
 /// What is known of the elements around the nodes that can be in contact; made once a mesh.
 #[derive(Debug)]
 pub struct ReactionForces {
     moduli: Moduli,
-    elements: Vec<Element>,
+    elements: Vec<Tetrahedron>,
     /// Rows of `around`, one a mesh node (empty for nodes that cannot be in contact).
     offsets: Vec<u32>,
     around: Vec<u32>,
@@ -37,6 +36,11 @@ pub struct ForceReport {
     pub inverted: usize,
 }
 
+/// Row `node` of `[K,3]`.
+fn row_of(values: &[f32], node: u32) -> [f64; 3] {
+    [0, 1, 2].map(|axis| f64::from(values[3 * node as usize + axis]))
+}
+
 impl ReactionForces {
     /// Adjacency and gradients of the elements that touch `nodes` (the surface's, say).
     ///
@@ -52,16 +56,14 @@ impl ReactionForces {
         let node_count = positions.len() / 3;
         let mut wanted = vec![false; node_count];
         nodes.iter().for_each(|&node| wanted[node as usize] = true);
-        let elements: Vec<Element> = tets
+        let elements: Vec<Tetrahedron> = tets
             .chunks_exact(4)
             .enumerate()
             .filter(|(_, tet)| tet.iter().any(|&node| wanted[node as usize]))
             .map(|(index, tet)| {
-                let mut element = Element::new(positions, [tet[0], tet[1], tet[2], tet[3]]);
-                element.volume *= stiffness
-                    .get(index)
-                    .map_or(1.0, |&factor| f64::from(factor));
-                element
+                let corners = [tet[0], tet[1], tet[2], tet[3]];
+                let factor = stiffness.get(index).map_or(1.0, |&f| f64::from(f));
+                Tetrahedron::new(corners, corners.map(|node| row_of(positions, node)), factor)
             })
             .collect();
         let mut offsets = vec![0u32; node_count + 1];
@@ -175,7 +177,9 @@ impl ReactionForces {
                     continue;
                 }
                 let element = &self.elements[e as usize];
-                let (forces, det) = element.forces(displacement, self.moduli);
+                let state =
+                    element.deformation(element.corners.map(|node| row_of(displacement, node)));
+                let (forces, det) = (element.forces(&state, self.moduli), state.det);
                 if !det.is_finite() {
                     return Err(Error::NonFinite(format!(
                         "reaction: displacement around node {node} is not finite"

@@ -1,10 +1,14 @@
-use super::element::{Element, cross, dot, sub};
 use super::*;
+use elements::vector::{cross, dot, subtract};
 
 const UNIT: Moduli = Moduli {
     shear_pa: 1000.0,
     bulk_pa: 5000.0,
 };
+
+fn element(positions: &[f32], corners: [u32; 4]) -> Tetrahedron {
+    Tetrahedron::new(corners, corners.map(|node| row_of(positions, node)), 1.0)
+}
 
 /// A cube of `n³` cells, five tetrahedra each, edge `n` mm.
 fn cube(n: u32) -> (Vec<f32>, Vec<u32>) {
@@ -38,7 +42,7 @@ fn cube(n: u32) -> (Vec<f32>, Vec<u32>) {
                 ];
                 for tet in if (x + y + z) % 2 == 0 { odd } else { even } {
                     let mut tet = tet.map(c);
-                    if Element::new(&positions, tet).volume < 0.0 {
+                    if element(&positions, tet).volume < 0.0 {
                         tet.swap(0, 1);
                     }
                     tets.extend(tet);
@@ -52,12 +56,12 @@ fn cube(n: u32) -> (Vec<f32>, Vec<u32>) {
 fn energy(positions: &[f32], tets: &[u32], u: &[f32], moduli: Moduli) -> f64 {
     tets.chunks_exact(4)
         .map(|t| {
-            let element = Element::new(positions, [t[0], t[1], t[2], t[3]]);
+            let element = element(positions, [t[0], t[1], t[2], t[3]]);
             let x = |a: usize| {
                 let at = 3 * t[a] as usize;
                 [0, 1, 2].map(|k| f64::from(positions[at + k]) + f64::from(u[at + k]))
             };
-            let edges = [1, 2, 3].map(|a| sub(x(a), x(0)));
+            let edges = [1, 2, 3].map(|a| subtract(x(a), x(0)));
             let det = dot(edges[0], cross(edges[1], edges[2])) / (6.0 * element.volume);
             // I1 = |F|², F = sum edge_a (outer) gradient_a.
             let f = |i: usize, j: usize| -> f64 {

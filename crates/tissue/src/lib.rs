@@ -12,13 +12,17 @@
     reason = "components of vectors and tensors read best by index"
 )]
 
+pub mod material {
+    //! The material, see [`elements`].
+    pub use elements::{Material, MaterialError};
+}
+
 pub mod baselines;
 pub mod contact;
 pub mod dataset;
 pub mod export;
 #[cfg(feature = "linear")]
 pub mod linear;
-pub mod material;
 pub mod mesh;
 #[cfg(feature = "files")]
 pub mod mesh_import;
@@ -32,4 +36,3 @@ pub mod statics;
 pub mod stuffing;
 pub mod tensors;
 pub mod trajectory;
-mod vector;

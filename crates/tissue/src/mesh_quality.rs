@@ -1,7 +1,7 @@
 //! Measures of a mesh: counts, sizes, angles, inscribed radii, manifoldness.
 
 use crate::mesh::{Mesh, components, tet_volume};
-use crate::vector::{cross, dot, length, subtract};
+use elements::vector::{cross, dot, length, subtract};
 use std::collections::BTreeMap;
 
 /// What `upt mesh info` prints, all lengths in mm and angles in degrees.

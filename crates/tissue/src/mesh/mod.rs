@@ -86,6 +86,15 @@ impl Mesh {
         self.positions.len()
     }
 
+    /// What the element law needs.
+    pub fn tetrahedra(&self) -> elements::Tetrahedra<'_> {
+        elements::Tetrahedra {
+            positions: &self.positions,
+            tets: &self.tets,
+            stiffness: &self.stiffness,
+        }
+    }
+
     /// Young's modulus of tetrahedron `tet` over the material's.
     pub fn stiffness_of(&self, tet: usize) -> f32 {
         self.stiffness.get(tet).copied().unwrap_or(1.0)

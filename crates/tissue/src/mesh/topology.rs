@@ -1,7 +1,7 @@
 //! Geometry and connectivity: volumes, boundary faces, face adjacency, components.
 
 use super::MeshError;
-use crate::vector::{cross, dot, subtract};
+use elements::vector::{cross, dot, subtract};
 use std::collections::HashMap;
 
 /// Rest position of a node in f64, mm.

@@ -1,9 +1,10 @@
 //! What a frame reports, and why it failed: f64 passes over the elements, once a frame.
 
 use super::{ContactNode, FrameReport, Solver, SolverError};
-use crate::solver::batches::shape_gradients;
-use crate::solver::partition::Chunk;
-use crate::vector::{cross, dot};
+use elements::Chunk;
+use elements::inverse_cube_root;
+use elements::shape_gradients;
+use elements::vector::{cross, dot};
 use rayon::prelude::*;
 
 /// Sums and extremes over the elements of the present state.
@@ -86,7 +87,7 @@ impl Solver {
             result.note(determinant, number);
             let speed_squared = f64::from(self.speed_squared[number]);
             result.largest_bound = result.largest_bound.max(state.bound * speed_squared);
-            let isochoric = state.invariant * inverse_cube_root(determinant).powi(2);
+            let isochoric = state.invariant * inverse_cube_root(determinant.max(1e-3)).powi(2);
             let density = shear_over_bulk * (isochoric - 3.0) + (determinant - 1.0).powi(2);
             // `bulk` is a sixth of the element's modulus.
             result.strain_energy += 3.0 * f64::from(element.bulk.abs()) * state.volume * density;
@@ -222,16 +223,4 @@ fn element_state(rest: [[f32; 3]; 4], displacement: [[f64; 3]; 4]) -> ElementSta
         invariant: dot(f[0], f[0]) + dot(f[1], f[1]) + dot(f[2], f[2]),
         bound,
     }
-}
-
-/// `x^(-1/3)` in f64 without the library's slow cube root: an f32 guess and three corrections.
-fn inverse_cube_root(x: f64) -> f64 {
-    let clamped = x.max(1e-3);
-    let bits = (clamped as f32).to_bits() / 3;
-    let mut y = f64::from(f32::from_bits(0x54A2_FA8C - bits));
-    for _ in 0..3 {
-        let e = 1.0 - clamped * y * y * y;
-        y += y * e * (1.0 / 3.0 + e * (2.0 / 9.0));
-    }
-    y
 }

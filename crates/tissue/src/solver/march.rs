@@ -8,9 +8,8 @@
 //! chunks add element forces to their own slots; owners collect ghost forces and move.
 
 use super::barrier::{FlushDenormals, SpinBarrier};
-use super::dispatch::Kernels;
-use super::partition::{Chunk, Partition};
-use super::slots::PADDED;
+use elements::PADDED;
+use elements::{Chunk, Kernels, Partition};
 use rayon::ThreadPool;
 
 /// Four floats on a 16-byte boundary.

@@ -5,9 +5,9 @@
 //! (selective mass scaling; Olovsson, Simonsson and Unosson 2005): statics stay
 //! as they are, and dynamics change by the mass that is added.
 
-use super::batches::shape_gradients;
 use crate::material::Material;
 use crate::mesh::{Mesh, tet_volume};
+use elements::shape_gradients;
 
 /// Nodal masses and what scaling added to them.
 pub(super) struct LumpedMass {

@@ -7,34 +7,26 @@
 //! bits for any number of threads.
 
 mod barrier;
-mod batches;
-mod cluster;
 mod diagnosis;
-mod dispatch;
 mod error;
 mod frame;
-mod kernel;
-mod lanes;
 mod march;
 mod mass;
 mod options;
-mod partition;
-mod slots;
 mod stability;
 // Against the energy of `statics`.
 #[cfg(all(test, feature = "linear"))]
 mod tests;
 
-pub use dispatch::Simd;
+pub use elements::Simd;
 pub use error::SolverError;
 pub use options::{Pressure, SolverOptions, Substep};
 
 use crate::mesh::{Boundary, Mesh};
-use dispatch::Kernels;
+use elements::{Kernels, Partition};
 use march::{Fields, Node, Path};
 use mass::LumpedMass;
 use options::check_positive;
-use partition::Partition;
 
 /// One prescribed node of a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -124,7 +116,7 @@ impl Solver {
                     })?,
             ),
         };
-        let partition = Partition::new(mesh, &options.material);
+        let partition = Partition::new(mesh.tetrahedra(), &options.material);
         let slots = partition.node_of_slot.len();
         let lumped = LumpedMass::new(mesh, &options.material, options.mass_scaling_s);
         let mut mass = vec![0.0; slots];
@@ -287,12 +279,12 @@ impl Solver {
                 + octahedra.bytes()
                 + pairs.bytes()
                 + singles.bytes(),
-            flops: slots * slots::FLOPS_PER_NODE,
+            flops: slots * elements::FLOPS_PER_NODE,
             gathers: 0,
         };
         for (nodes, tets, clusters, batches) in kinds {
-            cost.flops += clusters * kernel::flops(nodes, tets);
-            cost.gathers += lanes::WIDTH * batches * nodes;
+            cost.flops += clusters * elements::flops(nodes, tets);
+            cost.gathers += elements::WIDTH * batches * nodes;
         }
         cost
     }

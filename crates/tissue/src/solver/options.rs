@@ -1,8 +1,8 @@
 //! Settings of a solver and their checks.
 
-use super::dispatch::Simd;
 use super::error::SolverError;
 use crate::material::Material;
+use elements::Simd;
 
 /// How the pressure of an element is found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]

@@ -257,7 +257,7 @@ fn flat(contact: &[ContactNode]) -> Vec<f64> {
 fn length(vectors: &[f64]) -> f64 {
     let squares = vectors.as_chunks::<3>().0.iter();
     squares
-        .map(|v| crate::vector::length(*v))
+        .map(|v| elements::vector::length(*v))
         .fold(0.0, f64::max)
 }
 

@@ -4,12 +4,12 @@
 //! sixteen corners; the cells of a BCC lattice, so three quarters of a stuffed mesh), a
 //! *pair* shares a face (five instead of eight), and what is left is single.
 
-use super::lanes::WIDTH;
+use crate::lanes::WIDTH;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 /// Sixteen clusters of one kind, structure of arrays. All tetrahedra of a cluster share the edge of its nodes 0 and 1.
 #[repr(C, align(64))]
-pub(crate) struct Cluster<const NODES: usize, const TETS: usize> {
+pub struct Cluster<const NODES: usize, const TETS: usize> {
     /// `springs[t]`: `-mu V G`, µN/mm, entries 11, 12, 13, 22, 23, 33 in the order of `corners(t)`, with the rest
     /// volume `V` and `G = (D0^T D0)^-1` of the rest edges from node 0. Zero in padding lanes.
     pub springs: [[[f32; WIDTH]; 6]; TETS],
@@ -24,14 +24,14 @@ pub(crate) struct Cluster<const NODES: usize, const TETS: usize> {
 }
 
 /// Four tetrahedra around the edge of nodes 0 and 1; nodes 2 to 5 are the ring.
-pub(crate) type Octahedra = Cluster<6, 4>;
+pub type Octahedra = Cluster<6, 4>;
 /// Two tetrahedra with the common face 0, 1, 2.
-pub(crate) type Pairs = Cluster<5, 2>;
-pub(crate) type Singles = Cluster<4, 1>;
+pub type Pairs = Cluster<5, 2>;
+pub type Singles = Cluster<4, 1>;
 
 /// Nodes of a cluster that tetrahedron `tet` has beside node 0.
 #[inline(always)]
-pub(crate) const fn corners<const NODES: usize>(tet: usize) -> [usize; 3] {
+pub const fn corners<const NODES: usize>(tet: usize) -> [usize; 3] {
     if NODES == 6 {
         [1, 2 + tet, 2 + (tet + 1) % 4]
     } else {
@@ -41,14 +41,14 @@ pub(crate) const fn corners<const NODES: usize>(tet: usize) -> [usize; 3] {
 
 /// One cluster of a mesh, before it is packed: nodes and elements in the order of [`Cluster`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Group<const NODES: usize, const TETS: usize> {
+pub struct Group<const NODES: usize, const TETS: usize> {
     pub nodes: [u32; NODES],
     pub tets: [u32; TETS],
 }
 
 /// The clusters of some elements of a mesh; each element is in one of them.
 #[derive(Default)]
-pub(crate) struct Groups {
+pub struct Groups {
     pub octahedra: Vec<Group<6, 4>>,
     pub pairs: Vec<Group<5, 2>>,
     pub singles: Vec<Group<4, 1>>,
@@ -201,10 +201,10 @@ fn face_without(tet: [u32; 4], skip: usize) -> [u32; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::{Mesh, box_phantom};
+    use tissue::mesh::{Mesh, box_phantom};
 
     fn volume(mesh: &Mesh, nodes: [u32; 4]) -> f64 {
-        crate::solver::batches::shape_gradients(nodes.map(|n| mesh.positions[n as usize])).1
+        crate::batches::shape_gradients(nodes.map(|n| mesh.positions[n as usize])).1
     }
 
     /// Checks one kind: the nodes that [`corners`] names are those of the mesh's element.

@@ -4,7 +4,7 @@ use super::{CUBE_ROOT_GUESS, Lanes, WIDTH};
 use std::arch::aarch64::*;
 
 #[derive(Clone, Copy)]
-pub(crate) struct Neon([float32x4_t; 4]);
+pub struct Neon([float32x4_t; 4]);
 
 /// Transposes four rows `[x y z w]` to columns, and back.
 #[inline(always)]

@@ -1,16 +1,16 @@
 //! Passes over a chunk's slots: where nodes are, and where the step takes them. Nodes are `[x, y, z, w]`.
 
-use super::lanes::{Lanes, WIDTH};
+use crate::lanes::{Lanes, WIDTH};
 
 /// Floating-point operations of one node in [`place`] and [`advance`], a fused multiply-add counted as two.
-pub(crate) const FLOPS_PER_NODE: usize = 3 + 3 * 6;
+pub const FLOPS_PER_NODE: usize = 3 + 3 * 6;
 
 /// Slots are padded to a multiple of this, a register's worth at most.
-pub(crate) const PADDED: usize = 4;
+pub const PADDED: usize = 4;
 
 /// `positions = rest + displacement`, `count` nodes rounded up to [`PADDED`]; the fourth component of `rest` is zero.
 #[inline(always)]
-pub(crate) unsafe fn place<L: Lanes>(
+pub unsafe fn place<L: Lanes>(
     count: usize,
     rest: *const [f32; 4],
     displacement: *const [f32; 4],
@@ -29,7 +29,7 @@ pub(crate) unsafe fn place<L: Lanes>(
 ///
 /// The fourth components, gain and dilatation, stay.
 #[inline(always)]
-pub(crate) unsafe fn advance<L: Lanes>(
+pub unsafe fn advance<L: Lanes>(
     count: usize,
     beta: f32,
     force: *const [f32; 4],

@@ -4,17 +4,17 @@ use super::{CUBE_ROOT_GUESS, Lanes};
 use std::arch::x86_64::*;
 
 #[derive(Clone, Copy)]
-pub(crate) struct Avx2(__m256);
+pub struct Avx2(__m256);
 
 /// One node.
 #[inline(always)]
-pub(super) unsafe fn row(nodes: *const [f32; 4], index: u16) -> __m128 {
+pub unsafe fn row(nodes: *const [f32; 4], index: u16) -> __m128 {
     unsafe { _mm_loadu_ps(nodes.cast::<f64>().add(index as usize).cast()) }
 }
 
 /// Adds to one node.
 #[inline(always)]
-pub(super) unsafe fn add_row(nodes: *mut [f32; 4], index: u16, value: __m128) {
+pub unsafe fn add_row(nodes: *mut [f32; 4], index: u16, value: __m128) {
     unsafe {
         let target: *mut f32 = nodes.cast::<f64>().add(index as usize).cast();
         _mm_storeu_ps(target, _mm_add_ps(_mm_loadu_ps(target), value));

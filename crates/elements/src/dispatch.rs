@@ -1,9 +1,9 @@
 //! Run-time choice of the instruction set, and the kernels compiled for each.
 
-use super::kernel::{Shape, add_forces, add_volumes};
-use super::lanes::{Lanes, Scalar};
-use super::partition::{Chunk, Partition};
-use super::slots::{advance, place};
+use crate::kernel::{Shape, add_forces, add_volumes};
+use crate::lanes::{Lanes, Scalar};
+use crate::partition::{Chunk, Partition};
+use crate::slots::{advance, place};
 
 /// Instruction set of the element kernels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -71,7 +71,7 @@ type AdvanceKernel = unsafe fn(usize, f32, *const [f32; 4], *mut [f32; 4], *mut 
 
 /// The kernels of one instruction set.
 #[derive(Clone, Copy)]
-pub(crate) struct Kernels {
+pub struct Kernels {
     pub forces: ForceKernel,
     pub averaged_forces: ForceKernel,
     pub volumes: VolumeKernel,
@@ -160,7 +160,7 @@ macro_rules! kernels {
                 unsafe { advance::<$lanes>(count, beta, f, d, u) }
             }
 
-            pub(super) const KERNELS: Kernels = Kernels {
+            pub const KERNELS: Kernels = Kernels {
                 forces,
                 averaged_forces,
                 volumes,
@@ -173,15 +173,11 @@ macro_rules! kernels {
 
 kernels!(scalar, Scalar);
 #[cfg(target_arch = "x86_64")]
-kernels!(avx2, crate::solver::lanes::Avx2, "avx2,fma");
+kernels!(avx2, crate::lanes::Avx2, "avx2,fma");
 #[cfg(target_arch = "x86_64")]
-kernels!(
-    avx512,
-    crate::solver::lanes::Avx512,
-    "avx512f,avx512vl,avx2,fma"
-);
+kernels!(avx512, crate::lanes::Avx512, "avx512f,avx512vl,avx2,fma");
 #[cfg(target_arch = "aarch64")]
-kernels!(neon, crate::solver::lanes::Neon, "neon");
+kernels!(neon, crate::lanes::Neon, "neon");
 
 impl Kernels {
     /// The kernels of `simd`; `None` where this processor lacks it.

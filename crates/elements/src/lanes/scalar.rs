@@ -3,7 +3,7 @@
 use super::{CUBE_ROOT_GUESS, Lanes, WIDTH};
 
 #[derive(Clone, Copy)]
-pub(crate) struct Scalar([f32; WIDTH]);
+pub struct Scalar([f32; WIDTH]);
 
 impl Scalar {
     #[inline(always)]

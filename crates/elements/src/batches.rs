@@ -1,23 +1,23 @@
 //! Clusters packed into batches of 16, with the constants of their tetrahedra.
 
-use super::cluster::{Cluster, Group, corners};
-use super::lanes::WIDTH;
-use super::partition::PADDING;
+use crate::cluster::{Cluster, Group, corners};
+use crate::lanes::WIDTH;
 use crate::material::Material;
-use crate::mesh::Mesh;
+use crate::partition::PADDING;
+use crate::tetrahedra::Tetrahedra;
 use crate::vector::{cross, dot};
 use std::ops::Range;
 
 /// Batches of one kind of cluster.
 #[derive(Default)]
-pub(crate) struct Kind<const NODES: usize, const TETS: usize> {
+pub struct Kind<const NODES: usize, const TETS: usize> {
     pub batches: Vec<Cluster<NODES, TETS>>,
     /// Mesh elements of each batch; [`PADDING`] in padding lanes.
     pub elements: Vec<[[u32; WIDTH]; TETS]>,
 }
 
 /// One tetrahedron as the kernels see it.
-pub(crate) struct Element {
+pub struct Element {
     /// Its number in the mesh.
     pub number: u32,
     /// Twice the chunk-local slots of its corners.
@@ -28,10 +28,10 @@ pub(crate) struct Element {
 
 /// What the constants of a chunk's clusters are made from.
 #[derive(Clone, Copy)]
-pub(crate) struct Source<'a> {
+pub struct Source<'a> {
     /// By chunk-local slot, see `Partition::rest`.
     pub rest: &'a [[f32; 4]],
-    pub mesh: &'a Mesh,
+    pub mesh: Tetrahedra<'a>,
     pub material: &'a Material,
 }
 
@@ -152,7 +152,7 @@ const PAIRS: [[usize; 2]; 6] = [[0, 0], [0, 1], [0, 2], [1, 1], [1, 2], [2, 2]];
 
 /// Gradients of the shape functions of corners 1..=3 (1/mm) and the rest volume (mm³), in f64.
 #[inline]
-pub(crate) fn shape_gradients(corners: [[f32; 3]; 4]) -> ([[f64; 3]; 3], f64) {
+pub fn shape_gradients(corners: [[f32; 3]; 4]) -> ([[f64; 3]; 3], f64) {
     let mut edge = [[0.0; 3]; 3];
     for a in 0..3 {
         for k in 0..3 {

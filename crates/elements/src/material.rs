@@ -30,6 +30,25 @@ impl Default for Material {
     }
 }
 
+/// Elastic moduli.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Moduli {
+    /// Shear modulus `mu = E / (2 (1 + nu))`, Pa.
+    pub shear_pa: f64,
+    /// Bulk modulus `kappa = E / (3 (1 - 2 nu))`, Pa.
+    pub bulk_pa: f64,
+}
+
+impl Moduli {
+    /// From Young's modulus, Pa, and Poisson's ratio below 0.5.
+    pub fn from_young(young_pa: f64, poisson: f64) -> Self {
+        Self {
+            shear_pa: young_pa / (2.0 * (1.0 + poisson)),
+            bulk_pa: young_pa / (3.0 * (1.0 - 2.0 * poisson)),
+        }
+    }
+}
+
 /// A material that the solver cannot use.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("material: `{field}` is {value}; it must be {wanted}")]
@@ -40,14 +59,19 @@ pub struct MaterialError {
 }
 
 impl Material {
+    /// Shear and bulk modulus.
+    pub fn moduli(&self) -> Moduli {
+        Moduli::from_young(self.young_pa, self.poisson)
+    }
+
     /// Shear modulus `mu = E / (2 (1 + nu))`, Pa.
     pub fn shear_pa(&self) -> f64 {
-        self.young_pa / (2.0 * (1.0 + self.poisson))
+        self.moduli().shear_pa
     }
 
     /// Bulk modulus `kappa = E / (3 (1 - 2 nu))`, Pa.
     pub fn bulk_pa(&self) -> f64 {
-        self.young_pa / (3.0 * (1.0 - 2.0 * self.poisson))
+        self.moduli().bulk_pa
     }
 
     /// Density in g/mm³, the solver's unit.

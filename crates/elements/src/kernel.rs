@@ -19,11 +19,11 @@
 //! No closures here or in `lanes`: a closure does not take on its caller's
 //! instruction set, and every vector operation in it would become a call.
 
-use super::cluster::{Cluster, corners};
-use super::lanes::{Lanes, WIDTH, prefetch};
+use crate::cluster::{Cluster, corners};
+use crate::lanes::{Lanes, WIDTH, prefetch};
 
 /// Floating-point operations of one cluster in [`add_forces`], a fused multiply-add counted as two.
-pub(crate) const fn flops(nodes: usize, tets: usize) -> usize {
+pub const fn flops(nodes: usize, tets: usize) -> usize {
     let ring = nodes - 2;
     // Edges, their squares and what they share with the edge 0-1: cross and dot products.
     let shape = 3 * (nodes - 1) + 5 * (nodes - 1) + 14 * ring;
@@ -37,7 +37,7 @@ pub(crate) const fn flops(nodes: usize, tets: usize) -> usize {
 
 /// `x^(-1/3)` for positive `x`, relative error about 1e-7.
 #[inline(always)]
-pub(crate) unsafe fn inverse_cube_root<L: Lanes>(x: L) -> L {
+pub unsafe fn inverse_cube_root<L: Lanes>(x: L) -> L {
     unsafe {
         let y = x.inverse_cube_root_guess();
         // y (1 - e)^(-1/3) with e = 1 - x y^3: a Chebyshev fit over -0.121..0.091, the guess's whole range.
@@ -58,7 +58,7 @@ type Vectors = [[f32; WIDTH]; 3];
 /// What a batch keeps between the loops; a cluster of few nodes leaves the ends unused.
 #[repr(C, align(64))]
 #[derive(Clone, Copy)]
-pub(crate) struct Shape {
+pub struct Shape {
     /// `e_k`, mm; row `k - 1`.
     edge: [Vectors; 5],
     /// `e_1 x e_k`, mm²; row `k - 2`.
@@ -319,12 +319,7 @@ unsafe fn add_node<L: Lanes, const NODES: usize, const TETS: usize, const NODE: 
 /// With `AVERAGED` the relative change of volume is the mean of the corners' fourth component
 /// instead of the element's `J - 1`.
 #[inline(always)]
-pub(crate) unsafe fn add_forces<
-    L: Lanes,
-    const NODES: usize,
-    const TETS: usize,
-    const AVERAGED: bool,
->(
+pub unsafe fn add_forces<L: Lanes, const NODES: usize, const TETS: usize, const AVERAGED: bool>(
     clusters: &[Cluster<NODES, TETS>],
     nodes: *const [f32; 4],
     forces: *mut [f32; 4],
@@ -355,7 +350,7 @@ pub(crate) unsafe fn add_forces<
 
 /// Adds each element's current volume times its bulk modulus (nJ) to the third component of its corners' `forces`.
 #[inline(always)]
-pub(crate) unsafe fn add_volumes<L: Lanes, const NODES: usize, const TETS: usize>(
+pub unsafe fn add_volumes<L: Lanes, const NODES: usize, const TETS: usize>(
     clusters: &[Cluster<NODES, TETS>],
     nodes: *const [f32; 4],
     forces: *mut [f32; 4],

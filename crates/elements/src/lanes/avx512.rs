@@ -5,7 +5,7 @@ use super::{CUBE_ROOT_GUESS, Lanes, WIDTH};
 use std::arch::x86_64::*;
 
 #[derive(Clone, Copy)]
-pub(crate) struct Avx512(__m512);
+pub struct Avx512(__m512);
 
 /// Rows `i`, `i + 4`, `i + 8`, `i + 12` in the four 128-bit parts.
 #[inline(always)]

@@ -18,18 +18,18 @@ mod neon;
 mod scalar;
 
 #[cfg(target_arch = "x86_64")]
-pub(crate) use avx2::Avx2;
+pub use avx2::Avx2;
 #[cfg(target_arch = "x86_64")]
-pub(crate) use avx512::Avx512;
+pub use avx512::Avx512;
 #[cfg(target_arch = "aarch64")]
-pub(crate) use neon::Neon;
-pub(crate) use scalar::Scalar;
+pub use neon::Neon;
+pub use scalar::Scalar;
 
 /// Elements in a batch.
-pub(crate) const WIDTH: usize = 16;
+pub const WIDTH: usize = 16;
 
 /// Constant of the inverse cube root's first guess, `bits(y) = GUESS - bits(x) / 3`.
-pub(crate) const CUBE_ROOT_GUESS: f32 = 1_419_967_116.0;
+pub const CUBE_ROOT_GUESS: f32 = 1_419_967_116.0;
 
 /// `COUNT` f32 lanes.
 ///
@@ -38,7 +38,7 @@ pub(crate) const CUBE_ROOT_GUESS: f32 = 1_419_967_116.0;
 /// `store`, `gather` and `scatter_add` must be valid for `COUNT` values, or for the
 /// nodes that the indices name. The callers are `target_feature` functions that
 /// are reached only after run-time detection.
-pub(crate) trait Lanes: Copy {
+pub trait Lanes: Copy {
     /// Elements that go through together; divides [`WIDTH`].
     const COUNT: usize;
     unsafe fn splat(value: f32) -> Self;
@@ -64,7 +64,7 @@ pub(crate) trait Lanes: Copy {
 
 /// Asks for a value's cache lines; the pointer may be beyond any allocation.
 #[inline(always)]
-pub(crate) fn prefetch<T>(value: *const T) {
+pub fn prefetch<T>(value: *const T) {
     #[cfg(target_arch = "x86_64")]
     for line in (0..size_of::<T>()).step_by(64) {
         let line = value.cast::<i8>().wrapping_add(line);

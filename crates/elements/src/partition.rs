@@ -7,20 +7,20 @@
 //! added to the owner in ascending slot order. The split depends on the mesh
 //! alone: a result has the same bits for any number of threads.
 
-use super::batches::{Element, Kind, Source};
-use super::cluster::{Groups, Octahedra, Pairs, Singles};
+use crate::batches::{Element, Kind, Source};
+use crate::cluster::{Groups, Octahedra, Pairs, Singles};
 use crate::material::Material;
-use crate::mesh::Mesh;
+use crate::tetrahedra::Tetrahedra;
 use std::ops::Range;
 
 /// Target number of elements in a chunk.
 const CHUNK_ELEMENTS: usize = 2048;
 
 /// Marks a slot that only pads a chunk to a cache line.
-pub(crate) const PADDING: u32 = u32::MAX;
+pub const PADDING: u32 = u32::MAX;
 
 /// A chunk's nodes and elements.
-pub(crate) struct Chunk {
+pub struct Chunk {
     /// First slot; a multiple of 4.
     pub first: usize,
     /// Owned slots are `first..first + owned`.
@@ -45,7 +45,7 @@ impl Chunk {
 }
 
 /// All chunks, with the maps between the mesh's nodes and slots.
-pub(crate) struct Partition {
+pub struct Partition {
     pub chunks: Vec<Chunk>,
     pub octahedra: Kind<6, 4>,
     pub pairs: Kind<5, 2>,
@@ -61,8 +61,8 @@ pub(crate) struct Partition {
 
 impl Partition {
     /// Splits a validated mesh of a material. `O(T log T)`.
-    pub fn new(mesh: &Mesh, material: &Material) -> Self {
-        let (positions, tets) = (&mesh.positions, &mesh.tets);
+    pub fn new(mesh: Tetrahedra<'_>, material: &Material) -> Self {
+        let (positions, tets) = (mesh.positions, mesh.tets);
         let centroids: Vec<[f32; 3]> = tets
             .iter()
             .map(|tet| {
@@ -103,10 +103,10 @@ impl Partition {
         chunk: u32,
         leaf: &[u32],
         owner: &[u32],
-        mesh: &Mesh,
+        mesh: Tetrahedra<'_>,
         material: &Material,
     ) {
-        let tets = &mesh.tets;
+        let tets = mesh.tets;
         let first = self.node_of_slot.len();
         let mut nodes: Vec<u32> = leaf.iter().flat_map(|e| tets[*e as usize]).collect();
         nodes.sort_unstable();
@@ -126,7 +126,7 @@ impl Partition {
         };
         let here = self.node_of_slot[first..].iter();
         let rest = from_centre(here.map(|node| mesh.positions[*node as usize]).collect());
-        let groups = Groups::new(leaf, tets, &mesh.positions);
+        let groups = Groups::new(leaf, tets, mesh.positions);
         let source = Source {
             rest: &rest,
             mesh,

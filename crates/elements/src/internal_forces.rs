@@ -1,0 +1,163 @@
+//! Internal forces of a whole body, `f_int(u)`, by the clustered SIMD kernel: what the corrections of the runtime evaluate.
+//!
+//! Two phases over the chunks of the [`Partition`]: each chunk computes the forces of its elements into its own slots, then each
+//! collects for its nodes what their elements in other chunks added, in ascending slot order. So the sum has the same
+//! bits for any number of threads.
+
+use crate::dispatch::{Kernels, Simd};
+use crate::material::Material;
+use crate::partition::{Chunk, PADDING, Partition};
+use crate::slots::PADDED;
+use crate::tetrahedra::Tetrahedra;
+
+/// Runs `task(chunk, worker)` for each chunk below a count, in any order and on any threads; `worker` is below the number of
+/// workers that [`Scratch::new`] was given, and two tasks that run at once have different ones.
+pub type ParallelFor<'a> = &'a dyn Fn(usize, &(dyn Fn(usize, usize) + Sync));
+
+/// The elements of a body, ready for [`ElementForces::evaluate`].
+pub struct ElementForces {
+    partition: Partition,
+    kernels: Kernels,
+    node_count: usize,
+}
+
+/// A slot as the kernels read it.
+#[derive(Clone, Copy, Default)]
+#[repr(C, align(64))]
+struct Line([[f32; 4]; 4]);
+
+/// Buffers of an evaluation; kept between calls.
+pub struct Scratch {
+    /// Forces by slot.
+    forces: Vec<Line>,
+    /// Node positions of the chunk at hand, a row a worker.
+    positions: Vec<Vec<Line>>,
+    /// Smallest det F a chunk.
+    smallest: Vec<f32>,
+}
+
+/// A pointer that the tasks of one evaluation share.
+struct Shared<T>(*mut T);
+// SAFETY: the tasks touch disjoint parts (see `evaluate`).
+unsafe impl<T> Send for Shared<T> {}
+// SAFETY: as above.
+unsafe impl<T> Sync for Shared<T> {}
+
+impl<T> Shared<T> {
+    fn at(&self, index: usize) -> *mut T {
+        self.0.wrapping_add(index)
+    }
+}
+
+impl ElementForces {
+    /// Prepares a body. `O(T log T)`.
+    ///
+    /// # Panics
+    /// If this processor lacks the instruction set.
+    pub fn new(body: Tetrahedra<'_>, material: &Material, simd: Simd) -> Self {
+        let kernels = Kernels::of(simd);
+        Self {
+            kernels: kernels.unwrap_or_else(|| panic!("{simd:?} is not available here")),
+            partition: Partition::new(body, material),
+            node_count: body.positions.len(),
+        }
+    }
+
+    /// Nodes of the body, `K`.
+    pub fn node_count(&self) -> usize {
+        self.node_count
+    }
+
+    /// Bytes that one evaluation streams through.
+    pub fn bytes(&self) -> usize {
+        let partition = &self.partition;
+        partition.octahedra.bytes()
+            + partition.pairs.bytes()
+            + partition.singles.bytes()
+            + partition.node_of_slot.len() * (4 + 16 + 16)
+    }
+
+    /// Buffers for up to `workers` threads.
+    pub fn scratch(&self, workers: usize) -> Scratch {
+        let chunks = &self.partition.chunks;
+        let widest = chunks.iter().map(Chunk::slot_count).max().unwrap_or(0);
+        Scratch {
+            forces: vec![Line::default(); self.partition.node_of_slot.len().div_ceil(4)],
+            positions: vec![
+                vec![Line::default(); widest.next_multiple_of(PADDED).div_ceil(4)];
+                workers.max(1)
+            ],
+            smallest: vec![f32::MAX; chunks.len()],
+        }
+    }
+
+    /// `f_int(u)` (µN) to `out`, both `[K,3]`; returns the smallest det F. Allocates nothing.
+    ///
+    /// A displacement that is not finite shows in `out`, not in det F.
+    ///
+    /// # Panics
+    /// If a length is not `3 K`.
+    pub fn evaluate(
+        &self,
+        displacement: &[f32],
+        scratch: &mut Scratch,
+        out: &mut [f32],
+        parallel: ParallelFor<'_>,
+    ) -> f32 {
+        assert_eq!(displacement.len(), 3 * self.node_count, "displacement");
+        assert_eq!(out.len(), 3 * self.node_count, "out");
+        let forces = Shared(scratch.forces.as_mut_ptr().cast::<[f32; 4]>());
+        let positions = Shared(scratch.positions.as_mut_ptr());
+        let smallest = Shared(scratch.smallest.as_mut_ptr());
+        let chunks = &self.partition.chunks;
+        parallel(chunks.len(), &|index, worker| {
+            let chunk = &chunks[index];
+            // SAFETY: positions belong to this worker, slots and the entry of `smallest` to this chunk.
+            unsafe {
+                let positions = (*positions.at(worker)).as_mut_ptr().cast::<[f32; 4]>();
+                self.place(chunk, displacement, positions);
+                let own = forces.at(chunk.first);
+                std::ptr::write_bytes(own, 0, chunk.slot_count());
+                let det = (self.kernels.forces)(&self.partition, chunk, positions, own);
+                *smallest.at(index) = det;
+            }
+        });
+        let out = Shared(out.as_mut_ptr().cast::<[f32; 3]>());
+        parallel(chunks.len(), &|index, _| {
+            let chunk = &chunks[index];
+            // SAFETY: own slots and own nodes are this chunk's; ghost slots are only read in this phase.
+            unsafe {
+                for (own, ghost) in &chunk.contributions {
+                    let source = *forces.at(*ghost as usize);
+                    let target = &mut *forces.at(*own as usize);
+                    for k in 0..3 {
+                        target[k] += source[k];
+                    }
+                }
+                for slot in chunk.first..chunk.first + chunk.owned {
+                    let [x, y, z, _] = *forces.at(slot);
+                    *out.at(self.partition.node_of_slot[slot] as usize) = [-x, -y, -z];
+                }
+            }
+        });
+        scratch.smallest.iter().copied().fold(f32::MAX, f32::min)
+    }
+
+    /// Puts the chunk's nodes where they are now, from its centre.
+    unsafe fn place(&self, chunk: &Chunk, displacement: &[f32], positions: *mut [f32; 4]) {
+        let slots = chunk.first..chunk.first + chunk.slot_count();
+        let rest = &self.partition.rest[slots.clone()];
+        for (at, (rest, &node)) in rest
+            .iter()
+            .zip(&self.partition.node_of_slot[slots])
+            .enumerate()
+        {
+            debug_assert_ne!(node, PADDING);
+            let u = &displacement[3 * node as usize..][..3];
+            // SAFETY: the caller's room holds the widest chunk.
+            unsafe {
+                *positions.add(at) = [rest[0] + u[0], rest[1] + u[1], rest[2] + u[2], 0.0];
+            }
+        }
+    }
+}

@@ -1,0 +1,36 @@
+//! Linear tetrahedra of hyperelastic tissue: the material and its admitted ranges, the element law in f64, and the SIMD kernel
+//! that sums the internal forces of a whole mesh in f32.
+//!
+//! The reference solver, the statics, the reaction forces and the corrections of the runtime all use this crate, so the
+//! law stands once. It knows no file, no contact and no time integration.
+//!
+//! Units: millimetre, gram, second; stress and moduli come out in pascal, forces in micronewton, energies in nanojoule.
+
+#![allow(
+    clippy::needless_range_loop,
+    reason = "components of vectors and tensors read best by index"
+)]
+
+mod batches;
+mod cluster;
+mod dispatch;
+mod internal_forces;
+mod kernel;
+mod lanes;
+mod material;
+mod partition;
+mod slots;
+mod tetrahedra;
+mod tetrahedron;
+pub mod vector;
+
+pub use batches::{Element, Kind, shape_gradients};
+pub use dispatch::{Kernels, Simd};
+pub use internal_forces::{ElementForces, ParallelFor, Scratch};
+pub use kernel::flops;
+pub use lanes::WIDTH;
+pub use material::{Material, MaterialError, Moduli};
+pub use partition::{Chunk, PADDING, Partition};
+pub use slots::{FLOPS_PER_NODE, PADDED};
+pub use tetrahedra::Tetrahedra;
+pub use tetrahedron::{Deformation, Tetrahedron, energy_density, inverse_cube_root, stress};

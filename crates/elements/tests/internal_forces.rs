@@ -1,0 +1,97 @@
+//! The SIMD forces of a whole body against the f64 law, element by element.
+
+use elements::{ElementForces, Material, Simd, Tetrahedron};
+use tissue::mesh::{Mesh, box_phantom};
+
+fn body() -> Mesh {
+    let mut mesh = box_phantom([30.0, 40.0, 50.0], [7, 9, 12]).unwrap();
+    mesh.stiffness = (0..mesh.tets.len())
+        .map(|tet| 1.0 + (tet % 5) as f32 * 0.3)
+        .collect();
+    mesh
+}
+
+fn wave(mesh: &Mesh, size: f32) -> Vec<f32> {
+    let rows = mesh.positions.iter().enumerate();
+    rows.flat_map(|(i, p)| {
+        [0, 1, 2].map(|k| size * (0.21 * p[k] + 0.13 * p[(k + 1) % 3] + i as f32 * 0.01).sin())
+    })
+    .collect()
+}
+
+fn exact(mesh: &Mesh, material: &Material, u: &[f32]) -> (Vec<f64>, f64) {
+    let mut out = vec![0.0; u.len()];
+    let mut least = f64::INFINITY;
+    for (at, &corners) in mesh.tets.iter().enumerate() {
+        let rest = corners.map(|node| mesh.positions[node as usize].map(f64::from));
+        let tet = Tetrahedron::new(corners, rest, f64::from(mesh.stiffness_of(at)));
+        let state =
+            tet.deformation(corners.map(|n| [0, 1, 2].map(|k| f64::from(u[3 * n as usize + k]))));
+        least = least.min(state.det);
+        for (node, force) in corners.iter().zip(tet.forces(&state, material.moduli())) {
+            for k in 0..3 {
+                out[3 * *node as usize + k] += force[k];
+            }
+        }
+    }
+    (out, least)
+}
+
+fn serial(count: usize, task: &(dyn Fn(usize, usize) + Sync)) {
+    (0..count).for_each(|chunk| task(chunk, 0));
+}
+
+#[test]
+fn they_are_those_of_the_law_on_every_instruction_set() {
+    let (mesh, material) = (body(), Material::default());
+    let u = wave(&mesh, 0.6);
+    let (want, least) = exact(&mesh, &material, &u);
+    let scale = want.iter().fold(0.0f64, |a, b| a.max(b.abs()));
+    for simd in Simd::ALL.into_iter().filter(|simd| simd.is_available()) {
+        let forces = ElementForces::new(mesh.tetrahedra(), &material, simd);
+        let mut scratch = forces.scratch(1);
+        let mut out = vec![f32::NAN; u.len()];
+        let det = forces.evaluate(&u, &mut scratch, &mut out, &serial);
+        for (got, want) in out.iter().zip(&want) {
+            let error = (f64::from(*got) - want).abs();
+            assert!(error < 1e-4 * scale, "{simd:?}: {got} for {want}");
+        }
+        assert!((f64::from(det) - least).abs() < 1e-4, "{simd:?}");
+    }
+}
+
+#[test]
+fn threads_do_not_change_a_bit() {
+    let (mesh, material) = (body(), Material::default());
+    let u = wave(&mesh, 0.6);
+    let forces = ElementForces::new(mesh.tetrahedra(), &material, Simd::detect());
+    let run = |parallel: elements::ParallelFor<'_>| {
+        let mut scratch = forces.scratch(3);
+        let mut out = vec![0.0; u.len()];
+        forces.evaluate(&u, &mut scratch, &mut out, parallel);
+        out
+    };
+    let threaded = |count: usize, task: &(dyn Fn(usize, usize) + Sync)| {
+        std::thread::scope(|scope| {
+            for worker in 0..3 {
+                scope.spawn(move || (worker..count).step_by(3).for_each(|c| task(c, worker)));
+            }
+        });
+    };
+    assert_eq!(run(&serial), run(&threaded));
+}
+
+#[test]
+fn an_inverted_state_shows_in_det_and_a_nan_in_the_forces() {
+    let (mesh, material) = (body(), Material::default());
+    let forces = ElementForces::new(mesh.tetrahedra(), &material, Simd::detect());
+    let mut scratch = forces.scratch(1);
+    let mut u = vec![0.0; 3 * mesh.positions.len()];
+    let mut out = u.clone();
+    assert!(forces.evaluate(&u, &mut scratch, &mut out, &serial) > 0.999);
+    u[300] = 30.0;
+    assert!(forces.evaluate(&u, &mut scratch, &mut out, &serial) < 0.0);
+    u[300] = f32::NAN;
+    forces.evaluate(&u, &mut scratch, &mut out, &serial);
+    assert!(out[300].is_nan());
+}
