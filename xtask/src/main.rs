@@ -14,6 +14,7 @@ mod system;
 mod test;
 mod upkeep;
 mod venv;
+mod wheel;
 mod workspace;
 
 use anyhow::Result;
@@ -48,7 +49,7 @@ enum Task {
     Bench(bench::Options),
     /// Make the archive for C and C++ hosts, or the Unity package.
     #[command(
-        after_help = "Examples:\n  cargo xtask package\n  cargo xtask package --unity\n  cargo xtask package --platform windows-x64"
+        after_help = "Examples:\n  cargo xtask package\n  cargo xtask package --unity\n  cargo xtask package --wheel\n  cargo xtask package --platform windows-x64"
     )]
     Package(package::Options),
     /// Write README.md's measured table and picture.

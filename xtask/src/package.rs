@@ -19,6 +19,7 @@ use clap::Args;
 use crate::ort::{self, Platform};
 use crate::process::{has_program, run_checked};
 use crate::stages;
+use crate::wheel;
 use crate::workspace::Workspace;
 
 #[derive(Args)]
@@ -26,6 +27,9 @@ pub struct Options {
     /// Make the Unity package (.tgz with the native plugins) instead of the archive.
     #[arg(long)]
     unity: bool,
+    /// Make the Python wheel instead of the archive.
+    #[arg(long, conflicts_with = "unity")]
+    wheel: bool,
     /// Lay out the archive for another platform, with its ONNX Runtime; libupt must be built there.
     #[arg(long)]
     platform: Option<Platform>,
@@ -41,7 +45,9 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
         workspace.root.join(&options.out)
     };
     std::fs::create_dir_all(&out)?;
-    let made = if options.unity {
+    let made = if options.wheel {
+        wheel::make(workspace, &out)?
+    } else if options.unity {
         unity(workspace, &out)?
     } else {
         let host = Platform::host()?;

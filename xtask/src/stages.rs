@@ -9,7 +9,7 @@ use crate::counts::{self, Counts};
 use crate::process::{Finished, has_program, run_checked, run_logged};
 use crate::system::{self, Package};
 use crate::workspace::Workspace;
-use crate::{ort, venv};
+use crate::{ort, venv, wheel};
 
 /// What a stage reports.
 pub struct Outcome {
@@ -54,7 +54,7 @@ impl Outcome {
     }
 
     /// The counts of a program that ran; one that failed without a failed test counts as one failure.
-    fn of(finished: &Finished, counts: Counts) -> Self {
+    pub fn of(finished: &Finished, counts: Counts) -> Self {
         let mut outcome = Self::counted(counts);
         if !finished.success && counts.failed == 0 {
             outcome.counts.failed = 1;
@@ -113,6 +113,12 @@ pub const STAGES: &[Stage] = &[
         run: python,
     },
     Stage {
+        name: "wheel",
+        about: "the Python package: wheel, types, pytest",
+        needs: &[],
+        run: wheel::stage,
+    },
+    Stage {
         name: "c",
         about: "C and C++ hosts, CMake package, simulator",
         needs: &[system::NATIVE],
@@ -145,7 +151,7 @@ fn cargo(workspace: &Workspace) -> Command {
 }
 
 /// A check that passes or fails as a whole.
-fn check(workspace: &Workspace, label: &str, command: &mut Command) -> Result<Outcome> {
+pub fn check(workspace: &Workspace, label: &str, command: &mut Command) -> Result<Outcome> {
     let log = workspace
         .logs()
         .join(format!("{}.log", label.replace(' ', "-")));
@@ -241,7 +247,7 @@ fn style(workspace: &Workspace) -> Result<Outcome> {
     Ok(joined(parts))
 }
 
-fn joined(parts: Vec<Outcome>) -> Outcome {
+pub fn joined(parts: Vec<Outcome>) -> Outcome {
     let mut sum = Outcome::counted(Counts::default());
     for part in parts {
         sum.counts += part.counts;

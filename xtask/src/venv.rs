@@ -12,15 +12,21 @@ use crate::workspace::Workspace;
 /// Formatters pinned to one version, so that every machine agrees.
 const TOOLS: &[&str] = &["ruff==0.17.5", "clang-format==14.0.6"];
 
+/// The interpreter that makes the environment: Windows' installer has no `python3`.
+const SYSTEM_PYTHON: &str = if cfg!(windows) { "python" } else { "python3" };
+
 /// Makes the environment where it is absent. Only pip is in it then.
 pub fn create(workspace: &Workspace) -> Result<()> {
-    if workspace.python().exists() && works(workspace) {
+    create_at(workspace, &workspace.venv())
+}
+
+/// As [`create`], in another folder.
+pub fn create_at(workspace: &Workspace, folder: &Path) -> Result<()> {
+    if works(&Workspace::program_in(folder, "python")) {
         return Ok(());
     }
-    let mut command = Command::new("python3");
-    command
-        .args(["-m", "venv", "--clear"])
-        .arg(workspace.venv());
+    let mut command = Command::new(SYSTEM_PYTHON);
+    command.args(["-m", "venv", "--clear"]).arg(folder);
     run_checked(
         "python3 -m venv",
         &mut command,
@@ -30,8 +36,8 @@ pub fn create(workspace: &Workspace) -> Result<()> {
     Ok(())
 }
 
-fn works(workspace: &Workspace) -> bool {
-    Command::new(workspace.python())
+fn works(python: &Path) -> bool {
+    Command::new(python)
         .args(["-c", "import pip"])
         .output()
         .is_ok_and(|output| output.status.success())

@@ -53,10 +53,15 @@ impl Workspace {
     }
 
     pub fn venv_program(&self, name: &str) -> PathBuf {
+        Self::program_in(&self.venv(), name)
+    }
+
+    /// A program of the virtual environment in `folder`.
+    pub fn program_in(folder: &Path, name: &str) -> PathBuf {
         if cfg!(windows) {
-            self.venv().join("Scripts").join(format!("{name}.exe"))
+            folder.join("Scripts").join(format!("{name}.exe"))
         } else {
-            self.venv().join("bin").join(name)
+            folder.join("bin").join(name)
         }
     }
 

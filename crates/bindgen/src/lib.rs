@@ -1,7 +1,8 @@
-//! Writes the bindings of the C ABI from its one source, `src/ffi/`: the C header (cbindgen) and the C# class.
-//! Both are committed; the test `fresh` fails when they are stale.
+//! Writes the bindings of the C ABI from its one source, `src/ffi/`: the C header (cbindgen), the C# class and the Python
+//! structs. All are committed; the test `fresh` fails when they are stale.
 
 pub mod csharp;
+pub mod python;
 pub mod source;
 
 use std::path::{Path, PathBuf};
@@ -28,6 +29,7 @@ pub fn root() -> PathBuf {
 /// All generated files.
 pub fn outputs() -> Result<Vec<Output>> {
     let root = root();
+    let source = source::read(&root)?;
     Ok(vec![
         Output {
             path: "include/upt.h",
@@ -35,7 +37,11 @@ pub fn outputs() -> Result<Vec<Output>> {
         },
         Output {
             path: "unity-plugin/Runtime/Interop/Native.g.cs",
-            text: csharp::write(&source::read(&root)?)?,
+            text: csharp::write(&source)?,
+        },
+        Output {
+            path: "python/upt/_native.py",
+            text: python::write(&source)?,
         },
     ])
 }

@@ -1,0 +1,65 @@
+"""Steps a second of `BatchedScenes` against one scene times the number of cores, by turns.
+
+By the clock it is true only where nothing else runs; processor time says what the batch itself costs more.
+
+    python python/benches/throughput.py --bundle onnx/brain-reduced --scenes 8
+"""
+
+from __future__ import annotations
+
+import argparse
+import statistics
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import upt
+from upt.batch import core_count
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--bundle", default=str(ROOT / "onnx/brain-reduced"))
+    parser.add_argument("--scenes", type=int, default=8)
+    parser.add_argument("--steps", type=int, default=60, help="steps of each scene a turn")
+    parser.add_argument("--turns", type=int, default=9)
+    arguments = parser.parse_args()
+
+    model = upt.Model(arguments.bundle)
+    batch = upt.BatchedScenes(model, arguments.scenes, no_sleep=True)
+    domain = model.domain_nodes
+    contacts = [(domain[i : i + 4], np.tile(np.float32([0, 0, -2]), (4, 1))) for i in range(arguments.scenes)]
+    out = np.empty((arguments.scenes, model.node_count, 3), np.float32)
+
+    def timed(run: Callable[[], None]) -> tuple[float, float]:
+        """Steps a second of wall time and of processor time."""
+        wall, processor = time.perf_counter(), time.process_time()
+        run()
+        count = arguments.steps * arguments.scenes
+        return count / (time.perf_counter() - wall), count / (time.process_time() - processor)
+
+    def one_by_one() -> None:
+        for _ in range(arguments.steps):
+            for scene, (nodes, vectors), row in zip(batch.scenes, contacts, out, strict=True):
+                scene.step_contacts(nodes, vectors, row)
+
+    def together() -> None:
+        for _ in range(arguments.steps):
+            batch.step_contacts(contacts, out)
+
+    one_by_one()
+    together()
+    turns = [(timed(one_by_one), timed(together)) for _ in range(arguments.turns)]
+    cores = core_count()
+    single, both = (statistics.median(turn[i][0] for turn in turns) for i in range(2))
+    wall = statistics.median(b[0] / (cores * s[0]) for s, b in turns)
+    processor = statistics.median(b[1] / s[1] for s, b in turns)
+    print(f"one scene {single:.0f} steps/s, {arguments.scenes} scenes on {cores} cores {both:.0f} steps/s")
+    print(f"batch / (cores x one scene): {wall:.2f} by the clock, {processor:.2f} by processor time")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,140 @@
+"""A Gymnasium environment: move a point inside the tissue to a place by pushing a patch of the surface.
+
+    python python/examples/push_point.py --bundle onnx/brain-coarse-reduced
+
+plays the environment with a random policy and with a linear one that it learns by the cross-entropy method
+(seconds). Lengths in mm; a step is `model.dt` (50 ms of tissue).
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import gymnasium
+import numpy as np
+import upt
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+class PushPoint(gymnasium.Env):
+    """Observation `[9]`: where the point is, where it should be, how far the patch is pushed. Action `[3]`: how the
+    patch moves in this step, at most `reach` mm along each axis. Reward: minus the distance that is left, mm.
+
+    The patch is a site of the domain and its neighbours, the point lies `depth` mm below the site.
+    """
+
+    metadata = {"render_modes": []}
+
+    def __init__(
+        self,
+        model: upt.Model,
+        patch: int = 6,
+        depth: float = 8.0,
+        reach: float = 1.0,
+        push: float = 8.0,
+        steps: int = 30,
+    ) -> None:
+        self.scene = model.scene()
+        self.reach, self.push, self.steps = reach, push, steps
+        rest, domain = model.positions, model.domain_nodes
+        # The site in the middle of the domain, its nearest neighbours, and inward: away from their mean normal.
+        site = domain[np.argmin(np.linalg.norm(rest[domain] - rest[domain].mean(axis=0), axis=1))]
+        self.nodes = domain[np.argsort(np.linalg.norm(rest[domain] - rest[site], axis=1))[:patch]]
+        faces = rest[model.domain_faces[np.isin(model.domain_faces, self.nodes).any(axis=1)]]
+        normal = np.cross(faces[:, 1] - faces[:, 0], faces[:, 2] - faces[:, 0]).sum(axis=0)
+        self.inward = -normal / np.linalg.norm(normal)
+        self.scene.attach_points((rest[site] + depth * self.inward)[None])
+        self.scene.set_region(self.nodes)  # nothing else is looked at
+        limit = np.full(9, 4.0 * push, np.float32)
+        self.observation_space = gymnasium.spaces.Box(-limit, limit)
+        self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (3,), np.float32)
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        self.scene.reset()
+        self.pushed, self.time = np.zeros(3, np.float32), 0
+        # A place that can be reached: where a push of the patch takes the point.
+        push = self.push * (0.7 * self.inward + 0.5 * self.np_random.uniform(-1.0, 1.0, 3))
+        for k in range(4):
+            self._step(push * (k + 1) / 4)
+        for _ in range(8):
+            self._step(push)
+        self.goal = self.scene.read_points()[0].copy()
+        self.scene.reset()
+        return self._observe(), {}
+
+    def step(self, action):
+        move = self.reach * np.clip(action, -1.0, 1.0)
+        self.pushed = np.clip(self.pushed + move, -self.push, self.push).astype(np.float32)
+        self._step(self.pushed)
+        self.time += 1
+        left = float(np.linalg.norm(self._point() - self.goal))
+        return self._observe(), -left, False, self.time >= self.steps, {"left_mm": left}
+
+    def close(self):
+        self.scene.close()
+
+    def _step(self, push: np.ndarray) -> None:
+        self.scene.step_contacts(self.nodes, np.tile(np.float32(push), (len(self.nodes), 1)))
+
+    def _point(self) -> np.ndarray:
+        return self.scene.read_points()[0] if self.time else np.zeros(3, np.float32)
+
+    def _observe(self) -> np.ndarray:
+        return np.concatenate([self._point(), self.goal, self.pushed]).astype(np.float32)
+
+
+class LinearPolicy:
+    """`action = W (goal - point)`, `W [3, 3]`, 1/mm."""
+
+    def __init__(self, weights: np.ndarray) -> None:
+        self.weights = weights.reshape(3, 3)
+
+    def __call__(self, observation: np.ndarray) -> np.ndarray:
+        return np.clip(self.weights @ (observation[3:6] - observation[:3]), -1.0, 1.0)
+
+
+def play(environment: PushPoint, policy, seeds) -> float:
+    """Distance left at the end of an episode, mm: mean over `seeds`."""
+    left = []
+    for seed in seeds:
+        observation, _ = environment.reset(seed=seed)
+        done = False
+        while not done:
+            observation, _, _, done, info = environment.step(policy(observation))
+        left.append(info["left_mm"])
+    return float(np.mean(left))
+
+
+def learn(
+    environment: PushPoint, rounds: int = 12, population: int = 24, elite: int = 6, seed: int = 0
+) -> LinearPolicy:
+    """Cross-entropy method over the nine weights, three episodes a candidate."""
+    draw = np.random.default_rng(seed)
+    mean, spread = np.zeros(9), np.full(9, 0.5)
+    for turn in range(rounds):
+        candidates = mean + spread * draw.standard_normal((population, 9))
+        scores = [play(environment, LinearPolicy(w), range(3 * turn, 3 * turn + 3)) for w in candidates]
+        best = candidates[np.argsort(scores)[:elite]]
+        mean, spread = best.mean(axis=0), best.std(axis=0) + 0.05
+    return LinearPolicy(mean)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--bundle", default=str(ROOT / "onnx/brain-coarse-reduced"))
+    parser.add_argument("--rounds", type=int, default=12)
+    arguments = parser.parse_args()
+
+    environment = PushPoint(upt.Model(arguments.bundle))
+    held_out = range(10_000, 10_020)
+    environment.action_space.seed(0)
+    random = play(environment, lambda _: environment.action_space.sample(), held_out)
+    learned = play(environment, learn(environment, arguments.rounds), held_out)
+    print(f"distance left: random policy {random:.2f} mm, learned policy {learned:.2f} mm")
+
+
+if __name__ == "__main__":
+    main()

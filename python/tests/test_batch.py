@@ -1,0 +1,55 @@
+"""Scenes side by side give the bits of scenes one after another."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import upt
+from conftest import push
+
+
+@pytest.mark.parametrize("workers", [1, 2, 5])
+def test_the_same_bits_for_any_number_of_workers(model, workers):
+    count = 7
+    expected = []
+    for i in range(count):
+        with model.scene(threads=1, no_sleep=True) as scene:
+            expected.append([scene.step_contacts(*push(model, t + i)) for t in range(4)])
+    with upt.BatchedScenes(model, count, workers=workers, no_sleep=True) as batch:
+        for t in range(4):
+            out = batch.step_contacts([push(model, t + i) for i in range(count)])
+            np.testing.assert_array_equal(out, [states[t] for states in expected])
+        np.testing.assert_array_equal(batch.read(), out)
+        batch.reset([2, 4])
+        still = batch.read()
+        assert not still[2].any() and not still[4].any() and still[3].any()
+
+
+def test_dense_fields(model):
+    with upt.BatchedScenes(model, 2, no_sleep=True) as batch:
+        collision = np.zeros((2, model.node_count, 3), np.float32)
+        nodes, vectors = push(model, 3)
+        collision[1, nodes] = vectors
+        out = np.empty_like(collision)
+        assert batch.step(None, collision, out) is out
+        np.testing.assert_array_equal(out[0], model.scene(no_sleep=True).step())
+        np.testing.assert_array_equal(out[1], model.scene(no_sleep=True).step_contacts(nodes, vectors))
+        with pytest.raises(ValueError, match="collision has shape"):
+            batch.step(None, collision[:1])
+
+
+def test_one_failure_stops_no_other_scene(model):
+    with upt.BatchedScenes(model, 3, no_sleep=True) as batch:
+        good = push(model, 1)
+        with pytest.raises(upt.ArgumentError) as caught:
+            batch.step_contacts([good, ([0], [[np.nan, 0, 0]]), good])
+        assert "scene 1 of 3" in caught.value.__notes__[0]
+        assert [scene.stats.step_count for scene in batch.scenes] == [1, 0, 1]
+        with pytest.raises(ValueError, match="one for each of 3"):
+            batch.step_contacts([good])
+
+
+def test_a_region_for_all(model):
+    with upt.BatchedScenes(model, 2) as batch:
+        batch.set_region(model.domain_nodes[:4])
+        assert batch.step().shape == (2, 4, 3)

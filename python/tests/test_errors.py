@@ -1,0 +1,107 @@
+"""What a caller can do wrong is an exception that says so, and changes nothing."""
+
+from __future__ import annotations
+
+import logging
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import upt
+from conftest import FIXTURES, push
+
+
+def test_a_missing_bundle(tmp_path):
+    with pytest.raises(upt.BundleError, match="bundle.json") as caught:
+        upt.Model(tmp_path / "nothing")
+    assert caught.value.status == upt.Status.IO
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"colour": 1}, "has no field 'colour'"),
+        ({"kernel": "fast"}, "kernel: 'fast' is not one of auto, native"),
+        ({"reserved": (1, 0)}, "has no field 'reserved'"),
+    ],
+)
+def test_unknown_options(model, options, message):
+    with pytest.raises((TypeError, ValueError), match=message):
+        model.scene(**options)
+
+
+def test_the_librarys_own_checks_are_value_errors(model):
+    with pytest.raises(ValueError, match="threads"):
+        model.scene(threads=5000)
+    assert issubclass(upt.ArgumentError, ValueError)
+
+
+@pytest.mark.parametrize(
+    ("nodes", "vectors", "message"),
+    [
+        ([0], [[0, 0]], "contact has shape"),
+        ([0, 1], [[0, 0, 0]], r"expected \(2, 3\)"),
+        ([-1], [[0, 0, 0]], "negative"),
+        ([0.5], [[0, 0, 0]], "node indices"),
+        ([[0]], [[0, 0, 0]], "nodes has shape"),
+        ([10**6], [[0, 0, 0]], "1000000"),
+        ([0], [[0, 0, np.nan]], "NON_FINITE"),
+    ],
+)
+def test_bad_contacts(model, scene, nodes, vectors, message):
+    before = scene.step_contacts(*push(model, 2))
+    with pytest.raises((ValueError, TypeError), match=message):
+        scene.step_contacts(nodes, vectors)
+    np.testing.assert_array_equal(scene.read(), before)
+
+
+@pytest.mark.parametrize(
+    "spoil", [lambda o: o.astype(np.float64), lambda o: o[:-1], lambda o: o[:, ::-1], lambda o: o.tolist()]
+)
+def test_an_output_that_would_need_a_copy_is_refused(model, scene, spoil):
+    out = np.zeros((model.node_count, 3), np.float32)
+    with pytest.raises(ValueError, match="out must be"):
+        scene.step(out=spoil(out))
+
+
+def test_a_read_only_output_is_refused(model, scene):
+    with pytest.raises(ValueError, match="writeable"):
+        scene.read(model.positions)
+
+
+def test_messages_go_to_logging(caplog):
+    upt.set_log("info")
+    try:
+        with caplog.at_level(logging.DEBUG, logger="upt"):
+            upt.Model(FIXTURES / "tiny-reduced").scene().step()
+    finally:
+        upt.set_log("off")
+    assert any(record.name == "upt" for record in caplog.records)
+
+
+def test_a_start_with_other_options_is_refused(model):
+    with pytest.raises(upt.StateError):
+        upt.init(threads=7)
+
+
+def test_a_missing_library_says_what_to_do(tmp_path):
+    code = "import upt"
+    environment = os.environ | {"UPT_LIBRARY": str(tmp_path / "libupt.so")}
+    run = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True)
+    assert run.returncode != 0 and "libupt.so" in run.stderr
+
+
+def test_onnx_runtime_comes_from_its_package():
+    """Without ORT_DYLIB_PATH a fresh process finds the one of the package `onnxruntime`."""
+    code = "import upt; print([p['reason'] for p in upt.providers() if p['name'] == 'cpu'])"
+    environment = {key: value for key, value in os.environ.items() if key != "ORT_DYLIB_PATH"}
+    run = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True)
+    assert "onnxruntime" in run.stdout and "capi" in run.stdout, run.stdout + run.stderr
+
+
+def test_a_process_may_end_with_scenes_alive():
+    code = f"import upt; s = upt.Model({str(FIXTURES / 'tiny-reduced')!r}).scene(); s.step(); s.submit()"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert run.returncode == 0 and not run.stderr, run.stderr

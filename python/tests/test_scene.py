@@ -1,0 +1,174 @@
+"""A scene from Python: the stored rollouts, equal bits on each way in, and every call of the ABI."""
+
+from __future__ import annotations
+
+import sys
+import threading
+
+import numpy as np
+import pytest
+import upt
+from conftest import FIXTURES, push, tensors
+from upt import _arrays, _library
+
+
+def test_a_scene_follows_the_stored_rollout(name, scene):
+    rollout = tensors(FIXTURES / f"{name}-rollout.safetensors")
+    offsets = rollout["contact_offsets"]
+    for t, expected in enumerate(rollout["displacement"]):
+        rows = slice(offsets[t], offsets[t + 1])
+        u = scene.step_contacts(rollout["contact_nodes"][rows], rollout["contact_vectors"][rows])
+        np.testing.assert_allclose(u, expected, atol=1e-4, rtol=0)
+
+
+def test_dense_fields_and_listed_contacts_give_the_same_bits(model, scene):
+    dense = model.scene(no_sleep=True)
+    state = np.zeros((model.node_count, 3), np.float32)
+    for t in range(5):
+        nodes, vectors = push(model, t)
+        collision = np.zeros_like(state)
+        collision[nodes] = vectors
+        np.testing.assert_array_equal(dense.step(None, collision), scene.step_contacts(nodes, vectors))
+    assert dense.step(state).shape == state.shape
+
+
+def test_arrays_of_the_right_type_are_not_copied(model, scene):
+    vectors = np.zeros((4, 3), np.float32)
+    assert _arrays.vectors(vectors, "x") is vectors
+    nodes = np.arange(4, dtype=np.uint32)
+    assert np.shares_memory(_arrays.indices(nodes, "x"), nodes)
+    out = np.empty((model.node_count, 3), np.float32)
+    assert scene.step(out=out) is out
+    # In place: the result over the input.
+    collision = np.zeros_like(out)
+    collision[model.domain_nodes[0]] = [0, 0, -1]
+    expected = model.scene(no_sleep=True).step(np.zeros_like(out), collision)
+    out[:] = 0
+    model.scene(no_sleep=True).step(out, collision, out)
+    np.testing.assert_array_equal(out, expected)
+
+
+@pytest.mark.parametrize("convert", [np.float64, list])
+def test_other_types_are_converted(model, scene, convert):
+    nodes, vectors = push(model, 1)
+    expected = scene.step_contacts(nodes, vectors)
+    other = model.scene(no_sleep=True)
+    given = vectors.tolist() if convert is list else vectors.astype(convert)
+    np.testing.assert_array_equal(other.step_contacts(nodes.astype(np.int64), given), expected)
+
+
+def test_region_decode_and_points(model, scene):
+    nodes, vectors = push(model, 4)
+    whole = scene.step_contacts(nodes, vectors)
+    chosen = model.surface_nodes[::3][::-1]
+    np.testing.assert_allclose(scene.decode(chosen), whole[chosen], atol=1e-5)
+    scene.attach_points(model.positions[chosen[:5]])
+    scene.reset()
+    scene.set_region(chosen)
+    assert scene.out_count == len(chosen)
+    np.testing.assert_allclose(scene.step_contacts(nodes, vectors), whole[chosen], atol=1e-5)
+    assert scene.read_points().shape == (5, 3)
+    np.testing.assert_array_equal(scene.read_points(), scene.sample_points(1.0))
+    scene.set_region(None)
+    assert scene.read().shape == whole.shape
+    scene.attach_points(None)
+    with pytest.raises(upt.StateError, match="points"):
+        scene.read_points()
+
+
+def test_a_snapshot_resumes_to_the_bit(model, scene):
+    for t in range(3):
+        scene.step_contacts(*push(model, t))
+    snapshot = scene.save()
+    after = [scene.step_contacts(*push(model, t)) for t in range(3, 6)]
+    other = model.scene(no_sleep=True)
+    other.restore(snapshot)
+    for t, expected in zip(range(3, 6), after, strict=True):
+        np.testing.assert_array_equal(other.step_contacts(*push(model, t)), expected)
+    with pytest.raises(upt.BundleError, match="SNAPSHOT"):
+        other.restore(snapshot[: len(snapshot) // 2])
+
+
+def test_a_submitted_step_is_the_same_step(model, scene):
+    nodes, vectors = push(model, 2)
+    scene.submit(nodes, vectors)
+    assert scene.wait()
+    expected = model.scene(no_sleep=True).step_contacts(nodes, vectors)
+    np.testing.assert_array_equal(scene.read(), expected)
+    np.testing.assert_allclose(scene.sample(0.5), expected / 2, atol=1e-6)
+    with pytest.raises(upt.StateError):
+        model.scene().poll()
+
+
+def test_instruments_touch_and_are_pushed_back(model, scene):
+    site = model.domain_nodes[0]
+    tool = upt.Instrument(
+        shape="capsule", position=model.positions[site], rotation=(0, 0, 0, 1), half_extents=(0, 5, 0), radius=2.0
+    )
+    nodes, vectors = scene.contacts([tool])
+    assert site in nodes and vectors.shape == (len(nodes), 3) and np.abs(vectors).max() > 0.1
+    scene.step_contacts(nodes, vectors)
+    assert scene.stats.contact_count == len(nodes)
+    force = scene.contact_force()
+    assert force.shape == vectors.shape and np.isfinite(force).all() and np.abs(force).max() > 0
+    far = upt.Instrument(shape=upt.Shape.BOX, position=(1e3, 0, 0), rotation=(0, 0, 0, 1), half_extents=(1, 1, 1))
+    nodes, vectors = model.scene().contacts([far])
+    assert len(nodes) == 0 and vectors.shape == (0, 3)
+
+
+def test_statistics_are_typed(model, scene):
+    scene.step_contacts(*push(model, 120))
+    stats = scene.stats
+    assert stats.step_count == 1 and stats.contact_count == 3 and stats.sleeping is False
+    assert stats.flags & upt.Flag.PUSH, "a push of 24 mm is longer than the bundle was made for"
+    assert isinstance(stats.kernel, upt.Kernel)
+    assert set(stats.as_dict()) >= {"step_ms", "max_displacement_mm", "threads"}
+
+
+def test_the_gil_is_free_during_a_call():
+    """With switching by time turned off, another thread runs during a call only where the call lets go of the GIL."""
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(3600.0)
+    try:
+        seen = []
+        for _ in range(50):
+            inside, done = threading.Event(), []
+
+            def load(inside=inside, done=done):
+                inside.set()
+                upt.Model(FIXTURES / "tiny-reduced")
+                done.append(True)
+
+            thread = threading.Thread(target=load)
+            thread.start()
+            inside.wait()
+            seen.append(not done)
+            thread.join()
+            if any(seen):
+                break
+        assert any(seen)
+    finally:
+        sys.setswitchinterval(interval)
+    assert isinstance(_library.lib, __import__("ctypes").CDLL)
+
+
+def test_scenes_outlive_their_model(name, model):
+    own = upt.Model(FIXTURES / name)
+    scene = own.scene(no_sleep=True)
+    own.close()
+    expected = model.scene(no_sleep=True).step_contacts(*push(model, 1))
+    np.testing.assert_array_equal(scene.step_contacts(*push(model, 1)), expected)
+    scene.close()
+    scene.close()
+    with pytest.raises(upt.StateError, match="HANDLE"):
+        scene.step()
+
+
+def test_a_mesh_of_the_hosts_own():
+    """Only a bundle without a linear response takes one."""
+    model = upt.Model(FIXTURES / "tiny-upt")
+    scene = model.scene(mesh_path=FIXTURES / "tiny-upt" / "mesh.safetensors")
+    assert scene.node_count == model.node_count
+    assert scene.step().shape == (model.node_count, 3)
+    with pytest.raises(upt.UnsupportedError, match="mesh_path"):
+        upt.Model(FIXTURES / "tiny-reduced").scene(mesh_path=FIXTURES / "tiny-reduced" / "mesh.safetensors")

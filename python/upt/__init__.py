@@ -1,0 +1,104 @@
+"""Soft tissue in real time: libupt for Python.
+
+    import upt
+
+    model = upt.Model("onnx/brain-reduced")
+    scene = model.scene()
+    u = scene.step_contacts([17, 18], [[0, 0, -4], [0, 0, -4]])  # [K, 3], mm, 50 ms later
+
+Shapes and units: positions and displacements are float32 `[n, 3]`, mm; forces mN; times seconds, but in the statistics
+milliseconds. What a call may raise is in `upt.errors`; conventions of the library itself are in docs/abi.md.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from upt._library import check, ensure_started, init, lib, read_text
+from upt._native import (
+    ABI_VERSION,
+    Flag,
+    GuardPolicy,
+    IndexSet,
+    Instrument,
+    Kernel,
+    Kind,
+    LogLevel,
+    ModelInfo,
+    ModelOptions,
+    Precision,
+    Provider,
+    SceneOptions,
+    SceneStats,
+    Shape,
+    Status,
+    StepPath,
+)
+from upt.batch import BatchedScenes
+from upt.errors import (
+    ArgumentError,
+    BundleError,
+    BusyError,
+    Error,
+    GuardError,
+    PanicError,
+    RuntimeLibraryError,
+    StateError,
+    UnsupportedError,
+)
+from upt.log import set_log
+from upt.model import Model
+from upt.scene import Scene
+
+#: The library's version.
+__version__: str = lib.upt_version().decode()
+
+
+def providers() -> list[dict[str, Any]]:
+    """What can run a model: `[{"name": "cpu", "available": True, "reason": ""}, ...]`."""
+    ensure_started()
+    listed: list[dict[str, Any]] = json.loads(read_text(lib.upt_providers))
+    return listed
+
+
+def shutdown() -> None:
+    """Ends the library. Call it after closing all models, before exit where a GPU provider was used."""
+    check(lib.upt_shutdown())
+
+
+__all__ = [
+    "ABI_VERSION",
+    "ArgumentError",
+    "BatchedScenes",
+    "BundleError",
+    "BusyError",
+    "Error",
+    "Flag",
+    "GuardError",
+    "GuardPolicy",
+    "IndexSet",
+    "Instrument",
+    "Kernel",
+    "Kind",
+    "LogLevel",
+    "Model",
+    "ModelInfo",
+    "ModelOptions",
+    "PanicError",
+    "Precision",
+    "Provider",
+    "RuntimeLibraryError",
+    "Scene",
+    "SceneOptions",
+    "SceneStats",
+    "Shape",
+    "StateError",
+    "Status",
+    "StepPath",
+    "UnsupportedError",
+    "init",
+    "providers",
+    "set_log",
+    "shutdown",
+]

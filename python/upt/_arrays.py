@@ -1,0 +1,54 @@
+"""NumPy arrays at the C boundary: an address where an array fits as it is, a copy where an input does not."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Floats = NDArray[np.float32]
+Indices = NDArray[np.uint32]
+
+
+def address(array: NDArray[Any]) -> int:
+    """Where the data lie; the caller keeps the array alive over the call."""
+    data: int = array.__array_interface__["data"][0]
+    return data
+
+
+def vectors(values: ArrayLike, name: str, count: int | None = None) -> Floats:
+    """`[count, 3]` float32 in one piece; the array itself where it is that already."""
+    array = np.ascontiguousarray(values, np.float32)
+    if array.ndim != 2 or array.shape[1] != 3 or (count is not None and len(array) != count):
+        wanted = f"({'n' if count is None else count}, 3)"
+        raise ValueError(f"{name} has shape {array.shape}, expected {wanted}")
+    return array
+
+
+def indices(values: ArrayLike, name: str) -> Indices:
+    """`[n]` uint32 in one piece; the array itself where it is that already."""
+    array = np.asarray(values)
+    if array.ndim != 1:
+        raise ValueError(f"{name} has shape {array.shape}, expected (n,)")
+    if array.dtype != np.uint32:
+        if array.size and array.dtype.kind not in "iu":
+            raise TypeError(f"{name} has dtype {array.dtype}, expected node indices")
+        if array.size and (array.min() < 0 or array.max() > 0xFFFFFFFF):
+            raise ValueError(f"{name}: an index is negative or passes 32 bits")
+    return np.ascontiguousarray(array, np.uint32)
+
+
+def output(out: Floats | None, count: int, name: str = "out") -> Floats:
+    """Where a result goes: a new array, or the caller's own, which must fit without a copy."""
+    if out is None:
+        return np.empty((count, 3), np.float32)
+    if (
+        not isinstance(out, np.ndarray)
+        or out.dtype != np.float32
+        or out.shape != (count, 3)
+        or not out.flags.c_contiguous
+        or not out.flags.writeable
+    ):
+        raise ValueError(f"{name} must be a writeable C-contiguous float32 array of shape ({count}, 3)")
+    return out

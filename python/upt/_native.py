@@ -1,0 +1,589 @@
+# Written by `cargo xtask header` from src/ffi/; conventions: docs/abi.md.
+# SPDX-License-Identifier: Apache-2.0 OR MIT
+"""The C ABI in Python: enums, structs and the signature of each function."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+from collections.abc import Sequence
+from enum import IntEnum, IntFlag
+from typing import Any, TypedDict
+
+from upt._record import Record, boolean, choice, numbers, text, vector
+
+ABI_VERSION = 1
+"""Version of the C ABI that `upt_abi_version` returns. Bindings compare it at load."""
+
+
+class Status(IntEnum):
+    """`UPT_ERR_*`."""
+
+    OK = 0
+    """Success."""
+    PENDING = 1
+    """The submitted step has not finished."""
+    NULL = -1
+    """A required pointer is NULL."""
+    ARGUMENT = -2
+    """A size, index, enum or range is wrong."""
+    STRUCT_SIZE = -3
+    """`struct_size` is not one that this library knows."""
+    HANDLE = -4
+    """Not a live handle of this type."""
+    BUSY = -5
+    """The scene is in use by another thread or has a step in flight."""
+    NON_FINITE = -6
+    """An input holds NaN or Inf."""
+    STATE = -7
+    """The call does not fit the state (for instance: wait without submit)."""
+    UNSUPPORTED = -8
+    """This build or this bundle cannot do it."""
+    RUNTIME = -20
+    """ONNX Runtime is missing, too old or broken; the message lists what was tried."""
+    PROVIDER = -21
+    """No provider of the list can run the model."""
+    IO = -30
+    """A file cannot be read."""
+    BUNDLE = -31
+    """A bundle is invalid; the message names the file and the field."""
+    VERSION = -32
+    """The version of a bundle or snapshot is not supported."""
+    SNAPSHOT = -33
+    """A snapshot is damaged or of another model."""
+    GUARD = -40
+    """The guard refused the new state; the last good state stays."""
+    PANIC = -90
+    """A bug in the library; the scene involved can only be destroyed."""
+
+
+class Provider(IntEnum):
+    """`UPT_PROVIDER_*`."""
+
+    CPU = 0
+    """ONNX Runtime's CPU provider and the native kernels."""
+    CUDA = 1
+    """NVIDIA CUDA."""
+    TENSORRT = 2
+    """NVIDIA TensorRT."""
+    TENSORRT_RTX = 3
+    """NVIDIA TensorRT-RTX (a plugin provider)."""
+
+
+class Kind(IntEnum):
+    """`UPT_KIND_*`."""
+
+    UPT = 0
+    """A Universal Physics Transformer."""
+    REDUCED = 1
+    """A linear-elastic response with a learned correction in a static basis."""
+
+
+class LogLevel(IntEnum):
+    """`UPT_LOG_*`."""
+
+    OFF = 0
+    """No messages."""
+    ERROR = 1
+    """Failures."""
+    WARN = 2
+    """Fallbacks and envelope violations."""
+    INFO = 3
+    """Loading: what was opened and who runs it."""
+    DEBUG = 4
+    """Stage times."""
+    TRACE = 5
+    """Everything."""
+
+
+class Precision(IntEnum):
+    """`UPT_PRECISION_*`."""
+
+    F32 = 0
+    """32-bit floats: the reference."""
+    BF16 = 1
+    """bfloat16 products where the CPU has them."""
+    F16 = 2
+    """16-bit floats: the bundle's `*.f16.onnx`, or a GPU provider's own."""
+    INT8 = 3
+    """8-bit integers: the bundle's `*.int8.onnx`."""
+
+
+class Kernel(IntEnum):
+    """`UPT_KERNEL_*`."""
+
+    AUTO = 0
+    """The library chooses the decoder."""
+    NATIVE = 1
+    """The fused native decoder."""
+    ONNX = 2
+    """ONNX Runtime sessions in node tiles."""
+    RESIDENT = 3
+    """ONNX Runtime, all nodes in one run with the query table resident on the device."""
+
+
+class StepPath(IntEnum):
+    """`UPT_STEP_*`."""
+
+    AUTO = 0
+    """Split on the CPU; on a device the faster of split and whole, timed while the scene is made."""
+    SPLIT = 1
+    """Native encoder and message mean, then `latent.onnx` and the decoder."""
+    WHOLE = 2
+    """The bundle's `step.onnx`, which decodes every node in every step."""
+    MEASURED = 3
+    """Both are timed while the scene is made, and the faster one stays."""
+
+
+class GuardPolicy(IntEnum):
+    """`UPT_GUARD_*`."""
+
+    HOLD = 0
+    """Keep the last good state and return `UPT_ERR_GUARD`; without contact, where no later call could do otherwise, as
+    `UPT_GUARD_BLEND`."""
+    REPORT = 1
+    """Publish finite states and set flags."""
+    BLEND = 2
+    """Replace a refused state by the prior's or by rest and set flags."""
+
+
+class Flag(IntFlag):
+    """`UPT_FLAG_*`."""
+
+    PUSH = 1
+    """A push is longer than the model was trained on."""
+    CONTACT_AREA = 2
+    """A contact area is outside the trained range."""
+    SITE = 4
+    """A contact lies outside the domain."""
+    RATE = 8
+    """A push changes faster than trained."""
+    SITES = 16
+    """More separate contact sites than trained."""
+    BOUND = 32
+    """Guard: a displacement passes the bound."""
+    NON_FINITE = 64
+    """Guard: the state is not finite."""
+    INVERTED = 128
+    """Guard: an element is inverted."""
+    GROWTH = 256
+    """Guard: the displacement grew too much in one step."""
+    CLAMPED = 512
+    """The learned correction was bounded."""
+    REGULARISED = 1024
+    """The contact block was nearly singular and was regularised."""
+
+
+class IndexSet(IntEnum):
+    """`UPT_SET_*`."""
+
+    SURFACE_NODES = 0
+    """Nodes of the surface."""
+    DOMAIN_NODES = 1
+    """Nodes that instruments may touch."""
+    FIXED_NODES = 2
+    """Nodes held at zero under the bundle's boundary condition."""
+    SURFACE_FACES = 3
+    """Surface triangles, 3 node indices each, outward."""
+    DOMAIN_FACES = 4
+    """Triangles that instruments may touch, 3 node indices each, outward."""
+    TETS = 5
+    """Tetrahedra, 4 node indices each, positive volume."""
+
+
+class Shape(IntEnum):
+    """`UPT_SHAPE_*`."""
+
+    CAPSULE = 0
+    """An instrument's shape: a capsule along local y."""
+    BOX = 1
+    """An instrument's shape: a box."""
+    SPATULA = 2
+    """An instrument's shape: a box with rounded corners."""
+
+
+class InitOptions(Record):
+    """Options of `upt_init`."""
+
+    struct_size: int
+    """`sizeof(upt_init_options)`."""
+    threads: int
+    """Default number of threads of a model; 0: 1."""
+    onnxruntime_path: str | None = text("_onnxruntime_path")
+    """ONNX Runtime's shared library, a path; NULL: beside libupt, then `ORT_DYLIB_PATH`, then the system."""
+
+    _fields_ = [
+        ("struct_size", ctypes.c_uint32),
+        ("threads", ctypes.c_uint32),
+        ("_onnxruntime_path", ctypes.c_char_p),
+    ]
+
+
+class InitOptionsKeywords(TypedDict, total=False):
+    """Fields of `InitOptions`."""
+
+    threads: int
+    """Default number of threads of a model; 0: 1."""
+    onnxruntime_path: str | os.PathLike[str] | None
+    """ONNX Runtime's shared library, a path; NULL: beside libupt, then `ORT_DYLIB_PATH`, then the system."""
+
+
+class ModelOptions(Record):
+    """Options of `upt_model_open`."""
+
+    struct_size: int
+    """`sizeof(upt_model_options)`."""
+    threads: int
+    """Threads that a step may use, the caller's included; 0: the default of `upt_init`."""
+    providers: tuple[Provider, ...] = numbers("_providers", "provider_count", ctypes.c_int32, Provider)
+    """`UPT_PROVIDER_*` in order of preference; NULL: CPU."""
+    provider_count: int
+    """Entries in `providers`."""
+    device_id: int
+    """Device of GPU providers."""
+    precision: Precision = choice("_precision", Precision)
+    """`UPT_PRECISION_*`."""
+    gpu_memory_limit: int
+    """Bytes; 0: no limit."""
+    cache_dir: str | None = text("_cache_dir")
+    """Folder for compiled engines; NULL: none is kept."""
+    allow_tf32: bool = boolean("_allow_tf32")
+    """1: TF32 products allowed (CUDA; errors near 1e-3)."""
+    cuda_graph: bool = boolean("_cuda_graph")
+    """1: capture CUDA graphs."""
+    no_fallback: bool = boolean("_no_fallback")
+    """1: fail with `UPT_ERR_PROVIDER` when the first provider cannot run the model."""
+    reserved: int
+    """Zero."""
+    user_stream: int | None
+    """A `cudaStream_t` of `device_id` to run the graphs on, which outlives the model and its scenes; NULL: one of ONNX Runtime's own."""
+
+    _fields_ = [
+        ("struct_size", ctypes.c_uint32),
+        ("threads", ctypes.c_uint32),
+        ("_providers", ctypes.c_void_p),
+        ("provider_count", ctypes.c_uint64),
+        ("device_id", ctypes.c_int32),
+        ("_precision", ctypes.c_int32),
+        ("gpu_memory_limit", ctypes.c_uint64),
+        ("_cache_dir", ctypes.c_char_p),
+        ("_allow_tf32", ctypes.c_uint8),
+        ("_cuda_graph", ctypes.c_uint8),
+        ("_no_fallback", ctypes.c_uint8),
+        ("reserved", ctypes.c_uint8),
+        ("user_stream", ctypes.c_void_p),
+    ]
+
+
+class ModelOptionsKeywords(TypedDict, total=False):
+    """Fields of `ModelOptions`."""
+
+    threads: int
+    """Threads that a step may use, the caller's included; 0: the default of `upt_init`."""
+    providers: Sequence[Provider | str | int]
+    """`UPT_PROVIDER_*` in order of preference; NULL: CPU."""
+    device_id: int
+    """Device of GPU providers."""
+    precision: Precision | str | int
+    """`UPT_PRECISION_*`."""
+    gpu_memory_limit: int
+    """Bytes; 0: no limit."""
+    cache_dir: str | os.PathLike[str] | None
+    """Folder for compiled engines; NULL: none is kept."""
+    allow_tf32: bool
+    """1: TF32 products allowed (CUDA; errors near 1e-3)."""
+    cuda_graph: bool
+    """1: capture CUDA graphs."""
+    no_fallback: bool
+    """1: fail with `UPT_ERR_PROVIDER` when the first provider cannot run the model."""
+    user_stream: int | None
+    """A `cudaStream_t` of `device_id` to run the graphs on, which outlives the model and its scenes; NULL: one of ONNX Runtime's own."""
+
+
+class ModelInfo(Record):
+    """What a model is; filled by `upt_model_get_info`."""
+
+    struct_size: int
+    """`sizeof(upt_model_info)`, set by the caller."""
+    kind: Kind = choice("_kind", Kind)
+    """`UPT_KIND_*`."""
+    node_count: int
+    """K, the nodes of the bundle's mesh."""
+    tet_count: int
+    """Tetrahedra."""
+    surface_face_count: int
+    """Boundary triangles."""
+    domain_node_count: int
+    """Nodes that instruments may touch."""
+    held_node_count: int
+    """Nodes held at zero."""
+    supernode_count: int
+    """Supernodes (kind `UPT_KIND_UPT`), else 0."""
+    dt: float
+    """Length of a step, seconds."""
+    max_push_mm: float
+    """Longest push that the model was trained on, mm."""
+    provider: Provider = choice("_provider", Provider)
+    """`UPT_PROVIDER_*` that runs the latent stage."""
+    precision: Precision = choice("_precision", Precision)
+    """`UPT_PRECISION_*`."""
+    memory_bytes: int
+    """Host memory of the model."""
+    load_seconds: float
+    """Wall time of `upt_model_open`."""
+
+    _fields_ = [
+        ("struct_size", ctypes.c_uint32),
+        ("_kind", ctypes.c_int32),
+        ("node_count", ctypes.c_uint64),
+        ("tet_count", ctypes.c_uint64),
+        ("surface_face_count", ctypes.c_uint64),
+        ("domain_node_count", ctypes.c_uint64),
+        ("held_node_count", ctypes.c_uint64),
+        ("supernode_count", ctypes.c_uint64),
+        ("dt", ctypes.c_float),
+        ("max_push_mm", ctypes.c_float),
+        ("_provider", ctypes.c_int32),
+        ("_precision", ctypes.c_int32),
+        ("memory_bytes", ctypes.c_uint64),
+        ("load_seconds", ctypes.c_double),
+    ]
+
+
+class SceneOptions(Record):
+    """Options of `upt_scene_create`."""
+
+    struct_size: int
+    """`sizeof(upt_scene_options)`."""
+    threads: int
+    """Threads of a step; 0: the model's."""
+    kernel: Kernel = choice("_kernel", Kernel)
+    """`UPT_KERNEL_*`: who decodes."""
+    precision: Precision = choice("_precision", Precision)
+    """`UPT_PRECISION_*` of the native decoder."""
+    guard_policy: GuardPolicy = choice("_guard_policy", GuardPolicy)
+    """`UPT_GUARD_*`."""
+    mesh_path: str | None = text("_mesh_path")
+    """A mesh of the host's own (`*.mesh.safetensors`); NULL: the bundle's."""
+    free_boundary: bool = boolean("_free_boundary")
+    """1: do not enforce held and contact nodes."""
+    no_sleep: bool = boolean("_no_sleep")
+    """1: never sleep."""
+    check_inversion: bool = boolean("_check_inversion")
+    """1: the guard looks for inverted elements in each step."""
+    latest_wins: bool = boolean("_latest_wins")
+    """1: a submit while a step is in flight replaces the waiting contact instead of `UPT_ERR_BUSY`."""
+    cubic_sampling: bool = boolean("_cubic_sampling")
+    """1: sample with a cubic through the last states instead of a line."""
+    interpolate_points: bool = boolean("_interpolate_points")
+    """1: attached points are interpolated between nodes, not decoded (kind `upt`)."""
+    reserved: tuple[int, ...] = vector("_reserved")
+    """Zero."""
+    step_path: StepPath = choice("_step_path", StepPath)
+    """`UPT_STEP_*`: who makes a step of a `UPT_KIND_UPT` bundle."""
+
+    _fields_ = [
+        ("struct_size", ctypes.c_uint32),
+        ("threads", ctypes.c_uint32),
+        ("_kernel", ctypes.c_int32),
+        ("_precision", ctypes.c_int32),
+        ("_guard_policy", ctypes.c_int32),
+        ("_mesh_path", ctypes.c_char_p),
+        ("_free_boundary", ctypes.c_uint8),
+        ("_no_sleep", ctypes.c_uint8),
+        ("_check_inversion", ctypes.c_uint8),
+        ("_latest_wins", ctypes.c_uint8),
+        ("_cubic_sampling", ctypes.c_uint8),
+        ("_interpolate_points", ctypes.c_uint8),
+        ("_reserved", ctypes.c_uint8 * 2),
+        ("_step_path", ctypes.c_int32),
+    ]
+
+
+class SceneOptionsKeywords(TypedDict, total=False):
+    """Fields of `SceneOptions`."""
+
+    threads: int
+    """Threads of a step; 0: the model's."""
+    kernel: Kernel | str | int
+    """`UPT_KERNEL_*`: who decodes."""
+    precision: Precision | str | int
+    """`UPT_PRECISION_*` of the native decoder."""
+    guard_policy: GuardPolicy | str | int
+    """`UPT_GUARD_*`."""
+    mesh_path: str | os.PathLike[str] | None
+    """A mesh of the host's own (`*.mesh.safetensors`); NULL: the bundle's."""
+    free_boundary: bool
+    """1: do not enforce held and contact nodes."""
+    no_sleep: bool
+    """1: never sleep."""
+    check_inversion: bool
+    """1: the guard looks for inverted elements in each step."""
+    latest_wins: bool
+    """1: a submit while a step is in flight replaces the waiting contact instead of `UPT_ERR_BUSY`."""
+    cubic_sampling: bool
+    """1: sample with a cubic through the last states instead of a line."""
+    interpolate_points: bool
+    """1: attached points are interpolated between nodes, not decoded (kind `upt`)."""
+    step_path: StepPath | str | int
+    """`UPT_STEP_*`: who makes a step of a `UPT_KIND_UPT` bundle."""
+
+
+class Instrument(Record):
+    """A rigid instrument; the input of `upt_scene_contacts_from_instruments`."""
+
+    struct_size: int
+    """`sizeof(upt_instrument)`, the same in every element of an array."""
+    shape: Shape = choice("_shape", Shape)
+    """`UPT_SHAPE_*`."""
+    position: tuple[float, ...] = vector("_position")
+    """Centre, mm, in the mesh's frame."""
+    rotation: tuple[float, ...] = vector("_rotation")
+    """Unit quaternion x, y, z, w."""
+    half_extents: tuple[float, ...] = vector("_half_extents")
+    """Half sizes along the local axes, mm; a capsule's half length is `[1]` (local y)."""
+    radius: float
+    """A capsule's radius or a spatula's corner radius, mm."""
+    sticking: bool = boolean("_sticking")
+    """1: touched nodes move with the instrument until it leaves; 0: they slide."""
+    reserved: tuple[int, ...] = vector("_reserved")
+    """Zero."""
+
+    _fields_ = [
+        ("struct_size", ctypes.c_uint32),
+        ("_shape", ctypes.c_int32),
+        ("_position", ctypes.c_float * 3),
+        ("_rotation", ctypes.c_float * 4),
+        ("_half_extents", ctypes.c_float * 3),
+        ("radius", ctypes.c_float),
+        ("_sticking", ctypes.c_uint8),
+        ("_reserved", ctypes.c_uint8 * 3),
+    ]
+
+
+class SceneStats(Record):
+    """What the last step did and cost; filled by `upt_scene_get_stats`."""
+
+    struct_size: int
+    """`sizeof(upt_scene_stats)`, set by the caller."""
+    flags: Flag = choice("_flags", Flag)
+    """`UPT_FLAG_*` of the last step."""
+    step_count: int
+    """Steps since creation or reset."""
+    step_ms: float
+    """The whole step, ms; the stages follow."""
+    check_ms: float
+    """Input checks, ms."""
+    prior_ms: float
+    """Contact solve and linear response, ms."""
+    encode_ms: float
+    """Encoder, ms."""
+    aggregate_ms: float
+    """Message mean, ms."""
+    latent_ms: float
+    """Latent network, or the whole step's graph, ms."""
+    decode_ms: float
+    """Decoder, ms."""
+    guard_ms: float
+    """Guard and publishing, ms."""
+    decoded_node_count: int
+    """Nodes decoded in the last step."""
+    contact_count: int
+    """Contact nodes of the last step."""
+    memory_bytes: int
+    """Host memory of the scene beside the model."""
+    threads: int
+    """Threads of a step."""
+    kernel: Kernel = choice("_kernel", Kernel)
+    """`UPT_KERNEL_*` that decodes."""
+    provider: Provider = choice("_provider", Provider)
+    """`UPT_PROVIDER_*` that runs the latent stage."""
+    precision: Precision = choice("_precision", Precision)
+    """`UPT_PRECISION_*` of the decoder."""
+    max_displacement_mm: float
+    """Largest displacement among the decoded nodes, mm."""
+    indicator: float
+    """Calibrated trust indicator; 0: good."""
+    sleeping: bool = boolean("_sleeping")
+    """1: the scene sleeps."""
+    poisoned: bool = boolean("_poisoned")
+    """1: a bug was caught in an earlier call; only destroy is left."""
+    prior_forces: bool = boolean("_prior_forces")
+    """1: `upt_scene_contact_force` gives the contact forces of the linear response; 0: the elements' elastic forces."""
+    reserved: tuple[int, ...] = vector("_reserved")
+    """Zero."""
+    upload_ms: float
+    """Of the stages' times, copies to a device, ms; 0 on the CPU."""
+    download_ms: float
+    """Of the stages' times, copies back from a device, ms; 0 on the CPU."""
+    step_path: StepPath = choice("_step_path", StepPath)
+    """`UPT_STEP_SPLIT` or `UPT_STEP_WHOLE`."""
+
+    _fields_ = [
+        ("struct_size", ctypes.c_uint32),
+        ("_flags", ctypes.c_uint32),
+        ("step_count", ctypes.c_uint64),
+        ("step_ms", ctypes.c_double),
+        ("check_ms", ctypes.c_double),
+        ("prior_ms", ctypes.c_double),
+        ("encode_ms", ctypes.c_double),
+        ("aggregate_ms", ctypes.c_double),
+        ("latent_ms", ctypes.c_double),
+        ("decode_ms", ctypes.c_double),
+        ("guard_ms", ctypes.c_double),
+        ("decoded_node_count", ctypes.c_uint64),
+        ("contact_count", ctypes.c_uint64),
+        ("memory_bytes", ctypes.c_uint64),
+        ("threads", ctypes.c_uint32),
+        ("_kernel", ctypes.c_int32),
+        ("_provider", ctypes.c_int32),
+        ("_precision", ctypes.c_int32),
+        ("max_displacement_mm", ctypes.c_float),
+        ("indicator", ctypes.c_float),
+        ("_sleeping", ctypes.c_uint8),
+        ("_poisoned", ctypes.c_uint8),
+        ("_prior_forces", ctypes.c_uint8),
+        ("_reserved", ctypes.c_uint8 * 5),
+        ("upload_ms", ctypes.c_double),
+        ("download_ms", ctypes.c_double),
+        ("_step_path", ctypes.c_int32),
+    ]
+
+
+#: Name: (result, parameters).
+FUNCTIONS: dict[str, tuple[Any, list[Any]]] = {
+    "upt_init": (ctypes.c_int32, [ctypes.c_void_p]),
+    "upt_shutdown": (ctypes.c_int32, []),
+    "upt_version": (ctypes.c_char_p, []),
+    "upt_abi_version": (ctypes.c_uint32, []),
+    "upt_last_error": (ctypes.c_char_p, []),
+    "upt_status_name": (ctypes.c_char_p, [ctypes.c_int32]),
+    "upt_set_log": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int32]),
+    "upt_providers": (ctypes.c_int32, [ctypes.c_char_p, ctypes.c_uint64, ctypes.c_void_p]),
+    "upt_model_open": (ctypes.c_int32, [ctypes.c_char_p, ctypes.c_void_p, ctypes.c_void_p]),
+    "upt_model_close": (ctypes.c_int32, [ctypes.c_void_p]),
+    "upt_model_get_info": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p]),
+    "upt_model_describe": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_uint64, ctypes.c_void_p]),
+    "upt_model_positions": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
+    "upt_model_indices": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_int32, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p]),
+    "upt_scene_create": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p]),
+    "upt_scene_destroy": (ctypes.c_int32, [ctypes.c_void_p]),
+    "upt_scene_reset": (ctypes.c_int32, [ctypes.c_void_p]),
+    "upt_scene_step": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
+    "upt_scene_step_contacts": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p, ctypes.c_uint64]),
+    "upt_scene_read": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
+    "upt_scene_submit": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
+    "upt_scene_poll": (ctypes.c_int32, [ctypes.c_void_p]),
+    "upt_scene_wait": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_uint32]),
+    "upt_scene_sample": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p, ctypes.c_uint64]),
+    "upt_scene_set_region": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
+    "upt_scene_decode": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p, ctypes.c_uint64]),
+    "upt_scene_attach_points": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
+    "upt_scene_read_points": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
+    "upt_scene_sample_points": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p, ctypes.c_uint64]),
+    "upt_scene_contacts_from_instruments": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p]),
+    "upt_scene_contact_force": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
+    "upt_scene_get_stats": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p]),
+    "upt_scene_save": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p]),
+    "upt_scene_restore": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
+}

@@ -1,0 +1,129 @@
+"""A bundle made ready to step."""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import os
+import sys
+import weakref
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from upt._arrays import Floats, Indices, address
+from upt._library import check, ensure_started, lib, read_text
+from upt._native import IndexSet, ModelInfo, ModelOptions
+from upt.scene import Scene
+
+if TYPE_CHECKING:
+    if sys.version_info >= (3, 12):
+        from typing import Unpack
+    else:
+        from typing_extensions import Unpack
+
+    from upt._native import ModelOptionsKeywords, SceneOptionsKeywords
+
+
+class Model:
+    """A bundle made ready to step. Immutable; any thread may use it.
+
+    Args:
+        path: the bundle's folder.
+        options: fields of `upt.ModelOptions`, for instance `threads=2`, `providers=["cuda", "cpu"]`.
+
+    Raises:
+        upt.BundleError: a file is missing or invalid; the message names it and the field.
+        upt.RuntimeLibraryError: ONNX Runtime cannot be loaded, or no provider can run the model.
+    """
+
+    def __init__(self, path: str | os.PathLike[str], **options: Unpack[ModelOptionsKeywords]) -> None:
+        ensure_started()
+        handle = ctypes.c_void_p()
+        fields = ModelOptions(**options)
+        check(lib.upt_model_open(os.fspath(path).encode(), ctypes.byref(fields), ctypes.byref(handle)))
+        self._handle = handle.value
+        self._close = weakref.finalize(self, lib.upt_model_close, handle.value)
+
+    def scene(self, **options: Unpack[SceneOptionsKeywords]) -> Scene:
+        """A new scene at rest; options are fields of `upt.SceneOptions`, for instance `kernel="native"`."""
+        return Scene(self, **options)
+
+    @cached_property
+    def info(self) -> ModelInfo:
+        """Sizes, step length, provider, memory: see `upt.ModelInfo`."""
+        info = ModelInfo()
+        check(lib.upt_model_get_info(self._handle, ctypes.byref(info)))
+        return info
+
+    @property
+    def node_count(self) -> int:
+        """K, the nodes of the bundle's mesh."""
+        return self.info.node_count
+
+    @property
+    def dt(self) -> float:
+        """Length of a step, seconds."""
+        return self.info.dt
+
+    def describe(self) -> dict[str, Any]:
+        """Name, bundle hash, the provider of each stage and why others were not taken."""
+        described: dict[str, Any] = json.loads(read_text(lib.upt_model_describe, self._handle))
+        return described
+
+    @cached_property
+    def positions(self) -> Floats:
+        """Rest positions `[K, 3]` float32, mm; read-only."""
+        out = np.empty((self.node_count, 3), np.float32)
+        check(lib.upt_model_positions(self._handle, address(out), out.size))
+        out.flags.writeable = False
+        return out
+
+    def indices(self, which: IndexSet | int) -> Indices:
+        """A static index set as `[n]` uint32: node indices, 3 a face, 4 a tetrahedron."""
+        needed = ctypes.c_uint64()
+        check(lib.upt_model_indices(self._handle, which, None, 0, ctypes.byref(needed)))
+        out = np.empty(needed.value, np.uint32)
+        check(lib.upt_model_indices(self._handle, which, address(out), out.size, None))
+        return out
+
+    @cached_property
+    def surface_nodes(self) -> Indices:
+        """Nodes of the surface, `[n]` uint32."""
+        return self.indices(IndexSet.SURFACE_NODES)
+
+    @cached_property
+    def domain_nodes(self) -> Indices:
+        """Nodes that instruments may touch, `[n]` uint32."""
+        return self.indices(IndexSet.DOMAIN_NODES)
+
+    @cached_property
+    def fixed_nodes(self) -> Indices:
+        """Nodes held at zero, `[n]` uint32."""
+        return self.indices(IndexSet.FIXED_NODES)
+
+    @cached_property
+    def surface_faces(self) -> Indices:
+        """Boundary triangles `[n, 3]` uint32, outward."""
+        return self.indices(IndexSet.SURFACE_FACES).reshape(-1, 3)
+
+    @cached_property
+    def domain_faces(self) -> Indices:
+        """Triangles that instruments may touch, `[n, 3]` uint32, outward."""
+        return self.indices(IndexSet.DOMAIN_FACES).reshape(-1, 3)
+
+    @cached_property
+    def tets(self) -> Indices:
+        """Tetrahedra `[n, 4]` uint32, positive volume."""
+        return self.indices(IndexSet.TETS).reshape(-1, 4)
+
+    def close(self) -> None:
+        """Frees the model; its scenes live on. Also done when the object is collected."""
+        self._close()
+
+    def __enter__(self) -> Model:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()

@@ -1,0 +1,237 @@
+"""One deforming body: `u(t + dt) = M(u(t), c(t))`."""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import struct
+import sys
+import weakref
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from upt._arrays import Floats, Indices, address, indices, output, vectors
+from upt._library import check, lib
+from upt._native import Instrument, SceneOptions, SceneStats, Status
+
+if TYPE_CHECKING:
+    if sys.version_info >= (3, 12):
+        from typing import Unpack
+    else:
+        from typing_extensions import Unpack
+
+    from upt._native import SceneOptionsKeywords
+    from upt.model import Model
+
+#: How long `wait` waits when nothing is stated, milliseconds: 49 days.
+FOREVER_MS = 0xFFFFFFFF
+
+
+class Scene:
+    """One deforming body, made by `Model.scene`.
+
+    Arrays are float32, `[n, 3]`, mm; node indices are uint32. An input that is C-contiguous and of this type is not
+    copied, and a result goes straight into `out` where one is given. The GIL is released during each call, so scenes
+    step on several threads at once; one scene is used by one thread at a time (another gets `upt.BusyError`).
+    """
+
+    def __init__(self, model: Model, **options: Unpack[SceneOptionsKeywords]) -> None:
+        handle = ctypes.c_void_p()
+        fields = SceneOptions(**options)
+        check(lib.upt_scene_create(model._handle, ctypes.byref(fields), ctypes.byref(handle)))
+        self._handle = handle.value
+        self._destroy = weakref.finalize(self, lib.upt_scene_destroy, handle.value)
+        self._point_count = 0
+        self._region_count: int | None = None
+        self._node_count = model.node_count if fields.mesh_path is None else _node_count_of(fields.mesh_path)
+
+    @property
+    def node_count(self) -> int:
+        """K, the nodes of the scene's mesh."""
+        return self._node_count
+
+    @property
+    def out_count(self) -> int:
+        """Rows that a step writes: the region's, or K."""
+        return self._node_count if self._region_count is None else self._region_count
+
+    def step(
+        self, displacement: ArrayLike | None = None, collision: ArrayLike | None = None, out: Floats | None = None
+    ) -> Floats:
+        """One step with dense fields.
+
+        Args:
+            displacement: `u(t)`, `[K, 3]`, mm; None takes the scene's own state.
+            collision: `c(t)`, `[K, 3]`, mm, zero but at the nodes in contact: their displacement at the end of the
+                step. None means no contact.
+            out: `[n, 3]` to write to (n: K, or the region's count); None makes a new array.
+
+        Returns:
+            `u(t + dt)`, `[n, 3]`, mm.
+        """
+        u = None if displacement is None else vectors(displacement, "displacement", self._node_count)
+        c = None if collision is None else vectors(collision, "collision", self._node_count)
+        result = output(out, self.out_count)
+        check(
+            lib.upt_scene_step(
+                self._handle,
+                None if u is None else address(u),
+                None if c is None else address(c),
+                address(result),
+                result.size,
+            )
+        )
+        return result
+
+    def step_contacts(self, nodes: ArrayLike = (), contact: ArrayLike = (), out: Floats | None = None) -> Floats:
+        """One step from the scene's own state with the nodes in contact listed.
+
+        Args:
+            nodes: `[m]` indices, each once, in any order.
+            contact: `[m, 3]`, mm: the displacement of these nodes at the end of the step.
+            out: as in `step`.
+
+        Returns:
+            `u(t + dt)`, `[n, 3]`, mm.
+        """
+        n, c = _contacts(nodes, contact)
+        result = output(out, self.out_count)
+        check(lib.upt_scene_step_contacts(self._handle, address(n), address(c), len(n), address(result), result.size))
+        return result
+
+    def contacts(self, instruments: Sequence[Instrument]) -> tuple[Indices, Floats]:
+        """The nodes that rigid instruments touch and the displacement that they impose: the input of `step_contacts`.
+
+        Pass every instrument every time, in the same order: the scene remembers what each one touches.
+
+        Returns:
+            `nodes [m]` and `vectors [m, 3]`, mm.
+        """
+        array = (Instrument * len(instruments))(*instruments)
+        count = ctypes.c_uint64()
+        arguments = (self._handle, array if instruments else None, len(instruments))
+        find = lib.upt_scene_contacts_from_instruments
+        check(find(*arguments, None, None, 0, ctypes.byref(count)))
+        nodes, contact = np.empty(count.value, np.uint32), np.empty((count.value, 3), np.float32)
+        if count.value:
+            check(find(*arguments, address(nodes), address(contact), count.value, ctypes.byref(count)))
+        return nodes, contact
+
+    def contact_force(self, out: Floats | None = None) -> Floats:
+        """The reaction on the instrument at the last step's contact nodes, in their order: `[m, 3]`, mN."""
+        result = output(out, self.stats.contact_count)
+        check(lib.upt_scene_contact_force(self._handle, address(result), result.size))
+        return result
+
+    def read(self, out: Floats | None = None) -> Floats:
+        """The last published state `[n, 3]`, mm, in the region's order."""
+        result = output(out, self.out_count)
+        check(lib.upt_scene_read(self._handle, address(result), result.size))
+        return result
+
+    def submit(self, nodes: ArrayLike = (), contact: ArrayLike = ()) -> None:
+        """Starts a step on the scene's worker and returns at once; arguments as in `step_contacts`, copied."""
+        n, c = _contacts(nodes, contact)
+        check(lib.upt_scene_submit(self._handle, address(n), address(c), len(n)))
+
+    def poll(self) -> bool:
+        """True when the submitted step has finished; raises its error, once."""
+        return check(lib.upt_scene_poll(self._handle)) != Status.PENDING
+
+    def wait(self, timeout: float | None = None) -> bool:
+        """Waits for the submitted step, at most `timeout` seconds; false when they are over; raises its error."""
+        milliseconds = FOREVER_MS if timeout is None else min(max(int(timeout * 1000), 0), FOREVER_MS)
+        return check(lib.upt_scene_wait(self._handle, milliseconds)) != Status.PENDING
+
+    def sample(self, alpha: float, out: Floats | None = None) -> Floats:
+        """Between the last two states (`alpha` 0: the one before, 1: the last): `[n, 3]`, mm, in the region's order."""
+        result = output(out, self.out_count)
+        check(lib.upt_scene_sample(self._handle, alpha, address(result), result.size))
+        return result
+
+    def set_region(self, nodes: ArrayLike | None) -> None:
+        """Restricts what a step decodes and returns to these nodes `[n]`, in this order; None: all nodes."""
+        chosen = indices(() if nodes is None else nodes, "nodes")
+        if nodes is not None and not len(chosen):
+            raise ValueError("nodes is empty; None means all nodes")
+        check(lib.upt_scene_set_region(self._handle, address(chosen) if len(chosen) else None, len(chosen)))
+        self._region_count = None if nodes is None else len(chosen)
+
+    def decode(self, nodes: ArrayLike, out: Floats | None = None) -> Floats:
+        """Displacement of any nodes `[n]` in the last state, whatever the region is: `[n, 3]`, mm."""
+        chosen = indices(nodes, "nodes")
+        result = output(out, len(chosen))
+        check(lib.upt_scene_decode(self._handle, address(chosen), len(chosen), address(result), result.size))
+        return result
+
+    def attach_points(self, points: ArrayLike | None) -> None:
+        """Attaches points (rest positions `[n, 3]`, mm) in place of those attached before; None detaches all."""
+        rest = vectors(np.empty((0, 3), np.float32) if points is None else points, "points")
+        check(lib.upt_scene_attach_points(self._handle, address(rest) if len(rest) else None, len(rest)))
+        self._point_count = len(rest)
+
+    def read_points(self, out: Floats | None = None) -> Floats:
+        """Displacement of the attached points in the last state: `[n, 3]`, mm."""
+        result = output(out, self._point_count)
+        check(lib.upt_scene_read_points(self._handle, address(result), result.size))
+        return result
+
+    def sample_points(self, alpha: float, out: Floats | None = None) -> Floats:
+        """As `sample`, at the attached points."""
+        result = output(out, self._point_count)
+        check(lib.upt_scene_sample_points(self._handle, alpha, address(result), result.size))
+        return result
+
+    @property
+    def stats(self) -> SceneStats:
+        """What the last step did and cost; works beside a step in flight."""
+        stats = SceneStats()
+        check(lib.upt_scene_get_stats(self._handle, ctypes.byref(stats)))
+        return stats
+
+    def save(self) -> bytes:
+        """A snapshot; `restore` resumes from it to the bit."""
+        needed = ctypes.c_uint64()
+        check(lib.upt_scene_save(self._handle, None, 0, ctypes.byref(needed)))
+        buffer = ctypes.create_string_buffer(needed.value)
+        check(lib.upt_scene_save(self._handle, buffer, needed.value, None))
+        return buffer.raw
+
+    def restore(self, snapshot: bytes) -> None:
+        """Back to a snapshot of the same model."""
+        check(lib.upt_scene_restore(self._handle, snapshot, len(snapshot)))
+
+    def reset(self) -> None:
+        """Back to rest. The region and attached points stay."""
+        check(lib.upt_scene_reset(self._handle))
+
+    def close(self) -> None:
+        """Frees the scene; a step in flight is waited for. Also done when the object is collected."""
+        status = self._destroy()
+        if status is not None:
+            check(status)
+
+    def __enter__(self) -> Scene:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def _contacts(nodes: ArrayLike, contact: ArrayLike) -> tuple[Indices, Floats]:
+    n = indices(nodes, "nodes")
+    if not len(n) and not np.size(contact):
+        return n, np.empty((0, 3), np.float32)
+    return n, vectors(contact, "contact", len(n))
+
+
+def _node_count_of(mesh: str) -> int:
+    """K of a mesh file, from its header (docs/formats.md)."""
+    with open(mesh, "rb") as file:
+        (length,) = struct.unpack("<Q", file.read(8))
+        header = json.loads(file.read(length))
+    count: int = header["positions"]["shape"][0]
+    return count
