@@ -131,7 +131,9 @@ fn simulate(
 ) -> Result<PathBuf> {
     let mut hash = Sha256::new();
     hash.update(std::fs::read(workspace.path(MESH))?);
-    let mut folders = vec![workspace.path("crates/tissue/src")];
+    let mut folders = ["contact", "elements", "tissue"]
+        .map(|name| workspace.path(&format!("crates/{name}/src")))
+        .to_vec();
     let mut files = Vec::new();
     while let Some(folder) = folders.pop() {
         for entry in std::fs::read_dir(folder)? {

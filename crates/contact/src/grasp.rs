@@ -4,6 +4,15 @@ use crate::body::Body;
 use crate::samples::Samples;
 use parry3d::math::{Pose, Vector};
 
+/// A grasper holds samples within this distance of its surface, mm.
+pub const REACH_MM: f32 = 0.5;
+
+/// The part of the force on all bound samples that pulls or drags: a push along the mean of their outward normals tears
+/// nothing off. (Forces of single samples are not unique where there are more samples than nodes.)
+pub fn tension(force: Vector, normal: Vector) -> Vector {
+    force - normal * force.dot(normal).max(0.0)
+}
+
 /// A bound sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Anchor {
@@ -63,7 +72,7 @@ impl Grasp {
         at.ok().map(|at| self.anchors[at].place)
     }
 
-    /// Lets go of everything when the tool pulls with more than `tear_off`, a force in the caller's unit; tells whether
+    /// Lets go of everything when the [`tension`] on its samples, `pull`, is more than `tear_off`, a force in the caller's unit; tells whether
     /// it did. A tear-off force that is not positive never tears.
     pub fn tear(&mut self, pull: Vector, tear_off: f32) -> bool {
         let torn = !self.anchors.is_empty() && tear_off > 0.0 && pull.length() > tear_off;

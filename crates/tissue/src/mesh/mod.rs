@@ -111,6 +111,18 @@ impl Mesh {
         nodes
     }
 
+    /// Where tools touch the mesh: points of `domain` at most [`contact::SPACING_MM`] apart, without those that `boundary` holds.
+    pub fn samples(&self, boundary: Boundary) -> contact::Samples {
+        let held = self.held_nodes(boundary);
+        contact::Samples::of_domain(
+            &self.positions,
+            &self.surface,
+            &self.domain,
+            &held,
+            contact::SPACING_MM,
+        )
+    }
+
     /// SHA-256 (lower-case hex) over the bytes of `positions`, `tets`, `fixed`, `supported` and,
     /// where there is one, `stiffness` as the file stores them. Identifies the mesh in trajectories, datasets and bundles.
     pub fn hash(&self) -> String {

@@ -1,5 +1,6 @@
 //! What a frame reports, and why it failed: f64 passes over the elements, once a frame.
 
+use super::touch::{ToolPose, Touch};
 use super::{ContactNode, FrameReport, Solver, SolverError};
 use elements::Chunk;
 use elements::inverse_cube_root;
@@ -119,6 +120,11 @@ impl Solver {
             min_det_f: diagnosis.min_det_f,
             reaction,
             inner_steps: steps,
+            tools: self.touch.as_ref().map_or_else(Vec::new, Touch::reports),
+            sample_forces: self
+                .touch
+                .as_ref()
+                .map_or_else(Vec::new, Touch::sample_forces),
             critical_step_s: self.critical_now,
         }
     }
@@ -139,7 +145,13 @@ impl Solver {
     /// Runs the failed frame again up to the fault, to name time, element and cause.
     ///
     /// The caller restores the state afterwards.
-    pub(super) fn explain(&mut self, inverted_at: Option<u32>, steps: u32, dt: f64) -> SolverError {
+    pub(super) fn explain(
+        &mut self,
+        inverted_at: Option<u32>,
+        tools: &[ToolPose],
+        steps: u32,
+        dt: f64,
+    ) -> SolverError {
         let step_ms = dt * 1e3;
         let Some(step) = inverted_at else {
             let node = self
@@ -165,12 +177,16 @@ impl Solver {
             };
         };
         self.fields.clone_from(&self.backup);
+        self.touch.clone_from(&self.touch_backup);
         let targets = self.paths.clone();
         for path in &mut self.paths {
             path.target = path.at(step - 1, steps);
         }
         self.dt = self.backup_dt;
         self.set_step(dt);
+        if let Some(touch) = &mut self.touch {
+            touch.begin(tools, steps, dt);
+        }
         if step > 1 {
             self.run(step - 1);
         }

@@ -22,6 +22,10 @@ pub enum SolverError {
         value: f64,
         wanted: &'static str,
     },
+    #[error("tools[{index}]: {reason}")]
+    Tool { index: usize, reason: String },
+    #[error("{poses} poses for {tools} tools; give one each (`step_frame` alone moves no tools)")]
+    ToolCount { tools: usize, poses: usize },
     #[error("contact entry {index} (node {node}): {reason}")]
     Contact {
         index: usize,

@@ -2,7 +2,9 @@
 
 use super::march::{March, Path, Tally};
 use super::options::Pressure;
+use super::touch::ToolPose;
 use super::{ContactNode, Solver, SolverError};
+use std::sync::Mutex;
 
 impl Solver {
     /// Sets the frame's contact paths from the present positions.
@@ -44,9 +46,17 @@ impl Solver {
     }
 
     /// Runs one attempt at a frame; returns the external work, mJ.
-    pub(super) fn march(&mut self, steps: u32, duration_s: f64) -> Result<f64, SolverError> {
+    pub(super) fn march(
+        &mut self,
+        tools: &[ToolPose],
+        steps: u32,
+        duration_s: f64,
+    ) -> Result<f64, SolverError> {
         let dt = duration_s / f64::from(steps);
         self.set_step(dt);
+        if let Some(touch) = &mut self.touch {
+            touch.begin(tools, steps, dt);
+        }
         let tallies = self.run(steps);
         let inverted = tallies
             .iter()
@@ -54,14 +64,18 @@ impl Solver {
             .filter(|step| *step > 0)
             .min();
         if inverted.is_some() || !self.is_finite() {
-            return Err(self.explain(inverted, steps, dt));
+            return Err(self.explain(inverted, tools, steps, dt));
         }
         Ok(tallies.iter().map(|tally| tally.work).sum::<f64>() * 1e-6)
     }
 
     pub(super) fn run(&mut self, steps: u32) -> Vec<Tally> {
         let mut fields = std::mem::take(&mut self.fields);
-        let tallies = self.marcher(steps).run(&mut fields, self.pool.as_ref());
+        let mut touch = self.touch.take();
+        let mut march = self.marcher(steps);
+        march.touch = touch.as_mut().map(Mutex::new);
+        let tallies = march.run(&mut fields, self.pool.as_ref());
+        self.touch = touch;
         self.fields = fields;
         tallies
     }
@@ -78,6 +92,7 @@ impl Solver {
             dt: self.dt,
             damping,
             paths: &self.paths,
+            touch: None,
             steps,
         }
     }

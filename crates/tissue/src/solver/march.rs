@@ -4,13 +4,15 @@
 //! `d <- beta d + g f`, `u <- u + d`, with `beta = (1 - alpha dt/2) / (1 + alpha dt/2)`
 //! and `g = dt² / (m (1 + alpha dt/2))`; `g` sits in the fourth component of `d`,
 //! zero at held and prescribed nodes. Contact nodes move on a straight line and
-//! end the frame exactly at their target. Two phases a step, a barrier after each:
+//! end the frame exactly at their target. Tools ([`super::touch`]) then correct what has moved. Two phases a step, a barrier after each:
 //! chunks add element forces to their own slots; owners collect ghost forces and move.
 
 use super::barrier::{FlushDenormals, SpinBarrier};
+use super::touch::{Access, Touch};
 use elements::PADDED;
 use elements::{Chunk, Kernels, Partition};
 use rayon::ThreadPool;
+use std::sync::Mutex;
 
 /// Four floats on a 16-byte boundary.
 #[repr(C, align(16))]
@@ -60,6 +62,8 @@ pub(crate) struct March<'a> {
     pub damping: f64,
     /// Ascending slots.
     pub paths: &'a [Path],
+    /// Tools, resolved by the first thread between two barriers.
+    pub touch: Option<Mutex<&'a mut Touch>>,
     pub steps: u32,
 }
 
@@ -100,7 +104,7 @@ impl March<'_> {
     pub fn run(&self, fields: &mut Fields, pool: Option<&ThreadPool>) -> Vec<Tally> {
         let mut tallies = vec![Tally::default(); self.partition.chunks.len()];
         let shared = Shared::new(fields, &mut tallies);
-        self.on_threads(pool, |mine, barrier| {
+        self.on_threads(pool, |first, mine, barrier| {
             let mut positions = self.positions();
             for step in 1..=self.steps {
                 // SAFETY: phases and barriers as `Shared` demands; `mine` is disjoint a thread.
@@ -111,6 +115,12 @@ impl March<'_> {
                         self.node_phase(shared, chunk, step);
                     }
                     barrier.wait();
+                    if let Some(touch) = &self.touch {
+                        if first {
+                            self.touch_phase(shared, touch, step);
+                        }
+                        barrier.wait();
+                    }
                 }
             }
         });
@@ -121,7 +131,7 @@ impl March<'_> {
     pub fn forces(&self, fields: &mut Fields, pool: Option<&ThreadPool>) {
         let mut tallies = vec![Tally::default(); self.partition.chunks.len()];
         let shared = Shared::new(fields, &mut tallies);
-        self.on_threads(pool, |mine, barrier| {
+        self.on_threads(pool, |_, mine, barrier| {
             let mut positions = self.positions();
             // SAFETY: as in `run`.
             unsafe {
@@ -140,17 +150,17 @@ impl March<'_> {
         vec![Node::default(); sizes.max().unwrap_or(0).next_multiple_of(PADDED)]
     }
 
-    /// Calls `work` with each thread's chunks.
+    /// Calls `work` with each thread's chunks, and whether it is the first thread.
     fn on_threads(
         &self,
         pool: Option<&ThreadPool>,
-        work: impl Fn(std::ops::Range<usize>, &SpinBarrier) + Sync,
+        work: impl Fn(bool, std::ops::Range<usize>, &SpinBarrier) + Sync,
     ) {
         let count = self.partition.chunks.len();
         match pool {
             None => {
                 let _mode = FlushDenormals::new();
-                work(0..count, &SpinBarrier::new(1));
+                work(true, 0..count, &SpinBarrier::new(1));
             }
             Some(pool) => {
                 let threads = pool.current_num_threads();
@@ -159,6 +169,7 @@ impl March<'_> {
                     let _mode = FlushDenormals::new();
                     let index = context.index();
                     work(
+                        index == 0,
                         count * index / threads..count * (index + 1) / threads,
                         &barrier,
                     );
@@ -296,6 +307,21 @@ impl March<'_> {
                     displacement.0[k] = end[k];
                 }
             }
+        }
+    }
+
+    /// Contact with the tools after the free update; all other threads wait.
+    unsafe fn touch_phase(&self, shared: Shared, touch: &Mutex<&mut Touch>, step: u32) {
+        let access = Access {
+            displacement: shared.displacement,
+            increment: shared.increment,
+            force: shared.force,
+            beta: self.beta,
+        };
+        // Poisoned only where this thread panicked, which ends the march.
+        if let Ok(mut touch) = touch.lock() {
+            // SAFETY: the barriers around the phase keep other threads out of the arrays.
+            unsafe { (*shared.tallies).work += touch.resolve(access, step) };
         }
     }
 

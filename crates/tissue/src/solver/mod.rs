@@ -14,6 +14,7 @@ mod march;
 mod mass;
 mod options;
 mod stability;
+mod touch;
 // Against the energy of `statics`.
 #[cfg(all(test, feature = "linear"))]
 mod tests;
@@ -21,12 +22,14 @@ mod tests;
 pub use elements::Simd;
 pub use error::SolverError;
 pub use options::{Pressure, SolverOptions, Substep};
+pub use touch::{SampleForce, Tool, ToolPose, ToolReport};
 
 use crate::mesh::{Boundary, Mesh};
 use elements::{Kernels, Partition};
 use march::{Fields, Node, Path};
 use mass::LumpedMass;
 use options::check_positive;
+use touch::Touch;
 
 /// One prescribed node of a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,12 +48,16 @@ pub struct FrameReport {
     pub strain_energy: f64,
     /// mJ, from the half-step velocities.
     pub kinetic_energy: f64,
-    /// Work done by the contact nodes since rest, mJ.
+    /// Work done by contact nodes and tools since rest, mJ.
     pub external_work: f64,
     /// Smallest det F over the elements.
     pub min_det_f: f64,
     /// Elastic force of the tissue on the instrument, a row a contact node, mN.
     pub reaction: Vec<[f32; 3]>,
+    /// A row a tool.
+    pub tools: Vec<ToolReport>,
+    /// Forces at samples of the surface, by tool and sample.
+    pub sample_forces: Vec<SampleForce>,
     /// Inner steps taken.
     pub inner_steps: u32,
     /// Estimated critical step at this state, s.
@@ -79,6 +86,8 @@ pub struct Solver {
     held: Vec<bool>,
     fields: Fields,
     backup: Fields,
+    touch: Option<Touch>,
+    touch_backup: Option<Touch>,
     paths: Vec<Path>,
     pool: Option<rayon::ThreadPool>,
     /// Inner step that the increments in `fields` belong to, s.
@@ -149,6 +158,8 @@ impl Solver {
             added_mass: lumped.added,
             held,
             backup: fields.clone(),
+            touch: None,
+            touch_backup: None,
             fields,
             paths: Vec::new(),
             pool,
@@ -167,7 +178,7 @@ impl Solver {
         Ok(solver)
     }
 
-    /// Back to rest at time zero.
+    /// Back to rest at time zero, without tools.
     pub fn reset(&mut self) {
         for field in [
             &mut self.fields.displacement,
@@ -177,6 +188,7 @@ impl Solver {
             field.fill(Node::default());
         }
         self.paths.clear();
+        self.touch = None;
         self.dt = self.options.inner_step_s;
         self.time_s = 0.0;
         self.external_work = 0.0;
@@ -193,8 +205,21 @@ impl Solver {
         contact: &[ContactNode],
         duration_s: f64,
     ) -> Result<FrameReport, SolverError> {
+        self.step_tools(contact, &[], duration_s)
+    }
+
+    /// The same with tools ([`Solver::set_tools`]), each moved to its pose within the frame.
+    ///
+    /// A node may be prescribed and touched: it then goes where it is told, and the tool gives way to it.
+    pub fn step_tools(
+        &mut self,
+        contact: &[ContactNode],
+        tools: &[ToolPose],
+        duration_s: f64,
+    ) -> Result<FrameReport, SolverError> {
         check_positive("duration_s", duration_s)?;
         self.check_contact(contact)?;
+        self.check_tools(tools)?;
         let asked = (duration_s / self.options.inner_step_s).round().max(1.0) as u32;
         let allowed = self.options.safety * self.critical_now;
         let mut steps = asked;
@@ -211,11 +236,12 @@ impl Solver {
         }
         self.backup.clone_from(&self.fields);
         self.backup_dt = self.dt;
+        self.touch_backup.clone_from(&self.touch);
         let paths_before = std::mem::take(&mut self.paths);
         let mut refinements = 0;
         loop {
             self.lead(contact);
-            match self.march(steps, duration_s) {
+            match self.march(tools, steps, duration_s) {
                 Ok(work) => {
                     self.time_s += duration_s;
                     self.external_work += work;
@@ -223,6 +249,7 @@ impl Solver {
                 }
                 Err(error) => {
                     self.fields.clone_from(&self.backup);
+                    self.touch.clone_from(&self.touch_backup);
                     self.dt = self.backup_dt;
                     if self.options.substep == Substep::Refuse || refinements == MAX_REFINEMENTS {
                         self.paths = paths_before;

@@ -1,0 +1,157 @@
+//! The samples that an inner step solves for: those near a tool, found anew every millisecond, and those that it holds.
+
+use super::Touch;
+use contact::grasp::REACH_MM;
+use contact::{Placed, SKIN_MM, Vector, pose};
+
+/// Inner steps between two searches.
+pub(super) const SEARCH_STEPS: u32 = 10;
+
+/// One sample at one tool.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Row {
+    pub tool: u32,
+    pub sample: u32,
+    /// Place on the tool of a sample that it holds.
+    pub bound: Option<Vector>,
+    /// Places in the list of reached nodes.
+    pub nodes: [u32; 3],
+    pub weights: [f32; 3],
+    /// On the tissue, µN, of the last inner step.
+    pub force: Vector,
+    /// At the end of the last inner step, mm; none for a row that is new.
+    pub last_gap: Option<f32>,
+    /// The same of a bound sample: its way from its place.
+    pub last_slip: Option<Vector>,
+    /// Of this step: where the free update left it.
+    pub point: Vector,
+    pub normal: Vector,
+    pub gap: f32,
+    /// Way relative to the tool, mm; of a bound sample that from its place.
+    pub slip: Vector,
+    /// Way of the tool's material at the sample over the step, mm.
+    pub carried: Vector,
+    /// Displacement over a step for a unit of force, mm/µN.
+    pub gain: f32,
+}
+
+/// A node of a row.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Reached {
+    pub slot: u32,
+    pub node: u32,
+    /// mm/µN.
+    pub gain: f32,
+    /// Position after the free update and increments after and before it, mm.
+    pub at: Vector,
+    pub increment: Vector,
+    pub earlier: Vector,
+    /// What contact adds to the increment, mm.
+    pub change: Vector,
+}
+
+impl Touch {
+    /// Finds the rows for the inner steps from `step` on; `position` is that of a mesh node.
+    pub(super) fn look(&mut self, step: u32, position: impl Fn(u32) -> Vector) {
+        let scene = self.scene.clone();
+        let (from, to) = (self.part(step - 1), self.part(step - 1 + SEARCH_STEPS));
+        let placed: Vec<Placed> = self
+            .tools
+            .iter()
+            .zip(&scene.tools)
+            .map(|(tool, (_, body))| {
+                let start = pose::between(&tool.from, &tool.to, from);
+                let end = pose::between(&tool.from, &tool.to, to);
+                Placed {
+                    body,
+                    pose: start,
+                    skin: SKIN_MM + body.motion(&start, &end),
+                }
+            })
+            .collect();
+        for (index, tool) in self.tools.iter_mut().enumerate() {
+            if step == 1 && tool.closed && !tool.torn && tool.grasp.anchors().is_empty() {
+                let (body, at) = (placed[index].body, &placed[index].pose);
+                tool.grasp
+                    .close(&scene.samples, body, at, REACH_MM, &position);
+            }
+        }
+        std::mem::swap(&mut self.rows, &mut self.before);
+        self.rows.clear();
+        let found = self.search.find(&scene.samples, &placed, &position);
+        let mut candidates = found.iter().peekable();
+        for (index, tool) in self.tools.iter().enumerate() {
+            let index = index as u32;
+            let anchors = tool.grasp.anchors();
+            for anchor in anchors {
+                self.rows
+                    .push(row(&scene, index, anchor.sample, Some(anchor.place)));
+            }
+            while let Some(candidate) = candidates.next_if(|c| c.tool == index) {
+                if tool.grasp.place(candidate.sample).is_none() {
+                    self.rows.push(row(&scene, index, candidate.sample, None));
+                }
+            }
+        }
+        self.keep_forces();
+        self.reached.clear();
+        for row in &self.rows {
+            for node in scene.samples.rows()[row.sample as usize].nodes {
+                self.reached.push(Reached {
+                    slot: scene.slot_of_node[node as usize],
+                    node,
+                    gain: 0.0,
+                    at: Vector::ZERO,
+                    increment: Vector::ZERO,
+                    earlier: Vector::ZERO,
+                    change: Vector::ZERO,
+                });
+            }
+        }
+        self.reached.sort_unstable_by_key(|r| r.slot);
+        self.reached.dedup_by_key(|r| r.slot);
+        for row in &mut self.rows {
+            row.nodes = scene.samples.rows()[row.sample as usize].nodes.map(|node| {
+                let slot = scene.slot_of_node[node as usize];
+                self.reached.partition_point(|r| r.slot < slot) as u32
+            });
+        }
+    }
+
+    /// Gives rows that were there before the forces that they had.
+    fn keep_forces(&mut self) {
+        let key = |row: &Row| (row.tool, row.sample);
+        self.before.sort_unstable_by_key(key);
+        for row in &mut self.rows {
+            if let Ok(at) = self.before.binary_search_by_key(&key(row), key) {
+                row.force = self.before[at].force;
+                row.last_gap = self.before[at].last_gap;
+                row.last_slip = self.before[at].last_slip;
+            }
+        }
+    }
+
+    /// Part of the frame that has passed after `step`.
+    pub(super) fn part(&self, step: u32) -> f32 {
+        step as f32 / self.steps as f32
+    }
+}
+
+fn row(scene: &super::Scene, tool: u32, sample: u32, bound: Option<Vector>) -> Row {
+    Row {
+        tool,
+        sample,
+        bound,
+        nodes: [0; 3],
+        weights: scene.samples.rows()[sample as usize].weights,
+        force: Vector::ZERO,
+        last_gap: None,
+        last_slip: None,
+        point: Vector::ZERO,
+        normal: Vector::Y,
+        gap: 0.0,
+        slip: Vector::ZERO,
+        carried: Vector::ZERO,
+        gain: 0.0,
+    }
+}
