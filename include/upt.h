@@ -60,6 +60,11 @@
 #define UPT_ERR_UNSUPPORTED -8
 
 /**
+ * There is no memory for what the call needs.
+ */
+#define UPT_ERR_OUT_OF_MEMORY -9
+
+/**
  * ONNX Runtime is missing, too old or broken; the message lists what was tried.
  */
 #define UPT_ERR_RUNTIME -20
@@ -140,7 +145,7 @@
 #define UPT_LOG_ERROR 1
 
 /**
- * Fallbacks and envelope violations.
+ * Fallbacks, and once for each flag that rises: contacts outside of the envelope, states that the guard refuses.
  */
 #define UPT_LOG_WARN 2
 
@@ -160,7 +165,7 @@
 #define UPT_LOG_TRACE 5
 
 /**
- * 32-bit floats: the reference.
+ * 32-bit floats: the reference. Of a scene's options: what its model has.
  */
 #define UPT_PRECISION_F32 0
 
@@ -178,6 +183,11 @@
  * 8-bit integers: the bundle's `*.int8.onnx`.
  */
 #define UPT_PRECISION_INT8 3
+
+/**
+ * Of options only: 32-bit floats also in a scene of a model that was opened with another precision.
+ */
+#define UPT_PRECISION_FORCE_F32 4
 
 /**
  * The library chooses the decoder.
@@ -346,7 +356,8 @@
 typedef struct upt_model upt_model;
 
 /**
- * One deforming body. Used by one thread at a time; a call while another is running returns `UPT_ERR_BUSY`.
+ * One deforming body. Calls that change it come from one thread at a time, a second one is `UPT_ERR_BUSY`; reading and sampling
+ * published states and statistics may happen on any thread at any time.
  */
 typedef struct upt_scene upt_scene;
 
@@ -375,7 +386,7 @@ typedef struct upt_init_options {
 
 /**
  * Receives log messages (UTF-8, valid during the call) on the host's threads, inside of their calls; it must not call
- * the library.
+ * the library: such a call is `UPT_ERR_STATE`.
  */
 typedef void (*upt_log_fn)(int32_t level,
                            const char *message,
@@ -402,7 +413,7 @@ typedef struct upt_model_options {
    */
   uint64_t provider_count;
   /**
-   * Device of GPU providers.
+   * Device of GPU providers, from 0.
    */
   int32_t device_id;
   /**
@@ -410,7 +421,7 @@ typedef struct upt_model_options {
    */
   int32_t precision;
   /**
-   * Bytes; 0: no limit.
+   * Bytes; 0: no limit. Needs a GPU provider in `providers`.
    */
   uint64_t gpu_memory_limit;
   /**
@@ -518,7 +529,7 @@ typedef struct upt_scene_options {
    */
   int32_t kernel;
   /**
-   * `UPT_PRECISION_*` of the native decoder.
+   * `UPT_PRECISION_*` of the native decoder; 0: the model's, `UPT_PRECISION_FORCE_F32`: float32 whatever the model has.
    */
   int32_t precision;
   /**
@@ -682,7 +693,7 @@ typedef struct upt_scene_stats {
    */
   float max_displacement_mm;
   /**
-   * Calibrated trust indicator; 0: good.
+   * Largest ratio of push, rate of push, contact area and number of sites to what the model was trained on; above 1: outside.
    */
   float indicator;
   /**
@@ -761,7 +772,7 @@ const char *upt_status_name(upt_status status);
  *
  * user: handed to the receiver. level: `UPT_LOG_*`; less severe messages are not made at all. The receiver runs on
  * the host's threads only, inside of a call or at its end: what the library's own threads say waits for the next call.
- * Threads: any, but not from inside the receiver. Errors: `UPT_ERR_ARGUMENT` for an unknown level, `UPT_ERR_STATE`
+ * Threads: any. Errors: `UPT_ERR_ARGUMENT` for an unknown level, `UPT_ERR_STATE` from inside of the receiver, or
  * when the process is a Rust program that has a `tracing` subscriber of its own.
  */
 upt_status upt_set_log(upt_log_fn callback,
@@ -779,11 +790,11 @@ upt_status upt_providers(char *out,
                          uint64_t *needed);
 
 /**
- * Opens and checks a bundle (sizes, dtypes, SHA-256) and makes it ready to step.
+ * Opens and checks a bundle (sizes, dtypes, the SHA-256 of the manifest and of each file that is read) and makes it ready to step.
  *
  * path: the bundle's folder, UTF-8. options: NULL means the defaults. out: the new model.
  * Threads: any. Errors: `UPT_ERR_IO`, `UPT_ERR_BUNDLE`, `UPT_ERR_VERSION`, `UPT_ERR_RUNTIME`, `UPT_ERR_PROVIDER`,
- * `UPT_ERR_UNSUPPORTED`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NULL`.
+ * `UPT_ERR_UNSUPPORTED`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NULL`, `UPT_ERR_OUT_OF_MEMORY`.
  */
 upt_status upt_model_open(const char *path,
                           const struct upt_model_options *options,
@@ -843,7 +854,7 @@ upt_status upt_model_indices(const struct upt_model *model,
  *
  * options: NULL means the defaults. out: the new scene. The scene keeps what it needs of the model.
  * Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`,
- * `UPT_ERR_UNSUPPORTED`, `UPT_ERR_IO`, `UPT_ERR_BUNDLE`.
+ * `UPT_ERR_UNSUPPORTED`, `UPT_ERR_IO`, `UPT_ERR_BUNDLE`, `UPT_ERR_OUT_OF_MEMORY`.
  */
 upt_status upt_scene_create(const struct upt_model *model,
                             const struct upt_scene_options *options,
@@ -872,7 +883,8 @@ upt_status upt_scene_reset(struct upt_scene *scene);
  * out: `[n,3]`, mm (n: K, or the region's count), may be NULL; it may be the same memory as an input, at the price of
  * a copy. out_count: floats in out, 3 n; 0 when out is NULL.
  * Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`,
- * `UPT_ERR_NON_FINITE`, `UPT_ERR_UNSUPPORTED`, `UPT_ERR_GUARD`, `UPT_ERR_RUNTIME`, `UPT_ERR_PANIC`; the state stays.
+ * `UPT_ERR_NON_FINITE`, `UPT_ERR_UNSUPPORTED`, `UPT_ERR_GUARD`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`; the
+ * state stays.
  */
 upt_status upt_scene_step(struct upt_scene *scene,
                           const float *displacement,
@@ -885,7 +897,7 @@ upt_status upt_scene_step(struct upt_scene *scene,
  *
  * contact_nodes: `[m]` node indices, each at most once, in any order. contact_vectors: `[m,3]`, mm: the displacement of
  * these nodes at the end of the step. contact_count: m; 0 means no contact and both may be NULL.
- * out, out_count, threads and errors: as `upt_scene_step`; also `UPT_ERR_ARGUMENT` for an index of K or more.
+ * out, out_count, threads and errors: as `upt_scene_step`; also `UPT_ERR_ARGUMENT` for an index or a count beyond K.
  */
 upt_status upt_scene_step_contacts(struct upt_scene *scene,
                                    const uint32_t *contact_nodes,
@@ -898,7 +910,7 @@ upt_status upt_scene_step_contacts(struct upt_scene *scene,
  * Copies the last published state.
  *
  * out: `[n,3]`, mm, in the region's order (all nodes when there is none). out_count: floats in out, 3 n.
- * Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`, `UPT_ERR_PANIC`.
+ * Threads: any at any time, also while a step runs. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_PANIC`.
  */
 upt_status upt_scene_read(struct upt_scene *scene,
                           float *out,
@@ -907,9 +919,11 @@ upt_status upt_scene_read(struct upt_scene *scene,
 /**
  * Starts a step on the scene's worker and returns at once.
  *
- * contact_nodes, contact_vectors, contact_count: as `upt_scene_step_contacts`; copied before the call returns.
+ * contact_nodes, contact_vectors, contact_count: as `upt_scene_step_contacts`; checked and copied before the call returns.
+ * An error of an earlier step that was not told yet stays to be told.
  * Threads: one at a time. Errors: `UPT_ERR_BUSY` while a step is in flight (unless the scene was made with
- * `latest_wins`), `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NON_FINITE`, `UPT_ERR_PANIC`.
+ * `latest_wins`), `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` (also for an index or a count beyond K, or a node that is
+ * listed twice), `UPT_ERR_NON_FINITE`, `UPT_ERR_STATE` where no thread can be started, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
  */
 upt_status upt_scene_submit(struct upt_scene *scene,
                             const uint32_t *contact_nodes,
@@ -919,7 +933,8 @@ upt_status upt_scene_submit(struct upt_scene *scene,
 /**
  * Asks whether the submitted step has finished; never waits.
  *
- * Returns `UPT_OK`, `UPT_PENDING`, or the step's error (once).
+ * Returns `UPT_OK`, `UPT_PENDING`, or the step's error (once, also after a later submit). With `latest_wins`, `UPT_OK` says that
+ * a step has finished since the last `UPT_OK`, while another may be in flight: a host that submits in every frame sees each new state.
  * Threads: one at a time. Errors: the step's; `UPT_ERR_STATE` when nothing was submitted, `UPT_ERR_NULL`,
  * `UPT_ERR_HANDLE`.
  */
@@ -928,7 +943,7 @@ upt_status upt_scene_poll(struct upt_scene *scene);
 /**
  * Waits for the submitted step, at most `timeout_ms` milliseconds.
  *
- * Returns `UPT_OK`, `UPT_PENDING` when the time is over, or the step's error (once).
+ * Returns `UPT_OK` when none is in flight, `UPT_PENDING` when the time is over, or the step's error (once).
  * Threads: one at a time. Errors: as `upt_scene_poll`.
  */
 upt_status upt_scene_wait(struct upt_scene *scene,
@@ -939,7 +954,7 @@ upt_status upt_scene_wait(struct upt_scene *scene,
  *
  * alpha: 0 the state before, 1 the last state; from 0 to 1. out: `[n,3]`, mm, in the region's order.
  * out_count: floats in out, 3 n.
- * Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`,
+ * Threads: any at any time, also while a step runs. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT`,
  * `UPT_ERR_NON_FINITE`, `UPT_ERR_PANIC`.
  */
 upt_status upt_scene_sample(struct upt_scene *scene,
@@ -950,9 +965,9 @@ upt_status upt_scene_sample(struct upt_scene *scene,
 /**
  * Restricts what a step decodes and what `upt_scene_step`, `_read` and `_sample` write to these nodes, in this order.
  *
- * nodes: `[n]` indices, in any order; NULL with count 0: all nodes. A step costs less with fewer nodes.
+ * nodes: `[n]` indices, n at most K, in any order; NULL with count 0: all nodes. A step costs less with fewer nodes.
  * Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT` for an index of K
- * or more, `UPT_ERR_PANIC`.
+ * or more or too many of them, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
  */
 upt_status upt_scene_set_region(struct upt_scene *scene,
                                 const uint32_t *nodes,
@@ -961,9 +976,9 @@ upt_status upt_scene_set_region(struct upt_scene *scene,
 /**
  * Decodes any nodes of the last state, whatever the region is.
  *
- * nodes: `[n]` indices. out: `[n,3]`, mm. out_count: floats in out, 3 n.
+ * nodes: `[n]` indices, n at most K. out: `[n,3]`, mm. out_count: floats in out, 3 n.
  * Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`,
- * `UPT_ERR_STATE` before the first step, `UPT_ERR_PANIC`.
+ * `UPT_ERR_STATE` before the first step, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
  */
 upt_status upt_scene_decode(struct upt_scene *scene,
                             const uint32_t *nodes,
@@ -977,7 +992,7 @@ upt_status upt_scene_decode(struct upt_scene *scene,
  * points: `[n,3]`, rest positions, mm; NULL with count 0 detaches. count: points, n. A bundle of kind `upt` decodes each where it
  * is, in every step (unless the scene was made with `interpolate_points`); one of kind `reduced` interpolates between nodes.
  * Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_NON_FINITE`,
- * `UPT_ERR_ARGUMENT`, `UPT_ERR_UNSUPPORTED`, `UPT_ERR_PANIC`.
+ * `UPT_ERR_ARGUMENT`, `UPT_ERR_UNSUPPORTED`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
  */
 upt_status upt_scene_attach_points(struct upt_scene *scene,
                                    const float *points,
@@ -987,8 +1002,8 @@ upt_status upt_scene_attach_points(struct upt_scene *scene,
  * Copies the displacement of the attached points in the last state.
  *
  * out: `[n,3]`, mm. out_count: floats in out, 3 n.
- * Threads: one at a time. Errors: `UPT_ERR_STATE` when no points are attached, `UPT_ERR_NULL`, `UPT_ERR_HANDLE`,
- * `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`, `UPT_ERR_PANIC`.
+ * Threads: any at any time, also while a step runs. Errors: `UPT_ERR_STATE` when no points are attached, `UPT_ERR_NULL`,
+ * `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_PANIC`.
  */
 upt_status upt_scene_read_points(struct upt_scene *scene,
                                  float *out,
@@ -998,7 +1013,7 @@ upt_status upt_scene_read_points(struct upt_scene *scene,
  * As `upt_scene_sample`, at the attached points.
  *
  * alpha: 0 the state before, 1 the last state. out: `[n,3]`, mm. out_count: floats in out, 3 n.
- * Threads: one at a time. Errors: as `upt_scene_read_points`, and `UPT_ERR_NON_FINITE`.
+ * Threads: any at any time, also while a step runs. Errors: as `upt_scene_read_points`, and `UPT_ERR_NON_FINITE`.
  */
 upt_status upt_scene_sample_points(struct upt_scene *scene,
                                    double alpha,
@@ -1014,7 +1029,7 @@ upt_status upt_scene_sample_points(struct upt_scene *scene,
  * `[capacity,3]`, mm; both may be NULL with capacity 0, which only asks. contact_count: contacts found, always written.
  * Threads: one at a time. Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "contact", `UPT_ERR_NULL`,
  * `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_NON_FINITE`, `UPT_ERR_ARGUMENT` (also when capacity
- * is too small), `UPT_ERR_PANIC`.
+ * is too small), `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
  */
 upt_status upt_scene_contacts_from_instruments(struct upt_scene *scene,
                                                const struct upt_instrument *instruments,
@@ -1032,7 +1047,7 @@ upt_status upt_scene_contacts_from_instruments(struct upt_scene *scene,
  * zero. With others the elastic force of the elements around each node at the last state. Both leave out inertia and damping.
  * out: `[m,3]`, mN, the force on the instrument. out_count: floats in out, 3 m.
  * Threads: one at a time. Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "forces", `UPT_ERR_NULL`,
- * `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`, `UPT_ERR_PANIC`.
+ * `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
  */
 upt_status upt_scene_contact_force(struct upt_scene *scene,
                                    float *out,
@@ -1053,7 +1068,7 @@ upt_status upt_scene_get_stats(const struct upt_scene *scene,
  * out: bytes; NULL with capacity 0 only asks. capacity: bytes that fit in out.
  * needed: bytes of the snapshot, always written; may be NULL.
  * Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT` when capacity is
- * too small, `UPT_ERR_PANIC`.
+ * too small, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
  */
 upt_status upt_scene_save(struct upt_scene *scene,
                           uint8_t *out,
@@ -1064,7 +1079,7 @@ upt_status upt_scene_save(struct upt_scene *scene,
  * Restores a snapshot of the same model.
  *
  * Threads: one at a time. Errors: `UPT_ERR_SNAPSHOT`, `UPT_ERR_VERSION`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NULL`,
- * `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_PANIC`; the state stays.
+ * `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`; the state stays.
  */
 upt_status upt_scene_restore(struct upt_scene *scene,
                              const uint8_t *bytes,

@@ -1,6 +1,8 @@
 //! The envelope: whether a step's contact is inside what the model was trained on, as flags and a number.
 
 use crate::bundle::{Envelope, Mesh};
+use crate::error::Result;
+use crate::memory;
 use crate::scene::ContactSet;
 use crate::stats::flag;
 
@@ -34,40 +36,48 @@ pub struct EnvelopeCheck {
 
 impl EnvelopeCheck {
     /// Surface adjacency of a mesh.
-    pub fn new(mesh: &Mesh) -> EnvelopeCheck {
-        let mut edges: Vec<(u32, u32)> = mesh
-            .surface_faces
-            .chunks_exact(3)
-            .flat_map(|f| {
-                [(f[0], f[1]), (f[1], f[2]), (f[2], f[0])]
-                    .into_iter()
-                    .flat_map(|(a, b)| [(a, b), (b, a)])
-            })
-            .collect();
+    pub fn new(mesh: &Mesh) -> Result<EnvelopeCheck> {
+        const WHAT: &str = "the surface's edges";
+        let mut edges: Vec<(u32, u32)> = memory::room(2 * mesh.surface_faces.len(), WHAT)?;
+        for f in mesh.surface_faces.chunks_exact(3) {
+            for (a, b) in [(f[0], f[1]), (f[1], f[2]), (f[2], f[0])] {
+                edges.extend([(a, b), (b, a)]);
+            }
+        }
         edges.sort_unstable();
         edges.dedup();
         let count = mesh.node_count();
-        let mut offsets = vec![0u32; count + 1];
+        let mut offsets = memory::filled(count + 1, 0u32, WHAT)?;
         for &(a, _) in &edges {
             offsets[a as usize + 1] += 1;
         }
         for i in 0..count {
             offsets[i + 1] += offsets[i];
         }
-        let mut in_domain = vec![false; count];
+        let mut in_domain = memory::filled(count, false, WHAT)?;
         for &node in &mesh.domain_nodes {
             in_domain[node as usize] = true;
         }
-        EnvelopeCheck {
+        Ok(EnvelopeCheck {
             offsets,
-            neighbours: edges.into_iter().map(|(_, b)| b).collect(),
+            neighbours: memory::collected(edges.len(), edges.iter().map(|edge| edge.1), WHAT)?,
             in_domain,
-            patch: vec![NO_PATCH; count],
-            stack: Vec::with_capacity(count),
-            nodes: Vec::with_capacity(count),
+            patch: memory::filled(count, NO_PATCH, WHAT)?,
+            stack: memory::room(count, WHAT)?,
+            nodes: memory::room(count, WHAT)?,
             patch_flags: 0,
             patch_ratio: 0.0,
-        }
+        })
+    }
+
+    /// Bytes held.
+    pub fn memory_bytes(&self) -> usize {
+        let lists = self.offsets.len()
+            + self.neighbours.len()
+            + self.patch.len()
+            + self.stack.capacity()
+            + self.nodes.capacity();
+        4 * lists + self.in_domain.len()
     }
 
     /// Compares a step's contact, and the one of the step before, with the envelope.

@@ -24,6 +24,9 @@ pub enum Error {
     /// This build or this bundle kind cannot do it.
     #[error("{0}")]
     Unsupported(String),
+    /// There is no memory for what a call needs.
+    #[error("{0}")]
+    OutOfMemory(String),
     /// ONNX Runtime is missing, too old or broken; the message lists what was tried.
     #[error("ONNX Runtime: {0}")]
     Runtime(String),
@@ -72,6 +75,7 @@ impl Error {
             Error::NonFinite(_) => -6,
             Error::State(_) => -7,
             Error::Unsupported(_) => -8,
+            Error::OutOfMemory(_) => -9,
             Error::Runtime(_) => -20,
             Error::Provider(_) => -21,
             Error::Io { .. } => -30,
@@ -80,6 +84,18 @@ impl Error {
             Error::Snapshot(_) => -33,
             Error::Guard(_) => -40,
             Error::Panic(_) => -90,
+        }
+    }
+
+    /// Says of a step's error how many later ones failed as well.
+    pub(crate) fn and_more(self, later: u64) -> Self {
+        let add = |text: String| format!("{text} ({later} later steps failed as well)");
+        match self {
+            Error::Guard(text) => Error::Guard(add(text)),
+            Error::Runtime(text) => Error::Runtime(add(text)),
+            Error::OutOfMemory(text) => Error::OutOfMemory(add(text)),
+            Error::Panic(text) => Error::Panic(add(text)),
+            other => other,
         }
     }
 

@@ -1,5 +1,7 @@
 //! A uniform cell grid over points in mm: radius queries and nearest point, for load-time searches.
 
+use crate::memory;
+
 /// Points sorted into cubic cells.
 #[derive(Debug)]
 pub struct PointGrid {
@@ -20,6 +22,15 @@ pub fn squared_distance(a: [f32; 3], b: [f32; 3]) -> f64 {
 impl PointGrid {
     /// A grid of about two points a cell over `points [n,3]`, n > 0.
     pub fn new(points: Vec<f32>) -> PointGrid {
+        Self::try_new(points).expect("memory for a grid of points")
+    }
+
+    /// As [`PointGrid::new`].
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
+    pub fn try_new(points: Vec<f32>) -> crate::Result<PointGrid> {
+        const WHAT: &str = "a grid of points";
         let mut low = [f32::INFINITY; 3];
         let mut high = [f32::NEG_INFINITY; 3];
         for point in points.chunks_exact(3) {
@@ -39,26 +50,26 @@ impl PointGrid {
             origin: low,
             cell,
             dims,
-            offsets: vec![0; dims[0] * dims[1] * dims[2] + 1],
-            items: vec![0; count],
+            offsets: memory::filled(dims[0] * dims[1] * dims[2] + 1, 0, WHAT)?,
+            items: memory::filled(count, 0, WHAT)?,
         };
-        let cells: Vec<usize> = grid
+        let cells = grid
             .points
             .chunks_exact(3)
-            .map(|p| grid.index(grid.cell_of([p[0], p[1], p[2]])))
-            .collect();
+            .map(|p| grid.index(grid.cell_of([p[0], p[1], p[2]])));
+        let cells = memory::collected(count, cells, WHAT)?;
         for &cell in &cells {
             grid.offsets[cell + 1] += 1;
         }
         for i in 1..grid.offsets.len() {
             grid.offsets[i] += grid.offsets[i - 1];
         }
-        let mut next = grid.offsets.clone();
+        let mut next = memory::copied(&grid.offsets, WHAT)?;
         for (item, &cell) in cells.iter().enumerate() {
             grid.items[next[cell] as usize] = item as u32;
             next[cell] += 1;
         }
-        grid
+        Ok(grid)
     }
 
     fn cell_of(&self, p: [f32; 3]) -> [usize; 3] {

@@ -18,6 +18,7 @@ pub mod guard;
 pub mod instrument;
 pub mod kernels;
 pub mod library;
+mod memory;
 pub mod model;
 pub mod onnx;
 pub mod options;

@@ -26,6 +26,28 @@ pub mod flag {
     pub const CLAMPED: u32 = 512;
     /// The contact block was near singular and was regularised.
     pub const REGULARISED: u32 = 1024;
+
+    /// What the flags say, as text.
+    pub fn names(flags: u32) -> String {
+        let meanings = [
+            (PUSH, "a push is longer than trained"),
+            (
+                CONTACT_AREA,
+                "a contact area is outside of the trained range",
+            ),
+            (SITE, "a contact lies outside of the domain"),
+            (RATE, "a push changes faster than trained"),
+            (SITES, "more contact sites than trained"),
+            (BOUND, "guard: a displacement passes the bound"),
+            (NON_FINITE, "guard: the state is not finite"),
+            (INVERTED, "guard: an element is inverted"),
+            (GROWTH, "guard: the displacement grew without cause"),
+            (CLAMPED, "the learned correction was bounded"),
+            (REGULARISED, "the contact block was nearly singular"),
+        ];
+        let said = meanings.iter().filter(|(flag, _)| flags & flag != 0);
+        said.map(|(_, text)| *text).collect::<Vec<_>>().join("; ")
+    }
 }
 
 /// Statistics of a scene's last step.
@@ -73,7 +95,7 @@ pub struct SceneStats {
     pub download_ms: f64,
     /// Largest displacement of the last state, mm.
     pub max_displacement_mm: f32,
-    /// Trust indicator, 0 is good, above 1 is outside of what was trained on.
+    /// Largest ratio of push, rate, contact area and number of sites to what the model was trained on; above 1 is outside.
     pub indicator: f32,
     /// [`crate::Scene::contact_force`] gives the contact forces of the linear response, not the elements' elastic forces.
     pub prior_forces: bool,

@@ -99,7 +99,7 @@ fn anchors_do_not_change_what_a_point_is_decoded_to() {
         serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
     let upt = manifest["upt"].as_object_mut().unwrap();
     assert!(upt.remove("anchors").is_some());
-    std::fs::write(&path, manifest.to_string()).unwrap();
+    fixture::write_manifest(folder.path(), &mut manifest);
     let plain_model = Model::open(folder.path(), &ModelOptions::default()).unwrap();
 
     let contact = push(&anchored, 2);

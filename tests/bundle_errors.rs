@@ -2,10 +2,10 @@
 
 mod fixture;
 
+use std::io::{Seek, SeekFrom, Write};
 use std::path::Path;
 
 use fixture::{BUNDLES, copy_of, find_runtime};
-use sha2::{Digest, Sha256};
 use upt::{Error, Model, ModelOptions};
 
 fn open(path: &Path) -> Result<(), Error> {
@@ -16,11 +16,9 @@ fn open(path: &Path) -> Result<(), Error> {
 fn with_manifest(name: &str, change: impl Fn(&mut serde_json::Value)) -> Error {
     find_runtime();
     let folder = copy_of(name);
-    let path = folder.path().join("bundle.json");
-    let mut manifest: serde_json::Value =
-        serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
+    let mut manifest = fixture::manifest(folder.path());
     change(&mut manifest);
-    std::fs::write(&path, manifest.to_string()).unwrap();
+    fixture::write_manifest(folder.path(), &mut manifest);
     open(folder.path()).unwrap_err()
 }
 
@@ -31,15 +29,7 @@ fn with_file(name: &str, file: &str, change: impl Fn(&mut Vec<u8>)) -> Result<()
     let mut bytes = std::fs::read(folder.path().join(file)).unwrap();
     change(&mut bytes);
     std::fs::write(folder.path().join(file), &bytes).unwrap();
-    let path = folder.path().join("bundle.json");
-    let mut manifest: serde_json::Value =
-        serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
-    let digest: String = Sha256::digest(&bytes)
-        .iter()
-        .map(|b| format!("{b:02x}"))
-        .collect();
-    manifest["files"][file] = serde_json::json!({"bytes": bytes.len(), "sha256": digest});
-    std::fs::write(&path, manifest.to_string()).unwrap();
+    fixture::renew_hash(folder.path(), file, &bytes);
     open(folder.path())
 }
 
@@ -54,6 +44,61 @@ fn manifest_errors_name_the_field() {
     for (bundle, pointer, value, field) in [
         ("tiny-upt", "/format", "zip".into(), "format"),
         ("tiny-upt", "/dt_s", serde_json::json!(-1), "dt_s"),
+        ("tiny-upt", "/dt_s", serde_json::json!(1e18), "dt_s"),
+        (
+            "tiny-upt",
+            "/material/young_pa",
+            serde_json::json!(1e308),
+            "material.young_pa",
+        ),
+        (
+            "tiny-upt",
+            "/material/density_kg_m3",
+            serde_json::json!(0),
+            "material.density_kg_m3",
+        ),
+        (
+            "tiny-upt",
+            "/material/damping_per_s",
+            serde_json::json!(-1),
+            "material.damping_per_s",
+        ),
+        (
+            "tiny-upt",
+            "/precisions",
+            serde_json::json!([]),
+            "precisions",
+        ),
+        (
+            "tiny-upt",
+            "/precisions",
+            serde_json::json!(["f32", "f8"]),
+            "precisions",
+        ),
+        (
+            "tiny-upt",
+            "/rest_displacement_mm",
+            serde_json::json!(-0.1),
+            "rest_displacement_mm",
+        ),
+        (
+            "tiny-upt",
+            "/envelope/max_push_mm",
+            serde_json::json!(1e30),
+            "envelope.max_push_mm",
+        ),
+        (
+            "tiny-upt",
+            "/upt/coordinates/scale",
+            serde_json::json!(0),
+            "upt.coordinates.scale",
+        ),
+        (
+            "tiny-upt",
+            "/requires",
+            serde_json::json!("anchors"),
+            "requires",
+        ),
         ("tiny-upt", "/length_unit", "m".into(), "length_unit"),
         ("tiny-upt", "/kind", "other".into(), "kind"),
         ("tiny-upt", "/boundary", "free".into(), "boundary"),
@@ -247,4 +292,96 @@ fn graphs_and_tensors_that_do_not_fit_are_refused() {
         text.contains("anchors.safetensors") && text.contains("node 0"),
         "{text}"
     );
+}
+
+#[test]
+fn what_a_bundle_needs_of_a_newer_library_is_refused() {
+    type Change = fn(&mut serde_json::Value);
+    let changes: [(&str, Change); 4] = [
+        ("gravity", |m| m["gravity"] = serde_json::json!(9.81)),
+        ("upt.graph.shape", |m| {
+            m["upt"]["graph"]["shape"] = "ball".into()
+        }),
+        ("files.mesh.safetensors.codec", |m| {
+            m["files"]["mesh.safetensors"]["codec"] = "zstd".into()
+        }),
+        ("requires: plasticity", |m| {
+            m["requires"] = serde_json::json!(["plasticity"])
+        }),
+    ];
+    for (name, change) in changes {
+        let error = with_manifest("tiny-upt", change);
+        assert_eq!(error.status(), -32, "{error}");
+        let text = error.to_string();
+        assert!(
+            text.contains("needs a newer libupt") && text.contains(name),
+            "{text}"
+        );
+    }
+}
+
+/// Bit by bit, every byte of a manifest: none is taken for the one that was exported.
+#[test]
+fn every_flip_of_a_manifest_is_refused() {
+    find_runtime();
+    for bundle in BUNDLES {
+        let folder = copy_of(bundle);
+        let path = folder.path().join("bundle.json");
+        let good = std::fs::read(&path).unwrap();
+        let mut file = std::fs::OpenOptions::new().write(true).open(&path).unwrap();
+        // In place: a file that is written anew each time is flushed to the disk each time.
+        let mut put = |at: usize, byte: u8| {
+            file.seek(SeekFrom::Start(at as u64)).unwrap();
+            file.write_all(&[byte]).unwrap();
+        };
+        for at in 0..good.len() {
+            put(at, good[at] ^ 1 << (at % 8));
+            let error = open(folder.path()).unwrap_err();
+            assert!(
+                matches!(error.status(), -32..=-30),
+                "{bundle}: byte {at}: {error}"
+            );
+            put(at, good[at]);
+        }
+        open(folder.path()).unwrap();
+    }
+}
+
+/// Bundles that were made before there was a digest are taken.
+#[test]
+fn a_manifest_without_a_digest_is_taken() {
+    find_runtime();
+    let folder = copy_of("tiny-upt");
+    let mut manifest = fixture::manifest(folder.path());
+    let fields = manifest.as_object_mut().unwrap();
+    assert!(fields.remove("manifest_sha256").is_some());
+    std::fs::write(folder.path().join("bundle.json"), manifest.to_string()).unwrap();
+    open(folder.path()).unwrap();
+}
+
+#[cfg(unix)]
+#[test]
+fn only_regular_files_are_opened() {
+    find_runtime();
+    for file in ["bundle.json", "mesh.safetensors"] {
+        let folder = copy_of("tiny-upt");
+        let path = folder.path().join(file);
+        std::fs::remove_file(&path).unwrap();
+        let made = std::process::Command::new("mkfifo").arg(&path).status();
+        assert!(made.unwrap().success());
+        let error = open(folder.path()).unwrap_err();
+        assert_eq!(error.status(), -30, "{error}");
+        assert!(error.to_string().contains("not a regular file"), "{error}");
+    }
+    let model = fixture::model("tiny-upt");
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("pipe.mesh.safetensors");
+    let made = std::process::Command::new("mkfifo").arg(&path).status();
+    assert!(made.unwrap().success());
+    let options = upt::SceneOptions {
+        mesh_path: Some(path),
+        ..upt::SceneOptions::default()
+    };
+    let error = upt::Scene::new(model, &options).err().unwrap();
+    assert_eq!(error.status(), -30, "{error}");
 }

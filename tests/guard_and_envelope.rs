@@ -22,14 +22,9 @@ fn tight(name: &str) -> (tempfile::TempDir, std::sync::Arc<Model>) {
 fn bounded(name: &str, bound_mm: f32) -> (tempfile::TempDir, std::sync::Arc<Model>) {
     find_runtime();
     let folder = copy_of(name);
-    let path = folder.path().join("bundle.json");
-    let text = std::fs::read_to_string(&path).unwrap();
-    let changed = text.replace(
-        "\"displacement_bound_mm\": 30.0",
-        &format!("\"displacement_bound_mm\": {bound_mm}"),
-    );
-    assert_ne!(text, changed);
-    std::fs::write(&path, changed).unwrap();
+    let mut manifest = fixture::manifest(folder.path());
+    manifest["envelope"]["displacement_bound_mm"] = bound_mm.into();
+    fixture::write_manifest(folder.path(), &mut manifest);
     let model = Model::open(folder.path(), &ModelOptions::default()).unwrap();
     (folder, model)
 }

@@ -36,7 +36,7 @@ fn with_int8(folder: &Path, change: impl Fn(&str, Vec<u8>) -> Vec<u8>) {
         std::fs::write(folder.join(&file), &bytes).unwrap();
         manifest["files"][file] = serde_json::json!({"bytes": bytes.len(), "sha256": digest});
     }
-    std::fs::write(&path, manifest.to_string()).unwrap();
+    fixture::write_manifest(folder, &mut manifest);
 }
 
 #[test]

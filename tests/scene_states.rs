@@ -176,11 +176,91 @@ fn the_worker_gives_what_the_host_would_get() {
             background.read(&mut seen).unwrap();
             assert_eq!(bits(&seen), bits(&want), "{name} step {t}");
         }
-        // The error of a submitted step is told once.
-        background.submit(&[u32::MAX], &[0.0; 3]).unwrap();
-        assert!(matches!(background.wait(FOREVER), Err(Error::Argument(_))));
+        // What is wrong with an input is told by the submit, and the state stays.
+        let mut before = vec![0.0; 3 * background.node_count()];
+        background.read(&mut before).unwrap();
+        let count = background.node_count();
+        for (nodes, vectors) in [
+            (vec![u32::MAX], vec![0.0; 3]),
+            (vec![count as u32], vec![0.0; 3]),
+            (vec![5, 5], vec![0.0; 6]),
+            (vec![5], vec![f32::NAN, 0.0, 0.0]),
+            (vec![5], vec![1e7, 0.0, 0.0]),
+            (vec![5], vec![0.0; 2]),
+            ((0..=count as u32).collect(), vec![0.0; 3 * count + 3]),
+        ] {
+            let error = background.submit(&nodes, &vectors).unwrap_err();
+            assert!(matches!(error.status(), -2 | -6), "{error}");
+        }
         assert_eq!(background.poll().unwrap(), Progress::Done);
+        let mut after = before.clone();
+        background.read(&mut after).unwrap();
+        assert_eq!(bits(&after), bits(&before));
     }
+}
+
+/// A push that the guard refuses under its default policy.
+fn refused(model: &upt::Model) -> (Vec<u32>, Vec<f32>) {
+    let (nodes, _) = push(model, 0);
+    let vectors = nodes.iter().flat_map(|_| [0.0, 0.0, -900.0]).collect();
+    (nodes, vectors)
+}
+
+/// The error of a submitted step is told once, however many submits lie between.
+#[test]
+fn an_error_that_was_not_told_is_never_lost() {
+    let model = model("tiny-upt");
+    for latest_wins in [false, true] {
+        let options = SceneOptions {
+            latest_wins,
+            no_sleep: true,
+            ..SceneOptions::default()
+        };
+        let scene = scene(&model, &options);
+        let settle = || {
+            let made = scene.stats().step_count;
+            while scene.reset().is_err() {
+                std::thread::yield_now();
+            }
+            made
+        };
+        let (bad, good) = (refused(&model), push(&model, 1));
+        scene.submit(&bad.0, &bad.1).unwrap();
+        settle();
+        for _ in 0..3 {
+            scene.submit(&good.0, &good.1).unwrap();
+            settle();
+        }
+        scene.submit(&bad.0, &bad.1).unwrap();
+        settle();
+        scene.submit(&good.0, &good.1).unwrap();
+        let error = scene.wait(FOREVER).unwrap_err();
+        assert!(matches!(error, Error::Guard(_)), "{error}");
+        assert!(error.to_string().contains("1 later"), "{error}");
+        assert_eq!(scene.wait(FOREVER).unwrap(), Progress::Done);
+        assert_eq!(scene.poll().unwrap(), Progress::Done);
+    }
+}
+
+/// A host that submits in every frame is told of new states all the same.
+#[test]
+fn steady_submits_under_latest_wins_are_told_of_finished_steps() {
+    const STEPS: u64 = 60;
+    let model = model("tiny-upt");
+    let options = SceneOptions {
+        latest_wins: true,
+        ..plain()
+    };
+    let scene = scene(&model, &options);
+    let (nodes, vectors) = push(&model, 3);
+    let mut told = 0;
+    while scene.stats().step_count < STEPS {
+        scene.submit(&nodes, &vectors).unwrap();
+        told += u64::from(scene.poll().unwrap() == Progress::Done);
+    }
+    // Between two polls at most the step that ran, the one that waited and the new one can finish.
+    assert!(told >= STEPS / 3 - 2, "told {told} times of {STEPS} steps");
+    assert!(told <= scene.stats().step_count + 1);
 }
 
 #[test]

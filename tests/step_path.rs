@@ -185,7 +185,7 @@ fn a_missing_or_wrong_step_graph_is_named() {
         .as_object_mut()
         .unwrap()
         .remove("step.onnx");
-    std::fs::write(&path, manifest.to_string()).unwrap();
+    fixture::write_manifest(folder.path(), &mut manifest);
     let error = create(folder.path(), StepPath::Whole).err().unwrap();
     assert!(matches!(error, Error::Unsupported(_)), "{error}");
     assert!(error.to_string().contains("export --step"), "{error}");
@@ -199,7 +199,7 @@ fn a_missing_or_wrong_step_graph_is_named() {
     let digest: String = digest.iter().map(|b| format!("{b:02x}")).collect();
     manifest = full;
     manifest["files"]["step.onnx"] = serde_json::json!({"bytes": bytes.len(), "sha256": digest});
-    std::fs::write(&path, manifest.to_string()).unwrap();
+    fixture::write_manifest(folder.path(), &mut manifest);
     let error = create(folder.path(), StepPath::Whole).err().unwrap();
     assert!(matches!(error, Error::Bundle { .. }), "{error}");
     let text = error.to_string();

@@ -39,6 +39,8 @@ class Status(IntEnum):
     """The call does not fit the state (for instance: wait without submit)."""
     UNSUPPORTED = -8
     """This build or this bundle cannot do it."""
+    OUT_OF_MEMORY = -9
+    """There is no memory for what the call needs."""
     RUNTIME = -20
     """ONNX Runtime is missing, too old or broken; the message lists what was tried."""
     PROVIDER = -21
@@ -87,7 +89,7 @@ class LogLevel(IntEnum):
     ERROR = 1
     """Failures."""
     WARN = 2
-    """Fallbacks and envelope violations."""
+    """Fallbacks, and once for each flag that rises: contacts outside of the envelope, states that the guard refuses."""
     INFO = 3
     """Loading: what was opened and who runs it."""
     DEBUG = 4
@@ -100,13 +102,15 @@ class Precision(IntEnum):
     """`UPT_PRECISION_*`."""
 
     F32 = 0
-    """32-bit floats: the reference."""
+    """32-bit floats: the reference. Of a scene's options: what its model has."""
     BF16 = 1
     """bfloat16 products where the CPU has them."""
     F16 = 2
     """16-bit floats: the bundle's `*.f16.onnx`, or a GPU provider's own."""
     INT8 = 3
     """8-bit integers: the bundle's `*.int8.onnx`."""
+    FORCE_F32 = 4
+    """Of options only: 32-bit floats also in a scene of a model that was opened with another precision."""
 
 
 class Kernel(IntEnum):
@@ -240,11 +244,11 @@ class ModelOptions(Record):
     provider_count: int
     """Entries in `providers`."""
     device_id: int
-    """Device of GPU providers."""
+    """Device of GPU providers, from 0."""
     precision: Precision = choice("_precision", Precision)
     """`UPT_PRECISION_*`."""
     gpu_memory_limit: int
-    """Bytes; 0: no limit."""
+    """Bytes; 0: no limit. Needs a GPU provider in `providers`."""
     cache_dir: str | None = text("_cache_dir")
     """Folder for compiled engines; NULL: none is kept."""
     allow_tf32: bool = boolean("_allow_tf32")
@@ -283,11 +287,11 @@ class ModelOptionsKeywords(TypedDict, total=False):
     providers: Sequence[Provider | str | int]
     """`UPT_PROVIDER_*` in order of preference; NULL: CPU."""
     device_id: int
-    """Device of GPU providers."""
+    """Device of GPU providers, from 0."""
     precision: Precision | str | int
     """`UPT_PRECISION_*`."""
     gpu_memory_limit: int
-    """Bytes; 0: no limit."""
+    """Bytes; 0: no limit. Needs a GPU provider in `providers`."""
     cache_dir: str | os.PathLike[str] | None
     """Folder for compiled engines; NULL: none is kept."""
     allow_tf32: bool
@@ -360,7 +364,7 @@ class SceneOptions(Record):
     kernel: Kernel = choice("_kernel", Kernel)
     """`UPT_KERNEL_*`: who decodes."""
     precision: Precision = choice("_precision", Precision)
-    """`UPT_PRECISION_*` of the native decoder."""
+    """`UPT_PRECISION_*` of the native decoder; 0: the model's, `UPT_PRECISION_FORCE_F32`: float32 whatever the model has."""
     guard_policy: GuardPolicy = choice("_guard_policy", GuardPolicy)
     """`UPT_GUARD_*`."""
     mesh_path: str | None = text("_mesh_path")
@@ -408,7 +412,7 @@ class SceneOptionsKeywords(TypedDict, total=False):
     kernel: Kernel | str | int
     """`UPT_KERNEL_*`: who decodes."""
     precision: Precision | str | int
-    """`UPT_PRECISION_*` of the native decoder."""
+    """`UPT_PRECISION_*` of the native decoder; 0: the model's, `UPT_PRECISION_FORCE_F32`: float32 whatever the model has."""
     guard_policy: GuardPolicy | str | int
     """`UPT_GUARD_*`."""
     mesh_path: str | os.PathLike[str] | None
@@ -503,7 +507,7 @@ class SceneStats(Record):
     max_displacement_mm: float
     """Largest displacement among the decoded nodes, mm."""
     indicator: float
-    """Calibrated trust indicator; 0: good."""
+    """Largest ratio of push, rate of push, contact area and number of sites to what the model was trained on; above 1: outside."""
     sleeping: bool = boolean("_sleeping")
     """1: the scene sleeps."""
     poisoned: bool = boolean("_poisoned")

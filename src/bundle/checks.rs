@@ -17,17 +17,44 @@ pub(super) fn check(ok: bool, field: &str, message: &str) -> Result<()> {
 impl Manifest {
     pub(super) fn check(&self) -> Result<()> {
         check(
-            self.dt_s.is_finite() && self.dt_s > 0.0,
+            self.dt_s > 0.0 && self.dt_s <= 10.0,
             "dt_s",
-            "must be positive",
+            "must be positive and at most 10 s",
         )?;
         check(self.length_unit == "mm", "length_unit", "must be `mm`")?;
         check(self.force_unit == "mN", "force_unit", "must be `mN`")?;
         check(
-            self.material.young_pa > 0.0 && self.material.young_pa.is_finite(),
+            self.material.young_pa > 0.0 && self.material.young_pa <= 1e12,
             "material.young_pa",
-            "must be positive",
+            "must be positive and at most 1e12 Pa",
         )?;
+        check(
+            self.material.density_kg_m3 > 0.0 && self.material.density_kg_m3 <= 1e5,
+            "material.density_kg_m3",
+            "must be positive and at most 1e5 kg/m^3",
+        )?;
+        check(
+            (0.0..=1e6).contains(&self.material.damping_per_s),
+            "material.damping_per_s",
+            "must be in [0, 1e6] 1/s",
+        )?;
+        check(
+            (0.0..=1.0).contains(&self.rest_displacement_mm),
+            "rest_displacement_mm",
+            "must be in [0, 1] mm",
+        )?;
+        check(
+            self.precisions.iter().any(|one| one == "f32"),
+            "precisions",
+            "must list `f32`, which every bundle has",
+        )?;
+        for one in &self.precisions {
+            check(
+                ["f32", "f16", "int8"].contains(&one.as_str()),
+                "precisions",
+                "may list `f32`, `f16`, `int8`",
+            )?;
+        }
         check(
             self.material.poisson > -1.0 && self.material.poisson < 0.5,
             "material.poisson",
@@ -114,16 +141,17 @@ fn check_name(name: &str, field: &str) -> Result<()> {
 
 impl Envelope {
     fn check(&self) -> Result<()> {
-        let positive = |x: f32| x.is_finite() && x > 0.0;
+        // No tissue is longer than the largest input.
+        let positive = |x: f32| x > 0.0 && x <= crate::scene::INPUT_LIMIT;
         check(
             positive(self.max_push_mm),
             "envelope.max_push_mm",
-            "must be positive",
+            "must be positive and at most 1e6 mm",
         )?;
         check(
             positive(self.max_push_rate_mm),
             "envelope.max_push_rate_mm",
-            "must be positive",
+            "must be positive and at most 1e6 mm",
         )?;
         let [low, high] = self.contact_area_mm2;
         check(
@@ -132,14 +160,14 @@ impl Envelope {
             "must be a range [low, high]",
         )?;
         check(
-            self.max_sites >= 1,
+            (1..=1 << 20).contains(&self.max_sites),
             "envelope.max_sites",
-            "must be at least 1",
+            "must be in 1..=1048576",
         )?;
         check(
             positive(self.displacement_bound_mm),
             "envelope.displacement_bound_mm",
-            "must be positive",
+            "must be positive and at most 1e6 mm",
         )
     }
 }
@@ -170,6 +198,17 @@ impl UptEntry {
                 "must be positive",
             )?;
         }
+        let coordinates = &self.coordinates;
+        check(
+            coordinates.offset.iter().all(|x| x.is_finite()),
+            "upt.coordinates.offset",
+            "must be finite",
+        )?;
+        check(
+            coordinates.scale.is_finite() && coordinates.scale > 0.0,
+            "upt.coordinates.scale",
+            "must be positive",
+        )?;
         let graph = &self.graph;
         check(
             graph.radius_mm.is_finite() && graph.radius_mm > 0.0,
@@ -249,6 +288,7 @@ impl ReducedEntry {
         check(
             fade.start_push_mm.is_finite()
                 && fade.start_push_mm >= 0.0
+                && fade.end_push_mm.is_finite()
                 && fade.end_push_mm > fade.start_push_mm,
             "reduced.fade",
             "must have 0 <= start_push_mm < end_push_mm",

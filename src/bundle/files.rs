@@ -1,6 +1,7 @@
 //! The files of a bundle: read once, size and SHA-256 checked against the manifest.
 
 use std::fs;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
@@ -8,7 +9,11 @@ use sha2::{Digest, Sha256};
 use super::manifest::Manifest;
 use super::tensors::TensorFile;
 use crate::error::{Error, Result};
+use crate::memory;
 use crate::options::Precision;
+
+/// Larger manifests are none.
+const LARGEST_MANIFEST: u64 = 16 << 20;
 
 /// An opened bundle folder.
 #[derive(Debug)]
@@ -24,11 +29,21 @@ impl BundleFiles {
     /// Reads `bundle.json` and checks that each listed file exists with its size.
     pub fn open(folder: &Path) -> Result<BundleFiles> {
         let path = folder.join("bundle.json");
-        let bytes = fs::read(&path).map_err(|error| Error::io(&path, error))?;
+        let length = fs::metadata(&path).map_or(0, |found| found.len());
+        if length > LARGEST_MANIFEST {
+            return Err(Error::bundle(
+                "bundle.json",
+                format!("has {length} bytes, at most {LARGEST_MANIFEST} are read"),
+            ));
+        }
+        let bytes = read_regular(&path)?;
         let manifest = Manifest::parse(&bytes)?;
         for (name, entry) in &manifest.files {
             let path = folder.join(name);
             let found = fs::metadata(&path).map_err(|error| Error::io(&path, error))?;
+            if !found.is_file() {
+                return Err(not_regular(&path));
+            }
             if found.len() != entry.bytes {
                 return Err(Error::bundle(
                     name,
@@ -61,7 +76,7 @@ impl BundleFiles {
             )
         })?;
         let path = self.folder.join(name);
-        let bytes = fs::read(&path).map_err(|error| Error::io(&path, error))?;
+        let bytes = read_regular(&path)?;
         let digest = hex(&Sha256::digest(&bytes));
         if !digest.eq_ignore_ascii_case(&entry.sha256) {
             return Err(Error::bundle(
@@ -103,6 +118,40 @@ impl BundleFiles {
     pub fn tensors(&self, name: &str) -> Result<TensorFile> {
         TensorFile::parse(name, self.read(name)?)
     }
+}
+
+fn not_regular(path: &Path) -> Error {
+    Error::io(
+        path,
+        "is not a regular file; a bundle and a mesh are made of plain files",
+    )
+}
+
+/// The bytes of a regular file. Anything else (a pipe, a device, a folder) is refused without waiting for it.
+pub(crate) fn read_regular(path: &Path) -> Result<Vec<u8>> {
+    let failed = |error: std::io::Error| Error::io(path, error);
+    let mut options = fs::OpenOptions::new();
+    options.read(true);
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::OpenOptionsExt;
+        // A pipe that nobody writes to would be waited for.
+        options.custom_flags(libc::O_NONBLOCK);
+    }
+    let mut file = options.open(path).map_err(failed)?;
+    let found = file.metadata().map_err(failed)?;
+    if !found.is_file() {
+        return Err(not_regular(path));
+    }
+    let size = usize::try_from(found.len()).unwrap_or(usize::MAX);
+    let mut bytes = memory::room(size, &format!("the file {}", path.display()))?;
+    file.read_to_end(&mut bytes).map_err(|error| {
+        match error.kind() == std::io::ErrorKind::OutOfMemory {
+            true => Error::OutOfMemory(format!("no memory for the file {}", path.display())),
+            false => failed(error),
+        }
+    })?;
+    Ok(bytes)
 }
 
 /// Lower-case hex.

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::Deserialize;
 
 use super::checks::{FILE, bad, check};
+use super::{known, seal};
 use crate::error::{Error, Result};
 
 const VERSION: u64 = 1;
@@ -288,6 +289,9 @@ pub struct Manifest {
     /// Precisions of the graphs.
     #[serde(default)]
     pub precisions: Vec<String>,
+    /// Where the network's own free motion ends beside rest: its largest `|u|` of a node, mm; 0 where it ends at rest.
+    #[serde(default)]
+    pub rest_displacement_mm: f32,
     /// Linear response.
     pub prior: Option<PriorEntry>,
     /// Kind `upt`.
@@ -336,6 +340,9 @@ impl Manifest {
                 header.version
             )));
         }
+        let fields: serde_json::Value = parse(bytes)?;
+        seal::check(bytes, &fields)?;
+        known::check(&fields)?;
         let manifest: Manifest = parse(bytes)?;
         manifest.check()?;
         Ok(manifest)

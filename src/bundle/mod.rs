@@ -2,12 +2,14 @@
 
 mod checks;
 mod files;
+mod known;
 mod manifest;
 mod mesh;
+mod seal;
 mod tensors;
 
 pub use files::BundleFiles;
-pub(crate) use files::hex;
+pub(crate) use files::{hex, read_regular};
 pub use manifest::{
     Base, Bound, Boundary, Coordinates, Dims, Envelope, Fade, Feature, FileEntry, Graph, Manifest,
     ManifestKind, Material, MeshEntry, Normalisation, PriorEntry, ReducedEntry, ReducedInput,

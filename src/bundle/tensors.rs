@@ -6,6 +6,7 @@ use half::f16;
 use safetensors::tensor::{Dtype, Metadata, SafeTensors};
 
 use crate::error::{Error, Result};
+use crate::memory;
 
 /// A parsed safetensors file.
 pub struct TensorFile {
@@ -109,10 +110,10 @@ impl TensorFile {
     /// A float32 tensor, all values finite.
     pub fn f32(&self, tensor: &str, shape: &[Option<usize>]) -> Result<Vec<f32>> {
         let raw = self.raw(tensor, Dtype::F32, shape)?;
-        let values: Vec<f32> = raw
+        let values = raw
             .chunks_exact(4)
-            .map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]))
-            .collect();
+            .map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]));
+        let values = memory::collected(raw.len() / 4, values, tensor)?;
         match values.iter().position(|value| !value.is_finite()) {
             Some(index) => Err(self.bad(tensor, format!("element {index} is not finite"))),
             None => Ok(values),
@@ -122,10 +123,10 @@ impl TensorFile {
     /// A float16 tensor, all values finite.
     pub fn f16(&self, tensor: &str, shape: &[Option<usize>]) -> Result<Vec<f16>> {
         let raw = self.raw(tensor, Dtype::F16, shape)?;
-        let values: Vec<f16> = raw
+        let values = raw
             .chunks_exact(2)
-            .map(|b| f16::from_le_bytes([b[0], b[1]]))
-            .collect();
+            .map(|b| f16::from_le_bytes([b[0], b[1]]));
+        let values = memory::collected(raw.len() / 2, values, tensor)?;
         match values.iter().position(|value| !value.is_finite()) {
             Some(index) => Err(self.bad(tensor, format!("element {index} is not finite"))),
             None => Ok(values),
@@ -135,11 +136,9 @@ impl TensorFile {
     /// A float tensor of either width, widened to float32.
     pub fn float(&self, tensor: &str, shape: &[Option<usize>]) -> Result<Vec<f32>> {
         if self.is_f16(tensor) {
-            Ok(self
-                .f16(tensor, shape)?
-                .into_iter()
-                .map(f16::to_f32)
-                .collect())
+            let narrow = self.f16(tensor, shape)?;
+            let wide = narrow.iter().map(|value| value.to_f32());
+            memory::collected(narrow.len(), wide, tensor)
         } else {
             self.f32(tensor, shape)
         }
@@ -148,20 +147,17 @@ impl TensorFile {
     /// An int32 tensor of indices in `0..limit`.
     pub fn indices(&self, tensor: &str, shape: &[Option<usize>], limit: usize) -> Result<Vec<u32>> {
         let raw = self.raw(tensor, Dtype::I32, shape)?;
-        raw.chunks_exact(4)
-            .map(|b| i32::from_le_bytes([b[0], b[1], b[2], b[3]]))
-            .enumerate()
-            .map(|(at, value)| {
-                if value >= 0 && (value as usize) < limit {
-                    Ok(value as u32)
-                } else {
-                    Err(self.bad(
-                        tensor,
-                        format!("element {at} is {value}, must be in 0..{limit}"),
-                    ))
-                }
-            })
-            .collect()
+        let values = raw
+            .chunks_exact(4)
+            .map(|b| i32::from_le_bytes([b[0], b[1], b[2], b[3]]));
+        let valid = |value: i32| value >= 0 && (value as usize) < limit;
+        if let Some((at, value)) = values.clone().enumerate().find(|(_, v)| !valid(*v)) {
+            return Err(self.bad(
+                tensor,
+                format!("element {at} is {value}, must be in 0..{limit}"),
+            ));
+        }
+        memory::collected(raw.len() / 4, values.map(|value| value as u32), tensor)
     }
 
     /// As [`Self::indices`], strictly ascending.
@@ -187,7 +183,10 @@ impl TensorFile {
                 tensor,
                 format!("element {} is smaller than the one before", at + 1),
             )),
-            None => Ok(values.into_iter().map(|value| value as usize).collect()),
+            None => {
+                let wide = values.iter().map(|&value| value as usize);
+                memory::collected(values.len(), wide, tensor)
+            }
         }
     }
 }

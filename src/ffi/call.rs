@@ -4,10 +4,12 @@ use std::any::Any;
 use std::cell::RefCell;
 use std::ffi::c_char;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicU32, Ordering};
 
 use super::log;
-use super::status::{UPT_ERR_PANIC, upt_status};
+use super::status::{UPT_ERR_PANIC, UPT_ERR_STATE, upt_status};
 use crate::error::Error;
+use crate::kernels::MaskExceptions;
 
 /// A status with its message.
 pub(super) struct Failure {
@@ -46,7 +48,9 @@ pub(super) fn call(
     on_panic: impl FnOnce(),
     body: impl FnOnce() -> Answer,
 ) -> upt_status {
+    let _mode = MaskExceptions::enter();
     let _host = log::HostCall::enter();
+    let body = || misplaced().map_or_else(body, |why| fail(UPT_ERR_STATE, why));
     let failure = match catch_unwind(AssertUnwindSafe(body)) {
         Ok(Ok(status)) => return status,
         Ok(Err(failure)) => failure,
@@ -60,6 +64,23 @@ pub(super) fn call(
     };
     remember(name, &failure.message);
     failure.status
+}
+
+/// The process of the first call; 0 before it.
+static PROCESS: AtomicU32 = AtomicU32::new(0);
+
+/// Why a call from here cannot be answered: its locks may be held by threads that wait for it, or do not exist.
+fn misplaced() -> Option<&'static str> {
+    if log::in_receiver() {
+        return Some("called from inside of the log receiver, which must not call the library");
+    }
+    let here = std::process::id();
+    match PROCESS.compare_exchange(0, here, Ordering::Relaxed, Ordering::Relaxed) {
+        Err(first) if first != here => Some(
+            "the process was forked after the library was used, and its threads stayed behind; use it in one of the two, or load it after the fork",
+        ),
+        _ => None,
+    }
 }
 
 fn panic_message(payload: &(dyn Any + Send)) -> &str {

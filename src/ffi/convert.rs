@@ -30,6 +30,7 @@ fn provider(value: i32) -> Result<Provider, Failure> {
 fn precision(value: i32) -> Result<Option<Precision>, Failure> {
     Ok(match value {
         UPT_PRECISION_F32 => None,
+        UPT_PRECISION_FORCE_F32 => Some(Precision::F32),
         UPT_PRECISION_BF16 => Some(Precision::Bf16),
         UPT_PRECISION_F16 => Some(Precision::F16),
         UPT_PRECISION_INT8 => Some(Precision::Int8),
@@ -121,6 +122,9 @@ pub(super) fn reserved(bytes: &[u8]) -> Result<(), Failure> {
 /// A step has no use for more threads, and a field that was never set must not start them.
 const MOST_THREADS: u32 = 1024;
 
+/// Longer lists are a count that was never set.
+const MOST_PROVIDERS: u64 = 64;
+
 fn threads(value: u32) -> Result<usize, Failure> {
     match value {
         0..=MOST_THREADS => Ok(value as usize),
@@ -140,6 +144,15 @@ pub(super) unsafe fn init_options(raw: &upt_init_options) -> Result<InitOptions,
 
 pub(super) unsafe fn model_options(raw: &upt_model_options) -> Result<ModelOptions, Failure> {
     reserved(&[raw.reserved])?;
+    if raw.provider_count > MOST_PROVIDERS {
+        return fail(
+            UPT_ERR_ARGUMENT,
+            format!(
+                "provider_count is {}; a list of more than {MOST_PROVIDERS} has no meaning",
+                raw.provider_count
+            ),
+        );
+    }
     let providers = unsafe { slice(raw.providers, raw.provider_count, "providers") }?;
     Ok(ModelOptions {
         threads: threads(raw.threads)?,

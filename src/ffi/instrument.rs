@@ -22,7 +22,7 @@ use crate::instrument::{Instrument, MAX_INSTRUMENTS, Shape};
 /// `[capacity,3]`, mm; both may be NULL with capacity 0, which only asks. contact_count: contacts found, always written.
 /// Threads: one at a time. Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "contact", `UPT_ERR_NULL`,
 /// `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_NON_FINITE`, `UPT_ERR_ARGUMENT` (also when capacity
-/// is too small), `UPT_ERR_PANIC`.
+/// is too small), `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_scene_contacts_from_instruments(
     scene: *mut upt_scene,
@@ -115,7 +115,7 @@ unsafe fn read_instruments(
 /// zero. With others the elastic force of the elements around each node at the last state. Both leave out inertia and damping.
 /// out: `[m,3]`, mN, the force on the instrument. out_count: floats in out, 3 m.
 /// Threads: one at a time. Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "forces", `UPT_ERR_NULL`,
-/// `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`, `UPT_ERR_PANIC`.
+/// `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_scene_contact_force(
     scene: *mut upt_scene,
@@ -123,7 +123,6 @@ pub unsafe extern "C" fn upt_scene_contact_force(
     out_count: u64,
 ) -> upt_status {
     call_scene("upt_scene_contact_force", scene, |_scene| {
-        place(out, "out")?;
         let _out = unsafe { slice_mut(out, out_count, "out") }?;
         #[cfg(feature = "forces")]
         {

@@ -72,7 +72,7 @@ pub extern "C" fn upt_status_name(status: upt_status) -> *const c_char {
 ///
 /// user: handed to the receiver. level: `UPT_LOG_*`; less severe messages are not made at all. The receiver runs on
 /// the host's threads only, inside of a call or at its end: what the library's own threads say waits for the next call.
-/// Threads: any, but not from inside the receiver. Errors: `UPT_ERR_ARGUMENT` for an unknown level, `UPT_ERR_STATE`
+/// Threads: any. Errors: `UPT_ERR_ARGUMENT` for an unknown level, `UPT_ERR_STATE` from inside of the receiver, or
 /// when the process is a Rust program that has a `tracing` subscriber of its own.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_set_log(

@@ -49,6 +49,8 @@ const WAITING_LIMIT: usize = 1024;
 thread_local! {
     /// Exported functions that this thread is inside of.
     static DEPTH: Cell<u32> = const { Cell::new(0) };
+    /// The receiver runs on this thread.
+    static IN_RECEIVER: Cell<bool> = const { Cell::new(false) };
 }
 
 /// Held while an exported function runs; the outermost hands over what waits when it ends.
@@ -73,6 +75,11 @@ impl Drop for HostCall {
             }
         }
     }
+}
+
+/// Whether this thread is inside of the receiver.
+pub(super) fn in_receiver() -> bool {
+    IN_RECEIVER.try_with(Cell::get).unwrap_or(false)
 }
 
 fn take_waiting() -> VecDeque<(i32, String)> {
@@ -114,7 +121,7 @@ pub(super) fn set(callback: upt_log_fn, user: *mut c_void, level: i32) -> Answer
 }
 
 fn emit(level: i32, text: String) {
-    if DEPTH.try_with(Cell::get).unwrap_or(0) > 0 {
+    if DEPTH.try_with(Cell::get).unwrap_or(0) > 0 && !in_receiver() {
         return hand_over(level, text);
     }
     let mut waiting = WAITING.lock().unwrap_or_else(PoisonError::into_inner);
@@ -128,7 +135,9 @@ fn emit(level: i32, text: String) {
 fn hand_over(level: i32, text: String) {
     let receiver = RECEIVER.read().unwrap_or_else(PoisonError::into_inner);
     if let (Some(callback), Ok(text)) = (receiver.callback, CString::new(text.replace('\0', " "))) {
+        let _ = IN_RECEIVER.try_with(|inside| inside.set(true));
         unsafe { callback(level, text.as_ptr(), receiver.user) };
+        let _ = IN_RECEIVER.try_with(|inside| inside.set(false));
     }
 }
 

@@ -9,11 +9,11 @@ use super::structs::*;
 use super::{convert, pointers};
 use crate::Model;
 
-/// Opens and checks a bundle (sizes, dtypes, SHA-256) and makes it ready to step.
+/// Opens and checks a bundle (sizes, dtypes, the SHA-256 of the manifest and of each file that is read) and makes it ready to step.
 ///
 /// path: the bundle's folder, UTF-8. options: NULL means the defaults. out: the new model.
 /// Threads: any. Errors: `UPT_ERR_IO`, `UPT_ERR_BUNDLE`, `UPT_ERR_VERSION`, `UPT_ERR_RUNTIME`, `UPT_ERR_PROVIDER`,
-/// `UPT_ERR_UNSUPPORTED`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NULL`.
+/// `UPT_ERR_UNSUPPORTED`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NULL`, `UPT_ERR_OUT_OF_MEMORY`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_model_open(
     path: *const c_char,

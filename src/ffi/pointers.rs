@@ -1,11 +1,13 @@
 //! Raw pointers of the host -> slices, paths, structs. Checks what can be checked: NULL, alignment, size.
 
+use std::borrow::Cow;
 use std::ffi::{CStr, c_char};
 use std::path::PathBuf;
 
 use super::call::{Answer, Failure, fail};
 use super::status::*;
 use super::structs::*;
+use crate::memory;
 
 /// A struct that starts with `struct_size`. Later versions only grow; each size ever published stays known.
 ///
@@ -203,8 +205,16 @@ pub(super) unsafe fn copy_text(
     unsafe { copy_out(&bytes, out.cast(), capacity, needed) }
 }
 
-/// Whether two arrays share memory.
-pub(super) fn overlap(a: &[f32], b: &[f32]) -> bool {
-    let (a, b) = (a.as_ptr_range(), b.as_ptr_range());
-    a.start < b.end && b.start < a.end
+/// An input that shares no memory with an output: itself, or a copy.
+pub(super) fn apart<'a, T: Copy>(input: &'a [T], out: &[f32]) -> Result<Cow<'a, [T]>, Failure> {
+    let (a, b) = (input.as_ptr_range(), out.as_ptr_range());
+    let overlap = a.start.addr() < b.end.addr() && b.start.addr() < a.end.addr();
+    Ok(if overlap {
+        Cow::Owned(memory::copied(
+            input,
+            "a copy of an input that out overlaps",
+        )?)
+    } else {
+        Cow::Borrowed(input)
+    })
 }

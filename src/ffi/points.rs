@@ -1,6 +1,6 @@
 //! `upt_scene`: points that move with the tissue, such as a render mesh's vertices.
 
-use super::pointers::{optional, place, slice_mut};
+use super::pointers::{optional, slice_mut};
 use super::registry::call_scene;
 use super::status::*;
 use super::structs::*;
@@ -10,7 +10,7 @@ use super::structs::*;
 /// points: `[n,3]`, rest positions, mm; NULL with count 0 detaches. count: points, n. A bundle of kind `upt` decodes each where it
 /// is, in every step (unless the scene was made with `interpolate_points`); one of kind `reduced` interpolates between nodes.
 /// Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_NON_FINITE`,
-/// `UPT_ERR_ARGUMENT`, `UPT_ERR_UNSUPPORTED`, `UPT_ERR_PANIC`.
+/// `UPT_ERR_ARGUMENT`, `UPT_ERR_UNSUPPORTED`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_scene_attach_points(
     scene: *mut upt_scene,
@@ -18,6 +18,7 @@ pub unsafe extern "C" fn upt_scene_attach_points(
     count: u64,
 ) -> upt_status {
     call_scene("upt_scene_attach_points", scene, |scene| {
+        crate::scene::check_point_count(count)?;
         let points = unsafe { optional(points, count.saturating_mul(3), "points") }?;
         scene.attach_points(points)?;
         Ok(UPT_OK)
@@ -27,8 +28,8 @@ pub unsafe extern "C" fn upt_scene_attach_points(
 /// Copies the displacement of the attached points in the last state.
 ///
 /// out: `[n,3]`, mm. out_count: floats in out, 3 n.
-/// Threads: one at a time. Errors: `UPT_ERR_STATE` when no points are attached, `UPT_ERR_NULL`, `UPT_ERR_HANDLE`,
-/// `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`, `UPT_ERR_PANIC`.
+/// Threads: any at any time, also while a step runs. Errors: `UPT_ERR_STATE` when no points are attached, `UPT_ERR_NULL`,
+/// `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_PANIC`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_scene_read_points(
     scene: *mut upt_scene,
@@ -36,7 +37,6 @@ pub unsafe extern "C" fn upt_scene_read_points(
     out_count: u64,
 ) -> upt_status {
     call_scene("upt_scene_read_points", scene, |scene| {
-        place(out, "out")?;
         scene.read_points(unsafe { slice_mut(out, out_count, "out") }?)?;
         Ok(UPT_OK)
     })
@@ -45,7 +45,7 @@ pub unsafe extern "C" fn upt_scene_read_points(
 /// As `upt_scene_sample`, at the attached points.
 ///
 /// alpha: 0 the state before, 1 the last state. out: `[n,3]`, mm. out_count: floats in out, 3 n.
-/// Threads: one at a time. Errors: as `upt_scene_read_points`, and `UPT_ERR_NON_FINITE`.
+/// Threads: any at any time, also while a step runs. Errors: as `upt_scene_read_points`, and `UPT_ERR_NON_FINITE`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_scene_sample_points(
     scene: *mut upt_scene,
@@ -54,7 +54,6 @@ pub unsafe extern "C" fn upt_scene_sample_points(
     out_count: u64,
 ) -> upt_status {
     call_scene("upt_scene_sample_points", scene, |scene| {
-        place(out, "out")?;
         scene.sample_points(alpha, unsafe { slice_mut(out, out_count, "out") }?)?;
         Ok(UPT_OK)
     })

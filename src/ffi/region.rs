@@ -1,15 +1,15 @@
 //! `upt_scene`: which nodes are decoded.
 
-use super::pointers::{optional, place, slice, slice_mut};
+use super::pointers::{optional, slice, slice_mut};
 use super::registry::call_scene;
 use super::status::*;
 use super::structs::*;
 
 /// Restricts what a step decodes and what `upt_scene_step`, `_read` and `_sample` write to these nodes, in this order.
 ///
-/// nodes: `[n]` indices, in any order; NULL with count 0: all nodes. A step costs less with fewer nodes.
+/// nodes: `[n]` indices, n at most K, in any order; NULL with count 0: all nodes. A step costs less with fewer nodes.
 /// Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT` for an index of K
-/// or more, `UPT_ERR_PANIC`.
+/// or more or too many of them, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_scene_set_region(
     scene: *mut upt_scene,
@@ -17,6 +17,7 @@ pub unsafe extern "C" fn upt_scene_set_region(
     count: u64,
 ) -> upt_status {
     call_scene("upt_scene_set_region", scene, |scene| {
+        scene.check_node_count("count", count)?;
         scene.set_region(unsafe { optional(nodes, count, "nodes") }?)?;
         Ok(UPT_OK)
     })
@@ -24,9 +25,9 @@ pub unsafe extern "C" fn upt_scene_set_region(
 
 /// Decodes any nodes of the last state, whatever the region is.
 ///
-/// nodes: `[n]` indices. out: `[n,3]`, mm. out_count: floats in out, 3 n.
+/// nodes: `[n]` indices, n at most K. out: `[n,3]`, mm. out_count: floats in out, 3 n.
 /// Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`,
-/// `UPT_ERR_STATE` before the first step, `UPT_ERR_PANIC`.
+/// `UPT_ERR_STATE` before the first step, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_scene_decode(
     scene: *mut upt_scene,
@@ -36,7 +37,7 @@ pub unsafe extern "C" fn upt_scene_decode(
     out_count: u64,
 ) -> upt_status {
     call_scene("upt_scene_decode", scene, |scene| {
-        place(out, "out")?;
+        scene.check_node_count("count", count)?;
         let nodes = unsafe { slice(nodes, count, "nodes") }?;
         scene.decode(nodes, unsafe { slice_mut(out, out_count, "out") }?)?;
         Ok(UPT_OK)

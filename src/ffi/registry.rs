@@ -1,6 +1,7 @@
 //! Live handles. A handle is a number that is never used twice, not an address: a closed, foreign or invented
 //! handle is found out by a look-up and is never followed.
 
+use std::cell::OnceCell;
 use std::collections::HashMap;
 use std::ptr::without_provenance_mut;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -125,17 +126,15 @@ pub(super) fn call_scene(
     scene: *const upt_scene,
     body: impl FnOnce(&Scene) -> Answer,
 ) -> upt_status {
-    let entry = find_scene(scene);
+    let found: OnceCell<Arc<SceneEntry>> = OnceCell::new();
     let poison = || {
-        if let Ok(entry) = &entry {
+        if let Some(entry) = found.get() {
             entry.poisoned.store(true, Ordering::Release);
         }
     };
     call(name, poison, || {
-        let entry = match &entry {
-            Ok(entry) => entry,
-            Err(failure) => return fail(failure.status, failure.message.clone()),
-        };
+        let entry = find_scene(scene)?;
+        let entry = found.get_or_init(|| entry);
         if entry.poisoned.load(Ordering::Acquire) {
             return fail(
                 UPT_ERR_PANIC,

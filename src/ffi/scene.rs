@@ -1,7 +1,7 @@
 //! `upt_scene`: make, end, reset, step, read.
 
 use super::call::{Failure, call};
-use super::pointers::{overlap, slice, slice_mut};
+use super::pointers::{apart, slice, slice_mut};
 use super::registry::{add_scene, call_scene, find_model, remove_scene};
 use super::status::*;
 use super::structs::*;
@@ -12,7 +12,7 @@ use crate::{Contact, Scene, StepInput};
 ///
 /// options: NULL means the defaults. out: the new scene. The scene keeps what it needs of the model.
 /// Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`,
-/// `UPT_ERR_UNSUPPORTED`, `UPT_ERR_IO`, `UPT_ERR_BUNDLE`.
+/// `UPT_ERR_UNSUPPORTED`, `UPT_ERR_IO`, `UPT_ERR_BUNDLE`, `UPT_ERR_OUT_OF_MEMORY`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_scene_create(
     model: *const upt_model,
@@ -67,7 +67,8 @@ pub unsafe extern "C" fn upt_scene_reset(scene: *mut upt_scene) -> upt_status {
 /// out: `[n,3]`, mm (n: K, or the region's count), may be NULL; it may be the same memory as an input, at the price of
 /// a copy. out_count: floats in out, 3 n; 0 when out is NULL.
 /// Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`,
-/// `UPT_ERR_NON_FINITE`, `UPT_ERR_UNSUPPORTED`, `UPT_ERR_GUARD`, `UPT_ERR_RUNTIME`, `UPT_ERR_PANIC`; the state stays.
+/// `UPT_ERR_NON_FINITE`, `UPT_ERR_UNSUPPORTED`, `UPT_ERR_GUARD`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`; the
+/// state stays.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_scene_step(
     scene: *mut upt_scene,
@@ -96,7 +97,7 @@ pub unsafe extern "C" fn upt_scene_step(
 ///
 /// contact_nodes: `[m]` node indices, each at most once, in any order. contact_vectors: `[m,3]`, mm: the displacement of
 /// these nodes at the end of the step. contact_count: m; 0 means no contact and both may be NULL.
-/// out, out_count, threads and errors: as `upt_scene_step`; also `UPT_ERR_ARGUMENT` for an index of K or more.
+/// out, out_count, threads and errors: as `upt_scene_step`; also `UPT_ERR_ARGUMENT` for an index or a count beyond K.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_scene_step_contacts(
     scene: *mut upt_scene,
@@ -107,7 +108,8 @@ pub unsafe extern "C" fn upt_scene_step_contacts(
     out_count: u64,
 ) -> upt_status {
     call_scene("upt_scene_step_contacts", scene, |scene| {
-        let (nodes, vectors) = unsafe { contacts(contact_nodes, contact_vectors, contact_count) }?;
+        let (nodes, vectors) =
+            unsafe { contacts(scene, contact_nodes, contact_vectors, contact_count) }?;
         let contact = Contact::Sparse { nodes, vectors };
         let input = StepInput {
             displacement: None,
@@ -120,7 +122,7 @@ pub unsafe extern "C" fn upt_scene_step_contacts(
 /// Copies the last published state.
 ///
 /// out: `[n,3]`, mm, in the region's order (all nodes when there is none). out_count: floats in out, 3 n.
-/// Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`, `UPT_ERR_PANIC`.
+/// Threads: any at any time, also while a step runs. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_PANIC`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_scene_read(
     scene: *mut upt_scene,
@@ -128,24 +130,25 @@ pub unsafe extern "C" fn upt_scene_read(
     out_count: u64,
 ) -> upt_status {
     call_scene("upt_scene_read", scene, |scene| {
-        pointers::place(out, "out")?;
         scene.read(unsafe { slice_mut(out, out_count, "out") }?)?;
         Ok(UPT_OK)
     })
 }
 
-/// The sparse collision field `[m]`, `[m,3]`.
+/// The sparse collision field `[m]`, `[m,3]`, with at most as many entries as the mesh has nodes.
 pub(super) unsafe fn contacts<'a>(
+    scene: &Scene,
     nodes: *const u32,
     vectors: *const f32,
     count: u64,
 ) -> Result<(&'a [u32], &'a [f32]), Failure> {
+    scene.check_node_count("contact_count", count)?;
     let nodes = unsafe { slice(nodes, count, "contact_nodes") }?;
     let vectors = unsafe { slice(vectors, count.saturating_mul(3), "contact_vectors") }?;
     Ok((nodes, vectors))
 }
 
-/// `out` may be an input's memory; Rust's references may not, so such an input is copied first.
+/// `out` may be an input's memory; Rust's references may not, so such an input, whose size has been checked, is copied first.
 unsafe fn step(
     scene: &Scene,
     input: StepInput,
@@ -157,23 +160,29 @@ unsafe fn step(
         return Ok(UPT_OK);
     }
     let out_view = unsafe { slice(out.cast_const(), out_count, "out") }?;
-    let copied = |field: &[f32]| overlap(field, out_view).then(|| field.to_vec());
-    let displacement = input.displacement.and_then(copied);
+    scene.check_out(out_view.len())?;
+    let displacement = input.displacement.map(|u| apart(u, out_view)).transpose()?;
+    let (dense, nodes, vectors);
     let contact = match input.contact {
-        Contact::Dense(field) => copied(field),
-        Contact::Sparse { vectors, .. } => copied(vectors),
-        Contact::None => None,
+        Contact::None => Contact::None,
+        Contact::Dense(field) => {
+            dense = apart(field, out_view)?;
+            Contact::Dense(&dense)
+        }
+        Contact::Sparse {
+            nodes: n,
+            vectors: v,
+        } => {
+            (nodes, vectors) = (apart(n, out_view)?, apart(v, out_view)?);
+            Contact::Sparse {
+                nodes: &nodes,
+                vectors: &vectors,
+            }
+        }
     };
     let input = StepInput {
-        displacement: displacement.as_deref().or(input.displacement),
-        contact: match (contact.as_deref(), input.contact) {
-            (Some(copy), Contact::Dense(_)) => Contact::Dense(copy),
-            (Some(copy), Contact::Sparse { nodes, .. }) => Contact::Sparse {
-                nodes,
-                vectors: copy,
-            },
-            (_, contact) => contact,
-        },
+        displacement: displacement.as_deref(),
+        contact,
     };
     scene.step(input, Some(unsafe { slice_mut(out, out_count, "out") }?))?;
     Ok(UPT_OK)

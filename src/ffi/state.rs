@@ -64,7 +64,7 @@ pub unsafe extern "C" fn upt_scene_get_stats(
 /// out: bytes; NULL with capacity 0 only asks. capacity: bytes that fit in out.
 /// needed: bytes of the snapshot, always written; may be NULL.
 /// Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT` when capacity is
-/// too small, `UPT_ERR_PANIC`.
+/// too small, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_scene_save(
     scene: *mut upt_scene,
@@ -81,7 +81,7 @@ pub unsafe extern "C" fn upt_scene_save(
 /// Restores a snapshot of the same model.
 ///
 /// Threads: one at a time. Errors: `UPT_ERR_SNAPSHOT`, `UPT_ERR_VERSION`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NULL`,
-/// `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_PANIC`; the state stays.
+/// `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`; the state stays.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_scene_restore(
     scene: *mut upt_scene,
@@ -89,7 +89,6 @@ pub unsafe extern "C" fn upt_scene_restore(
     count: u64,
 ) -> upt_status {
     call_scene("upt_scene_restore", scene, |scene| {
-        pointers::place(bytes.cast_mut(), "bytes")?;
         scene.restore(unsafe { pointers::slice(bytes, count, "bytes") }?)?;
         Ok(UPT_OK)
     })

@@ -23,6 +23,8 @@ pub const UPT_ERR_NON_FINITE: i32 = -6;
 pub const UPT_ERR_STATE: i32 = -7;
 /// This build or this bundle cannot do it.
 pub const UPT_ERR_UNSUPPORTED: i32 = -8;
+/// There is no memory for what the call needs.
+pub const UPT_ERR_OUT_OF_MEMORY: i32 = -9;
 /// ONNX Runtime is missing, too old or broken; the message lists what was tried.
 pub const UPT_ERR_RUNTIME: i32 = -20;
 /// No provider of the list can run the model.
@@ -58,7 +60,7 @@ pub const UPT_KIND_REDUCED: i32 = 1;
 pub const UPT_LOG_OFF: i32 = 0;
 /// Failures.
 pub const UPT_LOG_ERROR: i32 = 1;
-/// Fallbacks and envelope violations.
+/// Fallbacks, and once for each flag that rises: contacts outside of the envelope, states that the guard refuses.
 pub const UPT_LOG_WARN: i32 = 2;
 /// Loading: what was opened and who runs it.
 pub const UPT_LOG_INFO: i32 = 3;
@@ -67,7 +69,7 @@ pub const UPT_LOG_DEBUG: i32 = 4;
 /// Everything.
 pub const UPT_LOG_TRACE: i32 = 5;
 
-/// 32-bit floats: the reference.
+/// 32-bit floats: the reference. Of a scene's options: what its model has.
 pub const UPT_PRECISION_F32: i32 = 0;
 /// bfloat16 products where the CPU has them.
 pub const UPT_PRECISION_BF16: i32 = 1;
@@ -75,6 +77,8 @@ pub const UPT_PRECISION_BF16: i32 = 1;
 pub const UPT_PRECISION_F16: i32 = 2;
 /// 8-bit integers: the bundle's `*.int8.onnx`.
 pub const UPT_PRECISION_INT8: i32 = 3;
+/// Of options only: 32-bit floats also in a scene of a model that was opened with another precision.
+pub const UPT_PRECISION_FORCE_F32: i32 = 4;
 
 /// The library chooses the decoder.
 pub const UPT_KERNEL_AUTO: i32 = 0;
@@ -158,6 +162,7 @@ pub(super) fn name(status: upt_status) -> &'static std::ffi::CStr {
         UPT_ERR_NON_FINITE => c"UPT_ERR_NON_FINITE",
         UPT_ERR_STATE => c"UPT_ERR_STATE",
         UPT_ERR_UNSUPPORTED => c"UPT_ERR_UNSUPPORTED",
+        UPT_ERR_OUT_OF_MEMORY => c"UPT_ERR_OUT_OF_MEMORY",
         UPT_ERR_RUNTIME => c"UPT_ERR_RUNTIME",
         UPT_ERR_PROVIDER => c"UPT_ERR_PROVIDER",
         UPT_ERR_IO => c"UPT_ERR_IO",

@@ -9,13 +9,14 @@ pub struct upt_model {
     _opaque: [u8; 0],
 }
 
-/// One deforming body. Used by one thread at a time; a call while another is running returns `UPT_ERR_BUSY`.
+/// One deforming body. Calls that change it come from one thread at a time, a second one is `UPT_ERR_BUSY`; reading and sampling
+/// published states and statistics may happen on any thread at any time.
 pub struct upt_scene {
     _opaque: [u8; 0],
 }
 
 /// Receives log messages (UTF-8, valid during the call) on the host's threads, inside of their calls; it must not call
-/// the library.
+/// the library: such a call is `UPT_ERR_STATE`.
 pub type upt_log_fn =
     Option<unsafe extern "C" fn(level: i32, message: *const c_char, user: *mut c_void)>;
 
@@ -45,11 +46,11 @@ pub struct upt_model_options {
     pub providers: *const i32,
     /// Entries in `providers`.
     pub provider_count: u64,
-    /// Device of GPU providers.
+    /// Device of GPU providers, from 0.
     pub device_id: i32,
     /// `UPT_PRECISION_*`.
     pub precision: i32,
-    /// Bytes; 0: no limit.
+    /// Bytes; 0: no limit. Needs a GPU provider in `providers`.
     pub gpu_memory_limit: u64,
     /// Folder for compiled engines; NULL: none is kept.
     pub cache_dir: *const c_char,
@@ -111,7 +112,7 @@ pub struct upt_scene_options {
     pub threads: u32,
     /// `UPT_KERNEL_*`: who decodes.
     pub kernel: i32,
-    /// `UPT_PRECISION_*` of the native decoder.
+    /// `UPT_PRECISION_*` of the native decoder; 0: the model's, `UPT_PRECISION_FORCE_F32`: float32 whatever the model has.
     pub precision: i32,
     /// `UPT_GUARD_*`.
     pub guard_policy: i32,
@@ -201,7 +202,7 @@ pub struct upt_scene_stats {
     pub precision: i32,
     /// Largest displacement among the decoded nodes, mm.
     pub max_displacement_mm: f32,
-    /// Calibrated trust indicator; 0: good.
+    /// Largest ratio of push, rate of push, contact area and number of sites to what the model was trained on; above 1: outside.
     pub indicator: f32,
     /// 1: the scene sleeps.
     pub sleeping: u8,

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::call::Answer;
-use super::pointers::{place, slice_mut};
+use super::pointers::slice_mut;
 use super::registry::call_scene;
 use super::scene::contacts;
 use super::status::*;
@@ -12,9 +12,11 @@ use crate::Progress;
 
 /// Starts a step on the scene's worker and returns at once.
 ///
-/// contact_nodes, contact_vectors, contact_count: as `upt_scene_step_contacts`; copied before the call returns.
+/// contact_nodes, contact_vectors, contact_count: as `upt_scene_step_contacts`; checked and copied before the call returns.
+/// An error of an earlier step that was not told yet stays to be told.
 /// Threads: one at a time. Errors: `UPT_ERR_BUSY` while a step is in flight (unless the scene was made with
-/// `latest_wins`), `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NON_FINITE`, `UPT_ERR_PANIC`.
+/// `latest_wins`), `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` (also for an index or a count beyond K, or a node that is
+/// listed twice), `UPT_ERR_NON_FINITE`, `UPT_ERR_STATE` where no thread can be started, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_scene_submit(
     scene: *mut upt_scene,
@@ -23,7 +25,8 @@ pub unsafe extern "C" fn upt_scene_submit(
     contact_count: u64,
 ) -> upt_status {
     call_scene("upt_scene_submit", scene, |scene| {
-        let (nodes, vectors) = unsafe { contacts(contact_nodes, contact_vectors, contact_count) }?;
+        let (nodes, vectors) =
+            unsafe { contacts(scene, contact_nodes, contact_vectors, contact_count) }?;
         scene.submit(nodes, vectors)?;
         Ok(UPT_OK)
     })
@@ -31,7 +34,8 @@ pub unsafe extern "C" fn upt_scene_submit(
 
 /// Asks whether the submitted step has finished; never waits.
 ///
-/// Returns `UPT_OK`, `UPT_PENDING`, or the step's error (once).
+/// Returns `UPT_OK`, `UPT_PENDING`, or the step's error (once, also after a later submit). With `latest_wins`, `UPT_OK` says that
+/// a step has finished since the last `UPT_OK`, while another may be in flight: a host that submits in every frame sees each new state.
 /// Threads: one at a time. Errors: the step's; `UPT_ERR_STATE` when nothing was submitted, `UPT_ERR_NULL`,
 /// `UPT_ERR_HANDLE`.
 #[unsafe(no_mangle)]
@@ -41,7 +45,7 @@ pub unsafe extern "C" fn upt_scene_poll(scene: *mut upt_scene) -> upt_status {
 
 /// Waits for the submitted step, at most `timeout_ms` milliseconds.
 ///
-/// Returns `UPT_OK`, `UPT_PENDING` when the time is over, or the step's error (once).
+/// Returns `UPT_OK` when none is in flight, `UPT_PENDING` when the time is over, or the step's error (once).
 /// Threads: one at a time. Errors: as `upt_scene_poll`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_scene_wait(scene: *mut upt_scene, timeout_ms: u32) -> upt_status {
@@ -54,7 +58,7 @@ pub unsafe extern "C" fn upt_scene_wait(scene: *mut upt_scene, timeout_ms: u32) 
 ///
 /// alpha: 0 the state before, 1 the last state; from 0 to 1. out: `[n,3]`, mm, in the region's order.
 /// out_count: floats in out, 3 n.
-/// Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`,
+/// Threads: any at any time, also while a step runs. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT`,
 /// `UPT_ERR_NON_FINITE`, `UPT_ERR_PANIC`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_scene_sample(
@@ -64,7 +68,6 @@ pub unsafe extern "C" fn upt_scene_sample(
     out_count: u64,
 ) -> upt_status {
     call_scene("upt_scene_sample", scene, |scene| {
-        place(out, "out")?;
         scene.sample(alpha, unsafe { slice_mut(out, out_count, "out") }?)?;
         Ok(UPT_OK)
     })

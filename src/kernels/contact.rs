@@ -9,6 +9,7 @@
 
 use super::isa::{Isa, by_isa};
 use super::lanes::Lanes;
+use crate::memory;
 
 /// Pivots below this part of their diagonal are rounding noise of the f32 compliance.
 const PIVOT_FLOOR: f64 = 1e-6;
@@ -66,6 +67,33 @@ impl ContactFactor {
             right: Vec::with_capacity(order),
             ..Self::default()
         }
+    }
+
+    /// As [`ContactFactor::with_capacity`].
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
+    pub fn try_with_capacity(order: usize) -> crate::Result<Self> {
+        let mut factor = Self::default();
+        factor.reserve(order)?;
+        Ok(factor)
+    }
+
+    /// Makes room for a block of `order`, so that [`ContactFactor::factor`] of such a one does not allocate.
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
+    pub fn reserve(&mut self, order: usize) -> crate::Result<()> {
+        const WHAT: &str = "the factor of a contact block";
+        let upper = (order * order).saturating_sub(self.upper.len());
+        let right = order.saturating_sub(self.right.len());
+        memory::reserve(&mut self.upper, upper, WHAT)?;
+        memory::reserve(&mut self.right, right, WHAT)
+    }
+
+    /// Bytes held.
+    pub fn memory_bytes(&self) -> usize {
+        8 * (self.upper.capacity() + self.right.capacity())
     }
 
     /// Degrees of freedom of the current factor; 0 before the first.

@@ -24,7 +24,7 @@ pub mod random;
 pub mod respond;
 pub mod rows;
 
-pub use flush::FlushToZero;
+pub use flush::{FlushToZero, MaskExceptions};
 pub use isa::Isa;
 pub use math::gelu;
 pub use pool::{Pool, PoolError};

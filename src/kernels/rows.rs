@@ -10,6 +10,7 @@ use super::isa::{Isa, by_isa};
 use super::lanes::Lanes;
 use super::parts::Parts;
 use super::pool::{Pool, PoolError};
+use crate::memory;
 use half::f16;
 
 /// Numbers stored as f32 or f16.
@@ -86,8 +87,11 @@ impl RowPlan {
     /// # Panics
     /// As [`RowPlan::region`].
     pub fn full(basis: &BlockBasis<'_>) -> Self {
-        let all: Vec<u32> = (0..basis.block_nodes.len() as u32).collect();
-        Self::region(basis, &all, false)
+        Self::region(
+            basis,
+            &(0..basis.block_nodes.len() as u32).collect::<Vec<_>>(),
+            false,
+        )
     }
 
     /// The nodes of a list (no node twice). `compact`: node `nodes[i]` goes to row `i` of an output
@@ -96,8 +100,22 @@ impl RowPlan {
     /// # Panics
     /// If a node is not in the basis or the offsets do not fit the basis (a bundle's loader checks).
     pub fn region(basis: &BlockBasis<'_>, nodes: &[u32], compact: bool) -> Self {
+        Self::try_region(basis, nodes, compact).expect("memory for a plan of rows")
+    }
+
+    /// As [`RowPlan::region`].
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
+    ///
+    /// # Panics
+    /// As [`RowPlan::region`].
+    pub fn try_region(basis: &BlockBasis<'_>, nodes: &[u32], compact: bool) -> crate::Result<Self> {
+        const WHAT: &str = "a plan of decoded rows";
         let node_count = basis.block_nodes.len();
-        let mut basis_offsets = vec![0];
+        let blocks = basis.block_offsets.len();
+        let mut basis_offsets = memory::room(blocks, WHAT)?;
+        basis_offsets.push(0);
         for k in 0..basis.block_offsets.len() - 1 {
             let n = (basis.block_offsets[k + 1] - basis.block_offsets[k]) as usize;
             let rank = (basis.rank_offsets[k + 1] - basis.rank_offsets[k]) as usize;
@@ -112,14 +130,16 @@ impl RowPlan {
             basis_offsets[basis_offsets.len() - 1],
             "basis length"
         );
-        let mut row_of_node = vec![u32::MAX; node_count];
+        let mut row_of_node = memory::filled(node_count, u32::MAX, WHAT)?;
         for (i, &node) in nodes.iter().enumerate() {
             row_of_node[node as usize] = if compact { i as u32 } else { node };
         }
         let mut plan = Self {
             basis_offsets,
             output_rows: if compact { nodes.len() } else { node_count },
-            ..Self::default()
+            runs: memory::room(blocks + nodes.len() / RUN_NODES, WHAT)?,
+            locals: memory::room(nodes.len(), WHAT)?,
+            outputs: memory::room(nodes.len(), WHAT)?,
         };
         for k in 0..basis.block_offsets.len() - 1 {
             let range = basis.block_offsets[k] as usize..basis.block_offsets[k + 1] as usize;
@@ -142,7 +162,14 @@ impl RowPlan {
             nodes.len(),
             "a node of the list is unknown or twice in it"
         );
-        plan
+        Ok(plan)
+    }
+
+    /// Bytes held.
+    pub fn memory_bytes(&self) -> usize {
+        size_of::<Run>() * self.runs.capacity()
+            + 4 * (self.locals.capacity() + self.outputs.capacity())
+            + 8 * self.basis_offsets.capacity()
     }
 
     fn end_run(&mut self, block: usize, start: &mut usize) {

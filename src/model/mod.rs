@@ -99,10 +99,22 @@ impl Model {
     /// [`crate::Error::Runtime`], [`crate::Error::Provider`].
     pub fn open(path: &Path, options: &ModelOptions) -> Result<Arc<Model>> {
         let start = Instant::now();
-        if options.user_stream.is_some() && !options.providers.iter().any(|&p| p != Provider::Cpu) {
-            return Err(crate::Error::Argument(
-                "user_stream is set and `providers` names no GPU provider".into(),
-            ));
+        if options.device_id < 0 {
+            return Err(crate::Error::Argument(format!(
+                "device_id is {}; devices are counted from 0",
+                options.device_id
+            )));
+        }
+        let on_device = options.providers.iter().any(|&p| p != Provider::Cpu);
+        for (name, set) in [
+            ("user_stream", options.user_stream.is_some()),
+            ("gpu_memory_limit", options.gpu_memory_limit != 0),
+        ] {
+            if set && !on_device {
+                return Err(crate::Error::Argument(format!(
+                    "{name} is set and `providers` names no GPU provider"
+                )));
+            }
         }
         let _span = tracing::info_span!("open", path = %path.display()).entered();
         let process = library::current();

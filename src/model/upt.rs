@@ -8,8 +8,11 @@ use crate::error::{Error, Result};
 use crate::graph::SupernodeGraph;
 use crate::kernels::decoder::{DecoderWeights, PackedDecoder};
 use crate::kernels::encode::transpose_weight;
+use crate::memory;
 use crate::onnx::{ProviderChoice, ProviderPlan, Runtime, Stage, StageOptions};
 use crate::options::Precision;
+
+const TABLES: &str = "the tables of a mesh";
 
 /// Nodes a run of `embed.onnx`.
 const EMBED_TILE: usize = 2048;
@@ -148,7 +151,7 @@ impl UptModel {
         threads: usize,
     ) -> Result<Vec<f32>> {
         let count = points.len() / 3;
-        let mut queries = Vec::with_capacity(count * self.entry.dims.query);
+        let mut queries = memory::room(count * self.entry.dims.query, "the queries of points")?;
         embed_points(
             &self.entry,
             &self.embed,
@@ -210,7 +213,7 @@ fn make_tables(
     let _span = tracing::debug_span!("tables", nodes = mesh.node_count()).entered();
     let graph = SupernodeGraph::of_mesh(mesh, &entry.graph);
     let encode_nodes = graph.needed_nodes();
-    let mut row = vec![u32::MAX; mesh.node_count()];
+    let mut row = memory::filled(mesh.node_count(), u32::MAX, TABLES)?;
     for (at, &node) in encode_nodes.iter().enumerate() {
         row[node as usize] = at as u32;
     }
@@ -221,9 +224,9 @@ fn make_tables(
             .collect::<Vec<u32>>()
     };
     let d = entry.dims.encoder;
-    let mut source_table = Vec::with_capacity(encode_nodes.len() * d);
-    let mut target_table = Vec::with_capacity(graph.supernodes.len() * d);
-    let mut query_table = Vec::with_capacity(mesh.node_count() * entry.dims.query);
+    let mut source_table = memory::room(encode_nodes.len() * d, TABLES)?;
+    let mut target_table = memory::room(graph.supernodes.len() * d, TABLES)?;
+    let mut query_table = memory::room(mesh.node_count() * entry.dims.query, TABLES)?;
     embed_points(
         entry,
         embed,

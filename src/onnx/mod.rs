@@ -12,6 +12,7 @@ mod placement;
 mod plugin;
 mod providers;
 mod runtime;
+mod sessions;
 mod stage;
 mod status;
 mod version;

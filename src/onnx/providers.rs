@@ -11,6 +11,7 @@ use super::gpu;
 use super::graph::Tensors;
 use super::memory::Memory;
 use super::runtime::Runtime;
+use super::sessions::Sessions;
 use crate::error::{Error, Result};
 use crate::library;
 use crate::options::{ModelOptions, Precision, Provider};
@@ -31,6 +32,8 @@ impl Provider {
 #[derive(Debug, Clone)]
 pub struct ProviderPlan {
     options: ModelOptions,
+    /// Shared by the clones of a plan.
+    pub(super) sessions: Sessions,
 }
 
 /// How a session is told which provider to use.
@@ -80,7 +83,10 @@ impl ProviderPlan {
         if order.is_empty() || (!options.no_fallback && !order.contains(&Provider::Cpu)) {
             order.push(Provider::Cpu);
         }
-        ProviderPlan { options }
+        ProviderPlan {
+            options,
+            sessions: Sessions::default(),
+        }
     }
 
     /// The CPU alone.

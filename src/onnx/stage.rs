@@ -3,6 +3,7 @@
 //! The host writes the inputs in place. On the CPU a run copies nothing; on a device it copies the inputs there and the
 //! outputs back ([`super::memory`]). Neither allocates anything of ours.
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use ort::AsPointer;
@@ -46,13 +47,14 @@ struct Buffer {
     device: Option<Tensor<f32>>,
 }
 
-/// One graph, its session and its bound tensors.
+/// One graph, its session, which other stages on the CPU share, and its own bound tensors.
 pub struct Stage {
     // Dropped before the session that it was made from.
     binding: IoBinding,
     inputs: Vec<Buffer>,
     outputs: Vec<Buffer>,
-    session: Session,
+    session: Arc<Session>,
+    constant_bytes: usize,
     memory: Memory,
     runtime: &'static Runtime,
     choice: ProviderChoice,
@@ -92,6 +94,10 @@ impl Stage {
     ) -> Result<Stage> {
         let _span = tracing::debug_span!("session", file).entered();
         let mut invalid = None;
+        let key = (file.to_owned(), options.threads);
+        if let Some((session, choice)) = options.plan.sessions.find(&key) {
+            return Stage::bind(runtime, file, tensors, session, Memory::Host, choice);
+        }
         let made = options.plan.choose(file, bytes, tensors, |provider, wish| {
             let mut builder = configure(runtime, options, wish)?;
             let session = builder.commit_from_memory(bytes).map_err(|error| {
@@ -111,6 +117,10 @@ impl Stage {
         let ((session, memory), mut choice) = made?;
         choice.nodes = placement::nodes_by_provider(&session);
         choice.memory = memory.name();
+        let session = Arc::new(session);
+        if choice.provider == Provider::Cpu {
+            options.plan.sessions.keep(key, &session, &choice);
+        }
         Stage::bind(runtime, file, tensors, session, memory, choice)
     }
 
@@ -118,7 +128,7 @@ impl Stage {
         runtime: &'static Runtime,
         file: &str,
         tensors: &Tensors<'_>,
-        session: Session,
+        session: Arc<Session>,
         memory: Memory,
         choice: ProviderChoice,
     ) -> Result<Stage> {
@@ -172,7 +182,10 @@ impl Stage {
         binding
             .synchronize_inputs()
             .map_err(|error| failed(&error))?;
+        let constants = tensors.constants.iter().map(|part| 4 * part.2.len());
+        let indices = tensors.indices.iter().map(|part| 8 * part.2.len());
         Ok(Stage {
+            constant_bytes: constants.chain(indices).sum(),
             binding,
             inputs,
             outputs,
@@ -193,6 +206,13 @@ impl Stage {
     /// Output `index` of the last run.
     pub fn output(&self, index: usize) -> &[f32] {
         self.outputs[index].host.extract_tensor().1
+    }
+
+    /// Bytes of the host's tensors. The session is the model's.
+    pub fn memory_bytes(&self) -> usize {
+        let buffers = self.inputs.iter().chain(&self.outputs);
+        let floats: usize = buffers.map(|b| b.host.extract_tensor().1.len()).sum();
+        4 * floats + self.constant_bytes
     }
 
     /// What runs this stage.
@@ -259,7 +279,8 @@ impl Stage {
 
     fn compute(&mut self) -> Result<()> {
         let session = self.session.inner();
-        // SAFETY: session and binding are alive; `&mut self` makes this the only run of the session.
+        // SAFETY: session and binding are alive; `&mut self` makes this the only run of the binding. A session takes runs of
+        // several threads at once.
         let outcome = unsafe {
             status::check((ort::api().RunWithBinding)(
                 AsPointer::ptr(&*session).cast_mut(),
@@ -359,7 +380,7 @@ mod tests {
             ..Tensors::default()
         };
         let choice = ProviderChoice::cpu();
-        Stage::bind(runtime(), FILE, &tensors, session, memory, choice).unwrap()
+        Stage::bind(runtime(), FILE, &tensors, Arc::new(session), memory, choice).unwrap()
     }
 
     fn outputs(stage: &mut Stage) -> Vec<u32> {

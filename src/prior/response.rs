@@ -6,6 +6,7 @@ use crate::kernels::contact::ContactFactor;
 use crate::kernels::respond::accumulate_rows;
 use crate::kernels::rows::Stored;
 use crate::kernels::{Isa, Pool};
+use crate::memory;
 
 /// Contact nodes for which the factor has room from the start; larger sets allocate once.
 const ROOM: usize = 256;
@@ -38,21 +39,33 @@ pub struct ContactResponse {
 
 impl ContactResponse {
     /// Buffers for a table.
-    pub fn new(table: &PriorTable) -> ContactResponse {
+    pub fn new(table: &PriorTable) -> Result<ContactResponse> {
+        const WHAT: &str = "the contact solve";
         let columns = table.contact_nodes.len();
-        ContactResponse {
-            factor: ContactFactor::with_capacity(3 * columns.min(ROOM)),
-            factored: Vec::with_capacity(3 * columns),
+        Ok(ContactResponse {
+            factor: ContactFactor::try_with_capacity(3 * columns.min(ROOM))?,
+            factored: memory::room(3 * columns, WHAT)?,
             regularised: false,
-            columns: Vec::with_capacity(columns),
-            rows: Vec::with_capacity(3 * columns),
-            values: Vec::with_capacity(3 * columns),
-            widened: vec![0.0; 6 * table.widest_block()],
-            forces: Vec::with_capacity(3 * columns),
-            sum: vec![[0.0; 3]; columns],
-            count: vec![0; columns],
-            own: vec![false; columns],
-        }
+            columns: memory::room(columns, WHAT)?,
+            rows: memory::room(3 * columns, WHAT)?,
+            values: memory::room(3 * columns, WHAT)?,
+            widened: memory::zeros(6 * table.widest_block(), WHAT)?,
+            forces: memory::room(3 * columns, WHAT)?,
+            sum: memory::filled(columns, [0.0; 3], WHAT)?,
+            count: memory::filled(columns, 0, WHAT)?,
+            own: memory::filled(columns, false, WHAT)?,
+        })
+    }
+
+    /// Bytes held.
+    pub fn memory_bytes(&self) -> usize {
+        let lists = self.factored.capacity()
+            + self.columns.capacity()
+            + self.rows.capacity()
+            + self.values.capacity()
+            + self.widened.len()
+            + self.forces.capacity();
+        self.factor.memory_bytes() + 4 * lists + 17 * self.own.len()
     }
 
     /// Solves for the forces. A node without a column of its own lends its displacement to the nearest column (the
@@ -107,6 +120,7 @@ impl ContactResponse {
             self.factored.clear();
             self.regularised = false;
             if !self.rows.is_empty() {
+                self.factor.reserve(self.rows.len())?;
                 let made = self
                     .factor
                     .factor(isa, &self.rows, |upper| {

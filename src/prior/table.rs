@@ -309,7 +309,7 @@ mod tests {
     #[test]
     fn borrowers_share_a_column_and_only_nodes_beyond_the_domain_are_reported() {
         let table = table();
-        let mut response = ContactResponse::new(&table);
+        let mut response = ContactResponse::new(&table).unwrap();
         let mut solve = |nodes: &[u32], vectors: &[f32]| {
             let report = response
                 .solve(Isa::Scalar, &table, &[false; 4], nodes, vectors)
@@ -335,7 +335,7 @@ mod tests {
     #[test]
     fn borrowers_share_a_columns_force_and_its_own_node_goes_before_them() {
         let mut table = table();
-        let mut response = ContactResponse::new(&table);
+        let mut response = ContactResponse::new(&table).unwrap();
         let held = [true, false, false, false];
         let mut reaction = |table: &PriorTable, nodes: &[u32], vectors: &[f32], places: &[u32]| {
             response

@@ -2,12 +2,15 @@
 
 use super::Contact;
 use crate::error::{Error, Result};
+use crate::memory;
 
 /// Displacements beyond this are refused as input, mm.
 pub const INPUT_LIMIT: f32 = 1e6;
 
+const CONTACTS: &str = "a step's contacts";
+
 /// Nodes in contact and what is imposed there.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Default)]
 pub struct ContactSet {
     /// Ascending.
     pub nodes: Vec<u32>,
@@ -19,12 +22,17 @@ pub struct ContactSet {
 
 impl ContactSet {
     /// Room for every node of the mesh, so that a step allocates nothing.
-    pub fn with_capacity(node_count: usize) -> ContactSet {
-        ContactSet {
-            nodes: Vec::with_capacity(node_count),
-            vectors: Vec::with_capacity(3 * node_count),
-            order: Vec::with_capacity(node_count),
-        }
+    pub fn with_capacity(node_count: usize) -> Result<ContactSet> {
+        Ok(ContactSet {
+            nodes: memory::room(node_count, CONTACTS)?,
+            vectors: memory::room(3 * node_count, CONTACTS)?,
+            order: memory::room(node_count, CONTACTS)?,
+        })
+    }
+
+    /// Bytes held.
+    pub fn memory_bytes(&self) -> usize {
+        4 * (self.nodes.capacity() + self.vectors.capacity() + self.order.capacity())
     }
 
     /// Nodes in contact.
@@ -42,6 +50,15 @@ impl ContactSet {
         self.nodes.clear();
         self.vectors.clear();
         self.order.clear();
+    }
+
+    /// A copy.
+    pub fn copy(&self) -> Result<ContactSet> {
+        Ok(ContactSet {
+            nodes: memory::copied(&self.nodes, CONTACTS)?,
+            vectors: memory::copied(&self.vectors, CONTACTS)?,
+            order: memory::copied(&self.order, CONTACTS)?,
+        })
     }
 
     /// Copies another set.
@@ -89,8 +106,14 @@ impl ContactSet {
                 3 * node_count
             )));
         }
+        let touched = |c: &[f32]| c[0] != 0.0 || c[1] != 0.0 || c[2] != 0.0;
+        let count = field.chunks_exact(3).filter(|c| touched(c)).count();
+        for list in [&mut self.nodes, &mut self.order] {
+            memory::reserve(list, count, CONTACTS)?;
+        }
+        memory::reserve(&mut self.vectors, 3 * count, CONTACTS)?;
         for (node, c) in field.chunks_exact(3).enumerate() {
-            if c[0] != 0.0 || c[1] != 0.0 || c[2] != 0.0 {
+            if touched(c) {
                 check("collision", node, c)?;
                 self.order.push(self.nodes.len() as u32);
                 self.nodes.push(node as u32);
@@ -108,12 +131,11 @@ impl ContactSet {
                 3 * nodes.len()
             )));
         }
-        if nodes.len() > node_count {
-            return Err(Error::Argument(format!(
-                "{} contact nodes, the mesh has {node_count}",
-                nodes.len()
-            )));
+        check_count("contact_count", nodes.len() as u64, node_count)?;
+        for list in [&mut self.nodes, &mut self.order] {
+            memory::reserve(list, nodes.len(), CONTACTS)?;
         }
+        memory::reserve(&mut self.vectors, vectors.len(), CONTACTS)?;
         for (at, (&node, c)) in nodes.iter().zip(vectors.chunks_exact(3)).enumerate() {
             if node as usize >= node_count {
                 return Err(Error::Argument(format!(
@@ -141,8 +163,18 @@ impl ContactSet {
     }
 }
 
-/// Finite and of a size that can be a displacement.
-fn check(what: &str, at: usize, c: &[f32]) -> Result<()> {
+/// A list of nodes that are named once each is no longer than the mesh.
+pub fn check_count(name: &str, count: u64, node_count: usize) -> Result<()> {
+    if count <= node_count as u64 {
+        return Ok(());
+    }
+    Err(Error::Argument(format!(
+        "{name} is {count}, the mesh has {node_count} nodes"
+    )))
+}
+
+/// Finite and of a size that can be a displacement or a place.
+pub fn check(what: &str, at: usize, c: &[f32]) -> Result<()> {
     if !(c[0].is_finite() && c[1].is_finite() && c[2].is_finite()) {
         return Err(Error::NonFinite(format!(
             "{what}: element {at} is not finite"

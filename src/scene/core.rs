@@ -15,6 +15,7 @@ use crate::envelope::EnvelopeCheck;
 use crate::error::Result;
 use crate::guard;
 use crate::kernels::{FlushToZero, Isa, Pool};
+use crate::memory;
 use crate::model::Model;
 use crate::options::SceneOptions;
 use crate::stats::SceneStats;
@@ -28,6 +29,8 @@ pub const QUIET_DISPLACEMENT: f32 = 0.02;
 pub const STILL_DISPLACEMENT: f32 = 0.05;
 /// See [`STILL_DISPLACEMENT`], mm a step.
 pub const STILL_CHANGE: f32 = 0.002;
+
+pub(super) const SCENE: &str = "a scene's states";
 
 /// Where a published state came from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -63,6 +66,8 @@ pub struct Core {
     /// Published frames that hold exactly rest since the scene fell asleep.
     pub(super) rest_frames: u32,
     pub(super) max_displacement: f32,
+    /// Flags of the last step, of which the log has told.
+    pub(super) told: u32,
     envelope: EnvelopeCheck,
     pub(super) next: Frame,
 }
@@ -89,18 +94,18 @@ pub(super) fn lock_write(
 }
 
 impl Core {
-    pub(super) fn new(parts: CoreParts) -> Core {
+    pub(super) fn new(parts: CoreParts) -> Result<Core> {
         let count = parts.mesh.node_count();
-        let mut held = vec![false; count];
+        let mut held = memory::filled(count, false, SCENE)?;
         for &node in &parts.mesh.held_nodes {
             held[node as usize] = true;
         }
-        let plan = NodePlan::all(count, parts.engine.planned_prior(&parts.model));
-        let contact = ContactSet::with_capacity(count);
-        Core {
-            envelope: EnvelopeCheck::new(&parts.mesh),
+        let plan = NodePlan::all(count, parts.engine.planned_prior(&parts.model))?;
+        let contact = ContactSet::with_capacity(count)?;
+        Ok(Core {
+            envelope: EnvelopeCheck::new(&parts.mesh)?,
             planned_tets: if parts.options.check_inversion {
-                parts.mesh.tets.clone()
+                memory::copied(&parts.mesh.tets, SCENE)?
             } else {
                 Vec::new()
             },
@@ -108,8 +113,8 @@ impl Core {
             held,
             plan,
             points: AttachedPoints::default(),
-            incoming: ContactSet::with_capacity(count),
-            contact_before: ContactSet::with_capacity(count),
+            incoming: ContactSet::with_capacity(count)?,
+            contact_before: ContactSet::with_capacity(count)?,
             contact,
             source: Source::Rest,
             source_before: Source::Rest,
@@ -118,16 +123,14 @@ impl Core {
             sleeping: false,
             rest_frames: 0,
             max_displacement: 0.0,
-            next: Frame {
-                field: vec![0.0; 3 * count],
-                points: Vec::new(),
-            },
+            told: 0,
+            next: Frame::rest(count)?,
             model: parts.model,
             mesh: parts.mesh,
             options: parts.options,
             pool: parts.pool,
             engine: parts.engine,
-        }
+        })
     }
 
     /// A blank account of a step.
@@ -205,6 +208,7 @@ impl Core {
         if let Some(out) = out {
             lock_read(published).read(Values::Region, out)?;
         }
+        self.tell_flags(&stats);
         stats.step_ms = start.elapsed().as_secs_f64() * 1e3;
         lock_write(published).stats = stats;
         Ok(())
@@ -366,15 +370,28 @@ impl Core {
         }
     }
 
-    /// Bytes of the scene's buffers.
+    /// Bytes of the scene's buffers, those of the published states included.
     pub(super) fn memory_bytes(&self) -> usize {
         let count = self.mesh.node_count();
         let frames = if self.options.cubic_sampling { 4 } else { 3 };
-        let contacts = 3 * 20 * count;
-        frames * 12 * count
+        let points = frames * 4 * self.next.points.len();
+        let contacts = [&self.incoming, &self.contact, &self.contact_before];
+        let contacts: usize = contacts.iter().map(|set| set.memory_bytes()).sum();
+        // A mesh of the scene's own is the scene's.
+        let own_mesh = match Arc::ptr_eq(&self.mesh, &self.model.mesh) {
+            true => 0,
+            false => self.mesh.memory_bytes() + self.engine.table_bytes(),
+        };
+        12 * count * frames
+            + points
             + contacts
-            + 16 * count
+            + 16 * count // contacts in the host's order
+            + self.held.len()
+            + 4 * self.planned_tets.len()
+            + self.plan.memory_bytes()
             + self.points.memory_bytes()
+            + self.envelope.memory_bytes()
             + self.engine.memory_bytes()
+            + own_mesh
     }
 }

@@ -11,6 +11,7 @@ use crate::bundle::Base;
 use crate::error::{Error, Result};
 use crate::kernels::rows::decode_rows;
 use crate::kernels::{Isa, Pool};
+use crate::memory;
 use crate::model::{KindModel, Model, UptTables};
 use crate::options::{DecoderKernel, Precision, Provider, StepPath};
 #[cfg(feature = "forces")]
@@ -194,7 +195,7 @@ impl Engine {
                         // A published state may be decoded at nodes that were not planned in its step.
                         let table = model.prior.as_ref().ok_or_else(mismatch)?;
                         let rows = plan.rows().ok_or_else(mismatch)?;
-                        let mut prior = vec![0.0; field.len()];
+                        let mut prior = memory::zeros(field.len(), "the linear response")?;
                         decode_rows(
                             isa,
                             pool,
@@ -338,6 +339,14 @@ impl Engine {
         match self {
             Engine::Upt(engine, _) => engine.precision(),
             Engine::Reduced(engine) => engine.precision(),
+        }
+    }
+
+    /// Bytes of the tables of the scene's mesh.
+    pub fn table_bytes(&self) -> usize {
+        match self {
+            Engine::Upt(_, tables) => tables.memory_bytes(),
+            Engine::Reduced(_) => 0,
         }
     }
 

@@ -25,10 +25,12 @@ use std::time::Duration;
 
 pub use contact::{ContactSet, INPUT_LIMIT};
 pub use core::{QUIET_DISPLACEMENT, QUIET_STEPS};
+pub use points::check_point_count;
 
 use crate::bundle::{Mesh, TensorFile};
 use crate::error::{Error, Result};
 use crate::kernels::Pool;
+use crate::memory;
 use crate::model::{KindModel, Model};
 use crate::options::{SceneOptions, StepPath};
 use crate::stats::SceneStats;
@@ -82,7 +84,6 @@ pub struct Scene {
     shared: Arc<Shared>,
     model: Arc<Model>,
     mesh: Arc<Mesh>,
-    latest_wins: bool,
     tools: tools::Tools,
 }
 
@@ -96,25 +97,22 @@ impl Scene {
         let _span = tracing::info_span!("scene").entered();
         let core = build(&model, options)?;
         let mesh = Arc::clone(&core.mesh);
-        let frame = Frame {
-            field: vec![0.0; 3 * mesh.node_count()],
-            points: Vec::new(),
-        };
+        let count = mesh.node_count();
+        let earlier = options.cubic_sampling.then(|| Frame::rest(count));
         let published = Published {
-            last: frame.clone(),
-            before: frame.clone(),
-            earlier: options.cubic_sampling.then_some(frame),
+            last: Frame::rest(count)?,
+            before: Frame::rest(count)?,
+            earlier: earlier.transpose()?,
             region: None,
             stats: core.blank_stats(),
-            contact_nodes: Vec::with_capacity(mesh.node_count()),
-            contact_vectors: Vec::with_capacity(3 * mesh.node_count()),
+            contact_nodes: memory::room(count, core::SCENE)?,
+            contact_vectors: memory::room(3 * count, core::SCENE)?,
         };
         Ok(Scene {
-            worker: Worker::default(),
+            worker: Worker::new(options.latest_wins),
             shared: Arc::new(Shared::new(core, published)),
             model,
             mesh,
-            latest_wins: options.latest_wins,
             tools: tools::Tools::default(),
         })
     }
@@ -155,6 +153,22 @@ impl Scene {
         })
     }
 
+    /// No list of the mesh's nodes is longer than the mesh: asked before a host's array is touched.
+    ///
+    /// # Errors
+    /// [`Error::Argument`].
+    pub fn check_node_count(&self, name: &str, count: u64) -> Result<()> {
+        contact::check_count(name, count, self.node_count())
+    }
+
+    /// Whether an output for the region has `len` floats.
+    ///
+    /// # Errors
+    /// [`Error::Argument`].
+    pub fn check_out(&self, len: usize) -> Result<()> {
+        lock_read(&self.shared.published).check_len(Values::Region, len)
+    }
+
     /// One step of `dt`; `out` is `[n,3]` (n: `K`, or the region's count).
     ///
     /// # Errors
@@ -181,8 +195,9 @@ impl Scene {
             if let Some(nodes) = nodes {
                 check_nodes(nodes, core.mesh.node_count())?;
             }
-            let points = core.points.clone();
-            core.set_plan(published, nodes.map(<[u32]>::to_vec), points)
+            let points = core.points.copy()?;
+            let nodes = nodes.map(|nodes| memory::copied(nodes, "a region"));
+            core.set_plan(published, nodes.transpose()?, points)
         })
     }
 
@@ -208,9 +223,9 @@ impl Scene {
             {
                 let threads = core.pool.threads();
                 let queries = kind.queries(points.places(), core.model.runtime, threads)?;
-                points.set_queries(queries);
+                points.set_queries(queries)?;
             }
-            let region = lock_read(published).region.clone();
+            let region = core.region_copy(published)?;
             core.set_plan(published, region, points)
         })
     }
@@ -240,21 +255,16 @@ impl Scene {
     /// Starts a step on the scene's worker.
     ///
     /// # Errors
-    /// [`Error::Busy`] while a submitted step has not finished, unless the scene was made with `latest_wins`: then an
-    /// input that has not started is replaced. Bad inputs are reported by [`Scene::poll`] or [`Scene::wait`].
+    /// [`Error::Argument`] and [`Error::NonFinite`] for the contact, as [`Scene::step`]. [`Error::Busy`] while a submitted
+    /// step has not finished, unless the scene was made with `latest_wins`: then an input that has not started is
+    /// replaced. [`Error::State`] where no thread can be started.
     pub fn submit(&self, nodes: &[u32], vectors: &[f32]) -> Result<()> {
-        if vectors.len() != 3 * nodes.len() {
-            return Err(Error::Argument(format!(
-                "contact_vectors has {} floats, must have {}",
-                vectors.len(),
-                3 * nodes.len()
-            )));
-        }
         self.worker
-            .submit(&self.shared, nodes, vectors, self.latest_wins)
+            .submit(&self.shared, nodes, vectors, self.node_count())
     }
 
-    /// Whether the submitted step has finished; its error, once.
+    /// Whether the submitted step has finished; an error that was not told yet, once, also of an earlier step. With
+    /// `latest_wins`: whether a step has finished since this was last said, while another may be in flight.
     pub fn poll(&self) -> Result<Progress> {
         self.worker.poll()
     }
@@ -266,7 +276,7 @@ impl Scene {
 
     /// A snapshot from which the scene resumes to the bit.
     pub fn save(&self) -> Result<Vec<u8>> {
-        self.with(|core, published| Ok(core.save(published)))
+        self.with(|core, published| core.save(published))
     }
 
     /// Restores a snapshot.
@@ -310,7 +320,7 @@ fn build(model: &Arc<Model>, options: &SceneOptions) -> Result<Core> {
                     "mesh_path: this bundle has a prior, which holds for its own mesh only".into(),
                 ));
             }
-            let bytes = std::fs::read(path).map_err(|error| Error::io(path, error))?;
+            let bytes = crate::bundle::read_regular(path)?;
             let file = TensorFile::parse(&path.display().to_string(), bytes)?;
             Some(Arc::new(Mesh::parse(&file, model.manifest.boundary)?))
         }
@@ -347,11 +357,14 @@ fn build(model: &Arc<Model>, options: &SceneOptions) -> Result<Core> {
             Engine::Upt(Box::new(engine), tables)
         }
     };
-    Ok(Core::new(CoreParts {
+    Core::new(CoreParts {
         model: Arc::clone(model),
         mesh: own_mesh.unwrap_or_else(|| Arc::clone(&model.mesh)),
         options: options.clone(),
         pool,
         engine,
-    }))
+    })
 }
+
+#[cfg(test)]
+mod tests;

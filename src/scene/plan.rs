@@ -1,7 +1,11 @@
 //! Which nodes a step decodes: the host's region, the attached points' tetrahedra, and what the recurrence needs.
 
+use crate::error::Result;
 use crate::kernels::rows::RowPlan;
+use crate::memory;
 use crate::prior::PriorTable;
+
+const WHAT: &str = "a plan of decoded nodes";
 
 /// Nodes to decode, ascending, and where the prior's rows of them lie.
 #[derive(Debug, Clone)]
@@ -12,24 +16,39 @@ pub struct NodePlan {
 
 impl NodePlan {
     /// The union of node lists over a mesh of `node_count` nodes.
-    pub fn new(lists: &[&[u32]], node_count: usize, table: Option<&PriorTable>) -> NodePlan {
-        let mut wanted = vec![false; node_count];
+    pub fn new(
+        lists: &[&[u32]],
+        node_count: usize,
+        table: Option<&PriorTable>,
+    ) -> Result<NodePlan> {
+        let mut wanted = memory::filled(node_count, false, WHAT)?;
         for &node in lists.iter().copied().flatten() {
             wanted[node as usize] = true;
         }
-        let nodes: Vec<u32> = (0..node_count as u32)
-            .filter(|&node| wanted[node as usize])
-            .collect();
-        let rows = table.map(|table| RowPlan::region(&table.basis(), &nodes, false));
-        NodePlan { nodes, rows }
+        let count = wanted.iter().filter(|&&wanted| wanted).count();
+        let nodes = (0..node_count as u32).filter(|&node| wanted[node as usize]);
+        NodePlan::of(memory::collected(count, nodes, WHAT)?, table)
+    }
+
+    fn of(nodes: Vec<u32>, table: Option<&PriorTable>) -> Result<NodePlan> {
+        let rows = table.map(|table| RowPlan::try_region(&table.basis(), &nodes, false));
+        Ok(NodePlan {
+            rows: rows.transpose()?,
+            nodes,
+        })
     }
 
     /// Every node.
-    pub fn all(node_count: usize, table: Option<&PriorTable>) -> NodePlan {
-        NodePlan {
-            nodes: (0..node_count as u32).collect(),
-            rows: table.map(|table| RowPlan::full(&table.basis())),
-        }
+    pub fn all(node_count: usize, table: Option<&PriorTable>) -> Result<NodePlan> {
+        NodePlan::of(
+            memory::collected(node_count, 0..node_count as u32, WHAT)?,
+            table,
+        )
+    }
+
+    /// Bytes held.
+    pub fn memory_bytes(&self) -> usize {
+        4 * self.nodes.capacity() + self.rows.as_ref().map_or(0, RowPlan::memory_bytes)
     }
 
     /// The nodes, ascending.

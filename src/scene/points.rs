@@ -3,12 +3,32 @@
 //! node a point moves with the node, boundary conditions included. A point outside of the mesh takes the closest combination of the nearest tetrahedra, weights clamped to `[0, 1]`; one
 //! that is [`REACH`] or more away is refused, because a mesh in other axes or units is a mistake, not a surface.
 
+use super::contact::check;
 use crate::bundle::Mesh;
 use crate::error::{Error, Result};
 use crate::grid::PointGrid;
+use crate::memory;
 
 /// Farthest that an attached point may lie outside of the mesh, mm.
 pub const REACH: f64 = 25.0;
+
+const WHAT: &str = "attached points";
+
+/// Most points that can be attached: they are counted in 32 bits, and each costs a row of the decoder.
+const MOST_POINTS: u64 = 1 << 27;
+
+/// A number of points that a host can mean: asked before its array is touched.
+///
+/// # Errors
+/// [`Error::Argument`].
+pub fn check_point_count(count: u64) -> Result<()> {
+    if count <= MOST_POINTS {
+        return Ok(());
+    }
+    Err(Error::Argument(format!(
+        "count is {count} points, at most {MOST_POINTS} can be attached"
+    )))
+}
 
 /// Attached points.
 #[derive(Debug, Clone, Default)]
@@ -34,14 +54,17 @@ impl AttachedPoints {
                 points.len()
             )));
         }
-        if let Some(at) = points.iter().position(|x| !x.is_finite() || x.abs() > 1e6) {
-            return Err(Error::NonFinite(format!(
-                "points: element {} is not finite or beyond 1e6 mm",
-                at / 3
-            )));
+        for (at, point) in points.chunks_exact(3).enumerate() {
+            check("points", at, point)?;
         }
-        let finder = TetFinder::new(mesh);
-        let mut attached = AttachedPoints::default();
+        let finder = TetFinder::new(mesh)?;
+        let count = points.len() / 3;
+        let mut attached = AttachedPoints {
+            nodes: memory::room(count, WHAT)?,
+            weights: memory::room(count, WHAT)?,
+            places: memory::room(3 * count, WHAT)?,
+            ..AttachedPoints::default()
+        };
         for (index, p) in points.chunks_exact(3).enumerate() {
             let (nodes, weights, miss) = finder.locate([p[0], p[1], p[2]]);
             if miss >= REACH {
@@ -70,8 +93,19 @@ impl AttachedPoints {
     }
 
     /// All nodes that the points need.
-    pub fn needed_nodes(&self) -> Vec<u32> {
-        self.nodes.iter().flatten().copied().collect()
+    pub fn needed_nodes(&self) -> &[u32] {
+        self.nodes.as_flattened()
+    }
+
+    /// A copy.
+    pub fn copy(&self) -> Result<AttachedPoints> {
+        Ok(AttachedPoints {
+            nodes: memory::copied(&self.nodes, WHAT)?,
+            weights: memory::copied(&self.weights, WHAT)?,
+            places: memory::copied(&self.places, WHAT)?,
+            queries: memory::copied(&self.queries, WHAT)?,
+            rows: memory::copied(&self.rows, WHAT)?,
+        })
     }
 
     /// Where a network is to be asked, `[n,3]`, rest mm.
@@ -80,9 +114,11 @@ impl AttachedPoints {
     }
 
     /// Takes the decoder's query rows of [`AttachedPoints::places`].
-    pub fn set_queries(&mut self, queries: Vec<f32>) {
+    pub fn set_queries(&mut self, queries: Vec<f32>) -> Result<()> {
+        let count = self.nodes.len();
+        self.rows = memory::collected(count, 0..count as u32, WHAT)?;
         self.queries = queries;
-        self.rows = (0..self.nodes.len() as u32).collect();
+        Ok(())
     }
 
     /// Query rows and their list; both empty where points are interpolated only.
@@ -122,8 +158,8 @@ struct TetFinder<'a> {
 }
 
 impl<'a> TetFinder<'a> {
-    fn new(mesh: &'a Mesh) -> TetFinder<'a> {
-        let mut centres = Vec::with_capacity(3 * mesh.tets.len() / 4);
+    fn new(mesh: &'a Mesh) -> Result<TetFinder<'a>> {
+        let mut centres = memory::room(3 * mesh.tets.len() / 4, WHAT)?;
         let mut reach = 0.0f64;
         for tet in mesh.tets.chunks_exact(4) {
             let corners = [0, 1, 2, 3].map(|k| mesh.position(tet[k]));
@@ -134,11 +170,11 @@ impl<'a> TetFinder<'a> {
             }
             centres.extend_from_slice(&centre);
         }
-        TetFinder {
+        Ok(TetFinder {
             mesh,
-            centres: PointGrid::new(centres),
+            centres: PointGrid::try_new(centres)?,
             reach: reach.sqrt(),
-        }
+        })
     }
 
     /// The tetrahedron that holds `p`, or the one whose clamped combination comes closest to it.

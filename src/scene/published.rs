@@ -1,6 +1,7 @@
 //! What other threads may read of a scene while a step is in flight: the last states, region order, statistics.
 
 use crate::error::{Error, Result};
+use crate::memory;
 use crate::stats::SceneStats;
 
 /// One published state.
@@ -13,6 +14,14 @@ pub struct Frame {
 }
 
 impl Frame {
+    /// Rest, without points.
+    pub fn rest(node_count: usize) -> Result<Frame> {
+        Ok(Frame {
+            field: memory::zeros(3 * node_count, "a scene's states")?,
+            points: Vec::new(),
+        })
+    }
+
     fn values(&self, values: Values) -> &[f32] {
         match values {
             Values::Points => &self.points,

@@ -52,6 +52,11 @@ impl Scene {
                 return Ok(());
             }
             let mut haptics = lock(&self.tools.forces)?;
+            if haptics.is_none() {
+                // Made of many lists: what they take together is asked for first.
+                let bytes = 160 * self.mesh.tets.len() / 4 + 8 * self.mesh.positions.len();
+                crate::memory::probe(bytes, "the elements' forces")?;
+            }
             let haptics = haptics.get_or_insert_with(|| Haptics::new(&self.mesh, &self.model));
             haptics.reaction(core, published, out)
         })

@@ -8,14 +8,17 @@ use crate::error::{Error, Result};
 use crate::kernels::respond::accumulate_rows;
 use crate::kernels::rows::Stored;
 use crate::kernels::{Isa, Pool};
+use crate::memory;
 use crate::model::{Model, ReducedModel};
 use crate::onnx::Stage;
 use crate::options::Precision;
 use crate::prior::{ContactResponse, PriorTable, SolveReport};
 use crate::stats::{SceneStats, flag};
 
+const STATE: &str = "a scene's reduced states";
+
 /// The reduced state after one step.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub struct ReducedRecord {
     /// Residual state `[r]`, mm.
     pub b: Vec<f32>,
@@ -36,17 +39,33 @@ pub struct ReducedRecord {
 }
 
 impl ReducedRecord {
-    fn new(model: &ReducedModel, table: &PriorTable) -> ReducedRecord {
-        ReducedRecord {
-            b: vec![0.0; model.entry.modes],
-            z: vec![0.0; model.entry.response_modes],
-            p: vec![0.0; model.entry.modes],
-            q_prior: vec![0.0; table.width()],
-            q: vec![0.0; table.width()],
+    fn new(model: &ReducedModel, table: &PriorTable) -> Result<ReducedRecord> {
+        Ok(ReducedRecord {
+            b: memory::zeros(model.entry.modes, STATE)?,
+            z: memory::zeros(model.entry.response_modes, STATE)?,
+            p: memory::zeros(model.entry.modes, STATE)?,
+            q_prior: memory::zeros(table.width(), STATE)?,
+            q: memory::zeros(table.width(), STATE)?,
             prior_norm: 0.0,
             bound: 0.0,
             contact: false,
-        }
+        })
+    }
+
+    /// A copy.
+    pub fn copy(&self) -> Result<ReducedRecord> {
+        Ok(ReducedRecord {
+            b: memory::copied(&self.b, STATE)?,
+            z: memory::copied(&self.z, STATE)?,
+            p: memory::copied(&self.p, STATE)?,
+            q_prior: memory::copied(&self.q_prior, STATE)?,
+            q: memory::copied(&self.q, STATE)?,
+            ..*self
+        })
+    }
+
+    fn memory_bytes(&self) -> usize {
+        4 * (self.b.len() + self.z.len() + self.p.len() + self.q_prior.len() + self.q.len())
     }
 
     fn clear(&mut self) {
@@ -103,19 +122,18 @@ fn distance(a: &[f32], b: &[f32]) -> f32 {
 impl ReducedEngine {
     /// Makes the session and the buffers.
     pub fn new(model: &Model, kind: &ReducedModel, table: &PriorTable) -> Result<ReducedEngine> {
-        let record = ReducedRecord::new(kind, table);
         let mut stage = kind.stage(model.runtime, &model.plan)?;
         stage.warm_up()?;
         Ok(ReducedEngine {
-            response: ContactResponse::new(table),
+            response: ContactResponse::new(table)?,
             stage,
             precision: kind.precision,
-            mode_rows: (0..kind.entry.modes as u32).collect(),
-            given_q: vec![0.0; table.width()],
-            given_b: vec![0.0; kind.entry.modes],
-            next: record.clone(),
-            last: record.clone(),
-            before: record,
+            mode_rows: memory::collected(kind.entry.modes, 0..kind.entry.modes as u32, STATE)?,
+            given_q: memory::zeros(table.width(), STATE)?,
+            given_b: memory::zeros(kind.entry.modes, STATE)?,
+            next: ReducedRecord::new(kind, table)?,
+            last: ReducedRecord::new(kind, table)?,
+            before: ReducedRecord::new(kind, table)?,
         })
     }
 
@@ -311,9 +329,10 @@ impl ReducedEngine {
 
     /// Bytes of the buffers.
     pub fn memory_bytes(&self) -> usize {
-        let record = &self.next;
-        let floats = 3 * (record.b.len() * 2 + record.z.len() + record.q.len() * 2);
-        4 * (floats + self.given_q.len() + self.given_b.len())
+        3 * self.next.memory_bytes()
+            + 4 * (self.given_q.len() + self.given_b.len() + self.mode_rows.len())
+            + self.response.memory_bytes()
+            + self.stage.memory_bytes()
     }
 }
 

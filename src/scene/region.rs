@@ -10,8 +10,20 @@ use super::published::{Frame, Published};
 use super::verdict::enforce;
 use crate::error::{Error, Result};
 use crate::kernels::FlushToZero;
+use crate::memory;
+
+const WHAT: &str = "a scene's region and points";
 
 impl Core {
+    /// A copy of the host's region.
+    pub(super) fn region_copy(&self, published: &RwLock<Published>) -> Result<Option<Vec<u32>>> {
+        let shared = lock_read(published);
+        let region = shared.region.as_deref();
+        region
+            .map(|region| memory::copied(region, WHAT))
+            .transpose()
+    }
+
     /// Back to rest.
     pub(super) fn reset(&mut self, published: &RwLock<Published>) {
         self.engine.reset();
@@ -24,6 +36,7 @@ impl Core {
         self.sleeping = false;
         self.rest_frames = 0;
         self.max_displacement = 0.0;
+        self.told = 0;
         let stats = self.blank_stats();
         let mut shared = lock_write(published);
         let shared = &mut *shared;
@@ -47,7 +60,6 @@ impl Core {
         out: &mut [f32],
     ) -> Result<()> {
         let count = self.mesh.node_count();
-        check_nodes(nodes, count)?;
         if out.len() != 3 * nodes.len() {
             return Err(Error::Argument(format!(
                 "out has {} floats, must have {}",
@@ -55,11 +67,15 @@ impl Core {
                 3 * nodes.len()
             )));
         }
+        check_nodes(nodes, count)?;
+        if nodes.is_empty() {
+            return Ok(());
+        }
         if self.step_count == 0 {
             return Err(Error::State("decode before the first step".into()));
         }
         let _flush = FlushToZero::enter();
-        let plan = NodePlan::new(&[nodes], count, self.engine.planned_prior(&self.model));
+        let plan = NodePlan::new(&[nodes], count, self.engine.planned_prior(&self.model))?;
         let points = AttachedPoints::default();
         self.decode_published(published, Which::Last, &plan, &points, &mut [])?;
         for (out, &node) in out.chunks_exact_mut(3).zip(nodes) {
@@ -145,44 +161,48 @@ impl Core {
                 &[
                     region,
                     self.engine.recurrence_nodes(),
-                    &points.needed_nodes(),
+                    points.needed_nodes(),
                 ],
                 count,
                 table,
-            ),
-            _ => NodePlan::all(count, table),
+            )?,
+            _ => NodePlan::all(count, table)?,
         };
         let _flush = FlushToZero::enter();
         self.engine
             .replan(self.isa, &self.pool, &self.model, &plan)?;
         let mut frames = [Frame::default(), Frame::default()];
         for (which, frame) in [Which::Last, Which::Before].into_iter().zip(&mut frames) {
-            frame.points = vec![0.0; 3 * points.len()];
+            frame.points = memory::zeros(3 * points.len(), WHAT)?;
             self.decode_published(published, which, &plan, &points, &mut frame.points)?;
-            frame.field.clone_from(&self.next.field);
+            memory::replace(&mut frame.field, &self.next.field, WHAT)?;
             points.add_interpolated(1.0, &frame.field, &mut frame.points);
         }
+        let spare = memory::zeros(3 * points.len(), WHAT)?;
+        let mut planned_tets = Vec::new();
         if self.options.check_inversion {
-            let mut known = vec![false; count];
+            let mut known = memory::filled(count, false, WHAT)?;
             plan.nodes()
                 .iter()
                 .for_each(|&node| known[node as usize] = true);
-            self.planned_tets = self
-                .mesh
-                .tets
-                .chunks_exact(4)
-                .filter(|tet| tet.iter().all(|&node| known[node as usize]))
-                .flatten()
-                .copied()
-                .collect();
+            let tets = self.mesh.tets.chunks_exact(4);
+            let tets = tets.filter(|tet| tet.iter().all(|&node| known[node as usize]));
+            memory::reserve(&mut planned_tets, 4 * tets.clone().count(), WHAT)?;
+            planned_tets.extend(tets.flatten());
         }
         let mut shared = lock_write(published);
         let shared = &mut *shared;
-        [shared.last, shared.before] = frames;
         if let Some(earlier) = &mut shared.earlier {
-            earlier.clone_from(&shared.before);
+            // Both lists have room before the first one changes.
+            let copy = Frame {
+                field: memory::copied(&frames[1].field, WHAT)?,
+                points: memory::copied(&frames[1].points, WHAT)?,
+            };
+            *earlier = copy;
         }
-        self.next.points = vec![0.0; 3 * points.len()];
+        [shared.last, shared.before] = frames;
+        self.planned_tets = planned_tets;
+        self.next.points = spare;
         shared.region = region;
         self.plan = plan;
         self.points = points;

@@ -16,6 +16,7 @@ use super::reduced::ReducedRecord;
 use super::upt::UptRecord;
 use crate::error::{Error, Result};
 use crate::kernels::FlushToZero;
+use crate::memory;
 
 const MAGIC: &[u8; 8] = b"UPTSNAP\0";
 const VERSION: u32 = 3;
@@ -75,10 +76,11 @@ impl<'a> Reader<'a> {
                 "holds a list of {stored} numbers, must have {count}"
             )));
         }
-        self.take(4 * count)?
-            .chunks_exact(4)
-            .map(|b| Reader(b).f32())
-            .collect()
+        let mut list = memory::room(count, "a snapshot")?;
+        for b in self.take(4 * count)?.chunks_exact(4) {
+            list.push(Reader(b).f32()?);
+        }
+        Ok(list)
     }
 
     fn contact(&mut self, node_count: usize) -> Result<ContactSet> {
@@ -88,9 +90,12 @@ impl<'a> Reader<'a> {
                 "holds more contact nodes than the mesh has nodes".into(),
             ));
         }
-        let nodes: Vec<u32> = (0..count).map(|_| self.u32()).collect::<Result<_>>()?;
+        let mut nodes = memory::room(count, "a snapshot")?;
+        for _ in 0..count {
+            nodes.push(self.u32()?);
+        }
         let vectors = self.floats(3 * count)?;
-        let mut set = ContactSet::with_capacity(node_count);
+        let mut set = ContactSet::with_capacity(node_count)?;
         set.gather(
             super::Contact::Sparse {
                 nodes: &nodes,
@@ -144,9 +149,21 @@ fn lists(engine: &mut Engine) -> Vec<&mut Vec<f32>> {
 }
 
 impl Core {
+    /// Bytes of a snapshot at most.
+    fn most_bytes(&mut self) -> usize {
+        let count = self.mesh.node_count();
+        let latents: usize = lists(&mut self.engine)
+            .iter()
+            .map(|list| 4 + 4 * list.len())
+            .sum();
+        let (contacts, fields) = (2 * (8 + 16 * count), 2 * (4 + 12 * count));
+        1024 + contacts + latents + fields
+    }
+
     /// The state as bytes.
-    pub(super) fn save(&mut self, published: &RwLock<Published>) -> Vec<u8> {
-        let mut w = Writer(Vec::new());
+    pub(super) fn save(&mut self, published: &RwLock<Published>) -> Result<Vec<u8>> {
+        let most = self.most_bytes();
+        let mut w = Writer(memory::room(most, "a snapshot")?);
         w.0.extend_from_slice(MAGIC);
         w.u32(VERSION);
         w.0.extend_from_slice(&self.model.hash);
@@ -180,11 +197,18 @@ impl Core {
         }
         let digest = Sha256::digest(&w.0);
         w.0.extend_from_slice(&digest);
-        w.0
+        Ok(w.0)
     }
 
     /// Takes a saved state; on error nothing has changed.
     pub(super) fn restore(&mut self, published: &RwLock<Published>, bytes: &[u8]) -> Result<()> {
+        // Asked first: a count that was never set is not followed to the end of the host's memory.
+        if bytes.len() > self.most_bytes() {
+            return Err(Error::Snapshot(format!(
+                "has {} bytes, more than any of this scene",
+                bytes.len()
+            )));
+        }
         if bytes.len() < MAGIC.len() + 4 + DIGEST || &bytes[..MAGIC.len()] != MAGIC {
             return Err(Error::Snapshot("is not a snapshot of a scene".into()));
         }
@@ -238,7 +262,7 @@ impl Core {
 
         // Everything is read and checked. What is computed from it may still fail: the old state is kept until then.
         let _flush = FlushToZero::enter();
-        let old = self.keep(published);
+        let old = self.keep(published)?;
         for (list, saved) in lists(&mut self.engine).into_iter().zip(latents) {
             *list = saved;
         }
@@ -288,27 +312,30 @@ impl Core {
                 &self.contact,
             )?;
         }
-        let region = lock_read(published).region.clone();
-        let points = self.points.clone();
+        let region = self.region_copy(published)?;
+        let points = self.points.copy()?;
         self.set_plan(published, region, points)
     }
 
     /// A copy of everything that a restore overwrites.
-    fn keep(&self, published: &RwLock<Published>) -> Kept {
-        let fields = self.engine.keeps_all_nodes(&self.model).then(|| {
+    fn keep(&self, published: &RwLock<Published>) -> Result<Kept> {
+        let fields = if self.engine.keeps_all_nodes(&self.model) {
             let shared = lock_read(published);
-            [shared.last.field.clone(), shared.before.field.clone()]
-        });
-        Kept {
+            let copy = |field: &[f32]| memory::copied(field, "a copy of the scene's state");
+            Some([copy(&shared.last.field)?, copy(&shared.before.field)?])
+        } else {
+            None
+        };
+        Ok(Kept {
             records: match &self.engine {
                 Engine::Upt(engine, _) => {
-                    Records::Upt(Box::new([engine.last.clone(), engine.before.clone()]))
+                    Records::Upt(Box::new([engine.last.copy()?, engine.before.copy()?]))
                 }
                 Engine::Reduced(engine) => {
-                    Records::Reduced(Box::new([engine.last.clone(), engine.before.clone()]))
+                    Records::Reduced(Box::new([engine.last.copy()?, engine.before.copy()?]))
                 }
             },
-            contacts: [self.contact.clone(), self.contact_before.clone()],
+            contacts: [self.contact.copy()?, self.contact_before.copy()?],
             sources: [self.source, self.source_before],
             step_count: self.step_count,
             quiet: self.quiet,
@@ -316,7 +343,7 @@ impl Core {
             rest_frames: self.rest_frames,
             max_displacement: self.max_displacement,
             fields,
-        }
+        })
     }
 
     /// Takes a kept state back.

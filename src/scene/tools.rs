@@ -62,6 +62,14 @@ impl Scene {
     ) -> Result<T> {
         let mut contacts = lock(&self.tools.contacts)?;
         let mesh = &self.mesh;
+        if contacts.is_none() {
+            // Made of many lists: what they take together is asked for first.
+            let bytes = 64 * mesh.surface_nodes.len() + 24 * mesh.surface_faces.len();
+            crate::memory::probe(
+                bytes + 4 * mesh.positions.len(),
+                "the instruments' contacts",
+            )?;
+        }
         let contacts = contacts.get_or_insert_with(|| {
             InstrumentContacts::new(&mesh.positions, &mesh.surface_faces, &mesh.held_nodes)
         });

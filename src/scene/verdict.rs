@@ -54,6 +54,21 @@ impl Core {
         Ok(verdict)
     }
 
+    /// One line of the log for the flags that this step has and the last one had not; none while they stay.
+    pub(super) fn tell_flags(&mut self, stats: &SceneStats) {
+        let risen = stats.flags & !self.told;
+        self.told = stats.flags;
+        if risen != 0 {
+            tracing::warn!(
+                step = self.step_count,
+                indicator = stats.indicator,
+                largest_mm = stats.max_displacement_mm,
+                "{}",
+                flag::names(risen)
+            );
+        }
+    }
+
     /// The policy for a refused state. `Ok` means that `next` may be published, and says whether it was replaced.
     ///
     /// A step without contact from the scene's own state asks nothing of the host: held, it would be made and refused
@@ -67,7 +82,6 @@ impl Core {
     ) -> Result<bool> {
         let bound = self.model.manifest.envelope.displacement_bound_mm;
         let error = Error::Guard(guard::describe(verdict, stats.max_displacement_mm, bound));
-        tracing::warn!(flags = verdict, "{error}");
         let policy = self.options.guard_policy;
         if policy == GuardPolicy::Report && verdict & flag::NON_FINITE == 0 {
             return Ok(false);
@@ -85,6 +99,7 @@ impl Core {
             }
             return Ok(true);
         }
+        self.tell_flags(stats);
         let mut shared = lock_write(published);
         stats.max_displacement_mm = self.max_displacement;
         shared.stats = *stats;

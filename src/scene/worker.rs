@@ -7,9 +7,11 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use super::contact::ContactSet;
 use super::shared::Shared;
 use super::{Contact, Progress, StepInput};
 use crate::error::{Error, Result};
+use crate::memory;
 
 #[derive(Default)]
 struct Slot {
@@ -18,7 +20,11 @@ struct Slot {
     stop: bool,
     nodes: Vec<u32>,
     vectors: Vec<f32>,
+    /// Errors that were not told: the first one, and how many came after it.
     failed: Option<Error>,
+    failed_later: u64,
+    /// A step has finished since the host was last told that one had.
+    finished: bool,
     ever: bool,
 }
 
@@ -30,10 +36,12 @@ struct Signal {
 }
 
 /// The worker's handle.
-#[derive(Default)]
 pub struct Worker {
     signal: Arc<Signal>,
     thread: Mutex<Option<JoinHandle<()>>>,
+    latest_wins: bool,
+    /// Where a contact is checked.
+    checked: Mutex<ContactSet>,
 }
 
 impl Signal {
@@ -43,28 +51,51 @@ impl Signal {
 }
 
 impl Worker {
-    /// Hands a contact to the worker. With `latest_wins` an input that has not started is replaced.
+    /// A worker without a thread. With `latest_wins` an input that has not started is replaced by the next.
+    pub fn new(latest_wins: bool) -> Worker {
+        Worker {
+            signal: Arc::default(),
+            thread: Mutex::default(),
+            latest_wins,
+            checked: Mutex::default(),
+        }
+    }
+
+    /// Hands a contact on a mesh of `node_count` nodes to the worker, checked.
     pub fn submit(
         &self,
         shared: &Arc<Shared>,
         nodes: &[u32],
         vectors: &[f32],
-        latest_wins: bool,
+        node_count: usize,
     ) -> Result<()> {
+        let mut checked = self.checked.lock().unwrap_or_else(PoisonError::into_inner);
+        checked.gather(Contact::Sparse { nodes, vectors }, node_count)?;
+        drop(checked);
         self.start(shared)?;
         let mut slot = self.signal.lock();
-        if (slot.waiting || slot.running) && !latest_wins {
+        if (slot.waiting || slot.running) && !self.latest_wins {
             return Err(Error::Busy(
                 "a submitted step has not finished; poll or wait first".into(),
             ));
         }
+        // Both have room before either changes: a contact that waits stays whole.
+        let room = |list: usize, have: usize| list.saturating_sub(have);
+        let (more_nodes, more_floats) = (
+            room(nodes.len(), slot.nodes.len()),
+            room(vectors.len(), slot.vectors.len()),
+        );
+        memory::reserve(&mut slot.nodes, more_nodes, "a submitted contact")?;
+        memory::reserve(&mut slot.vectors, more_floats, "a submitted contact")?;
         slot.nodes.clear();
         slot.nodes.extend_from_slice(nodes);
         slot.vectors.clear();
         slot.vectors.extend_from_slice(vectors);
         slot.waiting = true;
         slot.ever = true;
-        slot.failed = None;
+        if !self.latest_wins {
+            slot.finished = false;
+        }
         self.signal.work.notify_one();
         Ok(())
     }
@@ -75,26 +106,35 @@ impl Worker {
         slot.waiting || slot.running
     }
 
-    /// Progress of the last submit; its error, once.
+    /// An error that was not told; else whether a step has finished that was not told, or none is in flight.
     pub fn poll(&self) -> Result<Progress> {
-        Self::progress(&mut self.signal.lock())
+        let mut slot = self.signal.lock();
+        let progress = Self::progress(&mut slot)?;
+        match std::mem::take(&mut slot.finished) {
+            true => Ok(Progress::Done),
+            false => Ok(progress),
+        }
     }
 
-    /// Waits at most `timeout`.
+    /// Waits at most `timeout` until no step is in flight.
     pub fn wait(&self, timeout: Duration) -> Result<Progress> {
-        let until = Instant::now() + timeout;
+        let until = Instant::now().checked_add(timeout);
         let mut slot = self.signal.lock();
         while slot.waiting || slot.running {
-            let now = Instant::now();
-            if now >= until {
+            let left = until.map(|until| until.saturating_duration_since(Instant::now()));
+            let left = left.unwrap_or(Duration::from_secs(3600));
+            if left.is_zero() {
                 break;
             }
             slot = self
                 .signal
                 .done
-                .wait_timeout(slot, until - now)
+                .wait_timeout(slot, left)
                 .unwrap_or_else(PoisonError::into_inner)
                 .0;
+        }
+        if !(slot.waiting || slot.running) {
+            slot.finished = false;
         }
         Self::progress(&mut slot)
     }
@@ -103,13 +143,17 @@ impl Worker {
         if !slot.ever {
             return Err(Error::State("nothing was submitted".into()));
         }
+        if let Some(error) = slot.failed.take() {
+            let later = std::mem::take(&mut slot.failed_later);
+            return Err(match later {
+                0 => error,
+                _ => error.and_more(later),
+            });
+        }
         if slot.waiting || slot.running {
             return Ok(Progress::Pending);
         }
-        match slot.failed.take() {
-            Some(error) => Err(error),
-            None => Ok(Progress::Done),
-        }
+        Ok(Progress::Done)
     }
 
     fn start(&self, shared: &Arc<Shared>) -> Result<()> {
@@ -173,8 +217,10 @@ fn run(shared: &Shared, signal: &Signal) {
         let result = shared.step_blocking(input);
         slot = signal.lock();
         slot.running = false;
-        if let Err(error) = result {
-            slot.failed = Some(error);
+        match result {
+            Ok(()) => slot.finished = true,
+            Err(_) if slot.failed.is_some() => slot.failed_later += 1,
+            Err(error) => slot.failed = Some(error),
         }
         signal.done.notify_all();
     }

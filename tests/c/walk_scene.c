@@ -17,6 +17,7 @@ void walk_region_and_points(void) {
   EXPECT(upt_scene_decode(NULL, contact_nodes, 4, few, 12), UPT_ERR_NULL);
   EXPECT(upt_scene_decode(scene, NULL, 4, few, 12), UPT_ERR_NULL);
   EXPECT(upt_scene_decode(scene, contact_nodes, 4, NULL, 12), UPT_ERR_NULL);
+  EXPECT(upt_scene_decode(scene, NULL, 0, NULL, 0), UPT_OK);
   EXPECT(upt_scene_decode(scene, contact_nodes, 4, few, 9), UPT_ERR_ARGUMENT);
   EXPECT(upt_scene_decode(scene, &far, 1, few, 3), UPT_ERR_ARGUMENT);
   EXPECT(upt_scene_decode(scene, contact_nodes, 4, few, 12), UPT_OK);
@@ -103,6 +104,7 @@ void walk_instrument(void) {
 
   EXPECT(upt_scene_contact_force(NULL, few, 12), UPT_ERR_NULL);
   EXPECT(upt_scene_contact_force(scene, NULL, 12), UPT_ERR_NULL);
+  EXPECT(upt_scene_contact_force(scene, NULL, 0), bare ? UPT_ERR_UNSUPPORTED : UPT_OK);
   EXPECT(upt_scene_step_contacts(scene, contact_nodes, contact_vectors, 4, NULL, 0), UPT_OK);
   status = upt_scene_contact_force(scene, few, 12);
   if (bare) {

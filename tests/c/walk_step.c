@@ -52,7 +52,13 @@ void walk_step(void) {
   upt_scene *scene = make_scene(), *twin = make_scene(), *held = make_scene_with(UPT_GUARD_HOLD);
   float *field = calloc((size_t)floats, sizeof *field);
   uint32_t far[1];
+  uint64_t absurd[5];
   int i;
+  absurd[0] = info.node_count + 1;
+  absurd[1] = 100 * info.node_count;
+  absurd[2] = (uint64_t)1 << 31;
+  absurd[3] = (uint64_t)1 << 59;
+  absurd[4] = UINT64_MAX;
   far[0] = (uint32_t)info.node_count;
   for (i = 0; i < 12; i++) {
     contact_vectors[i] = i % 3 == 2 ? -2.0F : 0.5F;
@@ -82,8 +88,13 @@ void walk_step(void) {
   EXPECT(upt_scene_step_contacts(scene, NULL, contact_vectors, 4, NULL, 0), UPT_ERR_NULL);
   EXPECT(upt_scene_step_contacts(scene, contact_nodes, NULL, 4, NULL, 0), UPT_ERR_NULL);
   EXPECT(upt_scene_step_contacts(scene, far, contact_vectors, 1, NULL, 0), UPT_ERR_ARGUMENT);
-  EXPECT(upt_scene_step_contacts(scene, contact_nodes, contact_vectors, UINT64_MAX, NULL, 0),
-         UPT_ERR_ARGUMENT);
+  for (i = 0; i < (int)(sizeof absurd / sizeof *absurd); i++) {
+    EXPECT(upt_scene_step_contacts(scene, contact_nodes, contact_vectors, absurd[i], NULL, 0),
+           UPT_ERR_ARGUMENT);
+    EXPECT(upt_scene_submit(scene, contact_nodes, contact_vectors, absurd[i]), UPT_ERR_ARGUMENT);
+    EXPECT(upt_scene_step_contacts(scene, contact_nodes, before, absurd[i], before, floats),
+           UPT_ERR_ARGUMENT);
+  }
   contact_vectors[5] = INFINITY;
   EXPECT(upt_scene_step_contacts(scene, contact_nodes, contact_vectors, 4, NULL, 0),
          UPT_ERR_NON_FINITE);
@@ -99,7 +110,8 @@ void walk_step(void) {
   EXPECT(upt_scene_destroy(held), UPT_OK);
 
   EXPECT(upt_scene_read(NULL, after, floats), UPT_ERR_NULL);
-  EXPECT(upt_scene_read(scene, NULL, 0), UPT_ERR_NULL);
+  EXPECT(upt_scene_read(scene, NULL, floats), UPT_ERR_NULL);
+  EXPECT(upt_scene_read(scene, NULL, 0), UPT_ERR_ARGUMENT);
   EXPECT(upt_scene_read(scene, after, 3), UPT_ERR_ARGUMENT);
 
   /* The output may be the memory of an input. */
@@ -126,7 +138,10 @@ void walk_step(void) {
 
 void walk_worker(void) {
   upt_scene *scene = make_scene(), *twin = make_scene(), *held = make_scene_with(UPT_GUARD_HOLD);
+  uint32_t far[1], twice[2];
   int i;
+  far[0] = (uint32_t)info.node_count;
+  twice[0] = twice[1] = contact_nodes[0];
   EXPECT(upt_scene_submit(NULL, contact_nodes, contact_vectors, 4), UPT_ERR_NULL);
   EXPECT(upt_scene_submit(scene, NULL, contact_vectors, 4), UPT_ERR_NULL);
   EXPECT(upt_scene_poll(NULL), UPT_ERR_NULL);
@@ -157,6 +172,10 @@ void walk_worker(void) {
   }
   EXPECT_TRUE(expect_seen[99]);
   EXPECT_TRUE(expect_seen[-UPT_ERR_BUSY]);
+
+  /* What is wrong with an input is told at once. */
+  EXPECT(upt_scene_submit(scene, far, contact_vectors, 1), UPT_ERR_ARGUMENT);
+  EXPECT(upt_scene_submit(scene, twice, contact_vectors, 2), UPT_ERR_ARGUMENT);
 
   /* The error of a submitted step is given once. */
   contact_vectors[5] = 1000.0F;

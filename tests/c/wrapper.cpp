@@ -38,6 +38,11 @@ int main(int argc, char **argv) {
   EXPECT_TRUE(model.describe().front() == '{' && model.describe().back() == '}');
 
   upt::Scene scene(model);
+  // A frame without contact: empty lists everywhere.
+  EXPECT(scene.step_contacts({}, {}), UPT_OK);
+  EXPECT(scene.contact_force({}), UPT_OK);
+  EXPECT(scene.decode({}, {}), UPT_OK);
+  EXPECT(scene.reset(), UPT_OK);
   upt::Model moved = std::move(model);
   EXPECT_TRUE(!model && moved);
   EXPECT_TRUE(thrown([&] { (void)model.info(); }) == UPT_ERR_NULL);

@@ -84,6 +84,9 @@ def parser() -> argparse.ArgumentParser:
     anchors.add_argument("--spacing", type=float, required=True, help="least distance of two anchors, mm")
     anchors.add_argument("--neighbours", type=int, default=8, help="anchors that a node follows")
 
+    seal = commands.add_parser("seal", help="renew a manifest's digest and `requires` after a change by hand")
+    seal.add_argument("bundle", type=Path, nargs="+", help="bundle folders, changed in place")
+
     ablate = commands.add_parser("ablate", help="variants of a configuration at one small budget: tables and plots")
     ablate.add_argument("suite", choices=["windows", "tricks"])
     ablate.add_argument("--config", type=Path, required=True)
@@ -125,6 +128,12 @@ def main(arguments: list[str] | None = None) -> int:
             from upt_training.anchors import anchors_command
 
             return anchors_command(options)
+        if options.command == "seal":
+            from upt_training.bundle_folder import seal
+
+            for bundle in options.bundle:
+                seal(bundle)
+            return 0
         if options.command == "variants":
             from upt_training.variants import variants_command
 

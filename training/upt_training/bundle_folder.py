@@ -12,6 +12,7 @@ from pathlib import Path
 from upt_training.errors import InputError
 
 MANIFEST = "bundle.json"
+DIGEST = "manifest_sha256"
 
 
 @contextmanager
@@ -43,12 +44,43 @@ def read_manifest(bundle: Path) -> dict:
 
 
 def write_manifest(folder: Path, manifest: dict) -> None:
-    """Write `bundle.json`, with every other file's `{"bytes", "sha256"}` under `files`."""
+    """Write `bundle.json`: every other file's `{"bytes", "sha256"}` under `files`, what a reader must know under
+    `requires`, and the manifest's own digest."""
     files = sorted(path for path in folder.iterdir() if not path.name.startswith(MANIFEST))
     manifest["files"] = {path.name: file_entry(path) for path in files}
+    _write(folder, manifest, indent=2)
+
+
+def seal(folder: Path, entries: dict | None = None) -> None:
+    """Renew what a manifest says of itself after a change by hand, and set `entries`; the layout stays."""
+    manifest = read_manifest(folder) | (entries or {})
+    second = (folder / MANIFEST).read_text(encoding="utf-8").split("\n")[1]
+    _write(folder, manifest, indent=len(second) - len(second.lstrip(" ")))
+
+
+def _write(folder: Path, manifest: dict, indent: int) -> None:
+    """`requires`, the digest (docs/formats.md, "The manifest's digest"), and the file, moved into place."""
+    needed = requirements(manifest)
+    manifest.pop("requires", None)
+    if needed:
+        manifest["requires"] = needed
+    blank = "0" * 64
+    manifest.pop(DIGEST, None)
+    manifest[DIGEST] = blank
+    text = json.dumps(manifest, indent=indent) + "\n"
+    manifest[DIGEST] = hashlib.sha256(text.encode("utf-8")).hexdigest()
     partial = folder / (MANIFEST + ".partial")
-    partial.write_text(json.dumps(manifest, indent=2) + "\n", encoding="utf-8")
+    partial.write_text(text.replace(blank, manifest[DIGEST]), encoding="utf-8")
     partial.replace(folder / MANIFEST)
+
+
+def requirements(manifest: dict) -> list[str]:
+    """Parts of a bundle that change what a step gives: a library that does not know one must refuse the bundle."""
+    parts = {
+        "anchors": "anchors" in manifest.get("upt", {}),
+        "vibration": "vibration" in manifest.get("prior", {}),
+    }
+    return [name for name, used in parts.items() if used]
 
 
 def file_entry(path: Path) -> dict:

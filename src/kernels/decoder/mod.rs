@@ -20,6 +20,7 @@ pub use weights::{DecoderTokens, DecoderWeights, PackedDecoder};
 use super::isa::Isa;
 use super::parts::Parts;
 use super::pool::{Pool, PoolError};
+use crate::memory;
 
 /// Arithmetic of the matrix products.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -57,11 +58,25 @@ pub(super) struct CacheLine(pub(super) [f32; 16]);
 impl DecoderScratch {
     /// Room for `threads` workers on tiles of any instruction set.
     pub fn new(decoder: &PackedDecoder, tokens: usize, threads: usize) -> Self {
+        Self::try_new(decoder, tokens, threads).expect("memory for the decoder's threads")
+    }
+
+    /// As [`DecoderScratch::new`].
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
+    pub fn try_new(decoder: &PackedDecoder, tokens: usize, threads: usize) -> crate::Result<Self> {
         let a_worker = tile::scratch_floats(decoder, tokens).div_ceil(16);
-        Self {
-            blocks: vec![CacheLine([0.0; 16]); a_worker * threads],
+        let line = CacheLine([0.0; 16]);
+        Ok(Self {
+            blocks: memory::filled(a_worker * threads, line, "the decoder's threads")?,
             a_worker,
-        }
+        })
+    }
+
+    /// Bytes held.
+    pub fn memory_bytes(&self) -> usize {
+        64 * self.blocks.len()
     }
 }
 

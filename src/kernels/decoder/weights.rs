@@ -5,6 +5,7 @@
 //! output. The affine parts of LN_2 and LN_3 are folded into `W_1` and `W_3`; the attention's
 //! `1/sqrt(h/heads)` and the `log2 e` of its exponential are folded into the keys.
 
+use crate::memory;
 use half::bf16;
 
 /// Outputs a group.
@@ -214,19 +215,41 @@ pub struct DecoderTokens {
 impl DecoderTokens {
     /// Room for `tokens = L` latent tokens; zeros until [`DecoderTokens::set`].
     pub fn new(decoder: &PackedDecoder, tokens: usize) -> Self {
+        Self::try_new(decoder, tokens).expect("memory for the decoder's tokens")
+    }
+
+    /// As [`DecoderTokens::new`].
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
+    pub fn try_new(decoder: &PackedDecoder, tokens: usize) -> crate::Result<Self> {
+        const WHAT: &str = "the decoder's tokens";
         let (h, heads) = (decoder.hidden, decoder.heads);
         let width = h / heads;
-        Self {
+        let (key_pairs, value_pairs) = (pair_count(tokens, width), pair_count(width, tokens));
+        Ok(Self {
             tokens,
             hidden: h,
             heads,
-            keys: vec![0.0; tokens * h],
-            values: vec![0.0; tokens * h],
-            key_panels: vec![0.0; heads * panel_floats(tokens, width)],
-            value_panels: vec![0.0; heads * panel_floats(width, tokens)],
-            key_pairs: vec![bf16::ZERO; heads * pair_count(tokens, width)],
-            value_pairs: vec![bf16::ZERO; heads * pair_count(width, tokens)],
-        }
+            keys: memory::zeros(tokens * h, WHAT)?,
+            values: memory::zeros(tokens * h, WHAT)?,
+            key_panels: memory::zeros(heads * panel_floats(tokens, width), WHAT)?,
+            value_panels: memory::zeros(heads * panel_floats(width, tokens), WHAT)?,
+            key_pairs: memory::filled(heads * key_pairs, bf16::ZERO, WHAT)?,
+            value_pairs: memory::filled(heads * value_pairs, bf16::ZERO, WHAT)?,
+        })
+    }
+
+    /// Bytes held.
+    pub fn memory_bytes(&self) -> usize {
+        let floats = [
+            &self.keys,
+            &self.values,
+            &self.key_panels,
+            &self.value_panels,
+        ];
+        4 * floats.iter().map(|list| list.len()).sum::<usize>()
+            + 2 * (self.key_pairs.len() + self.value_pairs.len())
     }
 
     /// Takes a step's `keys [L,h]` and `values [L,h]`, the outputs of `latent.onnx`.

@@ -3,6 +3,7 @@
 use crate::error::{Error, Result};
 use crate::kernels::Pool;
 use crate::kernels::parts::Parts;
+use crate::memory;
 use crate::model::Anchors;
 
 /// Nodes a chunk of the interpolation.
@@ -19,13 +20,14 @@ pub struct AnchorField {
 
 impl AnchorField {
     /// Room for a mesh of `node_count` nodes.
-    pub fn new(anchors: &Anchors, node_count: usize) -> AnchorField {
-        AnchorField {
-            asked: Vec::with_capacity(node_count),
-            anchors: Vec::with_capacity(anchors.nodes().len()),
-            used: vec![false; node_count],
-            field: vec![0.0; 3 * node_count],
-        }
+    pub fn new(anchors: &Anchors, node_count: usize) -> Result<AnchorField> {
+        const WHAT: &str = "a scene's anchors";
+        Ok(AnchorField {
+            asked: memory::room(node_count, WHAT)?,
+            anchors: memory::room(anchors.nodes().len(), WHAT)?,
+            used: memory::filled(node_count, false, WHAT)?,
+            field: memory::zeros(3 * node_count, WHAT)?,
+        })
     }
 
     /// The nodes to decode, so that `nodes` can be interpolated, ascending, and the field `[K,3]` for them.

@@ -44,6 +44,18 @@ impl Decoders {
         })
     }
 
+    /// Bytes of the sessions' tensors.
+    pub fn memory_bytes(&self) -> usize {
+        match self {
+            Decoders::Native => 0,
+            Decoders::Tiles(stages) => stages
+                .iter()
+                .map(|stage| stage.lock().map_or(0, |stage| stage.memory_bytes()))
+                .sum(),
+            Decoders::Resident(stage) => stage.memory_bytes(),
+        }
+    }
+
     /// Which kernel it is.
     pub fn kernel(&self) -> DecoderKernel {
         match self {

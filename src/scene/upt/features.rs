@@ -1,5 +1,7 @@
 //! The encoder's node features of kind `upt`, normalised as the bundle says: `[encode_nodes, f]`.
 
+use std::hint::black_box;
+
 use super::UptInput;
 use super::record::UptRecord;
 use crate::bundle::Feature;
@@ -16,7 +18,7 @@ pub(super) fn fill_features(
 ) {
     let width = kind.entry.feature_width();
     let normalisation = &kind.entry.normalisation;
-    let (mean, std) = (normalisation.mean, normalisation.std);
+    let (mean, inverse) = (normalisation.mean, inverse(normalisation.std));
     let mut column = 0;
     for &feature in &kind.entry.features {
         let field = match feature {
@@ -32,12 +34,12 @@ pub(super) fn fill_features(
                 for (row, &node) in all.zip(&tables.encode_nodes) {
                     for axis in 0..3 {
                         let x = field[3 * node as usize + axis];
-                        row[column + axis] = (x - mean[axis]) / std[axis];
+                        row[column + axis] = (x - mean[axis]) * inverse[axis];
                     }
                 }
             }
             None if feature == Feature::Collision => {
-                let zero = [0, 1, 2].map(|axis| (0.0 - mean[axis]) / std[axis]);
+                let zero = [0, 1, 2].map(|axis| (0.0 - mean[axis]) * inverse[axis]);
                 all.for_each(|row| row[column..column + 3].copy_from_slice(&zero));
             }
             None => all.for_each(|row| row[column] = 0.0),
@@ -54,11 +56,16 @@ pub(super) fn fill_features(
                     row[column] = 1.0;
                 } else {
                     for axis in 0..3 {
-                        row[column + axis] = (c[axis] - mean[axis]) / std[axis];
+                        row[column + axis] = (c[axis] - mean[axis]) * inverse[axis];
                     }
                 }
             }
         }
         column += feature.width();
     }
+}
+
+/// One number after another: a quotient of three numbers in registers of four is 0/0 in the fourth, an invalid operation.
+fn inverse(std: [f32; 3]) -> [f32; 3] {
+    std.map(|x| black_box(1.0 / black_box(x)))
 }

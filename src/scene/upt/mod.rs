@@ -25,6 +25,7 @@ use crate::kernels::aggregate::{Csr, encode_aggregate};
 use crate::kernels::decoder::{DecoderPrecision, DecoderScratch, DecoderTokens};
 use crate::kernels::encode::LowRank;
 use crate::kernels::{Isa, Pool};
+use crate::memory;
 use crate::model::{Model, UptModel, UptTables};
 use crate::onnx::Stage;
 use crate::options::{DecoderKernel, Precision, StepPath};
@@ -118,17 +119,16 @@ impl UptEngine {
         let uses_prior = kind.entry.needs_prior();
         let table = model.prior.as_ref().filter(|_| uses_prior);
         let kv = dims.latent_tokens * dims.decoder;
-        let record = UptRecord {
-            keys: vec![0.0; kv],
-            values: vec![0.0; kv],
-            q_prior: vec![0.0; table.map_or(0, PriorTable::width)],
-            prior_field: vec![0.0; table.map_or(0, |_| 3 * node_count)],
-            vibration: vec![
-                0.0;
-                table
-                    .and_then(|table| table.vibration.as_ref())
-                    .map_or(0, |vibration| 2 * vibration.count())
-            ],
+        let vibration = table.and_then(|table| table.vibration.as_ref());
+        let zeros = |count| memory::zeros(count, "a scene's latent states");
+        let record = || {
+            Ok::<_, Error>(UptRecord {
+                keys: zeros(kv)?,
+                values: zeros(kv)?,
+                q_prior: zeros(table.map_or(0, PriorTable::width))?,
+                prior_field: zeros(table.map_or(0, |_| 3 * node_count))?,
+                vibration: zeros(vibration.map_or(0, |vibration| 2 * vibration.count()))?,
+            })
         };
         let (runtime, plan, threads) = (model.runtime, &model.plan, pool.threads());
         let path = if choice.whole {
@@ -137,20 +137,25 @@ impl UptEngine {
             let supernodes = tables.graph.supernodes.len();
             Path::Split {
                 latent: Box::new(kind.latent_stage(runtime, plan, threads, supernodes)?),
-                features: vec![0.0; tables.encode_nodes.len() * kind.entry.feature_width()],
-                scratch: vec![0.0; threads * dims.encoder],
+                features: zeros(tables.encode_nodes.len() * kind.entry.feature_width())?,
+                scratch: zeros(threads * dims.encoder)?,
             }
         };
         Ok(UptEngine {
-            response: table.map(ContactResponse::new),
+            response: table.map(ContactResponse::new).transpose()?,
             path,
-            tokens: DecoderTokens::new(&kind.decoder, dims.latent_tokens),
-            decoder_scratch: DecoderScratch::new(&kind.decoder, dims.latent_tokens, pool.threads()),
+            tokens: DecoderTokens::try_new(&kind.decoder, dims.latent_tokens)?,
+            decoder_scratch: DecoderScratch::try_new(
+                &kind.decoder,
+                dims.latent_tokens,
+                pool.threads(),
+            )?,
             decoders: Decoders::new(model, kind, tables, choice.kernel, threads)?,
             anchors: tables
                 .anchors
                 .as_ref()
                 .map(|anchors| AnchorField::new(anchors, node_count))
+                .transpose()?
                 .unwrap_or_default(),
             precision: if choice.precision == Precision::Bf16 && Isa::has_bf16() {
                 DecoderPrecision::Bf16
@@ -158,9 +163,9 @@ impl UptEngine {
                 DecoderPrecision::F32
             },
             graphs: kind.precision,
-            next: record.clone(),
-            last: record.clone(),
-            before: record,
+            next: record()?,
+            last: record()?,
+            before: record()?,
         })
     }
 
@@ -323,18 +328,20 @@ impl UptEngine {
 
     /// Bytes of the buffers.
     pub fn memory_bytes(&self) -> usize {
-        let record = &self.next;
-        let floats = record.keys.len()
-            + record.values.len()
-            + record.q_prior.len()
-            + record.prior_field.len()
-            + record.vibration.len();
         let own = match &self.path {
             Path::Split {
                 features, scratch, ..
-            } => features.len() + scratch.len(),
+            } => 4 * (features.len() + scratch.len()),
             Path::Whole(_) => 0,
         };
-        4 * (3 * floats + own) + self.anchors.memory_bytes()
+        let response = self.response.as_ref();
+        3 * self.next.memory_bytes()
+            + own
+            + self.stage().memory_bytes()
+            + self.decoders.memory_bytes()
+            + self.tokens.memory_bytes()
+            + self.decoder_scratch.memory_bytes()
+            + response.map_or(0, ContactResponse::memory_bytes)
+            + self.anchors.memory_bytes()
     }
 }

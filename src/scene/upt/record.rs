@@ -1,7 +1,10 @@
 //! What a `upt` scene keeps of a step.
 
+use crate::error::Result;
+use crate::memory;
+
 /// The latent state after one step.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub struct UptRecord {
     /// Decoder keys `[L,h]`.
     pub keys: Vec<f32>,
@@ -16,6 +19,27 @@ pub struct UptRecord {
 }
 
 impl UptRecord {
+    /// A copy.
+    pub fn copy(&self) -> Result<UptRecord> {
+        let copy = |values: &[f32]| memory::copied(values, "a scene's latent states");
+        Ok(UptRecord {
+            keys: copy(&self.keys)?,
+            values: copy(&self.values)?,
+            q_prior: copy(&self.q_prior)?,
+            prior_field: copy(&self.prior_field)?,
+            vibration: copy(&self.vibration)?,
+        })
+    }
+
+    /// Bytes held.
+    pub fn memory_bytes(&self) -> usize {
+        4 * (self.keys.len()
+            + self.values.len()
+            + self.q_prior.len()
+            + self.prior_field.len()
+            + self.vibration.len())
+    }
+
     /// Rest.
     pub fn clear(&mut self) {
         for values in [

@@ -8,6 +8,7 @@ use std::time::Instant;
 use super::{Choice, Means, UptEngine};
 use crate::error::Result;
 use crate::kernels::{Isa, Pool};
+use crate::memory;
 use crate::model::{Model, UptModel, UptTables};
 use crate::options::{DecoderKernel, Precision, Provider, SceneOptions, StepPath};
 use crate::scene::engine::Which;
@@ -87,7 +88,7 @@ impl Parts<'_> {
 
     /// A device's first runs load kernels and build engines.
     fn warm(&self, mut engine: UptEngine, on_cpu: bool) -> Result<UptEngine> {
-        let mut field = vec![0.0; 3 * self.node_count];
+        let mut field = memory::zeros(3 * self.node_count, "a timed step")?;
         for _ in 0..if on_cpu { 0 } else { WARM_UP } {
             self.time(&mut engine, &mut field)?;
         }
@@ -95,7 +96,7 @@ impl Parts<'_> {
     }
 
     fn faster(&self, mut split: UptEngine, mut whole: UptEngine) -> Result<UptEngine> {
-        let mut field = vec![0.0; 3 * self.node_count];
+        let mut field = memory::zeros(3 * self.node_count, "a timed step")?;
         let (mut split_ms, mut whole_ms) = (Vec::new(), Vec::new());
         for turn in 0..WARM_UP + TIMED {
             let times = [
@@ -121,7 +122,7 @@ impl Parts<'_> {
             kind: self.kind,
             tables: self.tables,
         };
-        let nodes: Vec<u32> = (0..self.node_count as u32).collect();
+        let nodes = memory::collected(self.node_count, 0..self.node_count as u32, "a timed step")?;
         let start = Instant::now();
         engine.network(means)?;
         engine.decode_mesh(means, Which::Next, &nodes, field)?;

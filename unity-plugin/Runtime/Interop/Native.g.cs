@@ -29,11 +29,11 @@ namespace Upt.Interop
         public int* providers;
         /// <summary>Entries in `providers`.</summary>
         public ulong provider_count;
-        /// <summary>Device of GPU providers.</summary>
+        /// <summary>Device of GPU providers, from 0.</summary>
         public int device_id;
         /// <summary>`UPT_PRECISION_*`.</summary>
         public int precision;
-        /// <summary>Bytes; 0: no limit.</summary>
+        /// <summary>Bytes; 0: no limit. Needs a GPU provider in `providers`.</summary>
         public ulong gpu_memory_limit;
         /// <summary>Folder for compiled engines; NULL: none is kept.</summary>
         public byte* cache_dir;
@@ -93,7 +93,7 @@ namespace Upt.Interop
         public uint threads;
         /// <summary>`UPT_KERNEL_*`: who decodes.</summary>
         public int kernel;
-        /// <summary>`UPT_PRECISION_*` of the native decoder.</summary>
+        /// <summary>`UPT_PRECISION_*` of the native decoder; 0: the model's, `UPT_PRECISION_FORCE_F32`: float32 whatever the model has.</summary>
         public int precision;
         /// <summary>`UPT_GUARD_*`.</summary>
         public int guard_policy;
@@ -181,7 +181,7 @@ namespace Upt.Interop
         public int precision;
         /// <summary>Largest displacement among the decoded nodes, mm.</summary>
         public float max_displacement_mm;
-        /// <summary>Calibrated trust indicator; 0: good.</summary>
+        /// <summary>Largest ratio of push, rate of push, contact area and number of sites to what the model was trained on; above 1: outside.</summary>
         public float indicator;
         /// <summary>1: the scene sleeps.</summary>
         public byte sleeping;
@@ -224,6 +224,8 @@ namespace Upt.Interop
         public const int UPT_ERR_STATE = -7;
         /// <summary>This build or this bundle cannot do it.</summary>
         public const int UPT_ERR_UNSUPPORTED = -8;
+        /// <summary>There is no memory for what the call needs.</summary>
+        public const int UPT_ERR_OUT_OF_MEMORY = -9;
         /// <summary>ONNX Runtime is missing, too old or broken; the message lists what was tried.</summary>
         public const int UPT_ERR_RUNTIME = -20;
         /// <summary>No provider of the list can run the model.</summary>
@@ -256,7 +258,7 @@ namespace Upt.Interop
         public const int UPT_LOG_OFF = 0;
         /// <summary>Failures.</summary>
         public const int UPT_LOG_ERROR = 1;
-        /// <summary>Fallbacks and envelope violations.</summary>
+        /// <summary>Fallbacks, and once for each flag that rises: contacts outside of the envelope, states that the guard refuses.</summary>
         public const int UPT_LOG_WARN = 2;
         /// <summary>Loading: what was opened and who runs it.</summary>
         public const int UPT_LOG_INFO = 3;
@@ -264,7 +266,7 @@ namespace Upt.Interop
         public const int UPT_LOG_DEBUG = 4;
         /// <summary>Everything.</summary>
         public const int UPT_LOG_TRACE = 5;
-        /// <summary>32-bit floats: the reference.</summary>
+        /// <summary>32-bit floats: the reference. Of a scene's options: what its model has.</summary>
         public const int UPT_PRECISION_F32 = 0;
         /// <summary>bfloat16 products where the CPU has them.</summary>
         public const int UPT_PRECISION_BF16 = 1;
@@ -272,6 +274,8 @@ namespace Upt.Interop
         public const int UPT_PRECISION_F16 = 2;
         /// <summary>8-bit integers: the bundle's `*.int8.onnx`.</summary>
         public const int UPT_PRECISION_INT8 = 3;
+        /// <summary>Of options only: 32-bit floats also in a scene of a model that was opened with another precision.</summary>
+        public const int UPT_PRECISION_FORCE_F32 = 4;
         /// <summary>The library chooses the decoder.</summary>
         public const int UPT_KERNEL_AUTO = 0;
         /// <summary>The fused native decoder.</summary>
@@ -382,7 +386,7 @@ namespace Upt.Interop
         ///
         /// user: handed to the receiver. level: `UPT_LOG_*`; less severe messages are not made at all. The receiver runs on
         /// the host's threads only, inside of a call or at its end: what the library's own threads say waits for the next call.
-        /// Threads: any, but not from inside the receiver. Errors: `UPT_ERR_ARGUMENT` for an unknown level, `UPT_ERR_STATE`
+        /// Threads: any. Errors: `UPT_ERR_ARGUMENT` for an unknown level, `UPT_ERR_STATE` from inside of the receiver, or
         /// when the process is a Rust program that has a `tracing` subscriber of its own.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
@@ -398,11 +402,11 @@ namespace Upt.Interop
         public static extern int upt_providers(byte* @out, ulong capacity, ulong* needed);
 
         /// <summary>
-        /// Opens and checks a bundle (sizes, dtypes, SHA-256) and makes it ready to step.
+        /// Opens and checks a bundle (sizes, dtypes, the SHA-256 of the manifest and of each file that is read) and makes it ready to step.
         ///
         /// path: the bundle's folder, UTF-8. options: NULL means the defaults. out: the new model.
         /// Threads: any. Errors: `UPT_ERR_IO`, `UPT_ERR_BUNDLE`, `UPT_ERR_VERSION`, `UPT_ERR_RUNTIME`, `UPT_ERR_PROVIDER`,
-        /// `UPT_ERR_UNSUPPORTED`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NULL`.
+        /// `UPT_ERR_UNSUPPORTED`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NULL`, `UPT_ERR_OUT_OF_MEMORY`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_model_open(byte* path, upt_model_options* options, IntPtr* @out);
@@ -456,7 +460,7 @@ namespace Upt.Interop
         ///
         /// options: NULL means the defaults. out: the new scene. The scene keeps what it needs of the model.
         /// Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`,
-        /// `UPT_ERR_UNSUPPORTED`, `UPT_ERR_IO`, `UPT_ERR_BUNDLE`.
+        /// `UPT_ERR_UNSUPPORTED`, `UPT_ERR_IO`, `UPT_ERR_BUNDLE`, `UPT_ERR_OUT_OF_MEMORY`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_scene_create(IntPtr model, upt_scene_options* options, IntPtr* @out);
@@ -486,7 +490,8 @@ namespace Upt.Interop
         /// out: `[n,3]`, mm (n: K, or the region's count), may be NULL; it may be the same memory as an input, at the price of
         /// a copy. out_count: floats in out, 3 n; 0 when out is NULL.
         /// Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`,
-        /// `UPT_ERR_NON_FINITE`, `UPT_ERR_UNSUPPORTED`, `UPT_ERR_GUARD`, `UPT_ERR_RUNTIME`, `UPT_ERR_PANIC`; the state stays.
+        /// `UPT_ERR_NON_FINITE`, `UPT_ERR_UNSUPPORTED`, `UPT_ERR_GUARD`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`; the
+        /// state stays.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_scene_step(IntPtr scene, float* displacement, float* collision, float* @out, ulong out_count);
@@ -496,7 +501,7 @@ namespace Upt.Interop
         ///
         /// contact_nodes: `[m]` node indices, each at most once, in any order. contact_vectors: `[m,3]`, mm: the displacement of
         /// these nodes at the end of the step. contact_count: m; 0 means no contact and both may be NULL.
-        /// out, out_count, threads and errors: as `upt_scene_step`; also `UPT_ERR_ARGUMENT` for an index of K or more.
+        /// out, out_count, threads and errors: as `upt_scene_step`; also `UPT_ERR_ARGUMENT` for an index or a count beyond K.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_scene_step_contacts(IntPtr scene, uint* contact_nodes, float* contact_vectors, ulong contact_count, float* @out, ulong out_count);
@@ -505,7 +510,7 @@ namespace Upt.Interop
         /// Copies the last published state.
         ///
         /// out: `[n,3]`, mm, in the region's order (all nodes when there is none). out_count: floats in out, 3 n.
-        /// Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`, `UPT_ERR_PANIC`.
+        /// Threads: any at any time, also while a step runs. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_PANIC`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_scene_read(IntPtr scene, float* @out, ulong out_count);
@@ -513,9 +518,11 @@ namespace Upt.Interop
         /// <summary>
         /// Starts a step on the scene's worker and returns at once.
         ///
-        /// contact_nodes, contact_vectors, contact_count: as `upt_scene_step_contacts`; copied before the call returns.
+        /// contact_nodes, contact_vectors, contact_count: as `upt_scene_step_contacts`; checked and copied before the call returns.
+        /// An error of an earlier step that was not told yet stays to be told.
         /// Threads: one at a time. Errors: `UPT_ERR_BUSY` while a step is in flight (unless the scene was made with
-        /// `latest_wins`), `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NON_FINITE`, `UPT_ERR_PANIC`.
+        /// `latest_wins`), `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` (also for an index or a count beyond K, or a node that is
+        /// listed twice), `UPT_ERR_NON_FINITE`, `UPT_ERR_STATE` where no thread can be started, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_scene_submit(IntPtr scene, uint* contact_nodes, float* contact_vectors, ulong contact_count);
@@ -523,7 +530,8 @@ namespace Upt.Interop
         /// <summary>
         /// Asks whether the submitted step has finished; never waits.
         ///
-        /// Returns `UPT_OK`, `UPT_PENDING`, or the step's error (once).
+        /// Returns `UPT_OK`, `UPT_PENDING`, or the step's error (once, also after a later submit). With `latest_wins`, `UPT_OK` says that
+        /// a step has finished since the last `UPT_OK`, while another may be in flight: a host that submits in every frame sees each new state.
         /// Threads: one at a time. Errors: the step's; `UPT_ERR_STATE` when nothing was submitted, `UPT_ERR_NULL`,
         /// `UPT_ERR_HANDLE`.
         /// </summary>
@@ -533,7 +541,7 @@ namespace Upt.Interop
         /// <summary>
         /// Waits for the submitted step, at most `timeout_ms` milliseconds.
         ///
-        /// Returns `UPT_OK`, `UPT_PENDING` when the time is over, or the step's error (once).
+        /// Returns `UPT_OK` when none is in flight, `UPT_PENDING` when the time is over, or the step's error (once).
         /// Threads: one at a time. Errors: as `upt_scene_poll`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
@@ -544,7 +552,7 @@ namespace Upt.Interop
         ///
         /// alpha: 0 the state before, 1 the last state; from 0 to 1. out: `[n,3]`, mm, in the region's order.
         /// out_count: floats in out, 3 n.
-        /// Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`,
+        /// Threads: any at any time, also while a step runs. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT`,
         /// `UPT_ERR_NON_FINITE`, `UPT_ERR_PANIC`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
@@ -553,9 +561,9 @@ namespace Upt.Interop
         /// <summary>
         /// Restricts what a step decodes and what `upt_scene_step`, `_read` and `_sample` write to these nodes, in this order.
         ///
-        /// nodes: `[n]` indices, in any order; NULL with count 0: all nodes. A step costs less with fewer nodes.
+        /// nodes: `[n]` indices, n at most K, in any order; NULL with count 0: all nodes. A step costs less with fewer nodes.
         /// Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT` for an index of K
-        /// or more, `UPT_ERR_PANIC`.
+        /// or more or too many of them, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_scene_set_region(IntPtr scene, uint* nodes, ulong count);
@@ -563,9 +571,9 @@ namespace Upt.Interop
         /// <summary>
         /// Decodes any nodes of the last state, whatever the region is.
         ///
-        /// nodes: `[n]` indices. out: `[n,3]`, mm. out_count: floats in out, 3 n.
+        /// nodes: `[n]` indices, n at most K. out: `[n,3]`, mm. out_count: floats in out, 3 n.
         /// Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`,
-        /// `UPT_ERR_STATE` before the first step, `UPT_ERR_PANIC`.
+        /// `UPT_ERR_STATE` before the first step, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_scene_decode(IntPtr scene, uint* nodes, ulong count, float* @out, ulong out_count);
@@ -576,7 +584,7 @@ namespace Upt.Interop
         /// points: `[n,3]`, rest positions, mm; NULL with count 0 detaches. count: points, n. A bundle of kind `upt` decodes each where it
         /// is, in every step (unless the scene was made with `interpolate_points`); one of kind `reduced` interpolates between nodes.
         /// Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_NON_FINITE`,
-        /// `UPT_ERR_ARGUMENT`, `UPT_ERR_UNSUPPORTED`, `UPT_ERR_PANIC`.
+        /// `UPT_ERR_ARGUMENT`, `UPT_ERR_UNSUPPORTED`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_scene_attach_points(IntPtr scene, float* points, ulong count);
@@ -585,8 +593,8 @@ namespace Upt.Interop
         /// Copies the displacement of the attached points in the last state.
         ///
         /// out: `[n,3]`, mm. out_count: floats in out, 3 n.
-        /// Threads: one at a time. Errors: `UPT_ERR_STATE` when no points are attached, `UPT_ERR_NULL`, `UPT_ERR_HANDLE`,
-        /// `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`, `UPT_ERR_PANIC`.
+        /// Threads: any at any time, also while a step runs. Errors: `UPT_ERR_STATE` when no points are attached, `UPT_ERR_NULL`,
+        /// `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_PANIC`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_scene_read_points(IntPtr scene, float* @out, ulong out_count);
@@ -595,7 +603,7 @@ namespace Upt.Interop
         /// As `upt_scene_sample`, at the attached points.
         ///
         /// alpha: 0 the state before, 1 the last state. out: `[n,3]`, mm. out_count: floats in out, 3 n.
-        /// Threads: one at a time. Errors: as `upt_scene_read_points`, and `UPT_ERR_NON_FINITE`.
+        /// Threads: any at any time, also while a step runs. Errors: as `upt_scene_read_points`, and `UPT_ERR_NON_FINITE`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_scene_sample_points(IntPtr scene, double alpha, float* @out, ulong out_count);
@@ -609,7 +617,7 @@ namespace Upt.Interop
         /// `[capacity,3]`, mm; both may be NULL with capacity 0, which only asks. contact_count: contacts found, always written.
         /// Threads: one at a time. Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "contact", `UPT_ERR_NULL`,
         /// `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_NON_FINITE`, `UPT_ERR_ARGUMENT` (also when capacity
-        /// is too small), `UPT_ERR_PANIC`.
+        /// is too small), `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_scene_contacts_from_instruments(IntPtr scene, upt_instrument* instruments, ulong instrument_count, uint* contact_nodes, float* contact_vectors, ulong capacity, ulong* contact_count);
@@ -622,7 +630,7 @@ namespace Upt.Interop
         /// zero. With others the elastic force of the elements around each node at the last state. Both leave out inertia and damping.
         /// out: `[m,3]`, mN, the force on the instrument. out_count: floats in out, 3 m.
         /// Threads: one at a time. Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "forces", `UPT_ERR_NULL`,
-        /// `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`, `UPT_ERR_PANIC`.
+        /// `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_scene_contact_force(IntPtr scene, float* @out, ulong out_count);
@@ -642,7 +650,7 @@ namespace Upt.Interop
         /// out: bytes; NULL with capacity 0 only asks. capacity: bytes that fit in out.
         /// needed: bytes of the snapshot, always written; may be NULL.
         /// Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT` when capacity is
-        /// too small, `UPT_ERR_PANIC`.
+        /// too small, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_scene_save(IntPtr scene, byte* @out, ulong capacity, ulong* needed);
@@ -651,7 +659,7 @@ namespace Upt.Interop
         /// Restores a snapshot of the same model.
         ///
         /// Threads: one at a time. Errors: `UPT_ERR_SNAPSHOT`, `UPT_ERR_VERSION`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NULL`,
-        /// `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_PANIC`; the state stays.
+        /// `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`; the state stays.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_scene_restore(IntPtr scene, byte* bytes, ulong count);

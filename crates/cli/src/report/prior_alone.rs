@@ -46,7 +46,7 @@ impl PriorAlone {
             held[*node as usize] = true;
         }
         Ok(Self {
-            response: ContactResponse::new(&table),
+            response: ContactResponse::new(&table)?,
             rows: RowPlan::full(&table.basis()),
             held,
             pool: Pool::new(threads as usize)?,

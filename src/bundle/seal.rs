@@ -1,0 +1,47 @@
+//! The manifest's own digest: `manifest_sha256` is the SHA-256 of `bundle.json` with these 64 digits written as zeros.
+
+use serde_json::Value;
+use sha2::{Digest, Sha256};
+
+use super::checks::{FILE, bad};
+use super::files::hex;
+use crate::error::{Error, Result};
+
+const FIELD: &str = "manifest_sha256";
+const DIGITS: usize = 64;
+
+/// Compares a manifest's digest with its bytes. One without a digest, as they were made before there was one, is taken.
+pub(super) fn check(bytes: &[u8], manifest: &Value) -> Result<()> {
+    let stated = match &manifest[FIELD] {
+        Value::Null => {
+            tracing::warn!("{FILE}: no `{FIELD}`; `python -m upt_training seal BUNDLE` adds it");
+            return Ok(());
+        }
+        Value::String(text) if text.len() == DIGITS => text,
+        _ => return Err(bad(FIELD, "must be 64 hex digits")),
+    };
+    let places: Vec<usize> = bytes
+        .windows(DIGITS)
+        .enumerate()
+        .filter(|(_, window)| *window == stated.as_bytes())
+        .map(|(at, _)| at)
+        .collect();
+    let [at] = places[..] else {
+        return Err(bad(FIELD, "must stand in the file once, as it is"));
+    };
+    let mut hash = Sha256::new();
+    hash.update(&bytes[..at]);
+    hash.update([b'0'; DIGITS]);
+    hash.update(&bytes[at + DIGITS..]);
+    let found = hex(&hash.finalize());
+    if found == *stated {
+        return Ok(());
+    }
+    Err(Error::bundle(
+        FILE,
+        format!(
+            "field `{FIELD}` says {stated}, the file has {found}: it was damaged or changed; fetch or export the bundle again, or, \
+             after a change of your own, run `python -m upt_training seal BUNDLE`"
+        ),
+    ))
+}

@@ -1,0 +1,79 @@
+//! Room whose size a host or a bundle decides: asked for, so that there being none is an error and not the end of the
+//! process.
+
+use crate::error::{Error, Result};
+
+fn none(bytes: usize, what: &str) -> Error {
+    Error::OutOfMemory(format!("no memory for {what}: {bytes} bytes"))
+}
+
+/// Room for `count` more elements.
+pub fn reserve<T>(list: &mut Vec<T>, count: usize, what: &str) -> Result<()> {
+    list.try_reserve_exact(count)
+        .map_err(|_| none(count.saturating_mul(size_of::<T>()), what))
+}
+
+/// An empty list with room for `count` elements.
+pub fn room<T>(count: usize, what: &str) -> Result<Vec<T>> {
+    let mut list = Vec::new();
+    reserve(&mut list, count, what)?;
+    Ok(list)
+}
+
+/// `count` times `value`.
+pub fn filled<T: Clone>(count: usize, value: T, what: &str) -> Result<Vec<T>> {
+    let mut list = room(count, what)?;
+    list.resize(count, value);
+    Ok(list)
+}
+
+/// `count` zeros.
+pub fn zeros(count: usize, what: &str) -> Result<Vec<f32>> {
+    filled(count, 0.0, what)
+}
+
+/// A copy.
+pub fn copied<T: Copy>(values: &[T], what: &str) -> Result<Vec<T>> {
+    let mut list = room(values.len(), what)?;
+    list.extend_from_slice(values);
+    Ok(list)
+}
+
+/// What an iterator of `count` elements at most gives.
+pub fn collected<T>(
+    count: usize,
+    values: impl IntoIterator<Item = T>,
+    what: &str,
+) -> Result<Vec<T>> {
+    let mut list = room(count, what)?;
+    list.extend(values.into_iter().take(count));
+    Ok(list)
+}
+
+#[cfg(any(feature = "contact", feature = "forces"))]
+/// Whether `bytes` are to be had now: for parts that are made of many lists at their first use.
+pub fn probe(bytes: usize, what: &str) -> Result<()> {
+    room::<u8>(bytes, what).map(drop)
+}
+
+/// Replaces what is in `list`.
+pub fn replace<T: Copy>(list: &mut Vec<T>, values: &[T], what: &str) -> Result<()> {
+    list.clear();
+    reserve(list, values.len(), what)?;
+    list.extend_from_slice(values);
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_absurd_size_is_an_error_that_names_it() {
+        let error = zeros(usize::MAX / 8, "a test").unwrap_err();
+        assert_eq!(error.status(), -9);
+        assert!(error.to_string().contains("a test"), "{error}");
+        assert_eq!(filled(3, 7u8, "three").unwrap(), [7, 7, 7]);
+        assert_eq!(collected(2, 0..9, "two").unwrap(), [0, 1]);
+    }
+}

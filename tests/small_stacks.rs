@@ -1,0 +1,67 @@
+//! The stack that calls need, as docs/abi.md states it: a thread with that much makes them.
+
+mod fixture;
+mod host;
+
+use std::sync::Mutex;
+
+use host::Host;
+use upt::ffi::*;
+
+/// Of a step; the thread itself has some of it.
+const STEP: usize = 64 << 10;
+/// Of opening a model, making a scene and attaching points.
+const OPEN: usize = 256 << 10;
+
+fn on_a_stack_of<T: Send>(bytes: usize, work: impl FnOnce() -> T + Send) -> T {
+    std::thread::scope(|scope| {
+        let builder = std::thread::Builder::new().stack_size(bytes);
+        builder.spawn_scoped(scope, work).unwrap().join().unwrap()
+    })
+}
+
+struct Shared(Host);
+// SAFETY: handles are numbers.
+unsafe impl Send for Shared {}
+
+#[test]
+fn calls_stay_within_the_stated_stack() {
+    let brain = concat!(env!("CARGO_MANIFEST_DIR"), "/onnx/brain-coarse");
+    for bundle in fixture::BUNDLES.into_iter().chain([brain]) {
+        for kernel in [UPT_KERNEL_NATIVE, UPT_KERNEL_ONNX] {
+            let shared = on_a_stack_of(OPEN, || {
+                let host = Host::new(bundle, |options| {
+                    options.kernel = kernel;
+                    options.check_inversion = 1;
+                });
+                let first = host::indices(host.model, UPT_SET_DOMAIN_NODES)[0] as usize;
+                let mut positions = vec![0.0f32; 3 * host.nodes];
+                let count = positions.len() as u64;
+                unsafe {
+                    let read = upt_model_positions(host.model, positions.as_mut_ptr(), count);
+                    assert_eq!(read, UPT_OK);
+                    let place = positions[3 * first..].as_ptr();
+                    assert_eq!(upt_scene_attach_points(host.scene, place, 1), UPT_OK);
+                }
+                Mutex::new(Shared(host))
+            });
+            on_a_stack_of(STEP, || {
+                let host = &shared.lock().unwrap().0;
+                let domain = host::indices(host.model, UPT_SET_DOMAIN_NODES);
+                for step in 0..6 {
+                    let count = if step > 3 { 0 } else { 4 };
+                    let status = host.step(&domain[..count], [0.0, 0.0, -0.2 * step as f32]);
+                    assert!(
+                        matches!(status, UPT_OK | UPT_ERR_GUARD),
+                        "{}",
+                        host::message()
+                    );
+                    let mut out = vec![0.0f32; 3 * host.nodes];
+                    let floats = out.len() as u64;
+                    let read = unsafe { upt_scene_read(host.scene, out.as_mut_ptr(), floats) };
+                    assert_eq!(read, UPT_OK);
+                }
+            });
+        }
+    }
+}
