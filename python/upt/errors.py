@@ -32,6 +32,10 @@ class UnsupportedError(Error):
     """This build or this bundle cannot do it."""
 
 
+class OutOfMemoryError(Error, MemoryError):
+    """There is no memory for what the call needs."""
+
+
 class RuntimeLibraryError(Error):
     """ONNX Runtime is missing, too old or broken, or no provider of the list can run the model."""
 
@@ -56,6 +60,7 @@ _CLASSES: dict[int, type[Error]] = {
     Status.STATE: StateError,
     Status.BUSY: BusyError,
     Status.UNSUPPORTED: UnsupportedError,
+    Status.OUT_OF_MEMORY: OutOfMemoryError,
     Status.RUNTIME: RuntimeLibraryError,
     Status.PROVIDER: RuntimeLibraryError,
     Status.IO: BundleError,
