@@ -334,14 +334,14 @@ fn every_flip_of_a_manifest_is_refused() {
             file.seek(SeekFrom::Start(at as u64)).unwrap();
             file.write_all(&[byte]).unwrap();
         };
-        for at in 0..good.len() {
-            put(at, good[at] ^ 1 << (at % 8));
+        for (at, &byte) in good.iter().enumerate() {
+            put(at, byte ^ 1 << (at % 8));
             let error = open(folder.path()).unwrap_err();
             assert!(
                 matches!(error.status(), -32..=-30),
                 "{bundle}: byte {at}: {error}"
             );
-            put(at, good[at]);
+            put(at, byte);
         }
         open(folder.path()).unwrap();
     }
