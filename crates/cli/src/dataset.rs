@@ -6,14 +6,15 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use tissue::dataset::{Dataset, DatasetPlan};
+use tissue::dataset::{Dataset, DatasetPlan, Load};
 use tissue::mesh::{Boundary, Mesh};
+use tissue::programmes::ToolProgramme;
 use tissue::schemes::Scheme;
 use tissue::solver::SolverOptions;
 
 #[derive(clap::Args)]
 #[command(
-    after_help = "Examples:\n  upt dataset --mesh onnx/meshes/brain-coarse.mesh.safetensors --schemes 1-4 --count 200 --out data/coarse\n  upt dataset --mesh brain.mesh.safetensors --schemes probe --count 40 --shard 0/4 --out data/probe\n  upt dataset --mesh brain.mesh.safetensors --columns brain.columns.safetensors --schemes static,static-two --count 100 --out data/statics"
+    after_help = "Examples:\n  upt dataset --mesh onnx/meshes/brain-coarse.mesh.safetensors --schemes 1-4 --count 200 --out data/coarse\n  upt dataset --mesh brain.mesh.safetensors --schemes probe --count 40 --shard 0/4 --out data/probe\n  upt dataset --mesh brain.mesh.safetensors --columns brain.columns.safetensors --schemes static,static-two --count 100 --out data/statics\n  upt dataset --mesh brain.mesh.safetensors --tools all --count 50 --out data/tools"
 )]
 pub struct Options {
     /// Mesh file (*.mesh.safetensors).
@@ -23,8 +24,11 @@ pub struct Options {
     #[arg(long, default_value = "fixed")]
     boundary: Boundary,
     /// Schemes: `1-4`, `5`, `1,3`, `hard`, `probe`, a regime's name; `static`, `static-two`, `static-deep` are equilibria.
-    #[arg(long, value_parser = Scheme::parse_list)]
-    schemes: std::vec::Vec<Scheme>,
+    #[arg(long, value_parser = Scheme::parse_list, required_unless_present = "tools")]
+    schemes: Option<std::vec::Vec<Scheme>>,
+    /// Programmes of rigid tools: `press`, `probe`, `stroke`, `retract`, `poke`, `lift`, `two`, `wobble`, `grasp`, `edge`; `all`.
+    #[arg(long, value_parser = ToolProgramme::parse_list)]
+    tools: Option<std::vec::Vec<ToolProgramme>>,
     /// Number of cases over all shards.
     #[arg(long)]
     count: usize,
@@ -57,6 +61,13 @@ pub struct Options {
 }
 
 impl Options {
+    /// Schemes, then programmes of tools.
+    fn loads(&self) -> Vec<Load> {
+        let schemes = self.schemes.iter().flatten().map(|s| Load::Scheme(*s));
+        let tools = self.tools.iter().flatten().map(|t| Load::Tools(*t));
+        schemes.chain(tools).collect()
+    }
+
     /// Solver settings of the split `train`, where they differ.
     fn training(&self) -> Option<SolverOptions> {
         let (step, scaling) = (self.train_inner_step_ms?, self.train_mass_scaling_ms?);
@@ -82,7 +93,7 @@ pub fn run(options: &Options) -> anyhow::Result<ExitCode> {
     let mesh = Mesh::read(&options.mesh)?;
     let plan = DatasetPlan {
         boundary: options.boundary,
-        schemes: options.schemes.clone(),
+        loads: options.loads(),
         count: options.count,
         seed: options.seed,
         half: options.half,
@@ -92,8 +103,8 @@ pub fn run(options: &Options) -> anyhow::Result<ExitCode> {
     };
     let dataset = Dataset::open(&plan, &mesh, &options.out)?;
     let pending = dataset.pending(options.shard.0, options.shard.1);
-    // A case of equilibria has fewer frames than a motion.
-    let frames = |index: usize| options.schemes[index % options.schemes.len()].frames() as u64 - 1;
+    // A case of equilibria or tools has fewer frames than a motion of a scheme.
+    let frames = |index: usize| plan.load(index).frames() as u64 - 1;
     let total = pending.iter().map(|case| frames(case.index)).sum();
     let bar =
         indicatif::ProgressBar::new(total).with_style(indicatif::ProgressStyle::with_template(

@@ -4,20 +4,24 @@ use anyhow::Context;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use tissue::mesh::{Boundary, Mesh};
+use tissue::programmes::ToolProgramme;
 use tissue::schemes::{FRAMES, Scheme};
 use tissue::solver::{Pressure, SolverOptions};
 
 #[derive(clap::Args)]
 #[command(
-    after_help = "Example:\n  upt simulate --mesh onnx/meshes/brain-coarse.mesh.safetensors --scheme 5 --seed 7 --threads 2 --out push.trajectory.safetensors"
+    after_help = "Example:\n  upt simulate --mesh onnx/meshes/brain-coarse.mesh.safetensors --scheme 5 --seed 7 --threads 2 --out push.trajectory.safetensors\n  upt simulate --mesh onnx/meshes/brain-coarse.mesh.safetensors --tool stroke --seed 3 --out stroke.trajectory.safetensors"
 )]
 pub struct Options {
     /// Mesh file (*.mesh.safetensors).
     #[arg(long)]
     mesh: PathBuf,
     /// Scheme: 1 to 5, or a hard regime (hard-deep, hard-fast, hard-two, hard-slide, hard-ring).
-    #[arg(long)]
-    scheme: Scheme,
+    #[arg(long, required_unless_present = "tool")]
+    scheme: Option<Scheme>,
+    /// Programme of rigid tools: press, probe, stroke, retract, poke, lift, two, wobble, grasp, edge.
+    #[arg(long, conflicts_with = "scheme")]
+    tool: Option<ToolProgramme>,
     /// Seed of the contact site.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -89,15 +93,27 @@ pub fn run(options: &Options) -> anyhow::Result<ExitCode> {
         indicatif::ProgressStyle::with_template("{bar:40} frame {pos}/{len}, {eta} left")?,
     );
     let start = std::time::Instant::now();
-    let trajectory = tissue::simulate::simulate(
-        &mesh,
-        options.boundary,
-        options.scheme,
-        options.seed,
-        &options.solver.options(options.threads),
-        |frame| bar.set_position(frame as u64),
-    )
-    .with_context(|| format!("scheme {}, seed {}", options.scheme.name(), options.seed))?;
+    let settings = options.solver.options(options.threads);
+    let (boundary, seed) = (options.boundary, options.seed);
+    let (load, outcome) = match (options.tool, options.scheme) {
+        (Some(tool), _) => {
+            let advance = |frame, count| {
+                bar.set_length(count as u64);
+                bar.set_position(frame as u64);
+            };
+            let case =
+                tissue::simulate::simulate_tools(&mesh, boundary, tool, seed, &settings, advance);
+            (format!("tool {}", tool.name()), case)
+        }
+        (None, Some(scheme)) => {
+            let advance = |frame| bar.set_position(frame as u64);
+            let case =
+                tissue::simulate::simulate(&mesh, boundary, scheme, seed, &settings, advance);
+            (format!("scheme {}", scheme.name()), case)
+        }
+        (None, None) => anyhow::bail!("give --scheme or --tool"),
+    };
+    let trajectory = outcome.with_context(|| format!("{load}, seed {seed}"))?;
     bar.finish_and_clear();
     let seconds = start.elapsed().as_secs_f64();
     trajectory.write(&options.out, options.half)?;
@@ -109,15 +125,24 @@ pub fn run(options: &Options) -> anyhow::Result<ExitCode> {
         .sqrt();
     let smallest = trajectory.min_det_f.iter().copied().fold(1.0, f32::min);
     println!(
-        "{}: {} nodes, scheme {}, seed {}, site [{:.1}, {:.1}, {:.1}] mm, largest displacement {largest:.2} mm, min det F {smallest:.3}, {seconds:.1} s ({:.1} ms a frame)",
+        "{}: {} nodes, {load}, seed {}, site [{:.1}, {:.1}, {:.1}] mm, largest displacement {largest:.2} mm, min det F {smallest:.3}, {seconds:.1} s ({:.1} ms a frame)",
         options.out.display(),
         mesh.node_count(),
-        options.scheme.name(),
         options.seed,
         trajectory.header.site[0],
         trajectory.header.site[1],
         trajectory.header.site[2],
-        seconds * 1e3 / (FRAMES - 1) as f64,
+        seconds * 1e3 / (trajectory.frame_count() - 1) as f64,
     );
+    if let Some(tracks) = &trajectory.tools {
+        let force = |w: &[f32; 6]| (w[0] * w[0] + w[1] * w[1] + w[2] * w[2]).sqrt();
+        println!(
+            "tools: {}, {} frames, largest force {:.1} mN, worst penetration {:.4} mm",
+            tracks.tools.len(),
+            trajectory.frame_count(),
+            tracks.wrenches.iter().map(force).fold(0.0, f32::max),
+            tracks.penetration.iter().copied().fold(0.0, f32::max),
+        );
+    }
     Ok(ExitCode::SUCCESS)
 }

@@ -6,10 +6,11 @@
 //! leaves a small record beside its trajectory; the manifest is put together from
 //! the records, so it is right whoever writes it last.
 
+pub use crate::load::Load;
 use crate::material::Material;
 use crate::mesh::{Boundary, Mesh};
-use crate::schemes::{Scheme, SplitMix};
-use crate::simulate::{SOLVER_NAME, simulate};
+use crate::schemes::SplitMix;
+use crate::simulate::{SOLVER_NAME, simulate, simulate_tools};
 use crate::solver::SolverOptions;
 #[cfg(feature = "linear")]
 use crate::statics::StaticSolver;
@@ -23,7 +24,7 @@ use std::path::{Path, PathBuf};
 #[derive(Clone, Debug)]
 pub struct DatasetPlan {
     pub boundary: Boundary,
-    pub schemes: Vec<Scheme>,
+    pub loads: Vec<Load>,
     pub count: usize,
     pub seed: u64,
     /// Store displacements as f16.
@@ -88,7 +89,7 @@ pub enum DatasetError {
     },
     #[error("{path}: {reason}; choose another folder or remove it")]
     Foreign { path: PathBuf, reason: String },
-    #[error("the plan has no schemes or no cases")]
+    #[error("the plan has no schemes or tools, or no cases")]
     EmptyPlan,
     #[error(
         "scheme `{0}` needs the compliance columns of its mesh: make them with `upt prior`, give --columns"
@@ -107,26 +108,30 @@ pub enum DatasetError {
 }
 
 impl DatasetPlan {
-    /// Case `index`: scheme `index mod |schemes|`, group `index div |schemes|`; every fifth group is held out.
+    /// Case `index`: load `index mod |loads|`, group `index div |loads|`; every fifth group is held out.
     pub fn case(&self, index: usize) -> Case {
-        let group = index / self.schemes.len();
-        let scheme = self.schemes[index % self.schemes.len()];
-        // Probes and equilibria serve training and are never held out.
-        let held_out = group % 5 == 4 && scheme != Scheme::Probe && !scheme.is_static();
+        let group = index / self.loads.len();
+        let load = self.load(index);
+        let held_out = group % 5 == 4 && load.is_tested();
         let mut random = SplitMix(self.seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ index as u64);
         Case {
             index,
             file: format!("case-{index:05}.trajectory.safetensors"),
-            scheme: scheme.name().into(),
+            scheme: load.name(),
             // 53 bits: exact in every JSON reader.
             seed: random.next() >> 11,
             split: if held_out { "test" } else { "train" }.into(),
         }
     }
 
+    /// What moves case `index`.
+    pub fn load(&self, index: usize) -> Load {
+        self.loads[index % self.loads.len()]
+    }
+
     /// Identifies everything that the trajectories' bytes depend on.
     fn key(&self, mesh: &Mesh) -> String {
-        let schemes: Vec<&str> = self.schemes.iter().map(|s| s.name()).collect();
+        let schemes: Vec<String> = self.loads.iter().map(|load| load.name()).collect();
         let mut key = format!(
             "{SOLVER_NAME}; mesh {}; {}; schemes {}; seed {}; {}; inner step {}; {:?}; {}",
             &mesh.hash()[..16],
@@ -174,7 +179,7 @@ enum StaticSolver {}
 impl StaticSolver {
     fn trajectory(
         &self,
-        _: Scheme,
+        _: crate::schemes::Scheme,
         _: u64,
         _: impl FnMut(usize),
     ) -> Result<(crate::trajectory::Trajectory, Vec<String>), std::convert::Infallible> {
@@ -207,10 +212,10 @@ impl<'a> Dataset<'a> {
         mesh: &'a Mesh,
         folder: &Path,
     ) -> Result<Self, DatasetError> {
-        if plan.schemes.is_empty() || plan.count == 0 {
+        if plan.loads.is_empty() || plan.count == 0 {
             return Err(DatasetError::EmptyPlan);
         }
-        let statics = match plan.schemes.iter().find(|scheme| scheme.is_static()) {
+        let statics = match plan.loads.iter().find_map(|load| load.statics()) {
             Some(scheme) => Some(static_solver(plan, mesh, scheme.name())?),
             None => None,
         };
@@ -258,22 +263,28 @@ impl<'a> Dataset<'a> {
     pub fn compute(
         &self,
         case: &Case,
-        progress: impl FnMut(usize),
+        mut progress: impl FnMut(usize),
     ) -> Result<CaseRecord, DatasetError> {
         self.remove_leftovers(case);
-        let scheme = self.plan.schemes[case.index % self.plan.schemes.len()];
+        let load = self.plan.load(case.index);
         let start = std::time::Instant::now();
         let options = match &self.plan.training {
             Some(training) if case.split == "train" => training,
             _ => &self.plan.options,
         };
-        let outcome = match &self.statics {
-            Some(statics) if scheme.is_static() => statics
+        let (mesh, boundary) = (self.mesh, self.plan.boundary);
+        let outcome = match (load, &self.statics) {
+            (Load::Scheme(scheme), Some(statics)) if scheme.is_static() => statics
                 .trajectory(scheme, case.seed, progress)
                 .map_err(|error| error.to_string()),
-            _ => {
-                let (mesh, boundary) = (self.mesh, self.plan.boundary);
+            (Load::Scheme(scheme), _) => {
                 simulate(mesh, boundary, scheme, case.seed, options, progress)
+                    .map(|trajectory| (trajectory, Vec::new()))
+                    .map_err(|error| error.to_string())
+            }
+            (Load::Tools(tools), _) => {
+                let progress = |frame, _| progress(frame);
+                simulate_tools(mesh, boundary, tools, case.seed, options, progress)
                     .map(|trajectory| (trajectory, Vec::new()))
                     .map_err(|error| error.to_string())
             }

@@ -23,11 +23,13 @@ pub mod dataset;
 pub mod export;
 #[cfg(feature = "linear")]
 pub mod linear;
+mod load;
 pub mod mesh;
 #[cfg(feature = "files")]
 pub mod mesh_import;
 pub mod mesh_quality;
 pub mod metrics;
+pub mod programmes;
 pub mod schemes;
 pub mod simulate;
 pub mod solver;
@@ -35,4 +37,5 @@ pub mod solver;
 pub mod statics;
 pub mod stuffing;
 pub mod tensors;
+pub mod tool_tracks;
 pub mod trajectory;

@@ -1,10 +1,14 @@
-//! One case from rest to the last frame.
+//! One case from rest to the last frame: contact that is prescribed, or tools.
 
 use crate::contact::{ContactDomain, ContactError};
 use crate::mesh::{Boundary, Mesh};
+use crate::programmes::{ProgrammeError, ToolCase, ToolProgramme};
 use crate::schemes::{FRAME_S, FRAMES, Programme, Scheme};
-use crate::solver::{Solver, SolverError, SolverOptions};
+use crate::solver::{ContactNode, FrameReport, SampleForce, Solver, SolverError, SolverOptions};
+use crate::tool_tracks::ToolTracks;
 use crate::trajectory::{Trajectory, TrajectoryHeader};
+use contact::{Samples, Vector};
+use std::collections::BTreeMap;
 
 /// Name and version that trajectories carry.
 pub const SOLVER_NAME: &str = concat!("libupt tled ", env!("CARGO_PKG_VERSION"));
@@ -14,6 +18,8 @@ pub const SOLVER_NAME: &str = concat!("libupt tled ", env!("CARGO_PKG_VERSION"))
 pub enum SimulationError {
     #[error(transparent)]
     Contact(#[from] ContactError),
+    #[error(transparent)]
+    Programme(#[from] ProgrammeError),
     #[error(transparent)]
     Solver(#[from] SolverError),
     #[error("scheme `{0}` is a list of equilibria, not a motion: use `upt dataset` with --columns")]
@@ -40,39 +46,133 @@ pub fn simulate(
     let mut options = options.clone();
     options.material.damping_per_s *= scheme.damping_factor();
     let mut solver = Solver::new(mesh, boundary, options.clone())?;
-    let nodes = mesh.node_count();
-    let header = TrajectoryHeader {
+    let header = header(mesh, boundary, scheme.name().into(), seed, &options);
+    let mut trajectory = Trajectory::at_rest(
+        TrajectoryHeader {
+            site: programme.site(),
+            ..header
+        },
+        mesh.node_count(),
+    );
+    for frame in 1..FRAMES {
+        let contact = programme.contact(frame);
+        let report = solver.step_frame(&contact, FRAME_S)?;
+        record(&mut trajectory, &solver, &report);
+        for entry in &contact {
+            trajectory.contact_nodes.push(entry.node);
+            trajectory.contact_vectors.push(entry.displacement);
+        }
+        close_row(&mut trajectory);
+        trajectory.reaction.extend(report.reaction);
+        progress(frame);
+    }
+    Ok(trajectory)
+}
+
+/// Simulates `programme` with `seed` on `mesh`; `progress` hears of each finished frame and of how many there will be.
+///
+/// The collision field of a frame is what a host that prescribes contact would give: the nodes that bear a tool's force,
+/// where they are at the frame's end.
+pub fn simulate_tools(
+    mesh: &Mesh,
+    boundary: Boundary,
+    programme: ToolProgramme,
+    seed: u64,
+    options: &SolverOptions,
+    mut progress: impl FnMut(usize, usize),
+) -> Result<Trajectory, SimulationError> {
+    let case = ToolCase::new(programme, mesh, seed)?;
+    let mut solver = Solver::new(mesh, boundary, options.clone())?;
+    let samples = mesh.samples(boundary);
+    solver.set_tools(samples.clone(), &case.tools, &case.start)?;
+    let name = format!("tool-{}", programme.name());
+    let header = header(mesh, boundary, name, seed, options);
+    let mut trajectory = Trajectory::at_rest(
+        TrajectoryHeader {
+            site: case.site,
+            ..header
+        },
+        mesh.node_count(),
+    );
+    let mut tracks = ToolTracks::at_rest(&case.tools, &case.start);
+    let held = mesh.held_nodes(boundary);
+    for (frame, poses) in case.frames.iter().enumerate() {
+        let report = solver.step_tools(&[], poses, FRAME_S)?;
+        record(&mut trajectory, &solver, &report);
+        let moved = trajectory.frame(frame + 1);
+        let (field, forces) = collision_field(&samples, &report.sample_forces, &held, moved);
+        for entry in field {
+            trajectory.contact_nodes.push(entry.node);
+            trajectory.contact_vectors.push(entry.displacement);
+        }
+        trajectory.reaction.extend(forces);
+        close_row(&mut trajectory);
+        tracks.push(poses, &report);
+        progress(frame + 1, case.frames.len());
+    }
+    trajectory.tools = Some(tracks);
+    Ok(trajectory)
+}
+
+/// Nodes that bear forces at samples, ascending, where they are, and the force of the tissue on the tool at each, mN.
+fn collision_field(
+    samples: &Samples,
+    forces: &[SampleForce],
+    held: &[u32],
+    displacement: &[[f32; 3]],
+) -> (Vec<ContactNode>, Vec<[f32; 3]>) {
+    let mut nodal: BTreeMap<u32, Vector> = BTreeMap::new();
+    for entry in forces {
+        for (node, weight) in samples.rows()[entry.sample as usize].entries() {
+            if held.binary_search(&node).is_err() {
+                *nodal.entry(node).or_default() += Vector::from(entry.force) * weight;
+            }
+        }
+    }
+    let field = nodal.keys().map(|node| ContactNode {
+        node: *node,
+        displacement: displacement[*node as usize],
+    });
+    let forces = nodal.values().map(|force| (-*force).to_array());
+    (field.collect(), forces.collect())
+}
+
+fn header(
+    mesh: &Mesh,
+    boundary: Boundary,
+    scheme: String,
+    seed: u64,
+    options: &SolverOptions,
+) -> TrajectoryHeader {
+    TrajectoryHeader {
         mesh_name: mesh.name.clone(),
         mesh_sha256: mesh.hash(),
         boundary: boundary.as_str().into(),
-        scheme: scheme.name().into(),
+        scheme,
         seed,
-        site: programme.site(),
+        site: [0.0; 3],
         material: options.material,
         dt_s: FRAME_S,
         inner_dt_s: options.inner_step_s,
         mass_scaling_s: options.mass_scaling_s,
         solver: SOLVER_NAME.into(),
-    };
-    let mut trajectory = Trajectory::at_rest(header, nodes);
-    trajectory.displacement.resize(FRAMES * nodes, [0.0; 3]);
-    for frame in 1..FRAMES {
-        let contact = programme.contact(frame);
-        let report = solver.step_frame(&contact, FRAME_S)?;
-        solver.displacement(&mut trajectory.displacement[frame * nodes..(frame + 1) * nodes]);
-        for entry in &contact {
-            trajectory.contact_nodes.push(entry.node);
-            trajectory.contact_vectors.push(entry.displacement);
-        }
-        trajectory
-            .contact_offsets
-            .push(trajectory.contact_nodes.len() as u32);
-        trajectory.reaction.extend(report.reaction);
-        trajectory.strain_energy.push(report.strain_energy as f32);
-        trajectory.kinetic_energy.push(report.kinetic_energy as f32);
-        trajectory.external_work.push(report.external_work as f32);
-        trajectory.min_det_f.push(report.min_det_f as f32);
-        progress(frame);
     }
-    Ok(trajectory)
+}
+
+/// Adds the state at a frame's end.
+fn record(trajectory: &mut Trajectory, solver: &Solver, report: &FrameReport) {
+    let at = trajectory.displacement.len();
+    let nodes = at / trajectory.frame_count();
+    trajectory.displacement.resize(at + nodes, [0.0; 3]);
+    solver.displacement(&mut trajectory.displacement[at..]);
+    trajectory.strain_energy.push(report.strain_energy as f32);
+    trajectory.kinetic_energy.push(report.kinetic_energy as f32);
+    trajectory.external_work.push(report.external_work as f32);
+    trajectory.min_det_f.push(report.min_det_f as f32);
+}
+
+/// Ends the frame's row of contact entries.
+fn close_row(trajectory: &mut Trajectory) {
+    let entries = trajectory.contact_nodes.len() as u32;
+    trajectory.contact_offsets.push(entries);
 }

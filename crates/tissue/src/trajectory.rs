@@ -2,6 +2,7 @@
 
 use crate::material::Material;
 use crate::tensors::{self, Dtype, Tensor};
+use crate::tool_tracks::ToolTracks;
 use safetensors::SafeTensors;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -28,6 +29,8 @@ pub struct Trajectory {
     pub external_work: Vec<f32>,
     /// `[F]`.
     pub min_det_f: Vec<f32>,
+    /// Tools, where there were any.
+    pub tools: Option<ToolTracks>,
 }
 
 /// What a trajectory says about itself.
@@ -37,10 +40,10 @@ pub struct TrajectoryHeader {
     pub mesh_sha256: String,
     /// `fixed` or `supported`.
     pub boundary: String,
-    /// `1`..`5` or a hard regime's name.
+    /// `1`..`5`, a hard regime's name, or `tool-` and the name of a programme of tools.
     pub scheme: String,
     pub seed: u64,
-    /// Centroid of the seed face, mm.
+    /// Centroid of the seed face, or where the first tool is to touch, mm.
     pub site: [f64; 3],
     pub material: Material,
     /// Time between frames, s.
@@ -85,6 +88,7 @@ impl Trajectory {
             kinetic_energy: vec![0.0],
             external_work: vec![0.0],
             min_det_f: vec![1.0],
+            tools: None,
         }
     }
 
@@ -152,7 +156,7 @@ impl Trajectory {
                 floats(&mut self.displacement.iter().flatten().copied()),
             )
         };
-        let tensors = [
+        let mut tensors = vec![
             displacement,
             Tensor::new(
                 "contact_offsets",
@@ -173,11 +177,14 @@ impl Trajectory {
             series("external_work", &self.external_work),
             series("min_det_f", &self.min_det_f),
         ];
-        tensors::write_file(path, &self.header.metadata(), &tensors).map_err(|source| {
-            TrajectoryError::Io {
-                path: path.into(),
-                source,
-            }
+        let mut metadata = self.header.metadata();
+        if let Some(tracks) = &self.tools {
+            tensors.extend(tracks.tensors());
+            metadata.insert("tools".into(), serde_json::json!(tracks.tools).to_string());
+        }
+        tensors::write_file(path, &metadata, &tensors).map_err(|source| TrajectoryError::Io {
+            path: path.into(),
+            source,
         })
     }
 
@@ -198,10 +205,8 @@ impl Trajectory {
             reason,
         };
         let (_, metadata) = SafeTensors::read_metadata(&bytes).map_err(not_safetensors)?;
-        let header = TrajectoryHeader::from_metadata(
-            &metadata.metadata().clone().unwrap_or_default(),
-            &field,
-        )?;
+        let metadata = metadata.metadata().clone().unwrap_or_default();
+        let header = TrajectoryHeader::from_metadata(&metadata, &field)?;
         let file = SafeTensors::deserialize(&bytes).map_err(not_safetensors)?;
         let tensor = |name: &str, dimensions: usize| {
             let view = file
@@ -236,7 +241,8 @@ impl Trajectory {
         let vectors = |name: &str, dimensions| -> Result<Vec<[f32; 3]>, TrajectoryError> {
             Ok(floats(name, dimensions)?.as_chunks().0.to_vec())
         };
-        let trajectory = Self {
+        let mut trajectory = Self {
+            tools: None,
             header,
             displacement: vectors("displacement", 3)?,
             contact_offsets: indices("contact_offsets")?,
@@ -259,6 +265,10 @@ impl Trajectory {
                 "contact_offsets",
                 format!("does not describe {frames} rows"),
             ));
+        }
+        if let Some(tools) = metadata.get("tools") {
+            let tracks = ToolTracks::read(&file, tools, frames);
+            trajectory.tools = Some(tracks.map_err(|(name, reason)| field(&name, reason))?);
         }
         Ok(trajectory)
     }

@@ -1,7 +1,7 @@
 //! Datasets: shards make the bytes of one run, interruption loses nothing, failures are kept.
 
 use std::path::Path;
-use tissue::dataset::{Dataset, DatasetPlan, Manifest};
+use tissue::dataset::{Dataset, DatasetPlan, Load, Manifest};
 use tissue::mesh::{Boundary, Mesh, box_phantom};
 use tissue::schemes::Scheme;
 use tissue::solver::SolverOptions;
@@ -16,7 +16,7 @@ fn plan(schemes: &[Scheme]) -> DatasetPlan {
         training: None,
         columns: None,
         boundary: Boundary::Fixed,
-        schemes: schemes.to_vec(),
+        loads: schemes.iter().map(|s| Load::Scheme(*s)).collect(),
         count: 4,
         seed: 11,
         half: false,

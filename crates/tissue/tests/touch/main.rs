@@ -5,3 +5,4 @@ mod bench;
 mod failures;
 mod forces;
 mod grasp;
+mod programmes;

@@ -25,7 +25,7 @@ pub const START_DEPTH_MM: f32 = 0.5;
 const TEAR_S: f64 = 0.001;
 
 /// A rigid tool.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Tool {
     pub shape: Shape,
     /// Coulomb's coefficient, 0 for none.

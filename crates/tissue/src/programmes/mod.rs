@@ -1,0 +1,209 @@
+//! Programmes of rigid tools: what a surgeon's hand does, as one table of specifications.
+//!
+//! A case draws everything that its row leaves open from a seed: site, sizes, depth, speeds, direction. Poses are checked before
+//! anything is simulated ([`case`]): a tool starts just outside of the tissue, wherever else its shaft may be. All programmes
+//! are the same sequence with parts left out: press in, slide, tilt and turn, close and pull, hold, go back, wait. Frames are
+//! those of the schemes, 50 ms; their number depends on the case.
+
+mod approach;
+mod case;
+mod legs;
+mod site;
+
+pub use case::{ProgrammeError, ToolCase};
+
+/// Lowest and highest value of a draw.
+pub type Range = [f64; 2];
+
+/// What touches the tissue.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Tip {
+    /// A rod with a round end of the drawn radius.
+    Rod,
+    /// A flat blade, as wide as drawn and 3 mm thick, its end foremost; it slides across its width.
+    Blade,
+    /// A rounded foot, twice the drawn radius wide and 6 mm thick.
+    Foot,
+}
+
+/// A row of the table.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Specification {
+    pub name: &'static str,
+    pub tip: Tip,
+    /// Radius of a rod or half width of a blade or foot, mm.
+    pub radius_mm: Range,
+    /// How far it goes in after the first touch, mm.
+    pub depth_mm: Range,
+    /// Speed on the way in, mm/s.
+    pub press_mm_s: Range,
+    /// Way along the surface, mm.
+    pub slide_mm: Range,
+    /// mm/s.
+    pub slide_mm_s: Range,
+    /// Largest tilt and turn about the tip while pressed, radians; to and fro twice.
+    pub wobble: [f64; 2],
+    /// Way out while it grasps, mm.
+    pub pull_mm: Range,
+    /// Pull at which every second grasp tears off, mN.
+    pub tear_off_mn: Range,
+    /// Time that it stays where it is, s.
+    pub hold_s: Range,
+    /// Speed on the way out, mm/s.
+    pub lift_mm_s: Range,
+    /// Coulomb's coefficient.
+    pub friction: Range,
+    /// Largest angle between the way in and the surface's normal, radians.
+    pub lean: f64,
+    /// Distance of a second tool's site, mm.
+    pub second_mm: Option<Range>,
+    /// The site lies on the border of the domain.
+    pub border: bool,
+}
+
+/// What most rows share.
+const PLAIN: Specification = Specification {
+    name: "",
+    tip: Tip::Rod,
+    radius_mm: [4.0, 8.0],
+    depth_mm: [4.0, 8.0],
+    press_mm_s: [10.0, 25.0],
+    slide_mm: [0.0, 0.0],
+    slide_mm_s: [10.0, 10.0],
+    wobble: [0.0, 0.0],
+    pull_mm: [0.0, 0.0],
+    tear_off_mn: [0.0, 0.0],
+    hold_s: [0.4, 0.8],
+    lift_mm_s: [10.0, 30.0],
+    friction: [0.0, 0.3],
+    lean: 0.35,
+    second_mm: None,
+    border: false,
+};
+
+/// All programmes.
+pub const TABLE: [Specification; 10] = [
+    Specification {
+        name: "press",
+        radius_mm: [4.0, 12.0],
+        depth_mm: [2.0, 15.0],
+        ..PLAIN
+    },
+    Specification {
+        name: "probe",
+        radius_mm: [2.0, 2.0],
+        depth_mm: [2.0, 6.0],
+        ..PLAIN
+    },
+    Specification {
+        name: "stroke",
+        radius_mm: [3.0, 6.0],
+        slide_mm: [10.0, 25.0],
+        slide_mm_s: [5.0, 50.0],
+        lean: 0.2,
+        ..PLAIN
+    },
+    Specification {
+        name: "retract",
+        tip: Tip::Blade,
+        radius_mm: [4.0, 10.0],
+        depth_mm: [3.0, 6.0],
+        slide_mm: [4.0, 8.0],
+        slide_mm_s: [5.0, 10.0],
+        hold_s: [1.0, 1.5],
+        lean: 0.2,
+        ..PLAIN
+    },
+    Specification {
+        name: "poke",
+        radius_mm: [3.0, 6.0],
+        depth_mm: [4.0, 10.0],
+        press_mm_s: [50.0, 100.0],
+        lift_mm_s: [50.0, 100.0],
+        hold_s: [0.2, 0.4],
+        ..PLAIN
+    },
+    Specification {
+        name: "lift",
+        depth_mm: [3.0, 5.0],
+        lift_mm_s: [1.0, 200.0],
+        ..PLAIN
+    },
+    Specification {
+        name: "two",
+        radius_mm: [3.0, 5.0],
+        depth_mm: [3.0, 8.0],
+        lean: 0.15,
+        second_mm: Some([10.0, 40.0]),
+        ..PLAIN
+    },
+    Specification {
+        name: "wobble",
+        tip: Tip::Foot,
+        radius_mm: [4.0, 7.0],
+        depth_mm: [4.0, 6.0],
+        wobble: [0.35, 0.8],
+        lean: 0.15,
+        ..PLAIN
+    },
+    Specification {
+        name: "grasp",
+        radius_mm: [3.0, 4.0],
+        depth_mm: [1.0, 2.0],
+        pull_mm: [5.0, 8.0],
+        tear_off_mn: [40.0, 120.0],
+        lean: 0.2,
+        ..PLAIN
+    },
+    Specification {
+        name: "edge",
+        border: true,
+        lean: 0.15,
+        ..PLAIN
+    },
+];
+
+/// A row of [`TABLE`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ToolProgramme {
+    row: usize,
+}
+
+impl ToolProgramme {
+    /// Its row.
+    pub fn specification(self) -> &'static Specification {
+        &TABLE[self.row]
+    }
+
+    /// Name on the command line.
+    pub fn name(self) -> &'static str {
+        self.specification().name
+    }
+
+    /// Parses a list: `press,lift` or `all`.
+    pub fn parse_list(text: &str) -> Result<Vec<Self>, String> {
+        let mut programmes = Vec::new();
+        for part in text.split(',').map(str::trim) {
+            match part {
+                "all" => programmes.extend((0..TABLE.len()).map(|row| Self { row })),
+                name => programmes.push(name.parse()?),
+            }
+        }
+        Ok(programmes)
+    }
+}
+
+impl std::str::FromStr for ToolProgramme {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let row = TABLE.iter().position(|row| row.name == text);
+        row.map(|row| Self { row }).ok_or_else(|| {
+            let names: Vec<&str> = TABLE.iter().map(|row| row.name).collect();
+            format!(
+                "programme of tools `{text}` is unknown; use one of {}, or `all`",
+                names.join(", ")
+            )
+        })
+    }
+}
