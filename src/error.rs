@@ -4,6 +4,8 @@
 
 use std::path::PathBuf;
 
+use crate::ffi;
+
 /// Everything that can fail in this library.
 ///
 /// A call that returns an error has changed nothing: the handle is in the state it was in before.
@@ -70,20 +72,20 @@ impl Error {
     /// The status code of `docs/abi.md`.
     pub fn status(&self) -> i32 {
         match self {
-            Error::Argument(_) => -2,
-            Error::Busy(_) => -5,
-            Error::NonFinite(_) => -6,
-            Error::State(_) => -7,
-            Error::Unsupported(_) => -8,
-            Error::OutOfMemory(_) => -9,
-            Error::Runtime(_) => -20,
-            Error::Provider(_) => -21,
-            Error::Io { .. } => -30,
-            Error::Bundle { .. } => -31,
-            Error::Version(_) => -32,
-            Error::Snapshot(_) => -33,
-            Error::Guard(_) => -40,
-            Error::Panic(_) => -90,
+            Error::Argument(_) => ffi::UPT_ERR_ARGUMENT,
+            Error::Busy(_) => ffi::UPT_ERR_BUSY,
+            Error::NonFinite(_) => ffi::UPT_ERR_NON_FINITE,
+            Error::State(_) => ffi::UPT_ERR_STATE,
+            Error::Unsupported(_) => ffi::UPT_ERR_UNSUPPORTED,
+            Error::OutOfMemory(_) => ffi::UPT_ERR_OUT_OF_MEMORY,
+            Error::Runtime(_) => ffi::UPT_ERR_RUNTIME,
+            Error::Provider(_) => ffi::UPT_ERR_PROVIDER,
+            Error::Io { .. } => ffi::UPT_ERR_IO,
+            Error::Bundle { .. } => ffi::UPT_ERR_BUNDLE,
+            Error::Version(_) => ffi::UPT_ERR_VERSION,
+            Error::Snapshot(_) => ffi::UPT_ERR_SNAPSHOT,
+            Error::Guard(_) => ffi::UPT_ERR_GUARD,
+            Error::Panic(_) => ffi::UPT_ERR_PANIC,
         }
     }
 

@@ -64,6 +64,20 @@ pub fn replace<T: Copy>(list: &mut Vec<T>, values: &[T], what: &str) -> Result<(
     Ok(())
 }
 
+/// Gives freed memory back to the system when it is dropped: glibc's allocator would keep what many scenes took until the
+/// process ends.
+pub struct GivenBack;
+
+impl Drop for GivenBack {
+    fn drop(&mut self) {
+        #[cfg(all(target_os = "linux", target_env = "gnu"))]
+        // SAFETY: takes no memory that is in use.
+        unsafe {
+            libc::malloc_trim(0);
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

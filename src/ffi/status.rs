@@ -149,6 +149,56 @@ pub const UPT_SHAPE_BOX: i32 = 1;
 /// An instrument's shape: a box with rounded corners.
 pub const UPT_SHAPE_SPATULA: i32 = 2;
 
+/// The library's own values are these; a difference does not compile.
+const _: () = {
+    use crate::stats::flag;
+    use crate::{DecoderKernel, GuardPolicy, IndexSet, Kind, Precision, Provider, StepPath};
+
+    macro_rules! same {
+        ($($constant:ident = $value:expr;)*) => { $(assert!($constant == $value);)* };
+    }
+    same! {
+        UPT_PROVIDER_CPU = Provider::Cpu as i32;
+        UPT_PROVIDER_CUDA = Provider::Cuda as i32;
+        UPT_PROVIDER_TENSORRT = Provider::TensorRt as i32;
+        UPT_PROVIDER_TENSORRT_RTX = Provider::TensorRtRtx as i32;
+        UPT_KIND_UPT = Kind::Upt as i32;
+        UPT_KIND_REDUCED = Kind::Reduced as i32;
+        UPT_PRECISION_F32 = Precision::F32 as i32;
+        UPT_PRECISION_BF16 = Precision::Bf16 as i32;
+        UPT_PRECISION_F16 = Precision::F16 as i32;
+        UPT_PRECISION_INT8 = Precision::Int8 as i32;
+        UPT_KERNEL_AUTO = DecoderKernel::Auto as i32;
+        UPT_KERNEL_NATIVE = DecoderKernel::Native as i32;
+        UPT_KERNEL_ONNX = DecoderKernel::Onnx as i32;
+        UPT_KERNEL_RESIDENT = DecoderKernel::Resident as i32;
+        UPT_STEP_AUTO = StepPath::Auto as i32;
+        UPT_STEP_SPLIT = StepPath::Split as i32;
+        UPT_STEP_WHOLE = StepPath::Whole as i32;
+        UPT_STEP_MEASURED = StepPath::Measured as i32;
+        UPT_GUARD_HOLD = GuardPolicy::Hold as i32;
+        UPT_GUARD_REPORT = GuardPolicy::Report as i32;
+        UPT_GUARD_BLEND = GuardPolicy::Blend as i32;
+        UPT_SET_SURFACE_NODES = IndexSet::SurfaceNodes as i32;
+        UPT_SET_DOMAIN_NODES = IndexSet::DomainNodes as i32;
+        UPT_SET_FIXED_NODES = IndexSet::HeldNodes as i32;
+        UPT_SET_SURFACE_FACES = IndexSet::SurfaceFaces as i32;
+        UPT_SET_DOMAIN_FACES = IndexSet::DomainFaces as i32;
+        UPT_SET_TETS = IndexSet::Tets as i32;
+        UPT_FLAG_PUSH = flag::PUSH;
+        UPT_FLAG_CONTACT_AREA = flag::CONTACT_AREA;
+        UPT_FLAG_SITE = flag::SITE;
+        UPT_FLAG_RATE = flag::RATE;
+        UPT_FLAG_SITES = flag::SITES;
+        UPT_FLAG_BOUND = flag::BOUND;
+        UPT_FLAG_NON_FINITE = flag::NON_FINITE;
+        UPT_FLAG_INVERTED = flag::INVERTED;
+        UPT_FLAG_GROWTH = flag::GROWTH;
+        UPT_FLAG_CLAMPED = flag::CLAMPED;
+        UPT_FLAG_REGULARISED = flag::REGULARISED;
+    }
+};
+
 /// The C name of a status, NUL-terminated.
 pub(super) fn name(status: upt_status) -> &'static std::ffi::CStr {
     match status {

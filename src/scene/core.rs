@@ -24,8 +24,8 @@ use crate::stats::SceneStats;
 pub const QUIET_STEPS: u32 = 4;
 /// ... in which no decoded node is displaced by more than this, mm, ...
 pub const QUIET_DISPLACEMENT: f32 = 0.02;
-/// ... or, with a model that need not come to rest at zero, in which no decoded node is displaced by more than this
-/// and moves by more than [`STILL_CHANGE`] a step, mm.
+/// ... or, with a model that need not come to rest at zero, in which no decoded node is displaced by more than this, beside
+/// where the model's own free motion ends, and moves by more than [`STILL_CHANGE`] a step, mm.
 pub const STILL_DISPLACEMENT: f32 = 0.05;
 /// See [`STILL_DISPLACEMENT`], mm a step.
 pub const STILL_CHANGE: f32 = 0.002;
@@ -314,7 +314,8 @@ impl Core {
     /// Whether `next` is close to rest and to the last state, with a model whose own fixed point may lie beside rest:
     /// what is left is then that model's bias, not motion.
     fn is_still(&self, published: &RwLock<Published>) -> bool {
-        if self.max_displacement > STILL_DISPLACEMENT || self.engine.comes_to_rest() {
+        let bias = self.model.manifest.rest_displacement_mm;
+        if self.max_displacement > bias + STILL_DISPLACEMENT || self.engine.comes_to_rest() {
             return false;
         }
         let shared = lock_read(published);

@@ -85,6 +85,8 @@ pub struct Scene {
     model: Arc<Model>,
     mesh: Arc<Mesh>,
     tools: tools::Tools,
+    // Dropped last.
+    _given_back: memory::GivenBack,
 }
 
 impl Scene {
@@ -114,6 +116,7 @@ impl Scene {
             model,
             mesh,
             tools: tools::Tools::default(),
+            _given_back: memory::GivenBack,
         })
     }
 

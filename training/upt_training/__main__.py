@@ -87,6 +87,9 @@ def parser() -> argparse.ArgumentParser:
     seal = commands.add_parser("seal", help="renew a manifest's digest and `requires` after a change by hand")
     seal.add_argument("bundle", type=Path, nargs="+", help="bundle folders, changed in place")
 
+    rest = commands.add_parser("rest", help="measure where free motion ends beside rest, and write it")
+    rest.add_argument("bundle", type=Path, nargs="+", help="bundle folders, changed in place")
+
     ablate = commands.add_parser("ablate", help="variants of a configuration at one small budget: tables and plots")
     ablate.add_argument("suite", choices=["windows", "tricks"])
     ablate.add_argument("--config", type=Path, required=True)
@@ -128,6 +131,10 @@ def main(arguments: list[str] | None = None) -> int:
             from upt_training.anchors import anchors_command
 
             return anchors_command(options)
+        if options.command == "rest":
+            from upt_training.rest import rest_command
+
+            return rest_command(options)
         if options.command == "seal":
             from upt_training.bundle_folder import seal
 

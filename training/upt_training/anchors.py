@@ -116,5 +116,8 @@ def add_to_bundle(bundle: Path, spacing_mm: float, per_node: int) -> Anchors:
 
 def anchors_command(options: argparse.Namespace) -> int:
     anchors = add_to_bundle(options.bundle, options.spacing, options.neighbours)
+    from upt_training.rest import write_rest  # which runs a bundle, anchors included
+
+    write_rest(options.bundle)
     print(f"{options.bundle}: {len(anchors.nodes)} of {len(anchors.neighbours)} nodes are decoded")
     return 0

@@ -52,8 +52,8 @@ def write_manifest(folder: Path, manifest: dict) -> None:
 
 
 def seal(folder: Path, entries: dict | None = None) -> None:
-    """Renew what a manifest says of itself after a change by hand, and set `entries`; the layout stays."""
-    manifest = read_manifest(folder) | (entries or {})
+    """Renew what a manifest says of itself after a change by hand, and set `entries` (None removes one)."""
+    manifest = {k: v for k, v in (read_manifest(folder) | (entries or {})).items() if v is not None}
     second = (folder / MANIFEST).read_text(encoding="utf-8").split("\n")[1]
     _write(folder, manifest, indent=len(second) - len(second.lstrip(" ")))
 

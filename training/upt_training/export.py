@@ -15,6 +15,7 @@ from upt_training.envelope import measure_envelope
 from upt_training.mesh_file import Mesh, load_mesh
 from upt_training.model import Upt, load_state
 from upt_training.prior_table import PriorTable
+from upt_training.rest import write_rest
 from upt_training.run import open_prior
 from upt_training.trainer import load_checkpoint
 
@@ -124,6 +125,7 @@ def export_command(options) -> int:
         precisions=("f32", *(["f16"] if options.f16 else []), *(["int8"] if options.int8 else [])),
         check_features=real_features(model, mesh, dataset, prior) if dataset else None,
     )
+    write_rest(Path(options.out))
     check = {k: f"{v:.1e}" for k, v in manifest["provenance"]["export_check"].items()}
     size = sum(f["bytes"] for f in manifest["files"].values())
     print(f"{options.out}: {manifest['provenance']['parameters']} parameters, {size / 1e6:.1f} MB, self-check {check}")

@@ -15,6 +15,7 @@ from upt_training.dataset import map_safetensors
 from upt_training.errors import InputError
 from upt_training.mesh_file import load_mesh
 from upt_training.prior_table import PriorTable
+from upt_training.rest import write_rest
 
 
 def transfer(
@@ -42,6 +43,7 @@ def transfer(
     manifest["name"] = name or out.name
     manifest["mesh"] = {"file": "mesh.safetensors", "nodes": mesh.node_count, "mesh_sha256": mesh.sha256}
     manifest["errors"] = {}
+    manifest.pop("rest_displacement_mm", None)
     manifest["upt"].pop("anchors", None)
     with new_bundle(out) as folder:
         for file in [*bundle.glob("*.onnx"), bundle / manifest["upt"]["weights"]]:
@@ -57,5 +59,6 @@ def transfer(
 
 def transfer_command(options: argparse.Namespace) -> int:
     manifest = transfer(options.bundle, options.mesh, options.out, options.prior, options.vibration, options.name)
+    write_rest(options.out)
     print(f"{options.out}: {manifest['name']}, {manifest['mesh']['nodes']} nodes")
     return 0

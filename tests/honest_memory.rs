@@ -1,0 +1,121 @@
+//! What the statistics say a scene takes is what it takes, and destroying scenes gives it back. In a process of its own, with the
+//! counts of glibc's allocator.
+#![cfg(all(target_os = "linux", target_env = "gnu"))]
+
+mod fixture;
+mod host;
+
+use std::path::{Path, PathBuf};
+
+use upt::ffi::*;
+
+/// Bytes that malloc has given out.
+fn allocated() -> f64 {
+    // SAFETY: only reads the allocator's counts.
+    let info = unsafe { libc::mallinfo2() };
+    (info.uordblks + info.hblkhd) as f64
+}
+
+/// Bytes of this process in memory.
+fn resident() -> f64 {
+    let text = std::fs::read_to_string("/proc/self/statm").unwrap();
+    let pages: f64 = text.split(' ').nth(1).unwrap().parse().unwrap();
+    pages * 4096.0
+}
+
+/// Scenes of a model that have made some steps in contact.
+fn stepped(
+    model: *mut upt_model,
+    options: &upt_scene_options,
+    count: usize,
+) -> Vec<*mut upt_scene> {
+    let domain = host::indices(model, UPT_SET_DOMAIN_NODES);
+    let nodes = &domain[..6];
+    let scenes: Vec<_> = (0..count).map(|_| host::create(model, options)).collect();
+    for &scene in &scenes {
+        for depth in 0..4 {
+            let vectors = [0.0, 0.0, -0.3 * depth as f32].repeat(nodes.len());
+            let (nodes, count) = (nodes.as_ptr(), nodes.len() as u64);
+            let none = std::ptr::null_mut();
+            let status =
+                unsafe { upt_scene_step_contacts(scene, nodes, vectors.as_ptr(), count, none, 0) };
+            assert!(
+                matches!(status, UPT_OK | UPT_ERR_GUARD),
+                "{}",
+                host::message()
+            );
+        }
+    }
+    scenes
+}
+
+fn destroy(scenes: Vec<*mut upt_scene>) {
+    for scene in scenes {
+        assert_eq!(unsafe { upt_scene_destroy(scene) }, UPT_OK);
+    }
+}
+
+fn brain(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("onnx")
+        .join(name)
+}
+
+/// One test: another one's allocations would be counted.
+#[test]
+fn memory_is_stated_to_ten_percent_and_given_back() {
+    fixture::find_runtime();
+    let bundles = [
+        "brain-coarse",
+        "brain-coarse-reduced",
+        "brain-fast",
+        "brain-reduced",
+    ];
+    for name in bundles {
+        let model = host::open(&brain(name));
+        for (cubic, points) in [(0, 0), (1, 500)] {
+            let mut options = host::scene_options();
+            options.cubic_sampling = cubic;
+            // The first scene makes what the model keeps for all.
+            destroy(stepped(model, &options, 1));
+            let before = allocated();
+            let scenes = stepped(model, &options, 8);
+            let mut positions = vec![0.0f32; 3 * host::node_count(model)];
+            let count = positions.len() as u64;
+            let read = unsafe { upt_model_positions(model, positions.as_mut_ptr(), count) };
+            assert_eq!(read, UPT_OK);
+            for &scene in &scenes {
+                let status = unsafe { upt_scene_attach_points(scene, positions.as_ptr(), points) };
+                assert_eq!(status, UPT_OK, "{}", host::message());
+                let none = std::ptr::null();
+                let step = unsafe { upt_scene_step(scene, none, none, std::ptr::null_mut(), 0) };
+                assert_eq!(step, UPT_OK);
+            }
+            drop(positions);
+            let found = (allocated() - before) / scenes.len() as f64;
+            let stated = host::stats(scenes[0]).memory_bytes as f64;
+            println!("{name}, {points} points: {stated} bytes stated, {found:.0} found");
+            assert!(
+                (stated / found - 1.0).abs() < 0.1,
+                "{name}: {stated} stated, {found} found"
+            );
+            destroy(scenes);
+        }
+        assert_eq!(unsafe { upt_model_close(model) }, UPT_OK);
+    }
+    let model = host::open(&brain("brain-reduced"));
+    let options = host::scene_options();
+    destroy(stepped(model, &options, 1));
+    let before = resident();
+    let scenes = stepped(model, &options, 200);
+    let most = resident();
+    destroy(scenes);
+    let after = resident();
+    println!("resident: {before} before, {most} with 200 scenes, {after} after");
+    assert!(most > 1.5 * before, "the scenes were there");
+    assert!(
+        after < 1.2 * before,
+        "{after} bytes are resident, {before} were before"
+    );
+    assert_eq!(unsafe { upt_model_close(model) }, UPT_OK);
+}
