@@ -669,7 +669,7 @@ typedef struct upt_scene_stats {
    */
   uint64_t contact_count;
   /**
-   * Host memory of the scene beside the model.
+   * Bytes that the scene has allocated beside the model; what it never touches is not resident.
    */
   uint64_t memory_bytes;
   /**

@@ -495,7 +495,7 @@ class SceneStats(Record):
     contact_count: int
     """Contact nodes of the last step."""
     memory_bytes: int
-    """Host memory of the scene beside the model."""
+    """Bytes that the scene has allocated beside the model; what it never touches is not resident."""
     threads: int
     """Threads of a step."""
     kernel: Kernel = choice("_kernel", Kernel)

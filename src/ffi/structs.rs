@@ -190,7 +190,7 @@ pub struct upt_scene_stats {
     pub decoded_node_count: u64,
     /// Contact nodes of the last step.
     pub contact_count: u64,
-    /// Host memory of the scene beside the model.
+    /// Bytes that the scene has allocated beside the model; what it never touches is not resident.
     pub memory_bytes: u64,
     /// Threads of a step.
     pub threads: u32,

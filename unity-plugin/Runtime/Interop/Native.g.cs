@@ -169,7 +169,7 @@ namespace Upt.Interop
         public ulong decoded_node_count;
         /// <summary>Contact nodes of the last step.</summary>
         public ulong contact_count;
-        /// <summary>Host memory of the scene beside the model.</summary>
+        /// <summary>Bytes that the scene has allocated beside the model; what it never touches is not resident.</summary>
         public ulong memory_bytes;
         /// <summary>Threads of a step.</summary>
         public uint threads;
