@@ -9,6 +9,7 @@ use half::slice::HalfFloatSliceExt;
 use super::numbers::Numbers;
 use crate::bundle::TensorFile;
 use crate::error::Result;
+use crate::memory;
 
 /// Where the entries come from.
 #[derive(Debug)]
@@ -90,10 +91,10 @@ impl Compliance {
                 ),
             ));
         }
-        let blocks: Vec<[f32; 9]> = values
+        let blocks = values
             .chunks_exact(9)
-            .map(|block| std::array::from_fn(|at| block[at]))
-            .collect();
+            .map(|block| std::array::from_fn(|at| block[at]));
+        let blocks: Vec<[f32; 9]> = memory::collected(values.len() / 9, blocks, "near_compliance")?;
         for (row, range) in offsets.windows(2).enumerate() {
             let own = &nodes[range[0]..range[1]];
             if own.first() != Some(&(row as u32)) || own.windows(2).any(|pair| pair[0] >= pair[1]) {

@@ -124,7 +124,7 @@ impl PriorTable {
         }
         let narrow = |values: Vec<usize>| values.into_iter().map(|value| value as u32).collect();
         Ok(PriorTable {
-            nearest_column: nearest_columns(mesh, &contact_nodes),
+            nearest_column: nearest_columns(mesh, &contact_nodes)?,
             in_domain,
             contact_nodes,
             compliance,
@@ -253,19 +253,19 @@ fn basis_places(
 }
 
 /// For each node the nearest of `contact_nodes` (ties: the smallest index), by a cell grid.
-fn nearest_columns(mesh: &Mesh, contact_nodes: &[u32]) -> Vec<u32> {
-    let grid = PointGrid::new(
+fn nearest_columns(mesh: &Mesh, contact_nodes: &[u32]) -> Result<Vec<u32>> {
+    let grid = PointGrid::try_new(
         contact_nodes
             .iter()
             .flat_map(|&node| mesh.position(node))
             .collect(),
-    );
+    )?;
     let area: f64 = contact_nodes
         .iter()
         .map(|&node| mesh.node_area[node as usize] as f64)
         .sum();
     let edge = (area / contact_nodes.len() as f64).sqrt();
-    (0..mesh.node_count() as u32)
+    Ok((0..mesh.node_count() as u32)
         .map(|node| {
             let p = mesh.position(node);
             let column = grid.nearest(p);
@@ -276,7 +276,7 @@ fn nearest_columns(mesh: &Mesh, contact_nodes: &[u32]) -> Vec<u32> {
                 NO_COLUMN
             }
         })
-        .collect()
+        .collect())
 }
 
 #[cfg(test)]
