@@ -27,3 +27,13 @@ fn any_sequence_of_calls_is_answered_as_documented() {
         world.end();
     });
 }
+
+/// A function that is new in the header is called here, or this fails.
+#[test]
+fn every_function_of_the_header_is_called() {
+    let called: std::collections::HashSet<String> = abi::CALLED_BY
+        .iter()
+        .map(|(name, _)| (*name).to_owned())
+        .collect();
+    assert_eq!(called, abi::declared());
+}

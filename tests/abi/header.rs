@@ -5,6 +5,20 @@ use std::collections::{HashMap, HashSet};
 /// Function name -> statuses beside `UPT_OK`.
 pub type Documented = HashMap<String, HashSet<i32>>;
 
+/// All functions that the header declares.
+pub fn declared() -> HashSet<String> {
+    let text = std::fs::read_to_string("include/upt.h").unwrap();
+    let code = text.split("/**").map(|piece| {
+        let code = piece.split_once("*/").map_or("", |(_, code)| code);
+        code.split_once("(").map_or("", |(head, _)| head)
+    });
+    code.filter(|head| !head.contains("typedef") && !head.contains('{'))
+        .filter_map(|head| head.split([' ', '*', '\n']).next_back())
+        .filter(|name| name.starts_with("upt_"))
+        .map(str::to_owned)
+        .collect()
+}
+
 /// Reads the header.
 pub fn documented() -> Documented {
     let text = std::fs::read_to_string("include/upt.h").unwrap();

@@ -9,6 +9,8 @@ use super::inputs::*;
 use super::{Call, Function, Odd, Size, World};
 use crate::fixture;
 
+unsafe extern "C" fn ignore(_: i32, _: *const c_char, _: *mut std::ffi::c_void) {}
+
 impl World<'_> {
     /// Calls of the library, of models, and those that make and end scenes.
     pub(super) fn call_library(
@@ -113,6 +115,22 @@ impl World<'_> {
                     }
                     ("upt_scene_destroy", status)
                 }
+                Function::SetLog => {
+                    let level = if wrong { 9 } else { (call.seed % 6) as i32 };
+                    let receiver: upt_log_fn = (call.null & 1 == 0).then_some(ignore);
+                    ("upt_set_log", upt_set_log(receiver, null_mut(), level))
+                }
+                Function::Texts => {
+                    for text in [
+                        upt_version(),
+                        upt_last_error(),
+                        upt_status_name(call.seed as i32),
+                    ] {
+                        assert!(std::ffi::CStr::from_ptr(text).to_str().is_ok());
+                    }
+                    assert_eq!(upt_abi_version(), UPT_ABI_VERSION);
+                    ("upt_init", UPT_OK)
+                }
                 other => unreachable!("{other:?} is a call on a scene"),
             }
         }
@@ -135,6 +153,11 @@ impl World<'_> {
             options.providers = providers.as_ptr();
             options.provider_count = 1 + call.seed % 2;
             options.allow_tf32 = (call.seed % 4) as u8;
+            options.device_id = -((call.seed % 3) as i32);
+            options.gpu_memory_limit = call.seed % 5;
+            if call.size == Size::Absurd {
+                options.provider_count = u64::MAX - 3;
+            }
         }
         let path = match call.size {
             Size::Right | Size::Long => fixture::path(fixture::BUNDLES[call.seed as usize % 2])

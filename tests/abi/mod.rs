@@ -4,9 +4,10 @@ mod header;
 mod inputs;
 mod library_calls;
 mod scene_calls;
+mod traps;
 mod world;
 
-pub use header::{Documented, documented};
+pub use header::{Documented, declared, documented};
 pub use world::World;
 
 use proptest::prelude::{Strategy, any};
@@ -44,7 +45,47 @@ pub enum Function {
     Stats,
     Save,
     Restore,
+    SetLog,
+    Texts,
 }
+
+/// What each function of `include/upt.h` is called by.
+pub const CALLED_BY: &[(&str, Function)] = &[
+    ("upt_init", Init),
+    ("upt_shutdown", Shutdown),
+    ("upt_version", Texts),
+    ("upt_abi_version", Texts),
+    ("upt_last_error", Texts),
+    ("upt_status_name", Texts),
+    ("upt_set_log", SetLog),
+    ("upt_providers", Providers),
+    ("upt_model_open", ModelOpen),
+    ("upt_model_close", ModelClose),
+    ("upt_model_get_info", ModelInfo),
+    ("upt_model_describe", ModelDescribe),
+    ("upt_model_positions", ModelPositions),
+    ("upt_model_indices", ModelIndices),
+    ("upt_scene_create", SceneCreate),
+    ("upt_scene_destroy", SceneDestroy),
+    ("upt_scene_reset", SceneReset),
+    ("upt_scene_step", Step),
+    ("upt_scene_step_contacts", StepContacts),
+    ("upt_scene_read", Read),
+    ("upt_scene_submit", Submit),
+    ("upt_scene_poll", Poll),
+    ("upt_scene_wait", Wait),
+    ("upt_scene_sample", Sample),
+    ("upt_scene_set_region", SetRegion),
+    ("upt_scene_decode", Decode),
+    ("upt_scene_attach_points", AttachPoints),
+    ("upt_scene_read_points", ReadPoints),
+    ("upt_scene_sample_points", SamplePoints),
+    ("upt_scene_contacts_from_instruments", Instruments),
+    ("upt_scene_contact_force", ContactForce),
+    ("upt_scene_get_stats", Stats),
+    ("upt_scene_save", Save),
+    ("upt_scene_restore", Restore),
+];
 
 use Function::*;
 
@@ -87,6 +128,7 @@ pub struct Call {
 pub fn call() -> impl Strategy<Value = Call> {
     let function = prop_oneof![
         3 => few(&[ModelOpen, Init, Shutdown, Providers, ModelClose]),
+        1 => few(&[SetLog, Texts]),
         3 => few(&[ModelInfo, ModelDescribe, ModelPositions, ModelIndices]),
         8 => few(&[SceneCreate, SceneCreate, SceneDestroy]),
         30 => few(&[Step, StepContacts, StepContacts, StepContacts]),

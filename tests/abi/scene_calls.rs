@@ -68,22 +68,42 @@ impl World<'_> {
                     );
                     let (node_pointer, vector_pointer) =
                         (pointer(&listed, call, 0), pointer(&imposed, call, 1));
+                    let passed = absurd(contacts, nodes, call);
+                    let refused = |status| {
+                        let right = passed == contacts as u64 || status != UPT_OK;
+                        assert!(right, "a count of {passed} was taken");
+                        status
+                    };
                     if call.function == Function::Submit {
-                        let status =
-                            upt_scene_submit(scene, node_pointer, vector_pointer, contacts as u64);
-                        return ("upt_scene_submit", status);
+                        let status = upt_scene_submit(scene, node_pointer, vector_pointer, passed);
+                        return ("upt_scene_submit", refused(status));
+                    }
+                    if call.seed.is_multiple_of(11) {
+                        // The output lies over the vectors, or over the nodes.
+                        let mut memory = vec![0.0f32; (3 * nodes).max(imposed.len())];
+                        let over = memory.as_mut_ptr();
+                        memory[..imposed.len()].copy_from_slice(&imposed);
+                        let (n, v) = if call.seed.is_multiple_of(2) {
+                            (node_pointer, over.cast_const())
+                        } else {
+                            over.cast::<u32>().copy_from(listed.as_ptr(), listed.len());
+                            (over.cast_const().cast(), vector_pointer)
+                        };
+                        let floats = 3 * nodes as u64;
+                        let status = upt_scene_step_contacts(scene, n, v, passed, over, floats);
+                        return ("upt_scene_step_contacts", refused(status));
                     }
                     let status = Self::output(call, 2, 3 * nodes, true, |out, count| {
                         upt_scene_step_contacts(
                             scene,
                             node_pointer,
                             vector_pointer,
-                            contacts as u64,
+                            passed,
                             out,
                             count,
                         )
                     });
-                    ("upt_scene_step_contacts", status)
+                    ("upt_scene_step_contacts", refused(status))
                 }
                 Function::Read => {
                     let status = Self::output(call, 0, 3 * nodes, true, |out, count| {
@@ -126,7 +146,7 @@ impl World<'_> {
                     let (listed, length) = if whole {
                         (null(), 0)
                     } else {
-                        (pointer(&region, call, 0), nodes as u64)
+                        (pointer(&region, call, 0), absurd(nodes, nodes, call))
                     };
                     (
                         "upt_scene_set_region",
@@ -144,8 +164,9 @@ impl World<'_> {
                         })
                         .collect();
                     let status = Self::output(call, 0, 3 * listed.len(), true, |out, count| {
+                        let length = absurd(listed.len(), nodes, call);
                         let nodes = pointer(&listed, call, 1);
-                        upt_scene_decode(scene, nodes, listed.len() as u64, out, count)
+                        upt_scene_decode(scene, nodes, length, out, count)
                     });
                     ("upt_scene_decode", status)
                 }
@@ -153,8 +174,13 @@ impl World<'_> {
                     let points = call.seed as usize % 5;
                     let scale = if wrong { 1e7 } else { 20.0 };
                     let rest = vectors(3 * points, scale);
-                    let status =
-                        upt_scene_attach_points(scene, pointer(&rest, call, 0), points as u64);
+                    let passed = match absurd(points, nodes, call) {
+                        // A count that may be right is followed.
+                        count if count < 1 << 28 => points as u64,
+                        count => count,
+                    };
+                    let status = upt_scene_attach_points(scene, pointer(&rest, call, 0), passed);
+                    assert!(status != UPT_OK || passed == points as u64);
                     if status == UPT_OK {
                         self.points.insert(scene.addr(), points);
                     }
