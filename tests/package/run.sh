@@ -27,9 +27,12 @@ cd "$root" || exit 1
 check archive cargo xtask package --out "$work/dist"
 check unity_package cargo xtask package --unity --out "$work/dist"
 archive="$(find "$work/dist" -name 'libupt-*.tar.gz' | head -n 1)"
+# The same commit gives the same bytes.
+check archive_again cargo xtask package --out "$work/again"
+check same_bytes cmp "${archive:-none}" "$work/again/$(basename "${archive:-none}")"
 check unpack tar -xzf "${archive:-none}" -C "$work/elsewhere"
 # Nothing may depend on where the archive was made.
-rm -rf "$work"/dist/libupt-*/
+rm -rf "$work"/dist/libupt-*/ "$work/again"
 prefix="$(find "$work/elsewhere" -mindepth 1 -maxdepth 1 -type d | head -n 1)"
 unset ORT_DYLIB_PATH LD_LIBRARY_PATH UPT_LIB_DIR UPT_INCLUDE_DIR UPT_BUNDLES
 cd "$work/elsewhere" || exit 1

@@ -1,6 +1,7 @@
 //! `cargo xtask`: the repository's commands. Each does its own set-up, so that a fresh clone needs
 //! nothing but Rust and Python.
 
+mod archive;
 mod bench;
 mod counts;
 mod demo;

@@ -16,6 +16,7 @@ use std::process::Command;
 use anyhow::{Context, Result, bail};
 use clap::Args;
 
+use crate::archive;
 use crate::ort::{self, Platform};
 use crate::process::{has_program, run_checked};
 use crate::stages;
@@ -199,7 +200,7 @@ fn native(workspace: &Workspace, host: Platform, out: &Path) -> Result<PathBuf> 
     #[cfg(unix)]
     std::os::unix::fs::symlink(format!("../lib/{library}"), root.join("bin").join(library))?;
     shared(workspace, &root, &ort_folder)?;
-    archive(out, &name)
+    archive(workspace, out, &name)
 }
 
 /// The layout for a platform that this machine does not build for.
@@ -231,22 +232,13 @@ fn foreign(workspace: &Workspace, platform: Platform, out: &Path) -> Result<Path
             platform.name()
         ),
     )?;
-    archive(out, &name)
+    archive(workspace, out, &name)
 }
 
-/// A .tar.gz by the system's tar, names sorted and owner removed so that it can be compared.
-fn archive(out: &Path, name: &str) -> Result<PathBuf> {
+/// A .tar.gz: the same commit gives the same bytes.
+fn archive(workspace: &Workspace, out: &Path, name: &str) -> Result<PathBuf> {
     let file = out.join(format!("{name}.tar.gz"));
-    let status = Command::new("tar")
-        .current_dir(out)
-        .arg("-czf")
-        .arg(&file)
-        .arg(name)
-        .status()
-        .context("tar is missing")?;
-    if !status.success() {
-        bail!("tar failed for {}", file.display());
-    }
+    archive::pack(out, name, &file, archive::time(&workspace.root))?;
     Ok(file)
 }
 
@@ -294,16 +286,7 @@ fn unity(workspace: &Workspace, out: &Path) -> Result<PathBuf> {
         "org.libupt.soft-tissue-{}.tgz",
         version(workspace)?
     ));
-    let status = Command::new("tar")
-        .current_dir(&staging)
-        .arg("-czf")
-        .arg(&file)
-        .arg(name)
-        .status()
-        .context("tar is missing")?;
-    if !status.success() {
-        bail!("tar failed for {}", file.display());
-    }
+    archive::pack(&staging, name, &file, archive::time(&workspace.root))?;
     Ok(file)
 }
 

@@ -6,6 +6,7 @@ use std::process::Command;
 
 use anyhow::{Context, Result};
 
+use crate::archive;
 use crate::counts;
 use crate::process::{run_checked, run_logged};
 use crate::stages::{self, Outcome, check, joined};
@@ -47,7 +48,11 @@ pub fn with_library(
         ])
         .arg(&scratch)
         .arg(workspace.path("python"))
-        .env("UPT_WHEEL_LIBRARY", library);
+        .env("UPT_WHEEL_LIBRARY", library)
+        .env(
+            "SOURCE_DATE_EPOCH",
+            archive::time(&workspace.root).to_string(),
+        );
     if let Some(platform) = platform {
         command.env("UPT_WHEEL_PLATFORM", platform);
     }

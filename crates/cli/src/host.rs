@@ -1,6 +1,7 @@
 //! The library as a host sees it: the functions of `upt.h`, called through their C signatures.
 //!
-//! What is measured here is what a C or C# program gets; nothing reaches behind the ABI.
+//! What is measured here is what a C or C# program gets. One row of `upt report` reaches behind the ABI, since no host can ask
+//! for it: a bundle's linear response alone (`report/prior_alone.rs`).
 
 use std::ffi::{CStr, CString};
 use std::path::Path;
