@@ -161,9 +161,7 @@ impl<'a> Path<'a> {
                 *trial = u - length * d;
             }
             let energy = self.body.evaluate(&self.trial, &mut self.trial_gradient);
-            let allowed =
-                self.energy.value - 1e-4 * length * slope + 1e-12 * self.energy.value.abs();
-            if energy.value <= allowed {
+            if self.change(&energy, length) <= -1e-4 * length * slope {
                 self.accept(energy);
                 self.iterations += 1;
                 if small {
@@ -180,6 +178,21 @@ impl<'a> Path<'a> {
         } else {
             self.pairs.clear();
         }
+    }
+
+    /// Energy of the trial point, `length` along the direction, beyond the present one's.
+    ///
+    /// Near an equilibrium the difference of two sums over the elements is rounding alone, and then the gradients at
+    /// both ends tell (the trapezoidal rule): they keep their digits, whatever the logarithm of the platform rounds.
+    fn change(&self, energy: &Energy, length: f64) -> f64 {
+        let change = energy.value - self.energy.value;
+        if change.abs() > 1e-8 * self.energy.value.abs() || !change.is_finite() {
+            return change;
+        }
+        // The direction is zero at held and contact nodes, so their forces do not count.
+        let ends = product(&self.gradient, &self.direction)
+            + product(&self.trial_gradient, &self.direction);
+        -0.5 * length * ends
     }
 
     fn tolerance(&self) -> f64 {

@@ -161,7 +161,7 @@ fn a_tighter_tolerance_moves_an_equilibrium_by_little() {
     let (mut statics, _folder) = solver(&mesh);
     let sites = vec![vec![push(&mesh, 12.0)]];
     let usual = statics.equilibria(&sites, |_| {}).unwrap().remove(0);
-    statics.tolerance_mm = 1e-5;
+    statics.tolerance_mm = 1e-6;
     let exact = statics.equilibria(&sites, |_| {}).unwrap().remove(0);
     let apart = (usual.found[0]
         .displacement
