@@ -13,12 +13,16 @@ use super::runtime::Runtime;
 pub(super) const NAME: &str = "NvTensorRTRTXExecutionProvider";
 /// Library or folder, where it is neither beside libupt nor beside ONNX Runtime.
 const VARIABLE: &str = "UPT_TENSORRT_RTX_PATH";
-/// What the plugin needs from its own folder, in the order in which they are opened.
-const COMPANIONS: [&str; 3] = [
-    "libcudart.so",
-    "libtensorrt_rtx.so",
-    "libtensorrt_onnxparser_rtx.so",
-];
+/// What the plugin needs from its own folder, in the order in which they are opened: how the names begin.
+const COMPANIONS: [&str; 3] = if cfg!(windows) {
+    ["cudart64_", "tensorrt_rtx_", "tensorrt_onnxparser_rtx_"]
+} else {
+    [
+        "libcudart.so",
+        "libtensorrt_rtx.so",
+        "libtensorrt_onnxparser_rtx.so",
+    ]
+};
 
 fn file_name() -> &'static str {
     if cfg!(windows) {
@@ -101,8 +105,10 @@ fn open_companions(plugin: &Path) {
     files.sort();
     for stem in COMPANIONS {
         let of_stem = |path: &&PathBuf| {
-            path.file_name()
-                .is_some_and(|name| name.to_string_lossy().starts_with(stem))
+            path.file_name().is_some_and(|name| {
+                let name = name.to_string_lossy();
+                name.starts_with(stem) && (!cfg!(windows) || name.ends_with(".dll"))
+            })
         };
         for file in files.iter().filter(of_stem) {
             // SAFETY: NVIDIA's libraries, which registering the plugin opens as well; they stay open.

@@ -121,6 +121,8 @@ fn refuse_telemetry() {
 
 fn open(path: &Path) -> std::result::Result<Runtime, String> {
     refuse_telemetry();
+    #[cfg(windows)]
+    open_module(path)?;
     let builder = ort::init_from(path).map_err(|error| error.to_string())?;
     let environment = builder
         .with_name("upt")
@@ -134,6 +136,29 @@ fn open(path: &Path) -> std::result::Result<Runtime, String> {
         path: path.to_owned(),
         version: version_of(path).unwrap_or_else(|| ort::info().to_owned()),
     })
+}
+
+/// Opens the module, so that the system's own words are in the error: `ort` passes on only which call failed.
+#[cfg(windows)]
+fn open_module(path: &Path) -> std::result::Result<(), String> {
+    // SAFETY: ONNX Runtime, which is opened in any case; it stays open.
+    match unsafe { libloading::Library::new(path) } {
+        Ok(module) => {
+            std::mem::forget(module);
+            Ok(())
+        }
+        Err(error) => {
+            let cause = std::error::Error::source(&error);
+            let mut text = cause.map_or_else(|| error.to_string(), ToString::to_string);
+            if path.exists() {
+                text.push_str(
+                    "; the file is there, so a library that it needs is missing: \
+                     install the Microsoft Visual C++ redistributable (x64)",
+                );
+            }
+            Err(text)
+        }
+    }
 }
 
 fn log(level: LogLevel, _category: &str, _id: &str, place: &str, message: &str) {

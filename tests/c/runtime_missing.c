@@ -6,6 +6,12 @@
  */
 #include "expect.h"
 
+/* The message names the file; its path may be written in the way of the system. */
+static int names_file(const char *message, const char *path) {
+  const char *name = strrchr(path, '/');
+  return strstr(message, name == NULL ? path : name + 1) != NULL;
+}
+
 int main(int argc, char **argv) {
   upt_init_options options;
   upt_model *model = NULL;
@@ -20,7 +26,7 @@ int main(int argc, char **argv) {
   EXPECT(upt_init(&options), UPT_OK);
   EXPECT(upt_providers(NULL, 0, &needed), UPT_ERR_RUNTIME);
   EXPECT(upt_model_open(argv[1], NULL, &model), UPT_ERR_RUNTIME);
-  EXPECT_TRUE(strstr(upt_last_error(), argv[2]) != NULL);
+  EXPECT_TRUE(names_file(upt_last_error(), argv[2]));
   EXPECT_TRUE(model == NULL);
   EXPECT(upt_model_open(argv[1], NULL, &model), UPT_ERR_RUNTIME);
   EXPECT(upt_shutdown(), UPT_OK);

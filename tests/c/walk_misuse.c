@@ -1,10 +1,26 @@
 /* Handles that are closed or of another kind, two threads on one scene, a panic inside the library.
  */
 #define _GNU_SOURCE
+#ifdef _WIN32
+#include <windows.h>
+#else
 #include <dlfcn.h>
+#endif
 #include <pthread.h>
 
 #include "walk.h"
+
+/* A function of the library that its header does not declare; NULL where it has none. */
+static void *library_function(const char *name) {
+#ifdef _WIN32
+  void *found;
+  FARPROC address = GetProcAddress(GetModuleHandleA("upt.dll"), name);
+  memcpy(&found, &address, sizeof found);
+  return found;
+#else
+  return dlsym(RTLD_DEFAULT, name);
+#endif
+}
 
 void walk_handles(void) {
   upt_scene *scene = make_scene();
@@ -50,7 +66,7 @@ int walk_panic(void) {
   upt_scene *scene, *sane;
   upt_scene_stats stats;
   upt_status (*test_panic)(upt_scene *);
-  *(void **)&test_panic = dlsym(RTLD_DEFAULT, "upt_test_panic");
+  *(void **)&test_panic = library_function("upt_test_panic");
   if (test_panic == NULL) {
     printf("left out: UPT_ERR_PANIC (the library has no feature \"fault\")\n");
     return 0;

@@ -1,0 +1,65 @@
+/* Steps a bundle through one push and its release, and writes each state: the same bytes wherever it runs, or not.
+ *
+ *   rollout BUNDLE STEPS FILE        FILE: [STEPS,K,3] floats, mm
+ */
+#include "expect.h"
+
+#include <stdlib.h>
+
+#define PUSHED 6
+
+int main(int argc, char **argv) {
+  upt_scene_options options;
+  upt_model_info info;
+  upt_model *model = NULL;
+  upt_scene *scene = NULL;
+  uint32_t nodes[PUSHED], *domain;
+  float vectors[3 * PUSHED], *out;
+  long step, steps;
+  int i;
+  FILE *file;
+  if (argc != 4) {
+    fprintf(stderr, "usage: %s BUNDLE STEPS FILE\n", argv[0]);
+    return 2;
+  }
+  steps = atol(argv[2]);
+  memset(&options, 0, sizeof options);
+  options.struct_size = sizeof options;
+  options.no_sleep = 1;
+  options.guard_policy = UPT_GUARD_REPORT;
+  memset(&info, 0, sizeof info);
+  info.struct_size = sizeof info;
+  EXPECT(upt_model_open(argv[1], NULL, &model), UPT_OK);
+  EXPECT(upt_model_get_info(model, &info), UPT_OK);
+  EXPECT(upt_scene_create(model, &options, &scene), UPT_OK);
+  if (expect_failures > 0) {
+    return expect_result("rollout");
+  }
+  domain = malloc(info.domain_node_count * sizeof *domain);
+  out = malloc(3 * info.node_count * sizeof *out);
+  EXPECT(upt_model_indices(model, UPT_SET_DOMAIN_NODES, domain, info.domain_node_count, NULL), UPT_OK);
+  for (i = 0; i < PUSHED; i++) {
+    nodes[i] = domain[i];
+  }
+  file = fopen(argv[3], "wb");
+  EXPECT_TRUE(file != NULL);
+  for (step = 0; file != NULL && step < steps; step++) {
+    const int held = step < steps * 2 / 3;
+    for (i = 0; i < PUSHED; i++) {
+      vectors[3 * i] = 0.125f * (float)(step + 1);
+      vectors[3 * i + 1] = 0.0f;
+      vectors[3 * i + 2] = -0.25f * (float)(step + 1);
+    }
+    EXPECT(upt_scene_step_contacts(scene, nodes, vectors, held ? PUSHED : 0, out,
+                                   3 * info.node_count),
+           UPT_OK);
+    EXPECT_TRUE(fwrite(out, 3 * sizeof *out, info.node_count, file) == info.node_count);
+  }
+  if (file != NULL) {
+    EXPECT_TRUE(fclose(file) == 0);
+  }
+  upt_scene_destroy(scene);
+  upt_model_close(model);
+  EXPECT(upt_shutdown(), UPT_OK);
+  return expect_result("rollout");
+}
