@@ -48,6 +48,13 @@ enum Task {
         after_help = "Examples:\n  cargo xtask bench --quick\n  cargo xtask bench --only kernels --keep-docs --json rows.json"
     )]
     Bench(bench::Options),
+    /// Show a bundle in the browser, with all set-up.
+    #[command(after_help = "Examples:\n  cargo xtask view\n  cargo xtask view onnx/brain-fast")]
+    View {
+        /// The bundle's folder.
+        #[arg(default_value = "onnx/brain-reduced")]
+        bundle: std::path::PathBuf,
+    },
     /// Make the archive for C and C++ hosts, or the Unity package.
     #[command(
         after_help = "Examples:\n  cargo xtask package\n  cargo xtask package --unity\n  cargo xtask package --wheel\n  cargo xtask package --platform windows-x64"
@@ -112,6 +119,7 @@ fn run(workspace: &Workspace, task: Task) -> Result<bool> {
         Task::Test(options) => test::run(workspace, &options),
         Task::Demo(options) => demo::run(workspace, &options),
         Task::Bench(options) => bench::run(workspace, &options),
+        Task::View { bundle } => upkeep::view(workspace, &bundle),
         Task::Package(options) => package::run(workspace, &options),
         Task::Readme(options) => readme::run(workspace, &options),
         Task::Footprint(options) => footprint::run(workspace, &options),

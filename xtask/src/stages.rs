@@ -142,6 +142,12 @@ pub const STAGES: &[Stage] = &[
         needs: &[system::NATIVE],
         run: package,
     },
+    Stage {
+        name: "view",
+        about: "upt view in headless Chromium",
+        needs: &[system::BROWSER],
+        run: view,
+    },
 ];
 
 fn cargo(workspace: &Workspace) -> Command {
@@ -403,6 +409,10 @@ fn csharp(workspace: &Workspace) -> Result<Outcome> {
 
 fn godot(workspace: &Workspace) -> Result<Outcome> {
     script(workspace, "godot", "examples/godot/run.sh")
+}
+
+fn view(workspace: &Workspace) -> Result<Outcome> {
+    script(workspace, "view", "tests/view/run.sh")
 }
 
 fn package(workspace: &Workspace) -> Result<Outcome> {

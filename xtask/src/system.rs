@@ -113,6 +113,12 @@ pub const CSHARP: &[Package] = &[
     ),
 ];
 
+/// What the tests of `upt view` need.
+pub const BROWSER: &[Package] = &[
+    program(&["chromium", "google-chrome"], "chromium", "the page"),
+    program(&["chromedriver"], "chromium-driver", "the page"),
+];
+
 impl Package {
     pub fn present(&self) -> bool {
         if self.programs == ["python3-venv-module"] {

@@ -1,5 +1,6 @@
-//! `cargo xtask header` and `cargo xtask bundle`: what is generated and committed.
+//! `cargo xtask header`, `cargo xtask bundle` and `cargo xtask view`: one program, with its set-up.
 
+use std::path::Path;
 use std::process::Command;
 
 use anyhow::{Result, bail};
@@ -42,4 +43,15 @@ pub fn bundle(workspace: &Workspace, module: &str, arguments: &[String]) -> Resu
         bail!("python -m {module} {} failed", arguments.join(" "));
     }
     Ok(true)
+}
+
+/// Runs `upt view` until it is ended.
+pub fn view(workspace: &Workspace, bundle: &Path) -> Result<bool> {
+    venv::create(workspace)?;
+    let library = ort::host_library(workspace)?;
+    stages::build_for_demo(workspace)?;
+    let mut command = Command::new(workspace.upt());
+    command.current_dir(&workspace.root).arg("view").arg(bundle);
+    ort::set_environment(&mut command, &library);
+    Ok(command.status()?.success())
 }

@@ -38,6 +38,10 @@ pub struct Model {
     info: ffi::upt_model_info,
 }
 
+// SAFETY: the ABI promises that a model may be used from any thread at once; the handle is a number.
+unsafe impl Send for Model {}
+unsafe impl Sync for Model {}
+
 /// A scene; destroyed when dropped. Used by the thread that made it.
 pub struct Scene {
     handle: *mut ffi::upt_scene,
@@ -118,6 +122,16 @@ impl Model {
             Ok(out)
         }
     }
+
+    /// `upt_model_positions`: rest positions, mm.
+    pub fn positions(&self) -> Result<Vec<[f32; 3]>> {
+        let mut out = vec![[0.0; 3]; self.info.node_count as usize];
+        // SAFETY: pointer and count describe `out`.
+        check(unsafe {
+            ffi::upt_model_positions(self.handle, out.as_mut_ptr().cast(), 3 * out.len() as u64)
+        })?;
+        Ok(out)
+    }
 }
 
 impl Drop for Model {
@@ -194,6 +208,66 @@ impl Scene {
             )
         };
         check(status)
+    }
+
+    /// `upt_scene_contacts_from_instruments`; the lists are as long as the contact afterwards.
+    pub fn contacts(
+        &mut self,
+        instruments: &[ffi::upt_instrument],
+        nodes: &mut Vec<u32>,
+        vectors: &mut Vec<[f32; 3]>,
+    ) -> Result<()> {
+        let mut count = 0;
+        let (first, many) = (instruments.as_ptr(), instruments.len() as u64);
+        // SAFETY: the pointers and counts describe the slices; without room the call only counts.
+        unsafe {
+            check(ffi::upt_scene_contacts_from_instruments(
+                self.handle,
+                first,
+                many,
+                std::ptr::null_mut(),
+                std::ptr::null_mut(),
+                0,
+                &mut count,
+            ))?;
+            nodes.resize(count as usize, 0);
+            vectors.resize(count as usize, [0.0; 3]);
+            if count > 0 {
+                check(ffi::upt_scene_contacts_from_instruments(
+                    self.handle,
+                    first,
+                    many,
+                    nodes.as_mut_ptr(),
+                    vectors.as_mut_ptr().cast(),
+                    count,
+                    &mut count,
+                ))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// `upt_scene_contact_force` at the `count` contact nodes of the last step, mN.
+    pub fn contact_force(&mut self, count: usize) -> Result<Vec<[f32; 3]>> {
+        let mut out = vec![[0.0; 3]; count];
+        // SAFETY: pointer and count describe `out`.
+        check(unsafe {
+            ffi::upt_scene_contact_force(self.handle, out.as_mut_ptr().cast(), 3 * count as u64)
+        })?;
+        Ok(out)
+    }
+
+    /// `upt_scene_sample`: between the last two states.
+    pub fn sample(&mut self, alpha: f64, out: &mut [[f32; 3]]) -> Result<()> {
+        // SAFETY: pointer and count describe `out`.
+        check(unsafe {
+            ffi::upt_scene_sample(
+                self.handle,
+                alpha,
+                out.as_mut_ptr().cast(),
+                3 * out.len() as u64,
+            )
+        })
     }
 
     /// `upt_scene_get_stats`.

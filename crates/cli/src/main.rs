@@ -27,6 +27,7 @@ mod rollout;
 mod simulate;
 mod soak;
 mod stress;
+mod view;
 
 use std::process::ExitCode;
 
@@ -91,6 +92,8 @@ enum Command {
     Beside(beside::Options),
     /// Very many steps on one scene, with the process's memory in a log.
     Soak(soak::Options),
+    /// A bundle in the browser: drag a tool, watch the tissue.
+    View(view::Options),
     /// Shell completions, on stdout.
     Completions(completions::Options),
 }
@@ -119,6 +122,7 @@ fn main() -> ExitCode {
         Command::Stress(options) => stress::run(&options),
         Command::Beside(options) => beside::run(&options),
         Command::Soak(options) => soak::run(&options),
+        Command::View(options) => view::run(&options),
         Command::Completions(options) => completions::run::<Arguments>(&options),
     };
     outcome.unwrap_or_else(|error| {
@@ -127,12 +131,24 @@ fn main() -> ExitCode {
     })
 }
 
-/// `upt ... | head` must not panic: Rust ignores SIGPIPE at start; the default action is put back.
+/// `upt ... | head` must not panic. On Unix Rust ignores SIGPIPE at start, and the default action is put back; Windows has
+/// no such signal, so there the panic of a print that finds its reader gone ends the program.
 fn end_quietly_on_closed_pipe() {
     #[cfg(unix)]
     // SAFETY: no other thread runs yet, and SIG_DFL is a valid disposition of SIGPIPE.
     unsafe {
         libc::signal(libc::SIGPIPE, libc::SIG_DFL);
+    }
+    #[cfg(not(unix))]
+    {
+        let usual = std::panic::take_hook();
+        std::panic::set_hook(Box::new(move |info| {
+            let text = info.payload_as_str().unwrap_or_default();
+            if text.starts_with("failed printing to stdout") {
+                std::process::exit(0);
+            }
+            usual(info);
+        }));
     }
 }
 

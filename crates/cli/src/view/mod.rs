@@ -1,0 +1,42 @@
+//! `upt view`: a bundle in the browser. A local page shows the organ; a tool that is dragged with the mouse presses it; the
+//! library steps and its surface is streamed over a WebSocket.
+//!
+//! Only 127.0.0.1 is served, and only who knows the token of the printed address. What the two sides say to each other is
+//! in `protocol.rs`; a bad message closes the client that sent it and nothing else.
+
+mod http;
+mod protocol;
+mod server;
+mod session;
+
+use std::net::TcpListener;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::{Context, Result};
+use clap::Args;
+
+#[derive(Args)]
+#[command(
+    after_help = "Examples:\n  upt view onnx/brain-reduced\n  upt view onnx/brain-fast --threads 2 --port 8080"
+)]
+pub struct Options {
+    /// The bundle's folder.
+    bundle: PathBuf,
+    /// Port of 127.0.0.1; 0: any that is free.
+    #[arg(long, default_value_t = 0)]
+    port: u16,
+    /// Threads of a step.
+    #[arg(long, default_value_t = 1)]
+    threads: u32,
+}
+
+pub fn run(options: &Options) -> Result<ExitCode> {
+    let listener = TcpListener::bind(("127.0.0.1", options.port))
+        .with_context(|| format!("port {} of 127.0.0.1 cannot be opened", options.port))?;
+    let server = server::Server::new(&options.bundle, options.threads, &listener)?;
+    println!("{}", server.address());
+    println!("open this address in a browser; Ctrl-C ends it");
+    server.serve(&listener);
+    Ok(ExitCode::SUCCESS)
+}

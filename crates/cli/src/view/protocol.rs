@@ -1,0 +1,181 @@
+//! What page and server say to each other.
+//!
+//! From the page, JSON text of at most 1,024 bytes:
+//!
+//! ```json
+//! {"tool": {"position": [0,0,0], "rotation": [0,0,0,1], "radius": 5, "half_length": 20, "sticking": true}, "sequence": 7}
+//! {"tool": null, "sequence": 8}      the tool is lifted
+//! {"reset": true}                    back to rest
+//! {"record": true}                   start a recording (false: end it)
+//! {"replay": true}                   from rest through the recording
+//! ```
+//!
+//! To the page: first JSON text (`Hello`), then a binary message of the surface, rest positions `[n,3]` f32, faces `[m,3]`
+//! u32 and 1 for each node of the domain `[n]` u32, then a binary message a frame: [`HEADER`] numbers of 32 bits, little-endian, then displacements
+//! `[n,3]` f32, mm.
+
+use serde::{Deserialize, Serialize};
+
+/// Bytes that a message from the page may have.
+pub const LONGEST_MESSAGE: usize = 1024;
+/// Numbers before the displacements of a frame: sequence, flags, contacts, state (u32: 1 recording, 2 replaying, 4 asleep),
+/// step ms, indicator, force x y z (mN), largest displacement (mm), ms that the pose waited for its step, steps (u32).
+pub const HEADER: usize = 12;
+/// No organ and no tool is larger, mm.
+const FARTHEST: f32 = 10_000.0;
+
+/// A capsule; its axis is local y.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Tool {
+    pub position: [f32; 3],
+    /// Unit quaternion x, y, z, w.
+    pub rotation: [f32; 4],
+    pub radius: f32,
+    pub half_length: f32,
+    pub sticking: bool,
+}
+
+/// One wish of the page.
+#[derive(Debug, PartialEq)]
+pub enum Wish {
+    Tool(Option<Tool>, u32),
+    Reset,
+    Record(bool),
+    Replay,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Message {
+    #[serde(default, deserialize_with = "given")]
+    tool: Option<Option<Tool>>,
+    sequence: Option<u32>,
+    reset: Option<bool>,
+    record: Option<bool>,
+    replay: Option<bool>,
+}
+
+/// Tells `"tool": null` from no tool at all.
+fn given<'de, D: serde::Deserializer<'de>>(source: D) -> Result<Option<Option<Tool>>, D::Error> {
+    Option::<Tool>::deserialize(source).map(Some)
+}
+
+impl Wish {
+    /// # Errors
+    /// What is wrong with the message, for the closing frame.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let message: Message = serde_json::from_str(text).map_err(|error| error.to_string())?;
+        let sequence = message.sequence.unwrap_or(0);
+        let given = [
+            message.tool.map(|tool| Wish::Tool(tool, sequence)),
+            message.reset.filter(|yes| *yes).map(|_| Wish::Reset),
+            message.record.map(Wish::Record),
+            message.replay.filter(|yes| *yes).map(|_| Wish::Replay),
+        ];
+        let mut given = given.into_iter().flatten();
+        match (given.next(), given.next()) {
+            (Some(Wish::Tool(Some(tool), sequence)), None) => {
+                tool.check()?;
+                Ok(Wish::Tool(Some(tool), sequence))
+            }
+            (Some(wish), None) => Ok(wish),
+            _ => Err("a message has one of tool, reset, record, replay".into()),
+        }
+    }
+}
+
+impl Tool {
+    fn check(&self) -> Result<(), String> {
+        let all = self.position.iter().chain(&self.rotation);
+        if !all
+            .chain([&self.radius, &self.half_length])
+            .all(|x| x.is_finite() && x.abs() <= FARTHEST)
+        {
+            return Err("tool: a number is not finite or too large".into());
+        }
+        let length = self.rotation.iter().map(|x| x * x).sum::<f32>().sqrt();
+        if (length - 1.0).abs() > 1e-3 {
+            return Err(format!("tool.rotation has length {length}, must be 1"));
+        }
+        if !(0.1..=50.0).contains(&self.radius) || !(0.0..=200.0).contains(&self.half_length) {
+            return Err("tool: radius is 0.1 to 50 mm, half_length 0 to 200 mm".into());
+        }
+        Ok(())
+    }
+}
+
+/// The first message to the page.
+#[derive(Serialize)]
+pub struct Hello {
+    pub bundle: String,
+    /// K.
+    pub node_count: usize,
+    pub surface_node_count: usize,
+    pub surface_face_count: usize,
+    /// Seconds.
+    pub dt: f32,
+    pub max_push_mm: f32,
+    /// Names of the bits of a frame's flags.
+    pub flags: Vec<(u32, &'static str)>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_wish_is_read() {
+        let tool = r#"{"tool":{"position":[1,2,3],"rotation":[0,0,0,1],"radius":5,"half_length":20,"sticking":true},"sequence":7}"#;
+        let Ok(Wish::Tool(Some(read), 7)) = Wish::parse(tool) else {
+            panic!()
+        };
+        assert_eq!(read.position, [1.0, 2.0, 3.0]);
+        assert_eq!(
+            Wish::parse(r#"{"tool":null,"sequence":8}"#),
+            Ok(Wish::Tool(None, 8))
+        );
+        assert_eq!(Wish::parse(r#"{"reset":true}"#), Ok(Wish::Reset));
+        assert_eq!(Wish::parse(r#"{"record":false}"#), Ok(Wish::Record(false)));
+    }
+
+    #[test]
+    fn what_is_no_wish_is_refused() {
+        let with = |field: &str, value: &str| {
+            let mut fields = std::collections::BTreeMap::from([
+                ("position", "[0,0,0]"),
+                ("rotation", "[0,0,0,1]"),
+                ("radius", "5"),
+                ("half_length", "20"),
+                ("sticking", "true"),
+            ]);
+            fields.insert(field, value);
+            let fields: Vec<String> = fields.iter().map(|(k, v)| format!("\"{k}\":{v}")).collect();
+            format!("{{\"tool\":{{{}}}}}", fields.join(","))
+        };
+        let mut bad: Vec<String> = [
+            "",
+            "{}",
+            "[]",
+            "null",
+            "{\"reset\":true,\"replay\":true}",
+            "{\"reset\":1}",
+        ]
+        .map(String::from)
+        .into();
+        bad.extend([
+            with("position", "[NaN,0,0]"),
+            with("position", "[1e39,0,0]"),
+            with("position", "[1e5,0,0]"),
+            with("position", "[0,0]"),
+            with("rotation", "[0,0,0,2]"),
+            with("radius", "0"),
+            with("radius", "-1"),
+            with("colour", "1"),
+        ]);
+        for text in bad {
+            assert!(Wish::parse(&text).is_err(), "{text}");
+        }
+        assert!(Wish::parse(&with("radius", "6")).is_ok());
+    }
+}

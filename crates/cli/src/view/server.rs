@@ -1,0 +1,246 @@
+//! Accepts connections on 127.0.0.1: the page's files, and one WebSocket at a time.
+
+use std::io::ErrorKind;
+use std::net::{TcpListener, TcpStream};
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result};
+use tungstenite::handshake::derive_accept_key;
+use tungstenite::protocol::{CloseFrame, Role, WebSocketConfig, frame::coding::CloseCode};
+use tungstenite::{Error, Message, WebSocket};
+
+use super::http::{Request, answer};
+use super::protocol::{LONGEST_MESSAGE, Wish};
+use super::session::Session;
+use crate::host::{Model, ModelSettings};
+
+/// Frames a second.
+const FRAME_RATE: f64 = 60.0;
+/// Connections that are served at once; more are closed.
+const MOST_CONNECTIONS: usize = 16;
+
+/// What the page is made of.
+const FILES: [(&str, &str, &[u8]); 3] = [
+    (
+        "/",
+        "text/html; charset=utf-8",
+        include_bytes!("page/index.html"),
+    ),
+    (
+        "/view.js",
+        "text/javascript",
+        include_bytes!("page/view.js"),
+    ),
+    (
+        "/three.js",
+        "text/javascript",
+        include_bytes!("page/three.js"),
+    ),
+];
+
+pub struct Server {
+    model: Model,
+    bundle: String,
+    port: u16,
+    token: String,
+    /// A client steps.
+    taken: AtomicBool,
+    connections: AtomicUsize,
+}
+
+impl Server {
+    pub fn new(bundle: &Path, threads: u32, listener: &TcpListener) -> Result<Self> {
+        let settings = ModelSettings {
+            threads,
+            ..ModelSettings::default()
+        };
+        let name = bundle.file_name().unwrap_or(bundle.as_os_str());
+        Ok(Self {
+            model: Model::open(bundle, &settings)?,
+            bundle: name.to_string_lossy().into_owned(),
+            port: listener.local_addr()?.port(),
+            token: token()?,
+            taken: AtomicBool::new(false),
+            connections: AtomicUsize::new(0),
+        })
+    }
+
+    /// What to open in a browser.
+    pub fn address(&self) -> String {
+        format!("http://127.0.0.1:{}/?token={}", self.port, self.token)
+    }
+
+    /// Never returns but when the listener fails.
+    pub fn serve(&self, listener: &TcpListener) {
+        std::thread::scope(|scope| {
+            for stream in listener.incoming().map_while(std::result::Result::ok) {
+                if self.connections.fetch_add(1, Ordering::AcqRel) >= MOST_CONNECTIONS {
+                    self.connections.fetch_sub(1, Ordering::AcqRel);
+                    continue;
+                }
+                scope.spawn(move || {
+                    self.connection(stream);
+                    self.connections.fetch_sub(1, Ordering::AcqRel);
+                });
+            }
+        });
+    }
+
+    fn connection(&self, mut stream: TcpStream) {
+        let Some(request) = Request::read(&mut stream) else {
+            return answer(
+                &mut stream,
+                "400 Bad Request",
+                "text/plain",
+                b"not understood\n",
+            );
+        };
+        // A page of another site that resolves its name to 127.0.0.1 says so here.
+        let own = [
+            format!("127.0.0.1:{}", self.port),
+            format!("localhost:{}", self.port),
+        ];
+        let host = request.header("host").unwrap_or_default();
+        let origin = request.header("origin");
+        let foreign = origin.is_some_and(|origin| {
+            !own.iter()
+                .any(|own| origin.strip_prefix("http://") == Some(own))
+        });
+        if !own.iter().any(|own| own == host) || foreign {
+            return answer(
+                &mut stream,
+                "403 Forbidden",
+                "text/plain",
+                b"another origin\n",
+            );
+        }
+        let secret = ["/", "/socket"].contains(&request.path.as_str());
+        if secret && request.token.as_deref() != Some(&self.token) {
+            return answer(
+                &mut stream,
+                "403 Forbidden",
+                "text/plain",
+                b"the token is wrong: open the address that `upt view` prints\n",
+            );
+        }
+        if request.path == "/socket" {
+            return self.socket(stream, &request, origin.is_some());
+        }
+        match FILES.iter().find(|(path, _, _)| *path == request.path) {
+            Some((_, kind, body)) => answer(&mut stream, "200 OK", kind, body),
+            None => answer(
+                &mut stream,
+                "404 Not Found",
+                "text/plain",
+                b"no such page\n",
+            ),
+        }
+    }
+
+    fn socket(&self, mut stream: TcpStream, request: &Request, from_page: bool) {
+        let upgrade = request.header("upgrade").unwrap_or_default();
+        let (Some(key), true, true) = (
+            request.header("sec-websocket-key"),
+            upgrade.eq_ignore_ascii_case("websocket"),
+            from_page,
+        ) else {
+            return answer(
+                &mut stream,
+                "400 Bad Request",
+                "text/plain",
+                b"not a WebSocket of the page\n",
+            );
+        };
+        if self.taken.swap(true, Ordering::AcqRel) {
+            return answer(
+                &mut stream,
+                "409 Conflict",
+                "text/plain",
+                b"another client is connected\n",
+            );
+        }
+        let accepted = format!(
+            "HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Accept: {}\r\n\r\n",
+            derive_accept_key(key.as_bytes())
+        );
+        if std::io::Write::write_all(&mut stream, accepted.as_bytes()).is_ok() {
+            let limits = WebSocketConfig::default()
+                .max_message_size(Some(LONGEST_MESSAGE))
+                .max_frame_size(Some(LONGEST_MESSAGE));
+            let mut socket = WebSocket::from_raw_socket(stream, Role::Server, Some(limits));
+            if let Err(reason) = self.converse(&mut socket) {
+                let mut reason = format!("{reason:#}");
+                reason.truncate(reason.floor_char_boundary(120));
+                let frame = CloseFrame {
+                    code: CloseCode::Policy,
+                    reason: reason.into(),
+                };
+                let _ = socket.close(Some(frame));
+                let _ = socket.flush();
+            }
+        }
+        self.taken.store(false, Ordering::Release);
+    }
+
+    /// Steps and streams until the client goes away; an error is what it did wrong.
+    fn converse(&self, socket: &mut WebSocket<TcpStream>) -> Result<()> {
+        socket.get_ref().set_nodelay(true)?;
+        // A client that reads nothing for so long is gone.
+        socket
+            .get_ref()
+            .set_write_timeout(Some(Duration::from_secs(5)))?;
+        let mut session = Session::new(&self.model)?;
+        let hello = serde_json::to_string(&session.hello(&self.bundle, &self.model))?;
+        socket.send(Message::text(hello))?;
+        socket.send(Message::binary(session.geometry()))?;
+        let period = Duration::from_secs_f64(1.0 / FRAME_RATE);
+        let mut next = Instant::now();
+        loop {
+            // What the client says is taken while it is waited for the next frame.
+            loop {
+                let left = next.saturating_duration_since(Instant::now());
+                if left.is_zero() {
+                    break;
+                }
+                socket
+                    .get_ref()
+                    .set_read_timeout(Some(left.max(Duration::from_micros(200))))?;
+                match socket.read() {
+                    Ok(Message::Text(text)) => {
+                        let wish = Wish::parse(text.as_str()).map_err(anyhow::Error::msg)?;
+                        session.take(wish)?;
+                    }
+                    Ok(Message::Binary(_)) => anyhow::bail!("messages are JSON text"),
+                    Ok(_) => {}
+                    Err(Error::Io(error))
+                        if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) =>
+                    {
+                        break;
+                    }
+                    Err(Error::ConnectionClosed | Error::AlreadyClosed | Error::Io(_)) => {
+                        return Ok(());
+                    }
+                    Err(error) => return Err(error.into()),
+                }
+            }
+            let frame = session.frame()?.to_vec();
+            match socket.send(Message::binary(frame)) {
+                Ok(()) => {}
+                Err(Error::ConnectionClosed | Error::AlreadyClosed | Error::Io(_)) => return Ok(()),
+                Err(error) => return Err(error.into()),
+            }
+            next = (next + period).max(Instant::now());
+        }
+    }
+}
+
+/// 128 random bits in hex.
+fn token() -> Result<String> {
+    let mut bytes = [0u8; 16];
+    getrandom::fill(&mut bytes)
+        .map_err(|error| anyhow::anyhow!("{error}"))
+        .context("no random numbers for the token")?;
+    Ok(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
+}

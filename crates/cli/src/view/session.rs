@@ -1,0 +1,238 @@
+//! One client's tissue: a scene that keeps step with the clock, a tool, a recording.
+
+use std::collections::BTreeMap;
+use std::time::Instant;
+
+use anyhow::Result;
+use upt::ffi;
+
+use super::protocol::{HEADER, Hello, Tool, Wish};
+use crate::host::{Model, Scene};
+
+/// Steps that may be made up for at once when the clock has run ahead; the rest is dropped.
+const MOST_STEPS: u32 = 2;
+/// A recording ends after so many steps: a quarter of an hour at 20 Hz.
+const LONGEST_RECORDING: usize = 18_000;
+
+pub struct Session {
+    scene: Scene,
+    /// Surface nodes, which are the region of the scene.
+    nodes: Vec<u32>,
+    rest: Vec<[f32; 3]>,
+    /// Indices into `nodes`.
+    faces: Vec<u32>,
+    /// 1 where the model was trained to be touched.
+    domain: Vec<u32>,
+    dt: f64,
+    tool: Option<Tool>,
+    sequence: u32,
+    /// When the pose came that no step has taken yet.
+    came: Option<Instant>,
+    waited_ms: f32,
+    /// When the last step was due.
+    due: Instant,
+    recording: Option<Vec<Option<Tool>>>,
+    recorded: Vec<Option<Tool>>,
+    replayed: Option<usize>,
+    contact_nodes: Vec<u32>,
+    contact_vectors: Vec<[f32; 3]>,
+    displacement: Vec<[f32; 3]>,
+    force: [f32; 3],
+    bytes: Vec<u8>,
+}
+
+impl Session {
+    pub fn new(model: &Model) -> Result<Self> {
+        let mut scene = Scene::create(model, ffi::UPT_KERNEL_AUTO)?;
+        let nodes = model.indices(ffi::UPT_SET_SURFACE_NODES)?;
+        let positions = model.positions()?;
+        let place: BTreeMap<u32, u32> = (0..).zip(&nodes).map(|(at, node)| (*node, at)).collect();
+        let faces = model.indices(ffi::UPT_SET_SURFACE_FACES)?;
+        let mut domain = vec![0; nodes.len()];
+        for node in model.indices(ffi::UPT_SET_DOMAIN_NODES)? {
+            if let Some(at) = place.get(&node) {
+                domain[*at as usize] = 1;
+            }
+        }
+        scene.set_region(&nodes)?;
+        Ok(Self {
+            faces: faces.iter().map(|node| place[node]).collect(),
+            rest: nodes.iter().map(|node| positions[*node as usize]).collect(),
+            displacement: vec![[0.0; 3]; nodes.len()],
+            nodes,
+            domain,
+            scene,
+            dt: f64::from(model.info().dt),
+            tool: None,
+            sequence: 0,
+            came: None,
+            waited_ms: 0.0,
+            due: Instant::now(),
+            recording: None,
+            recorded: Vec::new(),
+            replayed: None,
+            contact_nodes: Vec::new(),
+            contact_vectors: Vec::new(),
+            force: [0.0; 3],
+            bytes: Vec::new(),
+        })
+    }
+
+    pub fn hello(&self, bundle: &str, model: &Model) -> Hello {
+        let info = model.info();
+        Hello {
+            bundle: bundle.to_owned(),
+            node_count: info.node_count as usize,
+            surface_node_count: self.nodes.len(),
+            surface_face_count: self.faces.len() / 3,
+            dt: info.dt,
+            max_push_mm: info.max_push_mm,
+            flags: vec![
+                (ffi::UPT_FLAG_PUSH, "push longer than trained"),
+                (ffi::UPT_FLAG_CONTACT_AREA, "contact area not trained"),
+                (ffi::UPT_FLAG_SITE, "contact outside the domain"),
+                (ffi::UPT_FLAG_RATE, "faster than trained"),
+                (ffi::UPT_FLAG_SITES, "several contacts"),
+                (ffi::UPT_FLAG_BOUND, "guard: bound"),
+                (ffi::UPT_FLAG_NON_FINITE, "guard: not finite"),
+                (ffi::UPT_FLAG_INVERTED, "guard: inverted"),
+                (ffi::UPT_FLAG_GROWTH, "guard: growth"),
+                (ffi::UPT_FLAG_CLAMPED, "correction bounded"),
+                (ffi::UPT_FLAG_REGULARISED, "contact regularised"),
+            ],
+        }
+    }
+
+    /// Rest positions, faces and domain, for the page's second message.
+    pub fn geometry(&self) -> Vec<u8> {
+        let positions = self.rest.as_flattened().iter().map(|x| x.to_le_bytes());
+        let numbers = self.faces.iter().chain(&self.domain);
+        let numbers = numbers.map(|x| x.to_le_bytes());
+        positions.chain(numbers).flatten().collect()
+    }
+
+    pub fn take(&mut self, wish: Wish) -> Result<()> {
+        match wish {
+            Wish::Tool(tool, sequence) => {
+                self.tool = tool;
+                self.sequence = sequence;
+                self.came.get_or_insert_with(Instant::now);
+            }
+            Wish::Reset => self.rest_again()?,
+            Wish::Record(true) => self.recording = Some(Vec::new()),
+            Wish::Record(false) => {
+                if let Some(recording) = self.recording.take() {
+                    self.recorded = recording;
+                }
+            }
+            Wish::Replay => {
+                self.rest_again()?;
+                self.recording = None;
+                self.replayed = Some(0);
+            }
+        }
+        Ok(())
+    }
+
+    fn rest_again(&mut self) -> Result<()> {
+        self.tool = None;
+        self.replayed = None;
+        self.force = [0.0; 3];
+        self.scene.reset()
+    }
+
+    /// Steps as often as the clock asks, and writes the frame of this moment.
+    pub fn frame(&mut self) -> Result<&[u8]> {
+        let mut steps = 0;
+        while self.due.elapsed().as_secs_f64() >= self.dt {
+            if steps == MOST_STEPS {
+                self.due = Instant::now();
+                break;
+            }
+            self.due += std::time::Duration::from_secs_f64(self.dt);
+            self.step()?;
+            steps += 1;
+        }
+        let alpha = (self.due.elapsed().as_secs_f64() / self.dt).clamp(0.0, 1.0);
+        self.scene.sample(alpha, &mut self.displacement)?;
+        self.encode()
+    }
+
+    fn step(&mut self) -> Result<()> {
+        if let Some(at) = &mut self.replayed {
+            self.tool = self.recorded.get(*at).copied().flatten();
+            *at += 1;
+            if *at > self.recorded.len() {
+                self.replayed = None;
+            }
+        }
+        if let Some(recording) = &mut self.recording
+            && recording.len() < LONGEST_RECORDING
+        {
+            recording.push(self.tool);
+        }
+        if let Some(came) = self.came.take() {
+            self.waited_ms = came.elapsed().as_secs_f32() * 1e3;
+        }
+        let instruments: Vec<ffi::upt_instrument> = self.tool.iter().map(instrument).collect();
+        self.scene.contacts(
+            &instruments,
+            &mut self.contact_nodes,
+            &mut self.contact_vectors,
+        )?;
+        self.scene.step(
+            &self.contact_nodes,
+            &self.contact_vectors,
+            &mut self.displacement,
+        )?;
+        self.force = [0.0; 3];
+        if !self.contact_nodes.is_empty() {
+            for force in self.scene.contact_force(self.contact_nodes.len())? {
+                for (sum, f) in self.force.iter_mut().zip(force) {
+                    *sum += f;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn encode(&mut self) -> Result<&[u8]> {
+        let stats = self.scene.stats()?;
+        let state = u32::from(self.recording.is_some())
+            | (u32::from(self.replayed.is_some()) << 1)
+            | (u32::from(stats.sleeping) << 2);
+        let header: [[u8; 4]; HEADER] = [
+            self.sequence.to_le_bytes(),
+            stats.flags.to_le_bytes(),
+            (self.contact_nodes.len() as u32).to_le_bytes(),
+            state.to_le_bytes(),
+            (stats.step_ms as f32).to_le_bytes(),
+            stats.indicator.to_le_bytes(),
+            self.force[0].to_le_bytes(),
+            self.force[1].to_le_bytes(),
+            self.force[2].to_le_bytes(),
+            stats.max_displacement_mm.to_le_bytes(),
+            self.waited_ms.to_le_bytes(),
+            (stats.step_count as u32).to_le_bytes(),
+        ];
+        self.bytes.clear();
+        self.bytes.extend(header.as_flattened());
+        for x in self.displacement.as_flattened() {
+            self.bytes.extend(x.to_le_bytes());
+        }
+        Ok(&self.bytes)
+    }
+}
+
+fn instrument(tool: &Tool) -> ffi::upt_instrument {
+    ffi::upt_instrument {
+        struct_size: size_of::<ffi::upt_instrument>() as u32,
+        shape: ffi::UPT_SHAPE_CAPSULE,
+        position: tool.position,
+        rotation: tool.rotation,
+        half_extents: [0.0, tool.half_length, 0.0],
+        radius: tool.radius,
+        sticking: u8::from(tool.sticking),
+        reserved: [0; 3],
+    }
+}

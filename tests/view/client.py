@@ -1,0 +1,166 @@
+"""The two ways in: a plain WebSocket client that may misbehave, and a browser by the WebDriver protocol."""
+
+from __future__ import annotations
+
+import base64
+import json
+import os
+import shutil
+import socket
+import struct
+import subprocess
+import time
+import urllib.error
+import urllib.request
+
+
+class Refused(Exception):
+    """The server answered the handshake with something else than a WebSocket."""
+
+
+class RawClient:
+    """A WebSocket over a bare socket; frames are sent as they are told, right or wrong."""
+
+    def __init__(self, port: int, target: str, origin: str | None = "same", host: str | None = None) -> None:
+        own = f"127.0.0.1:{port}"
+        lines = [f"GET {target} HTTP/1.1", f"Host: {host or own}", "Upgrade: websocket", "Connection: Upgrade"]
+        lines += [f"Sec-WebSocket-Key: {base64.b64encode(os.urandom(16)).decode()}", "Sec-WebSocket-Version: 13"]
+        if origin:
+            lines.append(f"Origin: {f'http://{own}' if origin == 'same' else origin}")
+        self.socket = socket.create_connection(("127.0.0.1", port), timeout=30)
+        self.socket.sendall(("\r\n".join(lines) + "\r\n\r\n").encode())
+        self.data = b""
+        head = self._until(b"\r\n\r\n").decode()
+        if " 101 " not in head.split("\r\n")[0]:
+            self.socket.close()
+            raise Refused(head.split("\r\n")[0])
+
+    def _until(self, mark: bytes) -> bytes:
+        while mark not in self.data:
+            more = self.socket.recv(65536)
+            if not more:
+                break
+            self.data += more
+        head, _, self.data = self.data.partition(mark)
+        return head
+
+    def _take(self, count: int) -> bytes:
+        while len(self.data) < count:
+            more = self.socket.recv(65536)
+            if not more:
+                raise ConnectionError("closed")
+            self.data += more
+        taken, self.data = self.data[:count], self.data[count:]
+        return taken
+
+    def read(self) -> tuple[int, bytes]:
+        """Opcode and payload of the next frame."""
+        first, second = self._take(2)
+        length = second & 0x7F
+        if length == 126:
+            (length,) = struct.unpack(">H", self._take(2))
+        elif length == 127:
+            (length,) = struct.unpack(">Q", self._take(8))
+        return first & 0x0F, self._take(length)
+
+    def send(self, payload: bytes, opcode: int = 1, masked: bool = True, length: int | None = None) -> None:
+        size = len(payload) if length is None else length
+        mask = os.urandom(4) if masked else b""
+        bit = 0x80 if masked else 0
+        if size < 126:
+            head = struct.pack(">BB", 0x80 | opcode, bit | size)
+        elif size < 65536:
+            head = struct.pack(">BBH", 0x80 | opcode, bit | 126, size)
+        else:
+            head = struct.pack(">BBQ", 0x80 | opcode, bit | 127, size)
+        body = bytes(b ^ mask[i % 4] for i, b in enumerate(payload)) if masked else payload
+        self.socket.sendall(head + mask + body)
+
+    def closes(self) -> bool:
+        """Whether the server ends the connection, whatever it still had to say."""
+        try:
+            while True:
+                opcode, _ = self.read()
+                if opcode == 8:
+                    return True
+        except (ConnectionError, OSError) as error:
+            return not isinstance(error, TimeoutError)
+
+    def close(self) -> None:
+        self.socket.close()
+
+
+class Browser:
+    """Headless Chromium by chromedriver."""
+
+    def __init__(self, width: int = 1000, height: int = 700) -> None:
+        driver = shutil.which("chromedriver")
+        browser = shutil.which("chromium") or shutil.which("google-chrome")
+        if not driver or not browser:
+            raise FileNotFoundError("chromium and chromium-driver are needed")
+        with socket.socket() as free:
+            free.bind(("127.0.0.1", 0))
+            self.port = free.getsockname()[1]
+        command = [driver, f"--port={self.port}"]
+        self.driver = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.STDOUT)
+        arguments = ["--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--use-angle=swiftshader"]
+        arguments += ["--enable-unsafe-swiftshader", "--hide-scrollbars", f"--window-size={width},{height}"]
+        options = {"binary": browser, "args": arguments}
+        wanted = {"capabilities": {"alwaysMatch": {"goog:chromeOptions": options}}}
+        for _ in range(100):
+            try:
+                self.session = self._call("POST", "/session", wanted)["sessionId"]
+                break
+            except (urllib.error.URLError, ConnectionError):
+                time.sleep(0.1)
+        else:
+            raise RuntimeError("chromedriver does not answer")
+
+    def _call(self, method: str, path: str, body: object = None) -> object:
+        data = None if body is None else json.dumps(body).encode()
+        request = urllib.request.Request(f"http://127.0.0.1:{self.port}{path}", data, method=method)
+        request.add_header("Content-Type", "application/json")
+        with urllib.request.urlopen(request, timeout=120) as answer:
+            return json.load(answer)["value"]
+
+    def open(self, address: str) -> None:
+        self._call("POST", f"/session/{self.session}/url", {"url": address})
+
+    def run(self, script: str) -> object:
+        return self._call("POST", f"/session/{self.session}/execute/sync", {"script": script, "args": []})
+
+    def wait(self, condition: str, seconds: float = 60) -> object:
+        """The value of a JavaScript expression once it is true."""
+        until = time.monotonic() + seconds
+        while time.monotonic() < until:
+            value = self.run(f"return {condition}")
+            if value:
+                return value
+            time.sleep(0.05)
+        raise TimeoutError(condition)
+
+    def drag(self, points: list[tuple[int, int]], release: bool) -> None:
+        """The left button pressed at the first point, moved through the others, 100 ms each."""
+        move = [{"type": "pointerMove", "duration": 100, "x": x, "y": y, "origin": "viewport"} for x, y in points]
+        actions = [move[0], {"type": "pointerDown", "button": 0}, *move[1:]]
+        if release:
+            actions.append({"type": "pointerUp", "button": 0})
+        mouse = {"type": "pointer", "id": "mouse", "parameters": {"pointerType": "mouse"}, "actions": actions}
+        self._call("POST", f"/session/{self.session}/actions", {"actions": [mouse]})
+
+    def release(self) -> None:
+        self._call("DELETE", f"/session/{self.session}/actions")
+
+    def click(self, selector: str) -> None:
+        self.run(f"document.querySelector({json.dumps(selector)}).click()")
+
+    def screenshot(self, path: str) -> None:
+        with open(path, "wb") as file:
+            file.write(base64.b64decode(self._call("GET", f"/session/{self.session}/screenshot")))
+
+    def close(self) -> None:
+        try:
+            self._call("DELETE", f"/session/{self.session}")
+        finally:
+            self.driver.terminate()
+            self.driver.wait()

@@ -1,0 +1,236 @@
+"""`upt view`: what is refused, and the page in headless Chromium.
+
+    python3 tests/view/run.py
+
+Reads UPT_COMMAND (the command `upt`), UPT_BUNDLES (default onnx/), UPT_BUILD_DIR (pictures go to view/ there) and
+ORT_DYLIB_PATH. The last line is `N passed, N failed, N skipped`.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import os
+import struct
+import subprocess
+import sys
+import time
+import traceback
+import urllib.error
+import urllib.request
+from contextlib import contextmanager
+from pathlib import Path
+
+from client import Browser, RawClient, Refused
+
+ROOT = Path(__file__).resolve().parents[2]
+COMMAND = os.environ.get("UPT_COMMAND", str(ROOT / "target/release/upt"))
+BUNDLES = Path(os.environ.get("UPT_BUNDLES", ROOT / "onnx"))
+PICTURES = Path(os.environ.get("UPT_BUILD_DIR", ROOT / "target")) / "view"
+TOOL = {"position": [0, 0, 0], "rotation": [0, 0, 0, 1], "radius": 5, "half_length": 20, "sticking": True}
+
+
+@contextmanager
+def server(bundle: Path):
+    """Port and token of a running `upt view`."""
+    command = [COMMAND, "view", str(bundle)]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    try:
+        address = process.stdout.readline().strip()
+        rest, token = address.split("/?token=")
+        yield int(rest.rsplit(":", 1)[1]), token
+        assert process.poll() is None, "the server has ended"
+    finally:
+        process.kill()
+        process.wait()
+
+
+def status_of(port: int, path: str, host: str | None = None) -> int:
+    request = urllib.request.Request(f"http://127.0.0.1:{port}{path}")
+    if host:
+        request.add_header("Host", host)
+    try:
+        with urllib.request.urlopen(request, timeout=30) as answer:
+            return answer.status
+    except urllib.error.HTTPError as error:
+        return error.code
+
+
+def only_the_token_opens_the_page():
+    with server(ROOT / "tests/fixtures/tiny-reduced") as (port, token):
+        assert status_of(port, f"/?token={token}") == 200
+        assert status_of(port, "/") == 403
+        assert status_of(port, f"/?token={token[:-1]}") == 403
+        assert status_of(port, f"/?token={token}", "evil.example") == 403
+        assert status_of(port, "/view.js") == 200
+        assert status_of(port, f"/../Cargo.toml?token={token}") == 404
+
+
+def a_socket_of_another_origin_is_refused():
+    with server(ROOT / "tests/fixtures/tiny-reduced") as (port, token):
+        target = f"/socket?token={token}"
+        for origin, host in [("http://evil.example", None), (None, None), ("same", "evil.example")]:
+            try:
+                RawClient(port, target, origin, host)
+            except Refused:
+                continue
+            raise AssertionError(f"origin {origin}, host {host}")
+        try:
+            RawClient(port, "/socket?token=0")
+            raise AssertionError("wrong token")
+        except Refused:
+            pass
+        RawClient(port, target).close()
+
+
+def a_second_client_is_refused_and_the_first_goes_on():
+    with server(ROOT / "tests/fixtures/tiny-reduced") as (port, token):
+        first = RawClient(port, f"/socket?token={token}")
+        first.read()
+        try:
+            RawClient(port, f"/socket?token={token}")
+            raise AssertionError("two clients")
+        except Refused as refused:
+            assert "409" in str(refused)
+        assert all(first.read()[0] == 2 for _ in range(5))
+
+
+def a_bad_message_closes_its_client_alone():
+    def tool(**fields):
+        return json.dumps({"tool": TOOL | fields}).encode()
+
+    bad = {
+        "no JSON": (b"{", {}),
+        "not UTF-8": (b"\xff\xfe", {}),
+        "unknown field": (b'{"explode":true}', {}),
+        "NaN": (tool(position=[float("nan"), 0, 0]), {}),
+        "infinite": (b'{"tool":' + json.dumps(TOOL).replace("[0, 0, 0]", "[1e999,0,0]").encode() + b"}", {}),
+        "no rotation": (tool(rotation=[0, 0, 0, 0]), {}),
+        "binary": (b"\0" * 16, {"opcode": 2}),
+        "oversized": (b" " * 5000 + b"{}", {}),
+        "a length of a terabyte": (b"", {"length": 1 << 40}),
+        "not masked": (b'{"reset":true}', {"masked": False}),
+        "reserved opcode": (b"x", {"opcode": 5}),
+    }
+    with server(ROOT / "tests/fixtures/tiny-reduced") as (port, token):
+        for what, (payload, how) in bad.items():
+            client = connect_when_free(port, token)
+            client.read()
+            client.send(payload, **how)
+            assert client.closes(), what
+            client.close()
+        # The server still serves, and a good message moves the tissue of the phantom.
+        client = connect_when_free(port, token)
+        hello = json.loads(client.read()[1])
+        geometry = client.read()[1]
+        n = hello["surface_node_count"]
+        rest = struct.unpack(f"<{3 * n}f", geometry[: 12 * n])
+        nodes = [rest[3 * i : 3 * i + 3] for i in range(n)]
+        top = max(node[2] for node in nodes)
+        x, y, _ = min(
+            (node for node in nodes if node[2] == top), key=lambda node: abs(node[0] - 30) + abs(node[1] - 30)
+        )
+        where = [x, y, top + 21.0]  # the tip of a tool that stands on its axis, 4 mm deep
+        turned = {"position": where, "rotation": [0.70710678, 0, 0, 0.70710678]}
+        client.send(tool(**turned))
+        largest = 0.0
+        for _ in range(600):
+            _, frame = client.read()
+            largest = max(largest, struct.unpack("<12f", frame[:48])[9])
+            if largest > 1.0:
+                break
+        assert largest > 1.0, f"{largest} mm"
+
+
+def connect_when_free(port: int, token: str) -> RawClient:
+    """The place of a client that has just gone is free a moment later."""
+    for _ in range(500):
+        try:
+            return RawClient(port, f"/socket?token={token}")
+        except Refused:
+            time.sleep(0.02)
+    raise AssertionError("the place never became free")
+
+
+def a_drag_moves_the_surface(browser: Browser, bundle: str):
+    with server(BUNDLES / bundle) as (port, token):
+        browser.open(f"http://127.0.0.1:{port}/?token={token}")
+        browser.wait("window.uptView && uptView.shown > 10")
+        browser.screenshot(str(PICTURES / f"{bundle}-rest.png"))
+        width, height = browser.run("return [innerWidth, innerHeight]")
+        x, y = width // 2, height // 2
+        browser.click("#record")
+        browser.wait("uptView.recording")
+        browser.drag([(x, y), (x + 10, y), (x + 30, y + 10)], release=False)
+        browser.wait("uptView.largest > 2 && uptView.contacts > 0")
+        browser.wait("uptView.latency.length > 0")
+        browser.screenshot(str(PICTURES / f"{bundle}-pressed.png"))
+        assert browser.run("return uptView.force") > 0
+        steps = browser.run("return uptView.steps")
+        browser.wait(f"uptView.steps > {steps + 60}")
+        numbers = browser.run("return {rate: uptView.rate, latency: uptView.latency, step: uptView.stepMs}")
+        latency = sorted(numbers["latency"])[len(numbers["latency"]) // 2]
+        print(f"{bundle}: {numbers['rate']:.0f} pictures/s, step {numbers['step']:.2f} ms, ", end="")
+        print(f"mouse to picture beside the wait for the step {latency:.0f} ms (median)")
+        surface = json.loads(browser.run("return uptView.gltf()"))
+        check_gltf(surface)
+        browser.release()
+        browser.wait("uptView.contacts == 0")
+        browser.click("#record")
+        browser.wait("!uptView.recording")
+        browser.click("#reset")
+        browser.wait("uptView.largest < 0.01")
+        browser.click("#replay")
+        browser.wait("uptView.replaying && uptView.largest > 2")
+        browser.wait("!uptView.replaying")
+
+
+def check_gltf(surface: dict) -> None:
+    """The file holds what it says: as many bytes, indices in range, the stated bounds."""
+    data = base64.b64decode(surface["buffers"][0]["uri"].split(",", 1)[1])
+    assert len(data) == surface["buffers"][0]["byteLength"]
+    positions, _, indices = surface["accessors"]
+    places = [surface["bufferViews"][i] for i in range(3)]
+    values = struct.unpack_from(f"<{3 * positions['count']}f", data, places[0]["byteOffset"])
+    for axis in range(3):
+        assert abs(min(values[axis::3]) - positions["min"][axis]) < 1e-6
+    numbers = struct.unpack_from(f"<{indices['count']}I", data, places[2]["byteOffset"])
+    assert max(numbers) < positions["count"] and indices["count"] % 3 == 0
+
+
+def main() -> int:
+    PICTURES.mkdir(parents=True, exist_ok=True)
+    tests = [
+        only_the_token_opens_the_page,
+        a_socket_of_another_origin_is_refused,
+        a_second_client_is_refused_and_the_first_goes_on,
+        a_bad_message_closes_its_client_alone,
+    ]
+    passed = failed = skipped = 0
+    try:
+        browser = Browser()
+    except FileNotFoundError as missing:
+        browser = None
+        skipped = 1
+        print(f"skipped: the page: {missing}")
+    runs = [(test.__name__, test) for test in tests]
+    if browser:
+        runs.append(("a_drag_moves_the_surface", lambda: a_drag_moves_the_surface(browser, "brain-reduced")))
+    try:
+        for name, test in runs:
+            try:
+                test()
+                passed += 1
+                print(f"passed: {name}")
+            except Exception:
+                failed += 1
+                print(f"FAILED: {name}\n{traceback.format_exc()}")
+    finally:
+        if browser:
+            browser.close()
+    print(f"{passed} passed, {failed} failed, {skipped} skipped")
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
