@@ -22,6 +22,10 @@ pub struct Options {
     /// Programme of rigid tools: press, probe, stroke, retract, poke, lift, two, wobble, grasp, edge.
     #[arg(long, conflicts_with = "scheme")]
     tool: Option<ToolProgramme>,
+    /// Convex hull of this STL, OBJ or PLY file (mm; y up the shaft, the lowest end touches) in place of the programme's tool.
+    #[cfg(feature = "files")]
+    #[arg(long, requires = "tool")]
+    tool_shape: Option<PathBuf>,
     /// Seed of the contact site.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -39,6 +43,23 @@ pub struct Options {
     half: bool,
     #[command(flatten)]
     solver: SolverArguments,
+}
+
+impl Options {
+    /// A tool of the user's own.
+    #[cfg(feature = "files")]
+    fn own_shape(&self) -> anyhow::Result<Option<contact::Shape>> {
+        let file = self.tool_shape.as_deref();
+        Ok(file
+            .map(|path| tissue::mesh_import::tool_shape(path, 1.0))
+            .transpose()?)
+    }
+
+    /// Reading one takes the feature `files`.
+    #[cfg(not(feature = "files"))]
+    fn own_shape(&self) -> anyhow::Result<Option<contact::Shape>> {
+        Ok(None)
+    }
 }
 
 /// Settings of the solver that `simulate` and `dataset` share.
@@ -101,8 +122,16 @@ pub fn run(options: &Options) -> anyhow::Result<ExitCode> {
                 bar.set_length(count as u64);
                 bar.set_position(frame as u64);
             };
-            let case =
-                tissue::simulate::simulate_tools(&mesh, boundary, tool, seed, &settings, advance);
+            let own = options.own_shape()?;
+            let case = tissue::simulate::simulate_tools(
+                &mesh,
+                boundary,
+                tool,
+                own.as_ref(),
+                seed,
+                &settings,
+                advance,
+            );
             (format!("tool {}", tool.name()), case)
         }
         (None, Some(scheme)) => {

@@ -58,6 +58,11 @@ impl Hull {
         }
     }
 
+    /// Its corners.
+    pub fn corners(&self) -> &[Vector] {
+        self.faces.vertices()
+    }
+
     /// Corners of the box around it.
     pub fn bounds(&self) -> (Vector, Vector) {
         let vertices = self.faces.vertices();

@@ -1,5 +1,6 @@
 //! What a tool looks like in its own frame, mm. [`crate::Body`] answers queries about it.
 
+use crate::hull::Hull;
 use serde::{Deserialize, Serialize};
 
 /// A rigid tool's shape, centred on its own origin except where points say otherwise.
@@ -43,6 +44,23 @@ pub enum ShapeError {
 const LARGEST: f32 = 1e4;
 
 impl Shape {
+    /// The convex hull of points, such as those of an STL or OBJ file, with only its corners kept.
+    ///
+    /// # Errors
+    /// [`ShapeError`] for points that are not finite or have no volume between them.
+    pub fn hull_of(points: &[[f32; 3]]) -> Result<Self, ShapeError> {
+        let all = Shape::Hull {
+            points: points.to_vec(),
+            margin: 0.0,
+        };
+        all.check()?;
+        let hull = Hull::new(points)?;
+        Ok(Shape::Hull {
+            points: hull.corners().iter().map(|p| p.to_array()).collect(),
+            margin: 0.0,
+        })
+    }
+
     /// Sizes are finite and positive, a rounded box is as thick as its corners. Hulls are built by [`crate::Body::new`].
     ///
     /// # Errors

@@ -284,7 +284,7 @@ impl<'a> Dataset<'a> {
             }
             (Load::Tools(tools), _) => {
                 let progress = |frame, _| progress(frame);
-                simulate_tools(mesh, boundary, tools, case.seed, options, progress)
+                simulate_tools(mesh, boundary, tools, None, case.seed, options, progress)
                     .map(|trajectory| (trajectory, Vec::new()))
                     .map_err(|error| error.to_string())
             }

@@ -7,7 +7,7 @@ use crate::schemes::{FRAME_S, FRAMES, Programme, Scheme};
 use crate::solver::{ContactNode, FrameReport, SampleForce, Solver, SolverError, SolverOptions};
 use crate::tool_tracks::ToolTracks;
 use crate::trajectory::{Trajectory, TrajectoryHeader};
-use contact::{Samples, Vector};
+use contact::{Samples, Shape, Vector};
 use std::collections::BTreeMap;
 
 /// Name and version that trajectories carry.
@@ -69,7 +69,7 @@ pub fn simulate(
     Ok(trajectory)
 }
 
-/// Simulates `programme` with `seed` on `mesh`; `progress` hears of each finished frame and of how many there will be.
+/// Simulates `programme` with `seed` on `mesh`, with a shape of one's own in place of the table's where there is one; `progress` hears of each finished frame and of how many there will be.
 ///
 /// The collision field of a frame is what a host that prescribes contact would give: the nodes that bear a tool's force,
 /// where they are at the frame's end.
@@ -77,11 +77,12 @@ pub fn simulate_tools(
     mesh: &Mesh,
     boundary: Boundary,
     programme: ToolProgramme,
+    own: Option<&Shape>,
     seed: u64,
     options: &SolverOptions,
     mut progress: impl FnMut(usize, usize),
 ) -> Result<Trajectory, SimulationError> {
-    let case = ToolCase::new(programme, mesh, seed)?;
+    let case = ToolCase::new(programme, mesh, seed, own)?;
     let mut solver = Solver::new(mesh, boundary, options.clone())?;
     let samples = mesh.samples(boundary);
     solver.set_tools(samples.clone(), &case.tools, &case.start)?;

@@ -1,9 +1,11 @@
 //! Import: files of Gmsh and VTK (fixtures/import/make.py), and each fault by hand.
 
+use contact::Shape;
 use std::path::{Path, PathBuf};
 use tissue::mesh::Mesh;
 use tissue::mesh_import::{
     Ball, ImportError, ImportOptions, Imported, RawTets, Repair, Resolution, from_tets, import,
+    tool_shape,
 };
 use tissue::mesh_quality::measure;
 
@@ -44,6 +46,27 @@ fn sorted_positions(mesh: &Mesh) -> Vec<[i64; 3]> {
         .collect();
     rows.sort_unstable();
     rows
+}
+
+#[test]
+fn a_tool_is_the_hull_of_a_surface_file() {
+    for name in ["box.stl", "box.obj", "box.ply"] {
+        let Shape::Hull { points, .. } = tool_shape(&fixture(name), 2.0).unwrap() else {
+            panic!("a hull");
+        };
+        assert_eq!(points.len(), 8, "{name}: {points:?}");
+    }
+    let error = tool_shape(&fixture("box.vtk"), 1.0)
+        .unwrap_err()
+        .to_string();
+    assert!(
+        error.ends_with("a tool is read from .stl, .obj or .ply"),
+        "{error}"
+    );
+    assert!(matches!(
+        tool_shape(&fixture("box.stl"), -1.0),
+        Err(ImportError::Scale(_))
+    ));
 }
 
 #[test]

@@ -17,12 +17,14 @@ mod gmsh;
 mod repair;
 mod sets;
 mod surface_files;
+mod tool_file;
 mod vtk;
 mod vtk_raw;
 
 pub use distance::SurfaceDistance;
 pub use error::{ImportError, Repair};
 pub use sets::Ball;
+pub use tool_file::tool_shape;
 
 use crate::mesh::Mesh;
 use crate::stuffing;

@@ -22,6 +22,8 @@ const TRIES: usize = 400;
 /// A programme that cannot be placed on a mesh.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ProgrammeError {
+    #[error("the tool's own shape: {0}")]
+    Shape(#[from] contact::ShapeError),
     #[error("the mesh has no `domain` faces; tools have nowhere to touch")]
     EmptyDomain,
     #[error(
@@ -54,22 +56,31 @@ struct Hand {
 }
 
 impl ToolCase {
-    /// Draws a case from `seed`: the same one on every machine.
+    /// Draws a case from `seed`: the same one on every machine. A shape of one's own takes the place of the row's: its
+    /// y axis is the shaft, and the end that touches the lowest.
     ///
     /// # Errors
     /// [`ProgrammeError`] where the mesh has no domain, or no site of [`TRIES`] passes the checks.
-    pub fn new(programme: ToolProgramme, mesh: &Mesh, seed: u64) -> Result<Self, ProgrammeError> {
+    pub fn new(
+        programme: ToolProgramme,
+        mesh: &Mesh,
+        seed: u64,
+        own: Option<&Shape>,
+    ) -> Result<Self, ProgrammeError> {
         if mesh.domain.is_empty() {
             return Err(ProgrammeError::EmptyDomain);
         }
         let specification = programme.specification();
+        if let Some(shape) = own {
+            Body::new(shape)?;
+        }
         let surface = Surface::new(mesh);
         let sites = Sites::new(mesh);
         // Programmes of one seed go to different sites.
         let mut random = SplitMix(seed);
         random.0 ^= SplitMix(programme.row as u64).next();
         for _ in 0..TRIES {
-            if let Some(hands) = hands(specification, &surface, &sites, &mut random)
+            if let Some(hands) = hands(specification, own, &surface, &sites, &mut random)
                 && let Some(case) = Self::of(&hands, specification, &surface)
             {
                 return Ok(case);
@@ -114,6 +125,7 @@ impl ToolCase {
 
 fn hands(
     specification: &Specification,
+    own: Option<&Shape>,
     surface: &Surface,
     sites: &Sites,
     random: &mut SplitMix,
@@ -122,13 +134,13 @@ fn hands(
     let radius = draw(specification.radius_mm, random) as f32;
     let unit = random.unit();
     let (turn, distance) = (random.unit(), random.unit());
-    let first = hand(specification, radius, random, |reach| {
+    let first = hand(specification, own, radius, random, |reach| {
         sites.draw(unit, specification.border, reach)
     });
     let second = specification.second_mm.map(|range| {
         let from = sites.draw(unit, false, radius).map(|s| s.at);
         let away = (range[0] + (range[1] - range[0]) * distance) as f32;
-        hand(specification, radius, random, |reach| {
+        hand(specification, own, radius, random, |reach| {
             sites.beside(from?, away, turn, reach)
         })
     });
@@ -147,6 +159,7 @@ fn hands(
 /// A tool with its end on a site, and what it will do there.
 fn hand(
     specification: &Specification,
+    own: Option<&Shape>,
     radius: f32,
     random: &mut SplitMix,
     site: impl Fn(f32) -> Option<Site>,
@@ -162,8 +175,12 @@ fn hand(
         half_extents: [radius, SHAFT_MM, thick],
         radius: edge,
     };
-    let (shape, end, pivot) = match specification.tip {
-        Tip::Rod => {
+    let (shape, end, pivot) = match (own, specification.tip) {
+        (Some(shape), _) => {
+            let (low, _) = Body::new(shape).ok()?.bounds(&Pose::IDENTITY, 0.0);
+            (shape.clone(), -low.y, -low.y)
+        }
+        (None, Tip::Rod) => {
             let half_length = SHAFT_MM;
             let shape = Shape::Capsule {
                 half_length,
@@ -171,8 +188,8 @@ fn hand(
             };
             (shape, SHAFT_MM + radius, SHAFT_MM)
         }
-        Tip::Blade => (blade(BLADE_MM), SHAFT_MM, SHAFT_MM),
-        Tip::Foot => (blade(FOOT_MM), SHAFT_MM, SHAFT_MM),
+        (None, Tip::Blade) => (blade(BLADE_MM), SHAFT_MM, SHAFT_MM),
+        (None, Tip::Foot) => (blade(FOOT_MM), SHAFT_MM, SHAFT_MM),
     };
     let body = Body::new(&shape).ok()?;
     // The shaft leans from the normal by an angle whose sine is even in the disc.
@@ -209,7 +226,7 @@ fn hand(
     })
 }
 
-/// Whether two rods come closer than half a millimetre.
+/// Whether two tools come closer than half a millimetre: rods, or whatever has the other's shaft within its skin.
 fn collide(hands: &[Hand], poses: &[ToolPose]) -> bool {
     let [first, second] = hands else {
         return false;

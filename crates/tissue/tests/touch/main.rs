@@ -2,6 +2,7 @@
 //! number of threads. Hertz's law and the other tables of docs/reference-solver.md are in `examples/tool_tables.rs`.
 
 mod bench;
+mod calculix;
 mod failures;
 mod forces;
 mod grasp;

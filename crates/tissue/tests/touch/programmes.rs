@@ -1,6 +1,6 @@
 //! Programmes of tools: what they draw is in the table, starts clear, and comes out of a file as it went in.
 
-use contact::{Body, Samples, Vector};
+use contact::{Body, Samples, Shape, Vector};
 use tissue::dataset::{Dataset, DatasetPlan, Load};
 use tissue::mesh::{Boundary, Mesh, ellipsoid_phantom};
 use tissue::programmes::{TABLE, ToolCase, ToolProgramme};
@@ -53,9 +53,12 @@ fn every_programme_starts_clear_and_reaches_the_tissue() {
     for programme in all() {
         let row = programme.specification();
         for seed in [1, 2, 3] {
-            let case = ToolCase::new(programme, &mesh, seed).unwrap();
-            assert_eq!(case, ToolCase::new(programme, &mesh, seed).unwrap());
-            assert_ne!(case, ToolCase::new(programme, &mesh, seed + 10).unwrap());
+            let case = ToolCase::new(programme, &mesh, seed, None).unwrap();
+            assert_eq!(case, ToolCase::new(programme, &mesh, seed, None).unwrap());
+            assert_ne!(
+                case,
+                ToolCase::new(programme, &mesh, seed + 10, None).unwrap()
+            );
             assert_eq!(case.tools.len(), 1 + usize::from(row.second_mm.is_some()));
             for (index, tool) in case.tools.iter().enumerate() {
                 assert!((row.friction[0]..=row.friction[1]).contains(&f64::from(tool.friction)));
@@ -82,8 +85,16 @@ fn a_trajectory_of_tools_agrees_with_itself_and_its_file() {
     let samples = mesh.samples(Boundary::Fixed);
     for name in ["poke", "two", "grasp"] {
         let programme: ToolProgramme = name.parse().unwrap();
-        let trajectory =
-            simulate_tools(&mesh, Boundary::Fixed, programme, 5, &options(), |_, _| {}).unwrap();
+        let trajectory = simulate_tools(
+            &mesh,
+            Boundary::Fixed,
+            programme,
+            None,
+            5,
+            &options(),
+            |_, _| {},
+        )
+        .unwrap();
         let path = folder.path().join("case.trajectory.safetensors");
         trajectory.write(&path, false).unwrap();
         assert_eq!(Trajectory::read(&path).unwrap(), trajectory);
@@ -157,12 +168,52 @@ fn a_dataset_of_tools_has_a_test_split_and_says_what_it_holds() {
 }
 
 #[test]
+fn a_tool_of_ones_own_takes_the_place_of_the_tables() {
+    let mesh = phantom();
+    // A wedge 60 mm long, its end lowest and 2 mm thick.
+    let edge = [-1.0, 1.0].map(|z| [[-5.0, -30.0, z], [5.0, -30.0, z]]);
+    let top = [-4.0, 4.0].map(|z| [[-5.0, 30.0, z], [5.0, 30.0, z]]);
+    let inner = [[0.0, 1.0, 0.5]; 3];
+    let points = [edge.as_flattened(), top.as_flattened(), &inner].concat();
+    let wedge = Shape::hull_of(&points).unwrap();
+    let Shape::Hull {
+        points: corners, ..
+    } = &wedge
+    else {
+        panic!("a hull");
+    };
+    assert_eq!(corners.len(), 8, "inner points are left out: {corners:?}");
+    let case = ToolCase::new("poke".parse().unwrap(), &mesh, 1, Some(&wedge)).unwrap();
+    assert_eq!(case.tools[0].shape, wedge);
+    let trajectory = simulate_tools(
+        &mesh,
+        Boundary::Fixed,
+        "poke".parse().unwrap(),
+        Some(&wedge),
+        1,
+        &options(),
+        |_, _| {},
+    )
+    .unwrap();
+    let tracks = trajectory.tools.unwrap();
+    assert!(tracks.contacts.iter().any(|c| *c > 0));
+    let deepest = tracks.penetration.iter().copied().fold(0.0, f32::max);
+    assert!(deepest < 0.05, "{deepest} mm");
+    let flat = Shape::Hull {
+        points: vec![[0.0; 3]; 4],
+        margin: 0.0,
+    };
+    let error = ToolCase::new("poke".parse().unwrap(), &mesh, 1, Some(&flat)).unwrap_err();
+    assert!(error.to_string().contains("no volume"), "{error}");
+}
+
+#[test]
 fn a_mesh_without_room_is_refused() {
     let mut mesh = phantom();
     mesh.domain.truncate(2);
-    let error = ToolCase::new("stroke".parse().unwrap(), &mesh, 1).unwrap_err();
+    let error = ToolCase::new("stroke".parse().unwrap(), &mesh, 1, None).unwrap_err();
     assert!(error.to_string().contains("`stroke`, seed 1"), "{error}");
     mesh.domain.clear();
-    let error = ToolCase::new("press".parse().unwrap(), &mesh, 1).unwrap_err();
+    let error = ToolCase::new("press".parse().unwrap(), &mesh, 1, None).unwrap_err();
     assert!(error.to_string().contains("no `domain` faces"), "{error}");
 }
