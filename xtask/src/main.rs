@@ -4,6 +4,7 @@
 mod archive;
 mod bench;
 mod counts;
+mod cross;
 mod demo;
 mod footprint;
 mod ort;
@@ -57,7 +58,7 @@ enum Task {
     },
     /// Make the archive for C and C++ hosts, or the Unity package.
     #[command(
-        after_help = "Examples:\n  cargo xtask package\n  cargo xtask package --unity\n  cargo xtask package --wheel\n  cargo xtask package --platform windows-x64"
+        after_help = "Examples:\n  cargo xtask package\n  cargo xtask package --unity\n  cargo xtask package --wheel\n  cargo xtask package --platform windows-x86_64"
     )]
     Package(package::Options),
     /// Write README.md's measured table and picture.

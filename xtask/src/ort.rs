@@ -20,11 +20,11 @@ pub const VERSION: &str = "1.31.1";
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Platform {
-    #[value(name = "linux-x64")]
+    #[value(name = "linux-x64", alias = "linux-x86_64")]
     LinuxX64,
-    #[value(name = "linux-arm64")]
+    #[value(name = "linux-arm64", alias = "linux-aarch64")]
     LinuxArm64,
-    #[value(name = "windows-x64")]
+    #[value(name = "windows-x64", alias = "windows-x86_64")]
     WindowsX64,
     #[value(name = "macos-arm64")]
     MacosArm64,

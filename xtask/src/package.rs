@@ -17,6 +17,7 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 
 use crate::archive;
+use crate::cross;
 use crate::ort::{self, Platform};
 use crate::process::{has_program, run_checked};
 use crate::stages;
@@ -31,7 +32,7 @@ pub struct Options {
     /// Make the Python wheel instead of the archive.
     #[arg(long, conflicts_with = "unity")]
     wheel: bool,
-    /// Lay out the archive for another platform, with its ONNX Runtime; libupt must be built there.
+    /// For another platform, with its ONNX Runtime: built here for Windows and Linux arm64; for macOS laid out only.
     #[arg(long)]
     platform: Option<Platform>,
     /// Folder for the result.
@@ -47,7 +48,12 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
     };
     std::fs::create_dir_all(&out)?;
     let made = if options.wheel {
-        wheel::make(workspace, &out)?
+        match options.platform {
+            Some(platform) if platform != Platform::host()? => {
+                wheel::make_for(workspace, platform, &out)?
+            }
+            _ => wheel::make(workspace, &out)?,
+        }
     } else if options.unity {
         unity(workspace, &out)?
     } else {
@@ -173,7 +179,76 @@ fn native(workspace: &Workspace, host: Platform, out: &Path) -> Result<PathBuf> 
     let name = format!("libupt-{}-{}", version(workspace)?, host.name());
     let root = out.join(&name);
     std::fs::remove_dir_all(&root).ok();
-    let build = workspace.path("target/package-cmake");
+    install(workspace, None, &workspace.release(), &root)?;
+    let library = if cfg!(windows) {
+        "onnxruntime.dll"
+    } else if cfg!(target_os = "macos") {
+        "libonnxruntime.dylib"
+    } else {
+        "libonnxruntime.so"
+    };
+    let folder = if cfg!(windows) { "bin" } else { "lib" };
+    copy(&ort_folder.join(library), &root.join(folder).join(library))?;
+    let program = format!("upt{}", std::env::consts::EXE_SUFFIX);
+    copy(&workspace.upt(), &root.join("bin").join(program))?;
+    #[cfg(unix)]
+    std::os::unix::fs::symlink(format!("../lib/{library}"), root.join("bin").join(library))?;
+    shared(workspace, &root, &ort_folder)?;
+    archive(workspace, out, &name)
+}
+
+/// The archive for another platform: built here where that is possible, else laid out without libupt.
+fn foreign(workspace: &Workspace, platform: Platform, out: &Path) -> Result<PathBuf> {
+    let ort_folder = ort::fetch(workspace, platform, ort::VERSION)?;
+    let name = format!("libupt-{}-{}", version(workspace)?, platform.name());
+    let root = out.join(&name);
+    std::fs::remove_dir_all(&root).ok();
+    let (folder, library) = match platform {
+        Platform::WindowsX64 => ("bin", "onnxruntime.dll"),
+        Platform::MacosArm64 => ("lib", "libonnxruntime.dylib"),
+        Platform::LinuxX64 | Platform::LinuxArm64 => ("lib", "libonnxruntime.so"),
+    };
+    if platform == Platform::MacosArm64 {
+        for header in ["include/upt.h", "include/upt.hpp"] {
+            copy(&workspace.path(header), &root.join(header))?;
+        }
+        std::fs::write(
+            root.join("INCOMPLETE.txt"),
+            "This archive was laid out on another platform and holds no libupt.\n\
+             On macOS: run `cargo build --release` and put libupt.dylib into lib/, or run `cargo xtask package` there.\n\
+             The library has not been run on macOS by its authors.\n",
+        )?;
+    } else {
+        let built = cross::build(workspace, platform)?;
+        install(workspace, Some(platform), &built, &root)?;
+        if platform == Platform::WindowsX64 {
+            copy(&built.join("upt.exe"), &root.join("bin/upt.exe"))?;
+            cross::import_library(workspace, &built, &root.join("lib"))?;
+        } else {
+            copy(&built.join("upt"), &root.join("bin/upt"))?;
+            #[cfg(unix)]
+            std::os::unix::fs::symlink(
+                format!("../lib/{library}"),
+                root.join("bin").join(library),
+            )?;
+        }
+    }
+    copy(&ort_folder.join(library), &root.join(folder).join(library))?;
+    shared(workspace, &root, &ort_folder)?;
+    archive(workspace, out, &name)
+}
+
+/// Library, headers, CMake and pkg-config files, by CMake.
+fn install(
+    workspace: &Workspace,
+    platform: Option<Platform>,
+    built: &Path,
+    root: &Path,
+) -> Result<()> {
+    let build = workspace.path(&format!(
+        "target/package-cmake{}",
+        platform.map_or_else(String::new, |platform| format!("-{}", platform.name()))
+    ));
     let log = workspace.logs().join("package.log");
     let mut configure = Command::new("cmake");
     configure
@@ -181,58 +256,19 @@ fn native(workspace: &Workspace, host: Platform, out: &Path) -> Result<PathBuf> 
         .arg(workspace.path("cmake"))
         .arg("-B")
         .arg(&build)
-        .arg(format!("-DUPT_LIB_DIR={}", workspace.release().display()))
+        .arg(format!("-DUPT_LIB_DIR={}", built.display()))
         .arg(format!("-DCMAKE_INSTALL_PREFIX={}", root.display()))
         .arg("-DCMAKE_INSTALL_LIBDIR=lib");
+    if let Some(platform) = platform {
+        cross::configure(workspace, platform, &mut configure);
+    }
     run_checked("cmake", &mut configure, &log)?;
     run_checked(
         "cmake --install",
         Command::new("cmake").arg("--install").arg(&build),
         &log,
     )?;
-    let library = if cfg!(target_os = "macos") {
-        "libonnxruntime.dylib"
-    } else {
-        "libonnxruntime.so"
-    };
-    copy(&ort_folder.join(library), &root.join("lib").join(library))?;
-    copy(&workspace.upt(), &root.join("bin/upt"))?;
-    #[cfg(unix)]
-    std::os::unix::fs::symlink(format!("../lib/{library}"), root.join("bin").join(library))?;
-    shared(workspace, &root, &ort_folder)?;
-    archive(workspace, out, &name)
-}
-
-/// The layout for a platform that this machine does not build for.
-fn foreign(workspace: &Workspace, platform: Platform, out: &Path) -> Result<PathBuf> {
-    let ort_folder = ort::fetch(workspace, platform, ort::VERSION)?;
-    let name = format!("libupt-{}-{}", version(workspace)?, platform.name());
-    let root = out.join(&name);
-    std::fs::remove_dir_all(&root).ok();
-    let (folder, library, built) = match platform {
-        Platform::WindowsX64 => (
-            "bin",
-            "onnxruntime.dll",
-            "upt.dll (and upt.dll.lib in lib/)",
-        ),
-        Platform::MacosArm64 => ("lib", "libonnxruntime.dylib", "libupt.dylib"),
-        Platform::LinuxX64 | Platform::LinuxArm64 => ("lib", "libonnxruntime.so", "libupt.so"),
-    };
-    copy(&ort_folder.join(library), &root.join(folder).join(library))?;
-    for header in ["include/upt.h", "include/upt.hpp"] {
-        copy(&workspace.path(header), &root.join(header))?;
-    }
-    shared(workspace, &root, &ort_folder)?;
-    std::fs::write(
-        root.join("INCOMPLETE.txt"),
-        format!(
-            "This archive was laid out on another platform and holds no libupt.\n\
-             On {}: run `cargo build --release` and put {built} into {folder}/, or run `cargo xtask package` there.\n\
-             The library has not been run on this platform by its authors.\n",
-            platform.name()
-        ),
-    )?;
-    archive(workspace, out, &name)
+    Ok(())
 }
 
 /// A .tar.gz: the same commit gives the same bytes.

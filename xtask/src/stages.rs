@@ -9,7 +9,7 @@ use crate::counts::{self, Counts};
 use crate::process::{Finished, has_program, run_checked, run_logged};
 use crate::system::{self, Package};
 use crate::workspace::Workspace;
-use crate::{ort, venv, wheel};
+use crate::{cross, ort, venv, wheel};
 
 /// What a stage reports.
 pub struct Outcome {
@@ -77,6 +77,8 @@ pub struct Stage {
     pub name: &'static str,
     pub about: &'static str,
     pub needs: &'static [&'static [Package]],
+    /// Too long for every run: in the nightly one, and by name.
+    pub nightly: bool,
     pub run: fn(&Workspace) -> Result<Outcome>,
 }
 
@@ -86,67 +88,92 @@ pub const STAGES: &[Stage] = &[
         name: "fmt",
         about: "cargo fmt --check",
         needs: &[],
+        nightly: false,
         run: fmt,
     },
     Stage {
         name: "clippy",
         about: "cargo clippy, warnings are errors",
         needs: &[],
+        nightly: false,
         run: clippy,
     },
     Stage {
         name: "style",
         about: "ruff and clang-format",
         needs: &[],
+        nightly: false,
         run: style,
     },
     Stage {
         name: "rust",
         about: "cargo test --release --workspace",
         needs: &[],
+        nightly: false,
         run: rust,
     },
     Stage {
         name: "python",
         about: "pytest of training/",
         needs: &[],
+        nightly: false,
         run: python,
     },
     Stage {
         name: "wheel",
         about: "the Python package: wheel, types, pytest",
         needs: &[],
+        nightly: false,
         run: wheel::stage,
     },
     Stage {
         name: "c",
         about: "C and C++ hosts, CMake package, simulator",
         needs: &[system::NATIVE],
+        nightly: false,
         run: c,
     },
     Stage {
         name: "csharp",
         about: "the Unity package's C# under Mono",
         needs: &[system::CSHARP],
+        nightly: false,
         run: csharp,
     },
     Stage {
         name: "godot",
         about: "the GDExtension in a real engine",
         needs: &[system::NATIVE],
+        nightly: false,
         run: godot,
     },
     Stage {
         name: "package",
         about: "the archive, unpacked elsewhere",
         needs: &[system::NATIVE],
+        nightly: false,
         run: package,
     },
     Stage {
         name: "view",
         about: "upt view in headless Chromium",
         needs: &[system::BROWSER],
+        nightly: false,
         run: view,
+    },
+    Stage {
+        name: "windows",
+        about: "built by MinGW, run by Wine",
+        needs: &[system::WINDOWS],
+        nightly: true,
+        run: cross::windows,
+    },
+    Stage {
+        name: "arm64",
+        about: "Linux arm64, run by qemu",
+        needs: &[system::ARM64],
+        nightly: true,
+        run: cross::arm64,
     },
 ];
 
@@ -372,6 +399,16 @@ pub fn set_test_environment(workspace: &Workspace, command: &mut Command, librar
 
 /// Runs a test script whose last line reads `N passed, N failed, N skipped`.
 fn script(workspace: &Workspace, name: &str, path: &str) -> Result<Outcome> {
+    script_with(workspace, name, path, |_| {})
+}
+
+/// As [`script`], with arguments and environment of its own.
+pub fn script_with(
+    workspace: &Workspace,
+    name: &str,
+    path: &str,
+    prepare: impl FnOnce(&mut Command),
+) -> Result<Outcome> {
     let file = workspace.path(path);
     if !file.exists() {
         return Ok(Outcome::skipped(format!("{path} does not exist")));
@@ -381,6 +418,7 @@ fn script(workspace: &Workspace, name: &str, path: &str) -> Result<Outcome> {
     let mut command = Command::new("bash");
     command.arg(&file).current_dir(&workspace.root);
     set_test_environment(workspace, &mut command, &library);
+    prepare(&mut command);
     let finished = run_logged(
         name,
         &mut command,

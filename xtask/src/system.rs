@@ -119,6 +119,45 @@ pub const BROWSER: &[Package] = &[
     program(&["chromedriver"], "chromium-driver", "the page"),
 ];
 
+/// What the tests for Windows need.
+pub const WINDOWS: &[Package] = &[
+    program(&["cmake"], "cmake", "the C and C++ tests"),
+    program(
+        &["x86_64-w64-mingw32-g++"],
+        "g++-mingw-w64-x86-64-posix",
+        "building for Windows",
+    ),
+    file(
+        &[
+            "/usr/lib/wine/wine64",
+            "/usr/bin/wine64",
+            "/usr/lib/wine-development/wine64",
+        ],
+        "wine64",
+        "running what is built for Windows",
+    ),
+    program(
+        &["lld-link", "lld-link-14", "lld-link-19"],
+        "lld",
+        "linking as Microsoft's toolchain does",
+    ),
+];
+
+/// What the tests for Linux arm64 need.
+pub const ARM64: &[Package] = &[
+    program(&["cmake"], "cmake", "the C and C++ tests"),
+    program(
+        &["aarch64-linux-gnu-g++"],
+        "g++-aarch64-linux-gnu",
+        "building for arm64",
+    ),
+    program(
+        &["qemu-aarch64-static", "qemu-aarch64"],
+        "qemu-user-static",
+        "running what is built for arm64",
+    ),
+];
+
 impl Package {
     pub fn present(&self) -> bool {
         if self.programs == ["python3-venv-module"] {

@@ -52,6 +52,10 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
             options.only.is_empty() || options.only.iter().any(|name| name == stage.name)
         })
         .collect();
+    let nightly = std::env::var("UPT_NIGHTLY").is_ok_and(|value| value == "1");
+    let (chosen, left_out): (Vec<&Stage>, Vec<&Stage>) = chosen
+        .into_iter()
+        .partition(|stage| !stage.nightly || nightly || !options.only.is_empty());
     let strict = options.strict || std::env::var("UPT_STRICT").is_ok_and(|value| value == "1");
 
     let mut groups: Vec<&[system::Package]> = vec![system::BASE];
@@ -98,6 +102,15 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
             note: outcome.note,
         });
     }
+    rows.extend(left_out.iter().map(|stage| Row {
+        stage: stage.name,
+        counts: Counts {
+            skipped: 1,
+            ..Counts::default()
+        },
+        seconds: 0.0,
+        note: "nightly, or --only it".into(),
+    }));
     Ok(summarise(&rows))
 }
 

@@ -8,6 +8,8 @@ use anyhow::{Context, Result};
 
 use crate::archive;
 use crate::counts;
+use crate::cross;
+use crate::ort::Platform;
 use crate::process::{run_checked, run_logged};
 use crate::stages::{self, Outcome, check, joined};
 use crate::venv;
@@ -25,6 +27,18 @@ pub fn make(workspace: &Workspace, out: &Path) -> Result<PathBuf> {
         std::env::consts::DLL_SUFFIX
     );
     with_library(workspace, out, &workspace.release().join(name), None)
+}
+
+/// A wheel with the libupt of another platform, built here.
+pub fn make_for(workspace: &Workspace, platform: Platform, out: &Path) -> Result<PathBuf> {
+    let built = cross::build(workspace, platform)?;
+    let name = if platform == Platform::WindowsX64 {
+        "upt.dll"
+    } else {
+        "libupt.so"
+    };
+    let tag = cross::wheel_tag(platform);
+    with_library(workspace, out, &built.join(name), tag)
 }
 
 /// A wheel with a library that is built already; `platform` is its tag where the library is another platform's.

@@ -15,11 +15,9 @@ pub struct Options {
 }
 
 pub fn run<A: CommandFactory>(options: &Options) -> Result<ExitCode> {
-    clap_complete::generate(
-        options.shell,
-        &mut A::command(),
-        "upt",
-        &mut std::io::stdout(),
-    );
+    let mut script = Vec::new();
+    clap_complete::generate(options.shell, &mut A::command(), "upt", &mut script);
+    // Not straight to stdout: the generator panics in its own way where the reader has gone.
+    print!("{}", String::from_utf8_lossy(&script));
     Ok(ExitCode::SUCCESS)
 }

@@ -1,0 +1,64 @@
+# Sourced by run.sh: Linux arm64, run by qemu's user mode.
+export UPT_CROSS_TRIPLE=aarch64-unknown-linux-gnu
+export UPT_CROSS_SYSTEM=Linux UPT_CROSS_PROCESSOR=aarch64 UPT_CROSS_PREFIX=aarch64-linux-gnu-
+export UPT_CROSS_ORT_NAME=libonnxruntime.so UPT_CROSS_ROLLOUT=rollout UPT_CROSS_COMMAND=upt
+# mm: other vector lanes, another build of ONNX Runtime; and a tenth of it for the solver's own lanes.
+rollout_tolerance=1e-3
+solver_tolerance=1e-3
+
+qemu="$(command -v qemu-aarch64-static || command -v qemu-aarch64 || true)"
+if [ -z "$qemu" ]; then
+  echo "skipped: qemu-user-static is not installed"
+  echo "0 passed, 0 failed, 1 skipped"
+  exit 0
+fi
+# ONNX Runtime reads /proc/cpuinfo and crashes on that of another processor: under qemu's root lies an ARM one.
+system="$build/system"
+mkdir -p "$system/proc"
+cat >"$system/proc/cpuinfo" <<'CPU'
+processor	: 0
+BogoMIPS	: 243.75
+Features	: fp asimd evtstrm aes pmull sha1 sha2 crc32 atomics fphp asimdhp cpuid asimdrdm lrcpc dcpop asimddp
+CPU implementer	: 0x41
+CPU architecture: 8
+CPU variant	: 0x3
+CPU part	: 0xd0c
+CPU revision	: 1
+CPU
+ln -sfn /usr/aarch64-linux-gnu/lib "$system/lib"
+cat >"$build/run" <<RUN
+#!/bin/sh
+exec env LD_LIBRARY_PATH="\$UPT_CROSS_LIBRARIES" "$qemu" -cpu neoverse-n1 -L "$system" "\$@"
+RUN
+chmod +x "$build/run"
+export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUNNER="$build/run" UPT_CROSS_RUN="$build/run"
+export UPT_CROSS_LIBRARIES="$build/prefix/lib:/usr/aarch64-linux-gnu/lib"
+
+run() {
+  "$build/run" "$@"
+}
+
+prepare() {
+  :
+}
+
+installed() {
+  cp "$UPT_CROSS_ORT/libonnxruntime.so" "$1/lib/libonnxruntime.so"
+}
+
+compare() {
+  check "$1: displacements of x86-64 within $rollout_tolerance mm" \
+    python3 tests/cross/difference.py "$2" "$3" "$rollout_tolerance"
+}
+
+compare_trajectories() {
+  check "reference solver: displacements of x86-64 within $solver_tolerance mm" \
+    python3 tests/cross/difference.py "$1" "$2" "$solver_tolerance"
+}
+
+# The lanes that ran, from the command itself.
+more() {
+  local text
+  text="$(run "$1/upt" doctor onnx/brain-coarse-reduced 2>/dev/null)"
+  check "upt doctor opens a bundle with NEON kernels" grep -q 'kernels neon' <<<"$text"
+}
