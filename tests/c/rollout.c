@@ -1,4 +1,5 @@
-/* Steps a bundle through one push and its release, and writes each state: the same bytes wherever it runs, or not.
+/* Steps a bundle through one push and its release, and writes each state: the same bytes wherever
+ * it runs, or not.
  *
  *   rollout BUNDLE STEPS FILE        FILE: [STEPS,K,3] floats, mm
  */
@@ -37,7 +38,8 @@ int main(int argc, char **argv) {
   }
   domain = malloc(info.domain_node_count * sizeof *domain);
   out = malloc(3 * info.node_count * sizeof *out);
-  EXPECT(upt_model_indices(model, UPT_SET_DOMAIN_NODES, domain, info.domain_node_count, NULL), UPT_OK);
+  EXPECT(upt_model_indices(model, UPT_SET_DOMAIN_NODES, domain, info.domain_node_count, NULL),
+         UPT_OK);
   for (i = 0; i < PUSHED; i++) {
     nodes[i] = domain[i];
   }
@@ -50,9 +52,9 @@ int main(int argc, char **argv) {
       vectors[3 * i + 1] = 0.0f;
       vectors[3 * i + 2] = -0.25f * (float)(step + 1);
     }
-    EXPECT(upt_scene_step_contacts(scene, nodes, vectors, held ? PUSHED : 0, out,
-                                   3 * info.node_count),
-           UPT_OK);
+    EXPECT(
+        upt_scene_step_contacts(scene, nodes, vectors, held ? PUSHED : 0, out, 3 * info.node_count),
+        UPT_OK);
     EXPECT_TRUE(fwrite(out, 3 * sizeof *out, info.node_count, file) == info.node_count);
   }
   if (file != NULL) {
