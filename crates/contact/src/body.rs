@@ -1,11 +1,11 @@
 //! A tool ready for queries: signed distance and outward normal at any point.
 //!
-//! Each shape is a core rounded by a radius: a point, a segment, a box or a hull. The distance is that to the core
+//! Each shape is a core rounded by a radius: a point, a segment, a box or a closed surface. The distance is that to the core
 //! less the radius. Boxes and segments are closed forms that stay exact on the surface itself, where the direction to a
 //! projected point is rounding.
 
-use crate::hull::Hull;
 use crate::shape::{Shape, ShapeError};
+use crate::triangles::Triangles;
 use parry3d::math::{Pose, Vector};
 
 #[derive(Clone, Debug)]
@@ -17,7 +17,7 @@ enum Core {
     Cuboid {
         half: Vector,
     },
-    Hull(Box<Hull>),
+    Triangles(Box<Triangles>),
 }
 
 /// A shape ready for queries. Cheap to share, never changes.
@@ -66,7 +66,17 @@ impl Body {
                 let half = Vector::from(*half_extents) - Vector::splat(*radius);
                 (Core::Cuboid { half }, *radius)
             }
-            Shape::Hull { points, margin } => (Core::Hull(Box::new(Hull::new(points)?)), *margin),
+            Shape::Hull { points, margin } => {
+                (Core::Triangles(Box::new(Triangles::hull(points)?)), *margin)
+            }
+            Shape::Mesh {
+                points,
+                faces,
+                margin,
+            } => {
+                let surface = Triangles::surface(points, faces)?;
+                (Core::Triangles(Box::new(surface)), *margin)
+            }
         };
         let (low, high) = match &core {
             Core::Segment { half_length } => {
@@ -74,7 +84,7 @@ impl Body {
                 (-end, end)
             }
             Core::Cuboid { half } => (-*half, *half),
-            Core::Hull(hull) => hull.bounds(),
+            Core::Triangles(surface) => surface.bounds(),
         };
         Ok(Self {
             core,
@@ -100,7 +110,7 @@ impl Body {
                 (length, normal)
             }
             Core::Cuboid { half } => cuboid(point, *half),
-            Core::Hull(hull) => hull.nearest(point),
+            Core::Triangles(surface) => surface.nearest(point),
         };
         Nearest {
             distance: distance - self.radius,

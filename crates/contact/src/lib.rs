@@ -15,12 +15,12 @@
 pub mod body;
 pub mod friction;
 pub mod grasp;
-mod hull;
 pub mod pose;
 pub mod samples;
 pub mod search;
 pub mod shape;
 pub mod sweeps;
+mod triangles;
 
 pub use body::{Body, Nearest};
 pub use grasp::Grasp;

@@ -1,6 +1,6 @@
 //! What a tool looks like in its own frame, mm. [`crate::Body`] answers queries about it.
 
-use crate::hull::Hull;
+use crate::triangles::Triangles;
 use serde::{Deserialize, Serialize};
 
 /// A rigid tool's shape, centred on its own origin except where points say otherwise.
@@ -17,6 +17,12 @@ pub enum Shape {
     Spatula { half_extents: [f32; 3], radius: f32 },
     /// The convex hull of points (of a tool's own STL or OBJ), each point moved out by `margin`.
     Hull { points: Vec<[f32; 3]>, margin: f32 },
+    /// A closed surface of triangles that need not be convex, each point moved out by `margin`.
+    Mesh {
+        points: Vec<[f32; 3]>,
+        faces: Vec<[u32; 3]>,
+        margin: f32,
+    },
 }
 
 /// A shape that no tool can have.
@@ -32,11 +38,15 @@ pub enum ShapeError {
         "corner radius {radius} mm exceeds the smallest half extent {smallest} mm; make the box thicker or the radius smaller"
     )]
     Corner { radius: f32, smallest: f32 },
-    #[error("hull point {index} is not finite or farther than 10 m from the origin")]
+    #[error("point {index} is not finite or farther than 10 m from the origin")]
     Point { index: usize },
+    #[error("face {index} names a node beyond the {count} points")]
+    Face { index: usize, count: usize },
     #[error(
-        "the hull of {count} points has no volume ({reason}); give the corners of a solid tool"
+        "the surface is not closed: the edge from point {a} to {b} does not belong to one face on each side; give a watertight surface, or take its hull"
     )]
+    Open { a: u32, b: u32 },
+    #[error("the {count} points of the tool have no volume ({reason}); give a solid tool")]
     Flat { count: usize, reason: String },
 }
 
@@ -54,7 +64,7 @@ impl Shape {
             margin: 0.0,
         };
         all.check()?;
-        let hull = Hull::new(points)?;
+        let hull = Triangles::hull(points)?;
         Ok(Shape::Hull {
             points: hull.corners().iter().map(|p| p.to_array()).collect(),
             margin: 0.0,
@@ -91,7 +101,7 @@ impl Shape {
                 }
                 Ok(())
             }
-            Shape::Hull { points, margin } => {
+            Shape::Hull { points, margin } | Shape::Mesh { points, margin, .. } => {
                 let far = |p: &[f32; 3]| !p.iter().all(|v| v.abs() < LARGEST);
                 if let Some(index) = points.iter().position(far) {
                     return Err(ShapeError::Point { index });

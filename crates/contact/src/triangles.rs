@@ -1,0 +1,110 @@
+//! Signed distance to a closed surface of triangles, convex or not: the nearest one by parry3d's bounding-volume tree.
+
+use crate::shape::ShapeError;
+use parry3d::math::Vector;
+use parry3d::query::PointQueryWithLocation;
+use parry3d::shape::{TriMesh, TriMeshFlags};
+use parry3d::transformation::try_convex_hull;
+use std::collections::HashMap;
+
+/// Below this the direction to the nearest point is rounding, and the triangle's normal is taken, mm.
+const CLOSE: f32 = 1e-4;
+
+#[derive(Clone, Debug)]
+pub(crate) struct Triangles {
+    faces: TriMesh,
+}
+
+impl Triangles {
+    /// The convex hull of points.
+    pub fn hull(points: &[[f32; 3]]) -> Result<Self, ShapeError> {
+        let cloud: Vec<Vector> = points.iter().map(|p| Vector::from(*p)).collect();
+        let (vertices, faces) = try_convex_hull(&cloud).map_err(|error| ShapeError::Flat {
+            count: points.len(),
+            reason: error.to_string(),
+        })?;
+        Self::new(vertices, faces)
+    }
+
+    /// A closed surface, turned outward where it is inside out.
+    pub fn surface(points: &[[f32; 3]], faces: &[[u32; 3]]) -> Result<Self, ShapeError> {
+        let count = points.len();
+        let mut edges: HashMap<(u32, u32), i32> = HashMap::new();
+        for (index, face) in faces.iter().enumerate() {
+            if face.iter().any(|node| *node as usize >= count) {
+                return Err(ShapeError::Face { index, count });
+            }
+            for k in 0..3 {
+                let (a, b) = (face[k], face[(k + 1) % 3]);
+                *edges.entry((a, b)).or_default() += 1;
+            }
+        }
+        let open = |(a, b): &(u32, u32)| edges[&(*a, *b)] != 1 || edges.get(&(*b, *a)) != Some(&1);
+        // The lowest, so that the message does not depend on a hash.
+        if let Some((a, b)) = edges.keys().filter(|edge| open(edge)).min() {
+            return Err(ShapeError::Open { a: *a, b: *b });
+        }
+        let vertices = points.iter().map(|p| Vector::from(*p)).collect();
+        Self::new(vertices, faces.to_vec())
+    }
+
+    fn new(vertices: Vec<Vector>, mut faces: Vec<[u32; 3]>) -> Result<Self, ShapeError> {
+        let flat = |reason: String| ShapeError::Flat {
+            count: vertices.len(),
+            reason,
+        };
+        let middle = vertices.iter().sum::<Vector>() / vertices.len().max(1) as f32;
+        let volume: f32 = faces
+            .iter()
+            .map(|t| t.map(|v| vertices[v as usize] - middle))
+            .map(|[a, b, c]| a.dot(b.cross(c)) / 6.0)
+            .sum();
+        let reach = vertices.iter().map(|v| (*v - middle).length());
+        let reach = reach.fold(0.0, f32::max);
+        if volume.is_nan() || volume.abs() <= 1e-6 * reach.powi(3) {
+            return Err(flat(format!("{volume:e} mm³")));
+        }
+        if volume < 0.0 {
+            faces.iter_mut().for_each(|face| face.swap(1, 2));
+        }
+        let count = vertices.len();
+        let faces =
+            TriMesh::with_flags(vertices, faces, TriMeshFlags::ORIENTED).map_err(|error| {
+                let reason = error.to_string();
+                ShapeError::Flat { count, reason }
+            })?;
+        Ok(Self { faces })
+    }
+
+    /// Distance (negative inside) and outward normal at a local point.
+    pub fn nearest(&self, point: Vector) -> (f32, Vector) {
+        let (nearest, (face, _)) = self
+            .faces
+            .project_local_point_and_get_location(point, false);
+        let away = point - nearest.point;
+        let length = away.length();
+        if length < CLOSE {
+            let normal = self.faces.triangle(face).normal().unwrap_or(Vector::Y);
+            return (away.dot(normal), normal);
+        }
+        // The sign by pseudo-normals holds on edges and corners too.
+        if nearest.is_inside {
+            (-length, -away / length)
+        } else {
+            (length, away / length)
+        }
+    }
+
+    /// Its corners.
+    pub fn corners(&self) -> &[Vector] {
+        self.faces.vertices()
+    }
+
+    /// Corners of the box around it.
+    pub fn bounds(&self) -> (Vector, Vector) {
+        let vertices = self.faces.vertices();
+        let low = vertices.iter().copied().reduce(Vector::min);
+        let high = vertices.iter().copied().reduce(Vector::max);
+        (low.unwrap_or_default(), high.unwrap_or_default())
+    }
+}
