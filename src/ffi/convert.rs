@@ -190,3 +190,16 @@ pub(super) unsafe fn scene_options(raw: &upt_scene_options) -> Result<SceneOptio
         interpolate_points: flag("interpolate_points", raw.interpolate_points)?,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn float32_can_be_asked_for_where_zero_inherits() {
+        assert!(matches!(precision(UPT_PRECISION_F32), Ok(None)));
+        let forced = precision(UPT_PRECISION_FORCE_F32);
+        assert!(matches!(forced, Ok(Some(Precision::F32))));
+        assert!(precision(5).is_err());
+    }
+}
