@@ -230,6 +230,16 @@
 #define UPT_STEP_MEASURED 3
 
 /**
+ * No corrections.
+ */
+#define UPT_CORRECTIONS_NONE -1
+
+/**
+ * As many corrections as the scene's target asks for and its budget lets in.
+ */
+#define UPT_CORRECTIONS_AUTO -2
+
+/**
  * Keep the last good state and return `UPT_ERR_GUARD`; without contact, where no later call could do otherwise, as
  * `UPT_GUARD_BLEND`.
  */
@@ -299,6 +309,16 @@
  * The contact block was nearly singular and was regularised.
  */
 #define UPT_FLAG_REGULARISED 1024
+
+/**
+ * The corrections ended inverted, and the linear response took their place.
+ */
+#define UPT_FLAG_FELL_BACK 2048
+
+/**
+ * The estimated error is above the scene's `error_limit_mm`.
+ */
+#define UPT_FLAG_ERROR 4096
 
 /**
  * Nodes of the surface.
@@ -572,6 +592,23 @@ typedef struct upt_scene_options {
    * `UPT_STEP_*`: who makes a step of a `UPT_KIND_UPT` bundle.
    */
   int32_t step_path;
+  /**
+   * Corrections by the elements while there is contact: 1 to 64 a step, 0 as many as the bundle recommends,
+   * `UPT_CORRECTIONS_NONE`, or `UPT_CORRECTIONS_AUTO`.
+   */
+  int32_t corrections;
+  /**
+   * `UPT_CORRECTIONS_AUTO`: no correction starts later than this in a step, µs; 0: no budget.
+   */
+  uint32_t corrections_budget_us;
+  /**
+   * `UPT_CORRECTIONS_AUTO`: enough where the estimated error is below this, mm; 0: no target.
+   */
+  float corrections_target_mm;
+  /**
+   * `UPT_FLAG_ERROR` rises where the estimated error is above this, mm; 0: never.
+   */
+  float error_limit_mm;
 } upt_scene_options;
 
 /**
@@ -724,6 +761,30 @@ typedef struct upt_scene_stats {
    * `UPT_STEP_SPLIT` or `UPT_STEP_WHOLE`.
    */
   int32_t step_path;
+  /**
+   * Corrections made in the last step.
+   */
+  uint32_t corrections;
+  /**
+   * Corrections, ms.
+   */
+  double corrections_ms;
+  /**
+   * Evaluations of the element forces in the last step.
+   */
+  uint32_t evaluations;
+  /**
+   * Residual force after the corrections over that before them; 0 without corrections.
+   */
+  float residual;
+  /**
+   * Estimated root mean square error of the corrected state over all nodes, mm; 0 without corrections.
+   */
+  float error_mm;
+  /**
+   * Smallest det F of the corrected state; 0 without corrections.
+   */
+  float min_det;
 } upt_scene_stats;
 
 #ifdef __cplusplus

@@ -6,6 +6,7 @@
 //! Lengths are mm, forces mN, fields row-major `[K,3]` float32.
 
 pub mod bundle;
+pub mod corrections;
 pub mod envelope;
 pub mod error;
 pub mod ffi;
@@ -31,8 +32,8 @@ pub use library::{init, shutdown};
 pub use model::{Kind, Model, ModelInfo};
 pub use onnx::providers_json;
 pub use options::{
-    DecoderKernel, GuardPolicy, IndexSet, InitOptions, ModelOptions, Precision, Provider,
-    SceneOptions, StepPath, UserStream,
+    Corrections, DecoderKernel, GuardPolicy, IndexSet, InitOptions, ModelOptions, Precision,
+    Provider, SceneOptions, StepPath, UserStream,
 };
 pub use scene::{Contact, Progress, Scene, StepInput};
 pub use stats::{SceneStats, flag};

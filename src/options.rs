@@ -175,6 +175,29 @@ pub struct SceneOptions {
     pub cubic_sampling: bool,
     /// Interpolate attached points between nodes instead of decoding them (kind `upt`).
     pub interpolate_points: bool,
+    /// Corrections by the elements.
+    pub corrections: Corrections,
+    /// Raise [`crate::flag::ERROR`] where the estimated error is above this, mm; 0 for never.
+    pub error_limit_mm: f32,
+}
+
+/// How many corrections a step gets while there is contact.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Corrections {
+    /// As many as the bundle recommends; none where it has no tables for them.
+    #[default]
+    Recommended,
+    /// None: they cost nothing then.
+    None,
+    /// This many, 1 to 64.
+    Fixed(u32),
+    /// As many as a target asks for and a budget lets in.
+    Auto {
+        /// Stop where the estimated error is below this, mm; 0 for no target.
+        target_mm: f32,
+        /// Start no iteration after this time, µs; 0 for no budget.
+        budget_us: u32,
+    },
 }
 
 impl Default for SceneOptions {
@@ -192,6 +215,8 @@ impl Default for SceneOptions {
             latest_wins: false,
             cubic_sampling: false,
             interpolate_points: false,
+            corrections: Corrections::Recommended,
+            error_limit_mm: 0.0,
         }
     }
 }

@@ -26,6 +26,10 @@ pub mod flag {
     pub const CLAMPED: u32 = 512;
     /// The contact block was near singular and was regularised.
     pub const REGULARISED: u32 = 1024;
+    /// The corrections ended inverted, and the linear response took their place.
+    pub const FELL_BACK: u32 = 2048;
+    /// The estimated error is above the host's limit.
+    pub const ERROR: u32 = 4096;
 
     /// What the flags say, as text.
     pub fn names(flags: u32) -> String {
@@ -44,6 +48,11 @@ pub mod flag {
             (GROWTH, "guard: the displacement grew without cause"),
             (CLAMPED, "the learned correction was bounded"),
             (REGULARISED, "the contact block was nearly singular"),
+            (
+                FELL_BACK,
+                "the corrections fell back on the linear response",
+            ),
+            (ERROR, "the estimated error is above the limit"),
         ];
         let said = meanings.iter().filter(|(flag, _)| flags & flag != 0);
         said.map(|(_, text)| *text).collect::<Vec<_>>().join("; ")
@@ -73,6 +82,18 @@ pub struct SceneStats {
     pub decode_ms: f64,
     /// Guard.
     pub guard_ms: f64,
+    /// Corrections by the elements.
+    pub corrections_ms: f64,
+    /// Corrections made.
+    pub corrections: u32,
+    /// Evaluations of the element forces.
+    pub evaluations: u32,
+    /// `|r|` after the corrections over `|r|` before them; 0 without corrections.
+    pub residual: f32,
+    /// Estimated root mean square error of the corrected state over all nodes, mm; 0 without corrections.
+    pub error_mm: f32,
+    /// Smallest det F of the corrected state; 0 without corrections.
+    pub min_det: f32,
     /// Nodes decoded by the step.
     pub decoded_node_count: u64,
     /// Nodes in contact.

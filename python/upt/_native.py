@@ -139,6 +139,15 @@ class StepPath(IntEnum):
     """Both are timed while the scene is made, and the faster one stays."""
 
 
+class Corrections(IntEnum):
+    """`UPT_CORRECTIONS_*`."""
+
+    NONE = -1
+    """No corrections."""
+    AUTO = -2
+    """As many corrections as the scene's target asks for and its budget lets in."""
+
+
 class GuardPolicy(IntEnum):
     """`UPT_GUARD_*`."""
 
@@ -176,6 +185,10 @@ class Flag(IntFlag):
     """The learned correction was bounded."""
     REGULARISED = 1024
     """The contact block was nearly singular and was regularised."""
+    FELL_BACK = 2048
+    """The corrections ended inverted, and the linear response took their place."""
+    ERROR = 4096
+    """The estimated error is above the scene's `error_limit_mm`."""
 
 
 class IndexSet(IntEnum):
@@ -385,6 +398,15 @@ class SceneOptions(Record):
     """Zero."""
     step_path: StepPath = choice("_step_path", StepPath)
     """`UPT_STEP_*`: who makes a step of a `UPT_KIND_UPT` bundle."""
+    corrections: Corrections = choice("_corrections", Corrections)
+    """Corrections by the elements while there is contact: 1 to 64 a step, 0 as many as the bundle recommends,
+    `UPT_CORRECTIONS_NONE`, or `UPT_CORRECTIONS_AUTO`."""
+    corrections_budget_us: Corrections = choice("_corrections_budget_us", Corrections)
+    """`UPT_CORRECTIONS_AUTO`: no correction starts later than this in a step, µs; 0: no budget."""
+    corrections_target_mm: float
+    """`UPT_CORRECTIONS_AUTO`: enough where the estimated error is below this, mm; 0: no target."""
+    error_limit_mm: float
+    """`UPT_FLAG_ERROR` rises where the estimated error is above this, mm; 0: never."""
 
     _fields_ = [
         ("struct_size", ctypes.c_uint32),
@@ -401,6 +423,10 @@ class SceneOptions(Record):
         ("_interpolate_points", ctypes.c_uint8),
         ("_reserved", ctypes.c_uint8 * 2),
         ("_step_path", ctypes.c_int32),
+        ("_corrections", ctypes.c_int32),
+        ("_corrections_budget_us", ctypes.c_uint32),
+        ("corrections_target_mm", ctypes.c_float),
+        ("error_limit_mm", ctypes.c_float),
     ]
 
 
@@ -431,6 +457,15 @@ class SceneOptionsKeywords(TypedDict, total=False):
     """1: attached points are interpolated between nodes, not decoded (kind `upt`)."""
     step_path: StepPath | str | int
     """`UPT_STEP_*`: who makes a step of a `UPT_KIND_UPT` bundle."""
+    corrections: Corrections | str | int
+    """Corrections by the elements while there is contact: 1 to 64 a step, 0 as many as the bundle recommends,
+    `UPT_CORRECTIONS_NONE`, or `UPT_CORRECTIONS_AUTO`."""
+    corrections_budget_us: Corrections | str | int
+    """`UPT_CORRECTIONS_AUTO`: no correction starts later than this in a step, µs; 0: no budget."""
+    corrections_target_mm: float
+    """`UPT_CORRECTIONS_AUTO`: enough where the estimated error is below this, mm; 0: no target."""
+    error_limit_mm: float
+    """`UPT_FLAG_ERROR` rises where the estimated error is above this, mm; 0: never."""
 
 
 class Instrument(Record):
@@ -522,6 +557,18 @@ class SceneStats(Record):
     """Of the stages' times, copies back from a device, ms; 0 on the CPU."""
     step_path: StepPath = choice("_step_path", StepPath)
     """`UPT_STEP_SPLIT` or `UPT_STEP_WHOLE`."""
+    corrections: int
+    """Corrections made in the last step."""
+    corrections_ms: float
+    """Corrections, ms."""
+    evaluations: int
+    """Evaluations of the element forces in the last step."""
+    residual: float
+    """Residual force after the corrections over that before them; 0 without corrections."""
+    error_mm: float
+    """Estimated root mean square error of the corrected state over all nodes, mm; 0 without corrections."""
+    min_det: float
+    """Smallest det F of the corrected state; 0 without corrections."""
 
     _fields_ = [
         ("struct_size", ctypes.c_uint32),
@@ -551,6 +598,12 @@ class SceneStats(Record):
         ("upload_ms", ctypes.c_double),
         ("download_ms", ctypes.c_double),
         ("_step_path", ctypes.c_int32),
+        ("corrections", ctypes.c_uint32),
+        ("corrections_ms", ctypes.c_double),
+        ("evaluations", ctypes.c_uint32),
+        ("residual", ctypes.c_float),
+        ("error_mm", ctypes.c_float),
+        ("min_det", ctypes.c_float),
     ]
 
 

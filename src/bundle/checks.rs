@@ -66,6 +66,23 @@ impl Manifest {
             "must be at least 4",
         )?;
         self.envelope.check()?;
+        if let Some(corrections) = &self.corrections {
+            check(
+                corrections.recommended <= crate::corrections::LIMIT,
+                "corrections.recommended",
+                "must be at most 64",
+            )?;
+            check(
+                corrections.calibration.is_finite() && corrections.calibration > 0.0,
+                "corrections.calibration",
+                "must be positive",
+            )?;
+            check(
+                self.prior.is_some(),
+                "corrections",
+                "needs a linear response (field `prior`)",
+            )?;
+        }
         for (name, entry) in &self.files {
             check_name(name, &format!("files.{name}"))?;
             check(

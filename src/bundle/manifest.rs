@@ -78,6 +78,22 @@ pub struct PriorEntry {
     pub vibration: Option<String>,
 }
 
+/// The corrections' file.
+#[derive(Debug, Clone, Deserialize)]
+pub struct CorrectionsEntry {
+    /// File of the bundle.
+    pub file: String,
+    /// Iterations a step that the bundle recommends; 0 leaves them off unless a host asks.
+    pub recommended: u32,
+    /// Estimated over measured error on held-out cases: what [`crate::SceneStats::error_mm`] is multiplied by.
+    #[serde(default = "one")]
+    pub calibration: f32,
+}
+
+fn one() -> f32 {
+    1.0
+}
+
 /// One group of node features, in the order of the encoder's input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -294,6 +310,8 @@ pub struct Manifest {
     pub rest_displacement_mm: f32,
     /// Linear response.
     pub prior: Option<PriorEntry>,
+    /// Corrections by the elements.
+    pub corrections: Option<CorrectionsEntry>,
     /// Kind `upt`.
     pub upt: Option<UptEntry>,
     /// Kind `reduced`.

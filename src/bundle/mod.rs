@@ -11,9 +11,9 @@ mod tensors;
 pub use files::BundleFiles;
 pub(crate) use files::{hex, read_regular};
 pub use manifest::{
-    Base, Bound, Boundary, Coordinates, Dims, Envelope, Fade, Feature, FileEntry, Graph, Manifest,
-    ManifestKind, Material, MeshEntry, Normalisation, PriorEntry, ReducedEntry, ReducedInput,
-    UptEntry,
+    Base, Bound, Boundary, Coordinates, CorrectionsEntry, Dims, Envelope, Fade, Feature, FileEntry,
+    Graph, Manifest, ManifestKind, Material, MeshEntry, Normalisation, PriorEntry, ReducedEntry,
+    ReducedInput, UptEntry,
 };
 pub use mesh::Mesh;
 pub(crate) use mesh::volume;

@@ -5,8 +5,8 @@ use super::pointers::{optional_path, slice};
 use super::status::*;
 use super::structs::*;
 use crate::{
-    DecoderKernel, GuardPolicy, IndexSet, InitOptions, ModelOptions, Precision, Provider,
-    SceneOptions, StepPath, UserStream,
+    Corrections, DecoderKernel, GuardPolicy, IndexSet, InitOptions, ModelOptions, Precision,
+    Provider, SceneOptions, StepPath, UserStream,
 };
 
 fn unknown<T>(field: &str, value: i32) -> Result<T, Failure> {
@@ -173,6 +173,23 @@ pub(super) unsafe fn model_options(raw: &upt_model_options) -> Result<ModelOptio
     })
 }
 
+fn corrections(raw: &upt_scene_options) -> Result<Corrections, Failure> {
+    match raw.corrections {
+        UPT_CORRECTIONS_AUTO => Ok(Corrections::Auto {
+            target_mm: raw.corrections_target_mm,
+            budget_us: raw.corrections_budget_us,
+        }),
+        _ if raw.corrections_budget_us != 0 || raw.corrections_target_mm != 0.0 => fail(
+            UPT_ERR_ARGUMENT,
+            "corrections_budget_us and corrections_target_mm are for UPT_CORRECTIONS_AUTO",
+        ),
+        0 => Ok(Corrections::Recommended),
+        UPT_CORRECTIONS_NONE => Ok(Corrections::None),
+        count @ 1.. => Ok(Corrections::Fixed(count as u32)),
+        value => unknown("corrections", value),
+    }
+}
+
 pub(super) unsafe fn scene_options(raw: &upt_scene_options) -> Result<SceneOptions, Failure> {
     reserved(&raw.reserved)?;
     Ok(SceneOptions {
@@ -188,6 +205,8 @@ pub(super) unsafe fn scene_options(raw: &upt_scene_options) -> Result<SceneOptio
         latest_wins: flag("latest_wins", raw.latest_wins)?,
         cubic_sampling: flag("cubic_sampling", raw.cubic_sampling)?,
         interpolate_points: flag("interpolate_points", raw.interpolate_points)?,
+        corrections: corrections(raw)?,
+        error_limit_mm: raw.error_limit_mm,
     })
 }
 

@@ -52,6 +52,12 @@ pub unsafe extern "C" fn upt_scene_get_stats(
                     upload_ms: stats.upload_ms,
                     download_ms: stats.download_ms,
                     step_path: stats.step_path as i32,
+                    corrections: stats.corrections,
+                    corrections_ms: stats.corrections_ms,
+                    evaluations: stats.evaluations,
+                    residual: stats.residual,
+                    error_mm: stats.error_mm,
+                    min_det: stats.min_det,
                 })
             };
             unsafe { pointers::fill(out, fill) }

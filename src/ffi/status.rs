@@ -98,6 +98,11 @@ pub const UPT_STEP_WHOLE: i32 = 2;
 /// Both are timed while the scene is made, and the faster one stays.
 pub const UPT_STEP_MEASURED: i32 = 3;
 
+/// No corrections.
+pub const UPT_CORRECTIONS_NONE: i32 = -1;
+/// As many corrections as the scene's target asks for and its budget lets in.
+pub const UPT_CORRECTIONS_AUTO: i32 = -2;
+
 /// Keep the last good state and return `UPT_ERR_GUARD`; without contact, where no later call could do otherwise, as
 /// `UPT_GUARD_BLEND`.
 pub const UPT_GUARD_HOLD: i32 = 0;
@@ -128,6 +133,10 @@ pub const UPT_FLAG_GROWTH: u32 = 256;
 pub const UPT_FLAG_CLAMPED: u32 = 512;
 /// The contact block was nearly singular and was regularised.
 pub const UPT_FLAG_REGULARISED: u32 = 1024;
+/// The corrections ended inverted, and the linear response took their place.
+pub const UPT_FLAG_FELL_BACK: u32 = 2048;
+/// The estimated error is above the scene's `error_limit_mm`.
+pub const UPT_FLAG_ERROR: u32 = 4096;
 
 /// Nodes of the surface.
 pub const UPT_SET_SURFACE_NODES: i32 = 0;

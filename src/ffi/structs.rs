@@ -134,6 +134,15 @@ pub struct upt_scene_options {
     pub reserved: [u8; 2],
     /// `UPT_STEP_*`: who makes a step of a `UPT_KIND_UPT` bundle.
     pub step_path: i32,
+    /// Corrections by the elements while there is contact: 1 to 64 a step, 0 as many as the bundle recommends,
+    /// `UPT_CORRECTIONS_NONE`, or `UPT_CORRECTIONS_AUTO`.
+    pub corrections: i32,
+    /// `UPT_CORRECTIONS_AUTO`: no correction starts later than this in a step, µs; 0: no budget.
+    pub corrections_budget_us: u32,
+    /// `UPT_CORRECTIONS_AUTO`: enough where the estimated error is below this, mm; 0: no target.
+    pub corrections_target_mm: f32,
+    /// `UPT_FLAG_ERROR` rises where the estimated error is above this, mm; 0: never.
+    pub error_limit_mm: f32,
 }
 
 /// A rigid instrument; the input of `upt_scene_contacts_from_instruments`.
@@ -218,4 +227,16 @@ pub struct upt_scene_stats {
     pub download_ms: f64,
     /// `UPT_STEP_SPLIT` or `UPT_STEP_WHOLE`.
     pub step_path: i32,
+    /// Corrections made in the last step.
+    pub corrections: u32,
+    /// Corrections, ms.
+    pub corrections_ms: f64,
+    /// Evaluations of the element forces in the last step.
+    pub evaluations: u32,
+    /// Residual force after the corrections over that before them; 0 without corrections.
+    pub residual: f32,
+    /// Estimated root mean square error of the corrected state over all nodes, mm; 0 without corrections.
+    pub error_mm: f32,
+    /// Smallest det F of the corrected state; 0 without corrections.
+    pub min_det: f32,
 }

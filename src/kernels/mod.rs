@@ -19,10 +19,12 @@ pub mod largest;
 mod math;
 pub(crate) mod parts;
 pub mod pool;
+pub mod project;
 #[doc(hidden)]
 pub mod random;
 pub mod respond;
 pub mod rows;
+pub mod vectors;
 
 pub use flush::{FlushToZero, MaskExceptions};
 pub use isa::Isa;

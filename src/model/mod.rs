@@ -6,7 +6,7 @@ mod upt;
 mod upt_stages;
 
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::Instant;
 
 pub use anchors::Anchors;
@@ -15,6 +15,7 @@ pub use upt::{UptModel, UptTables};
 pub use upt_stages::DECODER_TILE;
 
 use crate::bundle::{BundleFiles, Manifest, ManifestKind, Mesh};
+use crate::corrections::Corrections;
 use crate::error::Result;
 use crate::library::{self, Alive};
 use crate::onnx::{ProviderChoice, ProviderPlan, Runtime};
@@ -82,6 +83,9 @@ pub struct Model {
     pub prior: Option<PriorTable>,
     /// The kind's own part.
     pub kind: KindModel,
+    corrections: OnceLock<Corrections>,
+    opening: Mutex<()>,
+    files: BundleFiles,
     pub(crate) runtime: &'static Runtime,
     pub(crate) plan: ProviderPlan,
     pub(crate) threads: usize,
@@ -167,6 +171,9 @@ impl Model {
         };
         let model = Model {
             hash: files.hash,
+            corrections: OnceLock::new(),
+            opening: Mutex::new(()),
+            files,
             mesh: Arc::new(mesh),
             prior,
             kind,
@@ -181,6 +188,20 @@ impl Model {
         };
         tracing::info!(name = %model.manifest.name, seconds = model.load_seconds, "model opened");
         Ok(Arc::new(model))
+    }
+
+    /// The corrections' tables, read when the first scene asks for them.
+    ///
+    /// # Errors
+    /// [`crate::Error::Unsupported`] where the bundle lacks what they need; [`crate::Error::Io`] and
+    /// [`crate::Error::Bundle`] for their file.
+    pub fn corrections(&self) -> Result<&Corrections> {
+        let _opening = self.opening.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(made) = self.corrections.get() {
+            return Ok(made);
+        }
+        let made = Corrections::open(&self.files, &self.mesh, self.prior.as_ref())?;
+        Ok(self.corrections.get_or_init(|| made))
     }
 
     /// What the model is.

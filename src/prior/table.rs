@@ -36,6 +36,8 @@ pub struct PriorTable {
     pub nearest_column: Vec<u32>,
     /// Whether a node belongs to the domain `[K]`. A bundle may have columns of a part of the domain only.
     pub in_domain: Vec<bool>,
+    /// By node: where its rows in the basis start, where its block's coordinates start, and how many.
+    places: Vec<(u32, u32, u32)>,
     /// What the response does when the contact is gone; without it the response is zero then.
     pub vibration: Option<FreeVibration>,
 }
@@ -140,6 +142,7 @@ impl PriorTable {
             },
             force_to_z: optional("force_to_z", [dofs, response_modes])?,
             force_to_p: optional("force_to_p", [dofs, modes])?,
+            places,
             vibration: None,
         })
     }
@@ -164,6 +167,30 @@ impl PriorTable {
     pub fn widest_block(&self) -> usize {
         let ranks = self.rank_offsets.windows(2);
         ranks.map(|pair| pair[1] - pair[0]).max().unwrap_or(0) as usize
+    }
+
+    /// Row `axis` of a node in the basis times coordinates `q`.
+    pub fn value_at(&self, node: u32, axis: usize, q: impl Fn(usize) -> f32) -> f32 {
+        let (row, start, rank) = self.places[node as usize];
+        let row = row as usize + axis * rank as usize;
+        let columns = 0..rank as usize;
+        columns
+            .map(|at| self.basis.at(row + at) * q(start as usize + at))
+            .sum()
+    }
+
+    /// Where each block's rows start in the basis `[B+1]`.
+    pub fn basis_starts(&self) -> Vec<usize> {
+        let mut starts = vec![0];
+        let blocks = self
+            .block_offsets
+            .windows(2)
+            .zip(self.rank_offsets.windows(2));
+        for (nodes, ranks) in blocks {
+            let size = 3 * (nodes[1] - nodes[0]) as usize * (ranks[1] - ranks[0]) as usize;
+            starts.push(starts[starts.len() - 1] + size);
+        }
+        starts
     }
 
     /// The block-wise basis as the kernels take it.
@@ -225,6 +252,7 @@ impl PriorTable {
             + self.nearest_column.len())
             + self.compliance.memory_bytes()
             + self.in_domain.len()
+            + 12 * self.places.len()
             + self.basis.bytes()
             + self.response.bytes()
             + self
@@ -302,6 +330,7 @@ mod tests {
             force_to_p: Vec::new(),
             nearest_column: vec![0, 1, 1, 1],
             in_domain: vec![true, true, true, false],
+            places: Vec::new(),
             vibration: None,
         }
     }

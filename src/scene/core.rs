@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use super::StepInput;
 use super::contact::{ContactSet, check_displacement};
+use super::corrected::Corrected;
 use super::engine::{Engine, Which};
 use super::plan::NodePlan;
 use super::points::AttachedPoints;
@@ -51,6 +52,7 @@ pub struct Core {
     pub(super) pool: Pool,
     pub(super) isa: Isa,
     pub(super) engine: Engine,
+    pub(super) corrected: Option<Corrected>,
     pub(super) held: Vec<bool>,
     pub(super) plan: NodePlan,
     pub(super) points: AttachedPoints,
@@ -79,6 +81,7 @@ pub struct CoreParts {
     pub options: SceneOptions,
     pub pool: Pool,
     pub engine: Engine,
+    pub corrected: Option<Corrected>,
 }
 
 pub(super) fn lock_read(
@@ -130,6 +133,7 @@ impl Core {
             options: parts.options,
             pool: parts.pool,
             engine: parts.engine,
+            corrected: parts.corrected,
         })
     }
 
@@ -146,6 +150,12 @@ impl Core {
             latent_ms: 0.0,
             decode_ms: 0.0,
             guard_ms: 0.0,
+            corrections_ms: 0.0,
+            corrections: 0,
+            evaluations: 0,
+            residual: 0.0,
+            error_mm: 0.0,
+            min_det: 0.0,
             decoded_node_count: 0,
             contact_count: 0,
             memory_bytes: self.memory_bytes() as u64,
@@ -194,6 +204,7 @@ impl Core {
             self.publish_rest(published);
         } else {
             self.predict_and_decode(published, given, &mut stats)?;
+            self.correct(published, given, start, &mut stats)?;
             [stats.upload_ms, stats.download_ms] = self.engine.transfer_ms();
             let verdict = self.judge(&mut stats)?;
             let replaced = verdict & guard::REFUSED != 0
@@ -241,7 +252,11 @@ impl Core {
         );
         stats.flags |= envelope.flags;
         stats.indicator = envelope.ratio;
+        let learned = self.corrected.is_none() || self.incoming.is_empty();
         let shared = lock_read(published);
+        if learned {
+            self.absorb(&shared)?;
+        }
         self.engine.predict(
             self.isa,
             &self.pool,
@@ -254,9 +269,14 @@ impl Core {
                 contact_changed: self.incoming.nodes != self.contact.nodes,
                 held: &self.held,
                 plan: &self.plan,
+                learned,
             },
             stats,
         )?;
+        if !learned {
+            self.next.points.fill(0.0);
+            return Ok(());
+        }
         let mut watch = Stopwatch::start();
         let _span = tracing::trace_span!("decode").entered();
         let displacement = given.unwrap_or(&shared.last.field);
@@ -288,6 +308,12 @@ impl Core {
         let Frame { field, points } = &mut self.next;
         self.points.add_interpolated(1.0, field, points);
         self.engine.commit();
+        if let Some(corrected) = &mut self.corrected {
+            if replaced {
+                corrected.stage.stop_next();
+            }
+            corrected.stage.commit();
+        }
         self.source_before = self.source;
         self.source = if replaced {
             Source::Fallback
@@ -338,6 +364,9 @@ impl Core {
         }
         self.rest_frames += 1;
         self.engine.reset();
+        if let Some(corrected) = &mut self.corrected {
+            corrected.stage.reset();
+        }
         self.source_before = Source::Rest;
         self.source = Source::Rest;
         self.next.field.fill(0.0);
@@ -393,6 +422,10 @@ impl Core {
             + self.points.memory_bytes()
             + self.envelope.memory_bytes()
             + self.engine.memory_bytes()
+            + self
+                .corrected
+                .as_ref()
+                .map_or(0, |corrected| corrected.stage.memory_bytes())
             + own_mesh
     }
 }

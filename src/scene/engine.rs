@@ -46,6 +46,8 @@ pub struct Inputs<'a> {
     pub held: &'a [bool],
     /// Decoded nodes.
     pub plan: &'a NodePlan,
+    /// Whether the learned part runs; a step that is corrected needs the linear response alone.
+    pub learned: bool,
 }
 
 /// The kind's own buffers, sessions and latent state.
@@ -125,6 +127,7 @@ impl Engine {
                     inputs.given,
                     inputs.contact,
                     inputs.contact_changed,
+                    inputs.learned,
                     stats,
                 )
             }
@@ -135,6 +138,7 @@ impl Engine {
                     contact: inputs.contact,
                     held: inputs.held,
                     plan: inputs.plan,
+                    learned: inputs.learned,
                 };
                 let means = Means {
                     isa,

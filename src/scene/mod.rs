@@ -4,6 +4,7 @@
 
 mod contact;
 mod core;
+mod corrected;
 mod engine;
 mod plan;
 mod points;
@@ -29,12 +30,13 @@ pub use points::check_point_count;
 
 use crate::bundle::{Mesh, TensorFile};
 use crate::error::{Error, Result};
-use crate::kernels::Pool;
+use crate::kernels::{Isa, Pool};
 use crate::memory;
 use crate::model::{KindModel, Model};
 use crate::options::{SceneOptions, StepPath};
 use crate::stats::SceneStats;
 use core::{Core, CoreParts, lock_read};
+use corrected::Corrected;
 use engine::Engine;
 use points::AttachedPoints;
 use published::{Frame, Published, Values};
@@ -220,7 +222,8 @@ impl Scene {
                 Some(points) => AttachedPoints::new(&core.mesh, points)?,
                 None => AttachedPoints::default(),
             };
-            if let KindModel::Upt(kind) = &core.model.kind
+            if core.corrected.is_none()
+                && let KindModel::Upt(kind) = &core.model.kind
                 && !core.options.interpolate_points
                 && points.len() > 0
             {
@@ -360,12 +363,14 @@ fn build(model: &Arc<Model>, options: &SceneOptions) -> Result<Core> {
             Engine::Upt(Box::new(engine), tables)
         }
     };
+    let corrected = Corrected::new(model, options, Isa::detect(), &pool)?;
     Core::new(CoreParts {
         model: Arc::clone(model),
         mesh: own_mesh.unwrap_or_else(|| Arc::clone(&model.mesh)),
         options: options.clone(),
         pool,
         engine,
+        corrected,
     })
 }
 

@@ -48,7 +48,7 @@ impl Scene {
                     out.len()
                 )));
             }
-            if core.prior_reaction(out)? {
+            if core.corrected_reaction(out) || core.prior_reaction(out)? {
                 return Ok(());
             }
             let mut haptics = lock(&self.tools.forces)?;

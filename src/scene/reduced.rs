@@ -5,6 +5,7 @@ use super::contact::ContactSet;
 use super::timing::Stopwatch;
 use crate::bundle::ReducedInput;
 use crate::error::{Error, Result};
+use crate::kernels::project::{project_field, row_dots};
 use crate::kernels::respond::accumulate_rows;
 use crate::kernels::rows::Stored;
 use crate::kernels::{Isa, Pool};
@@ -166,6 +167,7 @@ impl ReducedEngine {
         given: Option<&[f32]>,
         contact: &ContactSet,
         contact_changed: bool,
+        learned: bool,
         stats: &mut SceneStats,
     ) -> Result<()> {
         let mut watch = Stopwatch::start();
@@ -182,6 +184,11 @@ impl ReducedEngine {
         next.prior_norm = norm(&next.q_prior);
         next.contact = !contact.is_empty();
         stats.flags |= solve_flags(report);
+        if !learned {
+            self.drop_correction();
+            stats.prior_ms = watch.lap();
+            return Ok(());
+        }
         let b_now = match given {
             Some(field) => {
                 self.given_q.fill(0.0);
@@ -277,6 +284,32 @@ impl ReducedEngine {
             &mut record.q,
         )
         .map_err(|error| Error::Panic(error.to_string()))
+    }
+
+    /// Takes corrected fields `[K,3]` as those that the last two records stand for, `b = Phi^T (u - L(c))`; where a record was
+    /// not corrected there is none.
+    pub fn absorb(
+        &mut self,
+        isa: Isa,
+        pool: &Pool,
+        table: &PriorTable,
+        starts: &[usize],
+        fields: [Option<&[f32]>; 2],
+    ) -> Result<()> {
+        let failed = |error: crate::kernels::PoolError| Error::Panic(error.to_string());
+        let records = [&mut self.last, &mut self.before];
+        for (record, field) in records.into_iter().zip(fields) {
+            let Some(field) = field else { continue };
+            let q = &mut self.given_q;
+            project_field(isa, pool, &table.basis(), starts, field, q).map_err(failed)?;
+            for (given, prior) in q.iter_mut().zip(&record.q_prior) {
+                *given -= prior;
+            }
+            let modes = Stored::F32(&table.residual);
+            row_dots(isa, pool, modes, &self.mode_rows, q, &mut record.b).map_err(failed)?;
+            record.bound = norm(&record.b);
+        }
+        Ok(())
     }
 
     /// Drops the correction of `next`: the linear response alone.

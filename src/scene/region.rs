@@ -27,6 +27,9 @@ impl Core {
     /// Back to rest.
     pub(super) fn reset(&mut self, published: &RwLock<Published>) {
         self.engine.reset();
+        if let Some(corrected) = &mut self.corrected {
+            corrected.stage.reset();
+        }
         self.contact.clear();
         self.contact_before.clear();
         self.source = Source::Rest;
@@ -103,8 +106,8 @@ impl Core {
         } else {
             &shared.before
         };
+        let kept = self.keeps_all_nodes();
         let field = &mut self.next.field;
-        let kept = self.engine.keeps_all_nodes(&self.model);
         if kept && points.queries().1.is_empty() {
             detail.fill(0.0);
             field.copy_from_slice(&frame.field);
@@ -157,7 +160,7 @@ impl Core {
         let count = self.mesh.node_count();
         let table = self.engine.planned_prior(&self.model);
         let plan = match &region {
-            Some(region) if !self.engine.keeps_all_nodes(&self.model) => NodePlan::new(
+            Some(region) if !self.keeps_all_nodes() => NodePlan::new(
                 &[
                     region,
                     self.engine.recurrence_nodes(),

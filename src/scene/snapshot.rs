@@ -14,13 +14,17 @@ use super::engine::Engine;
 use super::published::Published;
 use super::reduced::ReducedRecord;
 use super::upt::UptRecord;
+use crate::corrections::{Motion, PAIRS};
 use crate::error::{Error, Result};
 use crate::kernels::FlushToZero;
 use crate::memory;
 
 const MAGIC: &[u8; 8] = b"UPTSNAP\0";
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 const DIGEST: usize = 32;
+
+/// L-BFGS pairs.
+type Pairs = Vec<[Vec<f32>; 2]>;
 
 struct Writer(Vec<u8>);
 
@@ -107,6 +111,23 @@ impl<'a> Reader<'a> {
         Ok(set)
     }
 
+    /// What corrections know of the past: velocities and pairs.
+    fn past(&mut self, len: usize, contacts: usize) -> Result<Option<(Motion, Pairs)>> {
+        let Some(count) = self.u32()?.checked_sub(1) else {
+            return Ok(None);
+        };
+        let motion = Motion {
+            velocity: self.floats(len)?,
+            velocity_before: self.floats(len)?,
+            min_det: self.floats(1)?[0],
+            reaction: self.floats(3 * contacts)?,
+        };
+        let pairs: Result<Pairs> = (0..count)
+            .map(|_| Ok([self.floats(len)?, self.floats(len)?]))
+            .collect();
+        Ok(Some((motion, pairs?)))
+    }
+
     fn source(&mut self) -> Result<Source> {
         match self.u32()? {
             0 => Ok(Source::Rest),
@@ -157,7 +178,12 @@ impl Core {
             .map(|list| 4 + 4 * list.len())
             .sum();
         let (contacts, fields) = (2 * (8 + 16 * count), 2 * (4 + 12 * count));
-        1024 + contacts + latents + fields
+        let past = match &self.corrected {
+            // Velocities, contact forces, pairs.
+            Some(_) => (3 + 2 * PAIRS) * (4 + 12 * count),
+            None => 0,
+        };
+        1024 + contacts + latents + fields + past
     }
 
     /// The state as bytes.
@@ -188,12 +214,30 @@ impl Core {
                 w.floats(&[record.prior_norm, record.bound, f32::from(record.contact)]);
             }
         }
-        let keeps = self.engine.keeps_all_nodes(&self.model);
+        let keeps = self.keeps_all_nodes();
         w.u32(u32::from(keeps));
         if keeps {
             let shared = lock_read(published);
             w.floats(&shared.last.field);
             w.floats(&shared.before.field);
+        }
+        match &self.corrected {
+            None => w.u32(0),
+            Some(corrected) => {
+                let stage = &corrected.stage;
+                w.u32(1 + stage.pairs().count() as u32);
+                w.floats(&stage.motion.velocity);
+                w.floats(&stage.motion.velocity_before);
+                w.floats(&[stage.motion.min_det]);
+                let mut reaction = stage.motion.reaction.clone();
+                // The guard may have dropped the contact that they belonged to.
+                reaction.resize(3 * self.contact.len(), 0.0);
+                w.floats(&reaction);
+                for (step, change) in stage.pairs() {
+                    w.floats(step);
+                    w.floats(change);
+                }
+            }
         }
         let digest = Sha256::digest(&w.0);
         w.0.extend_from_slice(&digest);
@@ -251,9 +295,15 @@ impl Core {
         let mut fields = Vec::new();
         if r.u32()? != 0 {
             fields = vec![r.floats(3 * count)?, r.floats(3 * count)?];
-        } else if self.engine.keeps_all_nodes(&self.model) {
+        } else if self.keeps_all_nodes() {
             return Err(Error::Snapshot(
                 "was saved by a scene that steps without step.onnx; restore it in a scene with `step_path` split".into(),
+            ));
+        }
+        let past = r.past(3 * count, contact.len())?;
+        if past.is_some() != self.corrected.is_some() {
+            return Err(Error::Snapshot(
+                "was saved by a scene with other `corrections`; restore it in one that corrects where that one did".into(),
             ));
         }
         if !r.0.is_empty() {
@@ -290,7 +340,10 @@ impl Core {
             shared.last.field.copy_from_slice(last);
             shared.before.field.copy_from_slice(before);
         }
-        if let Err(error) = self.recompute(published) {
+        if let Err(error) = self
+            .recompute(published)
+            .and_then(|()| self.restore_past(past))
+        {
             self.take_back(old, published);
             return Err(error);
         }
@@ -319,7 +372,7 @@ impl Core {
 
     /// A copy of everything that a restore overwrites.
     fn keep(&self, published: &RwLock<Published>) -> Result<Kept> {
-        let fields = if self.engine.keeps_all_nodes(&self.model) {
+        let fields = if self.keeps_all_nodes() {
             let shared = lock_read(published);
             let copy = |field: &[f32]| memory::copied(field, "a copy of the scene's state");
             Some([copy(&shared.last.field)?, copy(&shared.before.field)?])
@@ -343,6 +396,11 @@ impl Core {
             rest_frames: self.rest_frames,
             max_displacement: self.max_displacement,
             fields,
+            past: self.corrected.as_ref().map(|corrected| {
+                let stage = &corrected.stage;
+                let pairs = stage.pairs().map(|(s, y)| [s.to_vec(), y.to_vec()]);
+                (stage.motion.clone(), pairs.collect())
+            }),
         })
     }
 
@@ -367,6 +425,8 @@ impl Core {
         self.sleeping = kept.sleeping;
         self.rest_frames = kept.rest_frames;
         self.max_displacement = kept.max_displacement;
+        // Fails only where a worker panics, which has been reported by then.
+        let _ = self.restore_past(kept.past);
         if let Some([last, before]) = kept.fields {
             let mut shared = lock_write(published);
             shared.last.field = last;
@@ -392,4 +452,5 @@ struct Kept {
     rest_frames: u32,
     max_displacement: f32,
     fields: Option<[Vec<f32>; 2]>,
+    past: Option<(Motion, Pairs)>,
 }

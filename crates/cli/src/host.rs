@@ -19,6 +19,8 @@ pub struct ModelSettings {
     pub precision: i32,
     /// Fail rather than take another provider.
     pub exact: bool,
+    /// Corrections a step; none: as many as the bundle recommends.
+    pub corrections: Option<u32>,
 }
 
 impl Default for ModelSettings {
@@ -28,12 +30,14 @@ impl Default for ModelSettings {
             provider: ffi::UPT_PROVIDER_CPU,
             precision: ffi::UPT_PRECISION_F32,
             exact: false,
+            corrections: None,
         }
     }
 }
 
 /// An open model; closed when dropped.
 pub struct Model {
+    corrections: Option<u32>,
     handle: *mut ffi::upt_model,
     info: ffi::upt_model_info,
 }
@@ -95,7 +99,11 @@ impl Model {
             check(ffi::upt_model_open(text.as_ptr(), &options, &mut handle))?;
             let mut info: ffi::upt_model_info = zeroed();
             info.struct_size = size::<ffi::upt_model_info>();
-            let mut model = Self { handle, info };
+            let mut model = Self {
+                corrections: settings.corrections,
+                handle,
+                info,
+            };
             check(ffi::upt_model_get_info(handle, &mut model.info))?;
             Ok(model)
         }
@@ -151,6 +159,11 @@ impl Scene {
             options.kernel = kernel;
             options.precision = model.info.precision;
             options.guard_policy = ffi::UPT_GUARD_REPORT;
+            options.corrections = match model.corrections {
+                None => 0,
+                Some(0) => ffi::UPT_CORRECTIONS_NONE,
+                Some(count) => count as i32,
+            };
             let mut handle = std::ptr::null_mut();
             check(ffi::upt_scene_create(model.handle, &options, &mut handle))?;
             Ok(Self { handle })

@@ -6,6 +6,8 @@
 
 mod beside;
 mod completions;
+#[cfg(feature = "linear")]
+mod corrections;
 mod dataset;
 mod doctor;
 #[cfg(feature = "files")]
@@ -21,6 +23,7 @@ mod mesh_files;
 mod modes;
 #[cfg(feature = "linear")]
 mod prior;
+mod progress;
 mod render;
 mod report;
 mod rollout;
@@ -72,6 +75,12 @@ enum Command {
     /// Left out of this build.
     #[cfg(not(feature = "linear"))]
     Prior(left_out::Options),
+    /// The coarse space of a bundle's corrections by the elements.
+    #[cfg(feature = "linear")]
+    Corrections(corrections::Options),
+    /// Left out of this build.
+    #[cfg(not(feature = "linear"))]
+    Corrections(left_out::Options),
     /// Natural modes of a held mesh: how linear elasticity swings after a release.
     #[cfg(feature = "linear")]
     Modes(modes::Options),
@@ -111,6 +120,10 @@ fn main() -> ExitCode {
         Command::Prior(options) => prior::run(&options),
         #[cfg(not(feature = "linear"))]
         Command::Prior(options) => left_out::run("linear", &options),
+        #[cfg(feature = "linear")]
+        Command::Corrections(options) => corrections::run(&options),
+        #[cfg(not(feature = "linear"))]
+        Command::Corrections(options) => left_out::run("linear", &options),
         #[cfg(feature = "linear")]
         Command::Modes(options) => modes::run(&options),
         #[cfg(not(feature = "linear"))]

@@ -37,6 +37,9 @@ pub struct Options {
     /// Write a picture of the deepest push: truth, prediction, error side by side.
     #[arg(long, value_name = "FILE")]
     png: Option<PathBuf>,
+    /// Corrections a step, 0 to 64; left out: as many as the bundle recommends.
+    #[arg(long)]
+    corrections: Option<u32>,
     /// Leave out the Hausdorff distance (the slowest of the metrics).
     #[arg(long)]
     no_hausdorff: bool,
@@ -68,6 +71,7 @@ pub fn run(options: &Options) -> Result<ExitCode> {
         precision: options.precision,
         region: Region::All,
         threads: options.threads,
+        corrections: options.corrections,
     };
     let mut stepper = Stepper::new(&method, &mesh, &trajectory.header)?;
     let mut field = vec![[0.0f32; 3]; mesh.node_count()];

@@ -84,6 +84,23 @@ impl Tetrahedron {
         }
         forces
     }
+
+    /// Diagonal 3x3 blocks of the stiffness at rest for the four corners, µN/mm: xx, xy, xz, yy, yz, zz.
+    ///
+    /// The tangent of the law at `F = I` is that of linear elasticity, `mu` and `lambda = kappa - 2/3 mu`:
+    /// `V (mu |g|² I + (lambda + mu) g g^T)`.
+    pub fn diagonal_blocks(&self, moduli: Moduli) -> [[f64; 6]; 4] {
+        let [a, b, c] = self.gradients;
+        let first = [0, 1, 2].map(|k| -(a[k] + b[k] + c[k]));
+        let both = moduli.bulk_pa + moduli.shear_pa / 3.0;
+        [first, a, b, c].map(|g| {
+            let own = moduli.shear_pa * dot(g, g);
+            [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)].map(|(i, j)| {
+                let diagonal = if i == j { own } else { 0.0 };
+                self.volume * (diagonal + both * g[i] * g[j])
+            })
+        })
+    }
 }
 
 /// First Piola-Kirchhoff stress `P`, rows, Pa.

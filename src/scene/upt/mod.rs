@@ -99,6 +99,8 @@ pub struct UptInput<'a> {
     pub held: &'a [bool],
     /// Decoded nodes.
     pub plan: &'a NodePlan,
+    /// Whether the network runs.
+    pub learned: bool,
 }
 
 fn internal(error: impl std::fmt::Display) -> Error {
@@ -255,6 +257,9 @@ impl UptEngine {
         }
         drop(span);
         stats.prior_ms = watch.lap();
+        if !input.learned {
+            return Ok(());
+        }
         let span = tracing::trace_span!("encode").entered();
         let features = match &mut self.path {
             Path::Split { features, .. } => features.as_mut_slice(),

@@ -115,6 +115,17 @@ namespace Upt.Interop
         public fixed byte reserved[2];
         /// <summary>`UPT_STEP_*`: who makes a step of a `UPT_KIND_UPT` bundle.</summary>
         public int step_path;
+        /// <summary>
+        /// Corrections by the elements while there is contact: 1 to 64 a step, 0 as many as the bundle recommends,
+        /// `UPT_CORRECTIONS_NONE`, or `UPT_CORRECTIONS_AUTO`.
+        /// </summary>
+        public int corrections;
+        /// <summary>`UPT_CORRECTIONS_AUTO`: no correction starts later than this in a step, µs; 0: no budget.</summary>
+        public uint corrections_budget_us;
+        /// <summary>`UPT_CORRECTIONS_AUTO`: enough where the estimated error is below this, mm; 0: no target.</summary>
+        public float corrections_target_mm;
+        /// <summary>`UPT_FLAG_ERROR` rises where the estimated error is above this, mm; 0: never.</summary>
+        public float error_limit_mm;
     }
 
     /// <summary>A rigid instrument; the input of `upt_scene_contacts_from_instruments`.</summary>
@@ -197,6 +208,18 @@ namespace Upt.Interop
         public double download_ms;
         /// <summary>`UPT_STEP_SPLIT` or `UPT_STEP_WHOLE`.</summary>
         public int step_path;
+        /// <summary>Corrections made in the last step.</summary>
+        public uint corrections;
+        /// <summary>Corrections, ms.</summary>
+        public double corrections_ms;
+        /// <summary>Evaluations of the element forces in the last step.</summary>
+        public uint evaluations;
+        /// <summary>Residual force after the corrections over that before them; 0 without corrections.</summary>
+        public float residual;
+        /// <summary>Estimated root mean square error of the corrected state over all nodes, mm; 0 without corrections.</summary>
+        public float error_mm;
+        /// <summary>Smallest det F of the corrected state; 0 without corrections.</summary>
+        public float min_det;
     }
 
     /// <summary>The C ABI, as it is.</summary>
@@ -292,6 +315,10 @@ namespace Upt.Interop
         public const int UPT_STEP_WHOLE = 2;
         /// <summary>Both are timed while the scene is made, and the faster one stays.</summary>
         public const int UPT_STEP_MEASURED = 3;
+        /// <summary>No corrections.</summary>
+        public const int UPT_CORRECTIONS_NONE = -1;
+        /// <summary>As many corrections as the scene's target asks for and its budget lets in.</summary>
+        public const int UPT_CORRECTIONS_AUTO = -2;
         /// <summary>
         /// Keep the last good state and return `UPT_ERR_GUARD`; without contact, where no later call could do otherwise, as
         /// `UPT_GUARD_BLEND`.
@@ -323,6 +350,10 @@ namespace Upt.Interop
         public const uint UPT_FLAG_CLAMPED = 512;
         /// <summary>The contact block was nearly singular and was regularised.</summary>
         public const uint UPT_FLAG_REGULARISED = 1024;
+        /// <summary>The corrections ended inverted, and the linear response took their place.</summary>
+        public const uint UPT_FLAG_FELL_BACK = 2048;
+        /// <summary>The estimated error is above the scene's `error_limit_mm`.</summary>
+        public const uint UPT_FLAG_ERROR = 4096;
         /// <summary>Nodes of the surface.</summary>
         public const int UPT_SET_SURFACE_NODES = 0;
         /// <summary>Nodes that instruments may touch.</summary>

@@ -91,6 +91,7 @@ pub fn methods(
                             precision: *precision,
                             region: *region,
                             threads: *threads,
+                            corrections: None,
                         });
                     }
                 }

@@ -148,6 +148,7 @@ pub fn describe(method: &Method, mesh: &Mesh) -> Row {
             precision,
             region,
             threads,
+            corrections: _,
         } => {
             row.method = "surrogate".into();
             named(&mut row, bundle);

@@ -37,6 +37,8 @@ pub enum Method {
         precision: Precision,
         region: Region,
         threads: u32,
+        /// Corrections a step; none: as many as the bundle recommends.
+        corrections: Option<u32>,
     },
     PaperSplit {
         bundle: BundleFolder,
@@ -142,9 +144,17 @@ impl Stepper {
                 precision,
                 region,
                 threads,
-            } => Self::Surrogate(Box::new(SurrogateStepper::new(
-                bundle, *provider, *precision, *region, *threads,
-            )?)),
+                corrections,
+            } => {
+                let settings = host::ModelSettings {
+                    threads: *threads,
+                    provider: provider.code(),
+                    precision: precision.code(),
+                    exact: true,
+                    corrections: *corrections,
+                };
+                Self::Surrogate(Box::new(SurrogateStepper::new(bundle, &settings, *region)?))
+            }
             Method::PaperSplit { bundle, threads } => Self::PaperSplit(Box::new(
                 super::paper_split::PaperSplit::new(bundle, *threads)?,
             )),
@@ -280,20 +290,8 @@ fn solver_options(header: &TrajectoryHeader, threads: u32) -> SolverOptions {
 }
 
 impl SurrogateStepper {
-    fn new(
-        bundle: &BundleFolder,
-        provider: Provider,
-        precision: Precision,
-        region: Region,
-        threads: u32,
-    ) -> Result<Self> {
-        let settings = host::ModelSettings {
-            threads,
-            provider: provider.code(),
-            precision: precision.code(),
-            exact: true,
-        };
-        let model = host::Model::open(&bundle.path, &settings)?;
+    fn new(bundle: &BundleFolder, settings: &host::ModelSettings, region: Region) -> Result<Self> {
+        let model = host::Model::open(&bundle.path, settings)?;
         let mut scene = host::Scene::create(&model, ffi::UPT_KERNEL_AUTO)?;
         let count = model.info().node_count as usize;
         let region = match region {
@@ -305,11 +303,11 @@ impl SurrogateStepper {
             scene.set_region(&region)?;
         }
         let stats = scene.stats()?;
-        if stats.precision != precision.code() {
+        if stats.precision != settings.precision {
             bail!(
                 "{}: precision {} is not available here (the library would run another)",
                 bundle.name,
-                precision.name()
+                settings.precision
             );
         }
         let inside: std::collections::HashSet<u32> = region.iter().copied().collect();

@@ -246,6 +246,7 @@ fn float32_frames(method: &Method, plan: &Plan<'_>) -> Result<Option<Vec<Vec<[f3
         precision: Precision::F32,
         region: Region::All,
         threads: 1,
+        corrections: None,
     };
     let quick = Plan {
         case_limit: 1,

@@ -1,0 +1,228 @@
+//! The L-BFGS memory: pairs of a step `s` and the change of the residual `y`, kept from step to step and over changes of the
+//! contact (Nocedal and Wright, Numerical Optimization, algorithm 7.4; with a preconditioner as the initial matrix).
+//!
+//! Prescribed nodes are masked: their rows of `s` and `y` are left out of every product, so the pairs need not be dropped when the
+//! contact changes.
+
+use super::precondition::{Env, pooled};
+use crate::error::Result;
+use crate::kernels::vectors::{PartialSums, add_scaled, dots};
+use crate::memory;
+
+/// Pairs kept; 3 are six times worse than 8.
+pub const PAIRS: usize = 8;
+
+/// Room for the pairs of the last published state and for those of the step being made: a step that is refused leaves no trace.
+const SLOTS: usize = 2 * PAIRS;
+
+/// The pairs, oldest first by `order`.
+pub struct Memory {
+    steps: Vec<Vec<f32>>,
+    changes: Vec<Vec<f32>>,
+    /// Slots from the oldest to the newest.
+    order: Vec<usize>,
+    /// The same of the last published state.
+    published: Vec<usize>,
+    /// `s_i . y_j` over all nodes, by slot.
+    products: [[f64; SLOTS]; SLOTS],
+    /// The same without the masked nodes.
+    masked: [[f64; SLOTS]; SLOTS],
+    partial: PartialSums,
+    first: [f64; PAIRS],
+}
+
+impl Memory {
+    /// Room for vectors of `len`.
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
+    pub fn new(len: usize) -> Result<Memory> {
+        let vectors = || -> Result<Vec<Vec<f32>>> {
+            (0..SLOTS)
+                .map(|_| memory::zeros(len, "L-BFGS pairs"))
+                .collect()
+        };
+        Ok(Memory {
+            steps: vectors()?,
+            changes: vectors()?,
+            order: Vec::with_capacity(SLOTS),
+            published: Vec::with_capacity(SLOTS),
+            products: [[0.0; SLOTS]; SLOTS],
+            masked: [[0.0; SLOTS]; SLOTS],
+            partial: PartialSums::with_capacity(len, PAIRS),
+            first: [0.0; PAIRS],
+        })
+    }
+
+    /// Forgets all pairs, in the step being made.
+    pub fn clear(&mut self) {
+        self.order.clear();
+    }
+
+    /// Back to the pairs of the last published state.
+    pub fn begin(&mut self) {
+        self.order.clone_from(&self.published);
+    }
+
+    /// The state being made is published.
+    pub fn commit(&mut self) {
+        self.published.clone_from(&self.order);
+    }
+
+    /// Bytes held.
+    pub fn memory_bytes(&self) -> usize {
+        8 * SLOTS * self.steps[0].len()
+    }
+
+    /// The pairs, oldest first: what a snapshot holds.
+    pub fn pairs(&self) -> impl Iterator<Item = (&[f32], &[f32])> {
+        let slots = self.published.iter();
+        slots.map(|&slot| (self.steps[slot].as_slice(), self.changes[slot].as_slice()))
+    }
+
+    /// Leaves the nodes out of every product until the next call.
+    pub fn mask(&mut self, nodes: &[u32]) {
+        self.masked = self.products;
+        for &i in &self.order {
+            for &j in &self.order {
+                for &node in nodes {
+                    let at = 3 * node as usize;
+                    let pairs = self.steps[i][at..at + 3]
+                        .iter()
+                        .zip(&self.changes[j][at..at + 3]);
+                    let lost: f64 = pairs.map(|(s, y)| f64::from(*s) * f64::from(*y)).sum();
+                    self.masked[i][j] -= lost;
+                }
+            }
+        }
+    }
+
+    /// Stores `s = t d` and `y` (both zero at masked nodes) in place of the oldest pair, if it has curvature.
+    pub fn store(&mut self, env: Env<'_>, d: &[f32], t: f32, y: &[f32]) -> Result<()> {
+        if self.order.len() == PAIRS {
+            self.order.remove(0);
+        }
+        // Fewer than PAIRS are in use, and at most PAIRS are published.
+        let free = |slot: &usize| !self.order.contains(slot) && !self.published.contains(slot);
+        let slot = (0..SLOTS).find(free).unwrap_or(0);
+        for (s, d) in self.steps[slot].iter_mut().zip(d) {
+            *s = t * d;
+        }
+        self.changes[slot].copy_from_slice(y);
+        self.order.push(slot);
+        self.fill_products(env, slot)
+    }
+
+    fn fill_products(&mut self, env: Env<'_>, slot: usize) -> Result<()> {
+        let mut out = [0.0; PAIRS];
+        let count = self.order.len();
+        let views = views(&self.steps, &self.order);
+        let y = &self.changes[slot];
+        let (isa, pool) = (env.isa, env.pool);
+        pooled(dots(
+            isa,
+            pool,
+            &views[..count],
+            y,
+            &mut self.partial,
+            &mut out[..count],
+        ))?;
+        for (&i, value) in self.order.iter().zip(out) {
+            self.products[i][slot] = value;
+            self.masked[i][slot] = value;
+        }
+        let views = self::views(&self.changes, &self.order);
+        let s = &self.steps[slot];
+        pooled(dots(
+            isa,
+            pool,
+            &views[..count],
+            s,
+            &mut self.partial,
+            &mut out[..count],
+        ))?;
+        for (&j, value) in self.order.iter().zip(out) {
+            self.products[slot][j] = value;
+            self.masked[slot][j] = value;
+        }
+        if self.products[slot][slot] <= 0.0 {
+            self.order.retain(|&other| other != slot);
+        }
+        Ok(())
+    }
+
+    /// `d = -H g` with `H` from the pairs around `precondition`; `q` is scratch. All `[K,3]`, `g` zero at masked nodes.
+    pub fn direction(
+        &mut self,
+        env: Env<'_>,
+        g: &[f32],
+        q: &mut [f32],
+        d: &mut [f32],
+        mut precondition: impl FnMut(&mut [f32], &mut [f32]) -> Result<()>,
+    ) -> Result<()> {
+        let (isa, pool) = (env.isa, env.pool);
+        // A pair without curvature on the free nodes is left out.
+        let mut used = [0usize; PAIRS];
+        let mut count = 0;
+        for &slot in &self.order {
+            if self.masked[slot][slot] > 1e-12 * self.products[slot][slot] {
+                used[count] = slot;
+                count += 1;
+            }
+        }
+        let used = &used[..count];
+        let views = views(&self.steps, used);
+        let first = &mut self.first[..count];
+        pooled(dots(
+            isa,
+            pool,
+            &views[..count],
+            g,
+            &mut self.partial,
+            first,
+        ))?;
+        // alpha_i = s_i . (g - sum_{j > i} alpha_j y_j) / (s_i . y_i), newest first.
+        let mut alpha = [0.0f64; PAIRS];
+        for i in (0..count).rev() {
+            let later: f64 = (i + 1..count)
+                .map(|j| alpha[j] * self.masked[used[i]][used[j]])
+                .sum();
+            alpha[i] = (first[i] - later) / self.masked[used[i]][used[i]];
+        }
+        q.copy_from_slice(g);
+        let views = self::views(&self.changes, used);
+        let factors = alpha.map(|a| -a as f32);
+        pooled(add_scaled(isa, pool, &views[..count], &factors[..count], q))?;
+        precondition(q, d)?;
+        pooled(dots(
+            isa,
+            pool,
+            &views[..count],
+            d,
+            &mut self.partial,
+            first,
+        ))?;
+        // beta_i = y_i . (z + sum_{j < i} (alpha_j - beta_j) s_j) / (s_i . y_i), oldest first.
+        let mut weight = [0.0f64; PAIRS];
+        for i in 0..count {
+            let earlier: f64 = (0..i)
+                .map(|j| weight[j] * self.masked[used[j]][used[i]])
+                .sum();
+            weight[i] = alpha[i] - (first[i] + earlier) / self.masked[used[i]][used[i]];
+        }
+        let views = self::views(&self.steps, used);
+        let factors = weight.map(|w| w as f32);
+        pooled(add_scaled(isa, pool, &views[..count], &factors[..count], d))?;
+        d.iter_mut().for_each(|d| *d = -*d);
+        Ok(())
+    }
+}
+
+/// The vectors of some slots; entries beyond are empty.
+fn views<'a>(vectors: &'a [Vec<f32>], slots: &[usize]) -> [&'a [f32]; PAIRS] {
+    let mut views: [&[f32]; PAIRS] = [&[]; PAIRS];
+    for (view, &slot) in views.iter_mut().zip(slots) {
+        *view = &vectors[slot];
+    }
+    views
+}

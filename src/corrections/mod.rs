@@ -1,0 +1,106 @@
+//! Corrections: a few quasi-Newton iterations on the real elements after each prediction (`docs/corrections.md`).
+//!
+//! While there is contact, the predicted field is moved towards the equation of motion of the reference solver, discretised in time
+//! by BDF2: `r(u) = f_int(u) + M (a + alpha v) = 0` on the free nodes, with the contact nodes where the instruments hold them.
+//! `k` iterations of L-BFGS around a two-level preconditioner take it there; accuracy becomes a number that the host chooses.
+//!
+//! [`Corrections`] is what a model shares between scenes, made when the first scene asks for it; [`Stage`] is a scene's own.
+//! Displacements mm, forces µN, masses g, times s.
+
+mod body;
+mod memory;
+mod precondition;
+mod space;
+mod stage;
+
+use crate::bundle::{BundleFiles, CorrectionsEntry, Manifest, Mesh};
+use crate::error::{Error, Result};
+use crate::kernels::Isa;
+use crate::prior::PriorTable;
+
+pub use body::Body;
+pub use memory::PAIRS;
+pub use space::CoarseSpace;
+pub use stage::{Enough, Input, Lent, Motion, Report, Stage};
+
+/// Most iterations a step.
+pub const LIMIT: u32 = 64;
+
+/// BDF2 over steps of one length.
+#[derive(Debug, Clone, Copy)]
+pub struct Integrator {
+    /// Step `h`, s.
+    pub step_s: f64,
+    /// Mass-proportional damping `alpha`, 1/s.
+    pub damping_per_s: f64,
+}
+
+impl Integrator {
+    /// `kappa = 9/(4h²) + 3 alpha/(2h)`, 1/s²: what a displacement costs in inertia and damping, over its mass.
+    pub fn kappa(&self) -> f64 {
+        2.25 / (self.step_s * self.step_s) + 1.5 * self.damping_per_s / self.step_s
+    }
+}
+
+/// The tables and elements of a bundle's corrections.
+pub struct Corrections {
+    pub space: CoarseSpace,
+    pub body: Body,
+    pub integrator: Integrator,
+}
+
+impl Corrections {
+    /// Reads `corrections.safetensors` and prepares the elements.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] where the bundle has no linear response or no coarse space; [`Error::Bundle`] for a damaged file.
+    pub fn open(
+        files: &BundleFiles,
+        mesh: &Mesh,
+        prior: Option<&PriorTable>,
+    ) -> Result<Corrections> {
+        let manifest = &files.manifest;
+        let (entry, prior) = needed(manifest, prior)?;
+        let material = &manifest.material;
+        let material = elements::Material {
+            young_pa: material.young_pa,
+            poisson: material.poisson,
+            density_kg_m3: material.density_kg_m3,
+            damping_per_s: material.damping_per_s,
+        };
+        material
+            .validate()
+            .map_err(|error| Error::bundle("bundle.json", error.to_string()))?;
+        let integrator = Integrator {
+            step_s: manifest.dt_s,
+            damping_per_s: material.damping_per_s,
+        };
+        Ok(Corrections {
+            space: CoarseSpace::parse(&files.tensors(&entry.file)?, prior)?,
+            body: Body::new(mesh, &material, integrator.kappa(), Isa::detect()),
+            integrator,
+        })
+    }
+
+    /// Bytes held.
+    pub fn memory_bytes(&self) -> usize {
+        self.space.memory_bytes() + self.body.memory_bytes()
+    }
+}
+
+fn needed<'a>(
+    manifest: &'a Manifest,
+    prior: Option<&'a PriorTable>,
+) -> Result<(&'a CorrectionsEntry, &'a PriorTable)> {
+    let lacks = |what: &str| {
+        Error::Unsupported(format!(
+            "corrections: the bundle has no {what}; run `upt corrections BUNDLE` on a bundle with a linear response"
+        ))
+    };
+    let prior = prior.ok_or_else(|| lacks("linear response (`prior` in bundle.json)"))?;
+    let entry = manifest.corrections.as_ref();
+    Ok((
+        entry.ok_or_else(|| lacks("coarse space (`corrections` in bundle.json)"))?,
+        prior,
+    ))
+}

@@ -1,0 +1,379 @@
+//! The preconditioner of the corrections: two levels, zero at prescribed nodes.
+//!
+//! `P = w D^-1 + Psi (Psi^T (K + kappa M) Psi)^-1 Psi^T`, `w = 0.4`, with the 3x3 diagonal blocks `D` of `K + kappa M` and the modes
+//! less their own response to what they do at the contact, `Psi = Phi - L_C(Phi_C)`. `L_C` is the response of `K + kappa M`
+//! (the prior's columns less what inertia holds back), so `Psi^T (K + kappa M) Psi = Phi^T (K + kappa M) Phi -
+//! Phi_C^T A_k,CC^-1 Phi_C` holds without a further product.
+//!
+//! All products with fields go through the prior's block-wise bases: `U^T` once, the modes and columns on coordinates, `U` once.
+
+use super::body::Body;
+use super::space::CoarseSpace;
+use crate::error::{Error, Result};
+use crate::kernels::contact::ContactFactor;
+use crate::kernels::project::{project_field, row_dots};
+use crate::kernels::respond::accumulate_rows;
+use crate::kernels::rows::{RowPlan, decode_rows};
+use crate::kernels::{Isa, Pool};
+use crate::prior::PriorTable;
+
+/// Weight of the diagonal level; 1.0 and 0.15 are three to seven times worse.
+const DIAGONAL_WEIGHT: f32 = 0.4;
+
+/// What every product needs.
+#[derive(Clone, Copy)]
+pub struct Env<'a> {
+    pub isa: Isa,
+    pub pool: &'a Pool,
+    pub prior: &'a PriorTable,
+    pub space: &'a CoarseSpace,
+    pub body: &'a Body,
+}
+
+pub(super) fn pooled<T>(result: std::result::Result<T, crate::kernels::PoolError>) -> Result<T> {
+    result.map_err(|error| Error::Panic(error.to_string()))
+}
+
+/// The preconditioner for one set of prescribed nodes, and its buffers.
+pub struct Preconditioner {
+    held_back: Vec<f32>,
+    starts: Vec<usize>,
+    plan: RowPlan,
+    /// Contact dofs with columns, as rows of the prior's tables.
+    dofs: Vec<u32>,
+    columns: Vec<u32>,
+    /// Prescribed nodes, ascending.
+    nodes: Vec<u32>,
+    /// `A_k,CC`.
+    compliance: ContactFactor,
+    /// `A_k,CC^-1 Phi_C [3m,r]`, mN/mm.
+    through: Vec<f32>,
+    galerkin: ContactFactor,
+    galerkin_free: Vec<f64>,
+    widened: Vec<f32>,
+    coordinates: Vec<f32>,
+    on_modes: Vec<f32>,
+    solved: Vec<f32>,
+    at_contact: Vec<f32>,
+    forces: Vec<f32>,
+    ready: bool,
+}
+
+impl Preconditioner {
+    /// Buffers; the free body's preconditioner is made at the first [`Preconditioner::prescribe`].
+    pub fn new(env: Env<'_>, kappa: f64) -> Preconditioner {
+        let count = env.space.count();
+        let dofs = 3 * env.prior.contact_nodes.len();
+        let room = dofs.min(768);
+        Preconditioner {
+            held_back: env.space.held_back(kappa),
+            starts: env.prior.basis_starts(),
+            plan: RowPlan::full(&env.prior.basis()),
+            dofs: Vec::with_capacity(dofs),
+            columns: Vec::with_capacity(dofs / 3),
+            nodes: Vec::with_capacity(env.body.mass.len()),
+            compliance: ContactFactor::with_capacity(room),
+            through: Vec::with_capacity(room * count),
+            galerkin: ContactFactor::with_capacity(count),
+            galerkin_free: env.space.galerkin(kappa),
+            widened: vec![0.0; 6 * env.prior.widest_block()],
+            coordinates: vec![0.0; env.prior.width()],
+            on_modes: vec![0.0; count],
+            solved: vec![0.0; count],
+            at_contact: Vec::with_capacity(room),
+            forces: Vec::with_capacity(room),
+            ready: false,
+        }
+    }
+
+    /// Takes the prescribed nodes (ascending); cheap where they are those of the last call.
+    pub fn prescribe(&mut self, env: Env<'_>, nodes: &[u32]) -> Result<()> {
+        if self.ready && self.nodes == nodes {
+            return Ok(());
+        }
+        self.ready = false;
+        self.nodes.clear();
+        self.nodes.extend_from_slice(nodes);
+        self.columns.clear();
+        self.dofs.clear();
+        for &node in nodes {
+            if let Some((column, true)) = env.prior.column_for(&env.body.held, node) {
+                self.columns.push(column as u32);
+                self.dofs
+                    .extend([0, 1, 2].map(|axis| 3 * column as u32 + axis));
+            }
+        }
+        let (order, count) = (self.dofs.len(), env.space.count());
+        let bad = |error: crate::kernels::contact::FactorError| {
+            Error::bundle("corrections.safetensors", error.to_string())
+        };
+        self.through.clear();
+        self.through.resize(order * count, 0.0);
+        self.at_contact.resize(order, 0.0);
+        self.forces.resize(order, 0.0);
+        if order > 0 {
+            let (columns, dofs, widened) = (&self.columns, &self.dofs, &mut self.widened);
+            let held_back = &self.held_back;
+            self.compliance
+                .factor(env.isa, dofs, |upper| {
+                    env.prior.gather_compliance(columns, upper, widened);
+                    for (i, &row) in dofs.iter().enumerate() {
+                        let own = env.space.at_contact(row as usize);
+                        for (j, &column) in dofs.iter().enumerate().skip(i) {
+                            let other = env.space.at_contact(column as usize);
+                            let lost: f32 = held_back
+                                .iter()
+                                .zip(own)
+                                .zip(other)
+                                .map(|((d, a), b)| d * a * b)
+                                .sum();
+                            upper[i * order + j] -= f64::from(lost);
+                        }
+                    }
+                })
+                .map_err(bad)?;
+            for mode in 0..count {
+                for (value, &dof) in self.at_contact.iter_mut().zip(&self.dofs) {
+                    *value = env.space.at_contact(dof as usize)[mode];
+                }
+                self.compliance
+                    .solve(env.isa, &self.at_contact, &mut self.forces);
+                for (row, &force) in self.through.chunks_exact_mut(count).zip(&self.forces) {
+                    row[mode] = force;
+                }
+            }
+        }
+        let (dofs, through, free) = (&self.dofs, &self.through, &self.galerkin_free);
+        self.galerkin
+            .factor(env.isa, env.space.rows(), |upper| {
+                upper.copy_from_slice(free);
+                for (&dof, through) in dofs.iter().zip(through.chunks_exact(count)) {
+                    let own = env.space.at_contact(dof as usize);
+                    for (row, &own) in upper.chunks_exact_mut(count).zip(own) {
+                        let own = 1e3 * f64::from(own);
+                        for (value, &through) in row.iter_mut().zip(through) {
+                            *value -= own * f64::from(through);
+                        }
+                    }
+                }
+            })
+            .map_err(bad)?;
+        self.ready = true;
+        Ok(())
+    }
+
+    /// `z = P r`, both `[K,3]`, µN to mm. `r` must be zero at held and prescribed nodes.
+    pub fn apply(&mut self, env: Env<'_>, r: &[f32], z: &mut [f32]) -> Result<()> {
+        let (isa, pool) = (env.isa, env.pool);
+        let basis = env.prior.basis();
+        pooled(project_field(
+            isa,
+            pool,
+            &basis,
+            &self.starts,
+            r,
+            &mut self.coordinates,
+        ))?;
+        let modes = env.space.modes();
+        let rows = env.space.rows();
+        pooled(row_dots(
+            isa,
+            pool,
+            modes,
+            rows,
+            &self.coordinates,
+            &mut self.on_modes,
+        ))?;
+        self.contact_work(env)?;
+        // Psi^T r.
+        for (force, through) in self
+            .at_contact
+            .iter()
+            .zip(self.through.chunks_exact(rows.len()))
+        {
+            for (sum, &through) in self.on_modes.iter_mut().zip(through) {
+                *sum -= force * through;
+            }
+        }
+        self.galerkin.solve(isa, &self.on_modes, &mut self.solved);
+        // Forces at the contact that keep it where it is, mN.
+        for (force, through) in self
+            .forces
+            .iter_mut()
+            .zip(self.through.chunks_exact(rows.len()))
+        {
+            *force = -through
+                .iter()
+                .zip(&self.solved)
+                .map(|(t, y)| t * y)
+                .sum::<f32>();
+        }
+        self.spread(env)?;
+        pooled(decode_rows(
+            isa,
+            pool,
+            &basis,
+            &self.plan,
+            &self.coordinates,
+            z,
+        ))?;
+        let blocks = env.body.inverse_blocks.iter();
+        for ((z, r), [xx, xy, xz, yy, yz, zz]) in z
+            .as_chunks_mut::<3>()
+            .0
+            .iter_mut()
+            .zip(r.as_chunks::<3>().0)
+            .zip(blocks)
+        {
+            let w = DIAGONAL_WEIGHT;
+            z[0] += w * (xx * r[0] + xy * r[1] + xz * r[2]);
+            z[1] += w * (xy * r[0] + yy * r[1] + yz * r[2]);
+            z[2] += w * (xz * r[0] + yz * r[1] + zz * r[2]);
+        }
+        mask(&self.nodes, z);
+        mask_held(&env.body.held, z);
+        Ok(())
+    }
+
+    /// `at_contact = W^T r` of the columns in contact, from `coordinates = U^T r` and `on_modes = Phi^T r`.
+    fn contact_work(&mut self, env: Env<'_>) -> Result<()> {
+        pooled(row_dots(
+            env.isa,
+            env.pool,
+            env.prior.response.stored(),
+            &self.dofs,
+            &self.coordinates,
+            &mut self.at_contact,
+        ))?;
+        for (work, &dof) in self.at_contact.iter_mut().zip(&self.dofs) {
+            let own = env.space.at_contact(dof as usize);
+            for ((held_back, own), on_mode) in self.held_back.iter().zip(own).zip(&self.on_modes) {
+                *work -= held_back * own * on_mode;
+            }
+        }
+        Ok(())
+    }
+
+    /// `L_C^T r` at the prescribed nodes with columns, from `r [K,3]` that is zero there: what the free nodes' residual adds to the contact
+    /// forces, µN.
+    pub fn reaction(
+        &mut self,
+        env: Env<'_>,
+        r: &[f32],
+        mut take: impl FnMut(u32, [f32; 3]),
+    ) -> Result<()> {
+        let (isa, pool) = (env.isa, env.pool);
+        if self.dofs.is_empty() {
+            return Ok(());
+        }
+        let basis = env.prior.basis();
+        let q = &mut self.coordinates;
+        pooled(project_field(isa, pool, &basis, &self.starts, r, q))?;
+        let (modes, rows) = (env.space.modes(), env.space.rows());
+        pooled(row_dots(isa, pool, modes, rows, q, &mut self.on_modes))?;
+        self.contact_work(env)?;
+        self.compliance
+            .solve(isa, &self.at_contact, &mut self.forces);
+        for (&column, force) in self.columns.iter().zip(self.forces.as_chunks::<3>().0) {
+            take(env.prior.contact_nodes[column as usize], *force);
+        }
+        Ok(())
+    }
+
+    /// `coordinates` of `Phi solved + W forces`.
+    fn spread(&mut self, env: Env<'_>) -> Result<()> {
+        for (&dof, force) in self.dofs.iter().zip(&self.forces) {
+            let own = env.space.at_contact(dof as usize);
+            for ((y, held_back), own) in self.solved.iter_mut().zip(&self.held_back).zip(own) {
+                *y -= held_back * own * force;
+            }
+        }
+        let (isa, pool, q) = (env.isa, env.pool, &mut self.coordinates);
+        let rows = env.space.rows();
+        pooled(accumulate_rows(
+            isa,
+            pool,
+            env.space.modes(),
+            rows,
+            &self.solved,
+            false,
+            q,
+        ))?;
+        let response = env.prior.response.stored();
+        pooled(accumulate_rows(
+            isa,
+            pool,
+            response,
+            &self.dofs,
+            &self.forces,
+            true,
+            q,
+        ))
+    }
+
+    /// Adds the response of `K + kappa M` that takes the prescribed nodes to their targets: `u += L_C(target - u_C)`.
+    ///
+    /// `target(i)` is that of the `i`-th prescribed node, mm; `scratch [K,3]`.
+    pub fn respond(
+        &mut self,
+        env: Env<'_>,
+        target: impl Fn(usize) -> [f32; 3],
+        scratch: &mut [f32],
+        u: &mut [f32],
+    ) -> Result<()> {
+        let (isa, pool) = (env.isa, env.pool);
+        let basis = env.prior.basis();
+        let mut slot = 0;
+        for (index, &node) in self.nodes.iter().enumerate() {
+            if !matches!(env.prior.column_for(&env.body.held, node), Some((_, true))) {
+                continue;
+            }
+            let target = target(index);
+            for axis in 0..3 {
+                self.at_contact[slot] = target[axis] - u[3 * node as usize + axis];
+                slot += 1;
+            }
+        }
+        if slot > 0 {
+            self.compliance
+                .solve(isa, &self.at_contact, &mut self.forces);
+        }
+        self.solved.fill(0.0);
+        self.spread(env)?;
+        pooled(decode_rows(
+            isa,
+            pool,
+            &basis,
+            &self.plan,
+            &self.coordinates,
+            scratch,
+        ))?;
+        for (u, change) in u.iter_mut().zip(&*scratch) {
+            *u += change;
+        }
+        Ok(())
+    }
+
+    /// Bytes held.
+    pub fn memory_bytes(&self) -> usize {
+        4 * (self.through.capacity() + self.coordinates.len() + self.dofs.capacity())
+            + 8 * self.galerkin_free.len() * 2
+            + 20 * self.plan.nodes()
+    }
+}
+
+/// Zero at the nodes.
+pub(super) fn mask(nodes: &[u32], field: &mut [f32]) {
+    for &node in nodes {
+        field[3 * node as usize..3 * node as usize + 3].fill(0.0);
+    }
+}
+
+/// Zero at held nodes.
+pub(super) fn mask_held(held: &[bool], field: &mut [f32]) {
+    for (row, &held) in field.as_chunks_mut::<3>().0.iter_mut().zip(held) {
+        if held {
+            *row = [0.0; 3];
+        }
+    }
+}

@@ -1,0 +1,129 @@
+//! The coarse space of the corrections' preconditioner (`corrections.safetensors` of `docs/formats.md`): modes `Phi` in the block
+//! coordinates of the prior, their stiffness and mass, the first of them natural modes.
+//!
+//! With `kappa = 9/(4h²) + 3 alpha/(2h)` of BDF2, `K + kappa M` takes the place of the stiffness everywhere. Its compliance at the
+//! contact is the static one less what inertia holds back, `A_k = A - N diag(kappa / (w² (w² + kappa))) N^T` with
+//! natural modes `N` of frequency `w`.
+
+use half::f16;
+
+use crate::bundle::TensorFile;
+use crate::error::Result;
+use crate::kernels::rows::Stored;
+use crate::prior::PriorTable;
+
+/// Most modes that a file may hold.
+const LIMIT: usize = 1024;
+
+/// The modes and what the elements and the mass make of them.
+#[derive(Debug)]
+pub struct CoarseSpace {
+    /// `[r,Q]`, each of Euclidean length 1 as a field.
+    modes: Vec<f16>,
+    /// `0..r`, as a row list.
+    rows: Vec<u32>,
+    /// `Phi^T K Phi [r,r]`, µN/mm.
+    stiffness: Vec<f32>,
+    /// `Phi^T M Phi [r,r]`, g.
+    mass: Vec<f32>,
+    /// Angular frequency of the natural modes, which are the first rows of `modes`, rad/s.
+    frequency: Vec<f32>,
+    /// Modes at the contact degrees of freedom `[3D,r]`.
+    at_contact: Vec<f32>,
+}
+
+impl CoarseSpace {
+    /// Reads and checks the tables for a prior.
+    pub fn parse(file: &TensorFile, prior: &PriorTable) -> Result<CoarseSpace> {
+        let modes = file.f16("modes", &[None, Some(prior.width())])?;
+        let count = modes.len() / prior.width().max(1);
+        if count == 0 || count > LIMIT {
+            return Err(file.bad("modes", format!("must hold 1 to {LIMIT} modes")));
+        }
+        let square = [Some(count), Some(count)];
+        let (stiffness, mass) = (file.f32("stiffness", &square)?, file.f32("mass", &square)?);
+        for (name, table) in [("stiffness", &stiffness), ("mass", &mass)] {
+            if let Some(at) = (0..count).find(|&i| table[i * (count + 1)] <= 0.0) {
+                return Err(file.bad(name, format!("diagonal element {at} is not positive")));
+            }
+        }
+        let frequency = file.f32("frequency", &[None])?;
+        if frequency.len() > count {
+            return Err(file.bad("frequency", "names more natural modes than there are modes"));
+        }
+        if let Some(at) = frequency.iter().position(|&omega| omega <= 0.0) {
+            return Err(file.bad("frequency", format!("element {at} is not positive")));
+        }
+        let mut space = CoarseSpace {
+            at_contact: vec![0.0; 3 * prior.contact_nodes.len() * count],
+            rows: (0..count as u32).collect(),
+            modes,
+            stiffness,
+            mass,
+            frequency,
+        };
+        space.restrict(prior);
+        Ok(space)
+    }
+
+    /// Rows of the modes at the contact nodes.
+    fn restrict(&mut self, prior: &PriorTable) {
+        let (count, width) = (self.rows.len(), prior.width());
+        for (i, &node) in prior.contact_nodes.iter().enumerate() {
+            for axis in 0..3 {
+                for mode in 0..count {
+                    let q = &self.modes[mode * width..(mode + 1) * width];
+                    self.at_contact[(3 * i + axis) * count + mode] =
+                        prior.value_at(node, axis, |at| q[at].to_f32());
+                }
+            }
+        }
+    }
+
+    /// Modes, `r`.
+    pub fn count(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// `[r,Q]`, as the kernels take it.
+    pub fn modes(&self) -> Stored<'_> {
+        Stored::F16(&self.modes)
+    }
+
+    /// `0..r`.
+    pub fn rows(&self) -> &[u32] {
+        &self.rows
+    }
+
+    /// Modes at contact dof `dof`, `[r]`.
+    pub fn at_contact(&self, dof: usize) -> &[f32] {
+        &self.at_contact[dof * self.count()..(dof + 1) * self.count()]
+    }
+
+    /// For each natural mode `kappa / (m w² (w² + kappa))`: what inertia takes off its part of the compliance, mm/mN.
+    pub fn held_back(&self, kappa: f64) -> Vec<f32> {
+        let count = self.count();
+        let frequencies = self.frequency.iter().enumerate();
+        frequencies
+            .map(|(i, &omega)| {
+                let square = f64::from(omega).powi(2);
+                let mass = f64::from(self.mass[i * (count + 1)]);
+                (1e3 * kappa / (mass * square * (square + kappa))) as f32
+            })
+            .collect()
+    }
+
+    /// `Phi^T (K + kappa M) Phi [r,r]`, µN/mm.
+    pub fn galerkin(&self, kappa: f64) -> Vec<f64> {
+        let pairs = self.stiffness.iter().zip(&self.mass);
+        pairs
+            .map(|(&k, &m)| f64::from(k) + kappa * f64::from(m))
+            .collect()
+    }
+
+    /// Bytes held.
+    pub fn memory_bytes(&self) -> usize {
+        2 * self.modes.len()
+            + 4 * (self.stiffness.len() + self.mass.len() + self.at_contact.len() + self.rows.len())
+    }
+}

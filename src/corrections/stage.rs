@@ -1,0 +1,549 @@
+//! A scene's corrections: its velocities, its L-BFGS memory, and the iterations of a step.
+
+use std::time::Instant;
+
+use super::memory::Memory;
+use super::precondition::{Env, Preconditioner, mask, mask_held};
+use super::{Corrections, Integrator};
+use crate::error::{Error, Result};
+use crate::kernels::{Isa, Pool};
+use crate::memory;
+use crate::prior::PriorTable;
+use crate::scene::ContactSet;
+
+/// A state whose smallest det F falls below this is not accepted.
+const SMALLEST_DET: f32 = 0.02;
+/// A step is accepted where the mean of its end slopes is below this part of the first: a test by gradients, because in f32 the
+/// rounding of the energy drowns its change.
+const SLOPE: f64 = 1e-4;
+/// Shortenings of one step at most.
+const SHORTENINGS: u32 = 6;
+/// A load whose guess halves the smallest det F is taken in at most this many parts.
+const MOST_PARTS: u32 = 16;
+
+/// What BDF2 knows of the past, `[K,3]` each.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Motion {
+    /// Velocity at the last state, mm/s.
+    pub velocity: Vec<f32>,
+    /// Velocity at the state before.
+    pub velocity_before: Vec<f32>,
+    /// Smallest det F of the last corrected state.
+    pub min_det: f32,
+    /// `r` at the contact nodes of the last corrected state `[m,3]`, in their order, zero at held ones, µN.
+    pub reaction: Vec<f32>,
+}
+
+impl Motion {
+    fn at_rest(len: usize) -> Result<Motion> {
+        Ok(Motion {
+            velocity: memory::zeros(len, "velocities")?,
+            velocity_before: memory::zeros(len, "velocities")?,
+            min_det: 1.0,
+            reaction: memory::room(len, "contact forces")?,
+        })
+    }
+
+    fn clear(&mut self) {
+        self.velocity.fill(0.0);
+        self.velocity_before.fill(0.0);
+        self.min_det = 1.0;
+        self.reaction.clear();
+    }
+}
+
+/// How the corrections of a step went.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Report {
+    /// Iterations made.
+    pub iterations: u32,
+    /// Evaluations of the element forces.
+    pub evaluations: u32,
+    /// `|r|` at the end over `|r|` of the guess.
+    pub residual: f32,
+    /// Root mean square over the nodes of what a further iteration would move, estimated, mm.
+    pub remaining_mm: f32,
+    /// Smallest det F at the end.
+    pub min_det: f32,
+    /// The load was taken in this many parts.
+    pub parts: u32,
+    /// The iterations ended inverted and the linear response took their place.
+    pub fell_back: bool,
+}
+
+/// A scene's own part.
+pub struct Stage {
+    preconditioner: Preconditioner,
+    memory: Memory,
+    scratch: elements::Scratch,
+    /// Past of the last published state, and of the one being made.
+    pub motion: Motion,
+    next: Motion,
+    nodes: Vec<u32>,
+    /// `r` at `nodes`, of the last evaluation and of the state that stands.
+    at_nodes: [Vec<f32>; 2],
+    g: Vec<f32>,
+    g_new: Vec<f32>,
+    d: Vec<f32>,
+    q: Vec<f32>,
+    u: Vec<f32>,
+    /// `M p`: inertia of the step at the last displacement, µN.
+    drift: Vec<f32>,
+}
+
+/// The step being corrected.
+pub struct Input<'a> {
+    /// Prescribed nodes and where they end, mm.
+    pub contact: &'a ContactSet,
+    /// `u_n [K,3]`.
+    pub last: &'a [f32],
+    /// `u_{n-1} [K,3]`.
+    pub before: &'a [f32],
+    /// The host handed `last` over: nothing is known of its velocity.
+    pub still: bool,
+    /// When to stop.
+    pub enough: Enough,
+}
+
+/// When a step has been corrected enough.
+#[derive(Debug, Clone, Copy)]
+pub struct Enough {
+    /// Iterations at most.
+    pub iterations: u32,
+    /// [`Report::remaining_mm`] that suffices; 0 for never.
+    pub remaining_mm: f32,
+    /// No iteration starts after this.
+    pub until: Option<Instant>,
+}
+
+/// What a scene lends.
+#[derive(Clone, Copy)]
+pub struct Lent<'a> {
+    pub isa: Isa,
+    pub pool: &'a Pool,
+    pub prior: &'a PriorTable,
+    pub corrections: &'a Corrections,
+}
+
+impl<'a> Lent<'a> {
+    fn env(&self) -> Env<'a> {
+        Env {
+            isa: self.isa,
+            pool: self.pool,
+            prior: self.prior,
+            space: &self.corrections.space,
+            body: &self.corrections.body,
+        }
+    }
+}
+
+fn dot(a: &[f32], b: &[f32]) -> f64 {
+    // Pieces in f32 lanes, sums in f64: the same bits on one thread or many.
+    a.chunks(1024)
+        .zip(b.chunks(1024))
+        .map(|(a, b)| {
+            let mut lanes = [0.0f32; 16];
+            for (a, b) in a.chunks(16).zip(b.chunks(16)) {
+                for ((lane, a), b) in lanes.iter_mut().zip(a).zip(b) {
+                    *lane += a * b;
+                }
+            }
+            f64::from(lanes.iter().sum::<f32>())
+        })
+        .sum()
+}
+
+impl Stage {
+    /// Buffers of a scene at rest.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`].
+    pub fn new(lent: Lent<'_>) -> Result<Stage> {
+        let env = lent.env();
+        let len = 3 * env.body.mass.len();
+        let field = || memory::zeros(len, "the corrections of a scene");
+        Ok(Stage {
+            preconditioner: Preconditioner::new(env, lent.corrections.integrator.kappa()),
+            memory: Memory::new(len)?,
+            scratch: env.body.forces.scratch(lent.pool.threads()),
+            motion: Motion::at_rest(len)?,
+            next: Motion::at_rest(len)?,
+            nodes: memory::room(len / 3, "the corrections of a scene")?,
+            at_nodes: [
+                memory::room(len, "contact forces")?,
+                memory::room(len, "contact forces")?,
+            ],
+            g: field()?,
+            g_new: field()?,
+            d: field()?,
+            q: field()?,
+            u: field()?,
+            drift: field()?,
+        })
+    }
+
+    /// Back to rest.
+    pub fn reset(&mut self) {
+        self.motion.clear();
+        self.memory.clear();
+        self.memory.commit();
+    }
+
+    /// The state being made becomes the last.
+    pub fn commit(&mut self) {
+        std::mem::swap(&mut self.motion, &mut self.next);
+        self.memory.commit();
+    }
+
+    /// The state being made is one that no equation of motion led to: without velocity.
+    pub fn stop_next(&mut self) {
+        self.next.velocity.fill(0.0);
+        self.next.velocity_before.fill(0.0);
+        self.memory.clear();
+    }
+
+    /// The L-BFGS pairs, oldest first, for a snapshot.
+    pub fn pairs(&self) -> impl Iterator<Item = (&[f32], &[f32])> {
+        self.memory.pairs()
+    }
+
+    /// Takes a saved past.
+    ///
+    /// # Errors
+    /// A panic on another thread of the pool.
+    pub fn restore(
+        &mut self,
+        lent: Lent<'_>,
+        motion: Motion,
+        pairs: &[[Vec<f32>; 2]],
+    ) -> Result<()> {
+        self.motion = motion;
+        self.memory.clear();
+        self.memory.commit();
+        for [step, change] in pairs {
+            self.memory.store(lent.env(), step, 1.0, change)?;
+        }
+        self.memory.commit();
+        Ok(())
+    }
+
+    /// Bytes held.
+    pub fn memory_bytes(&self) -> usize {
+        self.memory.memory_bytes() + self.preconditioner.memory_bytes() + 12 * 4 * self.g.len()
+    }
+
+    /// Velocities of a state that the model predicted and nothing corrected.
+    pub fn follow(&mut self, lent: Lent<'_>, input: &Input<'_>, next: &[f32]) {
+        self.memory.begin();
+        self.finish(lent, input, next);
+    }
+
+    /// Inertia and damping of the step at the last displacement.
+    fn prepare(&mut self, lent: Lent<'_>, input: &Input<'_>) {
+        let (last, before) = (input.last, input.before);
+        let known = if input.still { 0.0 } else { 1.0 };
+        let Integrator {
+            step_s,
+            damping_per_s,
+        } = lent.corrections.integrator;
+        let (half, alpha) = ((0.5 / step_s) as f32, damping_per_s as f32);
+        let mass = &lent.corrections.body.mass;
+        for i in 0..self.drift.len() {
+            let v = (before[i] - last[i]) * half;
+            let v_n = known * self.motion.velocity[i];
+            let v_before = known * self.motion.velocity_before[i];
+            let a = (3.0 * (v - v_n) - (v_n - v_before)) * half;
+            self.drift[i] = mass[i / 3] * (a + alpha * v);
+        }
+    }
+
+    /// Velocity and inertia at `next`, the end of the step from `last`.
+    fn finish(&mut self, lent: Lent<'_>, input: &Input<'_>, next: &[f32]) {
+        let (last, before) = (input.last, input.before);
+        let half = (0.5 / lent.corrections.integrator.step_s) as f32;
+        for i in 0..next.len() {
+            self.next.velocity[i] = (3.0 * (next[i] - last[i]) - (last[i] - before[i])) * half;
+        }
+        if input.still {
+            self.next.velocity_before.fill(0.0);
+        } else {
+            let before = &mut self.next.velocity_before;
+            before.copy_from_slice(&self.motion.velocity);
+        }
+        self.next.min_det = 1.0;
+        self.next.reaction.clear();
+    }
+
+    /// `r(u)` to `out`, zero at held and prescribed nodes; returns the smallest det F.
+    fn residual(
+        &mut self,
+        lent: Lent<'_>,
+        last: &[f32],
+        u: &[f32],
+        out: &mut [f32],
+        report: &mut Report,
+    ) -> Result<f32> {
+        let body = &lent.corrections.body;
+        let failed = std::sync::Mutex::new(None);
+        let det = body
+            .forces
+            .evaluate(u, &mut self.scratch, out, &|count, task| {
+                if let Err(error) = lent.pool.run(count, task) {
+                    *failed
+                        .lock()
+                        .unwrap_or_else(std::sync::PoisonError::into_inner) = Some(error);
+                }
+            });
+        let failed = failed.into_inner();
+        if let Some(error) = failed.unwrap_or_else(std::sync::PoisonError::into_inner) {
+            return Err(Error::Panic(error.to_string()));
+        }
+        let kappa = lent.corrections.integrator.kappa() as f32;
+        for i in 0..out.len() {
+            out[i] += self.drift[i] + body.mass[i / 3] * kappa * (u[i] - last[i]);
+        }
+        mask_held(&body.held, out);
+        self.at_nodes[0].clear();
+        for &node in &self.nodes {
+            let at = 3 * node as usize;
+            self.at_nodes[0].extend_from_slice(&out[at..at + 3]);
+        }
+        mask(&self.nodes, out);
+        report.evaluations += 1;
+        Ok(det)
+    }
+
+    /// Corrects `next`, which holds the model's prediction with the boundary conditions on it.
+    pub fn correct(
+        &mut self,
+        lent: Lent<'_>,
+        input: &Input<'_>,
+        next: &mut [f32],
+    ) -> Result<Report> {
+        let env = lent.env();
+        let held = &env.body.held;
+        self.nodes.clear();
+        let nodes = input.contact.nodes.iter();
+        self.nodes
+            .extend(nodes.filter(|&&node| !held[node as usize]));
+        self.preconditioner.prescribe(env, &self.nodes)?;
+        self.memory.begin();
+        self.memory.mask(&self.nodes);
+        self.prepare(lent, input);
+        let mut report = Report::default();
+
+        let mut u = std::mem::take(&mut self.u);
+        let mut g = std::mem::take(&mut self.g);
+        let result = self.iterate(lent, input, &mut u, &mut g, &mut report);
+        if result.is_ok() {
+            next.copy_from_slice(&u);
+            self.finish(lent, input, next);
+            if report.fell_back {
+                self.stop_next();
+            }
+            self.next.min_det = report.min_det;
+        }
+        let result = result.and_then(|()| self.take_reaction(lent, input.contact, &g));
+        (self.u, self.g) = (u, g);
+        result.map(|()| report)
+    }
+
+    /// Takes `u` to where the contact is after `part` of this step, by the response of `K + kappa M`; returns the smallest det F, with the
+    /// residual in `g`.
+    fn lead(
+        &mut self,
+        lent: Lent<'_>,
+        input: &Input<'_>,
+        part: f32,
+        u: &mut [f32],
+        g: &mut [f32],
+        report: &mut Report,
+    ) -> Result<f32> {
+        let env = lent.env();
+        let target = |index: usize| {
+            let node = self.nodes[index];
+            let c = input.contact.at(node).unwrap_or_default();
+            let at = 3 * node as usize;
+            [0, 1, 2].map(|k| input.last[at + k] + part * (c[k] - input.last[at + k]))
+        };
+        self.preconditioner.respond(env, target, &mut self.d, u)?;
+        for index in 0..self.nodes.len() {
+            let at = 3 * self.nodes[index] as usize;
+            u[at..at + 3].copy_from_slice(&target(index));
+        }
+        mask_held(&env.body.held, u);
+        let det = self.residual(lent, input.last, u, g, report)?;
+        self.stand();
+        Ok(det)
+    }
+
+    /// The state of the last evaluation is the one that stands.
+    fn stand(&mut self) {
+        let [last, stands] = &mut self.at_nodes;
+        std::mem::swap(last, stands);
+    }
+
+    /// Contact forces of the state that stands, `L_C^T r`: the virtual work of the whole residual on the response to each contact.
+    fn take_reaction(&mut self, lent: Lent<'_>, contact: &ContactSet, g: &[f32]) -> Result<()> {
+        let env = lent.env();
+        let held = &env.body.held;
+        let reaction = &mut self.next.reaction;
+        let mut rows = self.at_nodes[1].as_chunks::<3>().0.iter();
+        for &node in &contact.nodes {
+            let row = match held[node as usize] {
+                true => None,
+                false => rows.next(),
+            };
+            reaction.extend(row.copied().unwrap_or_default());
+        }
+        self.preconditioner.reaction(env, g, |node, force| {
+            if let Ok(i) = contact.nodes.binary_search(&node) {
+                for (sum, force) in reaction[3 * i..3 * i + 3].iter_mut().zip(force) {
+                    *sum += force;
+                }
+            }
+        })
+    }
+
+    /// Force of the tissue on the instruments at the contact nodes of the last published state, in the host's order, mN.
+    pub fn reaction(&self, contact: &ContactSet, out: &mut [f32]) {
+        let rows = self.motion.reaction.as_chunks::<3>().0;
+        for (&place, row) in contact.order.iter().zip(rows) {
+            let at = 3 * place as usize;
+            out[at..at + 3].copy_from_slice(&row.map(|force| -1e-3 * force));
+        }
+    }
+
+    /// The first guess: the last state and the response to what the contact did since, in so many parts that the first of them does not
+    /// halve the smallest det F; all parts but the last get an iteration each.
+    fn guess(
+        &mut self,
+        lent: Lent<'_>,
+        input: &Input<'_>,
+        u: &mut [f32],
+        g: &mut [f32],
+        report: &mut Report,
+    ) -> Result<f32> {
+        // From an inverted state no path leads back but the one from rest.
+        let lost = self.motion.min_det < SMALLEST_DET && !input.still;
+        let least = SMALLEST_DET.max(0.5 * self.motion.min_det.min(1.0));
+        let mut parts = 1;
+        let mut det = loop {
+            if lost {
+                u.fill(0.0);
+            } else {
+                u.copy_from_slice(input.last);
+            }
+            let part = 1.0 / parts as f32;
+            let det = self.lead(lent, input, part, u, g, report)?;
+            if det > least || parts == MOST_PARTS {
+                break det;
+            }
+            parts *= 2;
+        };
+        for part in 2..=parts {
+            if det > SMALLEST_DET {
+                self.improve(lent, input.last, u, g, det, report)?;
+            }
+            det = self.lead(lent, input, part as f32 / parts as f32, u, g, report)?;
+        }
+        report.parts = parts;
+        Ok(det)
+    }
+
+    fn iterate(
+        &mut self,
+        lent: Lent<'_>,
+        input: &Input<'_>,
+        u: &mut [f32],
+        g: &mut [f32],
+        report: &mut Report,
+    ) -> Result<()> {
+        let mut det = self.guess(lent, input, u, g, report)?;
+        let start = dot(g, g).sqrt();
+        for iteration in 0..input.enough.iterations {
+            let size = dot(g, g).sqrt();
+            let until = input.enough.until;
+            let late = until.is_some_and(|until| Instant::now() >= until);
+            if !size.is_finite() || det < SMALLEST_DET || (iteration > 0 && late) {
+                break;
+            }
+            det = self.improve(lent, input.last, u, g, det, report)?;
+            report.iterations += 1;
+            report.remaining_mm = self.remaining(g, size);
+            if report.remaining_mm < input.enough.remaining_mm {
+                break;
+            }
+        }
+        let end = dot(g, g).sqrt();
+        if !end.is_finite() || det < SMALLEST_DET {
+            u.fill(0.0);
+            det = self.lead(lent, input, 1.0, u, g, report)?;
+            report.fell_back = true;
+            self.memory.clear();
+        }
+        report.residual = (end / start.max(f64::MIN_POSITIVE)) as f32;
+        report.min_det = det;
+        Ok(())
+    }
+
+    /// What a further iteration would move, from the last one's step and by how much it lessened the residual, mm.
+    fn remaining(&self, g: &[f32], before: f64) -> f32 {
+        let moved = (dot(&self.d, &self.d) / (self.d.len() / 3) as f64).sqrt();
+        (moved * dot(g, g).sqrt() / before.max(f64::MIN_POSITIVE)) as f32
+    }
+
+    /// One iteration: `u`, its residual `g` and its smallest det F become those of a better state.
+    fn improve(
+        &mut self,
+        lent: Lent<'_>,
+        last: &[f32],
+        u: &mut [f32],
+        g: &mut [f32],
+        det: f32,
+        report: &mut Report,
+    ) -> Result<f32> {
+        let env = lent.env();
+        let (mut d, mut q) = (std::mem::take(&mut self.d), std::mem::take(&mut self.q));
+        let mut g_new = std::mem::take(&mut self.g_new);
+        let preconditioner = &mut self.preconditioner;
+        let nodes = &self.nodes;
+        self.memory.direction(env, g, &mut q, &mut d, |q, z| {
+            mask(nodes, q);
+            preconditioner.apply(env, q, z)
+        })?;
+        mask(&self.nodes, &mut d);
+        let slope = dot(g, &d);
+        let mut t = 1.0f32;
+        let mut accepted = det;
+        for attempt in 0..=SHORTENINGS {
+            for i in 0..q.len() {
+                q[i] = u[i] + t * d[i];
+            }
+            let det_new = self.residual(lent, last, &q, &mut g_new, report)?;
+            let slope_new = dot(&g_new, &d);
+            if det_new > SMALLEST_DET && 0.5 * (slope + slope_new) <= SLOPE * slope {
+                self.stand();
+                u.copy_from_slice(&q);
+                for i in 0..q.len() {
+                    q[i] = g_new[i] - g[i];
+                }
+                self.memory.store(env, &d, t, &q)?;
+                g.copy_from_slice(&g_new);
+                accepted = det_new;
+                break;
+            }
+            if attempt == SHORTENINGS || slope >= 0.0 {
+                self.memory.clear();
+                break;
+            }
+            t *= if det_new > SMALLEST_DET && slope_new.is_finite() {
+                (-slope / (slope_new - slope)).clamp(0.1, 0.5) as f32
+            } else {
+                0.5
+            };
+        }
+        (self.d, self.q, self.g_new) = (d, q, g_new);
+        Ok(accepted)
+    }
+}

@@ -1,0 +1,217 @@
+//! Corrections inside a step: after the prediction, before the guard.
+
+use std::sync::{Arc, RwLock};
+use std::time::Instant;
+
+use super::contact::ContactSet;
+use super::core::{Core, lock_read};
+use super::engine::Engine;
+use super::published::Published;
+use super::timing::Stopwatch;
+use crate::corrections::{Enough, Input, LIMIT, Lent, Motion, Stage};
+use crate::error::{Error, Result};
+use crate::kernels::{Isa, Pool};
+use crate::model::Model;
+use crate::options::{Corrections, SceneOptions};
+use crate::stats::{SceneStats, flag};
+
+/// The stage of a scene that corrects, and how far it goes.
+pub struct Corrected {
+    pub stage: Box<Stage>,
+    most: u32,
+    target_mm: f32,
+    budget_us: u32,
+    error_limit_mm: f32,
+    calibration: f32,
+    basis_starts: Vec<usize>,
+}
+
+impl Corrected {
+    /// What the options and the bundle ask for; none where that is no correction.
+    pub fn new(
+        model: &Arc<Model>,
+        options: &SceneOptions,
+        isa: Isa,
+        pool: &Pool,
+    ) -> Result<Option<Corrected>> {
+        let entry = model.manifest.corrections.as_ref();
+        let (most, target_mm, budget_us) = match options.corrections {
+            Corrections::None => return Ok(None),
+            Corrections::Recommended => match entry {
+                Some(entry) if entry.recommended > 0 && !options.free_boundary => {
+                    (entry.recommended, 0.0, 0)
+                }
+                _ => return Ok(None),
+            },
+            Corrections::Fixed(count @ 1..=LIMIT) => (count, 0.0, 0),
+            Corrections::Fixed(count) => {
+                return Err(Error::Argument(format!(
+                    "corrections is {count}, must be at most {LIMIT}"
+                )));
+            }
+            Corrections::Auto {
+                target_mm,
+                budget_us,
+            } => {
+                if !(target_mm.is_finite() && target_mm >= 0.0)
+                    || (target_mm == 0.0 && budget_us == 0)
+                {
+                    return Err(Error::Argument(
+                        "corrections: `auto` needs a budget in µs or a target in mm, finite and above 0".into(),
+                    ));
+                }
+                (LIMIT, target_mm, budget_us)
+            }
+        };
+        if !(options.error_limit_mm.is_finite() && options.error_limit_mm >= 0.0) {
+            return Err(Error::Argument(format!(
+                "error_limit_mm is {}, must be finite and not negative",
+                options.error_limit_mm
+            )));
+        }
+        if options.free_boundary {
+            return Err(Error::Unsupported(
+                "corrections: the equation of motion needs the boundary; leave `free_boundary` off"
+                    .into(),
+            ));
+        }
+        let corrections = model.corrections()?;
+        let prior = model.prior.as_ref().ok_or_else(|| {
+            Error::Unsupported("corrections: the bundle has no linear response".into())
+        })?;
+        let lent = Lent {
+            isa,
+            pool,
+            prior,
+            corrections,
+        };
+        Ok(Some(Corrected {
+            stage: Box::new(Stage::new(lent)?),
+            most,
+            target_mm,
+            budget_us,
+            error_limit_mm: options.error_limit_mm,
+            calibration: entry.map_or(1.0, |entry| entry.calibration),
+            basis_starts: prior.basis_starts(),
+        }))
+    }
+}
+
+impl Core {
+    /// Corrects `next` while there is contact; otherwise lets the velocities follow it.
+    pub(super) fn correct(
+        &mut self,
+        published: &RwLock<Published>,
+        given: Option<&[f32]>,
+        start: Instant,
+        stats: &mut SceneStats,
+    ) -> Result<()> {
+        let Some(corrected) = &mut self.corrected else {
+            return Ok(());
+        };
+        let (Some(prior), corrections) = (&self.model.prior, self.model.corrections()?) else {
+            return Ok(());
+        };
+        let mut watch = Stopwatch::start();
+        let _span = tracing::trace_span!("corrections").entered();
+        let lent = Lent {
+            isa: self.isa,
+            pool: &self.pool,
+            prior,
+            corrections,
+        };
+        let shared = lock_read(published);
+        let input = Input {
+            contact: &self.incoming,
+            last: given.unwrap_or(&shared.last.field),
+            before: given.unwrap_or(&shared.before.field),
+            still: given.is_some(),
+            enough: Enough {
+                iterations: corrected.most,
+                remaining_mm: corrected.target_mm / corrected.calibration,
+                until: (corrected.budget_us > 0)
+                    .then(|| start + std::time::Duration::from_micros(corrected.budget_us.into())),
+            },
+        };
+        if self.incoming.is_empty() {
+            corrected.stage.follow(lent, &input, &self.next.field);
+        } else {
+            let report = corrected
+                .stage
+                .correct(lent, &input, &mut self.next.field)?;
+            stats.corrections = report.iterations;
+            stats.evaluations = report.evaluations;
+            stats.residual = report.residual;
+            stats.min_det = report.min_det;
+            stats.error_mm = report.remaining_mm * corrected.calibration;
+            if report.fell_back {
+                stats.flags |= flag::FELL_BACK;
+            }
+            if corrected.error_limit_mm > 0.0 && !(stats.error_mm <= corrected.error_limit_mm) {
+                stats.flags |= flag::ERROR;
+            }
+        }
+        drop(shared);
+        stats.corrections_ms = watch.lap();
+        Ok(())
+    }
+
+    /// The reaction of the last published state; false where it was not corrected.
+    #[cfg(feature = "forces")]
+    pub(super) fn corrected_reaction(&self, out: &mut [f32]) -> bool {
+        let Some(corrected) = &self.corrected else {
+            return false;
+        };
+        if self.contact.is_empty() || corrected.stage.motion.reaction.len() != out.len() {
+            return false;
+        }
+        corrected.stage.reaction(&self.contact, out);
+        true
+    }
+
+    /// Before a step that the learned part makes: it goes on from the corrected states, which it did not predict.
+    pub(super) fn absorb(&mut self, shared: &Published) -> Result<()> {
+        let (Some(corrected), Some(table)) = (&self.corrected, &self.model.prior) else {
+            return Ok(());
+        };
+        let Engine::Reduced(engine) = &mut self.engine else {
+            // A network reads the field itself.
+            return Ok(());
+        };
+        let was = |contact: &ContactSet| !contact.is_empty();
+        engine.absorb(
+            self.isa,
+            &self.pool,
+            table,
+            &corrected.basis_starts,
+            [
+                was(&self.contact).then_some(shared.last.field.as_slice()),
+                was(&self.contact_before).then_some(shared.before.field.as_slice()),
+            ],
+        )
+    }
+
+    /// Takes the past of a snapshot.
+    pub(super) fn restore_past(
+        &mut self,
+        past: Option<(Motion, Vec<[Vec<f32>; 2]>)>,
+    ) -> Result<()> {
+        let (Some(corrected), Some((motion, pairs)), Some(prior)) =
+            (&mut self.corrected, past, &self.model.prior)
+        else {
+            return Ok(());
+        };
+        let lent = Lent {
+            isa: self.isa,
+            pool: &self.pool,
+            prior,
+            corrections: self.model.corrections()?,
+        };
+        corrected.stage.restore(lent, motion, &pairs)
+    }
+
+    /// Whether every node is decoded in each step, and kept.
+    pub(super) fn keeps_all_nodes(&self) -> bool {
+        self.corrected.is_some() || self.engine.keeps_all_nodes(&self.model)
+    }
+}
