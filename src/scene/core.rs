@@ -168,7 +168,7 @@ impl Core {
             download_ms: 0.0,
             max_displacement_mm: self.max_displacement,
             indicator: 0.0,
-            prior_forces: self.engine.responds(),
+            prior_forces: self.engine.responds() && self.corrected.is_none(),
             sleeping: self.sleeping,
             poisoned: false,
         }

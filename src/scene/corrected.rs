@@ -147,7 +147,8 @@ impl Core {
             if report.fell_back {
                 stats.flags |= flag::FELL_BACK;
             }
-            if corrected.error_limit_mm > 0.0 && !(stats.error_mm <= corrected.error_limit_mm) {
+            let limit = corrected.error_limit_mm;
+            if limit > 0.0 && (stats.error_mm > limit || stats.error_mm.is_nan()) {
                 stats.flags |= flag::ERROR;
             }
         }
