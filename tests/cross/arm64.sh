@@ -2,8 +2,8 @@
 export UPT_CROSS_TRIPLE=aarch64-unknown-linux-gnu
 export UPT_CROSS_SYSTEM=Linux UPT_CROSS_PROCESSOR=aarch64 UPT_CROSS_PREFIX=aarch64-linux-gnu-
 export UPT_CROSS_ORT_NAME=libonnxruntime.so UPT_CROSS_ROLLOUT=rollout UPT_CROSS_COMMAND=upt
-# mm: other vector lanes, another build of ONNX Runtime; and a tenth of it for the solver's own lanes.
-rollout_tolerance=1e-3
+# mm: other vector lanes, another build of ONNX Runtime (8e-7 was seen). The solver adds up thousands of steps.
+rollout_tolerance=1e-5
 solver_tolerance=1e-3
 
 qemu="$(command -v qemu-aarch64-static || command -v qemu-aarch64 || true)"
