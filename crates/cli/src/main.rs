@@ -23,6 +23,7 @@ mod mesh_files;
 mod modes;
 #[cfg(feature = "linear")]
 mod prior;
+#[cfg(feature = "linear")]
 mod progress;
 mod render;
 mod report;
