@@ -120,6 +120,13 @@ fn no_memory_is_a_status_wherever_it_is_missing() {
         (options.guard_policy, options.check_inversion) = (UPT_GUARD_REPORT, 1);
         options.cubic_sampling = 1;
         let mut scene = null_mut();
+        // What the model keeps for all scenes is made with the first one, as opening makes it.
+        LEAST.store(OPEN, Ordering::Relaxed);
+        starve("the first upt_scene_create", || unsafe {
+            upt_scene_create(model, &options, &mut scene)
+        });
+        LEAST.store(SCENE, Ordering::Relaxed);
+        assert_eq!(unsafe { upt_scene_destroy(scene) }, UPT_OK);
         let created = starve("upt_scene_create", || unsafe {
             upt_scene_create(model, &options, &mut scene)
         });

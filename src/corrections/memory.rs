@@ -24,9 +24,9 @@ pub struct Memory {
     /// The same of the last published state.
     published: Vec<usize>,
     /// `s_i . y_j` over all nodes, by slot.
-    products: [[f64; SLOTS]; SLOTS],
+    products: Vec<[f64; SLOTS]>,
     /// The same without the masked nodes.
-    masked: [[f64; SLOTS]; SLOTS],
+    masked: Vec<[f64; SLOTS]>,
     partial: PartialSums,
     first: [f64; PAIRS],
 }
@@ -47,8 +47,8 @@ impl Memory {
             changes: vectors()?,
             order: Vec::with_capacity(SLOTS),
             published: Vec::with_capacity(SLOTS),
-            products: [[0.0; SLOTS]; SLOTS],
-            masked: [[0.0; SLOTS]; SLOTS],
+            products: memory::filled(SLOTS, [0.0; SLOTS], "L-BFGS pairs")?,
+            masked: memory::filled(SLOTS, [0.0; SLOTS], "L-BFGS pairs")?,
             partial: PartialSums::with_capacity(len, PAIRS),
             first: [0.0; PAIRS],
         })
@@ -82,7 +82,7 @@ impl Memory {
 
     /// Leaves the nodes out of every product until the next call.
     pub fn mask(&mut self, nodes: &[u32]) {
-        self.masked = self.products;
+        self.masked.copy_from_slice(&self.products);
         for &i in &self.order {
             for &j in &self.order {
                 for &node in nodes {

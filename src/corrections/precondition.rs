@@ -15,10 +15,15 @@ use crate::kernels::project::{project_field, row_dots};
 use crate::kernels::respond::accumulate_rows;
 use crate::kernels::rows::{RowPlan, decode_rows};
 use crate::kernels::{Isa, Pool};
+use crate::memory;
 use crate::prior::PriorTable;
 
 /// Weight of the diagonal level; 1.0 and 0.15 are three to seven times worse.
 const DIAGONAL_WEIGHT: f32 = 0.4;
+
+/// Degrees of freedom in contact for which there is room from the start.
+const ROOM: usize = 768;
+const WHAT: &str = "the corrections' preconditioner";
 
 /// What every product needs.
 #[derive(Clone, Copy)]
@@ -60,30 +65,49 @@ pub struct Preconditioner {
 }
 
 impl Preconditioner {
-    /// Buffers; the free body's preconditioner is made at the first [`Preconditioner::prescribe`].
-    pub fn new(env: Env<'_>, kappa: f64) -> Preconditioner {
+    /// Buffers; the factors are made at the first [`Preconditioner::prescribe`].
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`].
+    pub fn new(env: Env<'_>, kappa: f64) -> Result<Preconditioner> {
         let count = env.space.count();
         let dofs = 3 * env.prior.contact_nodes.len();
-        let room = dofs.min(768);
-        Preconditioner {
+        let room = dofs.min(ROOM);
+        let nodes = memory::collected(env.body.mass.len(), 0..env.body.mass.len() as u32, WHAT)?;
+        Ok(Preconditioner {
             held_back: env.space.held_back(kappa),
             starts: env.prior.basis_starts(),
-            plan: RowPlan::full(&env.prior.basis()),
-            dofs: Vec::with_capacity(dofs),
-            columns: Vec::with_capacity(dofs / 3),
-            nodes: Vec::with_capacity(env.body.mass.len()),
-            compliance: ContactFactor::with_capacity(room),
-            through: Vec::with_capacity(room * count),
-            galerkin: ContactFactor::with_capacity(count),
-            galerkin_free: env.space.galerkin(kappa),
-            widened: vec![0.0; 6 * env.prior.widest_block()],
-            coordinates: vec![0.0; env.prior.width()],
-            on_modes: vec![0.0; count],
-            solved: vec![0.0; count],
-            at_contact: Vec::with_capacity(room),
-            forces: Vec::with_capacity(room),
+            plan: RowPlan::try_region(&env.prior.basis(), &nodes, false)?,
+            dofs: memory::room(dofs, WHAT)?,
+            columns: memory::room(dofs / 3, WHAT)?,
+            nodes,
+            compliance: ContactFactor::try_with_capacity(room)?,
+            through: memory::room(room * count, WHAT)?,
+            galerkin: ContactFactor::try_with_capacity(count)?,
+            galerkin_free: env.space.galerkin(kappa)?,
+            widened: memory::zeros(6 * env.prior.widest_block(), WHAT)?,
+            coordinates: memory::zeros(env.prior.width(), WHAT)?,
+            on_modes: memory::zeros(count, WHAT)?,
+            solved: memory::zeros(count, WHAT)?,
+            at_contact: memory::room(room, WHAT)?,
+            forces: memory::room(room, WHAT)?,
             ready: false,
+        })
+    }
+
+    /// Makes room for `order` prescribed degrees of freedom; contacts of up to [`ROOM`] have it.
+    fn reserve(&mut self, order: usize, count: usize) -> Result<()> {
+        self.compliance.reserve(order)?;
+        for (list, wanted) in [
+            (&mut self.through, order * count),
+            (&mut self.at_contact, order),
+            (&mut self.forces, order),
+        ] {
+            let more = wanted.saturating_sub(list.len());
+            memory::reserve(list, more, WHAT)?;
+            list.resize(wanted, 0.0);
         }
+        Ok(())
     }
 
     /// Takes the prescribed nodes (ascending); cheap where they are those of the last call.
@@ -107,10 +131,7 @@ impl Preconditioner {
         let bad = |error: crate::kernels::contact::FactorError| {
             Error::bundle("corrections.safetensors", error.to_string())
         };
-        self.through.clear();
-        self.through.resize(order * count, 0.0);
-        self.at_contact.resize(order, 0.0);
-        self.forces.resize(order, 0.0);
+        self.reserve(order, count)?;
         if order > 0 {
             let (columns, dofs, widened) = (&self.columns, &self.dofs, &mut self.widened);
             let held_back = &self.held_back;
@@ -356,9 +377,19 @@ impl Preconditioner {
 
     /// Bytes held.
     pub fn memory_bytes(&self) -> usize {
-        4 * (self.through.capacity() + self.coordinates.len() + self.dofs.capacity())
-            + 8 * self.galerkin_free.len() * 2
-            + 20 * self.plan.nodes()
+        let lists = self.through.capacity()
+            + self.dofs.capacity()
+            + self.columns.capacity()
+            + self.nodes.capacity()
+            + self.widened.len()
+            + self.coordinates.len()
+            + self.at_contact.capacity()
+            + self.forces.capacity();
+        4 * lists
+            + 8 * self.galerkin_free.len()
+            + self.compliance.memory_bytes()
+            + self.galerkin.memory_bytes()
+            + self.plan.memory_bytes()
     }
 }
 

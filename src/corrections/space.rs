@@ -10,6 +10,7 @@ use half::f16;
 use crate::bundle::TensorFile;
 use crate::error::Result;
 use crate::kernels::rows::Stored;
+use crate::memory;
 use crate::prior::PriorTable;
 
 /// Most modes that a file may hold.
@@ -55,7 +56,10 @@ impl CoarseSpace {
             return Err(file.bad("frequency", format!("element {at} is not positive")));
         }
         let mut space = CoarseSpace {
-            at_contact: vec![0.0; 3 * prior.contact_nodes.len() * count],
+            at_contact: memory::zeros(
+                3 * prior.contact_nodes.len() * count,
+                "modes at the contact",
+            )?,
             rows: (0..count as u32).collect(),
             modes,
             stiffness,
@@ -114,11 +118,14 @@ impl CoarseSpace {
     }
 
     /// `Phi^T (K + kappa M) Phi [r,r]`, µN/mm.
-    pub fn galerkin(&self, kappa: f64) -> Vec<f64> {
+    pub fn galerkin(&self, kappa: f64) -> Result<Vec<f64>> {
         let pairs = self.stiffness.iter().zip(&self.mass);
-        pairs
-            .map(|(&k, &m)| f64::from(k) + kappa * f64::from(m))
-            .collect()
+        let values = pairs.map(|(&k, &m)| f64::from(k) + kappa * f64::from(m));
+        memory::collected(
+            self.stiffness.len(),
+            values,
+            "the corrections' preconditioner",
+        )
     }
 
     /// Bytes held.

@@ -22,7 +22,7 @@ const SHORTENINGS: u32 = 6;
 const MOST_PARTS: u32 = 16;
 
 /// What BDF2 knows of the past, `[K,3]` each.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, PartialEq)]
 pub struct Motion {
     /// Velocity at the last state, mm/s.
     pub velocity: Vec<f32>,
@@ -42,6 +42,29 @@ impl Motion {
             min_det: 1.0,
             reaction: memory::room(len, "contact forces")?,
         })
+    }
+
+    /// A copy.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`].
+    pub fn copy(&self) -> Result<Motion> {
+        let copied = |values: &[f32]| memory::copied(values, "a copy of velocities");
+        Ok(Motion {
+            velocity: copied(&self.velocity)?,
+            velocity_before: copied(&self.velocity_before)?,
+            min_det: self.min_det,
+            reaction: copied(&self.reaction)?,
+        })
+    }
+
+    /// Takes another one's values; the room stays.
+    fn take(&mut self, other: &Motion) {
+        self.velocity.copy_from_slice(&other.velocity);
+        self.velocity_before.copy_from_slice(&other.velocity_before);
+        self.min_det = other.min_det;
+        self.reaction.clear();
+        self.reaction.extend_from_slice(&other.reaction);
     }
 
     fn clear(&mut self) {
@@ -163,9 +186,11 @@ impl Stage {
         let len = 3 * env.body.mass.len();
         let field = || memory::zeros(len, "the corrections of a scene");
         Ok(Stage {
-            preconditioner: Preconditioner::new(env, lent.corrections.integrator.kappa()),
+            preconditioner: Preconditioner::new(env, lent.corrections.integrator.kappa())?,
             memory: Memory::new(len)?,
-            scratch: env.body.forces.scratch(lent.pool.threads()),
+            scratch: (env.body.forces.scratch(lent.pool.threads())).map_err(|_| {
+                Error::OutOfMemory("no memory for the element forces of a scene".into())
+            })?,
             motion: Motion::at_rest(len)?,
             next: Motion::at_rest(len)?,
             nodes: memory::room(len / 3, "the corrections of a scene")?,
@@ -214,10 +239,10 @@ impl Stage {
     pub fn restore(
         &mut self,
         lent: Lent<'_>,
-        motion: Motion,
+        motion: &Motion,
         pairs: &[[Vec<f32>; 2]],
     ) -> Result<()> {
-        self.motion = motion;
+        self.motion.take(motion);
         self.memory.clear();
         self.memory.commit();
         for [step, change] in pairs {
@@ -229,7 +254,12 @@ impl Stage {
 
     /// Bytes held.
     pub fn memory_bytes(&self) -> usize {
-        self.memory.memory_bytes() + self.preconditioner.memory_bytes() + 12 * 4 * self.g.len()
+        // Six fields and two velocities of two states; contact forces of two states and two evaluations, contact nodes.
+        let fields = (6 + 4 + 4) * 4 * self.g.len() + 4 * self.g.len() / 3;
+        self.memory.memory_bytes()
+            + self.preconditioner.memory_bytes()
+            + self.scratch.bytes()
+            + fields
     }
 
     /// Velocities of a state that the model predicted and nothing corrected.

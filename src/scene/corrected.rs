@@ -208,7 +208,7 @@ impl Core {
             prior,
             corrections: self.model.corrections()?,
         };
-        corrected.stage.restore(lent, motion, &pairs)
+        corrected.stage.restore(lent, &motion, &pairs)
     }
 
     /// Whether every node is decoded in each step, and kept.

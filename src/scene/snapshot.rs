@@ -229,10 +229,13 @@ impl Core {
                 w.floats(&stage.motion.velocity);
                 w.floats(&stage.motion.velocity_before);
                 w.floats(&[stage.motion.min_det]);
-                let mut reaction = stage.motion.reaction.clone();
                 // The guard may have dropped the contact that they belonged to.
-                reaction.resize(3 * self.contact.len(), 0.0);
-                w.floats(&reaction);
+                let contacts = 3 * self.contact.len();
+                w.u32(contacts as u32);
+                for at in 0..contacts {
+                    let force = stage.motion.reaction.get(at).copied().unwrap_or(0.0);
+                    w.u32(force.to_bits());
+                }
                 for (step, change) in stage.pairs() {
                     w.floats(step);
                     w.floats(change);
@@ -396,11 +399,16 @@ impl Core {
             rest_frames: self.rest_frames,
             max_displacement: self.max_displacement,
             fields,
-            past: self.corrected.as_ref().map(|corrected| {
-                let stage = &corrected.stage;
-                let pairs = stage.pairs().map(|(s, y)| [s.to_vec(), y.to_vec()]);
-                (stage.motion.clone(), pairs.collect())
-            }),
+            past: match &self.corrected {
+                None => None,
+                Some(corrected) => {
+                    let copied = |values: &[f32]| memory::copied(values, "a copy of L-BFGS pairs");
+                    let pairs = corrected.stage.pairs();
+                    let pairs: Result<Pairs> =
+                        pairs.map(|(s, y)| Ok([copied(s)?, copied(y)?])).collect();
+                    Some((corrected.stage.motion.copy()?, pairs?))
+                }
+            },
         })
     }
 

@@ -253,7 +253,10 @@ fn print_table(path: &Path) -> Result<()> {
     for row in rows {
         let text = |field: &str| row[field].as_str().unwrap_or("?");
         let method = match (text("method"), text("bundle")) {
-            ("surrogate", bundle) => bundle.to_owned(),
+            ("surrogate", bundle) => match row["corrections"].as_u64().unwrap_or(0) {
+                0 => bundle.to_owned(),
+                count => format!("{bundle}, {count} corrections"),
+            },
             (method, "") => method.to_owned(),
             (method, bundle) => format!("{bundle}, {method}"),
         };

@@ -108,7 +108,11 @@ fn section(path: &Path) -> Result<String> {
                 } else {
                     format!(", {}", text(&row["precision"]))
                 };
-                format!("**libupt, `{bundle}`**, {nodes}{precision}")
+                let corrections = match row["corrections"].as_u64().unwrap_or(0) {
+                    0 => String::new(),
+                    count => format!(", {count} corrections"),
+                };
+                format!("**libupt, `{bundle}`**, {nodes}{precision}{corrections}")
             }
             ("TLED", _) => "reference solver (TLED)".into(),
             (method, "") => method.to_owned(),

@@ -65,20 +65,26 @@ pub fn run(options: &Options) -> Result<ExitCode> {
             trajectory.header.boundary, bundle.boundary
         );
     }
+    let corrections = match (options.corrections, bundle.corrections) {
+        (Some(count), _) => count,
+        (None, recommended) => recommended.unwrap_or(0),
+    };
     let method = Method::Surrogate {
         bundle,
         provider: options.provider,
         precision: options.precision,
         region: Region::All,
         threads: options.threads,
-        corrections: options.corrections,
+        corrections,
     };
     let mut stepper = Stepper::new(&method, &mesh, &trajectory.header)?;
     let mut field = vec![[0.0f32; 3]; mesh.node_count()];
     let (mut steps, mut times, mut frames) = (Vec::new(), Vec::new(), Vec::new());
+    let mut estimates = Vec::new();
     for frame in 1..trajectory.frame_count() {
         let (nodes, vectors) = trajectory.contact(frame);
         times.push(stepper.step(nodes, vectors, &mut field)?);
+        estimates.push(stepper.estimated_mm()?);
         steps.push(step_errors(
             &mesh.positions,
             trajectory.frame(frame),
@@ -95,7 +101,7 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     if let Some(folder) = &options.vtu {
         write_vtu(folder, &mesh, &trajectory, &frames)?;
     }
-    print(options, &trajectory, &errors, &times)?;
+    print(options, &trajectory, &errors, &times, &estimates)?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -104,6 +110,7 @@ fn print(
     trajectory: &Trajectory,
     errors: &CaseErrors,
     times: &[f64],
+    estimates: &[Option<f32>],
 ) -> Result<()> {
     let mut sorted = times.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -112,6 +119,7 @@ fn print(
         let report = json!({
             "trajectory": options.trajectory, "bundle": options.bundle, "scheme": trajectory.header.scheme,
             "overall": errors.overall, "ms_p50": median, "steps": errors.steps, "ms": times,
+            "estimated_mm": estimates,
         });
         println!("{}", serde_json::to_string_pretty(&report)?);
         return Ok(());

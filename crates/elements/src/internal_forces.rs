@@ -9,6 +9,7 @@ use crate::material::Material;
 use crate::partition::{Chunk, PADDING, Partition};
 use crate::slots::PADDED;
 use crate::tetrahedra::Tetrahedra;
+use std::collections::TryReserveError;
 
 /// Runs `task(chunk, worker)` for each chunk below a count, in any order and on any threads; `worker` is below the number of
 /// workers that [`Scratch::new`] was given, and two tasks that run at once have different ones.
@@ -34,6 +35,21 @@ pub struct Scratch {
     positions: Vec<Vec<Line>>,
     /// Smallest det F a chunk.
     smallest: Vec<f32>,
+}
+
+impl Scratch {
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        let lines: usize = self.positions.iter().map(Vec::len).sum();
+        size_of::<Line>() * (self.forces.len() + lines) + 4 * self.smallest.len()
+    }
+}
+
+fn filled<T: Clone>(count: usize, value: T) -> Result<Vec<T>, TryReserveError> {
+    let mut list = Vec::new();
+    list.try_reserve_exact(count)?;
+    list.resize(count, value);
+    Ok(list)
 }
 
 /// A pointer that the tasks of one evaluation share.
@@ -78,17 +94,25 @@ impl ElementForces {
     }
 
     /// Buffers for up to `workers` threads.
-    pub fn scratch(&self, workers: usize) -> Scratch {
+    ///
+    /// # Errors
+    /// Where there is no memory for them.
+    pub fn scratch(&self, workers: usize) -> Result<Scratch, TryReserveError> {
         let chunks = &self.partition.chunks;
         let widest = chunks.iter().map(Chunk::slot_count).max().unwrap_or(0);
-        Scratch {
-            forces: vec![Line::default(); self.partition.node_of_slot.len().div_ceil(4)],
-            positions: vec![
-                vec![Line::default(); widest.next_multiple_of(PADDED).div_ceil(4)];
-                workers.max(1)
-            ],
-            smallest: vec![f32::MAX; chunks.len()],
+        let lines = widest.next_multiple_of(PADDED).div_ceil(4);
+        let mut positions = filled(workers.max(1), Vec::new())?;
+        for room in &mut positions {
+            *room = filled(lines, Line::default())?;
         }
+        Ok(Scratch {
+            forces: filled(
+                self.partition.node_of_slot.len().div_ceil(4),
+                Line::default(),
+            )?,
+            positions,
+            smallest: filled(chunks.len(), f32::MAX)?,
+        })
     }
 
     /// `f_int(u)` (µN) to `out`, both `[K,3]`; returns the smallest det F. Allocates nothing.

@@ -49,7 +49,7 @@ fn they_are_those_of_the_law_on_every_instruction_set() {
     let scale = want.iter().fold(0.0f64, |a, b| a.max(b.abs()));
     for simd in Simd::ALL.into_iter().filter(|simd| simd.is_available()) {
         let forces = ElementForces::new(mesh.tetrahedra(), &material, simd);
-        let mut scratch = forces.scratch(1);
+        let mut scratch = forces.scratch(1).unwrap();
         let mut out = vec![f32::NAN; u.len()];
         let det = forces.evaluate(&u, &mut scratch, &mut out, &serial);
         for (got, want) in out.iter().zip(&want) {
@@ -66,7 +66,7 @@ fn threads_do_not_change_a_bit() {
     let u = wave(&mesh, 0.6);
     let forces = ElementForces::new(mesh.tetrahedra(), &material, Simd::detect());
     let run = |parallel: elements::ParallelFor<'_>| {
-        let mut scratch = forces.scratch(3);
+        let mut scratch = forces.scratch(3).unwrap();
         let mut out = vec![0.0; u.len()];
         forces.evaluate(&u, &mut scratch, &mut out, parallel);
         out
@@ -85,7 +85,7 @@ fn threads_do_not_change_a_bit() {
 fn an_inverted_state_shows_in_det_and_a_nan_in_the_forces() {
     let (mesh, material) = (body(), Material::default());
     let forces = ElementForces::new(mesh.tetrahedra(), &material, Simd::detect());
-    let mut scratch = forces.scratch(1);
+    let mut scratch = forces.scratch(1).unwrap();
     let mut u = vec![0.0; 3 * mesh.positions.len()];
     let mut out = u.clone();
     assert!(forces.evaluate(&u, &mut scratch, &mut out, &serial) > 0.999);

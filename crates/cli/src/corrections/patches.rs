@@ -157,7 +157,7 @@ fn relax(
     let serial = |count: usize, task: &(dyn Fn(usize, usize) + Sync)| {
         (0..count).for_each(|chunk| task(chunk, 0));
     };
-    let mut scratch = forces.scratch(1);
+    let mut scratch = forces.scratch(1)?;
     let mut gradient = vec![0.0f32; 3 * nodes];
     // A push whose linear response is inverted is halved until it is not.
     let mut part = 1.0f32;

@@ -67,6 +67,17 @@ pub fn mesh_of(cases: &Cases, bundles: &[BundleFolder]) -> Result<Mesh> {
     )
 }
 
+/// Corrections a step that a bundle is measured with: those asked for, else none and as many as it recommends.
+fn corrections(options: &Options, bundle: &BundleFolder) -> Vec<u32> {
+    let mut counts = match bundle.corrections {
+        None => vec![0],
+        Some(recommended) if options.corrections.is_empty() => vec![0, recommended],
+        Some(_) => options.corrections.clone(),
+    };
+    counts.dedup();
+    counts
+}
+
 /// Every configuration asked for.
 pub fn methods(
     options: &Options,
@@ -85,14 +96,16 @@ pub fn methods(
             for precision in precisions {
                 for region in &options.region {
                     for threads in &options.threads {
-                        methods.push(Method::Surrogate {
-                            bundle: bundle.clone(),
-                            provider: *provider,
-                            precision: *precision,
-                            region: *region,
-                            threads: *threads,
-                            corrections: None,
-                        });
+                        methods.extend(corrections(options, bundle).into_iter().map(|count| {
+                            Method::Surrogate {
+                                bundle: bundle.clone(),
+                                provider: *provider,
+                                precision: *precision,
+                                region: *region,
+                                threads: *threads,
+                                corrections: count,
+                            }
+                        }));
                     }
                 }
             }

@@ -148,13 +148,14 @@ pub fn describe(method: &Method, mesh: &Mesh) -> Row {
             precision,
             region,
             threads,
-            corrections: _,
+            corrections,
         } => {
             row.method = "surrogate".into();
             named(&mut row, bundle);
             row.provider = provider.name().into();
             row.precision = precision.name().into();
             row.region = region.name().into();
+            row.corrections = *corrections;
             row.threads = *threads;
         }
         Method::PaperSplit { bundle, threads } => {

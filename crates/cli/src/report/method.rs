@@ -26,6 +26,8 @@ pub struct BundleFolder {
     pub sha256: String,
     /// Float32, the variants of the graphs that the manifest lists, and bfloat16 where kind and CPU have it.
     pub precisions: Vec<Precision>,
+    /// Corrections a step that the manifest recommends; none where the bundle has no tables for them.
+    pub corrections: Option<u32>,
 }
 
 /// A method in one configuration.
@@ -37,8 +39,8 @@ pub enum Method {
         precision: Precision,
         region: Region,
         threads: u32,
-        /// Corrections a step; none: as many as the bundle recommends.
-        corrections: Option<u32>,
+        /// Corrections a step in contact.
+        corrections: u32,
     },
     PaperSplit {
         bundle: BundleFolder,
@@ -123,6 +125,9 @@ impl BundleFolder {
         use sha2::Digest;
         Ok(Self {
             precisions,
+            corrections: fields["corrections"]["recommended"]
+                .as_u64()
+                .map(|count| count as u32),
             path: path.to_path_buf(),
             name: text(&fields["name"], "name")?,
             boundary: text(&fields["boundary"], "boundary")?,
@@ -151,7 +156,7 @@ impl Stepper {
                     provider: provider.code(),
                     precision: precision.code(),
                     exact: true,
-                    corrections: *corrections,
+                    corrections: Some(*corrections),
                 };
                 Self::Surrogate(Box::new(SurrogateStepper::new(bundle, &settings, *region)?))
             }
@@ -247,6 +252,15 @@ impl Stepper {
         Ok(started.elapsed().as_secs_f64() * 1e3)
     }
 
+    /// Estimated error of the last corrected step, root mean square over all nodes, mm; none without corrections.
+    pub fn estimated_mm(&self) -> Result<Option<f32>> {
+        let Self::Surrogate(surrogate) = self else {
+            return Ok(None);
+        };
+        let stats = surrogate.scene.stats()?;
+        Ok((stats.corrections > 0).then_some(stats.error_mm))
+    }
+
     /// Stage times of the last step, ms; empty where the method has none.
     pub fn stages(&self) -> Result<Vec<(&'static str, f64)>> {
         let Self::Surrogate(surrogate) = self else {
@@ -260,6 +274,7 @@ impl Stepper {
             ("aggregate", stats.aggregate_ms),
             ("latent", stats.latent_ms),
             ("decode", stats.decode_ms),
+            ("corrections", stats.corrections_ms),
             ("guard", stats.guard_ms),
         ];
         let other = stats.step_ms - named.iter().map(|stage| stage.1).sum::<f64>();

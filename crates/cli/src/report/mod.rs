@@ -67,6 +67,9 @@ pub struct Options {
     precision: Vec<Precision>,
     #[arg(long, value_delimiter = ',', default_value = "cpu")]
     provider: Vec<Provider>,
+    /// Corrections a step in contact (`0,1,3,5,10`: the frontier); default: none, and as many as a bundle recommends.
+    #[arg(long, value_delimiter = ',')]
+    corrections: Vec<u32>,
     /// Plain methods beside the library: zero, linear, prior (the bundles' linear response alone), coarse, tled, paper; or none.
     #[arg(
         long,
@@ -192,6 +195,7 @@ fn measure_all(
             measurements.push(stored);
             continue;
         }
+        let identity = format!("{} {}", described.bundle_sha256, described.corrections);
         let name = format!("{}, {}", described.family(), described.variant());
         bar.set_prefix(name.clone());
         let steps = cases.steps().min(plan.step_limit);
@@ -200,22 +204,14 @@ fn measure_all(
             && described.precision == "f32"
             && described.region == "all";
         let wanted = described.method == "surrogate" && !is_base;
-        if wanted
-            && reference
-                .as_ref()
-                .is_none_or(|(bundle, _)| *bundle != described.bundle_sha256)
-        {
-            reference = float32_frames(method, &plan)?
-                .map(|frames| (described.bundle_sha256.clone(), frames));
+        if wanted && reference.as_ref().is_none_or(|(of, _)| *of != identity) {
+            reference = float32_frames(method, &plan)?.map(|frames| (identity.clone(), frames));
         }
-        let mut keep = (is_base
-            && reference
-                .as_ref()
-                .is_none_or(|(bundle, _)| *bundle != described.bundle_sha256))
-        .then(Vec::new);
+        let mut keep =
+            (is_base && reference.as_ref().is_none_or(|(of, _)| *of != identity)).then(Vec::new);
         let against = reference
             .as_ref()
-            .filter(|(bundle, _)| *bundle == described.bundle_sha256)
+            .filter(|(of, _)| *of == identity)
             .map(|(_, frames)| frames.as_slice());
         let outcome = measure::measure(method, &plan, against, &mut keep, &|case, frame| {
             bar.set_position((case * steps + frame) as u64)
@@ -223,7 +219,7 @@ fn measure_all(
         match outcome {
             Ok(measurement) => {
                 if let Some(frames) = keep {
-                    reference = Some((described.bundle_sha256.clone(), frames));
+                    reference = Some((identity.clone(), frames));
                 }
                 cache.store(&key, &measurement)?;
                 measurements.push(measurement);
@@ -237,7 +233,12 @@ fn measure_all(
 
 /// The first case by the plain float32 path of the method's bundle: CPU, one thread, all nodes.
 fn float32_frames(method: &Method, plan: &Plan<'_>) -> Result<Option<Vec<Vec<[f32; 3]>>>> {
-    let Method::Surrogate { bundle, .. } = method else {
+    let Method::Surrogate {
+        bundle,
+        corrections,
+        ..
+    } = method
+    else {
         return Ok(None);
     };
     let plain = Method::Surrogate {
@@ -246,7 +247,7 @@ fn float32_frames(method: &Method, plan: &Plan<'_>) -> Result<Option<Vec<Vec<[f3
         precision: Precision::F32,
         region: Region::All,
         threads: 1,
-        corrections: None,
+        corrections: *corrections,
     };
     let quick = Plan {
         case_limit: 1,

@@ -19,6 +19,9 @@ pub struct Row {
     /// The nodes that each step decodes: `all`, `surface`, `domain`.
     pub region: String,
     pub boundary: String,
+    /// Corrections a step in contact; 0 for none and for other methods.
+    #[serde(default)]
+    pub corrections: u32,
     pub threads: u32,
     /// Nodes of the mesh, `K`.
     pub nodes: u64,
@@ -75,6 +78,9 @@ impl Row {
     /// A short name for legends: what it is, without what all share.
     pub fn family(&self) -> String {
         match (self.method.as_str(), self.bundle.as_str()) {
+            ("surrogate", bundle) if self.corrections > 0 => {
+                format!("{bundle}, k = {}", self.corrections)
+            }
             ("surrogate", bundle) => bundle.to_owned(),
             (method, "") => method.to_owned(),
             (method, bundle) => format!("{bundle}, {method}"),

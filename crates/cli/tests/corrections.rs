@@ -1,0 +1,151 @@
+//! `upt corrections` gives a bundle its coarse space, and the corrected bundle follows the reference solver.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use tissue::mesh::{Boundary, Mesh};
+use tissue::solver::{ContactNode, Solver, SolverOptions};
+use upt::{Contact, Corrections, InitOptions, Model, ModelOptions, Scene, SceneOptions, StepInput};
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+fn find_runtime() {
+    let found = std::env::var_os("ORT_DYLIB_PATH").map(PathBuf::from);
+    let runtime = found.unwrap_or_else(|| root().join("target/ort/libonnxruntime.so"));
+    let options = InitOptions {
+        threads: 0,
+        onnxruntime_path: Some(runtime),
+    };
+    upt::init(&options).unwrap();
+}
+
+/// A copy of the fixture without corrections.
+fn bundle() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    for entry in std::fs::read_dir(root().join("tests/fixtures/tiny-reduced")).unwrap() {
+        let entry = entry.unwrap();
+        std::fs::copy(entry.path(), folder.path().join(entry.file_name())).unwrap();
+    }
+    folder
+}
+
+fn upt(arguments: &[&str]) -> (bool, String) {
+    let output = Command::new(env!("CARGO_BIN_EXE_upt"))
+        .args(arguments)
+        .output()
+        .unwrap();
+    let text = [output.stdout, output.stderr].concat();
+    (
+        output.status.success(),
+        String::from_utf8_lossy(&text).into_owned(),
+    )
+}
+
+/// Mean squared error against the solver over a slow push that is held, mm².
+fn error(folder: &Path, corrections: Corrections) -> f64 {
+    let model = Model::open(folder, &ModelOptions::default()).unwrap();
+    let options = SceneOptions {
+        corrections,
+        no_sleep: true,
+        ..SceneOptions::default()
+    };
+    let scene = Scene::new(model, &options).unwrap();
+    let mesh = Mesh::read(&folder.join("mesh.safetensors")).unwrap();
+    let mut solver = Solver::new(&mesh, Boundary::Fixed, SolverOptions::default()).unwrap();
+    let domain = scene.model().indices(upt::IndexSet::DomainNodes).to_vec();
+    let nodes = domain[domain.len() / 2 - 2..domain.len() / 2 + 2].to_vec();
+    let (mut want, mut got) = (
+        vec![[0.0f32; 3]; mesh.node_count()],
+        vec![0.0f32; 3 * mesh.node_count()],
+    );
+    let mut sum = 0.0;
+    for frame in 1..=20 {
+        let depth = 0.4 * f32::min(frame as f32, 12.0);
+        let c = [0.1 * depth, 0.0, -depth];
+        let contact: Vec<ContactNode> = nodes
+            .iter()
+            .map(|&node| ContactNode {
+                node,
+                displacement: c,
+            })
+            .collect();
+        solver.step_frame(&contact, 0.05).unwrap();
+        solver.displacement(&mut want);
+        let vectors = c.repeat(nodes.len());
+        let input = StepInput {
+            displacement: None,
+            contact: Contact::Sparse {
+                nodes: &nodes,
+                vectors: &vectors,
+            },
+        };
+        scene.step(input, Some(&mut got)).unwrap();
+        let pairs = want.as_flattened().iter().zip(&got);
+        let squares = pairs.map(|(a, b)| f64::from(a - b).powi(2));
+        sum += squares.sum::<f64>() / mesh.node_count() as f64;
+    }
+    sum / 20.0
+}
+
+#[test]
+fn a_corrected_bundle_follows_the_solver_and_more_corrections_closer() {
+    find_runtime();
+    let folder = bundle();
+    let path = folder.path().to_str().unwrap();
+    let (done, text) = upt(&[
+        "corrections",
+        path,
+        "--natural",
+        "12",
+        "--patches",
+        "16",
+        "--patch-modes",
+        "8",
+    ]);
+    assert!(done, "{text}");
+    let manifest = std::fs::read_to_string(folder.path().join("bundle.json")).unwrap();
+    assert!(manifest.contains("\"recommended\": 3"), "{manifest}");
+    let errors = [0, 2, 8].map(|count| match count {
+        0 => error(folder.path(), Corrections::None),
+        count => error(folder.path(), Corrections::Fixed(count)),
+    });
+    println!("MSE for k = 0, 2, 8: {errors:?} mm²");
+    assert!(errors[1] < 0.1 * errors[0], "{errors:?}");
+    assert!(errors[2] < 0.02 * errors[0], "{errors:?}");
+    // The same command again gives the same bytes.
+    let file = folder.path().join("corrections.safetensors");
+    let before = std::fs::read(&file).unwrap();
+    let (done, text) = upt(&[
+        "corrections",
+        path,
+        "--natural",
+        "12",
+        "--patches",
+        "16",
+        "--patch-modes",
+        "8",
+    ]);
+    assert!(done, "{text}");
+    assert_eq!(before, std::fs::read(&file).unwrap());
+}
+
+#[test]
+fn a_bundle_without_a_linear_response_is_refused_untouched() {
+    let folder = tempfile::tempdir().unwrap();
+    for entry in std::fs::read_dir(root().join("tests/fixtures/tiny-upt")).unwrap() {
+        let entry = entry.unwrap();
+        std::fs::copy(entry.path(), folder.path().join(entry.file_name())).unwrap();
+    }
+    let (done, text) = upt(&["corrections", folder.path().to_str().unwrap()]);
+    assert!(!done && text.contains("linear response"), "{text}");
+    assert!(!folder.path().join("corrections.safetensors").exists());
+    let (done, text) = upt(&[
+        "corrections",
+        bundle().path().to_str().unwrap(),
+        "--natural",
+        "0",
+    ]);
+    assert!(!done && text.contains("--natural"), "{text}");
+}

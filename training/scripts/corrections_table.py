@@ -1,0 +1,112 @@
+"""What corrections are worth: error, time and estimate by their number, into docs/corrections.md.
+
+    python training/scripts/corrections_table.py --upt target/release/upt --bundle onnx/brain-reduced --data DIR \
+        --counts 0,1,3,5,10 --page docs/corrections.md
+
+Each case of the data is replayed through `upt rollout --json` with each count. The estimate is compared with the true
+root mean square error in the steps with contact: rank correlation, and their ratio (the bundle's `calibration`).
+"""
+
+import argparse
+import json
+import pathlib
+import statistics
+import struct
+import subprocess
+
+BEGIN = "<!-- corrections_table.py: begin {} -->"
+END = "<!-- corrections_table.py: end {} -->"
+
+
+def scheme_of(path: pathlib.Path) -> str:
+    """The scheme in a trajectory's metadata."""
+    with path.open("rb") as file:
+        (length,) = struct.unpack("<Q", file.read(8))
+        return json.loads(file.read(length))["__metadata__"]["scheme"]
+
+
+def ranks(values: list[float]) -> list[float]:
+    """Ranks from 0; ties do not occur in measured numbers."""
+    order = sorted(range(len(values)), key=values.__getitem__)
+    out = [0.0] * len(values)
+    for rank, index in enumerate(order):
+        out[index] = float(rank)
+    return out
+
+
+def replay(upt: str, bundle: str, case: pathlib.Path, count: int, threads: int) -> dict:
+    """One rollout as `upt rollout --json` gives it."""
+    command = [upt, "rollout", bundle, str(case), "--corrections", str(count), "--json"]
+    command += ["--no-hausdorff", "--threads", str(threads)]
+    return json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+
+
+def rows(upt: str, bundle: str, cases: list[pathlib.Path], counts: list[int], threads: int) -> list[str]:
+    """Table rows, one a scheme and one for the estimate."""
+    by_scheme: dict[str, list[pathlib.Path]] = {}
+    for case in cases:
+        by_scheme.setdefault(scheme_of(case), []).append(case)
+    lines, pairs, times = [], {k: [] for k in counts}, {k: [] for k in counts}
+    for scheme, members in sorted(by_scheme.items()):
+        cells = []
+        for count in counts:
+            errors, largest = [], []
+            for case in members:
+                result = replay(upt, bundle, case, count, threads)
+                errors.append(result["overall"]["mse"])
+                largest.append(result["overall"]["max"])
+                for step, estimate, ms in zip(result["steps"], result["estimated_mm"], result["ms"], strict=True):
+                    if estimate is not None:
+                        pairs[count].append((estimate, step["mse"] ** 0.5))
+                        times[count].append(ms)
+                    elif count == 0:
+                        times[count].append(ms)
+            cells.append(f"{statistics.fmean(errors):.2g} ({max(largest):.2g})")
+        lines.append(f"| {scheme} ({len(members)}) | " + " | ".join(cells) + " |")
+    spearman, ratio = [], []
+    for count in counts:
+        if len(pairs[count]) < 10:
+            spearman.append("-")
+            ratio.append("-")
+            continue
+        estimate, true = zip(*pairs[count], strict=True)
+        spearman.append(f"{statistics.correlation(ranks(list(estimate)), ranks(list(true))):.2f}")
+        ratio.append(f"{statistics.median(t / e for e, t in pairs[count] if e > 0):.2g}")
+    lines.append(
+        "| ms a step in contact (median) | " + " | ".join(f"{statistics.median(times[k]):.3g}" for k in counts) + " |"
+    )
+    lines.append("| estimate against truth, rank correlation | " + " | ".join(spearman) + " |")
+    lines.append("| truth over estimate (median) | " + " | ".join(ratio) + " |")
+    return lines
+
+
+def main() -> None:
+    """Replays and writes."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--upt", default="target/release/upt")
+    parser.add_argument("--bundle", required=True)
+    parser.add_argument("--data", action="append", required=True, type=pathlib.Path)
+    parser.add_argument("--counts", default="0,1,3,5,10")
+    parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument("--page", type=pathlib.Path)
+    options = parser.parse_args()
+    counts = [int(count) for count in options.counts.split(",")]
+    cases = sorted(case for folder in options.data for case in folder.glob("*.trajectory.safetensors"))
+    if not cases:
+        parser.error("no *.trajectory.safetensors in --data")
+    head = "| scheme (cases): MSE, mm² (largest error, mm) | " + " | ".join(f"k = {k}" for k in counts) + " |"
+    table = [head, "|---" * (len(counts) + 1) + "|", *rows(options.upt, options.bundle, cases, counts, options.threads)]
+    text = "\n".join(table)
+    print(text)
+    if options.page:
+        name = pathlib.Path(options.bundle).name
+        page = options.page.read_text()
+        begin, end = BEGIN.format(name), END.format(name)
+        if begin not in page:
+            raise SystemExit(f"{options.page}: the marker {begin} is missing")
+        before, rest = page.split(begin, 1)
+        options.page.write_text(f"{before}{begin}\n{text}\n{end}{rest.split(end, 1)[1]}")
+
+
+if __name__ == "__main__":
+    main()
