@@ -78,6 +78,7 @@ def requirements(manifest: dict) -> list[str]:
     """Parts of a bundle that change what a step gives: a library that does not know one must refuse the bundle."""
     parts = {
         "anchors": "anchors" in manifest.get("upt", {}),
+        "corrections": "corrections" in manifest,
         "vibration": "vibration" in manifest.get("prior", {}),
     }
     return [name for name, used in parts.items() if used]
