@@ -53,11 +53,11 @@ def rows(upt: str, bundle: str, cases: list[pathlib.Path], counts: list[int], th
             errors, largest = [], []
             for case in members:
                 result = replay(upt, bundle, case, count, threads)
-                errors.append(result["overall"]["mse"])
-                largest.append(result["overall"]["max"])
+                errors.append(result["overall"]["mse_mm2"])
+                largest.append(result["overall"]["max_mm"])
                 for step, estimate, ms in zip(result["steps"], result["estimated_mm"], result["ms"], strict=True):
                     if estimate is not None:
-                        pairs[count].append((estimate, step["mse"] ** 0.5))
+                        pairs[count].append((estimate, step["mse_mm2"] ** 0.5))
                         times[count].append(ms)
                     elif count == 0:
                         times[count].append(ms)

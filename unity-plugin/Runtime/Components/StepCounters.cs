@@ -16,6 +16,7 @@ namespace Upt
         private static ProfilerCounterValue<long> aggregate = Counter("libupt Aggregate");
         private static ProfilerCounterValue<long> latent = Counter("libupt Latent");
         private static ProfilerCounterValue<long> decode = Counter("libupt Decode");
+        private static ProfilerCounterValue<long> corrections = Counter("libupt Corrections");
         private static ProfilerCounterValue<long> guard = Counter("libupt Guard");
 
         /// <summary>Adds a finished step. Allocates nothing.</summary>
@@ -27,6 +28,7 @@ namespace Upt
             aggregate.Value += Nanoseconds(stats.aggregate_ms);
             latent.Value += Nanoseconds(stats.latent_ms);
             decode.Value += Nanoseconds(stats.decode_ms);
+            corrections.Value += Nanoseconds(stats.corrections_ms);
             guard.Value += Nanoseconds(stats.guard_ms);
         }
 
