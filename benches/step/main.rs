@@ -28,7 +28,8 @@ use measure::Row;
 use upt::bundle::Mesh;
 use upt::model::KindModel;
 use upt::{
-    Contact, GuardPolicy, IndexSet, Kind, Model, ModelOptions, Scene, SceneOptions, StepInput,
+    Contact, Corrections, GuardPolicy, IndexSet, Kind, Model, ModelOptions, Scene, SceneOptions,
+    StepInput,
 };
 
 fn main() {
@@ -129,6 +130,8 @@ fn options(threads: usize) -> SceneOptions {
         threads,
         guard_policy: GuardPolicy::Report,
         no_sleep: true,
+        // What the learned part costs; corrections are measured by training/scripts/corrections_table.py.
+        corrections: Corrections::None,
         ..SceneOptions::default()
     }
 }

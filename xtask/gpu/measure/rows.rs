@@ -8,8 +8,8 @@ use serde_json::{Value, json};
 use upt::model::KindModel;
 use upt::onnx::ProviderPlan;
 use upt::{
-    Contact, GuardPolicy, IndexSet, Model, ModelOptions, Precision, Provider, Scene, SceneOptions,
-    StepInput, StepPath,
+    Contact, Corrections, GuardPolicy, IndexSet, Model, ModelOptions, Precision, Provider, Scene,
+    SceneOptions, StepInput, StepPath,
 };
 
 use super::Wanted;
@@ -158,6 +158,7 @@ pub fn measure(
 fn options(path: StepPath) -> SceneOptions {
     SceneOptions {
         step_path: path,
+        corrections: Corrections::None,
         guard_policy: GuardPolicy::Report,
         no_sleep: true,
         ..SceneOptions::default()

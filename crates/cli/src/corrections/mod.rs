@@ -45,6 +45,9 @@ pub struct Options {
     /// Corrections a step that the bundle recommends.
     #[arg(long, default_value_t = 3)]
     pub recommended: u32,
+    /// What the estimated error is multiplied by: `truth over estimate` of `training/scripts/corrections_table.py` on held-out cases.
+    #[arg(long, default_value_t = 1.0)]
+    pub calibration: f32,
     /// Seed of the patches.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
@@ -67,6 +70,16 @@ pub fn run(args: &Options) -> Result<ExitCode> {
             args.bundle.display()
         );
     };
+    if !(args.calibration.is_finite() && args.calibration > 0.0) {
+        bail!("--calibration is {}, must be positive", args.calibration);
+    }
+    if args.recommended > upt::corrections::LIMIT {
+        bail!(
+            "--recommended is {}, must be at most {}",
+            args.recommended,
+            upt::corrections::LIMIT
+        );
+    }
     if args.natural == 0 {
         bail!("--natural is 0; corrections need natural modes");
     }
@@ -131,7 +144,7 @@ pub fn run(args: &Options) -> Result<ExitCode> {
     manifest::add(
         &args.bundle,
         file,
-        &json!({"file": file, "recommended": args.recommended}),
+        &json!({"file": file, "recommended": args.recommended, "calibration": args.calibration}),
     )?;
     let seconds = started.elapsed().as_secs_f64();
     if args.json {
