@@ -8,7 +8,9 @@
 //! Displacements mm, forces µN, masses g, times s.
 
 mod body;
+mod input;
 mod memory;
+mod motion;
 mod precondition;
 mod space;
 mod stage;
@@ -19,9 +21,11 @@ use crate::kernels::Isa;
 use crate::prior::PriorTable;
 
 pub use body::Body;
+pub use input::{Enough, Input, Lent, Report};
 pub use memory::PAIRS;
+pub use motion::Motion;
 pub use space::CoarseSpace;
-pub use stage::{Enough, Input, Lent, Motion, Report, Stage};
+pub use stage::Stage;
 
 /// Most iterations a step.
 pub const LIMIT: u32 = 64;

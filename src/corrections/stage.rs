@@ -2,13 +2,13 @@
 
 use std::time::Instant;
 
+use super::Integrator;
+use super::input::{Input, Lent, Report};
 use super::memory::Memory;
-use super::precondition::{Env, Preconditioner, mask, mask_held};
-use super::{Corrections, Integrator};
+use super::motion::Motion;
+use super::precondition::{Preconditioner, mask, mask_held};
 use crate::error::{Error, Result};
-use crate::kernels::{Isa, Pool};
 use crate::memory;
-use crate::prior::PriorTable;
 use crate::scene::ContactSet;
 
 /// A state whose smallest det F falls below this is not accepted.
@@ -20,79 +20,6 @@ const SLOPE: f64 = 1e-4;
 const SHORTENINGS: u32 = 6;
 /// A load whose guess halves the smallest det F is taken in at most this many parts.
 const MOST_PARTS: u32 = 16;
-
-/// What BDF2 knows of the past, `[K,3]` each.
-#[derive(Debug, PartialEq)]
-pub struct Motion {
-    /// Velocity at the last state, mm/s.
-    pub velocity: Vec<f32>,
-    /// Velocity at the state before.
-    pub velocity_before: Vec<f32>,
-    /// Smallest det F of the last corrected state.
-    pub min_det: f32,
-    /// `r` at the contact nodes of the last corrected state `[m,3]`, in their order, zero at held ones, µN.
-    pub reaction: Vec<f32>,
-}
-
-impl Motion {
-    fn at_rest(len: usize) -> Result<Motion> {
-        Ok(Motion {
-            velocity: memory::zeros(len, "velocities")?,
-            velocity_before: memory::zeros(len, "velocities")?,
-            min_det: 1.0,
-            reaction: memory::room(len, "contact forces")?,
-        })
-    }
-
-    /// A copy.
-    ///
-    /// # Errors
-    /// [`Error::OutOfMemory`].
-    pub fn copy(&self) -> Result<Motion> {
-        let copied = |values: &[f32]| memory::copied(values, "a copy of velocities");
-        Ok(Motion {
-            velocity: copied(&self.velocity)?,
-            velocity_before: copied(&self.velocity_before)?,
-            min_det: self.min_det,
-            reaction: copied(&self.reaction)?,
-        })
-    }
-
-    /// Takes another one's values; the room stays.
-    fn take(&mut self, other: &Motion) {
-        self.velocity.copy_from_slice(&other.velocity);
-        self.velocity_before.copy_from_slice(&other.velocity_before);
-        self.min_det = other.min_det;
-        self.reaction.clear();
-        self.reaction.extend_from_slice(&other.reaction);
-    }
-
-    fn clear(&mut self) {
-        self.velocity.fill(0.0);
-        self.velocity_before.fill(0.0);
-        self.min_det = 1.0;
-        self.reaction.clear();
-    }
-}
-
-/// How the corrections of a step went.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Report {
-    /// Iterations made.
-    pub iterations: u32,
-    /// Evaluations of the element forces.
-    pub evaluations: u32,
-    /// `|r|` at the end over `|r|` of the guess.
-    pub residual: f32,
-    /// Root mean square over the nodes of what a further iteration would move, estimated, mm.
-    pub remaining_mm: f32,
-    /// Smallest det F at the end.
-    pub min_det: f32,
-    /// The load was taken in this many parts.
-    pub parts: u32,
-    /// The iterations ended inverted and the linear response took their place.
-    pub fell_back: bool,
-}
 
 /// A scene's own part.
 pub struct Stage {
@@ -112,52 +39,6 @@ pub struct Stage {
     u: Vec<f32>,
     /// `M p`: inertia of the step at the last displacement, µN.
     drift: Vec<f32>,
-}
-
-/// The step being corrected.
-pub struct Input<'a> {
-    /// Prescribed nodes and where they end, mm.
-    pub contact: &'a ContactSet,
-    /// `u_n [K,3]`.
-    pub last: &'a [f32],
-    /// `u_{n-1} [K,3]`.
-    pub before: &'a [f32],
-    /// The host handed `last` over: nothing is known of its velocity.
-    pub still: bool,
-    /// When to stop.
-    pub enough: Enough,
-}
-
-/// When a step has been corrected enough.
-#[derive(Debug, Clone, Copy)]
-pub struct Enough {
-    /// Iterations at most.
-    pub iterations: u32,
-    /// [`Report::remaining_mm`] that suffices; 0 for never.
-    pub remaining_mm: f32,
-    /// No iteration starts after this.
-    pub until: Option<Instant>,
-}
-
-/// What a scene lends.
-#[derive(Clone, Copy)]
-pub struct Lent<'a> {
-    pub isa: Isa,
-    pub pool: &'a Pool,
-    pub prior: &'a PriorTable,
-    pub corrections: &'a Corrections,
-}
-
-impl<'a> Lent<'a> {
-    fn env(&self) -> Env<'a> {
-        Env {
-            isa: self.isa,
-            pool: self.pool,
-            prior: self.prior,
-            space: &self.corrections.space,
-            body: &self.corrections.body,
-        }
-    }
 }
 
 fn dot(a: &[f32], b: &[f32]) -> f64 {

@@ -1,0 +1,74 @@
+//! What a step hands to its corrections, and what they report.
+
+use std::time::Instant;
+
+use super::Corrections;
+use super::precondition::Env;
+use crate::kernels::{Isa, Pool};
+use crate::prior::PriorTable;
+use crate::scene::ContactSet;
+
+/// How the corrections of a step went.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Report {
+    /// Iterations made.
+    pub iterations: u32,
+    /// Evaluations of the element forces.
+    pub evaluations: u32,
+    /// `|r|` at the end over `|r|` of the guess.
+    pub residual: f32,
+    /// Root mean square over the nodes of what a further iteration would move, estimated, mm.
+    pub remaining_mm: f32,
+    /// Smallest det F at the end.
+    pub min_det: f32,
+    /// The load was taken in this many parts.
+    pub parts: u32,
+    /// The iterations ended inverted and the linear response took their place.
+    pub fell_back: bool,
+}
+
+/// The step being corrected.
+pub struct Input<'a> {
+    /// Prescribed nodes and where they end, mm.
+    pub contact: &'a ContactSet,
+    /// `u_n [K,3]`.
+    pub last: &'a [f32],
+    /// `u_{n-1} [K,3]`.
+    pub before: &'a [f32],
+    /// The host handed `last` over: nothing is known of its velocity.
+    pub still: bool,
+    /// When to stop.
+    pub enough: Enough,
+}
+
+/// When a step has been corrected enough.
+#[derive(Debug, Clone, Copy)]
+pub struct Enough {
+    /// Iterations at most.
+    pub iterations: u32,
+    /// [`Report::remaining_mm`] that suffices; 0 for never.
+    pub remaining_mm: f32,
+    /// No iteration starts after this.
+    pub until: Option<Instant>,
+}
+
+/// What a scene lends.
+#[derive(Clone, Copy)]
+pub struct Lent<'a> {
+    pub isa: Isa,
+    pub pool: &'a Pool,
+    pub prior: &'a PriorTable,
+    pub corrections: &'a Corrections,
+}
+
+impl<'a> Lent<'a> {
+    pub(super) fn env(&self) -> Env<'a> {
+        Env {
+            isa: self.isa,
+            pool: self.pool,
+            prior: self.prior,
+            space: &self.corrections.space,
+            body: &self.corrections.body,
+        }
+    }
+}

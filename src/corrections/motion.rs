@@ -1,0 +1,58 @@
+//! What corrections know of the past: velocities of two states, and the contact forces of the last.
+
+use crate::error::Result;
+use crate::memory;
+
+/// What BDF2 knows of the past, `[K,3]` each.
+#[derive(Debug, PartialEq)]
+pub struct Motion {
+    /// Velocity at the last state, mm/s.
+    pub velocity: Vec<f32>,
+    /// Velocity at the state before.
+    pub velocity_before: Vec<f32>,
+    /// Smallest det F of the last corrected state.
+    pub min_det: f32,
+    /// `r` at the contact nodes of the last corrected state `[m,3]`, in their order, zero at held ones, µN.
+    pub reaction: Vec<f32>,
+}
+
+impl Motion {
+    pub(super) fn at_rest(len: usize) -> Result<Motion> {
+        Ok(Motion {
+            velocity: memory::zeros(len, "velocities")?,
+            velocity_before: memory::zeros(len, "velocities")?,
+            min_det: 1.0,
+            reaction: memory::room(len, "contact forces")?,
+        })
+    }
+
+    /// A copy.
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
+    pub fn copy(&self) -> Result<Motion> {
+        let copied = |values: &[f32]| memory::copied(values, "a copy of velocities");
+        Ok(Motion {
+            velocity: copied(&self.velocity)?,
+            velocity_before: copied(&self.velocity_before)?,
+            min_det: self.min_det,
+            reaction: copied(&self.reaction)?,
+        })
+    }
+
+    /// Takes another one's values; the room stays.
+    pub(super) fn take(&mut self, other: &Motion) {
+        self.velocity.copy_from_slice(&other.velocity);
+        self.velocity_before.copy_from_slice(&other.velocity_before);
+        self.min_det = other.min_det;
+        self.reaction.clear();
+        self.reaction.extend_from_slice(&other.reaction);
+    }
+
+    pub(super) fn clear(&mut self) {
+        self.velocity.fill(0.0);
+        self.velocity_before.fill(0.0);
+        self.min_det = 1.0;
+        self.reaction.clear();
+    }
+}
