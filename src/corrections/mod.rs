@@ -25,7 +25,7 @@ pub use input::{Enough, Input, Lent, Report};
 pub use memory::PAIRS;
 pub use motion::Motion;
 pub use space::CoarseSpace;
-pub use stage::Stage;
+pub use stage::{SMALLEST_DET, Stage};
 
 /// Most iterations a step.
 pub const LIMIT: u32 = 64;

@@ -12,7 +12,7 @@ use crate::memory;
 use crate::scene::ContactSet;
 
 /// A state whose smallest det F falls below this is not accepted.
-const SMALLEST_DET: f32 = 0.02;
+pub const SMALLEST_DET: f32 = 0.02;
 /// A step is accepted where the mean of its end slopes is below this part of the first: a test by gradients, because in f32 the
 /// rounding of the energy drowns its change.
 const SLOPE: f64 = 1e-4;

@@ -8,7 +8,7 @@ use super::core::{Core, lock_read};
 use super::engine::Engine;
 use super::published::Published;
 use super::timing::Stopwatch;
-use crate::corrections::{Enough, Input, LIMIT, Lent, Motion, Stage};
+use crate::corrections::{Enough, Input, LIMIT, Lent, Motion, SMALLEST_DET, Stage};
 use crate::error::{Error, Result};
 use crate::kernels::{Isa, Pool};
 use crate::model::Model;
@@ -163,7 +163,10 @@ impl Core {
         let Some(corrected) = &self.corrected else {
             return false;
         };
-        if self.contact.is_empty() || corrected.stage.motion.reaction.len() != out.len() {
+        // A state that fell back has inverted elements, and what they push with means nothing.
+        let motion = &corrected.stage.motion;
+        let sound = motion.min_det >= SMALLEST_DET && motion.reaction.len() == out.len();
+        if self.contact.is_empty() || !sound {
             return false;
         }
         corrected.stage.reaction(&self.contact, out);
