@@ -301,3 +301,22 @@ impl Drop for Scene {
         unsafe { ffi::upt_scene_destroy(self.handle) };
     }
 }
+
+/// An instrument of the C interface; `shape` is a `UPT_SHAPE_*`, lengths are mm, the rotation a unit quaternion x, y, z, w.
+pub fn instrument(
+    shape: i32,
+    half_extents: [f32; 3],
+    radius: f32,
+    position: [f32; 3],
+    rotation: [f32; 4],
+) -> ffi::upt_instrument {
+    // SAFETY: zero is a value of every field.
+    let mut instrument: ffi::upt_instrument = unsafe { zeroed() };
+    instrument.struct_size = size::<ffi::upt_instrument>();
+    instrument.shape = shape;
+    instrument.half_extents = half_extents;
+    instrument.radius = radius;
+    instrument.position = position;
+    instrument.rotation = rotation;
+    instrument
+}

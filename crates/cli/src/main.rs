@@ -31,6 +31,7 @@ mod rollout;
 mod simulate;
 mod soak;
 mod stress;
+mod tools;
 mod view;
 
 use std::process::ExitCode;

@@ -67,14 +67,33 @@ figcaption{font-size:13px;color:#44505c;margin-top:4px}
 ul{margin:8px 0 0;padding-left:20px;color:#44505c;font-size:14px}
 ";
 
-pub fn page(page: &Page<'_>) -> String {
-    let mut out = String::new();
-    let _ = write!(
-        out,
-        "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width\"><title>{0}</title><style>{STYLE}</style></head><body><main><h1>{0}</h1><p>{1}</p>",
-        escape(page.title),
-        escape(&page.lead)
+/// The page up to its first section; `style` is added to that of all pages.
+pub fn opening(title: &str, lead: &str, style: &str) -> String {
+    format!(
+        "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width\"><title>{0}</title><style>{STYLE}{style}</style></head><body><main><h1>{0}</h1><p>{1}</p>",
+        escape(title),
+        escape(lead)
+    )
+}
+
+/// The page with its last section: how it was measured.
+pub fn closing(mut out: String, facts: &Facts) -> String {
+    let facts: String = facts
+        .iter()
+        .map(|(name, value)| format!("<dt>{}</dt><dd>{}</dd>", escape(name), escape(value)))
+        .collect();
+    section(
+        &mut out,
+        "How this was measured",
+        "",
+        &format!("<dl>{facts}</dl>"),
     );
+    out.push_str("</main></body></html>\n");
+    out
+}
+
+pub fn page(page: &Page<'_>) -> String {
+    let mut out = opening(page.title, &page.lead, "");
     for gallery in &page.galleries {
         out.push_str(&gallery_section(gallery));
     }
@@ -143,19 +162,7 @@ pub fn page(page: &Page<'_>) -> String {
             &plot::stage_breakdown(&stages),
         );
     }
-    let facts: String = page
-        .facts
-        .iter()
-        .map(|(name, value)| format!("<dt>{}</dt><dd>{}</dd>", escape(name), escape(value)))
-        .collect();
-    section(
-        &mut out,
-        "How this was measured",
-        "",
-        &format!("<dl>{facts}</dl>"),
-    );
-    out.push_str("</main></body></html>\n");
-    out
+    closing(out, &page.facts)
 }
 
 fn stage_name(one: &Measurement) -> String {
@@ -166,7 +173,7 @@ fn stage_name(one: &Measurement) -> String {
     )
 }
 
-fn section(out: &mut String, title: &str, explanation: &str, body: &str) {
+pub fn section(out: &mut String, title: &str, explanation: &str, body: &str) {
     let explanation = if explanation.is_empty() {
         String::new()
     } else {

@@ -7,7 +7,7 @@ mod cache;
 pub mod cases;
 mod choose;
 pub mod errors;
-mod html;
+pub mod html;
 mod measure;
 mod memory;
 pub mod method;
@@ -28,7 +28,11 @@ use clap::Args;
 use tissue::mesh::Mesh;
 
 use crate::machine::Machine;
+use crate::tools::{self, cases::Split};
 use cache::Cache;
+pub use row::quantile;
+pub use write::date;
+
 use cases::Cases;
 use measure::Plan;
 use method::Method;
@@ -40,8 +44,9 @@ use setting::{Precision, Provider, Region};
   upt report --data data/brain-fixed --cases 2 --out target/report
   upt report --trajectory push.trajectory.safetensors --bundle onnx/brain-reduced --plain zero,linear
   upt report --data data/brain-fixed --threads 1,2 --region all,surface --precision f32,bf16 --json
+  upt report --tools data/brain-tools --bundle onnx/brain-reduced --corrections 0,3,5 --out target/tools
 
-report.json and report.html are written to --out; the table goes to the terminal.")]
+report.json and report.html are written to --out (with --tools: tools.json and tools.html); the table goes to the terminal.")]
 pub struct Options {
     /// Bundles; default: all below onnx/ that fit the cases' mesh and boundary condition.
     #[arg(long = "bundle", value_name = "FOLDER")]
@@ -52,7 +57,18 @@ pub struct Options {
     /// A dataset folder whose test split is replayed (repeat for several).
     #[arg(long = "data", value_name = "FOLDER")]
     data: Vec<PathBuf>,
-    /// Cases of each scheme at most.
+    /// A dataset folder or a trajectory with rigid tools (`upt dataset --tools`, repeat for several): the library is driven by
+    /// their poses alone. Of the options below --split, --cases, --corrections, --threads (the largest), --out, --title,
+    /// --markdown and --json apply.
+    #[arg(long = "tools", value_name = "PATH", conflicts_with_all = ["trajectories", "data"])]
+    tools: Vec<PathBuf>,
+    /// Cases of the datasets of --tools: held-out ones, those that bundles may learn from, or both.
+    #[arg(long, default_value = "test", requires = "tools")]
+    split: Split,
+    /// Page whose part between the markers `upt report --tools MESH` is replaced by the tables of --tools.
+    #[arg(long, value_name = "FILE", requires = "tools")]
+    markdown: Option<PathBuf>,
+    /// Cases of each scheme or programme at most.
     #[arg(long, default_value_t = 2)]
     cases: usize,
     /// Folder for report.json, report.html and the finished rows.
@@ -90,8 +106,8 @@ pub struct Options {
     #[arg(long)]
     fresh: bool,
     /// The page's title.
-    #[arg(long, default_value = "Error against run time")]
-    title: String,
+    #[arg(long)]
+    title: Option<String>,
     /// Print report.json instead of the table.
     #[arg(long)]
     json: bool,
@@ -111,6 +127,20 @@ fn default_threads() -> Vec<u32> {
 }
 
 pub fn run(options: &Options) -> Result<ExitCode> {
+    if !options.tools.is_empty() {
+        return tools::report(&tools::Plan {
+            paths: &options.tools,
+            split: options.split,
+            per_programme: options.cases,
+            bundles: &options.bundles,
+            corrections: &options.corrections,
+            threads: options.threads.iter().copied().max().unwrap_or(1),
+            out: options.out.clone(),
+            title: options.title.as_deref().unwrap_or("From pose to picture"),
+            markdown: options.markdown.clone(),
+            json: options.json,
+        });
+    }
     let cases = Cases::read(&options.trajectories, &options.data, options.cases)?;
     let mut notes = Vec::new();
     let bundles = choose::fitting_bundles(options, &cases, &mut notes)?;

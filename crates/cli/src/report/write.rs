@@ -99,7 +99,7 @@ pub fn write(
         }
     }
     let page = html::Page {
-        title: &options.title,
+        title: options.title.as_deref().unwrap_or("Error against run time"),
         lead: format!(
             "{} on {} ({} nodes), replayed autoregressively by every method on {}.",
             match cases.list.len() {
@@ -148,7 +148,7 @@ fn one_a_family(measurements: &[Measurement]) -> Vec<usize> {
 }
 
 /// Today in UTC, `YYYY-MM-DD` (Howard Hinnant's civil-from-days).
-fn date() -> String {
+pub fn date() -> String {
     let seconds = std::time::SystemTime::now()
         .duration_since(std::time::UNIX_EPOCH)
         .map_or(0, |since| since.as_secs());

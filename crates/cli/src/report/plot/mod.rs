@@ -6,7 +6,7 @@ mod frontier;
 mod histogram;
 mod stages;
 
-pub use axes::{Axes, Scale, label};
+pub use axes::{Axes, Scale, label, legend};
 pub use band::{Band, error_over_time};
 pub use frontier::{Point, frontier, pareto_front};
 pub use histogram::{Latencies, latency_histogram};

@@ -1,0 +1,216 @@
+//! The cases of the yardstick: trajectories with tools, on one mesh under one boundary condition.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+use contact::{Body, Pose, Samples, Vector};
+use tissue::mesh::Mesh;
+use tissue::solver::{Tool, ToolPose};
+use tissue::tool_tracks::ToolTracks;
+use tissue::trajectory::Trajectory;
+
+use super::drive::{Load, load};
+use crate::report::cases::finished;
+
+/// Which part of a dataset is measured.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum Split {
+    /// Held-out cases.
+    #[default]
+    Test,
+    /// Cases that bundles may learn from.
+    Train,
+    /// Both.
+    All,
+}
+
+/// One simulated case.
+pub struct ToolCase {
+    pub name: String,
+    /// `press`, `stroke` and so on.
+    pub programme: String,
+    pub tools: Vec<Tool>,
+    pub bodies: Vec<Body>,
+    pub trajectory: Trajectory,
+    /// By frame, one a tool; the first is where they start.
+    pub poses: Vec<Vec<ToolPose>>,
+}
+
+impl ToolCase {
+    fn read(path: &Path) -> Result<Self> {
+        let trajectory = Trajectory::read(path)?;
+        let Some(tracks) = trajectory.tools.as_ref().filter(|t| !t.tools.is_empty()) else {
+            bail!(
+                "{}: has no tools (scheme {}); write one with `upt simulate --tool NAME` or `upt dataset --tools NAMES`",
+                path.display(),
+                trajectory.header.scheme
+            );
+        };
+        let bodies = tracks.tools.iter().enumerate().map(|(index, tool)| {
+            Body::new(&tool.shape)
+                .with_context(|| format!("{}: field `tools`, tool {index}", path.display()))
+        });
+        let programme = trajectory.header.scheme.trim_start_matches("tool-");
+        let file = path.file_name().unwrap_or_default().to_string_lossy();
+        let stem = file.trim_end_matches(".trajectory.safetensors");
+        Ok(Self {
+            name: format!("{programme}, {stem}"),
+            programme: programme.to_owned(),
+            tools: tracks.tools.clone(),
+            bodies: bodies.collect::<Result<_>>()?,
+            poses: (0..trajectory.frame_count())
+                .map(|frame| tracks.frame(frame))
+                .collect(),
+            trajectory,
+        })
+    }
+
+    /// What the reference solver says of its tools.
+    pub fn tracks(&self) -> &ToolTracks {
+        self.trajectory
+            .tools
+            .as_ref()
+            .expect("checked where the case was read")
+    }
+
+    /// Poses at a frame.
+    pub fn at(&self, frame: usize) -> Vec<Pose> {
+        self.poses[frame].iter().map(|to| to.pose).collect()
+    }
+
+    /// The parts of a recorded force at a sample; `samples` are those of the mesh.
+    pub fn load(&self, frame: usize, row: usize, samples: &Samples, rest: &[[f32; 3]]) -> Load {
+        let tracks = self.tracks();
+        let tool = tracks.sample_tools[row] as usize;
+        let field = self.trajectory.frame(frame);
+        let sample = &samples.rows()[tracks.sample_rows[row] as usize];
+        let point = sample
+            .gather(|node| Vector::from(rest[node as usize]) + Vector::from(field[node as usize]));
+        let nearest = self.bodies[tool].nearest_at(&self.poses[frame][tool].pose, point);
+        load(
+            tool,
+            Vector::from(tracks.sample_forces[row]),
+            nearest.normal,
+        )
+    }
+
+    /// The longest way that a point of any tool goes within a frame, mm.
+    pub fn motion(&self, frame: usize) -> f32 {
+        let ends = self.poses[frame - 1].iter().zip(&self.poses[frame]);
+        let ways = ends.zip(&self.bodies);
+        ways.map(|((from, to), body)| body.motion(&from.pose, &to.pose))
+            .fold(0.0, f32::max)
+    }
+
+    /// Whether any tool is in contact at the end of a frame.
+    pub fn touches(&self, frame: usize) -> bool {
+        let count = self.tools.len();
+        let contacts = &self.tracks().contacts[frame * count..(frame + 1) * count];
+        contacts.iter().any(|contacts| *contacts > 0)
+    }
+
+    /// Sum of the sizes of the tools' forces at the end of a frame, mN.
+    fn force(&self, frame: usize) -> f32 {
+        let count = self.tools.len();
+        let wrenches = &self.tracks().wrenches[frame * count..(frame + 1) * count];
+        wrenches
+            .iter()
+            .map(|w| (w[0] * w[0] + w[1] * w[1] + w[2] * w[2]).sqrt())
+            .sum()
+    }
+
+    /// The frame that pictures show: the truth's largest force.
+    pub fn moment(&self) -> usize {
+        (1..self.poses.len())
+            .max_by(|a, b| self.force(*a).total_cmp(&self.force(*b)))
+            .unwrap_or(0)
+    }
+
+    /// The last frame of the first rest of all tools in contact, from which a hold goes on; none where they never rest.
+    pub fn hold(&self) -> Option<usize> {
+        const STILL_MM: f32 = 1e-4;
+        let still = |frame: usize| self.motion(frame) < STILL_MM && self.touches(frame);
+        let frames = self.poses.len();
+        (1..frames).rfind(|frame| still(*frame) && (*frame + 1 == frames || !still(frame + 1)))
+    }
+}
+
+/// Cases on one mesh.
+pub struct ToolCases {
+    pub list: Vec<ToolCase>,
+    pub mesh_sha256: String,
+    pub boundary: String,
+}
+
+impl ToolCases {
+    /// Reads trajectories and, of dataset folders, the finished cases of a split, at most `per_programme` of each.
+    ///
+    /// # Errors
+    /// Names the path that has no tools, or another mesh than the first.
+    pub fn read(paths: &[PathBuf], split: Split, per_programme: usize) -> Result<Self> {
+        let mut files = Vec::new();
+        for path in paths {
+            if !path.is_dir() {
+                files.push(path.clone());
+                continue;
+            }
+            let splits: &[&str] = match split {
+                Split::Test => &["test"],
+                Split::Train => &["train"],
+                Split::All => &["train", "test"],
+            };
+            let before = files.len();
+            for split in splits {
+                files.extend(finished(path, split, per_programme)?);
+            }
+            if files.len() == before {
+                bail!(
+                    "{}: no finished case of the split `{}`; choose another with --split, or go on with `upt dataset`",
+                    path.display(),
+                    splits.join("` or `")
+                );
+            }
+        }
+        let list: Vec<ToolCase> = files
+            .iter()
+            .map(|path| ToolCase::read(path))
+            .collect::<Result<_>>()?;
+        let first = &list
+            .first()
+            .context("no cases: name a dataset with tools, or a trajectory")?
+            .trajectory
+            .header;
+        let (mesh_sha256, boundary) = (first.mesh_sha256.clone(), first.boundary.clone());
+        for (case, path) in list.iter().zip(&files) {
+            let header = &case.trajectory.header;
+            if header.mesh_sha256 != mesh_sha256 || header.boundary != boundary {
+                bail!(
+                    "{}: mesh {} with boundary `{}` differs from the first case's; write one report for each",
+                    path.display(),
+                    header.mesh_name,
+                    header.boundary
+                );
+            }
+        }
+        Ok(Self {
+            list,
+            mesh_sha256,
+            boundary,
+        })
+    }
+
+    /// Checks that the trajectories have as many nodes as the mesh.
+    pub fn check(&self, mesh: &Mesh) -> Result<()> {
+        for case in &self.list {
+            let nodes = case.trajectory.frame(0).len();
+            if nodes != mesh.node_count() {
+                bail!(
+                    "{}: field `displacement` has {nodes} nodes, the mesh {}; simulate the case again",
+                    case.name,
+                    mesh.node_count()
+                );
+            }
+        }
+        Ok(())
+    }
+}

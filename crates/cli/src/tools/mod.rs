@@ -1,0 +1,361 @@
+//! The yardstick from pose to picture (`upt report --tools`): the library is driven by the poses of rigid tools alone, step by
+//! step from its own last state, and is measured by the reference solver's answer to the same poses.
+//!
+//! | module | what |
+//! |---|---|
+//! | [`cases`] | trajectories with tools |
+//! | [`drive`] | how the library is driven |
+//! | [`yard`] | det F and penetration of one state |
+//! | [`measure`], [`row`] | a case, and the rows over cases |
+//! | [`section`], [`force`], [`table`], [`page`] | what is shown |
+
+pub mod cases;
+pub mod drive;
+mod force;
+mod measure;
+mod page;
+mod row;
+mod section;
+mod table;
+pub mod yard;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::{Context, Result, bail};
+use serde_json::json;
+use tissue::mesh::{Boundary, Mesh};
+
+use crate::host;
+use crate::machine::Machine;
+use crate::report::method::BundleFolder;
+use crate::report::plot::colour;
+use crate::stress::{progress, replace_between};
+use cases::{Split, ToolCases};
+use drive::{Drive, Driver};
+use measure::{Outcome, Truth};
+use row::{ALL, CaseFigures, Label, Row};
+use yard::Yard;
+
+/// What is measured.
+pub struct Plan<'a> {
+    /// Dataset folders and trajectories.
+    pub paths: &'a [PathBuf],
+    pub split: Split,
+    /// Cases of a programme at most.
+    pub per_programme: usize,
+    pub bundles: &'a [PathBuf],
+    /// Corrections a step; none: 0 and as many as a bundle recommends.
+    pub corrections: &'a [u32],
+    pub threads: u32,
+    pub out: PathBuf,
+    pub title: &'a str,
+    /// A page whose part between the markers `upt report --tools` and the mesh's name is replaced.
+    pub markdown: Option<PathBuf>,
+    pub json: bool,
+}
+
+/// A bundle in one configuration.
+struct Method {
+    bundle: BundleFolder,
+    drive: Drive,
+    corrections: u32,
+}
+
+impl Method {
+    fn label(&self) -> Label {
+        Label {
+            bundle: self.bundle.name.clone(),
+            drive: self.drive.name(),
+            corrections: self.corrections,
+        }
+    }
+
+    fn name(&self) -> String {
+        format!(
+            "{}, {}, k = {}",
+            self.bundle.name,
+            self.drive.name(),
+            self.corrections
+        )
+    }
+}
+
+/// A method's cases.
+struct Measured {
+    name: String,
+    outcomes: Vec<Outcome>,
+    rows: Vec<Row>,
+    figures: Vec<CaseFigures>,
+}
+
+/// Measures, and writes tools.json and tools.html.
+pub fn report(plan: &Plan) -> Result<ExitCode> {
+    let cases = ToolCases::read(plan.paths, plan.split, plan.per_programme)?;
+    let mut notes = Vec::new();
+    let bundles = fitting(plan, &cases, &mut notes)?;
+    let boundary: Boundary = cases.boundary.parse().map_err(anyhow::Error::msg)?;
+    let mesh = Mesh::read(&bundles[0].mesh_file)?;
+    cases.check(&mesh)?;
+    let mut yard = Yard::new(&mesh, boundary);
+    let truths: Vec<Truth> = cases
+        .list
+        .iter()
+        .map(|case| Truth::of(case, &mesh, boundary, &mut yard))
+        .collect();
+    let figures: Vec<CaseFigures> = cases
+        .list
+        .iter()
+        .zip(&truths)
+        .map(|(case, truth)| CaseFigures::of_truth(case, truth))
+        .collect();
+    let label = Label {
+        bundle: String::new(),
+        drive: "reference solver",
+        corrections: 0,
+    };
+    let mut rows = row::rows(&label, &figures);
+    let mut details = vec![json!({"method": label.drive, "cases": figures})];
+    let mut all = Vec::new();
+    for method in methods(plan, &bundles) {
+        let name = method.name();
+        match measure_all(&method, plan, &cases, &truths, &mut yard) {
+            Ok(measured) => {
+                details.push(json!({"method": name, "cases": measured.figures}));
+                rows.extend(measured.rows.iter().cloned());
+                all.push(measured);
+            }
+            Err(error) => notes.push(format!("{name}: {error:#}")),
+        }
+    }
+    if all.is_empty() {
+        bail!("nothing could be measured: {}", notes.join("; "));
+    }
+    let report = write(plan, &cases, &mesh, &truths, &all, &rows, &details, &notes)?;
+    if plan.json {
+        println!("{}", serde_json::to_string_pretty(&report)?);
+    } else {
+        print!("{}", table::text(&rows));
+        for note in &notes {
+            println!("left out: {note}");
+        }
+        println!("{}", plan.out.join("tools.html").display());
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The bundles on the cases' mesh under their boundary condition; where bundles were named, another mesh is an error.
+fn fitting(plan: &Plan, cases: &ToolCases, notes: &mut Vec<String>) -> Result<Vec<BundleFolder>> {
+    let named = !plan.bundles.is_empty();
+    let paths = match named {
+        true => plan.bundles.to_vec(),
+        false => crate::doctor::bundles_below("onnx".as_ref()),
+    };
+    let mesh = &cases.list[0].trajectory.header.mesh_name;
+    let mut fitting = Vec::new();
+    for path in &paths {
+        let bundle = BundleFolder::read(path)?;
+        let reason = if bundle.mesh_sha256 != cases.mesh_sha256 {
+            format!(
+                "{}: made for another mesh than that of the cases ({mesh})",
+                bundle.name
+            )
+        } else if bundle.boundary != cases.boundary {
+            format!(
+                "{}: made for the boundary `{}`, the cases have `{}`",
+                bundle.name, bundle.boundary, cases.boundary
+            )
+        } else {
+            fitting.push(bundle);
+            continue;
+        };
+        if named {
+            bail!("{reason}; name a bundle or a dataset that fits");
+        }
+        notes.push(reason);
+    }
+    if fitting.is_empty() {
+        bail!("no bundle below onnx/ fits the mesh {mesh} of the cases; name one with --bundle");
+    }
+    Ok(fitting)
+}
+
+fn methods(plan: &Plan, bundles: &[BundleFolder]) -> Vec<Method> {
+    let mut methods = Vec::new();
+    for bundle in bundles {
+        let mut counts = match bundle.corrections {
+            None => vec![0],
+            Some(recommended) if plan.corrections.is_empty() => vec![0, recommended],
+            Some(_) => plan.corrections.to_vec(),
+        };
+        counts.dedup();
+        for drive in Drive::ALL {
+            methods.extend(counts.iter().map(|corrections| Method {
+                bundle: bundle.clone(),
+                drive,
+                corrections: *corrections,
+            }));
+        }
+    }
+    methods
+}
+
+fn measure_all(
+    method: &Method,
+    plan: &Plan,
+    cases: &ToolCases,
+    truths: &[Truth],
+    yard: &mut Yard,
+) -> Result<Measured> {
+    let settings = host::ModelSettings {
+        threads: plan.threads,
+        corrections: Some(method.corrections),
+        ..host::ModelSettings::default()
+    };
+    let model = host::Model::open(&method.bundle.path, &settings)?;
+    let mut driver = Driver::new(&model, method.drive)?;
+    let name = method.name();
+    let bar = progress(cases.list.len(), &name);
+    let (mut outcomes, mut figures) = (Vec::new(), Vec::new());
+    for (case, truth) in cases.list.iter().zip(truths) {
+        let outcome =
+            measure::measure(case, truth, &mut driver, yard).with_context(|| case.name.clone())?;
+        figures.push(CaseFigures::of(case, truth, &outcome));
+        outcomes.push(outcome);
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    Ok(Measured {
+        rows: row::rows(&method.label(), &figures),
+        name,
+        outcomes,
+        figures,
+    })
+}
+
+/// The first case of each programme, with every method in it.
+fn pictures(
+    cases: &ToolCases,
+    mesh: &Mesh,
+    truths: &[Truth],
+    all: &[Measured],
+) -> Vec<page::Pictured> {
+    let mut seen: Vec<&str> = Vec::new();
+    let mut pictured = Vec::new();
+    for (index, case) in cases.list.iter().enumerate() {
+        if seen.contains(&case.programme.as_str()) {
+            continue;
+        }
+        seen.push(&case.programme);
+        let frame = case.moment();
+        let time = frame as f64 * case.trajectory.header.dt_s;
+        let each = all.iter().enumerate().map(|(at, one)| {
+            let outcome = &one.outcomes[index];
+            let mse = outcome.moments[frame - 1].mse_mm2;
+            let name = format!("{}: MSE {} mm²", one.name, crate::report::plot::label(mse));
+            section::picture(mesh, case, frame, &outcome.pictured, &name, colour(at))
+        });
+        let lines: Vec<(&Outcome, &str)> = all
+            .iter()
+            .enumerate()
+            .map(|(at, one)| (&one.outcomes[index], colour(at)))
+            .collect();
+        pictured.push(page::Pictured {
+            title: format!("{}: {time:.2} s", case.name),
+            sections: each.collect(),
+            forces: force::plots(case, &truths[index], &lines),
+        });
+    }
+    pictured
+}
+
+#[allow(clippy::too_many_arguments)]
+fn write(
+    plan: &Plan,
+    cases: &ToolCases,
+    mesh: &Mesh,
+    truths: &[Truth],
+    all: &[Measured],
+    rows: &[Row],
+    details: &[serde_json::Value],
+    notes: &[String],
+) -> Result<serde_json::Value> {
+    std::fs::create_dir_all(&plan.out)
+        .with_context(|| format!("cannot make {}", plan.out.display()))?;
+    let machine = Machine::this();
+    let header = &cases.list[0].trajectory.header;
+    let date = crate::report::date();
+    let report = json!({
+        "machine": machine,
+        "date": date,
+        "threads": plan.threads,
+        "versions": {"upt": env!("CARGO_PKG_VERSION"), "solver": header.solver},
+        "mesh": {"name": header.mesh_name, "sha256": cases.mesh_sha256, "nodes": mesh.node_count(), "boundary": cases.boundary},
+        "rows": rows,
+        "methods": details,
+        "left_out": notes,
+    });
+    std::fs::write(
+        plan.out.join("tools.json"),
+        serde_json::to_string_pretty(&report)? + "\n",
+    )?;
+    let lead = format!(
+        "{} cases of rigid tools on {} ({} nodes), every method driven by the tools' poses alone.",
+        cases.list.len(),
+        header.mesh_name,
+        mesh.node_count()
+    );
+    let facts = vec![
+        (
+            "machine".into(),
+            format!("{}, {} cores, {}", machine.cpu, machine.cores, machine.os),
+        ),
+        ("date".into(), date.clone()),
+        ("threads".into(), plan.threads.to_string()),
+        (
+            "versions".into(),
+            format!(
+                "upt {}, reference {}",
+                env!("CARGO_PKG_VERSION"),
+                header.solver
+            ),
+        ),
+        (
+            "cases".into(),
+            cases
+                .list
+                .iter()
+                .map(|case| case.name.as_str())
+                .collect::<Vec<_>>()
+                .join("; "),
+        ),
+    ];
+    let page = page::Page {
+        title: plan.title,
+        lead: lead.clone(),
+        rows,
+        keys: all
+            .iter()
+            .enumerate()
+            .map(|(at, one)| (one.name.clone(), colour(at)))
+            .collect(),
+        pictured: pictures(cases, mesh, truths, all),
+        notes: notes.iter().map(|n| format!("Left out: {n}")).collect(),
+        facts,
+    };
+    std::fs::write(plan.out.join("tools.html"), page::page(&page))?;
+    if let Some(path) = &plan.markdown {
+        let over_all: Vec<&Row> = rows.iter().filter(|row| row.programme == ALL).collect();
+        let text = format!(
+            "\n{lead} {} ({} cores, {} thread), {date}.\n\n{}\n{}",
+            machine.cpu,
+            machine.cores,
+            plan.threads,
+            table::markdown(&over_all),
+            table::markdown(&table::by_programme(rows))
+        );
+        let name = format!("upt report --tools {}", header.mesh_name);
+        replace_between(path, &name, &text)?;
+    }
+    Ok(report)
+}

@@ -1,0 +1,136 @@
+//! The rows as a table: for the terminal, for a page and for a document.
+
+use super::row::{ALL, Row};
+use crate::report::plot::label;
+
+/// What a column shows of a row.
+type Cell = fn(&Row) -> String;
+
+/// Column titles and cells; the first three name the row.
+pub const COLUMNS: &[(&str, Cell)] = &[
+    ("method", |row| match row.bundle.as_str() {
+        "" => row.drive.to_owned(),
+        bundle => format!("{bundle}, {}", row.drive),
+    }),
+    ("k", |row| match row.bundle.as_str() {
+        "" => "-".into(),
+        _ => row.corrections.to_string(),
+    }),
+    ("programme", |row| row.programme.clone()),
+    ("cases", |row| row.cases.to_string()),
+    ("MSE mean, mm²", |row| label(row.mse_mean_mm2)),
+    ("median", |row| label(row.mse_median_mm2)),
+    ("slip-offs", |row| row.slips.to_string()),
+    ("largest error, mm", |row| label(row.max_error_mm)),
+    ("det F", |row| format!("{:.2}", row.min_det)),
+    ("inverted", |row| percent(row.inverted)),
+    ("silent", |row| percent(row.inverted_silent)),
+    ("penetration, mm", |row| label(row.penetration_mm)),
+    ("jump", |row| format!("{:.2}", row.jump_median)),
+    ("force", |row| row.force_error.map_or_else(none, percent)),
+    ("torque", |row| row.torque_error.map_or_else(none, percent)),
+    ("friction", |row| {
+        row.friction_excess
+            .map_or_else(none, |excess| match excess {
+                excess if excess > 9.99 => "above 10".into(),
+                excess => format!("{excess:+.2}"),
+            })
+    }),
+    ("still, mm", |row| {
+        row.still_beyond_mm.map_or_else(none, label)
+    }),
+    ("found again", |row| row.found_again.to_string()),
+    ("ms", |row| row.ms_median.map_or_else(none, label)),
+    ("contact ms", |row| {
+        row.contact_ms_median.map_or_else(none, label)
+    }),
+];
+
+/// What the columns mean, for a page.
+pub const MEANING: &str = "All methods get the poses of the tools and nothing else, each step from their own last state. \
+MSE: mean over steps and nodes of the squared distance to the reference solver, mean and median over the cases, without the steps around \
+a slip-off (the tissue of the truth leaves a tool that touches it faster than the tool moves). det F: the smallest of any element in any step. \
+Inverted: steps with an element inside out; silent: those of them without a flag. Penetration: the deepest of points 1 mm apart. Jump: the \
+largest motion of a node in a step over the truth's largest (median of the cases). Force and torque: relative L2 error over the steps, \
+median of the tools. Friction: the largest sum of tangential over normal force of a tool, less its coefficient. Still: the largest motion \
+of a node in a step after the tools have not moved for 1 s, beyond the truth's where the truth was held as long. Found again: contacts that begin after one was lost and that the truth has not.";
+
+fn none() -> String {
+    "-".into()
+}
+
+fn percent(share: f64) -> String {
+    match share {
+        0.0 => "0".into(),
+        share if share < 0.001 => format!("{:.2} %", 100.0 * share),
+        share if share < 0.1 => format!("{:.1} %", 100.0 * share),
+        share => format!("{:.0} %", 100.0 * share),
+    }
+}
+
+/// Rows of one programme together, each in the order of the methods.
+pub fn by_programme(rows: &[Row]) -> Vec<&Row> {
+    let mut programmes: Vec<&str> = Vec::new();
+    for row in rows.iter().filter(|row| row.programme != ALL) {
+        if !programmes.contains(&row.programme.as_str()) {
+            programmes.push(&row.programme);
+        }
+    }
+    let own = |programme| rows.iter().filter(move |row| row.programme == programme);
+    programmes.into_iter().flat_map(own).collect()
+}
+
+/// Aligned columns, figures to the right.
+pub fn text(rows: &[Row]) -> String {
+    let mut lines: Vec<Vec<String>> =
+        vec![COLUMNS.iter().map(|column| column.0.to_owned()).collect()];
+    lines.extend(
+        rows.iter()
+            .map(|row| COLUMNS.iter().map(|column| (column.1)(row)).collect()),
+    );
+    let widths: Vec<usize> = (0..COLUMNS.len())
+        .map(|column| {
+            let cells = lines.iter().map(|line| line[column].chars().count());
+            cells.max().unwrap_or(0)
+        })
+        .collect();
+    let mut out = String::new();
+    for line in lines {
+        let cells: Vec<String> = line
+            .iter()
+            .zip(&widths)
+            .enumerate()
+            .map(|(column, (cell, width))| {
+                let space = " ".repeat(width - cell.chars().count());
+                if column == 0 || column == 2 {
+                    format!("{cell}{space}")
+                } else {
+                    format!("{space}{cell}")
+                }
+            })
+            .collect();
+        out.push_str(cells.join("  ").trim_end());
+        out.push('\n');
+    }
+    out
+}
+
+/// A table of Markdown.
+pub fn markdown(rows: &[&Row]) -> String {
+    let head: Vec<&str> = COLUMNS.iter().map(|column| column.0).collect();
+    let rule: Vec<&str> = (0..COLUMNS.len())
+        .map(|column| {
+            if column == 0 || column == 2 {
+                "---"
+            } else {
+                "---:"
+            }
+        })
+        .collect();
+    let mut out = format!("| {} |\n|{}|\n", head.join(" | "), rule.join("|"));
+    for row in rows {
+        let cells: Vec<String> = COLUMNS.iter().map(|column| (column.1)(row)).collect();
+        out.push_str(&format!("| {} |\n", cells.join(" | ")));
+    }
+    out
+}

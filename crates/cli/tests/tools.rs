@@ -1,0 +1,148 @@
+//! `upt report --tools`: from simulated tools to rows and a page, and what is refused.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+const MESH: &str = "tests/fixtures/box.mesh.safetensors";
+const BUNDLE: &str = "tests/fixtures/tiny-corrected";
+const NAME: &str = "tiny-reduced";
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+fn upt(arguments: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_upt"));
+    command.current_dir(root()).args(arguments);
+    if std::env::var_os("ORT_DYLIB_PATH").is_none() {
+        let library = root().join("target/ort/libonnxruntime.so");
+        command.env("ORT_DYLIB_PATH", library);
+    }
+    command.output().expect("upt starts")
+}
+
+fn told(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// Simulates a programme on a mesh.
+fn simulate(folder: &Path, mesh: &str, load: [&str; 2]) -> String {
+    let file = folder.join(format!("{}.trajectory.safetensors", load[1]));
+    let file = file.to_str().unwrap().to_owned();
+    let output = upt(&[&["simulate", "--mesh", mesh, "--out", &file][..], &load].concat());
+    assert!(output.status.success(), "{}", told(&output));
+    file
+}
+
+#[test]
+fn tools_are_driven_by_poses_and_measured() {
+    let folder = tempfile::tempdir().unwrap();
+    let press = simulate(folder.path(), MESH, ["--tool", "press"]);
+    let lift = simulate(folder.path(), MESH, ["--tool", "lift"]);
+    let out = folder.path().join("out");
+    let page = folder.path().join("page.md");
+    let output = upt(&[
+        "report",
+        "--tools",
+        &press,
+        "--tools",
+        &lift,
+        "--bundle",
+        BUNDLE,
+        "--corrections",
+        "0,2",
+        "--out",
+        out.to_str().unwrap(),
+        "--json",
+    ]);
+    assert!(output.status.success(), "{}", told(&output));
+    let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let rows = report["rows"].as_array().unwrap();
+    let of = |bundle: &str, programme: &str| -> Vec<&serde_json::Value> {
+        let fits =
+            |row: &&serde_json::Value| row["bundle"] == bundle && row["programme"] == programme;
+        rows.iter().filter(fits).collect()
+    };
+    let truth = of("", "press");
+    assert_eq!(truth.len(), 1);
+    assert_eq!(truth[0]["mse_mean_mm2"], 0.0);
+    assert!(truth[0]["min_det"].as_f64().unwrap() > 0.0);
+    for programme in ["press", "lift", "all but grasp"] {
+        let own = of(NAME, programme);
+        assert!(own.len() >= 2, "{programme}: {} rows", own.len());
+        for row in own {
+            assert!(row["mse_mean_mm2"].as_f64().unwrap().is_finite(), "{row}");
+            assert!(row["penetration_mm"].as_f64().unwrap() >= 0.0, "{row}");
+        }
+    }
+    let html = std::fs::read_to_string(out.join("tools.html")).unwrap();
+    // The dent of each case by each method, and a force a tool.
+    assert!(html.matches("<svg").count() >= 2 * 2 + 2);
+    assert!(html.contains("reference solver") && html.contains("press, press"));
+
+    let marked = "before\n<!-- begin: upt report --tools box -->\n<!-- end: upt report --tools box -->\nafter\n";
+    std::fs::write(&page, marked).unwrap();
+    let output = upt(&[
+        "report",
+        "--tools",
+        &press,
+        "--bundle",
+        BUNDLE,
+        "--out",
+        out.to_str().unwrap(),
+        "--markdown",
+        page.to_str().unwrap(),
+    ]);
+    assert!(output.status.success(), "{}", told(&output));
+    let text = std::fs::read_to_string(&page).unwrap();
+    assert!(text.starts_with("before\n") && text.ends_with("after\n"));
+    assert!(text.contains(&format!("| {NAME}, ")), "{text}");
+}
+
+#[test]
+fn cases_that_cannot_be_measured_are_refused_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let out = out.to_str().unwrap();
+    let refused = |arguments: &[&str], words: &[&str]| {
+        let output = upt(&[&["report", "--out", out], arguments].concat());
+        let message = told(&output);
+        assert_eq!(output.status.code(), Some(2), "{message}");
+        for word in words {
+            assert!(message.contains(word), "{word}: {message}");
+        }
+    };
+    let plain = simulate(folder.path(), MESH, ["--scheme", "5"]);
+    refused(
+        &["--tools", &plain, "--bundle", BUNDLE],
+        &["has no tools", "--tool NAME"],
+    );
+    let press = simulate(folder.path(), MESH, ["--tool", "press"]);
+    refused(
+        &["--tools", &press, "--bundle", "onnx/brain-coarse-reduced"],
+        &["another mesh", "brain-coarse-reduced"],
+    );
+    refused(
+        &[
+            "--tools",
+            folder.path().to_str().unwrap(),
+            "--bundle",
+            BUNDLE,
+        ],
+        &["manifest.json"],
+    );
+    let data = folder.path().join("data");
+    let data = data.to_str().unwrap();
+    let output = upt(&[
+        "dataset", "--mesh", MESH, "--tools", "press", "--count", "1", "--out", data,
+    ]);
+    assert!(output.status.success(), "{}", told(&output));
+    refused(
+        &["--tools", data, "--bundle", BUNDLE],
+        &["no finished case of the split `test`", "--split"],
+    );
+    let output = upt(&[
+        "report", "--tools", data, "--split", "all", "--bundle", BUNDLE, "--out", out,
+    ]);
+    assert!(output.status.success(), "{}", told(&output));
+}
