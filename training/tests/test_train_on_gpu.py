@@ -26,7 +26,8 @@ def call(config: Path, data: Path, mesh: Path, out: Path, **environment: str) ->
 
 def test_a_slice_of_two_processes_ends_together_and_the_next_slice_finishes_and_exports(data, mesh_path, tmp_path):
     out, config = tmp_path / "run", tmp_path / "short.toml"
-    config.write_text((CONFIGS / "tiny.toml").read_text() + "steps_per_epoch = 5\n")
+    levers = "scored_rows = 40\ndrawn_supernodes = 24\nbf16 = true\nresident_gb = 1.0\n"
+    config.write_text((CONFIGS / "tiny.toml").read_text() + "steps_per_epoch = 5\n" + levers)
     first = call(config, data, mesh_path, out, GPUS="2", SLICE_MINUTES="0.0001")
     assert "time limit at step 1;" in first and (out / "last.pt").exists() and not (out / "bundle").exists()
     second = call(config, data, mesh_path, out, SLICE_MINUTES="9")

@@ -45,8 +45,8 @@ def test_the_gradient_of_a_window_is_its_slope(data, mesh_path, tmp_path):
     settings = load_settings(CONFIGS / "tiny.toml")
     trainer = make_trainer(settings, data, load_mesh(mesh_path), None, tmp_path, "cpu")
     model, stepper, cache = trainer.model.double().eval(), trainer.stepper, trainer.train_cache
-    for name in ("positions", "free", "mask"):
-        setattr(stepper, name, getattr(stepper, name).double())
+    stepper.positions, stepper.free = stepper.positions.double(), stepper.free.double()
+    encoded = stepper.all._replace(mask=stepper.all.mask.double())
     targets = [
         {key: value.double() for key, value in cache.fields(np.array([0, 1]), np.full(2, t)).items()}
         for t in range(4, 7)
@@ -59,8 +59,7 @@ def test_the_gradient_of_a_window_is_its_slope(data, mesh_path, tmp_path):
             fields = {"displacement": state.u, "previous_displacement": state.previous}
             fields |= {"collision": target["c"], "contact": target["contact"]}
             source, key, query = tables
-            graph = (stepper.neighbours, stepper.mask, stepper.supernodes)
-            out = model(model.normalise(fields), (source, key), *graph, query)
+            out = model(model.normalise(fields), (source, key), *encoded[:3], query)
             state = State(out, state.u, None)
             total = total + squared_error(out, target["u"]).mean()
         return total
@@ -155,4 +154,9 @@ def test_a_run_is_not_overwritten_and_a_time_limit_leaves_a_checkpoint(data, mes
     shutil.copyfile(CONFIGS / "tiny-replay.toml", out / "config.toml")
     assert train(data, mesh_path, out, "tiny.toml", "--resume", "--max-minutes", "1e-9") == 2
     assert "another configuration" in capsys.readouterr().err
+    trainer = make_trainer(load_settings(CONFIGS / "tiny.toml"), data, load_mesh(mesh_path), None, tmp_path, "cpu")
+    saved, trainer.total_steps = [], 3
+    trainer.save, trainer.settings.train.evaluate_every = saved.append, 10**9
+    trainer.fit(report=lambda *a, **k: None, checkpoint_minutes=1e-9)
+    assert saved == ["last.pt", "last.pt", "best.pt", "last.pt"]
     assert (out / "last.pt").read_bytes() == before

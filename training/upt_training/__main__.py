@@ -1,4 +1,4 @@
-"""`python -m upt_training train | evaluate | export | ablate`; `--help` on each.
+"""`python -m upt_training train | evaluate | export | bench | scaling | ablate`; `--help` on each.
 
 Wrong input ends with a message and exit code 2.
 """
@@ -32,6 +32,10 @@ def parser() -> argparse.ArgumentParser:
     train.add_argument("--device", default="auto", help="auto, cpu, cuda, cuda:N")
     train.add_argument("--threads", type=int, default=1)
     train.add_argument("--max-minutes", type=float, default=0.0, help="stop with a checkpoint after this time")
+
+    train.add_argument(
+        "--checkpoint-minutes", type=float, default=10.0, help="write last.pt so often; 0: only at scores"
+    )
 
     evaluate = commands.add_parser("evaluate", help="autoregressive rollouts of a bundle on held-out cases, as JSON")
     evaluate.add_argument("bundle", type=Path)
@@ -90,6 +94,34 @@ def parser() -> argparse.ArgumentParser:
     rest = commands.add_parser("rest", help="measure where free motion ends beside rest, and write it")
     rest.add_argument("bundle", type=Path, nargs="+", help="bundle folders, changed in place")
 
+    bench = commands.add_parser("bench", help="samples a core-second of a training step, lever by lever: a table")
+    bench.add_argument("--config", type=Path, required=True)
+    bench.add_argument("--data", type=Path, required=True)
+    bench.add_argument("--mesh", type=Path)
+    bench.add_argument("--prior", type=Path)
+    bench.add_argument("--vibration", type=Path)
+    bench.add_argument("--init", type=Path, help="checkpoint whose weights the gradients are compared at")
+    bench.add_argument("--steps", type=int, default=4, help="places of the schedule, an optimiser step each")
+    bench.add_argument("--rounds", type=int, default=2, help="the fastest of so many counts")
+    bench.add_argument("--draws", type=int, default=16, help="windows averaged where rows or supernodes are drawn")
+    bench.add_argument("--page", type=Path, help="page to write into: docs/training.md")
+
+    scaling = commands.add_parser("scaling", help="error against parameters and core-hours: tables and plots")
+    scaling.add_argument("--data", type=Path, required=True)
+    scaling.add_argument("--configs", type=Path, default=Path("training/configs"), help="folder of configurations")
+    scaling.add_argument("--mesh", type=Path)
+    scaling.add_argument("--prior", type=Path)
+    scaling.add_argument("--vibration", type=Path)
+    scaling.add_argument("--out", type=Path, required=True, help="folder of the runs; finished ones are kept")
+    scaling.add_argument("--sizes", nargs="*", default=["0.1", "0.2", "0.9", "3.4"], help="millions of parameters")
+    scaling.add_argument("--inputs", nargs="*", default=["plain", "prior"], choices=["plain", "prior"])
+    scaling.add_argument("--seeds", nargs="*", type=int, default=[1])
+    scaling.add_argument("--train-cases", nargs="*", type=int, default=[0], help="0: all")
+    scaling.add_argument("--core-minutes", type=float, default=60.0, help="training time of each run")
+    scaling.add_argument("--cases", type=int, default=4, help="held-out cases scored")
+    scaling.add_argument("--report-only", action="store_true", help="tables and plots of what is done")
+    scaling.add_argument("--page", type=Path, help="page to write into: docs/training.md and its images")
+
     ablate = commands.add_parser("ablate", help="variants of a configuration at one small budget: tables and plots")
     ablate.add_argument("suite", choices=["windows", "tricks"])
     ablate.add_argument("--config", type=Path, required=True)
@@ -123,6 +155,14 @@ def main(arguments: list[str] | None = None) -> int:
             from upt_training.ablate import ablate_command
 
             return ablate_command(options)
+        if options.command == "bench":
+            from upt_training.bench import bench_command
+
+            return bench_command(options)
+        if options.command == "scaling":
+            from upt_training.scaling import scaling_command
+
+            return scaling_command(options)
         if options.command == "transfer":
             from upt_training.transfer import transfer_command
 

@@ -90,15 +90,23 @@ class TrainSettings:
     corrupt_contact: float = 0.0  # probability that a contact state is replaced by a corrupted one (replay)
     loss_nodes: int = 0  # nodes decoded and scored a step besides the needed ones; 0: all nodes
     balance_mm2: float = 0.0  # >0: a sample weighs balance / (balance + MSE of its base), so that releases do not drown
-    scored_rows: int = 0  # rows a one-step window is scored on (drawn anew each time); 0: all of the subset
+    scored_rows: int = 0  # rows a prediction is scored on, drawn anew for each; 0: all of the subset
+    drawn_supernodes: int = 0  # supernodes a window is encoded with, drawn anew for each; 0: all
     exact_boundary: bool = False  # held nodes 0 and contact nodes c inside the training rollout
-    bf16: bool = False
+    bf16: bool = False  # bfloat16 products where the device has fast ones
+    resident_gb: float = 0.0  # training cases that take no more than this are held in memory; 0: memory-mapped
     seed: int = 1
     evaluate_every: int = 5
     evaluate_cases: int = 10
     patience: int = 0  # evaluations without improvement before stopping; 0: never
     schemes: list[str] = field(default_factory=list)  # empty: all schemes of the data
     train_cases: int = 0  # 0: all
+
+    @property
+    def samples_per_step(self) -> int:
+        """Predictions that one process scores in an optimiser step."""
+        window = {"replay": self.window, "teacher": 1, "stf": self.window - 1}[self.strategy]
+        return self.micro_batch * self.accumulate * window
 
 
 @dataclass

@@ -9,7 +9,8 @@ array: at contact nodes it is the displacement itself.
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
+import os
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,8 @@ import torch
 from upt_training.dataset import Case, open_trajectory
 from upt_training.mesh_file import Mesh
 from upt_training.prior_table import PriorTable
+
+TORCH = {np.dtype(np.float16): torch.float16, np.dtype(np.uint8): torch.uint8}
 
 
 @dataclass
@@ -31,6 +34,7 @@ class FieldCache:
     displacement: list[np.ndarray]
     contact: list[np.ndarray]
     prior: list[np.ndarray] | None
+    resident: dict[str, torch.Tensor] = field(default_factory=dict)  # all cases in a row, `[cases * F, n, ...]`
 
     @property
     def case_count(self) -> int:
@@ -40,17 +44,36 @@ class FieldCache:
     def frame_count(self) -> int:
         return len(self.displacement[0])
 
+    def hold(self, limit_gb: float, device: torch.device) -> bool:
+        """Keep the cases in the device's memory if they take no more than `limit_gb`, to be read by one gather."""
+        parts = {"u": self.displacement, "contact": self.contact, "prior": self.prior}
+        parts = {name: arrays for name, arrays in parts.items() if arrays is not None}
+        if sum(a.nbytes for arrays in parts.values() for a in arrays) > limit_gb * 1e9:
+            return False
+        for name, arrays in parts.items():
+            rows = torch.empty((self.case_count * self.frame_count, *arrays[0].shape[1:]), dtype=TORCH[arrays[0].dtype])
+            for case, array in enumerate(arrays):
+                rows[case * self.frame_count : (case + 1) * self.frame_count] = torch.from_numpy(np.array(array))
+            self.resident[name] = rows.to(device)
+        return True
+
     def fields(self, case: np.ndarray, frame: np.ndarray) -> dict[str, torch.Tensor]:
         """Truth at `frame` (`[B]`, -1 is rest): `u`, `c`, `prior` `[B, n, 3]` mm, `contact` `[B, n, 1]`."""
-        at = list(zip(case, np.maximum(frame, 0), strict=True))
+        frame = np.maximum(frame, 0)
+        index = torch.from_numpy(case * self.frame_count + frame)
 
-        def read(arrays: list[np.ndarray]) -> torch.Tensor:
-            return torch.from_numpy(np.stack([arrays[c][t] for c, t in at]).astype(np.float32))
+        def read(name: str, arrays: list[np.ndarray]) -> torch.Tensor:
+            if name in self.resident:
+                rows = self.resident[name]
+                return rows.index_select(0, index.to(rows.device)).float()
+            return torch.from_numpy(
+                np.stack([arrays[c][t] for c, t in zip(case, frame, strict=True)]).astype(np.float32)
+            )
 
-        u, contact = read(self.displacement), read(self.contact)[..., None]
+        u, contact = read("u", self.displacement), read("contact", self.contact)[..., None]
         out = {"u": u, "contact": contact, "c": u * contact}
         if self.prior is not None:
-            out["prior"] = read(self.prior)
+            out["prior"] = read("prior", self.prior)
         return out
 
 
@@ -103,6 +126,6 @@ def _write_case(stem: Path, mesh: Mesh, case: Case, nodes: np.ndarray, prior: Pr
 
 
 def _save(path: Path, array: np.ndarray) -> None:
-    staging = path.with_suffix(".tmp.npy")
+    staging = path.with_suffix(f".{os.getpid()}.tmp.npy")  # another process may make the same cache
     np.save(staging, array)
     staging.rename(path)

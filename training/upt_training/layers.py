@@ -12,6 +12,7 @@ from torch import nn
 from torch.nn import functional
 
 EPS = 1e-6
+DENSE_KEYS = 1024  # on the CPU PyTorch's fused attention is no faster in bfloat16; so many scores a query fit its cache
 
 
 def sincos_frequencies(width: int) -> np.ndarray:
@@ -60,7 +61,14 @@ def attend(q: torch.Tensor, k: torch.Tensor, v: torch.Tensor, heads: int) -> tor
     def split(x: torch.Tensor) -> torch.Tensor:
         return x.unflatten(-1, (heads, -1)).transpose(-2, -3)
 
-    return functional.scaled_dot_product_attention(split(q), split(k), split(v)).transpose(-2, -3).flatten(-2)
+    q, k, v = split(q), split(k), split(v)
+    if k.dtype == torch.bfloat16 and k.device.type == "cpu" and k.shape[-2] <= DENSE_KEYS:
+        q = q.to(k.dtype)
+        with torch.autocast("cpu", enabled=False):
+            out = ((q * q.shape[-1] ** -0.5) @ k.transpose(-1, -2)).softmax(-1) @ v
+    else:
+        out = functional.scaled_dot_product_attention(q, k, v)
+    return out.transpose(-2, -3).flatten(-2)
 
 
 class Block(nn.Module):
@@ -139,4 +147,5 @@ class Decoder(nn.Module):
             q = q.expand(*k.shape[:-2], *q.shape)
         y = x + self.proj(attend(q, k, v, self.heads))
         y = y + self.mlp(self.norm2(y))
-        return self.head(self.norm3(y))
+        with torch.autocast(y.device.type, enabled=False):  # bfloat16 would round what is left of the residual
+            return self.head(self.norm3(y.float() if y.dtype == torch.bfloat16 else y))

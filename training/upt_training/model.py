@@ -121,9 +121,15 @@ class Upt(nn.Module):
         return source, target, self.decoder.queries(sincos(p, self.settings.decoder))
 
     def aggregate(self, source, target, neighbours, mask) -> torch.Tensor:
-        """Mean over a row of `GELU(source_j + target_i)`: `[..., n, d]`, `[..., n_S, d]` -> `[..., n_S, d]`."""
-        edge = functional.gelu(source[..., neighbours, :] + target[..., :, None, :])
-        return (edge * mask[..., None]).sum(-2) / mask.sum(-1, keepdim=True)
+        """Mean over a row of `GELU(source_j + target_i)`: `[..., n, d]`, `[..., n_S, d]` -> `[..., n_S, d]`.
+
+        Computed on the edges that there are: on coarse meshes half of the padded rows is padding.
+        """
+        receivers, column = mask.nonzero(as_tuple=True)
+        senders = neighbours[receivers, column]
+        edge = functional.gelu(source.index_select(-2, senders) + target.index_select(-2, receivers))
+        total = torch.zeros_like(target).index_add(-2, receivers, edge)
+        return total / mask.sum(-1, keepdim=True)
 
     def latent(self, supernodes: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
         """Aggregated supernodes `[..., n_S, d]` -> decoder keys and values `[..., L, h]`."""
@@ -146,7 +152,7 @@ class Upt(nn.Module):
 
         `tables` = (source `[n, d]`, target `[n, d]`); `neighbours [n_S, degree]` and `supernodes [n_S]` index `n`.
         `scored` (training only): rows of `query` through which gradients flow, and the rows that are decoded without
-        (what the next step reads); all other rows stay zero.
+        (what the next step reads; None for nothing); all other rows stay zero.
         """
         with torch.autocast(features.device.type, enabled=False):  # differences of the features need float32
             w_source, w_target = self.encoder_weights()
@@ -156,9 +162,10 @@ class Upt(nn.Module):
         if scored is None:
             return self.decode(query, k, v)
         rows, read = scored
-        with torch.no_grad():
-            out = torch.zeros(*k.shape[:-2], len(query), 3, device=k.device)
-            out[..., read, :] = self.decode(query[read], k, v).float()
+        out = torch.zeros(*k.shape[:-2], len(query), 3, device=k.device)
+        if read is not None:
+            with torch.no_grad():
+                out[..., read, :] = self.decode(query[read], k, v).float()
         return out.index_copy(-2, rows, self.decode(query[rows], k, v).float())
 
     def forward_unfactored(self, features, positions, neighbours, mask, supernodes) -> torch.Tensor:

@@ -37,6 +37,7 @@ def make_optimiser(settings, model: torch.nn.Module) -> torch.optim.Optimizer:
         settings.learning_rate,
         betas=(0.9, 0.98),
         weight_decay=settings.weight_decay,
+        fused=True,
     )
 
 

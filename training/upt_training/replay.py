@@ -36,14 +36,14 @@ class ReplayPool:
         """Slots, cases, frames and states of the next `batch` rollouts; finished ones restart, most at rest."""
         slots = (self.next + np.arange(batch)) % len(self.case)
         self.next = int((self.next + batch) % len(self.case))
-        for s in slots:
-            if self.frame[s] + window >= self.cache.frame_count or not torch.isfinite(self.u[s]).all():
-                case = int(self.generator.integers(self.cache.case_count))
-                late = int(self.generator.integers(0, self.cache.frame_count - window - 1))
-                frame = 0 if self.generator.random() < 0.7 else late
-                state = truth_state(self.cache, np.array([case]), np.array([frame]), "cpu")
-                self.case[s], self.frame[s] = case, frame
-                self.u[s], self.previous[s] = state.u[0], state.previous[0]
+        lost = ~torch.isfinite(self.u[slots]).flatten(1).all(dim=1).numpy()
+        for s in slots[lost | (self.frame[slots] + window >= self.cache.frame_count)]:
+            case = int(self.generator.integers(self.cache.case_count))
+            late = int(self.generator.integers(0, self.cache.frame_count - window - 1))
+            frame = 0 if self.generator.random() < 0.7 else late
+            state = truth_state(self.cache, np.array([case]), np.array([frame]), "cpu")
+            self.case[s], self.frame[s] = case, frame
+            self.u[s], self.previous[s] = state.u[0], state.previous[0]
         state = State(self.u[slots].to(device), self.previous[slots].to(device), None)
         if self.cache.prior is not None:
             state.prior = self.cache.fields(self.case[slots], self.frame[slots])["prior"].to(device)

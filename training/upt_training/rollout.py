@@ -7,6 +7,7 @@ boundary is enforced. All fields `[B, n, 3]` in mm on the subset's nodes.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -14,6 +15,15 @@ import torch
 from upt_training.graph import Graph
 from upt_training.mesh_file import Mesh
 from upt_training.model import Upt
+
+
+class Encoded(NamedTuple):
+    """Supernodes that a prediction is encoded with, all or some; indices count within the subset's nodes."""
+
+    neighbours: torch.Tensor  # [n_S, degree]
+    mask: torch.Tensor  # [n_S, degree]
+    supernodes: torch.Tensor  # [n_S]
+    read: torch.Tensor  # [r] nodes whose features are read: senders and supernodes
 
 
 @dataclass
@@ -26,6 +36,21 @@ class State:
 
     def detach(self) -> State:
         return State(self.u.detach(), self.previous.detach(), self.prior)
+
+    def part(self, samples: np.ndarray) -> State:
+        """Some samples of the batch."""
+        if len(samples) == len(self.u):
+            return self
+        return State(self.u[samples], self.previous[samples], None if self.prior is None else self.prior[samples])
+
+    def among(self, samples: np.ndarray, batch: int) -> State:
+        """These samples at their places in a batch whose other samples are zero."""
+        at = torch.from_numpy(samples).to(self.u.device)
+
+        def spread(x: torch.Tensor) -> torch.Tensor:
+            return torch.zeros(batch, *x.shape[1:], dtype=x.dtype, device=x.device).index_copy(0, at, x)
+
+        return State(spread(self.u), spread(self.previous), None if self.prior is None else spread(self.prior))
 
 
 class Stepper:
@@ -50,12 +75,10 @@ class Stepper:
         held[mesh.held_nodes(boundary)] = True
         self.model, self.exact, self.device = model, exact, torch.device(device)
         to = self.device
-        self.neighbours = torch.from_numpy(neighbours).to(to)
-        self.mask = torch.from_numpy(mask).to(to)
-        self.supernodes = torch.from_numpy(place[graph.supernodes]).to(to)
+        parts = (neighbours, mask, place[graph.supernodes], place[graph.needed_nodes()])
+        self.all = Encoded(*(torch.from_numpy(part).to(to) for part in parts))
         self.positions = torch.from_numpy(mesh.positions[nodes].astype(np.float32)).to(to)
         self.free = torch.from_numpy(~held[nodes]).to(to, torch.float32)[:, None]
-        self.read = torch.from_numpy(place[graph.needed_nodes()]).to(to)
         self.node_count = len(nodes)
 
     def tables(self) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
@@ -65,8 +88,22 @@ class Stepper:
         zero = torch.zeros(batch, self.node_count, 3, device=self.device)
         return State(zero, zero, zero if self.model.settings.uses_prior else None)
 
-    def step(self, state: State, target: dict[str, torch.Tensor], tables, scored=None) -> State:
-        """`target` holds `c`, `contact` and (where used) `prior` of the end of the step."""
+    def draw(self, count: int, generator: torch.Generator) -> Encoded:
+        """`count` of the supernodes, and the nodes that these read."""
+        chosen = torch.randperm(len(self.all.supernodes), generator=generator)[:count].sort().values.to(self.device)
+        neighbours, mask, supernodes = (part[chosen] for part in self.all[:3])
+        read = torch.zeros(self.node_count, dtype=torch.bool, device=self.device)
+        read[neighbours[mask > 0]] = True
+        read[supernodes] = True
+        return Encoded(neighbours, mask, supernodes, read.nonzero()[:, 0])
+
+    def step(
+        self, state: State, target: dict[str, torch.Tensor], tables, scored=None, encoded: Encoded | None = None
+    ) -> State:
+        """`target` holds `c`, `contact` and (where used) `prior` of the end of the step.
+
+        `scored`: as in `Upt.forward`. `encoded`: all supernodes by default.
+        """
         fields = {
             "displacement": state.u,
             "previous_displacement": state.previous,
@@ -77,8 +114,8 @@ class Stepper:
         }
         source, key, query = tables
         features = self.model.normalise(fields)
-        rows = None if scored is None else (scored, self.read)
-        out = self.model(features, (source, key), self.neighbours, self.mask, self.supernodes, query, rows).float()
+        encoded = self.all if encoded is None else encoded
+        out = self.model(features, (source, key), *encoded[:3], query, scored).float()
         base = self.model.settings.base
         if base == "displacement":
             out = out + state.u

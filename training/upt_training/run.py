@@ -121,7 +121,7 @@ def train_command(options) -> int:
         print(f"{settings.name}: {trainer.model.parameter_count()} parameters, {trainer.train_cache.case_count} cases, "
               f"{trainer.stepper.node_count} of {mesh.node_count} nodes, {trainer.total_steps} steps, "
               f"from step {trainer.step_count}, {device}", flush=True)  # fmt: skip
-    ended = trainer.fit(options.max_minutes)
+    ended = trainer.fit(options.max_minutes, checkpoint_minutes=options.checkpoint_minutes)
     if trainer.rank == 0:
         print(
             f"{ended} at step {trainer.step_count}; best autoregressive MSE {trainer.best:.5f} mm²",

@@ -22,8 +22,9 @@ from upt_training.errors import InputError
 from upt_training.field_cache import FieldCache
 from upt_training.model import Upt, load_state
 from upt_training.optimiser import learning_rate, make_optimiser
-from upt_training.replay import ReplayPool, corrupt, truth_state
-from upt_training.rollout import State, Stepper, autoregressive_scores, cache_rollout, squared_error
+from upt_training.replay import ReplayPool
+from upt_training.rollout import Stepper, autoregressive_scores, cache_rollout
+from upt_training.window import Windows
 
 POOL_SLOTS = 64
 
@@ -46,6 +47,8 @@ class Trainer:
         self.mesh, self.boundary = mesh, boundary
         self.train_cache, self.test_cache = train, test
         t = settings.train
+        if t.resident_gb > 0:
+            train.hold(t.resident_gb, self.device)
         torch.manual_seed(t.seed)
         self.model = Upt(settings.model)
         if t.scaled_start:
@@ -63,13 +66,15 @@ class Trainer:
         if self.rank > 0:  # drop path differs too
             torch.manual_seed(t.seed + 7919 * self.rank)
         self.pool = ReplayPool(train, POOL_SLOTS, self.generator) if t.strategy == "replay" else None
+        self.windows = Windows(settings, self.stepper, train, self.pool, self.generator, self.draw)
         self.step_count, self.best, self.stale = 0, float("inf"), 0
+        self.core_seconds = 0.0  # CPU time of this process in training steps, over all resumed parts
         self.loss_scale = 1.0 / float((self.model.output_scale**2).sum())
         windows = train.case_count * (train.frame_count - 1) // max(1, t.window)
         self.steps_per_epoch = t.steps_per_epoch or max(1, windows // (t.micro_batch * t.accumulate * self.world))
         self.total_steps = self.steps_per_epoch * (t.epochs + t.autoregressive_epochs)
 
-    # -- one window ---------------------------------------------------------------------------------------------
+    # -- one step -----------------------------------------------------------------------------------------------
 
     def teacher_probability(self) -> float:
         t = self.settings.train
@@ -77,75 +82,9 @@ class Trainer:
             return 1.0
         return max(0.0, 1.0 - self.step_count / max(1, self.steps_per_epoch * t.epochs))
 
-    def _target(self, case: np.ndarray, frame: np.ndarray) -> dict[str, torch.Tensor]:
-        return {k: v.to(self.device) for k, v in self.train_cache.fields(case, frame).items()}
-
-    def _teach(self, state: State, case: np.ndarray, frame: np.ndarray, p: float) -> State:
-        """Replace the state by the truth with probability `p`, sample by sample."""
-        forced = torch.rand(len(case), generator=self.draw) < p
-        if not forced.any():
-            return state
-        truth = truth_state(self.train_cache, case, frame, self.device)
-        forced = forced.to(self.device)[:, None, None]
-        u, previous = (
-            torch.where(forced, truth.u, state.u),
-            torch.where(forced, truth.previous, state.previous),
-        )
-        return State(u, previous, state.prior)
-
-    def window_loss(self, p: float) -> tuple[torch.Tensor, float]:
-        """The loss to minimise, and the MSE in mm² that it stands for."""
-        t = self.settings.train
-        slots = None
-        if self.pool is not None:
-            slots, case, frame, state = self.pool.take(t.micro_batch, t.window, self.device)
-            state = self._teach(state, case, frame, p)
-            first, window = 1, t.window
-        else:
-            window = 2 if t.strategy == "teacher" else t.window
-            case = self.generator.integers(self.train_cache.case_count, size=t.micro_batch)
-            frame = self.generator.integers(0, self.train_cache.frame_count - window, size=t.micro_batch)
-            first = 2
-            if p >= 1.0:  # the first prediction would be thrown away: start at the second's true input
-                frame, first, window = frame + 1, 1, window - 1
-            state = truth_state(self.train_cache, case, frame, self.device)
-        tables, loss, true_loss, scored = self.stepper.tables(), 0.0, 0.0, 0
-        rows = None
-        if t.scored_rows and window == 1:
-            rows = torch.randperm(self.stepper.node_count, generator=self.draw)[: t.scored_rows].to(self.device)
-        for i in range(1, window + 1):
-            if i > 1 and p > 0:
-                state = self._teach(state, case, frame, p)
-            frame = frame + 1
-            target = self._target(case, frame)
-            if t.corrupt_contact > 0 or t.input_noise_mm > 0:
-                state = corrupt(state, target["contact"], t.corrupt_contact, t.input_noise_mm, self.draw)
-            plain = self._base(state, target)
-            with torch.autocast(self.device.type, torch.bfloat16, enabled=t.bf16):
-                state = self.stepper.step(state, target, tables, rows if window == 1 else None)
-            if i >= first:
-                a, b = (
-                    (state.u, target["u"]) if window > 1 or rows is None else (state.u[:, rows], target["u"][:, rows])
-                )
-                error = squared_error(a, b)
-                true_loss += float(error.detach().mean())
-                if t.balance_mm2 > 0:
-                    error = error * t.balance_mm2 / (t.balance_mm2 + squared_error(plain, target["u"]))
-                loss, scored = loss + error.mean(), scored + 1
-        if slots is not None:
-            self.pool.put(slots, frame, state)
-        return loss / scored, true_loss / scored
-
-    def _base(self, state: State, target: dict[str, torch.Tensor]) -> torch.Tensor:
-        """What the network adds to: its error is a sample's scale."""
-        base = self.settings.model.base
-        if base == "prior":
-            return target["prior"]
-        return state.u.detach() if base == "displacement" else torch.zeros_like(target["u"])
-
     def train_step(self) -> tuple[float, float]:
         """One optimiser step over `accumulate` windows: mean loss in mm² and the gradient norm before clipping."""
-        t = self.settings.train
+        t, began = self.settings.train, time.process_time()
         rate = learning_rate(t, self.step_count / self.steps_per_epoch)
         for group in self.optimiser.param_groups:
             group["lr"] = rate
@@ -153,7 +92,7 @@ class Trainer:
         self.optimiser.zero_grad(set_to_none=True)
         p, total = self.teacher_probability(), 0.0
         for _ in range(t.accumulate):
-            loss, mse = self.window_loss(p)
+            loss, mse = self.windows.loss(p)
             (loss * self.loss_scale / t.accumulate).backward()
             total += mse / t.accumulate
         if self.world > 1:
@@ -167,8 +106,8 @@ class Trainer:
         if self.ema is not None:
             decay = min(t.ema, (1 + self.step_count) / (10 + self.step_count))
             with torch.no_grad():
-                for mean, value in zip(self.ema.parameters(), self.model.parameters(), strict=True):
-                    mean.lerp_(value, 1.0 - decay)
+                torch._foreach_lerp_(list(self.ema.parameters()), list(self.model.parameters()), 1.0 - decay)
+        self.core_seconds += time.process_time() - began
         return total, norm
 
     # -- evaluation and files -----------------------------------------------------------------------------------
@@ -182,9 +121,13 @@ class Trainer:
         self.stepper.model = self.model
         return scores
 
-    def fit(self, max_minutes: float = 0.0, report=print) -> str:
-        """Train to the end, to early stopping or to the time limit; returns which. Resumes exactly from `last.pt`."""
+    def fit(self, max_minutes: float = 0.0, report=print, checkpoint_minutes: float = 0.0) -> str:
+        """Train to the end, to early stopping or to the time limit; returns which. Resumes exactly from `last.pt`.
+
+        `last.pt` is written at each evaluation, at the end, and every `checkpoint_minutes` if that is above 0.
+        """
         t, began, first = self.settings.train, time.monotonic(), self.step_count
+        saved = began
         running, norms, spoken = [], [], time.monotonic()
         while self.step_count < self.total_steps:
             loss, norm = self.train_step()
@@ -199,7 +142,10 @@ class Trainer:
             if self.step_count % (self.steps_per_epoch * t.evaluate_every) == 0 or self.step_count == self.total_steps:
                 if self._evaluate_and_save(running, norms, elapsed, report):
                     return "stopped early"
-                running, norms = [], []
+                running, norms, saved = [], [], time.monotonic()
+            elif checkpoint_minutes and time.monotonic() - saved > 60 * checkpoint_minutes:
+                self.save("last.pt")
+                saved = time.monotonic()
             if max_minutes and self._any_process(elapsed > 60 * max_minutes):
                 self.save("last.pt")
                 return "time limit"
@@ -225,6 +171,7 @@ class Trainer:
             "max_gradient_norm": float(np.max(norms)) if norms else float("nan"),
             **{f"test_{k}": v for k, v in scores.items()},
             "seconds": round(elapsed, 1),
+            "core_hours": round(self.core_seconds / 3600, 4),
         }
         better = scores["mse_mm2"] < self.best
         self.best, self.stale = (scores["mse_mm2"], 0) if better else (self.best, self.stale + 1)
@@ -265,6 +212,7 @@ class Trainer:
                 "numpy": self.generator.bit_generator.state,
             },
             "step_count": self.step_count,
+            "core_seconds": self.core_seconds,
             "best": self.best,
             "stale": self.stale,
         }
@@ -286,6 +234,7 @@ class Trainer:
             load_state(self.ema, state["ema"], str(path))
         self.optimiser.load_state_dict(state["optimiser"])
         self.step_count, self.best, self.stale = state["step_count"], state["best"], state["stale"]
+        self.core_seconds = state.get("core_seconds", 0.0)
         if self.rank > 0:
             seeds = np.random.SeedSequence([self.settings.train.seed, self.rank, self.step_count])
             self.generator.bit_generator.state = np.random.PCG64(seeds).state
