@@ -75,11 +75,12 @@ def test_a_first_prediction_that_nothing_reads_is_not_made(make):
     assert len(calls) == 5
 
 
-def test_the_mean_over_scored_rows_is_the_gradient_of_all_rows(make):
-    """Two predictions, the second fed by the first; the rows of each are one half or the other: four gradients."""
-    reference = make(settings_with("tiny.toml", micro_batch=1, window=3))
+@pytest.mark.parametrize(("p", "batch"), [(0.0, 1), (0.6, 3)])
+def test_the_mean_over_scored_rows_is_the_gradient_of_all_rows(make, p, batch):
+    """Three predictions, each fed by the one before; the rows of each are one half or the other: eight gradients."""
+    reference = make(settings_with("tiny.toml", micro_batch=batch, window=3))
     settings = reference.settings
-    expected = gradient(reference, plain(reference), 0.0)
+    expected = gradient(reference, plain(reference), p)
     settings.train.scored_rows = reference.stepper.node_count // 2
     trainer = make(settings)
     n = trainer.stepper.node_count
@@ -89,7 +90,7 @@ def test_the_mean_over_scored_rows_is_the_gradient_of_all_rows(make):
     for choice in np.ndindex(2, 2, 2):
         picks = iter(choice)
         trainer.windows.rows = lambda count, picks=picks: halves[next(picks)]
-        found.append(gradient(trainer, trainer.windows, 0.0))
+        found.append(gradient(trainer, trainer.windows, p))
     assert relative(torch.stack(found).mean(0), expected) < 1e-4
     assert relative(found[0], expected) > 1e-2
 

@@ -151,8 +151,8 @@ class Upt(nn.Module):
         """Features `[..., n, f]` of the table's nodes -> `[..., m, 3]` mm for the rows of `query`.
 
         `tables` = (source `[n, d]`, target `[n, d]`); `neighbours [n_S, degree]` and `supernodes [n_S]` index `n`.
-        `scored` (training only): rows of `query` through which gradients flow, and the rows that are decoded without
-        (what the next step reads; None for nothing); all other rows stay zero.
+        `scored` (training only): rows of `query` through which gradients flow, the rows that are decoded without (what
+        the next step reads), and the samples of the batch for which they are; all other rows stay zero.
         """
         with torch.autocast(features.device.type, enabled=False):  # differences of the features need float32
             w_source, w_target = self.encoder_weights()
@@ -161,11 +161,11 @@ class Upt(nn.Module):
         k, v = self.latent(self.aggregate(source, target, neighbours, mask))
         if scored is None:
             return self.decode(query, k, v)
-        rows, read = scored
+        rows, read, readers = scored
         out = torch.zeros(*k.shape[:-2], len(query), 3, device=k.device)
-        if read is not None:
+        if len(readers) > 0:
             with torch.no_grad():
-                out[..., read, :] = self.decode(query[read], k, v).float()
+                out[readers[:, None], read] = self.decode(query[read], k[readers], v[readers]).float()
         return out.index_copy(-2, rows, self.decode(query[rows], k, v).float())
 
     def forward_unfactored(self, features, positions, neighbours, mask, supernodes) -> torch.Tensor:

@@ -124,10 +124,9 @@ class Windows:
             if i > 1:
                 state = self.teach(state, case, frame, forced[i - 2])
             frame = frame + 1
-            unread = bool(forced[i - 1].all())
-            part = np.arange(len(case))
+            part, readers = np.arange(len(case)), (~forced[i - 1]).nonzero()[:, 0]
             if i < first:  # where the truth is read next nothing needs this prediction
-                part = part[~forced[i - 1].numpy()]
+                part, readers = part[readers.numpy()], torch.arange(len(readers))
                 if len(part) == 0:
                     continue
                 state = state.part(part)
@@ -135,7 +134,7 @@ class Windows:
             if t.corrupt_contact > 0 or t.input_noise_mm > 0:
                 state = corrupt(state, target["contact"], t.corrupt_contact, t.input_noise_mm, self.draw)
             base, rows = self.base(state, target), self.rows(n) if 0 < t.scored_rows < n else None
-            scored = None if rows is None else (rows, None if unread else read)
+            scored = None if rows is None else (rows, read, readers.to(self.device))
             state = self.stepper.step(state, target, tables, scored, drawn)
             if i >= first:
                 found, truth = (state.u, target["u"]) if rows is None else (state.u[:, rows], target["u"][:, rows])
