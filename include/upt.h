@@ -321,6 +321,11 @@
 #define UPT_FLAG_ERROR 4096
 
 /**
+ * Tissue lies more than 1 mm inside of an instrument.
+ */
+#define UPT_FLAG_DEEP 8192
+
+/**
  * Nodes of the surface.
  */
 #define UPT_SET_SURFACE_NODES 0
@@ -364,6 +369,21 @@
  * An instrument's shape: a box with rounded corners.
  */
 #define UPT_SHAPE_SPATULA 2
+
+/**
+ * An instrument's shape: a hull of `upt_hull_create`.
+ */
+#define UPT_SHAPE_HULL 3
+
+/**
+ * An instrument pushes, with Coulomb friction.
+ */
+#define UPT_MODE_SLIDE 0
+
+/**
+ * An instrument holds what is within 0.5 mm of it when the mode changes to this, until the mode changes back or it tears off.
+ */
+#define UPT_MODE_GRASP 1
 
 /**
  * Version of the C ABI that `upt_abi_version` returns. Bindings compare it at load.
@@ -612,7 +632,7 @@ typedef struct upt_scene_options {
 } upt_scene_options;
 
 /**
- * A rigid instrument; the input of `upt_scene_contacts_from_instruments`.
+ * A rigid instrument; the input of `upt_scene_step_instruments` and `upt_scene_contacts_from_instruments`.
  */
 typedef struct upt_instrument {
   /**
@@ -640,13 +660,29 @@ typedef struct upt_instrument {
    */
   float radius;
   /**
-   * 1: touched nodes move with the instrument until it leaves; 0: they slide.
+   * `upt_scene_contacts_from_instruments` alone: 1: touched nodes move with the instrument until it leaves; 0: they slide.
    */
   uint8_t sticking;
   /**
+   * `upt_scene_step_instruments` alone: `UPT_MODE_*`.
+   */
+  uint8_t mode;
+  /**
    * Zero.
    */
-  uint8_t reserved[3];
+  uint8_t reserved[2];
+  /**
+   * `upt_scene_step_instruments` alone: Coulomb's coefficient, 0 or more.
+   */
+  float friction;
+  /**
+   * A grasp lets go where its samples pull harder than this together, mN; 0: never.
+   */
+  float tear_off_mn;
+  /**
+   * `UPT_SHAPE_HULL`: the `upt_hull`; otherwise NULL.
+   */
+  const void *hull;
 } upt_instrument;
 
 /**

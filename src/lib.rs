@@ -6,6 +6,8 @@
 //! Lengths are mm, forces mN, fields row-major `[K,3]` float32.
 
 pub mod bundle;
+#[cfg(feature = "contact")]
+pub mod contact;
 pub mod corrections;
 pub mod envelope;
 pub mod error;

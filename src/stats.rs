@@ -30,6 +30,8 @@ pub mod flag {
     pub const FELL_BACK: u32 = 2048;
     /// The estimated error is above the host's limit.
     pub const ERROR: u32 = 4096;
+    /// Tissue lies more than 1 mm inside of an instrument.
+    pub const DEEP: u32 = 8192;
 
     /// What the flags say, as text.
     pub fn names(flags: u32) -> String {
@@ -53,6 +55,7 @@ pub mod flag {
                 "the corrections fell back on the linear response",
             ),
             (ERROR, "the estimated error is above the limit"),
+            (DEEP, "an instrument lies deep inside of the tissue"),
         ];
         let said = meanings.iter().filter(|(flag, _)| flags & flag != 0);
         said.map(|(_, text)| *text).collect::<Vec<_>>().join("; ")

@@ -72,6 +72,7 @@ const CONSTANTS: &[(&str, i64, i64)] = constants! {
     UPT_FLAG_REGULARISED = 1024,
     UPT_FLAG_FELL_BACK = 2048,
     UPT_FLAG_ERROR = 4096,
+    UPT_FLAG_DEEP = 8192,
     UPT_SET_SURFACE_NODES = 0,
     UPT_SET_DOMAIN_NODES = 1,
     UPT_SET_FIXED_NODES = 2,
@@ -81,6 +82,9 @@ const CONSTANTS: &[(&str, i64, i64)] = constants! {
     UPT_SHAPE_CAPSULE = 0,
     UPT_SHAPE_BOX = 1,
     UPT_SHAPE_SPATULA = 2,
+    UPT_SHAPE_HULL = 3,
+    UPT_MODE_SLIDE = 0,
+    UPT_MODE_GRASP = 1,
     UPT_ABI_VERSION = 1,
 };
 

@@ -189,6 +189,8 @@ class Flag(IntFlag):
     """The corrections ended inverted, and the linear response took their place."""
     ERROR = 4096
     """The estimated error is above the scene's `error_limit_mm`."""
+    DEEP = 8192
+    """Tissue lies more than 1 mm inside of an instrument."""
 
 
 class IndexSet(IntEnum):
@@ -217,6 +219,17 @@ class Shape(IntEnum):
     """An instrument's shape: a box."""
     SPATULA = 2
     """An instrument's shape: a box with rounded corners."""
+    HULL = 3
+    """An instrument's shape: a hull of `upt_hull_create`."""
+
+
+class Mode(IntEnum):
+    """`UPT_MODE_*`."""
+
+    SLIDE = 0
+    """An instrument pushes, with Coulomb friction."""
+    GRASP = 1
+    """An instrument holds what is within 0.5 mm of it when the mode changes to this, until the mode changes back or it tears off."""
 
 
 class InitOptions(Record):
@@ -469,7 +482,7 @@ class SceneOptionsKeywords(TypedDict, total=False):
 
 
 class Instrument(Record):
-    """A rigid instrument; the input of `upt_scene_contacts_from_instruments`."""
+    """A rigid instrument; the input of `upt_scene_step_instruments` and `upt_scene_contacts_from_instruments`."""
 
     struct_size: int
     """`sizeof(upt_instrument)`, the same in every element of an array."""
@@ -484,9 +497,17 @@ class Instrument(Record):
     radius: float
     """A capsule's radius or a spatula's corner radius, mm."""
     sticking: bool = boolean("_sticking")
-    """1: touched nodes move with the instrument until it leaves; 0: they slide."""
+    """`upt_scene_contacts_from_instruments` alone: 1: touched nodes move with the instrument until it leaves; 0: they slide."""
+    mode: bool = boolean("_mode")
+    """`upt_scene_step_instruments` alone: `UPT_MODE_*`."""
     reserved: tuple[int, ...] = vector("_reserved")
     """Zero."""
+    friction: float
+    """`upt_scene_step_instruments` alone: Coulomb's coefficient, 0 or more."""
+    tear_off_mn: float
+    """A grasp lets go where its samples pull harder than this together, mN; 0: never."""
+    hull: int | None
+    """`UPT_SHAPE_HULL`: the `upt_hull`; otherwise NULL."""
 
     _fields_ = [
         ("struct_size", ctypes.c_uint32),
@@ -496,7 +517,57 @@ class Instrument(Record):
         ("_half_extents", ctypes.c_float * 3),
         ("radius", ctypes.c_float),
         ("_sticking", ctypes.c_uint8),
+        ("_mode", ctypes.c_uint8),
+        ("_reserved", ctypes.c_uint8 * 2),
+        ("friction", ctypes.c_float),
+        ("tear_off_mn", ctypes.c_float),
+        ("hull", ctypes.c_void_p),
+    ]
+
+
+class InstrumentReading(Record):
+    """What the tissue does to an instrument at the end of a step; filled by `upt_scene_instrument_readings`."""
+
+    struct_size: int
+    """`sizeof(upt_instrument_reading)`, set by the caller, the same in every element of an array."""
+    contact_count: int
+    """Points of the surface that push or hold the instrument."""
+    force: tuple[float, ...] = vector("_force")
+    """On the instrument, mN."""
+    torque: tuple[float, ...] = vector("_torque")
+    """On the instrument about its position, mN mm."""
+    penetration_mm: float
+    """How deep the deepest point of the surface lies inside of the instrument, mm."""
+    torn: bool = boolean("_torn")
+    """1: its grasp tore off in this step."""
+    reserved: tuple[int, ...] = vector("_reserved")
+    """Zero."""
+
+    _fields_ = [
+        ("struct_size", ctypes.c_uint32),
+        ("contact_count", ctypes.c_uint32),
+        ("_force", ctypes.c_float * 3),
+        ("_torque", ctypes.c_float * 3),
+        ("penetration_mm", ctypes.c_float),
+        ("_torn", ctypes.c_uint8),
         ("_reserved", ctypes.c_uint8 * 3),
+    ]
+
+
+class InstrumentContact(Record):
+    """A point of the surface that pushes or holds an instrument; filled by `upt_scene_instrument_contacts`."""
+
+    instrument: int
+    """Place of the instrument in the step's array."""
+    position: tuple[float, ...] = vector("_position")
+    """Where the point is, mm."""
+    force: tuple[float, ...] = vector("_force")
+    """On the instrument, mN."""
+
+    _fields_ = [
+        ("instrument", ctypes.c_uint32),
+        ("_position", ctypes.c_float * 3),
+        ("_force", ctypes.c_float * 3),
     ]
 
 

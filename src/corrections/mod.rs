@@ -9,6 +9,8 @@
 
 mod body;
 mod input;
+#[cfg(feature = "contact")]
+mod loaded;
 mod memory;
 mod motion;
 mod precondition;

@@ -10,6 +10,8 @@ pub struct Motion {
     pub velocity: Vec<f32>,
     /// Velocity at the state before.
     pub velocity_before: Vec<f32>,
+    /// `M (a + alpha v)` at the last state, µN.
+    pub inertia: Vec<f32>,
     /// Smallest det F of the last corrected state.
     pub min_det: f32,
     /// `r` at the contact nodes of the last corrected state `[m,3]`, in their order, zero at held ones, µN.
@@ -21,6 +23,7 @@ impl Motion {
         Ok(Motion {
             velocity: memory::zeros(len, "velocities")?,
             velocity_before: memory::zeros(len, "velocities")?,
+            inertia: memory::zeros(len, "inertia")?,
             min_det: 1.0,
             reaction: memory::room(len, "contact forces")?,
         })
@@ -35,6 +38,7 @@ impl Motion {
         Ok(Motion {
             velocity: copied(&self.velocity)?,
             velocity_before: copied(&self.velocity_before)?,
+            inertia: copied(&self.inertia)?,
             min_det: self.min_det,
             reaction: copied(&self.reaction)?,
         })
@@ -44,6 +48,7 @@ impl Motion {
     pub(super) fn take(&mut self, other: &Motion) {
         self.velocity.copy_from_slice(&other.velocity);
         self.velocity_before.copy_from_slice(&other.velocity_before);
+        self.inertia.copy_from_slice(&other.inertia);
         self.min_det = other.min_det;
         self.reaction.clear();
         self.reaction.extend_from_slice(&other.reaction);
@@ -52,6 +57,7 @@ impl Motion {
     pub(super) fn clear(&mut self) {
         self.velocity.fill(0.0);
         self.velocity_before.fill(0.0);
+        self.inertia.fill(0.0);
         self.min_det = 1.0;
         self.reaction.clear();
     }

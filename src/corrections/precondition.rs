@@ -42,6 +42,9 @@ pub(super) fn pooled<T>(result: std::result::Result<T, crate::kernels::PoolError
 /// The preconditioner for one set of prescribed nodes, and its buffers.
 pub struct Preconditioner {
     held_back: Vec<f32>,
+    /// `1 / (m (w² + kappa))` of each natural mode, mm/µN.
+    #[cfg(feature = "contact")]
+    moved_freely: Vec<f32>,
     starts: Vec<usize>,
     plan: RowPlan,
     /// Contact dofs with columns, as rows of the prior's tables.
@@ -76,6 +79,8 @@ impl Preconditioner {
         let nodes = memory::collected(env.body.mass.len(), 0..env.body.mass.len() as u32, WHAT)?;
         Ok(Preconditioner {
             held_back: env.space.held_back(kappa),
+            #[cfg(feature = "contact")]
+            moved_freely: env.space.moved_freely(kappa),
             starts: env.prior.basis_starts(),
             plan: RowPlan::try_region(&env.prior.basis(), &nodes, false)?,
             dofs: memory::room(dofs, WHAT)?,
@@ -342,8 +347,7 @@ impl Preconditioner {
         scratch: &mut [f32],
         u: &mut [f32],
     ) -> Result<()> {
-        let (isa, pool) = (env.isa, env.pool);
-        let basis = env.prior.basis();
+        let isa = env.isa;
         let mut slot = 0;
         for (index, &node) in self.nodes.iter().enumerate() {
             if !matches!(env.prior.column_for(&env.body.held, node), Some((_, true))) {
@@ -361,14 +365,86 @@ impl Preconditioner {
         }
         self.solved.fill(0.0);
         self.spread(env)?;
-        pooled(decode_rows(
+        self.add_decoded(env, scratch, u)
+    }
+
+    /// For each natural mode what inertia takes off its part of the compliance, mm/mN.
+    #[cfg(feature = "contact")]
+    pub fn held_back(&self) -> &[f32] {
+        &self.held_back
+    }
+
+    /// `u += A_k f` of forces `f` (mN) on degrees of freedom with columns; `scratch [K,3]`.
+    #[cfg(feature = "contact")]
+    pub fn load(
+        &mut self,
+        env: Env<'_>,
+        dofs: &[u32],
+        forces: &[f32],
+        scratch: &mut [f32],
+        u: &mut [f32],
+    ) -> Result<()> {
+        let count = self.held_back.len();
+        self.solved.fill(0.0);
+        for (&dof, force) in dofs.iter().zip(forces) {
+            let own = env.space.at_contact(dof as usize);
+            for ((y, held_back), own) in self.solved.iter_mut().zip(&self.held_back).zip(own) {
+                *y -= held_back * own * force;
+            }
+        }
+        let (isa, pool, q) = (env.isa, env.pool, &mut self.coordinates);
+        let rows = &env.space.rows()[..count];
+        let natural = &self.solved[..count];
+        pooled(accumulate_rows(
             isa,
             pool,
+            env.space.modes(),
+            rows,
+            natural,
+            false,
+            q,
+        ))?;
+        let response = env.prior.response.stored();
+        pooled(accumulate_rows(isa, pool, response, dofs, forces, true, q))?;
+        self.add_decoded(env, scratch, u)
+    }
+
+    /// `u -= N diag(1 / (m (w² + kappa))) N^T r` of a residual `[K,3]`, µN, that is zero at held nodes; `scratch [K,3]`.
+    #[cfg(feature = "contact")]
+    pub fn move_natural(
+        &mut self,
+        env: Env<'_>,
+        r: &[f32],
+        scratch: &mut [f32],
+        u: &mut [f32],
+    ) -> Result<()> {
+        let (isa, pool) = (env.isa, env.pool);
+        let count = self.held_back.len();
+        let basis = env.prior.basis();
+        let q = &mut self.coordinates;
+        pooled(project_field(isa, pool, &basis, &self.starts, r, q))?;
+        let (modes, rows) = (env.space.modes(), &env.space.rows()[..count]);
+        let natural = &mut self.on_modes[..count];
+        pooled(row_dots(isa, pool, modes, rows, q, natural))?;
+        for (value, moved) in natural.iter_mut().zip(&self.moved_freely) {
+            *value *= -moved;
+        }
+        pooled(accumulate_rows(isa, pool, modes, rows, natural, false, q))?;
+        self.add_decoded(env, scratch, u)
+    }
+
+    /// Adds the field of `coordinates`.
+    fn add_decoded(&mut self, env: Env<'_>, scratch: &mut [f32], u: &mut [f32]) -> Result<()> {
+        let basis = env.prior.basis();
+        pooled(decode_rows(
+            env.isa,
+            env.pool,
             &basis,
             &self.plan,
             &self.coordinates,
             scratch,
         ))?;
+        mask_held(&env.body.held, scratch);
         for (u, change) in u.iter_mut().zip(&*scratch) {
             *u += change;
         }

@@ -117,6 +117,19 @@ impl CoarseSpace {
             .collect()
     }
 
+    /// For each natural mode `1 / (m (w² + kappa))`: what a force on it moves, mm/µN.
+    #[cfg(feature = "contact")]
+    pub fn moved_freely(&self, kappa: f64) -> Vec<f32> {
+        let count = self.count();
+        let frequencies = self.frequency.iter().enumerate();
+        frequencies
+            .map(|(i, &omega)| {
+                let mass = f64::from(self.mass[i * (count + 1)]);
+                (1.0 / (mass * (f64::from(omega).powi(2) + kappa))) as f32
+            })
+            .collect()
+    }
+
     /// `Phi^T (K + kappa M) Phi [r,r]`, µN/mm.
     pub fn galerkin(&self, kappa: f64) -> Result<Vec<f64>> {
         let pairs = self.stiffness.iter().zip(&self.mass);

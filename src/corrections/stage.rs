@@ -15,33 +15,36 @@ use crate::scene::ContactSet;
 pub const SMALLEST_DET: f32 = 0.02;
 /// A step is accepted where the mean of its end slopes is below this part of the first: a test by gradients, because in f32 the
 /// rounding of the energy drowns its change.
-const SLOPE: f64 = 1e-4;
+pub(super) const SLOPE: f64 = 1e-4;
 /// Shortenings of one step at most.
-const SHORTENINGS: u32 = 6;
+pub(super) const SHORTENINGS: u32 = 6;
 /// A load whose guess halves the smallest det F is taken in at most this many parts.
-const MOST_PARTS: u32 = 16;
+pub(super) const MOST_PARTS: u32 = 16;
 
 /// A scene's own part.
 pub struct Stage {
-    preconditioner: Preconditioner,
-    memory: Memory,
+    pub(super) preconditioner: Preconditioner,
+    pub(super) memory: Memory,
     scratch: elements::Scratch,
     /// Past of the last published state, and of the one being made.
     pub motion: Motion,
-    next: Motion,
-    nodes: Vec<u32>,
+    pub(super) next: Motion,
+    pub(super) nodes: Vec<u32>,
     /// `r` at `nodes`, of the last evaluation and of the state that stands.
     at_nodes: [Vec<f32>; 2],
-    g: Vec<f32>,
-    g_new: Vec<f32>,
-    d: Vec<f32>,
-    q: Vec<f32>,
-    u: Vec<f32>,
+    pub(super) g: Vec<f32>,
+    pub(super) g_new: Vec<f32>,
+    pub(super) d: Vec<f32>,
+    pub(super) q: Vec<f32>,
+    pub(super) u: Vec<f32>,
     /// `M p`: inertia of the step at the last displacement, µN.
-    drift: Vec<f32>,
+    pub(super) drift: Vec<f32>,
+    /// What a load moves.
+    #[cfg(feature = "contact")]
+    pub(super) scratch_field: Vec<f32>,
 }
 
-fn dot(a: &[f32], b: &[f32]) -> f64 {
+pub(super) fn dot(a: &[f32], b: &[f32]) -> f64 {
     // Pieces in f32 lanes, sums in f64: the same bits on one thread or many.
     a.chunks(1024)
         .zip(b.chunks(1024))
@@ -85,6 +88,8 @@ impl Stage {
             q: field()?,
             u: field()?,
             drift: field()?,
+            #[cfg(feature = "contact")]
+            scratch_field: field()?,
         })
     }
 
@@ -105,6 +110,7 @@ impl Stage {
     pub fn stop_next(&mut self) {
         self.next.velocity.fill(0.0);
         self.next.velocity_before.fill(0.0);
+        self.next.inertia.fill(0.0);
         self.memory.clear();
     }
 
@@ -135,8 +141,8 @@ impl Stage {
 
     /// Bytes held.
     pub fn memory_bytes(&self) -> usize {
-        // Six fields and two velocities of two states; contact forces of two states and two evaluations, contact nodes.
-        let fields = (6 + 4 + 4) * 4 * self.g.len() + 4 * self.g.len() / 3;
+        // Seven fields, two velocities and the inertia of two states; contact forces of two states and two evaluations, contact nodes.
+        let fields = (7 + 6 + 4) * 4 * self.g.len() + 4 * self.g.len() / 3;
         self.memory.memory_bytes()
             + self.preconditioner.memory_bytes()
             + self.scratch.bytes()
@@ -150,7 +156,7 @@ impl Stage {
     }
 
     /// Inertia and damping of the step at the last displacement.
-    fn prepare(&mut self, lent: Lent<'_>, input: &Input<'_>) {
+    pub(super) fn prepare(&mut self, lent: Lent<'_>, input: &Input<'_>) {
         let (last, before) = (input.last, input.before);
         let known = if input.still { 0.0 } else { 1.0 };
         let Integrator {
@@ -169,11 +175,22 @@ impl Stage {
     }
 
     /// Velocity and inertia at `next`, the end of the step from `last`.
-    fn finish(&mut self, lent: Lent<'_>, input: &Input<'_>, next: &[f32]) {
+    pub(super) fn finish(&mut self, lent: Lent<'_>, input: &Input<'_>, next: &[f32]) {
         let (last, before) = (input.last, input.before);
-        let half = (0.5 / lent.corrections.integrator.step_s) as f32;
+        let Integrator {
+            step_s,
+            damping_per_s,
+        } = lent.corrections.integrator;
+        let (half, alpha) = ((0.5 / step_s) as f32, damping_per_s as f32);
+        let known = if input.still { 0.0 } else { 1.0 };
+        let mass = &lent.corrections.body.mass;
         for i in 0..next.len() {
-            self.next.velocity[i] = (3.0 * (next[i] - last[i]) - (last[i] - before[i])) * half;
+            let v = (3.0 * (next[i] - last[i]) - (last[i] - before[i])) * half;
+            let v_n = known * self.motion.velocity[i];
+            let v_before = known * self.motion.velocity_before[i];
+            let a = (3.0 * (v - v_n) - (v_n - v_before)) * half;
+            self.next.velocity[i] = v;
+            self.next.inertia[i] = mass[i / 3] * (a + alpha * v);
         }
         if input.still {
             self.next.velocity_before.fill(0.0);
@@ -186,7 +203,7 @@ impl Stage {
     }
 
     /// `r(u)` to `out`, zero at held and prescribed nodes; returns the smallest det F.
-    fn residual(
+    pub(super) fn residual(
         &mut self,
         lent: Lent<'_>,
         last: &[f32],

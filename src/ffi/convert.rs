@@ -94,8 +94,58 @@ pub(super) fn shape(raw: &upt_instrument) -> Result<crate::instrument::Shape, Fa
             half_extents,
             radius: raw.radius,
         },
+        UPT_SHAPE_HULL => {
+            return fail(
+                UPT_ERR_UNSUPPORTED,
+                "instruments[].shape: hulls are for upt_scene_step_instruments",
+            );
+        }
         value => return unknown("instruments[].shape", value),
     })
+}
+
+/// An instrument whose contact is solved.
+#[cfg(feature = "contact")]
+pub(super) fn tool(index: usize, raw: &upt_instrument) -> Result<crate::contact::Tool, Failure> {
+    use crate::contact::{Mode, Tool};
+    reserved(&raw.reserved)?;
+    let (at, turn, half_extents, radius) =
+        (raw.position, raw.rotation, raw.half_extents, raw.radius);
+    let shape = match raw.shape {
+        UPT_SHAPE_CAPSULE => ::contact::Shape::Capsule {
+            half_length: half_extents[1],
+            radius,
+        },
+        UPT_SHAPE_BOX => ::contact::Shape::Box { half_extents },
+        UPT_SHAPE_SPATULA => ::contact::Shape::Spatula {
+            half_extents,
+            radius,
+        },
+        UPT_SHAPE_HULL => {
+            let body = super::registry::find_hull(raw.hull)?;
+            return held(index, raw, Tool::of_body(index, (*body).clone(), at, turn)?);
+        }
+        value => return unknown("instruments[].shape", value),
+    };
+    if !raw.hull.is_null() {
+        return fail(
+            UPT_ERR_ARGUMENT,
+            format!("instruments[{index}]: hull is set and shape is not UPT_SHAPE_HULL"),
+        );
+    }
+    return held(index, raw, Tool::new(index, &shape, at, turn)?);
+
+    /// How it holds.
+    fn held(index: usize, raw: &upt_instrument, mut tool: Tool) -> Result<Tool, Failure> {
+        tool.mode = match raw.mode {
+            UPT_MODE_SLIDE => Mode::Slide,
+            UPT_MODE_GRASP => Mode::Grasp,
+            value => return unknown(&format!("instruments[{index}].mode"), value.into()),
+        };
+        (tool.friction, tool.tear_off_mn) = (raw.friction, raw.tear_off_mn);
+        tool.check(index)?;
+        Ok(tool)
+    }
 }
 
 pub(super) fn flag(field: &str, value: u8) -> Result<bool, Failure> {

@@ -5,7 +5,7 @@ use super::call::Failure;
 #[cfg(any(not(feature = "contact"), not(feature = "forces")))]
 use super::call::fail;
 use super::convert;
-use super::pointers::{place, required, slice_mut};
+use super::pointers::{each, place, slice_mut};
 use super::registry::call_scene;
 use super::status::*;
 use super::structs::*;
@@ -62,12 +62,11 @@ pub unsafe extern "C" fn upt_scene_contacts_from_instruments(
         }
         #[cfg(not(feature = "contact"))]
         {
-            for index in 0..instrument_count {
-                let raw = instruments.wrapping_add(index as usize);
-                let raw = unsafe { required(raw, "instruments[]") }?;
+            let read = |_: usize, raw: upt_instrument| {
                 convert::flag("sticking", raw.sticking)?;
-                convert::reserved(&raw.reserved)?;
-            }
+                convert::reserved(&raw.reserved)
+            };
+            unsafe { each(instruments, instrument_count, "instruments[]", read) }?;
             let _ = (count_out, nodes_out, vectors_out);
             fail(UPT_ERR_UNSUPPORTED, "this build has no feature \"contact\"")
         }
@@ -95,16 +94,17 @@ unsafe fn read_instruments(
         sticking: false,
     };
     let mut list = [blank; MAX_INSTRUMENTS];
-    for (index, place) in list.iter_mut().enumerate().take(count as usize) {
-        let raw = unsafe { required(instruments.wrapping_add(index), "instruments[]") }?;
+    let read = |index: usize, raw: upt_instrument| {
         convert::reserved(&raw.reserved)?;
-        *place = Instrument {
+        list[index] = Instrument {
             shape: convert::shape(&raw)?,
             position: raw.position,
             rotation: raw.rotation,
             sticking: convert::flag("sticking", raw.sticking)?,
         };
-    }
+        Ok(())
+    };
+    unsafe { each(instruments, count, "instruments[]", read) }?;
     Ok((list, count as usize))
 }
 

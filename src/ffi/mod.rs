@@ -7,6 +7,7 @@
 
 mod call;
 mod convert;
+mod driven;
 mod instrument;
 mod library;
 mod log;
@@ -24,6 +25,7 @@ mod worker;
 #[cfg(feature = "fault")]
 mod fault;
 
+pub use driven::*;
 pub use instrument::*;
 pub use library::*;
 pub use model::*;

@@ -28,9 +28,16 @@ sized!(
     upt_model_options,
     upt_model_info,
     upt_scene_options,
-    upt_instrument,
+    upt_instrument_reading,
     upt_scene_stats
 );
+
+// SAFETY: as the trait asks.
+unsafe impl Sized32 for upt_instrument {
+    const NAME: &'static str = "upt_instrument";
+    /// The first one ended with `reserved`.
+    const KNOWN: &'static [usize] = &[std::mem::offset_of!(Self, friction), size_of::<Self>()];
+}
 
 fn check<T>(pointer: *const T, name: &str) -> Result<(), Failure> {
     if pointer.is_null() {
@@ -120,6 +127,34 @@ pub(super) unsafe fn optional_path(
         return Ok(None);
     }
     unsafe { path(pointer, name) }.map(Some)
+}
+
+/// `count` structs to read, each of the size that the first one says: `take(index, value)`.
+pub(super) unsafe fn each<T: Sized32>(
+    pointer: *const T,
+    count: u64,
+    name: &str,
+    mut take: impl FnMut(usize, T) -> Result<(), Failure>,
+) -> Result<(), Failure> {
+    let count = length::<T>(count, name)?;
+    if count == 0 {
+        return Ok(());
+    }
+    let size = unsafe { struct_size(pointer, name) }?;
+    for index in 0..count {
+        let element = pointer.wrapping_byte_add(index * size);
+        let own = unsafe { struct_size(element, name) }?;
+        if own != size {
+            return fail(
+                UPT_ERR_STRUCT_SIZE,
+                format!(
+                    "{name}: struct_size is {size} in the first element and {own} in element {index}"
+                ),
+            );
+        }
+        take(index, unsafe { required(element, name) }?)?;
+    }
+    Ok(())
 }
 
 unsafe fn struct_size<T: Sized32>(pointer: *const T, name: &str) -> Result<usize, Failure> {

@@ -9,6 +9,8 @@ use std::sync::{Arc, LazyLock, PoisonError, RwLock};
 
 use super::call::{Answer, Failure, call, fail};
 use super::status::*;
+#[cfg(feature = "contact")]
+use super::structs::upt_hull;
 use super::structs::{upt_model, upt_scene};
 use crate::{Model, Scene};
 
@@ -16,9 +18,12 @@ use crate::{Model, Scene};
 const STRIDE: usize = 16;
 const MODEL_TAG: usize = 1;
 const SCENE_TAG: usize = 2;
+const HULL_TAG: usize = 3;
 
 static NEXT: AtomicUsize = AtomicUsize::new(STRIDE);
 static MODELS: Live<Model> = Live::new(MODEL_TAG, "model");
+#[cfg(feature = "contact")]
+static HULLS: Live<::contact::Body> = Live::new(HULL_TAG, "hull");
 static SCENES: Live<SceneEntry> = Live::new(SCENE_TAG, "scene");
 
 /// A scene and whether a bug was caught in it.
@@ -84,6 +89,7 @@ impl<T> Live<T> {
             tag if tag == self.tag && issued => "it was closed",
             MODEL_TAG if issued => "it is a model",
             SCENE_TAG if issued => "it is a scene",
+            HULL_TAG if issued => "it is a hull",
             _ => "this library never made it",
         };
         fail(
@@ -110,6 +116,21 @@ pub(super) fn find_model(model: *const upt_model) -> Result<Arc<Model>, Failure>
 
 pub(super) fn remove_model(model: *mut upt_model) -> Result<Arc<Model>, Failure> {
     MODELS.remove(model.addr(), false)
+}
+
+#[cfg(feature = "contact")]
+pub(super) fn add_hull(body: ::contact::Body) -> *mut upt_hull {
+    without_provenance_mut(HULLS.insert(Arc::new(body)))
+}
+
+#[cfg(feature = "contact")]
+pub(super) fn find_hull(hull: *const std::ffi::c_void) -> Result<Arc<::contact::Body>, Failure> {
+    HULLS.get(hull.addr())
+}
+
+#[cfg(feature = "contact")]
+pub(super) fn remove_hull(hull: *mut upt_hull) -> Result<Arc<::contact::Body>, Failure> {
+    HULLS.remove(hull.addr(), false)
 }
 
 pub(super) fn find_scene(scene: *const upt_scene) -> Result<Arc<SceneEntry>, Failure> {

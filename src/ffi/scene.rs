@@ -165,6 +165,8 @@ unsafe fn step(
     let (dense, nodes, vectors);
     let contact = match input.contact {
         Contact::None => Contact::None,
+        #[cfg(feature = "contact")]
+        Contact::Tools(tools) => Contact::Tools(tools),
         Contact::Dense(field) => {
             dense = apart(field, out_view)?;
             Contact::Dense(&dense)

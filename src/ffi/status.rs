@@ -137,6 +137,8 @@ pub const UPT_FLAG_REGULARISED: u32 = 1024;
 pub const UPT_FLAG_FELL_BACK: u32 = 2048;
 /// The estimated error is above the scene's `error_limit_mm`.
 pub const UPT_FLAG_ERROR: u32 = 4096;
+/// Tissue lies more than 1 mm inside of an instrument.
+pub const UPT_FLAG_DEEP: u32 = 8192;
 
 /// Nodes of the surface.
 pub const UPT_SET_SURFACE_NODES: i32 = 0;
@@ -157,6 +159,13 @@ pub const UPT_SHAPE_CAPSULE: i32 = 0;
 pub const UPT_SHAPE_BOX: i32 = 1;
 /// An instrument's shape: a box with rounded corners.
 pub const UPT_SHAPE_SPATULA: i32 = 2;
+/// An instrument's shape: a hull of `upt_hull_create`.
+pub const UPT_SHAPE_HULL: i32 = 3;
+
+/// An instrument pushes, with Coulomb friction.
+pub const UPT_MODE_SLIDE: u8 = 0;
+/// An instrument holds what is within 0.5 mm of it when the mode changes to this, until the mode changes back or it tears off.
+pub const UPT_MODE_GRASP: u8 = 1;
 
 /// The library's own values are these; a difference does not compile.
 const _: () = {
@@ -205,6 +214,9 @@ const _: () = {
         UPT_FLAG_GROWTH = flag::GROWTH;
         UPT_FLAG_CLAMPED = flag::CLAMPED;
         UPT_FLAG_REGULARISED = flag::REGULARISED;
+        UPT_FLAG_FELL_BACK = flag::FELL_BACK;
+        UPT_FLAG_ERROR = flag::ERROR;
+        UPT_FLAG_DEEP = flag::DEEP;
     }
 };
 

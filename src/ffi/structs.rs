@@ -15,6 +15,11 @@ pub struct upt_scene {
     _opaque: [u8; 0],
 }
 
+/// The convex hull of a tool's points. Immutable; may be used from any thread at once.
+pub struct upt_hull {
+    _opaque: [u8; 0],
+}
+
 /// Receives log messages (UTF-8, valid during the call) on the host's threads, inside of their calls; it must not call
 /// the library: such a call is `UPT_ERR_STATE`.
 pub type upt_log_fn =
@@ -145,7 +150,7 @@ pub struct upt_scene_options {
     pub error_limit_mm: f32,
 }
 
-/// A rigid instrument; the input of `upt_scene_contacts_from_instruments`.
+/// A rigid instrument; the input of `upt_scene_step_instruments` and `upt_scene_contacts_from_instruments`.
 #[derive_ReprC]
 #[repr(C)]
 #[derive(Clone, Copy)]
@@ -162,10 +167,52 @@ pub struct upt_instrument {
     pub half_extents: [f32; 3],
     /// A capsule's radius or a spatula's corner radius, mm.
     pub radius: f32,
-    /// 1: touched nodes move with the instrument until it leaves; 0: they slide.
+    /// `upt_scene_contacts_from_instruments` alone: 1: touched nodes move with the instrument until it leaves; 0: they slide.
     pub sticking: u8,
+    /// `upt_scene_step_instruments` alone: `UPT_MODE_*`.
+    pub mode: u8,
+    /// Zero.
+    pub reserved: [u8; 2],
+    /// `upt_scene_step_instruments` alone: Coulomb's coefficient, 0 or more.
+    pub friction: f32,
+    /// A grasp lets go where its samples pull harder than this together, mN; 0: never.
+    pub tear_off_mn: f32,
+    /// `UPT_SHAPE_HULL`: the `upt_hull`; otherwise NULL.
+    pub hull: *const c_void,
+}
+
+/// What the tissue does to an instrument at the end of a step; filled by `upt_scene_instrument_readings`.
+#[derive_ReprC]
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct upt_instrument_reading {
+    /// `sizeof(upt_instrument_reading)`, set by the caller, the same in every element of an array.
+    pub struct_size: u32,
+    /// Points of the surface that push or hold the instrument.
+    pub contact_count: u32,
+    /// On the instrument, mN.
+    pub force: [f32; 3],
+    /// On the instrument about its position, mN mm.
+    pub torque: [f32; 3],
+    /// How deep the deepest point of the surface lies inside of the instrument, mm.
+    pub penetration_mm: f32,
+    /// 1: its grasp tore off in this step.
+    pub torn: u8,
     /// Zero.
     pub reserved: [u8; 3],
+}
+
+/// A point of the surface that pushes or holds an instrument; filled by `upt_scene_instrument_contacts`.
+#[derive_ReprC]
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct upt_instrument_contact {
+    /// Place of the instrument in the step's array.
+    pub instrument: u32,
+    /// Where the point is, mm.
+    pub position: [f32; 3],
+    /// On the instrument, mN.
+    pub force: [f32; 3],
 }
 
 /// What the last step did and cost; filled by `upt_scene_get_stats`.

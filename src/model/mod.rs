@@ -84,6 +84,8 @@ pub struct Model {
     /// The kind's own part.
     pub kind: KindModel,
     corrections: OnceLock<Corrections>,
+    #[cfg(feature = "contact")]
+    samples: OnceLock<Arc<::contact::Samples>>,
     opening: Mutex<()>,
     files: BundleFiles,
     pub(crate) runtime: &'static Runtime,
@@ -172,6 +174,8 @@ impl Model {
         let model = Model {
             hash: files.hash,
             corrections: OnceLock::new(),
+            #[cfg(feature = "contact")]
+            samples: OnceLock::new(),
             opening: Mutex::new(()),
             files,
             mesh: Arc::new(mesh),
@@ -202,6 +206,31 @@ impl Model {
         }
         let made = Corrections::open(&self.files, &self.mesh, self.prior.as_ref())?;
         Ok(self.corrections.get_or_init(|| made))
+    }
+
+    /// Where tools touch the domain, those of the reference solver; made when the first scene is given tools.
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
+    #[cfg(feature = "contact")]
+    pub fn samples(&self) -> Result<Arc<::contact::Samples>> {
+        if let Some(made) = self.samples.get() {
+            return Ok(Arc::clone(made));
+        }
+        let mesh = &self.mesh;
+        // Made of many lists: what they take together is asked for first.
+        let bytes = 512 * mesh.domain_faces.len() + mesh.positions.len();
+        crate::memory::probe(bytes, "the samples of the surface")?;
+        let faces = mesh.domain_faces.as_chunks::<3>().0.iter().copied();
+        let made = || {
+            Arc::new(::contact::Samples::new(
+                mesh.positions.as_chunks().0,
+                faces,
+                &mesh.held_nodes,
+                ::contact::SPACING_MM,
+            ))
+        };
+        Ok(Arc::clone(self.samples.get_or_init(made)))
     }
 
     /// What the model is.

@@ -69,6 +69,18 @@ impl ContactSet {
         self.order.extend_from_slice(&other.order);
     }
 
+    /// Takes nodes, ascending, each where `field [K,3]` has it.
+    #[cfg(feature = "contact")]
+    pub fn take_nodes(&mut self, nodes: &[u32], field: &[f32]) {
+        self.clear();
+        for &node in nodes {
+            let at = 3 * node as usize;
+            self.order.push(self.nodes.len() as u32);
+            self.nodes.push(node);
+            self.vectors.extend_from_slice(&field[at..at + 3]);
+        }
+    }
+
     /// What is imposed at a node.
     pub fn at(&self, node: u32) -> Option<[f32; 3]> {
         let i = self.nodes.binary_search(&node).ok()?;
@@ -93,6 +105,8 @@ impl ContactSet {
         self.clear();
         match contact {
             Contact::None => Ok(()),
+            #[cfg(feature = "contact")]
+            Contact::Tools(_) => Ok(()),
             Contact::Dense(field) => self.gather_dense(field, node_count),
             Contact::Sparse { nodes, vectors } => self.gather_sparse(nodes, vectors, node_count),
         }

@@ -12,6 +12,8 @@ use super::points::AttachedPoints;
 use super::published::{Frame, Published, Values};
 use super::timing::Stopwatch;
 use crate::bundle::Mesh;
+#[cfg(feature = "contact")]
+use crate::contact::Problem;
 use crate::envelope::EnvelopeCheck;
 use crate::error::Result;
 use crate::guard;
@@ -53,6 +55,13 @@ pub struct Core {
     pub(super) isa: Isa,
     pub(super) engine: Engine,
     pub(super) corrected: Option<Corrected>,
+    /// Contact of tools, from the first step that has one.
+    #[cfg(feature = "contact")]
+    pub(super) problem: Option<Box<Problem>>,
+    /// Whether the last published state was corrected, and the one before it.
+    pub(super) was_corrected: [bool; 2],
+    /// Whether the state being made is.
+    pub(super) next_corrected: bool,
     pub(super) held: Vec<bool>,
     pub(super) plan: NodePlan,
     pub(super) points: AttachedPoints,
@@ -134,6 +143,10 @@ impl Core {
             pool: parts.pool,
             engine: parts.engine,
             corrected: parts.corrected,
+            #[cfg(feature = "contact")]
+            problem: None,
+            was_corrected: [false; 2],
+            next_corrected: false,
         })
     }
 
@@ -199,12 +212,16 @@ impl Core {
             None => None,
         };
         stats.check_ms = watch.lap();
+        let near = self.meet_tools(published, &input)?;
 
-        if self.sleeping && given.is_none() && self.incoming.is_empty() {
+        if self.sleeping && given.is_none() && self.incoming.is_empty() && !near {
             self.publish_rest(published);
         } else {
-            self.predict_and_decode(published, given, &mut stats)?;
-            self.correct(published, given, start, &mut stats)?;
+            if !self.drive(published, near, start, &mut stats)? {
+                let learned = self.corrected.is_none() || self.incoming.is_empty();
+                self.predict_and_decode(published, given, learned, &mut stats)?;
+                self.correct(published, given, start, &mut stats)?;
+            }
             [stats.upload_ms, stats.download_ms] = self.engine.transfer_ms();
             let verdict = self.judge(&mut stats)?;
             let replaced = verdict & guard::REFUSED != 0
@@ -238,10 +255,11 @@ impl Core {
         })
     }
 
-    fn predict_and_decode(
+    pub(super) fn predict_and_decode(
         &mut self,
         published: &RwLock<Published>,
         given: Option<&[f32]>,
+        learned: bool,
         stats: &mut SceneStats,
     ) -> Result<()> {
         let envelope = self.envelope.check(
@@ -252,7 +270,6 @@ impl Core {
         );
         stats.flags |= envelope.flags;
         stats.indicator = envelope.ratio;
-        let learned = self.corrected.is_none() || self.incoming.is_empty();
         let shared = lock_read(published);
         if learned {
             self.absorb(&shared)?;
@@ -314,6 +331,14 @@ impl Core {
             }
             corrected.stage.commit();
         }
+        self.was_corrected = [self.next_corrected && !replaced, self.was_corrected[0]];
+        #[cfg(feature = "contact")]
+        if let Some(problem) = &mut self.problem {
+            if replaced {
+                problem.let_go();
+            }
+            problem.commit();
+        }
         self.source_before = self.source;
         self.source = if replaced {
             Source::Fallback
@@ -328,6 +353,7 @@ impl Core {
             stats.max_displacement_mm
         };
         let quiet = self.contact.is_empty()
+            && !self.was_corrected[0]
             && !was_given
             && (self.max_displacement <= QUIET_DISPLACEMENT || self.is_still(published))
             && self.engine.is_quiet(QUIET_DISPLACEMENT);
@@ -367,6 +393,7 @@ impl Core {
         if let Some(corrected) = &mut self.corrected {
             corrected.stage.reset();
         }
+        self.was_corrected = [false; 2];
         self.source_before = Source::Rest;
         self.source = Source::Rest;
         self.next.field.fill(0.0);
@@ -384,6 +411,8 @@ impl Core {
         std::mem::swap(&mut shared.before, &mut shared.last);
         std::mem::swap(&mut shared.last, &mut self.next);
         self.show_contacts(shared);
+        #[cfg(feature = "contact")]
+        self.show_tools(shared);
     }
 
     /// The last step's contacts in the host's order.
@@ -422,6 +451,7 @@ impl Core {
             + self.points.memory_bytes()
             + self.envelope.memory_bytes()
             + self.engine.memory_bytes()
+            + self.problem_bytes()
             + self
                 .corrected
                 .as_ref()

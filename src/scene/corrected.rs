@@ -3,12 +3,11 @@
 use std::sync::{Arc, RwLock};
 use std::time::Instant;
 
-use super::contact::ContactSet;
 use super::core::{Core, lock_read};
 use super::engine::Engine;
 use super::published::Published;
 use super::timing::Stopwatch;
-use crate::corrections::{Enough, Input, LIMIT, Lent, Motion, SMALLEST_DET, Stage};
+use crate::corrections::{Enough, Input, LIMIT, Lent, Motion, Report, SMALLEST_DET, Stage};
 use crate::error::{Error, Result};
 use crate::kernels::{Isa, Pool};
 use crate::model::Model;
@@ -97,6 +96,34 @@ impl Corrected {
     }
 }
 
+impl Corrected {
+    /// When a step that began at `start` has been corrected enough.
+    pub(super) fn enough(&self, start: Instant) -> Enough {
+        Enough {
+            iterations: self.most,
+            remaining_mm: self.target_mm / self.calibration,
+            until: (self.budget_us > 0)
+                .then(|| start + std::time::Duration::from_micros(self.budget_us.into())),
+        }
+    }
+
+    /// Puts what the iterations report into the statistics.
+    pub(super) fn tell(&self, report: &Report, stats: &mut SceneStats) {
+        stats.corrections = report.iterations;
+        stats.evaluations = report.evaluations;
+        stats.residual = report.residual;
+        stats.min_det = report.min_det;
+        stats.error_mm = report.remaining_mm * self.calibration;
+        if report.fell_back {
+            stats.flags |= flag::FELL_BACK;
+        }
+        let limit = self.error_limit_mm;
+        if limit > 0.0 && (stats.error_mm > limit || stats.error_mm.is_nan()) {
+            stats.flags |= flag::ERROR;
+        }
+    }
+}
+
 impl Core {
     /// Corrects `next` while there is contact; otherwise lets the velocities follow it.
     pub(super) fn correct(
@@ -126,31 +153,16 @@ impl Core {
             last: given.unwrap_or(&shared.last.field),
             before: given.unwrap_or(&shared.before.field),
             still: given.is_some(),
-            enough: Enough {
-                iterations: corrected.most,
-                remaining_mm: corrected.target_mm / corrected.calibration,
-                until: (corrected.budget_us > 0)
-                    .then(|| start + std::time::Duration::from_micros(corrected.budget_us.into())),
-            },
+            enough: corrected.enough(start),
         };
-        if self.incoming.is_empty() {
-            corrected.stage.follow(lent, &input, &self.next.field);
-        } else {
+        self.next_corrected = !self.incoming.is_empty();
+        if self.next_corrected {
             let report = corrected
                 .stage
                 .correct(lent, &input, &mut self.next.field)?;
-            stats.corrections = report.iterations;
-            stats.evaluations = report.evaluations;
-            stats.residual = report.residual;
-            stats.min_det = report.min_det;
-            stats.error_mm = report.remaining_mm * corrected.calibration;
-            if report.fell_back {
-                stats.flags |= flag::FELL_BACK;
-            }
-            let limit = corrected.error_limit_mm;
-            if limit > 0.0 && (stats.error_mm > limit || stats.error_mm.is_nan()) {
-                stats.flags |= flag::ERROR;
-            }
+            corrected.tell(&report, stats);
+        } else {
+            corrected.stage.follow(lent, &input, &self.next.field);
         }
         drop(shared);
         stats.corrections_ms = watch.lap();
@@ -163,6 +175,12 @@ impl Core {
         let Some(corrected) = &self.corrected else {
             return false;
         };
+        #[cfg(feature = "contact")]
+        if let Some(problem) = &self.problem
+            && !problem.past.forces.is_empty()
+        {
+            return self.loads_at_contacts(problem, out);
+        }
         // A state that fell back has inverted elements, and what they push with means nothing.
         let motion = &corrected.stage.motion;
         let sound = motion.min_det >= SMALLEST_DET && motion.reaction.len() == out.len();
@@ -182,15 +200,14 @@ impl Core {
             // A network reads the field itself.
             return Ok(());
         };
-        let was = |contact: &ContactSet| !contact.is_empty();
         engine.absorb(
             self.isa,
             &self.pool,
             table,
             &corrected.basis_starts,
             [
-                was(&self.contact).then_some(shared.last.field.as_slice()),
-                was(&self.contact_before).then_some(shared.before.field.as_slice()),
+                self.was_corrected[0].then_some(shared.last.field.as_slice()),
+                self.was_corrected[1].then_some(shared.before.field.as_slice()),
             ],
         )
     }

@@ -5,6 +5,8 @@
 mod contact;
 mod core;
 mod corrected;
+#[cfg(feature = "contact")]
+mod driven;
 mod engine;
 mod plan;
 mod points;
@@ -17,6 +19,8 @@ mod shared;
 mod snapshot;
 mod timing;
 mod tools;
+#[cfg(not(feature = "contact"))]
+mod undriven;
 mod upt;
 mod verdict;
 mod worker;
@@ -29,6 +33,8 @@ pub use core::{QUIET_DISPLACEMENT, QUIET_STEPS};
 pub use points::check_point_count;
 
 use crate::bundle::{Mesh, TensorFile};
+#[cfg(feature = "contact")]
+use crate::contact::Tool;
 use crate::error::{Error, Result};
 use crate::kernels::{Isa, Pool};
 use crate::memory;
@@ -58,6 +64,9 @@ pub enum Contact<'a> {
         /// `[m,3]`, mm.
         vectors: &'a [f32],
     },
+    /// Rigid tools where they are at the end of the step; their contact is solved.
+    #[cfg(feature = "contact")]
+    Tools(&'a [Tool]),
 }
 
 /// Inputs of a step.
@@ -111,6 +120,8 @@ impl Scene {
             stats: core.blank_stats(),
             contact_nodes: memory::room(count, core::SCENE)?,
             contact_vectors: memory::room(3 * count, core::SCENE)?,
+            #[cfg(feature = "contact")]
+            tools: Default::default(),
         };
         Ok(Scene {
             worker: Worker::new(options.latest_wins),

@@ -70,6 +70,9 @@ pub struct Published {
     pub contact_nodes: Vec<u32>,
     /// `[m,3]`, mm.
     pub contact_vectors: Vec<f32>,
+    /// What the tools of the last step were told, and the samples that push them.
+    #[cfg(feature = "contact")]
+    pub tools: crate::contact::Told,
 }
 
 impl Published {

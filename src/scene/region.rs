@@ -30,6 +30,11 @@ impl Core {
         if let Some(corrected) = &mut self.corrected {
             corrected.stage.reset();
         }
+        self.was_corrected = [false; 2];
+        #[cfg(feature = "contact")]
+        if let Some(problem) = &mut self.problem {
+            problem.reset();
+        }
         self.contact.clear();
         self.contact_before.clear();
         self.source = Source::Rest;

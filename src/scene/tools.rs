@@ -6,6 +6,8 @@ use super::Scene;
 use super::core::lock_read;
 #[cfg(feature = "forces")]
 use super::reaction::Haptics;
+#[cfg(feature = "contact")]
+use crate::contact::{Told, Tool};
 #[cfg(any(feature = "contact", feature = "forces"))]
 use crate::error::{Error, Result};
 #[cfg(feature = "contact")]
@@ -18,6 +20,9 @@ use std::sync::{Mutex, MutexGuard, TryLockError};
 pub struct Tools {
     #[cfg(feature = "contact")]
     contacts: Mutex<Option<InstrumentContacts>>,
+    /// What a host's instruments are read into.
+    #[cfg(feature = "contact")]
+    list: Mutex<Vec<Tool>>,
     #[cfg(feature = "forces")]
     pub(super) forces: Mutex<Option<Haptics>>,
 }
@@ -42,6 +47,30 @@ pub(super) fn lock<T>(mutex: &Mutex<T>) -> Result<MutexGuard<'_, T>> {
         Err(TryLockError::WouldBlock) => {
             Err(Error::Busy("another thread is using the scene".into()))
         }
+    }
+}
+
+#[cfg(feature = "contact")]
+impl Scene {
+    /// A list for the tools of a step, kept from call to call.
+    ///
+    /// # Errors
+    /// [`Error::Busy`].
+    pub fn tool_list(&self) -> Result<MutexGuard<'_, Vec<Tool>>> {
+        lock(&self.tools.list)
+    }
+
+    /// Starts a step that tools drive on the scene's worker.
+    ///
+    /// # Errors
+    /// As [`Scene::submit`], and what [`Tool::check`] says.
+    pub fn submit_tools(&self, tools: &[Tool]) -> Result<()> {
+        self.worker.submit_tools(&self.shared, tools)
+    }
+
+    /// Reads what the tools of the last step were told, and the samples that push them.
+    pub fn with_told<T>(&self, read: impl FnOnce(&Told) -> T) -> T {
+        read(&lock_read(&self.shared.published).tools)
     }
 }
 

@@ -10,6 +10,8 @@ use std::time::{Duration, Instant};
 use super::contact::ContactSet;
 use super::shared::Shared;
 use super::{Contact, Progress, StepInput};
+#[cfg(feature = "contact")]
+use crate::contact::Tool;
 use crate::error::{Error, Result};
 use crate::memory;
 
@@ -20,6 +22,11 @@ struct Slot {
     stop: bool,
     nodes: Vec<u32>,
     vectors: Vec<f32>,
+    /// Tools drive the step that waits.
+    #[cfg(feature = "contact")]
+    driven: bool,
+    #[cfg(feature = "contact")]
+    tools: Vec<Tool>,
     /// Errors that were not told: the first one, and how many came after it.
     failed: Option<Error>,
     failed_later: u64,
@@ -73,12 +80,7 @@ impl Worker {
         checked.gather(Contact::Sparse { nodes, vectors }, node_count)?;
         drop(checked);
         self.start(shared)?;
-        let mut slot = self.signal.lock();
-        if (slot.waiting || slot.running) && !self.latest_wins {
-            return Err(Error::Busy(
-                "a submitted step has not finished; poll or wait first".into(),
-            ));
-        }
+        let mut slot = self.free_slot()?;
         // Both have room before either changes: a contact that waits stays whole.
         let room = |list: usize, have: usize| list.saturating_sub(have);
         let (more_nodes, more_floats) = (
@@ -91,13 +93,50 @@ impl Worker {
         slot.nodes.extend_from_slice(nodes);
         slot.vectors.clear();
         slot.vectors.extend_from_slice(vectors);
+        #[cfg(feature = "contact")]
+        {
+            slot.driven = false;
+        }
+        self.set_off(slot);
+        Ok(())
+    }
+
+    /// Hands tools to the worker, checked.
+    #[cfg(feature = "contact")]
+    pub fn submit_tools(&self, shared: &Arc<Shared>, tools: &[Tool]) -> Result<()> {
+        for (index, tool) in tools.iter().enumerate() {
+            tool.check(index)?;
+        }
+        self.start(shared)?;
+        let mut slot = self.free_slot()?;
+        let more = tools.len().saturating_sub(slot.tools.len());
+        memory::reserve(&mut slot.tools, more, "submitted instruments")?;
+        slot.tools.clear();
+        slot.tools.extend_from_slice(tools);
+        slot.driven = true;
+        self.set_off(slot);
+        Ok(())
+    }
+
+    /// Where the next input may be put.
+    fn free_slot(&self) -> Result<MutexGuard<'_, Slot>> {
+        let slot = self.signal.lock();
+        if (slot.waiting || slot.running) && !self.latest_wins {
+            return Err(Error::Busy(
+                "a submitted step has not finished; poll or wait first".into(),
+            ));
+        }
+        Ok(slot)
+    }
+
+    /// Wakes the thread for the input that was put there.
+    fn set_off(&self, mut slot: MutexGuard<'_, Slot>) {
         slot.waiting = true;
         slot.ever = true;
         if !self.latest_wins {
             slot.finished = false;
         }
         self.signal.work.notify_one();
-        Ok(())
     }
 
     /// Whether a step is waiting or running.
@@ -191,6 +230,8 @@ impl Drop for Worker {
 
 fn run(shared: &Shared, signal: &Signal) {
     let (mut nodes, mut vectors) = (Vec::new(), Vec::new());
+    #[cfg(feature = "contact")]
+    let mut tools = Vec::new();
     let mut slot = signal.lock();
     loop {
         while !slot.waiting && !slot.stop {
@@ -206,13 +247,23 @@ fn run(shared: &Shared, signal: &Signal) {
         slot.running = true;
         std::mem::swap(&mut nodes, &mut slot.nodes);
         std::mem::swap(&mut vectors, &mut slot.vectors);
+        #[cfg(feature = "contact")]
+        std::mem::swap(&mut tools, &mut slot.tools);
+        #[cfg(feature = "contact")]
+        let driven = slot.driven;
         drop(slot);
+        let contact = Contact::Sparse {
+            nodes: &nodes,
+            vectors: &vectors,
+        };
+        #[cfg(feature = "contact")]
+        let contact = match driven {
+            true => Contact::Tools(&tools),
+            false => contact,
+        };
         let input = StepInput {
             displacement: None,
-            contact: Contact::Sparse {
-                nodes: &nodes,
-                vectors: &vectors,
-            },
+            contact,
         };
         let result = shared.step_blocking(input);
         slot = signal.lock();

@@ -2,6 +2,7 @@
 
 mod header;
 mod inputs;
+mod instrument_calls;
 mod library_calls;
 mod scene_calls;
 mod traps;
@@ -41,6 +42,12 @@ pub enum Function {
     ReadPoints,
     SamplePoints,
     Instruments,
+    StepInstruments,
+    SubmitInstruments,
+    Readings,
+    InstrumentContacts,
+    HullCreate,
+    HullDestroy,
     ContactForce,
     Stats,
     Save,
@@ -81,6 +88,12 @@ pub const CALLED_BY: &[(&str, Function)] = &[
     ("upt_scene_read_points", ReadPoints),
     ("upt_scene_sample_points", SamplePoints),
     ("upt_scene_contacts_from_instruments", Instruments),
+    ("upt_scene_step_instruments", StepInstruments),
+    ("upt_scene_submit_instruments", SubmitInstruments),
+    ("upt_scene_instrument_readings", Readings),
+    ("upt_scene_instrument_contacts", InstrumentContacts),
+    ("upt_hull_create", HullCreate),
+    ("upt_hull_destroy", HullDestroy),
     ("upt_scene_contact_force", ContactForce),
     ("upt_scene_get_stats", Stats),
     ("upt_scene_save", Save),
@@ -132,10 +145,12 @@ pub fn call() -> impl Strategy<Value = Call> {
         3 => few(&[ModelInfo, ModelDescribe, ModelPositions, ModelIndices]),
         8 => few(&[SceneCreate, SceneCreate, SceneDestroy]),
         30 => few(&[Step, StepContacts, StepContacts, StepContacts]),
-        12 => few(&[Submit, Submit, Poll, Wait, Wait]),
+        30 => few(&[StepInstruments, StepInstruments, StepInstruments, Readings]),
+        2 => few(&[HullCreate, HullCreate, HullDestroy]),
+        12 => few(&[Submit, SubmitInstruments, Poll, Wait, Wait]),
         30 => few(&[
             Read, Sample, SetRegion, Decode, AttachPoints, ReadPoints, SamplePoints, Instruments,
-            ContactForce, Stats, Save, Restore, Restore, SceneReset,
+            InstrumentContacts, ContactForce, Stats, Save, Restore, Restore, SceneReset,
         ]),
     ];
     let null = prop_oneof![8 => few(&[0u8]), 1 => few(&[1, 2, 4, 3, 7])];

@@ -193,10 +193,6 @@ impl World<'_> {
                     });
                     ("upt_scene_read_points", status)
                 }
-                Function::Instruments => (
-                    "upt_scene_contacts_from_instruments",
-                    Self::instruments(call, scene, nodes),
-                ),
                 Function::ContactForce => {
                     let mut stats: upt_scene_stats = std::mem::zeroed();
                     stats.struct_size = size_of::<upt_scene_stats>() as u32;
@@ -254,44 +250,6 @@ impl World<'_> {
                 }
                 other => unreachable!("{other:?} is not a call on a scene"),
             }
-        }
-    }
-
-    fn instruments(call: &Call, scene: *mut upt_scene, nodes: usize) -> i32 {
-        let mut instruments = Vec::new();
-        for i in 0..call.seed % 3 {
-            let mut one: upt_instrument = unsafe { std::mem::zeroed() };
-            one.struct_size = sized::<upt_instrument>(call);
-            one.shape = if call.odd == Odd::Wrong {
-                9
-            } else {
-                ((call.seed + i) % 3) as i32
-            };
-            one.position = [10.0, 10.0, 12.0 - (call.seed % 30) as f32];
-            one.rotation = [0.0, 0.0, 0.0, 1.0];
-            one.half_extents = [4.0, 6.0, 3.0];
-            one.radius = 2.0;
-            spoil(&mut one.position, call.odd, call.seed as usize % 3);
-            instruments.push(one);
-        }
-        let mut listed = vec![0u32; nodes];
-        let mut imposed = vec![0f32; 3 * nodes];
-        let capacity = if call.size == Size::Zero {
-            0
-        } else {
-            nodes as u64
-        };
-        let mut found = 0;
-        unsafe {
-            upt_scene_contacts_from_instruments(
-                scene,
-                pointer(&instruments, call, 0),
-                instruments.len() as u64,
-                pointer_mut(&mut listed, call, 1),
-                pointer_mut(&mut imposed, call, 2),
-                capacity,
-                &mut found,
-            )
         }
     }
 }

@@ -17,6 +17,7 @@ pub struct World<'a> {
     pub(super) scenes: Vec<(*mut upt_scene, usize)>,
     pub(super) closed_models: Vec<*mut upt_model>,
     pub(super) closed_scenes: Vec<*mut upt_scene>,
+    pub(super) hulls: Vec<*mut upt_hull>,
     pub(super) snapshot: Vec<u8>,
     pub(super) points: std::collections::HashMap<usize, usize>,
 }
@@ -29,6 +30,7 @@ impl<'a> World<'a> {
             scenes: Vec::new(),
             closed_models: Vec::new(),
             closed_scenes: Vec::new(),
+            hulls: Vec::new(),
             snapshot: Vec::new(),
             points: Default::default(),
         };
@@ -54,6 +56,9 @@ impl<'a> World<'a> {
         for (scene, _) in self.scenes {
             assert_eq!(unsafe { upt_scene_destroy(scene) }, UPT_OK);
             assert_eq!(unsafe { upt_scene_destroy(scene) }, UPT_ERR_HANDLE);
+        }
+        for hull in self.hulls {
+            assert_eq!(unsafe { upt_hull_destroy(hull) }, UPT_OK);
         }
         for (model, _) in self.models {
             assert_eq!(unsafe { upt_model_close(model) }, UPT_OK);
@@ -184,6 +189,8 @@ impl<'a> World<'a> {
             | ModelPositions | ModelIndices | SceneCreate | SceneDestroy | SetLog | Texts => {
                 self.call_library(call, scene)
             }
+            Instruments | StepInstruments | SubmitInstruments | Readings | InstrumentContacts
+            | HullCreate | HullDestroy => self.call_instruments(call, scene, nodes),
             _ => self.call_scene(call, scene, nodes),
         }
     }

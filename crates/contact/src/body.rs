@@ -7,6 +7,7 @@
 use crate::shape::{Shape, ShapeError};
 use crate::triangles::Triangles;
 use parry3d::math::{Pose, Vector};
+use std::sync::Arc;
 
 #[derive(Clone, Debug)]
 enum Core {
@@ -17,10 +18,10 @@ enum Core {
     Cuboid {
         half: Vector,
     },
-    Triangles(Box<Triangles>),
+    Triangles(Arc<Triangles>),
 }
 
-/// A shape ready for queries. Cheap to share, never changes.
+/// A shape ready for queries. Cheap to clone, never changes.
 #[derive(Clone, Debug)]
 pub struct Body {
     core: Core,
@@ -67,7 +68,7 @@ impl Body {
                 (Core::Cuboid { half }, *radius)
             }
             Shape::Hull { points, margin } => {
-                (Core::Triangles(Box::new(Triangles::hull(points)?)), *margin)
+                (Core::Triangles(Arc::new(Triangles::hull(points)?)), *margin)
             }
             Shape::Mesh {
                 points,
@@ -75,7 +76,7 @@ impl Body {
                 margin,
             } => {
                 let surface = Triangles::surface(points, faces)?;
-                (Core::Triangles(Box::new(surface)), *margin)
+                (Core::Triangles(Arc::new(surface)), *margin)
             }
         };
         let (low, high) = match &core {
@@ -125,6 +126,21 @@ impl Body {
             distance: local.distance,
             normal: pose.rotation * local.normal,
         }
+    }
+
+    /// Length of the way out of the tool from a point of the world along a unit direction, 0 outside; none where it is longer
+    /// than `limit`.
+    pub fn way_out(&self, pose: &Pose, from: Vector, direction: Vector, limit: f32) -> Option<f32> {
+        let mut length = 0.0;
+        // Inside, the surface is at least `-distance` away in any direction.
+        while length <= limit {
+            let distance = self.nearest_at(pose, from + direction * length).distance;
+            if distance >= -1e-3 {
+                return Some(length);
+            }
+            length -= distance;
+        }
+        None
     }
 
     /// Corners of the axis-aligned box around the tool at `pose`, widened by `margin`.

@@ -56,6 +56,11 @@ impl Grasp {
         }
     }
 
+    /// Takes what was held, ascending by sample.
+    pub fn restore(&mut self, anchors: Vec<Anchor>) {
+        self.anchors = anchors;
+    }
+
     /// Lets go.
     pub fn open(&mut self) {
         self.anchors.clear();

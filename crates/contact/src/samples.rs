@@ -130,6 +130,11 @@ impl Samples {
         self.corners[face]
     }
 
+    /// The face that a sample belongs to.
+    pub fn face_of(&self, sample: u32) -> usize {
+        self.offsets.partition_point(|start| *start <= sample) - 1
+    }
+
     /// Samples that belong to a face, as a range of [`Samples::rows`].
     pub fn of_face(&self, face: usize) -> std::ops::Range<usize> {
         self.offsets[face] as usize..self.offsets[face + 1] as usize

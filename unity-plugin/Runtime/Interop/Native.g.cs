@@ -128,7 +128,7 @@ namespace Upt.Interop
         public float error_limit_mm;
     }
 
-    /// <summary>A rigid instrument; the input of `upt_scene_contacts_from_instruments`.</summary>
+    /// <summary>A rigid instrument; the input of `upt_scene_step_instruments` and `upt_scene_contacts_from_instruments`.</summary>
     [StructLayout(LayoutKind.Sequential)]
     public unsafe struct upt_instrument
     {
@@ -144,10 +144,50 @@ namespace Upt.Interop
         public fixed float half_extents[3];
         /// <summary>A capsule's radius or a spatula's corner radius, mm.</summary>
         public float radius;
-        /// <summary>1: touched nodes move with the instrument until it leaves; 0: they slide.</summary>
+        /// <summary>`upt_scene_contacts_from_instruments` alone: 1: touched nodes move with the instrument until it leaves; 0: they slide.</summary>
         public byte sticking;
+        /// <summary>`upt_scene_step_instruments` alone: `UPT_MODE_*`.</summary>
+        public byte mode;
+        /// <summary>Zero.</summary>
+        public fixed byte reserved[2];
+        /// <summary>`upt_scene_step_instruments` alone: Coulomb's coefficient, 0 or more.</summary>
+        public float friction;
+        /// <summary>A grasp lets go where its samples pull harder than this together, mN; 0: never.</summary>
+        public float tear_off_mn;
+        /// <summary>`UPT_SHAPE_HULL`: the `upt_hull`; otherwise NULL.</summary>
+        public IntPtr hull;
+    }
+
+    /// <summary>What the tissue does to an instrument at the end of a step; filled by `upt_scene_instrument_readings`.</summary>
+    [StructLayout(LayoutKind.Sequential)]
+    public unsafe struct upt_instrument_reading
+    {
+        /// <summary>`sizeof(upt_instrument_reading)`, set by the caller, the same in every element of an array.</summary>
+        public uint struct_size;
+        /// <summary>Points of the surface that push or hold the instrument.</summary>
+        public uint contact_count;
+        /// <summary>On the instrument, mN.</summary>
+        public fixed float force[3];
+        /// <summary>On the instrument about its position, mN mm.</summary>
+        public fixed float torque[3];
+        /// <summary>How deep the deepest point of the surface lies inside of the instrument, mm.</summary>
+        public float penetration_mm;
+        /// <summary>1: its grasp tore off in this step.</summary>
+        public byte torn;
         /// <summary>Zero.</summary>
         public fixed byte reserved[3];
+    }
+
+    /// <summary>A point of the surface that pushes or holds an instrument; filled by `upt_scene_instrument_contacts`.</summary>
+    [StructLayout(LayoutKind.Sequential)]
+    public unsafe struct upt_instrument_contact
+    {
+        /// <summary>Place of the instrument in the step's array.</summary>
+        public uint instrument;
+        /// <summary>Where the point is, mm.</summary>
+        public fixed float position[3];
+        /// <summary>On the instrument, mN.</summary>
+        public fixed float force[3];
     }
 
     /// <summary>What the last step did and cost; filled by `upt_scene_get_stats`.</summary>
@@ -354,6 +394,8 @@ namespace Upt.Interop
         public const uint UPT_FLAG_FELL_BACK = 2048;
         /// <summary>The estimated error is above the scene's `error_limit_mm`.</summary>
         public const uint UPT_FLAG_ERROR = 4096;
+        /// <summary>Tissue lies more than 1 mm inside of an instrument.</summary>
+        public const uint UPT_FLAG_DEEP = 8192;
         /// <summary>Nodes of the surface.</summary>
         public const int UPT_SET_SURFACE_NODES = 0;
         /// <summary>Nodes that instruments may touch.</summary>
@@ -372,6 +414,12 @@ namespace Upt.Interop
         public const int UPT_SHAPE_BOX = 1;
         /// <summary>An instrument's shape: a box with rounded corners.</summary>
         public const int UPT_SHAPE_SPATULA = 2;
+        /// <summary>An instrument's shape: a hull of `upt_hull_create`.</summary>
+        public const int UPT_SHAPE_HULL = 3;
+        /// <summary>An instrument pushes, with Coulomb friction.</summary>
+        public const int UPT_MODE_SLIDE = 0;
+        /// <summary>An instrument holds what is within 0.5 mm of it when the mode changes to this, until the mode changes back or it tears off.</summary>
+        public const int UPT_MODE_GRASP = 1;
         /// <summary>Version of the C ABI that `upt_abi_version` returns. Bindings compare it at load.</summary>
         public const uint UPT_ABI_VERSION = 1;
 

@@ -11,6 +11,9 @@ use crate::host::{Model, Scene};
 
 /// Steps that may be made up for at once when the clock has run ahead; the rest is dropped.
 const MOST_STEPS: u32 = 2;
+/// Coulomb's coefficient of a tool that sticks, and of one that slips, such as wet steel.
+const STICKS: f32 = 1.0;
+const SLIPS: f32 = 0.1;
 /// A recording ends after so many steps: a quarter of an hour at 20 Hz.
 const LONGEST_RECORDING: usize = 18_000;
 
@@ -34,8 +37,7 @@ pub struct Session {
     recording: Option<Vec<Option<Tool>>>,
     recorded: Vec<Option<Tool>>,
     replayed: Option<usize>,
-    contact_nodes: Vec<u32>,
-    contact_vectors: Vec<[f32; 3]>,
+    contacts: u32,
     displacement: Vec<[f32; 3]>,
     force: [f32; 3],
     bytes: Vec<u8>,
@@ -71,8 +73,7 @@ impl Session {
             recording: None,
             recorded: Vec::new(),
             replayed: None,
-            contact_nodes: Vec::new(),
-            contact_vectors: Vec::new(),
+            contacts: 0,
             force: [0.0; 3],
             bytes: Vec::new(),
         })
@@ -99,6 +100,8 @@ impl Session {
                 (ffi::UPT_FLAG_GROWTH, "guard: growth"),
                 (ffi::UPT_FLAG_CLAMPED, "correction bounded"),
                 (ffi::UPT_FLAG_REGULARISED, "contact regularised"),
+                (ffi::UPT_FLAG_FELL_BACK, "fell back on linear elasticity"),
+                (ffi::UPT_FLAG_DEEP, "tool deep in the tissue"),
             ],
         }
     }
@@ -175,24 +178,11 @@ impl Session {
             self.waited_ms = came.elapsed().as_secs_f32() * 1e3;
         }
         let instruments: Vec<ffi::upt_instrument> = self.tool.iter().map(instrument).collect();
-        self.scene.contacts(
-            &instruments,
-            &mut self.contact_nodes,
-            &mut self.contact_vectors,
-        )?;
-        self.scene.step(
-            &self.contact_nodes,
-            &self.contact_vectors,
-            &mut self.displacement,
-        )?;
-        self.force = [0.0; 3];
-        if !self.contact_nodes.is_empty() {
-            for force in self.scene.contact_force(self.contact_nodes.len())? {
-                for (sum, f) in self.force.iter_mut().zip(force) {
-                    *sum += f;
-                }
-            }
-        }
+        self.scene
+            .step_instruments(&instruments, &mut self.displacement)?;
+        let readings = self.scene.readings(instruments.len())?;
+        self.force = readings.first().map_or([0.0; 3], |reading| reading.force);
+        self.contacts = readings.iter().map(|reading| reading.contact_count).sum();
         Ok(())
     }
 
@@ -204,7 +194,7 @@ impl Session {
         let header: [[u8; 4]; HEADER] = [
             self.sequence.to_le_bytes(),
             stats.flags.to_le_bytes(),
-            (self.contact_nodes.len() as u32).to_le_bytes(),
+            self.contacts.to_le_bytes(),
             state.to_le_bytes(),
             (stats.step_ms as f32).to_le_bytes(),
             stats.indicator.to_le_bytes(),
@@ -232,7 +222,11 @@ fn instrument(tool: &Tool) -> ffi::upt_instrument {
         rotation: tool.rotation,
         half_extents: [0.0, tool.half_length, 0.0],
         radius: tool.radius,
-        sticking: u8::from(tool.sticking),
-        reserved: [0; 3],
+        sticking: 0,
+        mode: ffi::UPT_MODE_SLIDE,
+        reserved: [0; 2],
+        friction: if tool.sticking { STICKS } else { SLIPS },
+        tear_off_mn: 0.0,
+        hull: std::ptr::null(),
     }
 }

@@ -4,6 +4,10 @@
 //! latent states, and the fields where they are kept rather than decoded; at the end the SHA-256 of all before it.
 //! Region, attached points and options are the host's and are not part of it.
 
+mod bytes;
+#[cfg(feature = "contact")]
+mod tools;
+
 use std::sync::RwLock;
 
 use sha2::{Digest, Sha256};
@@ -18,127 +22,14 @@ use crate::corrections::{Motion, PAIRS};
 use crate::error::{Error, Result};
 use crate::kernels::FlushToZero;
 use crate::memory;
+use bytes::{Reader, Writer};
 
 const MAGIC: &[u8; 8] = b"UPTSNAP\0";
-const VERSION: u32 = 4;
+const VERSION: u32 = 5;
 const DIGEST: usize = 32;
 
 /// L-BFGS pairs.
 type Pairs = Vec<[Vec<f32>; 2]>;
-
-struct Writer(Vec<u8>);
-
-impl Writer {
-    fn u32(&mut self, value: u32) {
-        self.0.extend_from_slice(&value.to_le_bytes());
-    }
-
-    fn floats(&mut self, values: &[f32]) {
-        self.u32(values.len() as u32);
-        for value in values {
-            self.0.extend_from_slice(&value.to_le_bytes());
-        }
-    }
-
-    fn indices(&mut self, values: &[u32]) {
-        self.u32(values.len() as u32);
-        values.iter().for_each(|&value| self.u32(value));
-    }
-}
-
-struct Reader<'a>(&'a [u8]);
-
-impl<'a> Reader<'a> {
-    fn take(&mut self, count: usize) -> Result<&'a [u8]> {
-        if count > self.0.len() {
-            return Err(Error::Snapshot("is cut short".into()));
-        }
-        let (head, tail) = self.0.split_at(count);
-        self.0 = tail;
-        Ok(head)
-    }
-
-    fn u32(&mut self) -> Result<u32> {
-        let b = self.take(4)?;
-        Ok(u32::from_le_bytes([b[0], b[1], b[2], b[3]]))
-    }
-
-    fn f32(&mut self) -> Result<f32> {
-        let value = f32::from_bits(self.u32()?);
-        if value.is_finite() {
-            Ok(value)
-        } else {
-            Err(Error::Snapshot("holds a value that is not finite".into()))
-        }
-    }
-
-    /// Floats of exactly this many.
-    fn floats(&mut self, count: usize) -> Result<Vec<f32>> {
-        let stored = self.u32()? as usize;
-        if stored != count {
-            return Err(Error::Snapshot(format!(
-                "holds a list of {stored} numbers, must have {count}"
-            )));
-        }
-        let mut list = memory::room(count, "a snapshot")?;
-        for b in self.take(4 * count)?.chunks_exact(4) {
-            list.push(Reader(b).f32()?);
-        }
-        Ok(list)
-    }
-
-    fn contact(&mut self, node_count: usize) -> Result<ContactSet> {
-        let count = self.u32()? as usize;
-        if count > node_count {
-            return Err(Error::Snapshot(
-                "holds more contact nodes than the mesh has nodes".into(),
-            ));
-        }
-        let mut nodes = memory::room(count, "a snapshot")?;
-        for _ in 0..count {
-            nodes.push(self.u32()?);
-        }
-        let vectors = self.floats(3 * count)?;
-        let mut set = ContactSet::with_capacity(node_count)?;
-        set.gather(
-            super::Contact::Sparse {
-                nodes: &nodes,
-                vectors: &vectors,
-            },
-            node_count,
-        )
-        .map_err(|error| Error::Snapshot(error.to_string()))?;
-        Ok(set)
-    }
-
-    /// What corrections know of the past: velocities and pairs.
-    fn past(&mut self, len: usize, contacts: usize) -> Result<Option<(Motion, Pairs)>> {
-        let Some(count) = self.u32()?.checked_sub(1) else {
-            return Ok(None);
-        };
-        let motion = Motion {
-            velocity: self.floats(len)?,
-            velocity_before: self.floats(len)?,
-            min_det: self.floats(1)?[0],
-            reaction: self.floats(3 * contacts)?,
-        };
-        let pairs: Result<Pairs> = (0..count)
-            .map(|_| Ok([self.floats(len)?, self.floats(len)?]))
-            .collect();
-        Ok(Some((motion, pairs?)))
-    }
-
-    fn source(&mut self) -> Result<Source> {
-        match self.u32()? {
-            0 => Ok(Source::Rest),
-            1 => Ok(Source::Model),
-            2 => Ok(Source::Fallback),
-            other => Err(Error::Snapshot(format!(
-                "has an unknown state source {other}"
-            ))),
-        }
-    }
-}
 
 fn source_code(source: Source) -> u32 {
     match source {
@@ -180,9 +71,11 @@ impl Core {
         let (contacts, fields) = (2 * (8 + 16 * count), 2 * (4 + 12 * count));
         let past = match &self.corrected {
             // Velocities, contact forces, pairs.
-            Some(_) => (3 + 2 * PAIRS) * (4 + 12 * count),
+            Some(_) => (4 + 2 * PAIRS) * (4 + 12 * count),
             None => 0,
         };
+        #[cfg(feature = "contact")]
+        let past = past + self.most_tool_bytes();
         1024 + contacts + latents + fields + past
     }
 
@@ -228,6 +121,7 @@ impl Core {
                 w.u32(1 + stage.pairs().count() as u32);
                 w.floats(&stage.motion.velocity);
                 w.floats(&stage.motion.velocity_before);
+                w.floats(&stage.motion.inertia);
                 w.floats(&[stage.motion.min_det]);
                 // The guard may have dropped the contact that they belonged to.
                 let contacts = 3 * self.contact.len();
@@ -242,6 +136,13 @@ impl Core {
                 }
             }
         }
+        for was in self.was_corrected {
+            w.u32(u32::from(was));
+        }
+        #[cfg(feature = "contact")]
+        self.save_tools(&mut w);
+        #[cfg(not(feature = "contact"))]
+        w.u32(0);
         let digest = Sha256::digest(&w.0);
         w.0.extend_from_slice(&digest);
         Ok(w.0)
@@ -309,6 +210,16 @@ impl Core {
                 "was saved by a scene with other `corrections`; restore it in one that corrects where that one did".into(),
             ));
         }
+        let was_corrected = [r.u32()? != 0, r.u32()? != 0];
+        #[cfg(feature = "contact")]
+        let driven = self.read_tools(&mut r)?;
+        #[cfg(not(feature = "contact"))]
+        if r.u32()? != 0 {
+            return Err(Error::Snapshot(
+                "was saved by a scene with instruments; this build has no feature \"contact\""
+                    .into(),
+            ));
+        }
         if !r.0.is_empty() {
             return Err(Error::Snapshot(format!("has {} bytes too many", r.0.len())));
         }
@@ -338,6 +249,9 @@ impl Core {
         self.sleeping = sleeping;
         self.rest_frames = rest_frames;
         self.max_displacement = max_displacement;
+        self.was_corrected = was_corrected;
+        #[cfg(feature = "contact")]
+        let old_tools = self.swap_tools(driven)?;
         if let [last, before] = fields.as_slice() {
             let mut shared = lock_write(published);
             shared.last.field.copy_from_slice(last);
@@ -348,6 +262,8 @@ impl Core {
             .and_then(|()| self.restore_past(past))
         {
             self.take_back(old, published);
+            #[cfg(feature = "contact")]
+            self.swap_tools(old_tools)?;
             return Err(error);
         }
         let mut shared = lock_write(published);
@@ -398,6 +314,7 @@ impl Core {
             sleeping: self.sleeping,
             rest_frames: self.rest_frames,
             max_displacement: self.max_displacement,
+            was_corrected: self.was_corrected,
             fields,
             past: match &self.corrected {
                 None => None,
@@ -433,6 +350,7 @@ impl Core {
         self.sleeping = kept.sleeping;
         self.rest_frames = kept.rest_frames;
         self.max_displacement = kept.max_displacement;
+        self.was_corrected = kept.was_corrected;
         // Fails only where a worker panics, which has been reported by then.
         let _ = self.restore_past(kept.past);
         if let Some([last, before]) = kept.fields {
@@ -459,6 +377,7 @@ struct Kept {
     sleeping: bool,
     rest_frames: u32,
     max_displacement: f32,
+    was_corrected: [bool; 2],
     fields: Option<[Vec<f32>; 2]>,
     past: Option<(Motion, Pairs)>,
 }

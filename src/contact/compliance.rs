@@ -1,0 +1,177 @@
+//! How samples move under forces on samples: `W = B A B^T`, from the prior's columns at the samples' nodes.
+//!
+//! With a coarse space, `A` is the compliance of `K + kappa M`: the static one less what inertia holds back,
+//! `A_k = A - N diag(kappa / (w² (w² + kappa))) N^T` with natural modes `N` of frequency `w`.
+
+use ::contact::{Sample, Vector};
+
+use crate::corrections::CoarseSpace;
+use crate::prior::PriorTable;
+
+/// The tables of a solve.
+#[derive(Clone, Copy)]
+pub struct Compliance<'a> {
+    /// Columns.
+    pub prior: &'a PriorTable,
+    /// Held nodes `[K]`.
+    pub held: &'a [bool],
+    /// The natural modes, and for each what inertia takes off its part, mm/mN ([`CoarseSpace::held_back`]); none: static.
+    pub inertia: Option<(&'a CoarseSpace, &'a [f32])>,
+}
+
+impl Compliance<'_> {
+    /// Columns of the nodes of a sample with their weights; nodes that do not move are left out.
+    pub fn entries(&self, sample: Sample) -> impl Iterator<Item = (u32, f32)> {
+        let columns = sample.nodes.into_iter().zip(sample.weights);
+        columns.filter_map(|(node, weight)| {
+            let found = self.prior.column_for(self.held, node)?;
+            (weight != 0.0).then_some((found.0 as u32, weight))
+        })
+    }
+}
+
+/// `A` at some columns, and `W` of samples on them.
+#[derive(Debug, Default)]
+pub struct Delassus {
+    /// Ascending.
+    columns: Vec<u32>,
+    wanted: Vec<u32>,
+    upper: Vec<f64>,
+    widened: Vec<f32>,
+    /// Scaled modes of a row, and all modes by mode `[n,3m]`.
+    modes: Vec<f32>,
+    /// `A [3m,3m]`, mm/mN.
+    a: Vec<f32>,
+    /// The natural modes' part was left out of it.
+    is_static: bool,
+    /// `W [3n,3n]`, mm/mN.
+    w: Vec<f32>,
+}
+
+impl Delassus {
+    /// Forgets the columns: the next call reads them anew.
+    pub fn forget(&mut self) {
+        self.columns.clear();
+    }
+
+    /// `W` of samples, `[3n,3n]`, row-major.
+    pub fn of(
+        &mut self,
+        compliance: Compliance<'_>,
+        samples: impl Iterator<Item = Sample> + Clone,
+    ) -> &[f32] {
+        self.gather(compliance, samples.clone());
+        let (order, count) = (3 * self.columns.len(), samples.clone().count());
+        self.w.clear();
+        self.w.resize(9 * count * count, 0.0);
+        let place = |column: u32| 3 * self.columns.partition_point(|c| *c < column);
+        for (i, row) in samples.clone().enumerate() {
+            for (j, other) in samples.clone().enumerate().skip(i) {
+                let mut block = [0.0f32; 9];
+                for (a, x) in compliance.entries(row) {
+                    let from = place(a);
+                    for (b, y) in compliance.entries(other) {
+                        let to = place(b);
+                        for axis in 0..3 {
+                            let line = &self.a[(from + axis) * order + to..][..3];
+                            for (sum, value) in block[3 * axis..].iter_mut().zip(line) {
+                                *sum += x * y * value;
+                            }
+                        }
+                    }
+                }
+                for (at, &value) in block.iter().enumerate() {
+                    let (r, c) = (3 * i + at / 3, 3 * j + at % 3);
+                    self.w[r * 3 * count + c] = value;
+                    self.w[c * 3 * count + r] = value;
+                }
+            }
+        }
+        &self.w
+    }
+
+    /// Reads the columns that samples need, unless they are there.
+    fn gather(&mut self, compliance: Compliance<'_>, samples: impl Iterator<Item = Sample>) {
+        self.wanted.clear();
+        for sample in samples {
+            self.wanted
+                .extend(compliance.entries(sample).map(|entry| entry.0));
+        }
+        self.wanted.sort_unstable();
+        self.wanted.dedup();
+        let known = |column: &u32| self.columns.binary_search(column).is_ok();
+        if self.is_static == compliance.inertia.is_none()
+            && !self.columns.is_empty()
+            && self.columns.len() <= 2 * self.wanted.len()
+            && self.wanted.iter().all(known)
+        {
+            return;
+        }
+        self.is_static = compliance.inertia.is_none();
+        std::mem::swap(&mut self.columns, &mut self.wanted);
+        let order = 3 * self.columns.len();
+        self.upper.clear();
+        self.upper.resize(order * order, 0.0);
+        compliance
+            .prior
+            .gather_compliance(&self.columns, &mut self.upper, &mut self.widened);
+        self.a.clear();
+        self.a.extend(self.upper.iter().map(|value| *value as f32));
+        if let Some((space, held_back)) = compliance.inertia {
+            self.hold_back(space, held_back, order);
+        }
+        for i in 0..order {
+            for j in 0..i {
+                self.a[i * order + j] = self.a[j * order + i];
+            }
+        }
+    }
+
+    /// Takes the natural modes' part off the upper triangle.
+    fn hold_back(&mut self, space: &CoarseSpace, held_back: &[f32], order: usize) {
+        let dof = |at: usize| 3 * self.columns[at / 3] as usize + at % 3;
+        self.modes.clear();
+        self.modes.resize(held_back.len() * order, 0.0);
+        for at in 0..order {
+            let own = space.at_contact(dof(at));
+            for (mode, value) in own.iter().take(held_back.len()).enumerate() {
+                self.modes[mode * order + at] = *value;
+            }
+        }
+        for at in 0..order {
+            let row = &mut self.a[at * order + at..(at + 1) * order];
+            for (mode, lost) in held_back.iter().enumerate() {
+                let values = &self.modes[mode * order + at..(mode + 1) * order];
+                let factor = lost * values[0];
+                for (a, value) in row.iter_mut().zip(values) {
+                    *a -= factor * value;
+                }
+            }
+        }
+    }
+
+    /// What forces on degrees of freedom of the columns do to the node of one of them, mm.
+    pub fn moved(&self, column: u32, dofs: &[u32], forces: &[f32]) -> Vector {
+        let order = 3 * self.columns.len();
+        let place = |column: u32| 3 * self.columns.partition_point(|c| *c < column);
+        let mut moved = [0.0f32; 3];
+        for (&dof, force) in dofs.iter().zip(forces) {
+            let from = place(dof / 3) + (dof % 3) as usize;
+            for (axis, moved) in moved.iter_mut().enumerate() {
+                *moved += force * self.a[(place(column) + axis) * order + from];
+            }
+        }
+        Vector::from(moved)
+    }
+
+    /// Bytes held.
+    pub fn memory_bytes(&self) -> usize {
+        4 * (self.columns.capacity()
+            + self.wanted.capacity()
+            + self.widened.capacity()
+            + self.modes.capacity()
+            + self.a.capacity()
+            + self.w.capacity())
+            + 8 * self.upper.capacity()
+    }
+}

@@ -1,0 +1,21 @@
+//! Contact of rigid tools with the tissue, solved: forces with no penetration and Coulomb friction at samples of the surface,
+//! as loads on the tissue (`docs/instruments.md`).
+//!
+//! | module | what |
+//! |---|---|
+//! | [`tool`] | what a host gives: shape, pose, how it holds; and what it gets back |
+//! | [`past`] | what is remembered from step to step: poses, forces, grasps |
+//! | [`compliance`] | how samples move under forces on samples: the Delassus matrix `W = B A B^T` |
+//! | [`problem`] | one solve: gaps and slips at a state, forces, what they change |
+//!
+//! Shapes, samples and sweeps are those of the reference solver (crate `contact`). Lengths mm, forces mN.
+
+pub mod compliance;
+pub mod past;
+pub mod problem;
+pub mod tool;
+
+pub use compliance::Compliance;
+pub use past::Past;
+pub use problem::{Problem, State};
+pub use tool::{MAX_TOOLS, Mode, Push, Reading, Told, Tool};

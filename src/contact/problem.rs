@@ -1,0 +1,632 @@
+//! One contact problem: the samples near the tools, their gaps and slips at a state of the tissue, and the forces that leave no
+//! penetration, obey Coulomb's law and hold what is grasped.
+//!
+//! A step solves it several times, as the tissue's state gets better; each solve goes on from the forces of the one before, since
+//! the state that it is given is the tissue under those.
+
+use std::sync::Arc;
+
+use ::contact::grasp::{REACH_MM, tension};
+use ::contact::{
+    Contact, Law, Limits, Placed, Pose, SKIN_MM, Samples, Search, Sweeps, Vector, pose,
+};
+
+use super::compliance::{Compliance, Delassus};
+use super::past::{Force, Held, Past};
+use super::tool::{MAX_TOOLS, Mode, Push, Reading, Told, Tool};
+use crate::error::{Error, Result};
+use crate::memory;
+
+/// A tool that moves farther in a step was put there, not moved, mm.
+const PUT_MM: f32 = 40.0;
+/// What lies deeper inside of a tool at the start of a step comes out by this much a step, mm.
+const RECOVERY_MM: f32 = 3.0;
+/// Linearisations of the gap.
+const LINEARISATIONS: usize = 2;
+/// Longest way through a tool, mm.
+const THROUGH_MM: f32 = 30.0;
+/// A tool's normal may lean this much (cosine) to the outside of the tissue; beyond, the tool reaches the sample from within.
+const LEAN: f32 = 0.2;
+
+/// Where the tissue is, `[K,3]` each.
+#[derive(Clone, Copy)]
+pub struct State<'a> {
+    /// Rest positions, mm.
+    pub rest: &'a [f32],
+    /// Displacements, mm.
+    pub u: &'a [f32],
+    /// Displacements at the start of the step, mm.
+    pub start: &'a [f32],
+}
+
+fn vector(field: &[f32], node: u32) -> Vector {
+    let at = 3 * node as usize;
+    Vector::new(field[at], field[at + 1], field[at + 2])
+}
+
+impl State<'_> {
+    fn position(&self, node: u32) -> Vector {
+        vector(self.rest, node) + vector(self.u, node)
+    }
+}
+
+/// A sample that is looked at.
+#[derive(Clone, Copy, Debug)]
+struct Row {
+    tool: u32,
+    sample: u32,
+    force: Vector,
+    point: Vector,
+    /// Of the tissue's surface, outward.
+    outward: Vector,
+}
+
+/// The contact of one scene.
+pub struct Problem {
+    samples: Arc<Samples>,
+    tools: Vec<Tool>,
+    /// Where each tool was when the step began.
+    before: Vec<Pose>,
+    /// Depth that each tool may keep in this step, mm.
+    allowed: Vec<f32>,
+    /// At the end of the last published step.
+    pub past: Past,
+    /// Of the step being made.
+    pub next: Past,
+    search: Search,
+    sweeps: Sweeps,
+    delassus: Delassus,
+    rows: Vec<Row>,
+    contacts: Vec<Contact>,
+    forces: Vec<Vector>,
+    /// Forces before the last solve, to go part of the way.
+    kept: Vec<Force>,
+    columns: Vec<u32>,
+    change: Vec<f32>,
+    nodes: Vec<u32>,
+    vectors: Vec<f32>,
+}
+
+/// What one solve changed: forces on the degrees of freedom of the prior's columns.
+#[derive(Clone, Copy, Debug)]
+pub struct Change<'a> {
+    /// Rows of the response `[3n]`, ascending.
+    pub dofs: &'a [u32],
+    /// `[3n]`, mN.
+    pub forces: &'a [f32],
+}
+
+impl Problem {
+    /// A scene without tools.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`].
+    pub fn new(samples: Arc<Samples>) -> Result<Problem> {
+        const WHAT: &str = "the contact of instruments";
+        let room = samples.len().min(1024);
+        Ok(Problem {
+            tools: memory::room(MAX_TOOLS, WHAT)?,
+            before: memory::room(MAX_TOOLS, WHAT)?,
+            allowed: memory::room(MAX_TOOLS, WHAT)?,
+            past: Past::with_room(room)?,
+            next: Past::with_room(room)?,
+            search: Search::default(),
+            sweeps: Sweeps::with_capacity(256),
+            delassus: Delassus::default(),
+            rows: memory::room(room, WHAT)?,
+            contacts: memory::room(room, WHAT)?,
+            forces: memory::room(room, WHAT)?,
+            kept: memory::room(room, WHAT)?,
+            columns: memory::room(room, WHAT)?,
+            change: memory::room(room, WHAT)?,
+            nodes: memory::room(room, WHAT)?,
+            vectors: memory::room(room, WHAT)?,
+            samples,
+        })
+    }
+
+    /// No tool has ever been.
+    pub fn reset(&mut self) {
+        self.past.clear();
+        self.next.clear();
+    }
+
+    /// Another body's compliance: nothing that was read of the last one holds.
+    pub fn forget_columns(&mut self) {
+        self.delassus.forget();
+    }
+
+    /// The tools of this step.
+    pub fn tools(&self) -> &[Tool] {
+        &self.tools
+    }
+
+    /// Takes the tools of a step that begins at `state.start`. A tool's place in the list is its identity from step to step.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for friction, tear-off force or number; the past stays.
+    pub fn begin(&mut self, tools: &[Tool], rest: &[f32], start: &[f32]) -> Result<()> {
+        if tools.len() > MAX_TOOLS {
+            return Err(Error::Argument(format!(
+                "{} instruments; at most {MAX_TOOLS} at once",
+                tools.len()
+            )));
+        }
+        for (index, tool) in tools.iter().enumerate() {
+            tool.check(index)?;
+        }
+        self.tools.clear();
+        self.tools.extend_from_slice(tools);
+        self.next.take(&self.past);
+        self.next.tools.truncate(tools.len());
+        let state = State {
+            rest,
+            u: start,
+            start,
+        };
+        self.before.clear();
+        self.allowed.clear();
+        for (index, tool) in tools.iter().enumerate() {
+            let known = self.past.tools.get(index).map(|held| held.pose);
+            let moved = known.filter(|from| tool.body.motion(from, &tool.pose) <= PUT_MM);
+            let from = moved.unwrap_or(tool.pose);
+            self.before.push(from);
+            if self.next.tools.len() <= index {
+                self.next.tools.push(Held::default());
+            }
+            let held = &mut self.next.tools[index];
+            held.pose = tool.pose;
+            held.reading = Reading::default();
+            let closes = tool.mode == Mode::Grasp;
+            if closes && !held.closed {
+                let position = |node| state.position(node);
+                held.grasp
+                    .close(&self.samples, &tool.body, &from, REACH_MM, position);
+            } else if !closes {
+                held.grasp.open();
+            }
+            held.closed = closes;
+        }
+        for index in 0..tools.len() {
+            let deepest = self.deepest(index, &self.before[index].clone(), state);
+            self.allowed.push((deepest - RECOVERY_MM).max(0.0));
+        }
+        Ok(())
+    }
+
+    /// Whether a tool is near enough to touch the tissue in this step, or pushed it in the last.
+    pub fn is_near(&mut self, state: State<'_>) -> bool {
+        if !self.next.forces.is_empty() || self.holds() {
+            return true;
+        }
+        self.look(state, 1.0, true);
+        !self.rows.is_empty()
+    }
+
+    /// Whether forces were at work at the end of the last step.
+    pub fn pushed(&self) -> bool {
+        !self.past.forces.is_empty()
+    }
+
+    /// Whether forces are at work in the step being made.
+    pub fn pushes(&self) -> bool {
+        !self.next.forces.is_empty()
+    }
+
+    /// Whether the tissue lies inside of a tool deeper than `depth_mm`, tools at their ends.
+    pub fn intrudes(&mut self, state: State<'_>, depth_mm: f32) -> bool {
+        (0..self.tools.len())
+            .any(|index| self.deepest(index, &self.tools[index].pose.clone(), state) > depth_mm)
+    }
+
+    /// Whether a grasper holds a sample.
+    pub fn holds(&self) -> bool {
+        let holds = |held: &Held| !held.grasp.anchors().is_empty();
+        self.next.tools.iter().any(holds)
+    }
+
+    /// The longest way that a tool goes in this step, mm.
+    pub fn longest_motion(&self) -> f32 {
+        let ways = self.tools.iter().zip(&self.before);
+        ways.map(|(tool, from)| tool.body.motion(from, &tool.pose))
+            .fold(0.0, f32::max)
+    }
+
+    /// Back to the forces at the start of the step.
+    pub fn restart(&mut self) {
+        self.next.forces.clear();
+        self.next.forces.extend_from_slice(&self.past.forces);
+    }
+
+    /// Gives up all forces: the tissue starts from rest.
+    pub fn let_go(&mut self) {
+        self.next.forces.clear();
+    }
+
+    /// Solves for the forces at `state`, which is the tissue under the forces so far, with the tools at part `part` in `(0, 1]` of
+    /// their way. Gives what has changed.
+    pub fn solve(&mut self, compliance: Compliance<'_>, state: State<'_>, part: f32) -> Change<'_> {
+        self.kept.clear();
+        self.kept.extend_from_slice(&self.next.forces);
+        self.look(state, part, false);
+        self.forces.clear();
+        self.forces.extend(self.rows.iter().map(|row| row.force));
+        let samples = &self.samples;
+        let rows = &self.rows;
+        let of = rows.iter().map(|row| samples.rows()[row.sample as usize]);
+        let w = self.delassus.of(compliance, of);
+        for pass in 0..LINEARISATIONS {
+            self.contacts.clear();
+            for (at, row) in self.rows.iter_mut().enumerate() {
+                if pass > 0 {
+                    row.point += self.sweeps.shift(at);
+                }
+                self.contacts.push(measure(
+                    &self.tools,
+                    &self.before,
+                    &self.allowed,
+                    &self.next.tools,
+                    &self.samples,
+                    row,
+                    state,
+                    part,
+                ));
+            }
+            self.sweeps
+                .solve(w, &self.contacts, &mut self.forces, Limits::default());
+        }
+        self.next.forces.clear();
+        self.columns.clear();
+        for (row, force) in self.rows.iter().zip(&self.forces) {
+            let sample = self.samples.rows()[row.sample as usize];
+            self.columns
+                .extend(compliance.entries(sample).map(|entry| entry.0));
+            if *force != Vector::ZERO {
+                self.next.forces.push(Force {
+                    tool: row.tool,
+                    sample: row.sample,
+                    force: *force,
+                });
+            }
+        }
+        self.columns.sort_unstable();
+        self.columns.dedup();
+        self.change.clear();
+        self.change.resize(3 * self.columns.len(), 0.0);
+        for (row, force) in self.rows.iter().zip(&self.forces) {
+            let sample = self.samples.rows()[row.sample as usize];
+            let change = *force - row.force;
+            for (column, weight) in compliance.entries(sample) {
+                let at = 3 * self.columns.partition_point(|c| *c < column);
+                for (sum, value) in self.change[at..at + 3].iter_mut().zip(change.to_array()) {
+                    *sum += weight * value;
+                }
+            }
+        }
+        // Columns become degrees of freedom in place, from the last.
+        let count = self.columns.len();
+        self.columns.resize(3 * count, 0);
+        for at in (0..count).rev() {
+            let column = self.columns[at];
+            for axis in 0..3 {
+                self.columns[3 * at + axis] = 3 * column + axis as u32;
+            }
+        }
+        Change {
+            dofs: &self.columns,
+            forces: &self.change,
+        }
+    }
+
+    /// The contact solved once on the static response, as a collision field: nodes, ascending, and where they go, `[m,3]`, mm.
+    ///
+    /// The state is taken as that under half of the last forces; the other half is solved for again.
+    pub fn prescribe(&mut self, compliance: Compliance<'_>, state: State<'_>) -> (&[u32], &[f32]) {
+        for force in &mut self.next.forces {
+            force.force *= 0.5;
+        }
+        self.solve(compliance, state, 1.0);
+        self.nodes.clear();
+        for force in &self.next.forces {
+            let sample = self.samples.rows()[force.sample as usize];
+            let own = |node: &u32| {
+                matches!(
+                    compliance.prior.column_for(compliance.held, *node),
+                    Some((_, true))
+                )
+            };
+            self.nodes
+                .extend(sample.entries().map(|entry| entry.0).filter(own));
+        }
+        self.nodes.sort_unstable();
+        self.nodes.dedup();
+        self.vectors.clear();
+        for &node in &self.nodes {
+            let mut place = vector(state.u, node);
+            if let Some((column, _)) = compliance.prior.column_for(compliance.held, node) {
+                place += self
+                    .delassus
+                    .moved(column as u32, &self.columns, &self.change);
+            }
+            self.vectors.extend(place.to_array());
+        }
+        // The whole force: what was solved for and the half that stayed.
+        for force in &mut self.next.forces {
+            let kept = self.kept.binary_search_by_key(&force.key(), Force::key);
+            if let Ok(at) = kept {
+                force.force += self.kept[at].force;
+            }
+        }
+        (&self.nodes, &self.vectors)
+    }
+
+    /// Nodes of the samples that push, ascending, without held ones.
+    pub fn touched(&mut self, held: &[bool]) -> &[u32] {
+        self.nodes.clear();
+        for force in &self.next.forces {
+            let sample = self.samples.rows()[force.sample as usize];
+            let nodes = sample.entries().map(|entry| entry.0);
+            self.nodes
+                .extend(nodes.filter(|node| !held[*node as usize]));
+        }
+        self.nodes.sort_unstable();
+        self.nodes.dedup();
+        &self.nodes
+    }
+
+    /// Goes only part of the way from the forces before the last solve to those after it.
+    pub fn blend(&mut self, part: f32) {
+        for force in &mut self.next.forces {
+            force.force *= part;
+        }
+        for at in 0..self.kept.len() {
+            let kept = self.kept[at];
+            let found = self
+                .next
+                .forces
+                .binary_search_by_key(&kept.key(), Force::key);
+            let share = kept.force * (1.0 - part);
+            match found {
+                Ok(place) => self.next.forces[place].force += share,
+                Err(place) => self.next.forces.insert(
+                    place,
+                    Force {
+                        force: share,
+                        ..kept
+                    },
+                ),
+            }
+        }
+    }
+
+    /// Takes the forces before the last solve back.
+    pub fn undo(&mut self) {
+        std::mem::swap(&mut self.next.forces, &mut self.kept);
+    }
+
+    /// Calls with each node's share of the forces on the tissue, mN.
+    pub fn each_load(&self, take: impl FnMut(u32, Vector)) {
+        self.share(&self.next.forces, take);
+    }
+
+    /// The same of the last published step.
+    pub fn each_push(&self, take: impl FnMut(u32, Vector)) {
+        self.share(&self.past.forces, take);
+    }
+
+    fn share(&self, forces: &[Force], mut take: impl FnMut(u32, Vector)) {
+        for force in forces {
+            for (node, weight) in self.samples.rows()[force.sample as usize].entries() {
+                take(node, force.force * weight);
+            }
+        }
+    }
+
+    /// Tells each tool what it feels, tears grasps that are pulled too hard. `state` is that at the end of the step.
+    pub fn finish(&mut self, state: State<'_>) {
+        for index in 0..self.tools.len() {
+            let pose = self.tools[index].pose;
+            let penetration_mm = self.deepest(index, &pose, state).max(0.0);
+            let tool = &self.tools[index];
+            let (mut force, mut torque) = (Vector::ZERO, Vector::ZERO);
+            let (mut pull, mut normal) = (Vector::ZERO, Vector::ZERO);
+            let mut contacts = 0;
+            let held = &self.next.tools[index];
+            for row in self.next.forces.iter().filter(|f| f.tool == index as u32) {
+                let point = self.samples.rows()[row.sample as usize].gather(|n| state.position(n));
+                force -= row.force;
+                torque -= (point - tool.pose.translation).cross(row.force);
+                contacts += 1;
+                if held.grasp.place(row.sample).is_some() {
+                    pull += row.force;
+                    normal += tool.body.nearest_at(&tool.pose, point).normal;
+                }
+            }
+            let held = &mut self.next.tools[index];
+            let pull = tension(pull, normal.normalize_or_zero());
+            held.reading = Reading {
+                force: force.to_array(),
+                torque: torque.to_array(),
+                contacts,
+                penetration_mm,
+                torn: held.grasp.tear(pull, tool.tear_off_mn),
+            };
+        }
+    }
+
+    /// Makes the last step's readings and forces readable; displacements `[K,3]`, mm.
+    pub fn tell(&self, told: &mut Told, rest: &[f32], u: &[f32]) {
+        told.clear();
+        told.readings
+            .extend(self.past.tools.iter().map(|held| held.reading));
+        for force in &self.past.forces {
+            let sample = self.samples.rows()[force.sample as usize];
+            told.pushes.push(Push {
+                tool: force.tool,
+                point: sample
+                    .gather(|node| vector(rest, node) + vector(u, node))
+                    .to_array(),
+                force: (-force.force).to_array(),
+            });
+        }
+    }
+
+    /// The step being made becomes the last.
+    pub fn commit(&mut self) {
+        std::mem::swap(&mut self.past, &mut self.next);
+    }
+
+    /// Bytes held; the samples are the model's.
+    pub fn memory_bytes(&self) -> usize {
+        size_of::<Row>() * self.rows.capacity()
+            + size_of::<Contact>() * self.contacts.capacity()
+            + size_of::<Vector>() * self.forces.capacity()
+            + size_of::<Force>() * self.kept.capacity()
+            + 4 * (self.columns.capacity() + self.change.capacity())
+            + 4 * (self.nodes.capacity() + self.vectors.capacity())
+            + self.past.memory_bytes()
+            + self.next.memory_bytes()
+            + self.delassus.memory_bytes()
+    }
+
+    /// Fills `rows`: samples near the tools at part `part` of their way, those that are pushed, and those that are held. `wide`
+    /// looks as far as the tools move.
+    fn look(&mut self, state: State<'_>, part: f32, wide: bool) {
+        let mut placed: [Option<Placed>; MAX_TOOLS] = [const { None }; MAX_TOOLS];
+        for (place, (tool, from)) in placed.iter_mut().zip(self.tools.iter().zip(&self.before)) {
+            let motion = match wide {
+                true => tool.body.motion(from, &tool.pose),
+                false => 0.0,
+            };
+            *place = Some(Placed {
+                body: &tool.body,
+                pose: pose::between(from, &tool.pose, part),
+                skin: SKIN_MM + motion,
+            });
+        }
+        self.rows.clear();
+        let row = |tool: u32, sample: u32, force: Vector| Row {
+            tool,
+            sample,
+            force,
+            point: Vector::ZERO,
+            outward: Vector::ZERO,
+        };
+        for (index, placed) in placed.iter().flatten().enumerate() {
+            let found = self
+                .search
+                .find(&self.samples, std::slice::from_ref(placed), |node| {
+                    state.position(node)
+                });
+            let found = found
+                .iter()
+                .map(|c| row(index as u32, c.sample, Vector::ZERO));
+            self.rows.extend(found);
+            let anchors = self.next.tools[index].grasp.anchors().iter();
+            self.rows
+                .extend(anchors.map(|anchor| row(index as u32, anchor.sample, Vector::ZERO)));
+        }
+        let pushed = self.next.forces.iter();
+        self.rows
+            .extend(pushed.map(|force| row(force.tool, force.sample, force.force)));
+        // Those with a force come first of their equals, and stay.
+        self.rows
+            .sort_unstable_by_key(|row| (row.tool, row.sample, row.force == Vector::ZERO));
+        self.rows.dedup_by_key(|row| (row.tool, row.sample));
+        for row in &mut self.rows {
+            let sample = self.samples.rows()[row.sample as usize];
+            row.point = sample.gather(|node| state.position(node));
+            row.outward = outward(&self.samples, row.sample, state);
+        }
+    }
+
+    /// How deep the deepest sample lies inside of a tool at a pose, mm; not positive where none does.
+    fn deepest(&mut self, index: usize, at: &Pose, state: State<'_>) -> f32 {
+        let tool = &self.tools[index];
+        let placed = Placed {
+            body: &tool.body,
+            pose: *at,
+            skin: 0.0,
+        };
+        let samples = &self.samples;
+        let found = self
+            .search
+            .find(samples, &[placed], |node| state.position(node));
+        let mut deepest = 0.0f32;
+        for candidate in found {
+            let outward = outward(samples, candidate.sample, state);
+            let depth = match candidate.normal.dot(outward) > LEAN {
+                true => tool.body.way_out(at, candidate.point, -outward, THROUGH_MM),
+                false => Some(-candidate.distance),
+            };
+            deepest = deepest.max(depth.unwrap_or(0.0));
+        }
+        deepest
+    }
+}
+
+/// The tissue's outward normal at the face of a sample.
+fn outward(samples: &Samples, sample: u32, state: State<'_>) -> Vector {
+    let corners = samples.corners(samples.face_of(sample));
+    let [a, b, c] = corners.map(|at| state.position(samples.nodes()[at as usize]));
+    (b - a).cross(c - a).normalize_or_zero()
+}
+
+/// Gap and slip of a row at its point, with the tools at part `part` of their way.
+#[allow(clippy::too_many_arguments)]
+fn measure(
+    tools: &[Tool],
+    before: &[Pose],
+    allowed: &[f32],
+    held: &[Held],
+    samples: &Samples,
+    row: &Row,
+    state: State<'_>,
+    part: f32,
+) -> Contact {
+    let released = Contact {
+        law: Law::Touch { friction: 0.0 },
+        normal: Vector::X,
+        gap: f32::MAX,
+        slip: Vector::ZERO,
+    };
+    let index = row.tool as usize;
+    let Some(tool) = tools.get(index) else {
+        return released;
+    };
+    let from = &before[index];
+    let now = pose::between(from, &tool.pose, part);
+    let nearest = tool.body.nearest_at(&now, row.point);
+    if let Some(place) = held[index].grasp.place(row.sample) {
+        return Contact {
+            law: Law::Bound,
+            normal: nearest.normal,
+            gap: 0.0,
+            slip: row.point - now.transform_point(place),
+        };
+    }
+    let (mut normal, mut gap) = (nearest.normal, nearest.distance);
+    if normal.dot(row.outward) > LEAN {
+        let advance = now.translation - from.translation;
+        let from_within = row.force == Vector::ZERO && advance.dot(row.outward) > 0.0;
+        let way = match gap < 0.0 && !from_within {
+            true => tool.body.way_out(&now, row.point, -row.outward, THROUGH_MM),
+            false => None,
+        };
+        let Some(way) = way else {
+            return released;
+        };
+        (normal, gap) = (-row.outward, -way);
+    }
+    let sample = samples.rows()[row.sample as usize];
+    let start = sample.gather(|node| vector(state.rest, node) + vector(state.start, node));
+    let carried = now.transform_point(from.inverse_transform_point(start)) - start;
+    Contact {
+        law: Law::Touch {
+            friction: tool.friction,
+        },
+        normal,
+        gap: gap + allowed[index],
+        slip: row.point - start - carried,
+    }
+}

@@ -1,0 +1,282 @@
+//! `upt_scene`: steps that instruments drive, and what the tissue does to them; `upt_hull`.
+
+use super::call::call;
+#[cfg(not(feature = "contact"))]
+use super::call::fail;
+use super::pointers::{copy_out, place, slice};
+#[cfg(feature = "contact")]
+use super::pointers::{fill, slice_mut};
+use super::registry::call_scene;
+use super::status::*;
+use super::structs::*;
+#[cfg(feature = "contact")]
+use {
+    super::call::Failure,
+    super::convert,
+    super::pointers::each,
+    super::registry::{add_hull, remove_hull},
+    crate::contact::{MAX_TOOLS, Tool},
+    crate::error::Error,
+    crate::{Contact, Scene, StepInput},
+    ::contact::{Body, Shape},
+};
+
+#[cfg(not(feature = "contact"))]
+const WITHOUT: &str = "this build has no feature \"contact\"";
+
+/// One step from the scene's own state that rigid instruments drive: their contact with the tissue is solved.
+///
+/// The instruments are where they will be at the end of the step; from the last step's poses they get there on a line. Their contact
+/// is unilateral with Coulomb friction at points of the domain's surface at most 1.7 mm apart. Where the scene corrects, contact is
+/// solved inside of each correction, as a load; with `corrections = UPT_CORRECTIONS_NONE` once, on the linear response. The scene
+/// remembers each place of the array: pass every instrument every time, in the same order. An instrument that moves more than 40 mm in
+/// a step has been put there.
+/// instruments: array; every element has the same `struct_size`; at most 64; NULL with count 0: a free step.
+/// out, out_count, threads and errors: as `upt_scene_step`; also `UPT_ERR_UNSUPPORTED` in a build without feature "contact" and for
+/// a bundle without a linear response, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_HANDLE` for a hull that was destroyed.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn upt_scene_step_instruments(
+    scene: *mut upt_scene,
+    instruments: *const upt_instrument,
+    instrument_count: u64,
+    out: *mut f32,
+    out_count: u64,
+) -> upt_status {
+    call_scene("upt_scene_step_instruments", scene, |_scene| {
+        #[cfg(feature = "contact")]
+        {
+            _scene.with_tools(|tools| {
+                unsafe { read_tools(instruments, instrument_count, tools) }?;
+                let input = StepInput {
+                    displacement: None,
+                    contact: Contact::Tools(tools),
+                };
+                let out = match out.is_null() && out_count == 0 {
+                    true => None,
+                    false => {
+                        _scene.check_out(
+                            unsafe { slice(out.cast_const(), out_count, "out") }?.len(),
+                        )?;
+                        Some(unsafe { slice_mut(out, out_count, "out") }?)
+                    }
+                };
+                _scene.step(input, out)?;
+                Ok(UPT_OK)
+            })
+        }
+        #[cfg(not(feature = "contact"))]
+        {
+            let _ = (instruments, instrument_count, out, out_count);
+            fail(UPT_ERR_UNSUPPORTED, WITHOUT)
+        }
+    })
+}
+
+/// Starts a step that rigid instruments drive on the scene's worker and returns at once.
+///
+/// instruments, instrument_count: as `upt_scene_step_instruments`; checked and copied before the call returns.
+/// Threads and errors: as `upt_scene_submit`; also those of `upt_scene_step_instruments`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn upt_scene_submit_instruments(
+    scene: *mut upt_scene,
+    instruments: *const upt_instrument,
+    instrument_count: u64,
+) -> upt_status {
+    call_scene("upt_scene_submit_instruments", scene, |_scene| {
+        #[cfg(feature = "contact")]
+        {
+            _scene.with_tools(|tools| {
+                unsafe { read_tools(instruments, instrument_count, tools) }?;
+                _scene.submit_tools(tools)?;
+                Ok(UPT_OK)
+            })
+        }
+        #[cfg(not(feature = "contact"))]
+        {
+            let _ = (instruments, instrument_count);
+            fail(UPT_ERR_UNSUPPORTED, WITHOUT)
+        }
+    })
+}
+
+/// Copies what the tissue did to each instrument at the end of the last step.
+///
+/// out: `[count]`, in the order of the step's instruments; every element has its `struct_size` set. count: instruments of that step.
+/// Threads: any at any time, also while a step runs. Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "contact",
+/// `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT` where the last step had another number of instruments.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn upt_scene_instrument_readings(
+    scene: *mut upt_scene,
+    out: *mut upt_instrument_reading,
+    count: u64,
+) -> upt_status {
+    call_scene("upt_scene_instrument_readings", scene, |_scene| {
+        #[cfg(feature = "contact")]
+        {
+            _scene.with_told(|told| {
+                let have = told.readings.len() as u64;
+                if count != have {
+                    return Err(Error::Argument(format!(
+                        "count is {count}, the last step had {have} instruments"
+                    ))
+                    .into());
+                }
+                for (index, reading) in told.readings.iter().enumerate() {
+                    let make = |struct_size| {
+                        Ok(upt_instrument_reading {
+                            struct_size,
+                            contact_count: reading.contacts,
+                            force: reading.force,
+                            torque: reading.torque,
+                            penetration_mm: reading.penetration_mm,
+                            torn: reading.torn.into(),
+                            reserved: [0; 3],
+                        })
+                    };
+                    unsafe { fill(out.wrapping_add(index), make) }?;
+                }
+                Ok(UPT_OK)
+            })
+        }
+        #[cfg(not(feature = "contact"))]
+        {
+            let _ = (out, count);
+            fail(UPT_ERR_UNSUPPORTED, WITHOUT)
+        }
+    })
+}
+
+/// Copies the points of the surface that pushed or held instruments at the end of the last step, ascending by instrument.
+///
+/// out: `[capacity]`; NULL with capacity 0 only asks. needed: points, always written; may be NULL.
+/// Threads: any at any time, also while a step runs. Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "contact",
+/// `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` when capacity is too small.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn upt_scene_instrument_contacts(
+    scene: *mut upt_scene,
+    out: *mut upt_instrument_contact,
+    capacity: u64,
+    needed: *mut u64,
+) -> upt_status {
+    call_scene("upt_scene_instrument_contacts", scene, |_scene| {
+        #[cfg(feature = "contact")]
+        {
+            _scene.with_told(|told| {
+                let contacts: Vec<upt_instrument_contact> = told
+                    .pushes
+                    .iter()
+                    .map(|push| upt_instrument_contact {
+                        instrument: push.tool,
+                        position: push.point,
+                        force: push.force,
+                    })
+                    .collect();
+                unsafe { copy_out(&contacts, out, capacity, needed) }
+            })
+        }
+        #[cfg(not(feature = "contact"))]
+        {
+            let _ = unsafe { copy_out::<upt_instrument_contact>(&[], out, capacity, needed) };
+            fail(UPT_ERR_UNSUPPORTED, WITHOUT)
+        }
+    })
+}
+
+/// Makes the convex hull of a tool's points, for `UPT_SHAPE_HULL`.
+///
+/// points: `[n,3]`, mm, in the tool's own frame. point_count: n, 4 to 100,000. out: the new hull.
+/// Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_ARGUMENT` for points that are not finite, too many or without a volume,
+/// `UPT_ERR_UNSUPPORTED` in a build without feature "contact", `UPT_ERR_OUT_OF_MEMORY`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn upt_hull_create(
+    points: *const f32,
+    point_count: u64,
+    out: *mut *mut upt_hull,
+) -> upt_status {
+    call(
+        "upt_hull_create",
+        || (),
+        || {
+            let _out = place(out, "out")?;
+            #[cfg(feature = "contact")]
+            {
+                const MOST: u64 = 100_000;
+                if !(4..=MOST).contains(&point_count) {
+                    return Err(Error::Argument(format!(
+                        "point_count is {point_count}, must be 4 to {MOST}"
+                    ))
+                    .into());
+                }
+                let points = unsafe { slice(points, 3 * point_count, "points") }?;
+                crate::memory::probe(1024 * point_count as usize, "a hull")?;
+                let bad =
+                    |error: ::contact::ShapeError| Error::Argument(format!("points: {error}"));
+                let shape = Shape::hull_of(points.as_chunks().0).map_err(bad)?;
+                let body = Body::new(&shape).map_err(bad)?;
+                unsafe { _out.write(add_hull(body)) };
+                Ok(UPT_OK)
+            }
+            #[cfg(not(feature = "contact"))]
+            {
+                let _ = unsafe { slice(points, point_count.saturating_mul(3), "points") }?;
+                fail(UPT_ERR_UNSUPPORTED, WITHOUT)
+            }
+        },
+    )
+}
+
+/// Ends a hull. Steps that were submitted with it keep what they need.
+///
+/// Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also when it was destroyed before).
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn upt_hull_destroy(hull: *mut upt_hull) -> upt_status {
+    call(
+        "upt_hull_destroy",
+        || (),
+        || {
+            #[cfg(feature = "contact")]
+            {
+                drop(remove_hull(hull)?);
+                Ok(UPT_OK)
+            }
+            #[cfg(not(feature = "contact"))]
+            {
+                let _ = hull;
+                fail(UPT_ERR_UNSUPPORTED, WITHOUT)
+            }
+        },
+    )
+}
+
+/// The host's instruments as tools.
+#[cfg(feature = "contact")]
+unsafe fn read_tools(
+    instruments: *const upt_instrument,
+    count: u64,
+    tools: &mut Vec<Tool>,
+) -> Result<(), Failure> {
+    if count > MAX_TOOLS as u64 {
+        return Err(Error::Argument(format!(
+            "instrument_count is {count}, must be at most {MAX_TOOLS}"
+        ))
+        .into());
+    }
+    tools.clear();
+    let read = |index: usize, raw: upt_instrument| {
+        tools.push(convert::tool(index, &raw)?);
+        Ok(())
+    };
+    unsafe { each(instruments, count, "instruments[]", read) }
+}
+
+#[cfg(feature = "contact")]
+impl Scene {
+    /// Calls with the list that instruments are read into.
+    fn with_tools(
+        &self,
+        call: impl FnOnce(&mut Vec<Tool>) -> super::call::Answer,
+    ) -> super::call::Answer {
+        let mut list = self.tool_list()?;
+        call(&mut list)
+    }
+}

@@ -1,0 +1,243 @@
+//! A step that tools drive: where the bundle has corrections their contact is solved inside of them; with `corrections = 0` once, on
+//! the linear response.
+
+use std::sync::RwLock;
+use std::time::Instant;
+
+use super::core::{Core, lock_read};
+use super::published::Published;
+use super::timing::Stopwatch;
+use super::{Contact, StepInput};
+use crate::contact::{Compliance, Problem, State};
+use crate::corrections::{Input, Lent};
+use crate::error::{Error, Result};
+use crate::stats::{SceneStats, flag};
+
+/// Free tissue may come this deep into a tool before the step is made with contact, mm.
+const INTRUSION_MM: f32 = 0.02;
+/// Tissue this deep inside of a tool raises [`flag::DEEP`], mm.
+const DEEP_MM: f32 = 1.0;
+
+impl Core {
+    /// Takes the tools of a step; tells whether one is near enough to touch the tissue.
+    pub(super) fn meet_tools(
+        &mut self,
+        published: &RwLock<Published>,
+        input: &StepInput<'_>,
+    ) -> Result<bool> {
+        let Contact::Tools(tools) = input.contact else {
+            if let Some(problem) = &mut self.problem {
+                problem.reset();
+            }
+            return Ok(false);
+        };
+        if self.model.prior.is_none() {
+            return Err(Error::Unsupported(
+                "instruments: the bundle has no linear response to solve their contact with; use upt_scene_contacts_from_instruments and upt_scene_step_contacts".into(),
+            ));
+        }
+        let mut problem = match self.problem.take() {
+            Some(problem) => problem,
+            None => Box::new(Problem::new(self.model.samples()?)?),
+        };
+        let shared = lock_read(published);
+        let (rest, start) = (&self.mesh.positions, &shared.last.field);
+        let begun = problem.begin(tools, rest, start);
+        let near = begun.map(|()| {
+            problem.is_near(State {
+                rest,
+                u: start,
+                start,
+            })
+        });
+        self.problem = Some(problem);
+        near
+    }
+
+    /// Makes `next` where tools drive the step; false where it is free.
+    pub(super) fn drive(
+        &mut self,
+        published: &RwLock<Published>,
+        near: bool,
+        start: Instant,
+        stats: &mut SceneStats,
+    ) -> Result<bool> {
+        self.next_corrected = false;
+        let Some(mut problem) = self.problem.take() else {
+            return Ok(false);
+        };
+        let result = match problem.tools().is_empty() && !near {
+            true => Ok(false),
+            false if self.corrected.is_some() => {
+                self.drive_corrected(published, &mut problem, near, start, stats)
+            }
+            false => self.drive_linear(published, &mut problem, near, stats),
+        };
+        self.problem = Some(problem);
+        result
+    }
+
+    fn drive_corrected(
+        &mut self,
+        published: &RwLock<Published>,
+        problem: &mut Problem,
+        near: bool,
+        start: Instant,
+        stats: &mut SceneStats,
+    ) -> Result<bool> {
+        if near && (problem.pushed() || problem.holds()) {
+            self.load(published, problem, start, stats)?;
+            if problem.pushes() {
+                return Ok(true);
+            }
+        }
+        // Nothing pushes: the model's own free motion, unless that runs into a tool.
+        self.predict_and_decode(published, None, true, stats)?;
+        self.correct(published, None, start, stats)?;
+        let intrudes = {
+            let shared = lock_read(published);
+            let state = State {
+                rest: &self.mesh.positions,
+                u: &self.next.field,
+                start: &shared.last.field,
+            };
+            problem.intrudes(state, INTRUSION_MM)
+        };
+        if intrudes {
+            self.load(published, problem, start, stats)?;
+        } else {
+            self.finish_tools(published, problem, stats);
+        }
+        Ok(true)
+    }
+
+    /// The corrected step under the tools' loads.
+    fn load(
+        &mut self,
+        published: &RwLock<Published>,
+        problem: &mut Problem,
+        start: Instant,
+        stats: &mut SceneStats,
+    ) -> Result<()> {
+        let (Some(corrected), Some(prior)) = (&mut self.corrected, &self.model.prior) else {
+            return Ok(());
+        };
+        let mut watch = Stopwatch::start();
+        let span = tracing::trace_span!("corrections").entered();
+        let lent = Lent {
+            isa: self.isa,
+            pool: &self.pool,
+            prior,
+            corrections: self.model.corrections()?,
+        };
+        let shared = lock_read(published);
+        let input = Input {
+            contact: &self.incoming,
+            last: &shared.last.field,
+            before: &shared.before.field,
+            still: false,
+            enough: corrected.enough(start),
+        };
+        let rest = &self.mesh.positions;
+        let next = &mut self.next.field;
+        let report = corrected
+            .stage
+            .correct_loaded(lent, &input, rest, problem, next)?;
+        corrected.tell(&report, stats);
+        drop(shared);
+        drop(span);
+        self.next_corrected = true;
+        self.finish_tools(published, problem, stats);
+        // What a collision field would say: the envelope, the engine's record and the host's list of contacts go by it.
+        self.incoming
+            .take_nodes(problem.touched(&self.held), &self.next.field);
+        stats.corrections_ms = watch.lap();
+        self.predict_and_decode(published, None, false, stats)
+    }
+
+    /// Contact once on the linear response, as a collision field for the model.
+    ///
+    /// Half of the last forces stay in the state and half are solved for again: prescribed in full, two tools diverge.
+    fn drive_linear(
+        &mut self,
+        published: &RwLock<Published>,
+        problem: &mut Problem,
+        near: bool,
+        stats: &mut SceneStats,
+    ) -> Result<bool> {
+        let Some(prior) = &self.model.prior else {
+            return Ok(false);
+        };
+        if near {
+            let mut watch = Stopwatch::start();
+            let compliance = Compliance {
+                prior,
+                held: &self.held,
+                inertia: None,
+            };
+            let shared = lock_read(published);
+            let state = State {
+                rest: &self.mesh.positions,
+                u: &shared.last.field,
+                start: &shared.last.field,
+            };
+            let (nodes, vectors) = problem.prescribe(compliance, state);
+            self.incoming
+                .gather(Contact::Sparse { nodes, vectors }, self.mesh.node_count())?;
+            stats.check_ms += watch.lap();
+        }
+        self.predict_and_decode(published, None, true, stats)?;
+        self.finish_tools(published, problem, stats);
+        Ok(true)
+    }
+
+    fn finish_tools(
+        &mut self,
+        published: &RwLock<Published>,
+        problem: &mut Problem,
+        stats: &mut SceneStats,
+    ) {
+        let shared = lock_read(published);
+        problem.finish(State {
+            rest: &self.mesh.positions,
+            u: &self.next.field,
+            start: &shared.last.field,
+        });
+        let readings = problem.next.tools.iter().map(|held| held.reading);
+        if readings.map(|r| r.penetration_mm).fold(0.0, f32::max) > DEEP_MM {
+            stats.flags |= flag::DEEP;
+        }
+    }
+
+    /// The tools' readings and forces become readable.
+    pub(super) fn show_tools(&self, shared: &mut Published) {
+        match &self.problem {
+            Some(problem) => {
+                problem.tell(&mut shared.tools, &self.mesh.positions, &shared.last.field)
+            }
+            None => shared.tools.clear(),
+        }
+    }
+
+    /// The tools' loads at the contact nodes, in the host's order: what the tissue does to them, mN.
+    #[cfg(feature = "forces")]
+    pub(super) fn loads_at_contacts(&self, problem: &Problem, out: &mut [f32]) -> bool {
+        out.fill(0.0);
+        problem.each_push(|node, force| {
+            if let Ok(at) = self.contact.nodes.binary_search(&node) {
+                let at = 3 * self.contact.order[at] as usize;
+                for (sum, force) in out[at..at + 3].iter_mut().zip(force.to_array()) {
+                    *sum -= force;
+                }
+            }
+        });
+        true
+    }
+
+    /// Bytes of the tools' contact.
+    pub(super) fn problem_bytes(&self) -> usize {
+        self.problem
+            .as_ref()
+            .map_or(0, |problem| problem.memory_bytes())
+    }
+}

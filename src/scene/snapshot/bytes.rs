@@ -1,0 +1,126 @@
+//! Numbers and lists of a snapshot, little-endian, checked as they are read.
+
+use super::Pairs;
+use crate::corrections::Motion;
+use crate::error::{Error, Result};
+use crate::memory;
+use crate::scene::Contact;
+use crate::scene::contact::ContactSet;
+use crate::scene::core::Source;
+
+/// What is written.
+pub(super) struct Writer(pub(super) Vec<u8>);
+
+impl Writer {
+    pub(super) fn u32(&mut self, value: u32) {
+        self.0.extend_from_slice(&value.to_le_bytes());
+    }
+
+    pub(super) fn floats(&mut self, values: &[f32]) {
+        self.u32(values.len() as u32);
+        for value in values {
+            self.0.extend_from_slice(&value.to_le_bytes());
+        }
+    }
+
+    pub(super) fn indices(&mut self, values: &[u32]) {
+        self.u32(values.len() as u32);
+        values.iter().for_each(|&value| self.u32(value));
+    }
+}
+
+/// What is left to read.
+pub(super) struct Reader<'a>(pub(super) &'a [u8]);
+
+impl<'a> Reader<'a> {
+    pub(super) fn take(&mut self, count: usize) -> Result<&'a [u8]> {
+        if count > self.0.len() {
+            return Err(Error::Snapshot("is cut short".into()));
+        }
+        let (head, tail) = self.0.split_at(count);
+        self.0 = tail;
+        Ok(head)
+    }
+
+    pub(super) fn u32(&mut self) -> Result<u32> {
+        let b = self.take(4)?;
+        Ok(u32::from_le_bytes([b[0], b[1], b[2], b[3]]))
+    }
+
+    pub(super) fn f32(&mut self) -> Result<f32> {
+        let value = f32::from_bits(self.u32()?);
+        if value.is_finite() {
+            Ok(value)
+        } else {
+            Err(Error::Snapshot("holds a value that is not finite".into()))
+        }
+    }
+
+    /// Floats of exactly this many.
+    pub(super) fn floats(&mut self, count: usize) -> Result<Vec<f32>> {
+        let stored = self.u32()? as usize;
+        if stored != count {
+            return Err(Error::Snapshot(format!(
+                "holds a list of {stored} numbers, must have {count}"
+            )));
+        }
+        let mut list = memory::room(count, "a snapshot")?;
+        for b in self.take(4 * count)?.chunks_exact(4) {
+            list.push(Reader(b).f32()?);
+        }
+        Ok(list)
+    }
+
+    pub(super) fn contact(&mut self, node_count: usize) -> Result<ContactSet> {
+        let count = self.u32()? as usize;
+        if count > node_count {
+            return Err(Error::Snapshot(
+                "holds more contact nodes than the mesh has nodes".into(),
+            ));
+        }
+        let mut nodes = memory::room(count, "a snapshot")?;
+        for _ in 0..count {
+            nodes.push(self.u32()?);
+        }
+        let vectors = self.floats(3 * count)?;
+        let mut set = ContactSet::with_capacity(node_count)?;
+        set.gather(
+            Contact::Sparse {
+                nodes: &nodes,
+                vectors: &vectors,
+            },
+            node_count,
+        )
+        .map_err(|error| Error::Snapshot(error.to_string()))?;
+        Ok(set)
+    }
+
+    /// What corrections know of the past: velocities and pairs.
+    pub(super) fn past(&mut self, len: usize, contacts: usize) -> Result<Option<(Motion, Pairs)>> {
+        let Some(count) = self.u32()?.checked_sub(1) else {
+            return Ok(None);
+        };
+        let motion = Motion {
+            velocity: self.floats(len)?,
+            velocity_before: self.floats(len)?,
+            inertia: self.floats(len)?,
+            min_det: self.floats(1)?[0],
+            reaction: self.floats(3 * contacts)?,
+        };
+        let pairs: Result<Pairs> = (0..count)
+            .map(|_| Ok([self.floats(len)?, self.floats(len)?]))
+            .collect();
+        Ok(Some((motion, pairs?)))
+    }
+
+    pub(super) fn source(&mut self) -> Result<Source> {
+        match self.u32()? {
+            0 => Ok(Source::Rest),
+            1 => Ok(Source::Model),
+            2 => Ok(Source::Fallback),
+            other => Err(Error::Snapshot(format!(
+                "has an unknown state source {other}"
+            ))),
+        }
+    }
+}
