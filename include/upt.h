@@ -291,7 +291,7 @@
 #define UPT_FLAG_NON_FINITE 64
 
 /**
- * Guard: an element is inverted.
+ * An element at the contact is inverted; with `check_inversion` any element, and the guard refuses the state.
  */
 #define UPT_FLAG_INVERTED 128
 
@@ -389,6 +389,11 @@
  * Version of the C ABI that `upt_abi_version` returns. Bindings compare it at load.
  */
 #define UPT_ABI_VERSION 1
+
+/**
+ * The convex hull of a tool's points. Immutable; may be used from any thread at once.
+ */
+typedef struct upt_hull upt_hull;
 
 /**
  * A bundle made ready to step. Immutable; may be used from any thread at once.
@@ -686,6 +691,58 @@ typedef struct upt_instrument {
 } upt_instrument;
 
 /**
+ * What the tissue does to an instrument at the end of a step; filled by `upt_scene_instrument_readings`.
+ */
+typedef struct upt_instrument_reading {
+  /**
+   * `sizeof(upt_instrument_reading)`, set by the caller, the same in every element of an array.
+   */
+  uint32_t struct_size;
+  /**
+   * Points of the surface that push or hold the instrument.
+   */
+  uint32_t contact_count;
+  /**
+   * On the instrument, mN.
+   */
+  float force[3];
+  /**
+   * On the instrument about its position, mN mm.
+   */
+  float torque[3];
+  /**
+   * How deep the deepest point of the surface lies inside of the instrument, mm.
+   */
+  float penetration_mm;
+  /**
+   * 1: its grasp tore off in this step.
+   */
+  uint8_t torn;
+  /**
+   * Zero.
+   */
+  uint8_t reserved[3];
+} upt_instrument_reading;
+
+/**
+ * A point of the surface that pushes or holds an instrument; filled by `upt_scene_instrument_contacts`.
+ */
+typedef struct upt_instrument_contact {
+  /**
+   * Place of the instrument in the step's array.
+   */
+  uint32_t instrument;
+  /**
+   * Where the point is, mm.
+   */
+  float position[3];
+  /**
+   * On the instrument, mN.
+   */
+  float force[3];
+} upt_instrument_contact;
+
+/**
  * What the last step did and cost; filled by `upt_scene_get_stats`.
  */
 typedef struct upt_scene_stats {
@@ -818,9 +875,13 @@ typedef struct upt_scene_stats {
    */
   float error_mm;
   /**
-   * Smallest det F of the corrected state; 0 without corrections.
+   * Smallest det F of the corrected state; without corrections, of the elements at the contact; 0 where there is neither.
    */
   float min_det;
+  /**
+   * Solves of the contact of instruments, ms; part of `corrections_ms`, without corrections of `check_ms`.
+   */
+  double contact_ms;
 } upt_scene_stats;
 
 #ifdef __cplusplus
@@ -1116,6 +1177,75 @@ upt_status upt_scene_sample_points(struct upt_scene *scene,
                                    double alpha,
                                    float *out,
                                    uint64_t out_count);
+
+/**
+ * One step from the scene's own state that rigid instruments drive: their contact with the tissue is solved.
+ *
+ * The instruments are where they will be at the end of the step; from the last step's poses they get there on a line. Their contact
+ * is unilateral with Coulomb friction at points of the domain's surface at most 1.7 mm apart. Where the scene corrects, contact is
+ * solved inside of each correction, as a load; with `corrections = UPT_CORRECTIONS_NONE` once, on the linear response. The scene
+ * remembers each place of the array: pass every instrument every time, in the same order. An instrument that moves more than 40 mm in
+ * a step has been put there.
+ * instruments: array; every element has the same `struct_size`; at most 64; NULL with count 0: a free step.
+ * out, out_count, threads and errors: as `upt_scene_step`; also `UPT_ERR_UNSUPPORTED` in a build without feature "contact" and for
+ * a bundle without a linear response, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_HANDLE` for a hull that was destroyed.
+ */
+upt_status upt_scene_step_instruments(struct upt_scene *scene,
+                                      const struct upt_instrument *instruments,
+                                      uint64_t instrument_count,
+                                      float *out,
+                                      uint64_t out_count);
+
+/**
+ * Starts a step that rigid instruments drive on the scene's worker and returns at once.
+ *
+ * instruments, instrument_count: as `upt_scene_step_instruments`; checked and copied before the call returns.
+ * Threads and errors: as `upt_scene_submit`; also those of `upt_scene_step_instruments`.
+ */
+upt_status upt_scene_submit_instruments(struct upt_scene *scene,
+                                        const struct upt_instrument *instruments,
+                                        uint64_t instrument_count);
+
+/**
+ * Copies what the tissue did to each instrument at the end of the last step.
+ *
+ * out: `[count]`, in the order of the step's instruments; every element has its `struct_size` set. count: instruments of that step.
+ * Threads: any at any time, also while a step runs. Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "contact",
+ * `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT` where the last step had another number of instruments.
+ */
+upt_status upt_scene_instrument_readings(struct upt_scene *scene,
+                                         struct upt_instrument_reading *out,
+                                         uint64_t count);
+
+/**
+ * Copies the points of the surface that pushed or held instruments at the end of the last step, ascending by instrument.
+ *
+ * out: `[capacity]`; NULL with capacity 0 only asks. needed: points, always written; may be NULL.
+ * Threads: any at any time, also while a step runs. Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "contact",
+ * `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` when capacity is too small.
+ */
+upt_status upt_scene_instrument_contacts(struct upt_scene *scene,
+                                         struct upt_instrument_contact *out,
+                                         uint64_t capacity,
+                                         uint64_t *needed);
+
+/**
+ * Makes the convex hull of a tool's points, for `UPT_SHAPE_HULL`.
+ *
+ * points: `[n,3]`, mm, in the tool's own frame. point_count: n, 4 to 100,000. out: the new hull.
+ * Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_ARGUMENT` for points that are not finite, too many or without a volume,
+ * `UPT_ERR_UNSUPPORTED` in a build without feature "contact", `UPT_ERR_OUT_OF_MEMORY`.
+ */
+upt_status upt_hull_create(const float *points,
+                           uint64_t point_count,
+                           struct upt_hull **out);
+
+/**
+ * Ends a hull. Steps that were submitted with it keep what they need.
+ *
+ * Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also when it was destroyed before).
+ */
+upt_status upt_hull_destroy(struct upt_hull *hull);
 
 /**
  * Finds the nodes that rigid instruments touch and the displacement that they impose: the input of a step.

@@ -18,7 +18,7 @@ pub mod flag {
     pub const BOUND: u32 = 32;
     /// Guard: a displacement is NaN or infinite.
     pub const NON_FINITE: u32 = 64;
-    /// Guard: an element is inverted.
+    /// An element at the contact is inverted; with `check_inversion` any element, and the guard refuses the state.
     pub const INVERTED: u32 = 128;
     /// Guard: the state grows without cause.
     pub const GROWTH: u32 = 256;
@@ -46,7 +46,7 @@ pub mod flag {
             (SITES, "more contact sites than trained"),
             (BOUND, "guard: a displacement passes the bound"),
             (NON_FINITE, "guard: the state is not finite"),
-            (INVERTED, "guard: an element is inverted"),
+            (INVERTED, "an element is inverted"),
             (GROWTH, "guard: the displacement grew without cause"),
             (CLAMPED, "the learned correction was bounded"),
             (REGULARISED, "the contact block was nearly singular"),
@@ -87,6 +87,8 @@ pub struct SceneStats {
     pub guard_ms: f64,
     /// Corrections by the elements.
     pub corrections_ms: f64,
+    /// Solves of the contact of instruments, part of the corrections' or the check's time.
+    pub contact_ms: f64,
     /// Corrections made.
     pub corrections: u32,
     /// Evaluations of the element forces.
@@ -95,7 +97,7 @@ pub struct SceneStats {
     pub residual: f32,
     /// Estimated root mean square error of the corrected state over all nodes, mm; 0 without corrections.
     pub error_mm: f32,
-    /// Smallest det F of the corrected state; 0 without corrections.
+    /// Smallest det F of the corrected state; without corrections, of the elements at the contact; 0 where there is neither.
     pub min_det: f32,
     /// Nodes decoded by the step.
     pub decoded_node_count: u64,

@@ -2,7 +2,7 @@
 
 mod fixture;
 
-use fixture::{BUNDLES, bits, copy_of, find_runtime, model, push, rollout, scene, sparse};
+use fixture::{BUNDLES, bits, copy_of, find_runtime, model, plain, push, rollout, scene, sparse};
 use upt::{
     Contact, Error, GuardPolicy, IndexSet, Model, ModelOptions, SceneOptions, StepInput, flag,
 };
@@ -316,4 +316,29 @@ fn an_inverted_element_is_refused_where_asked() {
         .unwrap_err();
     assert_eq!(error.status(), -40);
     assert_ne!(scene.stats().flags & flag::INVERTED, 0);
+}
+
+#[test]
+fn an_element_inside_out_at_the_contact_is_told_of_without_being_asked() {
+    let model = model("tiny-reduced");
+    let scene = scene(&model, &plain());
+    let node = model.indices(IndexSet::DomainNodes)[0];
+    let pushed = |depth: f32| {
+        let vectors = [0.0, 0.0, -depth];
+        let contact = Contact::Sparse {
+            nodes: &[node],
+            vectors: &vectors,
+        };
+        let input = StepInput {
+            displacement: None,
+            contact,
+        };
+        scene.step(input, None).unwrap();
+        let stats = scene.stats();
+        (stats.min_det, stats.flags & flag::INVERTED != 0)
+    };
+    let (gentle, raised) = pushed(0.5);
+    assert!(gentle > 0.5 && gentle < 1.0 && !raised, "{gentle}");
+    let (hard, raised) = pushed(40.0);
+    assert!(hard < 0.0 && raised, "{hard}");
 }

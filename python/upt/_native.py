@@ -178,7 +178,7 @@ class Flag(IntFlag):
     NON_FINITE = 64
     """Guard: the state is not finite."""
     INVERTED = 128
-    """Guard: an element is inverted."""
+    """An element at the contact is inverted; with `check_inversion` any element, and the guard refuses the state."""
     GROWTH = 256
     """Guard: the displacement grew too much in one step."""
     CLAMPED = 512
@@ -639,7 +639,9 @@ class SceneStats(Record):
     error_mm: float
     """Estimated root mean square error of the corrected state over all nodes, mm; 0 without corrections."""
     min_det: float
-    """Smallest det F of the corrected state; 0 without corrections."""
+    """Smallest det F of the corrected state; without corrections, of the elements at the contact; 0 where there is neither."""
+    contact_ms: float
+    """Solves of the contact of instruments, ms; part of `corrections_ms`, without corrections of `check_ms`."""
 
     _fields_ = [
         ("struct_size", ctypes.c_uint32),
@@ -675,6 +677,7 @@ class SceneStats(Record):
         ("residual", ctypes.c_float),
         ("error_mm", ctypes.c_float),
         ("min_det", ctypes.c_float),
+        ("contact_ms", ctypes.c_double),
     ]
 
 
@@ -709,6 +712,12 @@ FUNCTIONS: dict[str, tuple[Any, list[Any]]] = {
     "upt_scene_attach_points": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
     "upt_scene_read_points": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
     "upt_scene_sample_points": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p, ctypes.c_uint64]),
+    "upt_scene_step_instruments": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p, ctypes.c_uint64]),
+    "upt_scene_submit_instruments": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
+    "upt_scene_instrument_readings": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
+    "upt_scene_instrument_contacts": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p]),
+    "upt_hull_create": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p]),
+    "upt_hull_destroy": (ctypes.c_int32, [ctypes.c_void_p]),
     "upt_scene_contacts_from_instruments": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p]),
     "upt_scene_contact_force": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
     "upt_scene_get_stats": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p]),

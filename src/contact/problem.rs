@@ -5,6 +5,7 @@
 //! the state that it is given is the tissue under those.
 
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use ::contact::grasp::{REACH_MM, tension};
 use ::contact::{
@@ -81,6 +82,8 @@ pub struct Problem {
     forces: Vec<Vector>,
     /// Forces before the last solve, to go part of the way.
     kept: Vec<Force>,
+    /// What the solves of this step took.
+    spent: Duration,
     columns: Vec<u32>,
     change: Vec<f32>,
     nodes: Vec<u32>,
@@ -117,6 +120,7 @@ impl Problem {
             contacts: memory::room(room, WHAT)?,
             forces: memory::room(room, WHAT)?,
             kept: memory::room(room, WHAT)?,
+            spent: Duration::ZERO,
             columns: memory::room(room, WHAT)?,
             change: memory::room(room, WHAT)?,
             nodes: memory::room(room, WHAT)?,
@@ -127,13 +131,26 @@ impl Problem {
 
     /// No tool has ever been.
     pub fn reset(&mut self) {
+        self.leave();
         self.past.clear();
+    }
+
+    /// A step without tools: they are forgotten once it is published.
+    pub fn leave(&mut self) {
+        self.tools.clear();
+        self.before.clear();
+        self.allowed.clear();
         self.next.clear();
     }
 
     /// Another body's compliance: nothing that was read of the last one holds.
     pub fn forget_columns(&mut self) {
         self.delassus.forget();
+    }
+
+    /// Wall time of the step's solves, ms.
+    pub fn spent_ms(&self) -> f64 {
+        1e3 * self.spent.as_secs_f64()
     }
 
     /// The tools of this step.
@@ -155,6 +172,7 @@ impl Problem {
         for (index, tool) in tools.iter().enumerate() {
             tool.check(index)?;
         }
+        self.spent = Duration::ZERO;
         self.tools.clear();
         self.tools.extend_from_slice(tools);
         self.next.take(&self.past);
@@ -246,6 +264,7 @@ impl Problem {
     /// Solves for the forces at `state`, which is the tissue under the forces so far, with the tools at part `part` in `(0, 1]` of
     /// their way. Gives what has changed.
     pub fn solve(&mut self, compliance: Compliance<'_>, state: State<'_>, part: f32) -> Change<'_> {
+        let start = Instant::now();
         self.kept.clear();
         self.kept.extend_from_slice(&self.next.forces);
         self.look(state, part, false);
@@ -312,6 +331,7 @@ impl Problem {
                 self.columns[3 * at + axis] = 3 * column + axis as u32;
             }
         }
+        self.spent += start.elapsed();
         Change {
             dofs: &self.columns,
             forces: &self.change,

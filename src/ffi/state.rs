@@ -58,6 +58,7 @@ pub unsafe extern "C" fn upt_scene_get_stats(
                     residual: stats.residual,
                     error_mm: stats.error_mm,
                     min_det: stats.min_det,
+                    contact_ms: stats.contact_ms,
                 })
             };
             unsafe { pointers::fill(out, fill) }

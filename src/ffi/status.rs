@@ -125,7 +125,7 @@ pub const UPT_FLAG_SITES: u32 = 16;
 pub const UPT_FLAG_BOUND: u32 = 32;
 /// Guard: the state is not finite.
 pub const UPT_FLAG_NON_FINITE: u32 = 64;
-/// Guard: an element is inverted.
+/// An element at the contact is inverted; with `check_inversion` any element, and the guard refuses the state.
 pub const UPT_FLAG_INVERTED: u32 = 128;
 /// Guard: the displacement grew too much in one step.
 pub const UPT_FLAG_GROWTH: u32 = 256;

@@ -284,6 +284,8 @@ pub struct upt_scene_stats {
     pub residual: f32,
     /// Estimated root mean square error of the corrected state over all nodes, mm; 0 without corrections.
     pub error_mm: f32,
-    /// Smallest det F of the corrected state; 0 without corrections.
+    /// Smallest det F of the corrected state; without corrections, of the elements at the contact; 0 where there is neither.
     pub min_det: f32,
+    /// Solves of the contact of instruments, ms; part of `corrections_ms`, without corrections of `check_ms`.
+    pub contact_ms: f64,
 }

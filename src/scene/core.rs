@@ -7,6 +7,7 @@ use super::StepInput;
 use super::contact::{ContactSet, check_displacement};
 use super::corrected::Corrected;
 use super::engine::{Engine, Which};
+use super::inversion::ContactElements;
 use super::plan::NodePlan;
 use super::points::AttachedPoints;
 use super::published::{Frame, Published, Values};
@@ -66,6 +67,7 @@ pub struct Core {
     pub(super) plan: NodePlan,
     pub(super) points: AttachedPoints,
     pub(super) planned_tets: Vec<u32>,
+    pub(super) contact_elements: Option<ContactElements>,
     pub(super) incoming: ContactSet,
     pub(super) contact: ContactSet,
     pub(super) contact_before: ContactSet,
@@ -121,6 +123,7 @@ impl Core {
             } else {
                 Vec::new()
             },
+            contact_elements: None,
             isa: Isa::detect(),
             held,
             plan,
@@ -164,6 +167,7 @@ impl Core {
             decode_ms: 0.0,
             guard_ms: 0.0,
             corrections_ms: 0.0,
+            contact_ms: 0.0,
             corrections: 0,
             evaluations: 0,
             residual: 0.0,
@@ -384,6 +388,8 @@ impl Core {
         self.contact_before.clear();
         self.contact.clear();
         self.max_displacement = 0.0;
+        #[cfg(feature = "contact")]
+        self.rest_tools(published);
         let frames = if self.options.cubic_sampling { 4 } else { 3 };
         if self.rest_frames >= frames {
             return;
@@ -447,6 +453,7 @@ impl Core {
             + 16 * count // contacts in the host's order
             + self.held.len()
             + 4 * self.planned_tets.len()
+            + self.contact_elements.as_ref().map_or(0, ContactElements::memory_bytes)
             + self.plan.memory_bytes()
             + self.points.memory_bytes()
             + self.envelope.memory_bytes()

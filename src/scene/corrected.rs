@@ -7,7 +7,7 @@ use super::core::{Core, lock_read};
 use super::engine::Engine;
 use super::published::Published;
 use super::timing::Stopwatch;
-use crate::corrections::{Enough, Input, LIMIT, Lent, Motion, Report, SMALLEST_DET, Stage};
+use crate::corrections::{Enough, Input, LIMIT, Lent, Motion, Report, Stage};
 use crate::error::{Error, Result};
 use crate::kernels::{Isa, Pool};
 use crate::model::Model;
@@ -183,7 +183,8 @@ impl Core {
         }
         // A state that fell back has inverted elements, and what they push with means nothing.
         let motion = &corrected.stage.motion;
-        let sound = motion.min_det >= SMALLEST_DET && motion.reaction.len() == out.len();
+        let sound = motion.min_det >= crate::corrections::SMALLEST_DET
+            && motion.reaction.len() == out.len();
         if self.contact.is_empty() || !sound {
             return false;
         }

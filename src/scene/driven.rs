@@ -4,7 +4,7 @@
 use std::sync::RwLock;
 use std::time::Instant;
 
-use super::core::{Core, lock_read};
+use super::core::{Core, lock_read, lock_write};
 use super::published::Published;
 use super::timing::Stopwatch;
 use super::{Contact, StepInput};
@@ -27,7 +27,7 @@ impl Core {
     ) -> Result<bool> {
         let Contact::Tools(tools) = input.contact else {
             if let Some(problem) = &mut self.problem {
-                problem.reset();
+                problem.leave();
             }
             return Ok(false);
         };
@@ -203,10 +203,20 @@ impl Core {
             u: &self.next.field,
             start: &shared.last.field,
         });
+        stats.contact_ms = problem.spent_ms();
         let readings = problem.next.tools.iter().map(|held| held.reading);
         if readings.map(|r| r.penetration_mm).fold(0.0, f32::max) > DEEP_MM {
             stats.flags |= flag::DEEP;
         }
+    }
+
+    /// The tools of a step in which the scene sleeps: known, and untouched.
+    pub(super) fn rest_tools(&mut self, published: &RwLock<Published>) {
+        if let Some(problem) = &mut self.problem {
+            problem.let_go();
+            problem.commit();
+        }
+        self.show_tools(&mut lock_write(published));
     }
 
     /// The tools' readings and forces become readable.

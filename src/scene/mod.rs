@@ -8,6 +8,7 @@ mod corrected;
 #[cfg(feature = "contact")]
 mod driven;
 mod engine;
+mod inversion;
 mod plan;
 mod points;
 mod published;

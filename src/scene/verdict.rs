@@ -5,6 +5,7 @@ use std::sync::RwLock;
 
 use super::contact::ContactSet;
 use super::core::{Core, lock_write};
+use super::inversion::ContactElements;
 use super::published::Published;
 use super::timing::Stopwatch;
 use crate::error::{Error, Result};
@@ -48,10 +49,32 @@ impl Core {
         {
             verdict |= flag::INVERTED;
         }
+        self.look_at_contact(stats)?;
         stats.flags |= verdict;
         stats.max_displacement_mm = max;
         stats.guard_ms += watch.lap();
         Ok(verdict)
+    }
+
+    /// Raises [`flag::INVERTED`] where an element at the contact is inside out; refuses nothing. A region leaves out nodes that this
+    /// needs: then only corrected steps are looked at.
+    fn look_at_contact(&mut self, stats: &mut SceneStats) -> Result<()> {
+        if stats.min_det == 0.0
+            && !self.incoming.is_empty()
+            && self.plan.nodes().len() == self.mesh.node_count()
+        {
+            let elements = match self.contact_elements.take() {
+                Some(elements) => elements,
+                None => ContactElements::new(&self.mesh)?,
+            };
+            stats.min_det =
+                elements.smallest_det(&self.mesh, &self.incoming.nodes, &self.next.field);
+            self.contact_elements = Some(elements);
+        }
+        if stats.min_det < 0.0 || stats.min_det.is_nan() {
+            stats.flags |= flag::INVERTED;
+        }
+        Ok(())
     }
 
     /// One line of the log for the flags that this step has and the last one had not; none while they stay.

@@ -9,7 +9,7 @@ use syn::{Attribute, Expr, FnArg, Item, Lit, Pat, ReturnType, Type};
 pub const FOLDER: &str = "src/ffi";
 
 /// The files with exported items, in the order of the header.
-pub const FILES: [&str; 10] = [
+pub const FILES: [&str; 11] = [
     "status.rs",
     "structs.rs",
     "library.rs",
@@ -18,6 +18,7 @@ pub const FILES: [&str; 10] = [
     "worker.rs",
     "region.rs",
     "points.rs",
+    "driven.rs",
     "instrument.rs",
     "state.rs",
 ];

@@ -223,6 +223,37 @@ impl Scene {
         check(status)
     }
 
+    /// `upt_scene_step_instruments`: one step that instruments drive.
+    pub fn step_instruments(
+        &mut self,
+        instruments: &[ffi::upt_instrument],
+        out: &mut [[f32; 3]],
+    ) -> Result<()> {
+        // SAFETY: the pointers and counts describe the slices, which live across the call.
+        check(unsafe {
+            ffi::upt_scene_step_instruments(
+                self.handle,
+                instruments.as_ptr(),
+                instruments.len() as u64,
+                out.as_mut_ptr().cast(),
+                3 * out.len() as u64,
+            )
+        })
+    }
+
+    /// `upt_scene_instrument_readings` of the last step's `count` instruments.
+    pub fn readings(&self, count: usize) -> Result<Vec<ffi::upt_instrument_reading>> {
+        // SAFETY: zeros are valid numbers.
+        let mut blank: ffi::upt_instrument_reading = unsafe { std::mem::zeroed() };
+        blank.struct_size = size_of::<ffi::upt_instrument_reading>() as u32;
+        let mut readings = vec![blank; count];
+        // SAFETY: the pointer and count describe the list.
+        check(unsafe {
+            ffi::upt_scene_instrument_readings(self.handle, readings.as_mut_ptr(), count as u64)
+        })?;
+        Ok(readings)
+    }
+
     /// `upt_scene_contacts_from_instruments`; the lists are as long as the contact afterwards.
     pub fn contacts(
         &mut self,

@@ -258,8 +258,10 @@ namespace Upt.Interop
         public float residual;
         /// <summary>Estimated root mean square error of the corrected state over all nodes, mm; 0 without corrections.</summary>
         public float error_mm;
-        /// <summary>Smallest det F of the corrected state; 0 without corrections.</summary>
+        /// <summary>Smallest det F of the corrected state; without corrections, of the elements at the contact; 0 where there is neither.</summary>
         public float min_det;
+        /// <summary>Solves of the contact of instruments, ms; part of `corrections_ms`, without corrections of `check_ms`.</summary>
+        public double contact_ms;
     }
 
     /// <summary>The C ABI, as it is.</summary>
@@ -382,7 +384,7 @@ namespace Upt.Interop
         public const uint UPT_FLAG_BOUND = 32;
         /// <summary>Guard: the state is not finite.</summary>
         public const uint UPT_FLAG_NON_FINITE = 64;
-        /// <summary>Guard: an element is inverted.</summary>
+        /// <summary>An element at the contact is inverted; with `check_inversion` any element, and the guard refuses the state.</summary>
         public const uint UPT_FLAG_INVERTED = 128;
         /// <summary>Guard: the displacement grew too much in one step.</summary>
         public const uint UPT_FLAG_GROWTH = 256;
@@ -686,6 +688,68 @@ namespace Upt.Interop
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_scene_sample_points(IntPtr scene, double alpha, float* @out, ulong out_count);
+
+        /// <summary>
+        /// One step from the scene's own state that rigid instruments drive: their contact with the tissue is solved.
+        ///
+        /// The instruments are where they will be at the end of the step; from the last step's poses they get there on a line. Their contact
+        /// is unilateral with Coulomb friction at points of the domain's surface at most 1.7 mm apart. Where the scene corrects, contact is
+        /// solved inside of each correction, as a load; with `corrections = UPT_CORRECTIONS_NONE` once, on the linear response. The scene
+        /// remembers each place of the array: pass every instrument every time, in the same order. An instrument that moves more than 40 mm in
+        /// a step has been put there.
+        /// instruments: array; every element has the same `struct_size`; at most 64; NULL with count 0: a free step.
+        /// out, out_count, threads and errors: as `upt_scene_step`; also `UPT_ERR_UNSUPPORTED` in a build without feature "contact" and for
+        /// a bundle without a linear response, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_HANDLE` for a hull that was destroyed.
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_scene_step_instruments(IntPtr scene, upt_instrument* instruments, ulong instrument_count, float* @out, ulong out_count);
+
+        /// <summary>
+        /// Starts a step that rigid instruments drive on the scene's worker and returns at once.
+        ///
+        /// instruments, instrument_count: as `upt_scene_step_instruments`; checked and copied before the call returns.
+        /// Threads and errors: as `upt_scene_submit`; also those of `upt_scene_step_instruments`.
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_scene_submit_instruments(IntPtr scene, upt_instrument* instruments, ulong instrument_count);
+
+        /// <summary>
+        /// Copies what the tissue did to each instrument at the end of the last step.
+        ///
+        /// out: `[count]`, in the order of the step's instruments; every element has its `struct_size` set. count: instruments of that step.
+        /// Threads: any at any time, also while a step runs. Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "contact",
+        /// `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT` where the last step had another number of instruments.
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_scene_instrument_readings(IntPtr scene, upt_instrument_reading* @out, ulong count);
+
+        /// <summary>
+        /// Copies the points of the surface that pushed or held instruments at the end of the last step, ascending by instrument.
+        ///
+        /// out: `[capacity]`; NULL with capacity 0 only asks. needed: points, always written; may be NULL.
+        /// Threads: any at any time, also while a step runs. Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "contact",
+        /// `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` when capacity is too small.
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_scene_instrument_contacts(IntPtr scene, upt_instrument_contact* @out, ulong capacity, ulong* needed);
+
+        /// <summary>
+        /// Makes the convex hull of a tool's points, for `UPT_SHAPE_HULL`.
+        ///
+        /// points: `[n,3]`, mm, in the tool's own frame. point_count: n, 4 to 100,000. out: the new hull.
+        /// Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_ARGUMENT` for points that are not finite, too many or without a volume,
+        /// `UPT_ERR_UNSUPPORTED` in a build without feature "contact", `UPT_ERR_OUT_OF_MEMORY`.
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_hull_create(float* points, ulong point_count, IntPtr* @out);
+
+        /// <summary>
+        /// Ends a hull. Steps that were submitted with it keep what they need.
+        ///
+        /// Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also when it was destroyed before).
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_hull_destroy(IntPtr hull);
 
         /// <summary>
         /// Finds the nodes that rigid instruments touch and the displacement that they impose: the input of a step.
