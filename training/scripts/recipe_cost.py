@@ -19,6 +19,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from upt_training.ablate import reference_scores  # noqa: E402
 from upt_training.config import load_settings  # noqa: E402
+from upt_training.page import write_table  # noqa: E402
 from upt_training.rollout import autoregressive_scores, cache_rollout  # noqa: E402
 from upt_training.run import find_mesh, make_trainer, open_prior  # noqa: E402
 
@@ -38,6 +39,7 @@ def main() -> None:
     parser.add_argument("--vibration", type=Path)
     parser.add_argument("--steps", type=int, default=30)
     parser.add_argument("--cases", type=int, default=2)
+    parser.add_argument("--page", type=Path, help="page to write into: docs/training.md")
     options = parser.parse_args()
     torch.set_num_threads(1)
     settings, mesh = load_settings(options.config), find_mesh(options.mesh, options.data)
@@ -68,7 +70,10 @@ def main() -> None:
         f"{plain['predict zero']:.2f}",
         f"{plain['copy the true last frame']:.3f}",
     ]
-    print(HEAD + "\n" + "|---" * len(cells) + "|\n| " + " | ".join(cells) + " |")
+    lines = [HEAD, "|---" * len(cells) + "|", "| " + " | ".join(cells) + " |"]
+    print("\n".join(lines))
+    if options.page:
+        write_table(options.page, f"recipe cost {settings.name}", lines)
 
 
 if __name__ == "__main__":
