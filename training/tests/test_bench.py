@@ -10,7 +10,8 @@ from conftest import CONFIGS
 
 from upt_training import scaling
 from upt_training.__main__ import main
-from upt_training.scaling_report import table
+from upt_training.errors import InputError
+from upt_training.scaling_report import Reference, read_reference, table
 
 
 def paths(data, mesh_path) -> list[str]:
@@ -85,11 +86,13 @@ def test_sizes_come_from_one_configuration_and_inputs_from_another():
 
 
 def test_the_table_gives_the_spread_of_the_seeds():
-    end = {"core_hours": 0.5, "step": 10, "train_mse_mm2": 0.3, "max_mm": 2.0}
+    end = {"core_hours": 0.5, "step": 10, "train_mse_mm2": 0.3, "max_mm": 2.0, "cases": 3}
     run = {"inputs": "prior", "parameters": 100, "size": "0.1", "training_cases": 8, "core_minutes": 30.0, "steps": 10}
     run |= {"samples": 160, "references": {"predict zero": 5.0}}
     runs = {str(seed): run | {"seed": seed, "curve": [end | {"mse_mm2": 0.1 * seed}]} for seed in (1, 3)}
     lines = table(runs)
+    bundle = Reference("other", [{"index": i, "bundle": {"mse_mm2": float(i)}} for i in range(7)])
+    assert "`other`, same 3 cases* | | | | | | | | 3.0000 |" in table(runs, bundle)[4]
     assert "| prior | 100 | 8 | 2 | 10 | 160 | 0.500 |" in lines[2] and "0.2000 (0.1000 to 0.3000)" in lines[2]
     assert lines[3] == "| *predict zero* | | | | | | | | 5.0000 | |"
 
@@ -97,8 +100,20 @@ def test_the_table_gives_the_spread_of_the_seeds():
 def test_the_table_of_runs_says_what_a_run_got(trained, tmp_path):
     page = tmp_path / "page.md"
     page.write_text("<!-- paper runs: begin -->\n<!-- paper runs: end -->\n")
-    script = CONFIGS.parent / "scripts/run_table.py"
-    subprocess.run([sys.executable, script, trained, "--page", page], check=True, capture_output=True)
+    script, other = CONFIGS.parent / "scripts/run_table.py", tmp_path / "other.json"
+    cases = [{"index": i, "bundle": {"mse_mm2": float(i)}} for i in (3, 1)]
+    other.write_text(json.dumps({"bundle": "other", "cases": cases}))
+    command = [sys.executable, script, trained, "--evaluation", other, "--page", page]
+    subprocess.run(command, check=True, capture_output=True)
     cells = [cell.strip() for cell in page.read_text().splitlines()[3].strip("|").split("|")]
     assert cells[:5] == ["`tiny-replay`", "10,691", "1,400", "1,400", "22,400"] and float(cells[5]) >= 0
-    assert cells[6].endswith("after step 1,400)") and cells[8:] == ["-", "-"]
+    assert cells[6].endswith("after step 1,400)") and cells[8:] == ["2.0000", "-", "-"]
+
+
+def test_a_reference_that_is_no_evaluation_names_its_file(tmp_path):
+    path = tmp_path / "other.json"
+    with pytest.raises(InputError, match="other.json: no such file"):
+        read_reference(path)
+    path.write_text("{}")
+    with pytest.raises(InputError, match="other.json: not the JSON of `evaluate`"):
+        read_reference(path)

@@ -119,6 +119,7 @@ def parser() -> argparse.ArgumentParser:
     scaling.add_argument("--train-cases", nargs="*", type=int, default=[0], help="0: all")
     scaling.add_argument("--core-minutes", type=float, default=60.0, help="training time of each run")
     scaling.add_argument("--cases", type=int, default=4, help="held-out cases scored")
+    scaling.add_argument("--evaluation", type=Path, help="JSON of `evaluate` of a bundle, to compare with")
     scaling.add_argument("--report-only", action="store_true", help="tables and plots of what is done")
     scaling.add_argument("--page", type=Path, help="page to write into: docs/training.md and its images")
 

@@ -23,7 +23,7 @@ from upt_training.errors import InputError
 from upt_training.page import replaced
 from upt_training.rollout import autoregressive_scores, cache_rollout
 from upt_training.run import find_mesh, make_trainer, open_prior
-from upt_training.scaling_report import write_report
+from upt_training.scaling_report import read_reference, write_report
 from upt_training.trainer import Trainer
 
 SIZES = {"0.1": "window.toml", "0.2": "brain-coarse.toml", "0.9": "wide.toml", "3.4": "paper.toml"}
@@ -31,6 +31,7 @@ INPUTS = {"plain": "plain.toml", "prior": "brain-coarse.toml"}
 INPUT_FIELDS = ("features", "base", "mixing", "vibration")
 COST = {"0.9": {"drawn_supernodes": 128, "bf16": True}, "3.4": {"drawn_supernodes": 256, "bf16": True}}  # of `[train]`
 SCORED_ROWS = 400
+LINEAR = "linear elasticity, free vibration"
 SAVE_SECONDS = 60.0
 
 
@@ -124,6 +125,8 @@ def train(run: Run, options, mesh, out: Path) -> dict:
             made.save("last.pt")
             saved = time.monotonic()
     references = reference_scores(made.test_cache, chosen_cases(made, options.cases))
+    if settings.model.vibration:
+        references[LINEAR] = references.pop("linear response, quasi-static")
     return {
         "inputs": run.inputs,
         "parameters": made.model.parameter_count(),
@@ -150,6 +153,7 @@ def scaling_command(options) -> int:
     torch.set_num_threads(1)
     out, mesh = Path(options.out), find_mesh(options.mesh, options.data)
     out.mkdir(parents=True, exist_ok=True)
+    bundle = read_reference(options.evaluation) if options.evaluation else None
     if options.page:  # a page without marks fails before hours of work
         replaced(options.page.read_text(), "scaling", [], options.page)
     path = out / "scaling.json"
@@ -160,6 +164,6 @@ def scaling_command(options) -> int:
             path.write_text(json.dumps(results, indent=1) + "\n")
     if not results:
         raise InputError(f"{path}: no finished run; call without --report-only")
-    write_report(results, out, options.page)
+    write_report(results, out, options.page, bundle)
     print((out / "scaling.md").read_text())
     return 0

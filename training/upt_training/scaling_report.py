@@ -2,17 +2,44 @@
 
 from __future__ import annotations
 
+import json
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from upt_training.errors import InputError
 from upt_training.page import write_table
 
 COLOURS = {"plain": "C1", "prior": "C0"}
 LABELS = {"plain": "inputs u and c", "prior": "linear elasticity as base and input"}
 
 
-def table(results: dict) -> list[str]:
+@dataclass
+class Reference:
+    """A bundle's scores on all held-out cases, by `evaluate`, and on those that a training run scores."""
+
+    name: str
+    cases: list[dict]
+
+    def mean(self, count: int, score: str = "mse_mm2") -> float:
+        """Over `count` cases spread over the held-out ones, as `Trainer.evaluate` takes them."""
+        at = np.unique(np.linspace(0, len(self.cases) - 1, min(count, len(self.cases))).round().astype(int))
+        return float(np.mean([self.cases[i]["bundle"][score] for i in at]))
+
+
+def read_reference(path: Path) -> Reference:
+    """The JSON that `python -m upt_training evaluate BUNDLE --data DATA --out FILE` wrote for the same data."""
+    if not path.exists():
+        raise InputError(f"{path}: no such file; write it by `python -m upt_training evaluate BUNDLE --out {path}`")
+    try:
+        result = json.loads(path.read_text())
+        return Reference(result["bundle"], sorted(result["cases"], key=lambda case: case["index"]))
+    except (ValueError, KeyError, TypeError) as error:
+        raise InputError(f"{path}: not the JSON of `evaluate` ({error!r})") from error
+
+
+def table(results: dict, bundle: Reference | None = None) -> list[str]:
     """A row for each inputs, size, number of cases and time; the spread is over the seeds."""
     groups: dict[tuple, list[dict]] = {}
     for r in results.values():
@@ -39,14 +66,18 @@ def table(results: dict) -> list[str]:
     references: dict[str, float] = {}
     for r in results.values():
         references |= r["references"]
+    if bundle is not None:
+        for count in sorted({r["curve"][-1]["cases"] for r in results.values()}):
+            references[f"`{bundle.name}`, same {count} cases"] = bundle.mean(count)
+        references[f"`{bundle.name}`, all {len(bundle.cases)} held-out cases"] = bundle.mean(len(bundle.cases))
     for name, value in references.items():
         lines.append(f"| *{name}* | | | | | | | | {value:.4f} | |")
     return lines
 
 
-def write_report(results: dict, out: Path, page: Path | None) -> None:
+def write_report(results: dict, out: Path, page: Path | None, bundle: Reference | None = None) -> None:
     """`OUT/scaling.md` and plots in `OUT`; with `page`, also into it and into `images/` beside it."""
-    lines = table(results)
+    lines = table(results, bundle)
     (out / "scaling.md").write_text("\n".join(lines) + "\n")
     figure = plot(results)
     for folder in [out] if page is None else [out, page.parent / "images"]:
@@ -56,29 +87,30 @@ def write_report(results: dict, out: Path, page: Path | None) -> None:
 
 
 def plot(results: dict):
-    """Error against parameters (the end of each run) and against core-hours (all points of each run)."""
+    """Error against parameters (the end of each run) and against core time (all points of each run)."""
     import matplotlib
 
     matplotlib.use("Agg")
     from matplotlib import pyplot
 
     figure, (by_size, by_time) = pyplot.subplots(1, 2, figsize=(9, 3.8), layout="constrained", sharey=True)
-    marks = dict(zip(sorted({r["parameters"] for r in results.values()}), "osD^vP", strict=False))
+    marks = dict(zip(sorted({r["size"] for r in results.values()}, key=float), "osD^", strict=False))
     for inputs, colour in COLOURS.items():
         chosen = [r for r in results.values() if r["inputs"] == inputs]
         label = LABELS[inputs]
         for r in sorted(chosen, key=lambda r: r["parameters"]):
-            mark = marks[r["parameters"]]
+            mark = marks[r["size"]]
             by_size.plot(r["parameters"], r["curve"][-1]["mse_mm2"], mark, color=colour, label=label)
-            hours, errors = ([p[name] for p in r["curve"]] for name in ("core_hours", "mse_mm2"))
-            by_time.plot(hours, errors, mark + "-", color=colour, lw=0.8, markersize=4)
+            minutes, errors = [60 * p["core_hours"] for p in r["curve"]], [p["mse_mm2"] for p in r["curve"]]
+            by_time.plot(minutes, errors, mark + "-", color=colour, lw=0.8, markersize=4)
             label = None
-    for parameters, mark in marks.items():
-        by_time.plot([], [], mark, color="0.4", label=f"{parameters / 1e6:.1f} M")
-    by_size.set(xscale="log", yscale="log", xlabel="parameters", ylabel="autoregressive MSE, mm²")
-    by_time.set(xscale="log", yscale="log", xlabel="core-hours of training")
+    for size, mark in marks.items():
+        by_time.plot([], [], mark, color="0.4", label=f"{size} M parameters")
+    by_size.set(xscale="log", yscale="log", xlabel="parameters", ylabel="autoregressive MSE, mm²", xlim=(5e4, 6e6))
+    by_time.set(yscale="log", xlabel="core-minutes of training")
+    by_time.set_xlim(left=0.0)
     references = {name: value for r in results.values() for name, value in r["references"].items()}
-    for style, name in ((":", "predict zero"), ("--", "linear response, quasi-static")):
+    for style, name in ((":", "predict zero"), ("--", "linear elasticity, free vibration")):
         if name in references:
             for axis in (by_size, by_time):
                 axis.axhline(references[name], color="0.5", lw=0.8, ls=style, label=name if axis is by_size else None)
