@@ -50,7 +50,6 @@ pub fn collected<T>(
     Ok(list)
 }
 
-#[cfg(any(feature = "contact", feature = "forces"))]
 /// Whether `bytes` are to be had now: for parts that are made of many lists at their first use.
 pub fn probe(bytes: usize, what: &str) -> Result<()> {
     room::<u8>(bytes, what).map(drop)

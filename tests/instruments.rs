@@ -322,6 +322,24 @@ fn wild_tools_stay_finite_and_the_tissue_comes_back() {
 }
 
 #[test]
+fn a_tool_as_large_as_the_organ_is_borne() {
+    for corrections in [0, 3] {
+        let options = SceneOptions {
+            guard_policy: upt::GuardPolicy::Blend,
+            ..with(corrections)
+        };
+        let scene = scene(&model("tiny-corrected"), &options);
+        let (at, normal) = site(&scene);
+        for t in 0..6 {
+            let centre = Vector::from(at) + normal * (500.0 - 0.3 * t as f32);
+            let u = step(&scene, &[ball(500.0, centre.to_array())]);
+            assert!(u.iter().all(|x| x.is_finite()));
+        }
+        assert!(readings(&scene)[0].contacts > 3);
+    }
+}
+
+#[test]
 fn what_cannot_be_is_refused_and_changes_nothing() {
     let model = model("tiny-corrected");
     let scene = scene(&model, &with(3));

@@ -6,7 +6,11 @@
 use ::contact::{Sample, Vector};
 
 use crate::corrections::CoarseSpace;
+use crate::error::Result;
+use crate::memory;
 use crate::prior::PriorTable;
+
+const WHAT: &str = "the compliance of a contact";
 
 /// The tables of a solve.
 #[derive(Clone, Copy)]
@@ -55,14 +59,18 @@ impl Delassus {
     }
 
     /// `W` of samples, `[3n,3n]`, row-major.
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
     pub fn of(
         &mut self,
         compliance: Compliance<'_>,
         samples: impl Iterator<Item = Sample> + Clone,
-    ) -> &[f32] {
-        self.gather(compliance, samples.clone());
+    ) -> Result<&[f32]> {
+        self.gather(compliance, samples.clone())?;
         let (order, count) = (3 * self.columns.len(), samples.clone().count());
         self.w.clear();
+        memory::reserve(&mut self.w, 9 * count * count, WHAT)?;
         self.w.resize(9 * count * count, 0.0);
         let place = |column: u32| 3 * self.columns.partition_point(|c| *c < column);
         for (i, row) in samples.clone().enumerate() {
@@ -87,11 +95,15 @@ impl Delassus {
                 }
             }
         }
-        &self.w
+        Ok(&self.w)
     }
 
     /// Reads the columns that samples need, unless they are there.
-    fn gather(&mut self, compliance: Compliance<'_>, samples: impl Iterator<Item = Sample>) {
+    fn gather(
+        &mut self,
+        compliance: Compliance<'_>,
+        samples: impl Iterator<Item = Sample>,
+    ) -> Result<()> {
         self.wanted.clear();
         for sample in samples {
             self.wanted
@@ -105,17 +117,23 @@ impl Delassus {
             && self.columns.len() <= 2 * self.wanted.len()
             && self.wanted.iter().all(known)
         {
-            return;
+            return Ok(());
         }
         self.is_static = compliance.inertia.is_none();
         std::mem::swap(&mut self.columns, &mut self.wanted);
         let order = 3 * self.columns.len();
         self.upper.clear();
+        self.a.clear();
+        let made = memory::reserve(&mut self.upper, order * order, WHAT)
+            .and_then(|()| memory::reserve(&mut self.a, order * order, WHAT));
+        if made.is_err() {
+            self.columns.clear();
+            return made;
+        }
         self.upper.resize(order * order, 0.0);
         compliance
             .prior
             .gather_compliance(&self.columns, &mut self.upper, &mut self.widened);
-        self.a.clear();
         self.a.extend(self.upper.iter().map(|value| *value as f32));
         if let Some((space, held_back)) = compliance.inertia {
             self.hold_back(space, held_back, order);
@@ -125,6 +143,7 @@ impl Delassus {
                 self.a[i * order + j] = self.a[j * order + i];
             }
         }
+        Ok(())
     }
 
     /// Takes the natural modes' part off the upper triangle.

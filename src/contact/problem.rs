@@ -24,6 +24,10 @@ const PUT_MM: f32 = 40.0;
 const RECOVERY_MM: f32 = 3.0;
 /// Linearisations of the gap.
 const LINEARISATIONS: usize = 2;
+/// Samples that one solve may have: what a tool as large as the organ touches beyond these is left to the next solve.
+const MOST_ROWS: usize = 256;
+/// Parts of a step's way at most.
+const MOST_PARTS: f32 = 16.0;
 /// Longest way through a tool, mm.
 const THROUGH_MM: f32 = 30.0;
 /// A tool's normal may lean this much (cosine) to the outside of the tissue; beyond, the tool reaches the sample from within.
@@ -106,6 +110,8 @@ impl Problem {
     /// [`Error::OutOfMemory`].
     pub fn new(samples: Arc<Samples>) -> Result<Problem> {
         const WHAT: &str = "the contact of instruments";
+        // A tool as large as the organ finds all samples at once.
+        memory::probe(128 * samples.len(), WHAT)?;
         let room = samples.len().min(1024);
         Ok(Problem {
             tools: memory::room(MAX_TOOLS, WHAT)?,
@@ -243,11 +249,14 @@ impl Problem {
         self.next.tools.iter().any(holds)
     }
 
-    /// The longest way that a tool goes in this step, mm.
-    pub fn longest_motion(&self) -> f32 {
-        let ways = self.tools.iter().zip(&self.before);
-        ways.map(|(tool, from)| tool.body.motion(from, &tool.pose))
-            .fold(0.0, f32::max)
+    /// In how many parts the tools' ways are taken: no tool may pass a sample between two looks, and none may push it over its own
+    /// edge.
+    pub fn parts(&self) -> u32 {
+        let parts = self.tools.iter().zip(&self.before).map(|(tool, from)| {
+            let most = (0.5 * tool.body.radius()).clamp(0.5, 2.0);
+            (tool.body.motion(from, &tool.pose) / most).ceil()
+        });
+        parts.fold(1.0, f32::max).min(MOST_PARTS) as u32
     }
 
     /// Back to the forces at the start of the step.
@@ -263,7 +272,15 @@ impl Problem {
 
     /// Solves for the forces at `state`, which is the tissue under the forces so far, with the tools at part `part` in `(0, 1]` of
     /// their way. Gives what has changed.
-    pub fn solve(&mut self, compliance: Compliance<'_>, state: State<'_>, part: f32) -> Change<'_> {
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`].
+    pub fn solve(
+        &mut self,
+        compliance: Compliance<'_>,
+        state: State<'_>,
+        part: f32,
+    ) -> Result<Change<'_>> {
         let start = Instant::now();
         self.kept.clear();
         self.kept.extend_from_slice(&self.next.forces);
@@ -273,7 +290,7 @@ impl Problem {
         let samples = &self.samples;
         let rows = &self.rows;
         let of = rows.iter().map(|row| samples.rows()[row.sample as usize]);
-        let w = self.delassus.of(compliance, of);
+        let w = self.delassus.of(compliance, of)?;
         for pass in 0..LINEARISATIONS {
             self.contacts.clear();
             for (at, row) in self.rows.iter_mut().enumerate() {
@@ -332,20 +349,27 @@ impl Problem {
             }
         }
         self.spent += start.elapsed();
-        Change {
+        Ok(Change {
             dofs: &self.columns,
             forces: &self.change,
-        }
+        })
     }
 
     /// The contact solved once on the static response, as a collision field: nodes, ascending, and where they go, `[m,3]`, mm.
     ///
     /// The state is taken as that under half of the last forces; the other half is solved for again.
-    pub fn prescribe(&mut self, compliance: Compliance<'_>, state: State<'_>) -> (&[u32], &[f32]) {
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`].
+    pub fn prescribe(
+        &mut self,
+        compliance: Compliance<'_>,
+        state: State<'_>,
+    ) -> Result<(&[u32], &[f32])> {
         for force in &mut self.next.forces {
             force.force *= 0.5;
         }
-        self.solve(compliance, state, 1.0);
+        self.solve(compliance, state, 1.0)?;
         self.nodes.clear();
         for force in &self.next.forces {
             let sample = self.samples.rows()[force.sample as usize];
@@ -377,7 +401,7 @@ impl Problem {
                 force.force += self.kept[at].force;
             }
         }
-        (&self.nodes, &self.vectors)
+        Ok((&self.nodes, &self.vectors))
     }
 
     /// Nodes of the samples that push, ascending, without held ones.
@@ -558,6 +582,28 @@ impl Problem {
             row.point = sample.gather(|node| state.position(node));
             row.outward = outward(&self.samples, row.sample, state);
         }
+        if self.rows.len() > MOST_ROWS {
+            self.keep_nearest(part);
+        }
+    }
+
+    /// Keeps [`MOST_ROWS`] rows: those with a force first, then those deepest inside of their tool.
+    fn keep_nearest(&mut self, part: f32) {
+        let depth = |row: &Row| match self.tools.get(row.tool as usize) {
+            Some(tool) => {
+                let from = &self.before[row.tool as usize];
+                let pose = pose::between(from, &tool.pose, part);
+                tool.body.nearest_at(&pose, row.point).distance
+            }
+            None => f32::MAX,
+        };
+        let rank = |row: &Row| (row.force == Vector::ZERO, depth(row), row.sample);
+        self.rows.sort_unstable_by(|a, b| {
+            let ((a0, a1, a2), (b0, b1, b2)) = (rank(a), rank(b));
+            a0.cmp(&b0).then(a1.total_cmp(&b1)).then(a2.cmp(&b2))
+        });
+        self.rows.truncate(MOST_ROWS);
+        self.rows.sort_unstable_by_key(|row| (row.tool, row.sample));
     }
 
     /// How deep the deepest sample lies inside of a tool at a pose, mm; not positive where none does.

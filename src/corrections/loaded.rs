@@ -19,9 +19,6 @@ use super::stage::{MOST_PARTS, SHORTENINGS, SLOPE, SMALLEST_DET, Stage, dot};
 use crate::contact::{Compliance, Problem, State};
 use crate::error::Result;
 
-/// A tool's way is taken in parts of at most this, mm: a thin tool must not pass through the tissue between two looks.
-const PART_MM: f32 = 2.0;
-
 /// The state of an iteration.
 struct Iterate<'a> {
     u: &'a mut [f32],
@@ -129,7 +126,7 @@ impl Stage {
     ) -> Result<()> {
         let lost = self.motion.min_det < SMALLEST_DET && !input.still;
         let least = SMALLEST_DET.max(0.5 * self.motion.min_det.min(1.0));
-        let ways = (problem.longest_motion() / PART_MM).ceil().clamp(1.0, 16.0) as u32;
+        let ways = problem.parts();
         let mut iterated = 1;
         loop {
             problem.restart();
@@ -188,7 +185,7 @@ impl Stage {
             start: input.last,
         };
         let compliance = compliance(lent, &self.preconditioner);
-        let change = problem.solve(compliance, state, way);
+        let change = problem.solve(compliance, state, way)?;
         self.preconditioner.load(
             lent.env(),
             change.dofs,

@@ -77,6 +77,9 @@ impl Corrections {
         material
             .validate()
             .map_err(|error| Error::bundle("bundle.json", error.to_string()))?;
+        // Made of many lists: what they take together is asked for first.
+        let bytes = 160 * mesh.tets.len() / 4 + 200 * mesh.node_count();
+        crate::memory::probe(bytes, "the elements of the corrections")?;
         let integrator = Integrator {
             step_s: manifest.dt_s,
             damping_per_s: material.damping_per_s,

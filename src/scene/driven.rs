@@ -181,7 +181,7 @@ impl Core {
                 u: &shared.last.field,
                 start: &shared.last.field,
             };
-            let (nodes, vectors) = problem.prescribe(compliance, state);
+            let (nodes, vectors) = problem.prescribe(compliance, state)?;
             self.incoming
                 .gather(Contact::Sparse { nodes, vectors }, self.mesh.node_count())?;
             stats.check_ms += watch.lap();

@@ -95,6 +95,11 @@ impl Body {
         })
     }
 
+    /// How round its edges are at least, mm; 0 where they are sharp.
+    pub fn radius(&self) -> f32 {
+        self.radius
+    }
+
     /// Signed distance and outward normal at a point of the tool's own frame.
     pub fn nearest(&self, point: Vector) -> Nearest {
         let (distance, normal) = match &self.core {
