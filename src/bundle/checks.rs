@@ -97,9 +97,9 @@ impl Manifest {
             if let Some(vibration) = &prior.vibration {
                 self.listed(vibration, "prior.vibration")?;
                 check(
-                    self.kind == ManifestKind::Upt,
+                    self.kind == ManifestKind::Upt || self.reduced.is_none(),
                     "prior.vibration",
-                    "only kind `upt` has it",
+                    "kind `reduced` has it only without a learned map (field `reduced`)",
                 )?;
             }
         }
@@ -124,12 +124,19 @@ impl Manifest {
                 )
             }
             ManifestKind::Reduced => {
-                let reduced = self
-                    .reduced
-                    .as_ref()
-                    .ok_or_else(|| bad("reduced", "is missing, kind `reduced` needs it"))?;
-                reduced.check()?;
-                self.listed("latent.onnx", "files")?;
+                match &self.reduced {
+                    Some(reduced) => {
+                        reduced.check()?;
+                        self.listed("latent.onnx", "files")?;
+                    }
+                    None => check(
+                        self.prior
+                            .as_ref()
+                            .is_none_or(|prior| prior.vibration.is_some()),
+                        "reduced",
+                        "is missing; kind `reduced` needs it, or a free vibration in its place (field `prior.vibration`)",
+                    )?,
+                }
                 check(
                     self.prior.is_some(),
                     "prior",

@@ -74,7 +74,7 @@ pub struct Envelope {
 pub struct PriorEntry {
     /// File of the bundle.
     pub file: String,
-    /// File with the free vibration that follows a release; kind `upt` only.
+    /// File with the free vibration that follows a release; not beside a learned map of kind `reduced`.
     pub vibration: Option<String>,
 }
 
@@ -314,7 +314,7 @@ pub struct Manifest {
     pub corrections: Option<CorrectionsEntry>,
     /// Kind `upt`.
     pub upt: Option<UptEntry>,
-    /// Kind `reduced`.
+    /// Kind `reduced`; absent where the bundle has no learned map.
     pub reduced: Option<ReducedEntry>,
     /// Errors measured at export; free form, for indicators and reports.
     #[serde(default)]

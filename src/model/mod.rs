@@ -10,7 +10,7 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::Instant;
 
 pub use anchors::Anchors;
-pub use reduced::ReducedModel;
+pub use reduced::{LearnedMap, ReducedModel};
 pub use upt::{UptModel, UptTables};
 pub use upt_stages::DECODER_TILE;
 
@@ -88,7 +88,8 @@ pub struct Model {
     samples: OnceLock<Arc<::contact::Samples>>,
     opening: Mutex<()>,
     files: BundleFiles,
-    pub(crate) runtime: &'static Runtime,
+    /// ONNX Runtime; none where the bundle has no graph.
+    runtime: Option<&'static Runtime>,
     pub(crate) plan: ProviderPlan,
     pub(crate) threads: usize,
     pub(crate) precision: Precision,
@@ -98,7 +99,8 @@ pub struct Model {
 }
 
 impl Model {
-    /// Opens and validates the bundle in the folder `path`, loads ONNX Runtime and computes the static tables.
+    /// Opens and validates the bundle in the folder `path`, loads ONNX Runtime where the bundle has a graph, and computes the
+    /// static tables.
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Bundle`] (names file and field), [`crate::Error::Version`],
@@ -152,7 +154,12 @@ impl Model {
             Some(entry) => Some(PriorTable::open(&files, entry, &mesh)?),
             None => None,
         };
-        let runtime = Runtime::get(process.onnxruntime_path.as_deref())?;
+        let load = || Runtime::get(process.onnxruntime_path.as_deref());
+        // Whatever is wrong with a bundle's graphs, a library that is missing is told of first.
+        let runtime = match (manifest.kind, &manifest.reduced) {
+            (ManifestKind::Reduced, None) => None,
+            _ => Some(load()?),
+        };
         let plan = ProviderPlan::new(options);
         let threads = match (options.threads, process.threads) {
             (0, 0) => 1,
@@ -162,12 +169,12 @@ impl Model {
         let graphs = graph_precision(&files, options);
         let (kind, choice) = match manifest.kind {
             ManifestKind::Reduced => {
-                let (model, choice) = ReducedModel::open(&files, runtime, &plan, graphs)?;
+                let (model, choice) = ReducedModel::open(&files, load, &plan, graphs)?;
                 (KindModel::Reduced(model), choice)
             }
             ManifestKind::Upt => {
                 let (model, choice) =
-                    UptModel::open(&files, &mesh, runtime, &plan, threads, graphs)?;
+                    UptModel::open(&files, &mesh, load()?, &plan, threads, graphs)?;
                 (KindModel::Upt(Box::new(model)), choice)
             }
         };
@@ -257,7 +264,7 @@ impl Model {
             provider: self.choice.provider,
             precision: match &self.kind {
                 KindModel::Upt(upt) => upt.precision,
-                KindModel::Reduced(reduced) => reduced.precision,
+                KindModel::Reduced(reduced) => reduced.precision(),
             },
             memory_bytes: (own + prior + self.mesh.memory_bytes()) as u64,
             load_seconds: self.load_seconds,
@@ -282,6 +289,9 @@ impl Model {
                 "decode": "native, or onnxruntime where the scene asks for it",
                 "step_graph": matches!(&self.kind, KindModel::Upt(kind) if kind.has_step()),
             }),
+            Kind::Reduced if self.runtime.is_none() => {
+                serde_json::json!({"prior": native, "decode": native})
+            }
             Kind::Reduced => {
                 serde_json::json!({"prior": native, "latent": latent, "decode": native})
             }
@@ -298,9 +308,21 @@ impl Model {
             "latent_nodes": self.choice.nodes,
             "latent_memory": self.choice.memory,
             "instruction_set": format!("{:?}", crate::kernels::Isa::detect()),
-            "onnxruntime": {"path": self.runtime.path().display().to_string(), "version": self.runtime.version()},
+            "onnxruntime": self.runtime.map(|runtime| {
+                serde_json::json!({"path": runtime.path().display().to_string(), "version": runtime.version()})
+            }),
         })
         .to_string()
+    }
+
+    /// ONNX Runtime, which a model with graphs has loaded.
+    ///
+    /// # Errors
+    /// [`crate::Error::Unsupported`] for a bundle without graphs.
+    pub(crate) fn runtime(&self) -> Result<&'static Runtime> {
+        self.runtime.ok_or_else(|| {
+            crate::Error::Unsupported(format!("{} has no graph", self.manifest.name))
+        })
     }
 
     fn manifest_kind(&self) -> &'static str {

@@ -1,48 +1,74 @@
-//! Kind `reduced`: linear response plus a learned correction of the residual state `b` in a static basis.
+//! Kind `reduced`: linear response plus a learned correction of the residual state `b` in a static basis, or, in a bundle
+//! without a learned map, the linear response and its free vibration alone.
 
 use crate::bundle::{BundleFiles, ReducedEntry};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::onnx::{ProviderChoice, ProviderPlan, Runtime, Stage, StageOptions};
 use crate::options::Precision;
 
 /// The part of a model that only kind `reduced` has; the tables are in [`crate::prior::PriorTable`].
 pub struct ReducedModel {
+    /// The learned map; none in a bundle that was made without training.
+    pub learned: Option<LearnedMap>,
+}
+
+/// The correction network.
+pub struct LearnedMap {
     /// The manifest's entry.
     pub entry: ReducedEntry,
     /// Precision of the graph: float32, float16 or int8.
     pub precision: Precision,
+    runtime: &'static Runtime,
     file: String,
     latent: Vec<u8>,
 }
 
 impl ReducedModel {
-    /// Reads the correction network and makes a session once, so that what is wrong with it shows at load.
+    /// Reads the correction network, where the bundle has one, and makes a session once, so that what is wrong with it shows
+    /// at load. `runtime` is called for a network only.
     pub fn open(
         files: &BundleFiles,
-        runtime: &'static Runtime,
+        runtime: impl FnOnce() -> Result<&'static Runtime>,
         plan: &ProviderPlan,
         precision: Precision,
     ) -> Result<(ReducedModel, ProviderChoice)> {
-        let entry = files
-            .manifest
-            .reduced
-            .clone()
-            .ok_or_else(|| Error::bundle("bundle.json", "field `reduced` is missing"))?;
+        let Some(entry) = files.manifest.reduced.clone() else {
+            let choice = plan.without_graph(&files.manifest.name)?;
+            if !matches!(precision, Precision::F32) {
+                files.graph_file("latent", precision)?;
+            }
+            return Ok((ReducedModel { learned: None }, choice));
+        };
         let file = files.graph_file("latent", precision)?;
-        let model = ReducedModel {
+        let map = LearnedMap {
             entry,
             precision,
+            runtime: runtime()?,
             latent: files.read(&file)?,
             file,
         };
-        let stage = model.stage(runtime, plan)?;
-        Ok((model, stage.choice().clone()))
+        let choice = map.stage(plan)?.choice().clone();
+        Ok((ReducedModel { learned: Some(map) }, choice))
     }
 
+    /// Precision of the graph; float32 without one.
+    pub fn precision(&self) -> Precision {
+        self.learned
+            .as_ref()
+            .map_or(Precision::F32, |map| map.precision)
+    }
+
+    /// Bytes held.
+    pub fn memory_bytes(&self) -> usize {
+        self.learned.as_ref().map_or(0, |map| map.latent.len())
+    }
+}
+
+impl LearnedMap {
     /// A session of `latent.onnx`: `state [1,n_in]` -> `b_next [1,r]`, mm. One thread: the network is tiny.
-    pub fn stage(&self, runtime: &'static Runtime, plan: &ProviderPlan) -> Result<Stage> {
+    pub fn stage(&self, plan: &ProviderPlan) -> Result<Stage> {
         Stage::new(
-            runtime,
+            self.runtime,
             &self.file,
             &self.latent,
             &[("state", &[1, self.entry.input_width()])],
@@ -52,10 +78,5 @@ impl ReducedModel {
                 plan: plan.clone(),
             },
         )
-    }
-
-    /// Bytes held.
-    pub fn memory_bytes(&self) -> usize {
-        self.latent.len()
     }
 }

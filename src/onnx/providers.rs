@@ -64,7 +64,6 @@ pub struct ProviderChoice {
 
 impl ProviderChoice {
     /// The CPU, which nobody refused.
-    #[cfg(test)]
     pub(super) fn cpu() -> ProviderChoice {
         ProviderChoice {
             provider: Provider::Cpu,
@@ -133,6 +132,29 @@ impl ProviderPlan {
             ""
         };
         Err(Error::Provider(format!("{}{note}", list.join("; "))))
+    }
+
+    /// What a bundle without any graph runs on: the CPU, if the list allows it.
+    ///
+    /// # Errors
+    /// [`Error::Provider`] when it does not.
+    pub fn without_graph(&self, bundle: &str) -> Result<ProviderChoice> {
+        let reason = || format!("{bundle} has no graph to run there");
+        let wanted = self.options.providers.iter();
+        let refused = wanted
+            .take_while(|&&provider| provider != Provider::Cpu)
+            .map(|&provider| (provider, reason()))
+            .collect();
+        if !self.options.providers.contains(&Provider::Cpu) {
+            return Err(Error::Provider(format!(
+                "{}; add the CPU to the providers",
+                reason()
+            )));
+        }
+        Ok(ProviderChoice {
+            refused,
+            ..ProviderChoice::cpu()
+        })
     }
 
     /// Where the tensors of a session lie.

@@ -3,7 +3,7 @@
 use super::compliance::{Bases, Compliance};
 use super::numbers::Numbers;
 use super::vibration::FreeVibration;
-use crate::bundle::{BundleFiles, Manifest, Mesh, PriorEntry, TensorFile};
+use crate::bundle::{BundleFiles, Manifest, ManifestKind, Mesh, PriorEntry, TensorFile};
 use crate::error::Result;
 use crate::grid::{PointGrid, squared_distance};
 use crate::kernels::rows::BlockBasis;
@@ -53,6 +53,7 @@ impl PriorTable {
                 &table,
                 manifest.material.damping_per_s,
                 manifest.dt_s,
+                manifest.kind == ManifestKind::Reduced,
             )?);
         }
         Ok(table)

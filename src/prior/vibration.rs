@@ -6,6 +6,7 @@
 use super::table::PriorTable;
 use crate::bundle::TensorFile;
 use crate::error::{Error, Result};
+use crate::kernels::project::row_dots;
 use crate::kernels::respond::accumulate_rows;
 use crate::kernels::rows::Stored;
 use crate::kernels::{Isa, Pool};
@@ -20,6 +21,8 @@ pub struct FreeVibration {
     force_to_mode: Vec<f32>,
     /// Modes in block coordinates `[m,Q]`.
     modes: Vec<f32>,
+    /// Amplitudes of a field in block coordinates `[m,Q]`; empty where the file has none.
+    projection: Vec<f32>,
     /// `0..m`, as the row list of the product with `modes`.
     rows: Vec<u32>,
     /// For each mode `A, B, C, D` of `z' = A z + B w`, `w' = C z + D w`.
@@ -27,12 +30,14 @@ pub struct FreeVibration {
 }
 
 impl FreeVibration {
-    /// Reads and checks the tables for a prior; `damping` in 1/s, `dt` in s.
+    /// Reads and checks the tables for a prior; `damping` in 1/s, `dt` in s. `projected`: the amplitudes of
+    /// fields are needed too.
     pub fn parse(
         file: &TensorFile,
         prior: &PriorTable,
         damping: f64,
         dt: f64,
+        projected: bool,
     ) -> Result<FreeVibration> {
         let frequency = file.f32("frequency", &[None])?;
         let count = frequency.len();
@@ -46,6 +51,11 @@ impl FreeVibration {
         Ok(FreeVibration {
             force_to_mode: file.f32("force_to_mode", &[Some(dofs), Some(count)])?,
             modes: file.f32("modes", &[Some(count), Some(prior.width())])?,
+            projection: if projected {
+                file.f32("projection", &[Some(count), Some(prior.width())])?
+            } else {
+                Vec::new()
+            },
             rows: (0..count as u32).collect(),
             propagator: frequency
                 .iter()
@@ -90,9 +100,19 @@ impl FreeVibration {
         .map_err(|error| Error::Panic(error.to_string()))
     }
 
+    /// The amplitudes `[m]`, mm, of a field in block coordinates `[Q]`: its mass-weighted projection on the modes.
+    pub fn amplitudes(&self, isa: Isa, pool: &Pool, q: &[f32], out: &mut [f32]) -> Result<()> {
+        let rows = Stored::F32(&self.projection);
+        row_dots(isa, pool, rows, &self.rows, q, out)
+            .map_err(|error| Error::Panic(error.to_string()))
+    }
+
     /// Bytes held.
     pub fn memory_bytes(&self) -> usize {
-        4 * (self.force_to_mode.len() + self.modes.len() + 5 * self.rows.len())
+        4 * (self.force_to_mode.len()
+            + self.modes.len()
+            + self.projection.len()
+            + 5 * self.rows.len())
     }
 }
 

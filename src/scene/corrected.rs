@@ -201,6 +201,17 @@ impl Core {
             // A network reads the field itself.
             return Ok(());
         };
+        if self.was_corrected[0] {
+            engine.swing_from(
+                self.isa,
+                &self.pool,
+                table,
+                &corrected.basis_starts,
+                &shared.last.field,
+                &corrected.stage.motion.velocity,
+                self.model.manifest.dt_s as f32,
+            )?;
+        }
         engine.absorb(
             self.isa,
             &self.pool,

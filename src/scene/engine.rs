@@ -291,7 +291,8 @@ impl Engine {
 
     /// Whether the model's free motion is known to end at exactly zero.
     pub fn comes_to_rest(&self) -> bool {
-        // The bound of a reduced model's correction decays geometrically; a network alone promises nothing.
+        // The bound of a reduced model's correction decays geometrically, and so does a free vibration; a network alone
+        // promises nothing.
         matches!(self, Engine::Reduced(_))
     }
 
@@ -323,10 +324,7 @@ impl Engine {
     pub fn transfer_ms(&self) -> [f64; 2] {
         match self {
             Engine::Upt(engine, _) => engine.transfer_ms(),
-            Engine::Reduced(engine) => {
-                let times = engine.stage().times();
-                [times.upload, times.download]
-            }
+            Engine::Reduced(engine) => engine.transfer_ms(),
         }
     }
 
@@ -334,7 +332,7 @@ impl Engine {
     pub fn provider(&self) -> Provider {
         match self {
             Engine::Upt(engine, _) => engine.stage().choice().provider,
-            Engine::Reduced(engine) => engine.stage().choice().provider,
+            Engine::Reduced(engine) => engine.provider(),
         }
     }
 

@@ -8,6 +8,7 @@ mod corrected;
 #[cfg(feature = "contact")]
 mod driven;
 mod engine;
+mod free_motion;
 mod inversion;
 mod plan;
 mod points;
@@ -240,7 +241,7 @@ impl Scene {
                 && points.len() > 0
             {
                 let threads = core.pool.threads();
-                let queries = kind.queries(points.places(), core.model.runtime, threads)?;
+                let queries = kind.queries(points.places(), core.model.runtime()?, threads)?;
                 points.set_queries(queries)?;
             }
             let region = core.region_copy(published)?;
@@ -360,7 +361,7 @@ fn build(model: &Arc<Model>, options: &SceneOptions) -> Result<Core> {
             let (tables, nodes) = match &own_mesh {
                 None => (Arc::clone(&kind.tables), model.mesh.node_count()),
                 Some(mesh) => (
-                    Arc::new(kind.tables_of(mesh, model.runtime, threads)?),
+                    Arc::new(kind.tables_of(mesh, model.runtime()?, threads)?),
                     mesh.node_count(),
                 ),
             };

@@ -1,5 +1,6 @@
 //! The step of kind `reduced`: `u' = L(c') + Phi b'`, with `b'` from the correction network, bounded relative to the
-//! linear response and faded out beyond the trained pushes (`docs/formats.md`).
+//! linear response and faded out beyond the trained pushes (`docs/formats.md`). A bundle without a learned map has `b' = 0`
+//! and swings freely after a release ([`super::free_motion`]).
 
 use super::contact::ContactSet;
 use super::timing::Stopwatch;
@@ -10,9 +11,9 @@ use crate::kernels::respond::accumulate_rows;
 use crate::kernels::rows::Stored;
 use crate::kernels::{Isa, Pool};
 use crate::memory;
-use crate::model::{Model, ReducedModel};
+use crate::model::{LearnedMap, Model, ReducedModel};
 use crate::onnx::Stage;
-use crate::options::Precision;
+use crate::options::{Precision, Provider};
 use crate::prior::{ContactResponse, PriorTable, SolveReport};
 use crate::stats::{SceneStats, flag};
 
@@ -31,6 +32,8 @@ pub struct ReducedRecord {
     pub q_prior: Vec<f32>,
     /// The whole field in block coordinates `[Q]`.
     pub q: Vec<f32>,
+    /// Amplitudes and velocities times the step of the free vibration `[2m]`, mm; empty beside a learned map.
+    pub vibration: Vec<f32>,
     /// `|L|` over all nodes, mm.
     pub prior_norm: f32,
     /// Bound of `|b|`, mm.
@@ -41,10 +44,14 @@ pub struct ReducedRecord {
 
 impl ReducedRecord {
     fn new(model: &ReducedModel, table: &PriorTable) -> Result<ReducedRecord> {
+        let entry = model.learned.as_ref().map(|map| &map.entry);
+        let (modes, response_modes) = entry.map_or((0, 0), |e| (e.modes, e.response_modes));
+        let swinging = table.vibration.as_ref().map_or(0, |v| 2 * v.count());
         Ok(ReducedRecord {
-            b: memory::zeros(model.entry.modes, STATE)?,
-            z: memory::zeros(model.entry.response_modes, STATE)?,
-            p: memory::zeros(model.entry.modes, STATE)?,
+            b: memory::zeros(modes, STATE)?,
+            z: memory::zeros(response_modes, STATE)?,
+            p: memory::zeros(modes, STATE)?,
+            vibration: memory::zeros(swinging, STATE)?,
             q_prior: memory::zeros(table.width(), STATE)?,
             q: memory::zeros(table.width(), STATE)?,
             prior_norm: 0.0,
@@ -61,12 +68,21 @@ impl ReducedRecord {
             p: memory::copied(&self.p, STATE)?,
             q_prior: memory::copied(&self.q_prior, STATE)?,
             q: memory::copied(&self.q, STATE)?,
+            vibration: memory::copied(&self.vibration, STATE)?,
             ..*self
         })
     }
 
     fn memory_bytes(&self) -> usize {
-        4 * (self.b.len() + self.z.len() + self.p.len() + self.q_prior.len() + self.q.len())
+        let lists = [
+            &self.b,
+            &self.z,
+            &self.p,
+            &self.q_prior,
+            &self.q,
+            &self.vibration,
+        ];
+        lists.iter().map(|list| 4 * list.len()).sum()
     }
 
     fn clear(&mut self) {
@@ -76,6 +92,7 @@ impl ReducedRecord {
             &mut self.p,
             &mut self.q_prior,
             &mut self.q,
+            &mut self.vibration,
         ] {
             values.fill(0.0);
         }
@@ -89,17 +106,36 @@ impl ReducedRecord {
 pub struct ReducedEngine {
     /// The contact solve.
     pub response: ContactResponse,
-    stage: Stage,
-    precision: Precision,
-    mode_rows: Vec<u32>,
-    given_q: Vec<f32>,
-    given_b: Vec<f32>,
+    learned: Option<LearnedStage>,
+    pub(super) given_q: Vec<f32>,
     /// The step being made, the last published one, the one before it.
     pub next: ReducedRecord,
     /// Last published.
     pub last: ReducedRecord,
     /// The one before.
     pub before: ReducedRecord,
+}
+
+/// Session and buffers of the correction network.
+struct LearnedStage {
+    stage: Stage,
+    precision: Precision,
+    mode_rows: Vec<u32>,
+    given_b: Vec<f32>,
+}
+
+impl LearnedStage {
+    fn new(model: &Model, map: &LearnedMap) -> Result<LearnedStage> {
+        let mut stage = map.stage(&model.plan)?;
+        stage.warm_up()?;
+        let modes = map.entry.modes;
+        Ok(LearnedStage {
+            stage,
+            precision: map.precision,
+            mode_rows: memory::collected(modes, 0..modes as u32, STATE)?,
+            given_b: memory::zeros(modes, STATE)?,
+        })
+    }
 }
 
 /// Euclidean norm, summed in f64 in index order.
@@ -123,15 +159,13 @@ fn distance(a: &[f32], b: &[f32]) -> f32 {
 impl ReducedEngine {
     /// Makes the session and the buffers.
     pub fn new(model: &Model, kind: &ReducedModel, table: &PriorTable) -> Result<ReducedEngine> {
-        let mut stage = kind.stage(model.runtime, &model.plan)?;
-        stage.warm_up()?;
+        let learned = kind.learned.as_ref();
         Ok(ReducedEngine {
             response: ContactResponse::new(table)?,
-            stage,
-            precision: kind.precision,
-            mode_rows: memory::collected(kind.entry.modes, 0..kind.entry.modes as u32, STATE)?,
+            learned: learned
+                .map(|map| LearnedStage::new(model, map))
+                .transpose()?,
             given_q: memory::zeros(table.width(), STATE)?,
-            given_b: memory::zeros(kind.entry.modes, STATE)?,
             next: ReducedRecord::new(kind, table)?,
             last: ReducedRecord::new(kind, table)?,
             before: ReducedRecord::new(kind, table)?,
@@ -144,14 +178,25 @@ impl ReducedEngine {
         self.before.clear();
     }
 
-    /// Precision of the correction network.
+    /// Precision of the correction network; float32 without one.
     pub fn precision(&self) -> Precision {
-        self.precision
+        let learned = self.learned.as_ref();
+        learned.map_or(Precision::F32, |learned| learned.precision)
     }
 
-    /// What runs the correction network.
-    pub fn stage(&self) -> &Stage {
-        &self.stage
+    /// What runs the correction network; the CPU without one.
+    pub fn provider(&self) -> Provider {
+        let learned = self.learned.as_ref();
+        learned.map_or(Provider::Cpu, |learned| learned.stage.choice().provider)
+    }
+
+    /// Wall time of the network's last copies to a device and back, ms.
+    pub fn transfer_ms(&self) -> [f64; 2] {
+        let Some(learned) = &self.learned else {
+            return [0.0; 2];
+        };
+        let times = learned.stage.times();
+        [times.upload, times.download]
     }
 
     /// `contact_changed`: the contact nodes differ from those of the last step.
@@ -175,20 +220,24 @@ impl ReducedEngine {
         let report = self
             .response
             .solve(isa, table, held, &contact.nodes, &contact.vectors)?;
-        let next = &mut self.next;
-        self.response.field(isa, pool, table, &mut next.q_prior)?;
-        self.response
-            .expand(isa, pool, Stored::F32(&table.force_to_z), &mut next.z)?;
-        self.response
-            .expand(isa, pool, Stored::F32(&table.force_to_p), &mut next.p)?;
-        next.prior_norm = norm(&next.q_prior);
-        next.contact = !contact.is_empty();
         stats.flags |= solve_flags(report);
-        if !learned {
+        let next = &mut self.next;
+        next.contact = !contact.is_empty();
+        if let Some(vibration) = &table.vibration {
+            self.swing(isa, pool, table, vibration, given)?;
+        } else {
+            self.response.field(isa, pool, table, &mut next.q_prior)?;
+            self.response
+                .expand(isa, pool, Stored::F32(&table.force_to_z), &mut next.z)?;
+            self.response
+                .expand(isa, pool, Stored::F32(&table.force_to_p), &mut next.p)?;
+        }
+        self.next.prior_norm = norm(&self.next.q_prior);
+        let (Some(map), Some(own), true) = (&kind.learned, &mut self.learned, learned) else {
             self.drop_correction();
             stats.prior_ms = watch.lap();
             return Ok(());
-        }
+        };
         let b_now = match given {
             Some(field) => {
                 self.given_q.fill(0.0);
@@ -196,14 +245,14 @@ impl ReducedEngine {
                 for (q, prior) in self.given_q.iter_mut().zip(&self.last.q_prior) {
                     *q -= prior;
                 }
-                for (b, mode) in self
+                for (b, mode) in own
                     .given_b
                     .iter_mut()
                     .zip(table.residual.chunks_exact(self.given_q.len()))
                 {
                     *b = mode.iter().zip(&self.given_q).map(|(m, q)| m * q).sum();
                 }
-                &self.given_b
+                &own.given_b
             }
             None => &self.last.b,
         };
@@ -211,9 +260,9 @@ impl ReducedEngine {
         stats.prior_ms = watch.lap();
         let span = tracing::trace_span!("latent").entered();
 
-        let input = self.stage.input(0);
+        let input = own.stage.input(0);
         let mut at = 0;
-        for group in &kind.entry.inputs {
+        for group in &map.entry.inputs {
             let flags =
                 [self.next.contact, self.last.contact].map(|on| if on { 1.0f32 } else { 0.0 });
             let values: &[f32] = match group {
@@ -229,9 +278,9 @@ impl ReducedEngine {
             input[at..at + values.len()].copy_from_slice(values);
             at += values.len();
         }
-        self.stage.run()?;
+        own.stage.run()?;
         let next = &mut self.next;
-        next.b.copy_from_slice(self.stage.output(0));
+        next.b.copy_from_slice(own.stage.output(0));
 
         let energy = if given.is_some() {
             norm(b_now)
@@ -243,7 +292,7 @@ impl ReducedEngine {
         } else {
             0.0
         };
-        let bound = &kind.entry.bound;
+        let bound = &map.entry.bound;
         next.bound = (bound.relative * next.prior_norm).max(bound.decay * (energy + jump));
         let size = norm(&next.b);
         let mut scale = 1.0;
@@ -251,7 +300,7 @@ impl ReducedEngine {
             scale = next.bound / size;
             stats.flags |= flag::CLAMPED;
         }
-        let fade = &kind.entry.fade;
+        let fade = &map.entry.fade;
         let push = contact.max_push();
         scale *=
             ((fade.end_push_mm - push) / (fade.end_push_mm - fade.start_push_mm)).clamp(0.0, 1.0);
@@ -260,7 +309,7 @@ impl ReducedEngine {
         }
         drop(span);
         stats.latent_ms = watch.lap();
-        Self::combine(isa, pool, table, &self.mode_rows, next)?;
+        Self::combine(isa, pool, table, &own.mode_rows, next)?;
         stats.prior_ms += watch.lap();
         Ok(())
     }
@@ -296,6 +345,9 @@ impl ReducedEngine {
         starts: &[usize],
         fields: [Option<&[f32]>; 2],
     ) -> Result<()> {
+        let Some(learned) = &self.learned else {
+            return Ok(());
+        };
         let failed = |error: crate::kernels::PoolError| Error::Panic(error.to_string());
         let records = [&mut self.last, &mut self.before];
         for (record, field) in records.into_iter().zip(fields) {
@@ -306,7 +358,7 @@ impl ReducedEngine {
                 *given -= prior;
             }
             let modes = Stored::F32(&table.residual);
-            row_dots(isa, pool, modes, &self.mode_rows, q, &mut record.b).map_err(failed)?;
+            row_dots(isa, pool, modes, &learned.mode_rows, q, &mut record.b).map_err(failed)?;
             record.bound = norm(&record.b);
         }
         Ok(())
@@ -345,27 +397,37 @@ impl ReducedEngine {
         for (record, contact) in [(&mut self.before, before), (&mut self.last, last)] {
             self.response
                 .solve(isa, table, held, &contact.nodes, &contact.vectors)?;
-            self.response.field(isa, pool, table, &mut record.q_prior)?;
-            self.response
-                .expand(isa, pool, Stored::F32(&table.force_to_z), &mut record.z)?;
-            self.response
-                .expand(isa, pool, Stored::F32(&table.force_to_p), &mut record.p)?;
-            Self::combine(isa, pool, table, &self.mode_rows, record)?;
+            match &table.vibration {
+                Some(vibration) if contact.is_empty() => {
+                    vibration.field(isa, pool, &record.vibration, &mut record.q_prior)?;
+                }
+                _ => self.response.field(isa, pool, table, &mut record.q_prior)?,
+            }
+            record.q.copy_from_slice(&record.q_prior);
+            if let Some(learned) = &self.learned {
+                self.response
+                    .expand(isa, pool, Stored::F32(&table.force_to_z), &mut record.z)?;
+                self.response
+                    .expand(isa, pool, Stored::F32(&table.force_to_p), &mut record.p)?;
+                Self::combine(isa, pool, table, &learned.mode_rows, record)?;
+            }
         }
         Ok(())
     }
 
-    /// `|b|` of the last state, mm.
+    /// `|b|` of the last state, or where it swings freely the largest it may swing to, mm.
     pub fn last_norm(&self) -> f32 {
-        norm(&self.last.b)
+        norm(&self.last.b).max(norm(&self.last.vibration))
     }
 
     /// Bytes of the buffers.
     pub fn memory_bytes(&self) -> usize {
         3 * self.next.memory_bytes()
-            + 4 * (self.given_q.len() + self.given_b.len() + self.mode_rows.len())
+            + 4 * self.given_q.len()
             + self.response.memory_bytes()
-            + self.stage.memory_bytes()
+            + self.learned.as_ref().map_or(0, |learned| {
+                4 * (learned.given_b.len() + learned.mode_rows.len()) + learned.stage.memory_bytes()
+            })
     }
 }
 

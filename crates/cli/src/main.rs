@@ -5,6 +5,8 @@
 //! input, with a message on stderr that says what to do. A closed pipe ends the program quietly.
 
 mod beside;
+#[cfg(feature = "linear")]
+mod check;
 mod completions;
 #[cfg(feature = "linear")]
 mod corrections;
@@ -16,11 +18,15 @@ mod host;
 #[cfg(not(all(feature = "files", feature = "linear")))]
 mod left_out;
 mod machine;
+#[cfg(all(feature = "files", feature = "linear"))]
+mod make;
 mod mesh;
 #[cfg(feature = "files")]
 mod mesh_files;
 #[cfg(feature = "linear")]
 mod modes;
+#[cfg(feature = "linear")]
+mod preview;
 #[cfg(feature = "linear")]
 mod prior;
 #[cfg(feature = "linear")]
@@ -34,6 +40,7 @@ mod stress;
 mod tools;
 mod view;
 
+use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
@@ -61,6 +68,18 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
+    /// From an organ's surface or mesh to a bundle with its certificate.
+    #[cfg(all(feature = "files", feature = "linear"))]
+    Make(Box<make::Options>),
+    /// Left out of this build.
+    #[cfg(not(all(feature = "files", feature = "linear")))]
+    Make(left_out::Options),
+    /// A bundle's certificate again: held-out contacts beside the reference solver.
+    #[cfg(feature = "linear")]
+    Check(check::Options),
+    /// Left out of this build.
+    #[cfg(not(feature = "linear"))]
+    Check(left_out::Options),
     /// What was found on this machine: ONNX Runtime, providers, CPU features, bundles.
     Doctor(doctor::Options),
     /// Meshes: quality, import, stuffing.
@@ -111,7 +130,16 @@ enum Command {
 
 fn main() -> ExitCode {
     end_quietly_on_closed_pipe();
+    take_runtime_of_the_build();
     let outcome = match Arguments::parse().command {
+        #[cfg(all(feature = "files", feature = "linear"))]
+        Command::Make(options) => make::run(&options),
+        #[cfg(not(all(feature = "files", feature = "linear")))]
+        Command::Make(options) => left_out::run("files,linear", &options),
+        #[cfg(feature = "linear")]
+        Command::Check(options) => check::run(&options),
+        #[cfg(not(feature = "linear"))]
+        Command::Check(options) => left_out::run("linear", &options),
         Command::Doctor(options) => doctor::run(&options),
         Command::Mesh(options) => mesh::run(&options),
         #[cfg(feature = "files")]
@@ -144,6 +172,22 @@ fn main() -> ExitCode {
         eprintln!("error: {error:#}");
         ExitCode::from(2)
     })
+}
+
+/// A `upt` out of `cargo build` takes the ONNX Runtime that `cargo xtask` fetched (`target/ort`) unless the environment names one.
+fn take_runtime_of_the_build() {
+    let named = std::env::var_os("ORT_DYLIB_PATH").is_some_and(|path| !path.is_empty());
+    let Some(found) = std::env::current_exe().ok().and_then(|exe| {
+        let target = exe.parent()?.parent()?;
+        let file = target
+            .join("ort")
+            .join(format!("{DLL_PREFIX}onnxruntime{DLL_SUFFIX}"));
+        (!named && file.is_file()).then_some(file)
+    }) else {
+        return;
+    };
+    // SAFETY: no other thread runs yet.
+    unsafe { std::env::set_var("ORT_DYLIB_PATH", found) };
 }
 
 /// `upt ... | head` must not panic. On Unix Rust ignores SIGPIPE at start, and the default action is put back; Windows has

@@ -53,6 +53,12 @@ pub struct Options {
 
 /// Runs the command.
 pub fn run(args: &Options) -> anyhow::Result<ExitCode> {
+    write(args)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Writes the file; returns the lowest and the highest frequency, Hz.
+pub fn write(args: &Options) -> anyhow::Result<[f64; 2]> {
     let mesh = Mesh::read(&args.mesh)?;
     let held = mesh.held_nodes(args.boundary);
     let lame = Lame::from_young(args.young, args.poisson)?;
@@ -113,5 +119,5 @@ pub fn run(args: &Options) -> anyhow::Result<ExitCode> {
             args.count
         );
     }
-    Ok(ExitCode::SUCCESS)
+    Ok([low, high])
 }

@@ -148,8 +148,24 @@ impl Partial {
     }
 }
 
+/// What was written.
+pub struct Written {
+    /// Columns, and the degrees of freedom of each.
+    pub rows: usize,
+    pub width: usize,
+    factor_entries: usize,
+    factor_seconds: f64,
+    solve_seconds: f64,
+}
+
 /// Runs the command.
 pub fn run(args: &Options) -> anyhow::Result<ExitCode> {
+    let written = write_columns(args)?;
+    report(args, &written)
+}
+
+/// Solves for the columns and writes the file.
+pub fn write_columns(args: &Options) -> anyhow::Result<Written> {
     let mesh = Mesh::read(&args.mesh)?;
     let held = mesh.held_nodes(args.boundary);
     let nodes = contact_nodes(&mesh, &held);
@@ -241,26 +257,24 @@ pub fn run(args: &Options) -> anyhow::Result<ExitCode> {
         .with_context(|| format!("{}: writing failed", temporary.display()))?;
     std::fs::rename(&temporary, &args.out)
         .with_context(|| format!("{}: cannot be renamed", temporary.display()))?;
-    report(
-        args,
-        &args.out,
+    Ok(Written {
         rows,
         width,
-        stats.factor_entries,
+        factor_entries: stats.factor_entries,
         factor_seconds,
         solve_seconds,
-    )
+    })
 }
 
-fn report(
-    args: &Options,
-    out: &Path,
-    rows: usize,
-    width: usize,
-    factor_entries: usize,
-    factor_seconds: f64,
-    solve_seconds: f64,
-) -> anyhow::Result<ExitCode> {
+fn report(args: &Options, written: &Written) -> anyhow::Result<ExitCode> {
+    let Written {
+        rows,
+        width,
+        factor_entries,
+        factor_seconds,
+        solve_seconds,
+    } = written;
+    let out = &args.out;
     if args.json {
         let value = json!({
             "columns": rows, "dofs": width, "factor_entries": factor_entries,

@@ -55,7 +55,7 @@ fn lists(engine: &mut Engine) -> Vec<&mut Vec<f32>> {
             .collect(),
         Engine::Reduced(engine) => [&mut engine.last, &mut engine.before]
             .into_iter()
-            .map(|record| &mut record.b)
+            .flat_map(|record| [&mut record.b, &mut record.vibration])
             .collect(),
     }
 }

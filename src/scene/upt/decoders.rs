@@ -32,11 +32,15 @@ impl Decoders {
             DecoderKernel::Auto | DecoderKernel::Native => Decoders::Native,
             DecoderKernel::Onnx => Decoders::Tiles(
                 (0..threads)
-                    .map(|_| Ok(Mutex::new(kind.decoder_stage(model.runtime, &model.plan)?)))
+                    .map(|_| {
+                        Ok(Mutex::new(
+                            kind.decoder_stage(model.runtime()?, &model.plan)?,
+                        ))
+                    })
                     .collect::<Result<_>>()?,
             ),
             DecoderKernel::Resident => Decoders::Resident(Box::new(kind.resident_decoder(
-                model.runtime,
+                model.runtime()?,
                 &model.plan,
                 threads,
                 &tables.query_table,

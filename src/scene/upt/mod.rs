@@ -132,7 +132,7 @@ impl UptEngine {
                 vibration: zeros(vibration.map_or(0, |vibration| 2 * vibration.count()))?,
             })
         };
-        let (runtime, plan, threads) = (model.runtime, &model.plan, pool.threads());
+        let (runtime, plan, threads) = (model.runtime()?, &model.plan, pool.threads());
         let path = if choice.whole {
             Path::Whole(Box::new(kind.step_stage(runtime, plan, threads, tables)?))
         } else {

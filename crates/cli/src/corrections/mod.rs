@@ -7,7 +7,7 @@ mod manifest;
 mod patches;
 mod space;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
@@ -21,6 +21,8 @@ use upt::prior::PriorTable;
 
 use crate::progress::spinner;
 use space::Space;
+
+const FILE: &str = "corrections.safetensors";
 
 /// Options of `upt corrections`.
 #[derive(Debug, Args)]
@@ -62,6 +64,34 @@ pub struct Options {
 /// Runs the command.
 pub fn run(args: &Options) -> Result<ExitCode> {
     let started = Instant::now();
+    let count = write(args)?;
+    let seconds = started.elapsed().as_secs_f64();
+    let path = args.bundle.join(FILE);
+    if args.json {
+        let value =
+            json!({"file": path, "modes": count, "natural": args.natural, "seconds": seconds});
+        println!("{value}");
+    } else {
+        println!(
+            "{}: {count} modes, {} of them natural ({seconds:.0} s)",
+            path.display(),
+            args.natural
+        );
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Changes how many corrections the bundle recommends and what their estimated error is multiplied by.
+pub fn set_calibration(bundle: &Path, recommended: u32, calibration: f32) -> Result<()> {
+    manifest::add(
+        bundle,
+        FILE,
+        &json!({"file": FILE, "recommended": recommended, "calibration": calibration}),
+    )
+}
+
+/// Writes the file and the manifest's entry; returns the number of modes.
+pub fn write(args: &Options) -> Result<usize> {
     let files = BundleFiles::open(&args.bundle)?;
     let manifest = &files.manifest;
     let Some(entry) = &manifest.prior else {
@@ -132,31 +162,20 @@ pub fn run(args: &Options) -> Result<ExitCode> {
                 damping_per_s: material.damping_per_s,
             },
             held: &held,
+            push_mm: f64::from(manifest.envelope.max_push_mm),
+            area_mm2: manifest.envelope.contact_area_mm2.map(f64::from),
         };
         let found = patches::modes(&source, args.patches, args.patch_modes, args.seed, quiet)?;
         space.add(found.into_iter());
     }
-    let file = "corrections.safetensors";
-    let path = args.bundle.join(file);
+    let path = args.bundle.join(FILE);
     let count = space
         .write(&path, &frequency)
         .with_context(|| format!("{}: cannot be written", path.display()))?;
     manifest::add(
         &args.bundle,
-        file,
-        &json!({"file": file, "recommended": args.recommended, "calibration": args.calibration}),
+        FILE,
+        &json!({"file": FILE, "recommended": args.recommended, "calibration": args.calibration}),
     )?;
-    let seconds = started.elapsed().as_secs_f64();
-    if args.json {
-        let value =
-            json!({"file": path, "modes": count, "natural": args.natural, "seconds": seconds});
-        println!("{value}");
-    } else {
-        println!(
-            "{}: {count} modes, {} of them natural ({seconds:.0} s)",
-            path.display(),
-            args.natural
-        );
-    }
-    Ok(ExitCode::SUCCESS)
+    Ok(count)
 }

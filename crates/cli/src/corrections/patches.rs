@@ -13,9 +13,8 @@ use crate::progress;
 
 /// Steps towards the equilibrium of each push.
 const STEPS: usize = 5;
-/// Radii, mm, and depths, mm, of the pushes.
-const RADIUS_MM: [f64; 2] = [4.0, 9.0];
-const DEPTH_MM: [f64; 2] = [6.0, 14.0];
+/// Depths of the pushes over the envelope's deepest.
+const DEPTH: [f64; 2] = [0.4, 0.93];
 
 /// What the pushes act on.
 pub struct Source<'a> {
@@ -25,6 +24,9 @@ pub struct Source<'a> {
     pub factor: &'a Factor,
     pub material: Material,
     pub held: &'a [u32],
+    /// Deepest push, mm, and area of a contact, mm², of the envelope.
+    pub push_mm: f64,
+    pub area_mm2: [f64; 2],
 }
 
 /// A push: nodes and where they go.
@@ -105,7 +107,11 @@ fn spread_sites(source: &Source<'_>, count: usize, random: &mut Random) -> Vec<u
 fn push(source: &Source<'_>, site: u32, held: &[bool], random: &mut Random) -> Push {
     let mesh = source.mesh;
     let centre = mesh.positions[site as usize].map(f64::from);
-    let (radius, depth) = (random.within(RADIUS_MM), random.within(DEPTH_MM));
+    let radii = source
+        .area_mm2
+        .map(|area| (area / std::f64::consts::PI).sqrt());
+    let depths = DEPTH.map(|share| share * source.push_mm);
+    let (radius, depth) = (random.within(radii), random.within(depths));
     let tilt = [0; 3].map(|_| 0.8 * (random.unit() - 0.5));
     let mut normal = [0.0; 3];
     for &face in &mesh.domain {

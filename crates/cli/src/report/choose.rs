@@ -8,7 +8,7 @@ use tissue::mesh::Mesh;
 use super::cases::Cases;
 use super::method::{BundleFolder, Method};
 use super::prior_alone::PriorAlone;
-use super::{Options, paper_split};
+use super::{Options, paper_split, same_body};
 
 /// The bundles whose mesh and boundary are the cases'; the others are named in `notes`.
 pub fn fitting_bundles(
@@ -134,8 +134,16 @@ pub fn methods(
                 }
             }
             "coarse" if options.coarse_mesh.is_file() => {
-                if Mesh::read(&options.coarse_mesh)?.hash() == cases.mesh_sha256 {
+                let coarse = Mesh::read(&options.coarse_mesh)?;
+                if coarse.hash() == cases.mesh_sha256 {
                     notes.push("coarse TLED: the cases are on the coarse mesh themselves".into());
+                    continue;
+                }
+                if let Some(reason) = same_body::difference(&coarse, &mesh_of(cases, bundles)?) {
+                    notes.push(format!(
+                        "coarse TLED: {} is another body than the cases' ({reason}); name a coarse mesh of theirs with --coarse-mesh",
+                        options.coarse_mesh.display()
+                    ));
                     continue;
                 }
                 methods.extend(options.threads.iter().map(|threads| Method::CoarseTled {

@@ -16,6 +16,7 @@ pub mod pictures;
 pub mod plot;
 mod prior_alone;
 mod row;
+mod same_body;
 pub mod setting;
 mod table;
 mod write;

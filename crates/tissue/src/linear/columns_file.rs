@@ -131,6 +131,30 @@ impl ColumnsFile {
         })
     }
 
+    /// Hands every column `[3K]`, mm/mN, with its number to `take`, in order: one pass through the file.
+    ///
+    /// # Errors
+    /// The file cannot be read.
+    pub fn each_column(&self, mut take: impl FnMut(usize, &[f32])) -> Result<(), ColumnsError> {
+        let io = |source| ColumnsError::Io {
+            path: self.path.clone(),
+            source,
+        };
+        let mut file = File::open(&self.path).map_err(io)?;
+        file.seek(SeekFrom::Start(self.start)).map_err(io)?;
+        let mut file = std::io::BufReader::with_capacity(1 << 22, file);
+        let mut bytes = vec![0; 4 * self.width];
+        let mut column = vec![0.0f32; self.width];
+        for at in 0..3 * self.compliance.nodes.len() {
+            file.read_exact(&mut bytes).map_err(io)?;
+            for (value, read) in column.iter_mut().zip(f32_values(&bytes)) {
+                *value = read;
+            }
+            take(at, &column);
+        }
+        Ok(())
+    }
+
     /// Columns `[3m, 3K]` of the nodes in `rows` (indices into the contact nodes), mm/mN.
     ///
     /// # Errors

@@ -14,6 +14,7 @@
 //!
 //! Units: mm, mN, so stresses are mN/mm² (1 Pa = 1e-3 mN/mm²) and compliances mm/mN.
 
+mod block_basis;
 mod columns_file;
 mod compliance;
 mod error;
@@ -24,6 +25,7 @@ mod ordering;
 mod response;
 mod stiffness;
 
+pub use block_basis::{Basis, Blocks, leading_directions};
 pub use columns_file::{ColumnsError, ColumnsFile};
 pub use compliance::{Compliance, compliance_columns, remaining_columns};
 pub use error::LinearError;

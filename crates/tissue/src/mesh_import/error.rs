@@ -112,6 +112,17 @@ pub enum ImportError {
     )]
     SurfaceParts { count: usize, face: usize },
     #[error(
+        "the surface passes through itself: an edge of face {first} goes {depth_mm:.2} mm through face {second} (at {at:?} mm), {count} \
+         such places; re-mesh it or remove the overlap in a mesh editor (--repair accepts shallow places)"
+    )]
+    SelfCrossing {
+        first: usize,
+        second: usize,
+        at: [f64; 3],
+        depth_mm: f64,
+        count: usize,
+    },
+    #[error(
         "the selection of `{set}` is empty: no {what} in the given balls; the mesh spans {low:?} to {high:?} mm"
     )]
     EmptySelection {

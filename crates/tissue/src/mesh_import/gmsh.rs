@@ -1,9 +1,9 @@
-//! Tetrahedra of a Gmsh mesh, MSH 2.2 and 4.1, text and binary (either byte order).
+//! Tetrahedra of a Gmsh mesh, MSH 2.2 and 4.1, text and binary (either byte order); version 1 is in `gmsh_1`.
 //!
 //! A strict reader of the sections that matter, `$Nodes` and `$Elements`, written from the format's
 //! description in the Gmsh manual; node tags may be sparse. Points, lines and faces are skipped.
 
-use super::{ImportError, RawTets};
+use super::{ImportError, RawTets, gmsh_1};
 use std::collections::HashMap;
 use std::path::Path;
 
@@ -26,19 +26,19 @@ pub fn read(path: &Path) -> Result<RawTets, ImportError> {
     })
 }
 
-enum Fault {
+pub(super) enum Fault {
     Text(String),
     Kind { element: usize, kind: i64 },
 }
 
-fn fault<T>(reason: impl Into<String>) -> Result<T, Fault> {
+pub(super) fn fault<T>(reason: impl Into<String>) -> Result<T, Fault> {
     Err(Fault::Text(reason.into()))
 }
 
 /// Gmsh element types that are skipped (points, lines, faces of any order), by number of nodes;
 /// and the linear tetrahedron.
-const TETRAHEDRON: i64 = 4;
-fn node_count(kind: i64, element: usize) -> Result<usize, Fault> {
+pub(super) const TETRAHEDRON: i64 = 4;
+pub(super) fn node_count(kind: i64, element: usize) -> Result<usize, Fault> {
     match kind {
         15 => Ok(1),
         1 => Ok(2),
@@ -49,7 +49,7 @@ fn node_count(kind: i64, element: usize) -> Result<usize, Fault> {
 }
 
 /// Walks the bytes of a file, text or binary.
-struct Cursor<'a> {
+pub(super) struct Cursor<'a> {
     bytes: &'a [u8],
     at: usize,
     binary: bool,
@@ -64,7 +64,7 @@ impl<'a> Cursor<'a> {
     }
 
     /// The next word of text.
-    fn word(&mut self) -> Result<&'a str, Fault> {
+    pub(super) fn word(&mut self) -> Result<&'a str, Fault> {
         self.skip_space();
         let start = self.at;
         while self
@@ -102,7 +102,7 @@ impl<'a> Cursor<'a> {
         Ok(out)
     }
 
-    fn parsed<T: std::str::FromStr>(&mut self) -> Result<T, Fault> {
+    pub(super) fn parsed<T: std::str::FromStr>(&mut self) -> Result<T, Fault> {
         let word = self.word()?;
         word.parse().or_else(|_| {
             fault(format!(
@@ -130,7 +130,7 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    fn real(&mut self) -> Result<f64, Fault> {
+    pub(super) fn real(&mut self) -> Result<f64, Fault> {
         if self.binary {
             Ok(f64::from_le_bytes(self.raw()?))
         } else {
@@ -138,7 +138,7 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    fn expect(&mut self, wanted: &str) -> Result<(), Fault> {
+    pub(super) fn expect(&mut self, wanted: &str) -> Result<(), Fault> {
         match self.word()? {
             word if word == wanted => Ok(()),
             word => fault(format!("`{word}` where `{wanted}` is due")),
@@ -163,14 +163,14 @@ impl<'a> Cursor<'a> {
 
 /// What the sections give: coordinates by order of appearance, and their tags.
 #[derive(Default)]
-struct Parts {
+pub(super) struct Parts {
     positions: Vec<[f64; 3]>,
     node_of_tag: HashMap<u64, u32>,
-    tets: Vec<[u64; 4]>,
+    pub(super) tets: Vec<[u64; 4]>,
 }
 
 impl Parts {
-    fn node(&mut self, tag: u64, point: [f64; 3]) -> Result<(), Fault> {
+    pub(super) fn node(&mut self, tag: u64, point: [f64; 3]) -> Result<(), Fault> {
         let node = self.positions.len() as u32;
         if self.node_of_tag.insert(tag, node).is_some() {
             return fault(format!("node tag {tag} appears twice"));
@@ -187,6 +187,9 @@ fn parse(bytes: &[u8]) -> Result<RawTets, Fault> {
         binary: false,
         swapped: false,
     };
+    if gmsh_1::is_version_1(bytes) {
+        return gmsh_1::parse(&mut cursor);
+    }
     cursor.expect("$MeshFormat")?;
     let version = cursor.word()?;
     let four = match version {
@@ -238,7 +241,7 @@ fn parse(bytes: &[u8]) -> Result<RawTets, Fault> {
     finish(parts)
 }
 
-fn finish(parts: Parts) -> Result<RawTets, Fault> {
+pub(super) fn finish(parts: Parts) -> Result<RawTets, Fault> {
     if parts.tets.is_empty() {
         return fault("the file holds no tetrahedra; mesh the volume (gmsh -3)");
     }

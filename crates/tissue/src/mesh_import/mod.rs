@@ -3,7 +3,7 @@
 //! | extension | read as |
 //! |---|---|
 //! | `.vtk`, `.vtu` | linear tetrahedra of a VTK legacy or XML unstructured grid |
-//! | `.msh` | linear tetrahedra of a Gmsh file, version 2.2 or 4.1, text or binary |
+//! | `.msh` | linear tetrahedra of a Gmsh file, version 2.2 or 4.1, text or binary, or version 1 |
 //! | `.stl`, `.obj`, `.ply` | a closed surface, filled with tetrahedra of a chosen spacing |
 //!
 //! Coordinates are taken as millimetres times [`ImportOptions::scale`]. What is wrong with a file is
@@ -14,7 +14,10 @@ mod closed_surface;
 mod distance;
 mod error;
 mod gmsh;
+mod gmsh_1;
+mod region;
 mod repair;
+mod self_crossing;
 mod sets;
 mod surface_files;
 mod tool_file;
@@ -23,6 +26,7 @@ mod vtk_raw;
 
 pub use distance::SurfaceDistance;
 pub use error::{ImportError, Repair};
+pub use region::{Opened, Region, faces_in, nodes_in};
 pub use sets::Ball;
 pub use tool_file::tool_shape;
 
@@ -119,6 +123,7 @@ pub fn import(path: &Path, options: &ImportOptions) -> Result<Imported, ImportEr
             let mut surface = surface_files::read(path, &extension)?;
             scale(&mut surface.positions, options.scale);
             closed_surface::check(&mut surface, options.repair, &mut repairs)?;
+            self_crossing::check(&surface, options.repair, &mut repairs)?;
             fill(surface, resolution)?
         }
         _ => return Err(ImportError::Extension { path: path.into() }),

@@ -12,7 +12,7 @@ pub struct Ball {
 }
 
 impl Ball {
-    fn holds(&self, point: [f64; 3]) -> bool {
+    pub(super) fn holds(&self, point: [f64; 3]) -> bool {
         let squared: f64 = (0..3).map(|k| (point[k] - self.centre[k]).powi(2)).sum();
         squared <= self.radius * self.radius
     }

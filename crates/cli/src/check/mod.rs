@@ -1,0 +1,225 @@
+//! `upt check`: held-out contacts through a bundle beside the reference solver, and the certificate that comes of it.
+//!
+//! Nothing is stored on the way: the solver and the bundle's scenes step side by side. One scene makes the steps that the bundle
+//! recommends, another leaves its corrections out; for a bundle without a learned map the latter is linear elasticity, static in
+//! contact and swinging freely after a release.
+
+mod case;
+mod certificate;
+mod page;
+mod score;
+
+pub use certificate::Certificate;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Instant;
+
+use anyhow::{Context, Result, bail};
+use clap::Args;
+use serde_json::Value;
+use tissue::mesh::{Boundary, Mesh};
+use tissue::schemes::Scheme;
+use upt::{Model, ModelOptions};
+
+use crate::progress;
+use case::Case;
+use score::Score;
+
+/// Programmes in the order in which they are run: `probe` has five sites, the others are the paper's.
+const ORDER: [Scheme; 8] = [
+    Scheme::Probe,
+    Scheme::Four,
+    Scheme::Probe,
+    Scheme::Three,
+    Scheme::Probe,
+    Scheme::One,
+    Scheme::Probe,
+    Scheme::Five,
+];
+/// A certificate's errors that differ by more than this part from a repetition's do not fit the bundle.
+const SAME: f64 = 0.1;
+
+#[derive(Args)]
+#[command(after_help = "Examples:
+  upt check liver
+  upt check liver --cases 4 --json")]
+pub struct Options {
+    /// Bundle folder with a certificate, as `upt make` leaves it.
+    bundle: PathBuf,
+    /// Held-out cases; left out: those of the certificate.
+    #[arg(long)]
+    cases: Option<usize>,
+    /// Another seed: other sites than the certificate's.
+    #[arg(long)]
+    seed: Option<u64>,
+    /// Write certificate.json and certificate.html anew.
+    #[arg(long)]
+    write: bool,
+    /// Threads (0: all).
+    #[arg(long, default_value_t = 0)]
+    threads: usize,
+    /// Print the certificate as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// What to measure.
+pub struct Plan {
+    pub bundle: PathBuf,
+    /// Cases; none: as many as fit into `seconds`, at most [`ORDER`]'s.
+    pub cases: Option<usize>,
+    pub seconds: f64,
+    pub seed: u64,
+    pub threads: usize,
+    pub quiet: bool,
+}
+
+/// Runs the command. Exit code 1 where the errors are not the certificate's.
+pub fn run(options: &Options) -> Result<ExitCode> {
+    let path = options.bundle.join("certificate.json");
+    let before: Option<Value> = match std::fs::read(&path) {
+        Ok(text) => {
+            Some(serde_json::from_slice(&text).with_context(|| format!("{}", path.display()))?)
+        }
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => None,
+        Err(error) => return Err(error).with_context(|| format!("{}", path.display())),
+    };
+    let stated = |name: &str| {
+        before
+            .as_ref()
+            .and_then(|text| text["tested"][name].as_u64())
+    };
+    let seed = options.seed.or(stated("seed")).unwrap_or(1);
+    let cases = options
+        .cases
+        .or(stated("cases").map(|count| count as usize));
+    let plan = Plan {
+        bundle: options.bundle.clone(),
+        cases: Some(cases.unwrap_or(4)),
+        seconds: f64::INFINITY,
+        seed,
+        threads: options.threads,
+        quiet: options.json,
+    };
+    if plan.cases == Some(0) {
+        bail!("--cases is 0; give 1 or more");
+    }
+    let mut found = measure(&plan)?;
+    let origin = before
+        .as_ref()
+        .map_or(Value::Null, |text| text["provenance"].clone());
+    found.finish(&options.bundle, &origin)?;
+    if options.json {
+        println!("{:#}", found.json());
+    } else {
+        println!("{}", found.text());
+    }
+    if options.write {
+        let mesh = Mesh::read(&options.bundle.join("mesh.safetensors"))?;
+        found.write(&options.bundle, &mesh, &[])?;
+    }
+    let same_plan = before.is_some()
+        && Some(seed) == stated("seed")
+        && cases == stated("cases").map(|n| n as usize);
+    let stated = before.and_then(|text| text["contact"]["mse_mm2"].as_f64());
+    if let (true, Some(stated)) = (same_plan, stated) {
+        let now = found.mse_in_contact();
+        if (now - stated).abs() > SAME * stated {
+            eprintln!(
+                "the certificate says {stated:.3e} mm² in contact, this run found {now:.3e}: the bundle or the library changed"
+            );
+            return Ok(ExitCode::from(1));
+        }
+        if !options.json {
+            println!("as the certificate says ({stated:.3e} mm² in contact)");
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Simulates and replays; the certificate lacks the bundle's identity until it is finished.
+pub fn measure(plan: &Plan) -> Result<Certificate> {
+    let started = Instant::now();
+    let model = Model::open(
+        &plan.bundle,
+        &ModelOptions {
+            threads: 1,
+            ..Default::default()
+        },
+    )?;
+    if model.prior.is_none() {
+        bail!(
+            "{}: has no linear response to compare with; use `upt report`",
+            plan.bundle.display()
+        );
+    }
+    let mesh = Mesh::read(&plan.bundle.join(&model.manifest.mesh.file))?;
+    let boundary = match model.manifest.boundary {
+        upt::bundle::Boundary::Fixed => Boundary::Fixed,
+        upt::bundle::Boundary::Supported => Boundary::Supported,
+    };
+    let most = plan.cases.unwrap_or(ORDER.len());
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let workers = match plan.threads {
+        0 => cores,
+        threads => threads,
+    }
+    .min(most);
+    let bar = progress::bar(
+        plan.quiet,
+        (most * tissue::schemes::FRAMES) as u64,
+        "held-out contacts",
+    );
+    let next = AtomicUsize::new(0);
+    let finished: Mutex<Vec<(usize, Score)>> = Mutex::new(Vec::new());
+    let regions = score::regions(&mesh);
+    let work = || -> Result<()> {
+        loop {
+            let at = next.fetch_add(1, Ordering::Relaxed);
+            let spent = started.elapsed().as_secs_f64();
+            // Another case takes about as long as those before it.
+            let rounds = (at / workers) as f64;
+            let late = plan.cases.is_none()
+                && at >= workers
+                && spent * (rounds + 1.0) / rounds > plan.seconds;
+            if at >= most || late {
+                return Ok(());
+            }
+            let case = Case {
+                scheme: ORDER[at % ORDER.len()],
+                seed: plan.seed.wrapping_mul(1000).wrapping_add(at as u64),
+            };
+            let score = case.run(&model, &mesh, boundary, &regions, &|| bar.inc(1))?;
+            if let Ok(mut list) = finished.lock() {
+                list.push((at, score));
+            }
+        }
+    };
+    std::thread::scope(|scope| {
+        let threads: Vec<_> = (0..workers).map(|_| scope.spawn(work)).collect();
+        threads
+            .into_iter()
+            .map(|thread| {
+                thread
+                    .join()
+                    .unwrap_or_else(|_| bail!("a thread of the check panicked"))
+            })
+            .collect::<Result<()>>()
+    })?;
+    bar.finish_and_clear();
+    let mut scores = finished.into_inner().unwrap_or_default();
+    scores.sort_by_key(|(at, _)| *at);
+    let scores: Vec<Score> = scores.into_iter().map(|(_, score)| score).collect();
+    let speed = case::speed(&model, &scores)?;
+    Ok(Certificate::of(
+        &model,
+        &mesh,
+        plan.seed,
+        scores,
+        regions.len(),
+        &speed,
+    ))
+}

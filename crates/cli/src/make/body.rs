@@ -1,0 +1,305 @@
+//! The body: the input as tetrahedra, what is held and what may be touched, and whether it is fit for simulation.
+
+use anyhow::{Context, Result, bail};
+use tissue::mesh::{Mesh, face_area};
+use tissue::mesh_import::{
+    ImportError, ImportOptions, Opened, Region, Resolution, faces_in, import, nodes_in,
+};
+use tissue::mesh_quality::{Quality, measure};
+
+use super::options::Options;
+use super::stages::Stage;
+use crate::preview;
+
+/// A body's longest side, mm: outside of this the unit is taken to be wrong.
+const LENGTH_MM: [f64; 2] = [3.0, 2000.0];
+/// Tetrahedra with a smaller dihedral angle make the reference solver's step too short.
+const SMALLEST_ANGLE_DEG: f64 = 2.0;
+/// The rim around what is held that is not touched, in mean surface edges.
+const RIM_EDGES: f64 = 1.5;
+
+/// Writes `mesh.safetensors` with its sets.
+pub fn make(options: &Options, stage: &mut Stage) -> Result<()> {
+    let mut mesh = read(options, stage)?;
+    check_length(&mesh, options)?;
+    let scale = options.scale()?;
+    let open = |regions: &[Region]| -> Result<Vec<Opened>, ImportError> {
+        regions.iter().map(|region| region.open(scale)).collect()
+    };
+    if !options.fixed.is_empty() {
+        mesh.fixed = nodes_in(&mesh, &open(&options.fixed)?);
+        mesh.supported.clear();
+        if mesh.fixed.is_empty() {
+            bail!(
+                "no node lies in --fixed; the body spans {}",
+                span(&measure(&mesh))
+            );
+        }
+    }
+    if mesh.fixed.is_empty() {
+        bail!(
+            "nothing is held, so nothing resists a push: {}",
+            suggestion(&mesh)
+        );
+    }
+    if mesh.fixed.len() == mesh.node_count() {
+        bail!("--fixed holds every node; hold a part of the body only");
+    }
+    choose_domain(&mut mesh, options, &open(&options.domain)?, stage)?;
+    if let Some(name) = &options.name {
+        mesh.name.clone_from(name);
+    }
+    mesh.license.clone_from(&options.license);
+    let path = stage.folder.join("mesh.safetensors");
+    mesh.write(&path)
+        .with_context(|| format!("{}: cannot be written", path.display()))?;
+    let quality = measure(&mesh);
+    stage.decided(&format!(
+        "{} nodes, {} tetrahedra, {:.1} ml, {}; {} nodes held; {} of {} mm² of surface may be touched",
+        quality.nodes,
+        quality.tets,
+        quality.volume_mm3 * 1e-3,
+        span(&quality),
+        quality.fixed_nodes,
+        quality.domain_area_mm2.round(),
+        quality.surface_area_mm2.round()
+    ));
+    Ok(())
+}
+
+fn read(options: &Options, stage: &mut Stage) -> Result<Mesh> {
+    let input = &options.input;
+    let name = input
+        .file_name()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .into_owned();
+    if name.ends_with(".safetensors") {
+        if options.scale()? != 1.0 {
+            bail!("{name}: a mesh file is in mm; leave --unit out");
+        }
+        return Ok(Mesh::read(input)?);
+    }
+    let imported = import(
+        input,
+        &ImportOptions {
+            name: options.name.clone(),
+            scale: options.scale()?,
+            resolution: Some(Resolution::Nodes(options.nodes)),
+            repair: !options.no_repair,
+            ..ImportOptions::default()
+        },
+    )
+    .map_err(|error| {
+        let hint = hint(&error);
+        let error = match error.names_file() {
+            true => anyhow::Error::new(error),
+            false => anyhow::Error::new(error).context(input.display().to_string()),
+        };
+        match hint {
+            Some(hint) => error.context(hint),
+            None => error,
+        }
+    })?;
+    for repair in &imported.repairs {
+        stage.decided(&format!("repaired: {repair}"));
+    }
+    Ok(imported.mesh)
+}
+
+/// What to do about a file that no repair helps, in the words of this command.
+fn hint(error: &ImportError) -> Option<&'static str> {
+    match error {
+        ImportError::Open { .. } => Some("only a closed surface can be filled"),
+        ImportError::Stuffing(_) | ImportError::NodeCount { .. } => {
+            Some("the surface could not be filled; look at --unit and --nodes")
+        }
+        _ => None,
+    }
+}
+
+fn span(quality: &Quality) -> String {
+    let side = |k: usize| format!("{:.1} to {:.1}", quality.low_mm[k], quality.high_mm[k]);
+    format!("x {}, y {}, z {} mm", side(0), side(1), side(2))
+}
+
+fn check_length(mesh: &Mesh, options: &Options) -> Result<()> {
+    let quality = measure(mesh);
+    let longest = (0..3)
+        .map(|k| f64::from(quality.high_mm[k] - quality.low_mm[k]))
+        .fold(0.0, f64::max);
+    if longest >= LENGTH_MM[0] && longest <= LENGTH_MM[1] {
+        return Ok(());
+    }
+    let scale = options.scale()?;
+    let likely = [("mm", 1.0), ("cm", 10.0), ("m", 1000.0)]
+        .into_iter()
+        .find(|(_, unit)| {
+            let length = longest / scale * unit;
+            (30.0..=600.0).contains(&length)
+        });
+    let advice = match likely {
+        Some((unit, factor)) => format!(
+            "with --unit {unit} it would be {:.0} mm",
+            longest / scale * factor
+        ),
+        None => "give --unit in millimetres a unit of the file".to_owned(),
+    };
+    bail!(
+        "the body is {longest:.3} mm long with --unit {}, which no organ is: {advice}",
+        options.unit
+    );
+}
+
+/// A `--fixed` for a body that has none: the lowest sixth along its shortest axis.
+fn suggestion(mesh: &Mesh) -> String {
+    let quality = measure(mesh);
+    let length = |k: usize| quality.high_mm[k] - quality.low_mm[k];
+    let axis = (0..3).fold(0, |best, k| if length(k) < length(best) { k } else { best });
+    let mut plane = [0.0f32; 4];
+    plane[axis] = -1.0;
+    plane[3] = quality.low_mm[axis] + length(axis) / 6.0;
+    let [a, b, c, d] = plane.map(|x| x + 0.0);
+    format!(
+        "give --fixed, for example --fixed plane:{a},{b},{c},{d:.1} for the side of smallest {}; the body spans {}",
+        ["x", "y", "z"][axis],
+        span(&quality)
+    )
+}
+
+fn choose_domain(
+    mesh: &mut Mesh,
+    options: &Options,
+    regions: &[Opened],
+    stage: &mut Stage,
+) -> Result<()> {
+    let mut held = vec![false; mesh.node_count()];
+    mesh.fixed
+        .iter()
+        .for_each(|&node| held[node as usize] = true);
+    let free = |mesh: &Mesh, row: u32| {
+        let corners = mesh.surface[row as usize];
+        !corners.iter().all(|&node| held[node as usize])
+    };
+    if !options.domain.is_empty() {
+        let chosen = faces_in(mesh, regions);
+        let count = chosen.len();
+        if count == 0 {
+            bail!(
+                "no face of the surface lies in --domain; the body spans {}",
+                span(&measure(mesh))
+            );
+        }
+        mesh.domain = chosen.into_iter().filter(|&row| free(mesh, row)).collect();
+        if mesh.domain.is_empty() {
+            bail!(
+                "all of the {count} faces in --domain are held by --fixed; touch another place, or hold less"
+            );
+        }
+        if mesh.domain.len() < count {
+            stage.decided(&format!(
+                "{} held faces left out of the domain",
+                count - mesh.domain.len()
+            ));
+        }
+        return Ok(());
+    }
+    if !mesh.domain.is_empty() {
+        mesh.domain.retain(|&row| {
+            !mesh.surface[row as usize]
+                .iter()
+                .all(|&node| held[node as usize])
+        });
+        if mesh.domain.is_empty() {
+            bail!("the mesh file's domain is held altogether; give --domain");
+        }
+        return Ok(());
+    }
+    let edge = (mesh
+        .surface
+        .iter()
+        .map(|&face| face_area(&mesh.positions, face))
+        .sum::<f64>()
+        / mesh.surface.len() as f64
+        * 2.3)
+        .sqrt();
+    let rim = RIM_EDGES * edge;
+    let far = |node: u32| {
+        let p = mesh.positions[node as usize];
+        mesh.fixed.iter().all(|&other| {
+            let q = mesh.positions[other as usize];
+            (0..3).map(|k| f64::from(p[k] - q[k]).powi(2)).sum::<f64>() > rim * rim
+        })
+    };
+    mesh.domain = (0..mesh.surface.len() as u32)
+        .filter(|&row| mesh.surface[row as usize].iter().all(|&node| far(node)))
+        .collect();
+    if mesh.domain.is_empty() {
+        bail!(
+            "no surface is farther than {rim:.1} mm from what is held; hold less, or give --domain"
+        );
+    }
+    stage.decided(&format!(
+        "domain: all of the surface at least {rim:.1} mm from what is held; a smaller --domain makes a smaller and faster bundle"
+    ));
+    Ok(())
+}
+
+/// Refuses a mesh on which the reference solver would need steps too short to be of use.
+pub fn gate(mesh: &Mesh, options: &Options) -> Result<()> {
+    let quality = measure(mesh);
+    if quality.min_dihedral_deg < SMALLEST_ANGLE_DEG {
+        bail!(
+            "tetrahedra with an angle of {:.2} degrees (at least {SMALLEST_ANGLE_DEG} are needed): re-mesh, or give the surface \
+             instead, which is filled without slivers; upt mesh info tells more",
+            quality.min_dihedral_deg
+        );
+    }
+    if !quality.non_manifold_edges.is_empty() {
+        bail!(
+            "the boundary is not manifold at {} edges, the first {:?}: tetrahedra meet there in an edge alone; re-mesh",
+            quality.non_manifold_edges.len(),
+            quality.non_manifold_edges[0]
+        );
+    }
+    if mesh.node_count() > 40_000 && options.minutes < 20.0 && !options.json {
+        eprintln!(
+            "      {} nodes take longer than {} minutes",
+            mesh.node_count(),
+            options.minutes
+        );
+    }
+    Ok(())
+}
+
+/// Where nothing is held the page shows at least the body, so that coordinates can be picked.
+pub fn preview_of_failure(options: &Options) {
+    let Ok(scale) = options.scale() else { return };
+    let name = options.input.to_string_lossy().into_owned();
+    let read = || -> Option<Mesh> {
+        if name.ends_with(".safetensors") {
+            return Mesh::read(&options.input).ok();
+        }
+        let import_options = ImportOptions {
+            scale,
+            resolution: Some(Resolution::Nodes(options.nodes.min(3000))),
+            repair: true,
+            ..ImportOptions::default()
+        };
+        import(&options.input, &import_options)
+            .ok()
+            .map(|found| found.mesh)
+    };
+    let Some(mesh) = read() else { return };
+    let page = options.out.with_extension("preview.html");
+    let facts = vec![
+        ("name".to_owned(), mesh.name.clone()),
+        ("nodes".to_owned(), mesh.node_count().to_string()),
+    ];
+    if preview::write(&page, &mesh, &preview::Error::None, &facts).is_ok() && !options.json {
+        eprintln!(
+            "{}: open it in a browser and click to get coordinates",
+            page.display()
+        );
+    }
+}

@@ -1,0 +1,297 @@
+//! Options of `upt make`, and what follows from them: material, sizes of tools, keys of stages.
+
+use std::path::PathBuf;
+
+use anyhow::{Result, bail};
+use clap::Args;
+use elements::Material;
+use serde_json::{Value, json};
+use tissue::mesh::{Mesh, face_area};
+use tissue::mesh_import::Region;
+
+/// Pushes and areas that the checks' programmes have at scale 1, mm and mm² (`tissue::schemes`).
+const PUSH_MM: f64 = 15.0;
+const AREA_MM2: [f64; 2] = [60.0, 280.0];
+/// The body whose tools have scale 1 is so wide across its second longest axis, mm.
+const REFERENCE_WIDTH_MM: f64 = 70.0;
+
+#[derive(Args, Clone, Debug)]
+#[command(after_help = "Examples:
+  upt make liver.obj --out liver --unit cm --fixed plane:0,0,-1,-20
+  upt make kidney.stl --out kidney --fixed ball:0,0,12,9 --domain ball:30,0,0,25 --minutes 3
+  upt make heart.vtu --out heart --fixed inside:pericardium.stl --young 15000 --nodes 8000
+  upt make liver.obj --out liver --fixed plane:0,0,-1,-20 --preview")]
+pub struct Options {
+    /// A closed surface (.stl, .obj, .ply) or tetrahedra (.msh, .vtk, .vtu, .mesh.safetensors).
+    pub input: PathBuf,
+    /// Folder of the bundle.
+    #[arg(long)]
+    pub out: PathBuf,
+    /// Unit of the input's coordinates: mm, cm, m, in, or millimetres a unit as a number. Regions are in mm.
+    #[arg(long, default_value = "mm")]
+    pub unit: String,
+    /// Nodes are held here: ball:x,y,z,r, plane:a,b,c,d (where a x + b y + c z + d > 0), inside:FILE (a closed surface in the
+    /// input's unit), not: and one of them. May be repeated. Left out: what the mesh file holds.
+    #[arg(long, value_name = "REGION", allow_hyphen_values = true)]
+    pub fixed: Vec<Region>,
+    /// Instruments may touch the surface here; may be repeated. Left out: what the mesh file names, or else all of the surface
+    /// but for a rim around what is held.
+    #[arg(long, value_name = "REGION", allow_hyphen_values = true)]
+    pub domain: Vec<Region>,
+    /// Wanted number of nodes where a surface is filled.
+    #[arg(long, default_value_t = 5000)]
+    pub nodes: usize,
+    /// Time to spend, minutes. It sets how many held-out cases the check simulates.
+    #[arg(long, default_value_t = 10.0)]
+    pub minutes: f64,
+    /// Held-out cases of the check; left out: as many as there is time for, at most 8.
+    #[arg(long)]
+    pub cases: Option<usize>,
+    /// brain, liver, kidney, heart or fat: Young's modulus, density and damping; or left out for brain.
+    #[arg(long, default_value = "brain")]
+    pub material: String,
+    /// Young's modulus, Pa; over the material's.
+    #[arg(long)]
+    pub young: Option<f64>,
+    /// Poisson's ratio, below 0.5.
+    #[arg(long, default_value_t = 0.49)]
+    pub poisson: f64,
+    /// Density, kg/m³; over the material's.
+    #[arg(long)]
+    pub density: Option<f64>,
+    /// Damping, 1/s; over the material's.
+    #[arg(long)]
+    pub damping: Option<f64>,
+    /// Deepest push that it is made for, mm; left out: 15 for a body of a brain's size, less for a smaller one.
+    #[arg(long)]
+    pub push: Option<f64>,
+    /// Fail where the mean squared error in contact is above this, mm².
+    #[arg(long, value_name = "MM2")]
+    pub target_error: Option<f64>,
+    /// Corrections a step that the bundle recommends.
+    #[arg(long = "corrections", default_value_t = 3)]
+    pub recommended: u32,
+    /// Natural modes.
+    #[arg(long, default_value_t = 60)]
+    pub natural: usize,
+    /// Patches that the coarse space is made from.
+    #[arg(long, default_value_t = 120)]
+    pub patches: usize,
+    /// Error of the block-wise tables, mm in the mean square over typical pushes.
+    #[arg(long, default_value_t = 5e-3)]
+    pub tolerance_mm: f64,
+    /// Name in the bundle; left out: the input's.
+    #[arg(long)]
+    pub name: Option<String>,
+    /// Licence of the bundle, which is the anatomy's.
+    #[arg(long, default_value = "as the input's")]
+    pub license: String,
+    /// Folder for stages; left out: the bundle's with `.work` behind it.
+    #[arg(long)]
+    pub work: Option<PathBuf>,
+    /// Only import, and write the page that shows what is held and touched.
+    #[arg(long)]
+    pub preview: bool,
+    /// Import faults as they are instead of repairing what can be repaired safely.
+    #[arg(long)]
+    pub no_repair: bool,
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Threads (0: all).
+    #[arg(long, default_value_t = 0)]
+    pub threads: usize,
+    /// Print the result as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Young's modulus (Pa), density (kg/m³) and damping (1/s) of a material by name.
+fn named(name: &str) -> Option<[f64; 3]> {
+    Some(match name {
+        "brain" => [3000.0, 1000.0, 20.0],
+        "liver" => [5000.0, 1060.0, 20.0],
+        "kidney" => [10_000.0, 1060.0, 30.0],
+        "heart" => [15_000.0, 1060.0, 40.0],
+        "fat" => [2000.0, 920.0, 20.0],
+        _ => return None,
+    })
+}
+
+impl Options {
+    /// Refuses what no stage can use.
+    pub fn check(&self) -> Result<()> {
+        if !(self.minutes.is_finite() && self.minutes > 0.0) {
+            bail!("--minutes is {}, must be above 0", self.minutes);
+        }
+        if self.cases == Some(0) {
+            bail!("--cases is 0; a certificate needs a held-out case, give 1 or more");
+        }
+        if self.nodes < 50 {
+            bail!("--nodes is {}, must be at least 50", self.nodes);
+        }
+        if !(self.tolerance_mm.is_finite() && self.tolerance_mm > 0.0) {
+            bail!("--tolerance-mm is {}, must be positive", self.tolerance_mm);
+        }
+        if self.natural == 0 {
+            bail!("--natural is 0; the free motion needs natural modes");
+        }
+        for (name, value) in [("--push", self.push), ("--target-error", self.target_error)] {
+            if value.is_some_and(|value| !(value.is_finite() && value > 0.0)) {
+                bail!("{name} must be positive");
+            }
+        }
+        if self.recommended > upt::corrections::LIMIT {
+            bail!(
+                "--corrections is {}, must be at most {}",
+                self.recommended,
+                upt::corrections::LIMIT
+            );
+        }
+        self.scale()?;
+        self.material()?.validate()?;
+        Ok(())
+    }
+
+    /// Millimetres a unit of the input.
+    pub fn scale(&self) -> Result<f64> {
+        Ok(match self.unit.as_str() {
+            "mm" => 1.0,
+            "cm" => 10.0,
+            "m" => 1000.0,
+            "in" => 25.4,
+            other => match other.parse::<f64>() {
+                Ok(scale) if scale.is_finite() && scale > 0.0 => scale,
+                _ => bail!(
+                    "--unit is `{other}`; use mm, cm, m, in, or millimetres a unit as a number"
+                ),
+            },
+        })
+    }
+
+    /// The tissue.
+    pub fn material(&self) -> Result<Material> {
+        let Some([young, density, damping]) = named(&self.material) else {
+            bail!(
+                "--material is `{}`; use brain, liver, kidney, heart or fat, and --young, --density, --damping for another",
+                self.material
+            );
+        };
+        Ok(Material {
+            young_pa: self.young.unwrap_or(young),
+            poisson: self.poisson,
+            density_kg_m3: self.density.unwrap_or(density),
+            damping_per_s: self.damping.unwrap_or(damping),
+        })
+    }
+
+    /// Where stages are kept.
+    pub fn work_folder(&self) -> PathBuf {
+        self.work.clone().unwrap_or_else(|| {
+            let mut name = self.out.file_name().unwrap_or_default().to_os_string();
+            name.push(".work");
+            self.out.with_file_name(name)
+        })
+    }
+
+    /// What the body depends on beside the input's bytes.
+    pub fn body_words(&self) -> Result<String> {
+        let mut words = format!(
+            "{} {} {} {:?}",
+            self.scale()?,
+            self.nodes,
+            self.no_repair,
+            self.name
+        );
+        for region in self.fixed.iter().chain([&Region::All]).chain(&self.domain) {
+            words += &format!(" {region}");
+            let mut inner = region;
+            while let Region::Not(next) = inner {
+                inner = next;
+            }
+            if let Region::Inside(path) = inner {
+                words += &super::key_of(&[&std::fs::read(path).unwrap_or_default()]);
+            }
+        }
+        Ok(words)
+    }
+
+    /// For the provenance.
+    pub fn words(&self) -> Value {
+        let list =
+            |regions: &[Region]| -> Vec<String> { regions.iter().map(Region::to_string).collect() };
+        json!({
+            "unit": self.unit, "fixed": list(&self.fixed), "domain": list(&self.domain), "nodes": self.nodes,
+            "material": self.material, "corrections": self.recommended, "natural": self.natural, "patches": self.patches,
+            "tolerance_mm": self.tolerance_mm, "minutes": self.minutes,
+        })
+    }
+}
+
+/// How large tools and pushes are for this body.
+#[derive(Clone, Copy, Debug)]
+pub struct Sizes {
+    /// Deepest push, mm.
+    pub push_mm: f64,
+    /// Area of a contact, mm².
+    pub area_mm2: [f64; 2],
+    chosen: bool,
+}
+
+impl Sizes {
+    /// From the option, or from the body's width; a contact has room in the domain, and at least about three nodes.
+    pub fn of(options: &Options, mesh: &Mesh) -> Result<Self> {
+        let mut extent = [0, 1, 2].map(|k| {
+            let values = mesh.positions.iter().map(|p| p[k]);
+            let low = values.clone().fold(f32::INFINITY, f32::min);
+            f64::from(values.fold(f32::NEG_INFINITY, f32::max) - low)
+        });
+        extent.sort_by(f64::total_cmp);
+        let by_width = (extent[1] / REFERENCE_WIDTH_MM).min(1.0);
+        let scale = options.push.map_or(by_width, |push| push / PUSH_MM);
+        let domain: f64 = mesh
+            .domain
+            .iter()
+            .map(|&row| face_area(&mesh.positions, mesh.surface[row as usize]))
+            .sum();
+        let area_mm2 = AREA_MM2.map(|area| area * scale * scale);
+        if domain < 1.3 * area_mm2[1] {
+            bail!(
+                "the domain has {domain:.0} mm² and a contact up to {:.0}: widen --domain, or make it for smaller tools with --push {:.1}",
+                area_mm2[1],
+                0.9 * PUSH_MM * scale * (domain / (1.3 * area_mm2[1])).sqrt()
+            );
+        }
+        Ok(Self {
+            push_mm: PUSH_MM * scale,
+            area_mm2,
+            chosen: options.push.is_some(),
+        })
+    }
+
+    /// A line for the user.
+    pub fn words(&self) -> String {
+        format!(
+            "made for pushes of up to {:.1} mm and contacts of {:.0} to {:.0} mm² ({})",
+            self.push_mm,
+            self.area_mm2[0],
+            self.area_mm2[1],
+            if self.chosen {
+                "--push"
+            } else {
+                "from the body's width; --push changes it"
+            }
+        )
+    }
+
+    /// What the preview says beside the mesh.
+    pub fn scene(&self, mesh: &Mesh) -> Vec<(String, String)> {
+        vec![
+            ("name".into(), mesh.name.clone()),
+            ("nodes".into(), mesh.node_count().to_string()),
+            ("tetrahedra".into(), mesh.tets.len().to_string()),
+            ("held nodes".into(), mesh.fixed.len().to_string()),
+            ("domain faces".into(), mesh.domain.len().to_string()),
+            ("deepest push, mm".into(), format!("{:.1}", self.push_mm)),
+        ]
+    }
+}

@@ -1,0 +1,289 @@
+//! `upt make` as a user calls it: a small organ end to end, killed at each stage, and input that cannot become a bundle.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use upt::{Contact, Model, ModelOptions, Scene, SceneOptions, StepInput};
+
+/// An ellipsoid with half axes 50, 40 and 30 mm as an OBJ, with `bend` applied to each point.
+fn organ(path: &Path, bend: impl Fn([f64; 3]) -> [f64; 3], inward: bool) {
+    let (rings, sectors) = (9, 16);
+    let mut text = String::new();
+    let mut point = |p: [f64; 3]| {
+        let [x, y, z] = bend(p);
+        text += &format!("v {x} {y} {z}\n");
+    };
+    point([0.0, 0.0, 30.0]);
+    for ring in 1..rings {
+        let theta = std::f64::consts::PI * f64::from(ring) / f64::from(rings);
+        for sector in 0..sectors {
+            let phi = std::f64::consts::TAU * f64::from(sector) / f64::from(sectors);
+            point([
+                50.0 * theta.sin() * phi.cos(),
+                40.0 * theta.sin() * phi.sin(),
+                30.0 * theta.cos(),
+            ]);
+        }
+    }
+    point([0.0, 0.0, -30.0]);
+    let last = 2 + (rings - 1) * sectors;
+    let at = |ring: i32, sector: i32| 2 + (ring - 1) * sectors + sector.rem_euclid(sectors);
+    let mut face = |a: i32, b: i32, c: i32| {
+        let (b, c) = if inward { (c, b) } else { (b, c) };
+        text += &format!("f {a} {b} {c}\n");
+    };
+    for sector in 0..sectors {
+        face(1, at(1, sector), at(1, sector + 1));
+        face(last, at(rings - 1, sector + 1), at(rings - 1, sector));
+        for ring in 1..rings - 1 {
+            face(
+                at(ring, sector),
+                at(ring + 1, sector),
+                at(ring + 1, sector + 1),
+            );
+            face(
+                at(ring, sector),
+                at(ring + 1, sector + 1),
+                at(ring, sector + 1),
+            );
+        }
+    }
+    std::fs::write(path, text).unwrap();
+}
+
+fn plain(path: &Path) {
+    organ(path, |p| p, false);
+}
+
+fn command(surface: &Path, out: &Path, more: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_upt"));
+    command
+        .arg("make")
+        .arg(surface)
+        .arg("--out")
+        .arg(out)
+        .args([
+            "--nodes",
+            "350",
+            "--cases",
+            "1",
+            "--patches",
+            "24",
+            "--natural",
+            "24",
+        ])
+        .args(more)
+        // A bundle without a graph needs no ONNX Runtime.
+        .env("ORT_DYLIB_PATH", "/nowhere/libonnxruntime.so");
+    command
+}
+
+const HELD: [&str; 2] = ["--fixed", "plane:0,0,-1,-20"];
+
+fn text(output: &Output) -> String {
+    let both = [output.stdout.as_slice(), &output.stderr].concat();
+    String::from_utf8_lossy(&both).into_owned()
+}
+
+/// Whether the folder holds a bundle whose tissue follows a push.
+fn works(bundle: &Path) {
+    let model = Model::open(bundle, &ModelOptions::default()).unwrap();
+    let scene = Scene::new(model, &SceneOptions::default()).unwrap();
+    let nodes = &scene.model().indices(upt::IndexSet::DomainNodes)[..3];
+    let mut field = vec![0.0; 3 * scene.node_count()];
+    let input = StepInput {
+        displacement: None,
+        contact: Contact::Sparse {
+            nodes,
+            vectors: &[0.0, 0.0, -1.0, 0.0, 0.0, -1.0, 0.0, 0.0, -1.0],
+        },
+    };
+    scene.step(input, Some(&mut field)).unwrap();
+    let moved = field.iter().filter(|u| u.abs() > 1e-4).count();
+    assert!(moved > 30, "{moved} numbers moved");
+}
+
+#[test]
+fn a_small_organ_end_to_end_and_checked_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let (surface, out) = (folder.path().join("organ.obj"), folder.path().join("organ"));
+    plain(&surface);
+    let output = command(&surface, &out, &HELD).output().unwrap();
+    assert!(output.status.success(), "{}", text(&output));
+    works(&out);
+    let certificate = std::fs::read(out.join("certificate.json")).unwrap();
+    let certificate: serde_json::Value = serde_json::from_slice(&certificate).unwrap();
+    let share = certificate["contact"]["share_of_linear"].as_f64().unwrap();
+    assert!(share < 0.2, "{certificate:#}");
+    assert!(out.join("certificate.html").is_file());
+    assert!(folder.path().join("organ.preview.html").is_file());
+
+    let again = Command::new(env!("CARGO_BIN_EXE_upt"))
+        .args(["check".as_ref(), out.as_os_str()])
+        .env("ORT_DYLIB_PATH", "/nowhere/libonnxruntime.so")
+        .output()
+        .unwrap();
+    assert!(again.status.success(), "{}", text(&again));
+    assert!(
+        text(&again).contains("as the certificate says"),
+        "{}",
+        text(&again)
+    );
+
+    // All stages are there, so nothing is computed again.
+    let kept = command(&surface, &out, &HELD).output().unwrap();
+    assert_eq!(
+        text(&kept).matches("kept from an earlier run").count(),
+        6,
+        "{}",
+        text(&kept)
+    );
+}
+
+#[test]
+fn killed_after_each_stage_it_leaves_nothing_or_a_bundle_that_works_and_goes_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let (surface, out) = (folder.path().join("organ.obj"), folder.path().join("organ"));
+    plain(&surface);
+    let work = folder.path().join("organ.work");
+    for stage in ["body", "columns", "modes", "tables", "coarse"] {
+        let record = work.join(format!("{stage}.stage.json"));
+        let mut child = command(&surface, &out, &HELD)
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        let started = Instant::now();
+        while !record.exists() && started.elapsed() < Duration::from_secs(60) {
+            assert!(
+                child.try_wait().unwrap().is_none() || record.exists(),
+                "{stage}"
+            );
+            std::thread::sleep(Duration::from_millis(2));
+        }
+        child.kill().unwrap();
+        child.wait().unwrap();
+        assert!(record.exists(), "{stage}");
+        if out.exists() {
+            works(&out);
+        }
+    }
+    let output = command(&surface, &out, &HELD).output().unwrap();
+    assert!(output.status.success(), "{}", text(&output));
+    assert!(
+        text(&output).contains("kept from an earlier run"),
+        "{}",
+        text(&output)
+    );
+    works(&out);
+    let left: Vec<PathBuf> = std::fs::read_dir(folder.path())
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .filter(|path| path.extension().is_some_and(|e| e == "new" || e == "old"))
+        .collect();
+    assert!(left.is_empty(), "{left:?}");
+}
+
+/// The message of a run that must fail and leave no bundle.
+fn refused(surface: &Path, more: &[&str]) -> String {
+    let out = surface.with_extension("bundle");
+    let output = command(surface, &out, more).output().unwrap();
+    assert_eq!(output.status.code(), Some(2), "{}", text(&output));
+    assert!(!out.exists());
+    text(&output)
+}
+
+#[test]
+fn input_that_cannot_become_a_bundle_is_named_with_what_to_do() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str| folder.path().join(name);
+    let has = |message: String, words: &[&str]| {
+        for word in words {
+            assert!(message.contains(word), "`{word}` is not in: {message}");
+        }
+    };
+
+    let good = file("good.obj");
+    plain(&good);
+    has(
+        refused(&good, &[]),
+        &["nothing is held", "--fixed plane:0,0,-1,", "preview.html"],
+    );
+    has(
+        refused(
+            &good,
+            &[
+                "--fixed",
+                "plane:0,0,-1,-20",
+                "--domain",
+                "plane:0,0,-1,-22",
+            ],
+        ),
+        &["held by --fixed"],
+    );
+    has(refused(&good, &["--fixed", "all"]), &["holds every node"]);
+    has(
+        refused(&good, &["--fixed", "ball:900,0,0,5"]),
+        &["no node lies in --fixed", "x -"],
+    );
+    has(
+        refused(&good, &["--fixed", "plane:0,0,0,1"]),
+        &["must not be zero"],
+    );
+    has(
+        refused(&good, &["--fixed", "plane:0,0,-1,-20", "--minutes", "0"]),
+        &["--minutes is 0"],
+    );
+    has(
+        refused(&good, &["--fixed", "plane:0,0,-1,-20", "--unit", "m"]),
+        &["100000", "--unit mm it would be 100 mm"],
+    );
+    has(
+        refused(&good, &["--fixed", "plane:0,0,-1,-20", "--unit", "0.001"]),
+        &["0.100 mm long", "--unit mm"],
+    );
+    has(
+        refused(&good, &["--fixed", "plane:0,0,-1,-20", "--poisson", "0.5"]),
+        &["poisson"],
+    );
+
+    let open = file("open.obj");
+    plain(&open);
+    let lines = std::fs::read_to_string(&open).unwrap();
+    std::fs::write(&open, lines.rsplit_once("f ").unwrap().0).unwrap();
+    has(refused(&open, &HELD), &["open", "edge"]);
+
+    let crossed = file("crossed.obj");
+    let through = |[x, y, z]: [f64; 3]| if z > 29.0 { [x, y, -60.0] } else { [x, y, z] };
+    organ(&crossed, through, false);
+    has(refused(&crossed, &HELD), &["passes through itself"]);
+
+    let inside_out = file("inside-out.obj");
+    organ(&inside_out, |p| p, true);
+    has(
+        refused(&inside_out, &["--fixed", "plane:0,0,-1,-20", "--no-repair"]),
+        &["inside out"],
+    );
+
+    let taken = file("taken");
+    std::fs::create_dir(&taken).unwrap();
+    std::fs::write(taken.join("thesis.txt"), "text").unwrap();
+    let output = command(&good, &taken, &HELD).output().unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    has(text(&output), &["is no bundle of `upt make`"]);
+    assert!(taken.join("thesis.txt").exists());
+}
+
+#[test]
+fn the_preview_alone_writes_a_page_and_no_bundle() {
+    let folder = tempfile::tempdir().unwrap();
+    let (surface, out) = (folder.path().join("organ.obj"), folder.path().join("organ"));
+    plain(&surface);
+    let arguments = [HELD[0], HELD[1], "--preview"];
+    let output = command(&surface, &out, &arguments).output().unwrap();
+    assert!(output.status.success(), "{}", text(&output));
+    assert!(!out.exists());
+    let page = std::fs::read_to_string(folder.path().join("organ.preview.html")).unwrap();
+    assert!(page.contains("uptPreview"));
+}
