@@ -130,7 +130,13 @@ pub fn measure(mesh: &Mesh) -> Quality {
         components: components(mesh.node_count(), &mesh.tets).1,
         volume_mm3: volume,
         surface_area_mm2: (0..mesh.surface.len()).map(area).sum(),
-        domain_area_mm2: mesh.domain.iter().map(|&row| area(row as usize)).sum(),
+        // The sum of nothing is -0.
+        domain_area_mm2: mesh
+            .domain
+            .iter()
+            .map(|&row| area(row as usize))
+            .sum::<f64>()
+            + 0.0,
         low_mm: low,
         high_mm: high,
         min_edge_mm: lengths.iter().copied().fold(f64::INFINITY, f64::min),

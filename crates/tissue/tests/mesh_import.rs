@@ -407,3 +407,99 @@ fn balls_select_the_sets() {
     assert!("1,2,3".parse::<Ball>().is_err());
     assert!("1,2,3,-4".parse::<Ball>().is_err());
 }
+
+#[test]
+fn gmsh_version_1_is_read_with_sparse_tags_and_faces_beside() {
+    let text = "$NOD\n5\n1 0 0 0\n2 10 0 0\n30 0 10 0\n4 0 0 10\n5 10 10 10\n$ENDNOD\n$ELM\n3\n\
+                1 2 0 1 3 1 2 30\n2 4 0 1 4 1 2 30 4\n3 4 0 1 4 2 5 30 4\n$ENDELM\n";
+    let mesh = read_text(text, "msh", &repairing()).unwrap().mesh;
+    assert_eq!((mesh.node_count(), mesh.tets.len()), (5, 2));
+    let cut = text.replace("2 4 0 1 4 1 2 30 4", "2 4 0 1 3 1 2 30");
+    let error = read_text(&cut, "msh", &repairing()).unwrap_err();
+    assert!(
+        error.to_string().contains("has 3 nodes, must have 4"),
+        "{error}"
+    );
+}
+
+/// A box of 20 mm as VTK polydata, quads; `more` follows its points and faces.
+fn polydata(points: &[[f64; 3]], faces: &[&[u32]]) -> String {
+    let mut text = format!(
+        "# vtk DataFile Version 3.0\nbox\nASCII\nDATASET POLYDATA\nPOINTS {} float\n",
+        points.len()
+    );
+    for [x, y, z] in points {
+        text += &format!("{x} {y} {z}\n");
+    }
+    let size: usize = faces.iter().map(|face| face.len() + 1).sum();
+    text += &format!("POLYGONS {} {size}\n", faces.len());
+    for face in faces {
+        text += &format!("{}", face.len());
+        face.iter().for_each(|node| text += &format!(" {node}"));
+        text += "\n";
+    }
+    text
+}
+
+fn box_points(low: f64, high: f64) -> Vec<[f64; 3]> {
+    (0..8)
+        .map(|c| [c & 1, (c >> 1) & 1, c >> 2].map(|bit| if bit == 1 { high } else { low }))
+        .collect()
+}
+
+const BOX_FACES: [&[u32]; 6] = [
+    &[0, 2, 3, 1],
+    &[4, 5, 7, 6],
+    &[0, 1, 5, 4],
+    &[2, 6, 7, 3],
+    &[0, 4, 6, 2],
+    &[1, 3, 7, 5],
+];
+
+#[test]
+fn vtk_polydata_is_a_closed_surface() {
+    let options = ImportOptions {
+        resolution: Some(Resolution::Nodes(300)),
+        ..ImportOptions::default()
+    };
+    let text = polydata(&box_points(0.0, 20.0), &BOX_FACES);
+    let mesh = read_text(&text, "vtk", &options).unwrap().mesh;
+    let volume = measure(&mesh).volume_mm3;
+    assert!((volume - 8000.0).abs() < 400.0, "{volume}");
+    assert_eq!(measure(&mesh).domain_area_mm2.to_string(), "0");
+}
+
+#[test]
+fn a_surface_that_passes_through_itself_is_named_unless_it_hardly_does() {
+    let options = |repair| ImportOptions {
+        resolution: Some(Resolution::Nodes(300)),
+        repair,
+        ..ImportOptions::default()
+    };
+    // A corner is pulled through the opposite faces.
+    let through = |by: f64| {
+        let mut points = box_points(0.0, 20.0);
+        points.push([10.0, 10.0, -by]);
+        let mut faces: Vec<&[u32]> = BOX_FACES.to_vec();
+        faces[1] = &[4, 5, 8];
+        faces.extend([[5, 7, 8].as_slice(), &[7, 6, 8], &[6, 4, 8]]);
+        polydata(&points, &faces)
+    };
+    for repair in [false, true] {
+        let error = read_text(&through(15.0), "vtk", &options(repair)).unwrap_err();
+        let ImportError::SelfCrossing { depth_mm, .. } = error else {
+            panic!("{error}");
+        };
+        assert!((depth_mm - 15.0).abs() < 1e-6, "{depth_mm}");
+    }
+    let shallow = through(0.1);
+    assert!(matches!(
+        read_text(&shallow, "vtk", &options(false)),
+        Err(ImportError::SelfCrossing { .. })
+    ));
+    let repairs = read_text(&shallow, "vtk", &options(true)).unwrap().repairs;
+    assert!(
+        repairs.iter().any(|r| r.what.contains("hardly")),
+        "{repairs:?}"
+    );
+}

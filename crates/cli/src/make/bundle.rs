@@ -132,6 +132,33 @@ pub fn assemble(
     std::fs::write(&path, text).with_context(|| format!("{}: cannot be written", path.display()))
 }
 
+fn remove(folder: &Path) -> Result<()> {
+    match std::fs::remove_dir_all(folder) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+            Err(error).with_context(|| format!("{}: cannot be removed", folder.display()))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Copies the files of a folder to a new one.
+pub fn copy(from: &Path, to: &Path) -> Result<()> {
+    remove(to)?;
+    let copied = || -> std::io::Result<()> {
+        std::fs::create_dir_all(to)?;
+        for entry in std::fs::read_dir(from)? {
+            let entry = entry?;
+            std::fs::copy(entry.path(), to.join(entry.file_name()))?;
+        }
+        Ok(())
+    };
+    copied().or_else(|error| {
+        // Half a bundle is of no use to anyone.
+        remove(to)?;
+        Err(error).with_context(|| format!("{}: cannot be written", to.display()))
+    })
+}
+
 /// Copies the folder beside `out` and lets it take that place.
 pub fn publish(draft: &Path, out: &Path) -> Result<()> {
     let beside = |end: &str| {
@@ -140,25 +167,8 @@ pub fn publish(draft: &Path, out: &Path) -> Result<()> {
         out.with_file_name(name)
     };
     let (fresh, old) = (beside(".new"), beside(".old"));
-    for folder in [&fresh, &old] {
-        if folder.exists() {
-            std::fs::remove_dir_all(folder)
-                .with_context(|| format!("{}: cannot be removed", folder.display()))?;
-        }
-    }
-    let copied = || -> std::io::Result<()> {
-        std::fs::create_dir_all(&fresh)?;
-        for entry in std::fs::read_dir(draft)? {
-            let entry = entry?;
-            std::fs::copy(entry.path(), fresh.join(entry.file_name()))?;
-        }
-        Ok(())
-    };
-    if let Err(error) = copied() {
-        // Half a bundle is of no use to anyone.
-        let _ = std::fs::remove_dir_all(&fresh);
-        return Err(error).with_context(|| format!("{}: cannot be written", fresh.display()));
-    }
+    remove(&old)?;
+    copy(draft, &fresh)?;
     let moved = || -> std::io::Result<()> {
         if out.exists() {
             std::fs::rename(out, &old)?;

@@ -198,11 +198,14 @@ pub fn run(options: &Options) -> Result<ExitCode> {
         .and_then(|_| {
             check::Certificate::read(&work.file("certificate.json"), &work.file("errors.bin"))
         })?;
+    // The draft stays as its stage left it.
+    let certified = work.file("certified");
+    bundle::copy(&draft, &certified)?;
     if let Some(factor) = certificate.calibration() {
-        corrections::set_calibration(&draft, options.recommended, factor)?;
+        corrections::set_calibration(&certified, options.recommended, factor)?;
     }
     certificate.finish(
-        &draft,
+        &certified,
         &json!({
             "command": "upt make",
             "input": options.input.file_name().map(|name| name.to_string_lossy()),
@@ -211,8 +214,8 @@ pub fn run(options: &Options) -> Result<ExitCode> {
             "seed": options.seed,
         }),
     )?;
-    certificate.write(&draft, &mesh, &sizes.scene(&mesh))?;
-    bundle::publish(&draft, &options.out)?;
+    certificate.write(&certified, &mesh, &sizes.scene(&mesh))?;
+    bundle::publish(&certified, &options.out)?;
     let seconds = started.elapsed().as_secs_f64();
     if options.json {
         println!(

@@ -22,7 +22,7 @@ const REFERENCE_WIDTH_MM: f64 = 70.0;
   upt make heart.vtu --out heart --fixed inside:pericardium.stl --young 15000 --nodes 8000
   upt make liver.obj --out liver --fixed plane:0,0,-1,-20 --preview")]
 pub struct Options {
-    /// A closed surface (.stl, .obj, .ply) or tetrahedra (.msh, .vtk, .vtu, .mesh.safetensors).
+    /// A closed surface (.stl, .obj, .ply, .vtp) or tetrahedra (.msh, .vtk, .vtu, .mesh.safetensors).
     pub input: PathBuf,
     /// Folder of the bundle.
     #[arg(long)]

@@ -50,7 +50,7 @@ function ramp(share) {
 const count = faces.length / 3;
 const heldCorners = (face) => held[faces[3 * face]] + held[faces[3 * face + 1]] + held[faces[3 * face + 2]];
 const choices = [
-  { name: "held (blue), touched (pale), neither (grey)", colour: (face) => (heldCorners(face) === 3 ? BLUE : domain[face] ? PALE : GREY).toArray() },
+  { name: "held: blue; touched: pale", colour: (face) => (heldCorners(face) === 3 ? BLUE : domain[face] ? PALE : GREY).toArray() },
 ];
 // A list of a number a face (or a corner), with its range.
 function numbers(name, list, corner, format) {
@@ -63,8 +63,8 @@ function numbers(name, list, corner, format) {
   const width = high - low || 1;
   choices.push({ name, low: format(low), high: format(high), colour: (face, i) => ramp((list[corner ? faces[i] : face] - low) / width) });
 }
-if (data.error) numbers("error in contact, mm (root mean square)", floats(data.error), true, (x) => x.toPrecision(2));
-numbers("smallest angle of the element behind, degrees", floats(data.quality), false, (x) => x.toFixed(1));
+if (data.error) numbers("error in contact, mm (RMS)", floats(data.error), true, (x) => x.toPrecision(2));
+numbers("smallest angle of elements, °", floats(data.quality), false, (x) => x.toFixed(1));
 numbers("stiffness over the material's", floats(data.stiffness), false, (x) => x.toPrecision(3));
 
 function paint(choice) {
@@ -123,6 +123,8 @@ renderer.setAnimationLoop(() => {
   if (canvas.width !== width || canvas.height !== height) {
     renderer.setSize(width, height, false);
     camera.aspect = width / height;
+    if (width > 800) camera.setViewOffset(width, height, -142, 0, width, height); // beside the panel
+    else camera.clearViewOffset();
     camera.updateProjectionMatrix();
   }
   light.position.copy(camera.position);

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | `.vtk`, `.vtu` | linear tetrahedra of a VTK legacy or XML unstructured grid |
 //! | `.msh` | linear tetrahedra of a Gmsh file, version 2.2 or 4.1, text or binary, or version 1 |
-//! | `.stl`, `.obj`, `.ply` | a closed surface, filled with tetrahedra of a chosen spacing |
+//! | `.stl`, `.obj`, `.ply`, VTK polydata (`.vtk`, `.vtp`) | a closed surface, filled with tetrahedra of a chosen spacing |
 //!
 //! Coordinates are taken as millimetres times [`ImportOptions::scale`]. What is wrong with a file is
 //! an [`ImportError`] that names the element; with [`ImportOptions::repair`] the fault is removed
@@ -115,22 +115,25 @@ pub fn import(path: &Path, options: &ImportOptions) -> Result<Imported, ImportEr
         .map(|e| e.to_string_lossy().to_lowercase())
         .unwrap_or_default();
     let mut repairs = Vec::new();
-    let mut raw = match extension.as_str() {
-        "vtk" | "vtu" => vtk::read(path)?,
-        "msh" => gmsh::read(path)?,
-        "stl" | "obj" | "ply" => {
+    let body = match extension.as_str() {
+        "vtk" | "vtu" | "vtp" => vtk::read(path)?,
+        "msh" => vtk::Body::Tets(gmsh::read(path)?),
+        "stl" | "obj" | "ply" => vtk::Body::Surface(surface_files::read(path, &extension)?),
+        _ => return Err(ImportError::Extension { path: path.into() }),
+    };
+    let raw = match body {
+        vtk::Body::Tets(mut raw) => {
+            scale(&mut raw.positions, options.scale);
+            raw
+        }
+        vtk::Body::Surface(mut surface) => {
             let resolution = options.resolution.ok_or(ImportError::NoResolution)?;
-            let mut surface = surface_files::read(path, &extension)?;
             scale(&mut surface.positions, options.scale);
             closed_surface::check(&mut surface, options.repair, &mut repairs)?;
             self_crossing::check(&surface, options.repair, &mut repairs)?;
             fill(surface, resolution)?
         }
-        _ => return Err(ImportError::Extension { path: path.into() }),
     };
-    if !matches!(extension.as_str(), "stl" | "obj" | "ply") {
-        scale(&mut raw.positions, options.scale);
-    }
     let mut mesh = from_tets(raw, options.repair, &mut repairs)?;
     let file = path.file_name().unwrap_or_default().to_string_lossy();
     mesh.source = format!("imported from {file}");

@@ -128,7 +128,7 @@ fn ply(path: &Path) -> Result<RawSurface, ImportError> {
 }
 
 /// Makes points with the same coordinates one; nodes out of range are left for the checks.
-fn merge_points(surface: RawSurface) -> RawSurface {
+pub(super) fn merge_points(surface: RawSurface) -> RawSurface {
     let mut first_at: HashMap<[u64; 3], u32> = HashMap::new();
     let mut positions = Vec::new();
     let merged: Vec<u32> = surface

@@ -1,0 +1,131 @@
+"""Makes the organs of docs/gallery.md with `upt make`, one command each, and writes its tables from their certificates.
+
+    python training/scripts/gallery.py --upt target/release/upt --sofa FOLDER --out gallery
+
+FOLDER is a checkout of github.com/sofa-framework/sofa (its share/mesh/liver-smooth.obj, LGPL 2.1). The kidney is a formula and the
+box a lattice, both written here. Bundles that are there are only read again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+from pathlib import Path
+
+import numpy as np
+
+from upt_training.box_mesh import box_mesh
+
+ROOT = Path(__file__).parents[2]
+PAGE = ROOT / "docs" / "gallery.md"
+
+
+def kidney(path: Path) -> None:
+    """A closed bean, 110 mm long, as OBJ: an ellipsoid bent about an axis behind its hilum."""
+    rings, sectors = 40, 64
+    theta = np.pi * np.arange(1, rings) / rings
+    phi = 2 * np.pi * np.arange(sectors) / sectors
+    ring = np.stack(
+        [
+            np.outer(np.sin(theta), np.cos(phi)),
+            np.outer(np.sin(theta), np.sin(phi)),
+            np.repeat(np.cos(theta)[:, None], sectors, 1),
+        ],
+        -1,
+    )
+    points = np.concatenate([[[0, 0, 1.0]], ring.reshape(-1, 3), [[0, 0, -1.0]]]) * [27.0, 22.0, 62.0]
+    bend = 55.0
+    angle, distance = points[:, 2] / bend, points[:, 0] + bend
+    points = np.stack([distance * np.cos(angle) - bend, points[:, 1], distance * np.sin(angle)], -1)
+    last = len(points)
+    at = lambda ring, sector: 2 + ring * sectors + sector % sectors  # noqa: E731
+    faces = []
+    for s in range(sectors):
+        faces += [(1, at(0, s), at(0, s + 1)), (last, at(rings - 2, s + 1), at(rings - 2, s))]
+        for r in range(rings - 2):
+            faces += [(at(r, s), at(r + 1, s), at(r + 1, s + 1)), (at(r, s), at(r + 1, s + 1), at(r, s + 1))]
+    lines = [f"v {x:.4f} {y:.4f} {z:.4f}" for x, y, z in points] + [f"f {a} {b} {c}" for a, b, c in faces]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def stiff_box(path: Path) -> None:
+    """A box of 120 x 100 x 50 mm, four times as stiff in a ball of 20 mm below the middle of its top."""
+    mesh = box_mesh((18, 15, 8), 6.5)
+    centre = mesh.positions[mesh.tets].mean(axis=1)
+    middle = mesh.positions.max(axis=0) * [0.5, 0.5, 0.55]
+    inside = np.linalg.norm(centre - middle, axis=1) < 20.0
+    mesh.stiffness = np.where(inside, 4.0, 1.0).astype(np.float32)
+    mesh.metadata["name"] = "box-inclusion"
+    mesh.save(path)
+
+
+def organs(work: Path, sofa: Path) -> dict[str, list[str]]:
+    """The arguments of `upt make` for each."""
+    kidney(work / "kidney.obj")
+    stiff_box(work / "box.mesh.safetensors")
+    liver = [str(sofa / "share/mesh/liver-smooth.obj"), "--unit", "25", "--material", "liver", "--name", "liver"]
+    liver += ["--license", "LGPL-2.1-or-later (SOFA's liver-smooth.obj)", "--fixed", "plane:0,0,-1,-10"]
+    small = ["--nodes", "1200", "--domain", "ball:-20,100,60,55", "--natural", "40", "--cases", "8"]
+    return {
+        "liver": [*liver, "--minutes", "3"],
+        "liver-coarse": [*liver, *small],
+        "kidney": [
+            *[str(work / "kidney.obj"), "--material", "kidney", "--license", "Apache-2.0 OR MIT"],
+            *["--fixed", "ball:-5,0,0,16", "--minutes", "3"],
+        ],
+        "box-inclusion": [
+            *[str(work / "box.mesh.safetensors"), "--license", "Apache-2.0 OR MIT", "--minutes", "3"],
+        ],
+    }
+
+
+def row(name: str, certificate: dict) -> str:
+    """One line of the table."""
+    number = lambda x: "-" if x is None else f"{x:.3g}"  # noqa: E731
+    contact, free, speed = certificate["contact"], certificate["free"], certificate["speed"]
+    cells = [
+        f"`{name}`",
+        f"{certificate['bundle']['nodes']:,}",
+        str(certificate["tested"]["cases"]),
+        number(contact["mse_mm2"]),
+        number(contact["linear_mse_mm2"]),
+        f"1/{1 / contact['share_of_linear']:.0f}",
+        number(free["share_of_linear"]),
+        number(certificate["worst_region_over_mean"]),
+        number(certificate["force_error"]),
+        number(speed["ms_median"]),
+    ]
+    return "| " + " | ".join(cells) + " |"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--upt", type=Path, default=ROOT / "target/release/upt")
+    parser.add_argument("--sofa", type=Path, required=True)
+    parser.add_argument("--out", type=Path, default=Path("gallery"))
+    parser.add_argument("--only", nargs="*", help="only these organs are made; the table is of all that are there")
+    options = parser.parse_args()
+    options.out.mkdir(parents=True, exist_ok=True)
+    rows = []
+    for name, arguments in organs(options.out, options.sofa).items():
+        bundle = options.out / name
+        if not (bundle / "certificate.json").exists() and (options.only is None or name in options.only):
+            subprocess.run([str(options.upt), "make", *arguments, "--out", str(bundle)], check=True)
+        if (bundle / "certificate.json").exists():
+            rows.append(row(name, json.loads((bundle / "certificate.json").read_text(encoding="utf-8"))))
+    head = [
+        "| organ | nodes | held-out cases | MSE in contact, mm² | linear elasticity | share | share after release | "
+        "worst region over mean | force error | ms a step |",
+        "|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|",
+    ]
+    before, rest = PAGE.read_text(encoding="utf-8").split("<!-- gallery.py: begin -->")
+    _, after = rest.split("<!-- gallery.py: end -->")
+    table = "\n".join([*head, *rows])
+    PAGE.write_text(
+        f"{before}<!-- gallery.py: begin -->\n{table}\n<!-- gallery.py: end -->{after}", encoding="utf-8", newline="\n"
+    )
+
+
+if __name__ == "__main__":
+    main()
