@@ -72,7 +72,7 @@ def organs(work: Path, sofa: Path) -> dict[str, list[str]]:
         "liver-coarse": [*liver, *small],
         "kidney": [
             *[str(work / "kidney.obj"), "--material", "kidney", "--license", "Apache-2.0 OR MIT"],
-            *["--fixed", "ball:-5,0,0,16", "--minutes", "3"],
+            *["--fixed", "ball:-33,0,0,14", "--push", "8", "--minutes", "3"],
         ],
         "box-inclusion": [
             *[str(work / "box.mesh.safetensors"), "--license", "Apache-2.0 OR MIT", "--minutes", "3"],

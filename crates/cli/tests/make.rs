@@ -277,7 +277,13 @@ fn input_that_cannot_become_a_bundle_is_named_with_what_to_do() {
     has(refused(&open, &HELD), &["open", "edge"]);
 
     let crossed = file("crossed.obj");
-    let through = |[x, y, z]: [f64; 3]| if z > 29.0 { [x, y, -60.0] } else { [x, y, z] };
+    let through = |[x, y, z]: [f64; 3]| {
+        if z > 29.0 {
+            [x + 3.0, y + 2.0, -60.0]
+        } else {
+            [x, y, z]
+        }
+    };
     organ(&crossed, through, false);
     has(refused(&crossed, &HELD), &["passes through itself"]);
 
@@ -308,4 +314,65 @@ fn the_preview_alone_writes_a_page_and_no_bundle() {
     assert!(!out.exists());
     let page = std::fs::read_to_string(folder.path().join("organ.preview.html")).unwrap();
     assert!(page.contains("uptPreview"));
+}
+
+#[cfg(unix)]
+#[test]
+fn job_scripts_are_scripts_and_wait_for_one_another() {
+    let folder = tempfile::tempdir().unwrap();
+    let (surface, out) = (
+        folder.path().join("my organ.obj"),
+        folder.path().join("organ"),
+    );
+    plain(&surface);
+    let jobs = folder.path().join("jobs");
+    let emit = |kind: &str| {
+        let arguments = [HELD[0], HELD[1], "--emit", kind, jobs.to_str().unwrap()];
+        command(&surface, &out, &arguments).output().unwrap()
+    };
+    let output = emit("slurm");
+    assert!(output.status.success(), "{}", text(&output));
+    for script in ["bundle.sbatch", "data.sbatch", "train.sbatch", "submit.sh"] {
+        let checked = Command::new("bash")
+            .arg("-n")
+            .arg(jobs.join(script))
+            .output()
+            .unwrap();
+        assert!(checked.status.success(), "{script}: {}", text(&checked));
+    }
+    // A scheduler that writes down what it is asked for.
+    let stub = folder.path().join("sbatch");
+    std::fs::write(
+        &stub,
+        "#!/bin/bash\necho \"$@\" >> asked.txt\nwc -l < asked.txt\n",
+    )
+    .unwrap();
+    std::fs::set_permissions(&stub, std::os::unix::fs::PermissionsExt::from_mode(0o755)).unwrap();
+    let path = format!(
+        "{}:{}",
+        folder.path().display(),
+        std::env::var("PATH").unwrap()
+    );
+    let submitted = Command::new("bash")
+        .arg(jobs.join("submit.sh"))
+        .env("PATH", path)
+        .output()
+        .unwrap();
+    assert!(submitted.status.success(), "{}", text(&submitted));
+    let asked = std::fs::read_to_string(jobs.join("asked.txt")).unwrap();
+    let lines: Vec<&str> = asked.lines().collect();
+    assert_eq!(
+        lines,
+        [
+            "--parsable bundle.sbatch",
+            "--parsable --dependency=afterok:1 data.sbatch",
+            "--parsable --dependency=afterok:2 train.sbatch",
+        ]
+    );
+    assert!(!out.exists());
+
+    assert!(emit("ray").status.success());
+    let program = std::fs::read_to_string(jobs.join("run.py")).unwrap();
+    assert!(program.contains("my organ.obj") && !program.contains("--emit"));
+    assert_eq!(emit("pbs").status.code(), Some(2));
 }

@@ -201,8 +201,18 @@ impl Certificate {
             contact["mse_mm2"],
             contact["share_of_linear"]
                 .as_f64()
-                .map_or(f64::NAN, |share| (1.0 / share).round()),
+                .map_or(f64::NAN, |share| (10.0 / share).round() / 10.0),
         )
+    }
+
+    /// What to do about errors that corrections hardly lessen.
+    fn advice(&self) -> &'static str {
+        let share = self.value["contact"]["share_of_linear"].as_f64();
+        if share.is_some_and(|share| share > 0.5) {
+            "\ncorrections help little here: the pushes may be too deep for what is held beneath them; lower --push, narrow --domain, or hold less"
+        } else {
+            ""
+        }
     }
 
     /// A few lines.
@@ -218,7 +228,7 @@ impl Certificate {
             )
         };
         format!(
-            "{}\n{}\n{}\nworst region over the mean {}, force error {}, {} ms a step (median, 1 thread), p99 {}",
+            "{}\n{}\n{}\nworst region over the mean {}, force error {}, {} ms a step (median, 1 thread), p99 {}{}",
             self.words(),
             row("in contact", &v["contact"]),
             row("after release", &v["free"]),
@@ -226,6 +236,7 @@ impl Certificate {
             v["force_error"],
             v["speed"]["ms_median"],
             v["speed"]["ms_p99"],
+            self.advice(),
         )
     }
 }

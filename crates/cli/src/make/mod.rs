@@ -7,6 +7,7 @@
 
 mod body;
 mod bundle;
+mod emit;
 mod options;
 mod patches;
 mod stages;
@@ -15,6 +16,7 @@ mod vibration;
 
 pub use options::Options;
 
+use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
 
@@ -35,6 +37,11 @@ const BOUNDARY: Boundary = Boundary::Fixed;
 pub fn run(options: &Options) -> Result<ExitCode> {
     let started = Instant::now();
     options.check()?;
+    if let [cluster, folder] = options.emit.as_slice() {
+        let start = emit::write(options, cluster, Path::new(folder))?;
+        println!("{}: start this", start.display());
+        return Ok(ExitCode::SUCCESS);
+    }
     bundle::check_target(&options.out)?;
     let mut work = Work::open(&options.work_folder(), options.json)?;
 

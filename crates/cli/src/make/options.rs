@@ -20,7 +20,8 @@ const REFERENCE_WIDTH_MM: f64 = 70.0;
   upt make liver.obj --out liver --unit cm --fixed plane:0,0,-1,-20
   upt make kidney.stl --out kidney --fixed ball:0,0,12,9 --domain ball:30,0,0,25 --minutes 3
   upt make heart.vtu --out heart --fixed inside:pericardium.stl --young 15000 --nodes 8000
-  upt make liver.obj --out liver --fixed plane:0,0,-1,-20 --preview")]
+  upt make liver.obj --out liver --fixed plane:0,0,-1,-20 --preview
+  upt make liver.obj --out liver --fixed plane:0,0,-1,-20 --emit slurm jobs")]
 pub struct Options {
     /// A closed surface (.stl, .obj, .ply, .vtp) or tetrahedra (.msh, .vtk, .vtu, .mesh.safetensors).
     pub input: PathBuf,
@@ -92,6 +93,9 @@ pub struct Options {
     /// Only import, and write the page that shows what is held and touched.
     #[arg(long)]
     pub preview: bool,
+    /// Write job scripts for a cluster into a folder instead of running: `--emit slurm DIR` or `--emit ray DIR`.
+    #[arg(long, num_args = 2, value_names = ["slurm|ray", "DIR"])]
+    pub emit: Vec<String>,
     /// Import faults as they are instead of repairing what can be repaired safely.
     #[arg(long)]
     pub no_repair: bool,
