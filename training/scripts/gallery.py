@@ -2,8 +2,8 @@
 
     python training/scripts/gallery.py --upt target/release/upt --sofa FOLDER --out gallery
 
-FOLDER is a checkout of github.com/sofa-framework/sofa (its share/mesh/liver-smooth.obj, LGPL 2.1). The kidney is a formula and the
-box a lattice, both written here. Bundles that are there are only read again.
+FOLDER is a checkout of github.com/sofa-framework/sofa (its share/mesh/liver-smooth.obj, LGPL 2.1). The kidney is a
+formula and the box a lattice, both written here. Bundles that are there are only read again.
 """
 
 from __future__ import annotations

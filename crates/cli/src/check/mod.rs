@@ -200,14 +200,11 @@ pub fn measure(plan: &Plan) -> Result<Certificate> {
     };
     std::thread::scope(|scope| {
         let threads: Vec<_> = (0..workers).map(|_| scope.spawn(work)).collect();
-        threads
-            .into_iter()
-            .map(|thread| {
-                thread
-                    .join()
-                    .unwrap_or_else(|_| bail!("a thread of the check panicked"))
-            })
-            .collect::<Result<()>>()
+        threads.into_iter().try_for_each(|thread| {
+            thread
+                .join()
+                .unwrap_or_else(|_| bail!("a thread of the check panicked"))
+        })
     })?;
     bar.finish_and_clear();
     let mut scores = finished.into_inner().unwrap_or_default();

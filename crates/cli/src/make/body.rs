@@ -128,7 +128,7 @@ fn check_length(mesh: &Mesh, options: &Options) -> Result<()> {
     let longest = (0..3)
         .map(|k| f64::from(quality.high_mm[k] - quality.low_mm[k]))
         .fold(0.0, f64::max);
-    if longest >= LENGTH_MM[0] && longest <= LENGTH_MM[1] {
+    if (LENGTH_MM[0]..=LENGTH_MM[1]).contains(&longest) {
         return Ok(());
     }
     let scale = options.scale()?;

@@ -70,7 +70,7 @@ pub struct Options {
     #[arg(long, value_name = "MM2")]
     pub target_error: Option<f64>,
     /// Corrections a step that the bundle recommends.
-    #[arg(long = "corrections", default_value_t = 3)]
+    #[arg(long = "corrections", default_value_t = 5)]
     pub recommended: u32,
     /// Natural modes.
     #[arg(long, default_value_t = 60)]
