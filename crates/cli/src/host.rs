@@ -261,34 +261,49 @@ impl Scene {
         nodes: &mut Vec<u32>,
         vectors: &mut Vec<[f32; 3]>,
     ) -> Result<()> {
-        let mut count = 0;
-        let (first, many) = (instruments.as_ptr(), instruments.len() as u64);
-        // SAFETY: the pointers and counts describe the slices; without room the call only counts.
-        unsafe {
-            check(ffi::upt_scene_contacts_from_instruments(
-                self.handle,
-                first,
-                many,
-                std::ptr::null_mut(),
-                std::ptr::null_mut(),
-                0,
-                &mut count,
-            ))?;
-            nodes.resize(count as usize, 0);
-            vectors.resize(count as usize, [0.0; 3]);
-            if count > 0 {
-                check(ffi::upt_scene_contacts_from_instruments(
+        /// Nodes that there is room for at first: more than a few tools touch.
+        const ROOM: usize = 4096;
+        let mut count = ROOM as u64;
+        loop {
+            let room = count;
+            nodes.resize(room as usize, 0);
+            vectors.resize(room as usize, [0.0; 3]);
+            // SAFETY: the pointers and counts describe the slices.
+            let status = unsafe {
+                ffi::upt_scene_contacts_from_instruments(
                     self.handle,
-                    first,
-                    many,
+                    instruments.as_ptr(),
+                    instruments.len() as u64,
                     nodes.as_mut_ptr(),
                     vectors.as_mut_ptr().cast(),
-                    count,
+                    room,
                     &mut count,
-                ))?;
+                )
+            };
+            if count <= room {
+                check(status)?;
+                nodes.truncate(count as usize);
+                vectors.truncate(count as usize);
+                return Ok(());
             }
         }
-        Ok(())
+    }
+
+    /// `upt_scene_instrument_contacts` of the last step.
+    pub fn instrument_contacts(&self) -> Result<Vec<ffi::upt_instrument_contact>> {
+        let mut needed = 0;
+        // SAFETY: a NULL buffer of capacity 0 asks for the count; the second call has that capacity.
+        unsafe {
+            ffi::upt_scene_instrument_contacts(self.handle, std::ptr::null_mut(), 0, &mut needed);
+            let mut out = vec![zeroed(); needed as usize];
+            check(ffi::upt_scene_instrument_contacts(
+                self.handle,
+                out.as_mut_ptr(),
+                needed,
+                &mut needed,
+            ))?;
+            Ok(out)
+        }
     }
 
     /// `upt_scene_contact_force` at the `count` contact nodes of the last step, mN.
@@ -333,21 +348,39 @@ impl Drop for Scene {
     }
 }
 
-/// An instrument of the C interface; `shape` is a `UPT_SHAPE_*`, lengths are mm, the rotation a unit quaternion x, y, z, w.
-pub fn instrument(
-    shape: i32,
-    half_extents: [f32; 3],
-    radius: f32,
-    position: [f32; 3],
-    rotation: [f32; 4],
-) -> ffi::upt_instrument {
+/// An instrument of the C interface with its size set and zero elsewhere.
+pub fn instrument() -> ffi::upt_instrument {
     // SAFETY: zero is a value of every field.
     let mut instrument: ffi::upt_instrument = unsafe { zeroed() };
     instrument.struct_size = size::<ffi::upt_instrument>();
-    instrument.shape = shape;
-    instrument.half_extents = half_extents;
-    instrument.radius = radius;
-    instrument.position = position;
-    instrument.rotation = rotation;
     instrument
+}
+
+/// The convex hull of a tool's points; destroyed when dropped.
+pub struct Hull {
+    handle: *mut ffi::upt_hull,
+}
+
+impl Hull {
+    /// `upt_hull_create`.
+    pub fn create(points: &[[f32; 3]]) -> Result<Self> {
+        let mut handle = std::ptr::null_mut();
+        // SAFETY: pointer and count describe `points`; `handle` is a place to write to.
+        check(unsafe {
+            ffi::upt_hull_create(points.as_ptr().cast(), points.len() as u64, &mut handle)
+        })?;
+        Ok(Self { handle })
+    }
+
+    /// What `upt_instrument` holds.
+    pub fn handle(&self) -> *const std::ffi::c_void {
+        self.handle.cast_const().cast()
+    }
+}
+
+impl Drop for Hull {
+    fn drop(&mut self) {
+        // SAFETY: the handle came from upt_hull_create and is destroyed once.
+        unsafe { ffi::upt_hull_destroy(self.handle) };
+    }
 }

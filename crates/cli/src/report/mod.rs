@@ -14,7 +14,7 @@ pub mod method;
 mod paper_split;
 pub mod pictures;
 pub mod plot;
-mod prior_alone;
+pub mod prior_alone;
 mod row;
 mod same_body;
 pub mod setting;
@@ -66,9 +66,10 @@ pub struct Options {
     /// Cases of the datasets of --tools: held-out ones, those that bundles may learn from, or both.
     #[arg(long, default_value = "test", requires = "tools")]
     split: Split,
-    /// Page whose part between the markers `upt report --tools MESH` is replaced by the tables of --tools.
+    /// Page whose part between the markers `upt report --tools MESH` is replaced by the tables of --tools, or by a narrow one
+    /// where the markers end in `summary` (repeat for several).
     #[arg(long, value_name = "FILE", requires = "tools")]
-    markdown: Option<PathBuf>,
+    markdown: Vec<PathBuf>,
     /// Cases of each scheme or programme at most.
     #[arg(long, default_value_t = 2)]
     cases: usize,
@@ -138,7 +139,7 @@ pub fn run(options: &Options) -> Result<ExitCode> {
             threads: options.threads.iter().copied().max().unwrap_or(1),
             out: options.out.clone(),
             title: options.title.as_deref().unwrap_or("From pose to picture"),
-            markdown: options.markdown.clone(),
+            markdown: &options.markdown,
             json: options.json,
         });
     }

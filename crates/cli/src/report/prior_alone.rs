@@ -58,6 +58,16 @@ impl PriorAlone {
         })
     }
 
+    /// The tables.
+    pub fn table(&self) -> &PriorTable {
+        &self.table
+    }
+
+    /// Whether each node is held, `[K]`.
+    pub fn held(&self) -> &[bool] {
+        &self.held
+    }
+
     /// Back to rest.
     pub fn reset(&mut self) {
         self.state.fill([0.0; 3]);

@@ -65,7 +65,7 @@ impl Run {
 }
 
 pub(crate) fn names(flags: u32) -> String {
-    const NAMES: [(u32, &str); 11] = [
+    const NAMES: [(u32, &str); 14] = [
         (flag::PUSH, "push"),
         (flag::CONTACT_AREA, "area"),
         (flag::SITE, "site"),
@@ -77,6 +77,9 @@ pub(crate) fn names(flags: u32) -> String {
         (flag::GROWTH, "growth"),
         (flag::CLAMPED, "clamped"),
         (flag::REGULARISED, "regularised"),
+        (flag::FELL_BACK, "fell-back"),
+        (flag::ERROR, "error"),
+        (flag::DEEP, "deep"),
     ];
     let set: Vec<&str> = NAMES
         .iter()

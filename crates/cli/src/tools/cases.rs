@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use contact::{Body, Pose, Samples, Vector};
+use tissue::baselines::DecayFit;
 use tissue::mesh::Mesh;
 use tissue::solver::{Tool, ToolPose};
 use tissue::tool_tracks::ToolTracks;
@@ -109,6 +110,15 @@ impl ToolCase {
         contacts.iter().any(|contacts| *contacts > 0)
     }
 
+    /// Whether a tool that is closed loses all that it holds in a frame.
+    pub fn tears(&self, frame: usize) -> bool {
+        let (count, tracks) = (self.tools.len(), self.tracks());
+        (0..count).any(|tool| {
+            let [before, now] = [frame - 1, frame].map(|frame| frame * count + tool);
+            tracks.grasp[now] != 0 && tracks.held[before] > 0 && tracks.held[now] == 0
+        })
+    }
+
     /// Sum of the sizes of the tools' forces at the end of a frame, mN.
     fn force(&self, frame: usize) -> f32 {
         let count = self.tools.len();
@@ -197,6 +207,22 @@ impl ToolCases {
             mesh_sha256,
             boundary,
         })
+    }
+
+    /// The decay a step without contact that fits these very cases best: linear elasticity at its best.
+    pub fn release_decay(&self) -> f32 {
+        let mut fit = DecayFit::default();
+        for case in &self.list {
+            for frame in 1..case.poses.len() {
+                if !case.touches(frame) && !case.touches(frame - 1) {
+                    fit.add(
+                        case.trajectory.frame(frame - 1),
+                        case.trajectory.frame(frame),
+                    );
+                }
+            }
+        }
+        fit.decay().unwrap_or(0.0)
     }
 
     /// Checks that the trajectories have as many nodes as the mesh.

@@ -1,29 +1,36 @@
 //! How the library is driven by the poses of tools, through the C calls of a host.
 
-use std::time::Instant;
+mod geometric;
+mod linear;
+mod solved;
 
-use anyhow::{Context, Result, bail};
-use contact::{Body, Pose, Shape, Vector};
+use anyhow::{Context, Result};
+use contact::{Body, Shape, Vector};
+use tissue::mesh::{Boundary, Mesh};
 use tissue::solver::{Tool, ToolPose};
 use upt::ffi;
 
 use crate::host;
+use crate::report::method::BundleFolder;
 
 /// A way to drive it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Drive {
+    /// `upt_scene_step_instruments`: contact is solved in the step.
+    Solved,
     /// `upt_scene_contacts_from_instruments`, then `upt_scene_step_contacts`: each touched node is projected on its own.
     Geometric,
+    /// The linear response of the bundle's tables alone, contact solved as without corrections.
+    Linear,
 }
 
 impl Drive {
-    /// All of them.
-    pub const ALL: [Drive; 1] = [Drive::Geometric];
-
     /// Name in tables.
     pub fn name(self) -> &'static str {
         match self {
+            Drive::Solved => "contact solved",
             Drive::Geometric => "geometric rule",
+            Drive::Linear => "linear elasticity alone, contact solved",
         }
     }
 }
@@ -60,12 +67,20 @@ pub struct Step {
     pub loads: Vec<Load>,
 }
 
+/// A tool made ready.
+struct Taken {
+    tool: Tool,
+    body: Body,
+    hull: Option<host::Hull>,
+}
+
 /// A scene that tools drive.
 pub struct Driver {
     drive: Drive,
     scene: host::Scene,
+    linear: Option<linear::Linear>,
     rest: Vec<Vector>,
-    tools: Vec<(Tool, Body)>,
+    tools: Vec<Taken>,
     nodes: Vec<u32>,
     vectors: Vec<[f32; 3]>,
 }
@@ -77,6 +92,7 @@ impl Driver {
         Ok(Self {
             drive,
             scene: host::Scene::create(model, ffi::UPT_KERNEL_AUTO)?,
+            linear: None,
             rest: positions.into_iter().map(Vector::from).collect(),
             tools: Vec::new(),
             nodes: Vec::new(),
@@ -84,15 +100,37 @@ impl Driver {
         })
     }
 
+    /// [`Drive::Linear`] of a bundle: `mesh` is the bundle's, `decay` the factor a step after a release.
+    pub fn of_linear(
+        model: &host::Model,
+        bundle: &BundleFolder,
+        mesh: &Mesh,
+        boundary: Boundary,
+        decay: f32,
+        threads: u32,
+    ) -> Result<Self> {
+        let samples = mesh.samples(boundary);
+        let linear = linear::Linear::new(bundle, samples, &mesh.positions, decay, threads)?;
+        Ok(Self {
+            linear: Some(linear),
+            ..Self::new(model, Drive::Linear)?
+        })
+    }
+
     /// Other tools; the tissue stays as it is.
     ///
     /// # Errors
-    /// A shape that this way of driving does not have.
+    /// A shape that no tool has, or that this way of driving does not take.
     pub fn take(&mut self, tools: &[Tool]) -> Result<()> {
+        let drive = self.drive;
         let taken = tools.iter().enumerate().map(|(index, tool)| {
-            self.instrument(tool, &Pose::IDENTITY)
-                .with_context(|| format!("tool {index}"))?;
-            Ok((tool.clone(), Body::new(&tool.shape)?))
+            let body = Body::new(&tool.shape).with_context(|| format!("tool {index}"))?;
+            let hull = hull(drive, &tool.shape).with_context(|| format!("tool {index}"))?;
+            Ok(Taken {
+                tool: tool.clone(),
+                body,
+                hull,
+            })
         });
         self.tools = taken.collect::<Result<_>>()?;
         Ok(())
@@ -100,98 +138,83 @@ impl Driver {
 
     /// Back to rest.
     pub fn reset(&mut self) -> Result<()> {
+        if let Some(linear) = &mut self.linear {
+            linear.reset();
+        }
         self.scene.reset()
     }
 
     /// One step with the tools at `poses` at its end; `out` `[K]` is the state after it, mm.
     pub fn step(&mut self, poses: &[ToolPose], out: &mut [[f32; 3]]) -> Result<Step> {
-        let instruments = self.tools.iter().zip(poses);
-        let instruments: Vec<ffi::upt_instrument> = instruments
-            .map(|((tool, _), to)| self.instrument(tool, &to.pose))
-            .collect::<Result<_>>()?;
+        let tools = self.tools.iter().zip(poses);
+        let instruments: Vec<ffi::upt_instrument> = tools
+            .map(|(taken, to)| instrument(&taken.tool, to, taken.hull.as_ref()))
+            .collect();
         match self.drive {
+            Drive::Solved => self.solved(&instruments, poses, out),
             Drive::Geometric => self.geometric(&instruments, poses, out),
+            Drive::Linear => self.linear(poses, out),
         }
     }
 
-    fn geometric(
+    /// One step with tools that are given to the library as they are, without a look at whether they can be.
+    pub fn step_raw(
         &mut self,
-        instruments: &[ffi::upt_instrument],
+        tools: &[Tool],
         poses: &[ToolPose],
         out: &mut [[f32; 3]],
-    ) -> Result<Step> {
-        let started = Instant::now();
-        self.scene
-            .contacts(instruments, &mut self.nodes, &mut self.vectors)?;
-        let found_ms = started.elapsed().as_secs_f64() * 1e3;
-        self.scene.step(&self.nodes, &self.vectors, out)?;
-        let ms = started.elapsed().as_secs_f64() * 1e3;
-        let stats = self.scene.stats()?;
-        let forces = if self.nodes.is_empty() {
-            Vec::new()
-        } else {
-            self.scene.contact_force(self.nodes.len())?
-        };
-        let mut step = Step {
-            ms,
-            contact_ms: found_ms + stats.prior_ms,
-            flags: stats.flags,
-            felt: vec![Felt::default(); poses.len()],
-            loads: Vec::new(),
-        };
-        for ((node, u), force) in self.nodes.iter().zip(&self.vectors).zip(forces) {
-            let point = self.rest[*node as usize] + Vector::from(*u);
-            let nearest = self.tools.iter().zip(poses).enumerate();
-            let nearest = nearest
-                .map(|(index, ((_, body), to))| (index, body.nearest_at(&to.pose, point)))
-                .min_by(|a, b| a.1.distance.total_cmp(&b.1.distance));
-            let Some((index, nearest)) = nearest else {
-                continue;
-            };
-            let force = Vector::from(force);
-            let felt = &mut step.felt[index];
-            felt.contacts += 1;
-            let torque = (point - poses[index].pose.translation).cross(force);
-            for k in 0..3 {
-                felt.force[k] += f64::from(force[k]);
-                felt.torque[k] += f64::from(torque[k]);
-            }
-            step.loads.push(load(index, -force, nearest.normal));
-        }
-        Ok(step)
+    ) -> Result<()> {
+        let tools = tools.iter().zip(poses);
+        let instruments: Vec<ffi::upt_instrument> =
+            tools.map(|(tool, to)| instrument(tool, to, None)).collect();
+        self.scene.step_instruments(&instruments, out)
     }
+}
 
-    /// A tool as the C interface takes it.
-    fn instrument(&self, tool: &Tool, pose: &Pose) -> Result<ffi::upt_instrument> {
-        let (shape, half_extents, radius) = match &tool.shape {
-            Shape::Sphere { radius } => (ffi::UPT_SHAPE_CAPSULE, [0.0; 3], *radius),
-            Shape::Capsule {
-                half_length,
-                radius,
-            } => (ffi::UPT_SHAPE_CAPSULE, [0.0, *half_length, 0.0], *radius),
-            Shape::Box { half_extents } => (ffi::UPT_SHAPE_BOX, *half_extents, 0.0),
-            Shape::Spatula {
-                half_extents,
-                radius,
-            } => (ffi::UPT_SHAPE_SPATULA, *half_extents, *radius),
-            Shape::Hull { .. } | Shape::Mesh { .. } => bail!(
-                "a {} cannot be driven by the {}: it takes spheres, capsules, boxes and spatulas",
-                if matches!(tool.shape, Shape::Hull { .. }) {
-                    "hull"
-                } else {
-                    "surface of triangles"
-                },
-                self.drive.name()
-            ),
-        };
-        Ok(host::instrument(
-            shape,
+/// The hull of a shape that has one.
+fn hull(drive: Drive, shape: &Shape) -> Result<Option<host::Hull>> {
+    match (shape, drive) {
+        (Shape::Hull { points, margin }, Drive::Solved) if *margin == 0.0 => {
+            Ok(Some(host::Hull::create(points)?))
+        }
+        (_, Drive::Linear) => Ok(None),
+        (Shape::Hull { .. } | Shape::Mesh { .. }, _) => anyhow::bail!(
+            "this shape cannot be driven by the library ({}): it takes spheres, capsules, boxes, spatulas and, where contact is solved, hulls without a margin",
+            drive.name()
+        ),
+        _ => Ok(None),
+    }
+}
+
+/// A tool as the C interface takes it.
+fn instrument(tool: &Tool, to: &ToolPose, hull: Option<&host::Hull>) -> ffi::upt_instrument {
+    let (shape, half_extents, radius) = match &tool.shape {
+        Shape::Sphere { radius } => (ffi::UPT_SHAPE_CAPSULE, [0.0; 3], *radius),
+        Shape::Capsule {
+            half_length,
+            radius,
+        } => (ffi::UPT_SHAPE_CAPSULE, [0.0, *half_length, 0.0], *radius),
+        Shape::Box { half_extents } => (ffi::UPT_SHAPE_BOX, *half_extents, 0.0),
+        Shape::Spatula {
             half_extents,
             radius,
-            pose.translation.to_array(),
-            pose.rotation.to_array(),
-        ))
-    }
+        } => (ffi::UPT_SHAPE_SPATULA, *half_extents, *radius),
+        Shape::Hull { .. } | Shape::Mesh { .. } => (ffi::UPT_SHAPE_HULL, [0.0; 3], 0.0),
+    };
+    let mut instrument = host::instrument();
+    instrument.shape = shape;
+    instrument.half_extents = half_extents;
+    instrument.radius = radius;
+    instrument.position = to.pose.translation.to_array();
+    instrument.rotation = to.pose.rotation.to_array();
+    instrument.mode = match to.grasp {
+        true => ffi::UPT_MODE_GRASP,
+        false => ffi::UPT_MODE_SLIDE,
+    };
+    instrument.friction = tool.friction;
+    instrument.tear_off_mn = tool.tear_off_mn;
+    instrument.hull = hull.map_or(std::ptr::null(), host::Hull::handle);
+    instrument
 }
 
 /// The parts of a force on the tissue, the tool's normal given.

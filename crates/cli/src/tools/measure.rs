@@ -8,7 +8,8 @@ use super::cases::ToolCase;
 use super::drive::{Driver, Felt, Load};
 use super::yard::{Yard, jump};
 
-/// The tissue slips off a tool where a node goes this much farther in a step than any point of any tool, mm.
+/// The tissue slips off a tool where a node goes this much farther in a step than any point of any tool, mm; a grasp that
+/// tears off counts as well.
 const SLIP_MM: f64 = 1.0;
 /// Steps around a slip-off that are counted apart: before, and after.
 const SLIP_WINDOW: (usize, usize) = (1, 2);
@@ -82,7 +83,7 @@ impl Truth {
                 .penetration
                 .push(yard.penetration(field, &case.bodies, &case.at(frame)));
             truth.jump.push(jump);
-            let slipped = case.touches(frame - 1) && jump > motion + SLIP_MM;
+            let slipped = case.tears(frame) || case.touches(frame - 1) && jump > motion + SLIP_MM;
             truth.slips += usize::from(slipped && !slipped_before);
             slipped_before = slipped;
             if slipped {

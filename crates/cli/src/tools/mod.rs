@@ -19,7 +19,7 @@ mod section;
 mod table;
 pub mod yard;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
@@ -30,6 +30,7 @@ use crate::host;
 use crate::machine::Machine;
 use crate::report::method::BundleFolder;
 use crate::report::plot::colour;
+use crate::report::prior_alone::PriorAlone;
 use crate::stress::{progress, replace_between};
 use cases::{Split, ToolCases};
 use drive::{Drive, Driver};
@@ -50,8 +51,8 @@ pub struct Plan<'a> {
     pub threads: u32,
     pub out: PathBuf,
     pub title: &'a str,
-    /// A page whose part between the markers `upt report --tools` and the mesh's name is replaced.
-    pub markdown: Option<PathBuf>,
+    /// Documents whose tables are written.
+    pub markdown: &'a [PathBuf],
     pub json: bool,
 }
 
@@ -72,6 +73,9 @@ impl Method {
     }
 
     fn name(&self) -> String {
+        if self.drive == Drive::Linear {
+            return format!("{}, {}", self.bundle.name, self.drive.name());
+        }
         format!(
             "{}, {}, k = {}",
             self.bundle.name,
@@ -119,7 +123,7 @@ pub fn report(plan: &Plan) -> Result<ExitCode> {
     let mut all = Vec::new();
     for method in methods(plan, &bundles) {
         let name = method.name();
-        match measure_all(&method, plan, &cases, &truths, &mut yard) {
+        match measure_all(&method, plan, &cases, &mesh, &truths, &mut yard) {
             Ok(measured) => {
                 details.push(json!({"method": name, "cases": measured.figures}));
                 rows.extend(measured.rows.iter().cloned());
@@ -189,13 +193,18 @@ fn methods(plan: &Plan, bundles: &[BundleFolder]) -> Vec<Method> {
             Some(_) => plan.corrections.to_vec(),
         };
         counts.dedup();
-        for drive in Drive::ALL {
+        let mut add = |drive, counts: &[u32]| {
             methods.extend(counts.iter().map(|corrections| Method {
                 bundle: bundle.clone(),
                 drive,
                 corrections: *corrections,
             }));
+        };
+        add(Drive::Solved, &counts);
+        if PriorAlone::available(bundle) {
+            add(Drive::Linear, &[0]);
         }
+        add(Drive::Geometric, &counts);
     }
     methods
 }
@@ -204,6 +213,7 @@ fn measure_all(
     method: &Method,
     plan: &Plan,
     cases: &ToolCases,
+    mesh: &Mesh,
     truths: &[Truth],
     yard: &mut Yard,
 ) -> Result<Measured> {
@@ -213,7 +223,17 @@ fn measure_all(
         ..host::ModelSettings::default()
     };
     let model = host::Model::open(&method.bundle.path, &settings)?;
-    let mut driver = Driver::new(&model, method.drive)?;
+    let mut driver = match method.drive {
+        Drive::Linear => Driver::of_linear(
+            &model,
+            &method.bundle,
+            mesh,
+            cases.boundary.parse().map_err(anyhow::Error::msg)?,
+            cases.release_decay(),
+            plan.threads,
+        )?,
+        drive => Driver::new(&model, drive)?,
+    };
     let name = method.name();
     let bar = progress(cases.list.len(), &name);
     let (mut outcomes, mut figures) = (Vec::new(), Vec::new());
@@ -344,18 +364,41 @@ fn write(
         facts,
     };
     std::fs::write(plan.out.join("tools.html"), page::page(&page))?;
-    if let Some(path) = &plan.markdown {
-        let over_all: Vec<&Row> = rows.iter().filter(|row| row.programme == ALL).collect();
-        let text = format!(
-            "\n{lead} {} ({} cores, {} thread), {date}.\n\n{}\n{}",
-            machine.cpu,
-            machine.cores,
-            plan.threads,
-            table::markdown(&over_all),
-            table::markdown(&table::by_programme(rows))
-        );
-        let name = format!("upt report --tools {}", header.mesh_name);
-        replace_between(path, &name, &text)?;
+    let made = format!(
+        "{lead} {} ({} cores, {} thread), {date}.",
+        machine.cpu, machine.cores, plan.threads
+    );
+    for path in plan.markdown {
+        document(path, &header.mesh_name, &made, rows)?;
     }
     Ok(report)
+}
+
+/// Writes the tables of a document: all columns between the markers `upt report --tools MESH`, or few between those with
+/// `summary` behind.
+fn document(path: &Path, mesh: &str, made: &str, rows: &[Row]) -> Result<()> {
+    let name = format!("upt report --tools {mesh}");
+    let summary = format!("{name} summary");
+    let over_all: Vec<&Row> = rows.iter().filter(|row| row.programme == ALL).collect();
+    let page = std::fs::read_to_string(path).with_context(|| format!("{}", path.display()))?;
+    if page.contains(&format!("begin: {summary} ")) {
+        let methods: Vec<&Row> = over_all
+            .into_iter()
+            .filter(|row| !row.bundle.is_empty())
+            .collect();
+        let text = table::markdown(table::FEW, &methods);
+        return replace_between(path, &summary, &format!("\n{made}\n\n{text}"));
+    }
+    let each: Vec<&Row> = table::by_programme(rows)
+        .into_iter()
+        .filter(|row| {
+            row.bundle.is_empty() || row.corrections > 0 && row.drive == Drive::Solved.name()
+        })
+        .collect();
+    let text = format!(
+        "\n{made}\n\n{}\nBy programme, where contact is solved inside of corrections:\n\n{}",
+        table::markdown(table::COLUMNS, &over_all),
+        table::markdown(table::COLUMNS, &each)
+    );
+    replace_between(path, &name, &text)
 }

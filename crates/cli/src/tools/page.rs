@@ -30,7 +30,7 @@ pub struct Page<'a> {
 const STYLE: &str = "svg.section{background:#fbfbfc;border:1px solid #eef0f3;border-radius:6px}\
     th:nth-child(3),td:nth-child(3){text-align:left}tr.all td{font-weight:600}\
     main{max-width:1760px}.gallery.wide{grid-template-columns:repeat(auto-fill,minmax(380px,1fr))}\
-    .gallery.wide svg{max-width:640px}table{font-size:12px}";
+    .gallery.forces{grid-template-columns:repeat(auto-fill,minmax(560px,1fr))}table{font-size:12px}";
 
 pub fn page(page: &Page<'_>) -> String {
     let mut out = opening(page.title, &page.lead, STYLE);
@@ -67,7 +67,7 @@ pub fn page(page: &Page<'_>) -> String {
     keys.extend(page.keys.iter().cloned());
     for case in &page.pictured {
         let body = format!(
-            "{}<div class=\"gallery wide\">{}</div><div class=\"gallery wide\">{}</div>",
+            "{}<div class=\"gallery wide\">{}</div><div class=\"gallery forces\">{}</div>",
             legend(&keys),
             case.sections,
             case.forces

@@ -37,6 +37,10 @@ pub struct CaseFigures {
     pub still_mm: Option<f64>,
     pub true_still_mm: Option<f64>,
     pub found_again: usize,
+    /// By tool and step, of the tissue on the tool.
+    pub force_mn: Vec<Vec<[f32; 3]>>,
+    /// By step.
+    pub mse_by_step_mm2: Vec<f32>,
     #[serde(skip)]
     pub ms: Vec<f64>,
     #[serde(skip)]
@@ -131,6 +135,13 @@ impl CaseFigures {
                     own.saturating_sub(true_count)
                 })
                 .sum(),
+            force_mn: (0..tools)
+                .map(|tool| {
+                    let forces = moments.iter().map(|m| m.felt[tool].force);
+                    forces.map(|force| force.map(|v| v as f32)).collect()
+                })
+                .collect(),
+            mse_by_step_mm2: moments.iter().map(|m| m.mse_mm2 as f32).collect(),
             ms: moments.iter().map(|m| m.ms).collect(),
             contact_ms: moments
                 .iter()
@@ -164,6 +175,13 @@ impl CaseFigures {
             still_mm: truth.still_mm,
             true_still_mm: truth.still_mm,
             found_again: 0,
+            force_mn: (0..case.tools.len())
+                .map(|tool| {
+                    let forces = truth.felt.iter().map(|felt| felt[tool].force);
+                    forces.map(|force| force.map(|v| v as f32)).collect()
+                })
+                .collect(),
+            mse_by_step_mm2: vec![0.0; truth.jump.len()],
             ms: Vec::new(),
             contact_ms: Vec::new(),
         }

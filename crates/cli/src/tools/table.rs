@@ -49,7 +49,7 @@ pub const COLUMNS: &[(&str, Cell)] = &[
 /// What the columns mean, for a page.
 pub const MEANING: &str = "All methods get the poses of the tools and nothing else, each step from their own last state. \
 MSE: mean over steps and nodes of the squared distance to the reference solver, mean and median over the cases, without the steps around \
-a slip-off (the tissue of the truth leaves a tool that touches it faster than the tool moves). det F: the smallest of any element in any step. \
+a slip-off (the tissue of the truth leaves a tool that touches it faster than the tool moves, or a grasp tears off). det F: the smallest of any element in any step. \
 Inverted: steps with an element inside out; silent: those of them without a flag. Penetration: the deepest of points 1 mm apart. Jump: the \
 largest motion of a node in a step over the truth's largest (median of the cases). Force and torque: relative L2 error over the steps, \
 median of the tools. Friction: the largest sum of tangential over normal force of a tool, less its coefficient. Still: the largest motion \
@@ -115,21 +115,41 @@ pub fn text(rows: &[Row]) -> String {
     out
 }
 
-/// A table of Markdown.
-pub fn markdown(rows: &[&Row]) -> String {
-    let head: Vec<&str> = COLUMNS.iter().map(|column| column.0).collect();
-    let rule: Vec<&str> = (0..COLUMNS.len())
-        .map(|column| {
-            if column == 0 || column == 2 {
-                "---"
-            } else {
-                "---:"
-            }
+/// The columns of a table that has to be narrow.
+pub const FEW: &[(&str, Cell)] = &[
+    ("method", |row| match row.bundle.as_str() {
+        "" => row.drive.to_owned(),
+        bundle => format!("`{bundle}`, {}", row.drive),
+    }),
+    ("k", |row| match row.bundle.as_str() {
+        "" => "-".into(),
+        _ => row.corrections.to_string(),
+    }),
+    ("MSE, mm² (median)", |row| label(row.mse_median_mm2)),
+    ("worst programme", |row| label(row.mse_worst_programme_mm2)),
+    ("force error", |row| {
+        row.force_error.map_or_else(none, percent)
+    }),
+    ("steps with an inverted element", |row| {
+        percent(row.inverted)
+    }),
+    ("deepest in a tool, mm", |row| label(row.penetration_mm)),
+    ("ms a step", |row| row.ms_median.map_or_else(none, label)),
+];
+
+/// A table of Markdown, figures to the right.
+pub fn markdown(columns: &[(&str, Cell)], rows: &[&Row]) -> String {
+    let head: Vec<&str> = columns.iter().map(|column| column.0).collect();
+    let rule: Vec<&str> = columns
+        .iter()
+        .map(|column| match column.0 {
+            "method" | "programme" => "---",
+            _ => "---:",
         })
         .collect();
     let mut out = format!("| {} |\n|{}|\n", head.join(" | "), rule.join("|"));
     for row in rows {
-        let cells: Vec<String> = COLUMNS.iter().map(|column| (column.1)(row)).collect();
+        let cells: Vec<String> = columns.iter().map(|column| (column.1)(row)).collect();
         out.push_str(&format!("| {} |\n", cells.join(" | ")));
     }
     out

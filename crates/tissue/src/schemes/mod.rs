@@ -16,7 +16,7 @@ mod slide;
 
 pub use load::{Draw, Pose};
 pub use programme::Programme;
-pub(crate) use random::SplitMix;
+pub use random::SplitMix;
 
 /// Length of every simulation, s.
 pub const DURATION_S: f64 = 8.0;
