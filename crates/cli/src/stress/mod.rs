@@ -8,6 +8,7 @@ mod jump;
 mod outside;
 mod reference;
 mod surrogate;
+mod tools;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
