@@ -146,3 +146,30 @@ fn cases_that_cannot_be_measured_are_refused_by_name() {
     ]);
     assert!(output.status.success(), "{}", told(&output));
 }
+
+#[test]
+fn random_tools_run_beside_the_solver() {
+    let folder = tempfile::tempdir().unwrap();
+    let page = folder.path().join("page.md");
+    let name = format!("upt beside --tools {NAME}");
+    let marked = format!("<!-- begin: {name} -->\n<!-- end: {name} -->\n");
+    std::fs::write(&page, marked).unwrap();
+    let output = upt(&[
+        "beside",
+        "--bundle",
+        BUNDLE,
+        "--steps",
+        "0",
+        "--tools",
+        "2",
+        "--markdown",
+        page.to_str().unwrap(),
+    ]);
+    // 1: the command ran and found a growing error, which two cases of a tiny bundle do not tell.
+    assert!(output.status.code() < Some(2), "{}", told(&output));
+    let text = std::fs::read_to_string(&page).unwrap();
+    assert!(
+        text.contains("| press | ") && text.contains("| probe | "),
+        "{text}"
+    );
+}

@@ -9,6 +9,7 @@ mod picture;
 mod rank;
 mod replay;
 mod tables;
+mod tools;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -24,6 +25,7 @@ use pair::Pair;
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   upt beside --bundle onnx/brain-coarse-reduced --markdown docs/stability.md --images docs/images
+  upt beside --bundle onnx/brain-coarse-reduced --steps 0 --tools 20
   upt beside --bundle onnx/brain-fast --steps 0 --held-out DATASET --held-out DATASET-S5/case-00000.trajectory.safetensors --outside DATASET-HARD/case-00000.trajectory.safetensors")]
 pub struct Options {
     /// Bundle folder.
@@ -33,6 +35,9 @@ pub struct Options {
     /// envelope and a release; minutes on a coarse mesh, an hour on a fine one; 0 leaves the solver out.
     #[arg(long, default_value_t = 1600)]
     steps: usize,
+    /// Programmes of rigid tools beside the solver, one after another without a reset; the bundle gets their poses alone.
+    #[arg(long, default_value_t = 0, value_name = "COUNT")]
+    tools: usize,
     /// Cases inside of the envelope that the bundle was not trained on: a dataset folder (its test split) or a
     /// trajectory; may be given many times.
     #[arg(long, value_name = "PATH", num_args = 1..)]
@@ -40,7 +45,7 @@ pub struct Options {
     /// The same outside of the envelope.
     #[arg(long, value_name = "PATH", num_args = 1..)]
     outside: Vec<PathBuf>,
-    /// Page whose part between the markers `upt beside NAME` is replaced.
+    /// Page whose part between the markers `upt beside NAME` is replaced, and that of --tools between `upt beside --tools NAME`.
     #[arg(long)]
     markdown: Option<PathBuf>,
     /// Folder for the plots.
@@ -75,12 +80,12 @@ pub fn run(options: &Options) -> Result<ExitCode> {
         2 * CASE
     );
     ensure!(
-        options.steps > 0 || !options.held_out.is_empty(),
-        "--steps 0 without --held-out leaves nothing to do"
+        options.steps > 0 || options.tools > 0 || !options.held_out.is_empty(),
+        "--steps 0 without --tools and --held-out leaves nothing to do"
     );
     let bench = Bench::open(&options.bundle, false)
         .with_context(|| format!("{}", options.bundle.display()))?;
-    let mut text = String::new();
+    let (mut text, mut of_tools) = (String::new(), String::new());
     let (mut inside, mut outside) = (Vec::new(), Vec::new());
     let mut complaints = Vec::new();
     if options.steps > 0 {
@@ -101,6 +106,12 @@ pub fn run(options: &Options) -> Result<ExitCode> {
         inside.extend(random);
         outside.extend(outside::moments(&bench)?);
     }
+    if options.tools > 0 {
+        let driven = tools::run(&bench, &options.bundle, options.tools)?;
+        if !tools::table(&mut of_tools, &driven) {
+            complaints.push("the error under tools GROWS");
+        }
+    }
     let held_out = replay::groups(&bench, &options.held_out)?;
     let far = replay::groups(&bench, &options.outside)?;
     if !held_out.is_empty() {
@@ -111,12 +122,18 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     if inside.iter().any(Moment::alarmed) {
         complaints.push("there are FALSE ALARMS inside of the envelope");
     }
-    tables::ranks(&mut text, &inside, &outside);
-    tables::points(&mut text, &inside);
-    print!("{text}");
+    if !inside.is_empty() {
+        tables::ranks(&mut text, &inside, &outside);
+        tables::points(&mut text, &inside);
+    }
+    print!("{text}{of_tools}");
     if let Some(page) = &options.markdown {
-        let name = format!("upt beside {}", bench.subject);
-        replace_between(page, &name, &format!("\n{text}"))?;
+        for (what, text) in [("upt beside", &text), ("upt beside --tools", &of_tools)] {
+            if !text.is_empty() {
+                let name = format!("{what} {}", bench.subject);
+                replace_between(page, &name, &format!("\n{text}"))?;
+            }
+        }
     }
     for complaint in &complaints {
         println!("{complaint}");

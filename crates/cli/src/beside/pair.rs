@@ -27,17 +27,22 @@ pub fn contact(touch: &Touch) -> Vec<ContactNode> {
     contact
 }
 
+/// The solver's options with the bundle's material.
+pub fn options(bench: &Bench) -> SolverOptions {
+    let material = &bench.model.manifest.material;
+    let mut options = SolverOptions::default();
+    options.material.young_pa = material.young_pa;
+    options.material.poisson = material.poisson;
+    options.material.density_kg_m3 = material.density_kg_m3;
+    options.material.damping_per_s = material.damping_per_s;
+    options
+}
+
 impl Pair {
     pub fn new(bench: &Bench) -> Result<Self> {
-        let material = &bench.model.manifest.material;
-        let mut options = SolverOptions::default();
-        options.material.young_pa = material.young_pa;
-        options.material.poisson = material.poisson;
-        options.material.density_kg_m3 = material.density_kg_m3;
-        options.material.damping_per_s = material.damping_per_s;
         Ok(Self {
             observer: Observer::new(bench)?,
-            solver: Solver::new(&bench.mesh, bench.boundary, options)?,
+            solver: Solver::new(&bench.mesh, bench.boundary, options(bench))?,
             truth: vec![[0.0; 3]; bench.mesh.node_count()],
         })
     }
