@@ -77,6 +77,17 @@ inline upt_status check(upt_status status) {
   return status;
 }
 
+namespace detail {
+/// Spans that do not belong together are refused here; the C call could not see it.
+inline upt_status mismatch() {
+#ifndef UPT_NO_EXCEPTIONS
+  throw error(UPT_ERR_ARGUMENT, "a [n,3] span's size is not three times its count");
+#else
+  return UPT_ERR_ARGUMENT;
+#endif
+}
+} // namespace detail
+
 /// A zeroed struct with its struct_size set: the defaults.
 template <typename T> T make() noexcept {
   T value{};
@@ -90,6 +101,8 @@ using model_info = upt_model_info;
 using scene_options = upt_scene_options;
 using scene_stats = upt_scene_stats;
 using instrument = upt_instrument;
+using instrument_reading = upt_instrument_reading;
+using instrument_contact = upt_instrument_contact;
 
 inline upt_status init(const upt_init_options &options) { return check(upt_init(&options)); }
 inline upt_status shutdown() { return check(upt_shutdown()); }
@@ -196,6 +209,64 @@ private:
   upt_model *handle_ = nullptr;
 };
 
+/// The convex hull of a tool's points, for instruments of shape UPT_SHAPE_HULL. Immutable: any thread
+/// may use it. It must live while instruments that name it are handed to a scene.
+class Hull {
+public:
+  Hull() noexcept = default;
+  Hull(Hull &&other) noexcept : handle_(std::exchange(other.handle_, nullptr)) {}
+  Hull &operator=(Hull &&other) noexcept {
+    if (this != &other) {
+      destroy();
+      handle_ = std::exchange(other.handle_, nullptr);
+    }
+    return *this;
+  }
+  Hull(const Hull &) = delete;
+  Hull &operator=(const Hull &) = delete;
+  ~Hull() { destroy(); }
+
+  /// points: [n,3], mm, in the tool's own frame; a hull held before is destroyed.
+  upt_status create(span<const float> points) {
+    if (points.size() % 3 != 0) {
+      return detail::mismatch();
+    }
+    upt_hull *handle = nullptr;
+    const upt_status status = check(upt_hull_create(points.data(), points.size() / 3, &handle));
+    if (status == UPT_OK) {
+      destroy();
+      handle_ = handle;
+    }
+    return status;
+  }
+
+#ifndef UPT_NO_EXCEPTIONS
+  explicit Hull(span<const float> points) { create(points); }
+#endif
+
+  /// Steps that were submitted with it go on.
+  void destroy() noexcept {
+    if (handle_ != nullptr) {
+      upt_hull_destroy(std::exchange(handle_, nullptr));
+    }
+  }
+
+  explicit operator bool() const noexcept { return handle_ != nullptr; }
+  upt_hull *get() const noexcept { return handle_; }
+
+  /// A sliding instrument of this shape, without friction, at the origin of the mesh's frame.
+  upt_instrument instrument() const noexcept {
+    upt_instrument made = make<upt_instrument>();
+    made.shape = UPT_SHAPE_HULL;
+    made.rotation[3] = 1.0F;
+    made.hull = handle_;
+    return made;
+  }
+
+private:
+  upt_hull *handle_ = nullptr;
+};
+
 /// One deforming body. Used by one thread at a time.
 class Scene {
 public:
@@ -251,7 +322,7 @@ public:
   upt_status step_contacts(span<const std::uint32_t> nodes, span<const float> vectors,
                            span<float> out = {}) {
     if (vectors.size() != 3 * nodes.size()) {
-      return mismatch();
+      return detail::mismatch();
     }
     return check(upt_scene_step_contacts(handle_, nodes.data(), vectors.data(), nodes.size(),
                                          out.data(), out.size()));
@@ -262,7 +333,7 @@ public:
 
   upt_status submit(span<const std::uint32_t> nodes, span<const float> vectors) {
     if (vectors.size() != 3 * nodes.size()) {
-      return mismatch();
+      return detail::mismatch();
     }
     return check(upt_scene_submit(handle_, nodes.data(), vectors.data(), nodes.size()));
   }
@@ -283,7 +354,7 @@ public:
   /// points: [n,3]; empty detaches.
   upt_status attach_points(span<const float> points) {
     if (points.size() % 3 != 0) {
-      return mismatch();
+      return detail::mismatch();
     }
     return check(upt_scene_attach_points(handle_, points.empty() ? nullptr : points.data(),
                                          points.size() / 3));
@@ -295,12 +366,40 @@ public:
     return check(upt_scene_sample_points(handle_, alpha, out.data(), out.size()));
   }
 
+  /// A step that rigid instruments drive, their contact solved; out: [n,3] or empty.
+  upt_status step_instruments(span<const upt_instrument> instruments, span<float> out = {}) {
+    return check(upt_scene_step_instruments(handle_, instruments.data(), instruments.size(),
+                                            out.data(), out.size()));
+  }
+  /// The same on the scene's worker; the instruments are copied.
+  upt_status submit_instruments(span<const upt_instrument> instruments) {
+    return check(upt_scene_submit_instruments(handle_, instruments.data(), instruments.size()));
+  }
+  /// What the tissue did to each instrument of the last step; out has one element for each.
+  upt_status readings(span<upt_instrument_reading> out) {
+    for (upt_instrument_reading &reading : out) {
+      reading = make<upt_instrument_reading>();
+    }
+    return check(upt_scene_instrument_readings(handle_, out.data(), out.size()));
+  }
+  /// The points of the surface that push or hold instruments at the end of the last step.
+  upt_status instrument_contacts(std::vector<upt_instrument_contact> &out) {
+    std::uint64_t needed = 0;
+    upt_status status = check(upt_scene_instrument_contacts(handle_, nullptr, 0, &needed));
+    if (status == UPT_OK) {
+      out.resize(static_cast<std::size_t>(needed));
+      status = check(upt_scene_instrument_contacts(handle_, out.data(), out.size(), &needed));
+      out.resize(static_cast<std::size_t>(needed));
+    }
+    return status;
+  }
+
   /// nodes: [capacity]; vectors: [capacity,3]; count: contacts found.
   upt_status contacts_from_instruments(span<const upt_instrument> instruments,
                                        span<std::uint32_t> nodes, span<float> vectors,
                                        std::uint64_t &count) {
     if (vectors.size() != 3 * nodes.size()) {
-      return mismatch();
+      return detail::mismatch();
     }
     return check(upt_scene_contacts_from_instruments(handle_, instruments.data(),
                                                      instruments.size(), nodes.data(),
@@ -333,6 +432,17 @@ public:
     stats(out);
     return out;
   }
+  /// count: instruments of the last step.
+  std::vector<upt_instrument_reading> readings(std::size_t count) {
+    std::vector<upt_instrument_reading> out(count);
+    readings(out);
+    return out;
+  }
+  std::vector<upt_instrument_contact> instrument_contacts() {
+    std::vector<upt_instrument_contact> out;
+    instrument_contacts(out);
+    return out;
+  }
   std::vector<std::uint8_t> save() {
     std::vector<std::uint8_t> out;
     save(out);
@@ -341,15 +451,6 @@ public:
 #endif
 
 private:
-  /// Spans that do not belong together are refused here; the C call could not see it.
-  static upt_status mismatch() {
-#ifndef UPT_NO_EXCEPTIONS
-    throw error(UPT_ERR_ARGUMENT, "a [n,3] span's size is not three times its count");
-#else
-    return UPT_ERR_ARGUMENT;
-#endif
-  }
-
   upt_scene *handle_ = nullptr;
 };
 

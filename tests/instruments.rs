@@ -120,6 +120,19 @@ fn a_press_leaves_no_penetration_and_pushes_back_and_a_lift_ends_it() {
 }
 
 #[test]
+fn a_reset_scene_forgets_what_its_tools_read() {
+    let scene = scene(&model("tiny-corrected"), &with(3));
+    step(&scene, &[pressing(&scene, 0.5, Vector::ZERO)]);
+    assert!(readings(&scene)[0].contacts > 0);
+    let saved = scene.save().unwrap();
+    scene.restore(&saved).unwrap();
+    assert!(readings(&scene).is_empty(), "a snapshot has no readings");
+    step(&scene, &[pressing(&scene, 0.5, Vector::ZERO)]);
+    scene.reset().unwrap();
+    assert!(readings(&scene).is_empty() && scene.with_told(|told| told.pushes.is_empty()));
+}
+
+#[test]
 fn friction_obeys_coulomb_and_drags() {
     let model = model("tiny-corrected");
     let dragged = |friction: f32| {

@@ -100,22 +100,6 @@ def test_a_submitted_step_is_the_same_step(model, scene):
         model.scene().poll()
 
 
-def test_instruments_touch_and_are_pushed_back(model, scene):
-    site = model.domain_nodes[0]
-    tool = upt.Instrument(
-        shape="capsule", position=model.positions[site], rotation=(0, 0, 0, 1), half_extents=(0, 5, 0), radius=2.0
-    )
-    nodes, vectors = scene.contacts([tool])
-    assert site in nodes and vectors.shape == (len(nodes), 3) and np.abs(vectors).max() > 0.1
-    scene.step_contacts(nodes, vectors)
-    assert scene.stats.contact_count == len(nodes)
-    force = scene.contact_force()
-    assert force.shape == vectors.shape and np.isfinite(force).all() and np.abs(force).max() > 0
-    far = upt.Instrument(shape=upt.Shape.BOX, position=(1e3, 0, 0), rotation=(0, 0, 0, 1), half_extents=(1, 1, 1))
-    nodes, vectors = model.scene().contacts([far])
-    assert len(nodes) == 0 and vectors.shape == (0, 3)
-
-
 def test_statistics_are_typed(model, scene):
     scene.step_contacts(*push(model, 120))
     stats = scene.stats

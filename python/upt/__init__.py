@@ -21,10 +21,12 @@ from upt._native import (
     Flag,
     GuardPolicy,
     IndexSet,
-    Instrument,
+    InstrumentContact,
+    InstrumentReading,
     Kernel,
     Kind,
     LogLevel,
+    Mode,
     ModelInfo,
     ModelOptions,
     Precision,
@@ -48,6 +50,7 @@ from upt.errors import (
     StateError,
     UnsupportedError,
 )
+from upt.instrument import Hull, Instrument
 from upt.log import set_log
 from upt.model import Model
 from upt.scene import Scene
@@ -79,11 +82,15 @@ __all__ = [
     "GuardError",
     "OutOfMemoryError",
     "GuardPolicy",
+    "Hull",
     "IndexSet",
     "Instrument",
+    "InstrumentContact",
+    "InstrumentReading",
     "Kernel",
     "Kind",
     "LogLevel",
+    "Mode",
     "Model",
     "ModelInfo",
     "ModelOptions",

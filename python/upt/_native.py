@@ -498,7 +498,7 @@ class Instrument(Record):
     """A capsule's radius or a spatula's corner radius, mm."""
     sticking: bool = boolean("_sticking")
     """`upt_scene_contacts_from_instruments` alone: 1: touched nodes move with the instrument until it leaves; 0: they slide."""
-    mode: bool = boolean("_mode")
+    mode: Mode = choice("_mode", Mode)
     """`upt_scene_step_instruments` alone: `UPT_MODE_*`."""
     reserved: tuple[int, ...] = vector("_reserved")
     """Zero."""

@@ -15,7 +15,8 @@ from numpy.typing import ArrayLike
 
 from upt._arrays import Floats, Indices, address, indices, output, vectors
 from upt._library import check, lib
-from upt._native import Instrument, SceneOptions, SceneStats, Status
+from upt._native import InstrumentContact, InstrumentReading, SceneOptions, SceneStats, Status
+from upt.instrument import Instrument, records
 
 if TYPE_CHECKING:
     if sys.version_info >= (3, 12):
@@ -45,6 +46,7 @@ class Scene:
         self._handle = handle.value
         self._destroy = weakref.finalize(self, lib.upt_scene_destroy, handle.value)
         self._point_count = 0
+        self._instrument_count = 0
         self._region_count: int | None = None
         self._node_count = model.node_count if fields.mesh_path is None else _node_count_of(fields.mesh_path)
 
@@ -84,6 +86,7 @@ class Scene:
                 result.size,
             )
         )
+        self._instrument_count = 0
         return result
 
     def step_contacts(self, nodes: ArrayLike = (), contact: ArrayLike = (), out: Floats | None = None) -> Floats:
@@ -100,19 +103,74 @@ class Scene:
         n, c = _contacts(nodes, contact)
         result = output(out, self.out_count)
         check(lib.upt_scene_step_contacts(self._handle, address(n), address(c), len(n), address(result), result.size))
+        self._instrument_count = 0
         return result
+
+    def step_instruments(self, instruments: Sequence[Instrument], out: Floats | None = None) -> Floats:
+        """One step from the scene's own state that rigid instruments drive: their contact is solved.
+
+        The instruments are where they will be at the end of the step; from the last step's poses they get there on a
+        line, or are put there where that is further than 40 mm. Pass every instrument every time, in the same order:
+        the scene remembers each place of the list. What the tissue does to them: `readings`.
+
+        Args:
+            instruments: at most 64; none: a free step.
+            out: as in `step`.
+
+        Returns:
+            `u(t + dt)`, `[n, 3]`, mm.
+
+        Raises:
+            upt.UnsupportedError: the bundle has no linear response to solve contact with; use `contacts` and
+                `step_contacts`.
+        """
+        array, count = records(instruments)
+        result = output(out, self.out_count)
+        check(lib.upt_scene_step_instruments(self._handle, array, count, address(result), result.size))
+        self._instrument_count = count
+        return result
+
+    def submit_instruments(self, instruments: Sequence[Instrument]) -> None:
+        """Starts such a step on the scene's worker and returns at once; the instruments are copied."""
+        array, count = records(instruments)
+        check(lib.upt_scene_submit_instruments(self._handle, array, count))
+        self._instrument_count = count
+
+    def readings(self) -> list[InstrumentReading]:
+        """What the tissue did to each instrument of the last step, in their order.
+
+        Force (mN), torque about the instrument's position (mN mm), contacts, penetration (mm), whether its grasp tore
+        off. After a submit with another number of instruments, only once the step has finished.
+        """
+        found = [InstrumentReading() for _ in range(self._instrument_count)]
+        array = (InstrumentReading * len(found))(*found)
+        check(lib.upt_scene_instrument_readings(self._handle, array if found else None, len(found)))
+        return list(array)
+
+    def instrument_contacts(self) -> list[InstrumentContact]:
+        """The points of the surface that pushed or held instruments at the end of the last step.
+
+        Ascending by instrument: its place in the list, position (mm), force on it (mN).
+        """
+        needed = ctypes.c_uint64()
+        find = lib.upt_scene_instrument_contacts
+        check(find(self._handle, None, 0, ctypes.byref(needed)))
+        array = (InstrumentContact * needed.value)()
+        if needed.value:
+            check(find(self._handle, array, len(array), ctypes.byref(needed)))
+        return list(array)
 
     def contacts(self, instruments: Sequence[Instrument]) -> tuple[Indices, Floats]:
         """The nodes that rigid instruments touch and the displacement that they impose: the input of `step_contacts`.
 
-        Pass every instrument every time, in the same order: the scene remembers what each one touches.
+        For hosts that want nodes and vectors, and for bundles without a linear response; with one, `step_instruments`
+        solves contact. Pass every instrument every time, in the same order: the scene remembers what each one touches.
 
         Returns:
             `nodes [m]` and `vectors [m, 3]`, mm.
         """
-        array = (Instrument * len(instruments))(*instruments)
         count = ctypes.c_uint64()
-        arguments = (self._handle, array if instruments else None, len(instruments))
+        arguments = (self._handle, *records(instruments))
         find = lib.upt_scene_contacts_from_instruments
         check(find(*arguments, None, None, 0, ctypes.byref(count)))
         nodes, contact = np.empty(count.value, np.uint32), np.empty((count.value, 3), np.float32)
@@ -136,6 +194,7 @@ class Scene:
         """Starts a step on the scene's worker and returns at once; arguments as in `step_contacts`, copied."""
         n, c = _contacts(nodes, contact)
         check(lib.upt_scene_submit(self._handle, address(n), address(c), len(n)))
+        self._instrument_count = 0
 
     def poll(self) -> bool:
         """True when the submitted step has finished; raises its error, once."""
@@ -203,10 +262,12 @@ class Scene:
     def restore(self, snapshot: bytes) -> None:
         """Back to a snapshot of the same model."""
         check(lib.upt_scene_restore(self._handle, snapshot, len(snapshot)))
+        self._instrument_count = 0
 
     def reset(self) -> None:
         """Back to rest. The region and attached points stay."""
         check(lib.upt_scene_reset(self._handle))
+        self._instrument_count = 0
 
     def close(self) -> None:
         """Frees the scene; a step in flight is waited for. Also done when the object is collected."""

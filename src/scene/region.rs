@@ -58,6 +58,8 @@ impl Core {
         shared.stats = stats;
         shared.contact_nodes.clear();
         shared.contact_vectors.clear();
+        #[cfg(feature = "contact")]
+        shared.tools.clear();
     }
 
     /// Decodes any nodes of the last state into `out [n,3]`.

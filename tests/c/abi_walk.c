@@ -64,6 +64,7 @@ int main(int argc, char **argv) {
   walk_worker();
   walk_region_and_points();
   walk_instrument();
+  walk_instruments(argv[3]);
   walk_state();
   walk_handles();
   walk_threads();

@@ -31,6 +31,7 @@ void walk_worker(void);
 
 void walk_region_and_points(void);
 void walk_instrument(void);
+void walk_instruments(const char *reduced_bundle);
 void walk_state(void);
 
 void walk_handles(void);

@@ -1,6 +1,6 @@
 // upt.hpp with exceptions: handles move, errors throw, spans take what a host has.
 //
-//   wrapper BUNDLE
+//   wrapper BUNDLE REDUCED
 #include "expect.h"
 
 #include <array>
@@ -12,6 +12,7 @@
 
 static_assert(!std::is_copy_constructible_v<upt::Model> && !std::is_copy_assignable_v<upt::Model>);
 static_assert(!std::is_copy_constructible_v<upt::Scene> && !std::is_copy_assignable_v<upt::Scene>);
+static_assert(!std::is_copy_constructible_v<upt::Hull> && !std::is_copy_assignable_v<upt::Hull>);
 static_assert(std::is_nothrow_move_constructible_v<upt::Model>);
 static_assert(std::is_nothrow_move_assignable_v<upt::Scene>);
 
@@ -25,8 +26,49 @@ template <typename Call> static upt_status thrown(Call call) {
   return UPT_OK;
 }
 
+// Instruments drive the steps of a bundle with a linear response.
+static void instruments(const char *bundle) {
+  upt::Model model = upt::Model::open(bundle);
+  upt::Scene scene(model);
+  const std::vector<float> rest = model.positions();
+  const std::vector<std::uint32_t> domain = model.indices(UPT_SET_DOMAIN_NODES);
+  std::vector<float> points;
+  for (int corner = 0; corner < 8; corner++) {
+    for (int axis = 0; axis < 3; axis++) {
+      points.push_back((corner >> axis & 1) != 0 ? 3.0F : -3.0F);
+    }
+  }
+  EXPECT_TRUE(thrown([&] { upt::Hull({points.data(), 4}); }) == UPT_ERR_ARGUMENT);
+  EXPECT_TRUE(thrown([&] { upt::Hull({points.data(), 12}); }) == UPT_ERR_ARGUMENT);
+  upt::Hull cube(points), empty;
+  EXPECT(empty.create(points), UPT_OK);
+  empty = std::move(cube);
+  EXPECT_TRUE(!cube && empty);
+  upt_instrument tools[2] = {empty.instrument(), upt::make<upt_instrument>()};
+  tools[0].friction = 0.2F;
+  tools[1].rotation[3] = 1.0F;
+  tools[1].radius = 2.0F;
+  for (int axis = 0; axis < 3; axis++) {
+    tools[0].position[axis] = rest[3 * domain[domain.size() / 2] + static_cast<std::size_t>(axis)];
+    tools[1].position[axis] = 900.0F;
+  }
+  std::vector<float> field(rest.size()), same(rest.size());
+  EXPECT(scene.step_instruments(tools, field), UPT_OK);
+  EXPECT(scene.step_instruments({tools, 2}), UPT_OK);
+  EXPECT(scene.submit_instruments(tools), UPT_OK);
+  EXPECT(scene.wait(60000), UPT_OK);
+  const std::vector<upt_instrument_reading> readings = scene.readings(2);
+  EXPECT_TRUE(readings[0].contact_count > 0 && readings[1].contact_count == 0);
+  EXPECT_TRUE(thrown([&] { scene.readings(1); }) == UPT_ERR_ARGUMENT);
+  EXPECT_TRUE(scene.instrument_contacts().size() == readings[0].contact_count);
+  empty.destroy();
+  EXPECT_TRUE(thrown([&] { scene.step_instruments(tools); }) == UPT_ERR_HANDLE);
+  EXPECT(scene.step_instruments({}), UPT_OK);
+  EXPECT_TRUE(scene.readings(0).empty() && scene.instrument_contacts().empty());
+}
+
 int main(int argc, char **argv) {
-  if (argc != 2) {
+  if (argc != 3) {
     return 2;
   }
   EXPECT_TRUE(upt::abi_matches());
@@ -75,6 +117,7 @@ int main(int argc, char **argv) {
   EXPECT(other.reset(), UPT_OK);
   EXPECT_TRUE(thrown([] { upt::shutdown(); }) == UPT_ERR_STATE);
   other.destroy();
+  instruments(argv[2]);
   EXPECT(upt::shutdown(), UPT_OK);
   return expect_result("wrapper");
 }

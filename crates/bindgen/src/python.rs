@@ -126,12 +126,16 @@ fn seen(source: &Source, item: &Struct, field: &Named) -> Result<Seen> {
         raw: raw.clone(),
     };
     Ok(match &field.kind {
-        Kind::Number(number) if number == "u8" && !name.starts_with("reserved") => {
+        Kind::Number(number)
+            if number == "u8"
+                && !name.starts_with("reserved")
+                && !field.doc.join(" ").contains("_*`") =>
+        {
             of("bool", "bool", Some(format!("boolean(\"_{name}\")")))
         }
         Kind::Number(number) if number.starts_with('f') => of("float", "float", None),
         Kind::Number(number) => match named_enum(source, &field.doc) {
-            Some(class) if matches!(number.as_str(), "i32" | "u32") => of(
+            Some(class) if matches!(number.as_str(), "u8" | "i32" | "u32") => of(
                 &class,
                 &format!("{class} | str | int"),
                 Some(format!("choice(\"_{name}\", {class})")),

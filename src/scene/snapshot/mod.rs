@@ -269,6 +269,8 @@ impl Core {
         let mut shared = lock_write(published);
         shared.stats = self.blank_stats();
         self.show_contacts(&mut shared);
+        #[cfg(feature = "contact")]
+        shared.tools.clear();
         Ok(())
     }
 

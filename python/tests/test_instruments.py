@@ -1,0 +1,133 @@
+"""Instruments: steps that they drive, what they read, and nodes and vectors for hosts that want them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import upt
+from conftest import FIXTURES
+
+CUBE = np.array([[x, y, z] for x in (-3, 3) for y in (-3, 3) for z in (-3, 3)], np.float32)
+
+
+@pytest.fixture(scope="module")
+def corrected() -> upt.Model:
+    """A bundle whose steps correct."""
+    return upt.Model(FIXTURES / "tiny-corrected")
+
+
+def site(model: upt.Model) -> tuple[np.ndarray, np.ndarray]:
+    """The middle of the domain's surface and the outward normal there."""
+    places = model.positions[model.domain_nodes]
+    place = places[np.argmin(np.linalg.norm(places - places.mean(axis=0), axis=1))]
+    a, b, c = (model.positions[model.domain_faces[:, corner]] for corner in range(3))
+    normal = np.cross(b - a, c - a).sum(axis=0)
+    return place, normal / np.linalg.norm(normal)
+
+
+def pressing(model: upt.Model, depth: float, radius: float = 3.0) -> np.ndarray:
+    """The centre of a ball that lies so deep in the rest surface."""
+    place, normal = site(model)
+    return place + (radius - depth) * normal
+
+
+def test_a_press_is_read_and_a_lift_ends_it(corrected):
+    _, normal = site(corrected)
+    with corrected.scene() as scene:
+        ball, other = upt.Instrument.capsule(3.0, friction=0.2), upt.Instrument.box((1, 1, 1), position=(500, 0, 0))
+        assert scene.readings() == []
+        for depth in (0.3, 0.6, 0.9):
+            ball.position = pressing(corrected, depth)
+            out = np.empty((corrected.node_count, 3), np.float32)
+            assert scene.step_instruments([ball, other], out) is out and np.abs(out).max() > 0.1
+        touched, free = scene.readings()
+        force = np.array(touched.force)
+        assert touched.contact_count > 0 and force @ normal > 0.7 * np.linalg.norm(force)
+        assert touched.penetration_mm < 0.1 and touched.torn is False and len(touched.torque) == 3
+        assert free.contact_count == 0 and free.force == (0.0, 0.0, 0.0)
+        contacts = scene.instrument_contacts()
+        assert [contact.instrument for contact in contacts] == [0] * touched.contact_count
+        np.testing.assert_allclose(np.sum([contact.force for contact in contacts], axis=0), force, rtol=1e-3, atol=1e-2)
+        assert scene.stats.contact_ms > 0
+        ball.position = pressing(corrected, -30.0)
+        scene.step_instruments([ball, other])
+        assert scene.readings()[0].force == (0.0, 0.0, 0.0) and scene.instrument_contacts() == []
+        scene.step_instruments([])
+        assert scene.readings() == []
+        scene.step_instruments([ball])
+        scene.step_contacts()
+        assert scene.readings() == []
+        scene.step_instruments([ball])
+        scene.reset()
+        assert scene.readings() == []
+
+
+@pytest.mark.parametrize("shape", ["capsule", "box", "spatula", "hull"])
+def test_each_shape_pushes_the_same_when_submitted(corrected, shape):
+    half, place = (3, 3, 3), pressing(corrected, 0.5)
+    made = {
+        "capsule": lambda: upt.Instrument.capsule(3.0, 2.0, position=place),
+        "box": lambda: upt.Instrument.box(half, position=place),
+        "spatula": lambda: upt.Instrument.spatula(half, 0.5, position=place),
+        "hull": lambda: upt.Instrument.hull(CUBE, position=place),
+    }
+    tool = made[shape]()
+    own, submitted = corrected.scene(), corrected.scene()
+    expected = own.step_instruments([tool])
+    submitted.submit_instruments([tool])
+    assert submitted.wait()
+    np.testing.assert_array_equal(submitted.read(), expected)
+    (reading,) = submitted.readings()
+    assert reading.contact_count > 0 and reading.as_dict() == own.readings()[0].as_dict()
+
+
+def test_a_grasp_pulls_and_tears_off(corrected):
+    _, normal = site(corrected)
+    with corrected.scene(corrections=5) as scene:
+        tool = upt.Instrument.capsule(3.0)
+        for depth in (0.3, 0.6, 0.9):
+            tool.position = pressing(corrected, depth)
+            scene.step_instruments([tool])
+        tool.grasp = True
+        for depth in (0.9, 0.6, 0.3, 0.0, -0.3, -0.6):
+            tool.position = pressing(corrected, depth)
+            scene.step_instruments([tool])
+        pull = np.array(scene.readings()[0].force) @ normal
+        assert pull < 0
+        tool.position, tool.tear_off = pressing(corrected, -1.2), -0.5 * pull
+        scene.step_instruments([tool])
+        assert scene.readings()[0].torn is True
+
+
+def test_bad_instruments_are_refused(corrected):
+    scene = corrected.scene()
+    with pytest.raises(upt.ArgumentError, match="friction"):
+        scene.step_instruments([upt.Instrument.capsule(2.0, friction=-1.0)])
+    with pytest.raises(upt.ArgumentError, match=r"instruments\[1\]"):
+        scene.step_instruments([upt.Instrument.capsule(2.0), upt.Instrument.capsule(-2.0)])
+    with pytest.raises(ValueError, match="rotation has 4 numbers"):
+        scene.step_instruments([upt.Instrument.capsule(2.0, rotation=(0, 0, 1))])
+    with pytest.raises(upt.ArgumentError, match="volume|plane|flat"):
+        upt.Hull(CUBE * [1, 1, 0])
+    hull = upt.Hull(CUBE)
+    tool = upt.Instrument.hull(hull)
+    hull.close()
+    with pytest.raises(upt.StateError, match="HANDLE"):
+        scene.step_instruments([tool])
+    without = upt.Model(FIXTURES / "tiny-upt").scene()
+    with pytest.raises(upt.UnsupportedError, match="linear response"):
+        without.step_instruments([upt.Instrument.capsule(2.0)])
+
+
+def test_nodes_and_vectors_for_hosts_that_want_them(model, scene):
+    node = model.domain_nodes[0]
+    tool = upt.Instrument.capsule(2.0, 5.0, position=model.positions[node])
+    nodes, vectors = scene.contacts([tool])
+    assert node in nodes and vectors.shape == (len(nodes), 3) and np.abs(vectors).max() > 0.1
+    scene.step_contacts(nodes, vectors)
+    assert scene.stats.contact_count == len(nodes)
+    force = scene.contact_force()
+    assert force.shape == vectors.shape and np.isfinite(force).all() and np.abs(force).max() > 0
+    far = upt.Instrument(shape="box", position=(1e3, 0, 0), half_extents=(1, 1, 1))
+    nodes, vectors = model.scene().contacts([far])
+    assert len(nodes) == 0 and vectors.shape == (0, 3)

@@ -1,0 +1,156 @@
+"""Rigid instruments that drive a scene's steps, and the hull of a tool of one's own."""
+
+from __future__ import annotations
+
+import ctypes
+import weakref
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from numpy.typing import ArrayLike
+
+from upt import _native
+from upt._arrays import address, vectors
+from upt._library import check, ensure_started, lib
+from upt._native import Mode, Shape
+
+
+class Hull:
+    """The convex hull of a tool's points, for `Instrument.hull`. Immutable; any thread may use it.
+
+    Args:
+        points: `[n, 3]`, mm, in the tool's own frame; 4 to 100,000, with a volume.
+
+    Raises:
+        upt.ArgumentError: points that are not finite, too few, too many or without a volume.
+    """
+
+    def __init__(self, points: ArrayLike) -> None:
+        ensure_started()
+        given = vectors(points, "points")
+        handle = ctypes.c_void_p()
+        check(lib.upt_hull_create(address(given), len(given), ctypes.byref(handle)))
+        self._handle = handle.value
+        self._destroy = weakref.finalize(self, lib.upt_hull_destroy, handle.value)
+
+    def close(self) -> None:
+        """Frees the hull; steps that were submitted with it go on. Also done when the object is collected."""
+        self._destroy()
+
+
+@dataclass
+class Instrument:
+    """A rigid instrument: the input of `Scene.step_instruments` and, but for hulls, of `Scene.contacts`.
+
+    Made by `capsule`, `box`, `spatula` or `hull`; move it by assigning `position` and `rotation`.
+    """
+
+    shape: Shape | str
+    """`upt.Shape` or its name: capsule (along local y), box, spatula (a box with rounded corners), hull."""
+    position: Sequence[float] = (0.0, 0.0, 0.0)
+    """Centre at the end of the step, mm, in the mesh's frame; a hull's origin."""
+    rotation: Sequence[float] = (0.0, 0.0, 0.0, 1.0)
+    """Unit quaternion x, y, z, w."""
+    half_extents: Sequence[float] = (0.0, 0.0, 0.0)
+    """Half sizes along the local axes, mm; a capsule's half length without its caps is `[1]`."""
+    radius: float = 0.0
+    """A capsule's radius or a spatula's corner radius, mm."""
+    friction: float = 0.0
+    """Coulomb's coefficient, 0 or more. `step_instruments` alone."""
+    grasp: bool = False
+    """Whether it holds what was within 0.5 mm of it when this became true. `step_instruments` alone."""
+    tear_off: float = 0.0
+    """A grasp lets go where the tissue pulls harder than this, mN; 0: never."""
+    sticking: bool = False
+    """`contacts` alone: touched nodes move with the instrument until it leaves."""
+    hull_of: Hull | None = None
+    """The shape of an instrument of shape hull."""
+
+    @classmethod
+    def capsule(
+        cls,
+        radius: float,
+        half_length: float = 0.0,
+        *,
+        position: Sequence[float] = (0.0, 0.0, 0.0),
+        rotation: Sequence[float] = (0.0, 0.0, 0.0, 1.0),
+        friction: float = 0.0,
+        grasp: bool = False,
+        tear_off: float = 0.0,
+    ) -> Instrument:
+        """A capsule along local y; `half_length` (mm, without the caps) 0 is a sphere."""
+        half = (0.0, half_length, 0.0)
+        return cls(Shape.CAPSULE, position, rotation, half, radius, friction, grasp, tear_off)
+
+    @classmethod
+    def box(
+        cls,
+        half_extents: Sequence[float],
+        *,
+        position: Sequence[float] = (0.0, 0.0, 0.0),
+        rotation: Sequence[float] = (0.0, 0.0, 0.0, 1.0),
+        friction: float = 0.0,
+        grasp: bool = False,
+        tear_off: float = 0.0,
+    ) -> Instrument:
+        """A box of these half sizes, mm."""
+        return cls(Shape.BOX, position, rotation, half_extents, 0.0, friction, grasp, tear_off)
+
+    @classmethod
+    def spatula(
+        cls,
+        half_extents: Sequence[float],
+        radius: float,
+        *,
+        position: Sequence[float] = (0.0, 0.0, 0.0),
+        rotation: Sequence[float] = (0.0, 0.0, 0.0, 1.0),
+        friction: float = 0.0,
+        grasp: bool = False,
+        tear_off: float = 0.0,
+    ) -> Instrument:
+        """A box of these half sizes rounded by `radius`, mm."""
+        return cls(Shape.SPATULA, position, rotation, half_extents, radius, friction, grasp, tear_off)
+
+    @classmethod
+    def hull(
+        cls,
+        hull: Hull | ArrayLike,
+        *,
+        position: Sequence[float] = (0.0, 0.0, 0.0),
+        rotation: Sequence[float] = (0.0, 0.0, 0.0, 1.0),
+        friction: float = 0.0,
+        grasp: bool = False,
+        tear_off: float = 0.0,
+    ) -> Instrument:
+        """The convex hull of points `[n, 3]`, mm, in the tool's own frame, or a `Hull` that several share."""
+        made = hull if isinstance(hull, Hull) else Hull(hull)
+        return cls(
+            Shape.HULL,
+            position,
+            rotation,
+            friction=friction,
+            grasp=grasp,
+            tear_off=tear_off,
+            hull_of=made,
+        )
+
+    def record(self) -> _native.Instrument:
+        """As the C ABI's struct. It does not keep the hull alive."""
+        return _native.Instrument(
+            shape=self.shape,
+            position=self.position,
+            rotation=self.rotation,
+            half_extents=self.half_extents,
+            radius=self.radius,
+            sticking=self.sticking,
+            mode=Mode.GRASP if self.grasp else Mode.SLIDE,
+            friction=self.friction,
+            tear_off_mn=self.tear_off,
+            hull=None if self.hull_of is None else self.hull_of._handle,
+        )
+
+
+def records(instruments: Sequence[Instrument]) -> tuple[ctypes.Array[_native.Instrument] | None, int]:
+    """As an array for the C ABI (None where there are no instruments), and its length."""
+    made = [one.record() for one in instruments]
+    return ((_native.Instrument * len(made))(*made) if made else None), len(made)
