@@ -21,6 +21,9 @@ namespace Upt.Editor
             "guard: growth",
             "correction bounded",
             "contact block regularised",
+            "corrections ended inverted: the linear response is shown",
+            "estimated error above the limit",
+            "tissue more than 1 mm inside of an instrument",
         };
 
         public override void OnInspectorGUI()
@@ -29,8 +32,15 @@ namespace Upt.Editor
             SoftTissue tissue = (SoftTissue)target;
             if (!Application.isPlaying || !tissue.IsRunning) return;
             upt_scene_stats stats = tissue.LastStats;
-            EditorGUILayout.LabelField("Step", stats.step_ms.ToString("0.000") + " ms, " + stats.contact_count +
-                                                   " nodes in contact" + (stats.sleeping != 0 ? ", asleep" : ""));
+            EditorGUILayout.LabelField("Step", stats.step_ms.ToString("0.000") + " ms, " + tissue.ContactCount +
+                                                   " contacts" + (stats.sleeping != 0 ? ", asleep" : ""));
+            foreach (Instrument instrument in tissue.instruments)
+            {
+                InstrumentReading reading;
+                if (tissue.TryGetReading(instrument, out reading))
+                    EditorGUILayout.LabelField(instrument.name, reading.force.magnitude.ToString("0") + " mN, penetration " +
+                                                                    reading.penetration.ToString("0.00") + " mm");
+            }
             for (int i = 0; i < FlagNames.Length; i++)
                 if ((stats.flags & (1u << i)) != 0) EditorGUILayout.HelpBox(FlagNames[i], MessageType.Warning);
             Repaint();
@@ -42,7 +52,7 @@ namespace Upt.Editor
         }
 
         /// <summary>In play mode: the border of the trained domain, green, or red when a flag is set, and a yellow cube
-        /// where each node in contact is taken.</summary>
+        /// at each contact.</summary>
         [DrawGizmo(GizmoType.Selected)]
         private static void DrawDomain(SoftTissue tissue, GizmoType kind)
         {

@@ -192,6 +192,7 @@ namespace UnityEngine
         }
     }
 
+    public class MeshCollider : Component { public Mesh sharedMesh; }
     public class MeshFilter : Component { public Mesh sharedMesh; }
     public class MeshRenderer : Component { public Material sharedMaterial; }
     public class Shader : Object { public static Shader Find(string name) { return new Shader(); } }

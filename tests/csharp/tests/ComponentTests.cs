@@ -99,6 +99,82 @@ namespace Upt.Tests
         }
 
         [Test]
+        public void ThePressedSpatulaIsPushedBack()
+        {
+            PushedBrain sample = Sample();
+            SoftTissue tissue = sample.Tissue;
+            if (!tissue.SolvesContact) Assert.Ignore("the test bundle has no linear response");
+            Instrument spatula = tissue.instruments[0];
+            InstrumentReading reading;
+            Assert.That(tissue.TryGetReading(spatula, out reading), Is.False, "no step has been made");
+            float largest = 0f, outward = 0f, deepest = 0f;
+            Play(sample.gameObject, tissue, 120, frame =>
+            {
+                if (!tissue.TryGetReading(spatula, out reading) || reading.force.magnitude <= largest) return;
+                largest = reading.force.magnitude;
+                // The sample's spatula looks out of the tissue.
+                outward = Vector3.Dot(reading.force, spatula.transform.rotation * new Vector3(0f, 0f, 1f));
+                deepest = reading.penetration;
+                Assert.That(reading.contactCount, Is.EqualTo(tissue.ContactCount));
+            });
+            Assert.That(Debug.Errors, Is.Empty);
+            Assert.That(largest, Is.GreaterThan(1f), "mN");
+            Assert.That(outward, Is.GreaterThan(0.7f * largest));
+            Assert.That(deepest, Is.LessThan(1f));
+            spatula.gameObject.SetActive(false);
+            Play(sample.gameObject, tissue, 12, frame => { });
+            Assert.That(tissue.TryGetReading(spatula, out reading), Is.False, "it takes no part");
+            Assert.That(tissue.ContactCount, Is.EqualTo(0));
+            sample.gameObject.SetActive(false);
+        }
+
+        [Test]
+        public void TheHullOfACollidersMeshPushesAsTheBoxOfItsSize()
+        {
+            float[] forces = new float[2];
+            for (int turn = 0; turn < 2; turn++)
+            {
+                PushedBrain sample = Sample();
+                SoftTissue tissue = sample.Tissue;
+                if (!tissue.SolvesContact) Assert.Ignore("the test bundle has no linear response");
+                Instrument tool = tissue.instruments[0];
+                tool.shape = turn == 0 ? InstrumentShape.Box : InstrumentShape.Hull;
+                Vector3 half = tool.halfExtents * 0.001f;
+                Mesh mesh = new Mesh();
+                Vector3[] corners = new Vector3[8];
+                for (int i = 0; i < 8; i++)
+                    corners[i] = new Vector3((i & 1) != 0 ? half.x : -half.x, (i & 2) != 0 ? half.y : -half.y,
+                                             (i & 4) != 0 ? half.z : -half.z);
+                mesh.vertices = corners;
+                tool.hull = tool.gameObject.AddComponent<MeshCollider>();
+                tool.hull.sharedMesh = mesh;
+                tool.hull.gameObject = tool.gameObject;
+                InstrumentReading reading = default(InstrumentReading);
+                Play(sample.gameObject, tissue, 100, frame =>
+                {
+                    InstrumentReading now;
+                    if (tissue.TryGetReading(tool, out now)) reading = now;
+                });
+                Assert.That(Debug.Errors, Is.Empty);
+                forces[turn] = reading.force.magnitude;
+                sample.gameObject.SetActive(false);
+            }
+            Assert.That(forces[0], Is.GreaterThan(1f));
+            Assert.That(forces[1], Is.EqualTo(forces[0]).Within(0.05f * forces[0]));
+        }
+
+        [Test]
+        public void AHullWithoutAMeshIsOneConsoleErrorThatSaysWhatToAssign()
+        {
+            PushedBrain sample = Sample();
+            sample.Tissue.instruments[0].shape = InstrumentShape.Hull;
+            Play(sample.gameObject, sample.Tissue, 6, frame => { });
+            Assert.That(Debug.Errors.Count, Is.EqualTo(1));
+            Assert.That(Debug.Errors[0], Is.StringContaining("'Hull'"));
+            sample.gameObject.SetActive(false);
+        }
+
+        [Test]
         public void TheDomainsBorderIsClosed()
         {
             SoftTissue tissue = Tissue();

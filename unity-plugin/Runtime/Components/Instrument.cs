@@ -9,13 +9,14 @@ namespace Upt
         Capsule = 0,
         Box = 1,
         Spatula = 2,
+        Hull = 3,
     }
 
     /// <summary>An instrument that pushes tissue: its pose is the transform's. Sizes are in
     /// millimetres.</summary>
     public sealed class Instrument : MonoBehaviour
     {
-        [Tooltip("Capsule, box, or spatula (a box with rounded corners).")]
+        [Tooltip("Capsule, box, spatula (a box with rounded corners), or the convex hull of a collider's mesh.")]
         public InstrumentShape shape = InstrumentShape.Spatula;
 
         [Tooltip("Half extents, mm. A capsule uses y: half its length without the caps.")]
@@ -24,8 +25,24 @@ namespace Upt
         [Tooltip("Radius of the capsule, or of the spatula's rounding, mm.")]
         public float radius = 1f;
 
-        [Tooltip("Tissue in contact sticks to the instrument instead of sliding along it.")]
+        [Tooltip("Shape Hull: the collider whose mesh is taken, on this object or one that is fixed to it. Its mesh needs Read/Write.")]
+        public MeshCollider hull;
+
+        [Tooltip("Coulomb's coefficient of friction, 0 or more.")]
+        public float friction = 0.2f;
+
+        [Tooltip("Holds the tissue that is within 0.5 mm when this is turned on, until it is turned off or tears off.")]
+        public bool grasp = false;
+
+        [Tooltip("A grasp lets go where the tissue pulls harder than this, mN. 0: never.")]
+        public float tearOff = 0f;
+
+        [Tooltip("Models without a linear response alone: tissue in contact sticks to the instrument instead of sliding along it.")]
         public bool sticking = false;
+
+        private Hull made;
+        private Mesh madeOf;
+        private float madeAt;
 
         private float shownScale = 0.001f;
 
@@ -46,7 +63,40 @@ namespace Upt
             if (shape == InstrumentShape.Capsule) TurnCapsule(ref instrument);
             instrument.radius = radius;
             instrument.sticking = (byte)(sticking ? 1 : 0);
+            instrument.friction = friction;
+            instrument.mode = (byte)(grasp ? Native.UPT_MODE_GRASP : Native.UPT_MODE_SLIDE);
+            instrument.tear_off_mn = tearOff;
+            if (shape == InstrumentShape.Hull) instrument.hull = HullAt(unitsPerMillimetre);
             return instrument;
+        }
+
+        private void OnDisable()
+        {
+            if (made != null) made.Dispose();
+            made = null;
+        }
+
+        /// <summary>The hull of the collider's mesh; made once for a mesh and a scale.</summary>
+        private unsafe System.IntPtr HullAt(float unitsPerMillimetre)
+        {
+            Mesh mesh = hull == null ? null : hull.sharedMesh;
+            if (mesh == null)
+                throw new System.InvalidOperationException("instrument '" + name + "': assign a MeshCollider with a mesh to the field 'Hull'");
+            if (made != null && madeOf == mesh && madeAt == unitsPerMillimetre) return made.Pointer;
+            if (!mesh.isReadable)
+                throw new System.InvalidOperationException("instrument '" + name + "': turn on Read/Write in the import settings of mesh '" + mesh.name + "'");
+            Vector3[] vertices = mesh.vertices;
+            float[] points = new float[3 * vertices.Length];
+            Quaternion turn = Quaternion.Inverse(transform.rotation);
+            fixed (float* p = points)
+                for (int i = 0; i < vertices.Length; i++)
+                    Anatomical.FromUnity(turn * (hull.transform.TransformPoint(vertices[i]) - transform.position),
+                                         unitsPerMillimetre, p + 3 * i);
+            if (made != null) made.Dispose();
+            made = new Hull(points);
+            madeOf = mesh;
+            madeAt = unitsPerMillimetre;
+            return made.Pointer;
         }
 
         /// <summary>A Unity capsule lies along Unity's y, which is RAS z; the library's lies along its own
@@ -69,6 +119,7 @@ namespace Upt
             // Sizes are millimetres of tissue: the transform's own scale has no part in them.
             Gizmos.matrix = Matrix4x4.TRS(transform.position, transform.rotation, new Vector3(shownScale, shownScale, shownScale));
             Gizmos.color = Color.cyan;
+            if (shape == InstrumentShape.Hull) return; // the collider draws itself
             if (shape == InstrumentShape.Capsule)
             {
                 Vector3 half = new Vector3(0f, halfExtents.y, 0f);

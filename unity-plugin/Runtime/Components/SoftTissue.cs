@@ -44,6 +44,12 @@ namespace Upt
         private uint[] contactNodes;
         private float[] contactVectors;
         private int contactCount;
+        private bool solvesContact;
+        private Instrument[] places = new Instrument[4];
+        private upt_instrument_reading[] readings = new upt_instrument_reading[4];
+        private upt_instrument_contact[] pushes = new upt_instrument_contact[64];
+        private int submittedCount;
+        private int readingCount;
         private bool inFlight;
         private bool refused;
         private bool failed;
@@ -51,7 +57,29 @@ namespace Upt
         /// <summary>Statistics of the last finished step: stage times in ms, envelope flags.</summary>
         public upt_scene_stats LastStats { get; private set; }
 
-        /// <summary>Nodes in contact in the last submitted step.</summary>
+        /// <summary>Whether the model solves the contact of instruments. Others (models without a linear response) take the
+        /// nodes that instruments touch, and have no readings.</summary>
+        public bool SolvesContact
+        {
+            get { return solvesContact; }
+        }
+
+        /// <summary>What the tissue did to <paramref name="instrument"/> in the last finished step; false where it took
+        /// no part in it.</summary>
+        public bool TryGetReading(Instrument instrument, out InstrumentReading reading)
+        {
+            for (int i = 0; i < readingCount; i++)
+            {
+                if (instrument == null || places[i] != instrument) continue;
+                reading = InstrumentReading.From(readings[i], transform.rotation);
+                return true;
+            }
+            reading = default(InstrumentReading);
+            return false;
+        }
+
+        /// <summary>Points of the tissue that push or hold instruments in the last finished step; where contact is not
+        /// solved, nodes in contact in the last submitted one.</summary>
         public int ContactCount
         {
             get { return contactCount; }
@@ -77,9 +105,17 @@ namespace Upt
             return geometry == null ? new Vector3[0] : geometry.DomainOutline();
         }
 
-        /// <summary>Where the nodes in contact are taken, local space. Allocates: for gizmos.</summary>
-        public Vector3[] ContactPoints()
+        /// <summary>Where the tissue touches instruments, local space. Allocates: for gizmos.</summary>
+        public unsafe Vector3[] ContactPoints()
         {
+            if (solvesContact)
+            {
+                Vector3[] points = new Vector3[contactCount];
+                for (int i = 0; i < contactCount; i++)
+                    fixed (float* p = pushes[i].position)
+                        points[i] = Anatomical.ToUnity(p[0], p[1], p[2], unitsPerMillimetre);
+                return points;
+            }
             return geometry == null ? new Vector3[0] : geometry.Displaced(contactNodes, contactVectors, contactCount);
         }
 
@@ -134,6 +170,8 @@ namespace Upt
             refused = false;
             failed = false;
             scene.Reset();
+            readingCount = 0;
+            contactCount = 0;
             LastStats = scene.Stats();
             playhead = new Playhead(playhead.Step);
         }
@@ -149,6 +187,7 @@ namespace Upt
             surface = new SurfaceMesh(native, renderMesh != null ? renderMesh : shownBefore, unitsPerMillimetre);
             // Render vertices between nodes are interpolated: decoding them costs a step more and is no more accurate.
             scene = new Scene(native, new upt_scene_options { interpolate_points = 1 });
+            solvesContact = Solves(scene);
             uint[] touchable = native.Indices(Native.UPT_SET_SURFACE_NODES);
             // What instruments touch; the attached points' nodes are decoded beside it, the rest of the volume is not.
             scene.SetRegion(touchable);
@@ -175,6 +214,8 @@ namespace Upt
             shownBefore = null;
             geometry = null;
             contactCount = 0;
+            readingCount = 0;
+            submittedCount = 0;
             inFlight = false;
             refused = false;
             acquired = false;
@@ -196,8 +237,7 @@ namespace Upt
                 surface.Upload(recalculateNormals);
             }
             if (inFlight || !playhead.IsDue) return;
-            using (ContactMarker.Auto()) GatherContacts();
-            scene.Submit(contactNodes, contactVectors, contactCount);
+            using (ContactMarker.Auto()) Submit();
             inFlight = true;
             playhead.Submitted();
         }
@@ -219,6 +259,12 @@ namespace Upt
             inFlight = false;
             refused = false;
             LastStats = scene.Stats();
+            if (solvesContact)
+            {
+                scene.Readings(readings, submittedCount);
+                readingCount = submittedCount;
+                contactCount = scene.InstrumentContacts(ref pushes);
+            }
             StepCounters.Add(LastStats);
             playhead.Landed();
         }
@@ -233,14 +279,60 @@ namespace Upt
             refused = true;
         }
 
-        private void GatherContacts()
+        /// <summary>Hands the instruments' poses to the worker. Each keeps its place of the list, by which the scene knows it:
+        /// one that takes no part is far away.</summary>
+        private void Submit()
         {
-            if (poses.Length < instruments.Count) poses = new upt_instrument[2 * instruments.Count];
-            int count = 0;
-            for (int i = 0; i < instruments.Count; i++)
-                if (instruments[i] != null && instruments[i].isActiveAndEnabled)
-                    poses[count++] = instruments[i].PoseIn(transform, unitsPerMillimetre);
+            int count = instruments.Count;
+            if (poses.Length < count)
+            {
+                poses = new upt_instrument[2 * count];
+                places = new Instrument[2 * count];
+                readings = new upt_instrument_reading[2 * count];
+                readingCount = 0;
+            }
+            for (int i = 0; i < count; i++)
+            {
+                bool takesPart = instruments[i] != null && instruments[i].isActiveAndEnabled;
+                places[i] = takesPart ? instruments[i] : null;
+                poses[i] = takesPart ? instruments[i].PoseIn(transform, unitsPerMillimetre) : FarAway();
+            }
+            submittedCount = count;
+            if (solvesContact)
+            {
+                scene.SubmitInstruments(poses, count);
+                return;
+            }
             contactCount = count == 0 ? 0 : scene.ContactsFrom(poses, count, contactNodes, contactVectors);
+            scene.Submit(contactNodes, contactVectors, contactCount);
+        }
+
+        /// <summary>A small sphere that touches nothing.</summary>
+        private static unsafe upt_instrument FarAway()
+        {
+            upt_instrument sphere = default(upt_instrument);
+            sphere.struct_size = (uint)sizeof(upt_instrument);
+            sphere.shape = Native.UPT_SHAPE_CAPSULE;
+            sphere.position[0] = 5000f;
+            sphere.rotation[3] = 1f;
+            sphere.radius = 1f;
+            return sphere;
+        }
+
+        /// <summary>Whether the bundle has a linear response to solve contact with. The scene is at rest after it.</summary>
+        private static bool Solves(Scene scene)
+        {
+            try
+            {
+                scene.StepInstruments(null, 0, null);
+            }
+            catch (UptException error)
+            {
+                if (error.Status != Native.UPT_ERR_UNSUPPORTED) throw;
+                return false;
+            }
+            scene.Reset();
+            return true;
         }
 
         private void Fail(string what, Exception error)

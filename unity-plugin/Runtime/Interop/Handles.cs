@@ -47,4 +47,23 @@ namespace Upt.Interop
             return released;
         }
     }
+
+    /// <summary>Owns a <c>upt_hull*</c>.</summary>
+    internal sealed class HullHandle : SafeHandle
+    {
+        public HullHandle(IntPtr pointer) : base(IntPtr.Zero, true)
+        {
+            SetHandle(pointer);
+        }
+
+        public override bool IsInvalid
+        {
+            get { return handle == IntPtr.Zero; }
+        }
+
+        protected override bool ReleaseHandle()
+        {
+            return Native.upt_hull_destroy(handle) == Native.UPT_OK;
+        }
+    }
 }
