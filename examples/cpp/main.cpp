@@ -151,14 +151,17 @@ static void run(const Options &options) {
       pressed = window.button(GLFW_MOUSE_BUTTON_LEFT);
       spatula.hover(tissue.pick(ray), ray);
       if (glfwGetKey(window.handle, GLFW_KEY_R) == GLFW_PRESS) {
-        tissue.finish();
-        tissue.scene().reset();
+        tissue.reset();
       }
     }
     spatula.move(static_cast<float>(std::min(now - last, 0.1)), pressed);
     last = now;
 
-    tissue.advance(now, spatula.contacts(tissue));
+    if (tissue.solves_contact()) {
+      tissue.advance(now, spatula.instruments());
+    } else {
+      tissue.advance(now, spatula.contacts(tissue));
+    }
     if (options.headless) {
       tissue.finish();
     }
@@ -181,7 +184,16 @@ static void run(const Options &options) {
               static_cast<unsigned long long>(stats.step_count), tissue.median_step_ms(),
               static_cast<double>(std::max(spatula.depth(), 0.0F)),
               static_cast<double>(tissue.max_displacement()),
-              spatula.library_contacts() ? "the library" : "the simulator");
+              tissue.solves_contact()      ? "the library's solve"
+              : spatula.library_contacts() ? "the library's nodes"
+                                           : "the simulator");
+  if (tissue.reading()) {
+    const upt_instrument_reading &felt = *tissue.reading();
+    std::printf("the spatula feels %.0f mN at %u points, penetration %.2f mm; flags: %s\n",
+                static_cast<double>(length(Vec3{felt.force[0], felt.force[1], felt.force[2]})),
+                felt.contact_count, static_cast<double>(felt.penetration_mm),
+                flag_names(stats.flags).c_str());
+  }
 }
 
 int main(int argc, char **argv) {

@@ -4,6 +4,8 @@
 
 // Speeds, mm/s, and heights over the surface, mm.
 static constexpr float DOWN = 14, UP = 40, HOVER = 4, DRAG_LIMIT = 5;
+// Coulomb's coefficient of a dry blade on tissue.
+static constexpr float FRICTION = 0.4F;
 // Nodes this far over or under the touched point, along the blade's normal, belong to the same
 // patch, mm. Those over it are pushed further than the blade's depth.
 static constexpr float OVER = 2, UNDER = 9;
@@ -70,19 +72,29 @@ static std::array<float, 4> quaternion(const Frame &f) {
   return q;
 }
 
-bool Spatula::library(Tissue &tissue, Contacts &out) {
+upt_instrument Spatula::blade() const {
   upt_instrument blade = upt::make<upt_instrument>();
   const Vec3 position = centre();
   const std::array<float, 4> rotation = quaternion(frame_);
   blade.shape = UPT_SHAPE_SPATULA;
   blade.sticking = 1;
+  blade.friction = FRICTION;
   const float values[3] = {position.x, position.y, position.z};
   std::copy(values, values + 3, blade.position);
   std::copy(rotation.begin(), rotation.end(), blade.rotation);
   const float half[3] = {HALF.x, HALF.y, HALF.z};
   std::copy(half, half + 3, blade.half_extents);
   blade.radius = 0.5F;
+  return blade;
+}
 
+std::vector<upt_instrument> Spatula::instruments() const {
+  return visible_ && engaged_ ? std::vector<upt_instrument>{blade()}
+                              : std::vector<upt_instrument>{};
+}
+
+bool Spatula::library(Tissue &tissue, Contacts &out) {
+  const upt_instrument blade = this->blade();
   out.nodes.resize(tissue.domain().size());
   out.vectors.resize(3 * out.nodes.size());
   std::uint64_t count = 0;

@@ -1,5 +1,5 @@
-// The spatula: follows the mouse over the tissue, presses while the button is down, and says which
-// nodes it touches.
+// The spatula: follows the mouse over the tissue and presses while the button is down. Where the
+// bundle solves contact it drives the steps as a rigid instrument, else it says which nodes it touches.
 #pragma once
 
 #include "tissue.hpp"
@@ -15,7 +15,9 @@ public:
   void hover(const std::optional<Hit> &hit, const Ray &ray);
   // Moves for `seconds`: down while `pressed`, back up after.
   void move(float seconds, bool pressed);
-  // Contact nodes and displacements at the present pose. Uses the library's instruments where this
+  // The blade while it is at the tissue; none: it hovers.
+  std::vector<upt_instrument> instruments() const;
+  // Contact nodes and displacements at the present pose, for bundles without a linear response. Uses the library's instruments where this
   // build and bundle have them, else its own rule: nodes below the blade move down to its plane and
   // along with it.
   Contacts contacts(Tissue &tissue);
@@ -27,6 +29,7 @@ public:
   const Frame &frame() const { return frame_; }
 
 private:
+  upt_instrument blade() const;
   bool library(Tissue &tissue, Contacts &out);
   void own(const Tissue &tissue, Contacts &out) const;
 

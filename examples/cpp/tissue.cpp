@@ -18,6 +18,17 @@ Tissue::Tissue(const std::string &bundle) : model_(upt::Model::open(bundle)), sc
     rest_.push_back(at(positions, node));
   }
 
+  // A bundle without a linear response has nothing to solve contact with; a library may lack the feature.
+  try {
+    scene_.step_instruments({});
+    scene_.reset();
+  } catch (const upt::error &error) {
+    if (error.status() != UPT_ERR_UNSUPPORTED) {
+      throw;
+    }
+    solves_contact_ = false;
+  }
+
   // Only the surface is drawn, so only the surface is decoded.
   scene_.set_region(surface_);
   std::vector<std::uint32_t> vertex_of(rest_.size(), 0);
@@ -78,18 +89,40 @@ void Tissue::find_cavities() {
   }
 }
 
-void Tissue::advance(double now, const Contacts &contacts) {
+bool Tissue::is_due(double now) {
   if (in_flight_) {
     if (scene_.poll() == UPT_PENDING) {
-      return; // the frame does not wait
+      return false; // the frame does not wait
     }
     count_step();
   }
-  if (now - last_start_ + 1e-9 >= info_.dt) {
+  return now - last_start_ + 1e-9 >= info_.dt;
+}
+
+void Tissue::started(double now, std::size_t instruments) {
+  in_flight_ = true;
+  instruments_ = instruments;
+  last_start_ = std::max(last_start_ + info_.dt, now - info_.dt);
+}
+
+void Tissue::advance(double now, const Contacts &contacts) {
+  if (is_due(now)) {
     scene_.submit(contacts.nodes, contacts.vectors);
-    in_flight_ = true;
-    last_start_ = std::max(last_start_ + info_.dt, now - info_.dt);
+    started(now, 0);
   }
+}
+
+void Tissue::advance(double now, upt::span<const upt_instrument> instruments) {
+  if (is_due(now)) {
+    scene_.submit_instruments(instruments);
+    started(now, instruments.size());
+  }
+}
+
+void Tissue::reset() {
+  finish();
+  scene_.reset();
+  reading_.reset();
 }
 
 void Tissue::finish() {
@@ -102,6 +135,10 @@ void Tissue::finish() {
 void Tissue::count_step() {
   const auto last = stats();
   in_flight_ = false;
+  reading_.reset();
+  if (instruments_ > 0) {
+    reading_ = scene_.readings(instruments_).front();
+  }
   counted_steps_ = last.step_count;
   step_ms_.push_back(last.step_ms);
 }

@@ -30,6 +30,12 @@ public:
 
   // Starts a step when the last one has finished and its time has come. `now`: seconds.
   void advance(double now, const Contacts &contacts);
+  // The same with a rigid instrument whose contact the library solves; none: a free step.
+  void advance(double now, upt::span<const upt_instrument> instruments);
+  // Whether the bundle and this build solve contact: then instruments drive the steps.
+  bool solves_contact() const { return solves_contact_; }
+  // What the tissue did to the first instrument of the last finished step; none: it had none.
+  const std::optional<upt_instrument_reading> &reading() const { return reading_; }
   // Waits for the step in flight (for pictures that must not depend on the machine's speed).
   void finish();
   // Positions, normals and displacements of the surface at `now`.
@@ -44,6 +50,7 @@ public:
   upt::Scene &scene() { return scene_; }
   const upt_model_info &info() const { return info_; }
   upt_scene_stats stats() const { return scene_.stats(); }
+  void reset();
 
   // Per surface vertex: position 3, normal 3, displacement 1, cavity 1 (above 0 in a sulcus).
   static constexpr std::size_t VERTEX_FLOATS = 8;
@@ -59,6 +66,9 @@ private:
   Vec3 position(std::uint32_t vertex) const;
   void find_cavities();
   void count_step();
+  // Whether a step may start at `now`: the last one has finished and the time has come.
+  bool is_due(double now);
+  void started(double now, std::size_t instruments);
   void fill(const std::vector<float> &displacement);
 
   upt::Model model_;
@@ -74,7 +84,9 @@ private:
   std::vector<double> step_ms_;
   Vec3 centre_;
   float radius_ = 0, max_displacement_ = 0;
-  bool in_flight_ = false;
+  bool in_flight_ = false, solves_contact_ = true;
+  std::size_t instruments_ = 0; // of the step in flight
+  std::optional<upt_instrument_reading> reading_;
   std::uint64_t counted_steps_ = 0;
   double last_start_ = -1e9;
 };

@@ -1,6 +1,7 @@
 #include "view.hpp"
 
 #include <algorithm>
+#include <cctype>
 #include <cstdio>
 
 // Rest colour to dark red; the legend uses the same ramp.
@@ -182,6 +183,28 @@ void View::draw(const Tissue &tissue, const Spatula &spatula, const Camera &came
   draw_numbers(tissue, spatula, width, height, frame_ms);
 }
 
+std::string flag_names(std::uint32_t flags) {
+  static const struct {
+    std::uint32_t flag;
+    const char *name;
+  } names[] = {
+      {UPT_FLAG_PUSH, "push"},           {UPT_FLAG_CONTACT_AREA, "area"},
+      {UPT_FLAG_SITE, "site"},           {UPT_FLAG_RATE, "rate"},
+      {UPT_FLAG_SITES, "sites"},         {UPT_FLAG_BOUND, "bound"},
+      {UPT_FLAG_NON_FINITE, "nonfinite"}, {UPT_FLAG_INVERTED, "inverted"},
+      {UPT_FLAG_GROWTH, "growth"},       {UPT_FLAG_CLAMPED, "clamped"},
+      {UPT_FLAG_REGULARISED, "regularised"}, {UPT_FLAG_FELL_BACK, "fell back"},
+      {UPT_FLAG_ERROR, "error"},         {UPT_FLAG_DEEP, "deep"},
+  };
+  std::string out;
+  for (const auto &entry : names) {
+    if ((flags & entry.flag) != 0) {
+      out += (out.empty() ? "" : ", ") + std::string(entry.name);
+    }
+  }
+  return out.empty() ? "none" : out;
+}
+
 void View::draw_numbers(const Tissue &tissue, const Spatula &spatula, int width, int height,
                         double frame_ms) {
   const Vec3 bright = {0.92F, 0.94F, 0.96F}, dim = {0.62F, 0.68F, 0.74F};
@@ -196,6 +219,19 @@ void View::draw_numbers(const Tissue &tissue, const Spatula &spatula, int width,
                 static_cast<double>(std::max(spatula.depth(), 0.0F)),
                 static_cast<double>(tissue.max_displacement()), stats.sleeping ? "   ASLEEP" : "");
   overlay_.text(16, 38, 2, line, dim);
+  if (tissue.reading()) {
+    const upt_instrument_reading &felt = *tissue.reading();
+    std::snprintf(line, sizeof line, "FORCE %5.0f MN   PENETRATION %4.2f MM",
+                  static_cast<double>(length(Vec3{felt.force[0], felt.force[1], felt.force[2]})),
+                  static_cast<double>(felt.penetration_mm));
+    overlay_.text(16, 60, 2, line, bright);
+  }
+  if (stats.flags != 0) {
+    std::string names = "FLAGS: " + flag_names(stats.flags);
+    std::transform(names.begin(), names.end(), names.begin(),
+                   [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
+    overlay_.text(16, 82, 2, names, {0.95F, 0.72F, 0.29F});
+  }
   overlay_.text(16, static_cast<float>(height) - 28, 2,
                 "LEFT: PRESS   RIGHT: TURN   WHEEL: ZOOM   R: RESET", dim);
 

@@ -6,6 +6,9 @@
 #include "spatula.hpp"
 #include "tissue.hpp"
 
+// The flags of a step in words.
+std::string flag_names(std::uint32_t flags);
+
 class View {
 public:
   // Colours span 0 to `scale_mm` of displacement.
