@@ -209,8 +209,8 @@ private:
   upt_model *handle_ = nullptr;
 };
 
-/// The convex hull of a tool's points, for instruments of shape UPT_SHAPE_HULL. Immutable: any thread
-/// may use it. It must live while instruments that name it are handed to a scene.
+/// The convex hull of a tool's points, for instruments of shape UPT_SHAPE_HULL. Immutable: any
+/// thread may use it. It must live while instruments that name it are handed to a scene.
 class Hull {
 public:
   Hull() noexcept = default;

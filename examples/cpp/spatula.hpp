@@ -1,5 +1,6 @@
 // The spatula: follows the mouse over the tissue and presses while the button is down. Where the
-// bundle solves contact it drives the steps as a rigid instrument, else it says which nodes it touches.
+// bundle solves contact it drives the steps as a rigid instrument, else it says which nodes it
+// touches.
 #pragma once
 
 #include "tissue.hpp"
@@ -17,8 +18,8 @@ public:
   void move(float seconds, bool pressed);
   // The blade while it is at the tissue; none: it hovers.
   std::vector<upt_instrument> instruments() const;
-  // Contact nodes and displacements at the present pose, for bundles without a linear response. Uses the library's instruments where this
-  // build and bundle have them, else its own rule: nodes below the blade move down to its plane and
+  // Contact nodes and displacements at the present pose, for bundles without a linear response. Uses
+  // the library's instruments where this build and bundle have them, else its own rule: nodes below the blade move down to its plane and
   // along with it.
   Contacts contacts(Tissue &tissue);
 

@@ -18,7 +18,8 @@ Tissue::Tissue(const std::string &bundle) : model_(upt::Model::open(bundle)), sc
     rest_.push_back(at(positions, node));
   }
 
-  // A bundle without a linear response has nothing to solve contact with; a library may lack the feature.
+  // A bundle without a linear response has nothing to solve contact with; a library may lack the
+  // feature.
   try {
     scene_.step_instruments({});
     scene_.reset();

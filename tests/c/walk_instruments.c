@@ -1,4 +1,5 @@
-/* Steps that instruments drive, on a bundle with a linear response: shapes, hulls, readings, misuse. */
+/* Steps that instruments drive, on a bundle with a linear response: shapes, hulls, readings,
+ * misuse. */
 #include <math.h>
 #include <stdlib.h>
 
