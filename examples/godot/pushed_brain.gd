@@ -21,6 +21,9 @@ var step := 0
 var options := {}
 var largest := 0.0
 var most_contacts := 0
+var largest_force := 0.0
+var deepest := 0.0
+var seen_flags := 0
 var upload_ms := 0.0
 var finished := false
 
@@ -42,6 +45,7 @@ func _ready() -> void:
 	material.roughness = 0.55
 	tissue.material_override = material
 	find_site()
+	tissue.hold(0.2, false, 0.0)
 	build_scene()
 	show_surface(rest)
 
@@ -58,6 +62,9 @@ func _physics_process(_delta: float) -> void:
 		finish("a step failed: " + tissue.message())
 		return
 	most_contacts = maxi(most_contacts, tissue.contact_count())
+	largest_force = maxf(largest_force, tissue.force().length())
+	deepest = maxf(deepest, tissue.penetration())
+	seen_flags |= tissue.flags()
 	var started := Time.get_ticks_usec()
 	var now := tissue.vertices()
 	show_surface(now)
@@ -91,7 +98,7 @@ func check_rest() -> void:
 		if left > 0.0005:
 			finish("10 s after release %.2f mm are left" % (1000.0 * left))
 			return
-	print("OK %d steps, %d nodes in contact at most, largest displacement %.2f mm, step %.2f ms, mesh upload at most %.2f ms for %d vertices" % [step, most_contacts, 1000.0 * largest, tissue.step_ms(), upload_ms, rest.size()])
+	print("OK %d steps, %d points in contact at most, force at most %.0f mN, penetration at most %.2f mm, flags %d, largest displacement %.2f mm, step %.2f ms, mesh upload at most %.2f ms for %d vertices" % [step, most_contacts, largest_force, deepest, seen_flags, 1000.0 * largest, tissue.step_ms(), upload_ms, rest.size()])
 	finish("")
 
 

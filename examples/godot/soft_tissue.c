@@ -4,8 +4,12 @@
  * (x, y, z) -> (x, z, -y) / 1000 is a quarter turn about x, so windings stay outward (Godot draws
  * clockwise faces as front, which `faces` takes into account).
  *
- * Script side: open(bundle), rest(), faces(), press(shape, position, rotation, half_extents,
- * radius), release(), vertices(), step_ms(), contact_count(), message(). */
+ * Where the bundle has a linear response the instrument drives the step and its contact is solved;
+ * else the step takes the nodes that it touches.
+ *
+ * Script side: open(bundle), rest(), faces(), hold(friction, grasp, tear_off_mn), press(shape,
+ * position, rotation, half_extents, radius), release(), vertices(), step_ms(), contact_count(),
+ * force(), penetration(), flags(), message(). */
 #include "godot_api.h"
 #include "upt.h"
 
@@ -27,6 +31,10 @@ typedef struct {
   uint64_t vertex_count;
   uint64_t index_count;
   uint64_t contact_count;
+  bool solves_contact;
+  float friction, tear_off_mn;
+  uint8_t mode;
+  upt_instrument_reading reading; /* of the last step; zero without an instrument */
   char message[512];
 } SoftTissue;
 
@@ -77,6 +85,18 @@ static bool load(SoftTissue *tissue, const char *path) {
       !ok(tissue, upt_model_get_info(tissue->model, &info)) ||
       !ok(tissue, upt_scene_create(tissue->model, NULL, &tissue->scene)))
     return false;
+  switch (upt_scene_step_instruments(tissue->scene, NULL, 0, NULL, 0)) {
+  case UPT_OK:
+    tissue->solves_contact = true;
+    if (!ok(tissue, upt_scene_reset(tissue->scene)))
+      return false;
+    break;
+  case UPT_ERR_UNSUPPORTED: /* no linear response, or a library without feature "contact" */
+    break;
+  default:
+    godot_error(upt_last_error());
+    return false;
+  }
   tissue->surface = index_set(tissue, UPT_SET_SURFACE_NODES, &tissue->vertex_count);
   tissue->faces = index_set(tissue, UPT_SET_SURFACE_FACES, &tissue->index_count);
   if (!tissue->surface || !tissue->faces)
@@ -174,6 +194,19 @@ static void faces(void *instance, const GDExtensionConstTypePtr *arguments,
   }
 }
 
+/* A step under instruments, at most one; their contact is solved. */
+static bool drive(SoftTissue *tissue, const upt_instrument *instrument, uint64_t count) {
+  if (!ok(tissue, upt_scene_step_instruments(tissue->scene, instrument, count, tissue->displacement,
+                                             3 * tissue->vertex_count)))
+    return false;
+  memset(&tissue->reading, 0, sizeof tissue->reading);
+  tissue->reading.struct_size = sizeof tissue->reading;
+  if (!ok(tissue, upt_scene_instrument_readings(tissue->scene, &tissue->reading, count)))
+    return false;
+  tissue->contact_count = tissue->reading.contact_count;
+  return true;
+}
+
 static bool step(SoftTissue *tissue) {
   return tissue->scene &&
          ok(tissue, upt_scene_step_contacts(tissue->scene, tissue->contacts, tissue->vectors,
@@ -203,12 +236,30 @@ static void press(void *instance, const GDExtensionConstTypePtr *arguments,
   instrument.rotation[3] = half * rotation[3] - half * rotation[0];
   memcpy(instrument.half_extents, extents, sizeof instrument.half_extents);
   instrument.radius = (float)*(const double *)arguments[4];
-  *(GDExtensionBool *)result =
-      tissue->scene &&
-      ok(tissue, upt_scene_contacts_from_instruments(
-                     tissue->scene, &instrument, 1, tissue->contacts, tissue->vectors,
-                     tissue->vertex_count, &tissue->contact_count)) &&
-      step(tissue);
+  instrument.friction = tissue->friction;
+  instrument.tear_off_mn = tissue->tear_off_mn;
+  instrument.mode = tissue->mode;
+  if (!tissue->scene)
+    *(GDExtensionBool *)result = false;
+  else if (tissue->solves_contact)
+    *(GDExtensionBool *)result = drive(tissue, &instrument, 1);
+  else
+    *(GDExtensionBool *)result =
+        ok(tissue, upt_scene_contacts_from_instruments(
+                       tissue->scene, &instrument, 1, tissue->contacts, tissue->vectors,
+                       tissue->vertex_count, &tissue->contact_count)) &&
+        step(tissue);
+}
+
+/* hold(friction, grasp, tear_off [mN]): how the instrument of the next presses holds the tissue.
+ * tear_off 0: a grasp never lets go. */
+static void hold(void *instance, const GDExtensionConstTypePtr *arguments,
+                 GDExtensionTypePtr result) {
+  SoftTissue *tissue = instance;
+  tissue->friction = (float)*(const double *)arguments[0];
+  tissue->mode = *(const GDExtensionBool *)arguments[1] ? UPT_MODE_GRASP : UPT_MODE_SLIDE;
+  tissue->tear_off_mn = (float)*(const double *)arguments[2];
+  *(GDExtensionBool *)result = true;
 }
 
 static void release(void *instance, const GDExtensionConstTypePtr *arguments,
@@ -216,7 +267,8 @@ static void release(void *instance, const GDExtensionConstTypePtr *arguments,
   SoftTissue *tissue = instance;
   (void)arguments;
   tissue->contact_count = 0;
-  *(GDExtensionBool *)result = step(tissue);
+  *(GDExtensionBool *)result =
+      tissue->scene && (tissue->solves_contact ? drive(tissue, NULL, 0) : step(tissue));
 }
 
 static void step_ms(void *instance, const GDExtensionConstTypePtr *arguments,
@@ -235,6 +287,37 @@ static void contact_count(void *instance, const GDExtensionConstTypePtr *argumen
                           GDExtensionTypePtr result) {
   (void)arguments;
   *(int64_t *)result = (int64_t)((SoftTissue *)instance)->contact_count;
+}
+
+/* force() -> Vector3: on the instrument in the last step, mN, Godot's axes. */
+static void force(void *instance, const GDExtensionConstTypePtr *arguments,
+                  GDExtensionTypePtr result) {
+  const float *f = ((SoftTissue *)instance)->reading.force;
+  float *out = result;
+  (void)arguments;
+  out[0] = f[0];
+  out[1] = f[2];
+  out[2] = -f[1];
+}
+
+/* penetration() -> float: how deep tissue lies inside of the instrument, mm. */
+static void penetration(void *instance, const GDExtensionConstTypePtr *arguments,
+                        GDExtensionTypePtr result) {
+  (void)arguments;
+  *(double *)result = (double)((SoftTissue *)instance)->reading.penetration_mm;
+}
+
+/* flags() -> int: UPT_FLAG_* of the last step. */
+static void flags(void *instance, const GDExtensionConstTypePtr *arguments,
+                  GDExtensionTypePtr result) {
+  SoftTissue *tissue = instance;
+  upt_scene_stats stats;
+  (void)arguments;
+  memset(&stats, 0, sizeof stats);
+  stats.struct_size = sizeof stats;
+  if (tissue->scene)
+    ok(tissue, upt_scene_get_stats(tissue->scene, &stats));
+  *(int64_t *)result = (int64_t)stats.flags;
 }
 
 static void message(void *instance, const GDExtensionConstTypePtr *arguments,
@@ -281,10 +364,18 @@ static const GodotMethod METHODS[] = {
       {"rotation", T(QUATERNION)},
       {"half_extents", T(VECTOR3)},
       {"radius", T(FLOAT)}}},
+    {"hold",
+     hold,
+     T(BOOL),
+     3,
+     {{"friction", T(FLOAT)}, {"grasp", T(BOOL)}, {"tear_off_mn", T(FLOAT)}}},
     {"release", release, T(BOOL), 0, {{0}}},
     {"vertices", vertices, T(PACKED_VECTOR3_ARRAY), 0, {{0}}},
     {"step_ms", step_ms, T(FLOAT), 0, {{0}}},
     {"contact_count", contact_count, T(INT), 0, {{0}}},
+    {"force", force, T(VECTOR3), 0, {{0}}},
+    {"penetration", penetration, T(FLOAT), 0, {{0}}},
+    {"flags", flags, T(INT), 0, {{0}}},
     {"message", message, T(STRING), 0, {{0}}},
 };
 #undef T
