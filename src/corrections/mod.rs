@@ -42,6 +42,11 @@ pub struct Integrator {
 }
 
 impl Integrator {
+    /// The same over another time, s.
+    pub fn over(self, step_s: f64) -> Integrator {
+        Integrator { step_s, ..self }
+    }
+
     /// `kappa = 9/(4h²) + 3 alpha/(2h)`, 1/s²: what a displacement costs in inertia and damping, over its mass.
     pub fn kappa(&self) -> f64 {
         2.25 / (self.step_s * self.step_s) + 1.5 * self.damping_per_s / self.step_s

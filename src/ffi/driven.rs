@@ -99,6 +99,43 @@ pub unsafe extern "C" fn upt_scene_submit_instruments(
     })
 }
 
+/// The tissue at a moment between steps, with rigid instruments where they are at that moment: for frames without lag.
+///
+/// From the last published state its velocities go on, and contact is solved at the poses given here with the compliance of that time. Any
+/// frame rate, also uneven; also while a submitted step is in flight. When a step arrives, what it puts elsewhere is blended in over a step's time.
+/// seconds: since the last published step's time, 0 or more; the velocities are followed for two steps at most. instruments: as
+/// `upt_scene_step_instruments`. out: `[n,3]`, mm, in the region's order. out_count: floats in out, 3 n.
+/// Threads: one thread at a time presents; another one may step or submit. Errors: `UPT_ERR_BUSY` while another thread presents, and at the
+/// first call while a step is in flight; `UPT_ERR_UNSUPPORTED` in a build without feature "contact", for a bundle without a linear response or
+/// corrections and a scene that does not correct; `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`,
+/// `UPT_ERR_NON_FINITE`, `UPT_ERR_STATE`, `UPT_ERR_RUNTIME`, `UPT_ERR_IO`, `UPT_ERR_BUNDLE`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn upt_scene_present(
+    scene: *mut upt_scene,
+    seconds: f64,
+    instruments: *const upt_instrument,
+    instrument_count: u64,
+    out: *mut f32,
+    out_count: u64,
+) -> upt_status {
+    call_scene("upt_scene_present", scene, |_scene| {
+        #[cfg(feature = "contact")]
+        {
+            let mut tools = _scene.frame_tools()?;
+            unsafe { read_tools(instruments, instrument_count, &mut tools) }?;
+            _scene.check_out(unsafe { slice(out.cast_const(), out_count, "out") }?.len())?;
+            let out = unsafe { slice_mut(out, out_count, "out") }?;
+            _scene.present(seconds, &tools, out)?;
+            Ok(UPT_OK)
+        }
+        #[cfg(not(feature = "contact"))]
+        {
+            let _ = (seconds, instruments, instrument_count, out, out_count);
+            fail(UPT_ERR_UNSUPPORTED, WITHOUT)
+        }
+    })
+}
+
 /// Copies what the tissue did to each instrument at the end of the last step.
 ///
 /// out: `[count]`, in the order of the step's instruments; every element has its `struct_size` set. count: instruments of that step.

@@ -419,6 +419,8 @@ impl Core {
         self.show_contacts(shared);
         #[cfg(feature = "contact")]
         self.show_tools(shared);
+        #[cfg(feature = "contact")]
+        self.leave_moment(shared);
     }
 
     /// The last step's contacts in the host's order.

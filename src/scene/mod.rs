@@ -12,6 +12,8 @@ mod free_motion;
 mod inversion;
 mod plan;
 mod points;
+#[cfg(feature = "contact")]
+mod present;
 mod published;
 #[cfg(feature = "forces")]
 mod reaction;
@@ -124,6 +126,8 @@ impl Scene {
             contact_vectors: memory::room(3 * count, core::SCENE)?,
             #[cfg(feature = "contact")]
             tools: Default::default(),
+            #[cfg(feature = "contact")]
+            moment: None,
         };
         Ok(Scene {
             worker: Worker::new(options.latest_wins),
@@ -310,6 +314,10 @@ impl Scene {
     pub fn stats(&self) -> SceneStats {
         let mut stats = lock_read(&self.shared.published).stats;
         stats.poisoned = self.shared.is_poisoned();
+        #[cfg(feature = "contact")]
+        {
+            stats.memory_bytes += self.presenter_bytes() as u64;
+        }
         stats
     }
 

@@ -73,6 +73,9 @@ pub struct Published {
     /// What the tools of the last step were told, and the samples that push them.
     #[cfg(feature = "contact")]
     pub tools: crate::contact::Told,
+    /// What frames between steps are made of, from the first that a host asks for.
+    #[cfg(feature = "contact")]
+    pub moment: Option<super::present::Moment>,
 }
 
 impl Published {

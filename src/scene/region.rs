@@ -60,6 +60,8 @@ impl Core {
         shared.contact_vectors.clear();
         #[cfg(feature = "contact")]
         shared.tools.clear();
+        #[cfg(feature = "contact")]
+        self.leave_moment(shared);
     }
 
     /// Decodes any nodes of the last state into `out [n,3]`.

@@ -20,9 +20,14 @@ use std::sync::{Mutex, MutexGuard, TryLockError};
 pub struct Tools {
     #[cfg(feature = "contact")]
     contacts: Mutex<Option<InstrumentContacts>>,
+    #[cfg(feature = "contact")]
+    pub(super) presenter: Mutex<Option<Box<super::present::Presenter>>>,
     /// What a host's instruments are read into.
     #[cfg(feature = "contact")]
     list: Mutex<Vec<Tool>>,
+    /// The same of a frame between steps.
+    #[cfg(feature = "contact")]
+    frame_list: Mutex<Vec<Tool>>,
     #[cfg(feature = "forces")]
     pub(super) forces: Mutex<Option<Haptics>>,
 }
@@ -58,6 +63,14 @@ impl Scene {
     /// [`Error::Busy`].
     pub fn tool_list(&self) -> Result<MutexGuard<'_, Vec<Tool>>> {
         lock(&self.tools.list)
+    }
+
+    /// A list for the tools of a frame between steps.
+    ///
+    /// # Errors
+    /// [`Error::Busy`].
+    pub fn frame_tools(&self) -> Result<MutexGuard<'_, Vec<Tool>>> {
+        lock(&self.tools.frame_list)
     }
 
     /// Starts a step that tools drive on the scene's worker.

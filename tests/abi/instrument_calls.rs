@@ -64,6 +64,17 @@ impl World<'_> {
                     let status = upt_scene_submit_instruments(scene, tools, count);
                     ("upt_scene_submit_instruments", status)
                 }
+                Function::Present => {
+                    let tools = self.instruments(call, 4);
+                    let count = absurd(tools.len(), 64, call);
+                    let mut seconds = [(call.seed % 120) as f32 * 1e-3];
+                    spoil(&mut seconds, call.odd, 0);
+                    let status = Self::output(call, 1, 3 * nodes, true, |out, floats| {
+                        let tools = pointer(&tools, call, 0);
+                        upt_scene_present(scene, seconds[0].into(), tools, count, out, floats)
+                    });
+                    ("upt_scene_present", status)
+                }
                 Function::Readings => {
                     let mut out = [std::mem::zeroed::<upt_instrument_reading>(); 8];
                     for one in &mut out {

@@ -189,8 +189,10 @@ impl<'a> World<'a> {
             | ModelPositions | ModelIndices | SceneCreate | SceneDestroy | SetLog | Texts => {
                 self.call_library(call, scene)
             }
-            Instruments | StepInstruments | SubmitInstruments | Readings | InstrumentContacts
-            | HullCreate | HullDestroy => self.call_instruments(call, scene, nodes),
+            Instruments | StepInstruments | SubmitInstruments | Present | Readings
+            | InstrumentContacts | HullCreate | HullDestroy => {
+                self.call_instruments(call, scene, nodes)
+            }
             _ => self.call_scene(call, scene, nodes),
         }
     }

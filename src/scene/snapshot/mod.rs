@@ -271,6 +271,8 @@ impl Core {
         self.show_contacts(&mut shared);
         #[cfg(feature = "contact")]
         shared.tools.clear();
+        #[cfg(feature = "contact")]
+        self.leave_moment(&mut shared);
         Ok(())
     }
 

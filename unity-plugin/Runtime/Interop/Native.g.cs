@@ -714,6 +714,21 @@ namespace Upt.Interop
         public static extern int upt_scene_submit_instruments(IntPtr scene, upt_instrument* instruments, ulong instrument_count);
 
         /// <summary>
+        /// The tissue at a moment between steps, with rigid instruments where they are at that moment: for frames without lag.
+        ///
+        /// From the last published state its velocities go on, and contact is solved at the poses given here with the compliance of that time. Any
+        /// frame rate, also uneven; also while a submitted step is in flight. When a step arrives, what it puts elsewhere is blended in over a step's time.
+        /// seconds: since the last published step's time, 0 or more; the velocities are followed for two steps at most. instruments: as
+        /// `upt_scene_step_instruments`. out: `[n,3]`, mm, in the region's order. out_count: floats in out, 3 n.
+        /// Threads: one thread at a time presents; another one may step or submit. Errors: `UPT_ERR_BUSY` while another thread presents, and at the
+        /// first call while a step is in flight; `UPT_ERR_UNSUPPORTED` in a build without feature "contact", for a bundle without a linear response or
+        /// corrections and a scene that does not correct; `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`,
+        /// `UPT_ERR_NON_FINITE`, `UPT_ERR_STATE`, `UPT_ERR_RUNTIME`, `UPT_ERR_IO`, `UPT_ERR_BUNDLE`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_scene_present(IntPtr scene, double seconds, upt_instrument* instruments, ulong instrument_count, float* @out, ulong out_count);
+
+        /// <summary>
         /// Copies what the tissue did to each instrument at the end of the last step.
         ///
         /// out: `[count]`, in the order of the step's instruments; every element has its `struct_size` set. count: instruments of that step.

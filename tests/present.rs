@@ -1,0 +1,189 @@
+//! The tissue between steps: what a frame shows of it.
+
+mod fixture;
+
+use contact::Shape;
+use fixture::{bits, model, plain, scene};
+use upt::contact::Tool;
+use upt::{Contact, Corrections, Error, Scene, SceneOptions, StepInput};
+
+const DT: f64 = 0.05;
+
+fn corrected() -> SceneOptions {
+    SceneOptions {
+        corrections: Corrections::Fixed(8),
+        ..plain()
+    }
+}
+
+/// A ball of radius 3 mm that goes 8 mm/s into the middle of the top, there at `t` steps.
+fn pressing(scene: &Scene, t: f64) -> Vec<Tool> {
+    let mesh = scene.mesh();
+    let place = |node: u32| [0, 1, 2].map(|axis| mesh.positions[3 * node as usize + axis]);
+    let count = mesh.domain_nodes.len() as f32;
+    let middle = [0, 1].map(|axis| {
+        let along = mesh.domain_nodes.iter().map(|&node| place(node)[axis]);
+        along.sum::<f32>() / count
+    });
+    let nearest = mesh.domain_nodes.iter().min_by(|a, b| {
+        let far = |node: u32| {
+            (0..2)
+                .map(|k| (place(node)[k] - middle[k]).powi(2))
+                .sum::<f32>()
+        };
+        far(**a).total_cmp(&far(**b))
+    });
+    let [x, y, z] = place(*nearest.unwrap());
+    let centre = [x, y, z + 3.0 - 0.4 * t as f32];
+    let shape = Shape::Sphere { radius: 3.0 };
+    vec![Tool::new(0, &shape, centre, [0.0, 0.0, 0.0, 1.0]).unwrap()]
+}
+
+fn step(scene: &Scene, tools: &[Tool]) -> Vec<f32> {
+    let mut u = vec![0.0; 3 * scene.node_count()];
+    let input = StepInput {
+        displacement: None,
+        contact: Contact::Tools(tools),
+    };
+    scene.step(input, Some(&mut u)).unwrap();
+    u
+}
+
+fn present(scene: &Scene, seconds: f64, tools: &[Tool]) -> Vec<f32> {
+    let mut u = vec![f32::NAN; 3 * scene.region_count()];
+    scene.present(seconds, tools, &mut u).unwrap();
+    u
+}
+
+fn farthest(a: &[f32], b: &[f32]) -> f32 {
+    let pairs = a.as_chunks::<3>().0.iter().zip(b.as_chunks::<3>().0);
+    let far = |a: &[f32; 3], b: &[f32; 3]| (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f32>();
+    pairs.map(|(a, b)| far(a, b)).fold(0.0, f32::max).sqrt()
+}
+
+#[test]
+fn at_its_own_time_a_step_is_shown_as_it_is() {
+    let scene = scene(&model("tiny-corrected"), &corrected());
+    for t in 1..6 {
+        let tools = pressing(&scene, f64::from(t));
+        let u = step(&scene, &tools);
+        assert_eq!(bits(&present(&scene, 0.0, &tools)), bits(&u));
+        present(&scene, 0.03, &tools);
+    }
+}
+
+#[test]
+fn a_frame_is_nearer_to_the_next_step_than_the_last_one_is() {
+    let scene = scene(&model("tiny-corrected"), &corrected());
+    let square =
+        |a: &[f32], b: &[f32]| -> f32 { a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum() };
+    let (mut of_frames, mut of_last) = (0.0, 0.0);
+    let mut last = step(&scene, &pressing(&scene, 1.0));
+    for t in 2..10 {
+        let tools = pressing(&scene, f64::from(t));
+        let shown = present(&scene, DT, &tools);
+        let next = step(&scene, &tools);
+        of_frames += square(&shown, &next);
+        of_last += square(&last, &next);
+        last = next;
+    }
+    assert!(of_frames < 0.3 * of_last, "{of_frames} of {of_last}");
+}
+
+#[test]
+fn frames_run_on_when_a_step_arrives() {
+    let scene = scene(&model("tiny-corrected"), &corrected());
+    let mut before: Option<Vec<f32>> = None;
+    let (mut within, mut arriving) = (0.0f32, 0.0f32);
+    for t in 1..12 {
+        step(&scene, &pressing(&scene, f64::from(t)));
+        for frame in 1..=5 {
+            let part = f64::from(frame) / 5.0;
+            let shown = present(&scene, part * DT, &pressing(&scene, f64::from(t) + part));
+            if let Some(before) = &before
+                && t > 3
+            {
+                let jump = farthest(&shown, before);
+                match frame {
+                    1 => arriving = arriving.max(jump),
+                    _ => within = within.max(jump),
+                }
+            }
+            before = Some(shown);
+        }
+    }
+    assert!(
+        arriving < within + 0.05,
+        "{arriving} mm at a step, {within} within"
+    );
+}
+
+#[test]
+fn a_frame_may_be_made_while_a_step_is_in_flight_and_changes_nothing() {
+    let scene = scene(&model("tiny-corrected"), &corrected());
+    for t in 1..5 {
+        step(&scene, &pressing(&scene, f64::from(t)));
+    }
+    present(&scene, 0.01, &pressing(&scene, 4.2));
+    let before = scene.save().unwrap();
+    present(&scene, 0.02, &pressing(&scene, 4.4));
+    assert!(scene.save().unwrap() == before);
+    scene.submit_tools(&pressing(&scene, 5.0)).unwrap();
+    for frame in 0..20 {
+        let shown = present(&scene, 0.002 * f64::from(frame), &pressing(&scene, 4.5));
+        assert!(shown.iter().all(|x| x.is_finite()));
+    }
+    scene.wait(std::time::Duration::from_secs(600)).unwrap();
+}
+
+#[test]
+fn a_region_is_shown_in_its_order() {
+    let scene = scene(&model("tiny-corrected"), &corrected());
+    for t in 1..5 {
+        step(&scene, &pressing(&scene, f64::from(t)));
+    }
+    let tools = pressing(&scene, 4.5);
+    let all = present(&scene, 0.025, &tools);
+    let nodes: Vec<u32> = (0..scene.node_count() as u32).rev().step_by(3).collect();
+    scene.set_region(Some(&nodes)).unwrap();
+    let some = present(&scene, 0.025, &tools);
+    for (&node, u) in nodes.iter().zip(some.chunks_exact(3)) {
+        assert_eq!(bits(u), bits(&all[3 * node as usize..][..3]), "node {node}");
+    }
+}
+
+#[test]
+fn what_cannot_be_is_refused() {
+    let model = model("tiny-corrected");
+    let one = scene(&model, &corrected());
+    step(&one, &pressing(&one, 1.0));
+    let mut out = vec![0.0; 3 * one.node_count()];
+    let tools = pressing(&one, 1.0);
+    assert!(matches!(
+        one.present(f64::NAN, &tools, &mut out),
+        Err(Error::NonFinite(_))
+    ));
+    assert!(matches!(
+        one.present(-0.01, &tools, &mut out),
+        Err(Error::Argument(_))
+    ));
+    assert!(matches!(
+        one.present(0.01, &tools, &mut out[3..]),
+        Err(Error::Argument(_))
+    ));
+    let rough = Tool {
+        friction: -1.0,
+        ..tools[0].clone()
+    };
+    assert!(matches!(
+        one.present(0.01, &[rough], &mut out),
+        Err(Error::Argument(_))
+    ));
+    let none = SceneOptions {
+        corrections: Corrections::None,
+        ..plain()
+    };
+    let plain_scene = scene(&model, &none);
+    let refused = plain_scene.present(0.01, &tools, &mut out);
+    assert!(matches!(refused, Err(Error::Unsupported(_))));
+}
