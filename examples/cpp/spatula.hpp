@@ -18,9 +18,9 @@ public:
   void move(float seconds, bool pressed);
   // The blade while it is at the tissue; none: it hovers.
   std::vector<upt_instrument> instruments() const;
-  // Contact nodes and displacements at the present pose, for bundles without a linear response. Uses
-  // the library's rule where this build has it, else its own: nodes below the blade move down to
-  // its plane and along with it.
+  // Contact nodes and displacements at the present pose, for bundles without a linear response.
+  // Uses the library's rule where this build has it, else its own: nodes below the blade move down
+  // to its plane and along with it.
   Contacts contacts(Tissue &tissue);
 
   bool visible() const { return visible_; }

@@ -188,13 +188,20 @@ std::string flag_names(std::uint32_t flags) {
     std::uint32_t flag;
     const char *name;
   } names[] = {
-      {UPT_FLAG_PUSH, "push"},           {UPT_FLAG_CONTACT_AREA, "area"},
-      {UPT_FLAG_SITE, "site"},           {UPT_FLAG_RATE, "rate"},
-      {UPT_FLAG_SITES, "sites"},         {UPT_FLAG_BOUND, "bound"},
-      {UPT_FLAG_NON_FINITE, "nonfinite"}, {UPT_FLAG_INVERTED, "inverted"},
-      {UPT_FLAG_GROWTH, "growth"},       {UPT_FLAG_CLAMPED, "clamped"},
-      {UPT_FLAG_REGULARISED, "regularised"}, {UPT_FLAG_FELL_BACK, "fell back"},
-      {UPT_FLAG_ERROR, "error"},         {UPT_FLAG_DEEP, "deep"},
+      {UPT_FLAG_PUSH, "push"},
+      {UPT_FLAG_CONTACT_AREA, "area"},
+      {UPT_FLAG_SITE, "site"},
+      {UPT_FLAG_RATE, "rate"},
+      {UPT_FLAG_SITES, "sites"},
+      {UPT_FLAG_BOUND, "bound"},
+      {UPT_FLAG_NON_FINITE, "nonfinite"},
+      {UPT_FLAG_INVERTED, "inverted"},
+      {UPT_FLAG_GROWTH, "growth"},
+      {UPT_FLAG_CLAMPED, "clamped"},
+      {UPT_FLAG_REGULARISED, "regularised"},
+      {UPT_FLAG_FELL_BACK, "fell back"},
+      {UPT_FLAG_ERROR, "error"},
+      {UPT_FLAG_DEEP, "deep"},
   };
   std::string out;
   for (const auto &entry : names) {

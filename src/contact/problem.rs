@@ -404,6 +404,11 @@ impl Problem {
         Ok((&self.nodes, &self.vectors))
     }
 
+    /// Whether a grasp has torn off in this step.
+    pub fn tears(&self) -> bool {
+        self.next.tools.iter().any(|held| held.reading.torn)
+    }
+
     /// Nodes of the samples that push, ascending, without held ones.
     pub fn touched(&mut self, held: &[bool]) -> &[u32] {
         self.nodes.clear();
@@ -488,12 +493,13 @@ impl Problem {
             }
             let held = &mut self.next.tools[index];
             let pull = tension(pull, normal.normalize_or_zero());
+            let torn = held.reading.torn || held.grasp.tear(pull, tool.tear_off_mn);
             held.reading = Reading {
                 force: force.to_array(),
                 torque: torque.to_array(),
                 contacts,
                 penetration_mm,
-                torn: held.grasp.tear(pull, tool.tear_off_mn),
+                torn,
             };
         }
     }

@@ -178,6 +178,11 @@ impl InstrumentContacts {
         Ok((&self.nodes, &self.vectors))
     }
 
+    /// What the last call found.
+    pub fn found(&self) -> (&[u32], &[f32]) {
+        (&self.nodes, &self.vectors)
+    }
+
     /// Collects the nodes in a box, and those that were touched, with their positions: nearly all of a search's time.
     #[inline(never)]
     fn sift(&mut self, displacement: &[f32], low: Vec3A, high: Vec3A) {

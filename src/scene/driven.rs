@@ -140,14 +140,29 @@ impl Core {
         };
         let rest = &self.mesh.positions;
         let next = &mut self.next.field;
-        let report = corrected
+        let mut report = corrected
             .stage
             .correct_loaded(lent, &input, rest, problem, next)?;
+        let end = |u: &[f32], problem: &mut Problem| {
+            problem.finish(State {
+                rest,
+                u,
+                start: &shared.last.field,
+            });
+        };
+        end(next, problem);
+        if problem.tears() {
+            // A grasp that tears off in this step holds nothing at its end.
+            report = corrected
+                .stage
+                .correct_loaded(lent, &input, rest, problem, next)?;
+            end(next, problem);
+        }
         corrected.tell(&report, stats);
         drop(shared);
         drop(span);
         self.next_corrected = true;
-        self.finish_tools(published, problem, stats);
+        Self::tell_depth(problem, stats);
         // What a collision field would say: the envelope, the engine's record and the host's list of contacts go by it.
         self.incoming
             .take_nodes(problem.touched(&self.held), &self.next.field);
@@ -203,6 +218,10 @@ impl Core {
             u: &self.next.field,
             start: &shared.last.field,
         });
+        Self::tell_depth(problem, stats);
+    }
+
+    fn tell_depth(problem: &Problem, stats: &mut SceneStats) {
         stats.contact_ms = problem.spent_ms();
         let readings = problem.next.tools.iter().map(|held| held.reading);
         if readings.map(|r| r.penetration_mm).fold(0.0, f32::max) > DEEP_MM {

@@ -15,11 +15,19 @@ use crate::instrument::{Instrument, InstrumentContacts};
 #[cfg(any(feature = "contact", feature = "forces"))]
 use std::sync::{Mutex, MutexGuard, TryLockError};
 
+/// The contacts that a host asks for, and what it asked last: the same question of the same state has the same answer.
+#[cfg(feature = "contact")]
+struct Asked {
+    contacts: InstrumentContacts,
+    instruments: Vec<Instrument>,
+    step: Option<u64>,
+}
+
 /// What the first use makes.
 #[derive(Default)]
 pub struct Tools {
     #[cfg(feature = "contact")]
-    contacts: Mutex<Option<InstrumentContacts>>,
+    contacts: Mutex<Option<Asked>>,
     #[cfg(feature = "contact")]
     pub(super) presenter: Mutex<Option<Box<super::present::Presenter>>>,
     /// What a host's instruments are read into.
@@ -39,7 +47,8 @@ impl Tools {
         if let Ok(mut contacts) = self.contacts.lock()
             && let Some(contacts) = contacts.as_mut()
         {
-            contacts.reset();
+            contacts.contacts.reset();
+            contacts.step = None;
         }
     }
 }
@@ -112,11 +121,25 @@ impl Scene {
                 "the instruments' contacts",
             )?;
         }
-        let contacts = contacts.get_or_insert_with(|| {
-            InstrumentContacts::new(&mesh.positions, &mesh.surface_faces, &mesh.held_nodes)
+        let asked = contacts.get_or_insert_with(|| Asked {
+            contacts: InstrumentContacts::new(
+                &mesh.positions,
+                &mesh.surface_faces,
+                &mesh.held_nodes,
+            ),
+            instruments: Vec::new(),
+            step: None,
         });
         let published = lock_read(&self.shared.published);
-        let (nodes, vectors) = contacts.find(instruments, &published.last.field)?;
+        let step = Some(published.stats.step_count);
+        if asked.step != step || asked.instruments != instruments {
+            asked.step = None;
+            asked.contacts.find(instruments, &published.last.field)?;
+            asked.instruments.clear();
+            asked.instruments.extend_from_slice(instruments);
+            asked.step = step;
+        }
+        let (nodes, vectors) = asked.contacts.found();
         take(nodes, vectors)
     }
 }
