@@ -136,7 +136,7 @@ def a_bad_message_closes_its_client_alone():
         largest = 0.0
         for _ in range(600):
             _, frame = client.read()
-            largest = max(largest, struct.unpack("<12f", frame[:48])[9])
+            largest = max(largest, struct.unpack("<15f", frame[:60])[9])
             if largest > 1.0:
                 break
         assert largest > 1.0, f"{largest} mm"

@@ -51,6 +51,8 @@ structs!(
     upt_model_info,
     upt_scene_options,
     upt_instrument,
+    upt_instrument_reading,
+    upt_instrument_contact,
     upt_scene_stats
 );
 

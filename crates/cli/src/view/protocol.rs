@@ -19,8 +19,9 @@ use serde::{Deserialize, Serialize};
 /// Bytes that a message from the page may have.
 pub const LONGEST_MESSAGE: usize = 1024;
 /// Numbers before the displacements of a frame: sequence, flags, contacts, state (u32: 1 recording, 2 replaying, 4 asleep),
-/// step ms, indicator, force x y z (mN), largest displacement (mm), ms that the pose waited for its step, steps (u32).
-pub const HEADER: usize = 12;
+/// step ms, indicator, force x y z (mN), largest displacement (mm), ms that the pose waited for its step, steps (u32),
+/// corrections (u32), their estimated error (mm), deepest tissue inside of the tool (mm).
+pub const HEADER: usize = 15;
 /// No organ and no tool is larger, mm.
 const FARTHEST: f32 = 10_000.0;
 

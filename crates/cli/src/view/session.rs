@@ -38,6 +38,9 @@ pub struct Session {
     recorded: Vec<Option<Tool>>,
     replayed: Option<usize>,
     contacts: u32,
+    /// Whether the library solves the tool's contact.
+    solves: bool,
+    penetration_mm: f32,
     displacement: Vec<[f32; 3]>,
     force: [f32; 3],
     bytes: Vec<u8>,
@@ -57,10 +60,13 @@ impl Session {
             }
         }
         scene.set_region(&nodes)?;
+        let mut displacement = vec![[0.0; 3]; nodes.len()];
+        let solves = scene.step_instruments(&[], &mut displacement).is_ok();
+        scene.reset()?;
         Ok(Self {
             faces: faces.iter().map(|node| place[node]).collect(),
             rest: nodes.iter().map(|node| positions[*node as usize]).collect(),
-            displacement: vec![[0.0; 3]; nodes.len()],
+            displacement,
             nodes,
             domain,
             scene,
@@ -74,6 +80,8 @@ impl Session {
             recorded: Vec::new(),
             replayed: None,
             contacts: 0,
+            solves,
+            penetration_mm: 0.0,
             force: [0.0; 3],
             bytes: Vec::new(),
         })
@@ -178,11 +186,33 @@ impl Session {
             self.waited_ms = came.elapsed().as_secs_f32() * 1e3;
         }
         let instruments: Vec<ffi::upt_instrument> = self.tool.iter().map(instrument).collect();
+        if !self.solves {
+            return self.step_nodes(&instruments);
+        }
         self.scene
             .step_instruments(&instruments, &mut self.displacement)?;
         let readings = self.scene.readings(instruments.len())?;
-        self.force = readings.first().map_or([0.0; 3], |reading| reading.force);
-        self.contacts = readings.iter().map(|reading| reading.contact_count).sum();
+        let first = readings.first();
+        self.force = first.map_or([0.0; 3], |reading| reading.force);
+        self.penetration_mm = first.map_or(0.0, |reading| reading.penetration_mm);
+        self.contacts = first.map_or(0, |reading| reading.contact_count);
+        Ok(())
+    }
+
+    /// A step of a bundle without a linear response: the nodes that the tool touches go where it puts them.
+    fn step_nodes(&mut self, instruments: &[ffi::upt_instrument]) -> Result<()> {
+        let (mut nodes, mut vectors) = (Vec::new(), Vec::new());
+        self.scene.contacts(instruments, &mut nodes, &mut vectors)?;
+        self.scene.step(&nodes, &vectors, &mut self.displacement)?;
+        self.contacts = nodes.len() as u32;
+        self.force = [0.0; 3];
+        if !nodes.is_empty() {
+            for force in self.scene.contact_force(nodes.len())? {
+                for (sum, f) in self.force.iter_mut().zip(force) {
+                    *sum += f;
+                }
+            }
+        }
         Ok(())
     }
 
@@ -204,6 +234,9 @@ impl Session {
             stats.max_displacement_mm.to_le_bytes(),
             self.waited_ms.to_le_bytes(),
             (stats.step_count as u32).to_le_bytes(),
+            stats.corrections.to_le_bytes(),
+            stats.error_mm.to_le_bytes(),
+            self.penetration_mm.to_le_bytes(),
         ];
         self.bytes.clear();
         self.bytes.extend(header.as_flattened());
@@ -222,7 +255,7 @@ fn instrument(tool: &Tool) -> ffi::upt_instrument {
         rotation: tool.rotation,
         half_extents: [0.0, tool.half_length, 0.0],
         radius: tool.radius,
-        sticking: 0,
+        sticking: u8::from(tool.sticking),
         mode: ffi::UPT_MODE_SLIDE,
         reserved: [0; 2],
         friction: if tool.sticking { STICKS } else { SLIPS },

@@ -2,7 +2,7 @@
 // What the two say to each other: protocol.rs.
 import * as three from "./three.js";
 
-const HEADER = 12;
+const HEADER = 15;
 const HALF_LENGTH = 25; // of the tool, mm
 const PRESS = 250; // ms until the tool is at its depth
 const PALE = new three.Color(0xd8bfb0);
@@ -120,6 +120,9 @@ function take(data) {
   show("step", `${numbers[4].toFixed(2)} ms`);
   show("indicator", numbers[5].toFixed(2));
   show("force", `${status.force.toFixed(0)} mN`);
+  status.penetration = numbers[14];
+  show("corrections", words[12] > 0 ? `${words[12]}, ± ${numbers[13].toFixed(3)} mm` : "none");
+  show("penetration", `${numbers[14].toFixed(2)} mm`);
   show("largest", `${numbers[9].toFixed(1)} mm`);
   show("contacts", words[2]);
   show("record", status.recording ? "Stop" : "Record");
