@@ -209,8 +209,9 @@ impl Presenter {
 
     /// Bytes held.
     fn memory_bytes(&self) -> usize {
+        // The published moment holds velocities too.
         let lists = self.last.len()
-            + self.velocity.len()
+            + 2 * self.velocity.len()
             + self.free.len()
             + self.region.len()
             + self.moved.len()
