@@ -6,16 +6,20 @@
 //! | [`tool`] | what a host gives: shape, pose, how it holds; and what it gets back |
 //! | [`past`] | what is remembered from step to step: poses, forces, grasps |
 //! | [`compliance`] | how samples move under forces on samples: the Delassus matrix `W = B A B^T` |
+//! | [`rows`] | samples near the tools: gaps and slips |
 //! | [`problem`] | one solve: gaps and slips at a state, forces, what they change |
 //!
 //! Shapes, samples and sweeps are those of the reference solver (crate `contact`). Lengths mm, forces mN.
 
 pub mod compliance;
+mod loads;
 pub mod past;
 pub mod problem;
+pub mod rows;
 pub mod tool;
 
 pub use compliance::Compliance;
 pub use past::Past;
-pub use problem::{Problem, State};
+pub use problem::Problem;
+pub use rows::State;
 pub use tool::{MAX_TOOLS, Mode, Push, Reading, Told, Tool};

@@ -7,14 +7,13 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use ::contact::grasp::{REACH_MM, tension};
-use ::contact::{
-    Contact, Law, Limits, Placed, Pose, SKIN_MM, Samples, Search, Sweeps, Vector, pose,
-};
+use ::contact::grasp::REACH_MM;
+use ::contact::{Contact, Limits, Pose, Samples, Search, Sweeps, Vector};
 
 use super::compliance::{Compliance, Delassus};
 use super::past::{Force, Held, Past};
-use super::tool::{MAX_TOOLS, Mode, Push, Reading, Told, Tool};
+use super::rows::{Row, State, measure, vector};
+use super::tool::{MAX_TOOLS, Mode, Reading, Tool};
 use crate::error::{Error, Result};
 use crate::memory;
 
@@ -24,64 +23,25 @@ const PUT_MM: f32 = 40.0;
 const RECOVERY_MM: f32 = 3.0;
 /// Linearisations of the gap.
 const LINEARISATIONS: usize = 2;
-/// Samples that one solve may have: what a tool as large as the organ touches beyond these is left to the next solve.
-const MOST_ROWS: usize = 256;
 /// Parts of a step's way at most.
 const MOST_PARTS: f32 = 16.0;
-/// Longest way through a tool, mm.
-const THROUGH_MM: f32 = 30.0;
-/// A tool's normal may lean this much (cosine) to the outside of the tissue; beyond, the tool reaches the sample from within.
-const LEAN: f32 = 0.2;
-
-/// Where the tissue is, `[K,3]` each.
-#[derive(Clone, Copy)]
-pub struct State<'a> {
-    /// Rest positions, mm.
-    pub rest: &'a [f32],
-    /// Displacements, mm.
-    pub u: &'a [f32],
-    /// Displacements at the start of the step, mm.
-    pub start: &'a [f32],
-}
-
-fn vector(field: &[f32], node: u32) -> Vector {
-    let at = 3 * node as usize;
-    Vector::new(field[at], field[at + 1], field[at + 2])
-}
-
-impl State<'_> {
-    fn position(&self, node: u32) -> Vector {
-        vector(self.rest, node) + vector(self.u, node)
-    }
-}
-
-/// A sample that is looked at.
-#[derive(Clone, Copy, Debug)]
-struct Row {
-    tool: u32,
-    sample: u32,
-    force: Vector,
-    point: Vector,
-    /// Of the tissue's surface, outward.
-    outward: Vector,
-}
 
 /// The contact of one scene.
 pub struct Problem {
-    samples: Arc<Samples>,
-    tools: Vec<Tool>,
+    pub(super) samples: Arc<Samples>,
+    pub(super) tools: Vec<Tool>,
     /// Where each tool was when the step began.
-    before: Vec<Pose>,
+    pub(super) before: Vec<Pose>,
     /// Depth that each tool may keep in this step, mm.
-    allowed: Vec<f32>,
+    pub(super) allowed: Vec<f32>,
     /// At the end of the last published step.
     pub past: Past,
     /// Of the step being made.
     pub next: Past,
-    search: Search,
+    pub(super) search: Search,
     sweeps: Sweeps,
     delassus: Delassus,
-    rows: Vec<Row>,
+    pub(super) rows: Vec<Row>,
     contacts: Vec<Contact>,
     forces: Vec<Vector>,
     /// Forces before the last solve, to go part of the way.
@@ -90,7 +50,7 @@ pub struct Problem {
     spent: Duration,
     columns: Vec<u32>,
     change: Vec<f32>,
-    nodes: Vec<u32>,
+    pub(super) nodes: Vec<u32>,
     vectors: Vec<f32>,
 }
 
@@ -404,25 +364,6 @@ impl Problem {
         Ok((&self.nodes, &self.vectors))
     }
 
-    /// Whether a grasp has torn off in this step.
-    pub fn tears(&self) -> bool {
-        self.next.tools.iter().any(|held| held.reading.torn)
-    }
-
-    /// Nodes of the samples that push, ascending, without held ones.
-    pub fn touched(&mut self, held: &[bool]) -> &[u32] {
-        self.nodes.clear();
-        for force in &self.next.forces {
-            let sample = self.samples.rows()[force.sample as usize];
-            let nodes = sample.entries().map(|entry| entry.0);
-            self.nodes
-                .extend(nodes.filter(|node| !held[*node as usize]));
-        }
-        self.nodes.sort_unstable();
-        self.nodes.dedup();
-        &self.nodes
-    }
-
     /// Goes only part of the way from the forces before the last solve to those after it.
     pub fn blend(&mut self, part: f32) {
         for force in &mut self.next.forces {
@@ -453,74 +394,6 @@ impl Problem {
         std::mem::swap(&mut self.next.forces, &mut self.kept);
     }
 
-    /// Calls with each node's share of the forces on the tissue, mN.
-    pub fn each_load(&self, take: impl FnMut(u32, Vector)) {
-        self.share(&self.next.forces, take);
-    }
-
-    /// The same of the last published step.
-    pub fn each_push(&self, take: impl FnMut(u32, Vector)) {
-        self.share(&self.past.forces, take);
-    }
-
-    fn share(&self, forces: &[Force], mut take: impl FnMut(u32, Vector)) {
-        for force in forces {
-            for (node, weight) in self.samples.rows()[force.sample as usize].entries() {
-                take(node, force.force * weight);
-            }
-        }
-    }
-
-    /// Tells each tool what it feels, tears grasps that are pulled too hard. `state` is that at the end of the step.
-    pub fn finish(&mut self, state: State<'_>) {
-        for index in 0..self.tools.len() {
-            let pose = self.tools[index].pose;
-            let penetration_mm = self.deepest(index, &pose, state).max(0.0);
-            let tool = &self.tools[index];
-            let (mut force, mut torque) = (Vector::ZERO, Vector::ZERO);
-            let (mut pull, mut normal) = (Vector::ZERO, Vector::ZERO);
-            let mut contacts = 0;
-            let held = &self.next.tools[index];
-            for row in self.next.forces.iter().filter(|f| f.tool == index as u32) {
-                let point = self.samples.rows()[row.sample as usize].gather(|n| state.position(n));
-                force -= row.force;
-                torque -= (point - tool.pose.translation).cross(row.force);
-                contacts += 1;
-                if held.grasp.place(row.sample).is_some() {
-                    pull += row.force;
-                    normal += tool.body.nearest_at(&tool.pose, point).normal;
-                }
-            }
-            let held = &mut self.next.tools[index];
-            let pull = tension(pull, normal.normalize_or_zero());
-            let torn = held.reading.torn || held.grasp.tear(pull, tool.tear_off_mn);
-            held.reading = Reading {
-                force: force.to_array(),
-                torque: torque.to_array(),
-                contacts,
-                penetration_mm,
-                torn,
-            };
-        }
-    }
-
-    /// Makes the last step's readings and forces readable; displacements `[K,3]`, mm.
-    pub fn tell(&self, told: &mut Told, rest: &[f32], u: &[f32]) {
-        told.clear();
-        told.readings
-            .extend(self.past.tools.iter().map(|held| held.reading));
-        for force in &self.past.forces {
-            let sample = self.samples.rows()[force.sample as usize];
-            told.pushes.push(Push {
-                tool: force.tool,
-                point: sample
-                    .gather(|node| vector(rest, node) + vector(u, node))
-                    .to_array(),
-                force: (-force.force).to_array(),
-            });
-        }
-    }
-
     /// The step being made becomes the last.
     pub fn commit(&mut self) {
         std::mem::swap(&mut self.past, &mut self.next);
@@ -537,168 +410,5 @@ impl Problem {
             + self.past.memory_bytes()
             + self.next.memory_bytes()
             + self.delassus.memory_bytes()
-    }
-
-    /// Fills `rows`: samples near the tools at part `part` of their way, those that are pushed, and those that are held. `wide`
-    /// looks as far as the tools move.
-    fn look(&mut self, state: State<'_>, part: f32, wide: bool) {
-        let mut placed: [Option<Placed>; MAX_TOOLS] = [const { None }; MAX_TOOLS];
-        for (place, (tool, from)) in placed.iter_mut().zip(self.tools.iter().zip(&self.before)) {
-            let motion = match wide {
-                true => tool.body.motion(from, &tool.pose),
-                false => 0.0,
-            };
-            *place = Some(Placed {
-                body: &tool.body,
-                pose: pose::between(from, &tool.pose, part),
-                skin: SKIN_MM + motion,
-            });
-        }
-        self.rows.clear();
-        let row = |tool: u32, sample: u32, force: Vector| Row {
-            tool,
-            sample,
-            force,
-            point: Vector::ZERO,
-            outward: Vector::ZERO,
-        };
-        for (index, placed) in placed.iter().flatten().enumerate() {
-            let found = self
-                .search
-                .find(&self.samples, std::slice::from_ref(placed), |node| {
-                    state.position(node)
-                });
-            let found = found
-                .iter()
-                .map(|c| row(index as u32, c.sample, Vector::ZERO));
-            self.rows.extend(found);
-            let anchors = self.next.tools[index].grasp.anchors().iter();
-            self.rows
-                .extend(anchors.map(|anchor| row(index as u32, anchor.sample, Vector::ZERO)));
-        }
-        let pushed = self.next.forces.iter();
-        self.rows
-            .extend(pushed.map(|force| row(force.tool, force.sample, force.force)));
-        // Those with a force come first of their equals, and stay.
-        self.rows
-            .sort_unstable_by_key(|row| (row.tool, row.sample, row.force == Vector::ZERO));
-        self.rows.dedup_by_key(|row| (row.tool, row.sample));
-        for row in &mut self.rows {
-            let sample = self.samples.rows()[row.sample as usize];
-            row.point = sample.gather(|node| state.position(node));
-            row.outward = outward(&self.samples, row.sample, state);
-        }
-        if self.rows.len() > MOST_ROWS {
-            self.keep_nearest(part);
-        }
-    }
-
-    /// Keeps [`MOST_ROWS`] rows: those with a force first, then those deepest inside of their tool.
-    fn keep_nearest(&mut self, part: f32) {
-        let depth = |row: &Row| match self.tools.get(row.tool as usize) {
-            Some(tool) => {
-                let from = &self.before[row.tool as usize];
-                let pose = pose::between(from, &tool.pose, part);
-                tool.body.nearest_at(&pose, row.point).distance
-            }
-            None => f32::MAX,
-        };
-        let rank = |row: &Row| (row.force == Vector::ZERO, depth(row), row.sample);
-        self.rows.sort_unstable_by(|a, b| {
-            let ((a0, a1, a2), (b0, b1, b2)) = (rank(a), rank(b));
-            a0.cmp(&b0).then(a1.total_cmp(&b1)).then(a2.cmp(&b2))
-        });
-        self.rows.truncate(MOST_ROWS);
-        self.rows.sort_unstable_by_key(|row| (row.tool, row.sample));
-    }
-
-    /// How deep the deepest sample lies inside of a tool at a pose, mm; not positive where none does.
-    fn deepest(&mut self, index: usize, at: &Pose, state: State<'_>) -> f32 {
-        let tool = &self.tools[index];
-        let placed = Placed {
-            body: &tool.body,
-            pose: *at,
-            skin: 0.0,
-        };
-        let samples = &self.samples;
-        let found = self
-            .search
-            .find(samples, &[placed], |node| state.position(node));
-        let mut deepest = 0.0f32;
-        for candidate in found {
-            let outward = outward(samples, candidate.sample, state);
-            let depth = match candidate.normal.dot(outward) > LEAN {
-                true => tool.body.way_out(at, candidate.point, -outward, THROUGH_MM),
-                false => Some(-candidate.distance),
-            };
-            deepest = deepest.max(depth.unwrap_or(0.0));
-        }
-        deepest
-    }
-}
-
-/// The tissue's outward normal at the face of a sample.
-fn outward(samples: &Samples, sample: u32, state: State<'_>) -> Vector {
-    let corners = samples.corners(samples.face_of(sample));
-    let [a, b, c] = corners.map(|at| state.position(samples.nodes()[at as usize]));
-    (b - a).cross(c - a).normalize_or_zero()
-}
-
-/// Gap and slip of a row at its point, with the tools at part `part` of their way.
-#[allow(clippy::too_many_arguments)]
-fn measure(
-    tools: &[Tool],
-    before: &[Pose],
-    allowed: &[f32],
-    held: &[Held],
-    samples: &Samples,
-    row: &Row,
-    state: State<'_>,
-    part: f32,
-) -> Contact {
-    let released = Contact {
-        law: Law::Touch { friction: 0.0 },
-        normal: Vector::X,
-        gap: f32::MAX,
-        slip: Vector::ZERO,
-    };
-    let index = row.tool as usize;
-    let Some(tool) = tools.get(index) else {
-        return released;
-    };
-    let from = &before[index];
-    let now = pose::between(from, &tool.pose, part);
-    let nearest = tool.body.nearest_at(&now, row.point);
-    if let Some(place) = held[index].grasp.place(row.sample) {
-        return Contact {
-            law: Law::Bound,
-            normal: nearest.normal,
-            gap: 0.0,
-            slip: row.point - now.transform_point(place),
-        };
-    }
-    let (mut normal, mut gap) = (nearest.normal, nearest.distance);
-    if normal.dot(row.outward) > LEAN {
-        let advance = now.translation - from.translation;
-        let from_within = row.force == Vector::ZERO && advance.dot(row.outward) > 0.0;
-        let way = match gap < 0.0 && !from_within {
-            true => tool.body.way_out(&now, row.point, -row.outward, THROUGH_MM),
-            false => None,
-        };
-        let Some(way) = way else {
-            return released;
-        };
-        (normal, gap) = (-row.outward, -way);
-    }
-    let sample = samples.rows()[row.sample as usize];
-    let start = sample.gather(|node| vector(state.rest, node) + vector(state.start, node));
-    let carried = now.transform_point(from.inverse_transform_point(start)) - start;
-    Contact {
-        law: Law::Touch {
-            friction: tool.friction,
-        },
-        normal,
-        gap: gap + allowed[index],
-        slip: row.point - start - carried,
     }
 }

@@ -1,0 +1,98 @@
+//! What the forces of a solve mean: loads on the tissue's nodes, and what the tools feel of them.
+
+use ::contact::Vector;
+use ::contact::grasp::tension;
+
+use super::past::Force;
+use super::problem::Problem;
+use super::rows::{State, vector};
+use super::tool::{Push, Reading, Told};
+
+impl Problem {
+    /// Whether a grasp has torn off in this step.
+    pub fn tears(&self) -> bool {
+        self.next.tools.iter().any(|held| held.reading.torn)
+    }
+
+    /// Nodes of the samples that push, ascending, without held ones.
+    pub fn touched(&mut self, held: &[bool]) -> &[u32] {
+        self.nodes.clear();
+        for force in &self.next.forces {
+            let sample = self.samples.rows()[force.sample as usize];
+            let nodes = sample.entries().map(|entry| entry.0);
+            self.nodes
+                .extend(nodes.filter(|node| !held[*node as usize]));
+        }
+        self.nodes.sort_unstable();
+        self.nodes.dedup();
+        &self.nodes
+    }
+
+    /// Calls with each node's share of the forces on the tissue, mN.
+    pub fn each_load(&self, take: impl FnMut(u32, Vector)) {
+        self.share(&self.next.forces, take);
+    }
+
+    /// The same of the last published step.
+    pub fn each_push(&self, take: impl FnMut(u32, Vector)) {
+        self.share(&self.past.forces, take);
+    }
+
+    fn share(&self, forces: &[Force], mut take: impl FnMut(u32, Vector)) {
+        for force in forces {
+            for (node, weight) in self.samples.rows()[force.sample as usize].entries() {
+                take(node, force.force * weight);
+            }
+        }
+    }
+
+    /// Tells each tool what it feels, tears grasps that are pulled too hard. `state` is that at the end of the step.
+    pub fn finish(&mut self, state: State<'_>) {
+        for index in 0..self.tools.len() {
+            let pose = self.tools[index].pose;
+            let penetration_mm = self.deepest(index, &pose, state).max(0.0);
+            let tool = &self.tools[index];
+            let (mut force, mut torque) = (Vector::ZERO, Vector::ZERO);
+            let (mut pull, mut normal) = (Vector::ZERO, Vector::ZERO);
+            let mut contacts = 0;
+            let held = &self.next.tools[index];
+            for row in self.next.forces.iter().filter(|f| f.tool == index as u32) {
+                let point = self.samples.rows()[row.sample as usize].gather(|n| state.position(n));
+                force -= row.force;
+                torque -= (point - tool.pose.translation).cross(row.force);
+                contacts += 1;
+                if held.grasp.place(row.sample).is_some() {
+                    pull += row.force;
+                    normal += tool.body.nearest_at(&tool.pose, point).normal;
+                }
+            }
+            let held = &mut self.next.tools[index];
+            let pull = tension(pull, normal.normalize_or_zero());
+            let torn = held.reading.torn || held.grasp.tear(pull, tool.tear_off_mn);
+            held.reading = Reading {
+                force: force.to_array(),
+                torque: torque.to_array(),
+                contacts,
+                penetration_mm,
+                torn,
+            };
+        }
+    }
+
+    /// Makes the last step's readings and forces readable; displacements `[K,3]`, mm.
+    pub fn tell(&self, told: &mut Told, rest: &[f32], u: &[f32]) {
+        told.clear();
+        told.readings
+            .extend(self.past.tools.iter().map(|held| held.reading));
+        for force in &self.past.forces {
+            let sample = self.samples.rows()[force.sample as usize];
+            told.pushes.push(Push {
+                tool: force.tool,
+                point: sample
+                    .gather(|node| vector(rest, node) + vector(u, node))
+                    .to_array(),
+                force: (-force.force).to_array(),
+            });
+        }
+    }
+}

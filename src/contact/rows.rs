@@ -1,0 +1,212 @@
+//! The rows of a contact problem: samples near the tools, and their gaps and slips at a state of the tissue.
+
+use ::contact::{Contact, Law, Placed, Pose, SKIN_MM, Samples, Vector, pose};
+
+use super::past::Held;
+use super::problem::Problem;
+use super::tool::{MAX_TOOLS, Tool};
+
+/// Samples that one solve may have: what a tool as large as the organ touches beyond these is left to the next solve.
+const MOST_ROWS: usize = 256;
+/// Longest way through a tool, mm.
+const THROUGH_MM: f32 = 30.0;
+/// A tool's normal may lean this much (cosine) to the outside of the tissue; beyond, the tool reaches the sample from within.
+const LEAN: f32 = 0.2;
+
+/// Where the tissue is, `[K,3]` each.
+#[derive(Clone, Copy)]
+pub struct State<'a> {
+    /// Rest positions, mm.
+    pub rest: &'a [f32],
+    /// Displacements, mm.
+    pub u: &'a [f32],
+    /// Displacements at the start of the step, mm.
+    pub start: &'a [f32],
+}
+
+pub(super) fn vector(field: &[f32], node: u32) -> Vector {
+    let at = 3 * node as usize;
+    Vector::new(field[at], field[at + 1], field[at + 2])
+}
+
+impl State<'_> {
+    pub(super) fn position(&self, node: u32) -> Vector {
+        vector(self.rest, node) + vector(self.u, node)
+    }
+}
+
+/// A sample that is looked at.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Row {
+    pub(super) tool: u32,
+    pub(super) sample: u32,
+    pub(super) force: Vector,
+    pub(super) point: Vector,
+    /// Of the tissue's surface, outward.
+    pub(super) outward: Vector,
+}
+
+impl Problem {
+    /// Fills `rows`: samples near the tools at part `part` of their way, those that are pushed, and those that are held. `wide`
+    /// looks as far as the tools move.
+    pub(super) fn look(&mut self, state: State<'_>, part: f32, wide: bool) {
+        let mut placed: [Option<Placed>; MAX_TOOLS] = [const { None }; MAX_TOOLS];
+        for (place, (tool, from)) in placed.iter_mut().zip(self.tools.iter().zip(&self.before)) {
+            let motion = match wide {
+                true => tool.body.motion(from, &tool.pose),
+                false => 0.0,
+            };
+            *place = Some(Placed {
+                body: &tool.body,
+                pose: pose::between(from, &tool.pose, part),
+                skin: SKIN_MM + motion,
+            });
+        }
+        self.rows.clear();
+        let row = |tool: u32, sample: u32, force: Vector| Row {
+            tool,
+            sample,
+            force,
+            point: Vector::ZERO,
+            outward: Vector::ZERO,
+        };
+        for (index, placed) in placed.iter().flatten().enumerate() {
+            let found = self
+                .search
+                .find(&self.samples, std::slice::from_ref(placed), |node| {
+                    state.position(node)
+                });
+            let found = found
+                .iter()
+                .map(|c| row(index as u32, c.sample, Vector::ZERO));
+            self.rows.extend(found);
+            let anchors = self.next.tools[index].grasp.anchors().iter();
+            self.rows
+                .extend(anchors.map(|anchor| row(index as u32, anchor.sample, Vector::ZERO)));
+        }
+        let pushed = self.next.forces.iter();
+        self.rows
+            .extend(pushed.map(|force| row(force.tool, force.sample, force.force)));
+        // Those with a force come first of their equals, and stay.
+        self.rows
+            .sort_unstable_by_key(|row| (row.tool, row.sample, row.force == Vector::ZERO));
+        self.rows.dedup_by_key(|row| (row.tool, row.sample));
+        for row in &mut self.rows {
+            let sample = self.samples.rows()[row.sample as usize];
+            row.point = sample.gather(|node| state.position(node));
+            row.outward = outward(&self.samples, row.sample, state);
+        }
+        if self.rows.len() > MOST_ROWS {
+            self.keep_nearest(part);
+        }
+    }
+
+    /// Keeps [`MOST_ROWS`] rows: those with a force first, then those deepest inside of their tool.
+    fn keep_nearest(&mut self, part: f32) {
+        let depth = |row: &Row| match self.tools.get(row.tool as usize) {
+            Some(tool) => {
+                let from = &self.before[row.tool as usize];
+                let pose = pose::between(from, &tool.pose, part);
+                tool.body.nearest_at(&pose, row.point).distance
+            }
+            None => f32::MAX,
+        };
+        let rank = |row: &Row| (row.force == Vector::ZERO, depth(row), row.sample);
+        self.rows.sort_unstable_by(|a, b| {
+            let ((a0, a1, a2), (b0, b1, b2)) = (rank(a), rank(b));
+            a0.cmp(&b0).then(a1.total_cmp(&b1)).then(a2.cmp(&b2))
+        });
+        self.rows.truncate(MOST_ROWS);
+        self.rows.sort_unstable_by_key(|row| (row.tool, row.sample));
+    }
+
+    /// How deep the deepest sample lies inside of a tool at a pose, mm; not positive where none does.
+    pub(super) fn deepest(&mut self, index: usize, at: &Pose, state: State<'_>) -> f32 {
+        let tool = &self.tools[index];
+        let placed = Placed {
+            body: &tool.body,
+            pose: *at,
+            skin: 0.0,
+        };
+        let samples = &self.samples;
+        let found = self
+            .search
+            .find(samples, &[placed], |node| state.position(node));
+        let mut deepest = 0.0f32;
+        for candidate in found {
+            let outward = outward(samples, candidate.sample, state);
+            let depth = match candidate.normal.dot(outward) > LEAN {
+                true => tool.body.way_out(at, candidate.point, -outward, THROUGH_MM),
+                false => Some(-candidate.distance),
+            };
+            deepest = deepest.max(depth.unwrap_or(0.0));
+        }
+        deepest
+    }
+}
+
+/// The tissue's outward normal at the face of a sample.
+fn outward(samples: &Samples, sample: u32, state: State<'_>) -> Vector {
+    let corners = samples.corners(samples.face_of(sample));
+    let [a, b, c] = corners.map(|at| state.position(samples.nodes()[at as usize]));
+    (b - a).cross(c - a).normalize_or_zero()
+}
+
+/// Gap and slip of a row at its point, with the tools at part `part` of their way.
+#[allow(clippy::too_many_arguments)]
+pub(super) fn measure(
+    tools: &[Tool],
+    before: &[Pose],
+    allowed: &[f32],
+    held: &[Held],
+    samples: &Samples,
+    row: &Row,
+    state: State<'_>,
+    part: f32,
+) -> Contact {
+    let released = Contact {
+        law: Law::Touch { friction: 0.0 },
+        normal: Vector::X,
+        gap: f32::MAX,
+        slip: Vector::ZERO,
+    };
+    let index = row.tool as usize;
+    let Some(tool) = tools.get(index) else {
+        return released;
+    };
+    let from = &before[index];
+    let now = pose::between(from, &tool.pose, part);
+    let nearest = tool.body.nearest_at(&now, row.point);
+    if let Some(place) = held[index].grasp.place(row.sample) {
+        return Contact {
+            law: Law::Bound,
+            normal: nearest.normal,
+            gap: 0.0,
+            slip: row.point - now.transform_point(place),
+        };
+    }
+    let (mut normal, mut gap) = (nearest.normal, nearest.distance);
+    if normal.dot(row.outward) > LEAN {
+        let advance = now.translation - from.translation;
+        let from_within = row.force == Vector::ZERO && advance.dot(row.outward) > 0.0;
+        let way = match gap < 0.0 && !from_within {
+            true => tool.body.way_out(&now, row.point, -row.outward, THROUGH_MM),
+            false => None,
+        };
+        let Some(way) = way else {
+            return released;
+        };
+        (normal, gap) = (-row.outward, -way);
+    }
+    let sample = samples.rows()[row.sample as usize];
+    let start = sample.gather(|node| vector(state.rest, node) + vector(state.start, node));
+    let carried = now.transform_point(from.inverse_transform_point(start)) - start;
+    Contact {
+        law: Law::Touch {
+            friction: tool.friction,
+        },
+        normal,
+        gap: gap + allowed[index],
+        slip: row.point - start - carried,
+    }
+}
