@@ -82,7 +82,7 @@ impl Stage {
             if !size.is_finite() || at.det < SMALLEST_DET || (iteration > 0 && late) {
                 break;
             }
-            self.improve_loaded(lent, input, rest, problem, at, report)?;
+            self.improve_at(lent, input, rest, problem, at, 1.0, report)?;
             report.iterations += 1;
             let before = size;
             size = self.unbalanced(lent, problem, at.g);
@@ -193,18 +193,6 @@ impl Stage {
             &mut self.scratch_field,
             u,
         )
-    }
-
-    fn improve_loaded(
-        &mut self,
-        lent: Lent<'_>,
-        input: &Input<'_>,
-        rest: &[f32],
-        problem: &mut Problem,
-        at: &mut Iterate<'_>,
-        report: &mut Report,
-    ) -> Result<()> {
-        self.improve_at(lent, input, rest, problem, at, 1.0, report)
     }
 
     /// One iteration with the tools at part `way` of their way.

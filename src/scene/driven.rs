@@ -86,10 +86,13 @@ impl Core {
         stats: &mut SceneStats,
     ) -> Result<bool> {
         if near && (problem.pushed() || problem.holds()) {
+            let before = *stats;
             self.load(published, problem, start, stats)?;
             if problem.pushes() {
                 return Ok(true);
             }
+            // That state is given up, and what it said of itself.
+            *stats = before;
         }
         // Nothing pushes: the model's own free motion, unless that runs into a tool.
         self.predict_and_decode(published, None, true, stats)?;
