@@ -1,6 +1,6 @@
 /* libupt: real-time soft tissue for game engines and simulators.
  *
- * Written by `cargo xtask header` from src/ffi/; conventions: docs/abi.md.
+ * Written by `cargo xtask header` from src/ffi/; conventions: docs/reference/abi.md.
  * SPDX-License-Identifier: Apache-2.0 OR MIT
  */
 

@@ -1,6 +1,6 @@
 //! The library's error: what went wrong, where, and what to do about it.
 //!
-//! Every variant maps to one status code of `docs/abi.md`.
+//! Every variant maps to one status code of `docs/reference/abi.md`.
 
 use std::path::PathBuf;
 
@@ -69,7 +69,7 @@ pub enum Error {
 pub type Result<T> = std::result::Result<T, Error>;
 
 impl Error {
-    /// The status code of `docs/abi.md`.
+    /// The status code of `docs/reference/abi.md`.
     pub fn status(&self) -> i32 {
         match self {
             Error::Argument(_) => ffi::UPT_ERR_ARGUMENT,

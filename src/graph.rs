@@ -1,4 +1,4 @@
-//! Seeded supernodes and the radius graph (`docs/formats.md`), the same in Python and in Rust.
+//! Seeded supernodes and the radius graph (`docs/reference/formats.md`), the same in Python and in Rust.
 //!
 //! Unlike the paper's code, a capped ball keeps the *nearest* `max_degree` nodes and never loses its own self edge.
 

@@ -13,7 +13,7 @@ use upt::ffi::*;
 
 /// Smaller requests are texts and the like; the meshes here have 210 and 3,000 nodes.
 const SCENE: usize = 4096;
-/// Smaller requests of opening are the search structures that docs/abi.md leaves out.
+/// Smaller requests of opening are the search structures that docs/reference/abi.md leaves out.
 const OPEN: usize = 1 << 20;
 
 struct Refusing;

@@ -1,4 +1,4 @@
-//! The stack that calls need, as docs/abi.md states it: a thread with that much makes them.
+//! The stack that calls need, as docs/reference/abi.md states it: a thread with that much makes them.
 
 mod fixture;
 mod host;

@@ -7,7 +7,7 @@
     u = scene.step_contacts([17, 18], [[0, 0, -4], [0, 0, -4]])  # [K, 3], mm, 50 ms later
 
 Shapes and units: positions and displacements are float32 `[n, 3]`, mm; forces mN; times seconds, but in the statistics
-milliseconds. What a call may raise is in `upt.errors`; conventions of the library itself are in docs/abi.md.
+milliseconds. What a call may raise is in `upt.errors`; conventions of the library itself are in docs/reference/abi.md.
 """
 
 from __future__ import annotations

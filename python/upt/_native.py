@@ -1,4 +1,4 @@
-# Written by `cargo xtask header` from src/ffi/; conventions: docs/abi.md.
+# Written by `cargo xtask header` from src/ffi/; conventions: docs/reference/abi.md.
 # SPDX-License-Identifier: Apache-2.0 OR MIT
 """The C ABI in Python: enums, structs and the signature of each function."""
 

@@ -290,7 +290,7 @@ def _contacts(nodes: ArrayLike, contact: ArrayLike) -> tuple[Indices, Floats]:
 
 
 def _node_count_of(mesh: str) -> int:
-    """K of a mesh file, from its header (docs/formats.md)."""
+    """K of a mesh file, from its header (docs/reference/formats.md)."""
     with open(mesh, "rb") as file:
         (length,) = struct.unpack("<Q", file.read(8))
         header = json.loads(file.read(length))

@@ -1,5 +1,5 @@
 //! What this library knows of a manifest. A bundle that asks for more is refused, instead of running other dynamics than
-//! it was made with (`docs/formats.md`, "Versions").
+//! it was made with (`docs/reference/formats.md`, "Versions").
 
 use serde_json::Value;
 

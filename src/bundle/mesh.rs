@@ -29,7 +29,7 @@ pub struct Mesh {
     pub held_nodes: Vec<u32>,
     /// A third of the area of each node's boundary triangles `[K]`, mm^2.
     pub node_area: Vec<f32>,
-    /// The mesh hash of `docs/formats.md`.
+    /// The mesh hash of `docs/reference/formats.md`.
     pub sha256: String,
 }
 

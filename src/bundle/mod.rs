@@ -1,4 +1,4 @@
-//! Bundles: bytes on disk -> checked values. The format is `docs/formats.md`.
+//! Bundles: bytes on disk -> checked values. The format is `docs/reference/formats.md`.
 
 mod checks;
 mod files;

@@ -1,5 +1,5 @@
 //! Contact of rigid tools with the tissue, solved: forces with no penetration and Coulomb friction at samples of the surface,
-//! as loads on the tissue (`docs/instruments.md`).
+//! as loads on the tissue (`docs/guide/instruments.md`).
 //!
 //! | module | what |
 //! |---|---|

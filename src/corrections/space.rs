@@ -1,4 +1,4 @@
-//! The coarse space of the corrections' preconditioner (`corrections.safetensors` of `docs/formats.md`): modes `Phi` in the block
+//! The coarse space of the corrections' preconditioner (`corrections.safetensors` of `docs/reference/formats.md`): modes `Phi` in the block
 //! coordinates of the prior, their stiffness and mass, the first of them natural modes.
 //!
 //! With `kappa = 9/(4h²) + 3 alpha/(2h)` of BDF2, `K + kappa M` takes the place of the stiffness everywhere. Its compliance at the

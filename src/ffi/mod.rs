@@ -1,7 +1,7 @@
 //! The C ABI: `include/upt.h` and the C# bindings are generated from this folder (`cargo xtask header`).
 //!
 //! A function checks its pointers, finds its handle, calls one safe function and turns the result into a status;
-//! there is no other logic here. Conventions: `docs/abi.md`; why it is built this way: `docs/decisions/001-ffi.md`.
+//! there is no other logic here. Conventions: `docs/reference/abi.md`; why it is built this way: `docs/decisions/001-ffi.md`.
 
 #![allow(non_camel_case_types, clippy::missing_safety_doc)]
 

@@ -15,7 +15,7 @@ use std::thread::JoinHandle;
 /// Bytes from which on streaming a table is split over threads. Waking a worker and waiting for its last chunk costs what
 /// one core reads in the meantime, some megabytes from cache. Measured (`cargo bench --bench kernels -- pool`, two cores that share
 /// their memory with others): reading alone gains nothing from a second thread up to 32 MB and loses below 4 MB; the products over the
-/// tables of a large mesh, which also compute, take a quarter less time on two (`brain-fine-reduced` in docs/performance.md).
+/// tables of a large mesh, which also compute, take a quarter less time on two (`brain-fine-reduced` in docs/results/performance.md).
 const SPLIT_BYTES: usize = 8 << 20;
 
 /// Why a pool could not be made or a job not be finished.

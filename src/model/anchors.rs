@@ -1,4 +1,4 @@
-//! Decoder anchors (`anchors.safetensors` of `docs/formats.md`): the correction of a `upt` bundle is smooth, so it is
+//! Decoder anchors (`anchors.safetensors` of `docs/reference/formats.md`): the correction of a `upt` bundle is smooth, so it is
 //! decoded at a part of the nodes and interpolated to the others.
 
 use crate::bundle::TensorFile;

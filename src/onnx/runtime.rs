@@ -114,7 +114,7 @@ fn refuse_telemetry() {
     const VARIABLE: &str = "ORT_DISABLE_TELEMETRY";
     if std::env::var_os(VARIABLE).is_none() {
         // SAFETY: sound unless another thread of the host reads or writes the environment without Rust's lock at this
-        // moment; docs/abi.md tells hosts that do so to set the variable themselves, and then nothing is written here.
+        // moment; docs/reference/abi.md tells hosts that do so to set the variable themselves, and then nothing is written here.
         unsafe { std::env::set_var(VARIABLE, "1") };
     }
 }

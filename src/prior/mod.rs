@@ -1,5 +1,5 @@
 //! The linear-elastic response `L(c)` of the held mesh to prescribed contact displacements
-//! (`prior.safetensors` of `docs/formats.md`), shared by both bundle kinds.
+//! (`prior.safetensors` of `docs/reference/formats.md`), shared by both bundle kinds.
 //!
 //! Contact forces `f = A_CC^-1 c` from the compliance `A` between contact degrees of freedom, then the field in
 //! block coordinates `q = sum_i f_i response[i]`, `u_k = U_k q_k`. With `vibration.safetensors` the response swings on

@@ -1,4 +1,4 @@
-//! Free vibration (`vibration.safetensors` of `docs/formats.md`): what linear elasticity does when the contact is gone.
+//! Free vibration (`vibration.safetensors` of `docs/reference/formats.md`): what linear elasticity does when the contact is gone.
 //!
 //! The held, damped, linear-elastic body swings from the last response: `M u'' + alpha M u' + K u = 0`. Its eigenmodes
 //! are independent oscillators, each advanced over a step exactly.

@@ -1,5 +1,5 @@
 //! A bundle without a learned map: while in contact the static response, after a release the free vibration of the last
-//! corrected state, `z = N^T M u` and `dz/dt = N^T M v` in the natural modes `N` (`docs/formats.md`, "`vibration.safetensors`").
+//! corrected state, `z = N^T M u` and `dz/dt = N^T M v` in the natural modes `N` (`docs/reference/formats.md`, "`vibration.safetensors`").
 
 use super::reduced::ReducedEngine;
 use crate::error::{Error, Result};

@@ -1,5 +1,5 @@
 //! The step of kind `reduced`: `u' = L(c') + Phi b'`, with `b'` from the correction network, bounded relative to the
-//! linear response and faded out beyond the trained pushes (`docs/formats.md`). A bundle without a learned map has `b' = 0`
+//! linear response and faded out beyond the trained pushes (`docs/reference/formats.md`). A bundle without a learned map has `b' = 0`
 //! and swings freely after a release ([`super::free_motion`]).
 
 use super::contact::ContactSet;

@@ -1,7 +1,7 @@
-"""What corrections are worth: error, time and estimate by their number, into docs/corrections.md.
+"""What corrections are worth: error, time and estimate by their number, into docs/results/corrections.md.
 
     python training/scripts/corrections_table.py --upt target/release/upt --bundle onnx/brain-reduced --data DIR \
-        --counts 0,1,3,5,10 --page docs/corrections.md
+        --counts 0,1,3,5,10 --page docs/results/corrections.md
 
 Each case of the data is replayed through `upt rollout --json` with each count. The estimate is compared with the true
 root mean square error in the steps with contact: rank correlation, and their ratio (the bundle's `calibration`).

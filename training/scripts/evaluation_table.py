@@ -1,6 +1,6 @@
 """A Markdown table of results of `evaluate`, printed or written into a page:
 
-python training/scripts/evaluation_table.py A.json ... [--page docs/training.md]
+python training/scripts/evaluation_table.py A.json ... [--page docs/results/training.md]
 """
 
 from __future__ import annotations

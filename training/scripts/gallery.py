@@ -1,4 +1,4 @@
-"""Makes the organs of docs/gallery.md with `upt make`, one command each, and writes its tables from their certificates.
+"""Makes the organs of docs/results/gallery.md with `upt make`, one command each; their certificates give its tables.
 
     python training/scripts/gallery.py --upt target/release/upt --sofa FOLDER --out gallery
 
@@ -18,7 +18,7 @@ import numpy as np
 from upt_training.box_mesh import box_mesh
 
 ROOT = Path(__file__).parents[2]
-PAGE = ROOT / "docs" / "gallery.md"
+PAGE = ROOT / "docs" / "results" / "gallery.md"
 
 
 def kidney(path: Path) -> None:

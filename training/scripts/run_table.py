@@ -1,4 +1,4 @@
-"""What training runs got and reached: `run_table.py RUN [RUN ...] --evaluation JSON --page docs/training.md`.
+"""What training runs got and reached: `run_table.py RUN [RUN ...] --evaluation JSON --page docs/results/training.md`.
 
 Reads the last scores in `log.csv` and the steps and CPU time in `last.pt` of each run folder; a run that has not been
 scored yet has no error in the table. `--evaluation` is the JSON of `evaluate` of a bundle on the same data, to compare

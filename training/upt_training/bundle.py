@@ -1,4 +1,4 @@
-"""Writes a bundle folder (docs/formats.md, "Bundle: a folder") and checks what it wrote.
+"""Writes a bundle folder (docs/reference/formats.md, "Bundle: a folder") and checks what it wrote.
 
 The self-check runs the PyTorch model, the same model unfactored (per-edge messages, as in the paper) and the ONNX
 graphs in ONNX Runtime on the same inputs; their relative difference must stay below 1e-5.

@@ -59,7 +59,7 @@ def seal(folder: Path, entries: dict | None = None) -> None:
 
 
 def _write(folder: Path, manifest: dict, indent: int) -> None:
-    """`requires`, the digest (docs/formats.md, "The manifest's digest"), and the file, moved into place."""
+    """`requires`, the digest (docs/reference/formats.md, "The manifest's digest"), and the file, moved into place."""
     needed = requirements(manifest)
     manifest.pop("requires", None)
     if needed:

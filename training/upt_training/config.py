@@ -27,7 +27,7 @@ BASES = ("none", "displacement", "prior")
 
 @dataclass
 class GraphSettings:
-    """Supernodes and radius graph (docs/formats.md)."""
+    """Supernodes and radius graph (docs/reference/formats.md)."""
 
     radius_mm: float = 12.0
     max_degree: int = 32

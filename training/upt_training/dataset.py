@@ -1,4 +1,4 @@
-"""Reads datasets (docs/formats.md): trajectories are memory-mapped, nothing is loaded before it is asked for.
+"""Reads datasets (docs/reference/formats.md): trajectories are memory-mapped, nothing is loaded before it is asked for.
 
 Row `t` of the contact arrays holds at the end of the step from frame `t - 1` to frame `t`; contact nodes of row `t`
 have displacement `c` in frame `t`. So the surrogate learns `M(u[t-1], c[t]) = u[t]`. Lengths in mm.

@@ -1,4 +1,4 @@
-"""The envelope of a dataset: what the model was trained on (docs/formats.md, `envelope`)."""
+"""The envelope of a dataset: what the model was trained on (docs/reference/formats.md, `envelope`)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Supernodes and the radius graph (docs/formats.md), the same in Python and in Rust, bit for bit.
+"""Supernodes and the radius graph (docs/reference/formats.md), the same in Python and in Rust, bit for bit.
 
 The paper samples `n_S` nodes at random and aggregates the messages of up to 32 nodes in a radius. Here the choice is a
 seeded hash (no generator state to agree on), and a full ball keeps the *nearest* nodes and always the self edge.

@@ -1,4 +1,4 @@
-"""Mesh files (`*.mesh.safetensors`, docs/formats.md): read, write, hash.
+"""Mesh files (`*.mesh.safetensors`, docs/reference/formats.md): read, write, hash.
 
 `positions` are rest positions in mm, `[K, 3]` float32; `tets` `[T, 4]` int32; `surface` `[F, 3]` int32, outward;
 `domain` `[D]` rows of `surface` that instruments may touch; `fixed` and `supported` are ascending node sets;

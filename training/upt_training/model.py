@@ -1,7 +1,7 @@
 """The surrogate M: (u^t, c^{t+Δt}) -> u^{t+Δt}: a Universal Physics Transformer (paper, "Deep learning architecture").
 
 concat(features) -> Linear + sincos -> mean message passing onto supernodes -> transformer -> perceiver pooling ->
-approximator -> perceiver decoder. The message Linears are kept factored (docs/formats.md, "Graphs of a upt bundle"):
+approximator -> perceiver decoder. Message Linears stay factored (docs/reference/formats.md, graphs of a upt bundle):
 `W1 [x_j ; x_i] + b1 = (W1s x_j) + (W1t x_i + b1)`, exact, so that only add, GELU and mean are done per edge.
 """
 

@@ -193,7 +193,7 @@ def scaled_head(model: Upt) -> tuple[torch.Tensor, torch.Tensor]:
     return model.decoder.head.weight * scale[:, None], model.decoder.head.bias * scale
 
 
-# -- the graphs of docs/formats.md --------------------------------------------------------------------------------
+# -- the graphs of docs/reference/formats.md --------------------------------------------------------------------------
 
 
 def embed_graph(model: Upt) -> onnx.ModelProto:

@@ -1,4 +1,4 @@
-"""Evaluates the linear-elastic response `L(c)` from `prior.safetensors` (docs/formats.md).
+"""Evaluates the linear-elastic response `L(c)` from `prior.safetensors` (docs/reference/formats.md).
 
 Contact forces `f = A_CC^-1 c`, block coordinates `q = f response`, field `u_block = U_k q_k`. Lengths mm, forces mN.
 With `vibration.safetensors` the response goes on swinging when the contact is gone; without, it is zero then.

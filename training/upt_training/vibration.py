@@ -1,4 +1,4 @@
-"""Free vibration: what linear elasticity does once the contact is gone (docs/formats.md, `vibration.safetensors`).
+"""Free vibration: linear elasticity after a release (docs/reference/formats.md, `vibration.safetensors`).
 
 While in contact the response is static, `L(c)`. At a release the held, damped, linear-elastic body swings:
 `M u'' + alpha M u' + K u = 0`. Its eigenmodes `K phi_k = omega_k² M phi_k` decouple it, and each is advanced over a

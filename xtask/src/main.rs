@@ -44,7 +44,7 @@ enum Task {
     /// Push the brain: reference simulation, replay through every committed bundle, table and page.
     #[command(after_help = "Examples:\n  cargo xtask demo\n  cargo xtask demo --scheme 3 --seed 7")]
     Demo(demo::Options),
-    /// Run the speed tables and write docs/performance.md.
+    /// Run the speed tables and write docs/results/performance.md.
     #[command(
         after_help = "Examples:\n  cargo xtask bench --quick\n  cargo xtask bench --only kernels --keep-docs --json rows.json"
     )]
@@ -66,7 +66,7 @@ enum Task {
         after_help = "Example:\n  cargo xtask readme --report target/report/report.json --bundle onnx/brain-reduced --trajectory push.trajectory.safetensors"
     )]
     Readme(readme::Options),
-    /// Build libupt for each cargo feature and write what it adds to docs/footprint.md.
+    /// Build libupt for each cargo feature and write what it adds to docs/results/footprint.md.
     #[command(after_help = "Example:\n  cargo xtask footprint")]
     Footprint(footprint::Options),
     /// Write include/upt.h and the C# bindings from the library's source.

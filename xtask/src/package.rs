@@ -120,8 +120,8 @@ fn shared(workspace: &Workspace, root: &Path, ort_folder: &Path) -> Result<()> {
         "NOTICE",
         "README.md",
         "CHANGELOG.md",
-        "docs/abi.md",
-        "docs/formats.md",
+        "docs/reference/abi.md",
+        "docs/reference/formats.md",
     ] {
         let file = Path::new(name)
             .file_name()

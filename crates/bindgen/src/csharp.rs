@@ -7,7 +7,7 @@ use anyhow::{Result, bail};
 use crate::source::{Function, Kind, Named, Source, Struct};
 
 const HEAD: &str = "\
-// Written by `cargo xtask header` from src/ffi/; conventions: docs/abi.md.
+// Written by `cargo xtask header` from src/ffi/; conventions: docs/reference/abi.md.
 // SPDX-License-Identifier: Apache-2.0 OR MIT
 using System;
 using System.Runtime.InteropServices;

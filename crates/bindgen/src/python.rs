@@ -7,7 +7,7 @@ use anyhow::{Result, bail};
 use crate::source::{Constant, Doc, Function, Kind, Named, Source, Struct};
 
 const HEAD: &str = "\
-# Written by `cargo xtask header` from src/ffi/; conventions: docs/abi.md.
+# Written by `cargo xtask header` from src/ffi/; conventions: docs/reference/abi.md.
 # SPDX-License-Identifier: Apache-2.0 OR MIT
 \"\"\"The C ABI in Python: enums, structs and the signature of each function.\"\"\"
 

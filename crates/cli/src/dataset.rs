@@ -1,4 +1,4 @@
-//! `upt dataset`: many cases in a folder, resumable and shardable (docs/datasets.md).
+//! `upt dataset`: many cases in a folder, resumable and shardable (docs/guide/datasets.md).
 
 use crate::simulate::SolverArguments;
 use anyhow::{Context, bail};

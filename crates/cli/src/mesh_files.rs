@@ -55,7 +55,7 @@ pub struct Import {
     after_help = "Example:\n  upt mesh stuff head.grid.safetensors head.mesh.safetensors --spacing 3.2 --half-space 1,0,0,0"
 )]
 pub struct Stuff {
-    /// Distance field (docs/formats.md), positive inside.
+    /// Distance field (docs/reference/formats.md), positive inside.
     field: PathBuf,
     /// Mesh file to write; no set is filled.
     output: PathBuf,

@@ -1,4 +1,4 @@
-//! Writes the verification, locking and mass-scaling tables of docs/reference-solver.md:
+//! Writes the verification, locking and mass-scaling tables of docs/results/reference-solver.md:
 //! `cargo run --release -p tissue --example reference_tables`.
 //!
 //! The text between `<!-- verification -->`, `<!-- locking -->` or `<!-- scaling -->` and the next `<!-- end -->` is replaced.
@@ -20,7 +20,7 @@ type Vectors = Vec<[f32; 3]>;
 
 fn main() -> Outcome<()> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let page = root.join("docs/reference-solver.md");
+    let page = root.join("docs/results/reference-solver.md");
     let mut text = std::fs::read_to_string(&page)?;
     let brain = Mesh::read(&root.join("onnx/meshes/brain-coarse.mesh.safetensors"))?;
     let fine = Mesh::read(&root.join("onnx/meshes/brain.mesh.safetensors"))?;

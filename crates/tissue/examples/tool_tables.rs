@@ -1,4 +1,4 @@
-//! Writes the tables of contact with tools in docs/reference-solver.md:
+//! Writes the tables of contact with tools in docs/results/reference-solver.md:
 //! `cargo run --release -p tissue --example tool_tables`.
 //!
 //! The text between `<!-- tools -->` or `<!-- hertz -->` and the next `<!-- end -->` is replaced.
@@ -16,7 +16,7 @@ type Outcome<T> = Result<T, Box<dyn Error>>;
 
 fn main() -> Outcome<()> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let page = root.join("docs/reference-solver.md");
+    let page = root.join("docs/results/reference-solver.md");
     let brain = Mesh::read(&root.join("onnx/meshes/brain-coarse.mesh.safetensors"))?;
     for (marker, table) in [("hertz", half_space()?), ("tools", properties(&brain)?)] {
         print!("{table}");

@@ -1,4 +1,4 @@
-//! A folder of simulated cases (docs/formats.md, "Dataset"; use in docs/datasets.md).
+//! A folder of simulated cases (docs/reference/formats.md, "Dataset"; use in docs/guide/datasets.md).
 //!
 //! Case `i` follows from the plan and `i` alone, so any process may compute any
 //! case: shards share a folder, an interrupted run goes on where it stopped, and

@@ -1,4 +1,4 @@
-//! What a trajectory says about tools: poses, wrenches and the forces at the samples of contact (docs/formats.md).
+//! What a trajectory says about tools: poses, wrenches and the forces at the samples of contact (docs/reference/formats.md).
 
 use crate::solver::{FrameReport, Tool, ToolPose};
 use crate::tensors::{self, Dtype, Tensor};

@@ -1,4 +1,4 @@
-//! A simulated case as a file (docs/formats.md, "Trajectory").
+//! A simulated case as a file (docs/reference/formats.md, "Trajectory").
 
 use crate::material::Material;
 use crate::tensors::{self, Dtype, Tensor};

@@ -42,7 +42,7 @@ ENVELOPE_DEPTH = 5.0
 
 @dataclass
 class Brain:
-    """A brain mesh: arrays as in docs/formats.md, positions in f64."""
+    """A brain mesh: arrays as in docs/reference/formats.md, positions in f64."""
 
     positions: np.ndarray
     tets: np.ndarray

@@ -1,4 +1,4 @@
-"""Writes a brain in the mesh format of docs/formats.md, the same bytes for the same mesh.
+"""Writes a brain in the mesh format of docs/reference/formats.md, the same bytes for the same mesh.
 
 The safetensors library writes metadata in no fixed order, so the header is written here.
 """
@@ -33,7 +33,7 @@ def tensors(brain):
 
 
 def mesh_hash(arrays):
-    """The mesh hash of docs/formats.md."""
+    """The mesh hash of docs/reference/formats.md."""
     digest = hashlib.sha256()
     for name in ("positions", "tets", "fixed", "supported"):
         digest.update(arrays[name].tobytes())

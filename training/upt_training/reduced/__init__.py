@@ -1,1 +1,1 @@
-"""Reduced models: the linear-elastic response of a mesh and a learned correction in a few modes (docs/reduced.md)."""
+"""Reduced models: linear-elastic response and a learned correction in a few modes (docs/results/reduced.md)."""

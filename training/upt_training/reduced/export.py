@@ -1,4 +1,4 @@
-"""Writes a bundle of kind `reduced` (docs/formats.md) and checks what it wrote.
+"""Writes a bundle of kind `reduced` (docs/reference/formats.md) and checks what it wrote.
 
 The self-check runs `latent.onnx` in ONNX Runtime against the PyTorch model, and a short scene through the bundle
 against the compliance columns: contact nodes at `c`, and `L(c)` within the block basis' tolerance.

@@ -1,4 +1,4 @@
-"""The learned correction `b' = base(state) + s * MLP(state)`; `state` holds the inputs of docs/formats.md.
+"""The learned correction `b' = base(state) + s * MLP(state)`; `state` holds the inputs of docs/reference/formats.md.
 
 While in contact the base is the static residual plus linear dynamics:
 
@@ -91,7 +91,7 @@ def perceptron(inputs: int, hidden: int, depth: int, outputs: int) -> nn.Sequent
 def bound(
     b: Tensor, limit: Tensor, response_norm: Tensor, jump: Tensor, changed: Tensor, relative: float, decay: float
 ) -> tuple[Tensor, Tensor]:
-    """The stability bound of docs/formats.md: `E' = max(relative |L'|, decay (E + changed |L' - L|))`, `|b| <= E'`."""
+    """Stability (docs/reference/formats.md): `E' = max(relative |L'|, decay (E + changed |L' - L|))`, `|b| <= E'`."""
     grown = torch.maximum(relative * response_norm, decay * (limit + changed * jump))
     norm = torch.linalg.vector_norm(b, dim=1)
     return b * torch.clamp(grown / norm.clamp_min(1e-12), max=1.0).unsqueeze(1), grown

@@ -1,4 +1,4 @@
-"""The linear-elastic response `L(c)` from a `prior.safetensors` file (docs/formats.md).
+"""The linear-elastic response `L(c)` from a `prior.safetensors` file (docs/reference/formats.md).
 
 `f = A_CC^-1 c`, `q = f response`, `u_block = U_k q_k`; also `z = f force_to_z` and `p = f force_to_p`.
 Contact nodes outside of `contact_nodes` have no column and do not act; `Prior.rows` tells which.

@@ -1,4 +1,4 @@
-"""Trajectories of a dataset folder (docs/formats.md), memory-mapped, with the contact forces of every frame."""
+"""Trajectories of a dataset folder (docs/reference/formats.md), memory-mapped, with contact forces."""
 
 from __future__ import annotations
 

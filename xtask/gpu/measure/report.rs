@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 
-/// A row of docs/performance.md, "Graphics cards": name, bundle, K from and to, bar and goal in ms.
+/// A row of docs/results/performance.md, "Graphics cards": name, bundle, K from and to, bar and goal in ms.
 type Bar = (&'static str, &'static str, [u64; 2], f64, f64);
 const MID: [u64; 2] = [20_000, 24_000];
 const FINE: [u64; 2] = [140_000, 160_000];

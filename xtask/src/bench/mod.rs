@@ -1,4 +1,4 @@
-//! `cargo xtask bench`: the speed tables, into docs/performance.md.
+//! `cargo xtask bench`: the speed tables, into docs/results/performance.md.
 //!
 //! Every bench target of `upt` and `tissue` prints its results as lines `ROW {json}`; this collects
 //! them. A row is {"name","value","unit","against","ratio","error","bar","goal"}; null where it has none.
@@ -32,7 +32,7 @@ pub struct Options {
     /// Only what these targets call so (of `step`: bundles whose name contains it); the tables keep their other rows.
     #[arg(long, requires = "only")]
     part: Option<String>,
-    /// Do not touch docs/performance.md.
+    /// Do not touch docs/results/performance.md.
     #[arg(long)]
     keep_docs: bool,
 }

@@ -1,4 +1,4 @@
-//! The measured part of docs/performance.md: a section a bench target, between two markers.
+//! The measured part of docs/results/performance.md: a section a bench target, between two markers.
 
 use std::fmt::Write;
 
@@ -20,7 +20,7 @@ pub fn write(
     failed: &[String],
     notes: &[String],
 ) -> Result<()> {
-    let path = workspace.path("docs/performance.md");
+    let path = workspace.path("docs/results/performance.md");
     let text = std::fs::read_to_string(&path)
         .with_context(|| format!("cannot read {}", path.display()))?;
     let (Some(start), Some(end)) = (text.find(BEGIN), text.find(END)) else {

@@ -1,4 +1,4 @@
-//! `cargo xtask footprint`: what each cargo feature of libupt adds, into docs/footprint.md.
+//! `cargo xtask footprint`: what each cargo feature of libupt adds, into docs/results/footprint.md.
 //!
 //! The library is built once for each set of features and stripped; a process of its own then opens it with the
 //! system's loader, opens bundles and steps them, and reads what it has mapped (`probe`).
@@ -204,7 +204,7 @@ fn tables(options: &Options, builds: &[Build]) -> Result<String> {
 fn write_document(workspace: &Workspace, options: &Options, builds: &[Build]) -> Result<()> {
     const BEGIN: &str = "<!-- cargo xtask footprint: begin -->";
     const END: &str = "<!-- cargo xtask footprint: end -->";
-    let path = workspace.path("docs/footprint.md");
+    let path = workspace.path("docs/results/footprint.md");
     let page = std::fs::read_to_string(&path)
         .with_context(|| format!("cannot read {}", path.display()))?;
     let (start, end) = page.find(BEGIN).zip(page.find(END)).with_context(|| {

@@ -24,7 +24,7 @@ use pair::Pair;
 
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  upt beside --bundle onnx/brain-coarse-reduced --markdown docs/stability.md --images docs/images
+  upt beside --bundle onnx/brain-coarse-reduced --markdown docs/results/stability.md --images docs/results/images
   upt beside --bundle onnx/brain-coarse-reduced --steps 0 --tools 20
   upt beside --bundle onnx/brain-fast --steps 0 --held-out DATASET --held-out DATASET-S5/case-00000.trajectory.safetensors --outside DATASET-HARD/case-00000.trajectory.safetensors")]
 pub struct Options {

@@ -1,4 +1,4 @@
-//! `certificate.json`: what was tested and how large the errors, forces and times are (`docs/make.md`).
+//! `certificate.json`: what was tested and how large the errors, forces and times are (`docs/guide/make.md`).
 
 use std::path::Path;
 

@@ -16,7 +16,7 @@ fn hex(bytes: &[u8]) -> String {
     digest.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// Lists `file`, sets the entry and the requirement `corrections`, and seals the manifest (`docs/formats.md`, "The manifest's digest").
+/// Lists `file`, sets the entry and the requirement `corrections`, and seals the manifest (`docs/reference/formats.md`, "The manifest's digest").
 pub fn add(bundle: &Path, file: &str, entry: &Value) -> Result<()> {
     let path = bundle.join("bundle.json");
     let text = std::fs::read_to_string(&path)

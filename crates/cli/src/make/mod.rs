@@ -1,5 +1,5 @@
 //! `upt make`: from an organ's surface or mesh to a bundle that steps in real time, with its certificate, in one command
-//! (`docs/make.md`).
+//! (`docs/guide/make.md`).
 //!
 //! Stages, each kept in a work folder and not made again: body (import, repair, tetrahedra, what is held and touched), columns
 //! (the linear response to every touch), modes (how it swings), tables, coarse space, check. A bundle is published as a whole

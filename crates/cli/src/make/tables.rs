@@ -1,4 +1,4 @@
-//! `prior.safetensors`: the compliance columns in block-wise bases (`docs/formats.md`), and the natural modes in the same.
+//! `prior.safetensors`: the compliance columns in block-wise bases (`docs/reference/formats.md`), and the natural modes in the same.
 //!
 //! The basis of a block spans what sampled contacts do there, and the natural modes with the amplitudes that these contacts give
 //! them. The columns are read once for as many blocks as have room in memory together.

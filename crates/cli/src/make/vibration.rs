@@ -1,4 +1,4 @@
-//! `vibration.safetensors`: the natural modes in block coordinates (`docs/formats.md`).
+//! `vibration.safetensors`: the natural modes in block coordinates (`docs/reference/formats.md`).
 
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -19,7 +19,7 @@ use serde::Serialize;
 
 #[derive(clap::Args)]
 #[command(
-    after_help = "Examples:\n  upt stress --quick\n  upt stress --bundle onnx/brain-reduced --bundle onnx/brain-fast --markdown docs/stability.md"
+    after_help = "Examples:\n  upt stress --quick\n  upt stress --bundle onnx/brain-reduced --bundle onnx/brain-fast --markdown docs/results/stability.md"
 )]
 pub struct Options {
     /// Bundle folders to stress; none: the reference solver only.

@@ -1,4 +1,4 @@
-//! Reads parts of a file of compliance columns that `upt prior` wrote (docs/formats.md).
+//! Reads parts of a file of compliance columns that `upt prior` wrote (docs/reference/formats.md).
 //!
 //! The file is half a gigabyte at 21,708 nodes, and a contact needs a tenth of it: columns are read by node.
 

@@ -1,4 +1,4 @@
-//! Reading and writing `*.mesh.safetensors` (docs/formats.md, "Mesh").
+//! Reading and writing `*.mesh.safetensors` (docs/reference/formats.md, "Mesh").
 
 use super::{Mesh, MeshError};
 use crate::tensors::{self, Dtype, Tensor};

@@ -2,7 +2,7 @@
 //!
 //! Lengths are millimetres (RAS: x right, y anterior, z superior); `K` nodes,
 //! `T` linear tetrahedra of positive volume, `F` boundary triangles oriented
-//! outward. The file format is `docs/formats.md`, "Mesh".
+//! outward. The file format is `docs/reference/formats.md`, "Mesh".
 
 mod error;
 mod file;

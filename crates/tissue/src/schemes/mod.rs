@@ -7,7 +7,7 @@
 //! `magnitude * p(t) * direction(phi, theta)`; there is no contact where `p(t)` is
 //! zero. As in the paper, only the site varies between the cases of a scheme.
 //! Scheme 3 is the paper's; the others follow its description (10 to 15 mm, 25 to
-//! 100 faces, continuous functions). See `docs/datasets.md` for a plot of each.
+//! 100 faces, continuous functions). See `docs/guide/datasets.md` for a plot of each.
 
 mod load;
 mod programme;

@@ -1,4 +1,4 @@
-//! Reads a signed distance grid that another program made (docs/formats.md, "Distance field").
+//! Reads a signed distance grid that another program made (docs/reference/formats.md, "Distance field").
 
 use super::GridField;
 use crate::mesh::MeshError;
