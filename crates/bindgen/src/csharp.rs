@@ -98,7 +98,7 @@ fn ty(source: &Source, kind: &Kind) -> Result<String> {
         .into(),
         Kind::Named(name) if name == "upt_log_fn" => "IntPtr".into(),
         Kind::Named(name) if source.structs.iter().any(|item| item.name == *name) => name.clone(),
-        Kind::Pointer(target) => match target.as_ref() {
+        Kind::Pointer(target, _) => match target.as_ref() {
             Kind::Named(name) if name == "c_char" => "byte*".into(),
             Kind::Named(name) if name == "c_void" || source.opaque.contains(name) => {
                 "IntPtr".into()

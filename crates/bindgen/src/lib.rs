@@ -1,8 +1,9 @@
-//! Writes the bindings of the C ABI from its one source, `src/ffi/`: the C header (cbindgen), the C# class and the Python
-//! structs. All are committed; the test `fresh` fails when they are stale.
+//! Writes the bindings of the C ABI from its one source, `src/ffi/`: the C header (cbindgen), the C# class, the Python
+//! structs and the reference in `docs/reference/abi.md`. All are committed; the test `fresh` fails when they are stale.
 
 pub mod csharp;
 pub mod python;
+pub mod reference;
 pub mod source;
 
 use std::path::{Path, PathBuf};
@@ -42,6 +43,10 @@ pub fn outputs() -> Result<Vec<Output>> {
         Output {
             path: "python/upt/_native.py",
             text: python::write(&source)?,
+        },
+        Output {
+            path: "docs/reference/abi.md",
+            text: reference::write(&root, &source)?,
         },
     ])
 }

@@ -153,7 +153,7 @@ fn seen(source: &Source, item: &Struct, field: &Named) -> Result<Seen> {
                 Some(format!("vector(\"_{name}\")")),
             )
         }
-        Kind::Pointer(target) => match target.as_ref() {
+        Kind::Pointer(target, _) => match target.as_ref() {
             Kind::Named(c_char) if c_char == "c_char" => of(
                 "str | None",
                 "str | os.PathLike[str] | None",
@@ -282,7 +282,7 @@ fn ctype(source: &Source, kind: &Kind) -> Result<String> {
         Kind::Array(element, length) => format!("{} * {length}", ctype(source, element)?),
         Kind::Named(name) if name == "upt_log_fn" => "ctypes.c_void_p".into(),
         Kind::Named(name) if source.structs.iter().any(|item| item.name == *name) => camel(name),
-        Kind::Pointer(target) => match target.as_ref() {
+        Kind::Pointer(target, _) => match target.as_ref() {
             Kind::Named(name) if name == "c_char" => "ctypes.c_char_p".into(),
             _ => "ctypes.c_void_p".into(),
         },

@@ -41,8 +41,8 @@ pub enum Kind {
     Number(String),
     /// `c_char`, `c_void` or a struct by name.
     Named(String),
-    /// A pointer.
-    Pointer(Box<Kind>),
+    /// A pointer, and whether it points to `const`.
+    Pointer(Box<Kind>, bool),
     /// A fixed array.
     Array(Box<Kind>, usize),
 }
@@ -63,6 +63,8 @@ pub struct Struct {
 
 /// An exported function.
 pub struct Function {
+    /// Its file in `src/ffi/`.
+    pub file: &'static str,
     pub doc: Doc,
     pub name: String,
     pub parameters: Vec<Named>,
@@ -87,7 +89,7 @@ pub fn read(root: &Path) -> Result<Source> {
         let file = syn::parse_file(&text).with_context(|| path.display().to_string())?;
         for item in &file.items {
             source
-                .add(item)
+                .add(name, item)
                 .with_context(|| path.display().to_string())?;
         }
     }
@@ -95,7 +97,7 @@ pub fn read(root: &Path) -> Result<Source> {
 }
 
 impl Source {
-    fn add(&mut self, item: &Item) -> Result<()> {
+    fn add(&mut self, file: &'static str, item: &Item) -> Result<()> {
         match item {
             Item::Const(item) if is_public(&item.vis) => {
                 let value = match item.expr.as_ref() {
@@ -143,6 +145,7 @@ impl Source {
                     })
                 });
                 self.functions.push(Function {
+                    file,
                     doc: doc(&item.attrs),
                     name: item.sig.ident.to_string(),
                     parameters: parameters.collect::<Result<_>>()?,
@@ -194,7 +197,9 @@ fn doc(attributes: &[Attribute]) -> Doc {
 
 fn kind(ty: &Type) -> Result<Kind> {
     Ok(match ty {
-        Type::Ptr(pointer) => Kind::Pointer(Box::new(kind(&pointer.elem)?)),
+        Type::Ptr(pointer) => {
+            Kind::Pointer(Box::new(kind(&pointer.elem)?), pointer.mutability.is_none())
+        }
         Type::Array(array) => {
             let Expr::Lit(length) = &array.len else {
                 bail!("array length")
