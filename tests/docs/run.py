@@ -1,0 +1,97 @@
+"""`cargo xtask test --only docs`: links, code blocks, commands, the index and the book. The last line counts.
+
+A page without a fault in one of these is one passed test; so is each code block that compiles.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))
+import blocks
+import commands
+import links
+
+ROOT = Path(__file__).resolve().parents[2]
+RELEASE = Path(os.environ.get("UPT_LIB_DIR", ROOT / "target/release"))
+WORK = Path(os.environ.get("UPT_BUILD_DIR", ROOT / "target")) / "docs-test"
+
+
+class Tally:
+    """Counts, and prints what failed."""
+
+    def __init__(self) -> None:
+        self.passed = 0
+        self.failed = 0
+
+    def add(self, faults: list[str]) -> None:
+        """One test."""
+        self.passed += not faults
+        self.failed += bool(faults)
+        for fault in faults:
+            print(f"FAILED {fault}")
+
+
+def known_files() -> set[Path]:
+    """Files that a clone has, and their folders."""
+    command = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
+    listed = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    files = {ROOT / name for name in listed.split("\0") if name and (ROOT / name).exists()}
+    return files | {parent for file in files for parent in file.parents}
+
+
+def index(pages: list[Path], name: str) -> list[str]:
+    """The pages of docs/ that a table of contents leaves out; README.md names the folder of the decisions only."""
+    contents = ROOT / "docs" / name
+    listed = {(contents.parent / link.target.partition("#")[0]).resolve() for link in links.page(contents).links}
+    within = [
+        path for path in pages if path.is_relative_to(ROOT / "docs") and path.name not in ("README.md", "SUMMARY.md")
+    ]
+    if name == "README.md":
+        within = [path for path in within if path.parent.name != "decisions"]
+    return [f"docs/{name} does not list {path.relative_to(ROOT)}" for path in within if path not in listed]
+
+
+def book() -> list[str]:
+    """Builds the book; a warning is a fault."""
+    WORK.mkdir(parents=True, exist_ok=True)
+    command = [
+        str(Path(sys.executable).parent / "mdbook"),
+        "build",
+        str(ROOT / "docs"),
+        "--dest-dir",
+        str(WORK / "book"),
+    ]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    said = [line for line in done.stderr.splitlines() if "WARN" in line or "ERROR" in line]
+    if done.returncode != 0 or said:
+        return ["mdbook: " + "\n".join(said or [done.stderr])]
+    return []
+
+
+def main() -> int:
+    """Runs all checks."""
+    tally = Tally()
+    known = known_files()
+    pages = sorted(path for path in known if path.suffix == ".md")
+    for path in pages:
+        tally.add(links.faults(path, known.__contains__))
+        if path.name != "CHANGELOG.md":
+            tally.add(commands.faults(path))
+    for name in ("README.md", "SUMMARY.md"):
+        tally.add(index(pages, name))
+    tally.add(book())
+    for path in pages:
+        page = links.page(path)
+        for block in blocks.marked(page):
+            fault = blocks.fault(page, block, WORK, RELEASE)
+            tally.add([fault] if fault else [])
+    print(f"{tally.passed} passed, {tally.failed} failed, 0 skipped")
+    return min(tally.failed, 1)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
