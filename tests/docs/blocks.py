@@ -17,7 +17,7 @@ import markdown
 ROOT = Path(__file__).resolve().parents[2]
 BUNDLE = ROOT / "onnx/brain-coarse-reduced"
 COMPILERS = {"c": ("cc", "-std=c99"), "cpp": ("c++", "-std=c++17")}
-WARNINGS = ["-Wall", "-Wextra", "-Werror"]
+WARNINGS = ["-Wall", "-Wextra", "-Werror", "-Wno-missing-field-initializers"]
 # What a `body` block may take for granted.
 BODY = {
     "c": "#include <stdio.h>\n#include <stdlib.h>\n#include <upt.h>\n\nvoid body(void);\nvoid body(void) {{\n{}\n}}\n",
@@ -56,5 +56,11 @@ def native(block: markdown.Block, base: Path, release: Path) -> list[list[str]]:
     compiled = [program, standard, *WARNINGS, f"-I{ROOT / 'include'}", str(source)]
     if not complete:
         return [[*compiled, "-fsyntax-only"]]
-    linked = [*compiled, "-o", str(base), f"-L{release}", "-lupt", "-lm", f"-Wl,-rpath,{release}"]
+    # A program asks for the library by its soname, which only an installed one has as a file.
+    folder = base.parent / "lib"
+    folder.mkdir(exist_ok=True)
+    for name in ("libupt.so", "libupt.so.0"):
+        (folder / name).unlink(missing_ok=True)
+        (folder / name).symlink_to(release / "libupt.so")
+    linked = [*compiled, "-o", str(base), f"-L{folder}", "-lupt", "-lm", f"-Wl,-rpath,{folder}"]
     return [linked, [str(base), str(BUNDLE)]]

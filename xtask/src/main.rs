@@ -58,10 +58,10 @@ enum Task {
     },
     /// Make the archive for C and C++ hosts, or the Unity package.
     #[command(
-        after_help = "Examples:\n  cargo xtask package\n  cargo xtask package --unity\n  cargo xtask package --wheel\n  cargo xtask package --platform windows-x86_64"
+        after_help = "Examples:\n  cargo xtask package\n  cargo xtask package --unity\n  cargo xtask package --wheel\n  cargo xtask package --platform windows-x64"
     )]
     Package(package::Options),
-    /// Write README.md's measured table and picture.
+    /// Write the measured table of docs/results/README.md, and the still picture.
     #[command(
         after_help = "Example:\n  cargo xtask readme --report target/report/report.json --bundle onnx/brain-reduced --trajectory push.trajectory.safetensors"
     )]

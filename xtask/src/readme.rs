@@ -1,5 +1,5 @@
-//! `cargo xtask readme`: the measured table and the picture of README.md, out of `upt report` and `upt rollout`, and such
-//! tables on other pages.
+//! `cargo xtask readme`: the measured table of docs/results/README.md and the still picture of the documents, out of
+//! `upt report` and `upt rollout`, and such tables on other pages.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -17,7 +17,7 @@ pub struct Options {
     #[arg(long = "report", value_name = "FILE")]
     reports: Vec<PathBuf>,
     /// The page that takes their table, between its markers; from the repository's root.
-    #[arg(long, value_name = "FILE", default_value = "README.md")]
+    #[arg(long, value_name = "FILE", default_value = "docs/results/README.md")]
     page: PathBuf,
     /// Render docs/images/pushed-brain.png with this bundle ...
     #[arg(long, requires = "trajectory")]

@@ -382,9 +382,12 @@ fn document(path: &Path, mesh: &str, made: &str, rows: &[Row]) -> Result<()> {
     let over_all: Vec<&Row> = rows.iter().filter(|row| row.programme == ALL).collect();
     let page = std::fs::read_to_string(path).with_context(|| format!("{}", path.display()))?;
     if page.contains(&format!("begin: {summary} ")) {
+        // The geometric rule once, with the most corrections: their number hardly matters to it.
+        let most = rows.iter().map(|row| row.corrections).max().unwrap_or(0);
         let methods: Vec<&Row> = over_all
             .into_iter()
             .filter(|row| !row.bundle.is_empty())
+            .filter(|row| row.drive != Drive::Geometric.name() || row.corrections == most)
             .collect();
         let text = table::markdown(table::FEW, &methods);
         return replace_between(path, &summary, &format!("\n{made}\n\n{text}"));
