@@ -391,6 +391,11 @@
 #define UPT_ABI_VERSION 1
 
 /**
+ * A tool that a hand feels. Used from one thread at a time, a second one is `UPT_ERR_BUSY`.
+ */
+typedef struct upt_haptics upt_haptics;
+
+/**
  * The convex hull of a tool's points. Immutable; may be used from any thread at once.
  */
 typedef struct upt_hull upt_hull;
@@ -741,6 +746,144 @@ typedef struct upt_instrument_contact {
    */
   float force[3];
 } upt_instrument_contact;
+
+/**
+ * Options of `upt_haptics_create`.
+ */
+typedef struct upt_haptics_options {
+  /**
+   * `sizeof(upt_haptics_options)`.
+   */
+  uint32_t struct_size;
+  /**
+   * The tool's place in the array of instruments that drives the steps.
+   */
+  uint32_t instrument;
+  /**
+   * Its shape, mode and friction, as in that array; position and rotation say where it is first.
+   */
+  const struct upt_instrument *tool;
+  /**
+   * What a new step puts elsewhere is blended in over this time, ms; 0: 25.
+   */
+  float blend_ms;
+  /**
+   * How old a step is when it arrives, ms: the time since the poses that it was given were taken; 0: as long as it took.
+   */
+  float step_latency_ms;
+  /**
+   * Longest force, N; 0: no limit.
+   */
+  float force_limit_n;
+  /**
+   * What the passivity controller damps with at most, N s/m; 0: 5.
+   */
+  float damping_limit_n_s_per_m;
+  /**
+   * 1: without the passivity observer and controller.
+   */
+  uint8_t no_passivity;
+  /**
+   * Zero.
+   */
+  uint8_t reserved[7];
+} upt_haptics_options;
+
+/**
+ * Where a tool is at a moment; the input of `upt_haptics_render`.
+ */
+typedef struct upt_haptic_pose {
+  /**
+   * `sizeof(upt_haptic_pose)`.
+   */
+  uint32_t struct_size;
+  /**
+   * 1: the velocities are given; 0: they are those between the last two poses.
+   */
+  uint8_t has_velocity;
+  /**
+   * Zero.
+   */
+  uint8_t reserved[3];
+  /**
+   * The host's clock, s; never before that of the last call.
+   */
+  double time_s;
+  /**
+   * In the mesh's frame, metres.
+   */
+  float position_m[3];
+  /**
+   * Unit quaternion x, y, z, w.
+   */
+  float rotation[4];
+  /**
+   * Of the tool's position.
+   */
+  float velocity_m_per_s[3];
+  /**
+   * About the axes of the mesh's frame.
+   */
+  float angular_velocity_rad_per_s[3];
+} upt_haptic_pose;
+
+/**
+ * What a hand feels; filled by `upt_haptics_render`.
+ */
+typedef struct upt_haptic_force {
+  /**
+   * `sizeof(upt_haptic_force)`, set by the caller.
+   */
+  uint32_t struct_size;
+  /**
+   * Points of the surface that push or hold the tool.
+   */
+  uint32_t contact_count;
+  /**
+   * 1: there is a force.
+   */
+  uint8_t contact;
+  /**
+   * 1: the passivity controller damps.
+   */
+  uint8_t damped;
+  /**
+   * Zero.
+   */
+  uint8_t reserved[6];
+  /**
+   * States of the scene that this object has seen.
+   */
+  uint64_t step_count;
+  /**
+   * Watchdog: how old the last of them is, s.
+   */
+  double age_s;
+  /**
+   * Energy that the hand was given beyond what came from it since the tool last touched, J; the controller takes it back.
+   */
+  double excess_energy_j;
+  /**
+   * On the tool, N, in the mesh's frame.
+   */
+  float force_n[3];
+  /**
+   * On the tool about its position, N m.
+   */
+  float torque_n_m[3];
+  /**
+   * `[3,3]`, row-major: how the force falls with the position, N/m. With the next two a symmetric 6x6 stiffness, of contact alone.
+   */
+  float stiffness_n_per_m[9];
+  /**
+   * `[3,3]`, row-major: how the force falls with the rotation, N/rad; transposed, the torque with the position, N m/m.
+   */
+  float coupling_n_per_rad[9];
+  /**
+   * `[3,3]`, row-major: how the torque falls with the rotation, N m/rad.
+   */
+  float angular_stiffness_n_m_per_rad[9];
+} upt_haptic_force;
 
 /**
  * What the last step did and cost; filled by `upt_scene_get_stats`.
@@ -1265,6 +1408,43 @@ upt_status upt_hull_create(const float *points,
  * Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also when it was destroyed before).
  */
 upt_status upt_hull_destroy(struct upt_hull *hull);
+
+/**
+ * Makes a tool felt: from now on each step of the scene leaves what `upt_haptics_render` needs.
+ *
+ * The steps of the scene are driven as before, with this tool among their instruments. The object does not keep the scene alive.
+ * options: required, for its tool. out: the new object. At most 8 a scene and 64 a process.
+ * Threads: one at a time on the scene. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also for a hull that was destroyed),
+ * `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NON_FINITE`, `UPT_ERR_BUSY` also while a step is in flight, `UPT_ERR_UNSUPPORTED` in a build
+ * without feature "haptics", for a bundle without a linear response or corrections and a scene that does not correct; `UPT_ERR_RUNTIME`,
+ * `UPT_ERR_IO`, `UPT_ERR_BUNDLE`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
+ */
+upt_status upt_haptics_create(struct upt_scene *scene,
+                              const struct upt_haptics_options *options,
+                              struct upt_haptics **out);
+
+/**
+ * The force on the tool at a pose: contact solved on what the last step left. Made for 1,000 calls a second.
+ *
+ * Waits for nothing, whatever the scene does: no lock, and no allocation unless it fails. A new step is blended in without a jump. Out of contact the
+ * force is zero; where the scene is not stepped any more `age_s` grows and the tissue stays as elastic as the last step left it. At this boundary lengths
+ * are metres, forces newtons, torques newton metres.
+ * pose: where the tool is now. out: `struct_size` set by the caller; where the call fails and out can be written there is no force in it.
+ * Threads: one at a time on the object; any other on the scene. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`,
+ * `UPT_ERR_NON_FINITE` and `UPT_ERR_ARGUMENT` for the pose and a time before the last; `UPT_ERR_BUSY` while another thread is in a call on this
+ * object; `UPT_ERR_STATE` once the scene was destroyed; `UPT_ERR_UNSUPPORTED` in a build without feature "haptics"; `UPT_ERR_PANIC`.
+ */
+upt_status upt_haptics_render(struct upt_haptics *haptics,
+                              const struct upt_haptic_pose *pose,
+                              struct upt_haptic_force *out);
+
+/**
+ * Ends a haptics object; its scene goes on.
+ *
+ * Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also when it was destroyed before), `UPT_ERR_BUSY` while another thread is in a call on
+ * it, `UPT_ERR_UNSUPPORTED` in a build without feature "haptics".
+ */
+upt_status upt_haptics_destroy(struct upt_haptics *haptics);
 
 /**
  * Finds the nodes that rigid instruments touch and the displacement that they impose: the input of a step.

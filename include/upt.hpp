@@ -454,6 +454,75 @@ private:
   upt_scene *handle_ = nullptr;
 };
 
+/// A tool that a hand feels: the force on it at each millisecond, from a thread of its own. Its
+/// scene is stepped by another one, with the same tool among the instruments.
+class Haptics {
+public:
+  Haptics() noexcept = default;
+  Haptics(Haptics &&other) noexcept : handle_(std::exchange(other.handle_, nullptr)) {}
+  Haptics &operator=(Haptics &&other) noexcept {
+    if (this != &other) {
+      destroy();
+      handle_ = std::exchange(other.handle_, nullptr);
+    }
+    return *this;
+  }
+  Haptics(const Haptics &) = delete;
+  Haptics &operator=(const Haptics &) = delete;
+  ~Haptics() { destroy(); }
+
+  /// No step of the scene may be in flight; an object held before is destroyed.
+  upt_status create(const Scene &scene, const upt_haptics_options &options) {
+    upt_haptics *handle = nullptr;
+    const upt_status status = check(upt_haptics_create(scene.get(), &options, &handle));
+    if (status == UPT_OK) {
+      destroy();
+      handle_ = handle;
+    }
+    return status;
+  }
+  /// The tool at place `instrument` of the steps' instruments, everything else as it is by default.
+  upt_status create(const Scene &scene, std::uint32_t instrument, const upt_instrument &tool) {
+    upt_haptics_options options = make<upt_haptics_options>();
+    options.instrument = instrument;
+    options.tool = &tool;
+    return create(scene, options);
+  }
+
+#ifndef UPT_NO_EXCEPTIONS
+  Haptics(const Scene &scene, const upt_haptics_options &options) { create(scene, options); }
+  Haptics(const Scene &scene, std::uint32_t instrument, const upt_instrument &tool) {
+    create(scene, instrument, tool);
+  }
+#endif
+
+  void destroy() noexcept {
+    if (handle_ != nullptr) {
+      upt_haptics_destroy(std::exchange(handle_, nullptr));
+    }
+  }
+
+  explicit operator bool() const noexcept { return handle_ != nullptr; }
+  upt_haptics *get() const noexcept { return handle_; }
+
+  /// Waits for nothing. Where it fails there is no force in out.
+  upt_status render(const upt_haptic_pose &pose, upt_haptic_force &out) {
+    out = make<upt_haptic_force>();
+    return check(upt_haptics_render(handle_, &pose, &out));
+  }
+
+#ifndef UPT_NO_EXCEPTIONS
+  upt_haptic_force render(const upt_haptic_pose &pose) {
+    upt_haptic_force out;
+    render(pose, out);
+    return out;
+  }
+#endif
+
+private:
+  upt_haptics *handle_ = nullptr;
+};
+
 } // namespace upt
 
 #endif // UPT_HPP

@@ -17,6 +17,8 @@ pub mod forces;
 pub mod graph;
 pub mod grid;
 pub mod guard;
+#[cfg(feature = "haptics")]
+pub mod haptics;
 #[cfg(feature = "contact")]
 pub mod instrument;
 pub mod kernels;

@@ -72,6 +72,50 @@ fn tools_allocate_nothing() {
     }
 }
 
+/// The hand's thread and a scene that a hand feels.
+#[cfg(feature = "haptics")]
+fn haptics_allocate_nothing() {
+    use upt::haptics::{HapticOptions, HapticPose};
+    let model = model("tiny-corrected");
+    let scene = scene(&model, &plain());
+    let node = model.indices(IndexSet::DomainNodes)[0] as usize;
+    let at: Vec<f32> = model.positions()[3 * node..3 * node + 3].to_vec();
+    let shape = contact::Shape::Sphere { radius: 3.0 };
+    let tool = |depth: f32| {
+        let centre = [at[0], at[1], at[2] + 3.0 - depth];
+        upt::contact::Tool::new(0, &shape, centre, [0.0, 0.0, 0.0, 1.0]).unwrap()
+    };
+    let tools = [[tool(0.5)], [tool(1.0)]];
+    let mut hand = scene.haptics(&HapticOptions::new(0, tool(0.0))).unwrap();
+    let (mut time_s, mut touched) = (0.0, false);
+    let mut turn = || {
+        let before = ALLOCATIONS.load(Ordering::Relaxed);
+        for tools in tools.iter().cycle().take(8) {
+            let input = StepInput {
+                displacement: None,
+                contact: Contact::Tools(tools),
+            };
+            scene.step(input, None).unwrap();
+            for _ in 0..5 {
+                time_s += 1e-3;
+                let at = tools[0].pose.translation.to_array();
+                let pose = HapticPose {
+                    time_s,
+                    position_m: at.map(|x| 1e-3 * x),
+                    rotation: [0.0, 0.0, 0.0, 1.0],
+                    velocity: None,
+                };
+                touched |= hand.render(&pose).unwrap().contact;
+            }
+        }
+        ALLOCATIONS.load(Ordering::Relaxed) - before
+    };
+    turn();
+    let count = (0..5).map(|_| turn()).min().unwrap();
+    assert!(touched, "the tool touches");
+    assert_eq!(count, 0, "haptics");
+}
+
 /// One test, so that no other test's allocations are counted.
 #[test]
 fn steps_allocate_nothing_and_keep_the_floating_point_mode() {
@@ -80,6 +124,8 @@ fn steps_allocate_nothing_and_keep_the_floating_point_mode() {
         return;
     }
     tools_allocate_nothing();
+    #[cfg(feature = "haptics")]
+    haptics_allocate_nothing();
     for name in BUNDLES {
         for (kernel, step_path) in [
             (DecoderKernel::Native, StepPath::Split),

@@ -20,6 +20,7 @@ from upt._native import (
     ABI_VERSION,
     Flag,
     GuardPolicy,
+    HapticForce,
     IndexSet,
     InstrumentContact,
     InstrumentReading,
@@ -50,6 +51,7 @@ from upt.errors import (
     StateError,
     UnsupportedError,
 )
+from upt.haptics import Haptics
 from upt.instrument import Hull, Instrument
 from upt.log import set_log
 from upt.model import Model
@@ -82,6 +84,8 @@ __all__ = [
     "GuardError",
     "OutOfMemoryError",
     "GuardPolicy",
+    "HapticForce",
+    "Haptics",
     "Hull",
     "IndexSet",
     "Instrument",

@@ -571,6 +571,139 @@ class InstrumentContact(Record):
     ]
 
 
+class HapticsOptions(Record):
+    """Options of `upt_haptics_create`."""
+
+    struct_size: int
+    """`sizeof(upt_haptics_options)`."""
+    instrument: int
+    """The tool's place in the array of instruments that drives the steps."""
+    tool: int | None
+    """Its shape, mode and friction, as in that array; position and rotation say where it is first."""
+    blend_ms: float
+    """What a new step puts elsewhere is blended in over this time, ms; 0: 25."""
+    step_latency_ms: float
+    """How old a step is when it arrives, ms: the time since the poses that it was given were taken; 0: as long as it took."""
+    force_limit_n: float
+    """Longest force, N; 0: no limit."""
+    damping_limit_n_s_per_m: float
+    """What the passivity controller damps with at most, N s/m; 0: 5."""
+    no_passivity: bool = boolean("_no_passivity")
+    """1: without the passivity observer and controller."""
+    reserved: tuple[int, ...] = vector("_reserved")
+    """Zero."""
+
+    _fields_ = [
+        ("struct_size", ctypes.c_uint32),
+        ("instrument", ctypes.c_uint32),
+        ("tool", ctypes.c_void_p),
+        ("blend_ms", ctypes.c_float),
+        ("step_latency_ms", ctypes.c_float),
+        ("force_limit_n", ctypes.c_float),
+        ("damping_limit_n_s_per_m", ctypes.c_float),
+        ("_no_passivity", ctypes.c_uint8),
+        ("_reserved", ctypes.c_uint8 * 7),
+    ]
+
+
+class HapticsOptionsKeywords(TypedDict, total=False):
+    """Fields of `HapticsOptions`."""
+
+    instrument: int
+    """The tool's place in the array of instruments that drives the steps."""
+    tool: int | None
+    """Its shape, mode and friction, as in that array; position and rotation say where it is first."""
+    blend_ms: float
+    """What a new step puts elsewhere is blended in over this time, ms; 0: 25."""
+    step_latency_ms: float
+    """How old a step is when it arrives, ms: the time since the poses that it was given were taken; 0: as long as it took."""
+    force_limit_n: float
+    """Longest force, N; 0: no limit."""
+    damping_limit_n_s_per_m: float
+    """What the passivity controller damps with at most, N s/m; 0: 5."""
+    no_passivity: bool
+    """1: without the passivity observer and controller."""
+
+
+class HapticPose(Record):
+    """Where a tool is at a moment; the input of `upt_haptics_render`."""
+
+    struct_size: int
+    """`sizeof(upt_haptic_pose)`."""
+    has_velocity: bool = boolean("_has_velocity")
+    """1: the velocities are given; 0: they are those between the last two poses."""
+    reserved: tuple[int, ...] = vector("_reserved")
+    """Zero."""
+    time_s: float
+    """The host's clock, s; never before that of the last call."""
+    position_m: tuple[float, ...] = vector("_position_m")
+    """In the mesh's frame, metres."""
+    rotation: tuple[float, ...] = vector("_rotation")
+    """Unit quaternion x, y, z, w."""
+    velocity_m_per_s: tuple[float, ...] = vector("_velocity_m_per_s")
+    """Of the tool's position."""
+    angular_velocity_rad_per_s: tuple[float, ...] = vector("_angular_velocity_rad_per_s")
+    """About the axes of the mesh's frame."""
+
+    _fields_ = [
+        ("struct_size", ctypes.c_uint32),
+        ("_has_velocity", ctypes.c_uint8),
+        ("_reserved", ctypes.c_uint8 * 3),
+        ("time_s", ctypes.c_double),
+        ("_position_m", ctypes.c_float * 3),
+        ("_rotation", ctypes.c_float * 4),
+        ("_velocity_m_per_s", ctypes.c_float * 3),
+        ("_angular_velocity_rad_per_s", ctypes.c_float * 3),
+    ]
+
+
+class HapticForce(Record):
+    """What a hand feels; filled by `upt_haptics_render`."""
+
+    struct_size: int
+    """`sizeof(upt_haptic_force)`, set by the caller."""
+    contact_count: int
+    """Points of the surface that push or hold the tool."""
+    contact: bool = boolean("_contact")
+    """1: there is a force."""
+    damped: bool = boolean("_damped")
+    """1: the passivity controller damps."""
+    reserved: tuple[int, ...] = vector("_reserved")
+    """Zero."""
+    step_count: int
+    """States of the scene that this object has seen."""
+    age_s: float
+    """Watchdog: how old the last of them is, s."""
+    excess_energy_j: float
+    """Energy that the hand was given beyond what came from it since the tool last touched, J; the controller takes it back."""
+    force_n: tuple[float, ...] = vector("_force_n")
+    """On the tool, N, in the mesh's frame."""
+    torque_n_m: tuple[float, ...] = vector("_torque_n_m")
+    """On the tool about its position, N m."""
+    stiffness_n_per_m: tuple[float, ...] = vector("_stiffness_n_per_m")
+    """`[3,3]`, row-major: how the force falls with the position, N/m. With the next two a symmetric 6x6 stiffness, of contact alone."""
+    coupling_n_per_rad: tuple[float, ...] = vector("_coupling_n_per_rad")
+    """`[3,3]`, row-major: how the force falls with the rotation, N/rad; transposed, the torque with the position, N m/m."""
+    angular_stiffness_n_m_per_rad: tuple[float, ...] = vector("_angular_stiffness_n_m_per_rad")
+    """`[3,3]`, row-major: how the torque falls with the rotation, N m/rad."""
+
+    _fields_ = [
+        ("struct_size", ctypes.c_uint32),
+        ("contact_count", ctypes.c_uint32),
+        ("_contact", ctypes.c_uint8),
+        ("_damped", ctypes.c_uint8),
+        ("_reserved", ctypes.c_uint8 * 6),
+        ("step_count", ctypes.c_uint64),
+        ("age_s", ctypes.c_double),
+        ("excess_energy_j", ctypes.c_double),
+        ("_force_n", ctypes.c_float * 3),
+        ("_torque_n_m", ctypes.c_float * 3),
+        ("_stiffness_n_per_m", ctypes.c_float * 9),
+        ("_coupling_n_per_rad", ctypes.c_float * 9),
+        ("_angular_stiffness_n_m_per_rad", ctypes.c_float * 9),
+    ]
+
+
 class SceneStats(Record):
     """What the last step did and cost; filled by `upt_scene_get_stats`."""
 
@@ -719,6 +852,9 @@ FUNCTIONS: dict[str, tuple[Any, list[Any]]] = {
     "upt_scene_instrument_contacts": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p]),
     "upt_hull_create": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p]),
     "upt_hull_destroy": (ctypes.c_int32, [ctypes.c_void_p]),
+    "upt_haptics_create": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p]),
+    "upt_haptics_render": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p]),
+    "upt_haptics_destroy": (ctypes.c_int32, [ctypes.c_void_p]),
     "upt_scene_contacts_from_instruments": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p]),
     "upt_scene_contact_force": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
     "upt_scene_get_stats": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p]),

@@ -19,7 +19,11 @@ pub mod rows;
 pub mod tool;
 
 pub use compliance::Compliance;
+#[cfg(feature = "haptics")]
+pub(crate) use compliance::Delassus;
 pub use past::Past;
 pub use problem::Problem;
 pub use rows::State;
+#[cfg(feature = "haptics")]
+pub(crate) use rows::{Pair, outward, vector};
 pub use tool::{MAX_TOOLS, Mode, Push, Reading, Told, Tool};

@@ -1,6 +1,6 @@
 //! The rows of a contact problem: samples near the tools, and their gaps and slips at a state of the tissue.
 
-use ::contact::{Contact, Law, Placed, Pose, SKIN_MM, Samples, Vector, pose};
+use ::contact::{Body, Contact, Law, Placed, Pose, SKIN_MM, Samples, Vector, pose};
 
 use super::past::Held;
 use super::problem::Problem;
@@ -24,13 +24,13 @@ pub struct State<'a> {
     pub start: &'a [f32],
 }
 
-pub(super) fn vector(field: &[f32], node: u32) -> Vector {
+pub(crate) fn vector(field: &[f32], node: u32) -> Vector {
     let at = 3 * node as usize;
     Vector::new(field[at], field[at + 1], field[at + 2])
 }
 
 impl State<'_> {
-    pub(super) fn position(&self, node: u32) -> Vector {
+    pub(crate) fn position(&self, node: u32) -> Vector {
         vector(self.rest, node) + vector(self.u, node)
     }
 }
@@ -146,11 +146,77 @@ impl Problem {
 }
 
 /// The tissue's outward normal at the face of a sample.
-fn outward(samples: &Samples, sample: u32, state: State<'_>) -> Vector {
+pub(crate) fn outward(samples: &Samples, sample: u32, state: State<'_>) -> Vector {
     let corners = samples.corners(samples.face_of(sample));
     let [a, b, c] = corners.map(|at| state.position(samples.nodes()[at as usize]));
     (b - a).cross(c - a).normalize_or_zero()
 }
+
+/// A tool on its way from one pose to another, and a sample that it may touch.
+pub(crate) struct Pair<'a> {
+    pub(crate) body: &'a Body,
+    /// Coulomb's coefficient.
+    pub(crate) friction: f32,
+    pub(crate) from: &'a Pose,
+    pub(crate) now: &'a Pose,
+    /// Place of a held sample in the tool's frame.
+    pub(crate) anchor: Option<Vector>,
+    /// Depth that may stay, mm.
+    pub(crate) allowed: f32,
+}
+
+impl Pair<'_> {
+    /// Gap and slip of a sample that was at `start` and is at `point`, on a surface with normal `outward`, `pushed` so far or not.
+    pub(crate) fn contact(
+        &self,
+        point: Vector,
+        start: Vector,
+        outward: Vector,
+        pushed: bool,
+    ) -> Contact {
+        let nearest = self.body.nearest_at(self.now, point);
+        if let Some(place) = self.anchor {
+            return Contact {
+                law: Law::Bound,
+                normal: nearest.normal,
+                gap: 0.0,
+                slip: point - self.now.transform_point(place),
+            };
+        }
+        let (mut normal, mut gap) = (nearest.normal, nearest.distance);
+        if normal.dot(outward) > LEAN {
+            let advance = self.now.translation - self.from.translation;
+            let from_within = !pushed && advance.dot(outward) > 0.0;
+            let way = match gap < 0.0 && !from_within {
+                true => self.body.way_out(self.now, point, -outward, THROUGH_MM),
+                false => None,
+            };
+            let Some(way) = way else {
+                return RELEASED;
+            };
+            (normal, gap) = (-outward, -way);
+        }
+        let carried = self
+            .now
+            .transform_point(self.from.inverse_transform_point(start));
+        Contact {
+            law: Law::Touch {
+                friction: self.friction,
+            },
+            normal,
+            gap: gap + self.allowed,
+            slip: point - start - (carried - start),
+        }
+    }
+}
+
+/// A sample that no tool touches.
+const RELEASED: Contact = Contact {
+    law: Law::Touch { friction: 0.0 },
+    normal: Vector::X,
+    gap: f32::MAX,
+    slip: Vector::ZERO,
+};
 
 /// Gap and slip of a row at its point, with the tools at part `part` of their way.
 #[allow(clippy::too_many_arguments)]
@@ -164,49 +230,19 @@ pub(super) fn measure(
     state: State<'_>,
     part: f32,
 ) -> Contact {
-    let released = Contact {
-        law: Law::Touch { friction: 0.0 },
-        normal: Vector::X,
-        gap: f32::MAX,
-        slip: Vector::ZERO,
-    };
     let index = row.tool as usize;
     let Some(tool) = tools.get(index) else {
-        return released;
+        return RELEASED;
     };
-    let from = &before[index];
-    let now = pose::between(from, &tool.pose, part);
-    let nearest = tool.body.nearest_at(&now, row.point);
-    if let Some(place) = held[index].grasp.place(row.sample) {
-        return Contact {
-            law: Law::Bound,
-            normal: nearest.normal,
-            gap: 0.0,
-            slip: row.point - now.transform_point(place),
-        };
-    }
-    let (mut normal, mut gap) = (nearest.normal, nearest.distance);
-    if normal.dot(row.outward) > LEAN {
-        let advance = now.translation - from.translation;
-        let from_within = row.force == Vector::ZERO && advance.dot(row.outward) > 0.0;
-        let way = match gap < 0.0 && !from_within {
-            true => tool.body.way_out(&now, row.point, -row.outward, THROUGH_MM),
-            false => None,
-        };
-        let Some(way) = way else {
-            return released;
-        };
-        (normal, gap) = (-row.outward, -way);
-    }
+    let pair = Pair {
+        body: &tool.body,
+        friction: tool.friction,
+        from: &before[index],
+        now: &pose::between(&before[index], &tool.pose, part),
+        anchor: held[index].grasp.place(row.sample),
+        allowed: allowed[index],
+    };
     let sample = samples.rows()[row.sample as usize];
     let start = sample.gather(|node| vector(state.rest, node) + vector(state.start, node));
-    let carried = now.transform_point(from.inverse_transform_point(start)) - start;
-    Contact {
-        law: Law::Touch {
-            friction: tool.friction,
-        },
-        normal,
-        gap: gap + allowed[index],
-        slip: row.point - start - carried,
-    }
+    pair.contact(row.point, start, row.outward, row.force != Vector::ZERO)
 }

@@ -104,6 +104,15 @@ impl CoarseSpace {
         &self.at_contact[dof * self.count()..(dof + 1) * self.count()]
     }
 
+    /// Frequency (rad/s) and mass (g) of each natural mode.
+    #[cfg(feature = "haptics")]
+    pub fn natural(&self) -> Vec<(f32, f32)> {
+        let count = self.count();
+        let frequencies = self.frequency.iter().enumerate();
+        let masses = frequencies.map(|(i, &omega)| (omega, self.mass[i * (count + 1)]));
+        masses.collect()
+    }
+
     /// For each natural mode `kappa / (m w² (w² + kappa))`: what inertia takes off its part of the compliance, mm/mN.
     pub fn held_back(&self, kappa: f64) -> Vec<f32> {
         let count = self.count();

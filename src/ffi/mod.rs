@@ -8,6 +8,9 @@
 mod call;
 mod convert;
 mod driven;
+#[cfg(feature = "haptics")]
+mod hands;
+mod haptics;
 mod instrument;
 mod library;
 mod log;
@@ -26,6 +29,7 @@ mod worker;
 mod fault;
 
 pub use driven::*;
+pub use haptics::*;
 pub use instrument::*;
 pub use library::*;
 pub use model::*;

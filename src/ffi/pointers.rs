@@ -29,6 +29,9 @@ sized!(
     upt_model_info,
     upt_scene_options,
     upt_instrument_reading,
+    upt_haptics_options,
+    upt_haptic_pose,
+    upt_haptic_force,
     upt_scene_stats
 );
 

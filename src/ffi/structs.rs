@@ -20,6 +20,11 @@ pub struct upt_hull {
     _opaque: [u8; 0],
 }
 
+/// A tool that a hand feels. Used from one thread at a time, a second one is `UPT_ERR_BUSY`.
+pub struct upt_haptics {
+    _opaque: [u8; 0],
+}
+
 /// Receives log messages (UTF-8, valid during the call) on the host's threads, inside of their calls; it must not call
 /// the library: such a call is `UPT_ERR_STATE`.
 pub type upt_log_fn =
@@ -213,6 +218,87 @@ pub struct upt_instrument_contact {
     pub position: [f32; 3],
     /// On the instrument, mN.
     pub force: [f32; 3],
+}
+
+/// Options of `upt_haptics_create`.
+#[derive_ReprC]
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct upt_haptics_options {
+    /// `sizeof(upt_haptics_options)`.
+    pub struct_size: u32,
+    /// The tool's place in the array of instruments that drives the steps.
+    pub instrument: u32,
+    /// Its shape, mode and friction, as in that array; position and rotation say where it is first.
+    pub tool: *const upt_instrument,
+    /// What a new step puts elsewhere is blended in over this time, ms; 0: 25.
+    pub blend_ms: f32,
+    /// How old a step is when it arrives, ms: the time since the poses that it was given were taken; 0: as long as it took.
+    pub step_latency_ms: f32,
+    /// Longest force, N; 0: no limit.
+    pub force_limit_n: f32,
+    /// What the passivity controller damps with at most, N s/m; 0: 5.
+    pub damping_limit_n_s_per_m: f32,
+    /// 1: without the passivity observer and controller.
+    pub no_passivity: u8,
+    /// Zero.
+    pub reserved: [u8; 7],
+}
+
+/// Where a tool is at a moment; the input of `upt_haptics_render`.
+#[derive_ReprC]
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct upt_haptic_pose {
+    /// `sizeof(upt_haptic_pose)`.
+    pub struct_size: u32,
+    /// 1: the velocities are given; 0: they are those between the last two poses.
+    pub has_velocity: u8,
+    /// Zero.
+    pub reserved: [u8; 3],
+    /// The host's clock, s; never before that of the last call.
+    pub time_s: f64,
+    /// In the mesh's frame, metres.
+    pub position_m: [f32; 3],
+    /// Unit quaternion x, y, z, w.
+    pub rotation: [f32; 4],
+    /// Of the tool's position.
+    pub velocity_m_per_s: [f32; 3],
+    /// About the axes of the mesh's frame.
+    pub angular_velocity_rad_per_s: [f32; 3],
+}
+
+/// What a hand feels; filled by `upt_haptics_render`.
+#[derive_ReprC]
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct upt_haptic_force {
+    /// `sizeof(upt_haptic_force)`, set by the caller.
+    pub struct_size: u32,
+    /// Points of the surface that push or hold the tool.
+    pub contact_count: u32,
+    /// 1: there is a force.
+    pub contact: u8,
+    /// 1: the passivity controller damps.
+    pub damped: u8,
+    /// Zero.
+    pub reserved: [u8; 6],
+    /// States of the scene that this object has seen.
+    pub step_count: u64,
+    /// Watchdog: how old the last of them is, s.
+    pub age_s: f64,
+    /// Energy that the hand was given beyond what came from it since the tool last touched, J; the controller takes it back.
+    pub excess_energy_j: f64,
+    /// On the tool, N, in the mesh's frame.
+    pub force_n: [f32; 3],
+    /// On the tool about its position, N m.
+    pub torque_n_m: [f32; 3],
+    /// `[3,3]`, row-major: how the force falls with the position, N/m. With the next two a symmetric 6x6 stiffness, of contact alone.
+    pub stiffness_n_per_m: [f32; 9],
+    /// `[3,3]`, row-major: how the force falls with the rotation, N/rad; transposed, the torque with the position, N m/m.
+    pub coupling_n_per_rad: [f32; 9],
+    /// `[3,3]`, row-major: how the torque falls with the rotation, N m/rad.
+    pub angular_stiffness_n_m_per_rad: [f32; 9],
 }
 
 /// What the last step did and cost; filled by `upt_scene_get_stats`.

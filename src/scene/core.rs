@@ -59,6 +59,11 @@ pub struct Core {
     /// Contact of tools, from the first step that has one.
     #[cfg(feature = "contact")]
     pub(super) problem: Option<Box<Problem>>,
+    /// Tools that hands feel, and how long the step being made took, s.
+    #[cfg(feature = "haptics")]
+    pub(super) hands: Vec<crate::haptics::publish::Link>,
+    #[cfg(feature = "haptics")]
+    pub(super) took_s: f64,
     /// Whether the last published state was corrected, and the one before it.
     pub(super) was_corrected: [bool; 2],
     /// Whether the state being made is.
@@ -148,6 +153,10 @@ impl Core {
             corrected: parts.corrected,
             #[cfg(feature = "contact")]
             problem: None,
+            #[cfg(feature = "haptics")]
+            hands: Vec::new(),
+            #[cfg(feature = "haptics")]
+            took_s: 0.0,
             was_corrected: [false; 2],
             next_corrected: false,
         })
@@ -231,6 +240,11 @@ impl Core {
             let replaced = verdict & guard::REFUSED != 0
                 && self.refuse(published, verdict, given.is_some(), &mut stats)?;
             self.publish(published, given.is_some(), replaced, &stats);
+        }
+        #[cfg(feature = "haptics")]
+        {
+            self.took_s = start.elapsed().as_secs_f64();
+            self.tell_hands(published);
         }
         self.step_count += 1;
         stats.step_count = self.step_count;
@@ -439,6 +453,10 @@ impl Core {
 
     /// Bytes of the scene's buffers, those of the published states included.
     pub(super) fn memory_bytes(&self) -> usize {
+        #[cfg(feature = "haptics")]
+        let hands = self.hand_bytes();
+        #[cfg(not(feature = "haptics"))]
+        let hands = 0;
         let count = self.mesh.node_count();
         let frames = if self.options.cubic_sampling { 4 } else { 3 };
         let points = frames * 4 * self.next.points.len();
@@ -450,6 +468,7 @@ impl Core {
             false => self.mesh.memory_bytes() + self.engine.table_bytes(),
         };
         12 * count * frames
+            + hands
             + points
             + contacts
             + 16 * count // contacts in the host's order

@@ -9,6 +9,8 @@ mod corrected;
 mod driven;
 mod engine;
 mod free_motion;
+#[cfg(feature = "haptics")]
+mod haptics;
 mod inversion;
 mod plan;
 mod points;

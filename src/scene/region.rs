@@ -46,8 +46,8 @@ impl Core {
         self.max_displacement = 0.0;
         self.told = 0;
         let stats = self.blank_stats();
-        let mut shared = lock_write(published);
-        let shared = &mut *shared;
+        let mut guard = lock_write(published);
+        let shared = &mut *guard;
         for frame in [&mut shared.last, &mut shared.before]
             .into_iter()
             .chain(shared.earlier.as_mut())
@@ -62,6 +62,9 @@ impl Core {
         shared.tools.clear();
         #[cfg(feature = "contact")]
         self.leave_moment(shared);
+        drop(guard);
+        #[cfg(feature = "haptics")]
+        self.tell_hands(published);
     }
 
     /// Decodes any nodes of the last state into `out [n,3]`.

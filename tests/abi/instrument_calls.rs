@@ -9,7 +9,7 @@ use super::{Call, Function, Odd, Size, World};
 
 impl World<'_> {
     /// Instruments about the tiny body, with shapes up to `shapes`.
-    fn instruments(&self, call: &Call, shapes: u64) -> Vec<upt_instrument> {
+    pub(super) fn instruments(&self, call: &Call, shapes: u64) -> Vec<upt_instrument> {
         let mut random = Random(call.seed | 1);
         let hull = self.hulls.get(call.handle as usize / 4).copied();
         let made = (0..call.seed % 3).map(|i| {

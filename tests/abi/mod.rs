@@ -1,5 +1,6 @@
 //! A model of the C ABI for random calls: what can be called with what, and what the header promises.
 
+mod haptic_calls;
 mod header;
 mod inputs;
 mod instrument_calls;
@@ -49,6 +50,9 @@ pub enum Function {
     InstrumentContacts,
     HullCreate,
     HullDestroy,
+    HapticsCreate,
+    HapticsRender,
+    HapticsDestroy,
     ContactForce,
     Stats,
     Save,
@@ -96,6 +100,9 @@ pub const CALLED_BY: &[(&str, Function)] = &[
     ("upt_scene_instrument_contacts", InstrumentContacts),
     ("upt_hull_create", HullCreate),
     ("upt_hull_destroy", HullDestroy),
+    ("upt_haptics_create", HapticsCreate),
+    ("upt_haptics_render", HapticsRender),
+    ("upt_haptics_destroy", HapticsDestroy),
     ("upt_scene_contact_force", ContactForce),
     ("upt_scene_get_stats", Stats),
     ("upt_scene_save", Save),
@@ -149,6 +156,7 @@ pub fn call() -> impl Strategy<Value = Call> {
         30 => few(&[Step, StepContacts, StepContacts, StepContacts]),
         30 => few(&[StepInstruments, StepInstruments, StepInstruments, Present, Readings]),
         2 => few(&[HullCreate, HullCreate, HullDestroy]),
+        20 => few(&[HapticsCreate, HapticsRender, HapticsRender, HapticsRender, HapticsDestroy]),
         12 => few(&[Submit, SubmitInstruments, Poll, Wait, Wait]),
         30 => few(&[
             Read, Sample, SetRegion, Decode, AttachPoints, ReadPoints, SamplePoints, Instruments,

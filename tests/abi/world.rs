@@ -18,6 +18,8 @@ pub struct World<'a> {
     pub(super) closed_models: Vec<*mut upt_model>,
     pub(super) closed_scenes: Vec<*mut upt_scene>,
     pub(super) hulls: Vec<*mut upt_hull>,
+    /// Haptics objects and the time of their next call, s.
+    pub(super) hands: Vec<(*mut upt_haptics, f64)>,
     pub(super) snapshot: Vec<u8>,
     pub(super) points: std::collections::HashMap<usize, usize>,
 }
@@ -31,6 +33,7 @@ impl<'a> World<'a> {
             closed_models: Vec::new(),
             closed_scenes: Vec::new(),
             hulls: Vec::new(),
+            hands: Vec::new(),
             snapshot: Vec::new(),
             points: Default::default(),
         };
@@ -56,6 +59,10 @@ impl<'a> World<'a> {
         for (scene, _) in self.scenes {
             assert_eq!(unsafe { upt_scene_destroy(scene) }, UPT_OK);
             assert_eq!(unsafe { upt_scene_destroy(scene) }, UPT_ERR_HANDLE);
+        }
+        for (hand, _) in self.hands {
+            assert_eq!(unsafe { upt_haptics_destroy(hand) }, UPT_OK);
+            assert_eq!(unsafe { upt_haptics_destroy(hand) }, UPT_ERR_HANDLE);
         }
         for hull in self.hulls {
             assert_eq!(unsafe { upt_hull_destroy(hull) }, UPT_OK);
@@ -193,6 +200,7 @@ impl<'a> World<'a> {
             | InstrumentContacts | HullCreate | HullDestroy => {
                 self.call_instruments(call, scene, nodes)
             }
+            HapticsCreate | HapticsRender | HapticsDestroy => self.call_haptics(call, scene),
             _ => self.call_scene(call, scene, nodes),
         }
     }

@@ -67,8 +67,36 @@ static void instruments(const char *bundle) {
   EXPECT_TRUE(scene.readings(0).empty() && scene.instrument_contacts().empty());
 }
 
+// A hand feels a tool of a bundle with corrections; elsewhere it is told that it cannot.
+static void haptics(const char *bundle) {
+  upt::Model model = upt::Model::open(bundle);
+  upt_scene_options corrected = upt::make<upt_scene_options>();
+  corrected.corrections = 5;
+  upt_instrument tool = upt::make<upt_instrument>();
+  tool.rotation[3] = 1.0F;
+  tool.radius = 3.0F;
+  upt::Scene plain(model);
+  upt::Scene scene;
+  if (thrown([&] { scene.create(model, &corrected); }) == UPT_ERR_UNSUPPORTED) {
+    EXPECT_TRUE(thrown([&] { upt::Haptics(plain, 0, tool); }) == UPT_ERR_UNSUPPORTED);
+    return;
+  }
+  upt::Haptics hand(scene, 0, tool), other;
+  other = std::move(hand);
+  EXPECT_TRUE(!hand && other);
+  upt_haptic_pose pose = upt::make<upt_haptic_pose>();
+  pose.rotation[3] = 1.0F;
+  pose.position_m[0] = 0.9F;
+  EXPECT_TRUE(other.render(pose).contact == 0);
+  pose.time_s = -1.0;
+  EXPECT_TRUE(thrown([&] { other.render(pose); }) == UPT_ERR_ARGUMENT);
+  scene.destroy();
+  pose.time_s = 1.0;
+  EXPECT_TRUE(thrown([&] { other.render(pose); }) == UPT_ERR_STATE);
+}
+
 int main(int argc, char **argv) {
-  if (argc != 3) {
+  if (argc != 4) {
     return 2;
   }
   EXPECT_TRUE(upt::abi_matches());
@@ -118,6 +146,8 @@ int main(int argc, char **argv) {
   EXPECT_TRUE(thrown([] { upt::shutdown(); }) == UPT_ERR_STATE);
   other.destroy();
   instruments(argv[2]);
+  haptics(argv[2]);
+  haptics(argv[3]);
   EXPECT(upt::shutdown(), UPT_OK);
   return expect_result("wrapper");
 }

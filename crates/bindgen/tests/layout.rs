@@ -53,6 +53,9 @@ structs!(
     upt_instrument,
     upt_instrument_reading,
     upt_instrument_contact,
+    upt_haptics_options,
+    upt_haptic_pose,
+    upt_haptic_force,
     upt_scene_stats
 );
 

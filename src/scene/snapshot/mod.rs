@@ -273,6 +273,9 @@ impl Core {
         shared.tools.clear();
         #[cfg(feature = "contact")]
         self.leave_moment(&mut shared);
+        drop(shared);
+        #[cfg(feature = "haptics")]
+        self.tell_hands(published);
         Ok(())
     }
 

@@ -190,6 +190,84 @@ namespace Upt.Interop
         public fixed float force[3];
     }
 
+    /// <summary>Options of `upt_haptics_create`.</summary>
+    [StructLayout(LayoutKind.Sequential)]
+    public unsafe struct upt_haptics_options
+    {
+        /// <summary>`sizeof(upt_haptics_options)`.</summary>
+        public uint struct_size;
+        /// <summary>The tool's place in the array of instruments that drives the steps.</summary>
+        public uint instrument;
+        /// <summary>Its shape, mode and friction, as in that array; position and rotation say where it is first.</summary>
+        public upt_instrument* tool;
+        /// <summary>What a new step puts elsewhere is blended in over this time, ms; 0: 25.</summary>
+        public float blend_ms;
+        /// <summary>How old a step is when it arrives, ms: the time since the poses that it was given were taken; 0: as long as it took.</summary>
+        public float step_latency_ms;
+        /// <summary>Longest force, N; 0: no limit.</summary>
+        public float force_limit_n;
+        /// <summary>What the passivity controller damps with at most, N s/m; 0: 5.</summary>
+        public float damping_limit_n_s_per_m;
+        /// <summary>1: without the passivity observer and controller.</summary>
+        public byte no_passivity;
+        /// <summary>Zero.</summary>
+        public fixed byte reserved[7];
+    }
+
+    /// <summary>Where a tool is at a moment; the input of `upt_haptics_render`.</summary>
+    [StructLayout(LayoutKind.Sequential)]
+    public unsafe struct upt_haptic_pose
+    {
+        /// <summary>`sizeof(upt_haptic_pose)`.</summary>
+        public uint struct_size;
+        /// <summary>1: the velocities are given; 0: they are those between the last two poses.</summary>
+        public byte has_velocity;
+        /// <summary>Zero.</summary>
+        public fixed byte reserved[3];
+        /// <summary>The host's clock, s; never before that of the last call.</summary>
+        public double time_s;
+        /// <summary>In the mesh's frame, metres.</summary>
+        public fixed float position_m[3];
+        /// <summary>Unit quaternion x, y, z, w.</summary>
+        public fixed float rotation[4];
+        /// <summary>Of the tool's position.</summary>
+        public fixed float velocity_m_per_s[3];
+        /// <summary>About the axes of the mesh's frame.</summary>
+        public fixed float angular_velocity_rad_per_s[3];
+    }
+
+    /// <summary>What a hand feels; filled by `upt_haptics_render`.</summary>
+    [StructLayout(LayoutKind.Sequential)]
+    public unsafe struct upt_haptic_force
+    {
+        /// <summary>`sizeof(upt_haptic_force)`, set by the caller.</summary>
+        public uint struct_size;
+        /// <summary>Points of the surface that push or hold the tool.</summary>
+        public uint contact_count;
+        /// <summary>1: there is a force.</summary>
+        public byte contact;
+        /// <summary>1: the passivity controller damps.</summary>
+        public byte damped;
+        /// <summary>Zero.</summary>
+        public fixed byte reserved[6];
+        /// <summary>States of the scene that this object has seen.</summary>
+        public ulong step_count;
+        /// <summary>Watchdog: how old the last of them is, s.</summary>
+        public double age_s;
+        /// <summary>Energy that the hand was given beyond what came from it since the tool last touched, J; the controller takes it back.</summary>
+        public double excess_energy_j;
+        /// <summary>On the tool, N, in the mesh's frame.</summary>
+        public fixed float force_n[3];
+        /// <summary>On the tool about its position, N m.</summary>
+        public fixed float torque_n_m[3];
+        /// <summary>`[3,3]`, row-major: how the force falls with the position, N/m. With the next two a symmetric 6x6 stiffness, of contact alone.</summary>
+        public fixed float stiffness_n_per_m[9];
+        /// <summary>`[3,3]`, row-major: how the force falls with the rotation, N/rad; transposed, the torque with the position, N m/m.</summary>
+        public fixed float coupling_n_per_rad[9];
+        /// <summary>`[3,3]`, row-major: how the torque falls with the rotation, N m/rad.</summary>
+        public fixed float angular_stiffness_n_m_per_rad[9];
+    }
+
     /// <summary>What the last step did and cost; filled by `upt_scene_get_stats`.</summary>
     [StructLayout(LayoutKind.Sequential)]
     public unsafe struct upt_scene_stats
@@ -765,6 +843,42 @@ namespace Upt.Interop
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_hull_destroy(IntPtr hull);
+
+        /// <summary>
+        /// Makes a tool felt: from now on each step of the scene leaves what `upt_haptics_render` needs.
+        ///
+        /// The steps of the scene are driven as before, with this tool among their instruments. The object does not keep the scene alive.
+        /// options: required, for its tool. out: the new object. At most 8 a scene and 64 a process.
+        /// Threads: one at a time on the scene. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also for a hull that was destroyed),
+        /// `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NON_FINITE`, `UPT_ERR_BUSY` also while a step is in flight, `UPT_ERR_UNSUPPORTED` in a build
+        /// without feature "haptics", for a bundle without a linear response or corrections and a scene that does not correct; `UPT_ERR_RUNTIME`,
+        /// `UPT_ERR_IO`, `UPT_ERR_BUNDLE`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_haptics_create(IntPtr scene, upt_haptics_options* options, IntPtr* @out);
+
+        /// <summary>
+        /// The force on the tool at a pose: contact solved on what the last step left. Made for 1,000 calls a second.
+        ///
+        /// Waits for nothing, whatever the scene does: no lock, and no allocation unless it fails. A new step is blended in without a jump. Out of contact the
+        /// force is zero; where the scene is not stepped any more `age_s` grows and the tissue stays as elastic as the last step left it. At this boundary lengths
+        /// are metres, forces newtons, torques newton metres.
+        /// pose: where the tool is now. out: `struct_size` set by the caller; where the call fails and out can be written there is no force in it.
+        /// Threads: one at a time on the object; any other on the scene. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`,
+        /// `UPT_ERR_NON_FINITE` and `UPT_ERR_ARGUMENT` for the pose and a time before the last; `UPT_ERR_BUSY` while another thread is in a call on this
+        /// object; `UPT_ERR_STATE` once the scene was destroyed; `UPT_ERR_UNSUPPORTED` in a build without feature "haptics"; `UPT_ERR_PANIC`.
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_haptics_render(IntPtr haptics, upt_haptic_pose* pose, upt_haptic_force* @out);
+
+        /// <summary>
+        /// Ends a haptics object; its scene goes on.
+        ///
+        /// Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also when it was destroyed before), `UPT_ERR_BUSY` while another thread is in a call on
+        /// it, `UPT_ERR_UNSUPPORTED` in a build without feature "haptics".
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_haptics_destroy(IntPtr haptics);
 
         /// <summary>
         /// Finds the nodes that rigid instruments touch and the displacement that they impose: the input of a step.

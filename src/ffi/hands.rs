@@ -1,0 +1,148 @@
+//! Live haptics objects, found without a lock: a fixed table whose places are taken and given back by one atomic exchange, so that a thread that
+//! renders never waits for one that makes or destroys another.
+
+use std::cell::UnsafeCell;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use super::call::{Failure, fail};
+use super::registry::{next_hand, refuse_hand};
+use super::status::*;
+use crate::haptics::Haptics;
+
+/// Haptics objects of a process.
+const MOST: usize = 64;
+
+/// A free place; handles are larger.
+const FREE: usize = 0;
+/// The lowest digits of a handle are its kind: these say what its place does.
+const BUSY: usize = 1 << (usize::BITS - 1);
+/// A bug was caught in a call on it.
+const BROKEN: usize = 1 << (usize::BITS - 2);
+
+struct Place {
+    /// [`FREE`], or a handle with what it does.
+    state: AtomicUsize,
+    hand: UnsafeCell<Option<Box<Haptics>>>,
+}
+
+// SAFETY: the cell is touched only by the thread whose exchange made the state busy.
+unsafe impl Sync for Place {}
+
+static PLACES: [Place; MOST] = [const {
+    Place {
+        state: AtomicUsize::new(FREE),
+        hand: UnsafeCell::new(None),
+    }
+}; MOST];
+
+/// A place that this thread alone has until it is dropped.
+struct Taken {
+    place: &'static Place,
+    /// What the state becomes.
+    then: usize,
+}
+
+impl Taken {
+    fn hand(&mut self) -> &mut Option<Box<Haptics>> {
+        // SAFETY: this thread's exchange made the place busy, and `self` is borrowed.
+        unsafe { &mut *self.place.hand.get() }
+    }
+}
+
+impl Drop for Taken {
+    fn drop(&mut self) {
+        let broken = if std::thread::panicking() { BROKEN } else { 0 };
+        let state = match self.then {
+            FREE => FREE,
+            handle => handle | broken,
+        };
+        self.place.state.store(state, Ordering::Release);
+    }
+}
+
+fn take(handle: usize) -> Result<(Taken, bool), Failure> {
+    if handle & (BUSY | BROKEN) != 0 || handle == FREE {
+        return refuse_hand(handle);
+    }
+    for place in &PLACES {
+        let state = place.state.load(Ordering::Relaxed);
+        if state & !(BUSY | BROKEN) != handle {
+            continue;
+        }
+        let busy = || {
+            fail(
+                UPT_ERR_BUSY,
+                "another thread is in a call on this haptics object",
+            )
+        };
+        if state & BUSY != 0 {
+            return busy();
+        }
+        let exchange = place.state.compare_exchange(
+            state,
+            handle | BUSY,
+            Ordering::Acquire,
+            Ordering::Relaxed,
+        );
+        return match exchange {
+            Ok(_) => {
+                let then = handle;
+                Ok((Taken { place, then }, state & BROKEN != 0))
+            }
+            Err(now) if now & !(BUSY | BROKEN) == handle => busy(),
+            Err(_) => refuse_hand(handle),
+        };
+    }
+    refuse_hand(handle)
+}
+
+/// Gives an object a place and a number.
+pub(super) fn add(hand: Haptics) -> Result<usize, Failure> {
+    let handle = next_hand();
+    let hand = Box::new(hand);
+    for place in &PLACES {
+        let exchange =
+            place
+                .state
+                .compare_exchange(FREE, handle | BUSY, Ordering::Acquire, Ordering::Relaxed);
+        if exchange.is_ok() {
+            let mut taken = Taken {
+                place,
+                then: handle,
+            };
+            *taken.hand() = Some(hand);
+            return Ok(handle);
+        }
+    }
+    fail(
+        UPT_ERR_ARGUMENT,
+        format!("{MOST} haptics objects are alive; destroy one first"),
+    )
+}
+
+/// Calls with an object.
+pub(super) fn with<T>(
+    handle: usize,
+    call: impl FnOnce(&mut Haptics) -> Result<T, Failure>,
+) -> Result<T, Failure> {
+    let (mut taken, broken) = take(handle)?;
+    if broken {
+        taken.then = handle | BROKEN;
+        return fail(
+            UPT_ERR_PANIC,
+            "a bug was caught in an earlier call on this haptics object; destroy it",
+        );
+    }
+    match taken.hand() {
+        Some(hand) => call(hand),
+        None => refuse_hand(handle),
+    }
+}
+
+/// Ends an object.
+pub(super) fn remove(handle: usize) -> Result<(), Failure> {
+    let (mut taken, _) = take(handle)?;
+    taken.then = FREE;
+    drop(taken.hand().take());
+    Ok(())
+}

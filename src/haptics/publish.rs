@@ -1,0 +1,312 @@
+//! The scene's end: after each published state the contact problem near the tool.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use ::contact::{Body, Placed, Pose, Samples, Search, Vector};
+use triple_buffer::{Input, Output, triple_buffer};
+
+use super::HapticOptions;
+use super::modes::Modes;
+use super::render::Haptics;
+use super::slow::{MOST_SAMPLES, Slow};
+use crate::contact::{Compliance, Delassus, Mode, Pair, Problem, State, outward, vector};
+use crate::corrections::{Corrections, Motion};
+use crate::error::{Error, Result};
+use crate::kernels::project::{project_field, row_dots};
+use crate::kernels::{Isa, Pool};
+use crate::memory;
+use crate::prior::PriorTable;
+
+const WHAT: &str = "the haptics of a scene";
+/// Samples this near to the tool are published, mm: what it may reach before the next step.
+const REACH_MM: f32 = 6.0;
+/// Time over which samples move at once, s: the modes take no part.
+const AT_ONCE_S: f64 = 1e-3;
+
+/// What both ends see of each other.
+#[derive(Debug, Default)]
+pub struct Ends {
+    /// The scene is there no more.
+    pub scene_gone: AtomicBool,
+    /// The hand is there no more.
+    pub hand_gone: AtomicBool,
+}
+
+/// A tool of a scene that a hand feels.
+pub struct Link {
+    instrument: u32,
+    body: Body,
+    friction: f32,
+    grasps: bool,
+    out: Input<Slow>,
+    pose: Output<Pose>,
+    ends: Arc<Ends>,
+    samples: Arc<Samples>,
+    search: Search,
+    delassus: Delassus,
+    held_back: Vec<f32>,
+    /// Nearest samples: distance, row.
+    found: Vec<(f32, u32)>,
+    starts: Vec<usize>,
+    coordinates: Vec<f32>,
+    field: Vec<f32>,
+    /// Mass of the natural modes, g.
+    masses: Vec<f32>,
+    rows: Vec<u32>,
+    number: u64,
+    latency_s: Option<f64>,
+}
+
+/// A published state.
+pub struct Stepped<'a> {
+    pub isa: Isa,
+    pub pool: &'a Pool,
+    pub prior: &'a PriorTable,
+    pub corrections: &'a Corrections,
+    pub motion: &'a Motion,
+    pub problem: Option<&'a Problem>,
+    /// `[K,3]`, mm.
+    pub rest: &'a [f32],
+    pub u: &'a [f32],
+    /// Time that the step took, s.
+    pub took_s: f64,
+}
+
+/// Both ends for a tool on a body.
+///
+/// # Errors
+/// [`Error::Argument`] for a tool or an option out of range, [`Error::OutOfMemory`].
+pub fn join(
+    options: &HapticOptions,
+    prior: &PriorTable,
+    corrections: &Corrections,
+    samples: Arc<Samples>,
+) -> Result<(Link, Haptics)> {
+    check(options)?;
+    let tool = &options.tool;
+    let natural = corrections.space.natural();
+    let slow = Slow::new(natural.len())?;
+    // Three of them, and what both ends keep.
+    memory::probe(4 * slow.memory_bytes(), WHAT)?;
+    let (out, slow) = triple_buffer(&slow);
+    let (at, pose) = triple_buffer(&tool.pose);
+    let ends = Arc::new(Ends::default());
+    let modes = Modes::new(&natural, corrections.integrator.damping_per_s)?;
+    let kappa = corrections.integrator.over(AT_ONCE_S).kappa();
+    let nodes = corrections.body.mass.len();
+    let count = natural.len();
+    let link = Link {
+        instrument: options.instrument,
+        body: tool.body.clone(),
+        friction: tool.friction,
+        grasps: tool.mode == Mode::Grasp,
+        out,
+        pose,
+        ends: Arc::clone(&ends),
+        samples,
+        search: Search::default(),
+        delassus: Delassus::default(),
+        held_back: corrections.space.held_back(kappa),
+        found: memory::room(4 * MOST_SAMPLES, WHAT)?,
+        starts: prior.basis_starts(),
+        coordinates: memory::zeros(prior.width(), WHAT)?,
+        field: memory::zeros(3 * nodes, WHAT)?,
+        masses: memory::collected(count, natural.iter().map(|mode| mode.1), WHAT)?,
+        rows: memory::collected(count, 0..count as u32, WHAT)?,
+        number: 0,
+        latency_s: options.latency_s,
+    };
+    let haptics = Haptics::new(options, modes, slow, at, ends)?;
+    Ok((link, haptics))
+}
+
+fn check(options: &HapticOptions) -> Result<()> {
+    let most = crate::contact::MAX_TOOLS as u32;
+    if options.instrument >= most {
+        return Err(Error::Argument(format!(
+            "instrument is {}, a place in a list of at most {most}",
+            options.instrument
+        )));
+    }
+    options.tool.check(options.instrument as usize)?;
+    let latency = options.latency_s.unwrap_or(0.0);
+    for (name, value, most) in [
+        ("blend_s", options.blend_s, 1.0),
+        (
+            "damping_limit_n_s_per_m",
+            options.damping_limit_n_s_per_m.into(),
+            1e6,
+        ),
+        ("force_limit_n", options.force_limit_n.into(), 1e6),
+        ("latency_s", latency, 1.0),
+    ] {
+        if !(value >= 0.0 && value <= most) {
+            return Err(Error::Argument(format!(
+                "{name} is {value}, must be 0 to {most}"
+            )));
+        }
+    }
+    Ok(())
+}
+
+impl Link {
+    /// Whether the hand has gone.
+    pub fn is_over(&self) -> bool {
+        self.ends.hand_gone.load(Ordering::Acquire)
+    }
+
+    /// Publishes a state.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`]; [`Error::Panic`] of a worker. The problem before stays.
+    pub fn publish(&mut self, step: &Stepped<'_>) -> Result<()> {
+        self.find(step);
+        let held = &step.corrections.body.held;
+        let compliance = Compliance {
+            prior: step.prior,
+            held,
+            inertia: Some((&step.corrections.space, &self.held_back)),
+        };
+        let rows = self.samples.rows();
+        let of = self.found.iter().map(|(_, row)| rows[*row as usize]);
+        let w = self.delassus.of(compliance, of.clone())?;
+        let slow = self.out.input_buffer_mut();
+        slow.delassus[..w.len()].copy_from_slice(w);
+        let modes = self.rows.len();
+        for (at, sample) in of.enumerate() {
+            let out = &mut slow.at_samples[3 * at * modes..3 * (at + 1) * modes];
+            out.fill(0.0);
+            for (column, weight) in compliance.entries(sample) {
+                for (axis, out) in out.chunks_exact_mut(modes.max(1)).enumerate() {
+                    let own = step
+                        .corrections
+                        .space
+                        .at_contact(3 * column as usize + axis);
+                    for (sum, value) in out.iter_mut().zip(own) {
+                        *sum += weight * value;
+                    }
+                }
+            }
+        }
+        let mut project = |field: &[f32], weighted: bool, out: &mut [f32]| -> Result<()> {
+            let mass = &step.corrections.body.mass;
+            for (i, (to, from)) in self.field.iter_mut().zip(field).enumerate() {
+                let mass = if weighted { mass[i / 3] } else { 1.0 };
+                *to = if held[i / 3] { 0.0 } else { mass * from };
+            }
+            let (isa, pool, q) = (step.isa, step.pool, &mut self.coordinates);
+            let failed = |error: crate::kernels::PoolError| Error::Panic(error.to_string());
+            let basis = step.prior.basis();
+            project_field(isa, pool, &basis, &self.starts, &self.field, q).map_err(failed)?;
+            let modes = step.corrections.space.modes();
+            row_dots(isa, pool, modes, &self.rows, q, out).map_err(failed)?;
+            for (out, mass) in out.iter_mut().zip(&self.masses) {
+                *out /= mass;
+            }
+            Ok(())
+        };
+        project(&step.motion.velocity, true, &mut slow.velocity)?;
+        project(&step.motion.inertia, false, &mut slow.drive)?;
+        let state = State {
+            rest: step.rest,
+            u: step.u,
+            start: step.u,
+        };
+        let index = self.instrument as usize;
+        let past = step
+            .problem
+            .and_then(|problem| Some((&problem.past, problem.past.tools.get(index)?)));
+        slow.pose = past.map(|(_, tool)| tool.pose);
+        slow.count = self.found.len();
+        for (at, &(_, row)) in self.found.iter().enumerate() {
+            let sample = self.samples.rows()[row as usize];
+            let point = sample.gather(|node| state.position(node));
+            let anchor = past.and_then(|(_, tool)| tool.grasp.place(row));
+            let force = past.map_or(Vector::ZERO, |(past, _)| {
+                let key = |force: &crate::contact::past::Force| (force.tool, force.sample);
+                let found = past
+                    .forces
+                    .binary_search_by_key(&(self.instrument, row), key);
+                found.map_or(Vector::ZERO, |place| past.forces[place].force)
+            });
+            slow.points[at] = point;
+            slow.outward[at] = outward(&self.samples, row, state);
+            slow.forces[at] = force;
+            slow.anchors[at] = anchor;
+            slow.errors[at] = slow.pose.map_or(Vector::ZERO, |pose| {
+                let pair = Pair {
+                    body: &self.body,
+                    friction: self.friction,
+                    from: &pose,
+                    now: &pose,
+                    anchor,
+                    allowed: 0.0,
+                };
+                let pushed = force != Vector::ZERO;
+                let contact = pair.contact(point, point, slow.outward[at], pushed);
+                match (anchor, pushed) {
+                    (Some(_), _) => contact.slip,
+                    _ if contact.gap == f32::MAX => Vector::ZERO,
+                    (None, true) => Vector::new(contact.gap, 0.0, 0.0),
+                    (None, false) => Vector::new(contact.gap.min(0.0), 0.0, 0.0),
+                }
+            });
+        }
+        self.number += 1;
+        slow.number = self.number;
+        slow.latency_s = self.latency_s.unwrap_or(step.took_s);
+        self.out.publish();
+        Ok(())
+    }
+
+    /// The samples that are pushed or held by the tool, and the nearest to where the hand is now.
+    fn find(&mut self, step: &Stepped<'_>) {
+        let pose = *self.pose.read();
+        self.found.clear();
+        let index = self.instrument as usize;
+        if let Some(problem) = step.problem {
+            let own = problem.past.forces.iter();
+            let own = own.filter(|force| force.tool == self.instrument);
+            self.found.extend(own.map(|force| (f32::MIN, force.sample)));
+            if let Some(tool) = problem.past.tools.get(index)
+                && self.grasps
+            {
+                let anchors = tool.grasp.anchors().iter();
+                self.found
+                    .extend(anchors.map(|anchor| (f32::MIN, anchor.sample)));
+            }
+        }
+        let placed = Placed {
+            body: &self.body,
+            pose,
+            skin: REACH_MM,
+        };
+        let position = |node| vector(step.rest, node) + vector(step.u, node);
+        let near = self.search.find(&self.samples, &[placed], position);
+        self.found
+            .extend(near.iter().map(|near| (near.distance, near.sample)));
+        // Of equals the pushed one comes first, and stays.
+        self.found
+            .sort_unstable_by(|a, b| a.1.cmp(&b.1).then(a.0.total_cmp(&b.0)));
+        self.found.dedup_by_key(|found| found.1);
+        self.found
+            .sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        self.found.truncate(MOST_SAMPLES);
+        self.found.sort_unstable_by_key(|found| found.1);
+    }
+
+    /// Bytes held, of both ends.
+    pub fn memory_bytes(&self) -> usize {
+        3 * self.out.input_buffer().memory_bytes()
+            + self.delassus.memory_bytes()
+            + 4 * (self.coordinates.len() + self.field.len() + 2 * self.starts.len())
+            + 8 * self.found.capacity()
+    }
+}
+
+impl Drop for Link {
+    fn drop(&mut self) {
+        self.ends.scene_gone.store(true, Ordering::Release);
+    }
+}

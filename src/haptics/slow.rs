@@ -1,0 +1,78 @@
+//! What a step publishes for a tool: the samples near it, how they move under forces and in the natural modes, the forces on
+//! them and the velocities.
+
+use ::contact::{Pose, Vector};
+
+use crate::error::Result;
+use crate::memory;
+
+const WHAT: &str = "a contact problem for haptics";
+/// Samples at most: what lies farther from the tool is left out.
+pub const MOST_SAMPLES: usize = 96;
+
+/// The contact problem near one tool at the end of a step. All lists have room for [`MOST_SAMPLES`], `count` are used.
+#[derive(Clone, Debug)]
+pub struct Slow {
+    /// Published states so far; 0: none.
+    pub number: u64,
+    /// How old it was when it was published, s.
+    pub latency_s: f64,
+    /// Where the tool was in the step, if it took part.
+    pub pose: Option<Pose>,
+    /// Samples.
+    pub count: usize,
+    /// Where they are, mm.
+    pub points: Vec<Vector>,
+    /// The surface's normal there.
+    pub outward: Vec<Vector>,
+    /// Of the tool on the tissue, mN.
+    pub forces: Vec<Vector>,
+    /// Of a held one, its place on the tool.
+    pub anchors: Vec<Option<Vector>>,
+    /// The step's own error: gap (x) of a touching sample, way from the anchor of a held one, mm.
+    pub errors: Vec<Vector>,
+    /// How samples move at once under forces on samples `[3n,3n]`, mm/mN: the compliance without the natural modes.
+    pub delassus: Vec<f32>,
+    /// Natural modes, `m`.
+    pub modes: usize,
+    /// The modes at the samples `[3n,m]`.
+    pub at_samples: Vec<f32>,
+    /// Velocity of the modes `[m]`.
+    pub velocity: Vec<f32>,
+    /// What drives the modes while the forces stay `[m]`: their acceleration and damping.
+    pub drive: Vec<f32>,
+}
+
+impl Slow {
+    /// Room for a body of `modes` natural modes.
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
+    pub fn new(modes: usize) -> Result<Slow> {
+        let vectors = || memory::filled(MOST_SAMPLES, Vector::ZERO, WHAT);
+        let rows = 3 * MOST_SAMPLES;
+        Ok(Slow {
+            number: 0,
+            latency_s: 0.0,
+            pose: None,
+            count: 0,
+            points: vectors()?,
+            outward: vectors()?,
+            forces: vectors()?,
+            anchors: memory::filled(MOST_SAMPLES, None, WHAT)?,
+            errors: vectors()?,
+            delassus: memory::zeros(rows * rows, WHAT)?,
+            modes,
+            at_samples: memory::zeros(rows * modes, WHAT)?,
+            velocity: memory::zeros(modes, WHAT)?,
+            drive: memory::zeros(modes, WHAT)?,
+        })
+    }
+
+    /// Bytes held.
+    pub fn memory_bytes(&self) -> usize {
+        let rows = 4 * size_of::<Vector>() + size_of::<Option<Vector>>();
+        rows * MOST_SAMPLES
+            + 4 * (self.delassus.len() + self.at_samples.len() + 2 * self.velocity.len())
+    }
+}

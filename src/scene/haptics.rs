@@ -1,0 +1,87 @@
+//! Tools of a scene that a hand feels: made here, told of each published state.
+
+use std::sync::RwLock;
+
+use super::Scene;
+use super::core::{Core, lock_read};
+use super::published::Published;
+use crate::error::{Error, Result};
+use crate::haptics::publish::{Stepped, join};
+use crate::haptics::{HapticOptions, Haptics};
+use crate::memory;
+
+/// Hands of one scene.
+const MOST_HANDS: usize = 8;
+
+impl Scene {
+    /// Makes a tool felt: from the next step on each is published for it.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for the tool, an option, or one hand too many; [`Error::Unsupported`] for a bundle without linear response or
+    /// corrections and a scene that does not correct; [`Error::Busy`] while the scene is used or a step is in flight.
+    pub fn haptics(&self, options: &HapticOptions) -> Result<Haptics> {
+        self.with(|core, published| core.add_hand(published, options))
+    }
+}
+
+impl Core {
+    fn add_hand(
+        &mut self,
+        published: &RwLock<Published>,
+        options: &HapticOptions,
+    ) -> Result<Haptics> {
+        let (Some(prior), Some(_)) = (&self.model.prior, &self.corrected) else {
+            return Err(Error::Unsupported(
+                "haptics: the bundle has no linear response, or the scene does not correct (`corrections`)".into(),
+            ));
+        };
+        self.hands.retain(|hand| !hand.is_over());
+        if self.hands.len() >= MOST_HANDS {
+            return Err(Error::Argument(format!(
+                "the scene has {MOST_HANDS} hands already; destroy one first"
+            )));
+        }
+        memory::reserve(&mut self.hands, 1, "the haptics of a scene")?;
+        let samples = self.model.samples()?;
+        let (link, haptics) = join(options, prior, self.model.corrections()?, samples)?;
+        self.hands.push(link);
+        self.took_s = 0.0;
+        self.tell_hands(published);
+        Ok(haptics)
+    }
+
+    /// Publishes the last state for each hand.
+    pub(super) fn tell_hands(&mut self, published: &RwLock<Published>) {
+        if self.hands.is_empty() {
+            return;
+        }
+        self.hands.retain(|hand| !hand.is_over());
+        let (Some(prior), Some(corrected), Ok(corrections)) =
+            (&self.model.prior, &self.corrected, self.model.corrections())
+        else {
+            return;
+        };
+        let shared = lock_read(published);
+        let step = Stepped {
+            isa: self.isa,
+            pool: &self.pool,
+            prior,
+            corrections,
+            motion: &corrected.stage.motion,
+            problem: self.problem.as_deref(),
+            rest: &self.mesh.positions,
+            u: &shared.last.field,
+            took_s: self.took_s,
+        };
+        for hand in &mut self.hands {
+            if let Err(error) = hand.publish(&step) {
+                tracing::error!("haptics: the step was not published: {error}");
+            }
+        }
+    }
+
+    /// Bytes of the hands.
+    pub(super) fn hand_bytes(&self) -> usize {
+        self.hands.iter().map(|hand| hand.memory_bytes()).sum()
+    }
+}
