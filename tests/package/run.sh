@@ -41,10 +41,12 @@ complete() {
   local file
   for file in lib/libupt.so lib/libonnxruntime.so lib/libupt.a lib/pkgconfig/upt.pc include/upt.h include/upt.hpp bin/upt \
     share/doc/upt/LICENSE-APACHE share/doc/upt/LICENSE-MIT share/doc/upt/NOTICE share/doc/upt/THIRD-PARTY.txt \
-    share/doc/upt/onnxruntime/LICENSE; do
+    share/doc/upt/onnxruntime/LICENSE share/doc/upt/docs/guide/instruments.md share/doc/upt/docs/guide/scene.md; do
     [ -e "$prefix/$file" ] || { echo "$file is missing"; return 1; }
   done
   grep -q '^ort v' "$prefix/share/doc/upt/THIRD-PARTY.txt"
+  # MIT asks for its text, not only for its name.
+  grep -q 'Permission is hereby granted' "$prefix/share/doc/upt/THIRD-PARTY.txt"
 }
 check complete complete
 
@@ -52,6 +54,7 @@ no_build_paths() {
   ! grep -rlF "$root" "$prefix/lib/cmake" "$prefix/lib/pkgconfig" "$prefix/share/doc"
 }
 check no_build_paths no_build_paths
+check documents "${UPT_PYTHON:-$root/target/venv/bin/python}" "$root/tests/docs/links.py" "$prefix/share/doc/upt"
 
 bundle="$(find "$prefix/share/upt/bundles" -mindepth 1 -maxdepth 1 -type d 2>/dev/null | sort | head -n 1)"
 check cmake_configure cmake -S "$prefix/share/upt/examples/c" -B "$work/c" -DCMAKE_PREFIX_PATH="$prefix" -DCMAKE_BUILD_TYPE=Release

@@ -7,7 +7,7 @@
 //!   lib/cmake/upt/, lib/pkgconfig/     find_package(upt), pkg-config upt
 //!   include/upt.h, upt.hpp
 //!   share/upt/bundles/, examples/
-//!   share/doc/upt/                     licences, notices, README, CHANGELOG
+//!   share/doc/upt/                     licences, notices, README, CHANGELOG, docs/
 //! ```
 
 use std::path::{Path, PathBuf};
@@ -18,6 +18,8 @@ use clap::Args;
 
 use crate::archive;
 use crate::cross;
+use crate::documents;
+use crate::licences;
 use crate::ort::{self, Platform};
 use crate::process::{has_program, run_checked};
 use crate::stages;
@@ -114,19 +116,9 @@ fn shared(workspace: &Workspace, root: &Path, ort_folder: &Path) -> Result<()> {
         )?;
     }
     let doc = root.join("share/doc/upt");
-    for name in [
-        "LICENSE-APACHE",
-        "LICENSE-MIT",
-        "NOTICE",
-        "README.md",
-        "CHANGELOG.md",
-        "docs/reference/abi.md",
-        "docs/reference/formats.md",
-    ] {
-        let file = Path::new(name)
-            .file_name()
-            .context("a document has a name")?;
-        copy(&workspace.path(name), &doc.join(file))?;
+    documents::copy(workspace, &doc)?;
+    for name in ["LICENSE-APACHE", "LICENSE-MIT"] {
+        copy(&workspace.path(name), &doc.join(name))?;
     }
     copy(
         &ort_folder.join("LICENSE"),
@@ -136,36 +128,8 @@ fn shared(workspace: &Workspace, root: &Path, ort_folder: &Path) -> Result<()> {
         &ort_folder.join("ThirdPartyNotices.txt"),
         &doc.join("onnxruntime/ThirdPartyNotices.txt"),
     )?;
-    std::fs::write(doc.join("THIRD-PARTY.txt"), third_party(workspace)?)?;
+    std::fs::write(doc.join("THIRD-PARTY.txt"), licences::notice(workspace)?)?;
     Ok(())
-}
-
-/// The crates that libupt and the command link, with versions and licences, from `cargo metadata`.
-fn third_party(workspace: &Workspace) -> Result<String> {
-    let output = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
-        .current_dir(&workspace.root)
-        .args([
-            "tree", "-p", "upt", "-p", "upt-cli", "--edges", "normal", "--prefix", "none",
-            "--format", "{p} {l}",
-        ])
-        .output()?;
-    if !output.status.success() {
-        bail!("cargo tree: {}", String::from_utf8_lossy(&output.stderr));
-    }
-    let text = String::from_utf8_lossy(&output.stdout).into_owned();
-    // Paths of workspace members and the mark of repeated entries are of no interest.
-    let mut lines: Vec<String> = text
-        .lines()
-        .map(|line| line.trim_end_matches(" (*)"))
-        .filter(|line| !line.is_empty() && !line.contains(" (/") && !line.contains("(proc-macro)"))
-        .map(str::to_owned)
-        .collect();
-    lines.sort();
-    lines.dedup();
-    Ok(format!(
-        "Rust crates linked into libupt and the command upt: name, version, licence.\n\n{}\n",
-        lines.join("\n")
-    ))
 }
 
 fn native(workspace: &Workspace, host: Platform, out: &Path) -> Result<PathBuf> {
@@ -315,7 +279,7 @@ fn unity(workspace: &Workspace, out: &Path) -> Result<PathBuf> {
     }
     std::fs::write(
         root.join("Documentation~/third-party-crates.txt"),
-        third_party(workspace)?,
+        licences::notice(workspace)?,
     )?;
     without_empty_plugins(&root)?;
     let file = out.join(format!(

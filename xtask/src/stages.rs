@@ -479,5 +479,7 @@ fn package(workspace: &Workspace) -> Result<Outcome> {
     if !has_program("cmake") {
         return Ok(Outcome::skipped("needs cmake".into()));
     }
+    // It reads the pages of the archive.
+    venv::install_docs(workspace)?;
     script(workspace, "package", "tests/package/run.sh")
 }
