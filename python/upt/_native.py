@@ -28,7 +28,7 @@ class Status(IntEnum):
     ARGUMENT = -2
     """A size, index, enum or range is wrong."""
     STRUCT_SIZE = -3
-    """`struct_size` is not one that this library knows."""
+    """This library does not know this `struct_size`."""
     HANDLE = -4
     """Not a live handle of this type."""
     BUSY = -5
@@ -40,7 +40,7 @@ class Status(IntEnum):
     UNSUPPORTED = -8
     """This build or this bundle cannot do it."""
     OUT_OF_MEMORY = -9
-    """There is no memory for what the call needs."""
+    """There is not enough memory for the call."""
     RUNTIME = -20
     """ONNX Runtime is missing, too old or broken; the message lists what was tried."""
     PROVIDER = -21
@@ -56,7 +56,7 @@ class Status(IntEnum):
     GUARD = -40
     """The guard refused the new state; the last good state stays."""
     PANIC = -90
-    """A bug in the library; the scene involved can only be destroyed."""
+    """A bug in the library; the scene can only be destroyed."""
 
 
 class Provider(IntEnum):
@@ -89,9 +89,9 @@ class LogLevel(IntEnum):
     ERROR = 1
     """Failures."""
     WARN = 2
-    """Fallbacks, and once for each flag that rises: contacts outside of the envelope, states that the guard refuses."""
+    """Fallbacks, and each flag once when it rises: contacts outside the envelope, states that the guard refuses."""
     INFO = 3
-    """Loading: what was opened and who runs it."""
+    """Loading: what was opened and which provider runs it."""
     DEBUG = 4
     """Stage times."""
     TRACE = 5
@@ -145,7 +145,7 @@ class Corrections(IntEnum):
     NONE = -1
     """No corrections."""
     AUTO = -2
-    """As many corrections as the scene's target asks for and its budget lets in."""
+    """As many corrections as the scene's target needs and its budget allows."""
 
 
 class GuardPolicy(IntEnum):
@@ -190,7 +190,7 @@ class Flag(IntFlag):
     ERROR = 4096
     """The estimated error is above the scene's `error_limit_mm`."""
     DEEP = 8192
-    """Tissue lies more than 1 mm inside of an instrument."""
+    """Tissue lies more than 1 mm inside an instrument."""
 
 
 class IndexSet(IntEnum):
@@ -229,7 +229,7 @@ class Mode(IntEnum):
     SLIDE = 0
     """An instrument pushes, with Coulomb friction."""
     GRASP = 1
-    """An instrument holds what is within 0.5 mm of it when the mode changes to this, until the mode changes back or it tears off."""
+    """An instrument holds what lies within 0.5 mm of it when the mode changes to this, until the mode changes back or the grasp tears off."""
 
 
 class InitOptions(Record):
@@ -240,7 +240,7 @@ class InitOptions(Record):
     threads: int
     """Default number of threads of a model; 0: 1."""
     onnxruntime_path: str | None = text("_onnxruntime_path")
-    """ONNX Runtime's shared library, a path; NULL: beside libupt, then `ORT_DYLIB_PATH`, then the system."""
+    """ONNX Runtime's shared library, a path; NULL: the folder of libupt, then `ORT_DYLIB_PATH`, then the system."""
 
     _fields_ = [
         ("struct_size", ctypes.c_uint32),
@@ -255,7 +255,7 @@ class InitOptionsKeywords(TypedDict, total=False):
     threads: int
     """Default number of threads of a model; 0: 1."""
     onnxruntime_path: str | os.PathLike[str] | None
-    """ONNX Runtime's shared library, a path; NULL: beside libupt, then `ORT_DYLIB_PATH`, then the system."""
+    """ONNX Runtime's shared library, a path; NULL: the folder of libupt, then `ORT_DYLIB_PATH`, then the system."""
 
 
 class ModelOptions(Record):
@@ -505,7 +505,7 @@ class Instrument(Record):
     friction: float
     """`upt_scene_step_instruments` alone: Coulomb's coefficient, 0 or more."""
     tear_off_mn: float
-    """A grasp lets go where its samples pull harder than this together, mN; 0: never."""
+    """A grasp tears off when its points together pull harder than this, mN; 0: never."""
     hull: int | None
     """`UPT_SHAPE_HULL`: the `upt_hull`; otherwise NULL."""
 
@@ -537,7 +537,7 @@ class InstrumentReading(Record):
     torque: tuple[float, ...] = vector("_torque")
     """On the instrument about its position, mN mm."""
     penetration_mm: float
-    """How deep the deepest point of the surface lies inside of the instrument, mm."""
+    """How deep the deepest point of the surface lies inside the instrument, mm."""
     torn: bool = boolean("_torn")
     """1: its grasp tore off in this step."""
     reserved: tuple[int, ...] = vector("_reserved")
@@ -734,7 +734,7 @@ class SceneStats(Record):
     contact_count: int
     """Contact nodes of the last step."""
     memory_bytes: int
-    """Bytes that the scene has allocated beside the model; what it never touches is not resident."""
+    """Bytes that the scene has allocated in addition to the model; pages that it never touches are not resident."""
     threads: int
     """Threads of a step."""
     kernel: Kernel = choice("_kernel", Kernel)

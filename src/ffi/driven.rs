@@ -24,16 +24,18 @@ use {
 #[cfg(not(feature = "contact"))]
 const WITHOUT: &str = "this build has no feature \"contact\"";
 
-/// One step from the scene's own state that rigid instruments drive: their contact with the tissue is solved.
+/// One step from the scene's own state, driven by rigid instruments. Their contact with the tissue is solved.
 ///
-/// The instruments are where they will be at the end of the step; from the last step's poses they get there on a line. Their contact
-/// is unilateral with Coulomb friction at points of the domain's surface at most 1.7 mm apart. Where the scene corrects, contact is
-/// solved inside of each correction, as a load; with `corrections = UPT_CORRECTIONS_NONE` once, on the linear response. The scene
-/// remembers each place of the array: pass every instrument every time, in the same order. An instrument that moves more than 40 mm in
-/// a step has been put there.
-/// instruments: array; every element has the same `struct_size`; at most 64; NULL with count 0: a free step.
-/// out, out_count, threads and errors: as `upt_scene_step`; also `UPT_ERR_UNSUPPORTED` in a build without feature "contact" and for
-/// a bundle without a linear response, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_HANDLE` for a hull that was destroyed.
+/// Give the pose that each instrument has at the end of the step; it moves there on a straight line from its last pose.
+/// An instrument that would move more than 40 mm in a step is placed there instead. Contact is unilateral, with Coulomb
+/// friction, at points of the domain's surface at most 1.7 mm apart. A scene with corrections solves it inside each
+/// correction, as a load; with `corrections = UPT_CORRECTIONS_NONE` it is solved once, on the linear response. The scene
+/// remembers each place of the array: pass every instrument every time, in the same order.
+///
+/// - `instruments`: at most 64, all with the same `struct_size`; NULL with count 0 makes a step without contact.
+/// - `out`, `out_count`, threads and errors: as in `upt_scene_step`; also `UPT_ERR_UNSUPPORTED` in a build without
+///   feature "contact" and for a bundle without a linear response, `UPT_ERR_STRUCT_SIZE`, and `UPT_ERR_HANDLE` for a hull
+///   that was destroyed.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_scene_step_instruments(
     scene: *mut upt_scene,
@@ -72,10 +74,11 @@ pub unsafe extern "C" fn upt_scene_step_instruments(
     })
 }
 
-/// Starts a step that rigid instruments drive on the scene's worker and returns at once.
+/// Starts a step driven by rigid instruments on the scene's worker thread and returns at once.
 ///
-/// instruments, instrument_count: as `upt_scene_step_instruments`; checked and copied before the call returns.
-/// Threads and errors: as `upt_scene_submit`; also those of `upt_scene_step_instruments`.
+/// - `instruments`, `instrument_count`: as in `upt_scene_step_instruments`; checked and copied before the call returns.
+///
+/// Threads and errors: those of `upt_scene_submit` and of `upt_scene_step_instruments`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_scene_submit_instruments(
     scene: *mut upt_scene,
@@ -99,16 +102,23 @@ pub unsafe extern "C" fn upt_scene_submit_instruments(
     })
 }
 
-/// The tissue at a moment between steps, with rigid instruments where they are at that moment: for frames without lag.
+/// The tissue at a moment between steps, with the instruments where they are at that moment: frames without lag.
 ///
-/// From the last published state its velocities go on, and contact is solved at the poses given here with the compliance of that time. Any
-/// frame rate, also uneven; also while a submitted step is in flight. When a step arrives, what it puts elsewhere is blended in over a step's time.
-/// seconds: since the last published step's time, 0 or more; the velocities are followed for two steps at most. instruments: as
-/// `upt_scene_step_instruments`. out: `[n,3]`, mm, in the region's order. out_count: floats in out, 3 n.
-/// Threads: one thread at a time presents; another one may step or submit. Errors: `UPT_ERR_BUSY` while another thread presents, and at the
-/// first call while a step is in flight; `UPT_ERR_UNSUPPORTED` in a build without feature "contact", for a bundle without a linear response or
-/// corrections and a scene that does not correct; `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`,
-/// `UPT_ERR_NON_FINITE`, `UPT_ERR_STATE`, `UPT_ERR_RUNTIME`, `UPT_ERR_IO`, `UPT_ERR_BUNDLE`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
+/// The velocities of the last published state continue, and contact is solved at the poses given here with the compliance
+/// of that time. Use any frame rate, even an uneven one, and call it while a submitted step is in flight too. When a step
+/// arrives, the difference to what was shown is blended in over the time of a step.
+///
+/// - `seconds`: time since the last published step, 0 or more; velocities are followed for two steps at most.
+/// - `instruments`: as `upt_scene_step_instruments`.
+/// - `out`: `[n,3]`, mm, in the region's order.
+/// - `out_count`: number of floats in `out`, 3 n.
+///
+/// Threads: one thread at a time presents; another may step or submit meanwhile.
+/// Errors: `UPT_ERR_BUSY` while another thread presents, and if a step is in flight at the first call;
+/// `UPT_ERR_UNSUPPORTED` in a build without feature "contact", for a bundle without a linear response or corrections, and
+/// for a scene without corrections; `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`,
+/// `UPT_ERR_NON_FINITE`, `UPT_ERR_STATE`, `UPT_ERR_RUNTIME`, `UPT_ERR_IO`, `UPT_ERR_BUNDLE`, `UPT_ERR_OUT_OF_MEMORY`,
+/// `UPT_ERR_PANIC`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_scene_present(
     scene: *mut upt_scene,
@@ -136,11 +146,14 @@ pub unsafe extern "C" fn upt_scene_present(
     })
 }
 
-/// Copies what the tissue did to each instrument at the end of the last step.
+/// Copies the force, torque and penetration of each instrument at the end of the last step.
 ///
-/// out: `[count]`, in the order of the step's instruments; every element has its `struct_size` set. count: instruments of that step.
-/// Threads: any at any time, also while a step runs. Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "contact",
-/// `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT` where the last step had another number of instruments.
+/// - `out`: `[count]`, in the order of the step's instruments; set `struct_size` of every element.
+/// - `count`: instruments of that step.
+///
+/// Threads: any, at any time, even while a step runs.
+/// Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "contact", `UPT_ERR_NULL`, `UPT_ERR_HANDLE`,
+/// `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT` if the last step had another number of instruments.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_scene_instrument_readings(
     scene: *mut upt_scene,
@@ -185,9 +198,12 @@ pub unsafe extern "C" fn upt_scene_instrument_readings(
 
 /// Copies the points of the surface that pushed or held instruments at the end of the last step, ascending by instrument.
 ///
-/// out: `[capacity]`; NULL with capacity 0 only asks. needed: points, always written; may be NULL.
-/// Threads: any at any time, also while a step runs. Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "contact",
-/// `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` when capacity is too small.
+/// - `out`: `[capacity]`; NULL with capacity 0 only queries the size.
+/// - `needed`: number of points, always written; may be NULL.
+///
+/// Threads: any, at any time, even while a step runs.
+/// Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "contact", `UPT_ERR_NULL`, `UPT_ERR_HANDLE`,
+/// `UPT_ERR_ARGUMENT` if capacity is too small.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_scene_instrument_contacts(
     scene: *mut upt_scene,
@@ -219,10 +235,14 @@ pub unsafe extern "C" fn upt_scene_instrument_contacts(
     })
 }
 
-/// Makes the convex hull of a tool's points, for `UPT_SHAPE_HULL`.
+/// Creates the convex hull of a tool's points, for `UPT_SHAPE_HULL`.
 ///
-/// points: `[n,3]`, mm, in the tool's own frame. point_count: n, 4 to 100,000. out: the new hull.
-/// Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_ARGUMENT` for points that are not finite, too many or without a volume,
+/// - `points`: `[n,3]`, mm, in the tool's own frame.
+/// - `point_count`: n, 4 to 100,000.
+/// - `out`: the new hull.
+///
+/// Threads: any.
+/// Errors: `UPT_ERR_NULL`, `UPT_ERR_ARGUMENT` for points that are not finite, too many, or without volume,
 /// `UPT_ERR_UNSUPPORTED` in a build without feature "contact", `UPT_ERR_OUT_OF_MEMORY`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_hull_create(
@@ -262,9 +282,10 @@ pub unsafe extern "C" fn upt_hull_create(
     )
 }
 
-/// Ends a hull. Steps that were submitted with it keep what they need.
+/// Destroys a hull. Steps that were submitted with it keep what they need.
 ///
-/// Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also when it was destroyed before).
+/// Threads: any.
+/// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also if it was destroyed before).
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_hull_destroy(hull: *mut upt_hull) -> upt_status {
     call(

@@ -18,14 +18,19 @@ use {
 #[cfg(not(feature = "haptics"))]
 const WITHOUT: &str = "this build has no feature \"haptics\"";
 
-/// Makes a tool felt: from now on each step of the scene leaves what `upt_haptics_render` needs.
+/// Lets a hand feel a tool: from now on, each step of the scene prepares what `upt_haptics_render` needs.
 ///
-/// The steps of the scene are driven as before, with this tool among their instruments. The object does not keep the scene alive.
-/// options: required, for its tool. out: the new object. At most 8 a scene and 64 a process.
-/// Threads: one at a time on the scene. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also for a hull that was destroyed),
-/// `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NON_FINITE`, `UPT_ERR_BUSY` also while a step is in flight, `UPT_ERR_UNSUPPORTED` in a build
-/// without feature "haptics", for a bundle without a linear response or corrections and a scene that does not correct; `UPT_ERR_RUNTIME`,
-/// `UPT_ERR_IO`, `UPT_ERR_BUNDLE`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
+/// Drive the steps of the scene as before, with this tool among their instruments. The object does not keep the scene
+/// alive.
+///
+/// - `options`: required, for its tool.
+/// - `out`: the new object. At most 8 per scene and 64 per process.
+///
+/// Threads: one at a time on the scene.
+/// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also for a hull that was destroyed), `UPT_ERR_STRUCT_SIZE`,
+/// `UPT_ERR_ARGUMENT`, `UPT_ERR_NON_FINITE`, `UPT_ERR_BUSY` also while a step is in flight, `UPT_ERR_UNSUPPORTED` in a
+/// build without feature "haptics", for a bundle without a linear response or corrections, and for a scene without
+/// corrections; `UPT_ERR_RUNTIME`, `UPT_ERR_IO`, `UPT_ERR_BUNDLE`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_haptics_create(
     scene: *mut upt_scene,
@@ -60,15 +65,19 @@ pub unsafe extern "C" fn upt_haptics_create(
     })
 }
 
-/// The force on the tool at a pose: contact solved on what the last step left. Made for 1,000 calls a second.
+/// The force on the tool at a pose, with contact solved on what the last step prepared. Made for 1,000 calls a second.
 ///
-/// Waits for nothing, whatever the scene does: no lock, and no allocation unless it fails. A new step is blended in without a jump. Out of contact the
-/// force is zero; where the scene is not stepped any more `age_s` grows and the tissue stays as elastic as the last step left it. At this boundary lengths
-/// are metres, forces newtons, torques newton metres.
-/// pose: where the tool is now. out: `struct_size` set by the caller; where the call fails and out can be written there is no force in it.
-/// Threads: one at a time on the object; any other on the scene. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`,
-/// `UPT_ERR_NON_FINITE` and `UPT_ERR_ARGUMENT` for the pose and a time before the last; `UPT_ERR_BUSY` while another thread is in a call on this
-/// object; `UPT_ERR_STATE` once the scene was destroyed; `UPT_ERR_UNSUPPORTED` in a build without feature "haptics"; `UPT_ERR_PANIC`.
+/// Waits for nothing, whatever the scene does: no lock, and no allocation unless it fails. A new step is blended in
+/// without a jump. Out of contact the force is zero. If the scene is no longer stepped, `age_s` grows and the tissue
+/// stays as elastic as the last step left it. In this call lengths are metres, forces newtons and torques newton metres.
+///
+/// - `pose`: where the tool is now.
+/// - `out`: set its `struct_size` first. If the call fails and `out` can be written, its force is zero.
+///
+/// Threads: one at a time on the object; any other on the scene.
+/// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_NON_FINITE` and `UPT_ERR_ARGUMENT` for the
+/// pose and a time before the last; `UPT_ERR_BUSY` while another thread is in a call on this object; `UPT_ERR_STATE` once
+/// the scene was destroyed; `UPT_ERR_UNSUPPORTED` in a build without feature "haptics"; `UPT_ERR_PANIC`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_haptics_render(
     haptics: *mut upt_haptics,
@@ -113,10 +122,11 @@ pub unsafe extern "C" fn upt_haptics_render(
     )
 }
 
-/// Ends a haptics object; its scene goes on.
+/// Destroys a haptics object. Its scene stays usable.
 ///
-/// Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also when it was destroyed before), `UPT_ERR_BUSY` while another thread is in a call on
-/// it, `UPT_ERR_UNSUPPORTED` in a build without feature "haptics".
+/// Threads: any.
+/// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also if it was destroyed before), `UPT_ERR_BUSY` while another thread is in
+/// a call on it, `UPT_ERR_UNSUPPORTED` in a build without feature "haptics".
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_haptics_destroy(haptics: *mut upt_haptics) -> upt_status {
     call(

@@ -14,15 +14,20 @@ use crate::error::Error;
 #[cfg(feature = "contact")]
 use crate::instrument::{Instrument, MAX_INSTRUMENTS, Shape};
 
-/// Finds the nodes that rigid instruments touch and the displacement that they impose: the input of a step.
+/// Finds the nodes that rigid instruments touch, and the displacement that they impose there: the input of a step.
 ///
-/// The scene remembers what each place of the array touches, until the array's length changes or upt_scene_reset:
-/// pass every instrument every time, in the same order. At most 64 instruments; NULL with count 0 lets go of all.
-/// instruments: array; every element has its `struct_size` set. contact_nodes: `[capacity]`, contact_vectors:
-/// `[capacity,3]`, mm; both may be NULL with capacity 0, which only asks. contact_count: contacts found, always written.
-/// Threads: one at a time. Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "contact", `UPT_ERR_NULL`,
-/// `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_NON_FINITE`, `UPT_ERR_ARGUMENT` (also when capacity
-/// is too small), `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
+/// The scene remembers what each place of the array touches until the array's length changes or `upt_scene_reset`: pass
+/// every instrument every time, in the same order. NULL with count 0 releases all.
+///
+/// - `instruments`: at most 64, each with its `struct_size` set.
+/// - `contact_nodes`: `[capacity]`, contact_vectors: `[capacity,3]`, mm; both may be NULL with capacity 0, which only
+///   queries the count.
+/// - `contact_count`: number of contacts found, always written.
+///
+/// Threads: one at a time.
+/// Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "contact", `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`,
+/// `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_NON_FINITE`, `UPT_ERR_ARGUMENT` (also when capacity is too small),
+/// `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_scene_contacts_from_instruments(
     scene: *mut upt_scene,
@@ -110,12 +115,17 @@ unsafe fn read_instruments(
 
 /// Copies the reaction of the tissue at the last step's contact nodes, in their order.
 ///
-/// With a bundle that uses a linear response (`prior_forces` of the statistics is 1) the contact forces of that response,
-/// `-A_CC^-1 c`: nodes that borrow a column of the compliance share its force, held nodes and nodes far from the domain get
-/// zero. With others the elastic force of the elements around each node at the last state. Both leave out inertia and damping.
-/// out: `[m,3]`, mN, the force on the instrument. out_count: floats in out, 3 m.
-/// Threads: one at a time. Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "forces", `UPT_ERR_NULL`,
-/// `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
+/// A bundle with a linear response (`prior_forces` of the statistics is 1) gives that response's contact forces,
+/// `-A_CC^-1 c`: nodes that borrow a column of the compliance share its force, and held nodes and nodes far from the
+/// domain get zero. Other bundles give the elastic force of the elements around each node at the last state. Both leave
+/// out inertia and damping.
+///
+/// - `out`: `[m,3]`, mN, the force on the instrument.
+/// - `out_count`: number of floats in `out`, 3 m.
+///
+/// Threads: one at a time.
+/// Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "forces", `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`,
+/// `UPT_ERR_ARGUMENT`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_scene_contact_force(
     scene: *mut upt_scene,

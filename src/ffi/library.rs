@@ -10,11 +10,12 @@ use super::{convert, log, pointers};
 /// Version of the C ABI that `upt_abi_version` returns. Bindings compare it at load.
 pub const UPT_ABI_VERSION: u32 = 1;
 
-/// Starts the library with options of the host's. Optional: the first model does it with the defaults.
+/// Starts the library with options of your own. Optional: opening the first model starts it with the defaults.
 ///
-/// options: NULL means the defaults.
-/// Threads: any. Errors: `UPT_ERR_STATE` when the library was started with other options, `UPT_ERR_STRUCT_SIZE`,
-/// `UPT_ERR_ARGUMENT`.
+/// - `options`: NULL means the defaults.
+///
+/// Threads: any.
+/// Errors: `UPT_ERR_STATE` when the library was started with other options, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_init(options: *const upt_init_options) -> upt_status {
     call(
@@ -28,9 +29,10 @@ pub unsafe extern "C" fn upt_init(options: *const upt_init_options) -> upt_statu
     )
 }
 
-/// Ends the library. Call it before the process exits when a GPU provider was used.
+/// Shuts the library down. Call it before the process exits if you used a GPU provider.
 ///
-/// Threads: any. Errors: `UPT_ERR_STATE` while models or scenes live.
+/// Threads: any.
+/// Errors: `UPT_ERR_STATE` while models or scenes exist.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_shutdown() -> upt_status {
     call(
@@ -43,37 +45,48 @@ pub unsafe extern "C" fn upt_shutdown() -> upt_status {
     )
 }
 
-/// The library's version, for instance "0.1.0". Threads: any.
+/// The library's version, for instance "0.1.0".
+///
+/// Threads: any.
 #[unsafe(no_mangle)]
 pub extern "C" fn upt_version() -> *const c_char {
     concat!(env!("CARGO_PKG_VERSION"), "\0").as_ptr().cast()
 }
 
-/// `UPT_ABI_VERSION` of the library that runs; refuse to go on when it is not the header's. Threads: any.
+/// The `UPT_ABI_VERSION` of the library that is loaded. Stop if it differs from the header's.
+///
+/// Threads: any.
 #[unsafe(no_mangle)]
 pub extern "C" fn upt_abi_version() -> u32 {
     UPT_ABI_VERSION
 }
 
-/// The message of the last failed call of the calling thread (UTF-8), "" when there is none.
-/// It is valid until that thread's next call. Threads: any.
+/// The message of the calling thread's last failed call (UTF-8), or "". It stays valid until that thread's next call.
+///
+/// Threads: any.
 #[unsafe(no_mangle)]
 pub extern "C" fn upt_last_error() -> *const c_char {
     last_error()
 }
 
-/// The name of a status, for instance "UPT_ERR_BUSY"; "UPT_UNKNOWN" for other numbers. Threads: any.
+/// The name of a status, for instance "UPT_ERR_BUSY"; "UPT_UNKNOWN" for other numbers.
+///
+/// Threads: any.
 #[unsafe(no_mangle)]
 pub extern "C" fn upt_status_name(status: upt_status) -> *const c_char {
     super::status::name(status).as_ptr()
 }
 
-/// Sets the receiver of log messages; NULL ends it. When the call returns, the former receiver is no longer running.
+/// Sets the function that receives log messages; NULL removes it. When the call returns, the former receiver is no longer
+/// running. It runs on the host's threads only, during a call or at its end; messages of the library's own threads wait
+/// for the next call.
 ///
-/// user: handed to the receiver. level: `UPT_LOG_*`; less severe messages are not made at all. The receiver runs on
-/// the host's threads only, inside of a call or at its end: what the library's own threads say waits for the next call.
-/// Threads: any. Errors: `UPT_ERR_ARGUMENT` for an unknown level, `UPT_ERR_STATE` from inside of the receiver, or
-/// when the process is a Rust program that has a `tracing` subscriber of its own.
+/// - `user`: passed to the receiver.
+/// - `level`: `UPT_LOG_*`; less severe messages are not created.
+///
+/// Threads: any.
+/// Errors: `UPT_ERR_ARGUMENT` for an unknown level, `UPT_ERR_STATE` from the receiver itself, or in a Rust program with a
+/// `tracing` subscriber of its own.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_set_log(
     callback: upt_log_fn,
@@ -97,8 +110,11 @@ pub unsafe extern "C" fn upt_set_log(
 
 /// Lists the providers as JSON: `[{"name":"cpu","available":true,"reason":""}]`. Loads ONNX Runtime.
 ///
-/// out: text with its NUL; NULL with capacity 0 only asks. needed: bytes with the NUL, always written; may be NULL.
-/// Threads: any. Errors: `UPT_ERR_RUNTIME`, `UPT_ERR_ARGUMENT` when capacity is too small, `UPT_ERR_NULL`.
+/// - `out`: receives text with its NUL; NULL with capacity 0 only queries the size.
+/// - `needed`: its size in bytes with the NUL, always written; may be NULL.
+///
+/// Threads: any.
+/// Errors: `UPT_ERR_RUNTIME`, `UPT_ERR_ARGUMENT` if capacity is too small, `UPT_ERR_NULL`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_providers(
     out: *mut c_char,

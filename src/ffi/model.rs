@@ -9,10 +9,15 @@ use super::structs::*;
 use super::{convert, pointers};
 use crate::Model;
 
-/// Opens and checks a bundle (sizes, dtypes, the SHA-256 of the manifest and of each file that is read) and makes it ready to step.
+/// Opens a bundle, checks it (sizes, dtypes, the SHA-256 of the manifest and of every file that is read) and makes it
+/// ready to step.
 ///
-/// path: the bundle's folder, UTF-8. options: NULL means the defaults. out: the new model.
-/// Threads: any. Errors: `UPT_ERR_IO`, `UPT_ERR_BUNDLE`, `UPT_ERR_VERSION`, `UPT_ERR_RUNTIME`, `UPT_ERR_PROVIDER`,
+/// - `path`: the bundle's folder, UTF-8.
+/// - `options`: NULL means the defaults.
+/// - `out`: the new model.
+///
+/// Threads: any.
+/// Errors: `UPT_ERR_IO`, `UPT_ERR_BUNDLE`, `UPT_ERR_VERSION`, `UPT_ERR_RUNTIME`, `UPT_ERR_PROVIDER`,
 /// `UPT_ERR_UNSUPPORTED`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NULL`, `UPT_ERR_OUT_OF_MEMORY`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_model_open(
@@ -34,9 +39,10 @@ pub unsafe extern "C" fn upt_model_open(
     )
 }
 
-/// Closes a model. Scenes made of it keep what they need and live on.
+/// Closes a model. Its scenes keep what they need and stay usable.
 ///
-/// Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also when it was closed before).
+/// Threads: any.
+/// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also if it was closed before).
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_model_close(model: *mut upt_model) -> upt_status {
     call(
@@ -49,9 +55,10 @@ pub unsafe extern "C" fn upt_model_close(model: *mut upt_model) -> upt_status {
     )
 }
 
-/// Says what a model is. Set `out->struct_size` first.
+/// Describes a model in numbers. Set `out->struct_size` first.
 ///
-/// Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`.
+/// Threads: any.
+/// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_model_get_info(
     model: *const upt_model,
@@ -86,10 +93,13 @@ pub unsafe extern "C" fn upt_model_get_info(
     )
 }
 
-/// Describes a model as JSON: name, bundle hash, the provider of each stage and why others were not taken.
+/// Describes a model as JSON: name, bundle hash, the provider of each stage and why the others were not chosen.
 ///
-/// out: text with its NUL; NULL with capacity 0 only asks. needed: bytes with the NUL, always written; may be NULL.
-/// Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` when capacity is too small.
+/// - `out`: receives text with its NUL; NULL with capacity 0 only queries the size.
+/// - `needed`: its size in bytes with the NUL, always written; may be NULL.
+///
+/// Threads: any.
+/// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` if capacity is too small.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_model_describe(
     model: *const upt_model,
@@ -109,8 +119,11 @@ pub unsafe extern "C" fn upt_model_describe(
 
 /// Copies the rest positions.
 ///
-/// out: `[K,3]` floats, mm. count: floats in out, 3 K.
-/// Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` when count is not 3 K.
+/// - `out`: `[K,3]` floats, mm.
+/// - `count`: number of floats in `out`, 3 K.
+///
+/// Threads: any.
+/// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` when count is not 3 K.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_model_positions(
     model: *const upt_model,
@@ -140,9 +153,13 @@ pub unsafe extern "C" fn upt_model_positions(
 
 /// Copies a static index set.
 ///
-/// set: `UPT_SET_*`. out: node indices; NULL with capacity 0 only asks. capacity: indices that fit in out.
-/// needed: indices in the set (3 a face, 4 a tetrahedron), always written; may be NULL.
-/// Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` (unknown set, capacity too small).
+/// - `set`: `UPT_SET_*`.
+/// - `out`: node indices; NULL with capacity 0 only queries the size.
+/// - `capacity`: number of indices that fit in `out`.
+/// - `needed`: number of indices in the set (3 per face, 4 per tetrahedron), always written; may be NULL.
+///
+/// Threads: any.
+/// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` (unknown set, capacity too small).
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_model_indices(
     model: *const upt_model,

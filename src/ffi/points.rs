@@ -5,12 +5,15 @@ use super::registry::call_scene;
 use super::status::*;
 use super::structs::*;
 
-/// Attaches points to the tissue; they replace those attached before.
+/// Attaches points to the tissue. They replace those attached before. A bundle of kind `upt` decodes each point in every
+/// step (unless the scene has `interpolate_points`); one of kind `reduced` interpolates between nodes.
 ///
-/// points: `[n,3]`, rest positions, mm; NULL with count 0 detaches. count: points, n. A bundle of kind `upt` decodes each where it
-/// is, in every step (unless the scene was made with `interpolate_points`); one of kind `reduced` interpolates between nodes.
-/// Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_NON_FINITE`,
-/// `UPT_ERR_ARGUMENT`, `UPT_ERR_UNSUPPORTED`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
+/// - `points`: `[n,3]`, rest positions, mm; NULL with count 0 detaches.
+/// - `count`: number of points, n.
+///
+/// Threads: one at a time.
+/// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_NON_FINITE`, `UPT_ERR_ARGUMENT`,
+/// `UPT_ERR_UNSUPPORTED`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_scene_attach_points(
     scene: *mut upt_scene,
@@ -27,9 +30,12 @@ pub unsafe extern "C" fn upt_scene_attach_points(
 
 /// Copies the displacement of the attached points in the last state.
 ///
-/// out: `[n,3]`, mm. out_count: floats in out, 3 n.
-/// Threads: any at any time, also while a step runs. Errors: `UPT_ERR_STATE` when no points are attached, `UPT_ERR_NULL`,
-/// `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_PANIC`.
+/// - `out`: `[n,3]`, mm.
+/// - `out_count`: number of floats in `out`, 3 n.
+///
+/// Threads: any, at any time, even while a step runs.
+/// Errors: `UPT_ERR_STATE` when no points are attached, `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT`,
+/// `UPT_ERR_PANIC`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_scene_read_points(
     scene: *mut upt_scene,
@@ -44,8 +50,12 @@ pub unsafe extern "C" fn upt_scene_read_points(
 
 /// As `upt_scene_sample`, at the attached points.
 ///
-/// alpha: 0 the state before, 1 the last state. out: `[n,3]`, mm. out_count: floats in out, 3 n.
-/// Threads: any at any time, also while a step runs. Errors: as `upt_scene_read_points`, and `UPT_ERR_NON_FINITE`.
+/// - `alpha`: 0 is the state before, 1 the last state.
+/// - `out`: `[n,3]`, mm.
+/// - `out_count`: number of floats in `out`, 3 n.
+///
+/// Threads: any, at any time, even while a step runs.
+/// Errors: as `upt_scene_read_points`, and `UPT_ERR_NON_FINITE`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_scene_sample_points(
     scene: *mut upt_scene,

@@ -5,11 +5,14 @@ use super::registry::call_scene;
 use super::status::*;
 use super::structs::*;
 
-/// Restricts what a step decodes and what `upt_scene_step`, `_read` and `_sample` write to these nodes, in this order.
+/// Limits a step to these nodes: `upt_scene_step`, `_read` and `_sample` write them alone, in this order. Fewer nodes
+/// make a cheaper step.
 ///
-/// nodes: `[n]` indices, n at most K, in any order; NULL with count 0: all nodes. A step costs less with fewer nodes.
-/// Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT` for an index of K
-/// or more or too many of them, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
+/// - `nodes`: `[n]` indices, n at most K, in any order; NULL with count 0: all nodes.
+///
+/// Threads: one at a time.
+/// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT` for an index of K or more or too many of
+/// them, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_scene_set_region(
     scene: *mut upt_scene,
@@ -23,11 +26,15 @@ pub unsafe extern "C" fn upt_scene_set_region(
     })
 }
 
-/// Decodes any nodes of the last state, whatever the region is.
+/// Decodes any nodes of the last state, in the region or not.
 ///
-/// nodes: `[n]` indices, n at most K. out: `[n,3]`, mm. out_count: floats in out, 3 n.
-/// Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`,
-/// `UPT_ERR_STATE` before the first step, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
+/// - `nodes`: `[n]` indices, n at most K.
+/// - `out`: `[n,3]`, mm.
+/// - `out_count`: number of floats in `out`, 3 n.
+///
+/// Threads: one at a time.
+/// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`, `UPT_ERR_STATE` before the first step,
+/// `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_scene_decode(
     scene: *mut upt_scene,

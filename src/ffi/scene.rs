@@ -8,11 +8,14 @@ use super::structs::*;
 use super::{convert, pointers};
 use crate::{Contact, Scene, StepInput};
 
-/// Makes a scene at rest.
+/// Creates a scene at rest.
 ///
-/// options: NULL means the defaults. out: the new scene. The scene keeps what it needs of the model.
-/// Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`,
-/// `UPT_ERR_UNSUPPORTED`, `UPT_ERR_IO`, `UPT_ERR_BUNDLE`, `UPT_ERR_OUT_OF_MEMORY`.
+/// - `options`: NULL means the defaults.
+/// - `out`: the new scene. The scene keeps what it needs of the model.
+///
+/// Threads: any.
+/// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_UNSUPPORTED`,
+/// `UPT_ERR_IO`, `UPT_ERR_BUNDLE`, `UPT_ERR_OUT_OF_MEMORY`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_scene_create(
     model: *const upt_model,
@@ -33,10 +36,12 @@ pub unsafe extern "C" fn upt_scene_create(
     )
 }
 
-/// Ends a scene; a step in flight is waited for. The only call that a poisoned scene takes beside `upt_scene_get_stats`.
+/// Destroys a scene, after waiting for a step in flight. A poisoned scene accepts only this call and
+/// `upt_scene_get_stats`.
 ///
-/// Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also when it was destroyed before), `UPT_ERR_BUSY` while
-/// another thread is in a call on it.
+/// Threads: any.
+/// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also if it was destroyed before), `UPT_ERR_BUSY` while another thread is in
+/// a call on it.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_scene_destroy(scene: *mut upt_scene) -> upt_status {
     call(
@@ -49,9 +54,10 @@ pub unsafe extern "C" fn upt_scene_destroy(scene: *mut upt_scene) -> upt_status 
     )
 }
 
-/// Back to rest. The region and attached points stay.
+/// Returns the scene to rest. The region and the attached points stay.
 ///
-/// Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_PANIC`.
+/// Threads: one at a time.
+/// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_PANIC`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_scene_reset(scene: *mut upt_scene) -> upt_status {
     call_scene("upt_scene_reset", scene, |scene| {
@@ -62,13 +68,17 @@ pub unsafe extern "C" fn upt_scene_reset(scene: *mut upt_scene) -> upt_status {
 
 /// One step: u(t), c(t) -> u(t + dt).
 ///
-/// displacement: `[K,3]`, mm; NULL takes the scene's own state. collision: `[K,3]`, mm, zero but at nodes in contact,
-/// where it is the displacement that the instrument imposes at the end of the step; NULL means no contact.
-/// out: `[n,3]`, mm (n: K, or the region's count), may be NULL; it may be the same memory as an input, at the price of
-/// a copy. out_count: floats in out, 3 n; 0 when out is NULL.
-/// Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`,
-/// `UPT_ERR_NON_FINITE`, `UPT_ERR_UNSUPPORTED`, `UPT_ERR_GUARD`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`; the
-/// state stays.
+/// - `displacement`: `[K,3]`, mm; NULL uses the scene's own state.
+/// - `collision`: `[K,3]`, mm, zero except at nodes in contact, where it is the displacement that the instrument imposes
+///   by the end of the step; NULL means no contact.
+/// - `out`: `[n,3]`, mm (n: K, or the region's count), may be NULL; it may be the memory of an input, at the cost of a
+///   copy.
+/// - `out_count`: number of floats in `out`, 3 n; 0 when out is NULL.
+///
+/// Threads: one at a time.
+/// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NON_FINITE`,
+/// `UPT_ERR_UNSUPPORTED`, `UPT_ERR_GUARD`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`; the state does
+/// not change.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_scene_step(
     scene: *mut upt_scene,
@@ -93,11 +103,13 @@ pub unsafe extern "C" fn upt_scene_step(
     })
 }
 
-/// One step from the scene's own state with the nodes in contact listed.
+/// One step from the scene's own state, with a list of the nodes in contact.
 ///
-/// contact_nodes: `[m]` node indices, each at most once, in any order. contact_vectors: `[m,3]`, mm: the displacement of
-/// these nodes at the end of the step. contact_count: m; 0 means no contact and both may be NULL.
-/// out, out_count, threads and errors: as `upt_scene_step`; also `UPT_ERR_ARGUMENT` for an index or a count beyond K.
+/// - `contact_nodes`: `[m]` node indices, each at most once, in any order.
+/// - `contact_vectors`: `[m,3]`, mm: the displacement of these nodes at the end of the step.
+/// - `contact_count`: m; 0 means no contact and both may be NULL.
+/// - `out`, `out_count`, threads and errors: as in `upt_scene_step`; also `UPT_ERR_ARGUMENT` for an index or a count
+///   beyond K.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_scene_step_contacts(
     scene: *mut upt_scene,
@@ -121,8 +133,11 @@ pub unsafe extern "C" fn upt_scene_step_contacts(
 
 /// Copies the last published state.
 ///
-/// out: `[n,3]`, mm, in the region's order (all nodes when there is none). out_count: floats in out, 3 n.
-/// Threads: any at any time, also while a step runs. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_PANIC`.
+/// - `out`: `[n,3]`, mm, in the region's order (all nodes when there is none).
+/// - `out_count`: number of floats in `out`, 3 n.
+///
+/// Threads: any, at any time, even while a step runs.
+/// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_PANIC`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_scene_read(
     scene: *mut upt_scene,

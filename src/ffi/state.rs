@@ -8,10 +8,11 @@ use super::registry::{call_scene, find_scene};
 use super::status::*;
 use super::structs::*;
 
-/// Says what the last step did and cost. Set `out->struct_size` first. Works while a step is in flight and on a
-/// poisoned scene.
+/// Reports what the last step did and how long it took. Set `out->struct_size` first. Works while a step is in flight and
+/// on a poisoned scene.
 ///
-/// Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`.
+/// Threads: any.
+/// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_scene_get_stats(
     scene: *const upt_scene,
@@ -66,12 +67,15 @@ pub unsafe extern "C" fn upt_scene_get_stats(
     )
 }
 
-/// Saves the state, to resume to the bit.
+/// Saves the state, so that it can be restored exactly.
 ///
-/// out: bytes; NULL with capacity 0 only asks. capacity: bytes that fit in out.
-/// needed: bytes of the snapshot, always written; may be NULL.
-/// Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT` when capacity is
-/// too small, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
+/// - `out`: bytes; NULL with capacity 0 only queries the size.
+/// - `capacity`: size of `out` in bytes.
+/// - `needed`: size of the snapshot in bytes, always written; may be NULL.
+///
+/// Threads: one at a time.
+/// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT` if capacity is too small,
+/// `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_scene_save(
     scene: *mut upt_scene,
@@ -87,8 +91,9 @@ pub unsafe extern "C" fn upt_scene_save(
 
 /// Restores a snapshot of the same model.
 ///
-/// Threads: one at a time. Errors: `UPT_ERR_SNAPSHOT`, `UPT_ERR_VERSION`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NULL`,
-/// `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`; the state stays.
+/// Threads: one at a time.
+/// Errors: `UPT_ERR_SNAPSHOT`, `UPT_ERR_VERSION`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`,
+/// `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`; the state does not change.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_scene_restore(
     scene: *mut upt_scene,

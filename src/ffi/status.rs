@@ -11,7 +11,7 @@ pub const UPT_PENDING: i32 = 1;
 pub const UPT_ERR_NULL: i32 = -1;
 /// A size, index, enum or range is wrong.
 pub const UPT_ERR_ARGUMENT: i32 = -2;
-/// `struct_size` is not one that this library knows.
+/// This library does not know this `struct_size`.
 pub const UPT_ERR_STRUCT_SIZE: i32 = -3;
 /// Not a live handle of this type.
 pub const UPT_ERR_HANDLE: i32 = -4;
@@ -23,7 +23,7 @@ pub const UPT_ERR_NON_FINITE: i32 = -6;
 pub const UPT_ERR_STATE: i32 = -7;
 /// This build or this bundle cannot do it.
 pub const UPT_ERR_UNSUPPORTED: i32 = -8;
-/// There is no memory for what the call needs.
+/// There is not enough memory for the call.
 pub const UPT_ERR_OUT_OF_MEMORY: i32 = -9;
 /// ONNX Runtime is missing, too old or broken; the message lists what was tried.
 pub const UPT_ERR_RUNTIME: i32 = -20;
@@ -39,7 +39,7 @@ pub const UPT_ERR_VERSION: i32 = -32;
 pub const UPT_ERR_SNAPSHOT: i32 = -33;
 /// The guard refused the new state; the last good state stays.
 pub const UPT_ERR_GUARD: i32 = -40;
-/// A bug in the library; the scene involved can only be destroyed.
+/// A bug in the library; the scene can only be destroyed.
 pub const UPT_ERR_PANIC: i32 = -90;
 
 /// ONNX Runtime's CPU provider and the native kernels.
@@ -60,9 +60,9 @@ pub const UPT_KIND_REDUCED: i32 = 1;
 pub const UPT_LOG_OFF: i32 = 0;
 /// Failures.
 pub const UPT_LOG_ERROR: i32 = 1;
-/// Fallbacks, and once for each flag that rises: contacts outside of the envelope, states that the guard refuses.
+/// Fallbacks, and each flag once when it rises: contacts outside the envelope, states that the guard refuses.
 pub const UPT_LOG_WARN: i32 = 2;
-/// Loading: what was opened and who runs it.
+/// Loading: what was opened and which provider runs it.
 pub const UPT_LOG_INFO: i32 = 3;
 /// Stage times.
 pub const UPT_LOG_DEBUG: i32 = 4;
@@ -100,7 +100,7 @@ pub const UPT_STEP_MEASURED: i32 = 3;
 
 /// No corrections.
 pub const UPT_CORRECTIONS_NONE: i32 = -1;
-/// As many corrections as the scene's target asks for and its budget lets in.
+/// As many corrections as the scene's target needs and its budget allows.
 pub const UPT_CORRECTIONS_AUTO: i32 = -2;
 
 /// Keep the last good state and return `UPT_ERR_GUARD`; without contact, where no later call could do otherwise, as
@@ -137,7 +137,7 @@ pub const UPT_FLAG_REGULARISED: u32 = 1024;
 pub const UPT_FLAG_FELL_BACK: u32 = 2048;
 /// The estimated error is above the scene's `error_limit_mm`.
 pub const UPT_FLAG_ERROR: u32 = 4096;
-/// Tissue lies more than 1 mm inside of an instrument.
+/// Tissue lies more than 1 mm inside an instrument.
 pub const UPT_FLAG_DEEP: u32 = 8192;
 
 /// Nodes of the surface.
@@ -164,7 +164,7 @@ pub const UPT_SHAPE_HULL: i32 = 3;
 
 /// An instrument pushes, with Coulomb friction.
 pub const UPT_MODE_SLIDE: u8 = 0;
-/// An instrument holds what is within 0.5 mm of it when the mode changes to this, until the mode changes back or it tears off.
+/// An instrument holds what lies within 0.5 mm of it when the mode changes to this, until the mode changes back or the grasp tears off.
 pub const UPT_MODE_GRASP: u8 = 1;
 
 /// The library's own values are these; a difference does not compile.

@@ -4,29 +4,29 @@
 use core::ffi::{c_char, c_void};
 use safer_ffi::derive_ReprC;
 
-/// A bundle made ready to step. Immutable; may be used from any thread at once.
+/// A bundle made ready to step. Immutable; any number of threads may use it at once.
 pub struct upt_model {
     _opaque: [u8; 0],
 }
 
-/// One deforming body. Calls that change it come from one thread at a time, a second one is `UPT_ERR_BUSY`; reading and sampling
-/// published states and statistics may happen on any thread at any time.
+/// One deforming body. One thread at a time may change it; a second one gets `UPT_ERR_BUSY`. Any thread may read and sample
+/// published states and statistics at any time.
 pub struct upt_scene {
     _opaque: [u8; 0],
 }
 
-/// The convex hull of a tool's points. Immutable; may be used from any thread at once.
+/// The convex hull of a tool's points. Immutable; any number of threads may use it at once.
 pub struct upt_hull {
     _opaque: [u8; 0],
 }
 
-/// A tool that a hand feels. Used from one thread at a time, a second one is `UPT_ERR_BUSY`.
+/// A tool that a hand feels. One thread at a time may use it; a second one gets `UPT_ERR_BUSY`.
 pub struct upt_haptics {
     _opaque: [u8; 0],
 }
 
-/// Receives log messages (UTF-8, valid during the call) on the host's threads, inside of their calls; it must not call
-/// the library: such a call is `UPT_ERR_STATE`.
+/// Receives log messages (UTF-8, valid during the call) on the host's threads, during their calls. It must not call
+/// the library: such a call returns `UPT_ERR_STATE`.
 pub type upt_log_fn =
     Option<unsafe extern "C" fn(level: i32, message: *const c_char, user: *mut c_void)>;
 
@@ -39,7 +39,7 @@ pub struct upt_init_options {
     pub struct_size: u32,
     /// Default number of threads of a model; 0: 1.
     pub threads: u32,
-    /// ONNX Runtime's shared library, a path; NULL: beside libupt, then `ORT_DYLIB_PATH`, then the system.
+    /// ONNX Runtime's shared library, a path; NULL: the folder of libupt, then `ORT_DYLIB_PATH`, then the system.
     pub onnxruntime_path: *const c_char,
 }
 
@@ -180,7 +180,7 @@ pub struct upt_instrument {
     pub reserved: [u8; 2],
     /// `upt_scene_step_instruments` alone: Coulomb's coefficient, 0 or more.
     pub friction: f32,
-    /// A grasp lets go where its samples pull harder than this together, mN; 0: never.
+    /// A grasp tears off when its points together pull harder than this, mN; 0: never.
     pub tear_off_mn: f32,
     /// `UPT_SHAPE_HULL`: the `upt_hull`; otherwise NULL.
     pub hull: *const c_void,
@@ -199,7 +199,7 @@ pub struct upt_instrument_reading {
     pub force: [f32; 3],
     /// On the instrument about its position, mN mm.
     pub torque: [f32; 3],
-    /// How deep the deepest point of the surface lies inside of the instrument, mm.
+    /// How deep the deepest point of the surface lies inside the instrument, mm.
     pub penetration_mm: f32,
     /// 1: its grasp tore off in this step.
     pub torn: u8,
@@ -332,7 +332,7 @@ pub struct upt_scene_stats {
     pub decoded_node_count: u64,
     /// Contact nodes of the last step.
     pub contact_count: u64,
-    /// Bytes that the scene has allocated beside the model; what it never touches is not resident.
+    /// Bytes that the scene has allocated in addition to the model; pages that it never touches are not resident.
     pub memory_bytes: u64,
     /// Threads of a step.
     pub threads: u32,

@@ -35,7 +35,7 @@ pub struct Options {
     /// Seed of the dataset.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Folder; an interrupted run goes on where it stopped.
+    /// Folder; an interrupted run resumes where it stopped.
     #[arg(long)]
     out: PathBuf,
     /// Cases computed at a time, one thread each.

@@ -23,7 +23,7 @@ pub struct Options {
     /// Folder for `trajectory.pvd` and its frames.
     #[arg(long, required_unless_present = "surface")]
     out: Option<PathBuf>,
-    /// Every how many frames one is written.
+    /// Write every n-th frame.
     #[arg(long, default_value_t = 1)]
     every: usize,
     /// Triangles of the surface only, for smaller files.

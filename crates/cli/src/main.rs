@@ -69,63 +69,63 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
-    /// From an organ's surface or mesh to a bundle with its certificate.
+    /// Make a bundle from an organ's surface or mesh, with a certificate.
     #[cfg(all(feature = "files", feature = "linear"))]
     Make(Box<make::Options>),
     /// Left out of this build.
     #[cfg(not(all(feature = "files", feature = "linear")))]
     Make(left_out::Options),
-    /// A bundle's certificate again: held-out contacts beside the reference solver.
+    /// Check a bundle on held-out contacts against the reference solver.
     #[cfg(feature = "linear")]
     Check(check::Options),
     /// Left out of this build.
     #[cfg(not(feature = "linear"))]
     Check(left_out::Options),
-    /// What was found on this machine: ONNX Runtime, providers, CPU features, bundles.
+    /// Show what is on this machine: ONNX Runtime, providers, CPU features, bundles.
     Doctor(doctor::Options),
-    /// Meshes: quality, import, stuffing.
+    /// Inspect, import and fill meshes.
     Mesh(mesh::Options),
-    /// A trajectory for ParaView, or a frame's surface as PLY or glTF.
+    /// Write a trajectory for ParaView, or one frame's surface as PLY or glTF.
     #[cfg(feature = "files")]
     Export(export::Options),
     /// Left out of this build.
     #[cfg(not(feature = "files"))]
     Export(left_out::Options),
-    /// Linear-elastic compliance columns of a mesh, the raw material of priors and reduced bundles.
+    /// Compute the linear-elastic compliance columns of a mesh, from which priors and reduced bundles are made.
     #[cfg(feature = "linear")]
     Prior(prior::Options),
     /// Left out of this build.
     #[cfg(not(feature = "linear"))]
     Prior(left_out::Options),
-    /// The coarse space of a bundle's corrections by the elements.
+    /// Give a bundle the coarse space that its corrections need.
     #[cfg(feature = "linear")]
     Corrections(corrections::Options),
     /// Left out of this build.
     #[cfg(not(feature = "linear"))]
     Corrections(left_out::Options),
-    /// Natural modes of a held mesh: how linear elasticity swings after a release.
+    /// Compute the natural modes of a held mesh: how it swings after a release.
     #[cfg(feature = "linear")]
     Modes(modes::Options),
     /// Left out of this build.
     #[cfg(not(feature = "linear"))]
     Modes(left_out::Options),
-    /// One reference simulation: a scheme on a mesh, as a trajectory file.
+    /// Run one reference simulation and write its trajectory.
     Simulate(simulate::Options),
-    /// Many reference simulations in a folder, resumable and shardable.
+    /// Run many reference simulations into a folder; resumes, and splits over machines.
     Dataset(dataset::Options),
-    /// A bundle through one contact, with the paper's metrics.
+    /// Replay one contact through a bundle, with the paper's metrics.
     Rollout(rollout::Options),
-    /// Error against run time: all bundles and the plain methods on the same contacts.
+    /// Compare bundles and plain methods on the same contacts: error against run time.
     Report(report::Options),
-    /// Stiff and extreme cases, with what happened and whether it is what must happen.
+    /// Run stiff and extreme cases, and say whether each came out as it must.
     Stress(stress::Options),
-    /// A bundle beside the reference solver: error over random steps, rank of the warnings, force error, release.
+    /// Run a bundle and the reference solver side by side: error over random steps, warnings, forces, release.
     Beside(beside::Options),
-    /// Very many steps on one scene, with the process's memory in a log.
+    /// Make very many steps on one scene and log the memory.
     Soak(soak::Options),
-    /// A bundle in the browser: drag a tool, watch the tissue.
+    /// Show a bundle in the browser: drag a tool, watch the tissue.
     View(view::Options),
-    /// Shell completions, on stdout.
+    /// Print shell completions.
     Completions(completions::Options),
     /// The page docs/reference/cli.md, on stdout.
     #[command(hide = true)]

@@ -20,10 +20,10 @@ pub struct Options {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Counts, quality, manifoldness and the critical time step of a mesh.
+    /// Print counts, quality, manifoldness and the critical time step of a mesh.
     Info(Info),
     #[cfg(feature = "files")]
-    /// A mesh from tetrahedra (VTK, VTU, MSH) or from a closed surface (STL, OBJ, PLY).
+    /// Import tetrahedra (VTK, VTU, MSH) or fill a closed surface (STL, OBJ, PLY).
     Import(Import),
     #[cfg(feature = "files")]
     /// Fill a signed distance grid with tetrahedra; `python -m upt_training.anatomy` calls this.

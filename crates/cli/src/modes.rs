@@ -28,7 +28,7 @@ pub struct Options {
     /// Held node sets: `fixed` or `supported`.
     #[arg(long, default_value = "fixed")]
     pub boundary: Boundary,
-    /// How many.
+    /// Number of modes.
     #[arg(long, default_value_t = 64)]
     pub count: usize,
     /// File to write.

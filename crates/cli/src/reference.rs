@@ -80,7 +80,10 @@ fn argument(text: &mut String, one: &Arg) -> std::fmt::Result {
         .map(|value| format!("`{}`", value.get_name()))
         .collect();
     if one.get_action().takes_values() && !choices.is_empty() {
-        write!(help, " One of {}.", choices.join(", "))?;
+        if !help.is_empty() && !help.ends_with('.') {
+            help.push('.');
+        }
+        write!(help, " One of {}", choices.join(", "))?;
     }
     let defaults: Vec<_> = one
         .get_default_values()

@@ -77,7 +77,7 @@ pub struct SolverArguments {
     /// Mass-proportional damping, 1/s.
     #[arg(long, default_value_t = 20.0)]
     damping: f64,
-    /// Asked inner step, ms; cut automatically where the mesh needs a shorter one.
+    /// Inner step, ms; shortened automatically if the mesh needs a shorter one.
     #[arg(long, default_value_t = 0.1)]
     inner_step_ms: f64,
     /// Selective mass scaling: elements with a shorter critical step of their own get mass until it is this long,

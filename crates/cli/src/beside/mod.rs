@@ -38,11 +38,11 @@ pub struct Options {
     /// Programmes of rigid tools beside the solver, one after another without a reset; the bundle gets their poses alone.
     #[arg(long, default_value_t = 0, value_name = "COUNT")]
     tools: usize,
-    /// Cases inside of the envelope that the bundle was not trained on: a dataset folder (its test split) or a
+    /// Cases inside the envelope that the bundle was not trained on: a dataset folder (its test split) or a
     /// trajectory; may be given many times.
     #[arg(long, value_name = "PATH", num_args = 1..)]
     held_out: Vec<PathBuf>,
-    /// The same outside of the envelope.
+    /// The same outside the envelope.
     #[arg(long, value_name = "PATH", num_args = 1..)]
     outside: Vec<PathBuf>,
     /// Page whose part between the markers `upt beside NAME` is replaced, and that of --tools between `upt beside --tools NAME`.
@@ -120,7 +120,7 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     inside.extend(held_out.into_iter().flat_map(|group| group.moments));
     outside.extend(far.into_iter().flat_map(|group| group.moments));
     if inside.iter().any(Moment::alarmed) {
-        complaints.push("there are FALSE ALARMS inside of the envelope");
+        complaints.push("there are FALSE ALARMS inside the envelope");
     }
     if !inside.is_empty() {
         tables::ranks(&mut text, &inside, &outside);

@@ -132,7 +132,7 @@ pub fn ranks(text: &mut String, inside: &[Moment], outside: &[Moment]) {
     let both: Vec<Moment> = inside.iter().chain(&outside).cloned().collect();
     let _ = writeln!(
         text,
-        "False alarms: {alarms} of {steps} steps inside of the envelope. Rank correlation (Spearman) of a warning with the largest \
+        "False alarms: {alarms} of {steps} steps inside the envelope. Rank correlation (Spearman) of a warning with the largest \
          error of the step, over {} steps in contact inside, {} outside, and both:\n\n| warning | inside | outside | both |\n|---|---|---|---|",
         inside.len(),
         outside.len()

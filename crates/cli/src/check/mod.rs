@@ -55,7 +55,7 @@ pub struct Options {
     /// Another seed: other sites than the certificate's.
     #[arg(long)]
     seed: Option<u64>,
-    /// Write certificate.json and certificate.html anew.
+    /// Rewrite certificate.json and certificate.html.
     #[arg(long)]
     write: bool,
     /// Threads (0: all).

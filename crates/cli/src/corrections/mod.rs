@@ -35,10 +35,10 @@ pub struct Options {
     /// Natural modes.
     #[arg(long, default_value_t = 60)]
     pub natural: usize,
-    /// Modes of what patches add to the linear response; 0 for none.
+    /// Modes of what patches add to the linear response; 0: none.
     #[arg(long, default_value_t = 60)]
     pub patch_modes: usize,
-    /// Patches that they are made from.
+    /// Number of patches that these modes are made from.
     #[arg(long, default_value_t = 160)]
     pub patches: usize,
     /// Use the bundle's own residual modes (kind `reduced`) in place of patches.
@@ -47,7 +47,7 @@ pub struct Options {
     /// Corrections a step that the bundle recommends.
     #[arg(long, default_value_t = 3)]
     pub recommended: u32,
-    /// What the estimated error is multiplied by: `truth over estimate` of `training/scripts/corrections_table.py` on held-out cases.
+    /// Factor of the estimated error: `truth over estimate` of `training/scripts/corrections_table.py` on held-out cases.
     #[arg(long, default_value_t = 1.0)]
     pub calibration: f32,
     /// Seed of the patches.

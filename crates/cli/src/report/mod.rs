@@ -88,7 +88,7 @@ pub struct Options {
     /// Corrections a step in contact (`0,1,3,5,10`: the frontier); default: none, and as many as a bundle recommends.
     #[arg(long, value_delimiter = ',')]
     corrections: Vec<u32>,
-    /// Plain methods beside the library: zero, linear, prior (the bundles' linear response alone), coarse, tled, paper; or none.
+    /// Plain methods to compare with: zero, linear, prior (the bundles' linear response alone), coarse, tled, paper; or none.
     #[arg(
         long,
         value_delimiter = ',',
@@ -104,7 +104,7 @@ pub struct Options {
     /// Leave out the Hausdorff distance (the slowest of the metrics).
     #[arg(long)]
     no_hausdorff: bool,
-    /// Measure again what is stored.
+    /// Measure again what is already stored.
     #[arg(long)]
     fresh: bool,
     /// The page's title.

@@ -54,7 +54,7 @@ impl Run {
         text
     }
 
-    /// Flags that say that the contact is outside of the envelope, or that the guard refused a state.
+    /// Flags that say that the contact is outside the envelope, or that the guard refused a state.
     pub(crate) fn alarms(&self) -> u32 {
         self.flags & !(flag::CLAMPED | flag::REGULARISED)
     }

@@ -28,16 +28,16 @@ pub struct Options {
     /// Mesh of the reference cases; none: an ellipsoid phantom.
     #[arg(long)]
     mesh: Option<PathBuf>,
-    /// Leave the reference solver out.
+    /// Leave out the reference solver.
     #[arg(long)]
     no_reference: bool,
-    /// A twentieth of the steps, for tests.
+    /// Make a twentieth of the steps, for tests.
     #[arg(long)]
     quick: bool,
     /// Rows as JSON.
     #[arg(long)]
     json: Option<PathBuf>,
-    /// The tables as a page; text outside of the markers in it is kept.
+    /// The tables as a page; text outside its markers is kept.
     #[arg(long)]
     markdown: Option<PathBuf>,
 }
