@@ -9,7 +9,7 @@ use tissue::tensors::{Dtype, Tensor, f32_values, write_file};
 
 use super::tables::Projected;
 
-/// Number of modes modes: as asked, but at most a sixth of the free degrees of freedom.
+/// Number of modes: as asked, but at most a sixth of the free degrees of freedom.
 pub fn count(mesh: &Mesh, asked: usize) -> usize {
     let free = 3 * (mesh.node_count() - mesh.fixed.len());
     asked.min(free / 6).max(1)
