@@ -30,7 +30,7 @@
 #define UPT_ERR_ARGUMENT -2
 
 /**
- * `struct_size` is not one that this library knows.
+ * This library does not know this `struct_size`.
  */
 #define UPT_ERR_STRUCT_SIZE -3
 
@@ -60,7 +60,7 @@
 #define UPT_ERR_UNSUPPORTED -8
 
 /**
- * There is no memory for what the call needs.
+ * There is not enough memory for the call.
  */
 #define UPT_ERR_OUT_OF_MEMORY -9
 
@@ -100,7 +100,7 @@
 #define UPT_ERR_GUARD -40
 
 /**
- * A bug in the library; the scene involved can only be destroyed.
+ * A bug in the library; the scene can only be destroyed.
  */
 #define UPT_ERR_PANIC -90
 
@@ -145,12 +145,12 @@
 #define UPT_LOG_ERROR 1
 
 /**
- * Fallbacks, and once for each flag that rises: contacts outside of the envelope, states that the guard refuses.
+ * Fallbacks, and each flag once when it rises: contacts outside the envelope, states that the guard refuses.
  */
 #define UPT_LOG_WARN 2
 
 /**
- * Loading: what was opened and who runs it.
+ * Loading: what was opened and which provider runs it.
  */
 #define UPT_LOG_INFO 3
 
@@ -235,7 +235,7 @@
 #define UPT_CORRECTIONS_NONE -1
 
 /**
- * As many corrections as the scene's target asks for and its budget lets in.
+ * As many corrections as the scene's target needs and its budget allows.
  */
 #define UPT_CORRECTIONS_AUTO -2
 
@@ -321,7 +321,7 @@
 #define UPT_FLAG_ERROR 4096
 
 /**
- * Tissue lies more than 1 mm inside of an instrument.
+ * Tissue lies more than 1 mm inside an instrument.
  */
 #define UPT_FLAG_DEEP 8192
 
@@ -381,7 +381,7 @@
 #define UPT_MODE_SLIDE 0
 
 /**
- * An instrument holds what is within 0.5 mm of it when the mode changes to this, until the mode changes back or it tears off.
+ * An instrument holds what lies within 0.5 mm of it when the mode changes to this, until the mode changes back or the grasp tears off.
  */
 #define UPT_MODE_GRASP 1
 
@@ -391,23 +391,23 @@
 #define UPT_ABI_VERSION 1
 
 /**
- * A tool that a hand feels. Used from one thread at a time, a second one is `UPT_ERR_BUSY`.
+ * A tool that a hand feels. One thread at a time may use it; a second one gets `UPT_ERR_BUSY`.
  */
 typedef struct upt_haptics upt_haptics;
 
 /**
- * The convex hull of a tool's points. Immutable; may be used from any thread at once.
+ * The convex hull of a tool's points. Immutable; any number of threads may use it at once.
  */
 typedef struct upt_hull upt_hull;
 
 /**
- * A bundle made ready to step. Immutable; may be used from any thread at once.
+ * A bundle made ready to step. Immutable; any number of threads may use it at once.
  */
 typedef struct upt_model upt_model;
 
 /**
- * One deforming body. Calls that change it come from one thread at a time, a second one is `UPT_ERR_BUSY`; reading and sampling
- * published states and statistics may happen on any thread at any time.
+ * One deforming body. One thread at a time may change it; a second one gets `UPT_ERR_BUSY`. Any thread may read and sample
+ * published states and statistics at any time.
  */
 typedef struct upt_scene upt_scene;
 
@@ -429,14 +429,14 @@ typedef struct upt_init_options {
    */
   uint32_t threads;
   /**
-   * ONNX Runtime's shared library, a path; NULL: beside libupt, then `ORT_DYLIB_PATH`, then the system.
+   * ONNX Runtime's shared library, a path; NULL: the folder of libupt, then `ORT_DYLIB_PATH`, then the system.
    */
   const char *onnxruntime_path;
 } upt_init_options;
 
 /**
- * Receives log messages (UTF-8, valid during the call) on the host's threads, inside of their calls; it must not call
- * the library: such a call is `UPT_ERR_STATE`.
+ * Receives log messages (UTF-8, valid during the call) on the host's threads, during their calls. It must not call
+ * the library: such a call returns `UPT_ERR_STATE`.
  */
 typedef void (*upt_log_fn)(int32_t level,
                            const char *message,
@@ -686,7 +686,7 @@ typedef struct upt_instrument {
    */
   float friction;
   /**
-   * A grasp lets go where its samples pull harder than this together, mN; 0: never.
+   * A grasp tears off when its points together pull harder than this, mN; 0: never.
    */
   float tear_off_mn;
   /**
@@ -716,7 +716,7 @@ typedef struct upt_instrument_reading {
    */
   float torque[3];
   /**
-   * How deep the deepest point of the surface lies inside of the instrument, mm.
+   * How deep the deepest point of the surface lies inside the instrument, mm.
    */
   float penetration_mm;
   /**
@@ -942,7 +942,7 @@ typedef struct upt_scene_stats {
    */
   uint64_t contact_count;
   /**
-   * Bytes that the scene has allocated beside the model; what it never touches is not resident.
+   * Bytes that the scene has allocated in addition to the model; pages that it never touches are not resident.
    */
   uint64_t memory_bytes;
   /**
@@ -1032,49 +1032,62 @@ extern "C" {
 #endif
 
 /**
- * Starts the library with options of the host's. Optional: the first model does it with the defaults.
+ * Starts the library with options of your own. Optional: opening the first model starts it with the defaults.
  *
- * options: NULL means the defaults.
- * Threads: any. Errors: `UPT_ERR_STATE` when the library was started with other options, `UPT_ERR_STRUCT_SIZE`,
- * `UPT_ERR_ARGUMENT`.
+ * - `options`: NULL means the defaults.
+ *
+ * Threads: any.
+ * Errors: `UPT_ERR_STATE` when the library was started with other options, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`.
  */
 upt_status upt_init(const struct upt_init_options *options);
 
 /**
- * Ends the library. Call it before the process exits when a GPU provider was used.
+ * Shuts the library down. Call it before the process exits if you used a GPU provider.
  *
- * Threads: any. Errors: `UPT_ERR_STATE` while models or scenes live.
+ * Threads: any.
+ * Errors: `UPT_ERR_STATE` while models or scenes exist.
  */
 upt_status upt_shutdown(void);
 
 /**
- * The library's version, for instance "0.1.0". Threads: any.
+ * The library's version, for instance "0.1.0".
+ *
+ * Threads: any.
  */
 const char *upt_version(void);
 
 /**
- * `UPT_ABI_VERSION` of the library that runs; refuse to go on when it is not the header's. Threads: any.
+ * The `UPT_ABI_VERSION` of the library that is loaded. Stop if it differs from the header's.
+ *
+ * Threads: any.
  */
 uint32_t upt_abi_version(void);
 
 /**
- * The message of the last failed call of the calling thread (UTF-8), "" when there is none.
- * It is valid until that thread's next call. Threads: any.
+ * The message of the calling thread's last failed call (UTF-8), or "". It stays valid until that thread's next call.
+ *
+ * Threads: any.
  */
 const char *upt_last_error(void);
 
 /**
- * The name of a status, for instance "UPT_ERR_BUSY"; "UPT_UNKNOWN" for other numbers. Threads: any.
+ * The name of a status, for instance "UPT_ERR_BUSY"; "UPT_UNKNOWN" for other numbers.
+ *
+ * Threads: any.
  */
 const char *upt_status_name(upt_status status);
 
 /**
- * Sets the receiver of log messages; NULL ends it. When the call returns, the former receiver is no longer running.
+ * Sets the function that receives log messages; NULL removes it. When the call returns, the former receiver is no longer
+ * running. It runs on the host's threads only, during a call or at its end; messages of the library's own threads wait
+ * for the next call.
  *
- * user: handed to the receiver. level: `UPT_LOG_*`; less severe messages are not made at all. The receiver runs on
- * the host's threads only, inside of a call or at its end: what the library's own threads say waits for the next call.
- * Threads: any. Errors: `UPT_ERR_ARGUMENT` for an unknown level, `UPT_ERR_STATE` from inside of the receiver, or
- * when the process is a Rust program that has a `tracing` subscriber of its own.
+ * - `user`: passed to the receiver.
+ * - `level`: `UPT_LOG_*`; less severe messages are not created.
+ *
+ * Threads: any.
+ * Errors: `UPT_ERR_ARGUMENT` for an unknown level, `UPT_ERR_STATE` from the receiver itself, or in a Rust program with a
+ * `tracing` subscriber of its own.
  */
 upt_status upt_set_log(upt_log_fn callback,
                        void *user,
@@ -1083,18 +1096,26 @@ upt_status upt_set_log(upt_log_fn callback,
 /**
  * Lists the providers as JSON: `[{"name":"cpu","available":true,"reason":""}]`. Loads ONNX Runtime.
  *
- * out: text with its NUL; NULL with capacity 0 only asks. needed: bytes with the NUL, always written; may be NULL.
- * Threads: any. Errors: `UPT_ERR_RUNTIME`, `UPT_ERR_ARGUMENT` when capacity is too small, `UPT_ERR_NULL`.
+ * - `out`: receives text with its NUL; NULL with capacity 0 only queries the size.
+ * - `needed`: its size in bytes with the NUL, always written; may be NULL.
+ *
+ * Threads: any.
+ * Errors: `UPT_ERR_RUNTIME`, `UPT_ERR_ARGUMENT` if capacity is too small, `UPT_ERR_NULL`.
  */
 upt_status upt_providers(char *out,
                          uint64_t capacity,
                          uint64_t *needed);
 
 /**
- * Opens and checks a bundle (sizes, dtypes, the SHA-256 of the manifest and of each file that is read) and makes it ready to step.
+ * Opens a bundle, checks it (sizes, dtypes, the SHA-256 of the manifest and of every file that is read) and makes it
+ * ready to step.
  *
- * path: the bundle's folder, UTF-8. options: NULL means the defaults. out: the new model.
- * Threads: any. Errors: `UPT_ERR_IO`, `UPT_ERR_BUNDLE`, `UPT_ERR_VERSION`, `UPT_ERR_RUNTIME`, `UPT_ERR_PROVIDER`,
+ * - `path`: the bundle's folder, UTF-8.
+ * - `options`: NULL means the defaults.
+ * - `out`: the new model.
+ *
+ * Threads: any.
+ * Errors: `UPT_ERR_IO`, `UPT_ERR_BUNDLE`, `UPT_ERR_VERSION`, `UPT_ERR_RUNTIME`, `UPT_ERR_PROVIDER`,
  * `UPT_ERR_UNSUPPORTED`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NULL`, `UPT_ERR_OUT_OF_MEMORY`.
  */
 upt_status upt_model_open(const char *path,
@@ -1102,25 +1123,30 @@ upt_status upt_model_open(const char *path,
                           struct upt_model **out);
 
 /**
- * Closes a model. Scenes made of it keep what they need and live on.
+ * Closes a model. Its scenes keep what they need and stay usable.
  *
- * Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also when it was closed before).
+ * Threads: any.
+ * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also if it was closed before).
  */
 upt_status upt_model_close(struct upt_model *model);
 
 /**
- * Says what a model is. Set `out->struct_size` first.
+ * Describes a model in numbers. Set `out->struct_size` first.
  *
- * Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`.
+ * Threads: any.
+ * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`.
  */
 upt_status upt_model_get_info(const struct upt_model *model,
                               struct upt_model_info *out);
 
 /**
- * Describes a model as JSON: name, bundle hash, the provider of each stage and why others were not taken.
+ * Describes a model as JSON: name, bundle hash, the provider of each stage and why the others were not chosen.
  *
- * out: text with its NUL; NULL with capacity 0 only asks. needed: bytes with the NUL, always written; may be NULL.
- * Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` when capacity is too small.
+ * - `out`: receives text with its NUL; NULL with capacity 0 only queries the size.
+ * - `needed`: its size in bytes with the NUL, always written; may be NULL.
+ *
+ * Threads: any.
+ * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` if capacity is too small.
  */
 upt_status upt_model_describe(const struct upt_model *model,
                               char *out,
@@ -1130,8 +1156,11 @@ upt_status upt_model_describe(const struct upt_model *model,
 /**
  * Copies the rest positions.
  *
- * out: `[K,3]` floats, mm. count: floats in out, 3 K.
- * Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` when count is not 3 K.
+ * - `out`: `[K,3]` floats, mm.
+ * - `count`: number of floats in `out`, 3 K.
+ *
+ * Threads: any.
+ * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` when count is not 3 K.
  */
 upt_status upt_model_positions(const struct upt_model *model,
                                float *out,
@@ -1140,9 +1169,13 @@ upt_status upt_model_positions(const struct upt_model *model,
 /**
  * Copies a static index set.
  *
- * set: `UPT_SET_*`. out: node indices; NULL with capacity 0 only asks. capacity: indices that fit in out.
- * needed: indices in the set (3 a face, 4 a tetrahedron), always written; may be NULL.
- * Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` (unknown set, capacity too small).
+ * - `set`: `UPT_SET_*`.
+ * - `out`: node indices; NULL with capacity 0 only queries the size.
+ * - `capacity`: number of indices that fit in `out`.
+ * - `needed`: number of indices in the set (3 per face, 4 per tetrahedron), always written; may be NULL.
+ *
+ * Threads: any.
+ * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` (unknown set, capacity too small).
  */
 upt_status upt_model_indices(const struct upt_model *model,
                              int32_t set,
@@ -1151,41 +1184,51 @@ upt_status upt_model_indices(const struct upt_model *model,
                              uint64_t *needed);
 
 /**
- * Makes a scene at rest.
+ * Creates a scene at rest.
  *
- * options: NULL means the defaults. out: the new scene. The scene keeps what it needs of the model.
- * Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`,
- * `UPT_ERR_UNSUPPORTED`, `UPT_ERR_IO`, `UPT_ERR_BUNDLE`, `UPT_ERR_OUT_OF_MEMORY`.
+ * - `options`: NULL means the defaults.
+ * - `out`: the new scene. The scene keeps what it needs of the model.
+ *
+ * Threads: any.
+ * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_UNSUPPORTED`,
+ * `UPT_ERR_IO`, `UPT_ERR_BUNDLE`, `UPT_ERR_OUT_OF_MEMORY`.
  */
 upt_status upt_scene_create(const struct upt_model *model,
                             const struct upt_scene_options *options,
                             struct upt_scene **out);
 
 /**
- * Ends a scene; a step in flight is waited for. The only call that a poisoned scene takes beside `upt_scene_get_stats`.
+ * Destroys a scene, after waiting for a step in flight. A poisoned scene accepts only this call and
+ * `upt_scene_get_stats`.
  *
- * Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also when it was destroyed before), `UPT_ERR_BUSY` while
- * another thread is in a call on it.
+ * Threads: any.
+ * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also if it was destroyed before), `UPT_ERR_BUSY` while another thread is in
+ * a call on it.
  */
 upt_status upt_scene_destroy(struct upt_scene *scene);
 
 /**
- * Back to rest. The region and attached points stay.
+ * Returns the scene to rest. The region and the attached points stay.
  *
- * Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_PANIC`.
+ * Threads: one at a time.
+ * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_PANIC`.
  */
 upt_status upt_scene_reset(struct upt_scene *scene);
 
 /**
  * One step: u(t), c(t) -> u(t + dt).
  *
- * displacement: `[K,3]`, mm; NULL takes the scene's own state. collision: `[K,3]`, mm, zero but at nodes in contact,
- * where it is the displacement that the instrument imposes at the end of the step; NULL means no contact.
- * out: `[n,3]`, mm (n: K, or the region's count), may be NULL; it may be the same memory as an input, at the price of
- * a copy. out_count: floats in out, 3 n; 0 when out is NULL.
- * Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`,
- * `UPT_ERR_NON_FINITE`, `UPT_ERR_UNSUPPORTED`, `UPT_ERR_GUARD`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`; the
- * state stays.
+ * - `displacement`: `[K,3]`, mm; NULL uses the scene's own state.
+ * - `collision`: `[K,3]`, mm, zero except at nodes in contact, where it is the displacement that the instrument imposes
+ *   by the end of the step; NULL means no contact.
+ * - `out`: `[n,3]`, mm (n: K, or the region's count), may be NULL; it may be the memory of an input, at the cost of a
+ *   copy.
+ * - `out_count`: number of floats in `out`, 3 n; 0 when out is NULL.
+ *
+ * Threads: one at a time.
+ * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NON_FINITE`,
+ * `UPT_ERR_UNSUPPORTED`, `UPT_ERR_GUARD`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`; the state does
+ * not change.
  */
 upt_status upt_scene_step(struct upt_scene *scene,
                           const float *displacement,
@@ -1194,11 +1237,13 @@ upt_status upt_scene_step(struct upt_scene *scene,
                           uint64_t out_count);
 
 /**
- * One step from the scene's own state with the nodes in contact listed.
+ * One step from the scene's own state, with a list of the nodes in contact.
  *
- * contact_nodes: `[m]` node indices, each at most once, in any order. contact_vectors: `[m,3]`, mm: the displacement of
- * these nodes at the end of the step. contact_count: m; 0 means no contact and both may be NULL.
- * out, out_count, threads and errors: as `upt_scene_step`; also `UPT_ERR_ARGUMENT` for an index or a count beyond K.
+ * - `contact_nodes`: `[m]` node indices, each at most once, in any order.
+ * - `contact_vectors`: `[m,3]`, mm: the displacement of these nodes at the end of the step.
+ * - `contact_count`: m; 0 means no contact and both may be NULL.
+ * - `out`, `out_count`, threads and errors: as in `upt_scene_step`; also `UPT_ERR_ARGUMENT` for an index or a count
+ *   beyond K.
  */
 upt_status upt_scene_step_contacts(struct upt_scene *scene,
                                    const uint32_t *contact_nodes,
@@ -1210,21 +1255,27 @@ upt_status upt_scene_step_contacts(struct upt_scene *scene,
 /**
  * Copies the last published state.
  *
- * out: `[n,3]`, mm, in the region's order (all nodes when there is none). out_count: floats in out, 3 n.
- * Threads: any at any time, also while a step runs. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_PANIC`.
+ * - `out`: `[n,3]`, mm, in the region's order (all nodes when there is none).
+ * - `out_count`: number of floats in `out`, 3 n.
+ *
+ * Threads: any, at any time, even while a step runs.
+ * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_PANIC`.
  */
 upt_status upt_scene_read(struct upt_scene *scene,
                           float *out,
                           uint64_t out_count);
 
 /**
- * Starts a step on the scene's worker and returns at once.
+ * Starts a step on the scene's worker thread and returns at once. An error of an earlier step that was not reported yet
+ * is still reported.
  *
- * contact_nodes, contact_vectors, contact_count: as `upt_scene_step_contacts`; checked and copied before the call returns.
- * An error of an earlier step that was not told yet stays to be told.
- * Threads: one at a time. Errors: `UPT_ERR_BUSY` while a step is in flight (unless the scene was made with
- * `latest_wins`), `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` (also for an index or a count beyond K, or a node that is
- * listed twice), `UPT_ERR_NON_FINITE`, `UPT_ERR_STATE` where no thread can be started, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
+ * - `contact_nodes`, `contact_vectors`, `contact_count`: as in `upt_scene_step_contacts`; checked and copied before the
+ *   call returns.
+ *
+ * Threads: one at a time.
+ * Errors: `UPT_ERR_BUSY` while a step is in flight (unless the scene was made with `latest_wins`), `UPT_ERR_NULL`,
+ * `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` (also for an index or a count beyond K, or a node listed twice),
+ * `UPT_ERR_NON_FINITE`, `UPT_ERR_STATE` if no thread can be started, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
  */
 upt_status upt_scene_submit(struct upt_scene *scene,
                             const uint32_t *contact_nodes,
@@ -1232,20 +1283,24 @@ upt_status upt_scene_submit(struct upt_scene *scene,
                             uint64_t contact_count);
 
 /**
- * Asks whether the submitted step has finished; never waits.
+ * Asks whether the submitted step has finished. Never waits.
  *
- * Returns `UPT_OK`, `UPT_PENDING`, or the step's error (once, also after a later submit). With `latest_wins`, `UPT_OK` says that
- * a step has finished since the last `UPT_OK`, while another may be in flight: a host that submits in every frame sees each new state.
- * Threads: one at a time. Errors: the step's; `UPT_ERR_STATE` when nothing was submitted, `UPT_ERR_NULL`,
- * `UPT_ERR_HANDLE`.
+ * Returns `UPT_OK`, `UPT_PENDING`, or the step's error (once, also after a later submit). With `latest_wins`, `UPT_OK`
+ * means that a step has finished since the last `UPT_OK`, even if another is in flight: a host that submits in every
+ * frame sees every new state.
+ *
+ * Threads: one at a time.
+ * Errors: the step's; `UPT_ERR_STATE` when nothing was submitted, `UPT_ERR_NULL`, `UPT_ERR_HANDLE`.
  */
 upt_status upt_scene_poll(struct upt_scene *scene);
 
 /**
  * Waits for the submitted step, at most `timeout_ms` milliseconds.
  *
- * Returns `UPT_OK` when none is in flight, `UPT_PENDING` when the time is over, or the step's error (once).
- * Threads: one at a time. Errors: as `upt_scene_poll`.
+ * Returns `UPT_OK` when no step is in flight, `UPT_PENDING` when the time is up, or the step's error (once).
+ *
+ * Threads: one at a time.
+ * Errors: as `upt_scene_poll`.
  */
 upt_status upt_scene_wait(struct upt_scene *scene,
                           uint32_t timeout_ms);
@@ -1253,10 +1308,12 @@ upt_status upt_scene_wait(struct upt_scene *scene,
 /**
  * Interpolates between the last two states, for frames between steps. Works while a step is in flight.
  *
- * alpha: 0 the state before, 1 the last state; from 0 to 1. out: `[n,3]`, mm, in the region's order.
- * out_count: floats in out, 3 n.
- * Threads: any at any time, also while a step runs. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT`,
- * `UPT_ERR_NON_FINITE`, `UPT_ERR_PANIC`.
+ * - `alpha`: 0 is the state before, 1 the last state; values from 0 to 1.
+ * - `out`: `[n,3]`, mm, in the region's order.
+ * - `out_count`: number of floats in `out`, 3 n.
+ *
+ * Threads: any, at any time, even while a step runs.
+ * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NON_FINITE`, `UPT_ERR_PANIC`.
  */
 upt_status upt_scene_sample(struct upt_scene *scene,
                             double alpha,
@@ -1264,22 +1321,29 @@ upt_status upt_scene_sample(struct upt_scene *scene,
                             uint64_t out_count);
 
 /**
- * Restricts what a step decodes and what `upt_scene_step`, `_read` and `_sample` write to these nodes, in this order.
+ * Limits a step to these nodes: `upt_scene_step`, `_read` and `_sample` write them alone, in this order. Fewer nodes
+ * make a cheaper step.
  *
- * nodes: `[n]` indices, n at most K, in any order; NULL with count 0: all nodes. A step costs less with fewer nodes.
- * Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT` for an index of K
- * or more or too many of them, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
+ * - `nodes`: `[n]` indices, n at most K, in any order; NULL with count 0: all nodes.
+ *
+ * Threads: one at a time.
+ * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT` for an index of K or more or too many of
+ * them, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
  */
 upt_status upt_scene_set_region(struct upt_scene *scene,
                                 const uint32_t *nodes,
                                 uint64_t count);
 
 /**
- * Decodes any nodes of the last state, whatever the region is.
+ * Decodes any nodes of the last state, in the region or not.
  *
- * nodes: `[n]` indices, n at most K. out: `[n,3]`, mm. out_count: floats in out, 3 n.
- * Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`,
- * `UPT_ERR_STATE` before the first step, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
+ * - `nodes`: `[n]` indices, n at most K.
+ * - `out`: `[n,3]`, mm.
+ * - `out_count`: number of floats in `out`, 3 n.
+ *
+ * Threads: one at a time.
+ * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`, `UPT_ERR_STATE` before the first step,
+ * `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
  */
 upt_status upt_scene_decode(struct upt_scene *scene,
                             const uint32_t *nodes,
@@ -1288,12 +1352,15 @@ upt_status upt_scene_decode(struct upt_scene *scene,
                             uint64_t out_count);
 
 /**
- * Attaches points to the tissue; they replace those attached before.
+ * Attaches points to the tissue. They replace those attached before. A bundle of kind `upt` decodes each point in every
+ * step (unless the scene has `interpolate_points`); one of kind `reduced` interpolates between nodes.
  *
- * points: `[n,3]`, rest positions, mm; NULL with count 0 detaches. count: points, n. A bundle of kind `upt` decodes each where it
- * is, in every step (unless the scene was made with `interpolate_points`); one of kind `reduced` interpolates between nodes.
- * Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_NON_FINITE`,
- * `UPT_ERR_ARGUMENT`, `UPT_ERR_UNSUPPORTED`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
+ * - `points`: `[n,3]`, rest positions, mm; NULL with count 0 detaches.
+ * - `count`: number of points, n.
+ *
+ * Threads: one at a time.
+ * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_NON_FINITE`, `UPT_ERR_ARGUMENT`,
+ * `UPT_ERR_UNSUPPORTED`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
  */
 upt_status upt_scene_attach_points(struct upt_scene *scene,
                                    const float *points,
@@ -1302,9 +1369,12 @@ upt_status upt_scene_attach_points(struct upt_scene *scene,
 /**
  * Copies the displacement of the attached points in the last state.
  *
- * out: `[n,3]`, mm. out_count: floats in out, 3 n.
- * Threads: any at any time, also while a step runs. Errors: `UPT_ERR_STATE` when no points are attached, `UPT_ERR_NULL`,
- * `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_PANIC`.
+ * - `out`: `[n,3]`, mm.
+ * - `out_count`: number of floats in `out`, 3 n.
+ *
+ * Threads: any, at any time, even while a step runs.
+ * Errors: `UPT_ERR_STATE` when no points are attached, `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT`,
+ * `UPT_ERR_PANIC`.
  */
 upt_status upt_scene_read_points(struct upt_scene *scene,
                                  float *out,
@@ -1313,8 +1383,12 @@ upt_status upt_scene_read_points(struct upt_scene *scene,
 /**
  * As `upt_scene_sample`, at the attached points.
  *
- * alpha: 0 the state before, 1 the last state. out: `[n,3]`, mm. out_count: floats in out, 3 n.
- * Threads: any at any time, also while a step runs. Errors: as `upt_scene_read_points`, and `UPT_ERR_NON_FINITE`.
+ * - `alpha`: 0 is the state before, 1 the last state.
+ * - `out`: `[n,3]`, mm.
+ * - `out_count`: number of floats in `out`, 3 n.
+ *
+ * Threads: any, at any time, even while a step runs.
+ * Errors: as `upt_scene_read_points`, and `UPT_ERR_NON_FINITE`.
  */
 upt_status upt_scene_sample_points(struct upt_scene *scene,
                                    double alpha,
@@ -1322,16 +1396,18 @@ upt_status upt_scene_sample_points(struct upt_scene *scene,
                                    uint64_t out_count);
 
 /**
- * One step from the scene's own state that rigid instruments drive: their contact with the tissue is solved.
+ * One step from the scene's own state, driven by rigid instruments. Their contact with the tissue is solved.
  *
- * The instruments are where they will be at the end of the step; from the last step's poses they get there on a line. Their contact
- * is unilateral with Coulomb friction at points of the domain's surface at most 1.7 mm apart. Where the scene corrects, contact is
- * solved inside of each correction, as a load; with `corrections = UPT_CORRECTIONS_NONE` once, on the linear response. The scene
- * remembers each place of the array: pass every instrument every time, in the same order. An instrument that moves more than 40 mm in
- * a step has been put there.
- * instruments: array; every element has the same `struct_size`; at most 64; NULL with count 0: a free step.
- * out, out_count, threads and errors: as `upt_scene_step`; also `UPT_ERR_UNSUPPORTED` in a build without feature "contact" and for
- * a bundle without a linear response, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_HANDLE` for a hull that was destroyed.
+ * Give the pose that each instrument has at the end of the step; it moves there on a straight line from its last pose.
+ * An instrument that would move more than 40 mm in a step is placed there instead. Contact is unilateral, with Coulomb
+ * friction, at points of the domain's surface at most 1.7 mm apart. A scene with corrections solves it inside each
+ * correction, as a load; with `corrections = UPT_CORRECTIONS_NONE` it is solved once, on the linear response. The scene
+ * remembers each place of the array: pass every instrument every time, in the same order.
+ *
+ * - `instruments`: at most 64, all with the same `struct_size`; NULL with count 0 makes a step without contact.
+ * - `out`, `out_count`, threads and errors: as in `upt_scene_step`; also `UPT_ERR_UNSUPPORTED` in a build without
+ *   feature "contact" and for a bundle without a linear response, `UPT_ERR_STRUCT_SIZE`, and `UPT_ERR_HANDLE` for a hull
+ *   that was destroyed.
  */
 upt_status upt_scene_step_instruments(struct upt_scene *scene,
                                       const struct upt_instrument *instruments,
@@ -1340,26 +1416,34 @@ upt_status upt_scene_step_instruments(struct upt_scene *scene,
                                       uint64_t out_count);
 
 /**
- * Starts a step that rigid instruments drive on the scene's worker and returns at once.
+ * Starts a step driven by rigid instruments on the scene's worker thread and returns at once.
  *
- * instruments, instrument_count: as `upt_scene_step_instruments`; checked and copied before the call returns.
- * Threads and errors: as `upt_scene_submit`; also those of `upt_scene_step_instruments`.
+ * - `instruments`, `instrument_count`: as in `upt_scene_step_instruments`; checked and copied before the call returns.
+ *
+ * Threads and errors: those of `upt_scene_submit` and of `upt_scene_step_instruments`.
  */
 upt_status upt_scene_submit_instruments(struct upt_scene *scene,
                                         const struct upt_instrument *instruments,
                                         uint64_t instrument_count);
 
 /**
- * The tissue at a moment between steps, with rigid instruments where they are at that moment: for frames without lag.
+ * The tissue at a moment between steps, with the instruments where they are at that moment: frames without lag.
  *
- * From the last published state its velocities go on, and contact is solved at the poses given here with the compliance of that time. Any
- * frame rate, also uneven; also while a submitted step is in flight. When a step arrives, what it puts elsewhere is blended in over a step's time.
- * seconds: since the last published step's time, 0 or more; the velocities are followed for two steps at most. instruments: as
- * `upt_scene_step_instruments`. out: `[n,3]`, mm, in the region's order. out_count: floats in out, 3 n.
- * Threads: one thread at a time presents; another one may step or submit. Errors: `UPT_ERR_BUSY` while another thread presents, and at the
- * first call while a step is in flight; `UPT_ERR_UNSUPPORTED` in a build without feature "contact", for a bundle without a linear response or
- * corrections and a scene that does not correct; `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`,
- * `UPT_ERR_NON_FINITE`, `UPT_ERR_STATE`, `UPT_ERR_RUNTIME`, `UPT_ERR_IO`, `UPT_ERR_BUNDLE`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
+ * The velocities of the last published state continue, and contact is solved at the poses given here with the compliance
+ * of that time. Use any frame rate, even an uneven one, and call it while a submitted step is in flight too. When a step
+ * arrives, the difference to what was shown is blended in over the time of a step.
+ *
+ * - `seconds`: time since the last published step, 0 or more; velocities are followed for two steps at most.
+ * - `instruments`: as `upt_scene_step_instruments`.
+ * - `out`: `[n,3]`, mm, in the region's order.
+ * - `out_count`: number of floats in `out`, 3 n.
+ *
+ * Threads: one thread at a time presents; another may step or submit meanwhile.
+ * Errors: `UPT_ERR_BUSY` while another thread presents, and if a step is in flight at the first call;
+ * `UPT_ERR_UNSUPPORTED` in a build without feature "contact", for a bundle without a linear response or corrections, and
+ * for a scene without corrections; `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`,
+ * `UPT_ERR_NON_FINITE`, `UPT_ERR_STATE`, `UPT_ERR_RUNTIME`, `UPT_ERR_IO`, `UPT_ERR_BUNDLE`, `UPT_ERR_OUT_OF_MEMORY`,
+ * `UPT_ERR_PANIC`.
  */
 upt_status upt_scene_present(struct upt_scene *scene,
                              double seconds,
@@ -1369,11 +1453,14 @@ upt_status upt_scene_present(struct upt_scene *scene,
                              uint64_t out_count);
 
 /**
- * Copies what the tissue did to each instrument at the end of the last step.
+ * Copies the force, torque and penetration of each instrument at the end of the last step.
  *
- * out: `[count]`, in the order of the step's instruments; every element has its `struct_size` set. count: instruments of that step.
- * Threads: any at any time, also while a step runs. Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "contact",
- * `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT` where the last step had another number of instruments.
+ * - `out`: `[count]`, in the order of the step's instruments; set `struct_size` of every element.
+ * - `count`: instruments of that step.
+ *
+ * Threads: any, at any time, even while a step runs.
+ * Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "contact", `UPT_ERR_NULL`, `UPT_ERR_HANDLE`,
+ * `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT` if the last step had another number of instruments.
  */
 upt_status upt_scene_instrument_readings(struct upt_scene *scene,
                                          struct upt_instrument_reading *out,
@@ -1382,9 +1469,12 @@ upt_status upt_scene_instrument_readings(struct upt_scene *scene,
 /**
  * Copies the points of the surface that pushed or held instruments at the end of the last step, ascending by instrument.
  *
- * out: `[capacity]`; NULL with capacity 0 only asks. needed: points, always written; may be NULL.
- * Threads: any at any time, also while a step runs. Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "contact",
- * `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` when capacity is too small.
+ * - `out`: `[capacity]`; NULL with capacity 0 only queries the size.
+ * - `needed`: number of points, always written; may be NULL.
+ *
+ * Threads: any, at any time, even while a step runs.
+ * Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "contact", `UPT_ERR_NULL`, `UPT_ERR_HANDLE`,
+ * `UPT_ERR_ARGUMENT` if capacity is too small.
  */
 upt_status upt_scene_instrument_contacts(struct upt_scene *scene,
                                          struct upt_instrument_contact *out,
@@ -1392,10 +1482,14 @@ upt_status upt_scene_instrument_contacts(struct upt_scene *scene,
                                          uint64_t *needed);
 
 /**
- * Makes the convex hull of a tool's points, for `UPT_SHAPE_HULL`.
+ * Creates the convex hull of a tool's points, for `UPT_SHAPE_HULL`.
  *
- * points: `[n,3]`, mm, in the tool's own frame. point_count: n, 4 to 100,000. out: the new hull.
- * Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_ARGUMENT` for points that are not finite, too many or without a volume,
+ * - `points`: `[n,3]`, mm, in the tool's own frame.
+ * - `point_count`: n, 4 to 100,000.
+ * - `out`: the new hull.
+ *
+ * Threads: any.
+ * Errors: `UPT_ERR_NULL`, `UPT_ERR_ARGUMENT` for points that are not finite, too many, or without volume,
  * `UPT_ERR_UNSUPPORTED` in a build without feature "contact", `UPT_ERR_OUT_OF_MEMORY`.
  */
 upt_status upt_hull_create(const float *points,
@@ -1403,59 +1497,75 @@ upt_status upt_hull_create(const float *points,
                            struct upt_hull **out);
 
 /**
- * Ends a hull. Steps that were submitted with it keep what they need.
+ * Destroys a hull. Steps that were submitted with it keep what they need.
  *
- * Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also when it was destroyed before).
+ * Threads: any.
+ * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also if it was destroyed before).
  */
 upt_status upt_hull_destroy(struct upt_hull *hull);
 
 /**
- * Makes a tool felt: from now on each step of the scene leaves what `upt_haptics_render` needs.
+ * Lets a hand feel a tool: from now on, each step of the scene prepares what `upt_haptics_render` needs.
  *
- * The steps of the scene are driven as before, with this tool among their instruments. The object does not keep the scene alive.
- * options: required, for its tool. out: the new object. At most 8 a scene and 64 a process.
- * Threads: one at a time on the scene. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also for a hull that was destroyed),
- * `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NON_FINITE`, `UPT_ERR_BUSY` also while a step is in flight, `UPT_ERR_UNSUPPORTED` in a build
- * without feature "haptics", for a bundle without a linear response or corrections and a scene that does not correct; `UPT_ERR_RUNTIME`,
- * `UPT_ERR_IO`, `UPT_ERR_BUNDLE`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
+ * Drive the steps of the scene as before, with this tool among their instruments. The object does not keep the scene
+ * alive.
+ *
+ * - `options`: required, for its tool.
+ * - `out`: the new object. At most 8 per scene and 64 per process.
+ *
+ * Threads: one at a time on the scene.
+ * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also for a hull that was destroyed), `UPT_ERR_STRUCT_SIZE`,
+ * `UPT_ERR_ARGUMENT`, `UPT_ERR_NON_FINITE`, `UPT_ERR_BUSY` also while a step is in flight, `UPT_ERR_UNSUPPORTED` in a
+ * build without feature "haptics", for a bundle without a linear response or corrections, and for a scene without
+ * corrections; `UPT_ERR_RUNTIME`, `UPT_ERR_IO`, `UPT_ERR_BUNDLE`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
  */
 upt_status upt_haptics_create(struct upt_scene *scene,
                               const struct upt_haptics_options *options,
                               struct upt_haptics **out);
 
 /**
- * The force on the tool at a pose: contact solved on what the last step left. Made for 1,000 calls a second.
+ * The force on the tool at a pose, with contact solved on what the last step prepared. Made for 1,000 calls a second.
  *
- * Waits for nothing, whatever the scene does: no lock, and no allocation unless it fails. A new step is blended in without a jump. Out of contact the
- * force is zero; where the scene is not stepped any more `age_s` grows and the tissue stays as elastic as the last step left it. At this boundary lengths
- * are metres, forces newtons, torques newton metres.
- * pose: where the tool is now. out: `struct_size` set by the caller; where the call fails and out can be written there is no force in it.
- * Threads: one at a time on the object; any other on the scene. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`,
- * `UPT_ERR_NON_FINITE` and `UPT_ERR_ARGUMENT` for the pose and a time before the last; `UPT_ERR_BUSY` while another thread is in a call on this
- * object; `UPT_ERR_STATE` once the scene was destroyed; `UPT_ERR_UNSUPPORTED` in a build without feature "haptics"; `UPT_ERR_PANIC`.
+ * Waits for nothing, whatever the scene does: no lock, and no allocation unless it fails. A new step is blended in
+ * without a jump. Out of contact the force is zero. If the scene is no longer stepped, `age_s` grows and the tissue
+ * stays as elastic as the last step left it. In this call lengths are metres, forces newtons and torques newton metres.
+ *
+ * - `pose`: where the tool is now.
+ * - `out`: set its `struct_size` first. If the call fails and `out` can be written, its force is zero.
+ *
+ * Threads: one at a time on the object; any other on the scene.
+ * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_NON_FINITE` and `UPT_ERR_ARGUMENT` for the
+ * pose and a time before the last; `UPT_ERR_BUSY` while another thread is in a call on this object; `UPT_ERR_STATE` once
+ * the scene was destroyed; `UPT_ERR_UNSUPPORTED` in a build without feature "haptics"; `UPT_ERR_PANIC`.
  */
 upt_status upt_haptics_render(struct upt_haptics *haptics,
                               const struct upt_haptic_pose *pose,
                               struct upt_haptic_force *out);
 
 /**
- * Ends a haptics object; its scene goes on.
+ * Destroys a haptics object. Its scene stays usable.
  *
- * Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also when it was destroyed before), `UPT_ERR_BUSY` while another thread is in a call on
- * it, `UPT_ERR_UNSUPPORTED` in a build without feature "haptics".
+ * Threads: any.
+ * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also if it was destroyed before), `UPT_ERR_BUSY` while another thread is in
+ * a call on it, `UPT_ERR_UNSUPPORTED` in a build without feature "haptics".
  */
 upt_status upt_haptics_destroy(struct upt_haptics *haptics);
 
 /**
- * Finds the nodes that rigid instruments touch and the displacement that they impose: the input of a step.
+ * Finds the nodes that rigid instruments touch, and the displacement that they impose there: the input of a step.
  *
- * The scene remembers what each place of the array touches, until the array's length changes or upt_scene_reset:
- * pass every instrument every time, in the same order. At most 64 instruments; NULL with count 0 lets go of all.
- * instruments: array; every element has its `struct_size` set. contact_nodes: `[capacity]`, contact_vectors:
- * `[capacity,3]`, mm; both may be NULL with capacity 0, which only asks. contact_count: contacts found, always written.
- * Threads: one at a time. Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "contact", `UPT_ERR_NULL`,
- * `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_NON_FINITE`, `UPT_ERR_ARGUMENT` (also when capacity
- * is too small), `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
+ * The scene remembers what each place of the array touches until the array's length changes or `upt_scene_reset`: pass
+ * every instrument every time, in the same order. NULL with count 0 releases all.
+ *
+ * - `instruments`: at most 64, each with its `struct_size` set.
+ * - `contact_nodes`: `[capacity]`, contact_vectors: `[capacity,3]`, mm; both may be NULL with capacity 0, which only
+ *   queries the count.
+ * - `contact_count`: number of contacts found, always written.
+ *
+ * Threads: one at a time.
+ * Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "contact", `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`,
+ * `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_NON_FINITE`, `UPT_ERR_ARGUMENT` (also when capacity is too small),
+ * `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
  */
 upt_status upt_scene_contacts_from_instruments(struct upt_scene *scene,
                                                const struct upt_instrument *instruments,
@@ -1468,33 +1578,42 @@ upt_status upt_scene_contacts_from_instruments(struct upt_scene *scene,
 /**
  * Copies the reaction of the tissue at the last step's contact nodes, in their order.
  *
- * With a bundle that uses a linear response (`prior_forces` of the statistics is 1) the contact forces of that response,
- * `-A_CC^-1 c`: nodes that borrow a column of the compliance share its force, held nodes and nodes far from the domain get
- * zero. With others the elastic force of the elements around each node at the last state. Both leave out inertia and damping.
- * out: `[m,3]`, mN, the force on the instrument. out_count: floats in out, 3 m.
- * Threads: one at a time. Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "forces", `UPT_ERR_NULL`,
- * `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
+ * A bundle with a linear response (`prior_forces` of the statistics is 1) gives that response's contact forces,
+ * `-A_CC^-1 c`: nodes that borrow a column of the compliance share its force, and held nodes and nodes far from the
+ * domain get zero. Other bundles give the elastic force of the elements around each node at the last state. Both leave
+ * out inertia and damping.
+ *
+ * - `out`: `[m,3]`, mN, the force on the instrument.
+ * - `out_count`: number of floats in `out`, 3 m.
+ *
+ * Threads: one at a time.
+ * Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "forces", `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`,
+ * `UPT_ERR_ARGUMENT`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
  */
 upt_status upt_scene_contact_force(struct upt_scene *scene,
                                    float *out,
                                    uint64_t out_count);
 
 /**
- * Says what the last step did and cost. Set `out->struct_size` first. Works while a step is in flight and on a
- * poisoned scene.
+ * Reports what the last step did and how long it took. Set `out->struct_size` first. Works while a step is in flight and
+ * on a poisoned scene.
  *
- * Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`.
+ * Threads: any.
+ * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`.
  */
 upt_status upt_scene_get_stats(const struct upt_scene *scene,
                                struct upt_scene_stats *out);
 
 /**
- * Saves the state, to resume to the bit.
+ * Saves the state, so that it can be restored exactly.
  *
- * out: bytes; NULL with capacity 0 only asks. capacity: bytes that fit in out.
- * needed: bytes of the snapshot, always written; may be NULL.
- * Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT` when capacity is
- * too small, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
+ * - `out`: bytes; NULL with capacity 0 only queries the size.
+ * - `capacity`: size of `out` in bytes.
+ * - `needed`: size of the snapshot in bytes, always written; may be NULL.
+ *
+ * Threads: one at a time.
+ * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT` if capacity is too small,
+ * `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
  */
 upt_status upt_scene_save(struct upt_scene *scene,
                           uint8_t *out,
@@ -1504,8 +1623,9 @@ upt_status upt_scene_save(struct upt_scene *scene,
 /**
  * Restores a snapshot of the same model.
  *
- * Threads: one at a time. Errors: `UPT_ERR_SNAPSHOT`, `UPT_ERR_VERSION`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NULL`,
- * `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`; the state stays.
+ * Threads: one at a time.
+ * Errors: `UPT_ERR_SNAPSHOT`, `UPT_ERR_VERSION`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`,
+ * `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`; the state does not change.
  */
 upt_status upt_scene_restore(struct upt_scene *scene,
                              const uint8_t *bytes,

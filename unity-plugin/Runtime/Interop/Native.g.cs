@@ -13,7 +13,7 @@ namespace Upt.Interop
         public uint struct_size;
         /// <summary>Default number of threads of a model; 0: 1.</summary>
         public uint threads;
-        /// <summary>ONNX Runtime's shared library, a path; NULL: beside libupt, then `ORT_DYLIB_PATH`, then the system.</summary>
+        /// <summary>ONNX Runtime's shared library, a path; NULL: the folder of libupt, then `ORT_DYLIB_PATH`, then the system.</summary>
         public byte* onnxruntime_path;
     }
 
@@ -152,7 +152,7 @@ namespace Upt.Interop
         public fixed byte reserved[2];
         /// <summary>`upt_scene_step_instruments` alone: Coulomb's coefficient, 0 or more.</summary>
         public float friction;
-        /// <summary>A grasp lets go where its samples pull harder than this together, mN; 0: never.</summary>
+        /// <summary>A grasp tears off when its points together pull harder than this, mN; 0: never.</summary>
         public float tear_off_mn;
         /// <summary>`UPT_SHAPE_HULL`: the `upt_hull`; otherwise NULL.</summary>
         public IntPtr hull;
@@ -170,7 +170,7 @@ namespace Upt.Interop
         public fixed float force[3];
         /// <summary>On the instrument about its position, mN mm.</summary>
         public fixed float torque[3];
-        /// <summary>How deep the deepest point of the surface lies inside of the instrument, mm.</summary>
+        /// <summary>How deep the deepest point of the surface lies inside the instrument, mm.</summary>
         public float penetration_mm;
         /// <summary>1: its grasp tore off in this step.</summary>
         public byte torn;
@@ -298,7 +298,7 @@ namespace Upt.Interop
         public ulong decoded_node_count;
         /// <summary>Contact nodes of the last step.</summary>
         public ulong contact_count;
-        /// <summary>Bytes that the scene has allocated beside the model; what it never touches is not resident.</summary>
+        /// <summary>Bytes that the scene has allocated in addition to the model; pages that it never touches are not resident.</summary>
         public ulong memory_bytes;
         /// <summary>Threads of a step.</summary>
         public uint threads;
@@ -355,7 +355,7 @@ namespace Upt.Interop
         public const int UPT_ERR_NULL = -1;
         /// <summary>A size, index, enum or range is wrong.</summary>
         public const int UPT_ERR_ARGUMENT = -2;
-        /// <summary>`struct_size` is not one that this library knows.</summary>
+        /// <summary>This library does not know this `struct_size`.</summary>
         public const int UPT_ERR_STRUCT_SIZE = -3;
         /// <summary>Not a live handle of this type.</summary>
         public const int UPT_ERR_HANDLE = -4;
@@ -367,7 +367,7 @@ namespace Upt.Interop
         public const int UPT_ERR_STATE = -7;
         /// <summary>This build or this bundle cannot do it.</summary>
         public const int UPT_ERR_UNSUPPORTED = -8;
-        /// <summary>There is no memory for what the call needs.</summary>
+        /// <summary>There is not enough memory for the call.</summary>
         public const int UPT_ERR_OUT_OF_MEMORY = -9;
         /// <summary>ONNX Runtime is missing, too old or broken; the message lists what was tried.</summary>
         public const int UPT_ERR_RUNTIME = -20;
@@ -383,7 +383,7 @@ namespace Upt.Interop
         public const int UPT_ERR_SNAPSHOT = -33;
         /// <summary>The guard refused the new state; the last good state stays.</summary>
         public const int UPT_ERR_GUARD = -40;
-        /// <summary>A bug in the library; the scene involved can only be destroyed.</summary>
+        /// <summary>A bug in the library; the scene can only be destroyed.</summary>
         public const int UPT_ERR_PANIC = -90;
         /// <summary>ONNX Runtime's CPU provider and the native kernels.</summary>
         public const int UPT_PROVIDER_CPU = 0;
@@ -401,9 +401,9 @@ namespace Upt.Interop
         public const int UPT_LOG_OFF = 0;
         /// <summary>Failures.</summary>
         public const int UPT_LOG_ERROR = 1;
-        /// <summary>Fallbacks, and once for each flag that rises: contacts outside of the envelope, states that the guard refuses.</summary>
+        /// <summary>Fallbacks, and each flag once when it rises: contacts outside the envelope, states that the guard refuses.</summary>
         public const int UPT_LOG_WARN = 2;
-        /// <summary>Loading: what was opened and who runs it.</summary>
+        /// <summary>Loading: what was opened and which provider runs it.</summary>
         public const int UPT_LOG_INFO = 3;
         /// <summary>Stage times.</summary>
         public const int UPT_LOG_DEBUG = 4;
@@ -437,7 +437,7 @@ namespace Upt.Interop
         public const int UPT_STEP_MEASURED = 3;
         /// <summary>No corrections.</summary>
         public const int UPT_CORRECTIONS_NONE = -1;
-        /// <summary>As many corrections as the scene's target asks for and its budget lets in.</summary>
+        /// <summary>As many corrections as the scene's target needs and its budget allows.</summary>
         public const int UPT_CORRECTIONS_AUTO = -2;
         /// <summary>
         /// Keep the last good state and return `UPT_ERR_GUARD`; without contact, where no later call could do otherwise, as
@@ -474,7 +474,7 @@ namespace Upt.Interop
         public const uint UPT_FLAG_FELL_BACK = 2048;
         /// <summary>The estimated error is above the scene's `error_limit_mm`.</summary>
         public const uint UPT_FLAG_ERROR = 4096;
-        /// <summary>Tissue lies more than 1 mm inside of an instrument.</summary>
+        /// <summary>Tissue lies more than 1 mm inside an instrument.</summary>
         public const uint UPT_FLAG_DEEP = 8192;
         /// <summary>Nodes of the surface.</summary>
         public const int UPT_SET_SURFACE_NODES = 0;
@@ -498,55 +498,74 @@ namespace Upt.Interop
         public const int UPT_SHAPE_HULL = 3;
         /// <summary>An instrument pushes, with Coulomb friction.</summary>
         public const int UPT_MODE_SLIDE = 0;
-        /// <summary>An instrument holds what is within 0.5 mm of it when the mode changes to this, until the mode changes back or it tears off.</summary>
+        /// <summary>An instrument holds what lies within 0.5 mm of it when the mode changes to this, until the mode changes back or the grasp tears off.</summary>
         public const int UPT_MODE_GRASP = 1;
         /// <summary>Version of the C ABI that `upt_abi_version` returns. Bindings compare it at load.</summary>
         public const uint UPT_ABI_VERSION = 1;
 
         /// <summary>
-        /// Starts the library with options of the host's. Optional: the first model does it with the defaults.
+        /// Starts the library with options of your own. Optional: opening the first model starts it with the defaults.
         ///
-        /// options: NULL means the defaults.
-        /// Threads: any. Errors: `UPT_ERR_STATE` when the library was started with other options, `UPT_ERR_STRUCT_SIZE`,
-        /// `UPT_ERR_ARGUMENT`.
+        /// - `options`: NULL means the defaults.
+        ///
+        /// Threads: any.
+        /// Errors: `UPT_ERR_STATE` when the library was started with other options, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_init(upt_init_options* options);
 
         /// <summary>
-        /// Ends the library. Call it before the process exits when a GPU provider was used.
+        /// Shuts the library down. Call it before the process exits if you used a GPU provider.
         ///
-        /// Threads: any. Errors: `UPT_ERR_STATE` while models or scenes live.
+        /// Threads: any.
+        /// Errors: `UPT_ERR_STATE` while models or scenes exist.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_shutdown();
 
-        /// <summary>The library's version, for instance "0.1.0". Threads: any.</summary>
+        /// <summary>
+        /// The library's version, for instance "0.1.0".
+        ///
+        /// Threads: any.
+        /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern byte* upt_version();
 
-        /// <summary>`UPT_ABI_VERSION` of the library that runs; refuse to go on when it is not the header's. Threads: any.</summary>
+        /// <summary>
+        /// The `UPT_ABI_VERSION` of the library that is loaded. Stop if it differs from the header's.
+        ///
+        /// Threads: any.
+        /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern uint upt_abi_version();
 
         /// <summary>
-        /// The message of the last failed call of the calling thread (UTF-8), "" when there is none.
-        /// It is valid until that thread's next call. Threads: any.
+        /// The message of the calling thread's last failed call (UTF-8), or "". It stays valid until that thread's next call.
+        ///
+        /// Threads: any.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern byte* upt_last_error();
 
-        /// <summary>The name of a status, for instance "UPT_ERR_BUSY"; "UPT_UNKNOWN" for other numbers. Threads: any.</summary>
+        /// <summary>
+        /// The name of a status, for instance "UPT_ERR_BUSY"; "UPT_UNKNOWN" for other numbers.
+        ///
+        /// Threads: any.
+        /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern byte* upt_status_name(int status);
 
         /// <summary>
-        /// Sets the receiver of log messages; NULL ends it. When the call returns, the former receiver is no longer running.
+        /// Sets the function that receives log messages; NULL removes it. When the call returns, the former receiver is no longer
+        /// running. It runs on the host's threads only, during a call or at its end; messages of the library's own threads wait
+        /// for the next call.
         ///
-        /// user: handed to the receiver. level: `UPT_LOG_*`; less severe messages are not made at all. The receiver runs on
-        /// the host's threads only, inside of a call or at its end: what the library's own threads say waits for the next call.
-        /// Threads: any. Errors: `UPT_ERR_ARGUMENT` for an unknown level, `UPT_ERR_STATE` from inside of the receiver, or
-        /// when the process is a Rust program that has a `tracing` subscriber of its own.
+        /// - `user`: passed to the receiver.
+        /// - `level`: `UPT_LOG_*`; less severe messages are not created.
+        ///
+        /// Threads: any.
+        /// Errors: `UPT_ERR_ARGUMENT` for an unknown level, `UPT_ERR_STATE` from the receiver itself, or in a Rust program with a
+        /// `tracing` subscriber of its own.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_set_log(IntPtr callback, IntPtr user, int level);
@@ -554,43 +573,56 @@ namespace Upt.Interop
         /// <summary>
         /// Lists the providers as JSON: `[{"name":"cpu","available":true,"reason":""}]`. Loads ONNX Runtime.
         ///
-        /// out: text with its NUL; NULL with capacity 0 only asks. needed: bytes with the NUL, always written; may be NULL.
-        /// Threads: any. Errors: `UPT_ERR_RUNTIME`, `UPT_ERR_ARGUMENT` when capacity is too small, `UPT_ERR_NULL`.
+        /// - `out`: receives text with its NUL; NULL with capacity 0 only queries the size.
+        /// - `needed`: its size in bytes with the NUL, always written; may be NULL.
+        ///
+        /// Threads: any.
+        /// Errors: `UPT_ERR_RUNTIME`, `UPT_ERR_ARGUMENT` if capacity is too small, `UPT_ERR_NULL`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_providers(byte* @out, ulong capacity, ulong* needed);
 
         /// <summary>
-        /// Opens and checks a bundle (sizes, dtypes, the SHA-256 of the manifest and of each file that is read) and makes it ready to step.
+        /// Opens a bundle, checks it (sizes, dtypes, the SHA-256 of the manifest and of every file that is read) and makes it
+        /// ready to step.
         ///
-        /// path: the bundle's folder, UTF-8. options: NULL means the defaults. out: the new model.
-        /// Threads: any. Errors: `UPT_ERR_IO`, `UPT_ERR_BUNDLE`, `UPT_ERR_VERSION`, `UPT_ERR_RUNTIME`, `UPT_ERR_PROVIDER`,
+        /// - `path`: the bundle's folder, UTF-8.
+        /// - `options`: NULL means the defaults.
+        /// - `out`: the new model.
+        ///
+        /// Threads: any.
+        /// Errors: `UPT_ERR_IO`, `UPT_ERR_BUNDLE`, `UPT_ERR_VERSION`, `UPT_ERR_RUNTIME`, `UPT_ERR_PROVIDER`,
         /// `UPT_ERR_UNSUPPORTED`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NULL`, `UPT_ERR_OUT_OF_MEMORY`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_model_open(byte* path, upt_model_options* options, IntPtr* @out);
 
         /// <summary>
-        /// Closes a model. Scenes made of it keep what they need and live on.
+        /// Closes a model. Its scenes keep what they need and stay usable.
         ///
-        /// Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also when it was closed before).
+        /// Threads: any.
+        /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also if it was closed before).
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_model_close(IntPtr model);
 
         /// <summary>
-        /// Says what a model is. Set `out-&gt;struct_size` first.
+        /// Describes a model in numbers. Set `out-&gt;struct_size` first.
         ///
-        /// Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`.
+        /// Threads: any.
+        /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_model_get_info(IntPtr model, upt_model_info* @out);
 
         /// <summary>
-        /// Describes a model as JSON: name, bundle hash, the provider of each stage and why others were not taken.
+        /// Describes a model as JSON: name, bundle hash, the provider of each stage and why the others were not chosen.
         ///
-        /// out: text with its NUL; NULL with capacity 0 only asks. needed: bytes with the NUL, always written; may be NULL.
-        /// Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` when capacity is too small.
+        /// - `out`: receives text with its NUL; NULL with capacity 0 only queries the size.
+        /// - `needed`: its size in bytes with the NUL, always written; may be NULL.
+        ///
+        /// Threads: any.
+        /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` if capacity is too small.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_model_describe(IntPtr model, byte* @out, ulong capacity, ulong* needed);
@@ -598,8 +630,11 @@ namespace Upt.Interop
         /// <summary>
         /// Copies the rest positions.
         ///
-        /// out: `[K,3]` floats, mm. count: floats in out, 3 K.
-        /// Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` when count is not 3 K.
+        /// - `out`: `[K,3]` floats, mm.
+        /// - `count`: number of floats in `out`, 3 K.
+        ///
+        /// Threads: any.
+        /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` when count is not 3 K.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_model_positions(IntPtr model, float* @out, ulong count);
@@ -607,36 +642,46 @@ namespace Upt.Interop
         /// <summary>
         /// Copies a static index set.
         ///
-        /// set: `UPT_SET_*`. out: node indices; NULL with capacity 0 only asks. capacity: indices that fit in out.
-        /// needed: indices in the set (3 a face, 4 a tetrahedron), always written; may be NULL.
-        /// Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` (unknown set, capacity too small).
+        /// - `set`: `UPT_SET_*`.
+        /// - `out`: node indices; NULL with capacity 0 only queries the size.
+        /// - `capacity`: number of indices that fit in `out`.
+        /// - `needed`: number of indices in the set (3 per face, 4 per tetrahedron), always written; may be NULL.
+        ///
+        /// Threads: any.
+        /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` (unknown set, capacity too small).
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_model_indices(IntPtr model, int set, uint* @out, ulong capacity, ulong* needed);
 
         /// <summary>
-        /// Makes a scene at rest.
+        /// Creates a scene at rest.
         ///
-        /// options: NULL means the defaults. out: the new scene. The scene keeps what it needs of the model.
-        /// Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`,
-        /// `UPT_ERR_UNSUPPORTED`, `UPT_ERR_IO`, `UPT_ERR_BUNDLE`, `UPT_ERR_OUT_OF_MEMORY`.
+        /// - `options`: NULL means the defaults.
+        /// - `out`: the new scene. The scene keeps what it needs of the model.
+        ///
+        /// Threads: any.
+        /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_UNSUPPORTED`,
+        /// `UPT_ERR_IO`, `UPT_ERR_BUNDLE`, `UPT_ERR_OUT_OF_MEMORY`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_scene_create(IntPtr model, upt_scene_options* options, IntPtr* @out);
 
         /// <summary>
-        /// Ends a scene; a step in flight is waited for. The only call that a poisoned scene takes beside `upt_scene_get_stats`.
+        /// Destroys a scene, after waiting for a step in flight. A poisoned scene accepts only this call and
+        /// `upt_scene_get_stats`.
         ///
-        /// Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also when it was destroyed before), `UPT_ERR_BUSY` while
-        /// another thread is in a call on it.
+        /// Threads: any.
+        /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also if it was destroyed before), `UPT_ERR_BUSY` while another thread is in
+        /// a call on it.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_scene_destroy(IntPtr scene);
 
         /// <summary>
-        /// Back to rest. The region and attached points stay.
+        /// Returns the scene to rest. The region and the attached points stay.
         ///
-        /// Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_PANIC`.
+        /// Threads: one at a time.
+        /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_PANIC`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_scene_reset(IntPtr scene);
@@ -644,23 +689,29 @@ namespace Upt.Interop
         /// <summary>
         /// One step: u(t), c(t) -&gt; u(t + dt).
         ///
-        /// displacement: `[K,3]`, mm; NULL takes the scene's own state. collision: `[K,3]`, mm, zero but at nodes in contact,
-        /// where it is the displacement that the instrument imposes at the end of the step; NULL means no contact.
-        /// out: `[n,3]`, mm (n: K, or the region's count), may be NULL; it may be the same memory as an input, at the price of
-        /// a copy. out_count: floats in out, 3 n; 0 when out is NULL.
-        /// Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`,
-        /// `UPT_ERR_NON_FINITE`, `UPT_ERR_UNSUPPORTED`, `UPT_ERR_GUARD`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`; the
-        /// state stays.
+        /// - `displacement`: `[K,3]`, mm; NULL uses the scene's own state.
+        /// - `collision`: `[K,3]`, mm, zero except at nodes in contact, where it is the displacement that the instrument imposes
+        /// by the end of the step; NULL means no contact.
+        /// - `out`: `[n,3]`, mm (n: K, or the region's count), may be NULL; it may be the memory of an input, at the cost of a
+        /// copy.
+        /// - `out_count`: number of floats in `out`, 3 n; 0 when out is NULL.
+        ///
+        /// Threads: one at a time.
+        /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NON_FINITE`,
+        /// `UPT_ERR_UNSUPPORTED`, `UPT_ERR_GUARD`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`; the state does
+        /// not change.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_scene_step(IntPtr scene, float* displacement, float* collision, float* @out, ulong out_count);
 
         /// <summary>
-        /// One step from the scene's own state with the nodes in contact listed.
+        /// One step from the scene's own state, with a list of the nodes in contact.
         ///
-        /// contact_nodes: `[m]` node indices, each at most once, in any order. contact_vectors: `[m,3]`, mm: the displacement of
-        /// these nodes at the end of the step. contact_count: m; 0 means no contact and both may be NULL.
-        /// out, out_count, threads and errors: as `upt_scene_step`; also `UPT_ERR_ARGUMENT` for an index or a count beyond K.
+        /// - `contact_nodes`: `[m]` node indices, each at most once, in any order.
+        /// - `contact_vectors`: `[m,3]`, mm: the displacement of these nodes at the end of the step.
+        /// - `contact_count`: m; 0 means no contact and both may be NULL.
+        /// - `out`, `out_count`, threads and errors: as in `upt_scene_step`; also `UPT_ERR_ARGUMENT` for an index or a count
+        /// beyond K.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_scene_step_contacts(IntPtr scene, uint* contact_nodes, float* contact_vectors, ulong contact_count, float* @out, ulong out_count);
@@ -668,31 +719,39 @@ namespace Upt.Interop
         /// <summary>
         /// Copies the last published state.
         ///
-        /// out: `[n,3]`, mm, in the region's order (all nodes when there is none). out_count: floats in out, 3 n.
-        /// Threads: any at any time, also while a step runs. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_PANIC`.
+        /// - `out`: `[n,3]`, mm, in the region's order (all nodes when there is none).
+        /// - `out_count`: number of floats in `out`, 3 n.
+        ///
+        /// Threads: any, at any time, even while a step runs.
+        /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_PANIC`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_scene_read(IntPtr scene, float* @out, ulong out_count);
 
         /// <summary>
-        /// Starts a step on the scene's worker and returns at once.
+        /// Starts a step on the scene's worker thread and returns at once. An error of an earlier step that was not reported yet
+        /// is still reported.
         ///
-        /// contact_nodes, contact_vectors, contact_count: as `upt_scene_step_contacts`; checked and copied before the call returns.
-        /// An error of an earlier step that was not told yet stays to be told.
-        /// Threads: one at a time. Errors: `UPT_ERR_BUSY` while a step is in flight (unless the scene was made with
-        /// `latest_wins`), `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` (also for an index or a count beyond K, or a node that is
-        /// listed twice), `UPT_ERR_NON_FINITE`, `UPT_ERR_STATE` where no thread can be started, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
+        /// - `contact_nodes`, `contact_vectors`, `contact_count`: as in `upt_scene_step_contacts`; checked and copied before the
+        /// call returns.
+        ///
+        /// Threads: one at a time.
+        /// Errors: `UPT_ERR_BUSY` while a step is in flight (unless the scene was made with `latest_wins`), `UPT_ERR_NULL`,
+        /// `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` (also for an index or a count beyond K, or a node listed twice),
+        /// `UPT_ERR_NON_FINITE`, `UPT_ERR_STATE` if no thread can be started, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_scene_submit(IntPtr scene, uint* contact_nodes, float* contact_vectors, ulong contact_count);
 
         /// <summary>
-        /// Asks whether the submitted step has finished; never waits.
+        /// Asks whether the submitted step has finished. Never waits.
         ///
-        /// Returns `UPT_OK`, `UPT_PENDING`, or the step's error (once, also after a later submit). With `latest_wins`, `UPT_OK` says that
-        /// a step has finished since the last `UPT_OK`, while another may be in flight: a host that submits in every frame sees each new state.
-        /// Threads: one at a time. Errors: the step's; `UPT_ERR_STATE` when nothing was submitted, `UPT_ERR_NULL`,
-        /// `UPT_ERR_HANDLE`.
+        /// Returns `UPT_OK`, `UPT_PENDING`, or the step's error (once, also after a later submit). With `latest_wins`, `UPT_OK`
+        /// means that a step has finished since the last `UPT_OK`, even if another is in flight: a host that submits in every
+        /// frame sees every new state.
+        ///
+        /// Threads: one at a time.
+        /// Errors: the step's; `UPT_ERR_STATE` when nothing was submitted, `UPT_ERR_NULL`, `UPT_ERR_HANDLE`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_scene_poll(IntPtr scene);
@@ -700,8 +759,10 @@ namespace Upt.Interop
         /// <summary>
         /// Waits for the submitted step, at most `timeout_ms` milliseconds.
         ///
-        /// Returns `UPT_OK` when none is in flight, `UPT_PENDING` when the time is over, or the step's error (once).
-        /// Threads: one at a time. Errors: as `upt_scene_poll`.
+        /// Returns `UPT_OK` when no step is in flight, `UPT_PENDING` when the time is up, or the step's error (once).
+        ///
+        /// Threads: one at a time.
+        /// Errors: as `upt_scene_poll`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_scene_wait(IntPtr scene, uint timeout_ms);
@@ -709,41 +770,53 @@ namespace Upt.Interop
         /// <summary>
         /// Interpolates between the last two states, for frames between steps. Works while a step is in flight.
         ///
-        /// alpha: 0 the state before, 1 the last state; from 0 to 1. out: `[n,3]`, mm, in the region's order.
-        /// out_count: floats in out, 3 n.
-        /// Threads: any at any time, also while a step runs. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT`,
-        /// `UPT_ERR_NON_FINITE`, `UPT_ERR_PANIC`.
+        /// - `alpha`: 0 is the state before, 1 the last state; values from 0 to 1.
+        /// - `out`: `[n,3]`, mm, in the region's order.
+        /// - `out_count`: number of floats in `out`, 3 n.
+        ///
+        /// Threads: any, at any time, even while a step runs.
+        /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NON_FINITE`, `UPT_ERR_PANIC`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_scene_sample(IntPtr scene, double alpha, float* @out, ulong out_count);
 
         /// <summary>
-        /// Restricts what a step decodes and what `upt_scene_step`, `_read` and `_sample` write to these nodes, in this order.
+        /// Limits a step to these nodes: `upt_scene_step`, `_read` and `_sample` write them alone, in this order. Fewer nodes
+        /// make a cheaper step.
         ///
-        /// nodes: `[n]` indices, n at most K, in any order; NULL with count 0: all nodes. A step costs less with fewer nodes.
-        /// Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT` for an index of K
-        /// or more or too many of them, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
+        /// - `nodes`: `[n]` indices, n at most K, in any order; NULL with count 0: all nodes.
+        ///
+        /// Threads: one at a time.
+        /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT` for an index of K or more or too many of
+        /// them, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_scene_set_region(IntPtr scene, uint* nodes, ulong count);
 
         /// <summary>
-        /// Decodes any nodes of the last state, whatever the region is.
+        /// Decodes any nodes of the last state, in the region or not.
         ///
-        /// nodes: `[n]` indices, n at most K. out: `[n,3]`, mm. out_count: floats in out, 3 n.
-        /// Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`,
-        /// `UPT_ERR_STATE` before the first step, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
+        /// - `nodes`: `[n]` indices, n at most K.
+        /// - `out`: `[n,3]`, mm.
+        /// - `out_count`: number of floats in `out`, 3 n.
+        ///
+        /// Threads: one at a time.
+        /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`, `UPT_ERR_STATE` before the first step,
+        /// `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_scene_decode(IntPtr scene, uint* nodes, ulong count, float* @out, ulong out_count);
 
         /// <summary>
-        /// Attaches points to the tissue; they replace those attached before.
+        /// Attaches points to the tissue. They replace those attached before. A bundle of kind `upt` decodes each point in every
+        /// step (unless the scene has `interpolate_points`); one of kind `reduced` interpolates between nodes.
         ///
-        /// points: `[n,3]`, rest positions, mm; NULL with count 0 detaches. count: points, n. A bundle of kind `upt` decodes each where it
-        /// is, in every step (unless the scene was made with `interpolate_points`); one of kind `reduced` interpolates between nodes.
-        /// Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_NON_FINITE`,
-        /// `UPT_ERR_ARGUMENT`, `UPT_ERR_UNSUPPORTED`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
+        /// - `points`: `[n,3]`, rest positions, mm; NULL with count 0 detaches.
+        /// - `count`: number of points, n.
+        ///
+        /// Threads: one at a time.
+        /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_NON_FINITE`, `UPT_ERR_ARGUMENT`,
+        /// `UPT_ERR_UNSUPPORTED`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_scene_attach_points(IntPtr scene, float* points, ulong count);
@@ -751,9 +824,12 @@ namespace Upt.Interop
         /// <summary>
         /// Copies the displacement of the attached points in the last state.
         ///
-        /// out: `[n,3]`, mm. out_count: floats in out, 3 n.
-        /// Threads: any at any time, also while a step runs. Errors: `UPT_ERR_STATE` when no points are attached, `UPT_ERR_NULL`,
-        /// `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_PANIC`.
+        /// - `out`: `[n,3]`, mm.
+        /// - `out_count`: number of floats in `out`, 3 n.
+        ///
+        /// Threads: any, at any time, even while a step runs.
+        /// Errors: `UPT_ERR_STATE` when no points are attached, `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT`,
+        /// `UPT_ERR_PANIC`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_scene_read_points(IntPtr scene, float* @out, ulong out_count);
@@ -761,57 +837,74 @@ namespace Upt.Interop
         /// <summary>
         /// As `upt_scene_sample`, at the attached points.
         ///
-        /// alpha: 0 the state before, 1 the last state. out: `[n,3]`, mm. out_count: floats in out, 3 n.
-        /// Threads: any at any time, also while a step runs. Errors: as `upt_scene_read_points`, and `UPT_ERR_NON_FINITE`.
+        /// - `alpha`: 0 is the state before, 1 the last state.
+        /// - `out`: `[n,3]`, mm.
+        /// - `out_count`: number of floats in `out`, 3 n.
+        ///
+        /// Threads: any, at any time, even while a step runs.
+        /// Errors: as `upt_scene_read_points`, and `UPT_ERR_NON_FINITE`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_scene_sample_points(IntPtr scene, double alpha, float* @out, ulong out_count);
 
         /// <summary>
-        /// One step from the scene's own state that rigid instruments drive: their contact with the tissue is solved.
+        /// One step from the scene's own state, driven by rigid instruments. Their contact with the tissue is solved.
         ///
-        /// The instruments are where they will be at the end of the step; from the last step's poses they get there on a line. Their contact
-        /// is unilateral with Coulomb friction at points of the domain's surface at most 1.7 mm apart. Where the scene corrects, contact is
-        /// solved inside of each correction, as a load; with `corrections = UPT_CORRECTIONS_NONE` once, on the linear response. The scene
-        /// remembers each place of the array: pass every instrument every time, in the same order. An instrument that moves more than 40 mm in
-        /// a step has been put there.
-        /// instruments: array; every element has the same `struct_size`; at most 64; NULL with count 0: a free step.
-        /// out, out_count, threads and errors: as `upt_scene_step`; also `UPT_ERR_UNSUPPORTED` in a build without feature "contact" and for
-        /// a bundle without a linear response, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_HANDLE` for a hull that was destroyed.
+        /// Give the pose that each instrument has at the end of the step; it moves there on a straight line from its last pose.
+        /// An instrument that would move more than 40 mm in a step is placed there instead. Contact is unilateral, with Coulomb
+        /// friction, at points of the domain's surface at most 1.7 mm apart. A scene with corrections solves it inside each
+        /// correction, as a load; with `corrections = UPT_CORRECTIONS_NONE` it is solved once, on the linear response. The scene
+        /// remembers each place of the array: pass every instrument every time, in the same order.
+        ///
+        /// - `instruments`: at most 64, all with the same `struct_size`; NULL with count 0 makes a step without contact.
+        /// - `out`, `out_count`, threads and errors: as in `upt_scene_step`; also `UPT_ERR_UNSUPPORTED` in a build without
+        /// feature "contact" and for a bundle without a linear response, `UPT_ERR_STRUCT_SIZE`, and `UPT_ERR_HANDLE` for a hull
+        /// that was destroyed.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_scene_step_instruments(IntPtr scene, upt_instrument* instruments, ulong instrument_count, float* @out, ulong out_count);
 
         /// <summary>
-        /// Starts a step that rigid instruments drive on the scene's worker and returns at once.
+        /// Starts a step driven by rigid instruments on the scene's worker thread and returns at once.
         ///
-        /// instruments, instrument_count: as `upt_scene_step_instruments`; checked and copied before the call returns.
-        /// Threads and errors: as `upt_scene_submit`; also those of `upt_scene_step_instruments`.
+        /// - `instruments`, `instrument_count`: as in `upt_scene_step_instruments`; checked and copied before the call returns.
+        ///
+        /// Threads and errors: those of `upt_scene_submit` and of `upt_scene_step_instruments`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_scene_submit_instruments(IntPtr scene, upt_instrument* instruments, ulong instrument_count);
 
         /// <summary>
-        /// The tissue at a moment between steps, with rigid instruments where they are at that moment: for frames without lag.
+        /// The tissue at a moment between steps, with the instruments where they are at that moment: frames without lag.
         ///
-        /// From the last published state its velocities go on, and contact is solved at the poses given here with the compliance of that time. Any
-        /// frame rate, also uneven; also while a submitted step is in flight. When a step arrives, what it puts elsewhere is blended in over a step's time.
-        /// seconds: since the last published step's time, 0 or more; the velocities are followed for two steps at most. instruments: as
-        /// `upt_scene_step_instruments`. out: `[n,3]`, mm, in the region's order. out_count: floats in out, 3 n.
-        /// Threads: one thread at a time presents; another one may step or submit. Errors: `UPT_ERR_BUSY` while another thread presents, and at the
-        /// first call while a step is in flight; `UPT_ERR_UNSUPPORTED` in a build without feature "contact", for a bundle without a linear response or
-        /// corrections and a scene that does not correct; `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`,
-        /// `UPT_ERR_NON_FINITE`, `UPT_ERR_STATE`, `UPT_ERR_RUNTIME`, `UPT_ERR_IO`, `UPT_ERR_BUNDLE`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
+        /// The velocities of the last published state continue, and contact is solved at the poses given here with the compliance
+        /// of that time. Use any frame rate, even an uneven one, and call it while a submitted step is in flight too. When a step
+        /// arrives, the difference to what was shown is blended in over the time of a step.
+        ///
+        /// - `seconds`: time since the last published step, 0 or more; velocities are followed for two steps at most.
+        /// - `instruments`: as `upt_scene_step_instruments`.
+        /// - `out`: `[n,3]`, mm, in the region's order.
+        /// - `out_count`: number of floats in `out`, 3 n.
+        ///
+        /// Threads: one thread at a time presents; another may step or submit meanwhile.
+        /// Errors: `UPT_ERR_BUSY` while another thread presents, and if a step is in flight at the first call;
+        /// `UPT_ERR_UNSUPPORTED` in a build without feature "contact", for a bundle without a linear response or corrections, and
+        /// for a scene without corrections; `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`,
+        /// `UPT_ERR_NON_FINITE`, `UPT_ERR_STATE`, `UPT_ERR_RUNTIME`, `UPT_ERR_IO`, `UPT_ERR_BUNDLE`, `UPT_ERR_OUT_OF_MEMORY`,
+        /// `UPT_ERR_PANIC`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_scene_present(IntPtr scene, double seconds, upt_instrument* instruments, ulong instrument_count, float* @out, ulong out_count);
 
         /// <summary>
-        /// Copies what the tissue did to each instrument at the end of the last step.
+        /// Copies the force, torque and penetration of each instrument at the end of the last step.
         ///
-        /// out: `[count]`, in the order of the step's instruments; every element has its `struct_size` set. count: instruments of that step.
-        /// Threads: any at any time, also while a step runs. Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "contact",
-        /// `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT` where the last step had another number of instruments.
+        /// - `out`: `[count]`, in the order of the step's instruments; set `struct_size` of every element.
+        /// - `count`: instruments of that step.
+        ///
+        /// Threads: any, at any time, even while a step runs.
+        /// Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "contact", `UPT_ERR_NULL`, `UPT_ERR_HANDLE`,
+        /// `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT` if the last step had another number of instruments.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_scene_instrument_readings(IntPtr scene, upt_instrument_reading* @out, ulong count);
@@ -819,77 +912,100 @@ namespace Upt.Interop
         /// <summary>
         /// Copies the points of the surface that pushed or held instruments at the end of the last step, ascending by instrument.
         ///
-        /// out: `[capacity]`; NULL with capacity 0 only asks. needed: points, always written; may be NULL.
-        /// Threads: any at any time, also while a step runs. Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "contact",
-        /// `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` when capacity is too small.
+        /// - `out`: `[capacity]`; NULL with capacity 0 only queries the size.
+        /// - `needed`: number of points, always written; may be NULL.
+        ///
+        /// Threads: any, at any time, even while a step runs.
+        /// Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "contact", `UPT_ERR_NULL`, `UPT_ERR_HANDLE`,
+        /// `UPT_ERR_ARGUMENT` if capacity is too small.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_scene_instrument_contacts(IntPtr scene, upt_instrument_contact* @out, ulong capacity, ulong* needed);
 
         /// <summary>
-        /// Makes the convex hull of a tool's points, for `UPT_SHAPE_HULL`.
+        /// Creates the convex hull of a tool's points, for `UPT_SHAPE_HULL`.
         ///
-        /// points: `[n,3]`, mm, in the tool's own frame. point_count: n, 4 to 100,000. out: the new hull.
-        /// Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_ARGUMENT` for points that are not finite, too many or without a volume,
+        /// - `points`: `[n,3]`, mm, in the tool's own frame.
+        /// - `point_count`: n, 4 to 100,000.
+        /// - `out`: the new hull.
+        ///
+        /// Threads: any.
+        /// Errors: `UPT_ERR_NULL`, `UPT_ERR_ARGUMENT` for points that are not finite, too many, or without volume,
         /// `UPT_ERR_UNSUPPORTED` in a build without feature "contact", `UPT_ERR_OUT_OF_MEMORY`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_hull_create(float* points, ulong point_count, IntPtr* @out);
 
         /// <summary>
-        /// Ends a hull. Steps that were submitted with it keep what they need.
+        /// Destroys a hull. Steps that were submitted with it keep what they need.
         ///
-        /// Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also when it was destroyed before).
+        /// Threads: any.
+        /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also if it was destroyed before).
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_hull_destroy(IntPtr hull);
 
         /// <summary>
-        /// Makes a tool felt: from now on each step of the scene leaves what `upt_haptics_render` needs.
+        /// Lets a hand feel a tool: from now on, each step of the scene prepares what `upt_haptics_render` needs.
         ///
-        /// The steps of the scene are driven as before, with this tool among their instruments. The object does not keep the scene alive.
-        /// options: required, for its tool. out: the new object. At most 8 a scene and 64 a process.
-        /// Threads: one at a time on the scene. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also for a hull that was destroyed),
-        /// `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NON_FINITE`, `UPT_ERR_BUSY` also while a step is in flight, `UPT_ERR_UNSUPPORTED` in a build
-        /// without feature "haptics", for a bundle without a linear response or corrections and a scene that does not correct; `UPT_ERR_RUNTIME`,
-        /// `UPT_ERR_IO`, `UPT_ERR_BUNDLE`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
+        /// Drive the steps of the scene as before, with this tool among their instruments. The object does not keep the scene
+        /// alive.
+        ///
+        /// - `options`: required, for its tool.
+        /// - `out`: the new object. At most 8 per scene and 64 per process.
+        ///
+        /// Threads: one at a time on the scene.
+        /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also for a hull that was destroyed), `UPT_ERR_STRUCT_SIZE`,
+        /// `UPT_ERR_ARGUMENT`, `UPT_ERR_NON_FINITE`, `UPT_ERR_BUSY` also while a step is in flight, `UPT_ERR_UNSUPPORTED` in a
+        /// build without feature "haptics", for a bundle without a linear response or corrections, and for a scene without
+        /// corrections; `UPT_ERR_RUNTIME`, `UPT_ERR_IO`, `UPT_ERR_BUNDLE`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_haptics_create(IntPtr scene, upt_haptics_options* options, IntPtr* @out);
 
         /// <summary>
-        /// The force on the tool at a pose: contact solved on what the last step left. Made for 1,000 calls a second.
+        /// The force on the tool at a pose, with contact solved on what the last step prepared. Made for 1,000 calls a second.
         ///
-        /// Waits for nothing, whatever the scene does: no lock, and no allocation unless it fails. A new step is blended in without a jump. Out of contact the
-        /// force is zero; where the scene is not stepped any more `age_s` grows and the tissue stays as elastic as the last step left it. At this boundary lengths
-        /// are metres, forces newtons, torques newton metres.
-        /// pose: where the tool is now. out: `struct_size` set by the caller; where the call fails and out can be written there is no force in it.
-        /// Threads: one at a time on the object; any other on the scene. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`,
-        /// `UPT_ERR_NON_FINITE` and `UPT_ERR_ARGUMENT` for the pose and a time before the last; `UPT_ERR_BUSY` while another thread is in a call on this
-        /// object; `UPT_ERR_STATE` once the scene was destroyed; `UPT_ERR_UNSUPPORTED` in a build without feature "haptics"; `UPT_ERR_PANIC`.
+        /// Waits for nothing, whatever the scene does: no lock, and no allocation unless it fails. A new step is blended in
+        /// without a jump. Out of contact the force is zero. If the scene is no longer stepped, `age_s` grows and the tissue
+        /// stays as elastic as the last step left it. In this call lengths are metres, forces newtons and torques newton metres.
+        ///
+        /// - `pose`: where the tool is now.
+        /// - `out`: set its `struct_size` first. If the call fails and `out` can be written, its force is zero.
+        ///
+        /// Threads: one at a time on the object; any other on the scene.
+        /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_NON_FINITE` and `UPT_ERR_ARGUMENT` for the
+        /// pose and a time before the last; `UPT_ERR_BUSY` while another thread is in a call on this object; `UPT_ERR_STATE` once
+        /// the scene was destroyed; `UPT_ERR_UNSUPPORTED` in a build without feature "haptics"; `UPT_ERR_PANIC`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_haptics_render(IntPtr haptics, upt_haptic_pose* pose, upt_haptic_force* @out);
 
         /// <summary>
-        /// Ends a haptics object; its scene goes on.
+        /// Destroys a haptics object. Its scene stays usable.
         ///
-        /// Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also when it was destroyed before), `UPT_ERR_BUSY` while another thread is in a call on
-        /// it, `UPT_ERR_UNSUPPORTED` in a build without feature "haptics".
+        /// Threads: any.
+        /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also if it was destroyed before), `UPT_ERR_BUSY` while another thread is in
+        /// a call on it, `UPT_ERR_UNSUPPORTED` in a build without feature "haptics".
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_haptics_destroy(IntPtr haptics);
 
         /// <summary>
-        /// Finds the nodes that rigid instruments touch and the displacement that they impose: the input of a step.
+        /// Finds the nodes that rigid instruments touch, and the displacement that they impose there: the input of a step.
         ///
-        /// The scene remembers what each place of the array touches, until the array's length changes or upt_scene_reset:
-        /// pass every instrument every time, in the same order. At most 64 instruments; NULL with count 0 lets go of all.
-        /// instruments: array; every element has its `struct_size` set. contact_nodes: `[capacity]`, contact_vectors:
-        /// `[capacity,3]`, mm; both may be NULL with capacity 0, which only asks. contact_count: contacts found, always written.
-        /// Threads: one at a time. Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "contact", `UPT_ERR_NULL`,
-        /// `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_NON_FINITE`, `UPT_ERR_ARGUMENT` (also when capacity
-        /// is too small), `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
+        /// The scene remembers what each place of the array touches until the array's length changes or `upt_scene_reset`: pass
+        /// every instrument every time, in the same order. NULL with count 0 releases all.
+        ///
+        /// - `instruments`: at most 64, each with its `struct_size` set.
+        /// - `contact_nodes`: `[capacity]`, contact_vectors: `[capacity,3]`, mm; both may be NULL with capacity 0, which only
+        /// queries the count.
+        /// - `contact_count`: number of contacts found, always written.
+        ///
+        /// Threads: one at a time.
+        /// Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "contact", `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`,
+        /// `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_NON_FINITE`, `UPT_ERR_ARGUMENT` (also when capacity is too small),
+        /// `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_scene_contacts_from_instruments(IntPtr scene, upt_instrument* instruments, ulong instrument_count, uint* contact_nodes, float* contact_vectors, ulong capacity, ulong* contact_count);
@@ -897,32 +1013,41 @@ namespace Upt.Interop
         /// <summary>
         /// Copies the reaction of the tissue at the last step's contact nodes, in their order.
         ///
-        /// With a bundle that uses a linear response (`prior_forces` of the statistics is 1) the contact forces of that response,
-        /// `-A_CC^-1 c`: nodes that borrow a column of the compliance share its force, held nodes and nodes far from the domain get
-        /// zero. With others the elastic force of the elements around each node at the last state. Both leave out inertia and damping.
-        /// out: `[m,3]`, mN, the force on the instrument. out_count: floats in out, 3 m.
-        /// Threads: one at a time. Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "forces", `UPT_ERR_NULL`,
-        /// `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
+        /// A bundle with a linear response (`prior_forces` of the statistics is 1) gives that response's contact forces,
+        /// `-A_CC^-1 c`: nodes that borrow a column of the compliance share its force, and held nodes and nodes far from the
+        /// domain get zero. Other bundles give the elastic force of the elements around each node at the last state. Both leave
+        /// out inertia and damping.
+        ///
+        /// - `out`: `[m,3]`, mN, the force on the instrument.
+        /// - `out_count`: number of floats in `out`, 3 m.
+        ///
+        /// Threads: one at a time.
+        /// Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "forces", `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`,
+        /// `UPT_ERR_ARGUMENT`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_scene_contact_force(IntPtr scene, float* @out, ulong out_count);
 
         /// <summary>
-        /// Says what the last step did and cost. Set `out-&gt;struct_size` first. Works while a step is in flight and on a
-        /// poisoned scene.
+        /// Reports what the last step did and how long it took. Set `out-&gt;struct_size` first. Works while a step is in flight and
+        /// on a poisoned scene.
         ///
-        /// Threads: any. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`.
+        /// Threads: any.
+        /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_scene_get_stats(IntPtr scene, upt_scene_stats* @out);
 
         /// <summary>
-        /// Saves the state, to resume to the bit.
+        /// Saves the state, so that it can be restored exactly.
         ///
-        /// out: bytes; NULL with capacity 0 only asks. capacity: bytes that fit in out.
-        /// needed: bytes of the snapshot, always written; may be NULL.
-        /// Threads: one at a time. Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT` when capacity is
-        /// too small, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
+        /// - `out`: bytes; NULL with capacity 0 only queries the size.
+        /// - `capacity`: size of `out` in bytes.
+        /// - `needed`: size of the snapshot in bytes, always written; may be NULL.
+        ///
+        /// Threads: one at a time.
+        /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT` if capacity is too small,
+        /// `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_scene_save(IntPtr scene, byte* @out, ulong capacity, ulong* needed);
@@ -930,8 +1055,9 @@ namespace Upt.Interop
         /// <summary>
         /// Restores a snapshot of the same model.
         ///
-        /// Threads: one at a time. Errors: `UPT_ERR_SNAPSHOT`, `UPT_ERR_VERSION`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NULL`,
-        /// `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`; the state stays.
+        /// Threads: one at a time.
+        /// Errors: `UPT_ERR_SNAPSHOT`, `UPT_ERR_VERSION`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`,
+        /// `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`; the state does not change.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_scene_restore(IntPtr scene, byte* bytes, ulong count);
