@@ -74,6 +74,8 @@ impl Stage {
         report: &mut Report,
     ) -> Result<()> {
         self.guess_loaded(lent, input, rest, problem, at, report)?;
+        let touched = problem.touched(&lent.corrections.body.held);
+        self.preconditioner.engage(lent.env(), touched)?;
         let start = self.unbalanced(lent, problem, at.g);
         let mut size = start;
         for iteration in 0..input.enough.iterations {

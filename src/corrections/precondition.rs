@@ -5,6 +5,9 @@
 //! (the prior's columns less what inertia holds back), so `Psi^T (K + kappa M) Psi = Phi^T (K + kappa M) Phi -
 //! Phi_C^T A_k,CC^-1 Phi_C` holds without a further product.
 //!
+//! Under loads the touched nodes move: the responses `W` to forces on them join the modes in the coarse space, whose Galerkin inverse
+//! is `Psi (..)^-1 Psi^T + W A_k,CC^-1 W^T`. Without them the tissue's stiffening under a tool takes tens of iterations.
+//!
 //! All products with fields go through the prior's block-wise bases: `U^T` once, the modes and columns on coordinates, `U` once.
 
 use super::body::Body;
@@ -64,6 +67,8 @@ pub struct Preconditioner {
     solved: Vec<f32>,
     at_contact: Vec<f32>,
     forces: Vec<f32>,
+    /// The nodes are loaded, not prescribed: they move.
+    loaded: bool,
     ready: bool,
 }
 
@@ -96,6 +101,7 @@ impl Preconditioner {
             solved: memory::zeros(count, WHAT)?,
             at_contact: memory::room(room, WHAT)?,
             forces: memory::room(room, WHAT)?,
+            loaded: false,
             ready: false,
         })
     }
@@ -117,10 +123,22 @@ impl Preconditioner {
 
     /// Takes the prescribed nodes (ascending); cheap where they are those of the last call.
     pub fn prescribe(&mut self, env: Env<'_>, nodes: &[u32]) -> Result<()> {
+        self.take(env, nodes, false)
+    }
+
+    /// Takes nodes that loads act on (ascending): the responses to forces on them join the modes in the coarse space.
+    #[cfg(feature = "contact")]
+    pub fn engage(&mut self, env: Env<'_>, nodes: &[u32]) -> Result<()> {
+        self.take(env, nodes, true)
+    }
+
+    fn take(&mut self, env: Env<'_>, nodes: &[u32], loaded: bool) -> Result<()> {
         if self.ready && self.nodes == nodes {
+            self.loaded = loaded;
             return Ok(());
         }
         self.ready = false;
+        self.loaded = loaded;
         self.nodes.clear();
         self.nodes.extend_from_slice(nodes);
         self.columns.clear();
@@ -222,13 +240,20 @@ impl Preconditioner {
             }
         }
         self.galerkin.solve(isa, &self.on_modes, &mut self.solved);
-        // Forces at the contact that keep it where it is, mN.
+        // Forces at the contact, mN: those that keep it where it is, and under loads what it lacks besides.
+        if self.loaded && !self.dofs.is_empty() {
+            self.compliance
+                .solve(isa, &self.at_contact, &mut self.forces);
+            self.forces.iter_mut().for_each(|force| *force *= 1e-3);
+        } else {
+            self.forces.fill(0.0);
+        }
         for (force, through) in self
             .forces
             .iter_mut()
             .zip(self.through.chunks_exact(rows.len()))
         {
-            *force = -through
+            *force -= through
                 .iter()
                 .zip(&self.solved)
                 .map(|(t, y)| t * y)
@@ -256,7 +281,9 @@ impl Preconditioner {
             z[1] += w * (xy * r[0] + yy * r[1] + yz * r[2]);
             z[2] += w * (xz * r[0] + yz * r[1] + zz * r[2]);
         }
-        mask(&self.nodes, z);
+        if !self.loaded {
+            mask(&self.nodes, z);
+        }
         mask_held(&env.body.held, z);
         Ok(())
     }
