@@ -72,7 +72,7 @@ static PROCESS: AtomicU32 = AtomicU32::new(0);
 /// Why a call from here cannot be answered: its locks may be held by threads that wait for it, or do not exist.
 fn misplaced() -> Option<&'static str> {
     if log::in_receiver() {
-        return Some("called from inside of the log receiver, which must not call the library");
+        return Some("called from the log receiver, which must not call the library");
     }
     let here = std::process::id();
     match PROCESS.compare_exchange(0, here, Ordering::Relaxed, Ordering::Relaxed) {
@@ -132,6 +132,7 @@ mod tests {
         let status = call("upt_x", || marked = true, || panic!("index {} of {}", 4, 3));
         assert_eq!(status, UPT_ERR_PANIC);
         assert!(marked);
+        // SAFETY: the library returns a C string that lives until this thread's next call.
         let message = unsafe { CStr::from_ptr(last_error()) };
         assert_eq!(message, c"upt_x: internal error: index 4 of 3");
     }
@@ -140,15 +141,18 @@ mod tests {
     fn messages_belong_to_their_thread() {
         call("upt_a", || (), || fail(-2, "here"));
         std::thread::spawn(|| {
+            // SAFETY: the library returns a C string that lives until this thread's next call.
             assert_eq!(unsafe { CStr::from_ptr(last_error()) }, c"");
             call("upt_b", || (), || fail(-2, "nul \0 inside"));
             assert_eq!(
+                // SAFETY: the library returns a C string that lives until this thread's next call.
                 unsafe { CStr::from_ptr(last_error()) },
                 c"upt_b: nul   inside"
             );
         })
         .join()
         .unwrap();
+        // SAFETY: the library returns a C string that lives until this thread's next call.
         assert_eq!(unsafe { CStr::from_ptr(last_error()) }, c"upt_a: here");
     }
 }

@@ -188,6 +188,7 @@ fn threads(value: u32) -> Result<usize, Failure> {
 pub(super) unsafe fn init_options(raw: &upt_init_options) -> Result<InitOptions, Failure> {
     Ok(InitOptions {
         threads: threads(raw.threads)?,
+        // SAFETY: NULL or a C string, as the header asks.
         onnxruntime_path: unsafe { optional_path(raw.onnxruntime_path, "onnxruntime_path") }?,
     })
 }
@@ -203,6 +204,7 @@ pub(super) unsafe fn model_options(raw: &upt_model_options) -> Result<ModelOptio
             ),
         );
     }
+    // SAFETY: the host passes that many elements, as the header asks.
     let providers = unsafe { slice(raw.providers, raw.provider_count, "providers") }?;
     Ok(ModelOptions {
         threads: threads(raw.threads)?,
@@ -213,6 +215,7 @@ pub(super) unsafe fn model_options(raw: &upt_model_options) -> Result<ModelOptio
         device_id: raw.device_id,
         precision: precision(raw.precision)?,
         gpu_memory_limit: raw.gpu_memory_limit,
+        // SAFETY: NULL or a C string, as the header asks.
         cache_dir: unsafe { optional_path(raw.cache_dir, "cache_dir") }?,
         allow_tf32: flag("allow_tf32", raw.allow_tf32)?,
         cuda_graph: flag("cuda_graph", raw.cuda_graph)?,
@@ -248,6 +251,7 @@ pub(super) unsafe fn scene_options(raw: &upt_scene_options) -> Result<SceneOptio
         step_path: step_path(raw.step_path)?,
         precision: precision(raw.precision)?,
         guard_policy: guard_policy(raw.guard_policy)?,
+        // SAFETY: NULL or a C string, as the header asks.
         mesh_path: unsafe { optional_path(raw.mesh_path, "mesh_path") }?,
         free_boundary: flag("free_boundary", raw.free_boundary)?,
         no_sleep: flag("no_sleep", raw.no_sleep)?,

@@ -48,6 +48,7 @@ pub unsafe extern "C" fn upt_scene_step_instruments(
         #[cfg(feature = "contact")]
         {
             _scene.with_tools(|tools| {
+                // SAFETY: the host passes that many instruments, as the header asks.
                 unsafe { read_tools(instruments, instrument_count, tools) }?;
                 let input = StepInput {
                     displacement: None,
@@ -57,8 +58,10 @@ pub unsafe extern "C" fn upt_scene_step_instruments(
                     true => None,
                     false => {
                         _scene.check_out(
+                            // SAFETY: the host passes that many elements, as the header asks.
                             unsafe { slice(out.cast_const(), out_count, "out") }?.len(),
                         )?;
+                        // SAFETY: the host passes room for that many elements, as the header asks.
                         Some(unsafe { slice_mut(out, out_count, "out") }?)
                     }
                 };
@@ -89,6 +92,7 @@ pub unsafe extern "C" fn upt_scene_submit_instruments(
         #[cfg(feature = "contact")]
         {
             _scene.with_tools(|tools| {
+                // SAFETY: the host passes that many instruments, as the header asks.
                 unsafe { read_tools(instruments, instrument_count, tools) }?;
                 _scene.submit_tools(tools)?;
                 Ok(UPT_OK)
@@ -132,8 +136,11 @@ pub unsafe extern "C" fn upt_scene_present(
         #[cfg(feature = "contact")]
         {
             let mut tools = _scene.frame_tools()?;
+            // SAFETY: the host passes that many instruments, as the header asks.
             unsafe { read_tools(instruments, instrument_count, &mut tools) }?;
+            // SAFETY: the host passes that many elements, as the header asks.
             _scene.check_out(unsafe { slice(out.cast_const(), out_count, "out") }?.len())?;
+            // SAFETY: the host passes room for that many elements, as the header asks.
             let out = unsafe { slice_mut(out, out_count, "out") }?;
             _scene.present(seconds, &tools, out)?;
             Ok(UPT_OK)
@@ -183,6 +190,7 @@ pub unsafe extern "C" fn upt_scene_instrument_readings(
                             reserved: [0; 3],
                         })
                     };
+                    // SAFETY: `out` points to a struct whose first field is its size, as the header asks.
                     unsafe { fill(out.wrapping_add(index), make) }?;
                 }
                 Ok(UPT_OK)
@@ -224,11 +232,13 @@ pub unsafe extern "C" fn upt_scene_instrument_contacts(
                         force: push.force,
                     })
                     .collect();
+                // SAFETY: `out` has room for `capacity` elements and `needed` is NULL or writable, as the header asks.
                 unsafe { copy_out(&contacts, out, capacity, needed) }
             })
         }
         #[cfg(not(feature = "contact"))]
         {
+            // SAFETY: `out` has room for `capacity` elements and `needed` is NULL or writable, as the header asks.
             let _ = unsafe { copy_out::<upt_instrument_contact>(&[], out, capacity, needed) };
             fail(UPT_ERR_UNSUPPORTED, WITHOUT)
         }
@@ -264,17 +274,20 @@ pub unsafe extern "C" fn upt_hull_create(
                     ))
                     .into());
                 }
+                // SAFETY: the host passes that many elements, as the header asks.
                 let points = unsafe { slice(points, 3 * point_count, "points") }?;
                 crate::memory::probe(1024 * point_count as usize, "a hull")?;
                 let bad =
                     |error: ::contact::ShapeError| Error::Argument(format!("points: {error}"));
                 let shape = Shape::hull_of(points.as_chunks().0).map_err(bad)?;
                 let body = Body::new(&shape).map_err(bad)?;
+                // SAFETY: `place` found it aligned and not NULL, and the header asks for a place to write.
                 unsafe { _out.write(add_hull(body)) };
                 Ok(UPT_OK)
             }
             #[cfg(not(feature = "contact"))]
             {
+                // SAFETY: the host passes that many elements, as the header asks.
                 let _ = unsafe { slice(points, point_count.saturating_mul(3), "points") }?;
                 fail(UPT_ERR_UNSUPPORTED, WITHOUT)
             }
@@ -324,6 +337,7 @@ unsafe fn read_tools(
         tools.push(convert::tool(index, &raw)?);
         Ok(())
     };
+    // SAFETY: the host passes that many instruments, as the header asks.
     unsafe { each(instruments, count, "instruments[]", read) }
 }
 

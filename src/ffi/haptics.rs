@@ -39,9 +39,11 @@ pub unsafe extern "C" fn upt_haptics_create(
 ) -> upt_status {
     call_scene("upt_haptics_create", scene, |_scene| {
         let _out = place(out, "out")?;
+        // SAFETY: the host passes a struct whose first field is its size, as the header asks.
         let raw = unsafe { required(options, "options") }?;
         convert::reserved(&raw.reserved)?;
         let _passivity = !convert::flag("no_passivity", raw.no_passivity)?;
+        // SAFETY: the host passes a struct whose first field is its size, as the header asks.
         let _tool = unsafe { required(raw.tool, "options.tool") }?;
         #[cfg(feature = "haptics")]
         {
@@ -57,6 +59,7 @@ pub unsafe extern "C" fn upt_haptics_create(
                 ..HapticOptions::new(raw.instrument, tool)
             };
             let hand = hands::add(_scene.haptics(&options)?)?;
+            // SAFETY: `place` found it aligned and not NULL, and the header asks for a place to write.
             unsafe { _out.write(without_provenance_mut(hand)) };
             Ok(UPT_OK)
         }
@@ -89,13 +92,16 @@ pub unsafe extern "C" fn upt_haptics_render(
         || (),
         || {
             let none = |struct_size| {
+                // SAFETY: every bit pattern of zeros is a value of these structs.
                 let blank: upt_haptic_force = unsafe { std::mem::zeroed() };
                 Ok(upt_haptic_force {
                     struct_size,
                     ..blank
                 })
             };
+            // SAFETY: `out` points to a struct whose first field is its size, as the header asks.
             unsafe { fill(out, none) }?;
+            // SAFETY: the host passes a struct whose first field is its size, as the header asks.
             let raw = unsafe { pointers::required(pose, "pose") }?;
             convert::reserved(&raw.reserved)?;
             let _has_velocity = convert::flag("has_velocity", raw.has_velocity)?;
@@ -111,6 +117,7 @@ pub unsafe extern "C" fn upt_haptics_render(
                 let force = hands::with(haptics.addr(), |hand| {
                     hand.render(&at).map_err(Failure::from)
                 })?;
+                // SAFETY: `out` points to a struct whose first field is its size, as the header asks.
                 unsafe { fill(out, |struct_size| Ok(written(struct_size, &force))) }
             }
             #[cfg(not(feature = "haptics"))]

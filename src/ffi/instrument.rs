@@ -41,14 +41,18 @@ pub unsafe extern "C" fn upt_scene_contacts_from_instruments(
     call_scene("upt_scene_contacts_from_instruments", scene, |_scene| {
         let count_out = place(contact_count, "contact_count")?;
         let capacity_floats = capacity.saturating_mul(3);
+        // SAFETY: the host passes room for that many elements, as the header asks.
         let nodes_out = unsafe { slice_mut(contact_nodes, capacity, "contact_nodes") }?;
         let vectors_out =
+            // SAFETY: the host passes room for that many elements, as the header asks.
             unsafe { slice_mut(contact_vectors, capacity_floats, "contact_vectors") }?;
         #[cfg(feature = "contact")]
         {
+            // SAFETY: the host passes that many instruments, as the header asks.
             let list = unsafe { read_instruments(instruments, instrument_count) }?;
             let list = &list.0[..list.1];
             _scene.contacts_from_instruments(list, |nodes, vectors| {
+                // SAFETY: `place` found it aligned and not NULL, and the header asks for a place to write.
                 unsafe { count_out.write(nodes.len() as u64) };
                 if capacity == 0 {
                     return Ok(());
@@ -71,6 +75,7 @@ pub unsafe extern "C" fn upt_scene_contacts_from_instruments(
                 convert::flag("sticking", raw.sticking)?;
                 convert::reserved(&raw.reserved)
             };
+            // SAFETY: the host passes that many instruments, as the header asks.
             unsafe { each(instruments, instrument_count, "instruments[]", read) }?;
             let _ = (count_out, nodes_out, vectors_out);
             fail(UPT_ERR_UNSUPPORTED, "this build has no feature \"contact\"")
@@ -109,6 +114,7 @@ unsafe fn read_instruments(
         };
         Ok(())
     };
+    // SAFETY: the host passes that many instruments, as the header asks.
     unsafe { each(instruments, count, "instruments[]", read) }?;
     Ok((list, count as usize))
 }
@@ -133,6 +139,7 @@ pub unsafe extern "C" fn upt_scene_contact_force(
     out_count: u64,
 ) -> upt_status {
     call_scene("upt_scene_contact_force", scene, |_scene| {
+        // SAFETY: the host passes room for that many elements, as the header asks.
         let _out = unsafe { slice_mut(out, out_count, "out") }?;
         #[cfg(feature = "forces")]
         {

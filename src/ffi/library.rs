@@ -22,7 +22,9 @@ pub unsafe extern "C" fn upt_init(options: *const upt_init_options) -> upt_statu
         "upt_init",
         || (),
         || {
+            // SAFETY: NULL, or a struct whose first field is its size, as the header asks.
             let raw = unsafe { pointers::options(options) }?;
+            // SAFETY: the pointers in the struct are NULL or what the header asks for.
             crate::init(&unsafe { convert::init_options(&raw) }?)?;
             Ok(UPT_OK)
         },
@@ -126,6 +128,7 @@ pub unsafe extern "C" fn upt_providers(
         || (),
         || -> Answer {
             let text = crate::providers_json()?;
+            // SAFETY: `out` has room for `capacity` elements and `needed` is NULL or writable, as the header asks.
             unsafe { pointers::copy_text(&text, out, capacity, needed) }
         },
     )

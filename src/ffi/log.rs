@@ -26,8 +26,9 @@ struct Receiver {
     user: *mut c_void,
 }
 
-// The host promises that its callback takes calls of any thread.
+// SAFETY: the host promises that its callback, with `user`, takes calls of any thread.
 unsafe impl Send for Receiver {}
+// SAFETY: as above.
 unsafe impl Sync for Receiver {}
 
 /// A reader holds the lock while the callback runs, so that a change waits for it.
@@ -136,6 +137,7 @@ fn hand_over(level: i32, text: String) {
     let receiver = RECEIVER.read().unwrap_or_else(PoisonError::into_inner);
     if let (Some(callback), Ok(text)) = (receiver.callback, CString::new(text.replace('\0', " "))) {
         let _ = IN_RECEIVER.try_with(|inside| inside.set(true));
+        // SAFETY: the host passed this function with `user`, for calls like this one.
         unsafe { callback(level, text.as_ptr(), receiver.user) };
         let _ = IN_RECEIVER.try_with(|inside| inside.set(false));
     }

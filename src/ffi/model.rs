@@ -30,9 +30,13 @@ pub unsafe extern "C" fn upt_model_open(
         || (),
         || {
             let out = pointers::place(out, "out")?;
+            // SAFETY: NULL or a C string, as the header asks.
             let path = unsafe { pointers::path(path, "path") }?;
+            // SAFETY: NULL, or a struct whose first field is its size, as the header asks.
             let raw = unsafe { pointers::options(options) }?;
+            // SAFETY: the pointers in the struct are NULL or what the header asks for.
             let model = Model::open(&path, &unsafe { convert::model_options(&raw) }?)?;
+            // SAFETY: `place` found it aligned and not NULL, and the header asks for a place to write.
             unsafe { out.write(add_model(model)) };
             Ok(UPT_OK)
         },
@@ -88,6 +92,7 @@ pub unsafe extern "C" fn upt_model_get_info(
                     load_seconds: info.load_seconds,
                 })
             };
+            // SAFETY: `out` points to a struct whose first field is its size, as the header asks.
             unsafe { pointers::fill(out, fill) }
         },
     )
@@ -112,6 +117,7 @@ pub unsafe extern "C" fn upt_model_describe(
         || (),
         || {
             let text = find_model(model)?.describe_json();
+            // SAFETY: `out` has room for `capacity` elements and `needed` is NULL or writable, as the header asks.
             unsafe { pointers::copy_text(&text, out, capacity, needed) }
         },
     )
@@ -145,6 +151,7 @@ pub unsafe extern "C" fn upt_model_positions(
                     ),
                 );
             }
+            // SAFETY: the host passes room for that many elements, as the header asks.
             unsafe { pointers::slice_mut(out, count, "out") }?.copy_from_slice(positions);
             Ok(UPT_OK)
         },
@@ -174,6 +181,7 @@ pub unsafe extern "C" fn upt_model_indices(
         || {
             let model = find_model(model)?;
             let indices = model.indices(convert::index_set(set)?);
+            // SAFETY: `out` has room for `capacity` elements and `needed` is NULL or writable, as the header asks.
             unsafe { pointers::copy_out(indices, out, capacity, needed) }
         },
     )

@@ -20,6 +20,7 @@ pub(super) unsafe trait Sized32: Copy {
 
 macro_rules! sized {
     ($($name:ident),*) => {$(
+        // SAFETY: `repr(C)` in `structs.rs`, `struct_size` first, integers, floats and pointers alone.
         unsafe impl Sized32 for $name { const NAME: &'static str = stringify!($name); }
     )*};
 }
@@ -77,6 +78,7 @@ pub(super) unsafe fn slice<'a, T>(
         return Ok(&[]);
     }
     check(pointer, name)?;
+    // SAFETY: checked above: aligned, not NULL, of a size that fits; the caller promises the elements.
     Ok(unsafe { std::slice::from_raw_parts(pointer, count) })
 }
 
@@ -89,6 +91,7 @@ pub(super) unsafe fn optional<'a, T>(
     if pointer.is_null() && count == 0 {
         return Ok(None);
     }
+    // SAFETY: the host passes that many elements, as the header asks.
     unsafe { slice(pointer, count, name) }.map(Some)
 }
 
@@ -103,6 +106,7 @@ pub(super) unsafe fn slice_mut<'a, T>(
         return Ok(&mut []);
     }
     check(pointer, name)?;
+    // SAFETY: checked above: aligned, not NULL, of a size that fits; the caller promises the elements.
     Ok(unsafe { std::slice::from_raw_parts_mut(pointer, count) })
 }
 
@@ -114,6 +118,7 @@ pub(super) fn place<T>(pointer: *mut T, name: &str) -> Result<*mut T, Failure> {
 /// A UTF-8 path.
 pub(super) unsafe fn path(pointer: *const c_char, name: &str) -> Result<PathBuf, Failure> {
     check(pointer, name)?;
+    // SAFETY: the caller promises a C string.
     match unsafe { CStr::from_ptr(pointer) }.to_str() {
         Ok("") => fail(UPT_ERR_ARGUMENT, format!("{name} is empty")),
         Ok(text) => Ok(PathBuf::from(text)),
@@ -129,6 +134,7 @@ pub(super) unsafe fn optional_path(
     if pointer.is_null() {
         return Ok(None);
     }
+    // SAFETY: NULL or a C string, as the header asks.
     unsafe { path(pointer, name) }.map(Some)
 }
 
@@ -143,9 +149,11 @@ pub(super) unsafe fn each<T: Sized32>(
     if count == 0 {
         return Ok(());
     }
+    // SAFETY: the pointer leads to a struct, as this function's caller promises.
     let size = unsafe { struct_size(pointer, name) }?;
     for index in 0..count {
         let element = pointer.wrapping_byte_add(index * size);
+        // SAFETY: the pointer leads to a struct, as this function's caller promises.
         let own = unsafe { struct_size(element, name) }?;
         if own != size {
             return fail(
@@ -155,6 +163,7 @@ pub(super) unsafe fn each<T: Sized32>(
                 ),
             );
         }
+        // SAFETY: the host passes a struct whose first field is its size, as the header asks.
         take(index, unsafe { required(element, name) }?)?;
     }
     Ok(())
@@ -162,6 +171,7 @@ pub(super) unsafe fn each<T: Sized32>(
 
 unsafe fn struct_size<T: Sized32>(pointer: *const T, name: &str) -> Result<usize, Failure> {
     check(pointer, name)?;
+    // SAFETY: checked above: aligned and not NULL; every struct begins with a `u32`.
     let size = unsafe { pointer.cast::<u32>().read() } as usize;
     if T::KNOWN.contains(&size) {
         return Ok(size);
@@ -179,15 +189,20 @@ unsafe fn struct_size<T: Sized32>(pointer: *const T, name: &str) -> Result<usize
 /// An options struct; NULL means the defaults (all zero).
 pub(super) unsafe fn options<T: Sized32>(pointer: *const T) -> Result<T, Failure> {
     if pointer.is_null() {
+        // SAFETY: every bit pattern of zeros is a value of these structs.
         return Ok(unsafe { std::mem::zeroed() });
     }
+    // SAFETY: the host passes a struct whose first field is its size, as the header asks.
     unsafe { required(pointer, "options") }
 }
 
 /// A struct to read; fields that the caller's version does not have are zero.
 pub(super) unsafe fn required<T: Sized32>(pointer: *const T, name: &str) -> Result<T, Failure> {
+    // SAFETY: the pointer leads to a struct, as this function's caller promises.
     let size = unsafe { struct_size(pointer, name) }?;
+    // SAFETY: every bit pattern of zeros is a value of these structs.
     let mut value: T = unsafe { std::mem::zeroed() };
+    // SAFETY: both have `size` bytes, one that this library knows, and are apart.
     unsafe {
         std::ptr::copy_nonoverlapping(pointer.cast::<u8>(), (&raw mut value).cast(), size);
     }
@@ -199,8 +214,10 @@ pub(super) unsafe fn fill<T: Sized32>(
     out: *mut T,
     make: impl FnOnce(u32) -> Result<T, Failure>,
 ) -> Answer {
+    // SAFETY: the pointer leads to a struct, as this function's caller promises.
     let size = unsafe { struct_size(out, "out") }?;
     let value = make(size as u32)?;
+    // SAFETY: both have `size` bytes, one that this library knows, and are apart.
     unsafe { std::ptr::copy_nonoverlapping((&raw const value).cast::<u8>(), out.cast(), size) };
     Ok(UPT_OK)
 }
@@ -216,6 +233,7 @@ pub(super) unsafe fn copy_out<T: Copy>(
         return fail(UPT_ERR_NULL, "out and needed are both NULL");
     }
     if !needed.is_null() {
+        // SAFETY: not NULL here, and `place` finds it aligned; the header asks for a place to write.
         unsafe { place(needed, "needed")?.write(values.len() as u64) };
     }
     if out.is_null() && capacity == 0 {
@@ -227,6 +245,7 @@ pub(super) unsafe fn copy_out<T: Copy>(
             format!("capacity is {capacity}, {} are needed", values.len()),
         );
     }
+    // SAFETY: the host passes room for that many elements, as the header asks.
     unsafe { slice_mut(out, values.len() as u64, "out") }?.copy_from_slice(values);
     Ok(UPT_OK)
 }
@@ -240,6 +259,7 @@ pub(super) unsafe fn copy_text(
 ) -> Answer {
     let mut bytes: Vec<u8> = text.bytes().filter(|&byte| byte != 0).collect();
     bytes.push(0);
+    // SAFETY: `out` has room for `capacity` elements and `needed` is NULL or writable, as the header asks.
     unsafe { copy_out(&bytes, out.cast(), capacity, needed) }
 }
 

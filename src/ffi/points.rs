@@ -22,6 +22,7 @@ pub unsafe extern "C" fn upt_scene_attach_points(
 ) -> upt_status {
     call_scene("upt_scene_attach_points", scene, |scene| {
         crate::scene::check_point_count(count)?;
+        // SAFETY: the host passes that many elements, as the header asks.
         let points = unsafe { optional(points, count.saturating_mul(3), "points") }?;
         scene.attach_points(points)?;
         Ok(UPT_OK)
@@ -43,6 +44,7 @@ pub unsafe extern "C" fn upt_scene_read_points(
     out_count: u64,
 ) -> upt_status {
     call_scene("upt_scene_read_points", scene, |scene| {
+        // SAFETY: the host passes room for that many elements, as the header asks.
         scene.read_points(unsafe { slice_mut(out, out_count, "out") }?)?;
         Ok(UPT_OK)
     })
@@ -64,6 +66,7 @@ pub unsafe extern "C" fn upt_scene_sample_points(
     out_count: u64,
 ) -> upt_status {
     call_scene("upt_scene_sample_points", scene, |scene| {
+        // SAFETY: the host passes room for that many elements, as the header asks.
         scene.sample_points(alpha, unsafe { slice_mut(out, out_count, "out") }?)?;
         Ok(UPT_OK)
     })

@@ -21,6 +21,7 @@ pub unsafe extern "C" fn upt_scene_set_region(
 ) -> upt_status {
     call_scene("upt_scene_set_region", scene, |scene| {
         scene.check_node_count("count", count)?;
+        // SAFETY: the host passes that many elements, as the header asks.
         scene.set_region(unsafe { optional(nodes, count, "nodes") }?)?;
         Ok(UPT_OK)
     })
@@ -45,7 +46,9 @@ pub unsafe extern "C" fn upt_scene_decode(
 ) -> upt_status {
     call_scene("upt_scene_decode", scene, |scene| {
         scene.check_node_count("count", count)?;
+        // SAFETY: the host passes that many elements, as the header asks.
         let nodes = unsafe { slice(nodes, count, "nodes") }?;
+        // SAFETY: the host passes room for that many elements, as the header asks.
         scene.decode(nodes, unsafe { slice_mut(out, out_count, "out") }?)?;
         Ok(UPT_OK)
     })

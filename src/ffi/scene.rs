@@ -28,8 +28,11 @@ pub unsafe extern "C" fn upt_scene_create(
         || {
             let out = pointers::place(out, "out")?;
             let model = find_model(model)?;
+            // SAFETY: NULL, or a struct whose first field is its size, as the header asks.
             let raw = unsafe { pointers::options(options) }?;
+            // SAFETY: the pointers in the struct are NULL or what the header asks for.
             let scene = Scene::new(model, &unsafe { convert::scene_options(&raw) }?)?;
+            // SAFETY: `place` found it aligned and not NULL, and the header asks for a place to write.
             unsafe { out.write(add_scene(scene)) };
             Ok(UPT_OK)
         },
@@ -91,6 +94,7 @@ pub unsafe extern "C" fn upt_scene_step(
         let floats = 3 * scene.node_count() as u64;
         let field = |pointer: *const f32, name| match pointer.is_null() {
             true => Ok(None),
+            // SAFETY: the host passes that many elements, as the header asks.
             false => unsafe { slice(pointer, floats, name) }.map(Some),
         };
         let displacement = field(displacement, "displacement")?;
@@ -99,6 +103,7 @@ pub unsafe extern "C" fn upt_scene_step(
             displacement,
             contact,
         };
+        // SAFETY: the host passes `out_count` floats of room, as the header asks.
         unsafe { step(scene, input, out, out_count) }
     })
 }
@@ -121,12 +126,14 @@ pub unsafe extern "C" fn upt_scene_step_contacts(
 ) -> upt_status {
     call_scene("upt_scene_step_contacts", scene, |scene| {
         let (nodes, vectors) =
+            // SAFETY: the host passes that many nodes and vectors, as the header asks.
             unsafe { contacts(scene, contact_nodes, contact_vectors, contact_count) }?;
         let contact = Contact::Sparse { nodes, vectors };
         let input = StepInput {
             displacement: None,
             contact,
         };
+        // SAFETY: the host passes `out_count` floats of room, as the header asks.
         unsafe { step(scene, input, out, out_count) }
     })
 }
@@ -145,6 +152,7 @@ pub unsafe extern "C" fn upt_scene_read(
     out_count: u64,
 ) -> upt_status {
     call_scene("upt_scene_read", scene, |scene| {
+        // SAFETY: the host passes room for that many elements, as the header asks.
         scene.read(unsafe { slice_mut(out, out_count, "out") }?)?;
         Ok(UPT_OK)
     })
@@ -158,7 +166,9 @@ pub(super) unsafe fn contacts<'a>(
     count: u64,
 ) -> Result<(&'a [u32], &'a [f32]), Failure> {
     scene.check_node_count("contact_count", count)?;
+    // SAFETY: the host passes that many elements, as the header asks.
     let nodes = unsafe { slice(nodes, count, "contact_nodes") }?;
+    // SAFETY: the host passes that many elements, as the header asks.
     let vectors = unsafe { slice(vectors, count.saturating_mul(3), "contact_vectors") }?;
     Ok((nodes, vectors))
 }
@@ -174,6 +184,7 @@ unsafe fn step(
         scene.step(input, None)?;
         return Ok(UPT_OK);
     }
+    // SAFETY: the host passes that many elements, as the header asks.
     let out_view = unsafe { slice(out.cast_const(), out_count, "out") }?;
     scene.check_out(out_view.len())?;
     let displacement = input.displacement.map(|u| apart(u, out_view)).transpose()?;
@@ -201,6 +212,7 @@ unsafe fn step(
         displacement: displacement.as_deref(),
         contact,
     };
+    // SAFETY: the host passes room for that many elements, as the header asks.
     scene.step(input, Some(unsafe { slice_mut(out, out_count, "out") }?))?;
     Ok(UPT_OK)
 }

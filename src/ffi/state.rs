@@ -62,6 +62,7 @@ pub unsafe extern "C" fn upt_scene_get_stats(
                     contact_ms: stats.contact_ms,
                 })
             };
+            // SAFETY: `out` points to a struct whose first field is its size, as the header asks.
             unsafe { pointers::fill(out, fill) }
         },
     )
@@ -85,6 +86,7 @@ pub unsafe extern "C" fn upt_scene_save(
 ) -> upt_status {
     call_scene("upt_scene_save", scene, |scene| {
         let snapshot = scene.save()?;
+        // SAFETY: `out` has room for `capacity` elements and `needed` is NULL or writable, as the header asks.
         unsafe { pointers::copy_out(&snapshot, out, capacity, needed) }
     })
 }
@@ -101,6 +103,7 @@ pub unsafe extern "C" fn upt_scene_restore(
     count: u64,
 ) -> upt_status {
     call_scene("upt_scene_restore", scene, |scene| {
+        // SAFETY: the host passes that many elements, as the header asks.
         scene.restore(unsafe { pointers::slice(bytes, count, "bytes") }?)?;
         Ok(UPT_OK)
     })

@@ -29,6 +29,7 @@ pub unsafe extern "C" fn upt_scene_submit(
 ) -> upt_status {
     call_scene("upt_scene_submit", scene, |scene| {
         let (nodes, vectors) =
+            // SAFETY: the host passes that many nodes and vectors, as the header asks.
             unsafe { contacts(scene, contact_nodes, contact_vectors, contact_count) }?;
         scene.submit(nodes, vectors)?;
         Ok(UPT_OK)
@@ -77,6 +78,7 @@ pub unsafe extern "C" fn upt_scene_sample(
     out_count: u64,
 ) -> upt_status {
     call_scene("upt_scene_sample", scene, |scene| {
+        // SAFETY: the host passes room for that many elements, as the header asks.
         scene.sample(alpha, unsafe { slice_mut(out, out_count, "out") }?)?;
         Ok(UPT_OK)
     })
