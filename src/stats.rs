@@ -37,11 +37,8 @@ pub mod flag {
     pub fn names(flags: u32) -> String {
         let meanings = [
             (PUSH, "a push is longer than trained"),
-            (
-                CONTACT_AREA,
-                "a contact area is outside of the trained range",
-            ),
-            (SITE, "a contact lies outside of the domain"),
+            (CONTACT_AREA, "a contact area is outside the trained range"),
+            (SITE, "a contact lies outside the domain"),
             (RATE, "a push changes faster than trained"),
             (SITES, "more contact sites than trained"),
             (BOUND, "guard: a displacement passes the bound"),
@@ -55,7 +52,7 @@ pub mod flag {
                 "the corrections fell back on the linear response",
             ),
             (ERROR, "the estimated error is above the limit"),
-            (DEEP, "an instrument lies deep inside of the tissue"),
+            (DEEP, "tissue lies more than 1 mm inside an instrument"),
         ];
         let said = meanings.iter().filter(|(flag, _)| flags & flag != 0);
         said.map(|(_, text)| *text).collect::<Vec<_>>().join("; ")

@@ -27,7 +27,7 @@ pub fn candidates(explicit: Option<&Path>) -> Vec<(PathBuf, &'static str)> {
         if beside.is_empty() {
             beside.push(folder.join(plain_name()));
         }
-        found.extend(beside.into_iter().map(|path| (path, "beside libupt")));
+        found.extend(beside.into_iter().map(|path| (path, "next to libupt")));
     }
     if let Some(path) = std::env::var_os("ORT_DYLIB_PATH").filter(|value| !value.is_empty()) {
         found.push((absolute(Path::new(&path)), "ORT_DYLIB_PATH"));

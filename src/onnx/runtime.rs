@@ -99,7 +99,7 @@ fn load(explicit: Option<&Path>) -> Result<Runtime> {
         }
     }
     Err(Error::Runtime(format!(
-        "no usable library (version 1.{} or newer); tried {}. Put {} beside libupt, set ORT_DYLIB_PATH, \
+        "no usable library (version 1.{} or newer); tried {}. Put {} into the folder of libupt, set ORT_DYLIB_PATH, \
          or fetch it with `cargo xtask ort`",
         ort::MINOR_VERSION,
         tried.join("; "),

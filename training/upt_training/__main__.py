@@ -69,7 +69,7 @@ def parser() -> argparse.ArgumentParser:
     export.add_argument("--f16", action="store_true", help="also half-precision graphs")
     export.add_argument("--int8", action="store_true", help="also dynamically quantised graphs")
 
-    variants = commands.add_parser("variants", help="a copy of a bundle with f16 and int8 graphs beside")
+    variants = commands.add_parser("variants", help="a copy of a bundle with f16 and int8 graphs too")
     variants.add_argument("bundle", type=Path)
     variants.add_argument("--f16", action="store_true", help="half-precision graphs")
     variants.add_argument("--int8", action="store_true", help="dynamically quantised graphs")
@@ -91,7 +91,7 @@ def parser() -> argparse.ArgumentParser:
     seal = commands.add_parser("seal", help="renew a manifest's digest and `requires` after a change by hand")
     seal.add_argument("bundle", type=Path, nargs="+", help="bundle folders, changed in place")
 
-    rest = commands.add_parser("rest", help="measure where free motion ends beside rest, and write it")
+    rest = commands.add_parser("rest", help="measure how far from rest free motion ends, and write it")
     rest.add_argument("bundle", type=Path, nargs="+", help="bundle folders, changed in place")
 
     bench = commands.add_parser("bench", help="samples a core-second of a training step, lever by lever: a table")

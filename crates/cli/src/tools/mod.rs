@@ -399,7 +399,7 @@ fn document(path: &Path, mesh: &str, made: &str, rows: &[Row]) -> Result<()> {
         })
         .collect();
     let text = format!(
-        "\n{made}\n\n{}\nBy programme, where contact is solved inside of corrections:\n\n{}",
+        "\n{made}\n\n{}\nBy programme, where contact is solved inside the corrections:\n\n{}",
         table::markdown(table::COLUMNS, &over_all),
         table::markdown(table::COLUMNS, &each)
     );
