@@ -6,9 +6,11 @@ A page without a fault in one of these is one passed test; so is each code block
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
+from urllib.parse import unquote
 
 sys.path.insert(0, str(Path(__file__).parent))
 import blocks
@@ -69,7 +71,17 @@ def book() -> list[str]:
     said = [line for line in done.stderr.splitlines() if "WARN" in line or "ERROR" in line]
     if done.returncode != 0 or said:
         return ["mdbook: " + "\n".join(said or [done.stderr])]
-    return []
+    return dead_links(WORK / "book")
+
+
+def dead_links(folder: Path) -> list[str]:
+    """Links of the built pages that lead to no file."""
+    found = []
+    for page in sorted(folder.rglob("*.html")):
+        for target in re.findall(r'(?:href|src)="([^"#?]+)', page.read_text(encoding="utf-8")):
+            if not re.match(r"[a-z]+:|//", target) and not (page.parent / unquote(target)).exists():
+                found.append(f"{page.relative_to(folder)}: {target} is not in the book")
+    return found
 
 
 def main() -> int:
