@@ -48,26 +48,35 @@ pub struct Delassus {
     a: Vec<f32>,
     /// The natural modes' part was left out of it.
     is_static: bool,
-    /// `W [3n,3n]`, mm/mN.
+    /// `W [3n,3n]`, mm/mN, and the samples that it is of.
     w: Vec<f32>,
+    of: Vec<u32>,
 }
 
 impl Delassus {
     /// Forgets the columns: the next call reads them anew.
     pub fn forget(&mut self) {
         self.columns.clear();
+        self.of.clear();
     }
 
-    /// `W` of samples, `[3n,3n]`, row-major.
+    /// `W` of samples, `[3n,3n]`, row-major; read again only where they are others than those of the last call.
     ///
     /// # Errors
     /// [`crate::Error::OutOfMemory`].
     pub fn of(
         &mut self,
         compliance: Compliance<'_>,
-        samples: impl Iterator<Item = Sample> + Clone,
+        all: &[Sample],
+        rows: impl Iterator<Item = u32> + Clone,
     ) -> Result<&[f32]> {
-        self.gather(compliance, samples.clone())?;
+        let samples = rows.clone().map(|row| all[row as usize]);
+        let read = self.gather(compliance, samples.clone())?;
+        if !read && self.of.iter().copied().eq(rows.clone()) {
+            return Ok(&self.w);
+        }
+        self.of.clear();
+        self.of.extend(rows);
         let (order, count) = (3 * self.columns.len(), samples.clone().count());
         self.w.clear();
         memory::reserve(&mut self.w, 9 * count * count, WHAT)?;
@@ -98,12 +107,12 @@ impl Delassus {
         Ok(&self.w)
     }
 
-    /// Reads the columns that samples need, unless they are there.
+    /// Reads the columns that samples need, unless they are there; tells whether it has.
     fn gather(
         &mut self,
         compliance: Compliance<'_>,
         samples: impl Iterator<Item = Sample>,
-    ) -> Result<()> {
+    ) -> Result<bool> {
         self.wanted.clear();
         for sample in samples {
             self.wanted
@@ -117,8 +126,9 @@ impl Delassus {
             && self.columns.len() <= 2 * self.wanted.len()
             && self.wanted.iter().all(known)
         {
-            return Ok(());
+            return Ok(false);
         }
+        self.of.clear();
         self.is_static = compliance.inertia.is_none();
         std::mem::swap(&mut self.columns, &mut self.wanted);
         let order = 3 * self.columns.len();
@@ -126,9 +136,9 @@ impl Delassus {
         self.a.clear();
         let made = memory::reserve(&mut self.upper, order * order, WHAT)
             .and_then(|()| memory::reserve(&mut self.a, order * order, WHAT));
-        if made.is_err() {
+        if let Err(error) = made {
             self.columns.clear();
-            return made;
+            return Err(error);
         }
         self.upper.resize(order * order, 0.0);
         compliance
@@ -143,7 +153,7 @@ impl Delassus {
                 self.a[i * order + j] = self.a[j * order + i];
             }
         }
-        Ok(())
+        Ok(true)
     }
 
     /// Takes the natural modes' part off the upper triangle.
@@ -190,7 +200,8 @@ impl Delassus {
             + self.widened.capacity()
             + self.modes.capacity()
             + self.a.capacity()
-            + self.w.capacity())
+            + self.w.capacity()
+            + self.of.capacity())
             + 8 * self.upper.capacity()
     }
 }

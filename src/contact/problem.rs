@@ -249,8 +249,8 @@ impl Problem {
         self.forces.extend(self.rows.iter().map(|row| row.force));
         let samples = &self.samples;
         let rows = &self.rows;
-        let of = rows.iter().map(|row| samples.rows()[row.sample as usize]);
-        let w = self.delassus.of(compliance, of)?;
+        let of = rows.iter().map(|row| row.sample);
+        let w = self.delassus.of(compliance, samples.rows(), of)?;
         for pass in 0..LINEARISATIONS {
             self.contacts.clear();
             for (at, row) in self.rows.iter_mut().enumerate() {

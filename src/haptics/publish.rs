@@ -170,7 +170,8 @@ impl Link {
         };
         let rows = self.samples.rows();
         let of = self.found.iter().map(|(_, row)| rows[*row as usize]);
-        let w = self.delassus.of(compliance, of.clone())?;
+        let sampled = self.found.iter().map(|(_, row)| *row);
+        let w = self.delassus.of(compliance, rows, sampled)?;
         let slow = self.out.input_buffer_mut();
         slow.delassus[..w.len()].copy_from_slice(w);
         let modes = self.rows.len();

@@ -23,10 +23,15 @@ pub fn frame(normal: Vector) -> Matrix {
     Matrix::from_cols(normal, first, normal.cross(first))
 }
 
+/// Length of the tangential part. Not `hypot`, which is the system's and differs between systems.
+fn across(force: Vector) -> f32 {
+    (force.y * force.y + force.z * force.z).sqrt()
+}
+
 /// The tangential part of a local force, cut to the friction cone.
 pub fn clamp_tangential(force: Vector, friction: f32) -> Vector {
     let limit = friction * force.x.max(0.0);
-    let size = force.y.hypot(force.z);
+    let size = across(force);
     if size <= limit {
         return force;
     }
@@ -43,7 +48,7 @@ pub fn coulomb(w: &Matrix, inverse: &Matrix, b: Vector, friction: f32, guess: Ve
         return Vector::new(-b.x / w.x_axis.x, 0.0, 0.0);
     }
     let stick = -(*inverse * b);
-    if stick.x >= 0.0 && stick.y.hypot(stick.z) <= friction * stick.x {
+    if stick.x >= 0.0 && across(stick) <= friction * stick.x {
         return stick;
     }
     // A step of one over the trace of the tangential block never overshoots.
