@@ -100,7 +100,7 @@ pub const STAGES: &[Stage] = &[
     },
     Stage {
         name: "style",
-        about: "ruff and clang-format",
+        about: "ruff, clang-format, unused dependencies",
         needs: &[],
         nightly: false,
         run: style,
@@ -264,6 +264,11 @@ fn style(workspace: &Workspace) -> Result<Outcome> {
             Command::new(&ruff)
                 .args(["format", "--check"])
                 .current_dir(&workspace.root),
+        )?,
+        check(
+            workspace,
+            "unused dependencies",
+            Command::new(workspace.python()).arg(workspace.path("tests/style/dependencies.py")),
         )?,
     ];
     let listed = Command::new("git")
