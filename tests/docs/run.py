@@ -46,14 +46,13 @@ def known_files() -> set[Path]:
 
 
 def index(pages: list[Path], name: str) -> list[str]:
-    """The pages of docs/ that a table of contents leaves out; README.md names the folder of the decisions only."""
+    """The pages of docs/ that a table of contents leaves out; the decisions have a table of their own."""
     contents = ROOT / "docs" / name
     listed = {(contents.parent / link.target.partition("#")[0]).resolve() for link in links.page(contents).links}
-    within = [
-        path for path in pages if path.is_relative_to(ROOT / "docs") and path.name not in ("README.md", "SUMMARY.md")
-    ]
-    if name == "README.md":
-        within = [path for path in within if path.parent.name != "decisions"]
+    decisions = ROOT / "docs/decisions"
+    within = [path for path in pages if path.is_relative_to(ROOT / "docs") and not path.stem.isupper()]
+    if name != "SUMMARY.md":
+        within = [path for path in within if (path.parent == decisions) == (contents.parent == decisions)]
     return [f"docs/{name} does not list {path.relative_to(ROOT)}" for path in within if path not in listed]
 
 
@@ -93,7 +92,7 @@ def main() -> int:
         tally.add(links.faults(path, known.__contains__))
         if path.name != "CHANGELOG.md":
             tally.add(commands.faults(path))
-    for name in ("README.md", "SUMMARY.md"):
+    for name in ("README.md", "SUMMARY.md", "decisions/README.md"):
         tally.add(index(pages, name))
     tally.add(book())
     for path in pages:
