@@ -14,6 +14,7 @@ mod dataset;
 mod doctor;
 #[cfg(feature = "files")]
 mod export;
+mod haptics;
 mod host;
 #[cfg(not(all(feature = "files", feature = "linear")))]
 mod left_out;
@@ -121,6 +122,8 @@ enum Command {
     Stress(stress::Options),
     /// Run a bundle and the reference solver side by side: error over random steps, warnings, forces, release.
     Beside(beside::Options),
+    /// Let a simulated hand feel a bundle at 1 kHz: energy, force steps, call times, forces against the reference solver.
+    Haptics(haptics::Options),
     /// Make very many steps on one scene and log the memory.
     Soak(soak::Options),
     /// Show a bundle in the browser: drag a tool, watch the tissue.
@@ -168,6 +171,7 @@ fn main() -> ExitCode {
         Command::Report(options) => report::run(&options),
         Command::Stress(options) => stress::run(&options),
         Command::Beside(options) => beside::run(&options),
+        Command::Haptics(options) => haptics::run(&options),
         Command::Soak(options) => soak::run(&options),
         Command::View(options) => view::run(&options),
         Command::Completions(options) => completions::run::<Arguments>(&options),

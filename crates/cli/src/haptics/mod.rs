@@ -1,0 +1,156 @@
+//! `upt haptics`: a simulated hand on a simulated device feels a bundle at 1 kHz; energy, force steps, call times, and the forces beside the
+//! reference solver's.
+//!
+//! | module | what |
+//! |---|---|
+//! | [`device`] | the device's mass, the hand that holds it, and a clock that jitters |
+//! | [`gesture`] | what the hand wants: presses, strokes, taps, two tools |
+//! | [`play`] | one gesture: steps at 20 Hz, forces at 1 kHz |
+//! | [`truth`] | the reference solver on the way that the tools took |
+//! | [`table`] | what is shown |
+
+mod device;
+mod gesture;
+mod play;
+mod table;
+mod truth;
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Arc;
+
+use anyhow::{Context, Result, bail};
+use tissue::mesh::{Boundary, Mesh};
+use upt::{Corrections, Model, ModelOptions, SceneOptions};
+
+use crate::machine::Machine;
+use crate::report::method::BundleFolder;
+use crate::stress::{progress, replace_between};
+use gesture::{GESTURES, Gesture, Site};
+use play::Player;
+use table::{Account, Row};
+
+#[derive(clap::Args)]
+#[command(
+    after_help = "Examples:\n  upt haptics onnx/brain-coarse-reduced --minutes 1\n  upt haptics onnx/brain-reduced --minutes 10 --reference 4 --markdown docs/guide/frames-and-haptics.md --plot force.svg"
+)]
+pub struct Options {
+    /// Bundle folder with corrections.
+    bundle: PathBuf,
+    /// Simulated time.
+    #[arg(long, default_value_t = 1.0)]
+    minutes: f64,
+    /// Seconds of each gesture that the reference solver replays; 0: none.
+    #[arg(long, default_value_t = 0.0)]
+    reference: f64,
+    /// How old a step is when it arrives, ms.
+    #[arg(long, default_value_t = 12.0)]
+    latency_ms: f64,
+    /// Corrections a step; by default as many as the bundle recommends.
+    #[arg(long)]
+    corrections: Option<u32>,
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// A page with the markers `begin: upt haptics NAME` and `end: upt haptics NAME`, NAME the bundle's.
+    #[arg(long)]
+    markdown: Option<PathBuf>,
+    /// The force of a stroke over time beside the solver's, SVG; needs --reference.
+    #[arg(long)]
+    plot: Option<PathBuf>,
+}
+
+/// Exit code 1 when a force was not a number, or stayed when the tools had gone.
+pub fn run(options: &Options) -> Result<ExitCode> {
+    if options.plot.is_some() && options.reference <= 0.0 {
+        bail!("--plot shows the solver's force too: say for how many seconds with --reference");
+    }
+    if !(options.minutes > 0.0 && options.minutes <= 10_000.0) {
+        bail!("--minutes is {}, must be above 0", options.minutes);
+    }
+    if !(0.0..=40.0).contains(&options.latency_ms) {
+        bail!("--latency-ms is {}, must be 0 to 40", options.latency_ms);
+    }
+    let bundle = BundleFolder::read(&options.bundle)?;
+    let mesh = Mesh::read(&bundle.mesh_file)?;
+    let boundary: Boundary = bundle.boundary.parse().map_err(anyhow::Error::msg)?;
+    let model = Model::open(&options.bundle, &ModelOptions::default())
+        .with_context(|| options.bundle.display().to_string())?;
+    let scene = SceneOptions {
+        threads: 1,
+        corrections: match options.corrections {
+            Some(count) => Corrections::Fixed(count),
+            None => Corrections::Recommended,
+        },
+        ..SceneOptions::default()
+    };
+    let seconds = 60.0 * options.minutes;
+    let each: f64 = GESTURES.iter().map(|gesture| gesture.seconds).sum();
+    let rounds = (seconds / each).ceil().max(1.0) as u64;
+    let bar = progress(rounds as usize * GESTURES.len(), "gestures");
+    let mut rows: Vec<Row> = GESTURES
+        .iter()
+        .map(|gesture| Row::new(gesture.name))
+        .collect();
+    let mut account = Account::default();
+    for round in 0..rounds {
+        for (row, gesture) in rows.iter_mut().zip(&GESTURES) {
+            let site = Site::new(gesture, &mesh, options.seed + round)?;
+            let mut player = Player::new(&model, &scene, options.latency_ms, &site)?;
+            let track = player.play(gesture, &site, true, options.seed + round)?;
+            row.add(&track);
+            account.add(&track);
+            if round == 0 {
+                let mut bare = Player::new(&model, &scene, options.latency_ms, &site)?;
+                row.add_bare(&bare.play(gesture, &site, false, options.seed)?);
+                if options.reference > 0.0 {
+                    compare(
+                        options, &model, &mesh, boundary, gesture, &site, &track, row,
+                    )?;
+                }
+            }
+            bar.inc(1);
+        }
+    }
+    bar.finish_and_clear();
+    let text = table::markdown(&rows, &account, options.reference > 0.0);
+    println!("{text}");
+    if let Some(page) = &options.markdown {
+        write(page, &bundle.name, mesh.node_count(), options, &text)?;
+    }
+    Ok(ExitCode::from(u8::from(account.is_bad())))
+}
+
+/// Puts the solver's forces on a gesture's way into its row, and into the plot where it is the one that is shown.
+#[allow(clippy::too_many_arguments)]
+fn compare(
+    options: &Options,
+    model: &Arc<Model>,
+    mesh: &Mesh,
+    boundary: Boundary,
+    gesture: &Gesture,
+    site: &Site,
+    track: &play::Track,
+    row: &mut Row,
+) -> Result<()> {
+    let seconds = options.reference.min(gesture.seconds);
+    let truth = truth::replay(model, mesh, boundary, site, track, seconds)?;
+    row.compare(track, &truth);
+    match &options.plot {
+        Some(path) if gesture.shown => std::fs::write(path, table::plot(track, &truth))
+            .with_context(|| path.display().to_string()),
+        _ => Ok(()),
+    }
+}
+
+fn write(page: &Path, name: &str, nodes: usize, options: &Options, text: &str) -> Result<()> {
+    let machine = Machine::this();
+    let lead = format!(
+        "\n`{name}`, {nodes} nodes, steps of 50 ms that arrive {} ms late, {:.0} minutes of simulated time; {} ({} cores), other work beside.\n\n",
+        options.latency_ms, options.minutes, machine.cpu, machine.cores
+    );
+    replace_between(
+        page,
+        &format!("upt haptics {name}"),
+        &format!("{lead}{text}"),
+    )
+}

@@ -1,0 +1,256 @@
+//! The table and the plot.
+
+use std::fmt::Write;
+
+use contact::Vector;
+
+use super::play::Track;
+use super::truth::{FRAME_S, Forces, resample};
+use crate::report::plot::{Axes, Scale, colour};
+
+/// A gesture over all its rounds.
+pub struct Row {
+    name: &'static str,
+    /// Largest force, N.
+    peak: f32,
+    /// Largest change of the force within a millisecond, N.
+    jump: f32,
+    given_j: f64,
+    bare_j: f64,
+    damped: usize,
+    touching: usize,
+    beside: Option<Beside>,
+}
+
+/// Beside the solver, over the first round.
+struct Beside {
+    /// Relative L2 error of the force, and of the last step's force held.
+    error: f64,
+    held: f64,
+    /// Largest change within a millisecond: rendered and the solver's, N.
+    jumps: [f32; 2],
+}
+
+/// All gestures together.
+#[derive(Default)]
+pub struct Account {
+    calls_us: Vec<f64>,
+    ticks: usize,
+    given_j: f64,
+    not_finite: usize,
+    stuck: usize,
+}
+
+impl Account {
+    pub fn add(&mut self, track: &Track) {
+        self.calls_us.extend_from_slice(&track.calls_us);
+        self.ticks += track.ticks.len();
+        self.given_j += track.given_j;
+        self.not_finite += track.not_finite;
+        self.stuck += usize::from(track.stuck);
+    }
+
+    /// A force that is no number, or that stays.
+    pub fn is_bad(&self) -> bool {
+        self.not_finite + self.stuck > 0
+    }
+}
+
+/// Force of a tool by millisecond.
+fn forces(track: &Track, tool: usize, count: usize) -> Vec<Vector> {
+    let at = |k: usize| resample(track, k as f64 * FRAME_S, |tick| tick.tools[tool].1);
+    (0..count).map(at).collect()
+}
+
+fn largest_change(forces: &[Vector]) -> f32 {
+    let pairs = forces.windows(2);
+    pairs
+        .map(|pair| (pair[1] - pair[0]).length())
+        .fold(0.0, f32::max)
+}
+
+impl Row {
+    pub fn new(name: &'static str) -> Row {
+        Row {
+            name,
+            peak: 0.0,
+            jump: 0.0,
+            given_j: 0.0,
+            bare_j: 0.0,
+            damped: 0,
+            touching: 0,
+            beside: None,
+        }
+    }
+
+    pub fn add(&mut self, track: &Track) {
+        let last = track.ticks.last().map_or(0.0, |tick| tick.time_s);
+        let count = (last / FRAME_S) as usize;
+        for tool in 0..track.ticks.first().map_or(0, |tick| tick.tools.len()) {
+            let forces = forces(track, tool, count);
+            self.jump = self.jump.max(largest_change(&forces));
+            let sizes = forces.iter().map(|force| force.length());
+            self.peak = sizes.fold(self.peak, f32::max);
+        }
+        self.given_j += track.given_j;
+        self.damped += track.damped;
+        self.touching += track.touching;
+    }
+
+    /// The same gesture without the controller.
+    pub fn add_bare(&mut self, track: &Track) {
+        self.bare_j += track.given_j;
+    }
+
+    /// Beside the solver.
+    pub fn compare(&mut self, track: &Track, truth: &Forces) {
+        let square = |v: Vector| f64::from(v.length_squared());
+        let (mut off, mut held, mut size) = (0.0, 0.0, 0.0);
+        let mut jumps = [0.0f32; 2];
+        for tool in 0..truth[0].len() {
+            let felt = forces(track, tool, truth.len());
+            let real: Vec<Vector> = truth.iter().map(|frame| frame[tool]).collect();
+            for (k, (felt, real)) in felt.iter().zip(&real).enumerate() {
+                let told = resample(track, k as f64 * FRAME_S, |tick| tick.tools[tool].2);
+                off += square(*felt - *real);
+                held += square(told - *real);
+                size += square(*real);
+            }
+            jumps[0] = jumps[0].max(largest_change(&felt));
+            jumps[1] = jumps[1].max(largest_change(&real));
+        }
+        self.beside = Some(Beside {
+            error: (off / size).sqrt(),
+            held: (held / size).sqrt(),
+            jumps,
+        });
+    }
+}
+
+fn quantile(sorted: &[f64], part: f64) -> f64 {
+    let at = (part * sorted.len() as f64) as usize;
+    sorted[at.min(sorted.len() - 1)]
+}
+
+/// The tables as Markdown.
+pub fn markdown(rows: &[Row], account: &Account, compared: bool) -> String {
+    let mut text = String::from(
+        "| gesture | largest force, mN | largest change in 1 ms, mN | energy given, µJ | without the controller (first round), µJ | damped, part of touching |\n|---|---|---|---|---|---|\n",
+    );
+    for row in rows {
+        let damped = row.damped as f64 / row.touching.max(1) as f64;
+        let _ = writeln!(
+            text,
+            "| {} | {:.0} | {:.2} | {:.3} | {:.3} | {:.1} % |",
+            row.name,
+            1e3 * row.peak,
+            1e3 * row.jump,
+            1e6 * row.given_j,
+            1e6 * row.bare_j,
+            100.0 * damped
+        );
+    }
+    if compared {
+        text += "\n| beside the solver | force error, relative L2 | the last step's force held | largest change in 1 ms: rendered / solver, mN | ratio |\n|---|---|---|---|---|\n";
+        for row in rows {
+            let Some(beside) = &row.beside else { continue };
+            let [felt, real] = beside.jumps;
+            let _ = writeln!(
+                text,
+                "| {} | {:.1} % | {:.1} % | {:.2} / {:.2} | {:.2} |",
+                row.name,
+                100.0 * beside.error,
+                100.0 * beside.held,
+                1e3 * felt,
+                1e3 * real,
+                felt / real
+            );
+        }
+    }
+    let mut calls = account.calls_us.clone();
+    calls.sort_unstable_by(f64::total_cmp);
+    let missed = calls.iter().filter(|us| **us > 1000.0).count();
+    let _ = write!(
+        text,
+        "\n{} calls: p50 {:.0} µs, p99 {:.0} µs, p99.9 {:.0} µs, largest {:.0} µs; {missed} took longer than 1 ms. Energy given in all: {:.4} mJ. \
+         Forces that are no numbers: {}. Gestures that end with a force: {}.\n",
+        calls.len(),
+        quantile(&calls, 0.5),
+        quantile(&calls, 0.99),
+        quantile(&calls, 0.999),
+        calls[calls.len() - 1],
+        1e3 * account.given_j,
+        account.not_finite,
+        account.stuck
+    );
+    text
+}
+
+/// Force on the first tool over time at 1 kHz: rendered, the solver's, and the last step's held.
+pub fn plot(track: &Track, truth: &Forces) -> String {
+    let time = |k: usize| k as f64 * FRAME_S;
+    let line = |of: &dyn Fn(usize) -> Vector| -> Vec<(f64, f64)> {
+        let size = |k: usize| (time(k), 1e3 * f64::from(of(k).length()));
+        (0..truth.len()).map(size).collect()
+    };
+    let felt = line(&|k| resample(track, time(k), |tick| tick.tools[0].1));
+    let told = line(&|k| resample(track, time(k), |tick| tick.tools[0].2));
+    let real = line(&|k| truth[k][0]);
+    let all = felt.iter().chain(&told).chain(&real);
+    let most = all.map(|point| point.1).fold(0.0, f64::max);
+    let mut axes = Axes::new(
+        900.0,
+        360.0,
+        Scale::linear(0.0, time(truth.len())),
+        Scale::linear(0.0, most),
+        "time, s",
+        "force on the tool, mN",
+    );
+    axes.line(&told, "#b9c1c9", 1.0, false);
+    axes.line(&real, colour(1), 2.0, false);
+    axes.line(&felt, colour(0), 1.2, false);
+    axes.standalone(&[
+        ("rendered at 1 kHz", colour(0)),
+        ("reference solver", colour(1)),
+        ("last step's force", "#b9c1c9"),
+    ])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::play::Tick;
+    use super::*;
+
+    fn track(force: impl Fn(f64) -> f32) -> Track {
+        let tick = |k: usize| {
+            let time_s = 1.1e-3 * k as f64;
+            let felt = Vector::new(0.0, force(time_s), 0.0);
+            Tick {
+                time_s,
+                tools: vec![(Vector::ZERO, felt, Vector::ZERO)],
+            }
+        };
+        Track {
+            ticks: (0..100).map(tick).collect(),
+            calls_us: vec![10.0; 100],
+            ..Track::default()
+        }
+    }
+
+    #[test]
+    fn a_force_that_is_a_tenth_too_large_is_ten_per_cent_off() {
+        let truth: Forces = (0..100)
+            .map(|k| vec![Vector::new(0.0, 1e-3 * k as f32, 0.0)])
+            .collect();
+        let mut row = Row::new("ramp");
+        row.compare(&track(|t| 1.1 * t as f32), &truth);
+        let beside = row.beside.as_ref().unwrap();
+        assert!((beside.error - 0.1).abs() < 1e-3, "{}", beside.error);
+        assert!((beside.jumps[0] / beside.jumps[1] - 1.1).abs() < 1e-2);
+        let mut account = Account::default();
+        account.add(&track(|t| t as f32));
+        let text = markdown(&[row], &account, true);
+        assert!(text.contains("| ramp | 10.0 % |"), "{text}");
+        assert!(!account.is_bad());
+    }
+}
