@@ -146,3 +146,49 @@ pub(super) fn remove(handle: usize) -> Result<(), Failure> {
     drop(taken.hand().take());
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::Tool;
+    use crate::haptics::HapticOptions;
+    use crate::haptics::test_hand;
+
+    fn hand() -> Haptics {
+        let shape = ::contact::Shape::Sphere { radius: 3.0 };
+        let tool = Tool::new(0, &shape, [0.0; 3], [0.0, 0.0, 0.0, 1.0]).unwrap();
+        test_hand(&HapticOptions::new(0, tool))
+    }
+
+    /// Threads that find, make and end objects at once: each call has the object alone, or is told that it has not.
+    #[test]
+    fn one_thread_at_a_time_has_an_object() {
+        let turns = if cfg!(miri) { 20 } else { 20_000 };
+        let shared = add(hand()).map_err(|e| e.message).unwrap();
+        let inside = AtomicUsize::new(0);
+        std::thread::scope(|scope| {
+            for _ in 0..3 {
+                scope.spawn(|| {
+                    for turn in 0..turns {
+                        let done = with(shared, |_| {
+                            assert_eq!(inside.fetch_add(1, Ordering::AcqRel), 0);
+                            inside.fetch_sub(1, Ordering::AcqRel);
+                            Ok(())
+                        });
+                        assert!(done.map_or_else(|e| e.status == UPT_ERR_BUSY, |()| true));
+                        if turn % 50 == 0 {
+                            let own = add(hand()).map_err(|e| e.message).unwrap();
+                            assert!(with(own, |_| Ok(())).is_ok());
+                            assert!(remove(own).is_ok());
+                            assert!(
+                                with(own, |_| Ok(())).is_err_and(|e| e.status == UPT_ERR_HANDLE)
+                            );
+                        }
+                    }
+                });
+            }
+        });
+        assert!(remove(shared).is_ok());
+        assert!(remove(shared).is_err());
+    }
+}

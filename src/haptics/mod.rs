@@ -25,6 +25,15 @@ pub use render::Haptics;
 
 use crate::contact::Tool;
 
+/// A hand without a scene.
+#[cfg(test)]
+pub(crate) fn test_hand(options: &HapticOptions) -> Haptics {
+    let modes = modes::Modes::new(&[], 0.0).unwrap();
+    let (_, slow) = triple_buffer::triple_buffer(&slow::Slow::new(0).unwrap());
+    let (pose, _) = triple_buffer::triple_buffer(&options.tool.pose);
+    Haptics::new(options, modes, slow, pose, Default::default()).unwrap()
+}
+
 /// How a tool is rendered.
 #[derive(Clone, Debug)]
 pub struct HapticOptions {

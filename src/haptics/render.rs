@@ -21,7 +21,7 @@ use crate::scene::INPUT_LIMIT;
 const WHAT: &str = "haptics";
 /// Samples in one solve at most; those that push come first.
 const MOST_ROWS: usize = 64;
-/// Samples this near to the tool are solved for, beside its motion, mm.
+/// Samples this near to the tool are solved for, and farther by its motion, mm.
 const SKIN_MM: f32 = 0.5;
 /// A tool that is farther from where it was has been put there, mm.
 const PUT_MM: f32 = 40.0;
@@ -173,7 +173,7 @@ impl Haptics {
         if arrived {
             self.offset = [self.shown[0] - force, self.shown[1] - torque];
         }
-        // What the last step's prediction was beside: faded out in time, and outside of the tissue in space.
+        // The difference from the last step's force fades out in time, and outside of the tissue in space.
         let near = match contacts > 0 {
             true => 1.0,
             false => 1.0 - self.contact.nearest.max(0.0) / FADE_MM,
@@ -285,9 +285,9 @@ impl Solver {
         for at in 0..slow.count {
             let pushed = self.forces[at] != Vector::ZERO;
             let point = self.place(slow, at);
-            let beside = point.cmplt(low).any() || point.cmpgt(high).any();
+            let outside = point.cmplt(low).any() || point.cmpgt(high).any();
             let held = slow.anchors[at].is_some();
-            let distance = match beside && !pushed && !held {
+            let distance = match outside && !pushed && !held {
                 true => f32::MAX,
                 false => body.nearest_at(now, point).distance,
             };

@@ -76,3 +76,59 @@ impl Slow {
             + 4 * (self.delassus.len() + self.at_samples.len() + 2 * self.velocity.len())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::atomic::{AtomicBool, Ordering};
+    use triple_buffer::triple_buffer;
+
+    /// One number in every field.
+    fn write(slow: &mut Slow, number: u64) {
+        let value = number as f32;
+        slow.points.fill(Vector::splat(value));
+        slow.delassus.fill(value);
+        slow.velocity.fill(value);
+        slow.number = number;
+    }
+
+    fn is_whole(slow: &Slow) -> bool {
+        let value = slow.number as f32;
+        slow.points
+            .iter()
+            .all(|point| *point == Vector::splat(value))
+            && slow.delassus.iter().all(|w| *w == value)
+            && slow.velocity.iter().all(|v| *v == value)
+    }
+
+    /// What is read while the other thread writes is of one step, whole, and never older than what was read before.
+    #[test]
+    fn a_problem_is_never_torn() {
+        // Miri is slow, and looks at each access.
+        let count = if cfg!(miri) { 3 } else { 20_000 };
+        let (mut out, mut slow) = triple_buffer(&Slow::new(4).unwrap());
+        let done = AtomicBool::new(false);
+        std::thread::scope(|scope| {
+            scope.spawn(|| {
+                for number in 1..=count {
+                    write(out.input_buffer_mut(), number);
+                    out.publish();
+                }
+                done.store(true, Ordering::Release);
+            });
+            let mut last = 0;
+            loop {
+                let over = done.load(Ordering::Acquire);
+                slow.update();
+                let now = slow.output_buffer();
+                assert!(is_whole(now), "torn at {}", now.number);
+                assert!(now.number >= last);
+                last = now.number;
+                if over {
+                    break;
+                }
+            }
+            assert_eq!(last, count);
+        });
+    }
+}

@@ -1,5 +1,5 @@
-//! `upt haptics`: a simulated hand on a simulated device feels a bundle at 1 kHz; energy, force steps, call times, and the forces beside the
-//! reference solver's.
+//! `upt haptics`: a simulated hand on a simulated device feels a bundle at 1 kHz; energy, force steps, call times, and the forces against
+//! those of the reference solver.
 //!
 //! | module | what |
 //! |---|---|
@@ -37,7 +37,7 @@ use table::{Account, Row};
 pub struct Options {
     /// Bundle folder with corrections.
     bundle: PathBuf,
-    /// Simulated time.
+    /// Simulated time, minutes.
     #[arg(long, default_value_t = 1.0)]
     minutes: f64,
     /// Seconds of each gesture that the reference solver replays; 0: none.
@@ -49,12 +49,13 @@ pub struct Options {
     /// Corrections a step; by default as many as the bundle recommends.
     #[arg(long)]
     corrections: Option<u32>,
+    /// Seed of the sites and of the clock's jitter.
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// A page with the markers `begin: upt haptics NAME` and `end: upt haptics NAME`, NAME the bundle's.
     #[arg(long)]
     markdown: Option<PathBuf>,
-    /// The force of a stroke over time beside the solver's, SVG; needs --reference.
+    /// Write the force of a stroke over time, and the solver's, as SVG; needs --reference.
     #[arg(long)]
     plot: Option<PathBuf>,
 }
@@ -120,7 +121,7 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     Ok(ExitCode::from(u8::from(account.is_bad())))
 }
 
-/// Puts the solver's forces on a gesture's way into its row, and into the plot where it is the one that is shown.
+/// Compares a gesture's row with the solver's forces on its way, and into the plot where it is the one that is shown.
 #[allow(clippy::too_many_arguments)]
 fn compare(
     options: &Options,
@@ -145,7 +146,7 @@ fn compare(
 fn write(page: &Path, name: &str, nodes: usize, options: &Options, text: &str) -> Result<()> {
     let machine = Machine::this();
     let lead = format!(
-        "\n`{name}`, {nodes} nodes, steps of 50 ms that arrive {} ms late, {:.0} minutes of simulated time; {} ({} cores), other work beside.\n\n",
+        "\n`{name}`, {nodes} nodes, steps of 50 ms that arrive {} ms late, {:.0} minutes of simulated time; {} ({} cores), busy with other work.\n\n",
         options.latency_ms, options.minutes, machine.cpu, machine.cores
     );
     replace_between(

@@ -19,11 +19,11 @@ pub struct Row {
     bare_j: f64,
     damped: usize,
     touching: usize,
-    beside: Option<Beside>,
+    against: Option<Against>,
 }
 
-/// Beside the solver, over the first round.
-struct Beside {
+/// Against the solver, over the first round.
+struct Against {
     /// Relative L2 error of the force, and of the last step's force held.
     error: f64,
     held: f64,
@@ -79,7 +79,7 @@ impl Row {
             bare_j: 0.0,
             damped: 0,
             touching: 0,
-            beside: None,
+            against: None,
         }
     }
 
@@ -102,7 +102,7 @@ impl Row {
         self.bare_j += track.given_j;
     }
 
-    /// Beside the solver.
+    /// Compares with the solver.
     pub fn compare(&mut self, track: &Track, truth: &Forces) {
         let square = |v: Vector| f64::from(v.length_squared());
         let (mut off, mut held, mut size) = (0.0, 0.0, 0.0);
@@ -119,7 +119,7 @@ impl Row {
             jumps[0] = jumps[0].max(largest_change(&felt));
             jumps[1] = jumps[1].max(largest_change(&real));
         }
-        self.beside = Some(Beside {
+        self.against = Some(Against {
             error: (off / size).sqrt(),
             held: (held / size).sqrt(),
             jumps,
@@ -151,16 +151,18 @@ pub fn markdown(rows: &[Row], account: &Account, compared: bool) -> String {
         );
     }
     if compared {
-        text += "\n| beside the solver | force error, relative L2 | the last step's force held | largest change in 1 ms: rendered / solver, mN | ratio |\n|---|---|---|---|---|\n";
+        text += "\n| against the solver | force error, relative L2 | the last step's force held | largest change in 1 ms: rendered / solver, mN | ratio |\n|---|---|---|---|---|\n";
         for row in rows {
-            let Some(beside) = &row.beside else { continue };
-            let [felt, real] = beside.jumps;
+            let Some(against) = &row.against else {
+                continue;
+            };
+            let [felt, real] = against.jumps;
             let _ = writeln!(
                 text,
                 "| {} | {:.1} % | {:.1} % | {:.2} / {:.2} | {:.2} |",
                 row.name,
-                100.0 * beside.error,
-                100.0 * beside.held,
+                100.0 * against.error,
+                100.0 * against.held,
                 1e3 * felt,
                 1e3 * real,
                 felt / real
@@ -244,9 +246,9 @@ mod tests {
             .collect();
         let mut row = Row::new("ramp");
         row.compare(&track(|t| 1.1 * t as f32), &truth);
-        let beside = row.beside.as_ref().unwrap();
-        assert!((beside.error - 0.1).abs() < 1e-3, "{}", beside.error);
-        assert!((beside.jumps[0] / beside.jumps[1] - 1.1).abs() < 1e-2);
+        let against = row.against.as_ref().unwrap();
+        assert!((against.error - 0.1).abs() < 1e-3, "{}", against.error);
+        assert!((against.jumps[0] / against.jumps[1] - 1.1).abs() < 1e-2);
         let mut account = Account::default();
         account.add(&track(|t| t as f32));
         let text = markdown(&[row], &account, true);
