@@ -1,0 +1,181 @@
+//! Responses of `K + kappa M` through the prior's columns and the modes: to prescribed nodes, to loads, to what the natural modes do
+//! by themselves.
+
+use super::{Env, Preconditioner, mask_held, pooled};
+use crate::error::Result;
+use crate::kernels::project::{project_field, row_dots};
+use crate::kernels::respond::accumulate_rows;
+use crate::kernels::rows::decode_rows;
+
+impl Preconditioner {
+    /// `L_C^T r` at the prescribed nodes with columns, from `r [K,3]` that is zero there: what the free nodes' residual adds to the contact
+    /// forces, µN.
+    pub fn reaction(
+        &mut self,
+        env: Env<'_>,
+        r: &[f32],
+        mut take: impl FnMut(u32, [f32; 3]),
+    ) -> Result<()> {
+        let (isa, pool) = (env.isa, env.pool);
+        if self.dofs.is_empty() {
+            return Ok(());
+        }
+        let basis = env.prior.basis();
+        let q = &mut self.coordinates;
+        pooled(project_field(isa, pool, &basis, &self.starts, r, q))?;
+        let (modes, rows) = (env.space.modes(), env.space.rows());
+        pooled(row_dots(isa, pool, modes, rows, q, &mut self.on_modes))?;
+        self.contact_work(env)?;
+        self.compliance
+            .solve(isa, &self.at_contact, &mut self.forces);
+        for (&column, force) in self.columns.iter().zip(self.forces.as_chunks::<3>().0) {
+            take(env.prior.contact_nodes[column as usize], *force);
+        }
+        Ok(())
+    }
+
+    /// `coordinates` of `Phi solved + W forces`.
+    pub(super) fn spread(&mut self, env: Env<'_>) -> Result<()> {
+        for (&dof, force) in self.dofs.iter().zip(&self.forces) {
+            let own = env.space.at_contact(dof as usize);
+            for ((y, held_back), own) in self.solved.iter_mut().zip(&self.held_back).zip(own) {
+                *y -= held_back * own * force;
+            }
+        }
+        let (isa, pool, q) = (env.isa, env.pool, &mut self.coordinates);
+        let rows = env.space.rows();
+        pooled(accumulate_rows(
+            isa,
+            pool,
+            env.space.modes(),
+            rows,
+            &self.solved,
+            false,
+            q,
+        ))?;
+        let response = env.prior.response.stored();
+        pooled(accumulate_rows(
+            isa,
+            pool,
+            response,
+            &self.dofs,
+            &self.forces,
+            true,
+            q,
+        ))
+    }
+
+    /// Adds the response of `K + kappa M` that takes the prescribed nodes to their targets: `u += L_C(target - u_C)`.
+    ///
+    /// `target(i)` is that of the `i`-th prescribed node, mm; `scratch [K,3]`.
+    pub fn respond(
+        &mut self,
+        env: Env<'_>,
+        target: impl Fn(usize) -> [f32; 3],
+        scratch: &mut [f32],
+        u: &mut [f32],
+    ) -> Result<()> {
+        let isa = env.isa;
+        let mut slot = 0;
+        for (index, &node) in self.nodes.iter().enumerate() {
+            if !matches!(env.prior.column_for(&env.body.held, node), Some((_, true))) {
+                continue;
+            }
+            let target = target(index);
+            for axis in 0..3 {
+                self.at_contact[slot] = target[axis] - u[3 * node as usize + axis];
+                slot += 1;
+            }
+        }
+        if slot > 0 {
+            self.compliance
+                .solve(isa, &self.at_contact, &mut self.forces);
+        }
+        self.solved.fill(0.0);
+        self.spread(env)?;
+        self.add_decoded(env, scratch, u)
+    }
+
+    /// For each natural mode what inertia takes off its part of the compliance, mm/mN.
+    #[cfg(feature = "contact")]
+    pub fn held_back(&self) -> &[f32] {
+        &self.held_back
+    }
+
+    /// `u += A_k f` of forces `f` (mN) on degrees of freedom with columns; `scratch [K,3]`.
+    #[cfg(feature = "contact")]
+    pub fn load(
+        &mut self,
+        env: Env<'_>,
+        dofs: &[u32],
+        forces: &[f32],
+        scratch: &mut [f32],
+        u: &mut [f32],
+    ) -> Result<()> {
+        let count = self.held_back.len();
+        self.solved.fill(0.0);
+        for (&dof, force) in dofs.iter().zip(forces) {
+            let own = env.space.at_contact(dof as usize);
+            for ((y, held_back), own) in self.solved.iter_mut().zip(&self.held_back).zip(own) {
+                *y -= held_back * own * force;
+            }
+        }
+        let (isa, pool, q) = (env.isa, env.pool, &mut self.coordinates);
+        let rows = &env.space.rows()[..count];
+        let natural = &self.solved[..count];
+        pooled(accumulate_rows(
+            isa,
+            pool,
+            env.space.modes(),
+            rows,
+            natural,
+            false,
+            q,
+        ))?;
+        let response = env.prior.response.stored();
+        pooled(accumulate_rows(isa, pool, response, dofs, forces, true, q))?;
+        self.add_decoded(env, scratch, u)
+    }
+
+    /// `u -= N diag(1 / (m (w² + kappa))) N^T r` of a residual `[K,3]`, µN, that is zero at held nodes; `scratch [K,3]`.
+    #[cfg(feature = "contact")]
+    pub fn move_natural(
+        &mut self,
+        env: Env<'_>,
+        r: &[f32],
+        scratch: &mut [f32],
+        u: &mut [f32],
+    ) -> Result<()> {
+        let (isa, pool) = (env.isa, env.pool);
+        let count = self.held_back.len();
+        let basis = env.prior.basis();
+        let q = &mut self.coordinates;
+        pooled(project_field(isa, pool, &basis, &self.starts, r, q))?;
+        let (modes, rows) = (env.space.modes(), &env.space.rows()[..count]);
+        let natural = &mut self.on_modes[..count];
+        pooled(row_dots(isa, pool, modes, rows, q, natural))?;
+        for (value, moved) in natural.iter_mut().zip(&self.moved_freely) {
+            *value *= -moved;
+        }
+        pooled(accumulate_rows(isa, pool, modes, rows, natural, false, q))?;
+        self.add_decoded(env, scratch, u)
+    }
+
+    /// Adds the field of `coordinates`.
+    fn add_decoded(&mut self, env: Env<'_>, scratch: &mut [f32], u: &mut [f32]) -> Result<()> {
+        let basis = env.prior.basis();
+        pooled(decode_rows(
+            env.isa,
+            env.pool,
+            &basis,
+            &self.plan,
+            &self.coordinates,
+            scratch,
+        ))?;
+        mask_held(&env.body.held, scratch);
+        for (u, change) in u.iter_mut().zip(&*scratch) {
+            *u += change;
+        }
+        Ok(())
+    }
+}
