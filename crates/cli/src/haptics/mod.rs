@@ -146,7 +146,7 @@ fn compare(
 fn write(page: &Path, name: &str, nodes: usize, options: &Options, text: &str) -> Result<()> {
     let machine = Machine::this();
     let lead = format!(
-        "\n`{name}`, {nodes} nodes, steps of 50 ms that arrive {} ms late, {:.0} minutes of simulated time; {} ({} cores), busy with other work.\n\n",
+        "\n`{name}`, {nodes} nodes, steps of 50 ms that arrive {} ms late, {} minutes of simulated time; {} ({} cores), busy with other work.\n\n",
         options.latency_ms, options.minutes, machine.cpu, machine.cores
     );
     replace_between(
