@@ -10,6 +10,7 @@ mod page;
 mod score;
 
 pub use certificate::Certificate;
+pub use score::{nearest, regions};
 
 use std::path::PathBuf;
 use std::process::ExitCode;

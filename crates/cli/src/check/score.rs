@@ -34,6 +34,12 @@ pub fn regions(mesh: &Mesh) -> Regions {
     centres
 }
 
+/// The region that a place belongs to.
+pub fn nearest(regions: &Regions, place: [f64; 3]) -> Option<usize> {
+    (0..regions.len())
+        .min_by(|&a, &b| squared(place, regions[a]).total_cmp(&squared(place, regions[b])))
+}
+
 fn squared(a: [f64; 3], b: [f64; 3]) -> f64 {
     (0..3).map(|k| (a[k] - b[k]).powi(2)).sum()
 }
@@ -143,9 +149,7 @@ impl Score {
         for place in places {
             (0..3).for_each(|k| site[k] += place[k] / step.nodes.len() as f64);
         }
-        let nearest = (0..regions.len())
-            .min_by(|&a, &b| squared(site, regions[a]).total_cmp(&squared(site, regions[b])));
-        if let Some(region) = nearest {
+        if let Some(region) = nearest(regions, site) {
             self.regions[region].add(mse, baseline, size, largest);
         }
         for k in 0..3 {

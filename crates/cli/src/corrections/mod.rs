@@ -3,24 +3,25 @@
 //! Sources, none of which is a trajectory: natural modes, the bundle's own residual modes where it has them, and patches
 //! (what a few quasi-Newton steps add to the linear response of pushes all over the domain).
 
+mod constraint;
 mod manifest;
 mod patches;
+mod pushes;
 mod space;
+mod workbench;
+
+pub use constraint::Constraint;
+pub use patches::differences;
+pub use pushes::{Push, Pushes, Random};
+pub use workbench::Workbench;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, bail};
 use clap::Args;
 use serde_json::json;
-use tissue::linear::{Factor, Lame, Stiffness, natural_modes};
-use tissue::mesh::{Boundary, Mesh};
-use upt::bundle::BundleFiles;
-use upt::prior::PriorTable;
-
-use crate::progress::spinner;
-use space::Space;
 
 const FILE: &str = "corrections.safetensors";
 
@@ -92,14 +93,6 @@ pub fn set_calibration(bundle: &Path, recommended: u32, calibration: f32) -> Res
 
 /// Writes the file and the manifest's entry; returns the number of modes.
 pub fn write(args: &Options) -> Result<usize> {
-    let files = BundleFiles::open(&args.bundle)?;
-    let manifest = &files.manifest;
-    let Some(entry) = &manifest.prior else {
-        bail!(
-            "{}: bundle.json has no `prior`; corrections need a linear response",
-            args.bundle.display()
-        );
-    };
     if !(args.calibration.is_finite() && args.calibration > 0.0) {
         bail!("--calibration is {}, must be positive", args.calibration);
     }
@@ -113,69 +106,51 @@ pub fn write(args: &Options) -> Result<usize> {
     if args.natural == 0 {
         bail!("--natural is 0; corrections need natural modes");
     }
-    let boundary: Boundary = match manifest.boundary {
-        upt::bundle::Boundary::Fixed => Boundary::Fixed,
-        upt::bundle::Boundary::Supported => Boundary::Supported,
-    };
-    let mesh = Mesh::read(&args.bundle.join(&manifest.mesh.file))?;
-    let runtime_mesh =
-        upt::bundle::Mesh::parse(&files.tensors(&manifest.mesh.file)?, manifest.boundary)?;
-    let prior = PriorTable::open(&files, entry, &runtime_mesh)?;
-    let held = mesh.held_nodes(boundary);
-    let material = &manifest.material;
-    let lame = Lame::from_young(material.young_pa, material.poisson)?;
-    let quiet = args.json;
-
-    let bar = spinner(quiet, "factorisation");
-    let stiffness = Stiffness::assemble(&mesh, &held, lame)?;
-    let factor = Factor::new(&stiffness, &mesh.positions, args.threads)?;
-    bar.finish_and_clear();
-    let bar = spinner(quiet, "natural modes: solves with the factor");
-    let natural = natural_modes(
-        &mesh,
-        &stiffness,
-        &factor,
-        material.density_kg_m3,
-        args.natural,
-        &|| bar.inc(1),
-    )?;
-    bar.finish_and_clear();
-
-    let mut space = Space::new(&prior, &stiffness, &mesh, material.density_kg_m3);
-    let frequency = space.add_natural(&natural)?;
-    if args.residual {
-        let width = prior.width();
-        if prior.residual.is_empty() {
+    let bench = Workbench::open(&args.bundle, args.natural, args.threads, args.json)?;
+    let more = if args.residual {
+        let width = bench.prior.width();
+        if bench.prior.residual.is_empty() {
             bail!("--residual: this bundle has no residual modes; leave the option out");
         }
-        space.add(prior.residual.chunks_exact(width).map(<[f32]>::to_vec));
+        let modes = bench.prior.residual.chunks_exact(width);
+        modes.map(<[f32]>::to_vec).collect()
     } else if args.patch_modes > 0 {
-        let source = patches::Source {
-            mesh: &mesh,
-            prior: &prior,
-            stiffness: &stiffness,
-            factor: &factor,
-            material: elements::Material {
-                young_pa: material.young_pa,
-                poisson: material.poisson,
-                density_kg_m3: material.density_kg_m3,
-                damping_per_s: material.damping_per_s,
-            },
-            held: &held,
-            push_mm: f64::from(manifest.envelope.max_push_mm),
-            area_mm2: manifest.envelope.contact_area_mm2.map(f64::from),
-        };
-        let found = patches::modes(&source, args.patches, args.patch_modes, args.seed, quiet)?;
-        space.add(found.into_iter());
-    }
-    let path = args.bundle.join(FILE);
-    let count = space
-        .write(&path, &frequency)
-        .with_context(|| format!("{}: cannot be written", path.display()))?;
-    manifest::add(
+        let found = patches::differences(&bench, args.patches, args.seed, args.json)?;
+        principal(&found, args.patch_modes)
+    } else {
+        Vec::new()
+    };
+    bench.write_space(
         &args.bundle,
-        FILE,
-        &json!({"file": FILE, "recommended": args.recommended, "calibration": args.calibration}),
-    )?;
-    Ok(count)
+        more.into_iter(),
+        args.recommended,
+        args.calibration,
+    )
+}
+
+/// The leading principal directions of some vectors, by their Gram matrix.
+pub fn principal(vectors: &[Vec<f32>], count: usize) -> Vec<Vec<f32>> {
+    let n = vectors.len();
+    let dot = |a: &[f32], b: &[f32]| -> f64 {
+        let pairs = a.iter().zip(b);
+        pairs.map(|(a, b)| f64::from(*a) * f64::from(*b)).sum()
+    };
+    let gram = nalgebra::DMatrix::from_fn(n, n, |i, j| dot(&vectors[i], &vectors[j]));
+    let eigen = gram.symmetric_eigen();
+    let mut order: Vec<usize> = (0..n).collect();
+    order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
+    order
+        .into_iter()
+        .take(count)
+        .filter(|&at| eigen.eigenvalues[at] > 1e-9 * eigen.eigenvalues.max())
+        .map(|at| {
+            let mut mode = vec![0.0f32; vectors[0].len()];
+            for (vector, &weight) in vectors.iter().zip(eigen.eigenvectors.column(at).iter()) {
+                for (mode, value) in mode.iter_mut().zip(vector) {
+                    *mode += weight as f32 * value;
+                }
+            }
+            mode
+        })
+        .collect()
 }

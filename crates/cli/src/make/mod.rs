@@ -2,14 +2,16 @@
 //! (`docs/guide/make.md`).
 //!
 //! Stages, each kept in a work folder and not made again: body (import, repair, tetrahedra, what is held and touched), columns
-//! (the linear response to every touch), modes (how it swings), tables, coarse space, check. A bundle is published as a whole
+//! (the linear response to every touch), modes (how it swings), tables, coarse space, refinement, check. A bundle is published as a whole
 //! folder as soon as it works, and again with each stage that makes it better.
 
 mod body;
 mod bundle;
 mod emit;
+mod foreign;
 mod options;
 mod patches;
+mod refine;
 mod stages;
 mod tables;
 mod vibration;
@@ -26,12 +28,18 @@ use tissue::linear::ColumnsFile;
 use tissue::mesh::{Boundary, Mesh};
 
 use crate::check;
+use crate::corrections::{Workbench, principal};
 use crate::{corrections, modes, preview, prior};
 use options::Sizes;
 use stages::{Work, key_of};
 
 /// The bundles of `upt make` hold the mesh's set `fixed`.
 const BOUNDARY: Boundary = Boundary::Fixed;
+/// Part of the time after which no round of equilibria starts.
+const REFINED: f64 = 0.6;
+/// Corrections that are added where `--target-error` is missed, and the most that are tried.
+const MORE_CORRECTIONS: u32 = 3;
+const MOST_CORRECTIONS: u32 = 11;
 
 /// Runs the command.
 pub fn run(options: &Options) -> Result<ExitCode> {
@@ -155,61 +163,66 @@ pub fn run(options: &Options) -> Result<ExitCode> {
         options.recommended.to_string().as_bytes(),
     ]);
     let draft = work.file("bundle");
-    work.stage("coarse", &coarse_key, &["bundle/bundle.json"], |stage| {
-        bundle::assemble(options, &mesh, &sizes, &stage.folder, &draft)?;
-        bundle::publish(&draft, &options.out)?;
-        stage.decided("a bundle of the linear response and its free vibration is there");
-        let count = corrections::write(&corrections::Options {
-            bundle: draft.clone(),
-            natural: vibration::count(&mesh, options.natural),
-            patch_modes: options.patches.div_ceil(3).min(60),
-            patches: options.patches,
-            residual: false,
-            recommended: options.recommended,
-            calibration: 1.0,
-            seed: options.seed,
-            threads: options.threads,
-            json: options.json,
-        })?;
-        stage.decided(&format!(
-            "{count} modes of the coarse space, {} corrections a step",
-            options.recommended
-        ));
-        Ok(())
-    })?;
-
-    let check_key = key_of(&[
-        coarse_key.as_bytes(),
-        format!("{} {:?}", options.seed, options.cases).as_bytes(),
-    ]);
-    let left = (60.0 * options.minutes - started.elapsed().as_secs_f64()).max(20.0);
-    let mut certificate = work
-        .stage("check", &check_key, &["certificate.json"], |stage| {
-            let plan = check::Plan {
-                bundle: draft.clone(),
-                cases: options.cases,
-                seconds: 0.7 * left,
-                seed: options.seed ^ 0xCE27,
-                threads: options.threads,
-                quiet: options.json,
-            };
-            let found = check::measure(&plan)?;
-            stage.decided(&found.words());
-            std::fs::write(
-                stage.folder.join("certificate.json"),
-                serde_json::to_vec_pretty(&found.json())?,
+    work.stage(
+        "coarse",
+        &coarse_key,
+        &["bundle/bundle.json", refine::PATCHES],
+        |stage| {
+            bundle::assemble(options, &mesh, &sizes, &stage.folder, &draft)?;
+            bundle::publish(&draft, &options.out)?;
+            stage.decided("a bundle of the linear response and its free vibration is there");
+            let natural = vibration::count(&mesh, options.natural);
+            let bench = Workbench::open(&draft, natural, options.threads, options.json)?;
+            let found =
+                corrections::differences(&bench, options.patches, options.seed, options.json)?;
+            refine::write_differences(&stage.folder.join(refine::PATCHES), &found)?;
+            let count = bench.write_space(
+                &draft,
+                principal(&found, options.patches.div_ceil(3).min(60)).into_iter(),
+                options.recommended,
+                1.0,
             )?;
-            std::fs::write(stage.folder.join("errors.bin"), found.node_errors_bytes())?;
+            bundle::publish(&draft, &options.out)?;
+            stage.decided(&format!(
+                "{count} modes of the coarse space, {} corrections a step",
+                options.recommended
+            ));
             Ok(())
-        })
-        .and_then(|_| {
-            check::Certificate::read(&work.file("certificate.json"), &work.file("errors.bin"))
-        })?;
-    // The draft stays as its stage left it.
-    let certified = work.file("certified");
-    bundle::copy(&draft, &certified)?;
+        },
+    )?;
+
+    let budget = 60.0 * options.minutes;
+    let refine_key = key_of(&[coarse_key.as_bytes(), budget.to_string().as_bytes()]);
+    let seconds = REFINED * budget - work.spent();
+    let made = work.stage("refine", &refine_key, &["refined/bundle.json"], |stage| {
+        let rounds = refine::Rounds {
+            options,
+            mesh: &mesh,
+            draft: &draft,
+            columns: &columns_file,
+            key: coarse_key.clone(),
+            seconds,
+        };
+        refine::run(&rounds, stage)
+    })?;
+    let draft = work.file("refined");
+
+    let mut corrections = options.recommended;
+    let (mut certificate, certified) = loop {
+        let name = format!("check-{corrections}");
+        let found = certify(options, &mut work, &made.key, &draft, corrections, budget)?;
+        let error = found.mse_in_contact();
+        let missed = options.target_error.is_some_and(|target| error > target);
+        if !missed || corrections >= MOST_CORRECTIONS || work.spent() > budget {
+            break (found, work.file(&name));
+        }
+        corrections = (corrections + MORE_CORRECTIONS).min(MOST_CORRECTIONS);
+        work.tell(&format!(
+            "{error:.2e} mm² is above --target-error: {corrections} corrections a step"
+        ));
+    };
     if let Some(factor) = certificate.calibration() {
-        corrections::set_calibration(&certified, options.recommended, factor)?;
+        corrections::set_calibration(&certified, corrections, factor)?;
     }
     certificate.finish(
         &certified,
@@ -240,9 +253,53 @@ pub fn run(options: &Options) -> Result<ExitCode> {
         && certificate.mse_in_contact() > target
     {
         bail!(
-            "the error in contact is {:.3e} mm², above --target-error {target:.3e}; raise --corrections, or --nodes for a finer mesh",
+            "the error in contact is {:.3e} mm² with {corrections} corrections a step, above --target-error {target:.3e}; give more --minutes, or a smaller --push",
             certificate.mse_in_contact()
         );
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Held-out contacts of the bundle with so many corrections a step, in a copy of its own.
+fn certify(
+    options: &Options,
+    work: &mut Work,
+    key: &str,
+    draft: &Path,
+    corrections: u32,
+    budget: f64,
+) -> Result<check::Certificate> {
+    let name = format!("check-{corrections}");
+    let key = key_of(&[
+        key.as_bytes(),
+        format!("{corrections} {} {:?}", options.seed, options.cases).as_bytes(),
+    ]);
+    let left = (budget - work.spent()).max(20.0);
+    let copy = work.file(&name);
+    bundle::copy(draft, &copy)?;
+    if corrections != options.recommended {
+        corrections::set_calibration(&copy, corrections, 1.0)?;
+    }
+    let files = [format!("{name}.json"), format!("{name}.errors")];
+    let paths = files.each_ref().map(|file| work.file(file));
+    work.stage(
+        &name,
+        &key,
+        &files.each_ref().map(String::as_str),
+        |stage| {
+            let found = check::measure(&check::Plan {
+                bundle: copy,
+                cases: options.cases,
+                seconds: 0.7 * left,
+                seed: options.seed ^ 0xCE27,
+                threads: options.threads,
+                quiet: options.json,
+            })?;
+            stage.decided(&found.words());
+            std::fs::write(&paths[0], serde_json::to_vec_pretty(&found.json())?)?;
+            std::fs::write(&paths[1], found.node_errors_bytes())?;
+            Ok(())
+        },
+    )?;
+    check::Certificate::read(&paths[0], &paths[1])
 }

@@ -160,6 +160,23 @@ impl StaticSolver {
         Ok((trajectory, skipped))
     }
 
+    /// The displacement at rest under each push, `[3K]` mm; none where no equilibrium was found. All pushes share each solve.
+    ///
+    /// # Errors
+    /// [`StaticsError::NoColumn`]; a file that cannot be read.
+    pub fn at_rest(
+        &self,
+        pushes: &[Vec<ContactNode>],
+    ) -> Result<Vec<Option<Vec<f64>>>, StaticsError> {
+        let sites: Vec<Vec<Vec<ContactNode>>> =
+            pushes.iter().map(|push| vec![push.clone()]).collect();
+        let outcomes = self.equilibria(&sites, |_| {})?;
+        let fields = outcomes
+            .into_iter()
+            .map(|mut outcome| Some(outcome.found.pop()?.displacement));
+        Ok(fields.collect())
+    }
+
     /// Follows every site through its contacts; all sites share each solve.
     fn equilibria(
         &self,

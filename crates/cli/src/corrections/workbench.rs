@@ -1,0 +1,132 @@
+//! A bundle's body, factorised, with its linear response and natural modes: what coarse spaces are made on.
+
+use std::path::Path;
+
+use anyhow::{Context, Result, bail};
+use elements::{ElementForces, Material, Simd};
+use serde_json::json;
+use tissue::linear::{Factor, Lame, NaturalModes, Stiffness, natural_modes};
+use tissue::mesh::{Boundary, Mesh};
+use upt::bundle::BundleFiles;
+use upt::prior::PriorTable;
+
+use super::pushes::Pushes;
+use super::space::Space;
+use super::{FILE, manifest};
+use crate::progress::spinner;
+
+pub struct Workbench {
+    pub mesh: Mesh,
+    pub boundary: Boundary,
+    pub material: Material,
+    pub prior: PriorTable,
+    pub stiffness: Stiffness,
+    pub factor: Factor,
+    natural: NaturalModes,
+    pub held: Vec<u32>,
+    pub held_flags: Vec<bool>,
+    push_mm: f64,
+    area_mm2: [f64; 2],
+}
+
+impl Workbench {
+    /// Reads the bundle, factorises its stiffness and finds `natural` modes.
+    pub fn open(bundle: &Path, natural: usize, threads: usize, quiet: bool) -> Result<Self> {
+        let files = BundleFiles::open(bundle)?;
+        let stated = &files.manifest;
+        let Some(entry) = &stated.prior else {
+            bail!(
+                "{}: bundle.json has no `prior`; corrections need a linear response",
+                bundle.display()
+            );
+        };
+        let boundary = match stated.boundary {
+            upt::bundle::Boundary::Fixed => Boundary::Fixed,
+            upt::bundle::Boundary::Supported => Boundary::Supported,
+        };
+        let mesh = Mesh::read(&bundle.join(&stated.mesh.file))?;
+        let runtime_mesh =
+            upt::bundle::Mesh::parse(&files.tensors(&stated.mesh.file)?, stated.boundary)?;
+        let prior = PriorTable::open(&files, entry, &runtime_mesh)?;
+        let held = mesh.held_nodes(boundary);
+        let material = Material {
+            young_pa: stated.material.young_pa,
+            poisson: stated.material.poisson,
+            density_kg_m3: stated.material.density_kg_m3,
+            damping_per_s: stated.material.damping_per_s,
+        };
+        let lame = Lame::from_young(material.young_pa, material.poisson)?;
+
+        let bar = spinner(quiet, "factorisation");
+        let stiffness = Stiffness::assemble(&mesh, &held, lame)?;
+        let factor = Factor::new(&stiffness, &mesh.positions, threads)?;
+        bar.finish_and_clear();
+        let bar = spinner(quiet, "natural modes: solves with the factor");
+        let natural = natural_modes(
+            &mesh,
+            &stiffness,
+            &factor,
+            material.density_kg_m3,
+            natural,
+            &|| bar.inc(1),
+        )?;
+        bar.finish_and_clear();
+        let mut held_flags = vec![false; mesh.node_count()];
+        held.iter()
+            .for_each(|&node| held_flags[node as usize] = true);
+        Ok(Self {
+            boundary,
+            material,
+            prior,
+            stiffness,
+            factor,
+            natural,
+            held,
+            held_flags,
+            push_mm: f64::from(stated.envelope.max_push_mm),
+            area_mm2: stated.envelope.contact_area_mm2.map(f64::from),
+            mesh,
+        })
+    }
+
+    /// Pushes of the bundle's envelope.
+    pub fn pushes(&self) -> Pushes<'_> {
+        Pushes {
+            mesh: &self.mesh,
+            nodes: &self.prior.contact_nodes,
+            held: &self.held_flags,
+            push_mm: self.push_mm,
+            area_mm2: self.area_mm2,
+        }
+    }
+
+    pub fn element_forces(&self) -> ElementForces {
+        ElementForces::new(self.mesh.tetrahedra(), &self.material, Simd::detect())
+    }
+
+    /// Writes the natural modes and `more` (in block coordinates) as the coarse space of a copy of the bundle, with the manifest's
+    /// entry;
+    /// returns the number of modes.
+    pub fn write_space(
+        &self,
+        bundle: &Path,
+        more: impl Iterator<Item = Vec<f32>>,
+        recommended: u32,
+        calibration: f32,
+    ) -> Result<usize> {
+        let density = self.material.density_kg_m3;
+        let mut space = Space::new(&self.prior, &self.stiffness, &self.mesh, density);
+        let frequency = space.add_natural(&self.natural)?;
+        space.add(more);
+        let path = bundle.join(FILE);
+        let count = space
+            .write(&path, &frequency)
+            .with_context(|| format!("{}: cannot be written", path.display()))?;
+        manifest::add(
+            bundle,
+            FILE,
+            &json!({"file": FILE, "recommended": recommended, "calibration": calibration}),
+        )?;
+        Ok(count)
+    }
+}

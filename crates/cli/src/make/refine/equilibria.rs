@@ -1,0 +1,88 @@
+//! What nonlinear elasticity adds to the linear response at rest under pushes: exact equilibria, by the reference's statics.
+
+use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
+
+use anyhow::{Result, bail};
+use tissue::solver::ContactNode;
+use tissue::statics::StaticSolver;
+use upt::kernels::{Isa, Pool};
+use upt::prior::ContactResponse;
+
+use crate::corrections::{Push, Workbench};
+use crate::progress;
+
+/// Pushes that share each solve.
+const TOGETHER: usize = 4;
+
+/// The differences of the pushes whose equilibrium was found, in block coordinates.
+pub fn differences(
+    bench: &Workbench,
+    columns: &Path,
+    pushes: &[Push],
+    threads: usize,
+    quiet: bool,
+) -> Result<Vec<Vec<f32>>> {
+    let solver = StaticSolver::new(&bench.mesh, bench.boundary, bench.material, columns)?;
+    let bar = progress::bar(quiet, pushes.len() as u64, "equilibria");
+    let groups: Vec<&[Push]> = pushes.chunks(TOGETHER).collect();
+    let next = AtomicUsize::new(0);
+    let found: Mutex<Vec<(usize, Vec<Vec<f32>>)>> = Mutex::default();
+    let work = || -> Result<()> {
+        loop {
+            let at = next.fetch_add(1, Ordering::Relaxed);
+            let Some(group) = groups.get(at) else {
+                return Ok(());
+            };
+            let contacts: Vec<Vec<ContactNode>> = group.iter().map(contact).collect();
+            let fields = solver.at_rest(&contacts)?;
+            let mut differences = Vec::new();
+            for (push, field) in group.iter().zip(fields) {
+                if let Some(field) = field {
+                    differences.push(difference(bench, push, &field)?);
+                }
+            }
+            found
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner)
+                .push((at, differences));
+            bar.inc(group.len() as u64);
+        }
+    };
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let workers = if threads == 0 { cores } else { threads };
+    std::thread::scope(|scope| {
+        let threads: Vec<_> = (0..workers).map(|_| scope.spawn(work)).collect();
+        threads.into_iter().try_for_each(|thread| {
+            thread
+                .join()
+                .unwrap_or_else(|_| bail!("a thread of the equilibria panicked"))
+        })
+    })?;
+    bar.finish_and_clear();
+    let mut found = found.into_inner().unwrap_or_else(PoisonError::into_inner);
+    found.sort_by_key(|(at, _)| *at);
+    Ok(found.into_iter().flat_map(|(_, list)| list).collect())
+}
+
+fn contact(push: &Push) -> Vec<ContactNode> {
+    let vectors = push.vectors.as_chunks::<3>().0;
+    let pairs = push.nodes.iter().zip(vectors);
+    pairs
+        .map(|(&node, &displacement)| ContactNode { node, displacement })
+        .collect()
+}
+
+fn difference(bench: &Workbench, push: &Push, field: &[f64]) -> Result<Vec<f32>> {
+    let (isa, pool) = (Isa::detect(), Pool::new(1)?);
+    let prior = &bench.prior;
+    let mut response = ContactResponse::new(prior)?;
+    let mut linear = vec![0.0; prior.width()];
+    response.solve(isa, prior, &bench.held_flags, &push.nodes, &push.vectors)?;
+    response.field(isa, &pool, prior, &mut linear)?;
+    let single: Vec<f32> = field.iter().map(|&value| value as f32).collect();
+    let mut q = vec![0.0; prior.width()];
+    prior.project(&single, &mut q);
+    Ok(q.iter().zip(&linear).map(|(a, b)| a - b).collect())
+}
