@@ -1,12 +1,15 @@
 //! The body: the input as tetrahedra, what is held and what may be touched, and whether it is fit for simulation.
 
+use std::path::PathBuf;
+
 use anyhow::{Context, Result, bail};
 use tissue::mesh::{Mesh, face_area};
 use tissue::mesh_import::{
-    ImportError, ImportOptions, Opened, Region, Resolution, faces_in, import, nodes_in,
+    ImportError, ImportOptions, Opened, Region, Resolution, faces_in, import, nodes_in, tets_in,
 };
 use tissue::mesh_quality::{Quality, measure};
 
+use super::foreign;
 use super::options::Options;
 use super::stages::Stage;
 use crate::preview;
@@ -20,11 +23,14 @@ const RIM_EDGES: f64 = 1.5;
 
 /// Writes `mesh.safetensors` with its sets.
 pub fn make(options: &Options, stage: &mut Stage) -> Result<()> {
-    let mut mesh = read(options, stage)?;
+    let (mut mesh, input) = read(options, stage)?;
     check_length(&mesh, options)?;
     let scale = options.scale()?;
     let open = |regions: &[Region]| -> Result<Vec<Opened>, ImportError> {
-        regions.iter().map(|region| region.open(scale)).collect()
+        regions
+            .iter()
+            .map(|region| region.open(&input, scale))
+            .collect()
     };
     if !options.fixed.is_empty() {
         mesh.fixed = nodes_in(&mesh, &open(&options.fixed)?);
@@ -44,6 +50,18 @@ pub fn make(options: &Options, stage: &mut Stage) -> Result<()> {
     }
     if mesh.fixed.len() == mesh.node_count() {
         bail!("--fixed holds every node; hold a part of the body only");
+    }
+    for (region, factor) in &options.stiffness {
+        let rows = tets_in(&mesh, &region.open(&input, scale)?);
+        if rows.is_empty() {
+            bail!("no tetrahedron lies in --stiffness {region}={factor}");
+        }
+        mesh.stiffness.resize(mesh.tets.len(), 1.0);
+        rows.iter().for_each(|&row| mesh.stiffness[row] = *factor);
+        stage.decided(&format!(
+            "{} tetrahedra have {factor} times the stiffness ({region})",
+            rows.len()
+        ));
     }
     choose_domain(&mut mesh, options, &open(&options.domain)?, stage)?;
     if let Some(name) = &options.name {
@@ -67,9 +85,10 @@ pub fn make(options: &Options, stage: &mut Stage) -> Result<()> {
     Ok(())
 }
 
-fn read(options: &Options, stage: &mut Stage) -> Result<Mesh> {
-    let input = &options.input;
-    let name = input
+/// The mesh, and the file that it came from in the end.
+fn read(options: &Options, stage: &mut Stage) -> Result<(Mesh, PathBuf)> {
+    let name = options
+        .input
         .file_name()
         .unwrap_or_default()
         .to_string_lossy()
@@ -78,12 +97,14 @@ fn read(options: &Options, stage: &mut Stage) -> Result<Mesh> {
         if options.scale()? != 1.0 {
             bail!("{name}: a mesh file is in mm; leave --unit out");
         }
-        return Ok(Mesh::read(input)?);
+        return Ok((Mesh::read(&options.input)?, options.input.clone()));
     }
+    let input = foreign::convert(&options.input, stage)?;
+    let stem = name.split('.').next().unwrap_or_default().to_owned();
     let imported = import(
-        input,
+        &input,
         &ImportOptions {
-            name: options.name.clone(),
+            name: Some(options.name.clone().unwrap_or(stem)),
             scale: options.scale()?,
             resolution: Some(Resolution::Nodes(options.nodes)),
             repair: !options.no_repair,
@@ -104,7 +125,7 @@ fn read(options: &Options, stage: &mut Stage) -> Result<Mesh> {
     for repair in &imported.repairs {
         stage.decided(&format!("repaired: {repair}"));
     }
-    Ok(imported.mesh)
+    Ok((imported.mesh, input))
 }
 
 /// What to do about a file that no repair helps, in the words of this command.

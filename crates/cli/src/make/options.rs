@@ -23,7 +23,8 @@ const REFERENCE_WIDTH_MM: f64 = 70.0;
   upt make liver.obj --out liver --fixed plane:0,0,-1,-20 --preview
   upt make liver.obj --out liver --fixed plane:0,0,-1,-20 --emit slurm jobs")]
 pub struct Options {
-    /// A closed surface (.stl, .obj, .ply, .vtp) or tetrahedra (.msh, .vtk, .vtu, .mesh.safetensors).
+    /// A closed surface (.stl, .obj, .ply, .vtp), tetrahedra (.msh, .vtk, .vtu, .inp, .feb, .mesh.safetensors) or a label volume
+    /// (.nii, .nii.gz). Those of .inp, .feb and NIfTI are read by Python libraries, which the command installs for itself.
     pub input: PathBuf,
     /// Folder of the bundle.
     #[arg(long)]
@@ -32,13 +33,17 @@ pub struct Options {
     #[arg(long, default_value = "mm")]
     pub unit: String,
     /// Nodes are held here: ball:x,y,z,r, plane:a,b,c,d (where a x + b y + c z + d > 0), inside:FILE (a closed surface in the
-    /// input's unit), not: and one of them. May be repeated. Left out: what the mesh file holds.
+    /// input's unit), group:NAME (a group, material or #rrggbb colour of the input), not: and one of them. May be repeated. Left out: what the mesh file holds.
     #[arg(long, value_name = "REGION", allow_hyphen_values = true)]
     pub fixed: Vec<Region>,
     /// Instruments may touch the surface here; may be repeated. Left out: what the mesh file names, or else all of the surface
     /// but for a rim around what is held.
     #[arg(long, value_name = "REGION", allow_hyphen_values = true)]
     pub domain: Vec<Region>,
+    /// Tissue of another stiffness: a region, `=` and a factor on Young's modulus, such as group:tumour=4 or inside:tumour.stl=4.
+    /// May be repeated; the later one counts.
+    #[arg(long, value_name = "REGION=FACTOR", allow_hyphen_values = true, value_parser = stiffer)]
+    pub stiffness: Vec<(Region, f32)>,
     /// Wanted number of nodes where a surface is filled.
     #[arg(long, default_value_t = 5000)]
     pub nodes: usize,
@@ -107,6 +112,17 @@ pub struct Options {
     /// Print the result as JSON.
     #[arg(long)]
     pub json: bool,
+}
+
+/// `REGION=FACTOR`; a region may hold an equals sign itself.
+fn stiffer(text: &str) -> Result<(Region, f32), String> {
+    let (region, factor) = text
+        .rsplit_once('=')
+        .ok_or_else(|| format!("`{text}` has no factor; write REGION=FACTOR"))?;
+    match factor.trim().parse::<f32>() {
+        Ok(factor) if factor.is_finite() && factor > 0.0 => Ok((region.parse()?, factor)),
+        _ => Err(format!("`{factor}` is no factor above 0")),
+    }
 }
 
 /// Young's modulus (Pa), density (kg/m³) and damping (1/s) of a material by name.
@@ -206,7 +222,12 @@ impl Options {
             self.no_repair,
             self.name
         );
-        for region in self.fixed.iter().chain([&Region::All]).chain(&self.domain) {
+        let stiffer = self.stiffness.iter().map(|(region, _)| region);
+        words += &format!(" {:?}", self.stiffness);
+        for region in (self.fixed.iter().chain([&Region::All]))
+            .chain(&self.domain)
+            .chain(stiffer)
+        {
             words += &format!(" {region}");
             let mut inner = region;
             while let Region::Not(next) = inner {
@@ -224,7 +245,8 @@ impl Options {
         let list =
             |regions: &[Region]| -> Vec<String> { regions.iter().map(Region::to_string).collect() };
         json!({
-            "unit": self.unit, "fixed": list(&self.fixed), "domain": list(&self.domain), "nodes": self.nodes,
+            "unit": self.unit, "stiffness": self.stiffness.iter().map(|(region, factor)| format!("{region}={factor}")).collect::<Vec<String>>(),
+            "fixed": list(&self.fixed), "domain": list(&self.domain), "nodes": self.nodes,
             "material": self.material, "corrections": self.recommended, "natural": self.natural, "patches": self.patches,
             "tolerance_mm": self.tolerance_mm, "minutes": self.minutes,
         })

@@ -3,17 +3,27 @@
 //! A strict reader of the sections that matter, `$Nodes` and `$Elements`, written from the format's
 //! description in the Gmsh manual; node tags may be sparse. Points, lines and faces are skipped.
 
+use super::gmsh_groups::Groups;
 use super::{ImportError, RawTets, gmsh_1};
 use std::collections::HashMap;
 use std::path::Path;
 
 /// Reads the linear tetrahedra of a file.
 pub fn read(path: &Path) -> Result<RawTets, ImportError> {
+    named(path, |bytes| parse(bytes).and_then(finish))
+}
+
+/// Reads the triangles and tetrahedra with their physical groups; coordinates as the file has them.
+pub(super) fn read_groups(path: &Path) -> Result<Parts, ImportError> {
+    named(path, parse)
+}
+
+fn named<T>(path: &Path, read: impl FnOnce(&[u8]) -> Result<T, Fault>) -> Result<T, ImportError> {
     let bytes = std::fs::read(path).map_err(|source| ImportError::Io {
         path: path.into(),
         source,
     })?;
-    parse(&bytes).map_err(|fault| match fault {
+    read(&bytes).map_err(|fault| match fault {
         Fault::Text(reason) => ImportError::Format {
             path: path.into(),
             reason,
@@ -81,6 +91,13 @@ impl<'a> Cursor<'a> {
             .or_else(|_| fault(format!("byte {start}: not text where text is due")))
     }
 
+    /// To the first byte of a binary block.
+    pub(super) fn begin_block(&mut self) {
+        if self.binary {
+            self.end_line();
+        }
+    }
+
     /// Past the end of the line, which opens a binary block.
     fn end_line(&mut self) {
         while self.at < self.bytes.len() && self.bytes[self.at] != b'\n' {
@@ -113,7 +130,7 @@ impl<'a> Cursor<'a> {
     }
 
     /// A 4-byte integer where binary.
-    fn int(&mut self) -> Result<i64, Fault> {
+    pub(super) fn int(&mut self) -> Result<i64, Fault> {
         if self.binary {
             Ok(i64::from(i32::from_le_bytes(self.raw()?)))
         } else {
@@ -122,7 +139,7 @@ impl<'a> Cursor<'a> {
     }
 
     /// An 8-byte size where binary.
-    fn size(&mut self) -> Result<u64, Fault> {
+    pub(super) fn size(&mut self) -> Result<u64, Fault> {
         if self.binary {
             Ok(u64::from_le_bytes(self.raw()?))
         } else {
@@ -164,9 +181,10 @@ impl<'a> Cursor<'a> {
 /// What the sections give: coordinates by order of appearance, and their tags.
 #[derive(Default)]
 pub(super) struct Parts {
-    positions: Vec<[f64; 3]>,
-    node_of_tag: HashMap<u64, u32>,
+    pub(super) positions: Vec<[f64; 3]>,
+    pub(super) node_of_tag: HashMap<u64, u32>,
     pub(super) tets: Vec<[u64; 4]>,
+    pub(super) groups: Groups,
 }
 
 impl Parts {
@@ -180,7 +198,7 @@ impl Parts {
     }
 }
 
-fn parse(bytes: &[u8]) -> Result<RawTets, Fault> {
+fn parse(bytes: &[u8]) -> Result<Parts, Fault> {
     let mut cursor = Cursor {
         bytes,
         at: 0,
@@ -224,12 +242,14 @@ fn parse(bytes: &[u8]) -> Result<RawTets, Fault> {
         let Some(section) = word.strip_prefix('$') else {
             return fault(format!("`{word}` where a $Section is due"));
         };
-        if !matches!(section, "Nodes" | "Elements") {
+        if !matches!(section, "Nodes" | "Elements" | "PhysicalNames" | "Entities") {
             cursor.skip_section(section)?;
             continue;
         }
-        cursor.binary = binary;
+        cursor.binary = binary && section != "PhysicalNames";
         match (section, four) {
+            ("PhysicalNames", _) => parts.groups.read_names(&mut cursor)?,
+            ("Entities", _) => parts.groups.read_entities(&mut cursor)?,
             ("Nodes", true) => nodes_4(&mut cursor, &mut parts)?,
             ("Nodes", false) => nodes_2(&mut cursor, &mut parts)?,
             (_, true) => elements_4(&mut cursor, &mut parts)?,
@@ -238,10 +258,10 @@ fn parse(bytes: &[u8]) -> Result<RawTets, Fault> {
         cursor.binary = false;
         cursor.expect(&format!("$End{section}"))?;
     }
-    finish(parts)
+    Ok(parts)
 }
 
-pub(super) fn finish(parts: Parts) -> Result<RawTets, Fault> {
+fn finish(parts: Parts) -> Result<RawTets, Fault> {
     if parts.tets.is_empty() {
         return fault("the file holds no tetrahedra; mesh the volume (gmsh -3)");
     }
@@ -297,13 +317,19 @@ fn elements_2(cursor: &mut Cursor, parts: &mut Parts) -> Result<(), Fault> {
             if cursor.binary {
                 cursor.int()?;
             }
-            for _ in 0..tags {
-                cursor.int()?;
+            // The first tag is the physical group.
+            let mut physical = 0;
+            for at in 0..tags {
+                let tag = cursor.int()?;
+                if at == 0 {
+                    physical = tag;
+                }
             }
             let mut list = [0u64; 4];
             for node in list.iter_mut().take(nodes) {
                 *node = cursor.int()? as u64;
             }
+            parts.groups.add(kind, &list[..nodes], &[physical]);
             if kind == TETRAHEDRON {
                 parts.tets.push(list);
             }
@@ -314,9 +340,7 @@ fn elements_2(cursor: &mut Cursor, parts: &mut Parts) -> Result<(), Fault> {
 }
 
 fn nodes_4(cursor: &mut Cursor, parts: &mut Parts) -> Result<(), Fault> {
-    if cursor.binary {
-        cursor.end_line();
-    }
+    cursor.begin_block();
     let blocks = cursor.size()?;
     let [_count, _lowest, _highest] = [cursor.size()?, cursor.size()?, cursor.size()?];
     for _ in 0..blocks {
@@ -342,21 +366,21 @@ fn nodes_4(cursor: &mut Cursor, parts: &mut Parts) -> Result<(), Fault> {
 }
 
 fn elements_4(cursor: &mut Cursor, parts: &mut Parts) -> Result<(), Fault> {
-    if cursor.binary {
-        cursor.end_line();
-    }
+    cursor.begin_block();
     let blocks = cursor.size()?;
     let [_count, _lowest, _highest] = [cursor.size()?, cursor.size()?, cursor.size()?];
     let mut element = 0;
     for _ in 0..blocks {
-        let [_dimension, _entity, kind] = [cursor.int()?, cursor.int()?, cursor.int()?];
+        let [dimension, entity, kind] = [cursor.int()?, cursor.int()?, cursor.int()?];
         let nodes = node_count(kind, element)?;
+        let physical = parts.groups.of_entity(dimension, entity);
         for _ in 0..cursor.size()? {
             let _tag = cursor.size()?;
             let mut list = [0u64; 4];
             for node in list.iter_mut().take(nodes) {
                 *node = cursor.size()?;
             }
+            parts.groups.add(kind, &list[..nodes], &physical);
             if kind == TETRAHEDRON {
                 parts.tets.push(list);
             }

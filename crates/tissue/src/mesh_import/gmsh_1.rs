@@ -2,8 +2,7 @@
 //!
 //! `$NOD`: a count, then `tag x y z`. `$ELM`: a count, then `tag type physical elementary nodes node...`.
 
-use super::RawTets;
-use super::gmsh::{Cursor, Fault, Parts, TETRAHEDRON, fault, finish, node_count};
+use super::gmsh::{Cursor, Fault, Parts, TETRAHEDRON, fault, node_count};
 
 /// Whether the file begins as version 1 does.
 pub fn is_version_1(bytes: &[u8]) -> bool {
@@ -12,7 +11,7 @@ pub fn is_version_1(bytes: &[u8]) -> bool {
 }
 
 /// Reads the linear tetrahedra.
-pub fn parse(cursor: &mut Cursor<'_>) -> Result<RawTets, Fault> {
+pub fn parse(cursor: &mut Cursor<'_>) -> Result<Parts, Fault> {
     let mut parts = Parts::default();
     cursor.expect("$NOD")?;
     let count: u64 = cursor.parsed()?;
@@ -27,7 +26,7 @@ pub fn parse(cursor: &mut Cursor<'_>) -> Result<RawTets, Fault> {
     for element in 0..count {
         let _tag: u64 = cursor.parsed()?;
         let kind: i64 = cursor.parsed()?;
-        let [_physical, _elementary]: [i64; 2] = [cursor.parsed()?, cursor.parsed()?];
+        let [physical, _elementary]: [i64; 2] = [cursor.parsed()?, cursor.parsed()?];
         let stated: usize = cursor.parsed()?;
         let nodes = node_count(kind, element)?;
         if stated != nodes {
@@ -39,10 +38,11 @@ pub fn parse(cursor: &mut Cursor<'_>) -> Result<RawTets, Fault> {
         for node in list.iter_mut().take(nodes) {
             *node = cursor.parsed()?;
         }
+        parts.groups.add(kind, &list[..nodes], &[physical]);
         if kind == TETRAHEDRON {
             parts.tets.push(list);
         }
     }
     cursor.expect("$ENDELM")?;
-    finish(parts)
+    Ok(parts)
 }

@@ -15,6 +15,8 @@ mod distance;
 mod error;
 mod gmsh;
 mod gmsh_1;
+mod gmsh_groups;
+mod labels;
 mod region;
 mod repair;
 mod self_crossing;
@@ -22,11 +24,13 @@ mod sets;
 mod surface_files;
 mod tool_file;
 mod vtk;
+mod vtk_labels;
 mod vtk_raw;
 
 pub use distance::SurfaceDistance;
 pub use error::{ImportError, Repair};
-pub use region::{Opened, Region, faces_in, nodes_in};
+pub use labels::{Group, Labels};
+pub use region::{Opened, Region, faces_in, nodes_in, tets_in};
 pub use sets::Ball;
 pub use tool_file::tool_shape;
 

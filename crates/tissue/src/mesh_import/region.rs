@@ -1,12 +1,14 @@
-//! A part of space by which nodes and faces are chosen: a ball, a half-space, the inside of another closed surface.
+//! A part of a body by which nodes, faces and tetrahedra are chosen: a ball, a half-space, the inside of another closed surface,
+//! a part that the mesh's file names.
 
+use super::labels::{Group, Labels};
 use super::{Ball, ImportError, SurfaceDistance, closed_surface, surface_files};
 use crate::mesh::{Mesh, face_centroid};
 use crate::stuffing::Field;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-/// How a part of space is written: `ball:x,y,z,r`, `plane:a,b,c,d`, `inside:FILE`, `all`, `not:` and one of them.
+/// How a part is written: `ball:x,y,z,r`, `plane:a,b,c,d`, `inside:FILE`, `group:NAME`, `all`, `not:` and one of them.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Region {
     Ball(Ball),
@@ -14,6 +16,8 @@ pub enum Region {
     Plane([f64; 4]),
     /// Inside of a closed surface (`.stl`, `.obj`, `.ply`) in the units of the mesh's file.
     Inside(PathBuf),
+    /// What the mesh's own file calls so ([`Labels`]).
+    Group(String),
     All,
     Not(Box<Region>),
 }
@@ -44,9 +48,10 @@ impl FromStr for Region {
                 }
             }
             "inside" if !rest.is_empty() => Ok(Self::Inside(rest.into())),
+            "group" if !rest.trim().is_empty() => Ok(Self::Group(rest.trim().into())),
             "not" => Ok(Self::Not(Box::new(rest.parse()?))),
             _ => Err(format!(
-                "`{text}` is no region; write ball:x,y,z,r, plane:a,b,c,d, inside:FILE, all, or not: and one of them"
+                "`{text}` is no region; write ball:x,y,z,r, plane:a,b,c,d, inside:FILE, group:NAME, all, or not: and one of them"
             )),
         }
     }
@@ -61,6 +66,7 @@ impl std::fmt::Display for Region {
             }) => write!(f, "ball:{x},{y},{z},{radius}"),
             Self::Plane([a, b, c, d]) => write!(f, "plane:{a},{b},{c},{d}"),
             Self::Inside(path) => write!(f, "inside:{}", path.display()),
+            Self::Group(name) => write!(f, "group:{name}"),
             Self::All => write!(f, "all"),
             Self::Not(region) => write!(f, "not:{region}"),
         }
@@ -72,21 +78,26 @@ pub enum Opened {
     Ball(Ball),
     Plane([f64; 4]),
     Inside(Box<SurfaceDistance>),
+    Group(Box<Group>),
     All,
     Not(Box<Opened>),
 }
 
 impl Region {
-    /// Reads the surface of `inside:`, `scale` millimetres a unit of its file.
+    /// Reads the surface of `inside:` and the names of `group:` out of the mesh's file `input`, `scale` millimetres a unit.
     ///
     /// # Errors
-    /// [`ImportError`] of that file.
-    pub fn open(&self, scale: f64) -> Result<Opened, ImportError> {
+    /// [`ImportError`] of those files; a name that is not there, with those that are.
+    pub fn open(&self, input: &Path, scale: f64) -> Result<Opened, ImportError> {
         Ok(match self {
             Self::Ball(ball) => Opened::Ball(*ball),
             Self::Plane(plane) => Opened::Plane(*plane),
             Self::All => Opened::All,
-            Self::Not(region) => Opened::Not(Box::new(region.open(scale)?)),
+            Self::Not(region) => Opened::Not(Box::new(region.open(input, scale)?)),
+            Self::Group(name) => {
+                let group = Labels::read(input)?.group(name, input, scale)?;
+                Opened::Group(Box::new(group))
+            }
             Self::Inside(path) => {
                 let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
                 let extension = extension.unwrap_or_default();
@@ -105,33 +116,76 @@ impl Region {
     }
 }
 
+/// What a point of a body is.
+#[derive(Clone, Copy)]
+enum Kind {
+    /// A face's centroid.
+    Face,
+    /// A tetrahedron's centroid.
+    Tet,
+}
+
 impl Opened {
     /// Whether a point, mm, belongs to it.
-    pub fn holds(&self, point: [f64; 3]) -> bool {
+    fn holds(&self, point: [f64; 3], kind: Kind) -> bool {
         match self {
             Self::Ball(ball) => ball.holds(point),
             Self::Plane([a, b, c, d]) => a * point[0] + b * point[1] + c * point[2] + d > 0.0,
             Self::Inside(surface) => surface.value(point) > 0.0,
+            Self::Group(group) => match kind {
+                Kind::Face => group.holds_by_face(point) || group.holds_by_corner(point),
+                Kind::Tet => group.holds_tet(point),
+            },
             Self::All => true,
-            Self::Not(region) => !region.holds(point),
+            Self::Not(region) => !region.holds(point, kind),
+        }
+    }
+
+    /// Whether each node belongs to it. A group has the nodes of its faces, and those whose own corner in the file it names.
+    fn nodes(&self, mesh: &Mesh) -> Vec<bool> {
+        let positions = || mesh.positions.iter().map(|p| p.map(f64::from));
+        match self {
+            Self::Not(region) => region.nodes(mesh).iter().map(|held| !held).collect(),
+            Self::Group(group) => {
+                let mut flags = vec![false; mesh.node_count()];
+                for &face in &mesh.surface {
+                    let whole = group.holds_by_face(face_centroid(&mesh.positions, face));
+                    for node in face.map(|node| node as usize) {
+                        let place = mesh.positions[node].map(f64::from);
+                        flags[node] |= whole || group.holds_by_corner(place);
+                    }
+                }
+                flags
+            }
+            region => positions().map(|p| region.holds(p, Kind::Tet)).collect(),
         }
     }
 }
 
 /// Nodes in any of the regions, ascending.
 pub fn nodes_in(mesh: &Mesh, regions: &[Opened]) -> Vec<u32> {
-    let holds = |&node: &u32| {
-        let point = mesh.positions[node as usize].map(f64::from);
-        regions.iter().any(|region| region.holds(point))
-    };
-    (0..mesh.node_count() as u32).filter(holds).collect()
+    let flags: Vec<Vec<bool>> = regions.iter().map(|region| region.nodes(mesh)).collect();
+    (0..mesh.node_count() as u32)
+        .filter(|&node| flags.iter().any(|flags| flags[node as usize]))
+        .collect()
 }
 
 /// Rows of `surface` with their centroid in any of the regions, ascending.
 pub fn faces_in(mesh: &Mesh, regions: &[Opened]) -> Vec<u32> {
     let holds = |&row: &u32| {
         let point = face_centroid(&mesh.positions, mesh.surface[row as usize]);
-        regions.iter().any(|region| region.holds(point))
+        regions.iter().any(|region| region.holds(point, Kind::Face))
     };
     (0..mesh.surface.len() as u32).filter(holds).collect()
+}
+
+/// Rows of `tets` with their centroid in the region, ascending.
+pub fn tets_in(mesh: &Mesh, region: &Opened) -> Vec<usize> {
+    let holds = |&row: &usize| {
+        let corners = mesh.tets[row].map(|node| mesh.positions[node as usize].map(f64::from));
+        let centre: [f64; 3] =
+            std::array::from_fn(|k| corners.iter().map(|p| p[k]).sum::<f64>() / 4.0);
+        region.holds(centre, Kind::Tet)
+    };
+    (0..mesh.tets.len()).filter(holds).collect()
 }

@@ -1,6 +1,7 @@
 //! Closed surfaces from STL, OBJ and PLY files. Polygons are cut into fans of triangles; points
 //! with exactly the same coordinates become one, as these formats repeat them.
 
+use super::labels::Labels;
 use super::{ImportError, RawSurface};
 use ply_rs_bw::parser::Parser;
 use ply_rs_bw::ply::{DefaultElement, Property};
@@ -54,30 +55,97 @@ fn stl(path: &Path) -> Result<RawSurface, ImportError> {
 }
 
 fn obj(path: &Path) -> Result<RawSurface, ImportError> {
+    let labels = obj_labels(path)?;
+    Ok(RawSurface {
+        positions: labels.positions,
+        faces: labels.faces,
+    })
+}
+
+/// The triangles with the names of their groups, objects and materials.
+pub(super) fn obj_labels(path: &Path) -> Result<Labels, ImportError> {
     let options = tobj::LoadOptions {
         triangulate: true,
         ignore_points: true,
         ignore_lines: true,
         ..Default::default()
     };
-    // Materials say nothing about shape, so a missing .mtl file does not matter.
-    let (models, _) = tobj::load_obj_buf(&mut open(path)?, &options, |_| {
-        Err(tobj::LoadError::OpenFileFailed)
+    let text = std::fs::read(path).map_err(|source| ImportError::Io {
+        path: path.into(),
+        source,
+    })?;
+    // A material's name alone matters, so the .mtl file need not be there: every name that is used is known.
+    let mut materials: Vec<String> = Vec::new();
+    for line in text.split(|&byte| byte == b'\n') {
+        let line = String::from_utf8_lossy(line);
+        if let Some(name) = line.trim().strip_prefix("usemtl ").map(str::trim)
+            && !materials.iter().any(|known| known == name)
+        {
+            materials.push(name.to_owned());
+        }
+    }
+    let known: HashMap<String, usize> = materials.iter().cloned().zip(0..).collect();
+    let head: &[u8] = b"mtllib names\n";
+    let mut reader = BufReader::new(std::io::Read::chain(head, text.as_slice()));
+    let (models, _) = tobj::load_obj_buf(&mut reader, &options, |_| {
+        let blank = vec![tobj::Material::default(); known.len()];
+        Ok((blank, known.clone()))
     })
     .map_err(|error| format(path, error))?;
-    let mut surface = RawSurface::default();
+    let mut labels = Labels::default();
     for model in models {
-        let first = surface.positions.len() as u32;
+        let first = labels.positions.len() as u32;
         let (points, _) = model.mesh.positions.as_chunks::<3>();
         let (faces, _) = model.mesh.indices.as_chunks::<3>();
-        surface
+        // Each `mtllib` of the file gives all the names again.
+        let id = model.mesh.material_id.map(|id| id % materials.len().max(1));
+        let material = id.and_then(|id| materials.get(id));
+        let names: Vec<String> = std::iter::once(&model.name)
+            .chain(material)
+            .flat_map(|name| std::iter::once(name.as_str()).chain(name.split_whitespace()))
+            .map(str::to_owned)
+            .collect();
+        labels
             .positions
             .extend(points.iter().map(|p| p.map(f64::from)));
-        surface
-            .faces
-            .extend(faces.iter().map(|face| face.map(|node| first + node)));
+        for face in faces {
+            labels.faces.push(face.map(|node| first + node));
+            labels.of_face.push(names.clone());
+        }
     }
-    Ok(surface)
+    Ok(labels)
+}
+
+/// The triangles with the colour of each point as a name, `#rrggbb`.
+pub(super) fn ply_labels(path: &Path) -> Result<Labels, ImportError> {
+    let surface = ply(path)?;
+    let file = Parser::<DefaultElement>::new()
+        .read_ply(&mut open(path)?)
+        .map_err(|error| format(path, error))?;
+    let colour = |vertex: &DefaultElement| -> Option<String> {
+        let parts = ["red", "green", "blue"].map(|name| match vertex.get(name) {
+            Some(Property::UChar(value)) => Some(*value),
+            Some(other) => other
+                .to_f32_lossy()
+                .map(|x| (255.0 * x.clamp(0.0, 1.0)).round() as u8),
+            None => None,
+        });
+        let [Some(r), Some(g), Some(b)] = parts else {
+            return None;
+        };
+        Some(format!("#{r:02x}{g:02x}{b:02x}"))
+    };
+    let vertices = file.payload.get("vertex");
+    Ok(Labels {
+        positions: surface.positions,
+        faces: surface.faces,
+        of_point: vertices
+            .into_iter()
+            .flatten()
+            .map(|vertex| colour(vertex).into_iter().collect())
+            .collect(),
+        ..Labels::default()
+    })
 }
 
 fn ply(path: &Path) -> Result<RawSurface, ImportError> {

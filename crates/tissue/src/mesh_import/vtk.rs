@@ -14,24 +14,11 @@ pub enum Body {
 /// Reads the linear tetrahedra, of which any other volume cell is an error and points, lines and faces are not; or the polygons
 /// and triangle strips of polydata.
 pub fn read(path: &Path) -> Result<Body, ImportError> {
-    if let Err(source) = std::fs::metadata(path) {
-        return Err(ImportError::Io {
-            path: path.into(),
-            source,
-        });
-    }
+    let file = open(path)?;
     let format = |reason: String| ImportError::Format {
         path: path.into(),
         reason,
     };
-    let file = match std::fs::read(path)
-        .ok()
-        .and_then(|b| vtk_raw::to_base64(&b))
-    {
-        Some(text) => vtkio::Vtk::parse_xml(text.as_bytes()),
-        None => vtkio::Vtk::import(path),
-    }
-    .map_err(|error| format(error.to_string()))?;
     let source = file.file_path.clone();
     match file.data {
         DataSet::UnstructuredGrid { pieces, .. } => {
@@ -61,6 +48,22 @@ pub fn read(path: &Path) -> Result<Body, ImportError> {
             "the data set is neither an unstructured grid nor polydata; convert it to tetrahedra or a closed surface".into(),
         )),
     }
+}
+
+/// The file as the crate `vtkio` understands it.
+pub(super) fn open(path: &Path) -> Result<vtkio::Vtk, ImportError> {
+    let bytes = std::fs::read(path).map_err(|source| ImportError::Io {
+        path: path.into(),
+        source,
+    })?;
+    let read = match vtk_raw::to_base64(&bytes) {
+        Some(text) => vtkio::Vtk::parse_xml(text.as_bytes()),
+        None => vtkio::Vtk::import(path),
+    };
+    read.map_err(|error| ImportError::Format {
+        path: path.into(),
+        reason: error.to_string(),
+    })
 }
 
 /// Polygons as fans of triangles, strips as triangles that turn in turn.
