@@ -157,7 +157,7 @@ fn a_small_organ_end_to_end_and_checked_again() {
     let kept = command(&surface, &out, &HELD).output().unwrap();
     assert_eq!(
         text(&kept).matches("kept from an earlier run").count(),
-        6,
+        7,
         "{}",
         text(&kept)
     );
@@ -169,7 +169,7 @@ fn killed_after_each_stage_it_leaves_nothing_or_a_bundle_that_works_and_goes_on(
     let (surface, out) = (folder.path().join("organ.obj"), folder.path().join("organ"));
     plain(&surface);
     let work = folder.path().join("organ.work");
-    for stage in ["body", "columns", "modes", "tables", "coarse"] {
+    for stage in ["body", "columns", "modes", "tables", "coarse", "refine"] {
         let record = work.join(format!("{stage}.stage.json"));
         let mut child = command(&surface, &out, &HELD)
             .stdout(Stdio::null())
@@ -301,6 +301,113 @@ fn input_that_cannot_become_a_bundle_is_named_with_what_to_do() {
     assert_eq!(output.status.code(), Some(2));
     has(text(&output), &["is no bundle of `upt make`"]);
     assert!(taken.join("thesis.txt").exists());
+}
+
+#[test]
+fn two_pieces_become_the_larger_one_and_are_refused_as_they_are() {
+    let folder = tempfile::tempdir().unwrap();
+    let surface = folder.path().join("two.obj");
+    plain(&surface);
+    let body = std::fs::read_to_string(&surface).unwrap();
+    let count = body.lines().filter(|line| line.starts_with("v ")).count();
+    let mut text = body.clone();
+    for line in body.lines() {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        let moved: Vec<String> = match words[0] {
+            "v" => words[1..]
+                .iter()
+                .map(|x| (0.3 * x.parse::<f64>().unwrap() + 90.0).to_string())
+                .collect(),
+            _ => words[1..]
+                .iter()
+                .map(|n| (n.parse::<usize>().unwrap() + count).to_string())
+                .collect(),
+        };
+        text += &format!("{} {}\n", words[0], moved.join(" "));
+    }
+    std::fs::write(&surface, text).unwrap();
+    let out = surface.with_extension("bundle");
+    let output = command(&surface, &out, &[HELD[0], HELD[1], "--preview"])
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", crate::text(&output));
+    let said = crate::text(&output);
+    assert!(
+        said.contains("repaired: ") && said.contains("part"),
+        "{said}"
+    );
+    let message = refused(&surface, &[HELD[0], HELD[1], "--no-repair"]);
+    assert!(
+        message.contains("part") || message.contains("piece"),
+        "{message}"
+    );
+}
+
+/// A limit on the size of files stands in for a disk that is full at some point.
+#[cfg(unix)]
+#[test]
+fn a_full_disk_is_named_and_leaves_nothing_half_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let (surface, out) = (folder.path().join("organ.obj"), folder.path().join("organ"));
+    plain(&surface);
+    for kilobytes in [16, 200, 1500] {
+        let upt = command(&surface, &out, &HELD);
+        let mut shell = Command::new("bash");
+        shell
+            .args(["-c", "ulimit -f $0; trap '' XFSZ; exec \"$@\""])
+            .arg(kilobytes.to_string())
+            .arg(upt.get_program())
+            .args(upt.get_args());
+        let output = shell.output().unwrap();
+        assert_eq!(
+            output.status.code(),
+            Some(2),
+            "{kilobytes}: {}",
+            text(&output)
+        );
+        let said = text(&output);
+        assert!(
+            said.contains("error: ")
+                && (said.contains("cannot be written") || said.contains("too large")),
+            "{kilobytes}: {said}"
+        );
+        if out.exists() {
+            works(&out);
+        }
+    }
+    // With room again it goes on.
+    let output = command(&surface, &out, &HELD).output().unwrap();
+    assert!(output.status.success(), "{}", text(&output));
+    works(&out);
+}
+
+#[test]
+fn parts_that_the_file_names_are_held_and_stiffer() {
+    let folder = tempfile::tempdir().unwrap();
+    let surface = folder.path().join("named.obj");
+    plain(&surface);
+    let mut text = std::fs::read_to_string(&surface).unwrap();
+    // The last faces are three sectors of sixteen.
+    let at = text.match_indices("f ").map(|(at, _)| at).nth(208).unwrap();
+    text.insert_str(at, "usemtl ligament\n");
+    std::fs::write(&surface, text).unwrap();
+    let out = surface.with_extension("bundle");
+    let arguments = [
+        "--fixed",
+        "group:ligament",
+        "--stiffness",
+        "ball:0,0,0,15=4",
+        "--preview",
+    ];
+    let output = command(&surface, &out, &arguments).output().unwrap();
+    let said = crate::text(&output);
+    assert!(output.status.success(), "{said}");
+    assert!(said.contains("4 times the stiffness"), "{said}");
+    let message = refused(&surface, &["--fixed", "group:tendon"]);
+    assert!(
+        message.contains("tendon") && message.contains("ligament"),
+        "{message}"
+    );
 }
 
 #[test]

@@ -9,6 +9,7 @@ use anyhow::{Context, Result, bail};
 
 use super::options::Options;
 
+const RAY: &str = include_str!("emit_ray.py");
 /// Cases of the trajectories, and shards that make them.
 const CASES: usize = 400;
 const SHARDS: usize = 20;
@@ -57,23 +58,10 @@ pub fn write(options: &Options, cluster: &str, folder: &Path) -> Result<PathBuf>
         ("--density", material.density_kg_m3),
         ("--damping", material.damping_per_s),
     ];
-    let mut simulate: Vec<String> = [
-        "upt",
-        "dataset",
-        "--mesh",
-        &mesh,
-        "--schemes",
-        "probe,1-4",
-        "--count",
-    ]
-    .map(str::to_owned)
-    .to_vec();
-    simulate.extend([
-        CASES.to_string(),
-        "--out".into(),
-        data.clone(),
-        "--half".into(),
-    ]);
+    let mut simulate: Vec<String> = ["upt", "dataset", "--mesh", &mesh, "--schemes", "probe,1-4"]
+        .map(str::to_owned)
+        .to_vec();
+    simulate.extend(["--out".into(), data.clone(), "--half".into()]);
     simulate.extend(
         numbers
             .iter()
@@ -129,14 +117,14 @@ pub fn write(options: &Options, cluster: &str, folder: &Path) -> Result<PathBuf>
                 "data",
                 &format!("{cores}#SBATCH --array=0-{}\n", SHARDS - 1),
                 format!(
-                    "{} --jobs \"$SLURM_CPUS_PER_TASK\" --shard \"$SLURM_ARRAY_TASK_ID/{SHARDS}\"",
+                    "{} --count {CASES} --jobs \"$SLURM_CPUS_PER_TASK\" --shard \"$SLURM_ARRAY_TASK_ID/{SHARDS}\"",
                     line(&simulate)
                 ),
             )?;
             job(
                 "train",
                 &cores,
-                format!("{}\n{}", line(&simulate), line(&train)),
+                format!("{} --count {CASES}\n{}", line(&simulate), line(&train)),
             )?;
             save(
                 "submit.sh",
@@ -148,27 +136,19 @@ pub fn write(options: &Options, cluster: &str, folder: &Path) -> Result<PathBuf>
             )
         }
         _ => {
-            let list = |words: &[String]| serde_json::to_string(words);
-            save(
-                "run.py",
-                format!(
-                    "\"\"\"Makes the bundle, its trajectories in shards, and a learned part, on a Ray cluster with a shared file system.\"\"\"\n\n\
-                     import subprocess\nimport sys\n\nimport ray\n\nFOLDER = {}\nMAKE = {}\nSIMULATE = {}\nTRAIN = {}\nSHARDS = {SHARDS}\n\n\n\
-                     @ray.remote\ndef run(command):\n    subprocess.run(command, check=True, cwd=FOLDER)\n\n\n\
-                     def main(cores, shards, stages):\n    ray.init(ignore_reinit_error=True)\n    task = run.options(num_cpus=cores)\n\
-                     \x20   if \"make\" in stages:\n        ray.get(task.remote(MAKE))\n    if \"data\" in stages:\n\
-                     \x20       parts = [[*SIMULATE, \"--jobs\", str(cores), \"--shard\", f\"{{i}}/{{shards}}\"] for i in range(shards)]\n\
-                     \x20       ray.get([task.remote(part) for part in parts])\n        ray.get(task.remote(SIMULATE))\n\
-                     \x20   if \"train\" in stages:\n        ray.get(task.remote(TRAIN))\n\n\n\
-                     if __name__ == \"__main__\":\n\
-                     \x20   cores = int(sys.argv[1]) if len(sys.argv) > 1 else {CORES}\n\
-                     \x20   main(cores, int(sys.argv[2]) if len(sys.argv) > 2 else SHARDS, sys.argv[3:] or [\"make\", \"data\", \"train\"])\n",
-                    serde_json::to_string(&here)?,
-                    list(&make)?,
-                    list(&simulate)?,
-                    list(&train)?,
-                ),
-            )
+            let mut program = RAY.to_owned();
+            for (name, words) in [
+                ("@FOLDER@", serde_json::to_string(&here)?),
+                ("@MAKE@", serde_json::to_string(&make)?),
+                ("@SIMULATE@", serde_json::to_string(&simulate)?),
+                ("@TRAIN@", serde_json::to_string(&train)?),
+                ("@CORES@", CORES.to_string()),
+                ("@SHARDS@", SHARDS.to_string()),
+                ("@CASES@", CASES.to_string()),
+            ] {
+                program = program.replace(name, &words);
+            }
+            save("run.py", program)
         }
     }
 }
