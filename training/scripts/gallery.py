@@ -104,9 +104,11 @@ def main() -> None:
     parser.add_argument("--upt", type=Path, default=ROOT / "target/release/upt")
     parser.add_argument("--sofa", type=Path, required=True)
     parser.add_argument("--out", type=Path, default=Path("gallery"))
-    parser.add_argument("--only", nargs="*", help="only these organs are made; the table is of all that are there")
+    parser.add_argument("--only", nargs="*", help="make these alone; the table keeps the lines of others")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
+    before, rest = PAGE.read_text(encoding="utf-8").split("<!-- gallery.py: begin -->")
+    table, after = rest.split("<!-- gallery.py: end -->")
     rows = []
     for name, arguments in organs(options.out, options.sofa).items():
         bundle = options.out / name
@@ -114,13 +116,13 @@ def main() -> None:
             subprocess.run([str(options.upt), "make", *arguments, "--out", str(bundle)], check=True)
         if (bundle / "certificate.json").exists():
             rows.append(row(name, json.loads((bundle / "certificate.json").read_text(encoding="utf-8"))))
+        else:
+            rows += [line for line in table.splitlines() if line.startswith(f"| `{name}` |")]
     head = [
         "| organ | nodes | held-out cases | MSE in contact, mm² | linear elasticity | share | share after release | "
         "worst region over mean | force error | ms a step |",
         "|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|",
     ]
-    before, rest = PAGE.read_text(encoding="utf-8").split("<!-- gallery.py: begin -->")
-    _, after = rest.split("<!-- gallery.py: end -->")
     table = "\n".join([*head, *rows])
     PAGE.write_text(
         f"{before}<!-- gallery.py: begin -->\n{table}\n<!-- gallery.py: end -->{after}", encoding="utf-8", newline="\n"

@@ -1,20 +1,55 @@
-//! `cargo xtask demo`: a brain pushed by libupt beside the reference solver, from a fresh clone.
+//! `cargo xtask demo`: an organ pushed by libupt beside the reference solver, from a fresh clone.
 //!
 //! Set-up; one contact of scheme 5, which no bundle was trained on, simulated by the reference solver
-//! (kept by content); the same contact replayed through every committed brain bundle; a table and a page.
+//! (kept by content); the same contact replayed through every committed bundle of that organ; a table and a page.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, bail};
-use clap::Args;
+use clap::{Args, ValueEnum};
 use sha2::{Digest, Sha256};
 
 use crate::workspace::Workspace;
 use crate::{ort, stages, system, venv};
 
+/// An organ with committed bundles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Organ {
+    Brain,
+    Liver,
+}
+
+impl Organ {
+    /// The mesh whose bundles are shown.
+    fn mesh(self) -> &'static str {
+        match self {
+            Self::Brain => "onnx/meshes/brain.mesh.safetensors",
+            Self::Liver => "onnx/liver-coarse/mesh.safetensors",
+        }
+    }
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Brain => "brain",
+            Self::Liver => "liver",
+        }
+    }
+
+    /// What it is compared with: there is no coarser mesh of the liver.
+    fn plain(self) -> &'static str {
+        match self {
+            Self::Brain => "zero,prior,coarse,tled",
+            Self::Liver => "zero,prior,tled",
+        }
+    }
+}
+
 #[derive(Args)]
 pub struct Options {
+    /// What is pushed; the liver's bundle was made by `upt make` without any training.
+    #[arg(long, default_value = "brain")]
+    organ: Organ,
     /// Install no system packages.
     #[arg(long)]
     no_install: bool,
@@ -26,12 +61,11 @@ pub struct Options {
     seed: u64,
 }
 
-const MESH: &str = "onnx/meshes/brain.mesh.safetensors";
-
-/// A bundle that the demo shows: name, boundary condition.
+/// A bundle that the demo shows.
 struct Bundle {
     path: PathBuf,
     boundary: String,
+    material: serde_json::Value,
 }
 
 pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
@@ -44,21 +78,24 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
     let library = ort::host_library(workspace)?;
     stages::build_for_demo(workspace)?;
 
-    let bundles = brain_bundles(workspace)?;
+    let bundles = bundles_of(workspace, options.organ)?;
     let mut boundaries: Vec<&str> = bundles
         .iter()
         .map(|bundle| bundle.boundary.as_str())
         .collect();
     boundaries.sort_unstable();
     boundaries.dedup();
-    let folder = workspace.path("target/demo");
+    let folder = match options.organ {
+        Organ::Brain => workspace.path("target/demo"),
+        organ => workspace.path("target/demo").join(organ.name()),
+    };
     std::fs::create_dir_all(&folder)?;
     for boundary in &boundaries {
-        let trajectory = simulate(workspace, options, boundary, &folder)?;
         let own: Vec<&Bundle> = bundles
             .iter()
             .filter(|bundle| bundle.boundary == *boundary)
             .collect();
+        let trajectory = simulate(workspace, options, own[0], &folder)?;
         // The paper's boundary condition gets the plain names; another one its own folder.
         let out = if *boundary == boundaries[0] {
             folder.clone()
@@ -70,11 +107,11 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
     Ok(true)
 }
 
-/// The committed bundles whose mesh is the brain that the demo simulates.
-fn brain_bundles(workspace: &Workspace) -> Result<Vec<Bundle>> {
+/// The committed bundles of the mesh that the demo simulates.
+fn bundles_of(workspace: &Workspace, organ: Organ) -> Result<Vec<Bundle>> {
     let mut found = Vec::new();
     let mut left_out = Vec::new();
-    let nodes = mesh_nodes(workspace)?;
+    let nodes = mesh_nodes(&workspace.path(organ.mesh()))?;
     for entry in std::fs::read_dir(workspace.path("onnx"))? {
         let path = entry?.path();
         let Ok(text) = std::fs::read_to_string(path.join("bundle.json")) else {
@@ -90,6 +127,7 @@ fn brain_bundles(workspace: &Workspace) -> Result<Vec<Bundle>> {
         found.push(Bundle {
             path,
             boundary: manifest["boundary"].as_str().unwrap_or("fixed").to_owned(),
+            material: manifest["material"].clone(),
         });
     }
     found.sort_by(|a, b| a.path.cmp(&b.path));
@@ -97,15 +135,14 @@ fn brain_bundles(workspace: &Workspace) -> Result<Vec<Bundle>> {
         eprintln!("left out: {}", left_out.join(", "));
     }
     if found.is_empty() {
-        bail!("no bundle below onnx/ fits {MESH}");
+        bail!("no bundle below onnx/ fits {}", organ.mesh());
     }
     Ok(found)
 }
 
 /// Node count of the demo's mesh, from the header of its file.
-fn mesh_nodes(workspace: &Workspace) -> Result<u64> {
-    let path = workspace.path(MESH);
-    let bytes = std::fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
+fn mesh_nodes(path: &Path) -> Result<u64> {
+    let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
     let length = u64::from_le_bytes(
         bytes
             .get(..8)
@@ -126,11 +163,13 @@ fn mesh_nodes(workspace: &Workspace) -> Result<u64> {
 fn simulate(
     workspace: &Workspace,
     options: &Options,
-    boundary: &str,
+    bundle: &Bundle,
     folder: &Path,
 ) -> Result<PathBuf> {
+    let mesh = options.organ.mesh();
+    let boundary = bundle.boundary.as_str();
     let mut hash = Sha256::new();
-    hash.update(std::fs::read(workspace.path(MESH))?);
+    hash.update(std::fs::read(workspace.path(mesh))?);
     let mut folders = ["contact", "elements", "tissue"]
         .map(|name| workspace.path(&format!("crates/{name}/src")))
         .to_vec();
@@ -149,7 +188,10 @@ fn simulate(
     for file in files {
         hash.update(std::fs::read(file)?);
     }
-    hash.update(format!("{} {} {boundary}", options.scheme, options.seed));
+    hash.update(format!(
+        "{} {} {boundary} {}",
+        options.scheme, options.seed, bundle.material
+    ));
     let key = format!("{:x}", hash.finalize());
     let file = folder.join(format!("contact-{}.trajectory.safetensors", &key[..16]));
     if file.is_file() {
@@ -170,7 +212,7 @@ fn simulate(
         .args([
             "simulate",
             "--mesh",
-            MESH,
+            mesh,
             "--scheme",
             &options.scheme,
             "--seed",
@@ -180,6 +222,16 @@ fn simulate(
         ])
         .args(["--threads", &threads.to_string(), "--out"])
         .arg(&file);
+    for (option, key) in [
+        ("--young", "young_pa"),
+        ("--poisson", "poisson"),
+        ("--density", "density_kg_m3"),
+        ("--damping", "damping_per_s"),
+    ] {
+        if let Some(value) = bundle.material[key].as_f64() {
+            command.args([option, &value.to_string()]);
+        }
+    }
     run_visibly(&mut command, "upt simulate")?;
     Ok(file)
 }
@@ -212,15 +264,17 @@ fn report(
             "--region",
             "all,surface",
             "--plain",
-            "zero,prior,coarse,tled",
+            options.organ.plain(),
             "--tled-frames",
             "20",
         ])
         .args([
             "--title",
             &format!(
-                "A brain pushed by libupt: scheme {}, seed {}",
-                options.scheme, options.seed
+                "A {} pushed by libupt: scheme {}, seed {}",
+                options.organ.name(),
+                options.scheme,
+                options.seed
             ),
         ]);
     ort::set_environment(&mut command, library);

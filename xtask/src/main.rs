@@ -44,7 +44,9 @@ enum Task {
     )]
     Test(test::Options),
     /// Push the brain: reference simulation, replay through every committed bundle, table and page.
-    #[command(after_help = "Examples:\n  cargo xtask demo\n  cargo xtask demo --scheme 3 --seed 7")]
+    #[command(
+        after_help = "Examples:\n  cargo xtask demo\n  cargo xtask demo --organ liver\n  cargo xtask demo --scheme 3 --seed 7"
+    )]
     Demo(demo::Options),
     /// Run the speed tables and write docs/results/performance.md.
     #[command(
