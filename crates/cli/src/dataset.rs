@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use tissue::dataset::{Dataset, DatasetPlan, Load};
 use tissue::mesh::{Boundary, Mesh};
 use tissue::programmes::ToolProgramme;
-use tissue::schemes::Scheme;
+use tissue::schemes::{FRAME_S, Scheme};
 use tissue::solver::SolverOptions;
 
 #[derive(clap::Args)]
@@ -47,6 +47,9 @@ pub struct Options {
     /// Store displacements as f16.
     #[arg(long)]
     half: bool,
+    /// Time between recorded frames of --tools, ms; a whole part of a step of 50 ms. Shorter frames are what `upt report --shown` measures by.
+    #[arg(long, default_value_t = 1e3 * FRAME_S, requires = "tools", conflicts_with = "schemes")]
+    frame_ms: f64,
     /// Inner step of the split `train`, ms; held-out cases keep `--inner-step-ms`. Needs `--train-mass-scaling-ms`.
     #[arg(long, requires = "train_mass_scaling_ms")]
     train_inner_step_ms: Option<f64>,
@@ -66,6 +69,19 @@ impl Options {
         let schemes = self.schemes.iter().flatten().map(|s| Load::Scheme(*s));
         let tools = self.tools.iter().flatten().map(|t| Load::Tools(*t));
         schemes.chain(tools).collect()
+    }
+
+    fn frames_per_step(&self) -> anyhow::Result<usize> {
+        let step_ms = 1e3 * FRAME_S;
+        let count = (step_ms / self.frame_ms).round();
+        let whole = count >= 1.0 && (count * self.frame_ms - step_ms).abs() < 1e-6 * step_ms;
+        if !whole {
+            bail!(
+                "--frame-ms {}: must be a whole part of a step of {step_ms} ms, such as 5",
+                self.frame_ms
+            );
+        }
+        Ok(count as usize)
     }
 
     /// Solver settings of the split `train`, where they differ.
@@ -97,6 +113,7 @@ pub fn run(options: &Options) -> anyhow::Result<ExitCode> {
         count: options.count,
         seed: options.seed,
         half: options.half,
+        frames_per_step: options.frames_per_step()?,
         training: options.training(),
         columns: options.columns.clone(),
         options: options.solver.options(1),
@@ -104,7 +121,7 @@ pub fn run(options: &Options) -> anyhow::Result<ExitCode> {
     let dataset = Dataset::open(&plan, &mesh, &options.out)?;
     let pending = dataset.pending(options.shard.0, options.shard.1);
     // A case of equilibria or tools has fewer frames than a motion of a scheme.
-    let frames = |index: usize| plan.load(index).frames() as u64 - 1;
+    let frames = |index: usize| (plan.frames_per_step * (plan.load(index).frames() - 1)) as u64;
     let total = pending.iter().map(|case| frames(case.index)).sum();
     let bar =
         indicatif::ProgressBar::new(total).with_style(indicatif::ProgressStyle::with_template(

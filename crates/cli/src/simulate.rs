@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use tissue::mesh::{Boundary, Mesh};
 use tissue::programmes::ToolProgramme;
 use tissue::schemes::{FRAMES, Scheme};
+use tissue::simulate::{ToolOrder, simulate_tools};
 use tissue::solver::{Pressure, SolverOptions};
 
 #[derive(clap::Args)]
@@ -123,15 +124,11 @@ pub fn run(options: &Options) -> anyhow::Result<ExitCode> {
                 bar.set_position(frame as u64);
             };
             let own = options.own_shape()?;
-            let case = tissue::simulate::simulate_tools(
-                &mesh,
-                boundary,
-                tool,
-                own.as_ref(),
-                seed,
-                &settings,
-                advance,
-            );
+            let order = ToolOrder {
+                own: own.as_ref(),
+                ..ToolOrder::new(tool, seed)
+            };
+            let case = simulate_tools(&mesh, boundary, order, &settings, advance);
             (format!("tool {}", tool.name()), case)
         }
         (None, Some(scheme)) => {

@@ -10,7 +10,7 @@ pub use crate::load::Load;
 use crate::material::Material;
 use crate::mesh::{Boundary, Mesh};
 use crate::schemes::SplitMix;
-use crate::simulate::{SOLVER_NAME, simulate, simulate_tools};
+use crate::simulate::{SOLVER_NAME, ToolOrder, simulate, simulate_tools};
 use crate::solver::SolverOptions;
 #[cfg(feature = "linear")]
 use crate::statics::StaticSolver;
@@ -29,6 +29,8 @@ pub struct DatasetPlan {
     pub seed: u64,
     /// Store displacements as f16.
     pub half: bool,
+    /// Frames that each step of a tool's programme is recorded in; 1, or more for what hosts show between steps.
+    pub frames_per_step: usize,
     pub options: SolverOptions,
     /// Settings for the split `train` where they differ: longer inner steps with mass scaling.
     pub training: Option<SolverOptions>,
@@ -145,6 +147,9 @@ impl DatasetPlan {
         );
         if self.options.mass_scaling_s > 0.0 {
             key += &format!("; mass scaling {}", self.options.mass_scaling_s);
+        }
+        if self.frames_per_step > 1 {
+            key += &format!("; {} frames a step", self.frames_per_step);
         }
         if let Some(training) = &self.training {
             key += &format!(
@@ -284,7 +289,11 @@ impl<'a> Dataset<'a> {
             }
             (Load::Tools(tools), _) => {
                 let progress = |frame, _| progress(frame);
-                simulate_tools(mesh, boundary, tools, None, case.seed, options, progress)
+                let order = ToolOrder {
+                    frames_per_step: self.plan.frames_per_step,
+                    ..ToolOrder::new(tools, case.seed)
+                };
+                simulate_tools(mesh, boundary, order, options, progress)
                     .map(|trajectory| (trajectory, Vec::new()))
                     .map_err(|error| error.to_string())
             }

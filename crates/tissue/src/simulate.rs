@@ -69,20 +69,49 @@ pub fn simulate(
     Ok(trajectory)
 }
 
-/// Simulates `programme` with `seed` on `mesh`, with a shape of one's own in place of the table's where there is one; `progress` hears of each finished frame and of how many there will be.
+/// A case of tools to simulate.
+#[derive(Clone, Copy, Debug)]
+pub struct ToolOrder<'a> {
+    pub programme: ToolProgramme,
+    /// A shape of one's own in place of the table's.
+    pub own: Option<&'a Shape>,
+    pub seed: u64,
+    /// Frames that each step of the programme is recorded in.
+    pub frames_per_step: usize,
+}
+
+impl ToolOrder<'_> {
+    /// A programme with the table's shape, a frame a step.
+    pub fn new(programme: ToolProgramme, seed: u64) -> Self {
+        Self {
+            programme,
+            own: None,
+            seed,
+            frames_per_step: 1,
+        }
+    }
+}
+
+/// Simulates a case of tools on `mesh`; `progress` hears of each finished frame and of how many there will be.
 ///
 /// The collision field of a frame is what a host that prescribes contact would give: the nodes that bear a tool's force,
 /// where they are at the frame's end.
 pub fn simulate_tools(
     mesh: &Mesh,
     boundary: Boundary,
-    programme: ToolProgramme,
-    own: Option<&Shape>,
-    seed: u64,
+    order: ToolOrder<'_>,
     options: &SolverOptions,
     mut progress: impl FnMut(usize, usize),
 ) -> Result<Trajectory, SimulationError> {
-    let case = ToolCase::new(programme, mesh, seed, own)?;
+    let ToolOrder {
+        programme,
+        own,
+        seed,
+        ..
+    } = order;
+    let parts = order.frames_per_step.max(1);
+    let case = ToolCase::new(programme, mesh, seed, own)?.split(parts);
+    let frame_s = FRAME_S / parts as f64;
     let mut solver = Solver::new(mesh, boundary, options.clone())?;
     let samples = mesh.samples(boundary);
     solver.set_tools(samples.clone(), &case.tools, &case.start)?;
@@ -91,6 +120,7 @@ pub fn simulate_tools(
     let mut trajectory = Trajectory::at_rest(
         TrajectoryHeader {
             site: case.site,
+            dt_s: frame_s,
             ..header
         },
         mesh.node_count(),
@@ -98,7 +128,7 @@ pub fn simulate_tools(
     let mut tracks = ToolTracks::at_rest(&case.tools, &case.start);
     let held = mesh.held_nodes(boundary);
     for (frame, poses) in case.frames.iter().enumerate() {
-        let report = solver.step_tools(&[], poses, FRAME_S)?;
+        let report = solver.step_tools(&[], poses, frame_s)?;
         record(&mut trajectory, &solver, &report);
         let moved = trajectory.frame(frame + 1);
         let (field, forces) = collision_field(&samples, &report.sample_forces, &held, moved);

@@ -7,7 +7,7 @@ use super::{Specification, Tip, ToolProgramme};
 use crate::mesh::Mesh;
 use crate::schemes::{FRAME_S, FRAMES, SplitMix};
 use crate::solver::{Tool, ToolPose};
-use contact::{Body, Matrix, Pose, Rotation, Shape, Vector};
+use contact::{Body, Matrix, Pose, Rotation, Shape, Vector, pose};
 
 /// Half the length of a shaft, mm.
 const SHAFT_MM: f32 = 20.0;
@@ -120,6 +120,28 @@ impl ToolCase {
             frames,
             site: hands[0].site.to_array().map(f64::from),
         })
+    }
+
+    /// The same motion in `parts` shorter frames each, with the poses that tools have within a frame.
+    pub fn split(mut self, parts: usize) -> Self {
+        let still = |pose: &Pose| ToolPose {
+            pose: *pose,
+            grasp: false,
+        };
+        let mut from: Vec<ToolPose> = self.start.iter().map(still).collect();
+        let mut frames = Vec::with_capacity(parts * self.frames.len());
+        for to in self.frames {
+            for part in 1..=parts {
+                let way = from.iter().zip(&to).map(|(from, to)| ToolPose {
+                    pose: pose::between(&from.pose, &to.pose, part as f32 / parts as f32),
+                    grasp: to.grasp,
+                });
+                frames.push(way.collect());
+            }
+            from = to;
+        }
+        self.frames = frames;
+        self
     }
 }
 

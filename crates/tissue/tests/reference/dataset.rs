@@ -20,6 +20,7 @@ fn plan(schemes: &[Scheme]) -> DatasetPlan {
         count: 4,
         seed: 11,
         half: false,
+        frames_per_step: 1,
         options: SolverOptions {
             // The phantom is stable well above the default.
             inner_step_s: 5e-4,

@@ -4,7 +4,7 @@ use contact::{Body, Samples, Shape, Vector};
 use tissue::dataset::{Dataset, DatasetPlan, Load};
 use tissue::mesh::{Boundary, Mesh, ellipsoid_phantom};
 use tissue::programmes::{TABLE, ToolCase, ToolProgramme};
-use tissue::simulate::simulate_tools;
+use tissue::simulate::{ToolOrder, simulate_tools};
 use tissue::solver::SolverOptions;
 use tissue::trajectory::Trajectory;
 
@@ -88,9 +88,7 @@ fn a_trajectory_of_tools_agrees_with_itself_and_its_file() {
         let trajectory = simulate_tools(
             &mesh,
             Boundary::Fixed,
-            programme,
-            None,
-            5,
+            ToolOrder::new(programme, 5),
             &options(),
             |_, _| {},
         )
@@ -134,6 +132,30 @@ fn a_trajectory_of_tools_agrees_with_itself_and_its_file() {
 }
 
 #[test]
+fn shorter_frames_are_the_same_motion() {
+    let mesh = phantom();
+    let whole = ToolOrder::new("wobble".parse().unwrap(), 5);
+    let parts = ToolOrder {
+        frames_per_step: 10,
+        ..whole
+    };
+    let [whole, parts] = [whole, parts]
+        .map(|order| simulate_tools(&mesh, Boundary::Fixed, order, &options(), |_, _| {}).unwrap());
+    assert!((parts.header.dt_s - 0.005).abs() < 1e-12);
+    assert_eq!(parts.frame_count() - 1, 10 * (whole.frame_count() - 1));
+    let [of_whole, of_parts] = [&whole, &parts].map(|t| t.tools.as_ref().unwrap());
+    for frame in 1..whole.frame_count() {
+        assert_eq!(of_whole.frame(frame), of_parts.frame(10 * frame));
+        let pairs = whole.frame(frame).iter().zip(parts.frame(10 * frame));
+        let apart = |(a, b): (&[f32; 3], &[f32; 3])| {
+            (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f32>().sqrt()
+        };
+        let farthest = pairs.map(apart).fold(0.0, f32::max);
+        assert!(farthest < 0.1, "{farthest} mm apart at frame {frame}");
+    }
+}
+
+#[test]
 fn a_dataset_of_tools_has_a_test_split_and_says_what_it_holds() {
     let mesh = phantom();
     let folder = tempfile::tempdir().unwrap();
@@ -149,6 +171,7 @@ fn a_dataset_of_tools_has_a_test_split_and_says_what_it_holds() {
         count: 10,
         seed: 11,
         half: false,
+        frames_per_step: 1,
         options: options(),
     };
     let splits: Vec<String> = (0..10).map(|i| plan.case(i).split).collect();
@@ -188,9 +211,10 @@ fn a_tool_of_ones_own_takes_the_place_of_the_tables() {
     let trajectory = simulate_tools(
         &mesh,
         Boundary::Fixed,
-        "poke".parse().unwrap(),
-        Some(&wedge),
-        1,
+        ToolOrder {
+            own: Some(&wedge),
+            ..ToolOrder::new("poke".parse().unwrap(), 1)
+        },
         &options(),
         |_, _| {},
     )
