@@ -1431,7 +1431,8 @@ upt_status upt_scene_submit_instruments(struct upt_scene *scene,
  *
  * The velocities of the last published state continue, and contact is solved at the poses given here with the compliance
  * of that time. Use any frame rate, even an uneven one, and call it while a submitted step is in flight too. When a step
- * arrives, the difference to what was shown is blended in over the time of a step.
+ * arrives, the frame goes on from where it would have been without it, and over to it within 20 ms, or at 40 mm/s where that
+ * takes longer.
  *
  * - `seconds`: time since the last published step, 0 or more; velocities are followed for two steps at most.
  * - `instruments`: as `upt_scene_step_instruments`.
@@ -1451,6 +1452,23 @@ upt_status upt_scene_present(struct upt_scene *scene,
                              uint64_t instrument_count,
                              float *out,
                              uint64_t out_count);
+
+/**
+ * As `upt_scene_present`, at the attached points.
+ *
+ * - `seconds`, `instruments`: as `upt_scene_present`.
+ * - `out`: `[n,3]`, mm.
+ * - `out_count`: number of floats in `out`, 3 n.
+ *
+ * Threads: one thread at a time presents, the region or points; another may step or submit meanwhile.
+ * Errors: those of `upt_scene_present`; `UPT_ERR_STATE` when no points are attached.
+ */
+upt_status upt_scene_present_points(struct upt_scene *scene,
+                                    double seconds,
+                                    const struct upt_instrument *instruments,
+                                    uint64_t instrument_count,
+                                    float *out,
+                                    uint64_t out_count);
 
 /**
  * Copies the force, torque and penetration of each instrument at the end of the last step.

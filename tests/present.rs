@@ -119,6 +119,36 @@ fn frames_run_on_when_a_step_arrives() {
 }
 
 #[test]
+fn the_arrival_of_a_step_moves_nothing_at_its_moment() {
+    let scene = scene(&model("tiny-corrected"), &corrected());
+    for t in 1..8 {
+        let now = pressing(&scene, f64::from(t) + 0.2);
+        let before = (t > 1).then(|| present(&scene, 1.2 * DT, &now));
+        step(&scene, &pressing(&scene, f64::from(t)));
+        let after = present(&scene, 0.2 * DT, &now);
+        if let Some(before) = before {
+            assert!(farthest(&before, &after) < 1e-4);
+        }
+        let later = present(&scene, 0.9 * DT, &pressing(&scene, f64::from(t) + 0.9));
+        assert!(farthest(&after, &later) < 0.5);
+    }
+}
+
+#[test]
+fn a_host_that_took_a_step_for_the_one_before_shows_the_step_as_it_is() {
+    let scene = scene(&model("tiny-corrected"), &corrected());
+    for t in 1..4 {
+        step(&scene, &pressing(&scene, f64::from(t)));
+        present(&scene, 0.02, &pressing(&scene, f64::from(t) + 0.4));
+    }
+    let u = step(&scene, &pressing(&scene, 4.0));
+    // The step has come in while the host still counts from the one before.
+    present(&scene, DT + 0.001, &pressing(&scene, 4.02));
+    let shown = present(&scene, 0.001, &pressing(&scene, 4.02));
+    assert!(farthest(&shown, &u) < 0.05);
+}
+
+#[test]
 fn a_frame_may_be_made_while_a_step_is_in_flight_and_changes_nothing() {
     let scene = scene(&model("tiny-corrected"), &corrected());
     for t in 1..5 {
@@ -150,6 +180,35 @@ fn a_region_is_shown_in_its_order() {
     for (&node, u) in nodes.iter().zip(some.chunks_exact(3)) {
         assert_eq!(bits(u), bits(&all[3 * node as usize..][..3]), "node {node}");
     }
+}
+
+#[test]
+fn points_at_nodes_go_with_them() {
+    let scene = scene(&model("tiny-corrected"), &corrected());
+    let rest = scene.mesh().positions.clone();
+    let tools = pressing(&scene, 4.5);
+    let mut points = vec![0.0; rest.len()];
+    let none = scene.present_points(0.01, &tools, &mut points);
+    assert!(matches!(none, Err(Error::State(_))));
+    scene.attach_points(Some(&rest)).unwrap();
+    for t in 1..5 {
+        step(&scene, &pressing(&scene, f64::from(t)));
+        scene.present_points(0.01, &tools, &mut points).unwrap();
+        assert!(farthest(&present(&scene, 0.01, &tools), &points) < 1e-3);
+    }
+    scene.present_points(0.025, &tools, &mut points).unwrap();
+    assert!(farthest(&present(&scene, 0.025, &tools), &points) < 1e-3);
+    assert!(matches!(
+        scene.present_points(0.01, &tools, &mut points[3..]),
+        Err(Error::Argument(_))
+    ));
+    // Other points, in flight too.
+    scene.attach_points(Some(&rest[..9])).unwrap();
+    scene.submit_tools(&pressing(&scene, 5.0)).unwrap();
+    scene
+        .present_points(0.03, &tools, &mut points[..9])
+        .unwrap();
+    scene.wait(std::time::Duration::from_secs(600)).unwrap();
 }
 
 #[test]

@@ -110,7 +110,8 @@ pub unsafe extern "C" fn upt_scene_submit_instruments(
 ///
 /// The velocities of the last published state continue, and contact is solved at the poses given here with the compliance
 /// of that time. Use any frame rate, even an uneven one, and call it while a submitted step is in flight too. When a step
-/// arrives, the difference to what was shown is blended in over the time of a step.
+/// arrives, the frame goes on from where it would have been without it, and over to it within 20 ms, or at 40 mm/s where that
+/// takes longer.
 ///
 /// - `seconds`: time since the last published step, 0 or more; velocities are followed for two steps at most.
 /// - `instruments`: as `upt_scene_step_instruments`.
@@ -143,6 +144,40 @@ pub unsafe extern "C" fn upt_scene_present(
             // SAFETY: the host passes room for that many elements, as the header asks.
             let out = unsafe { slice_mut(out, out_count, "out") }?;
             _scene.present(seconds, &tools, out)?;
+            Ok(UPT_OK)
+        }
+        #[cfg(not(feature = "contact"))]
+        {
+            let _ = (seconds, instruments, instrument_count, out, out_count);
+            fail(UPT_ERR_UNSUPPORTED, WITHOUT)
+        }
+    })
+}
+
+/// As `upt_scene_present`, at the attached points.
+///
+/// - `seconds`, `instruments`: as `upt_scene_present`.
+/// - `out`: `[n,3]`, mm.
+/// - `out_count`: number of floats in `out`, 3 n.
+///
+/// Threads: one thread at a time presents, the region or points; another may step or submit meanwhile.
+/// Errors: those of `upt_scene_present`; `UPT_ERR_STATE` when no points are attached.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn upt_scene_present_points(
+    scene: *mut upt_scene,
+    seconds: f64,
+    instruments: *const upt_instrument,
+    instrument_count: u64,
+    out: *mut f32,
+    out_count: u64,
+) -> upt_status {
+    call_scene("upt_scene_present_points", scene, |_scene| {
+        #[cfg(feature = "contact")]
+        {
+            let mut tools = _scene.frame_tools()?;
+            unsafe { read_tools(instruments, instrument_count, &mut tools) }?;
+            let out = unsafe { slice_mut(out, out_count, "out") }?;
+            _scene.present_points(seconds, &tools, out)?;
             Ok(UPT_OK)
         }
         #[cfg(not(feature = "contact"))]

@@ -16,6 +16,8 @@ mod plan;
 mod points;
 #[cfg(feature = "contact")]
 mod present;
+#[cfg(feature = "contact")]
+mod presenter;
 mod published;
 #[cfg(feature = "forces")]
 mod reaction;
@@ -130,6 +132,8 @@ impl Scene {
             tools: Default::default(),
             #[cfg(feature = "contact")]
             moment: None,
+            #[cfg(feature = "contact")]
+            attached: Arc::default(),
         };
         Ok(Scene {
             worker: Worker::new(options.latest_wins),
@@ -219,7 +223,7 @@ impl Scene {
             if let Some(nodes) = nodes {
                 check_nodes(nodes, core.mesh.node_count())?;
             }
-            let points = core.points.copy()?;
+            let points = Arc::clone(&core.points);
             let nodes = nodes.map(|nodes| memory::copied(nodes, "a region"));
             core.set_plan(published, nodes.transpose()?, points)
         })
@@ -251,7 +255,7 @@ impl Scene {
                 points.set_queries(queries)?;
             }
             let region = core.region_copy(published)?;
-            core.set_plan(published, region, points)
+            core.set_plan(published, region, Arc::new(points))
         })
     }
 

@@ -97,17 +97,6 @@ impl AttachedPoints {
         self.nodes.as_flattened()
     }
 
-    /// A copy.
-    pub fn copy(&self) -> Result<AttachedPoints> {
-        Ok(AttachedPoints {
-            nodes: memory::copied(&self.nodes, WHAT)?,
-            weights: memory::copied(&self.weights, WHAT)?,
-            places: memory::copied(&self.places, WHAT)?,
-            queries: memory::copied(&self.queries, WHAT)?,
-            rows: memory::copied(&self.rows, WHAT)?,
-        })
-    }
-
     /// Where a network is to be asked, `[n,3]`, rest mm.
     pub fn places(&self) -> &[f32] {
         &self.places

@@ -76,6 +76,9 @@ pub struct Published {
     /// What frames between steps are made of, from the first that a host asks for.
     #[cfg(feature = "contact")]
     pub moment: Option<super::present::Moment>,
+    /// The attached points.
+    #[cfg(feature = "contact")]
+    pub attached: std::sync::Arc<super::points::AttachedPoints>,
 }
 
 impl Published {

@@ -1,6 +1,6 @@
 //! Which nodes a scene shows: regions, attached points, nodes decoded on demand, and the way back to rest.
 
-use std::sync::RwLock;
+use std::sync::{Arc, RwLock};
 
 use super::core::{Core, Source, lock_read, lock_write};
 use super::engine::Which;
@@ -167,7 +167,7 @@ impl Core {
         &mut self,
         published: &RwLock<Published>,
         region: Option<Vec<u32>>,
-        points: AttachedPoints,
+        points: Arc<AttachedPoints>,
     ) -> Result<()> {
         let count = self.mesh.node_count();
         let table = self.engine.planned_prior(&self.model);
@@ -220,6 +220,8 @@ impl Core {
         self.next.points = spare;
         shared.region = region;
         self.plan = plan;
+        #[cfg(feature = "contact")]
+        shared.attached.clone_from(&points);
         self.points = points;
         Ok(())
     }

@@ -64,11 +64,20 @@ impl World<'_> {
                     let status = upt_scene_submit_instruments(scene, tools, count);
                     ("upt_scene_submit_instruments", status)
                 }
-                Function::Present => {
+                Function::Present | Function::PresentPoints => {
                     let tools = self.instruments(call, 4);
                     let count = absurd(tools.len(), 64, call);
                     let mut seconds = [(call.seed % 120) as f32 * 1e-3];
                     spoil(&mut seconds, call.odd, 0);
+                    if call.function == Function::PresentPoints {
+                        let points = self.points.get(&scene.addr()).copied().unwrap_or(1);
+                        let status = Self::output(call, 1, 3 * points, true, |out, floats| {
+                            let tools = pointer(&tools, call, 0);
+                            let seconds = seconds[0].into();
+                            upt_scene_present_points(scene, seconds, tools, count, out, floats)
+                        });
+                        return ("upt_scene_present_points", status);
+                    }
                     let status = Self::output(call, 1, 3 * nodes, true, |out, floats| {
                         let tools = pointer(&tools, call, 0);
                         upt_scene_present(scene, seconds[0].into(), tools, count, out, floats)

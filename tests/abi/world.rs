@@ -196,8 +196,8 @@ impl<'a> World<'a> {
             | ModelPositions | ModelIndices | SceneCreate | SceneDestroy | SetLog | Texts => {
                 self.call_library(call, scene)
             }
-            Instruments | StepInstruments | SubmitInstruments | Present | Readings
-            | InstrumentContacts | HullCreate | HullDestroy => {
+            Instruments | StepInstruments | SubmitInstruments | Present | PresentPoints
+            | Readings | InstrumentContacts | HullCreate | HullDestroy => {
                 self.call_instruments(call, scene, nodes)
             }
             HapticsCreate | HapticsRender | HapticsDestroy => self.call_haptics(call, scene),

@@ -292,7 +292,7 @@ impl Core {
             )?;
         }
         let region = self.region_copy(published)?;
-        let points = self.points.copy()?;
+        let points = std::sync::Arc::clone(&self.points);
         self.set_plan(published, region, points)
     }
 
