@@ -11,6 +11,7 @@
 
 #include "upt.h"
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -375,6 +376,18 @@ public:
   upt_status submit_instruments(span<const upt_instrument> instruments) {
     return check(upt_scene_submit_instruments(handle_, instruments.data(), instruments.size()));
   }
+  /// The tissue `seconds` after the last published step, with the instruments where they are then;
+  /// out: [n,3].
+  upt_status present(double seconds, span<const upt_instrument> instruments, span<float> out) {
+    return check(upt_scene_present(handle_, seconds, instruments.data(), instruments.size(),
+                                   out.data(), out.size()));
+  }
+  /// The same at the attached points.
+  upt_status present_points(double seconds, span<const upt_instrument> instruments,
+                            span<float> out) {
+    return check(upt_scene_present_points(handle_, seconds, instruments.data(), instruments.size(),
+                                          out.data(), out.size()));
+  }
   /// What the tissue did to each instrument of the last step; out has one element for each.
   upt_status readings(span<upt_instrument_reading> out) {
     for (upt_instrument_reading &reading : out) {
@@ -521,6 +534,196 @@ public:
 
 private:
   upt_haptics *handle_ = nullptr;
+};
+
+/// When a host steps and what it shows: a scene's frames without lag, at any rate, uneven ones too.
+///
+/// Time is the host's own in seconds, from any origin, and does not go back. A step is made for
+/// every `dt` of it, with the poses that the instruments had at that moment (between those of the
+/// two frames around it), on the scene's worker. A host that hangs for more than two steps goes on
+/// from where it is: the time that is lost makes no steps. Used by one thread.
+class FrameClock {
+public:
+  /// dt: the model's step, s (`model.info().dt`).
+  explicit FrameClock(double dt) : dt_(dt) {}
+
+  /// One frame: takes a finished step, writes the tissue at `now` with the instruments where they
+  /// are now, and submits the next step when it is due. Never waits for a step.
+  ///
+  /// now: s. instruments: each in the same place in every frame. out: [n,3], mm, the region.
+  /// A scene that cannot present shows its last two steps between each other, up to two steps late.
+  /// A failed step is returned (or thrown) once; the next frame goes on.
+  upt_status frame(Scene &scene, double now, span<const upt_instrument> instruments,
+                   span<float> out) {
+    moved(now, instruments);
+    landed_now_ = false;
+    upt_status result = collect(scene);
+    look(scene);
+    upt_status status = show(scene, now, instruments, out);
+    if (status == UPT_OK && in_flight_ && look(scene)) {
+      // A step that finished after it was asked for has changed the state under the frame.
+      status = show(scene, now, instruments, out);
+    }
+    if (status == UPT_OK && due(now)) {
+      look(scene);
+      const std::vector<upt_instrument> &poses = start(now);
+      status = upt_scene_submit_instruments(scene.get(), poses.data(), poses.size());
+      if (status < 0) {
+        in_flight_ = false;
+      }
+    }
+    return check(status < 0 ? status : result);
+  }
+
+  /// Whether the last frame took a finished step: readings and statistics are new.
+  bool landed() const noexcept { return landed_now_; }
+  /// Whether a step was submitted that no frame has taken yet.
+  bool in_flight() const noexcept { return in_flight_; }
+  /// Back to rest, with the scene: waits for the step in flight, resets, and forgets the poses.
+  upt_status reset(Scene &scene) {
+    if (in_flight_) {
+      upt_scene_wait(scene.get(), 0xFFFFFFFFU);
+    }
+    *this = FrameClock(dt_);
+    return scene.reset();
+  }
+
+  // The parts of `frame`, for hosts that call the scene themselves.
+
+  /// The instruments are here at `now`.
+  void moved(double now, span<const upt_instrument> instruments) {
+    if (!started_) {
+      started_ = true;
+      next_ = published_ = now;
+    }
+    if (queue_.size() == MOST_POSES) {
+      queue_.erase(queue_.begin());
+    }
+    queue_.push_back({now, {instruments.begin(), instruments.end()}});
+  }
+  /// Whether a step is to be submitted now.
+  bool due(double now) const noexcept { return started_ && !in_flight_ && now + 1e-9 >= next_; }
+  /// The instruments of the step that is submitted now, at its moment.
+  const std::vector<upt_instrument> &start(double now) {
+    if (now - next_ > 2 * dt_) {
+      next_ = now;
+    }
+    place(next_);
+    step_ = next_;
+    next_ += dt_;
+    in_flight_ = true;
+    return poses_;
+  }
+  /// The step has landed, or has been refused: the state is that of its moment.
+  void finished() noexcept {
+    in_flight_ = false;
+    landed_now_ = true;
+    published_ = step_;
+  }
+  /// The moment of the step that was submitted last, s.
+  double step_time() const noexcept { return step_; }
+  /// Its instruments.
+  const std::vector<upt_instrument> &step_instruments() const noexcept { return poses_; }
+  /// What `upt_scene_present` takes: the time since the last published step's moment, s.
+  double since(double now) const noexcept { return now > published_ ? now - published_ : 0.0; }
+
+private:
+  static constexpr std::size_t MOST_POSES = 256;
+  // An instrument that moves farther from a frame to the next has been put there.
+  static constexpr float PUT_MM = 40;
+  struct Moment {
+    double time;
+    std::vector<upt_instrument> poses;
+  };
+
+  upt_status collect(Scene &scene) {
+    if (!in_flight_) {
+      return UPT_OK;
+    }
+    const upt_status status = upt_scene_poll(scene.get());
+    if (status == UPT_PENDING) {
+      return UPT_OK;
+    }
+    finished();
+    return status;
+  }
+
+  // Whether a step has been published since the last look; poll() may not have told yet.
+  bool look(Scene &scene) {
+    upt_scene_stats stats = make<upt_scene_stats>();
+    if (upt_scene_get_stats(scene.get(), &stats) != UPT_OK || stats.step_count == counted_) {
+      return false;
+    }
+    counted_ = stats.step_count;
+    if (in_flight_) {
+      published_ = step_;
+    }
+    return true;
+  }
+
+  upt_status show(Scene &scene, double now, span<const upt_instrument> instruments,
+                  span<float> out) {
+    if (presents_) {
+      const upt_status status =
+          upt_scene_present(scene.get(), since(now), instruments.data(), instruments.size(),
+                            out.data(), out.size());
+      if (status != UPT_ERR_UNSUPPORTED) {
+        return status;
+      }
+      presents_ = false;
+    }
+    const double alpha = since(now) / dt_;
+    return upt_scene_sample(scene.get(), alpha < 1 ? alpha : 1, out.data(), out.size());
+  }
+
+  // The instruments at a moment: on the line between two frames, as they were before the first.
+  void place(double time) {
+    while (queue_.size() > 2 && queue_[1].time <= time) {
+      queue_.erase(queue_.begin());
+    }
+    const Moment &from = queue_.front();
+    const Moment &to = queue_.size() > 1 && time > from.time ? queue_[1] : from;
+    poses_ = to.poses;
+    const double way = to.time - from.time;
+    const double part = way > 0 ? (time - from.time) / way : 1;
+    if (from.poses.size() != to.poses.size() || part >= 1) {
+      return;
+    }
+    for (std::size_t i = 0; i < poses_.size(); i++) {
+      blend(from.poses[i], static_cast<float>(part), poses_[i]);
+    }
+  }
+
+  static void blend(const upt_instrument &from, float part, upt_instrument &to) {
+    float dot = 0, length = 0, far = 0;
+    for (int k = 0; k < 3; k++) {
+      far = std::fmax(far, std::fabs(to.position[k] - from.position[k]));
+    }
+    if (far > PUT_MM) {
+      return;
+    }
+    for (int k = 0; k < 4; k++) {
+      dot += from.rotation[k] * to.rotation[k];
+    }
+    for (int k = 0; k < 4; k++) {
+      const float start = dot < 0 ? -from.rotation[k] : from.rotation[k];
+      to.rotation[k] = start + part * (to.rotation[k] - start);
+      length += to.rotation[k] * to.rotation[k];
+    }
+    for (int k = 0; k < 4; k++) {
+      to.rotation[k] /= std::sqrt(length);
+    }
+    for (int k = 0; k < 3; k++) {
+      to.position[k] = from.position[k] + part * (to.position[k] - from.position[k]);
+    }
+  }
+
+  double dt_;
+  double next_ = 0, step_ = 0, published_ = 0;
+  std::uint64_t counted_ = 0;
+  bool started_ = false, in_flight_ = false, landed_now_ = false, presents_ = true;
+  std::vector<Moment> queue_;
+  std::vector<upt_instrument> poses_;
 };
 
 } // namespace upt

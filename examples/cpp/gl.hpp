@@ -11,12 +11,14 @@
   X(PFNGLATTACHSHADERPROC, AttachShader)                                                           \
   X(PFNGLBINDBUFFERPROC, BindBuffer)                                                               \
   X(PFNGLBINDVERTEXARRAYPROC, BindVertexArray)                                                     \
+  X(PFNGLBLENDFUNCPROC, BlendFunc)                                                                 \
   X(PFNGLBUFFERDATAPROC, BufferData)                                                               \
   X(PFNGLCLEARPROC, Clear)                                                                         \
   X(PFNGLCLEARCOLORPROC, ClearColor)                                                               \
   X(PFNGLCOMPILESHADERPROC, CompileShader)                                                         \
   X(PFNGLCREATEPROGRAMPROC, CreateProgram)                                                         \
   X(PFNGLCREATESHADERPROC, CreateShader)                                                           \
+  X(PFNGLDEPTHMASKPROC, DepthMask)                                                                 \
   X(PFNGLDISABLEPROC, Disable)                                                                     \
   X(PFNGLDRAWARRAYSPROC, DrawArrays)                                                               \
   X(PFNGLDRAWELEMENTSPROC, DrawElements)                                                           \

@@ -125,7 +125,7 @@ static void run(const Options &options) {
   Camera camera;
   // From the side of the site, along the surface a little, so that the dent is seen in profile.
   const Frame around = frame_around(site.normal, {0, 0, 1});
-  camera.frame(tissue.centre() * 0.7F + site.point * 0.3F, 0.70F * tissue.radius(),
+  camera.frame(tissue.centre() * 0.4F + site.point * 0.6F, 0.45F * tissue.radius(),
                around.z + around.x * 0.75F + around.y * 0.35F);
 
   using Clock = std::chrono::steady_clock;
@@ -158,14 +158,14 @@ static void run(const Options &options) {
     last = now;
 
     if (tissue.solves_contact()) {
-      tissue.advance(now, spatula.instruments());
+      tissue.frame(now, spatula.instruments());
     } else {
       tissue.advance(now, spatula.contacts(tissue));
+      tissue.sample(now);
     }
     if (options.headless) {
       tissue.finish();
     }
-    tissue.sample(now);
     view.draw(tissue, spatula, camera, width, height, frame_ms);
     frame++;
     if (frame == options.frames && !options.screenshot.empty()) {

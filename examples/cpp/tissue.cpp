@@ -11,6 +11,7 @@ static Vec3 at(const std::vector<float> &values, std::size_t index, std::size_t 
 
 Tissue::Tissue(const std::string &bundle) : model_(upt::Model::open(bundle)), scene_(model_) {
   info_ = model_.info();
+  clock_ = upt::FrameClock(info_.dt);
   surface_ = model_.indices(UPT_SET_SURFACE_NODES);
   domain_ = model_.indices(UPT_SET_DOMAIN_NODES);
   const std::vector<float> positions = model_.positions();
@@ -48,10 +49,14 @@ Tissue::Tissue(const std::string &bundle) : model_(upt::Model::open(bundle)), sc
   displacement_.assign(3 * surface_.size(), 0);
   cavity_.assign(surface_.size(), 0);
   vertices_.assign(STRIDE * surface_.size(), 0);
+  ghost_.assign(GHOST_FLOATS * surface_.size(), 0);
   fill(displacement_);
   for (std::size_t vertex = 0; vertex < surface_.size(); vertex++) {
     const float *normal = &vertices_[STRIDE * vertex + 3];
     rest_normals_.push_back(normalized({normal[0], normal[1], normal[2]}));
+    const Vec3 p = rest_[surface_[vertex]], n = rest_normals_.back();
+    const float values[GHOST_FLOATS] = {p.x, p.y, p.z, n.x, n.y, n.z, 0};
+    std::copy(values, values + GHOST_FLOATS, &ghost_[GHOST_FLOATS * vertex]);
   }
 
   find_cavities();
@@ -90,55 +95,56 @@ void Tissue::find_cavities() {
   }
 }
 
-bool Tissue::is_due(double now) {
+void Tissue::advance(double now, const Contacts &contacts) {
   if (in_flight_) {
     if (scene_.poll() == UPT_PENDING) {
-      return false; // the frame does not wait
+      return; // the frame does not wait
     }
-    count_step();
+    in_flight_ = false;
+    count_step(0);
   }
-  return now - last_start_ + 1e-9 >= info_.dt;
-}
-
-void Tissue::started(double now, std::size_t instruments) {
-  in_flight_ = true;
-  instruments_ = instruments;
-  last_start_ = std::max(last_start_ + info_.dt, now - info_.dt);
-}
-
-void Tissue::advance(double now, const Contacts &contacts) {
-  if (is_due(now)) {
+  if (now - last_start_ + 1e-9 >= info_.dt) {
     scene_.submit(contacts.nodes, contacts.vectors);
-    started(now, 0);
+    in_flight_ = true;
+    last_start_ = std::max(last_start_ + info_.dt, now - info_.dt);
   }
 }
 
-void Tissue::advance(double now, upt::span<const upt_instrument> instruments) {
-  if (is_due(now)) {
-    scene_.submit_instruments(instruments);
-    started(now, instruments.size());
+void Tissue::frame(double now, upt::span<const upt_instrument> instruments) {
+  const std::size_t count = clock_.step_instruments().size();
+  clock_.frame(scene_, now, instruments, displacement_);
+  if (clock_.landed()) {
+    count_step(count);
   }
+  fill(displacement_);
 }
 
 void Tissue::reset() {
   finish();
-  scene_.reset();
+  if (solves_contact_) {
+    clock_.reset(scene_);
+  } else {
+    scene_.reset();
+  }
   reading_.reset();
 }
 
 void Tissue::finish() {
+  if (clock_.in_flight()) {
+    scene_.wait(60000);
+  }
   if (in_flight_) {
     scene_.wait(60000);
-    count_step();
+    in_flight_ = false;
+    count_step(0);
   }
 }
 
-void Tissue::count_step() {
+void Tissue::count_step(std::size_t instruments) {
   const auto last = stats();
-  in_flight_ = false;
   reading_.reset();
-  if (instruments_ > 0) {
-    reading_ = scene_.readings(instruments_).front();
+  if (instruments > 0) {
+    reading_ = scene_.readings(instruments).front();
   }
   counted_steps_ = last.step_count;
   step_ms_.push_back(last.step_ms);
@@ -164,6 +170,7 @@ void Tissue::fill(const std::vector<float> &displacement) {
     const float size = length(u);
     const float values[STRIDE] = {p.x, p.y, p.z, 0, 0, 0, size, cavity_[vertex]};
     std::copy(values, values + STRIDE, &vertices_[STRIDE * vertex]);
+    ghost_[GHOST_FLOATS * vertex + 6] = size;
     max_displacement_ = std::max(max_displacement_, size);
   }
   // Vertex normals: the sum of the faces' area vectors.

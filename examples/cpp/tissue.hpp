@@ -1,4 +1,5 @@
-// The deforming tissue: libupt steps on the scene's own worker, the window samples between steps.
+// The deforming tissue: libupt steps on the scene's own worker, each frame shows the tissue at its own
+// moment. Where a bundle does not solve contact a frame lies between the last two steps.
 #pragma once
 
 #include <cstdint>
@@ -30,8 +31,9 @@ public:
 
   // Starts a step when the last one has finished and its time has come. `now`: seconds.
   void advance(double now, const Contacts &contacts);
-  // The same with a rigid instrument whose contact the library solves; none: a free step.
-  void advance(double now, upt::span<const upt_instrument> instruments);
+  // A frame with rigid instruments whose contact the library solves: the surface at `now`, and the
+  // next step when it is due.
+  void frame(double now, upt::span<const upt_instrument> instruments);
   // Whether the bundle and this build solve contact: then instruments drive the steps.
   bool solves_contact() const { return solves_contact_; }
   // What the tissue did to the first instrument of the last finished step; none: it had none.
@@ -55,6 +57,9 @@ public:
   // Per surface vertex: position 3, normal 3, displacement 1, cavity 1 (above 0 in a sulcus).
   static constexpr std::size_t VERTEX_FLOATS = 8;
   const std::vector<float> &vertices() const { return vertices_; }
+  // The surface at rest; per vertex: position 3, normal 3, present displacement 1.
+  static constexpr std::size_t GHOST_FLOATS = 7;
+  const std::vector<float> &ghost() const { return ghost_; }
   // Three a triangle, indices of surface vertices.
   const std::vector<std::uint32_t> &triangles() const { return triangles_; }
   const std::vector<Vec3> &rest() const { return rest_; }
@@ -65,10 +70,7 @@ public:
 private:
   Vec3 position(std::uint32_t vertex) const;
   void find_cavities();
-  void count_step();
-  // Whether a step may start at `now`: the last one has finished and the time has come.
-  bool is_due(double now);
-  void started(double now, std::size_t instruments);
+  void count_step(std::size_t instruments);
   void fill(const std::vector<float> &displacement);
 
   upt::Model model_;
@@ -80,12 +82,12 @@ private:
   std::vector<bool> vertex_in_domain_; // per surface vertex
   std::vector<std::uint32_t> triangles_;
   std::vector<Vec3> rest_normals_;
-  std::vector<float> displacement_, vertices_, cavity_;
+  std::vector<float> displacement_, vertices_, ghost_, cavity_;
   std::vector<double> step_ms_;
   Vec3 centre_;
   float radius_ = 0, max_displacement_ = 0;
+  upt::FrameClock clock_{0.05};
   bool in_flight_ = false, solves_contact_ = true;
-  std::size_t instruments_ = 0; // of the step in flight
   std::optional<upt_instrument_reading> reading_;
   std::uint64_t counted_steps_ = 0;
   double last_start_ = -1e9;

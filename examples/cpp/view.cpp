@@ -55,6 +55,32 @@ void main() {
   result = vec4(tone * diffuse + 0.30 * shine + 0.05 * rim, 1.0);
 })";
 
+// The surface at rest, where the tissue has left it: seen through, brighter where it is seen edge on.
+static const char *GHOST_VERTEX = R"(#version 330 core
+layout(location = 0) in vec3 position;
+layout(location = 1) in vec3 normal;
+layout(location = 2) in float displacement;
+uniform mat4 camera;
+out vec3 world, side;
+out float moved;
+void main() {
+  world = position;
+  side = normal;
+  moved = displacement;
+  gl_Position = camera * vec4(position, 1.0);
+})";
+
+static const char *GHOST_FRAGMENT = R"(#version 330 core
+in vec3 world, side;
+in float moved;
+uniform vec3 eye;
+out vec4 result;
+void main() {
+  float facing = abs(dot(normalize(side), normalize(eye - world)));
+  float there = smoothstep(2.0, 5.0, moved);
+  result = vec4(0.62, 0.80, 0.96, there * mix(0.55, 0.16, facing));
+})";
+
 static const char *METAL_VERTEX = R"(#version 330 core
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec3 normal;
@@ -125,6 +151,10 @@ void View::create(const Tissue &tissue, float scale_mm) {
   tissue_.upload_elements(triangles.data(), triangles.size() * sizeof triangles[0]);
   index_count_ = static_cast<GLsizei>(triangles.size());
 
+  ghost_program_ = gl::program(GHOST_VERTEX, GHOST_FRAGMENT);
+  ghost_.create({3, 3, 1});
+  ghost_.upload_elements(triangles.data(), triangles.size() * sizeof triangles[0]);
+
   // The blade, and a handle that rises from its end.
   std::vector<float> metal;
   const Frame straight = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
@@ -180,7 +210,21 @@ void View::draw(const Tissue &tissue, const Spatula &spatula, const Camera &came
     gl::BindVertexArray(metal_.array);
     gl::DrawArrays(GL_TRIANGLES, 0, metal_count_);
   }
+  draw_ghost(tissue, matrix, eye);
   draw_numbers(tissue, spatula, width, height, frame_ms);
+}
+
+void View::draw_ghost(const Tissue &tissue, const Mat4 &matrix, Vec3 eye) {
+  gl::Enable(GL_BLEND);
+  gl::BlendFunc(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA);
+  gl::DepthMask(GL_FALSE);
+  gl::UseProgram(ghost_program_);
+  gl::UniformMatrix4fv(uniform(ghost_program_, "camera"), 1, GL_FALSE, matrix.data());
+  gl::Uniform3f(uniform(ghost_program_, "eye"), eye.x, eye.y, eye.z);
+  ghost_.upload(tissue.ghost().data(), tissue.ghost().size() * sizeof(float));
+  gl::DrawElements(GL_TRIANGLES, index_count_, GL_UNSIGNED_INT, nullptr);
+  gl::DepthMask(GL_TRUE);
+  gl::Disable(GL_BLEND);
 }
 
 std::string flag_names(std::uint32_t flags) {

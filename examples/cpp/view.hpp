@@ -21,8 +21,10 @@ private:
   void draw_numbers(const Tissue &tissue, const Spatula &spatula, int width, int height,
                     double frame_ms);
 
-  GLuint tissue_program_ = 0, metal_program_ = 0, background_program_ = 0;
-  gl::Vertices tissue_, metal_, background_;
+  void draw_ghost(const Tissue &tissue, const Mat4 &matrix, Vec3 eye);
+
+  GLuint tissue_program_ = 0, ghost_program_ = 0, metal_program_ = 0, background_program_ = 0;
+  gl::Vertices tissue_, ghost_, metal_, background_;
   GLsizei index_count_ = 0, metal_count_ = 0;
   Overlay overlay_;
   float scale_mm_ = 10;
