@@ -46,7 +46,7 @@ mcs "${mcs_flags[@]}" -nowarn:0649 -target:library -out:"$build/Upt.dll" -r:"$bu
 mcs "${mcs_flags[@]}" -nowarn:0649 -target:library -out:"$build/Upt.Editor.dll" -r:"$build/Upt.Interop.dll" \
   -r:"$build/UnityEngine.Stub.dll" -r:"$build/Upt.dll" "$plugin"/Editor/*.cs
 mcs "${mcs_flags[@]}" -define:ENABLE_LEGACY_INPUT_MANAGER -nowarn:0649 -target:library -out:"$build/Upt.Samples.dll" -r:"$build/Upt.Interop.dll" \
-  -r:"$build/UnityEngine.Stub.dll" -r:"$build/Upt.dll" "$plugin"/Samples~/PushedBrain/*.cs
+  -r:"$build/UnityEngine.Stub.dll" -r:"$build/Upt.dll" "$plugin"/Samples~/*/*.cs
 mcs "${mcs_flags[@]}" -target:library -out:"$build/Upt.Tests.dll" -r:"$nunit" -r:"$build/Upt.Interop.dll" \
   -r:"$build/UnityEngine.Stub.dll" -r:"$build/Upt.dll" -r:"$build/Upt.Samples.dll" "$root"/tests/csharp/tests/*.cs "$plugin"/Tests/Runtime/*.cs
 mcs "${mcs_flags[@]}" -target:exe -out:"$build/MissingLibrary.exe" -r:"$build/Upt.Interop.dll" \

@@ -70,6 +70,16 @@ namespace Upt
             return instrument;
         }
 
+        /// <summary>The rotation of a tool that lies as <paramref name="local"/> in the tissue's space; no other field. From any
+        /// thread.</summary>
+        internal unsafe upt_instrument TurnedAs(Quaternion local)
+        {
+            upt_instrument instrument = default(upt_instrument);
+            Anatomical.FromUnity(local, instrument.rotation);
+            if (shape == InstrumentShape.Capsule) TurnCapsule(ref instrument);
+            return instrument;
+        }
+
         private void OnDisable()
         {
             if (made != null) made.Dispose();

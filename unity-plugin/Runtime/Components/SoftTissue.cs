@@ -8,8 +8,9 @@ namespace Upt
 {
     /// <summary>
     /// Soft tissue on this object's mesh. Steps run on the scene's worker at the model's own rate (20 Hz);
-    /// the frame only samples between the last two states and uploads the vertices. The picture is
-    /// therefore one step (50 ms), and the time that a step takes, behind the instruments.
+    /// each frame shows the tissue at its own moment, with the instruments where they are then. Models without
+    /// corrections cannot: there a frame lies between the last two states, one step (50 ms) and the time
+    /// that a step takes behind the instruments.
     /// </summary>
     [RequireComponent(typeof(MeshFilter))]
     public sealed class SoftTissue : MonoBehaviour
@@ -40,7 +41,11 @@ namespace Upt
         private SurfaceMesh surface;
         private Mesh shownBefore;
         private Playhead playhead;
+        private FrameClock clock;
+        private double now;
+        private bool presents;
         private upt_instrument[] poses = new upt_instrument[4];
+        private upt_instrument[] stepPoses = new upt_instrument[4];
         private uint[] contactNodes;
         private float[] contactVectors;
         private int contactCount;
@@ -62,6 +67,12 @@ namespace Upt
         public bool SolvesContact
         {
             get { return solvesContact; }
+        }
+
+        /// <summary>Whether frames show the present moment, without lag.</summary>
+        public bool Presents
+        {
+            get { return presents; }
         }
 
         /// <summary>What the tissue did to <paramref name="instrument"/> in the last finished step; false where it took
@@ -119,6 +130,18 @@ namespace Upt
             return geometry == null ? new Vector3[0] : geometry.Displaced(contactNodes, contactVectors, contactCount);
         }
 
+        /// <summary>Lets a hand feel <paramref name="instrument"/>, one of the list; null where this tissue does not run or cannot
+        /// (<see cref="Presents"/>). Waits for a step in flight. The caller disposes it.</summary>
+        internal Haptics MakeHaptics(Instrument instrument, float forceLimit)
+        {
+            int place = instruments.IndexOf(instrument);
+            if (!IsRunning || !presents || place < 0) return null;
+            if (inFlight) scene.Wait(uint.MaxValue);
+            upt_haptics_options options = default(upt_haptics_options);
+            options.force_limit_n = forceLimit;
+            return scene.MakeHaptics(place, instrument.PoseIn(transform, unitsPerMillimetre), options);
+        }
+
         private void OnEnable()
         {
             failed = false;
@@ -174,6 +197,7 @@ namespace Upt
             contactCount = 0;
             LastStats = scene.Stats();
             playhead = new Playhead(playhead.Step);
+            clock = new FrameClock(playhead.Step);
         }
 
         private void Open()
@@ -196,6 +220,9 @@ namespace Upt
             contactVectors = new float[3 * touchable.Length];
             geometry = new RestGeometry(native, unitsPerMillimetre);
             playhead = new Playhead(native.Info.dt);
+            clock = new FrameClock(native.Info.dt);
+            now = 0.0;
+            presents = solvesContact && surface.TryPresent(scene);
             LastStats = scene.Stats();
             filter.sharedMesh = surface.Mesh;
         }
@@ -223,6 +250,11 @@ namespace Upt
 
         private void Advance(float deltaTime)
         {
+            if (presents)
+            {
+                Present(deltaTime);
+                return;
+            }
             playhead.Advance(deltaTime);
             if (inFlight) Collect();
             using (UploadMarker.Auto())
@@ -242,6 +274,35 @@ namespace Upt
             playhead.Submitted();
         }
 
+        /// <summary>A frame at its own moment; the next step where it is due.</summary>
+        private void Present(float deltaTime)
+        {
+            now += deltaTime;
+            int count = TakePoses();
+            clock.Moved(now, poses, count);
+            if (inFlight) Collect();
+            using (UploadMarker.Auto())
+            {
+                surface.Present(scene, clock.Since(now), poses, count);
+                // A step that finished after it was asked for has changed the state under the frame.
+                if (inFlight && scene.Stats().step_count != LastStats.step_count)
+                {
+                    clock.Published();
+                    Collect();
+                    surface.Present(scene, clock.Since(now), poses, count);
+                }
+                surface.Upload(recalculateNormals);
+            }
+            if (inFlight || !clock.IsDue(now)) return;
+            using (ContactMarker.Auto())
+            {
+                submittedCount = clock.Start(now, ref stepPoses);
+                inFlight = true;
+                TakePlaces();
+                scene.SubmitInstruments(stepPoses, submittedCount);
+            }
+        }
+
         /// <summary>Takes the submitted step's result when it is there.</summary>
         private void Collect()
         {
@@ -252,12 +313,14 @@ namespace Upt
             catch (UptException error)
             {
                 inFlight = false;
+                clock.Finished();
                 if (error.Status != Native.UPT_ERR_GUARD) throw;
                 Hold(error);
                 return;
             }
             inFlight = false;
             refused = false;
+            clock.Finished();
             LastStats = scene.Stats();
             if (solvesContact)
             {
@@ -283,21 +346,10 @@ namespace Upt
         /// one that takes no part is far away.</summary>
         private void Submit()
         {
-            int count = instruments.Count;
-            if (poses.Length < count)
-            {
-                poses = new upt_instrument[2 * count];
-                places = new Instrument[2 * count];
-                readings = new upt_instrument_reading[2 * count];
-                readingCount = 0;
-            }
-            for (int i = 0; i < count; i++)
-            {
-                bool takesPart = instruments[i] != null && instruments[i].isActiveAndEnabled;
-                places[i] = takesPart ? instruments[i] : null;
-                poses[i] = takesPart ? instruments[i].PoseIn(transform, unitsPerMillimetre) : FarAway();
-            }
+            int count = TakePoses();
+            if (stepPoses.Length < count) stepPoses = new upt_instrument[2 * count];
             submittedCount = count;
+            TakePlaces();
             if (solvesContact)
             {
                 scene.SubmitInstruments(poses, count);
@@ -305,6 +357,39 @@ namespace Upt
             }
             contactCount = count == 0 ? 0 : scene.ContactsFrom(poses, count, contactNodes, contactVectors);
             scene.Submit(contactNodes, contactVectors, contactCount);
+        }
+
+        /// <summary>Where the instruments are now; their number.</summary>
+        private int TakePoses()
+        {
+            int count = instruments.Count;
+            if (poses.Length < count) poses = new upt_instrument[2 * count];
+            for (int i = 0; i < count; i++)
+                poses[i] = TakesPart(i) ? instruments[i].PoseIn(transform, unitsPerMillimetre) : FarAway();
+            return count;
+        }
+
+        /// <summary>Which instrument the readings of the submitted step will be of.</summary>
+        private void TakePlaces()
+        {
+            if (places.Length < submittedCount)
+            {
+                places = new Instrument[2 * submittedCount];
+                readings = new upt_instrument_reading[2 * submittedCount];
+                readingCount = 0;
+            }
+            for (int i = 0; i < submittedCount; i++)
+            {
+                places[i] = TakesPart(i) ? instruments[i] : null;
+                // The pose is of an earlier frame; a hull that it names may be gone.
+                if (places[i] == null) stepPoses[i] = FarAway();
+                else stepPoses[i].hull = poses[i].hull;
+            }
+        }
+
+        private bool TakesPart(int index)
+        {
+            return index < instruments.Count && instruments[index] != null && instruments[index].isActiveAndEnabled;
         }
 
         /// <summary>A small sphere that touches nothing.</summary>

@@ -79,6 +79,29 @@ namespace Upt
             scene.SamplePoints(alpha, (float*)NativeArrayUnsafeUtility.GetUnsafePtr(displacement), displacement.Length);
         }
 
+        /// <summary>Whether a scene at rest can show the present moment.</summary>
+        public bool TryPresent(Scene scene)
+        {
+            try
+            {
+                Present(scene, 0.0, null, 0);
+            }
+            catch (UptException error)
+            {
+                if (error.Status != Native.UPT_ERR_UNSUPPORTED) throw;
+                return false;
+            }
+            return true;
+        }
+
+        /// <summary>Takes the tissue <paramref name="seconds"/> after the last published step, with the instruments where
+        /// they are then. No managed memory is allocated.</summary>
+        public void Present(Scene scene, double seconds, upt_instrument[] instruments, int count)
+        {
+            scene.PresentPoints(seconds, instruments, count,
+                                (float*)NativeArrayUnsafeUtility.GetUnsafePtr(displacement), displacement.Length);
+        }
+
         /// <summary>Uploads the sampled vertices. No managed memory is allocated.</summary>
         public void Upload(bool normals)
         {

@@ -48,6 +48,25 @@ namespace Upt.Interop
         }
     }
 
+    /// <summary>Owns a <c>upt_haptics*</c>.</summary>
+    internal sealed class HapticsHandle : SafeHandle
+    {
+        public HapticsHandle(IntPtr pointer) : base(IntPtr.Zero, true)
+        {
+            SetHandle(pointer);
+        }
+
+        public override bool IsInvalid
+        {
+            get { return handle == IntPtr.Zero; }
+        }
+
+        protected override bool ReleaseHandle()
+        {
+            return Native.upt_haptics_destroy(handle) == Native.UPT_OK;
+        }
+    }
+
     /// <summary>Owns a <c>upt_hull*</c>.</summary>
     internal sealed class HullHandle : SafeHandle
     {

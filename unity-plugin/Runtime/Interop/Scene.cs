@@ -230,6 +230,36 @@ namespace Upt.Interop
             finally { Leave(); }
         }
 
+        /// <summary>Displacement of the attached points <paramref name="seconds"/> after the last published step, with the first
+        /// <paramref name="count"/> instruments where they are then. Throws <c>UPT_ERR_UNSUPPORTED</c> where the scene does not
+        /// correct. The pointer may be a <c>NativeArray</c>'s.</summary>
+        public void PresentPoints(double seconds, upt_instrument[] instruments, int count, float* output, int floats)
+        {
+            RequireInstruments(instruments, count);
+            IntPtr scene = Enter();
+            try
+            {
+                fixed (upt_instrument* i = instruments)
+                    Status.Check(Native.upt_scene_present_points(scene, seconds, i, (ulong)count, output,
+                                                                 checked((ulong)floats)));
+            }
+            finally { Leave(); }
+        }
+
+        /// <summary>The same in the region's order.</summary>
+        public void Present(double seconds, upt_instrument[] instruments, int count, float[] output)
+        {
+            RequireInstruments(instruments, count);
+            IntPtr scene = Enter();
+            try
+            {
+                fixed (upt_instrument* i = instruments)
+                fixed (float* o = output)
+                    Status.Check(Native.upt_scene_present(scene, seconds, i, (ulong)count, o, Length(output)));
+            }
+            finally { Leave(); }
+        }
+
         /// <summary>One step from the scene's own state that the first <paramref name="count"/> instruments drive: their
         /// contact is solved. Throws <c>UPT_ERR_UNSUPPORTED</c> for a bundle without a linear response.</summary>
         public void StepInstruments(upt_instrument[] instruments, int count, float[] output)
@@ -353,6 +383,24 @@ namespace Upt.Interop
             {
                 fixed (byte* b = snapshot)
                     Status.Check(Native.upt_scene_restore(scene, b, (ulong)snapshot.Length));
+            }
+            finally { Leave(); }
+        }
+
+        /// <summary>Makes a tool felt: <paramref name="tool"/> at place <paramref name="instrument"/> of the steps'
+        /// instruments, where it is now. No step may be in flight. Throws <c>UPT_ERR_UNSUPPORTED</c> where the scene does not
+        /// correct.</summary>
+        public Haptics MakeHaptics(int instrument, upt_instrument tool, upt_haptics_options options)
+        {
+            options.struct_size = (uint)sizeof(upt_haptics_options);
+            options.instrument = checked((uint)instrument);
+            options.tool = &tool;
+            IntPtr scene = Enter();
+            try
+            {
+                IntPtr created = IntPtr.Zero;
+                Status.Check(Native.upt_haptics_create(scene, &options, &created));
+                return new Haptics(created);
             }
             finally { Leave(); }
         }
