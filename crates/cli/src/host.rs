@@ -329,6 +329,26 @@ impl Scene {
         })
     }
 
+    /// `upt_scene_present`: `seconds` after the last step, with instruments where they are then.
+    pub fn present(
+        &mut self,
+        seconds: f64,
+        instruments: &[ffi::upt_instrument],
+        out: &mut [[f32; 3]],
+    ) -> Result<()> {
+        // SAFETY: the pointers and counts describe the slices.
+        check(unsafe {
+            ffi::upt_scene_present(
+                self.handle,
+                seconds,
+                instruments.as_ptr(),
+                instruments.len() as u64,
+                out.as_mut_ptr().cast(),
+                3 * out.len() as u64,
+            )
+        })
+    }
+
     /// `upt_scene_get_stats`.
     pub fn stats(&self) -> Result<ffi::upt_scene_stats> {
         // SAFETY: the struct is a place to write to and states its size.

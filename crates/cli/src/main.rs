@@ -36,6 +36,7 @@ mod reference;
 mod render;
 mod report;
 mod rollout;
+mod shown;
 mod simulate;
 mod soak;
 mod stress;

@@ -29,6 +29,7 @@ use clap::Args;
 use tissue::mesh::Mesh;
 
 use crate::machine::Machine;
+use crate::shown;
 use crate::tools::{self, cases::Split};
 use cache::Cache;
 pub use row::quantile;
@@ -46,6 +47,7 @@ use setting::{Precision, Provider, Region};
   upt report --trajectory push.trajectory.safetensors --bundle onnx/brain-reduced --plain zero,linear
   upt report --data data/brain-fixed --threads 1,2 --region all,surface --precision f32,bf16 --json
   upt report --tools data/brain-tools --bundle onnx/brain-reduced --corrections 0,3,5 --out target/tools
+  upt report --shown 90 --tools data/brain-frames --split all --bundle onnx/brain-reduced --out target/shown
 
 report.json and report.html are written to --out (with --tools: tools.json and tools.html); the table goes to the terminal.")]
 pub struct Options {
@@ -66,6 +68,14 @@ pub struct Options {
     /// Cases of the datasets of --tools: held-out ones, those that bundles may learn from, or both.
     #[arg(long, default_value = "test", requires = "tools")]
     split: Split,
+    /// What a host shows between steps at this many frames a second; --tools names datasets with frames shorter than a step
+    /// (`upt dataset --tools all --frame-ms 5`). Writes shown.json and pictures; --markdown replaces the part between the markers
+    /// `upt report --shown BUNDLE`.
+    #[arg(long, value_name = "HZ", requires = "tools")]
+    shown: Option<f64>,
+    /// With --shown: time from a step's moment to the arrival of its state, ms.
+    #[arg(long, default_value_t = 10.0, requires = "shown")]
+    arrival_ms: f64,
     /// Page whose part between the markers `upt report --tools MESH` is replaced by the tables of --tools, or by a narrow one
     /// where the markers end in `summary` (repeat for several).
     #[arg(long, value_name = "FILE", requires = "tools")]
@@ -129,6 +139,22 @@ fn default_threads() -> Vec<u32> {
 }
 
 pub fn run(options: &Options) -> Result<ExitCode> {
+    let threads = options.threads.iter().copied().max().unwrap_or(1);
+    if let Some(hz) = options.shown {
+        return shown::report(&shown::Plan {
+            hz,
+            arrival_ms: options.arrival_ms,
+            paths: &options.tools,
+            split: options.split,
+            per_programme: options.cases,
+            bundles: &options.bundles,
+            corrections: options.corrections.first().copied(),
+            threads,
+            out: options.out.clone(),
+            markdown: &options.markdown,
+            json: options.json,
+        });
+    }
     if !options.tools.is_empty() {
         return tools::report(&tools::Plan {
             paths: &options.tools,
@@ -136,7 +162,7 @@ pub fn run(options: &Options) -> Result<ExitCode> {
             per_programme: options.cases,
             bundles: &options.bundles,
             corrections: &options.corrections,
-            threads: options.threads.iter().copied().max().unwrap_or(1),
+            threads,
             out: options.out.clone(),
             title: options.title.as_deref().unwrap_or("From pose to picture"),
             markdown: &options.markdown,

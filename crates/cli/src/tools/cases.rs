@@ -6,6 +6,7 @@ use anyhow::{Context, Result, bail};
 use contact::{Body, Pose, Samples, Vector};
 use tissue::baselines::DecayFit;
 use tissue::mesh::Mesh;
+use tissue::schemes::FRAME_S;
 use tissue::solver::{Tool, ToolPose};
 use tissue::tool_tracks::ToolTracks;
 use tissue::trajectory::Trajectory;
@@ -223,6 +224,23 @@ impl ToolCases {
             }
         }
         fit.decay().unwrap_or(0.0)
+    }
+
+    /// Checks that each frame is a step.
+    ///
+    /// # Errors
+    /// Names a case with shorter frames.
+    pub fn check_steps(&self) -> Result<()> {
+        for case in &self.list {
+            let frame_s = case.trajectory.header.dt_s;
+            if (frame_s - FRAME_S).abs() > 1e-9 {
+                bail!(
+                    "{}: field `dt_s` is {frame_s}, a step takes {FRAME_S} s; add --shown 90 to measure what is shown between steps",
+                    case.name
+                );
+            }
+        }
+        Ok(())
     }
 
     /// Checks that the trajectories have as many nodes as the mesh.

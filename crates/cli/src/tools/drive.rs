@@ -4,6 +4,8 @@ mod geometric;
 mod linear;
 mod solved;
 
+use std::time::Instant;
+
 use anyhow::{Context, Result};
 use contact::{Body, Shape, Vector};
 use tissue::mesh::{Boundary, Mesh};
@@ -155,6 +157,32 @@ impl Driver {
             Drive::Geometric => self.geometric(&instruments, poses, out),
             Drive::Linear => self.linear(poses, out),
         }
+    }
+
+    /// `upt_scene_sample`.
+    pub fn sample(&mut self, alpha: f64, out: &mut [[f32; 3]]) -> Result<()> {
+        self.scene.sample(alpha, out)
+    }
+
+    /// `upt_scene_present`: the tissue `seconds` after the last step, with the tools at `poses`; the time of the call, ms.
+    pub fn present(
+        &mut self,
+        seconds: f64,
+        poses: &[ToolPose],
+        out: &mut [[f32; 3]],
+    ) -> Result<f64> {
+        let tools = self.tools.iter().zip(poses);
+        let instruments: Vec<ffi::upt_instrument> = tools
+            .map(|(taken, to)| instrument(&taken.tool, to, taken.hull.as_ref()))
+            .collect();
+        let started = Instant::now();
+        self.scene.present(seconds, &instruments, out)?;
+        Ok(started.elapsed().as_secs_f64() * 1e3)
+    }
+
+    /// Nodes that steps and frames write; an empty list means all.
+    pub fn set_region(&mut self, nodes: &[u32]) -> Result<()> {
+        self.scene.set_region(nodes)
     }
 
     /// One step with tools that are given to the library as they are, without a look at whether they can be.

@@ -10,9 +10,9 @@ use super::yard::{Yard, jump};
 
 /// The tissue slips off a tool where a node goes this much farther in a step than any point of any tool, mm; a grasp that
 /// tears off counts as well.
-const SLIP_MM: f64 = 1.0;
+pub const SLIP_MM: f64 = 1.0;
 /// Steps around a slip-off that are counted apart: before, and after.
-const SLIP_WINDOW: (usize, usize) = (1, 2);
+pub const SLIP_WINDOW: (usize, usize) = (1, 2);
 /// Steps that a tool is held still at least before motion counts as motion under a still tool: 1 s.
 const SETTLE: usize = 20;
 /// Steps of the hold.

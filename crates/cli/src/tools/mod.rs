@@ -3,19 +3,20 @@
 //!
 //! | module | what |
 //! |---|---|
-//! | [`cases`] | trajectories with tools |
+//! | [`cases`], [`bundles`] | trajectories with tools, and what fits them |
 //! | [`drive`] | how the library is driven |
 //! | [`yard`] | det F and penetration of one state |
 //! | [`measure`], [`row`] | a case, and the rows over cases |
 //! | [`section`], [`force`], [`table`], [`page`] | what is shown |
 
+pub mod bundles;
 pub mod cases;
 pub mod drive;
 mod force;
-mod measure;
+pub mod measure;
 mod page;
 mod row;
-mod section;
+pub mod section;
 mod table;
 pub mod yard;
 
@@ -97,7 +98,8 @@ struct Measured {
 pub fn report(plan: &Plan) -> Result<ExitCode> {
     let cases = ToolCases::read(plan.paths, plan.split, plan.per_programme)?;
     let mut notes = Vec::new();
-    let bundles = fitting(plan, &cases, &mut notes)?;
+    cases.check_steps()?;
+    let bundles = bundles::fitting(plan.bundles, &cases, &mut notes)?;
     let boundary: Boundary = cases.boundary.parse().map_err(anyhow::Error::msg)?;
     let mesh = Mesh::read(&bundles[0].mesh_file)?;
     cases.check(&mesh)?;
@@ -146,42 +148,6 @@ pub fn report(plan: &Plan) -> Result<ExitCode> {
         println!("{}", plan.out.join("tools.html").display());
     }
     Ok(ExitCode::SUCCESS)
-}
-
-/// The bundles on the cases' mesh under their boundary condition; where bundles were named, another mesh is an error.
-fn fitting(plan: &Plan, cases: &ToolCases, notes: &mut Vec<String>) -> Result<Vec<BundleFolder>> {
-    let named = !plan.bundles.is_empty();
-    let paths = match named {
-        true => plan.bundles.to_vec(),
-        false => crate::doctor::bundles_below("onnx".as_ref()),
-    };
-    let mesh = &cases.list[0].trajectory.header.mesh_name;
-    let mut fitting = Vec::new();
-    for path in &paths {
-        let bundle = BundleFolder::read(path)?;
-        let reason = if bundle.mesh_sha256 != cases.mesh_sha256 {
-            format!(
-                "{}: made for another mesh than that of the cases ({mesh})",
-                bundle.name
-            )
-        } else if bundle.boundary != cases.boundary {
-            format!(
-                "{}: made for the boundary `{}`, the cases have `{}`",
-                bundle.name, bundle.boundary, cases.boundary
-            )
-        } else {
-            fitting.push(bundle);
-            continue;
-        };
-        if named {
-            bail!("{reason}; name a bundle or a dataset that fits");
-        }
-        notes.push(reason);
-    }
-    if fitting.is_empty() {
-        bail!("no bundle below onnx/ fits the mesh {mesh} of the cases; name one with --bundle");
-    }
-    Ok(fitting)
 }
 
 fn methods(plan: &Plan, bundles: &[BundleFolder]) -> Vec<Method> {

@@ -170,17 +170,16 @@ fn tool(out: &mut String, plane: &Plane, body: &Body, pose: &Pose) {
     path(out, &outline, "#9c8f78", 1.2);
 }
 
-/// One picture: the tools at `frame`, the surface at rest, the truth, and a prediction in `colour`.
-pub fn picture(
+/// The tools at `frame`, the surface at rest, the truth, and a prediction in `colour`: what is inside of an `svg` of 416 by 272.
+pub fn drawing(
     mesh: &Mesh,
     case: &ToolCase,
     frame: usize,
     prediction: &[[f32; 3]],
-    name: &str,
     colour: &str,
 ) -> String {
     let plane = Plane::of(case, frame);
-    let [width, height] = HALF_MM.map(|half| 2.0 * half * PIXELS_PER_MM);
+    let height = 2.0 * HALF_MM[1] * PIXELS_PER_MM;
     let mut body = String::new();
     for (shape, pose) in case.bodies.iter().zip(case.at(frame)) {
         tool(&mut body, &plane, shape, &pose);
@@ -201,6 +200,20 @@ pub fn picture(
         x + scale + 6.0,
         y + 4.0
     );
+    body
+}
+
+/// One picture with its name.
+pub fn picture(
+    mesh: &Mesh,
+    case: &ToolCase,
+    frame: usize,
+    prediction: &[[f32; 3]],
+    name: &str,
+    colour: &str,
+) -> String {
+    let [width, height] = HALF_MM.map(|half| 2.0 * half * PIXELS_PER_MM);
+    let body = drawing(mesh, case, frame, prediction, colour);
     format!(
         "<figure><svg viewBox=\"0 0 {width} {height}\" role=\"img\" class=\"section\">{body}</svg><figcaption>{}</figcaption></figure>",
         escape(name)

@@ -1,0 +1,48 @@
+//! Bundles that fit the cases.
+
+use std::path::PathBuf;
+
+use anyhow::{Result, bail};
+
+use super::cases::ToolCases;
+use crate::report::method::BundleFolder;
+
+/// The bundles on the cases' mesh under their boundary condition; where bundles were named, another mesh is an error.
+pub fn fitting(
+    named_paths: &[PathBuf],
+    cases: &ToolCases,
+    notes: &mut Vec<String>,
+) -> Result<Vec<BundleFolder>> {
+    let named = !named_paths.is_empty();
+    let paths = match named {
+        true => named_paths.to_vec(),
+        false => crate::doctor::bundles_below("onnx".as_ref()),
+    };
+    let mesh = &cases.list[0].trajectory.header.mesh_name;
+    let mut fitting = Vec::new();
+    for path in &paths {
+        let bundle = BundleFolder::read(path)?;
+        let reason = if bundle.mesh_sha256 != cases.mesh_sha256 {
+            format!(
+                "{}: made for another mesh than that of the cases ({mesh})",
+                bundle.name
+            )
+        } else if bundle.boundary != cases.boundary {
+            format!(
+                "{}: made for the boundary `{}`, the cases have `{}`",
+                bundle.name, bundle.boundary, cases.boundary
+            )
+        } else {
+            fitting.push(bundle);
+            continue;
+        };
+        if named {
+            bail!("{reason}; name a bundle or a dataset that fits");
+        }
+        notes.push(reason);
+    }
+    if fitting.is_empty() {
+        bail!("no bundle below onnx/ fits the mesh {mesh} of the cases; name one with --bundle");
+    }
+    Ok(fitting)
+}
