@@ -4,6 +4,9 @@
 
 use ::contact::{Pose, Rotation, Vector};
 
+/// What came out too much is taken back over this time, s: within one call it would be a blow.
+const BACK_S: f64 = 0.02;
+
 /// The observer of one tool; SI units.
 #[derive(Debug, Default)]
 pub struct Observer {
@@ -37,9 +40,9 @@ impl Observer {
         self.given.max(0.0)
     }
 
-    /// Damping that takes the excess back within `seconds` at a velocity, N s/m, at most `limit`.
-    pub fn damping(&self, velocity: Vector, seconds: f64, limit: f32) -> f32 {
-        let power = f64::from(velocity.length_squared()) * seconds;
+    /// Damping that takes the excess back within [`BACK_S`] at a velocity, N s/m, at most `limit`.
+    pub fn damping(&self, velocity: Vector, limit: f32) -> f32 {
+        let power = f64::from(velocity.length_squared()) * BACK_S;
         if self.given <= 0.0 || power <= 0.0 {
             return 0.0;
         }
@@ -72,10 +75,10 @@ mod tests {
             let to = 3.0 * phase.sin().max(-0.2);
             observer.observe(&at(x), &at(to));
             total += f64::from(observer.held[0].x) * f64::from(to - x) * 1e-3;
-            let v = Vector::new(to - x, 0.0, 0.0);
+            let v = Vector::new(to - x, 0.0, 0.0); // mm/ms, so m/s
             let stiffness = if to < x { 0.06 } else { 0.05 };
             let force = Vector::new(-stiffness * to.max(0.0), 0.0, 0.0);
-            let damping = observer.damping(v, 1e-3, 1e3);
+            let damping = observer.damping(v, 1e3);
             let force = match to > 0.0 {
                 true => force - v * damping,
                 false => Vector::ZERO,
@@ -85,7 +88,8 @@ mod tests {
             excess = excess.max(observer.excess());
         }
         assert!(excess > 0.0, "the spring is active");
-        assert!(total < 1e-6, "{total} J given");
+        // The spring by itself gives 45 µJ in each of four cycles.
+        assert!(total < 1e-5, "{total} J given");
     }
 
     #[test]

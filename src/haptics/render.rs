@@ -200,7 +200,7 @@ impl Haptics {
         if self.passivity && force_n != Vector::ZERO && seconds > 0.0 {
             let way = (now.translation - from.translation) * 1e-3 / seconds as f32;
             let velocity = at.velocity.map_or(way, |[linear, _]| Vector::from(linear));
-            let damping = self.observer.damping(velocity, seconds, self.damping_limit);
+            let damping = self.observer.damping(velocity, self.damping_limit);
             force_n -= velocity * damping;
             damped = damping > 0.0;
         }
@@ -250,6 +250,21 @@ fn check(at: &HapticPose) -> Result<Pose> {
         )));
     }
     Ok(now)
+}
+
+/// What a change of the force on a sample moves at once.
+fn displace(moved: &mut [f32], slow: &Slow, at: usize, change: Vector) {
+    if change == Vector::ZERO {
+        return;
+    }
+    let all = 3 * slow.count;
+    for (axis, change) in change.to_array().into_iter().enumerate() {
+        // Symmetric: a row is a column.
+        let row = &slow.delassus[(3 * at + axis) * all..][..all];
+        for (moved, w) in moved.iter_mut().zip(row) {
+            *moved += change * w;
+        }
+    }
 }
 
 impl Solver {
@@ -302,7 +317,8 @@ impl Solver {
             self.rows
                 .sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
             for &(_, at) in &self.rows[MOST_ROWS..] {
-                self.forces[at] = Vector::ZERO;
+                let force = std::mem::take(&mut self.forces[at]);
+                displace(&mut self.moved, slow, at, -force);
             }
             self.rows.truncate(MOST_ROWS);
             self.rows.sort_unstable_by_key(|row| row.1);
@@ -344,16 +360,7 @@ impl Solver {
         for (&(_, at), &force) in self.rows.iter().zip(&self.solved) {
             let change = force - self.forces[at];
             self.forces[at] = force;
-            if change == Vector::ZERO {
-                continue;
-            }
-            for (axis, change) in change.to_array().into_iter().enumerate() {
-                // Symmetric: a row is a column.
-                let row = &slow.delassus[(3 * at + axis) * all..][..all];
-                for (moved, w) in self.moved.iter_mut().zip(row) {
-                    *moved += change * w;
-                }
-            }
+            displace(&mut self.moved, slow, at, change);
         }
         for at in 0..slow.count {
             self.points[at] = self.place(slow, at);
