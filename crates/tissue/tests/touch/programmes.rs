@@ -134,7 +134,7 @@ fn a_trajectory_of_tools_agrees_with_itself_and_its_file() {
 #[test]
 fn shorter_frames_are_the_same_motion() {
     let mesh = phantom();
-    let whole = ToolOrder::new("wobble".parse().unwrap(), 5);
+    let whole = ToolOrder::new("poke".parse().unwrap(), 5);
     let parts = ToolOrder {
         frames_per_step: 10,
         ..whole
