@@ -4,7 +4,7 @@
 mod measure;
 
 use measure::{Row, medians};
-use upt::forces::{Moduli, ReactionForces};
+use upt::forces::ReactionForces;
 use upt::instrument::{Instrument, InstrumentContacts, Shape};
 
 /// A slab of `n x n x layers` cells of 4 mm: positions, tetrahedra (six a cell), top and bottom faces.
@@ -88,7 +88,7 @@ fn forces(positions: &[f32], tets: &[u32], displacement: &[f32]) {
         let nodes: Vec<u32> = (0..side * side)
             .map(|i| 40 + i % side + 90 * (40 + i / side) + 3 * 90 * 90)
             .collect();
-        let moduli = Moduli::from_young(3000.0, 0.49);
+        let moduli = elements::Material::default().moduli();
         let mut forces = ReactionForces::new(positions, tets, &[], &nodes, moduli);
         let mut out = vec![0.0; 3 * nodes.len()];
         let seconds = medians(&mut [Box::new(|| {

@@ -65,6 +65,18 @@ fn manifest_errors_name_the_field() {
         ),
         (
             "tiny-upt",
+            "/material/law",
+            serde_json::json!({"name": "mooney-rivlin", "c01_share": 1.5}),
+            "material.law.c01_share",
+        ),
+        (
+            "tiny-upt",
+            "/material/law",
+            serde_json::json!({"name": "ogden"}),
+            "ogden",
+        ),
+        (
+            "tiny-upt",
             "/precisions",
             serde_json::json!([]),
             "precisions",

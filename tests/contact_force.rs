@@ -4,7 +4,7 @@ mod fixture;
 
 use fixture::{BUNDLES, bits, model, path, plain, push, scene, sparse};
 use safetensors::SafeTensors;
-use upt::forces::{Moduli, ReactionForces};
+use upt::forces::ReactionForces;
 use upt::{Error, GuardPolicy, IndexSet, Model, Scene, SceneOptions, StepInput, flag};
 
 const WITH_PRIOR: [&str; 2] = ["tiny-reduced", "tiny-upt-prior"];
@@ -226,7 +226,7 @@ fn without_a_prior_it_is_the_elements_force_at_the_last_state() {
         &mesh.tets,
         &mesh.stiffness,
         &contact.0,
-        Moduli::from_young(material.young_pa, material.poisson),
+        material.moduli(),
     );
     let mut want = vec![0.0; contact.1.len()];
     forces.reaction(&field, &contact.0, &mut want).unwrap();

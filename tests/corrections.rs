@@ -227,10 +227,7 @@ fn the_contact_force_is_the_works_derivative() {
 /// Strain energy, nJ.
 fn energy(model: &upt::Model, u: &[f32]) -> f64 {
     let mesh = &model.mesh;
-    let moduli = elements::Moduli::from_young(
-        model.manifest.material.young_pa,
-        model.manifest.material.poisson,
-    );
+    let moduli = model.manifest.material.moduli();
     let row =
         |values: &[f32], node: u32| [0, 1, 2].map(|k| f64::from(values[3 * node as usize + k]));
     mesh.tets

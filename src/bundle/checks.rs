@@ -23,21 +23,12 @@ impl Manifest {
         )?;
         check(self.length_unit == "mm", "length_unit", "must be `mm`")?;
         check(self.force_unit == "mN", "force_unit", "must be `mN`")?;
-        check(
-            self.material.young_pa > 0.0 && self.material.young_pa <= 1e12,
-            "material.young_pa",
-            "must be positive and at most 1e12 Pa",
-        )?;
-        check(
-            self.material.density_kg_m3 > 0.0 && self.material.density_kg_m3 <= 1e5,
-            "material.density_kg_m3",
-            "must be positive and at most 1e5 kg/m^3",
-        )?;
-        check(
-            (0.0..=1e6).contains(&self.material.damping_per_s),
-            "material.damping_per_s",
-            "must be in [0, 1e6] 1/s",
-        )?;
+        self.material.validate().map_err(|error| {
+            bad(
+                &format!("material.{}", error.field),
+                &format!("is {}; it must be {}", error.value, error.wanted),
+            )
+        })?;
         check(
             (0.0..=1.0).contains(&self.rest_displacement_mm),
             "rest_displacement_mm",
@@ -55,11 +46,6 @@ impl Manifest {
                 "may list `f32`, `f16`, `int8`",
             )?;
         }
-        check(
-            self.material.poisson > -1.0 && self.material.poisson < 0.5,
-            "material.poisson",
-            "must be in (-1, 0.5)",
-        )?;
         check(
             self.mesh.nodes >= 4 && self.mesh.nodes < i32::MAX as usize,
             "mesh.nodes",

@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 
 /// What `requires` may name: each changes what a step gives, and a library without it must refuse the bundle. A new one is
 /// one line here, beside its keys in [`KEYS`].
-const REQUIREMENTS: &[&str] = &["anchors", "corrections", "unlearned", "vibration"];
+const REQUIREMENTS: &[&str] = &["anchors", "corrections", "law", "unlearned", "vibration"];
 
 /// The keys of each object of `bundle.json`. What lies below `provenance` and `errors` is for people, `files` is a list.
 const KEYS: &[(&str, &[&str])] = &[
@@ -43,8 +43,15 @@ const KEYS: &[(&str, &[&str])] = &[
     ),
     (
         "material",
-        &["young_pa", "poisson", "density_kg_m3", "damping_per_s"],
+        &[
+            "young_pa",
+            "poisson",
+            "density_kg_m3",
+            "damping_per_s",
+            "law",
+        ],
     ),
+    ("material.law", &["name", "c01_share"]),
     ("mesh", &["file", "nodes", "mesh_sha256"]),
     (
         "envelope",

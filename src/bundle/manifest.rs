@@ -30,19 +30,6 @@ pub enum Boundary {
     Supported,
 }
 
-/// Material of the training data.
-#[derive(Debug, Clone, Copy, Deserialize)]
-pub struct Material {
-    /// Young's modulus, Pa.
-    pub young_pa: f64,
-    /// Poisson's ratio.
-    pub poisson: f64,
-    /// Density, kg/m^3.
-    pub density_kg_m3: f64,
-    /// Mass-proportional damping, 1/s.
-    pub damping_per_s: f64,
-}
-
 /// Which mesh the bundle is for.
 #[derive(Debug, Clone, Deserialize)]
 pub struct MeshEntry {
@@ -296,8 +283,8 @@ pub struct Manifest {
     pub force_unit: String,
     /// Held node sets.
     pub boundary: Boundary,
-    /// Material.
-    pub material: Material,
+    /// Material of the training data.
+    pub material: elements::Material,
     /// Mesh.
     pub mesh: MeshEntry,
     /// Envelope.

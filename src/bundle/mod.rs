@@ -12,7 +12,7 @@ pub use files::BundleFiles;
 pub(crate) use files::{hex, read_regular};
 pub use manifest::{
     Base, Bound, Boundary, Coordinates, CorrectionsEntry, Dims, Envelope, Fade, Feature, FileEntry,
-    Graph, Manifest, ManifestKind, Material, MeshEntry, Normalisation, PriorEntry, ReducedEntry,
+    Graph, Manifest, ManifestKind, MeshEntry, Normalisation, PriorEntry, ReducedEntry,
     ReducedInput, UptEntry,
 };
 pub use mesh::Mesh;

@@ -73,15 +73,6 @@ impl Corrections {
         let manifest = &files.manifest;
         let (entry, prior) = needed(manifest, prior)?;
         let material = &manifest.material;
-        let material = elements::Material {
-            young_pa: material.young_pa,
-            poisson: material.poisson,
-            density_kg_m3: material.density_kg_m3,
-            damping_per_s: material.damping_per_s,
-        };
-        material
-            .validate()
-            .map_err(|error| Error::bundle("bundle.json", error.to_string()))?;
         // Made of many lists: what they take together is asked for first.
         let bytes = 160 * mesh.tets.len() / 4 + 200 * mesh.node_count();
         crate::memory::probe(bytes, "the elements of the corrections")?;
@@ -91,7 +82,7 @@ impl Corrections {
         };
         Ok(Corrections {
             space: CoarseSpace::parse(&files.tensors(&entry.file)?, prior)?,
-            body: Body::new(mesh, &material, integrator.kappa(), Isa::detect()),
+            body: Body::new(mesh, material, integrator.kappa(), Isa::detect()),
             integrator,
         })
     }

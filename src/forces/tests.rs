@@ -4,6 +4,7 @@ use elements::vector::{cross, dot, subtract};
 const UNIT: Moduli = Moduli {
     shear_pa: 1000.0,
     bulk_pa: 5000.0,
+    law: elements::Law::NeoHookean(elements::NeoHookean {}),
 };
 
 fn element(positions: &[f32], corners: [u32; 4]) -> Tetrahedron {

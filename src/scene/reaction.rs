@@ -15,7 +15,7 @@ use super::published::Published;
 use super::tools::lock;
 use crate::bundle::Mesh;
 use crate::error::{Error, Result};
-use crate::forces::{Moduli, ReactionForces};
+use crate::forces::ReactionForces;
 use crate::kernels::FlushToZero;
 use crate::model::Model;
 
@@ -95,7 +95,7 @@ impl Haptics {
                 &mesh.tets,
                 &mesh.stiffness,
                 &mesh.surface_nodes,
-                Moduli::from_young(material.young_pa, material.poisson),
+                material.moduli(),
             ),
             around: Vec::new(),
             decoded: Vec::new(),

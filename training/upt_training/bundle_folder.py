@@ -79,6 +79,7 @@ def requirements(manifest: dict) -> list[str]:
     parts = {
         "anchors": "anchors" in manifest.get("upt", {}),
         "corrections": "corrections" in manifest,
+        "law": "law" in manifest.get("material", {}),
         "unlearned": manifest.get("kind") == "reduced" and "reduced" not in manifest,
         "vibration": "vibration" in manifest.get("prior", {}),
     }

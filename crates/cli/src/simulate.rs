@@ -69,6 +69,9 @@ pub struct SolverArguments {
     /// Young's modulus, Pa.
     #[arg(long, default_value_t = 3000.0)]
     young: f64,
+    /// Law of the tissue: neo-hookean, or mooney-rivlin:SHARE with the share of C01 in C10 + C01 (left out: 0.526, brain).
+    #[arg(long, default_value_t = elements::Law::default())]
+    law: elements::Law,
     /// Poisson's ratio.
     #[arg(long, default_value_t = 0.49)]
     poisson: f64,
@@ -102,6 +105,7 @@ impl SolverArguments {
         options.material.poisson = self.poisson;
         options.material.density_kg_m3 = self.density;
         options.material.damping_per_s = self.damping;
+        options.material.law = self.law;
         if self.average_pressure {
             options.pressure = Pressure::AverageNodal;
         }

@@ -164,6 +164,35 @@ fn a_small_organ_end_to_end_and_checked_again() {
 }
 
 #[test]
+fn an_organ_of_another_law_is_corrected_by_that_law() {
+    let folder = tempfile::tempdir().unwrap();
+    let (surface, out) = (folder.path().join("organ.obj"), folder.path().join("organ"));
+    plain(&surface);
+    let law = ["--law", "mooney-rivlin:1"];
+    let output = command(&surface, &out, &[HELD, law].concat())
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", text(&output));
+    works(&out);
+    let read = |name: &str| -> serde_json::Value {
+        serde_json::from_slice(&std::fs::read(out.join(name)).unwrap()).unwrap()
+    };
+    let manifest = read("bundle.json");
+    let law = serde_json::json!({"name": "mooney-rivlin", "c01_share": 1.0});
+    assert_eq!(manifest["material"]["law"], law);
+    let requires = manifest["requires"].as_array().unwrap();
+    assert!(requires.iter().any(|name| name == "law"), "{requires:?}");
+    // Measured against the reference solver with the same law.
+    let certificate = read("certificate.json");
+    let share = certificate["contact"]["share_of_linear"].as_f64().unwrap();
+    assert!(share < 0.05, "{certificate:#}");
+
+    let output = command(&surface, &out, &["--law", "ogden"]).output();
+    let said = text(&output.unwrap());
+    assert!(said.contains("law `ogden` is unknown"), "{said}");
+}
+
+#[test]
 fn killed_after_each_stage_it_leaves_nothing_or_a_bundle_that_works_and_goes_on() {
     let folder = tempfile::tempdir().unwrap();
     let (surface, out) = (folder.path().join("organ.obj"), folder.path().join("organ"));

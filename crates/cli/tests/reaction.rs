@@ -2,7 +2,7 @@
 
 use tissue::mesh::{Boundary, box_phantom};
 use tissue::solver::{ContactNode, Solver, SolverOptions};
-use upt::forces::{Moduli, ReactionForces};
+use upt::forces::ReactionForces;
 
 #[test]
 fn reaction_equals_the_reference_solvers() {
@@ -29,7 +29,7 @@ fn reaction_equals_the_reference_solvers() {
         mesh.tets.as_flattened(),
         &mesh.stiffness,
         &nodes,
-        Moduli::from_young(material.young_pa, material.poisson),
+        material.moduli(),
     );
     let mut displacement = vec![[0.0; 3]; mesh.node_count()];
     let mut reaction = vec![0.0; 3 * nodes.len()];

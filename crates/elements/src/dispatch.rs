@@ -2,6 +2,7 @@
 
 use crate::kernel::{Shape, add_forces, add_volumes};
 use crate::lanes::{Lanes, Scalar};
+use crate::laws::{Isochoric, Law};
 use crate::partition::{Chunk, Partition};
 use crate::slots::{advance, place};
 
@@ -88,12 +89,35 @@ unsafe fn all_forces<L: Lanes, const AVERAGED: bool>(
     forces: *mut [f32; 4],
 ) -> f32 {
     unsafe {
+        match partition.moduli.law {
+            Law::NeoHookean(law) => {
+                forces_by::<L, _, AVERAGED>(law, partition, chunk, nodes, forces)
+            }
+            Law::MooneyRivlin(law) => {
+                forces_by::<L, _, AVERAGED>(law, partition, chunk, nodes, forces)
+            }
+        }
+    }
+}
+
+/// The same by a law.
+#[inline(always)]
+unsafe fn forces_by<L: Lanes, M: Isochoric, const AVERAGED: bool>(
+    law: M,
+    partition: &Partition,
+    chunk: &Chunk,
+    nodes: *const [f32; 4],
+    forces: *mut [f32; 4],
+) -> f32 {
+    unsafe {
+        let moduli = partition.moduli;
+        let law = (law, (moduli.bulk_pa / moduli.shear_pa) as f32);
         let (octahedra, pairs, singles) = partition.clusters(chunk);
         let mut shape = Shape::EMPTY;
         let shape = &mut shape;
-        let a = add_forces::<L, 6, 4, AVERAGED>(octahedra, nodes, forces, shape);
-        let b = add_forces::<L, 5, 2, AVERAGED>(pairs, nodes, forces, shape);
-        let c = add_forces::<L, 4, 1, AVERAGED>(singles, nodes, forces, shape);
+        let a = add_forces::<L, M, 6, 4, AVERAGED>(law, octahedra, nodes, forces, shape);
+        let b = add_forces::<L, M, 5, 2, AVERAGED>(law, pairs, nodes, forces, shape);
+        let c = add_forces::<L, M, 4, 1, AVERAGED>(law, singles, nodes, forces, shape);
         a.min(b).min(c)
     }
 }

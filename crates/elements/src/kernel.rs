@@ -8,6 +8,9 @@
 //! `-V mu J^(-2/3) D G - V / det D0 [kappa (J - 1) - mu/3 J^(-5/3) I1] cof D`:
 //! springs along the edges and a pressure on the faces.
 //!
+//! A law that depends on `I2`, too, has springs that change with the shape: with the products `E = D^T D` of the edges,
+//! `F F^T F` becomes `D G E G`, `I2 = (I1² - tr (E G)²) / 2`, and the springs are `f1 G + f2 (I1 G - G E G)` ([`crate::laws`]).
+//!
 //! All tetrahedra of a cluster share the edge of its nodes 0 and 1 ([`Cluster`]), so edges, their dot products and
 //! most cross products serve two or more of them, spring constants of a pair of nodes add up before they meet
 //! the edge, each node is gathered once and its forces meet in registers.
@@ -21,14 +24,24 @@
 
 use crate::cluster::{Cluster, corners};
 use crate::lanes::{Lanes, WIDTH, prefetch};
+use crate::laws::{Isochoric, Law};
 
 /// Floating-point operations of one cluster in [`add_forces`], a fused multiply-add counted as two.
-pub const fn flops(nodes: usize, tets: usize) -> usize {
+pub fn flops(nodes: usize, tets: usize, law: &Law) -> usize {
+    match law {
+        Law::NeoHookean(law) => flops_of(*law, nodes, tets),
+        Law::MooneyRivlin(law) => flops_of(*law, nodes, tets),
+    }
+}
+
+fn flops_of<M: Isochoric>(_: M, nodes: usize, tets: usize) -> usize {
     let ring = nodes - 2;
     // Edges, their squares and what they share with the edge 0-1: cross and dot products.
     let shape = 3 * (nodes - 1) + 5 * (nodes - 1) + 14 * ring;
-    // A face's cross and dot product, determinant, invariant; root 15, coefficients 11; spring constants 12.
-    let tet = 9 + 5 + 5 + 12 + 15 + 11 + 12;
+    // E G, its square's trace, G E G, both invariants, springs.
+    let second = if M::SECOND { 45 + 10 + 30 + 10 + 22 } else { 0 };
+    // A face's cross and dot product, determinant, invariant; root 15, coefficients 6 and the law's; spring constants 12.
+    let tet = 9 + 5 + 5 + 12 + 15 + 6 + M::FLOPS + 12 + second;
     // Springs along the edges from nodes 0 and 1, along the face's third edge, pressure on three corners.
     let forces = 6 * (nodes - 1) + 12 * ring + tets * (12 + 18);
     // Balance and addition to the nodes.
@@ -65,12 +78,14 @@ pub struct Shape {
     across: [Vectors; 4],
     /// `e_b x e_c` of a tetrahedron's corners, mm².
     face: [Vectors; 4],
-    /// det D, mm³; then the springs' factor `J^(-2/3)`.
+    /// det D, mm³; then the springs' factor `J^(-2/3)`, unless the law has `I2`.
     determinant: [[f32; WIDTH]; 4],
     /// `-mu V I1`, nJ; then the factor of cof D, Pa.
     invariant: [[f32; WIDTH]; 4],
     /// Sum of the corners' fourth component: nodal dilatation, where it is used.
     dilatation: [[f32; WIDTH]; 4],
+    /// Of a law with `I2`: `E = D^T D`, mm², entries as those of [`Cluster::springs`]; then its springs, µN/mm.
+    products: [[[f32; WIDTH]; 6]; 4],
 }
 
 impl Shape {
@@ -81,6 +96,7 @@ impl Shape {
         determinant: [[0.0; WIDTH]; 4],
         invariant: [[0.0; WIDTH]; 4],
         dilatation: [[0.0; WIDTH]; 4],
+        products: [[[0.0; WIDTH]; 6]; 4],
     };
 }
 
@@ -143,7 +159,13 @@ unsafe fn edges<L: Lanes, const NODES: usize, const TETS: usize>(
 
 /// Gathers the nodes and fills `out`.
 #[inline(always)]
-unsafe fn shape<L: Lanes, const NODES: usize, const TETS: usize, const AVERAGED: bool>(
+unsafe fn shape<
+    L: Lanes,
+    M: Isochoric,
+    const NODES: usize,
+    const TETS: usize,
+    const AVERAGED: bool,
+>(
     cluster: &Cluster<NODES, TETS>,
     first: usize,
     nodes: *const [f32; 4],
@@ -168,7 +190,14 @@ unsafe fn shape<L: Lanes, const NODES: usize, const TETS: usize, const AVERAGED:
             store_vector(face, &mut out.face[tet], first);
             store(dot(edge[1], face), &mut out.determinant[tet], first);
             let m = &cluster.springs[tet];
-            let mixed = load::<L>(&m[4], first).mul(dot(edge[b], edge[c]));
+            let between = dot(edge[b], edge[c]);
+            if M::SECOND {
+                let products = [square[1], along[b], along[c], square[b], between, square[c]];
+                for k in 0..6 {
+                    store(products[k], &mut out.products[tet][k], first);
+                }
+            }
+            let mixed = load::<L>(&m[4], first).mul(between);
             let mixed = load::<L>(&m[2], first).mul_add(along[c], mixed);
             let mixed = load::<L>(&m[1], first).mul_add(along[b], mixed);
             let own = load::<L>(&m[5], first).mul(square[c]);
@@ -184,9 +213,19 @@ unsafe fn shape<L: Lanes, const NODES: usize, const TETS: usize, const AVERAGED:
     }
 }
 
-/// Turns determinant and invariant into the factors of springs and pressure; returns det F.
+/// Where row `j`, column `k` of a symmetric matrix is in the order of [`Cluster::springs`].
+const ENTRY: [[usize; 3]; 3] = [[0, 1, 2], [1, 3, 4], [2, 4, 5]];
+
+/// Turns determinant, invariant and products into the factors of springs and pressure; returns det F.
 #[inline(always)]
-unsafe fn moduli<L: Lanes, const NODES: usize, const TETS: usize, const AVERAGED: bool>(
+unsafe fn moduli<
+    L: Lanes,
+    M: Isochoric,
+    const NODES: usize,
+    const TETS: usize,
+    const AVERAGED: bool,
+>(
+    (law, bulk_over_shear): (M, f32),
     cluster: &Cluster<NODES, TETS>,
     tet: usize,
     first: usize,
@@ -197,19 +236,103 @@ unsafe fn moduli<L: Lanes, const NODES: usize, const TETS: usize, const AVERAGED
         let inverse = load::<L>(&cluster.inverse[tet], first);
         let ratio = determinant.mul(inverse);
         let root = inverse_cube_root(ratio.max(L::splat(1e-3)));
-        let root2 = root.mul(root);
         let loss = if AVERAGED {
             load::<L>(&shape.dilatation[tet], first).mul(L::splat(-0.25))
         } else {
             determinant.neg_mul_add(inverse, L::splat(1.0))
         };
-        let pressure = load::<L>(&cluster.bulk[tet], first).mul(loss);
-        let root5 = root2.mul(root2).mul(root.mul(L::splat(1.0 / 3.0)));
+        let bulk = load::<L>(&cluster.bulk[tet], first);
+        let pressure = bulk.mul(loss);
         let invariant = load::<L>(&shape.invariant[tet], first);
-        let factor = root5.neg_mul_add(inverse.mul(invariant), pressure);
-        store(root2, &mut shape.determinant[tet], first);
+        let factor;
+        if M::SECOND {
+            // -1 / (mu V), 1/nJ, by way of the square so that padding lanes give zero.
+            let scale = bulk
+                .mul(inverse)
+                .mul(L::splat(-bulk_over_shear))
+                .div(bulk.mul(bulk).max(L::splat(f32::MIN_POSITIVE)));
+            let volume = springs::<L, M, NODES, TETS>(
+                law,
+                [invariant.mul(scale), scale, root],
+                cluster,
+                tet,
+                first,
+                shape,
+            );
+            let sum = bulk.mul(L::splat(-1.0 / bulk_over_shear)).mul(volume[1]);
+            factor = volume[0].neg_mul_add(sum, pressure);
+        } else {
+            let slopes = law.lane_slopes(inverse.mul(invariant), inverse, root);
+            store(slopes.first, &mut shape.determinant[tet], first);
+            factor = slopes.volume[0].neg_mul_add(slopes.volume[1], pressure);
+        }
         store(factor, &mut shape.invariant[tet], first);
         ratio
+    }
+}
+
+/// Of a law with `I2`: puts the springs in place of the edges' products; returns the two factors of `-dw/dJ`.
+#[inline(always)]
+unsafe fn springs<L: Lanes, M: Isochoric, const NODES: usize, const TETS: usize>(
+    law: M,
+    [invariant, scale, root]: [L; 3],
+    cluster: &Cluster<NODES, TETS>,
+    tet: usize,
+    first: usize,
+    shape: &mut Shape,
+) -> [L; 2] {
+    unsafe {
+        let zero = L::splat(0.0);
+        let (mut e, mut g) = ([zero; 6], [zero; 6]);
+        for k in 0..6 {
+            e[k] = load(&shape.products[tet][k], first);
+            g[k] = load(&cluster.springs[tet][k], first);
+        }
+        // E G and the trace of its square, both with the factor -mu V of G.
+        let mut product = [[zero; 3]; 3];
+        for j in 0..3 {
+            for k in 0..3 {
+                let sum = e[ENTRY[j][0]].mul(g[ENTRY[0][k]]);
+                let sum = e[ENTRY[j][1]].mul_add(g[ENTRY[1][k]], sum);
+                product[j][k] = e[ENTRY[j][2]].mul_add(g[ENTRY[2][k]], sum);
+            }
+        }
+        let mixed = product[0][1].mul(product[1][0]);
+        let mixed = product[0][2].mul_add(product[2][0], mixed);
+        let mixed = product[1][2].mul_add(product[2][1], mixed);
+        let mut trace = mixed.add(mixed);
+        for j in 0..3 {
+            trace = product[j][j].mul_add(product[j][j], trace);
+        }
+        let squares = scale
+            .mul(scale)
+            .neg_mul_add(trace, invariant.mul(invariant));
+        let slopes = law.lane_slopes(invariant, squares.mul(L::splat(0.5)), root);
+        let own = slopes.second.mul_add(invariant, slopes.first);
+        let less = slopes.second.mul(scale);
+        for j in 0..3 {
+            for k in j..3 {
+                // G E G, with the square of the factor.
+                let sum = g[ENTRY[j][0]].mul(product[0][k]);
+                let sum = g[ENTRY[j][1]].mul_add(product[1][k], sum);
+                let sum = g[ENTRY[j][2]].mul_add(product[2][k], sum);
+                let spring = less.neg_mul_add(sum, own.mul(g[ENTRY[j][k]]));
+                store(spring, &mut shape.products[tet][ENTRY[j][k]], first);
+            }
+        }
+        slopes.volume
+    }
+}
+
+/// Adds a spring to a sum: the stored one times its factor, or one that the law has made anew.
+#[inline(always)]
+unsafe fn add_spring<L: Lanes, M: Isochoric>(factor: L, spring: L, sum: L) -> L {
+    unsafe {
+        if M::SECOND {
+            sum.add(spring)
+        } else {
+            factor.mul_add(spring, sum)
+        }
     }
 }
 
@@ -226,7 +349,7 @@ struct Pull<L, const NODES: usize, const TETS: usize> {
 
 /// Adds the forces to the nodes.
 #[inline(always)]
-unsafe fn scatter<L: Lanes, const NODES: usize, const TETS: usize>(
+unsafe fn scatter<L: Lanes, M: Isochoric, const NODES: usize, const TETS: usize>(
     cluster: &Cluster<NODES, TETS>,
     first: usize,
     shape: &Shape,
@@ -242,14 +365,19 @@ unsafe fn scatter<L: Lanes, const NODES: usize, const TETS: usize>(
         };
         for tet in 0..TETS {
             let [_, b, c] = corners::<NODES>(tet);
-            let root2 = load::<L>(&shape.determinant[tet], first);
-            let m = &cluster.springs[tet];
-            pull.own[1] = root2.mul_add(load(&m[0], first), pull.own[1]);
-            pull.along[b] = root2.mul_add(load(&m[1], first), pull.along[b]);
-            pull.along[c] = root2.mul_add(load(&m[2], first), pull.along[c]);
-            pull.own[b] = root2.mul_add(load(&m[3], first), pull.own[b]);
-            pull.face[tet] = root2.mul(load(&m[4], first));
-            pull.own[c] = root2.mul_add(load(&m[5], first), pull.own[c]);
+            let by = load::<L>(&shape.determinant[tet], first);
+            let m = if M::SECOND {
+                &shape.products[tet]
+            } else {
+                &cluster.springs[tet]
+            };
+            pull.own[1] = add_spring::<L, M>(by, load(&m[0], first), pull.own[1]);
+            pull.along[b] = add_spring::<L, M>(by, load(&m[1], first), pull.along[b]);
+            pull.along[c] = add_spring::<L, M>(by, load(&m[2], first), pull.along[c]);
+            pull.own[b] = add_spring::<L, M>(by, load(&m[3], first), pull.own[b]);
+            pull.own[c] = add_spring::<L, M>(by, load(&m[5], first), pull.own[c]);
+            let face = load::<L>(&m[4], first);
+            pull.face[tet] = if M::SECOND { face } else { by.mul(face) };
             pull.factor[tet] = load(&shape.invariant[tet], first);
         }
         // The forces of an element are in balance: what the other nodes get is taken from node 0.
@@ -317,9 +445,16 @@ unsafe fn add_node<L: Lanes, const NODES: usize, const TETS: usize, const NODE: 
 /// seen.
 ///
 /// With `AVERAGED` the relative change of volume is the mean of the corners' fourth component
-/// instead of the element's `J - 1`.
+/// instead of the element's `J - 1`. `law` comes with the material's bulk modulus over its shear modulus.
 #[inline(always)]
-pub unsafe fn add_forces<L: Lanes, const NODES: usize, const TETS: usize, const AVERAGED: bool>(
+pub unsafe fn add_forces<
+    L: Lanes,
+    M: Isochoric,
+    const NODES: usize,
+    const TETS: usize,
+    const AVERAGED: bool,
+>(
+    law: (M, f32),
     clusters: &[Cluster<NODES, TETS>],
     nodes: *const [f32; 4],
     forces: *mut [f32; 4],
@@ -329,17 +464,18 @@ pub unsafe fn add_forces<L: Lanes, const NODES: usize, const TETS: usize, const 
         let mut smallest = L::splat(f32::MAX);
         for cluster in clusters {
             for first in (0..WIDTH).step_by(L::COUNT) {
-                shape::<L, NODES, TETS, AVERAGED>(cluster, first, nodes, buffer);
+                shape::<L, M, NODES, TETS, AVERAGED>(cluster, first, nodes, buffer);
             }
             prefetch(std::ptr::from_ref(cluster).wrapping_add(1));
             for tet in 0..TETS {
                 for first in (0..WIDTH).step_by(L::COUNT) {
-                    let ratio = moduli::<L, NODES, TETS, AVERAGED>(cluster, tet, first, buffer);
+                    let ratio =
+                        moduli::<L, M, NODES, TETS, AVERAGED>(law, cluster, tet, first, buffer);
                     smallest = smallest.min(ratio);
                 }
             }
             for first in (0..WIDTH).step_by(L::COUNT) {
-                scatter::<L, NODES, TETS>(cluster, first, buffer, forces);
+                scatter::<L, M, NODES, TETS>(cluster, first, buffer, forces);
             }
         }
         let mut lanes = [f32::MAX; WIDTH];

@@ -1,8 +1,6 @@
-//! The compressible neo-Hookean material and its damping.
-//!
-//! `S = mu J^(-2/3) (I - I1/3 C^-1) + kappa J (J - 1) C^-1`, from the energy
-//! `W = mu/2 (J^(-2/3) I1 - 3) + kappa/2 (J - 1)^2`, Pa.
+//! A hyperelastic material: its constants, their admitted ranges, its law and its damping.
 
+use crate::laws::Law;
 use serde::{Deserialize, Serialize};
 
 /// Elastic constants, density and damping.
@@ -16,37 +14,33 @@ pub struct Material {
     pub density_kg_m3: f64,
     /// Mass-proportional damping, 1/s; 20 is near critical for the brain's lowest mode.
     pub damping_per_s: f64,
+    /// Left out of files where it is neo-Hookean.
+    #[serde(default, skip_serializing_if = "Law::is_default")]
+    pub law: Law,
 }
 
 impl Default for Material {
-    /// Brain tissue as in the paper: 3000 Pa, 0.49, 1000 kg/m³, 20 /s.
+    /// Brain tissue as in the paper: 3000 Pa, 0.49, 1000 kg/m³, 20 /s, neo-Hookean.
     fn default() -> Self {
         Self {
             young_pa: 3000.0,
             poisson: 0.49,
             density_kg_m3: 1000.0,
             damping_per_s: 20.0,
+            law: Law::default(),
         }
     }
 }
 
-/// Elastic moduli.
+/// Elastic moduli and the law that they stand in.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Moduli {
     /// Shear modulus `mu = E / (2 (1 + nu))`, Pa.
     pub shear_pa: f64,
     /// Bulk modulus `kappa = E / (3 (1 - 2 nu))`, Pa.
     pub bulk_pa: f64,
-}
-
-impl Moduli {
-    /// From Young's modulus, Pa, and Poisson's ratio below 0.5.
-    pub fn from_young(young_pa: f64, poisson: f64) -> Self {
-        Self {
-            shear_pa: young_pa / (2.0 * (1.0 + poisson)),
-            bulk_pa: young_pa / (3.0 * (1.0 - 2.0 * poisson)),
-        }
-    }
+    /// Law of the strain energy without change of volume.
+    pub law: Law,
 }
 
 /// A material that the solver cannot use.
@@ -59,19 +53,23 @@ pub struct MaterialError {
 }
 
 impl Material {
-    /// Shear and bulk modulus.
+    /// Shear and bulk modulus, and the law.
     pub fn moduli(&self) -> Moduli {
-        Moduli::from_young(self.young_pa, self.poisson)
+        Moduli {
+            shear_pa: self.shear_pa(),
+            bulk_pa: self.bulk_pa(),
+            law: self.law,
+        }
     }
 
     /// Shear modulus `mu = E / (2 (1 + nu))`, Pa.
     pub fn shear_pa(&self) -> f64 {
-        self.moduli().shear_pa
+        self.young_pa / (2.0 * (1.0 + self.poisson))
     }
 
     /// Bulk modulus `kappa = E / (3 (1 - 2 nu))`, Pa.
     pub fn bulk_pa(&self) -> f64 {
-        self.moduli().bulk_pa
+        self.young_pa / (3.0 * (1.0 - 2.0 * self.poisson))
     }
 
     /// Density in g/mm³, the solver's unit.
@@ -94,18 +92,22 @@ impl Material {
                 wanted,
             })
         };
-        if !(self.young_pa.is_finite() && self.young_pa > 0.0) {
-            return fail("young_pa", self.young_pa, "positive");
+        if !(self.young_pa > 0.0 && self.young_pa <= 1e12) {
+            return fail("young_pa", self.young_pa, "positive and at most 1e12 Pa");
         }
         if !(self.poisson > -1.0 && self.poisson < 0.4999) {
             return fail("poisson", self.poisson, "above -1 and below 0.4999");
         }
-        if !(self.density_kg_m3.is_finite() && self.density_kg_m3 > 0.0) {
-            return fail("density_kg_m3", self.density_kg_m3, "positive");
+        if !(self.density_kg_m3 > 0.0 && self.density_kg_m3 <= 1e5) {
+            let wanted = "positive and at most 1e5 kg/m^3";
+            return fail("density_kg_m3", self.density_kg_m3, wanted);
         }
-        if !(self.damping_per_s.is_finite() && self.damping_per_s >= 0.0) {
-            return fail("damping_per_s", self.damping_per_s, "zero or positive");
+        if !(0.0..=1e6).contains(&self.damping_per_s) {
+            return fail("damping_per_s", self.damping_per_s, "in [0, 1e6] 1/s");
         }
-        Ok(())
+        match self.law.fault() {
+            Some((field, value, wanted)) => fail(field, value, wanted),
+            None => Ok(()),
+        }
     }
 }

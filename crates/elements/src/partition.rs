@@ -9,7 +9,7 @@
 
 use crate::batches::{Element, Kind, Source};
 use crate::cluster::{Groups, Octahedra, Pairs, Singles};
-use crate::material::Material;
+use crate::material::{Material, Moduli};
 use crate::tetrahedra::Tetrahedra;
 use std::ops::Range;
 
@@ -57,6 +57,8 @@ pub struct Partition {
     /// Rest position of each slot from its chunk's centre, mm, and a zero: small numbers, so that a sum with the
     /// displacement keeps its last bits.
     pub rest: Vec<[f32; 4]>,
+    /// The material's.
+    pub moduli: Moduli,
 }
 
 impl Partition {
@@ -90,6 +92,7 @@ impl Partition {
             node_of_slot: Vec::new(),
             slot_of_node: vec![PADDING; positions.len()],
             rest: Vec::new(),
+            moduli: material.moduli(),
         };
         for (chunk, leaf) in leaves.iter().enumerate() {
             partition.push_chunk(chunk as u32, leaf, &owner, mesh, material);

@@ -1,9 +1,11 @@
-//! The element law in f64: energy and nodal forces of a neo-Hookean tetrahedron.
+//! The element in f64: energy and nodal forces of a hyperelastic tetrahedron.
 //!
 //! With `F = I + du/dX` constant on a tetrahedron of rest volume `V` and shape gradients `g_a`, the derivative of its strain
-//! energy is `f_a = V P g_a`, `P = F S = mu J^(-2/3) (F - I1/(3 J) cof F) + kappa (J - 1) cof F`, which is
+//! energy is `f_a = V P g_a`, with the stress `P` of the material's law ([`crate::Law`]). For neo-Hookean tissue it is
+//! `P = F S = mu J^(-2/3) (F - I1/(3 J) cof F) + kappa (J - 1) cof F`, which is
 //! `S = mu J^(-2/3) (I - I1/3 C^-1) + kappa J (J - 1) C^-1`. Lengths are mm, moduli Pa: energies nJ, forces µN.
 
+use crate::laws::Invariants;
 use crate::material::Moduli;
 use crate::vector::{cross, dot, subtract};
 
@@ -103,19 +105,42 @@ impl Tetrahedron {
     }
 }
 
-/// First Piola-Kirchhoff stress `P`, rows, Pa.
-pub fn stress(state: &Deformation, moduli: Moduli) -> [[f64; 3]; 3] {
-    let root = inverse_cube_root(state.det.max(SMALLEST_DET));
-    let isochoric = moduli.shear_pa * root * root;
-    let over_three_dets = root * root * root * (1.0 / 3.0);
-    let along = moduli.bulk_pa * (state.det - 1.0) - isochoric * state.invariant * over_three_dets;
-    [0, 1, 2].map(|i| [0, 1, 2].map(|j| isochoric * state.f[i][j] + along * state.cofactor[i][j]))
+impl Deformation {
+    /// `I1`, `I2` and `det^(-1/3)`, where `det` stands for `det F`.
+    pub fn invariants(&self, det: f64) -> Invariants {
+        Invariants {
+            first: self.invariant,
+            second: self.cofactor.iter().map(|row| dot(*row, *row)).sum(),
+            root: inverse_cube_root(det),
+        }
+    }
 }
 
-/// Strain energy a rest volume, `mu/2 (J^(-2/3) I1 - 3) + kappa/2 (J - 1)²`, Pa; `det F` must be positive.
+/// First Piola-Kirchhoff stress `P`, rows, Pa.
+pub fn stress(state: &Deformation, moduli: Moduli) -> [[f64; 3]; 3] {
+    let slopes = (moduli.law).slopes(state.invariants(state.det.max(SMALLEST_DET)));
+    let along = moduli.bulk_pa * (state.det - 1.0) + moduli.shear_pa * slopes.volume;
+    let own = moduli.shear_pa * (slopes.first + slopes.second * state.invariant);
+    let mut stress =
+        [0, 1, 2].map(|i| [0, 1, 2].map(|j| own * state.f[i][j] + along * state.cofactor[i][j]));
+    if slopes.second != 0.0 {
+        let second = moduli.shear_pa * slopes.second;
+        for i in 0..3 {
+            // Row i of (F F^T) F.
+            for k in 0..3 {
+                let product = second * dot(state.f[i], state.f[k]);
+                for j in 0..3 {
+                    stress[i][j] -= product * state.f[k][j];
+                }
+            }
+        }
+    }
+    stress
+}
+
+/// Strain energy a rest volume, `mu w + kappa/2 (J - 1)²`, Pa; `det F` must be positive.
 pub fn energy_density(state: &Deformation, moduli: Moduli) -> f64 {
-    let root = inverse_cube_root(state.det);
-    0.5 * moduli.shear_pa * (root * root * state.invariant - 3.0)
+    moduli.shear_pa * moduli.law.energy(state.invariants(state.det))
         + 0.5 * moduli.bulk_pa * (state.det - 1.0) * (state.det - 1.0)
 }
 

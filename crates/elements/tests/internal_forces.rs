@@ -1,6 +1,6 @@
 //! The SIMD forces of a whole body against the f64 law, element by element.
 
-use elements::{ElementForces, Material, Simd, Tetrahedron};
+use elements::{ElementForces, Law, Material, MooneyRivlin, Simd, Tetrahedron};
 use tissue::mesh::{Mesh, box_phantom};
 
 fn body() -> Mesh {
@@ -43,12 +43,22 @@ fn serial(count: usize, task: &(dyn Fn(usize, usize) + Sync)) {
 
 #[test]
 fn they_are_those_of_the_law_on_every_instruction_set() {
-    let (mesh, material) = (body(), Material::default());
+    let law = Law::MooneyRivlin(MooneyRivlin { c01_share: 0.7 });
+    for law in [Law::default(), law] {
+        check(&Material {
+            law,
+            ..Material::default()
+        });
+    }
+}
+
+fn check(material: &Material) {
+    let mesh = body();
     let u = wave(&mesh, 0.6);
-    let (want, least) = exact(&mesh, &material, &u);
+    let (want, least) = exact(&mesh, material, &u);
     let scale = want.iter().fold(0.0f64, |a, b| a.max(b.abs()));
     for simd in Simd::ALL.into_iter().filter(|simd| simd.is_available()) {
-        let forces = ElementForces::new(mesh.tetrahedra(), &material, simd);
+        let forces = ElementForces::new(mesh.tetrahedra(), material, simd);
         let mut scratch = forces.scratch(1).unwrap();
         let mut out = vec![f32::NAN; u.len()];
         let det = forces.evaluate(&u, &mut scratch, &mut out, &serial);

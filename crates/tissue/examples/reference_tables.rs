@@ -1,8 +1,10 @@
-//! Writes the verification, locking and mass-scaling tables of docs/results/reference-solver.md:
-//! `cargo run --release -p tissue --example reference_tables`.
+//! Writes the tables of docs/results/reference-solver.md:
+//! `cargo run --release -p tissue --example reference_tables [-- TABLE..]`.
 //!
-//! The text between `<!-- verification -->`, `<!-- locking -->` or `<!-- scaling -->` and the next `<!-- end -->` is replaced.
+//! The tables are `verification`, `laws`, `locking` and `scaling`; all where none is named. The text between `<!-- TABLE -->`
+//! and the next `<!-- end -->` is replaced.
 
+use elements::{ElementForces, Law, MooneyRivlin, Simd};
 use safetensors::SafeTensors;
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -24,11 +26,17 @@ fn main() -> Outcome<()> {
     let mut text = std::fs::read_to_string(&page)?;
     let brain = Mesh::read(&root.join("onnx/meshes/brain-coarse.mesh.safetensors"))?;
     let fine = Mesh::read(&root.join("onnx/meshes/brain.mesh.safetensors"))?;
-    for (marker, table) in [
-        ("verification", verification(&brain)?),
-        ("locking", locking(&brain, &fine)?),
-        ("scaling", mass_scaling(&brain, &fine)?),
-    ] {
+    let asked: Vec<String> = std::env::args().skip(1).collect();
+    for marker in ["verification", "laws", "locking", "scaling"] {
+        if !asked.is_empty() && !asked.iter().any(|name| name == marker) {
+            continue;
+        }
+        let table = match marker {
+            "verification" => verification(&brain)?,
+            "laws" => laws(&fine)?,
+            "locking" => locking(&brain, &fine)?,
+            _ => mass_scaling(&brain, &fine)?,
+        };
         print!("{table}");
         text = replace(&text, marker, &table)?;
     }
@@ -86,17 +94,34 @@ fn soft(damping_per_s: f64) -> Material {
 fn verification(brain: &Mesh) -> Outcome<String> {
     let mut table = String::from("| case | against | difference |\n|---|---|---|\n");
     let cube = regular_box([40.0; 3], [5; 3])?;
-    for (name, label, mesh, frames) in [
+    let mooney_rivlin = Law::MooneyRivlin(MooneyRivlin::default());
+    for (name, label, mesh, frames, law) in [
         (
             "cube",
             "cube, sheared 6 mm and pressed 8 mm of 40",
             &cube,
             40,
+            Law::default(),
         ),
-        ("brain", "coarse brain, pushed 8 mm", brain, 80),
+        (
+            "brain",
+            "coarse brain, pushed 8 mm",
+            brain,
+            80,
+            Law::default(),
+        ),
+        ("cube", "cube, Mooney-Rivlin", &cube, 40, mooney_rivlin),
+        (
+            "brain",
+            "coarse brain, Mooney-Rivlin",
+            brain,
+            80,
+            mooney_rivlin,
+        ),
     ] {
-        let (contact, displacement, forces, solver) = calculix(name)?;
-        let (u, reaction, _) = settle(mesh, &contact, soft(40.0), Pressure::Element, frames)?;
+        let (contact, displacement, forces, solver) = calculix(name, law)?;
+        let material = Material { law, ..soft(40.0) };
+        let (u, reaction, _) = settle(mesh, &contact, material, Pressure::Element, frames)?;
         let worst = largest(&u, &displacement);
         let negated: Vec<[f32; 3]> = reaction.iter().map(|f| f.map(|v| -v)).collect();
         table += &format!(
@@ -132,10 +157,14 @@ fn largest(a: &[[f32; 3]], b: &[[f32; 3]]) -> f32 {
 
 type Static = (Vec<ContactNode>, Vectors, Vectors, String);
 
-/// Contact, displacement and forces of a case in the CalculiX fixture.
-fn calculix(name: &str) -> Outcome<Static> {
-    let path: PathBuf =
-        Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/calculix.safetensors");
+/// Contact, displacement and forces of a case in the CalculiX fixture of a law.
+fn calculix(name: &str, law: Law) -> Outcome<Static> {
+    let file = match law {
+        Law::NeoHookean(_) => "calculix.safetensors",
+        Law::MooneyRivlin(_) => "calculix-mooney-rivlin.safetensors",
+    };
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures");
+    let path: PathBuf = folder.join(file);
     let bytes = std::fs::read(path)?;
     let (_, header) = SafeTensors::read_metadata(&bytes)?;
     let solver = header
@@ -170,6 +199,52 @@ fn top(mesh: &Mesh, height: f32, displacement: [f32; 3]) -> Vec<ContactNode> {
         .filter(|n| mesh.positions[*n as usize][2] > height - 1e-3)
         .map(|node| ContactNode { node, displacement })
         .collect()
+}
+
+/// What each law costs: the forces of a mesh by one thread, the laws in turn, medians.
+fn laws(mesh: &Mesh) -> Outcome<String> {
+    const ROUNDS: usize = 200;
+    let all = [Law::default(), Law::MooneyRivlin(MooneyRivlin::default())];
+    let count = mesh.node_count();
+    let mut table = format!(
+        "| law | instruction set | forces of {count} nodes, {} tetrahedra, ms | over neo-Hookean |\n|---|---|---|---|\n",
+        mesh.tets.len()
+    );
+    let u: Vec<f32> = (mesh.positions.iter().flatten())
+        .map(|x| 0.5 * (0.1 * x).sin())
+        .collect();
+    for simd in Simd::ALL.into_iter().filter(|simd| simd.is_available()) {
+        let bodies = all.map(|law| {
+            let material = Material {
+                law,
+                ..Material::default()
+            };
+            ElementForces::new(mesh.tetrahedra(), &material, simd)
+        });
+        let mut scratch = bodies[0].scratch(1)?;
+        let mut out = vec![0.0; u.len()];
+        let mut times = [Vec::new(), Vec::new()];
+        for _ in 0..ROUNDS {
+            for (body, times) in bodies.iter().zip(&mut times) {
+                let start = std::time::Instant::now();
+                body.evaluate(&u, &mut scratch, &mut out, &|count, task| {
+                    (0..count).for_each(|chunk| task(chunk, 0));
+                });
+                times.push(1e3 * start.elapsed().as_secs_f64());
+            }
+        }
+        let medians = times.map(|mut times| {
+            times.sort_by(f64::total_cmp);
+            times[ROUNDS / 2]
+        });
+        for (law, median) in all.iter().zip(medians) {
+            table += &format!(
+                "| {law:.3} | {simd:?} | {median:.3} | {:.2} |\n",
+                median / medians[0]
+            );
+        }
+    }
+    Ok(table)
 }
 
 /// Relative difference of the arrival of half the imposed step, 100 mm down a bar.

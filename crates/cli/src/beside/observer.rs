@@ -1,7 +1,7 @@
 //! A scene that is watched: each step compared with a true state, and what the scene itself could have known of its error.
 
 use anyhow::{Result, ensure};
-use upt::forces::{Moduli, ReactionForces};
+use upt::forces::ReactionForces;
 use upt::{Contact, Error, Scene, StepInput, flag};
 
 use crate::stress::bench::Bench;
@@ -141,7 +141,7 @@ impl Observer {
                 mesh.tets.as_flattened(),
                 &mesh.stiffness,
                 &free,
-                Moduli::from_young(material.young_pa, material.poisson),
+                material.moduli(),
             ),
             internal: vec![0.0; 3 * free.len()],
             at_points: vec![0.0; points.len()],

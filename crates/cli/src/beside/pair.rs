@@ -29,13 +29,10 @@ pub fn contact(touch: &Touch) -> Vec<ContactNode> {
 
 /// The solver's options with the bundle's material.
 pub fn options(bench: &Bench) -> SolverOptions {
-    let material = &bench.model.manifest.material;
-    let mut options = SolverOptions::default();
-    options.material.young_pa = material.young_pa;
-    options.material.poisson = material.poisson;
-    options.material.density_kg_m3 = material.density_kg_m3;
-    options.material.damping_per_s = material.damping_per_s;
-    options
+    SolverOptions {
+        material: bench.model.manifest.material,
+        ..SolverOptions::default()
+    }
 }
 
 impl Pair {

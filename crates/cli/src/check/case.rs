@@ -47,12 +47,7 @@ impl Case {
             mesh,
             boundary,
             SolverOptions {
-                material: elements::Material {
-                    young_pa: stated.young_pa,
-                    poisson: stated.poisson,
-                    density_kg_m3: stated.density_kg_m3,
-                    damping_per_s: stated.damping_per_s,
-                },
+                material: *stated,
                 ..SolverOptions::default()
             },
         )?;

@@ -108,8 +108,7 @@ impl Certificate {
             "machine": serde_json::to_value(Machine::this()).unwrap_or_default(),
             "envelope": {
                 "max_push_mm": stated.envelope.max_push_mm, "contact_area_mm2": stated.envelope.contact_area_mm2,
-                "material": {"young_pa": stated.material.young_pa, "poisson": stated.material.poisson,
-                    "density_kg_m3": stated.material.density_kg_m3, "damping_per_s": stated.material.damping_per_s},
+                "material": stated.material,
             },
         });
         let steps = contact.steps.max(1) as f64;

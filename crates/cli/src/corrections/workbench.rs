@@ -49,12 +49,7 @@ impl Workbench {
             upt::bundle::Mesh::parse(&files.tensors(&stated.mesh.file)?, stated.boundary)?;
         let prior = PriorTable::open(&files, entry, &runtime_mesh)?;
         let held = mesh.held_nodes(boundary);
-        let material = Material {
-            young_pa: stated.material.young_pa,
-            poisson: stated.material.poisson,
-            density_kg_m3: stated.material.density_kg_m3,
-            damping_per_s: stated.material.damping_per_s,
-        };
+        let material = stated.material;
         let lame = Lame::from_young(material.young_pa, material.poisson)?;
 
         let bar = spinner(quiet, "factorisation");

@@ -73,12 +73,16 @@ pub fn assemble(
         );
     }
     let material = options.material()?;
+    let mut requires = vec!["unlearned", "vibration"];
+    if !material.law.is_default() {
+        requires.insert(0, "law");
+    }
     let rounded = |x: f64| (x * 1000.0).round() / 1000.0;
     let blank = "0".repeat(64);
     let entries = [
         ("format", json!("upt-bundle")),
         ("version", json!(1)),
-        ("requires", json!(["unlearned", "vibration"])),
+        ("requires", json!(requires)),
         ("kind", json!("reduced")),
         ("name", json!(mesh.name)),
         (

@@ -67,6 +67,7 @@ pub fn write(options: &Options, cluster: &str, folder: &Path) -> Result<PathBuf>
             .iter()
             .flat_map(|(name, value)| [(*name).to_owned(), value.to_string()]),
     );
+    simulate.extend(["--law".to_owned(), material.law.to_string()]);
     let train: Vec<String> = [
         "python",
         "-m",

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::{Result, bail};
 use clap::Args;
-use elements::Material;
+use elements::{Law, Material};
 use serde_json::{Value, json};
 use tissue::mesh::{Mesh, face_area};
 use tissue::mesh_import::Region;
@@ -59,6 +59,9 @@ pub struct Options {
     /// Young's modulus, Pa; over the material's.
     #[arg(long)]
     pub young: Option<f64>,
+    /// Law of the tissue: neo-hookean, or mooney-rivlin:SHARE with the share of C01 in C10 + C01 (left out: 0.526, brain).
+    #[arg(long, default_value_t = Law::default())]
+    pub law: Law,
     /// Poisson's ratio, below 0.5.
     #[arg(long, default_value_t = 0.49)]
     pub poisson: f64,
@@ -201,6 +204,7 @@ impl Options {
             poisson: self.poisson,
             density_kg_m3: self.density.unwrap_or(density),
             damping_per_s: self.damping.unwrap_or(damping),
+            law: self.law,
         })
     }
 

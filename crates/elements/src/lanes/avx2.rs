@@ -77,6 +77,11 @@ impl Lanes for Avx2 {
     }
 
     #[inline(always)]
+    unsafe fn div(self, other: Self) -> Self {
+        unsafe { Self(_mm256_div_ps(self.0, other.0)) }
+    }
+
+    #[inline(always)]
     unsafe fn mul_add(self, b: Self, c: Self) -> Self {
         unsafe { Self(_mm256_fmadd_ps(self.0, b.0, c.0)) }
     }

@@ -88,6 +88,18 @@ impl Lanes for Neon {
     }
 
     #[inline(always)]
+    unsafe fn div(self, other: Self) -> Self {
+        unsafe {
+            Self([
+                vdivq_f32(self.0[0], other.0[0]),
+                vdivq_f32(self.0[1], other.0[1]),
+                vdivq_f32(self.0[2], other.0[2]),
+                vdivq_f32(self.0[3], other.0[3]),
+            ])
+        }
+    }
+
+    #[inline(always)]
     unsafe fn mul_add(self, b: Self, c: Self) -> Self {
         unsafe {
             Self([

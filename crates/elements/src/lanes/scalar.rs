@@ -47,6 +47,11 @@ impl Lanes for Scalar {
     }
 
     #[inline(always)]
+    unsafe fn div(self, other: Self) -> Self {
+        self.zip(other, |a, b| a / b)
+    }
+
+    #[inline(always)]
     unsafe fn mul_add(self, b: Self, c: Self) -> Self {
         self.zip(b, |x, y| x * y).zip(c, |x, y| x + y)
     }

@@ -1,4 +1,4 @@
-//! Small-strain moduli of the compressible neo-Hookean law.
+//! Small-strain moduli, the same for every law.
 
 use super::LinearError;
 

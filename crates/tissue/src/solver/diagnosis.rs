@@ -3,9 +3,9 @@
 use super::touch::{ToolPose, Touch};
 use super::{ContactNode, FrameReport, Solver, SolverError};
 use elements::Chunk;
-use elements::inverse_cube_root;
 use elements::shape_gradients;
 use elements::vector::{cross, dot};
+use elements::{Invariants, inverse_cube_root};
 use rayon::prelude::*;
 
 /// Sums and extremes over the elements of the present state.
@@ -88,8 +88,12 @@ impl Solver {
             result.note(determinant, number);
             let speed_squared = f64::from(self.speed_squared[number]);
             result.largest_bound = result.largest_bound.max(state.bound * speed_squared);
-            let isochoric = state.invariant * inverse_cube_root(determinant.max(1e-3)).powi(2);
-            let density = shear_over_bulk * (isochoric - 3.0) + (determinant - 1.0).powi(2);
+            let invariants = Invariants {
+                root: inverse_cube_root(determinant.max(1e-3)),
+                ..state.invariants
+            };
+            let isochoric = self.options.material.law.energy(invariants);
+            let density = 2.0 * shear_over_bulk * isochoric + (determinant - 1.0).powi(2);
             // `bulk` is a sixth of the element's modulus.
             result.strain_energy += 3.0 * f64::from(element.bulk.abs()) * state.volume * density;
         });
@@ -205,8 +209,8 @@ struct ElementState {
     /// At rest, mm³.
     volume: f64,
     determinant: f64,
-    /// `tr F^T F`
-    invariant: f64,
+    /// Without the root.
+    invariants: Invariants,
     bound: f64,
 }
 
@@ -236,7 +240,11 @@ fn element_state(rest: [[f32; 3]; 4], displacement: [[f64; 3]; 4]) -> ElementSta
     ElementState {
         volume: volume.abs(),
         determinant: dot(f[0], cofactor[0]),
-        invariant: dot(f[0], f[0]) + dot(f[1], f[1]) + dot(f[2], f[2]),
+        invariants: Invariants {
+            first: f.iter().map(|row| dot(*row, *row)).sum(),
+            second: cofactor.iter().map(|row| dot(*row, *row)).sum(),
+            root: 1.0,
+        },
         bound,
     }
 }

@@ -310,7 +310,7 @@ impl Solver {
             gathers: 0,
         };
         for (nodes, tets, clusters, batches) in kinds {
-            cost.flops += clusters * elements::flops(nodes, tets);
+            cost.flops += clusters * elements::flops(nodes, tets, &self.options.material.law);
             cost.gathers += elements::WIDTH * batches * nodes;
         }
         cost

@@ -1,7 +1,7 @@
 //! Strain energy of the reference's law and its derivative, all in f64.
 //!
-//! `W = mu/2 (J^(-2/3) I1 - 3) + kappa/2 (J - 1)²` on each linear tetrahedron, so the derivative by a corner is
-//! `V P g_a` with `P = mu J^(-2/3) (F - I1 / (3 J) cof F) + kappa (J - 1) cof F` and the shape gradients `g_a`.
+//! The law's `W` is constant on each linear tetrahedron ([`elements`]), so the derivative by a corner is
+//! `V P g_a` with its stress `P` and the shape gradients `g_a`.
 //! Units: mm, mN; moduli mN/mm², energies mN mm (µJ).
 
 use crate::material::Material;
@@ -37,6 +37,7 @@ impl StrainEnergy {
             moduli: Moduli {
                 shear_pa: material.shear_pa() * 1e-3,
                 bulk_pa: material.bulk_pa() * 1e-3,
+                law: material.law,
             },
         }
     }

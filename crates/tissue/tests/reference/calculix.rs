@@ -1,22 +1,27 @@
 //! Static solutions of CalculiX on the same meshes with the same elements and law
-//! (fixture: tests/fixtures/make_calculix.py).
+//! (fixtures: tests/fixtures/make_calculix.py).
 
+use elements::{Law, MooneyRivlin};
 use safetensors::SafeTensors;
 use tissue::mesh::{Boundary, Mesh, regular_box};
 use tissue::solver::{ContactNode, Solver, SolverOptions};
 use tissue::tensors::{f32_values, i32_values};
 
 struct Case {
+    law: Law,
     displacement: Vec<[f32; 3]>,
     reaction: Vec<[f32; 3]>,
     contact: Vec<ContactNode>,
 }
 
-fn case(name: &str) -> Case {
-    let path = concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/tests/fixtures/calculix.safetensors"
-    );
+/// A case of the fixture of a law.
+fn case(name: &str, law: Law) -> Case {
+    let file = match law {
+        Law::NeoHookean(_) => "calculix.safetensors",
+        Law::MooneyRivlin(_) => "calculix-mooney-rivlin.safetensors",
+    };
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/fixtures");
+    let path = std::path::Path::new(folder).join(file);
     let bytes = std::fs::read(path).unwrap();
     let file = SafeTensors::deserialize(&bytes).unwrap();
     let vectors = |field: &str| -> Vec<[f32; 3]> {
@@ -33,6 +38,7 @@ fn case(name: &str) -> Case {
         })
         .collect();
     Case {
+        law,
         displacement: vectors("displacement"),
         reaction: vectors("reaction"),
         contact,
@@ -44,6 +50,7 @@ fn settle(mesh: &Mesh, case: &Case, frames: u32) -> (Vec<[f32; 3]>, Vec<[f32; 3]
     let mut options = SolverOptions::default();
     // The static end is the same for any damping; 40 /s gets there soon.
     options.material.damping_per_s = 40.0;
+    options.material.law = case.law;
     options.inner_step_s = 2e-4;
     let mut solver = Solver::new(mesh, Boundary::Fixed, options).unwrap();
     let mut report = None;
@@ -88,7 +95,13 @@ fn compare(mesh: &Mesh, case: &Case, frames: u32) {
 
 #[test]
 fn a_sheared_and_pressed_cube_agrees_with_calculix() {
-    compare(&regular_box([40.0; 3], [5; 3]).unwrap(), &case("cube"), 40);
+    let mesh = regular_box([40.0; 3], [5; 3]).unwrap();
+    compare(&mesh, &case("cube", Law::default()), 40);
+    compare(&mesh, &case("cube", mooney_rivlin()), 40);
+}
+
+fn mooney_rivlin() -> Law {
+    Law::MooneyRivlin(MooneyRivlin::default())
 }
 
 #[test]
@@ -98,5 +111,6 @@ fn a_pushed_brain_agrees_with_calculix() {
         "/../../onnx/meshes/brain-coarse.mesh.safetensors"
     );
     let mesh = Mesh::read(std::path::Path::new(path)).unwrap();
-    compare(&mesh, &case("brain"), 80);
+    compare(&mesh, &case("brain", Law::default()), 80);
+    compare(&mesh, &case("brain", mooney_rivlin()), 80);
 }
