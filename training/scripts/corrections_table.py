@@ -3,8 +3,10 @@
     python training/scripts/corrections_table.py --upt target/release/upt --bundle onnx/brain-reduced --data DIR \
         --counts 0,1,3,5,10 --page docs/results/corrections.md
 
-Each case of the data is replayed through `upt rollout --json` with each count. The estimate is compared with the true
-root mean square error in the steps with contact: rank correlation, and their ratio (the bundle's `calibration`).
+Each case of the data is replayed through `upt rollout --json` with each count. The contact force is that of
+`upt_scene_contact_force`, summed over the nodes of a step, against the solver's over all steps with contact. The
+estimate is compared with the true root mean square error in the steps with contact: rank correlation, and their
+ratio (the bundle's `calibration`).
 """
 
 import argparse
@@ -47,6 +49,7 @@ def rows(upt: str, bundle: str, cases: list[pathlib.Path], counts: list[int], th
     for case in cases:
         by_scheme.setdefault(scheme_of(case), []).append(case)
     lines, pairs, times = [], {k: [] for k in counts}, {k: [] for k in counts}
+    forces = {k: [0.0, 0.0] for k in counts}
     for scheme, members in sorted(by_scheme.items()):
         cells = []
         for count in counts:
@@ -61,6 +64,10 @@ def rows(upt: str, bundle: str, cases: list[pathlib.Path], counts: list[int], th
                         times[count].append(ms)
                     elif count == 0:
                         times[count].append(ms)
+                for force in filter(None, result["force_mn"]):
+                    apart = zip(force["found"], force["wanted"], strict=True)
+                    forces[count][0] += sum((found - wanted) ** 2 for found, wanted in apart)
+                    forces[count][1] += sum(wanted**2 for wanted in force["wanted"])
             cells.append(f"{statistics.fmean(errors):.2g} ({max(largest):.2g})")
         lines.append(f"| {scheme} ({len(members)}) | " + " | ".join(cells) + " |")
     spearman, ratio = [], []
@@ -75,6 +82,8 @@ def rows(upt: str, bundle: str, cases: list[pathlib.Path], counts: list[int], th
     lines.append(
         "| ms a step in contact (median) | " + " | ".join(f"{statistics.median(times[k]):.3g}" for k in counts) + " |"
     )
+    relative = ["-" if whole == 0 else f"{100 * (part / whole) ** 0.5:.2g} %" for part, whole in forces.values()]
+    lines.append("| contact force, sum, relative L2 | " + " | ".join(relative) + " |")
     lines.append("| estimate against truth, rank correlation | " + " | ".join(spearman) + " |")
     lines.append("| truth over estimate (median) | " + " | ".join(ratio) + " |")
     return lines

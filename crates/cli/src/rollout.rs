@@ -80,11 +80,16 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     let mut stepper = Stepper::new(&method, &mesh, &trajectory.header)?;
     let mut field = vec![[0.0f32; 3]; mesh.node_count()];
     let (mut steps, mut times, mut frames) = (Vec::new(), Vec::new(), Vec::new());
-    let mut estimates = Vec::new();
+    let (mut estimates, mut forces) = (Vec::new(), Vec::new());
     for frame in 1..trajectory.frame_count() {
         let (nodes, vectors) = trajectory.contact(frame);
         times.push(stepper.step(nodes, vectors, &mut field)?);
         estimates.push(stepper.estimated_mm()?);
+        let force = stepper.contact_force(nodes.len())?;
+        forces.push(force.filter(|_| !nodes.is_empty()).map(|force| Forces {
+            found: total(&force),
+            wanted: total(trajectory.reaction(frame)),
+        }));
         steps.push(step_errors(
             &mesh.positions,
             trajectory.frame(frame),
@@ -101,8 +106,21 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     if let Some(folder) = &options.vtu {
         write_vtu(folder, &mesh, &trajectory, &frames)?;
     }
-    print(options, &trajectory, &errors, &times, &estimates)?;
+    print(options, &trajectory, &errors, &times, &estimates, &forces)?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Sums over the contact nodes of a step, mN.
+#[derive(serde::Serialize)]
+struct Forces {
+    /// `upt_scene_contact_force`.
+    found: [f64; 3],
+    /// The trajectory's.
+    wanted: [f64; 3],
+}
+
+fn total(forces: &[[f32; 3]]) -> [f64; 3] {
+    [0, 1, 2].map(|k| forces.iter().map(|force| f64::from(force[k])).sum())
 }
 
 fn print(
@@ -111,6 +129,7 @@ fn print(
     errors: &CaseErrors,
     times: &[f64],
     estimates: &[Option<f32>],
+    forces: &[Option<Forces>],
 ) -> Result<()> {
     let mut sorted = times.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -119,7 +138,7 @@ fn print(
         let report = json!({
             "trajectory": options.trajectory, "bundle": options.bundle, "scheme": trajectory.header.scheme,
             "overall": errors.overall, "ms_p50": median, "steps": errors.steps, "ms": times,
-            "estimated_mm": estimates,
+            "estimated_mm": estimates, "force_mn": forces,
         });
         println!("{}", serde_json::to_string_pretty(&report)?);
         return Ok(());

@@ -109,6 +109,12 @@ impl Trajectory {
         (&self.contact_nodes[row.clone()], &self.contact_vectors[row])
     }
 
+    /// Elastic force of the tissue on the instrument at the nodes of [`Self::contact`], mN.
+    pub fn reaction(&self, frame: usize) -> &[[f32; 3]] {
+        let row = self.contact_offsets[frame] as usize..self.contact_offsets[frame + 1] as usize;
+        &self.reaction[row]
+    }
+
     /// Writes the file, whole or not at all; `half` stores `displacement` as f16.
     pub fn write(&self, path: &Path, half: bool) -> Result<(), TrajectoryError> {
         let frames = self.frame_count();

@@ -261,6 +261,14 @@ impl Stepper {
         Ok((stats.corrections > 0).then_some(stats.error_mm))
     }
 
+    /// Force of the tissue on the instruments at the `count` contact nodes of the last step, mN; none of a method without.
+    pub fn contact_force(&mut self, count: usize) -> Result<Option<Vec<[f32; 3]>>> {
+        let Self::Surrogate(surrogate) = self else {
+            return Ok(None);
+        };
+        surrogate.scene.contact_force(count).map(Some)
+    }
+
     /// Stage times of the last step, ms; empty where the method has none.
     pub fn stages(&self) -> Result<Vec<(&'static str, f64)>> {
         let Self::Surrogate(surrogate) = self else {
