@@ -8,7 +8,7 @@ use tissue::mesh::Mesh;
 use super::cases::Cases;
 use super::method::{BundleFolder, Method};
 use super::prior_alone::PriorAlone;
-use super::{Options, paper_split, same_body};
+use super::{Options, Region, paper_split, same_body};
 
 /// The bundles whose mesh and boundary are the cases'; the others are named in `notes`.
 pub fn fitting_bundles(
@@ -67,13 +67,22 @@ pub fn mesh_of(cases: &Cases, bundles: &[BundleFolder]) -> Result<Mesh> {
     )
 }
 
-/// Corrections a step that a bundle is measured with: those asked for, else none and as many as it recommends.
-fn corrections(options: &Options, bundle: &BundleFolder) -> Vec<u32> {
+/// The curve of error against run time that a bundle with corrections is.
+const FRONTIER: [u32; 5] = [0, 1, 3, 5, 10];
+
+/// Corrections a step that a bundle is measured with: those asked for; else none and as many as it recommends, and the frontier
+/// in the configuration whose field is whole and has the most threads.
+fn corrections(options: &Options, bundle: &BundleFolder, region: Region, threads: u32) -> Vec<u32> {
+    let most = options.threads.iter().max() == Some(&threads);
     let mut counts = match bundle.corrections {
         None => vec![0],
-        Some(recommended) if options.corrections.is_empty() => vec![0, recommended],
-        Some(_) => options.corrections.clone(),
+        Some(_) if !options.corrections.is_empty() => options.corrections.clone(),
+        Some(recommended) if region == Region::All && most => {
+            [FRONTIER.as_slice(), &[recommended]].concat()
+        }
+        Some(recommended) => vec![0, recommended],
     };
+    counts.sort_unstable();
     counts.dedup();
     counts
 }
@@ -96,15 +105,14 @@ pub fn methods(
             for precision in precisions {
                 for region in &options.region {
                     for threads in &options.threads {
-                        methods.extend(corrections(options, bundle).into_iter().map(|count| {
-                            Method::Surrogate {
-                                bundle: bundle.clone(),
-                                provider: *provider,
-                                precision: *precision,
-                                region: *region,
-                                threads: *threads,
-                                corrections: count,
-                            }
+                        let counts = corrections(options, bundle, *region, *threads);
+                        methods.extend(counts.into_iter().map(|count| Method::Surrogate {
+                            bundle: bundle.clone(),
+                            provider: *provider,
+                            precision: *precision,
+                            region: *region,
+                            threads: *threads,
+                            corrections: count,
                         }));
                     }
                 }

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use base64::Engine;
 
 use super::plot::{self, Band, Latencies, Point, Stages, escape};
-use super::row::Measurement;
+use super::row::{Measurement, Row};
 use super::table::COLUMNS;
 
 /// Facts above the figures: name and value.
@@ -101,7 +101,7 @@ pub fn page(page: &Page<'_>) -> String {
     section(
         &mut out,
         "Error against run time",
-        "Each disc is a row of the table below; hollow discs are plain methods. The dashed line is the Pareto front: no row lies below and to the left of it.",
+        "Each disc is a row of the table below; hollow discs are plain methods. A coloured line joins the numbers of corrections (k) of one bundle in one configuration. The dashed line is the Pareto front: no row lies below and to the left of it.",
         &plot::frontier(&points),
     );
     section(
@@ -186,13 +186,20 @@ pub fn section(out: &mut String, title: &str, explanation: &str, body: &str) {
     );
 }
 
+/// What rows of one colour have in common: the bundle, whatever its number of corrections, or the plain method.
+fn group(row: &Row) -> String {
+    row.curve()
+        .map_or_else(|| row.family(), |(bundle, _)| bundle)
+}
+
 /// Every row that has a time as a point of the frontier.
 pub fn points(measurements: &[Measurement]) -> Vec<Point> {
     measurements
         .iter()
         .map(|one| Point {
-            family: one.row.family(),
+            family: group(&one.row),
             label: one.row.variant(),
+            corrections: one.row.curve().map_or(0, |(_, corrections)| corrections),
             milliseconds: one.row.ms_p50.max(1e-4),
             mse: one.row.mse_mm2,
             plain: one.row.is_plain(),
@@ -205,7 +212,7 @@ fn table(page: &Page<'_>, points: &[Point]) -> String {
     let mut families: Vec<String> = Vec::new();
     let mut body = String::new();
     for (index, one) in page.measurements.iter().enumerate() {
-        let family = one.row.family();
+        let family = group(&one.row);
         if !families.contains(&family) {
             families.push(family.clone());
         }

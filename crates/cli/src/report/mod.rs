@@ -95,7 +95,7 @@ pub struct Options {
     precision: Vec<Precision>,
     #[arg(long, value_delimiter = ',', default_value = "cpu")]
     provider: Vec<Provider>,
-    /// Corrections a step in contact (`0,1,3,5,10`: the frontier); default: none, and as many as a bundle recommends.
+    /// Corrections a step in contact ; default: none and as many as a bundle recommends, and 0, 1, 3, 5, 10 with all nodes and the most threads.
     #[arg(long, value_delimiter = ',')]
     corrections: Vec<u32>,
     /// Plain methods to compare with: zero, linear, prior (the bundles' linear response alone), coarse, tled, paper; or none.

@@ -87,6 +87,11 @@ impl Row {
         }
     }
 
+    /// The family without its number of corrections, and that number, for rows of a bundle: the points of one curve.
+    pub fn curve(&self) -> Option<(String, u32)> {
+        (self.method == "surrogate").then(|| (self.bundle.clone(), self.corrections))
+    }
+
     /// What distinguishes a row within its family.
     pub fn variant(&self) -> String {
         let threads = if self.threads == 1 {

@@ -10,8 +10,10 @@ use super::colour;
 pub struct Point {
     /// Groups rows by colour: the bundle or the plain method.
     pub family: String,
-    /// What distinguishes it within its family.
+    /// What distinguishes it within its family, beside its corrections.
     pub label: String,
+    /// Corrections a step in contact: points of one family and label with several of them are one curve.
+    pub corrections: u32,
     pub milliseconds: f64,
     /// mm²; zero (the reference itself) is drawn at the bottom edge.
     pub mse: f64,
@@ -35,6 +37,34 @@ pub fn pareto_front(points: &[Point]) -> Vec<usize> {
         better
     });
     order
+}
+
+/// The family, and the corrections where there are any.
+fn named(point: &Point) -> String {
+    match point.corrections {
+        0 => point.family.clone(),
+        count => format!("{}, k = {count}", point.family),
+    }
+}
+
+/// Indices of the points that differ by their corrections alone, by ascending corrections; sets of two or more.
+fn curves(points: &[Point]) -> Vec<Vec<usize>> {
+    let mut curves: Vec<Vec<usize>> = Vec::new();
+    for (index, point) in points.iter().enumerate() {
+        let same = |other: &&mut Vec<usize>| {
+            let first = &points[other[0]];
+            first.family == point.family && first.label == point.label
+        };
+        match curves.iter_mut().find(same) {
+            Some(curve) => curve.push(index),
+            None => curves.push(vec![index]),
+        }
+    }
+    curves.retain(|curve| curve.len() > 1);
+    for curve in &mut curves {
+        curve.sort_by_key(|&index| points[index].corrections);
+    }
+    curves
 }
 
 pub fn frontier(points: &[Point]) -> String {
@@ -81,6 +111,14 @@ pub fn frontier(points: &[Point]) -> String {
             families.push(&point.family);
         }
     }
+    for curve in curves(points) {
+        let line: Vec<(f64, f64)> = (curve.iter())
+            .map(|&index| (points[index].milliseconds, drawn(points[index].mse)))
+            .collect();
+        let family = &points[curve[0]].family;
+        let at = families.iter().position(|one| one == family).unwrap_or(0);
+        axes.line(&line, colour(at), 1.6, false);
+    }
     for point in points {
         let index = families
             .iter()
@@ -93,7 +131,7 @@ pub fn frontier(points: &[Point]) -> String {
         };
         let tip = format!(
             "{} {}: {} ms, MSE {error} mm²",
-            point.family,
+            named(point),
             point.label,
             label(point.milliseconds)
         );
@@ -111,7 +149,7 @@ pub fn frontier(points: &[Point]) -> String {
     for index in &front {
         let point = &points[*index];
         let (px, py) = (axes.px(point.milliseconds), axes.py(drawn(point.mse)));
-        let text = point.family.clone();
+        let text = named(point);
         let half = 3.4 * text.len() as f64;
         let (cx, cy) = [(0.0, -11.0), (0.0, 20.0), (0.0, -25.0), (0.0, 34.0)]
             .iter()
@@ -146,10 +184,28 @@ mod tests {
         Point {
             family: "a".into(),
             label: String::new(),
+            corrections: 0,
             milliseconds,
             mse,
             plain: false,
         }
+    }
+
+    #[test]
+    fn a_curve_joins_points_that_differ_by_their_corrections_alone() {
+        let of = |family: &str, label: &str, corrections| Point {
+            family: family.into(),
+            label: label.into(),
+            corrections,
+            ..point(1.0, 1.0)
+        };
+        let points = [
+            of("a", "2 threads", 5),
+            of("a", "1 thread", 0),
+            of("b", "2 threads", 3),
+            of("a", "2 threads", 0),
+        ];
+        assert_eq!(curves(&points), [vec![3, 0]]);
     }
 
     #[test]
