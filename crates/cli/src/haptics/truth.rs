@@ -24,12 +24,10 @@ pub fn replay(
     track: &Track,
     seconds: f64,
 ) -> Result<Forces> {
-    let stated = &model.manifest.material;
-    let mut options = SolverOptions::default();
-    options.material.young_pa = stated.young_pa;
-    options.material.poisson = stated.poisson;
-    options.material.density_kg_m3 = stated.density_kg_m3;
-    options.material.damping_per_s = stated.damping_per_s;
+    let options = SolverOptions {
+        material: model.manifest.material,
+        ..SolverOptions::default()
+    };
     let mut solver = Solver::new(mesh, boundary, options)?;
     let poses = |time: f64| -> Vec<Pose> {
         let at = |tool: usize| site.pose(tool, resample(track, time, |tick| tick.tools[tool].0));
