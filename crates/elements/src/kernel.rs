@@ -244,8 +244,7 @@ unsafe fn moduli<
         let bulk = load::<L>(&cluster.bulk[tet], first);
         let pressure = bulk.mul(loss);
         let invariant = load::<L>(&shape.invariant[tet], first);
-        let factor;
-        if M::SECOND {
+        let factor = if M::SECOND {
             // -1 / (mu V), 1/nJ, by way of the square so that padding lanes give zero.
             let scale = bulk
                 .mul(inverse)
@@ -260,12 +259,12 @@ unsafe fn moduli<
                 shape,
             );
             let sum = bulk.mul(L::splat(-1.0 / bulk_over_shear)).mul(volume[1]);
-            factor = volume[0].neg_mul_add(sum, pressure);
+            volume[0].neg_mul_add(sum, pressure)
         } else {
             let slopes = law.lane_slopes(inverse.mul(invariant), inverse, root);
             store(slopes.first, &mut shape.determinant[tet], first);
-            factor = slopes.volume[0].neg_mul_add(slopes.volume[1], pressure);
-        }
+            slopes.volume[0].neg_mul_add(slopes.volume[1], pressure)
+        };
         store(factor, &mut shape.invariant[tet], first);
         ratio
     }

@@ -1,5 +1,10 @@
 //! The laws in f64: stress as the derivative of energy, tangent at rest, and closed forms.
 
+#![allow(
+    clippy::needless_range_loop,
+    reason = "components of tensors read best by index"
+)]
+
 use elements::vector::{cross, dot};
 use elements::{Deformation, Law, Material, Moduli, MooneyRivlin, energy_density, stress};
 
