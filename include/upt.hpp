@@ -664,9 +664,8 @@ private:
   upt_status show(Scene &scene, double now, span<const upt_instrument> instruments,
                   span<float> out) {
     if (presents_) {
-      const upt_status status =
-          upt_scene_present(scene.get(), since(now), instruments.data(), instruments.size(),
-                            out.data(), out.size());
+      const upt_status status = upt_scene_present(scene.get(), since(now), instruments.data(),
+                                                  instruments.size(), out.data(), out.size());
       if (status != UPT_ERR_UNSUPPORTED) {
         return status;
       }

@@ -1,5 +1,5 @@
-// The deforming tissue: libupt steps on the scene's own worker, each frame shows the tissue at its own
-// moment. Where a bundle does not solve contact a frame lies between the last two steps.
+// The deforming tissue: libupt steps on the scene's own worker, each frame shows the tissue at its
+// own moment. Where a bundle does not solve contact a frame lies between the last two steps.
 #pragma once
 
 #include <cstdint>

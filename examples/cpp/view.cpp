@@ -55,7 +55,8 @@ void main() {
   result = vec4(tone * diffuse + 0.30 * shine + 0.05 * rim, 1.0);
 })";
 
-// The surface at rest, where the tissue has left it: seen through, brighter where it is seen edge on.
+// The surface at rest, where the tissue has left it: seen through, brighter where it is seen edge
+// on.
 static const char *GHOST_VERTEX = R"(#version 330 core
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec3 normal;

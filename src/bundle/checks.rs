@@ -26,7 +26,7 @@ impl Manifest {
         self.material.validate().map_err(|error| {
             bad(
                 &format!("material.{}", error.field),
-                &format!("is {}; it must be {}", error.value, error.wanted),
+                format!("is {}; it must be {}", error.value, error.wanted),
             )
         })?;
         check(

@@ -175,7 +175,9 @@ pub unsafe extern "C" fn upt_scene_present_points(
         #[cfg(feature = "contact")]
         {
             let mut tools = _scene.frame_tools()?;
+            // SAFETY: the caller's arrays hold what their counts say.
             unsafe { read_tools(instruments, instrument_count, &mut tools) }?;
+            // SAFETY: the caller's array holds what its count says.
             let out = unsafe { slice_mut(out, out_count, "out") }?;
             _scene.present_points(seconds, &tools, out)?;
             Ok(UPT_OK)

@@ -18,6 +18,8 @@ const ACCEPTED: &[&str] = &[
     "BSD-2-Clause",
     "ISC",
     "MIT",
+    // Of each file by itself: asks for the text and for where the source is, and nothing of what links it.
+    "MPL-2.0",
     "Unicode-3.0",
     "Unlicense",
     "Zlib",
@@ -36,7 +38,8 @@ struct Linked {
 pub fn notice(workspace: &Workspace) -> Result<String> {
     let mut crates = linked(workspace)?;
     let mut notice = String::from(
-        "Rust crates linked into libupt and the command upt: name, version, licence.\n\n",
+        "Rust crates linked into libupt and the command upt, unmodified: name, version, licence. Their source: \
+         https://crates.io/crates/NAME/VERSION\n\n",
     );
     for one in &mut crates {
         ensure!(
