@@ -100,6 +100,13 @@ impl Stage {
             at.u.fill(0.0);
             self.press(lent, input, rest, problem, 1.0, at.u)?;
             at.det = self.residual(lent, input.last, at.u, at.g, report)?;
+            let sound = self.motion.min_det >= SMALLEST_DET && !input.still;
+            if at.det < SMALLEST_DET && sound {
+                // Inverted too: the tissue stays where it was.
+                problem.let_go();
+                at.u.copy_from_slice(input.last);
+                at.det = self.residual(lent, input.last, at.u, at.g, report)?;
+            }
             report.fell_back = true;
             self.memory.clear();
         }
