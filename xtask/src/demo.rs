@@ -1,7 +1,7 @@
 //! `cargo xtask demo`: an organ pushed by libupt beside the reference solver, from a fresh clone.
 //!
-//! Set-up; one contact of scheme 5, which no bundle was trained on, simulated by the reference solver
-//! (kept by content); the same contact replayed through every committed bundle of that organ; a table and a page.
+//! Set-up; a tool that presses, slides and lifts, simulated by the reference solver (kept by content); every committed bundle of that organ driven by
+//! the tool's poses alone; a table and a page. With `--scheme` the paper's own measure instead: a collision field, replayed.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -12,6 +12,10 @@ use sha2::{Digest, Sha256};
 
 use crate::workspace::Workspace;
 use crate::{ort, stages, system, venv};
+
+mod tables;
+
+use tables::{print_table, print_tool_table};
 
 /// An organ with committed bundles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -53,12 +57,34 @@ pub struct Options {
     /// Install no system packages.
     #[arg(long)]
     no_install: bool,
-    /// Contact scheme: 1 to 5, or a hard regime. The bundles were trained on 1 to 4.
-    #[arg(long, default_value = "5")]
-    scheme: String,
+    /// Programme of a rigid tool: `stroke` presses, slides and lifts; `press`, `poke`, `lift`, `two` and others (`upt simulate --help`).
+    #[arg(long, default_value = "stroke", conflicts_with = "scheme")]
+    tool: String,
+    /// Replay a collision field instead, the paper's own measure: contact scheme 1 to 5, or a hard regime. The bundles were trained on
+    /// 1 to 4.
+    #[arg(long)]
+    scheme: Option<String>,
     /// Seed of the contact site.
     #[arg(long, default_value_t = 2026)]
     seed: u64,
+}
+
+impl Options {
+    /// What drives the contact, as `upt simulate` takes it.
+    fn driver(&self) -> (&'static str, &str) {
+        match &self.scheme {
+            Some(scheme) => ("--scheme", scheme),
+            None => ("--tool", &self.tool),
+        }
+    }
+
+    /// The same in words.
+    fn words(&self) -> String {
+        match &self.scheme {
+            Some(scheme) => format!("scheme {scheme}, seed {}", self.seed),
+            None => format!("tool programme `{}`, seed {}", self.tool, self.seed),
+        }
+    }
 }
 
 /// A bundle that the demo shows.
@@ -102,7 +128,10 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
         } else {
             folder.join(boundary)
         };
-        report(workspace, options, &library, &trajectory, &own, &out)?;
+        match options.scheme {
+            Some(_) => report(workspace, options, &library, &trajectory, &own, &out)?,
+            None => report_tool(workspace, options, &library, &trajectory, &own, &out)?,
+        }
     }
     Ok(true)
 }
@@ -188,9 +217,10 @@ fn simulate(
     for file in files {
         hash.update(std::fs::read(file)?);
     }
+    let (option, name) = options.driver();
     hash.update(format!(
-        "{} {} {boundary} {}",
-        options.scheme, options.seed, bundle.material
+        "{option} {name} {} {boundary} {}",
+        options.seed, bundle.material
     ));
     let key = format!("{:x}", hash.finalize());
     let file = folder.join(format!("contact-{}.trajectory.safetensors", &key[..16]));
@@ -202,8 +232,8 @@ fn simulate(
         return Ok(file);
     }
     eprintln!(
-        "2/4 simulating scheme {}, seed {}, boundary `{boundary}` with the reference solver: 160 frames of 50 ms",
-        options.scheme, options.seed
+        "2/4 simulating {}, boundary `{boundary}`, with the reference solver: frames of 50 ms",
+        options.words()
     );
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     let mut command = Command::new(workspace.upt());
@@ -213,8 +243,8 @@ fn simulate(
             "simulate",
             "--mesh",
             mesh,
-            "--scheme",
-            &options.scheme,
+            option,
+            name,
             "--seed",
             &options.seed.to_string(),
             "--boundary",
@@ -271,10 +301,9 @@ fn report(
         .args([
             "--title",
             &format!(
-                "A {} pushed by libupt: scheme {}, seed {}",
+                "A {} pushed by libupt: {}",
                 options.organ.name(),
-                options.scheme,
-                options.seed
+                options.words()
             ),
         ]);
     ort::set_environment(&mut command, library);
@@ -287,56 +316,44 @@ fn report(
     Ok(())
 }
 
-/// Error, time and speed-up over the reference solver, from the rows of a report.
-fn print_table(path: &Path) -> Result<()> {
-    let report: serde_json::Value = serde_json::from_slice(&std::fs::read(path)?)?;
-    let rows = report["rows"]
-        .as_array()
-        .context("report.json has no rows")?;
-    let number = |row: &serde_json::Value, field: &str| row[field].as_f64().unwrap_or(f64::NAN);
-    let reference = rows
-        .iter()
-        .filter(|row| row["method"] == "TLED")
-        .map(|row| number(row, "ms_p50"))
-        .fold(f64::INFINITY, f64::min);
-    println!();
-    println!(
-        "{:<38} {:<26} {:>10} {:>8} {:>10} {:>12}",
-        "method", "configuration", "MSE mm²", "max mm", "ms a step", "x reference"
+/// The library driven by the poses of the tool alone.
+fn report_tool(
+    workspace: &Workspace,
+    options: &Options,
+    library: &Path,
+    trajectory: &Path,
+    bundles: &[&Bundle],
+    out: &Path,
+) -> Result<()> {
+    eprintln!(
+        "3/4 driving {} bundle(s) by the tool's poses alone: {}",
+        bundles.len(),
+        match options.tool.as_str() {
+            "stroke" => "it presses, slides and lifts",
+            other => other,
+        }
     );
-    for row in rows {
-        let text = |field: &str| row[field].as_str().unwrap_or("?");
-        let method = match (text("method"), text("bundle")) {
-            ("surrogate", bundle) => match row["corrections"].as_u64().unwrap_or(0) {
-                0 => bundle.to_owned(),
-                count => format!("{bundle}, {count} corrections"),
-            },
-            (method, "") => method.to_owned(),
-            (method, bundle) => format!("{bundle}, {method}"),
-        };
-        let configuration = format!(
-            "{} {}, {} thread(s)",
-            row["precision"].as_str().unwrap_or(""),
-            row["region"].as_str().unwrap_or(""),
-            row["threads"]
-        );
-        let speed = reference / number(row, "ms_p50");
-        let speed = if speed.is_finite() && speed < 1e6 {
-            format!("{speed:.1}")
-        } else {
-            "-".into()
-        };
-        println!(
-            "{method:<38} {configuration:<26} {:>10.4} {:>8.2} {:>10.3} {speed:>12}",
-            number(row, "mse_mm2"),
-            number(row, "max_mm"),
-            number(row, "ms_p50")
-        );
+    let mut command = Command::new(workspace.upt());
+    command.current_dir(&workspace.root).arg("report");
+    command.arg("--tools").arg(trajectory).arg("--out").arg(out);
+    for bundle in bundles {
+        command.arg("--bundle").arg(&bundle.path);
     }
-    for note in report["left_out"].as_array().into_iter().flatten() {
-        println!("left out: {}", note.as_str().unwrap_or("?"));
-    }
-    println!();
+    command.args([
+        "--title",
+        &format!(
+            "A {} pushed by libupt: {}",
+            options.organ.name(),
+            options.words()
+        ),
+    ]);
+    ort::set_environment(&mut command, library);
+    run_visibly(command.stdout(Stdio::null()), "upt report --tools")?;
+    print_tool_table(&out.join("tools.json"))?;
+    println!(
+        "4/4 the dent in cross-section, forces over time: {}",
+        out.join("tools.html").display()
+    );
     Ok(())
 }
 
