@@ -13,7 +13,7 @@ pub fn print_tool_table(path: &Path) -> Result<()> {
     println!();
     println!(
         "{:<58} {:>2} {:>10} {:>8} {:>8} {:>10} {:>10}",
-        "from the tool's pose alone", "k", "MSE mm²", "max mm", "deep mm", "force", "ms a step"
+        "from the tool's pose alone", "k", "MSE mm²", "max mm", "deep mm", "force", "ms touched"
     );
     for row in rows {
         let text = |field: &str| row[field].as_str().unwrap_or("");

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::cases::ToolCase;
 use super::drive::Felt;
-use super::measure::{Outcome, Truth};
+use super::measure::{Moment, Outcome, Truth};
 use crate::report::quantile;
 
 /// Programme of the row over all programmes without a grasp.
@@ -83,6 +83,7 @@ pub struct Row {
     pub still_mm: Option<f64>,
     pub still_beyond_mm: Option<f64>,
     pub found_again: usize,
+    /// Of the steps in which a tool touches: the whole step, and its contact solves.
     pub ms_median: Option<f64>,
     pub contact_ms_median: Option<f64>,
 }
@@ -98,6 +99,10 @@ impl CaseFigures {
                     (sum + m.mse_mm2, count + 1.0)
                 });
             sum / count.max(1.0)
+        };
+        let touching = || {
+            let touches = |m: &&Moment| m.felt.iter().any(|felt| felt.contacts > 0);
+            moments.iter().filter(touches)
         };
         let inverted = || moments.iter().filter(|m| m.det <= 0.0);
         let apart = |value: &dyn Fn(usize) -> f64| {
@@ -142,12 +147,8 @@ impl CaseFigures {
                 })
                 .collect(),
             mse_by_step_mm2: moments.iter().map(|m| m.mse_mm2 as f32).collect(),
-            ms: moments.iter().map(|m| m.ms).collect(),
-            contact_ms: moments
-                .iter()
-                .filter(|m| m.felt.iter().any(|felt| felt.contacts > 0))
-                .map(|m| m.contact_ms)
-                .collect(),
+            ms: touching().map(|m| m.ms).collect(),
+            contact_ms: touching().map(|m| m.contact_ms).collect(),
         }
     }
 

@@ -53,7 +53,8 @@ a slip-off (the tissue of the truth leaves a tool that touches it faster than th
 Inverted: steps with an element inside out; silent: those of them without a flag. Penetration: the deepest of points 1 mm apart. Jump: the \
 largest motion of a node in a step over the truth's largest (median of the cases). Force and torque: relative L2 error over the steps, \
 median of the tools. Friction: the largest sum of tangential over normal force of a tool, less its coefficient. Still: the largest motion \
-of a node in a step after the tools have not moved for 1 s, beyond the truth's where the truth was held as long. Found again: contacts that begin after one was lost and that the truth has not.";
+of a node in a step after the tools have not moved for 1 s, beyond the truth's where the truth was held as long. Found again: contacts that begin after one was lost and that the truth has not. \
+ms: median of the steps in which a tool touches.";
 
 fn none() -> String {
     "-".into()
