@@ -76,10 +76,10 @@ impl Delassus {
             return Ok(&self.w);
         }
         self.of.clear();
-        self.of.extend(rows);
         let (order, count) = (3 * self.columns.len(), samples.clone().count());
         self.w.clear();
         memory::reserve(&mut self.w, 9 * count * count, WHAT)?;
+        self.of.extend(rows);
         self.w.resize(9 * count * count, 0.0);
         let place = |column: u32| 3 * self.columns.partition_point(|c| *c < column);
         for (i, row) in samples.clone().enumerate() {
