@@ -5,6 +5,7 @@
 use std::path::PathBuf;
 
 use crate::ffi;
+use crate::kernels::PoolError;
 
 /// Everything that can fail in this library.
 ///
@@ -63,6 +64,15 @@ pub enum Error {
     /// A panic was caught: a bug in this library.
     #[error("internal error: {0}")]
     Panic(String),
+}
+
+impl From<PoolError> for Error {
+    fn from(error: PoolError) -> Error {
+        match error {
+            PoolError::Panicked { .. } => Error::Panic(error.to_string()),
+            PoolError::Spawn { .. } => Error::Argument(error.to_string()),
+        }
+    }
 }
 
 /// The library's result.

@@ -4,7 +4,7 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::bundle::volume;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::kernels::Pool;
 use crate::stats::flag;
 
@@ -54,8 +54,7 @@ pub fn inverted(pool: &Pool, positions: &[f32], field: &[f32], tets: &[u32]) -> 
                 found.store(true, Ordering::Relaxed);
             }
         }
-    })
-    .map_err(|error| Error::Panic(error.to_string()))?;
+    })?;
     Ok(found.into_inner())
 }
 

@@ -144,18 +144,18 @@ impl<'a> Native<'a> {
     }
 
     fn run(&mut self) {
-        decode(
-            self.isa,
-            &self.pool,
-            self.precision,
-            self.packed,
-            self.tokens,
-            self.queries,
-            DecoderRows::Compact(&self.rows),
-            &mut self.scratch,
-            &mut self.out,
-        )
-        .expect("rows of the table");
+        let compute = Compute {
+            isa: self.isa,
+            pool: &self.pool,
+        };
+        let what = Decoding {
+            decoder: self.packed,
+            precision: self.precision,
+            tokens: self.tokens,
+            queries: self.queries,
+            rows: DecoderRows::Compact(&self.rows),
+        };
+        decode(compute, what, &mut self.scratch, &mut self.out).expect("rows of the table");
     }
 
     fn label(&self) -> String {

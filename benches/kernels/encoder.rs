@@ -1,6 +1,7 @@
 //! Low-rank encoder and message mean against the scalar reference: 512 supernodes of degree 32, width 96.
 
-use upt::kernels::aggregate::{Csr, aggregate, encode_aggregate};
+use upt::kernels::Compute;
+use upt::kernels::aggregate::{Csr, Messages, aggregate, encode_aggregate};
 use upt::kernels::encode::LowRank;
 use upt::kernels::random::Random;
 use upt::kernels::{Isa, Pool};
@@ -41,9 +42,13 @@ pub fn against_scalar() {
             rivals.push(Box::new(move || {
                 if encode {
                     let scratch = &mut scratch;
-                    encode_aggregate(
-                        isa, pool, csr, nodes, source, receiver, features, scratch, out,
-                    )
+                    let messages = Messages {
+                        senders: csr,
+                        supernodes: nodes,
+                        source,
+                        target: receiver,
+                    };
+                    encode_aggregate(Compute { isa, pool }, messages, features, scratch, out)
                 } else {
                     aggregate(isa, pool, csr, width, table, target, out)
                 }

@@ -6,6 +6,7 @@
 //! same mean with `source` and `target` computed on the fly from their tables
 //! (see [`super::encode`]), so that no `[n,d]` array is written at all.
 
+use super::Compute;
 use super::encode::LowRank;
 use super::isa::{Isa, by_isa};
 use super::lanes::Lanes;
@@ -67,30 +68,44 @@ pub fn aggregate(
     })
 }
 
+/// Who sends messages to whom, and what is sent before features are added.
+#[derive(Clone, Copy)]
+pub struct Messages<'a> {
+    /// Senders of each supernode.
+    pub senders: Csr<'a>,
+    /// `[n_S]`: rows of the supernodes' own features.
+    pub supernodes: &'a [u32],
+    /// Table `[n,d]` and weights of the senders.
+    pub source: LowRank<'a>,
+    /// Table `[n_S,d]` and weights of the supernodes.
+    pub target: LowRank<'a>,
+}
+
 /// [`aggregate`] of `source_j = source_table_j + W_s f_j`, `target_i = target_table_i + W_t f_{s_i}`
 /// for supernodes `s`, without storing either.
 ///
-/// `source_table [n,d]`, `target_table [n_S,d]`, `features [n,f]`, `supernodes [n_S]`, `out [n_S,d]`.
-/// `scratch [threads * d]` holds a target row a thread. Only features of supernodes and their
-/// neighbours are read.
+/// `features [n,f]`, `out [n_S,d]`. `scratch [threads * d]` holds a target row a thread. Only features of supernodes and
+/// their neighbours are read.
 ///
 /// # Errors
 /// [`PoolError::Panicked`] where an index lies outside the tables.
 ///
 /// # Panics
 /// If the shapes do not match.
-#[allow(clippy::too_many_arguments)]
 pub fn encode_aggregate(
-    isa: Isa,
-    pool: &Pool,
-    csr: Csr<'_>,
-    supernodes: &[u32],
-    source: LowRank<'_>,
-    target: LowRank<'_>,
+    compute: Compute<'_>,
+    messages: Messages<'_>,
     features: &[f32],
     scratch: &mut [f32],
     out: &mut [f32],
 ) -> Result<(), PoolError> {
+    let Compute { isa, pool } = compute;
+    let Messages {
+        senders: csr,
+        supernodes,
+        source,
+        target,
+    } = messages;
     let (rows, width, rank) = (csr.rows(), source.width, source.rank);
     source.check(features);
     assert_eq!(

@@ -30,3 +30,12 @@ pub use flush::{FlushToZero, MaskExceptions};
 pub use isa::Isa;
 pub use math::gelu;
 pub use pool::{Pool, PoolError};
+
+/// What a computation runs on.
+#[derive(Clone, Copy)]
+pub struct Compute<'a> {
+    /// Instruction set of the kernels.
+    pub isa: Isa,
+    /// Threads.
+    pub pool: &'a Pool,
+}

@@ -48,17 +48,15 @@ pub fn accumulate_rows(
         // SAFETY: these columns belong to this chunk alone.
         let q = unsafe { parts.part(start, COLUMNS.min(width - start)) };
         match table {
-            Stored::F32(table) => columns_f32(isa, table, width, start, rows, factors, add, q),
-            Stored::F16(table) => columns_f16(isa, table, width, start, rows, factors, add, q),
+            Stored::F32(table) => columns_f32(isa, &table[start..], width, rows, factors, add, q),
+            Stored::F16(table) => columns_f16(isa, &table[start..], width, rows, factors, add, q),
         }
     })
 }
 
-#[allow(clippy::too_many_arguments)]
 fn columns_scalar<T: Number>(
     table: &[T],
     width: usize,
-    start: usize,
     rows: &[u32],
     factors: &[f32],
     add: bool,
@@ -68,7 +66,7 @@ fn columns_scalar<T: Number>(
         q.fill(0.0);
     }
     for (&row, &factor) in rows.iter().zip(factors) {
-        let row = &table[row as usize * width + start..][..q.len()];
+        let row = &table[row as usize * width..][..q.len()];
         for (q, x) in q.iter_mut().zip(row) {
             *q += factor * x.wide();
         }
@@ -76,20 +74,18 @@ fn columns_scalar<T: Number>(
 }
 
 by_isa! {
-    fn columns_f32(table: &[f32], width: usize, start: usize, rows: &[u32], factors: &[f32], add: bool, q: &mut [f32])
+    fn columns_f32(table: &[f32], width: usize, rows: &[u32], factors: &[f32], add: bool, q: &mut [f32])
         = columns_body, columns_scalar;
 }
 by_isa! {
-    fn columns_f16(table: &[f16], width: usize, start: usize, rows: &[u32], factors: &[f32], add: bool, q: &mut [f32])
+    fn columns_f16(table: &[f16], width: usize, rows: &[u32], factors: &[f32], add: bool, q: &mut [f32])
         = columns_body, columns_scalar;
 }
 
 #[inline(always)]
-#[allow(clippy::too_many_arguments)]
 unsafe fn columns_body<V: Lanes>(
     table: &[impl Number],
     width: usize,
-    start: usize,
     rows: &[u32],
     factors: &[f32],
     add: bool,
@@ -98,7 +94,7 @@ unsafe fn columns_body<V: Lanes>(
     let mut column = 0;
     // SAFETY: `accumulate_rows` has checked every row; columns stay below `q.len()`.
     unsafe {
-        let table = table.as_ptr().add(start);
+        let table = table.as_ptr();
         while column + 8 * V::N <= q.len() {
             register_tile::<V, 8>(table, width, column, rows, factors, add, q);
             column += 8 * V::N;

@@ -66,9 +66,9 @@ pub struct ModelInfo {
 /// What differs between the kinds.
 pub enum KindModel {
     /// Kind `upt`.
-    Upt(Box<UptModel>),
+    Upt(Arc<UptModel>),
     /// Kind `reduced`.
-    Reduced(ReducedModel),
+    Reduced(Arc<ReducedModel>),
 }
 
 /// A bundle made ready to step.
@@ -80,7 +80,7 @@ pub struct Model {
     /// The bundle's mesh.
     pub mesh: Arc<Mesh>,
     /// The linear response, where the bundle has one.
-    pub prior: Option<PriorTable>,
+    pub prior: Option<Arc<PriorTable>>,
     /// The kind's own part.
     pub kind: KindModel,
     corrections: OnceLock<Corrections>,
@@ -151,7 +151,7 @@ impl Model {
             ));
         }
         let prior = match &manifest.prior {
-            Some(entry) => Some(PriorTable::open(&files, entry, &mesh)?),
+            Some(entry) => Some(Arc::new(PriorTable::open(&files, entry, &mesh)?)),
             None => None,
         };
         let load = || Runtime::get(process.onnxruntime_path.as_deref());
@@ -170,12 +170,12 @@ impl Model {
         let (kind, choice) = match manifest.kind {
             ManifestKind::Reduced => {
                 let (model, choice) = ReducedModel::open(&files, load, &plan, graphs)?;
-                (KindModel::Reduced(model), choice)
+                (KindModel::Reduced(Arc::new(model)), choice)
             }
             ManifestKind::Upt => {
                 let (model, choice) =
                     UptModel::open(&files, &mesh, load()?, &plan, threads, graphs)?;
-                (KindModel::Upt(Box::new(model)), choice)
+                (KindModel::Upt(Arc::new(model)), choice)
             }
         };
         let model = Model {
@@ -211,7 +211,7 @@ impl Model {
         if let Some(made) = self.corrections.get() {
             return Ok(made);
         }
-        let made = Corrections::open(&self.files, &self.mesh, self.prior.as_ref())?;
+        let made = Corrections::open(&self.files, &self.mesh, self.prior.as_deref())?;
         Ok(self.corrections.get_or_init(|| made))
     }
 
@@ -250,7 +250,7 @@ impl Model {
             ),
             KindModel::Reduced(reduced) => (Kind::Reduced, 0, reduced.memory_bytes()),
         };
-        let prior = self.prior.as_ref().map_or(0, PriorTable::memory_bytes);
+        let prior = self.prior.as_ref().map_or(0, |table| table.memory_bytes());
         ModelInfo {
             kind,
             node_count: self.mesh.node_count() as u64,

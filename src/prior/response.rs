@@ -156,7 +156,7 @@ impl ContactResponse {
             out.fill(0.0);
             return Ok(());
         }
-        accumulate_rows(isa, pool, table, &self.rows, &self.forces, false, out)
-            .map_err(|error| Error::Panic(error.to_string()))
+        let (rows, forces) = (&self.rows, &self.forces);
+        Ok(accumulate_rows(isa, pool, table, rows, forces, false, out)?)
     }
 }

@@ -5,7 +5,7 @@
 
 use super::table::PriorTable;
 use crate::bundle::TensorFile;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::kernels::project::row_dots;
 use crate::kernels::respond::accumulate_rows;
 use crate::kernels::rows::Stored;
@@ -88,23 +88,16 @@ impl FreeVibration {
     /// The field of a state in block coordinates `[Q]`.
     pub fn field(&self, isa: Isa, pool: &Pool, state: &[f32], q: &mut [f32]) -> Result<()> {
         let modes = Stored::F32(&self.modes);
-        accumulate_rows(
-            isa,
-            pool,
-            modes,
-            &self.rows,
-            &state[..self.count()],
-            false,
-            q,
-        )
-        .map_err(|error| Error::Panic(error.to_string()))
+        let amplitudes = &state[..self.count()];
+        Ok(accumulate_rows(
+            isa, pool, modes, &self.rows, amplitudes, false, q,
+        )?)
     }
 
     /// The amplitudes `[m]`, mm, of a field in block coordinates `[Q]`: its mass-weighted projection on the modes.
     pub fn amplitudes(&self, isa: Isa, pool: &Pool, q: &[f32], out: &mut [f32]) -> Result<()> {
         let rows = Stored::F32(&self.projection);
-        row_dots(isa, pool, rows, &self.rows, q, out)
-            .map_err(|error| Error::Panic(error.to_string()))
+        Ok(row_dots(isa, pool, rows, &self.rows, q, out)?)
     }
 
     /// Bytes held.

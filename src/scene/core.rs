@@ -6,7 +6,7 @@ use std::time::Instant;
 use super::StepInput;
 use super::contact::{ContactSet, check_displacement};
 use super::corrected::Corrected;
-use super::engine::{Engine, Which};
+use super::engine::{Decode, Engine, Inputs, Which};
 use super::inversion::ContactElements;
 use super::plan::NodePlan;
 use super::points::AttachedPoints;
@@ -18,7 +18,7 @@ use crate::contact::Problem;
 use crate::envelope::EnvelopeCheck;
 use crate::error::Result;
 use crate::guard;
-use crate::kernels::{FlushToZero, Isa, Pool};
+use crate::kernels::{Compute, FlushToZero, Isa, Pool};
 use crate::memory;
 use crate::model::Model;
 use crate::options::SceneOptions;
@@ -119,7 +119,7 @@ impl Core {
         for &node in &parts.mesh.held_nodes {
             held[node as usize] = true;
         }
-        let plan = NodePlan::all(count, parts.engine.planned_prior(&parts.model))?;
+        let plan = NodePlan::all(count, parts.engine.planned_prior())?;
         let contact = ContactSet::with_capacity(count)?;
         Ok(Core {
             envelope: EnvelopeCheck::new(&parts.mesh)?,
@@ -194,7 +194,7 @@ impl Core {
             download_ms: 0.0,
             max_displacement_mm: self.max_displacement,
             indicator: 0.0,
-            prior_forces: self.engine.responds() && self.corrected.is_none(),
+            prior_forces: self.engine.linear().is_some() && self.corrected.is_none(),
             sleeping: self.sleeping,
             poisoned: false,
         }
@@ -292,11 +292,13 @@ impl Core {
         if learned {
             self.absorb(&shared)?;
         }
+        let compute = Compute {
+            isa: self.isa,
+            pool: &self.pool,
+        };
         self.engine.predict(
-            self.isa,
-            &self.pool,
-            &self.model,
-            &super::engine::Inputs {
+            compute,
+            &Inputs {
                 given,
                 displacement: given.unwrap_or(&shared.last.field),
                 previous: &shared.before.field,
@@ -315,17 +317,14 @@ impl Core {
         let mut watch = Stopwatch::start();
         let _span = tracing::trace_span!("decode").entered();
         let displacement = given.unwrap_or(&shared.last.field);
-        self.engine.decode(
-            self.isa,
-            &self.pool,
-            &self.model,
-            Which::Next,
-            &self.plan,
+        let what = Decode {
+            which: Which::Next,
+            plan: &self.plan,
             displacement,
-            &mut self.next.field,
-            &self.points,
-            &mut self.next.points,
-        )?;
+            points: &self.points,
+        };
+        let Frame { field, points } = &mut self.next;
+        self.engine.decode(compute, &what, field, points)?;
         drop(shared);
         stats.decoded_node_count = self.plan.nodes().len() as u64;
         self.enforce_next();

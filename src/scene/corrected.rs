@@ -9,7 +9,7 @@ use super::published::Published;
 use super::timing::Stopwatch;
 use crate::corrections::{Enough, Input, LIMIT, Lent, Motion, Report, Stage};
 use crate::error::{Error, Result};
-use crate::kernels::{Isa, Pool};
+use crate::kernels::{Compute, Isa, Pool};
 use crate::model::Model;
 use crate::options::{Corrections, SceneOptions};
 use crate::stats::{SceneStats, flag};
@@ -194,18 +194,21 @@ impl Core {
 
     /// Before a step that the learned part makes: it goes on from the corrected states, which it did not predict.
     pub(super) fn absorb(&mut self, shared: &Published) -> Result<()> {
-        let (Some(corrected), Some(table)) = (&self.corrected, &self.model.prior) else {
+        let Some(corrected) = &self.corrected else {
             return Ok(());
         };
-        let Engine::Reduced(engine) = &mut self.engine else {
+        let engine = match &mut self.engine {
+            Engine::Reduced(engine) => engine,
             // A network reads the field itself.
-            return Ok(());
+            Engine::Upt(_) => return Ok(()),
+        };
+        let compute = Compute {
+            isa: self.isa,
+            pool: &self.pool,
         };
         if self.was_corrected[0] {
             engine.swing_from(
-                self.isa,
-                &self.pool,
-                table,
+                compute,
                 &corrected.basis_starts,
                 &shared.last.field,
                 &corrected.stage.motion.velocity,
@@ -213,9 +216,7 @@ impl Core {
             )?;
         }
         engine.absorb(
-            self.isa,
-            &self.pool,
-            table,
+            compute,
             &corrected.basis_starts,
             [
                 self.was_corrected[0].then_some(shared.last.field.as_slice()),
@@ -245,6 +246,6 @@ impl Core {
 
     /// Whether every node is decoded in each step, and kept.
     pub(super) fn keeps_all_nodes(&self) -> bool {
-        self.corrected.is_some() || self.engine.keeps_all_nodes(&self.model)
+        self.corrected.is_some() || self.engine.keeps_all_nodes()
     }
 }

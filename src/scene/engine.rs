@@ -1,21 +1,16 @@
 //! What differs between the bundle kinds inside a step, behind one enum.
 
-use std::sync::Arc;
-
 use super::contact::ContactSet;
+use super::linear::Linear;
 use super::plan::NodePlan;
 use super::points::AttachedPoints;
 use super::reduced::{ReducedEngine, ReducedRecord};
-use super::upt::{Means, UptEngine, UptInput};
+use super::upt::UptEngine;
 use crate::bundle::Base;
-use crate::error::{Error, Result};
-use crate::kernels::rows::decode_rows;
-use crate::kernels::{Isa, Pool};
+use crate::error::Result;
+use crate::kernels::Compute;
 use crate::memory;
-use crate::model::{KindModel, Model, UptTables};
 use crate::options::{DecoderKernel, Precision, Provider, StepPath};
-#[cfg(feature = "forces")]
-use crate::prior::ContactResponse;
 use crate::prior::PriorTable;
 use crate::stats::SceneStats;
 
@@ -50,58 +45,64 @@ pub struct Inputs<'a> {
     pub learned: bool,
 }
 
-/// The kind's own buffers, sessions and latent state.
+/// The kind's own buffers, sessions and latent state, with the model that they belong to.
 pub enum Engine {
-    /// Kind `upt`, with the tables of the scene's mesh.
-    Upt(Box<UptEngine>, Arc<UptTables>),
+    /// Kind `upt`.
+    Upt(Box<UptEngine>),
     /// Kind `reduced`.
     Reduced(Box<ReducedEngine>),
 }
 
-fn mismatch() -> Error {
-    Error::Panic("the scene's engine is of another kind than its model".into())
+/// A state to decode.
+pub struct Decode<'a> {
+    /// Which state.
+    pub which: Which,
+    /// The nodes.
+    pub plan: &'a NodePlan,
+    /// The state `[K,3]` before it.
+    pub displacement: &'a [f32],
+    /// The attached points.
+    pub points: &'a AttachedPoints,
 }
 
 impl Engine {
-    /// The prior whose rows a plan must hold.
-    pub fn planned_prior<'m>(&self, model: &'m Model) -> Option<&'m PriorTable> {
-        match (self, &model.kind) {
-            (Engine::Reduced(_), _) => model.prior.as_ref(),
-            (Engine::Upt(..), KindModel::Upt(kind)) if kind.entry.needs_prior() => {
-                model.prior.as_ref()
-            }
-            _ => None,
-        }
-    }
-
-    /// Whether the scene has a linear response.
-    pub fn responds(&self) -> bool {
+    /// The linear response, where the scene has one.
+    pub fn linear(&self) -> Option<&Linear> {
         match self {
-            Engine::Reduced(_) => true,
-            Engine::Upt(engine, _) => engine.response.is_some(),
+            Engine::Reduced(engine) => Some(&engine.linear),
+            Engine::Upt(engine) => engine.linear.as_ref(),
         }
     }
 
-    /// Its contact solve.
+    /// As [`Engine::linear`].
     #[cfg(feature = "forces")]
-    pub fn contact_response(&mut self) -> Option<&mut ContactResponse> {
+    pub fn linear_mut(&mut self) -> Option<&mut Linear> {
         match self {
-            Engine::Reduced(engine) => Some(&mut engine.response),
-            Engine::Upt(engine, _) => engine.response.as_mut(),
+            Engine::Reduced(engine) => Some(&mut engine.linear),
+            Engine::Upt(engine) => engine.linear.as_mut(),
         }
+    }
+
+    /// The tables whose rows a plan must hold.
+    pub fn planned_prior(&self) -> Option<&PriorTable> {
+        self.linear().map(|linear| &*linear.table)
     }
 
     /// Whether every node is decoded in each step, and kept: because the prediction is added to the displacement, or
     /// because `step.onnx` decodes, whose bits no other path gives again.
-    pub fn keeps_all_nodes(&self, model: &Model) -> bool {
-        self.path() == StepPath::Whole
-            || matches!(&model.kind, KindModel::Upt(kind) if kind.entry.base == Base::Displacement)
+    pub fn keeps_all_nodes(&self) -> bool {
+        match self {
+            Engine::Upt(engine) => {
+                engine.path() == StepPath::Whole || engine.kind.entry.base == Base::Displacement
+            }
+            Engine::Reduced(_) => false,
+        }
     }
 
     /// Nodes whose displacement the next step reads.
     pub fn recurrence_nodes(&self) -> &[u32] {
         match self {
-            Engine::Upt(_, tables) => &tables.encode_nodes,
+            Engine::Upt(engine) => &engine.tables.encode_nodes,
             Engine::Reduced(_) => &[],
         }
     }
@@ -109,157 +110,96 @@ impl Engine {
     /// Computes the next latent state.
     pub fn predict(
         &mut self,
-        isa: Isa,
-        pool: &Pool,
-        model: &Model,
+        compute: Compute<'_>,
         inputs: &Inputs<'_>,
         stats: &mut SceneStats,
     ) -> Result<()> {
-        match (self, &model.kind) {
-            (Engine::Reduced(engine), KindModel::Reduced(kind)) => {
-                let table = model.prior.as_ref().ok_or_else(mismatch)?;
-                engine.predict(
-                    isa,
-                    pool,
-                    kind,
-                    table,
-                    inputs.held,
-                    inputs.given,
-                    inputs.contact,
-                    inputs.contact_changed,
-                    inputs.learned,
-                    stats,
-                )
-            }
-            (Engine::Upt(engine, tables), KindModel::Upt(kind)) => {
-                let input = UptInput {
-                    displacement: inputs.displacement,
-                    previous: inputs.previous,
-                    contact: inputs.contact,
-                    held: inputs.held,
-                    plan: inputs.plan,
-                    learned: inputs.learned,
-                };
-                let means = Means {
-                    isa,
-                    pool,
-                    kind,
-                    tables,
-                };
-                engine.predict(means, model, &input, stats)
-            }
-            _ => Err(mismatch()),
+        match self {
+            Engine::Reduced(engine) => engine.predict(compute, inputs, stats),
+            Engine::Upt(engine) => engine.predict(compute, inputs, stats),
         }
     }
 
-    /// Decodes the nodes of a plan into a field `[K,3]`, boundary conditions not yet enforced. `displacement` is the
-    /// state before the decoded one. `detail [n,3]` is what the attached points have beside the interpolation of the field.
-    #[allow(clippy::too_many_arguments)]
+    /// Decodes the nodes of a plan into a field `[K,3]`, boundary conditions not yet enforced. `detail [n,3]` is what the
+    /// attached points have beside the interpolation of the field.
     pub fn decode(
         &mut self,
-        isa: Isa,
-        pool: &Pool,
-        model: &Model,
-        which: Which,
-        plan: &NodePlan,
-        displacement: &[f32],
+        compute: Compute<'_>,
+        what: &Decode<'_>,
         field: &mut [f32],
-        points: &AttachedPoints,
         detail: &mut [f32],
     ) -> Result<()> {
         detail.fill(0.0);
-        match (self, &model.kind) {
-            (Engine::Reduced(engine), _) => {
-                let table = model.prior.as_ref().ok_or_else(mismatch)?;
-                let rows = plan.rows().ok_or_else(mismatch)?;
-                let record = engine.record(which);
-                decode_rows(isa, pool, &table.basis(), rows, &record.q, field)
-                    .map_err(|error| Error::Panic(error.to_string()))
+        let (which, plan) = (what.which, what.plan);
+        match self {
+            Engine::Reduced(engine) => {
+                let q = &engine.record(which).q;
+                engine.linear.decode(compute, plan, q, field)
             }
-            (Engine::Upt(engine, tables), KindModel::Upt(kind)) => {
-                let means = Means {
-                    isa,
-                    pool,
-                    kind,
-                    tables,
-                };
-                engine.decode_mesh(means, which, plan.nodes(), field)?;
-                let (queries, rows) = points.queries();
+            Engine::Upt(engine) => {
+                engine.decode_mesh(compute, which, plan.nodes(), field)?;
+                let (queries, rows) = what.points.queries();
                 if !rows.is_empty() {
-                    engine.decode_queries(means, which, queries, rows, detail)?;
-                    points.add_interpolated(-1.0, field, detail);
+                    engine.decode_queries(compute, which, queries, rows, detail)?;
+                    what.points.add_interpolated(-1.0, field, detail);
                 }
-                match kind.entry.base {
-                    Base::None => {}
-                    Base::Displacement => add(displacement, plan.nodes(), field),
-                    Base::Prior if which == Which::Next => {
+                match (engine.kind.entry.base, &engine.linear) {
+                    (Base::None, _) | (Base::Prior, None) => {}
+                    (Base::Displacement, _) => add(what.displacement, plan.nodes(), field),
+                    (Base::Prior, Some(_)) if which == Which::Next => {
                         add(&engine.record(which).prior_field, plan.nodes(), field);
                     }
-                    Base::Prior => {
+                    (Base::Prior, Some(linear)) => {
                         // A published state may be decoded at nodes that were not planned in its step.
-                        let table = model.prior.as_ref().ok_or_else(mismatch)?;
-                        let rows = plan.rows().ok_or_else(mismatch)?;
                         let mut prior = memory::zeros(field.len(), "the linear response")?;
-                        decode_rows(
-                            isa,
-                            pool,
-                            &table.basis(),
-                            rows,
-                            &engine.record(which).q_prior,
-                            &mut prior,
-                        )
-                        .map_err(|error| Error::Panic(error.to_string()))?;
+                        let q = &engine.record(which).q_prior;
+                        linear.decode(compute, plan, q, &mut prior)?;
                         add(&prior, plan.nodes(), field);
                     }
                 }
                 Ok(())
             }
-            _ => Err(mismatch()),
         }
     }
 
     /// Replaces the next state by the linear response alone, or by rest where the bundle has none.
     pub fn fall_back(
         &mut self,
-        isa: Isa,
-        pool: &Pool,
-        model: &Model,
+        compute: Compute<'_>,
         plan: &NodePlan,
         field: &mut [f32],
     ) -> Result<()> {
-        if let Engine::Reduced(engine) = self {
-            engine.drop_correction();
+        match self {
+            Engine::Reduced(engine) => engine.drop_correction(),
+            // The prediction lies in the field alone, which is replaced.
+            Engine::Upt(_) => {}
         }
-        self.decode_fallback(isa, pool, model, Which::Next, plan, field)
+        self.decode_fallback(compute, Which::Next, plan, field)
     }
 
     /// Decodes the linear response of a state, or rest where the bundle has none.
     pub fn decode_fallback(
-        &mut self,
-        isa: Isa,
-        pool: &Pool,
-        model: &Model,
+        &self,
+        compute: Compute<'_>,
         which: Which,
         plan: &NodePlan,
         field: &mut [f32],
     ) -> Result<()> {
-        let Some(table) = self.planned_prior(model) else {
+        let Some(linear) = self.linear() else {
             field.fill(0.0);
             return Ok(());
         };
-        let q = match &*self {
+        let q = match self {
             Engine::Reduced(engine) => &engine.record(which).q,
-            Engine::Upt(engine, _) => &engine.record(which).q_prior,
+            Engine::Upt(engine) => &engine.record(which).q_prior,
         };
-        let rows = plan.rows().ok_or_else(mismatch)?;
-        decode_rows(isa, pool, &table.basis(), rows, q, field)
-            .map_err(|error| Error::Panic(error.to_string()))
+        linear.decode(compute, plan, q, field)
     }
 
     /// The next state is rest.
     pub fn rest_next(&mut self) {
         match self {
-            Engine::Upt(engine, _) => engine.next.clear(),
+            Engine::Upt(engine) => engine.next.clear(),
             Engine::Reduced(engine) => engine.rest_next(),
         }
     }
@@ -267,7 +207,7 @@ impl Engine {
     /// The next state becomes the last.
     pub fn commit(&mut self) {
         match self {
-            Engine::Upt(engine, _) => engine.commit(),
+            Engine::Upt(engine) => engine.commit(),
             Engine::Reduced(engine) => engine.commit(),
         }
     }
@@ -275,7 +215,7 @@ impl Engine {
     /// Back to rest.
     pub fn reset(&mut self) {
         match self {
-            Engine::Upt(engine, _) => engine.reset(),
+            Engine::Upt(engine) => engine.reset(),
             Engine::Reduced(engine) => engine.reset(),
         }
     }
@@ -285,21 +225,24 @@ impl Engine {
         match self {
             // Orthonormal modes: no node is displaced by more than |b|, and one by at least |b| / sqrt(K).
             Engine::Reduced(engine) => engine.last_norm() <= 50.0 * displacement,
-            Engine::Upt(..) => true,
+            Engine::Upt(_) => true,
         }
     }
 
     /// Whether the model's free motion is known to end at exactly zero.
     pub fn comes_to_rest(&self) -> bool {
-        // The bound of a reduced model's correction decays geometrically, and so does a free vibration; a network alone
-        // promises nothing.
-        matches!(self, Engine::Reduced(_))
+        match self {
+            // The bound of its correction decays geometrically, and so does a free vibration.
+            Engine::Reduced(_) => true,
+            // A network alone promises nothing.
+            Engine::Upt(_) => false,
+        }
     }
 
     /// Recomputes what the published records hold per planned node.
-    pub fn replan(&mut self, isa: Isa, pool: &Pool, model: &Model, plan: &NodePlan) -> Result<()> {
+    pub fn replan(&mut self, compute: Compute<'_>, plan: &NodePlan) -> Result<()> {
         match self {
-            Engine::Upt(engine, _) => engine.replan(isa, pool, model.prior.as_ref(), plan),
+            Engine::Upt(engine) => engine.replan(compute, plan),
             Engine::Reduced(_) => Ok(()),
         }
     }
@@ -307,7 +250,7 @@ impl Engine {
     /// What decodes.
     pub fn kernel(&self) -> DecoderKernel {
         match self {
-            Engine::Upt(engine, _) => engine.kernel(),
+            Engine::Upt(engine) => engine.kernel(),
             Engine::Reduced(_) => DecoderKernel::Native,
         }
     }
@@ -315,7 +258,7 @@ impl Engine {
     /// Who makes a step.
     pub fn path(&self) -> StepPath {
         match self {
-            Engine::Upt(engine, _) => engine.path(),
+            Engine::Upt(engine) => engine.path(),
             Engine::Reduced(_) => StepPath::Split,
         }
     }
@@ -323,7 +266,7 @@ impl Engine {
     /// Wall time of the last step's copies to a device and back, ms.
     pub fn transfer_ms(&self) -> [f64; 2] {
         match self {
-            Engine::Upt(engine, _) => engine.transfer_ms(),
+            Engine::Upt(engine) => engine.transfer_ms(),
             Engine::Reduced(engine) => engine.transfer_ms(),
         }
     }
@@ -331,7 +274,7 @@ impl Engine {
     /// Where the latent stage runs.
     pub fn provider(&self) -> Provider {
         match self {
-            Engine::Upt(engine, _) => engine.stage().choice().provider,
+            Engine::Upt(engine) => engine.stage().choice().provider,
             Engine::Reduced(engine) => engine.provider(),
         }
     }
@@ -339,7 +282,7 @@ impl Engine {
     /// Precision that runs.
     pub fn precision(&self) -> Precision {
         match self {
-            Engine::Upt(engine, _) => engine.precision(),
+            Engine::Upt(engine) => engine.precision(),
             Engine::Reduced(engine) => engine.precision(),
         }
     }
@@ -347,7 +290,7 @@ impl Engine {
     /// Bytes of the tables of the scene's mesh.
     pub fn table_bytes(&self) -> usize {
         match self {
-            Engine::Upt(_, tables) => tables.memory_bytes(),
+            Engine::Upt(engine) => engine.tables.memory_bytes(),
             Engine::Reduced(_) => 0,
         }
     }
@@ -355,7 +298,7 @@ impl Engine {
     /// Bytes of the buffers.
     pub fn memory_bytes(&self) -> usize {
         match self {
-            Engine::Upt(engine, _) => engine.memory_bytes(),
+            Engine::Upt(engine) => engine.memory_bytes(),
             Engine::Reduced(engine) => engine.memory_bytes(),
         }
     }

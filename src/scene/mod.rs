@@ -12,6 +12,7 @@ mod free_motion;
 #[cfg(feature = "haptics")]
 mod haptics;
 mod inversion;
+mod linear;
 mod plan;
 mod points;
 #[cfg(feature = "contact")]
@@ -344,7 +345,7 @@ fn build(model: &Arc<Model>, options: &SceneOptions) -> Result<Core> {
             "threads is {threads}, must be at most 1024"
         )));
     }
-    let pool = Pool::new(threads).map_err(|error| Error::Argument(error.to_string()))?;
+    let pool = Pool::new(threads)?;
     let own_mesh = match &options.mesh_path {
         None => None,
         Some(path) => {
@@ -387,7 +388,7 @@ fn build(model: &Arc<Model>, options: &SceneOptions) -> Result<Core> {
                 node_count: nodes,
             };
             let engine = parts.engine(options)?;
-            Engine::Upt(Box::new(engine), tables)
+            Engine::Upt(Box::new(engine))
         }
     };
     let corrected = Corrected::new(model, options, Isa::detect(), &pool)?;

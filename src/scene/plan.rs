@@ -11,7 +11,7 @@ const WHAT: &str = "a plan of decoded nodes";
 #[derive(Debug, Clone)]
 pub struct NodePlan {
     nodes: Vec<u32>,
-    rows: Option<RowPlan>,
+    rows: RowPlan,
 }
 
 impl NodePlan {
@@ -33,7 +33,7 @@ impl NodePlan {
     fn of(nodes: Vec<u32>, table: Option<&PriorTable>) -> Result<NodePlan> {
         let rows = table.map(|table| RowPlan::try_region(&table.basis(), &nodes, false));
         Ok(NodePlan {
-            rows: rows.transpose()?,
+            rows: rows.transpose()?.unwrap_or_default(),
             nodes,
         })
     }
@@ -48,7 +48,7 @@ impl NodePlan {
 
     /// Bytes held.
     pub fn memory_bytes(&self) -> usize {
-        4 * self.nodes.capacity() + self.rows.as_ref().map_or(0, RowPlan::memory_bytes)
+        4 * self.nodes.capacity() + self.rows.memory_bytes()
     }
 
     /// The nodes, ascending.
@@ -56,8 +56,8 @@ impl NodePlan {
         &self.nodes
     }
 
-    /// The prior's rows of the nodes, where the bundle has a prior.
-    pub fn rows(&self) -> Option<&RowPlan> {
-        self.rows.as_ref()
+    /// The linear response's rows of the nodes; none where the engine has no linear response.
+    pub fn rows(&self) -> &RowPlan {
+        &self.rows
     }
 }

@@ -66,22 +66,18 @@ impl Scene {
 impl Core {
     /// The reaction of the linear response to the last published contact; false where the scene has none.
     fn prior_reaction(&mut self, out: &mut [f32]) -> Result<bool> {
-        let (Some(response), Some(table)) = (self.engine.contact_response(), &self.model.prior)
-        else {
+        let Some(linear) = self.engine.linear_mut() else {
             return Ok(false);
         };
         let _flush = FlushToZero::enter();
         let contact = &self.contact;
         // The last solve may be of a contact that the guard refused, or, after a restore, of another time. The factor is
         // kept where the nodes are the same.
-        response.solve(
-            self.isa,
-            table,
-            &self.held,
-            &contact.nodes,
-            &contact.vectors,
-        )?;
-        response.reaction(table, &self.held, &contact.nodes, &contact.order, out);
+        linear.meet(self.isa, &self.held, contact)?;
+        let table = &linear.table;
+        linear
+            .solve
+            .reaction(table, &self.held, &contact.nodes, &contact.order, out);
         Ok(true)
     }
 }

@@ -2,19 +2,23 @@
 //! linear response and faded out beyond the trained pushes (`docs/reference/formats.md`). A bundle without a learned map has `b' = 0`
 //! and swings freely after a release ([`super::free_motion`]).
 
+use std::sync::Arc;
+
 use super::contact::ContactSet;
+use super::engine::Inputs;
+use super::linear::Linear;
 use super::timing::Stopwatch;
 use crate::bundle::ReducedInput;
-use crate::error::{Error, Result};
+use crate::error::Result;
+use crate::kernels::Compute;
 use crate::kernels::project::{project_field, row_dots};
 use crate::kernels::respond::accumulate_rows;
 use crate::kernels::rows::Stored;
-use crate::kernels::{Isa, Pool};
 use crate::memory;
 use crate::model::{LearnedMap, Model, ReducedModel};
 use crate::onnx::Stage;
 use crate::options::{Precision, Provider};
-use crate::prior::{ContactResponse, PriorTable, SolveReport};
+use crate::prior::{PriorTable, SolveReport};
 use crate::stats::{SceneStats, flag};
 
 const STATE: &str = "a scene's reduced states";
@@ -104,8 +108,9 @@ impl ReducedRecord {
 
 /// Buffers and session of a scene of kind `reduced`.
 pub struct ReducedEngine {
-    /// The contact solve.
-    pub response: ContactResponse,
+    /// The linear response.
+    pub linear: Linear,
+    kind: Arc<ReducedModel>,
     learned: Option<LearnedStage>,
     pub(super) given_q: Vec<f32>,
     /// The step being made, the last published one, the one before it.
@@ -158,10 +163,15 @@ fn distance(a: &[f32], b: &[f32]) -> f32 {
 
 impl ReducedEngine {
     /// Makes the session and the buffers.
-    pub fn new(model: &Model, kind: &ReducedModel, table: &PriorTable) -> Result<ReducedEngine> {
+    pub fn new(
+        model: &Model,
+        kind: &Arc<ReducedModel>,
+        table: &Arc<PriorTable>,
+    ) -> Result<ReducedEngine> {
         let learned = kind.learned.as_ref();
         Ok(ReducedEngine {
-            response: ContactResponse::new(table)?,
+            linear: Linear::new(table)?,
+            kind: Arc::clone(kind),
             learned: learned
                 .map(|map| LearnedStage::new(model, map))
                 .transpose()?,
@@ -199,45 +209,34 @@ impl ReducedEngine {
         [times.upload, times.download]
     }
 
-    /// `contact_changed`: the contact nodes differ from those of the last step.
     /// Computes `next` from `last`, `before`, the contact and, where given, the host's displacement `[K,3]`.
-    #[allow(clippy::too_many_arguments)]
     pub fn predict(
         &mut self,
-        isa: Isa,
-        pool: &Pool,
-        kind: &ReducedModel,
-        table: &PriorTable,
-        held: &[bool],
-        given: Option<&[f32]>,
-        contact: &ContactSet,
-        contact_changed: bool,
-        learned: bool,
+        compute: Compute<'_>,
+        inputs: &Inputs<'_>,
         stats: &mut SceneStats,
     ) -> Result<()> {
+        let (given, contact) = (inputs.given, inputs.contact);
         let mut watch = Stopwatch::start();
         let span = tracing::trace_span!("prior").entered();
-        let report = self
-            .response
-            .solve(isa, table, held, &contact.nodes, &contact.vectors)?;
+        let report = self.linear.meet(compute.isa, inputs.held, contact)?;
         stats.flags |= solve_flags(report);
-        let next = &mut self.next;
-        next.contact = !contact.is_empty();
-        if let Some(vibration) = &table.vibration {
-            self.swing(isa, pool, table, vibration, given)?;
-        } else {
-            self.response.field(isa, pool, table, &mut next.q_prior)?;
-            self.response
-                .expand(isa, pool, Stored::F32(&table.force_to_z), &mut next.z)?;
-            self.response
-                .expand(isa, pool, Stored::F32(&table.force_to_p), &mut next.p)?;
+        self.next.contact = !contact.is_empty();
+        if let Some(field) = given {
+            self.swing_at(compute, field)?;
         }
-        self.next.prior_norm = norm(&self.next.q_prior);
-        let (Some(map), Some(own), true) = (&kind.learned, &mut self.learned, learned) else {
+        let next = &mut self.next;
+        let (last, swung, q) = (&self.last.vibration, &mut next.vibration, &mut next.q_prior);
+        self.linear.respond(compute, next.contact, last, swung, q)?;
+        self.linear.leading(compute, next)?;
+        next.prior_norm = norm(&next.q_prior);
+        let (Some(map), Some(own), true) = (&self.kind.learned, &mut self.learned, inputs.learned)
+        else {
             self.drop_correction();
             stats.prior_ms = watch.lap();
             return Ok(());
         };
+        let table = &self.linear.table;
         let b_now = match given {
             Some(field) => {
                 self.given_q.fill(0.0);
@@ -287,7 +286,7 @@ impl ReducedEngine {
         } else {
             self.last.bound
         };
-        let jump = if contact_changed {
+        let jump = if inputs.contact_changed {
             distance(&next.q_prior, &self.last.q_prior)
         } else {
             0.0
@@ -309,56 +308,33 @@ impl ReducedEngine {
         }
         drop(span);
         stats.latent_ms = watch.lap();
-        Self::combine(isa, pool, table, &own.mode_rows, next)?;
+        combine(compute, table, &own.mode_rows, next)?;
         stats.prior_ms += watch.lap();
         Ok(())
-    }
-
-    /// `q = q_prior + sum_j b_j residual[j]`.
-    fn combine(
-        isa: Isa,
-        pool: &Pool,
-        table: &PriorTable,
-        rows: &[u32],
-        record: &mut ReducedRecord,
-    ) -> Result<()> {
-        record.q.copy_from_slice(&record.q_prior);
-        accumulate_rows(
-            isa,
-            pool,
-            Stored::F32(&table.residual),
-            rows,
-            &record.b,
-            true,
-            &mut record.q,
-        )
-        .map_err(|error| Error::Panic(error.to_string()))
     }
 
     /// Takes corrected fields `[K,3]` as those that the last two records stand for, `b = Phi^T (u - L(c))`; where a record was
     /// not corrected there is none.
     pub fn absorb(
         &mut self,
-        isa: Isa,
-        pool: &Pool,
-        table: &PriorTable,
+        compute: Compute<'_>,
         starts: &[usize],
         fields: [Option<&[f32]>; 2],
     ) -> Result<()> {
         let Some(learned) = &self.learned else {
             return Ok(());
         };
-        let failed = |error: crate::kernels::PoolError| Error::Panic(error.to_string());
+        let (Compute { isa, pool }, table) = (compute, &self.linear.table);
         let records = [&mut self.last, &mut self.before];
         for (record, field) in records.into_iter().zip(fields) {
             let Some(field) = field else { continue };
             let q = &mut self.given_q;
-            project_field(isa, pool, &table.basis(), starts, field, q).map_err(failed)?;
+            project_field(isa, pool, &table.basis(), starts, field, q)?;
             for (given, prior) in q.iter_mut().zip(&record.q_prior) {
                 *given -= prior;
             }
             let modes = Stored::F32(&table.residual);
-            row_dots(isa, pool, modes, &learned.mode_rows, q, &mut record.b).map_err(failed)?;
+            row_dots(isa, pool, modes, &learned.mode_rows, q, &mut record.b)?;
             record.bound = norm(&record.b);
         }
         Ok(())
@@ -384,32 +360,27 @@ impl ReducedEngine {
     }
 
     /// After a restore: field coordinates from `b` and the contact, with the factor of the last contact.
-    #[allow(clippy::too_many_arguments)]
     pub fn rebuild(
         &mut self,
-        isa: Isa,
-        pool: &Pool,
-        table: &PriorTable,
+        compute: Compute<'_>,
         held: &[bool],
         before: &ContactSet,
         last: &ContactSet,
     ) -> Result<()> {
+        let Compute { isa, pool } = compute;
         for (record, contact) in [(&mut self.before, before), (&mut self.last, last)] {
-            self.response
-                .solve(isa, table, held, &contact.nodes, &contact.vectors)?;
+            self.linear.meet(isa, held, contact)?;
+            let (linear, table) = (&self.linear, &self.linear.table);
             match &table.vibration {
                 Some(vibration) if contact.is_empty() => {
                     vibration.field(isa, pool, &record.vibration, &mut record.q_prior)?;
                 }
-                _ => self.response.field(isa, pool, table, &mut record.q_prior)?,
+                _ => linear.solve.field(isa, pool, table, &mut record.q_prior)?,
             }
             record.q.copy_from_slice(&record.q_prior);
             if let Some(learned) = &self.learned {
-                self.response
-                    .expand(isa, pool, Stored::F32(&table.force_to_z), &mut record.z)?;
-                self.response
-                    .expand(isa, pool, Stored::F32(&table.force_to_p), &mut record.p)?;
-                Self::combine(isa, pool, table, &learned.mode_rows, record)?;
+                linear.leading(compute, record)?;
+                combine(compute, table, &learned.mode_rows, record)?;
             }
         }
         Ok(())
@@ -424,11 +395,45 @@ impl ReducedEngine {
     pub fn memory_bytes(&self) -> usize {
         3 * self.next.memory_bytes()
             + 4 * self.given_q.len()
-            + self.response.memory_bytes()
+            + self.linear.solve.memory_bytes()
             + self.learned.as_ref().map_or(0, |learned| {
                 4 * (learned.given_b.len() + learned.mode_rows.len()) + learned.stage.memory_bytes()
             })
     }
+}
+
+impl Linear {
+    /// The response in the learned map's coordinates.
+    fn leading(&self, compute: Compute<'_>, record: &mut ReducedRecord) -> Result<()> {
+        let (Compute { isa, pool }, table) = (compute, &self.table);
+        let (to_z, to_p) = (
+            Stored::F32(&table.force_to_z),
+            Stored::F32(&table.force_to_p),
+        );
+        self.solve.expand(isa, pool, to_z, &mut record.z)?;
+        self.solve.expand(isa, pool, to_p, &mut record.p)
+    }
+}
+
+/// `q = q_prior + sum_j b_j residual[j]`.
+fn combine(
+    compute: Compute<'_>,
+    table: &PriorTable,
+    rows: &[u32],
+    record: &mut ReducedRecord,
+) -> Result<()> {
+    let Compute { isa, pool } = compute;
+    record.q.copy_from_slice(&record.q_prior);
+    let modes = Stored::F32(&table.residual);
+    Ok(accumulate_rows(
+        isa,
+        pool,
+        modes,
+        rows,
+        &record.b,
+        true,
+        &mut record.q,
+    )?)
 }
 
 /// Envelope flags of a contact solve.

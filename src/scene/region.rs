@@ -3,13 +3,13 @@
 use std::sync::{Arc, RwLock};
 
 use super::core::{Core, Source, lock_read, lock_write};
-use super::engine::Which;
+use super::engine::{Decode, Which};
 use super::plan::NodePlan;
 use super::points::AttachedPoints;
 use super::published::{Frame, Published};
 use super::verdict::enforce;
 use crate::error::{Error, Result};
-use crate::kernels::FlushToZero;
+use crate::kernels::{Compute, FlushToZero};
 use crate::memory;
 
 const WHAT: &str = "a scene's region and points";
@@ -90,7 +90,7 @@ impl Core {
             return Err(Error::State("decode before the first step".into()));
         }
         let _flush = FlushToZero::enter();
-        let plan = NodePlan::new(&[nodes], count, self.engine.planned_prior(&self.model))?;
+        let plan = NodePlan::new(&[nodes], count, self.engine.planned_prior())?;
         let points = AttachedPoints::default();
         self.decode_published(published, Which::Last, &plan, &points, &mut [])?;
         for (out, &node) in out.chunks_exact_mut(3).zip(nodes) {
@@ -125,33 +125,28 @@ impl Core {
             field.copy_from_slice(&frame.field);
             return Ok(());
         }
+        let compute = Compute {
+            isa: self.isa,
+            pool: &self.pool,
+        };
         match source {
             Source::Rest => {
                 detail.fill(0.0);
                 field.fill(0.0);
                 return Ok(());
             }
-            Source::Model => self.engine.decode(
-                self.isa,
-                &self.pool,
-                &self.model,
-                which,
-                plan,
-                &shared.before.field,
-                field,
-                points,
-                detail,
-            )?,
-            Source::Fallback => {
-                detail.fill(0.0);
-                self.engine.decode_fallback(
-                    self.isa,
-                    &self.pool,
-                    &self.model,
+            Source::Model => {
+                let what = Decode {
                     which,
                     plan,
-                    field,
-                )?;
+                    displacement: &shared.before.field,
+                    points,
+                };
+                self.engine.decode(compute, &what, field, detail)?;
+            }
+            Source::Fallback => {
+                detail.fill(0.0);
+                self.engine.decode_fallback(compute, which, plan, field)?;
             }
         }
         if kept {
@@ -170,7 +165,7 @@ impl Core {
         points: Arc<AttachedPoints>,
     ) -> Result<()> {
         let count = self.mesh.node_count();
-        let table = self.engine.planned_prior(&self.model);
+        let table = self.engine.planned_prior();
         let plan = match &region {
             Some(region) if !self.keeps_all_nodes() => NodePlan::new(
                 &[
@@ -184,8 +179,11 @@ impl Core {
             _ => NodePlan::all(count, table)?,
         };
         let _flush = FlushToZero::enter();
-        self.engine
-            .replan(self.isa, &self.pool, &self.model, &plan)?;
+        let compute = Compute {
+            isa: self.isa,
+            pool: &self.pool,
+        };
+        self.engine.replan(compute, &plan)?;
         let mut frames = [Frame::default(), Frame::default()];
         for (which, frame) in [Which::Last, Which::Before].into_iter().zip(&mut frames) {
             frame.points = memory::zeros(3 * points.len(), WHAT)?;

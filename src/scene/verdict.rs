@@ -10,6 +10,7 @@ use super::published::Published;
 use super::timing::Stopwatch;
 use crate::error::{Error, Result};
 use crate::guard;
+use crate::kernels::Compute;
 use crate::kernels::largest::largest;
 use crate::options::GuardPolicy;
 use crate::stats::{SceneStats, flag};
@@ -131,13 +132,12 @@ impl Core {
 
     /// Replaces `next` by the linear response, or by the imposed contact alone where the bundle has none.
     fn fall_back(&mut self) -> Result<()> {
-        self.engine.fall_back(
-            self.isa,
-            &self.pool,
-            &self.model,
-            &self.plan,
-            &mut self.next.field,
-        )?;
+        let compute = Compute {
+            isa: self.isa,
+            pool: &self.pool,
+        };
+        self.engine
+            .fall_back(compute, &self.plan, &mut self.next.field)?;
         self.enforce_next();
         Ok(())
     }

@@ -101,13 +101,15 @@ fn fused_equals_encode_then_aggregate() {
             aggregate(isa, &pool, case.csr(), width, &source, &target, &mut want).unwrap();
             let mut got = vec![f32::NAN; case.rows * width];
             let mut scratch = vec![0.0; pool.threads() * width];
+            let messages = Messages {
+                senders: case.csr(),
+                supernodes: &supernodes,
+                source: source_update,
+                target: target_update,
+            };
             encode_aggregate(
-                isa,
-                &pool,
-                case.csr(),
-                &supernodes,
-                source_update,
-                target_update,
+                Compute { isa, pool: &pool },
+                messages,
                 &features,
                 &mut scratch,
                 &mut got,

@@ -17,9 +17,10 @@ mod weights;
 
 pub use weights::{DecoderTokens, DecoderWeights, PackedDecoder};
 
+use super::Compute;
 use super::isa::Isa;
 use super::parts::Parts;
-use super::pool::{Pool, PoolError};
+use super::pool::PoolError;
 use crate::memory;
 
 /// Arithmetic of the matrix products.
@@ -80,27 +81,42 @@ impl DecoderScratch {
     }
 }
 
-/// Decodes rows of the query table: displacement, mm, before the bundle's `base` is added.
-///
-/// `queries [n, 2h]`, `out` as [`DecoderRows`] says.
+/// What is decoded, and by what.
+#[derive(Clone, Copy)]
+pub struct Decoding<'a> {
+    /// The weights.
+    pub decoder: &'a PackedDecoder,
+    /// Arithmetic of the matrix products.
+    pub precision: DecoderPrecision,
+    /// Keys and values of the latent state.
+    pub tokens: &'a DecoderTokens,
+    /// The query table `[n, 2h]`.
+    pub queries: &'a [f32],
+    /// Which of its rows.
+    pub rows: DecoderRows<'a>,
+}
+
+/// Decodes rows of the query table: displacement, mm, before the bundle's `base` is added. `out` as [`DecoderRows`] says.
 ///
 /// # Errors
 /// [`PoolError::Panicked`] where a row lies outside the query table.
 ///
 /// # Panics
 /// If `queries` or `out` has another shape, or `scratch` is too small for the model or the pool.
-#[allow(clippy::too_many_arguments)]
 pub fn decode(
-    isa: Isa,
-    pool: &Pool,
-    precision: DecoderPrecision,
-    decoder: &PackedDecoder,
-    tokens: &DecoderTokens,
-    queries: &[f32],
-    rows: DecoderRows<'_>,
+    compute: Compute<'_>,
+    what: Decoding<'_>,
     scratch: &mut DecoderScratch,
     out: &mut [f32],
 ) -> Result<(), PoolError> {
+    let Compute { isa, pool } = compute;
+    let Decoding {
+        decoder,
+        precision,
+        tokens,
+        queries,
+        rows,
+    } = what;
     let width = 2 * decoder.hidden;
     assert!(
         queries.len().is_multiple_of(width),

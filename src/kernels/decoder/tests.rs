@@ -60,18 +60,14 @@ fn run(
     let mut out = vec![f32::NAN; 3 * count];
     let pool = Pool::new(threads).unwrap();
     let mut scratch = DecoderScratch::new(&case.decoder, case.tokens.len(), threads);
-    decode(
-        isa,
-        &pool,
+    let what = Decoding {
+        decoder: &case.decoder,
         precision,
-        &case.decoder,
-        &case.tokens,
-        &case.queries,
+        tokens: &case.tokens,
+        queries: &case.queries,
         rows,
-        &mut scratch,
-        &mut out,
-    )
-    .unwrap();
+    };
+    decode(Compute { isa, pool: &pool }, what, &mut scratch, &mut out).unwrap();
     out
 }
 

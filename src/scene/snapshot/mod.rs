@@ -20,7 +20,7 @@ use super::reduced::ReducedRecord;
 use super::upt::UptRecord;
 use crate::corrections::{Motion, PAIRS};
 use crate::error::{Error, Result};
-use crate::kernels::FlushToZero;
+use crate::kernels::{Compute, FlushToZero};
 use crate::memory;
 use bytes::{Reader, Writer};
 
@@ -42,7 +42,7 @@ fn source_code(source: Source) -> u32 {
 /// Latent lists of a record, in the order in which they are stored.
 fn lists(engine: &mut Engine) -> Vec<&mut Vec<f32>> {
     match engine {
-        Engine::Upt(engine, _) => [&mut engine.last, &mut engine.before]
+        Engine::Upt(engine) => [&mut engine.last, &mut engine.before]
             .into_iter()
             .flat_map(|record| {
                 [
@@ -281,11 +281,12 @@ impl Core {
 
     /// What a snapshot leaves out because it follows from the rest.
     fn recompute(&mut self, published: &RwLock<Published>) -> Result<()> {
-        if let (Engine::Reduced(engine), Some(table)) = (&mut self.engine, &self.model.prior) {
+        if let Engine::Reduced(engine) = &mut self.engine {
             engine.rebuild(
-                self.isa,
-                &self.pool,
-                table,
+                Compute {
+                    isa: self.isa,
+                    pool: &self.pool,
+                },
                 &self.held,
                 &self.contact_before,
                 &self.contact,
@@ -307,7 +308,7 @@ impl Core {
         };
         Ok(Kept {
             records: match &self.engine {
-                Engine::Upt(engine, _) => {
+                Engine::Upt(engine) => {
                     Records::Upt(Box::new([engine.last.copy()?, engine.before.copy()?]))
                 }
                 Engine::Reduced(engine) => {
@@ -339,7 +340,7 @@ impl Core {
     /// Takes a kept state back.
     fn take_back(&mut self, kept: Kept, published: &RwLock<Published>) {
         match (&mut self.engine, kept.records) {
-            (Engine::Upt(engine, _), Records::Upt(records)) => {
+            (Engine::Upt(engine), Records::Upt(records)) => {
                 [engine.last, engine.before] = *records;
             }
             (Engine::Reduced(engine), Records::Reduced(records)) => {

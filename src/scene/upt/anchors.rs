@@ -1,6 +1,6 @@
 //! Decoding at anchors: which of them some nodes need, and the interpolation.
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::kernels::Pool;
 use crate::kernels::parts::Parts;
 use crate::memory;
@@ -52,7 +52,7 @@ impl AnchorField {
     /// Rows `nodes` of `out [K,3]` from the anchors' rows. What a node gets depends on nothing but its anchors.
     ///
     /// # Errors
-    /// [`Error::Panic`] where a node lies outside of `out`.
+    /// [`crate::Error::Panic`] where a node lies outside of `out`.
     pub fn interpolate(
         &self,
         pool: &Pool,
@@ -75,8 +75,8 @@ impl AnchorField {
                 // SAFETY: no node is in the list twice, so its row belongs to this chunk alone.
                 unsafe { parts.part(3 * node as usize, 3) }.copy_from_slice(&sum);
             }
-        })
-        .map_err(|error| Error::Panic(error.to_string()))
+        })?;
+        Ok(())
     }
 
     /// Bytes held.

@@ -1,9 +1,12 @@
 //! From a latent state to displacements: the decoder at nodes of the mesh, all or at anchors, and at any other points.
 
 use super::decoders::{Decoders, decode_resident, decode_tiles, take_rows};
-use super::{Means, Path, UptEngine, UptRecord, internal};
+use std::sync::Arc;
+
+use super::{Path, UptEngine, UptRecord};
 use crate::error::Result;
-use crate::kernels::decoder::{DecoderRows, decode};
+use crate::kernels::Compute;
+use crate::kernels::decoder::{DecoderRows, Decoding, decode};
 use crate::scene::engine::Which;
 
 impl UptEngine {
@@ -16,25 +19,26 @@ impl UptEngine {
     /// those that the nodes need, and interpolates.
     pub fn decode_mesh(
         &mut self,
-        means: Means<'_>,
+        compute: Compute<'_>,
         which: Which,
         nodes: &[u32],
         out: &mut [f32],
     ) -> Result<()> {
-        let Some(table) = &means.tables.anchors else {
-            return self.decode_nodes(means, which, nodes, out);
+        let tables = Arc::clone(&self.tables);
+        let Some(table) = &tables.anchors else {
+            return self.decode_nodes(compute, which, nodes, out);
         };
         let mut anchors = std::mem::take(&mut self.anchors);
         let (needed, field) = anchors.needed(table, nodes);
-        let done = self.decode_nodes(means, which, needed, field);
-        let done = done.and_then(|()| anchors.interpolate(means.pool, table, nodes, out));
+        let done = self.decode_nodes(compute, which, needed, field);
+        let done = done.and_then(|()| anchors.interpolate(compute.pool, table, nodes, out));
         self.anchors = anchors;
         done
     }
 
     fn decode_nodes(
         &mut self,
-        means: Means<'_>,
+        compute: Compute<'_>,
         which: Which,
         nodes: &[u32],
         out: &mut [f32],
@@ -47,13 +51,14 @@ impl UptEngine {
             let record = pick(which, [&self.next, &self.last, &self.before]);
             return decode_resident(stage, record, nodes, out);
         }
-        self.decode_queries(means, which, &means.tables.query_table, nodes, out)
+        let tables = Arc::clone(&self.tables);
+        self.decode_queries(compute, which, &tables.query_table, nodes, out)
     }
 
     /// Decodes rows `rows` of a query table into the same rows of `out`, before the base is added.
     pub fn decode_queries(
         &mut self,
-        means: Means<'_>,
+        compute: Compute<'_>,
         which: Which,
         queries: &[f32],
         rows: &[u32],
@@ -61,23 +66,19 @@ impl UptEngine {
     ) -> Result<()> {
         let record = pick(which, [&self.next, &self.last, &self.before]);
         if let Decoders::Tiles(stages) = &self.decoders {
-            let width = means.kind.entry.dims.query;
-            return decode_tiles(stages, means.pool, width, record, queries, rows, out);
+            let width = self.kind.entry.dims.query;
+            return decode_tiles(stages, compute.pool, width, record, queries, rows, out);
         }
         self.tokens
             .set(self.precision, &record.keys, &record.values);
-        decode(
-            means.isa,
-            means.pool,
-            self.precision,
-            &means.kind.decoder,
-            &self.tokens,
+        let what = Decoding {
+            decoder: &self.kind.decoder,
+            precision: self.precision,
+            tokens: &self.tokens,
             queries,
-            DecoderRows::Scatter(rows),
-            &mut self.decoder_scratch,
-            out,
-        )
-        .map_err(internal)
+            rows: DecoderRows::Scatter(rows),
+        };
+        Ok(decode(compute, what, &mut self.decoder_scratch, out)?)
     }
 }
 

@@ -135,8 +135,7 @@ pub fn decode_tiles(
                 .unwrap_or_else(|e| e.into_inner())
                 .get_or_insert(error);
         }
-    })
-    .map_err(internal)?;
+    })?;
     match failed.into_inner().unwrap_or_else(|e| e.into_inner()) {
         Some(error) => Err(error),
         None => Ok(()),

@@ -2,17 +2,17 @@
 
 use std::hint::black_box;
 
-use super::UptInput;
 use super::record::UptRecord;
 use crate::bundle::Feature;
 use crate::model::{UptModel, UptTables};
+use crate::scene::engine::Inputs;
 
 /// Writes every row. `next` and `last` hold the linear response of this step and of the one before.
 pub(super) fn fill_features(
     rows: &mut [f32],
     kind: &UptModel,
     tables: &UptTables,
-    input: &UptInput<'_>,
+    input: &Inputs<'_>,
     next: &UptRecord,
     last: &UptRecord,
 ) {

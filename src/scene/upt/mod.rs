@@ -5,31 +5,31 @@ mod anchors;
 mod decode;
 mod decoders;
 mod features;
-mod prior;
 mod record;
 pub mod step_path;
 
 pub use record::UptRecord;
 
-use super::contact::ContactSet;
+use std::sync::Arc;
+
+use super::engine::Inputs;
+use super::linear::Linear;
 use super::plan::NodePlan;
 use super::reduced::solve_flags;
 use super::timing::Stopwatch;
 use anchors::AnchorField;
 use decoders::Decoders;
 use features::fill_features;
-use prior::{decode_prior, respond};
 
 use crate::error::{Error, Result};
-use crate::kernels::aggregate::{Csr, encode_aggregate};
+use crate::kernels::aggregate::{Csr, Messages, encode_aggregate};
 use crate::kernels::decoder::{DecoderPrecision, DecoderScratch, DecoderTokens};
 use crate::kernels::encode::LowRank;
-use crate::kernels::{Isa, Pool};
+use crate::kernels::{Compute, Isa, Pool};
 use crate::memory;
 use crate::model::{Model, UptModel, UptTables};
 use crate::onnx::Stage;
 use crate::options::{DecoderKernel, Precision, StepPath};
-use crate::prior::{ContactResponse, PriorTable};
 use crate::stats::SceneStats;
 
 /// Who makes a step.
@@ -57,8 +57,12 @@ pub struct Choice {
 
 /// Buffers and sessions of a scene of kind `upt`.
 pub struct UptEngine {
-    /// The contact solve; none where the bundle does not use its prior.
-    pub response: Option<ContactResponse>,
+    /// The weights.
+    pub kind: Arc<UptModel>,
+    /// Tables of the scene's mesh.
+    pub tables: Arc<UptTables>,
+    /// The linear response; none where the network does not use it.
+    pub linear: Option<Linear>,
     path: Path,
     tokens: DecoderTokens,
     decoder_scratch: DecoderScratch,
@@ -74,45 +78,12 @@ pub struct UptEngine {
     pub before: UptRecord,
 }
 
-/// What the network runs on and with.
-#[derive(Clone, Copy)]
-pub struct Means<'a> {
-    /// Instruction set of the kernels.
-    pub isa: Isa,
-    /// Threads.
-    pub pool: &'a Pool,
-    /// Weights.
-    pub kind: &'a UptModel,
-    /// Tables of the scene's mesh.
-    pub tables: &'a UptTables,
-}
-
-/// What a step of this kind reads.
-pub struct UptInput<'a> {
-    /// `u[t]` `[K,3]`, valid at the encoder's nodes.
-    pub displacement: &'a [f32],
-    /// `u[t-1]` `[K,3]`.
-    pub previous: &'a [f32],
-    /// `c[t+1]`.
-    pub contact: &'a ContactSet,
-    /// Held nodes `[K]`.
-    pub held: &'a [bool],
-    /// Decoded nodes.
-    pub plan: &'a NodePlan,
-    /// Whether the network runs.
-    pub learned: bool,
-}
-
-fn internal(error: impl std::fmt::Display) -> Error {
-    Error::Panic(error.to_string())
-}
-
 impl UptEngine {
     /// Makes sessions and buffers.
     pub fn new(
         model: &Model,
-        kind: &UptModel,
-        tables: &UptTables,
+        kind: &Arc<UptModel>,
+        tables: &Arc<UptTables>,
         pool: &Pool,
         node_count: usize,
         choice: Choice,
@@ -127,7 +98,7 @@ impl UptEngine {
             Ok::<_, Error>(UptRecord {
                 keys: zeros(kv)?,
                 values: zeros(kv)?,
-                q_prior: zeros(table.map_or(0, PriorTable::width))?,
+                q_prior: zeros(table.map_or(0, |table| table.width()))?,
                 prior_field: zeros(table.map_or(0, |_| 3 * node_count))?,
                 vibration: zeros(vibration.map_or(0, |vibration| 2 * vibration.count()))?,
             })
@@ -144,7 +115,9 @@ impl UptEngine {
             }
         };
         Ok(UptEngine {
-            response: table.map(ContactResponse::new).transpose()?,
+            kind: Arc::clone(kind),
+            tables: Arc::clone(tables),
+            linear: table.map(Linear::new).transpose()?,
             path,
             tokens: DecoderTokens::try_new(&kind.decoder, dims.latent_tokens)?,
             decoder_scratch: DecoderScratch::try_new(
@@ -225,39 +198,23 @@ impl UptEngine {
     /// Computes the latent state `next`.
     pub fn predict(
         &mut self,
-        means: Means<'_>,
-        model: &Model,
-        input: &UptInput<'_>,
+        compute: Compute<'_>,
+        inputs: &Inputs<'_>,
         stats: &mut SceneStats,
     ) -> Result<()> {
-        let Means { isa, pool, .. } = means;
         let mut watch = Stopwatch::start();
         let span = tracing::trace_span!("prior").entered();
-        if let (Some(response), Some(table)) = (&mut self.response, &model.prior) {
-            let report = respond(
-                isa,
-                pool,
-                table,
-                response,
-                input.held,
-                input.contact,
-                &self.last,
-                &mut self.next,
-            )?;
+        if let Some(linear) = &mut self.linear {
+            let report = linear.meet(compute.isa, inputs.held, inputs.contact)?;
             stats.flags |= solve_flags(report);
-            let next = &mut self.next;
-            decode_prior(
-                isa,
-                pool,
-                table,
-                input.plan,
-                &next.q_prior,
-                &mut next.prior_field,
-            )?;
+            let (touched, next) = (!inputs.contact.is_empty(), &mut self.next);
+            let (last, swung, q) = (&self.last.vibration, &mut next.vibration, &mut next.q_prior);
+            linear.respond(compute, touched, last, swung, q)?;
+            linear.decode(compute, inputs.plan, &next.q_prior, &mut next.prior_field)?;
         }
         drop(span);
         stats.prior_ms = watch.lap();
-        if !input.learned {
+        if !inputs.learned {
             return Ok(());
         }
         let span = tracing::trace_span!("encode").entered();
@@ -267,27 +224,22 @@ impl UptEngine {
         };
         fill_features(
             features,
-            means.kind,
-            means.tables,
-            input,
+            &self.kind,
+            &self.tables,
+            inputs,
             &self.next,
             &self.last,
         );
         drop(span);
         stats.encode_ms = watch.lap();
-        [stats.aggregate_ms, stats.latent_ms] = self.network(means)?;
+        [stats.aggregate_ms, stats.latent_ms] = self.network(compute)?;
         Ok(())
     }
 
     /// Keys and values of `next` from the features, and on the whole path its displacements; wall time of the message
     /// mean and of the graph, ms.
-    pub fn network(&mut self, means: Means<'_>) -> Result<[f64; 2]> {
-        let Means {
-            isa,
-            pool,
-            kind,
-            tables,
-        } = means;
+    pub fn network(&mut self, compute: Compute<'_>) -> Result<[f64; 2]> {
+        let (kind, tables) = (&self.kind, &self.tables);
         let mut watch = Stopwatch::start();
         let mut aggregate_ms = 0.0;
         let (stage, first) = match &mut self.path {
@@ -298,21 +250,16 @@ impl UptEngine {
             } => {
                 let _span = tracing::trace_span!("aggregate").entered();
                 let (d, f) = (kind.entry.dims.encoder, kind.entry.feature_width());
-                encode_aggregate(
-                    isa,
-                    pool,
-                    Csr {
+                let messages = Messages {
+                    senders: Csr {
                         offsets: &tables.graph.offsets,
                         neighbours: &tables.neighbour_rows,
                     },
-                    &tables.supernode_rows,
-                    LowRank::new(&tables.source_table, &kind.source_weight, d, f),
-                    LowRank::new(&tables.target_table, &kind.target_weight, d, f),
-                    features,
-                    scratch,
-                    latent.input(0),
-                )
-                .map_err(internal)?;
+                    supernodes: &tables.supernode_rows,
+                    source: LowRank::new(&tables.source_table, &kind.source_weight, d, f),
+                    target: LowRank::new(&tables.target_table, &kind.target_weight, d, f),
+                };
+                encode_aggregate(compute, messages, features, scratch, latent.input(0))?;
                 aggregate_ms = watch.lap();
                 (latent, 0)
             }
@@ -323,6 +270,17 @@ impl UptEngine {
         self.next.keys.copy_from_slice(stage.output(first));
         self.next.values.copy_from_slice(stage.output(first + 1));
         Ok([aggregate_ms, watch.lap()])
+    }
+
+    /// Recomputes the response's fields of the published records at a new plan's nodes.
+    pub fn replan(&mut self, compute: Compute<'_>, plan: &NodePlan) -> Result<()> {
+        let Some(linear) = &self.linear else {
+            return Ok(());
+        };
+        for record in [&mut self.last, &mut self.before] {
+            linear.decode(compute, plan, &record.q_prior, &mut record.prior_field)?;
+        }
+        Ok(())
     }
 
     /// `next` becomes `last`.
@@ -339,14 +297,16 @@ impl UptEngine {
             } => 4 * (features.len() + scratch.len()),
             Path::Whole(_) => 0,
         };
-        let response = self.response.as_ref();
         3 * self.next.memory_bytes()
             + own
             + self.stage().memory_bytes()
             + self.decoders.memory_bytes()
             + self.tokens.memory_bytes()
             + self.decoder_scratch.memory_bytes()
-            + response.map_or(0, ContactResponse::memory_bytes)
+            + self
+                .linear
+                .as_ref()
+                .map_or(0, |linear| linear.solve.memory_bytes())
             + self.anchors.memory_bytes()
     }
 }

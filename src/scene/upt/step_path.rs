@@ -3,11 +3,12 @@
 //! the scene's own mesh while it is made, and the faster one stays. The first runs are a device's warm-up as well:
 //! kernels are loaded and engines built before the first step.
 
+use std::sync::Arc;
 use std::time::Instant;
 
-use super::{Choice, Means, UptEngine};
+use super::{Choice, UptEngine};
 use crate::error::Result;
-use crate::kernels::{Isa, Pool};
+use crate::kernels::{Compute, Isa, Pool};
 use crate::memory;
 use crate::model::{Model, UptModel, UptTables};
 use crate::options::{DecoderKernel, Precision, Provider, SceneOptions, StepPath};
@@ -21,8 +22,8 @@ const TIMED: usize = 7;
 /// What a scene's engine is made of.
 pub struct Parts<'a> {
     pub model: &'a Model,
-    pub kind: &'a UptModel,
-    pub tables: &'a UptTables,
+    pub kind: &'a Arc<UptModel>,
+    pub tables: &'a Arc<UptTables>,
     pub pool: &'a Pool,
     pub node_count: usize,
 }
@@ -116,16 +117,14 @@ impl Parts<'_> {
 
     /// Milliseconds of the network and of decoding every node, at rest.
     fn time(&self, engine: &mut UptEngine, field: &mut [f32]) -> Result<f64> {
-        let means = Means {
+        let compute = Compute {
             isa: Isa::detect(),
             pool: self.pool,
-            kind: self.kind,
-            tables: self.tables,
         };
         let nodes = memory::collected(self.node_count, 0..self.node_count as u32, "a timed step")?;
         let start = Instant::now();
-        engine.network(means)?;
-        engine.decode_mesh(means, Which::Next, &nodes, field)?;
+        engine.network(compute)?;
+        engine.decode_mesh(compute, Which::Next, &nodes, field)?;
         Ok(start.elapsed().as_secs_f64() * 1e3)
     }
 }

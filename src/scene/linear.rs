@@ -1,0 +1,84 @@
+//! The linear response of a scene: the model's tables and the scene's own contact solve.
+
+use std::sync::Arc;
+
+use super::contact::ContactSet;
+use super::plan::NodePlan;
+use crate::error::Result;
+use crate::kernels::rows::decode_rows;
+use crate::kernels::{Compute, Isa};
+use crate::prior::{ContactResponse, PriorTable, SolveReport};
+
+/// Tables, and the solve of the last contact.
+pub struct Linear {
+    /// The model's tables.
+    pub table: Arc<PriorTable>,
+    /// The contact solve.
+    pub solve: ContactResponse,
+}
+
+impl Linear {
+    /// Makes the solve's buffers.
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
+    pub fn new(table: &Arc<PriorTable>) -> Result<Linear> {
+        Ok(Linear {
+            solve: ContactResponse::new(table)?,
+            table: Arc::clone(table),
+        })
+    }
+
+    /// Solves for the forces of a contact.
+    pub fn meet(&mut self, isa: Isa, held: &[bool], contact: &ContactSet) -> Result<SolveReport> {
+        let (nodes, vectors) = (&contact.nodes, &contact.vectors);
+        self.solve.solve(isa, &self.table, held, nodes, vectors)
+    }
+
+    /// Block coordinates `[Q]` and state of the free vibration `[2m]` (empty where the tables have none) after `contact`, which
+    /// has been met: static while it lasts, swinging on from the state `last` without it.
+    pub fn respond(
+        &self,
+        compute: Compute<'_>,
+        contact: bool,
+        last: &[f32],
+        next: &mut [f32],
+        q: &mut [f32],
+    ) -> Result<()> {
+        let Compute { isa, pool } = compute;
+        let Some(vibration) = &self.table.vibration else {
+            return self.solve.field(isa, pool, &self.table, q);
+        };
+        if !contact {
+            vibration.advance(last, next);
+            return vibration.field(isa, pool, next, q);
+        }
+        self.solve.field(isa, pool, &self.table, q)?;
+        let (place, velocity) = next.split_at_mut(vibration.count());
+        self.solve
+            .expand(isa, pool, vibration.force_to_mode(), place)?;
+        for ((velocity, now), before) in velocity.iter_mut().zip(place).zip(last) {
+            *velocity = *now - before;
+        }
+        Ok(())
+    }
+
+    /// The field `[K,3]` of block coordinates at the nodes of a plan.
+    pub fn decode(
+        &self,
+        compute: Compute<'_>,
+        plan: &NodePlan,
+        q: &[f32],
+        field: &mut [f32],
+    ) -> Result<()> {
+        let Compute { isa, pool } = compute;
+        Ok(decode_rows(
+            isa,
+            pool,
+            &self.table.basis(),
+            plan.rows(),
+            q,
+            field,
+        )?)
+    }
+}
