@@ -3,11 +3,11 @@
 
 use ndarray::{Array1, Array2, ArrayView2, Axis, s};
 use upt::kernels::decoder::{
-    DecoderPrecision, DecoderRows, DecoderScratch, DecoderTokens, DecoderWeights, PackedDecoder,
-    decode,
+    DecoderPrecision, DecoderRows, DecoderScratch, DecoderTokens, DecoderWeights, Decoding,
+    PackedDecoder, decode,
 };
 use upt::kernels::random::Random;
-use upt::kernels::{Isa, Pool, gelu};
+use upt::kernels::{Compute, Isa, Pool, gelu};
 use upt::model::{DECODER_TILE, KindModel};
 use upt::onnx::{ProviderPlan, Runtime};
 use upt::{Model, ModelOptions};
@@ -159,10 +159,10 @@ impl<'a> Native<'a> {
     }
 
     fn label(&self) -> String {
-        let kind = if self.precision == DecoderPrecision::Bf16 {
-            "bf16"
-        } else {
-            self.isa.name()
+        let kind = match self.precision {
+            DecoderPrecision::F32 => self.isa.name(),
+            DecoderPrecision::Bf16Vectors => "bf16 vectors",
+            DecoderPrecision::Bf16Tiles => "bf16 tiles",
         };
         format!("{kind}, {} threads", self.pool.threads())
     }
@@ -176,7 +176,9 @@ pub fn against_references() {
     ] {
         let packed = decoder.packed();
         let mut tokens = DecoderTokens::new(&packed, decoder.tokens);
-        tokens.set(DecoderPrecision::Bf16, &decoder.keys, &decoder.values);
+        for precision in DecoderPrecision::available() {
+            tokens.set(precision, &decoder.keys, &decoder.values);
+        }
         let native = |isa, threads, precision, nodes| {
             let queries = &decoder.queries;
             Native::new(isa, threads, precision, &packed, &tokens, queries, nodes)
@@ -189,8 +191,9 @@ pub fn against_references() {
                 if isa != Isa::Scalar {
                     fast.push(native(isa, threads, DecoderPrecision::F32, NODES));
                 }
-                if isa == Isa::Avx512 && Isa::has_bf16() {
-                    fast.push(native(isa, threads, DecoderPrecision::Bf16, NODES));
+                if isa == Isa::Avx512 {
+                    let narrow = DecoderPrecision::available().split_off(1);
+                    fast.extend(narrow.into_iter().map(|p| native(isa, threads, p, NODES)));
                 }
             }
         }

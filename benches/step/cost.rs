@@ -77,7 +77,7 @@ impl Cost {
 
     /// The network's weights are used once each; the residual modes are added to the coordinates.
     fn add_correction(&mut self, model: &Model, kind: &ReducedModel, latent: f64) {
-        let width = model.prior.as_ref().map_or(0, PriorTable::width);
+        let width = model.prior.as_ref().map_or(0, |table| table.width());
         let modes = kind.learned.as_ref().map_or(0, |map| map.entry.modes);
         self.flops += latent / 2.0 + 2.0 * (modes * width) as f64;
         self.bytes += 4.0 * (modes * width) as f64;

@@ -99,25 +99,21 @@ impl Isa {
 macro_rules! by_isa {
     ($(#[$meta:meta])* $vis:vis fn $name:ident($($arg:ident : $ty:ty),* $(,)?) = $body:ident, $scalar:ident;) => {
         $(#[$meta])*
-        #[allow(clippy::too_many_arguments)]
         $vis fn $name(isa: $crate::kernels::Isa, $($arg: $ty),*) {
             #[cfg(target_arch = "x86_64")]
             #[target_feature(enable = "avx2,fma,f16c")]
-            #[allow(clippy::too_many_arguments)]
             fn avx2($($arg: $ty),*) {
                 // SAFETY: the features of these lanes are enabled here.
                 unsafe { $body::<$crate::kernels::lanes::Avx2>($($arg),*) }
             }
             #[cfg(target_arch = "x86_64")]
             #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx2,fma,f16c")]
-            #[allow(clippy::too_many_arguments)]
             fn avx512($($arg: $ty),*) {
                 // SAFETY: the features of these lanes are enabled here.
                 unsafe { $body::<$crate::kernels::lanes::Avx512>($($arg),*) }
             }
             #[cfg(target_arch = "aarch64")]
             #[target_feature(enable = "neon")]
-            #[allow(clippy::too_many_arguments)]
             fn neon($($arg: $ty),*) {
                 // SAFETY: the features of these lanes are enabled here.
                 unsafe { $body::<$crate::kernels::lanes::Neon>($($arg),*) }

@@ -1,8 +1,8 @@
-//! The decoder's tile with bf16 products (`vdpbf16ps`): operands rounded to bf16, sums in f32;
-//! attention weights, norms, GELU and the head stay f32. AVX-512 machines with BF16 only.
+//! The decoder's tile with bf16 products: operands rounded to bf16, sums in f32; attention weights, norms, GELU and the head
+//! stay f32. AVX-512 machines with BF16 only. The products run on vectors (`vdpbf16ps`) or on matrix tiles ([`super::amx`]).
 //!
-//! Inputs are stored as pairs of successive features, `[in/2][nodes][2]`, so that a 32-bit lane
-//! holds what one `vdpbf16ps` consumes.
+//! Inputs are stored as pairs of successive features, `[in/2][nodes][2]`: a 32-bit lane holds what one `vdpbf16ps` consumes, and
+//! sixteen rows of sixteen lanes are a matrix tile. Behind the last feature are zeros up to a whole tile.
 
 use super::tile::MAX_NODES;
 use super::weights::{DecoderTokens, PackedDecoder};
@@ -10,9 +10,11 @@ use super::weights::{DecoderTokens, PackedDecoder};
 /// Nodes of a tile.
 pub(super) const NODES: usize = 48;
 
-/// Decodes the `NODES` nodes `rows` to `out [3][NODES]`; the caller has checked `Isa::has_bf16`.
+/// Decodes the `NODES` nodes `rows` to `out [3][NODES]`; the caller has checked `Isa::has_bf16`, and for matrix tiles
+/// `amx::is_available`.
 #[cfg(target_arch = "x86_64")]
 pub(super) fn tile(
+    matrix_tiles: bool,
     decoder: &PackedDecoder,
     tokens: &DecoderTokens,
     queries: &[f32],
@@ -21,12 +23,14 @@ pub(super) fn tile(
     out: &mut [f32],
 ) {
     assert!(crate::kernels::Isa::has_bf16());
+    assert!(!matrix_tiles || super::amx::is_available());
     // SAFETY: the machine has the instructions.
-    unsafe { x86::layers(decoder, tokens, queries, rows, scratch, out) }
+    unsafe { x86::layers(matrix_tiles, decoder, tokens, queries, rows, scratch, out) }
 }
 
 #[cfg(not(target_arch = "x86_64"))]
 pub(super) fn tile(
+    _: bool,
     _: &PackedDecoder,
     _: &DecoderTokens,
     _: &[f32],
@@ -39,9 +43,10 @@ pub(super) fn tile(
 
 #[cfg(target_arch = "x86_64")]
 mod x86 {
+    use super::super::amx::{DEPTH, OUTPUTS, Sums, Tiles};
     use super::super::gemm::{Finish, store};
     use super::super::tile::{Layout, exponentials, gather, head, normalise};
-    use super::super::weights::{GROUP, pair_count};
+    use super::super::weights::{GROUP, Narrow};
     use super::{DecoderTokens, MAX_NODES, NODES, PackedDecoder};
     use crate::kernels::lanes::Avx512;
     use core::arch::x86_64::*;
@@ -52,6 +57,7 @@ mod x86 {
 
     #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx512bf16,avx2,fma,f16c")]
     pub(super) unsafe fn layers(
+        matrix_tiles: bool,
         decoder: &PackedDecoder,
         tokens: &DecoderTokens,
         queries: &[f32],
@@ -71,45 +77,52 @@ mod x86 {
             gather::<V>(queries, rows, 2 * h, 0, h, stream);
             gather::<V>(queries, rows, 2 * h, h, h, input);
             let width = h / decoder.heads;
-            let (key, value) = (pair_count(count, width), pair_count(width, count));
+            let tiles = matrix_tiles.then(|| Tiles::configure());
+            let multiply = |weights: Narrow<'_>, depth, y, finish| match &tiles {
+                Some(tiles) => multiply_tiles(tiles, weights, depth, pairs, y, finish),
+                None => multiply_pairs(weights.pairs, depth, pairs, y, finish),
+            };
             for head in 0..decoder.heads {
                 let first = head * width * NODES;
                 pair(input.add(first), width, pairs);
-                let keys = &tokens.key_pairs[head * key..][..key];
-                multiply(keys, width, pairs, hidden, Finish::Plain);
+                multiply(tokens.keys_of(head), width, hidden, Finish::Plain);
                 let mut scale = [0.0f32; MAX_NODES];
                 exponentials::<V, C>(hidden, count, scale.as_mut_ptr());
                 pair(hidden, count, pairs);
-                let values = &tokens.value_pairs[head * value..][..value];
                 let finish = Finish::Scale(scale.as_ptr());
-                multiply(values, count, pairs, attended.add(first), finish);
+                multiply(tokens.values_of(head), count, attended.add(first), finish);
             }
             pair(attended, h, pairs);
             let layer = &decoder.attention_out;
             let finish = Finish::Residual(layer.bias.as_ptr());
-            multiply(&layer.pairs, h, pairs, stream, finish);
+            multiply(layer.narrow(), h, stream, finish);
             normalise::<V, C>(stream, h, input);
             pair(input, h, pairs);
             let layer = &decoder.mlp1;
             let finish = Finish::Gelu(layer.bias.as_ptr());
-            multiply(&layer.pairs, h, pairs, hidden, finish);
+            multiply(layer.narrow(), h, hidden, finish);
             pair(hidden, m, pairs);
             let layer = &decoder.mlp2;
             let finish = Finish::Residual(layer.bias.as_ptr());
-            multiply(&layer.pairs, m, pairs, stream, finish);
+            multiply(layer.narrow(), m, stream, finish);
             normalise::<V, C>(stream, h, input);
             head::<V, C>(decoder, input, out.as_mut_ptr());
         }
     }
 
-    /// `x [depth][NODES]` f32 to `[depth/2][NODES][2]` bf16; an odd last row is paired with zeros.
+    /// `x [depth][NODES]` f32 to `[depth/2][NODES][2]` bf16, and zeros up to a whole tile.
     #[inline]
     #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx512bf16,avx2,fma,f16c")]
     unsafe fn pair(x: *const f32, depth: usize, to: *mut u32) {
-        for k in (0..depth).step_by(2) {
+        for k in (0..depth.next_multiple_of(DEPTH)).step_by(2) {
             for c in 0..C {
                 // SAFETY: the caller's.
                 unsafe {
+                    if k >= depth {
+                        let to = to.add(k / 2 * NODES + c * 16);
+                        _mm512_storeu_si512(to.cast(), _mm512_setzero_si512());
+                        continue;
+                    }
                     let even = _mm512_loadu_ps(x.add(k * NODES + c * 16));
                     let odd = if k + 1 < depth {
                         _mm512_loadu_ps(x.add((k + 1) * NODES + c * 16))
@@ -131,7 +144,13 @@ mod x86 {
     /// `y = finish(W x)`: [`super::super::gemm::multiply`] on pairs.
     #[inline]
     #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx512bf16,avx2,fma,f16c")]
-    unsafe fn multiply(panels: &[bf16], depth: usize, x: *const u32, y: *mut f32, finish: Finish) {
+    unsafe fn multiply_pairs(
+        panels: &[bf16],
+        depth: usize,
+        x: *const u32,
+        y: *mut f32,
+        finish: Finish,
+    ) {
         let steps = depth.div_ceil(2);
         for (group, panel) in panels.chunks_exact(2 * GROUP * steps).enumerate() {
             // SAFETY: the caller's.
@@ -159,6 +178,41 @@ mod x86 {
                 }
                 let row = group * GROUP;
                 store::<V, GROUP, C>(sum.map(|s| s.map(Avx512)), y.add(row * NODES), row, finish);
+            }
+        }
+    }
+
+    /// As [`multiply_pairs`], on matrix tiles.
+    #[inline]
+    #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx512bf16,avx2,fma,f16c")]
+    unsafe fn multiply_tiles(
+        tiles: &Tiles,
+        weights: Narrow<'_>,
+        depth: usize,
+        x: *const u32,
+        y: *mut f32,
+        finish: Finish,
+    ) {
+        let steps = depth.div_ceil(DEPTH);
+        let mut sums = Sums([[0.0; NODES]; OUTPUTS]);
+        let blocks = weights.blocks.chunks_exact(OUTPUTS * DEPTH * steps);
+        for (block, panel) in blocks.enumerate() {
+            // SAFETY: the caller's; the pairs hold zeros up to a whole tile.
+            unsafe {
+                tiles.multiply(panel.as_ptr(), x, steps, &mut sums);
+                for half in 0..OUTPUTS / GROUP {
+                    let row = block * OUTPUTS + half * GROUP;
+                    if row >= weights.outputs {
+                        break;
+                    }
+                    let mut sum = [[Avx512(_mm512_setzero_ps()); C]; GROUP];
+                    for (sum, from) in sum.iter_mut().zip(&sums.0[half * GROUP..]) {
+                        for (c, sum) in sum.iter_mut().enumerate() {
+                            *sum = Avx512(_mm512_load_ps(from.as_ptr().add(c * 16)));
+                        }
+                    }
+                    store::<V, GROUP, C>(sum, y.add(row * NODES), row, finish);
+                }
             }
         }
     }

@@ -8,6 +8,7 @@
 //! threads, and a region has the bits of the full decode. [`weights`] packs once a model and once a
 //! step, [`gemm`] is the micro-kernel, [`tile`] the layers, [`scalar`] the readable reference.
 
+mod amx;
 mod bf16;
 mod gemm;
 pub mod probe;
@@ -28,9 +29,59 @@ use crate::memory;
 pub enum DecoderPrecision {
     /// f32 throughout.
     F32,
-    /// bf16 operands, f32 sums (`vdpbf16ps`); f32 where the machine lacks it
+    /// bf16 operands, f32 sums, on vectors (`vdpbf16ps`); f32 where the machine lacks it
     /// ([`Isa::has_bf16`]). Error about 3e-3 of the output's size: opt-in.
-    Bf16,
+    Bf16Vectors,
+    /// The same on matrix tiles (Intel AMX); f32 where the machine or the system has none.
+    Bf16Tiles,
+}
+
+impl DecoderPrecision {
+    /// All that this machine runs, f32 first.
+    pub fn available() -> Vec<DecoderPrecision> {
+        [
+            DecoderPrecision::F32,
+            DecoderPrecision::Bf16Vectors,
+            DecoderPrecision::Bf16Tiles,
+        ]
+        .into_iter()
+        .filter(|precision| precision.is_available())
+        .collect()
+    }
+
+    /// Whether this machine runs it.
+    pub fn is_available(self) -> bool {
+        match self {
+            DecoderPrecision::F32 => true,
+            DecoderPrecision::Bf16Vectors => Isa::has_bf16(),
+            DecoderPrecision::Bf16Tiles => amx::is_available(),
+        }
+    }
+
+    /// What a scene runs that asks for bf16: matrix tiles, else vectors on CPUs whose `vdpbf16ps` is faster than f32 (AMD since
+    /// Zen 4), else f32. By the CPU's kind, not by a stopwatch: the same machine gives the same bits each time.
+    pub fn fastest_bf16() -> DecoderPrecision {
+        if amx::is_available() {
+            DecoderPrecision::Bf16Tiles
+        } else if Isa::has_bf16() && is_amd() {
+            DecoderPrecision::Bf16Vectors
+        } else {
+            DecoderPrecision::F32
+        }
+    }
+}
+
+fn is_amd() -> bool {
+    #[cfg(target_arch = "x86_64")]
+    {
+        let id = core::arch::x86_64::__cpuid(0);
+        let name = [id.ebx, id.edx, id.ecx].map(u32::to_le_bytes).concat();
+        name == b"AuthenticAMD"
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    {
+        false
+    }
 }
 
 /// Which nodes to decode, and where each goes.
@@ -139,7 +190,9 @@ pub fn decode(
         scratch.a_worker >= needed && scratch.blocks.len() >= scratch.a_worker * pool.threads(),
         "scratch made for a smaller model or fewer threads"
     );
-    let bf16 = precision == DecoderPrecision::Bf16 && isa == Isa::Avx512 && Isa::has_bf16();
+    let tiles = precision == DecoderPrecision::Bf16Tiles && isa == Isa::Avx512;
+    let vectors = precision == DecoderPrecision::Bf16Vectors && isa == Isa::Avx512;
+    let bf16 = tiles && amx::is_available() || vectors && Isa::has_bf16();
     let nodes = if bf16 { bf16::NODES } else { tile::nodes(isa) };
     let (parts, a_worker) = (Parts::new(out), scratch.a_worker);
     let scratch = Parts::new(&mut scratch.blocks);
@@ -171,7 +224,7 @@ pub fn decode(
         let mut result = [0.0f32; 3 * tile::MAX_NODES];
         let result = &mut result[..3 * nodes];
         if bf16 {
-            bf16::tile(decoder, tokens, queries, input, scratch, result);
+            bf16::tile(tiles, decoder, tokens, queries, input, scratch, result);
         } else {
             tile::tile(isa, decoder, tokens, queries, input, scratch, result);
         }

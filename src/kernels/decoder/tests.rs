@@ -1,4 +1,5 @@
 use super::*;
+use crate::kernels::Pool;
 use crate::kernels::random::{Random, max_error};
 
 struct Case {
@@ -37,7 +38,9 @@ fn case(h: usize, heads: usize, tokens: usize, mlp: usize, nodes: usize) -> Case
         random.normal(tokens * h, 1.5),
         random.normal(tokens * h, 1.0),
     );
-    packed.set(DecoderPrecision::Bf16, &keys, &values);
+    for precision in DecoderPrecision::available() {
+        packed.set(precision, &keys, &values);
+    }
     Case {
         decoder,
         tokens: packed,
@@ -190,7 +193,7 @@ fn threads_and_regions_do_not_change_a_bit() {
             rows.swap(i, j);
         }
         rows.truncate(123);
-        for precision in [DecoderPrecision::F32, DecoderPrecision::Bf16] {
+        for precision in DecoderPrecision::available() {
             for isa in Isa::available() {
                 let full = run(&case, isa, 1, precision, DecoderRows::All);
                 assert_eq!(full, run(&case, isa, 2, precision, DecoderRows::All));
@@ -213,28 +216,49 @@ fn threads_and_regions_do_not_change_a_bit() {
 
 #[test]
 fn bf16_stays_near_f32() {
-    let isa = Isa::Avx512;
-    if !Isa::has_bf16() {
-        return;
-    }
+    let isa = Isa::detect();
+    let narrow: Vec<_> = DecoderPrecision::available().split_off(1);
+    println!("of bf16 this machine runs {narrow:?}");
     for (h, heads, tokens, mlp) in SHAPES {
         let case = case(h, heads, tokens, mlp, 100);
         let want = run(&case, isa, 1, DecoderPrecision::F32, DecoderRows::All);
-        let got = run(&case, isa, 1, DecoderPrecision::Bf16, DecoderRows::All);
         let size = want.iter().map(|x| x.abs()).fold(0.0, f32::max);
-        let error = max_error(&want, &got) / size;
-        println!("bf16 h {h} L {tokens}: {error:.1e} of the largest output");
-        assert!(error > 0.0 && error < 2e-2, "h {h}: {error:e}");
+        for &precision in &narrow {
+            let got = run(&case, isa, 1, precision, DecoderRows::All);
+            let error = max_error(&want, &got) / size;
+            println!("{precision:?} h {h} L {tokens}: {error:.1e} of the largest output");
+            assert!(error > 0.0 && error < 2e-2, "h {h}: {error:e}");
+        }
+    }
+}
+
+/// A machine without the instructions, or a process that may not use them, gets float32.
+#[test]
+fn what_the_machine_lacks_is_float32() {
+    let case = case(64, 2, 64, 128, 60);
+    for isa in Isa::available() {
+        let plain = run(&case, isa, 1, DecoderPrecision::F32, DecoderRows::All);
+        for precision in [DecoderPrecision::Bf16Vectors, DecoderPrecision::Bf16Tiles] {
+            if isa == Isa::Avx512 && precision.is_available() {
+                continue;
+            }
+            let got = run(&case, isa, 1, precision, DecoderRows::All);
+            assert_eq!(plain, got, "{} {precision:?}", isa.name());
+        }
     }
 }
 
 #[test]
 fn nonsense_in_a_query_stays_in_its_node() {
-    for isa in Isa::available() {
+    let every = Isa::available().into_iter().flat_map(|isa| {
+        let precisions = DecoderPrecision::available().into_iter();
+        precisions.map(move |precision| (isa, precision))
+    });
+    for (isa, precision) in every {
         let mut case = case(64, 2, 64, 128, 60);
-        let clean = run(&case, isa, 1, DecoderPrecision::F32, DecoderRows::All);
+        let clean = run(&case, isa, 1, precision, DecoderRows::All);
         case.queries[7 * 128 + 100] = f32::NAN;
-        let got = run(&case, isa, 1, DecoderPrecision::F32, DecoderRows::All);
+        let got = run(&case, isa, 1, precision, DecoderRows::All);
         assert!(got[21..24].iter().all(|x| x.is_nan()), "{}", isa.name());
         assert_eq!(clean[..21], got[..21]);
         assert_eq!(clean[24..], got[24..]);

@@ -53,7 +53,7 @@ impl Layout {
             attention: 2 * h * nodes,
             hidden: 3 * h * nodes,
             pairs: (3 * h + wide) * nodes,
-            total: (3 * h + wide + widest / 2 + 1) * nodes,
+            total: (3 * h + wide + widest.next_multiple_of(super::amx::DEPTH) / 2) * nodes,
         }
     }
 }

@@ -5,6 +5,7 @@
 //! output. The affine parts of LN_2 and LN_3 are folded into `W_1` and `W_3`; the attention's
 //! `1/sqrt(h/heads)` and the `log2 e` of its exponential are folded into the keys.
 
+use super::{DecoderPrecision, amx};
 use crate::memory;
 use half::bf16;
 
@@ -42,13 +43,32 @@ pub(super) struct Linear {
     pub plain: Vec<f32>,
     /// `[out/8][in][8]`.
     pub panels: Vec<f32>,
-    /// `[out/8][in/2][8][2]`, for bf16.
+    /// `[out/8][in/2][8][2]`, for bf16 on vectors.
     pub pairs: Vec<bf16>,
+    /// `[out/16][in/32][16][32]`, for bf16 on matrix tiles; empty where the machine has none.
+    pub blocks: Vec<bf16>,
     /// `[out]`, zeros up to a multiple of 8.
     pub bias: Vec<f32>,
 }
 
+/// A matrix in bf16, in both layouts.
+#[derive(Clone, Copy)]
+pub(super) struct Narrow<'a> {
+    pub outputs: usize,
+    pub pairs: &'a [bf16],
+    pub blocks: &'a [bf16],
+}
+
 impl Linear {
+    /// The weights in bf16.
+    pub(super) fn narrow(&self) -> Narrow<'_> {
+        Narrow {
+            outputs: self.bias.len(),
+            pairs: &self.pairs,
+            blocks: &self.blocks,
+        }
+    }
+
     fn new(outputs: usize, depth: usize, weight: Vec<f32>, bias: Vec<f32>) -> Self {
         let mut linear = Self {
             depth,
@@ -62,6 +82,12 @@ impl Linear {
             weight[o * depth + k]
         });
         pack_pairs(&mut linear.pairs, outputs, depth, |o, k| {
+            weight[o * depth + k]
+        });
+        linear
+            .blocks
+            .resize(block_count(outputs, depth), bf16::ZERO);
+        pack_blocks(&mut linear.blocks, outputs, depth, |o, k| {
             weight[o * depth + k]
         });
         linear.plain = weight;
@@ -93,6 +119,32 @@ pub(super) fn panel_floats(outputs: usize, depth: usize) -> usize {
 
 pub(super) fn pair_count(outputs: usize, depth: usize) -> usize {
     outputs.next_multiple_of(GROUP) * depth.next_multiple_of(2)
+}
+
+/// Numbers of a matrix as blocks; none where the machine has no matrix tiles.
+fn block_count(outputs: usize, depth: usize) -> usize {
+    if !amx::is_available() {
+        return 0;
+    }
+    outputs.next_multiple_of(amx::OUTPUTS) * depth.next_multiple_of(amx::DEPTH)
+}
+
+fn pack_blocks(
+    blocks: &mut [bf16],
+    outputs: usize,
+    depth: usize,
+    weight: impl Fn(usize, usize) -> f32,
+) {
+    let (rows, columns, steps) = (amx::OUTPUTS, amx::DEPTH, depth.div_ceil(amx::DEPTH));
+    for (index, block) in blocks.chunks_exact_mut(rows * columns).enumerate() {
+        let (first, start) = (index / steps * rows, index % steps * columns);
+        for (i, x) in block.iter_mut().enumerate() {
+            let (o, k) = (first + i / columns, start + i % columns);
+            if o < outputs && k < depth {
+                *x = bf16::from_f32(weight(o, k));
+            }
+        }
+    }
 }
 
 fn pack(panels: &mut [f32], outputs: usize, depth: usize, weight: impl Fn(usize, usize) -> f32) {
@@ -208,8 +260,10 @@ pub struct DecoderTokens {
     pub(super) key_panels: Vec<f32>,
     /// A head after another: `[h/heads, L]` as panels.
     pub(super) value_panels: Vec<f32>,
-    pub(super) key_pairs: Vec<bf16>,
-    pub(super) value_pairs: Vec<bf16>,
+    key_pairs: Vec<bf16>,
+    value_pairs: Vec<bf16>,
+    key_blocks: Vec<bf16>,
+    value_blocks: Vec<bf16>,
 }
 
 impl DecoderTokens {
@@ -227,6 +281,7 @@ impl DecoderTokens {
         let (h, heads) = (decoder.hidden, decoder.heads);
         let width = h / heads;
         let (key_pairs, value_pairs) = (pair_count(tokens, width), pair_count(width, tokens));
+        let (key_blocks, value_blocks) = (block_count(tokens, width), block_count(width, tokens));
         Ok(Self {
             tokens,
             hidden: h,
@@ -237,6 +292,8 @@ impl DecoderTokens {
             value_panels: memory::zeros(heads * panel_floats(width, tokens), WHAT)?,
             key_pairs: memory::filled(heads * key_pairs, bf16::ZERO, WHAT)?,
             value_pairs: memory::filled(heads * value_pairs, bf16::ZERO, WHAT)?,
+            key_blocks: memory::filled(heads * key_blocks, bf16::ZERO, WHAT)?,
+            value_blocks: memory::filled(heads * value_blocks, bf16::ZERO, WHAT)?,
         })
     }
 
@@ -250,13 +307,14 @@ impl DecoderTokens {
         ];
         4 * floats.iter().map(|list| list.len()).sum::<usize>()
             + 2 * (self.key_pairs.len() + self.value_pairs.len())
+            + 2 * (self.key_blocks.len() + self.value_blocks.len())
     }
 
     /// Takes a step's `keys [L,h]` and `values [L,h]`, the outputs of `latent.onnx`.
     ///
     /// # Panics
     /// If they have another length.
-    pub fn set(&mut self, precision: super::DecoderPrecision, keys: &[f32], values: &[f32]) {
+    pub fn set(&mut self, precision: DecoderPrecision, keys: &[f32], values: &[f32]) {
         let (h, tokens, width) = (self.hidden, self.tokens, self.hidden / self.heads);
         assert_eq!(keys.len(), tokens * h, "keys must be [L, h]");
         assert_eq!(values.len(), tokens * h, "values must be [L, h]");
@@ -277,11 +335,51 @@ impl DecoderTokens {
                 tokens,
                 value,
             );
-            if precision == super::DecoderPrecision::Bf16 {
-                let (k, v) = (pair_count(tokens, width), pair_count(width, tokens));
-                pack_pairs(&mut self.key_pairs[head * k..][..k], tokens, width, key);
-                pack_pairs(&mut self.value_pairs[head * v..][..v], width, tokens, value);
+            let (kp, vp) = (pair_count(tokens, width), pair_count(width, tokens));
+            let (kb, vb) = (block_count(tokens, width), block_count(width, tokens));
+            match precision {
+                DecoderPrecision::F32 => {}
+                DecoderPrecision::Bf16Vectors => {
+                    pack_pairs(&mut self.key_pairs[head * kp..][..kp], tokens, width, key);
+                    pack_pairs(
+                        &mut self.value_pairs[head * vp..][..vp],
+                        width,
+                        tokens,
+                        value,
+                    );
+                }
+                DecoderPrecision::Bf16Tiles => {
+                    pack_blocks(&mut self.key_blocks[head * kb..][..kb], tokens, width, key);
+                    pack_blocks(
+                        &mut self.value_blocks[head * vb..][..vb],
+                        width,
+                        tokens,
+                        value,
+                    );
+                }
             }
+        }
+    }
+
+    /// A head's keys in bf16, `[L, h/heads]`.
+    pub(super) fn keys_of(&self, head: usize) -> Narrow<'_> {
+        let (tokens, width) = (self.tokens, self.hidden / self.heads);
+        let (pairs, blocks) = (pair_count(tokens, width), block_count(tokens, width));
+        Narrow {
+            outputs: tokens,
+            pairs: &self.key_pairs[head * pairs..][..pairs],
+            blocks: &self.key_blocks[head * blocks..][..blocks],
+        }
+    }
+
+    /// A head's values in bf16, `[h/heads, L]`.
+    pub(super) fn values_of(&self, head: usize) -> Narrow<'_> {
+        let (tokens, width) = (self.tokens, self.hidden / self.heads);
+        let (pairs, blocks) = (pair_count(width, tokens), block_count(width, tokens));
+        Narrow {
+            outputs: width,
+            pairs: &self.value_pairs[head * pairs..][..pairs],
+            blocks: &self.value_blocks[head * blocks..][..blocks],
         }
     }
 

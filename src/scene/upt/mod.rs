@@ -25,7 +25,7 @@ use crate::error::{Error, Result};
 use crate::kernels::aggregate::{Csr, Messages, encode_aggregate};
 use crate::kernels::decoder::{DecoderPrecision, DecoderScratch, DecoderTokens};
 use crate::kernels::encode::LowRank;
-use crate::kernels::{Compute, Isa, Pool};
+use crate::kernels::{Compute, Pool};
 use crate::memory;
 use crate::model::{Model, UptModel, UptTables};
 use crate::onnx::Stage;
@@ -132,8 +132,8 @@ impl UptEngine {
                 .map(|anchors| AnchorField::new(anchors, node_count))
                 .transpose()?
                 .unwrap_or_default(),
-            precision: if choice.precision == Precision::Bf16 && Isa::has_bf16() {
-                DecoderPrecision::Bf16
+            precision: if choice.precision == Precision::Bf16 {
+                DecoderPrecision::fastest_bf16()
             } else {
                 DecoderPrecision::F32
             },
@@ -150,7 +150,7 @@ impl UptEngine {
             _ if self.path() == StepPath::Whole || self.kernel() != DecoderKernel::Native => {
                 self.graphs
             }
-            DecoderPrecision::Bf16 => Precision::Bf16,
+            DecoderPrecision::Bf16Vectors | DecoderPrecision::Bf16Tiles => Precision::Bf16,
             DecoderPrecision::F32 => Precision::F32,
         }
     }

@@ -11,6 +11,7 @@ use tissue::trajectory::TrajectoryHeader;
 #[cfg(feature = "linear")]
 use tissue::{baselines::LinearQuasiStatic, linear::Lame};
 use upt::ffi;
+use upt::kernels::decoder::DecoderPrecision;
 
 use super::setting::{Precision, Provider, Region};
 use crate::host;
@@ -114,7 +115,7 @@ impl BundleFolder {
             list.is_some_and(|list| list.iter().any(|one| one == name))
         };
         let mut precisions = vec![Precision::F32];
-        if fields["kind"] == "upt" && upt::kernels::Isa::has_bf16() {
+        if fields["kind"] == "upt" && DecoderPrecision::fastest_bf16() != DecoderPrecision::F32 {
             precisions.push(Precision::Bf16);
         }
         for narrow in [Precision::F16, Precision::Int8] {
