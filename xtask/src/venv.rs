@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::Command;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
 use sha2::{Digest, Sha256};
 
 use crate::process::run_checked;
@@ -89,21 +89,4 @@ pub fn pip(workspace: &Workspace) -> Command {
     let mut command = Command::new(workspace.python());
     command.args(["-m", "pip"]);
     command
-}
-
-/// Unpacks a zip file (a wheel) by Python's own reader.
-pub fn unzip(workspace: &Workspace, archive: &Path, into: &Path) -> Result<()> {
-    let output = Command::new(workspace.python())
-        .args(["-m", "zipfile", "-e"])
-        .arg(archive)
-        .arg(into)
-        .output()?;
-    if !output.status.success() {
-        bail!(
-            "cannot unpack {}: {}",
-            archive.display(),
-            String::from_utf8_lossy(&output.stderr)
-        );
-    }
-    Ok(())
 }

@@ -75,8 +75,24 @@ fn check(status: i32) -> Result<()> {
             CStr::from_ptr(ffi::upt_last_error()),
         )
     };
-    bail!("{} ({})", message.to_string_lossy(), name.to_string_lossy())
+    let text = format!("{} ({})", message.to_string_lossy(), name.to_string_lossy());
+    if status == ffi::UPT_ERR_RUNTIME {
+        return Err(NoRuntime(text).into());
+    }
+    bail!(text)
 }
+
+/// ONNX Runtime is missing, too old or broken.
+#[derive(Debug)]
+pub struct NoRuntime(String);
+
+impl std::fmt::Display for NoRuntime {
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        out.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for NoRuntime {}
 
 impl Model {
     /// `upt_model_open`.

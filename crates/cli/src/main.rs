@@ -32,10 +32,12 @@ mod preview;
 mod prior;
 #[cfg(feature = "linear")]
 mod progress;
+mod python;
 mod reference;
 mod render;
 mod report;
 mod rollout;
+mod runtime;
 mod shown;
 mod simulate;
 mod soak;
@@ -43,7 +45,6 @@ mod stress;
 mod tools;
 mod view;
 
-use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
@@ -85,6 +86,8 @@ enum Command {
     Check(left_out::Options),
     /// Show what is on this machine: ONNX Runtime, providers, CPU features, bundles.
     Doctor(doctor::Options),
+    /// Fetch ONNX Runtime for this user.
+    Runtime(runtime::Options),
     /// Inspect, import and fill meshes.
     Mesh(mesh::Options),
     /// Write a trajectory for ParaView, or one frame's surface as PLY or glTF.
@@ -138,7 +141,8 @@ enum Command {
 
 fn main() -> ExitCode {
     end_quietly_on_closed_pipe();
-    take_runtime_of_the_build();
+    // SAFETY: no other thread runs yet.
+    unsafe { runtime::take() };
     let outcome = match Arguments::parse().command {
         #[cfg(all(feature = "files", feature = "linear"))]
         Command::Make(options) => make::run(&options),
@@ -149,6 +153,7 @@ fn main() -> ExitCode {
         #[cfg(not(feature = "linear"))]
         Command::Check(options) => left_out::run("linear", &options),
         Command::Doctor(options) => doctor::run(&options),
+        Command::Runtime(options) => runtime::run(&options),
         Command::Mesh(options) => mesh::run(&options),
         #[cfg(feature = "files")]
         Command::Export(options) => export::run(&options),
@@ -179,25 +184,12 @@ fn main() -> ExitCode {
         Command::Reference => reference::run::<Arguments>(),
     };
     outcome.unwrap_or_else(|error| {
+        if let Some(code) = runtime::offer(&error) {
+            return code;
+        }
         eprintln!("error: {error:#}");
         ExitCode::from(2)
     })
-}
-
-/// A `upt` out of `cargo build` takes the ONNX Runtime that `cargo xtask` fetched (`target/ort`) unless the environment names one.
-fn take_runtime_of_the_build() {
-    let named = std::env::var_os("ORT_DYLIB_PATH").is_some_and(|path| !path.is_empty());
-    let Some(found) = std::env::current_exe().ok().and_then(|exe| {
-        let target = exe.parent()?.parent()?;
-        let file = target
-            .join("ort")
-            .join(format!("{DLL_PREFIX}onnxruntime{DLL_SUFFIX}"));
-        (!named && file.is_file()).then_some(file)
-    }) else {
-        return;
-    };
-    // SAFETY: no other thread runs yet.
-    unsafe { std::env::set_var("ORT_DYLIB_PATH", found) };
 }
 
 /// `upt ... | head` must not panic. On Unix Rust ignores SIGPIPE at start, and the default action is put back; Windows has

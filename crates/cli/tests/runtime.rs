@@ -1,0 +1,110 @@
+//! Which ONNX Runtime the command `upt` takes, and what it says without one.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use ort_wheel::{Platform, VERSION};
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+/// A copy of the command that lies in no build folder, with a cache of its own.
+struct Installed {
+    folder: tempfile::TempDir,
+}
+
+impl Installed {
+    fn new() -> Installed {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::create_dir_all(folder.path().join("bin")).unwrap();
+        std::fs::copy(
+            env!("CARGO_BIN_EXE_upt"),
+            folder.path().join("bin").join("upt"),
+        )
+        .unwrap();
+        Installed { folder }
+    }
+
+    /// Where `upt runtime` keeps the library.
+    fn kept(&self) -> PathBuf {
+        let cache = self.folder.path().join("cache").join("upt");
+        cache.join("onnxruntime").join(VERSION)
+    }
+
+    fn run(&self, arguments: &[&str], library: &str) -> Output {
+        Command::new(self.folder.path().join("bin").join("upt"))
+            .current_dir(root())
+            .args(arguments)
+            .env("ORT_DYLIB_PATH", library)
+            .env("XDG_CACHE_HOME", self.folder.path().join("cache"))
+            .env_remove("UPT_PYTHON")
+            .output()
+            .expect("upt starts")
+    }
+}
+
+/// The library that the tests use.
+fn library() -> PathBuf {
+    let named = std::env::var_os("ORT_DYLIB_PATH").filter(|path| !path.is_empty());
+    let of_the_build = root().join("target/ort").join(host().library());
+    named.map_or(of_the_build, PathBuf::from)
+}
+
+fn host() -> Platform {
+    Platform::host().expect("tests run where a wheel is known")
+}
+
+#[test]
+fn a_library_that_was_fetched_is_taken_and_not_fetched_again() {
+    let upt = Installed::new();
+    std::fs::create_dir_all(upt.kept()).unwrap();
+    let kept = upt.kept().join(host().library());
+    std::fs::copy(library(), &kept).unwrap();
+    std::fs::write(upt.kept().join("version.txt"), VERSION).unwrap();
+
+    let ran = upt.run(&["doctor", "--json", "tests/fixtures/tiny-upt"], "");
+    let findings: serde_json::Value = serde_json::from_slice(&ran.stdout).unwrap();
+    assert_eq!(
+        findings["onnxruntime"]["path"],
+        kept.display().to_string(),
+        "{findings}"
+    );
+
+    // Nothing is downloaded: there is no Python environment in this cache.
+    let ran = upt.run(&["runtime"], "");
+    assert_eq!(ran.status.code(), Some(0));
+    let said = String::from_utf8(ran.stdout).unwrap();
+    assert_eq!(said.trim(), kept.display().to_string());
+    assert!(!upt.folder.path().join("cache/upt/python").exists());
+}
+
+/// A library of another version, or one whose download was interrupted, is not taken.
+#[test]
+fn half_a_library_is_not_taken() {
+    let upt = Installed::new();
+    std::fs::create_dir_all(upt.kept()).unwrap();
+    let kept = upt.kept().join(host().library());
+    std::fs::write(&kept, b"half").unwrap();
+    let ran = upt.run(&["doctor", "--json", "tests/fixtures/tiny-upt"], "");
+    let findings: serde_json::Value = serde_json::from_slice(&ran.stdout).unwrap();
+    assert_ne!(
+        findings["onnxruntime"]["path"],
+        kept.display().to_string(),
+        "{findings}"
+    );
+}
+
+/// Who named a library is told of that library, and is not offered another.
+#[test]
+fn a_library_that_the_user_named_and_that_is_missing_is_told_by_its_name() {
+    let upt = Installed::new();
+    let ran = upt.run(
+        &["stress", "tests/fixtures/tiny-upt"],
+        "/nowhere/libonnxruntime.so",
+    );
+    let said = String::from_utf8_lossy(&ran.stderr);
+    assert_eq!(ran.status.code(), Some(2), "{said}");
+    assert!(said.contains("/nowhere/libonnxruntime.so"), "{said}");
+    assert!(!said.contains("upt runtime"), "{said}");
+}
