@@ -1,4 +1,8 @@
 //! A host that traps floating-point exceptions may call: inside they are masked, after each call its mode is what it was.
+#![allow(
+    clippy::undocumented_unsafe_blocks,
+    reason = "a host in a test: every call keeps to the header, or breaks it on purpose"
+)]
 #![cfg(target_arch = "x86_64")]
 
 mod fixture;

@@ -1,4 +1,8 @@
 //! After a fork the child has none of the library's threads: its calls say so at once, and the parent goes on.
+#![allow(
+    clippy::undocumented_unsafe_blocks,
+    reason = "a host in a test: every call keeps to the header, or breaks it on purpose"
+)]
 #![cfg(unix)]
 
 mod fixture;

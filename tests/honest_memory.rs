@@ -1,5 +1,9 @@
 //! What the statistics say a scene takes is what it takes, and destroying scenes gives it back. In a process of its own, with the
 //! counts of glibc's allocator.
+#![allow(
+    clippy::undocumented_unsafe_blocks,
+    reason = "a host in a test: every call keeps to the header, or breaks it on purpose"
+)]
 #![cfg(all(target_os = "linux", target_env = "gnu"))]
 
 mod fixture;

@@ -1,4 +1,8 @@
 //! What the log says of flags, and what its receiver must not do. A process of its own: there is one receiver.
+#![allow(
+    clippy::undocumented_unsafe_blocks,
+    reason = "a host in a test: every call keeps to the header, or breaks it on purpose"
+)]
 
 mod fixture;
 mod host;

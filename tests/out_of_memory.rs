@@ -1,5 +1,9 @@
 //! No memory is a status. An allocator that refuses one request after another, wherever a call makes it: every one of a size that a
 //! host or a bundle decides gives `UPT_ERR_OUT_OF_MEMORY`, changes nothing, and the same call works when there is memory again.
+#![allow(
+    clippy::undocumented_unsafe_blocks,
+    reason = "a host in a test: every call keeps to the header, or breaks it on purpose"
+)]
 
 mod fixture;
 mod host;

@@ -1,4 +1,8 @@
 //! The stack that calls need, as docs/reference/abi.md states it: a thread with that much makes them.
+#![allow(
+    clippy::undocumented_unsafe_blocks,
+    reason = "a host in a test: every call keeps to the header, or breaks it on purpose"
+)]
 
 mod fixture;
 mod host;

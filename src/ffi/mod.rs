@@ -3,7 +3,6 @@
 //! A function checks its pointers, finds its handle, calls one safe function and turns the result into a status;
 //! there is no other logic here. Conventions: `docs/reference/abi.md`; why it is built this way: `docs/decisions/001-ffi.md`.
 
-#![warn(clippy::undocumented_unsafe_blocks)]
 #![allow(non_camel_case_types, clippy::missing_safety_doc)]
 
 mod call;

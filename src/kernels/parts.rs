@@ -7,6 +7,7 @@ pub(crate) struct Parts<T> {
 }
 // SAFETY: `Parts` only hands out parts that its users promise to be disjoint.
 unsafe impl<T: Send> Send for Parts<T> {}
+// SAFETY: as above.
 unsafe impl<T: Send> Sync for Parts<T> {}
 
 impl<T> Parts<T> {

@@ -44,6 +44,7 @@ pub struct Model {
 
 // SAFETY: the ABI promises that a model may be used from any thread at once; the handle is a number.
 unsafe impl Send for Model {}
+// SAFETY: as above.
 unsafe impl Sync for Model {}
 
 /// A scene; destroyed when dropped. Used by the thread that made it.
@@ -60,6 +61,7 @@ fn size<T>() -> u32 {
 /// SAFETY: the caller names a `repr(C)` struct for which all-zero bytes are a value: the ABI's
 /// documented default of every options struct.
 unsafe fn zeroed<T>() -> T {
+    // SAFETY: the caller's.
     unsafe { std::mem::MaybeUninit::zeroed().assume_init() }
 }
 

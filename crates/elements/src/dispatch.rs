@@ -1,4 +1,8 @@
 //! Run-time choice of the instruction set, and the kernels compiled for each.
+#![allow(
+    clippy::undocumented_unsafe_blocks,
+    reason = "one contract for all: each function is chosen where the machine has its instruction set"
+)]
 
 use crate::kernel::{Shape, add_forces, add_volumes};
 use crate::lanes::{Lanes, Scalar};

@@ -21,6 +21,10 @@
 //!
 //! No closures here or in `lanes`: a closure does not take on its caller's
 //! instruction set, and every vector operation in it would become a call.
+#![allow(
+    clippy::undocumented_unsafe_blocks,
+    reason = "one contract for all: the instruction set is enabled in the caller, and pointers hold what the shapes say"
+)]
 
 use crate::cluster::{Cluster, corners};
 use crate::lanes::{Lanes, WIDTH, prefetch};

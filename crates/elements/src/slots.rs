@@ -16,6 +16,7 @@ pub unsafe fn place<L: Lanes>(
     displacement: *const [f32; 4],
     positions: *mut [f32; 4],
 ) {
+    // SAFETY: the caller's.
     unsafe {
         for at in (0..4 * count.next_multiple_of(PADDED)).step_by(L::COUNT) {
             let sum = L::load(rest.cast::<f32>().add(at));
@@ -36,6 +37,7 @@ pub unsafe fn advance<L: Lanes>(
     increment: *mut [f32; 4],
     displacement: *mut [f32; 4],
 ) {
+    // SAFETY: the caller's.
     unsafe {
         // One and nought in the fourth place keep whole vectors going.
         let beta: [f32; WIDTH] = std::array::from_fn(|k| if k % 4 == 3 { 1.0 } else { beta });

@@ -1,4 +1,8 @@
 //! 256-bit lanes: AVX2 with FMA and F16C.
+#![allow(
+    clippy::undocumented_unsafe_blocks,
+    reason = "one contract for all: the instruction set is enabled in the caller, and pointers hold what the shapes say"
+)]
 
 use super::Lanes;
 use core::arch::x86_64::*;

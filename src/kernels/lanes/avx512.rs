@@ -1,4 +1,8 @@
 //! 512-bit lanes: AVX-512 F, BW, DQ, VL.
+#![allow(
+    clippy::undocumented_unsafe_blocks,
+    reason = "one contract for all: the instruction set is enabled in the caller, and pointers hold what the shapes say"
+)]
 
 use super::Lanes;
 use core::arch::x86_64::*;

@@ -1,4 +1,8 @@
 //! 128-bit lanes: Advanced SIMD of AArch64.
+#![allow(
+    clippy::undocumented_unsafe_blocks,
+    reason = "one contract for all: the instruction set is enabled in the caller, and pointers hold what the shapes say"
+)]
 
 use super::Lanes;
 use core::arch::aarch64::*;

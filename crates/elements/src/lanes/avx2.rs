@@ -1,4 +1,8 @@
 //! AVX2 and FMA: one register of 8 lanes.
+#![allow(
+    clippy::undocumented_unsafe_blocks,
+    reason = "one contract for all: the instruction set is enabled in the caller, and pointers hold what the shapes say"
+)]
 
 use super::{CUBE_ROOT_GUESS, Lanes};
 use std::arch::x86_64::*;

@@ -1,4 +1,8 @@
 //! AVX-512F: one register of 16 lanes; gathers are 128-bit loads and in-register transposes.
+#![allow(
+    clippy::undocumented_unsafe_blocks,
+    reason = "one contract for all: the instruction set is enabled in the caller, and pointers hold what the shapes say"
+)]
 
 use super::avx2::{add_row, row};
 use super::{CUBE_ROOT_GUESS, Lanes, WIDTH};

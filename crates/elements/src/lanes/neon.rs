@@ -1,4 +1,8 @@
 //! NEON: four registers of 4 lanes.
+#![allow(
+    clippy::undocumented_unsafe_blocks,
+    reason = "one contract for all: the instruction set is enabled in the caller, and pointers hold what the shapes say"
+)]
 
 use super::{CUBE_ROOT_GUESS, Lanes, WIDTH};
 use std::arch::aarch64::*;

@@ -1,4 +1,8 @@
 //! Plain arrays: the readable reference, and the fallback of any processor.
+#![allow(
+    clippy::undocumented_unsafe_blocks,
+    reason = "one contract for all: the instruction set is enabled in the caller, and pointers hold what the shapes say"
+)]
 
 use super::{CUBE_ROOT_GUESS, Lanes, WIDTH};
 

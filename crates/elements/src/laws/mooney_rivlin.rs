@@ -57,6 +57,7 @@ impl Isochoric for MooneyRivlin {
 
     #[inline(always)]
     unsafe fn lane_slopes<L: Lanes>(self, first: L, second: L, root: L) -> LaneSlopes<L> {
+        // SAFETY: the caller's.
         unsafe {
             let root2 = root.mul(root);
             let slope1 = root2.mul(L::splat((1.0 - self.c01_share) as f32));

@@ -28,6 +28,7 @@ impl Isochoric for NeoHookean {
 
     #[inline(always)]
     unsafe fn lane_slopes<L: Lanes>(self, first: L, second: L, root: L) -> LaneSlopes<L> {
+        // SAFETY: the caller's.
         unsafe {
             let root2 = root.mul(root);
             let root5 = root2.mul(root2).mul(root.mul(L::splat(1.0 / 3.0)));

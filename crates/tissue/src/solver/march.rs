@@ -187,6 +187,7 @@ impl March<'_> {
         positions: &mut [Node],
         step: u32,
     ) {
+        // SAFETY: the caller's: these chunks are this worker's, and phases are separated by the barrier.
         unsafe {
             if self.averaged {
                 for chunk in mine.clone() {
@@ -229,6 +230,7 @@ impl March<'_> {
 
     /// Puts the chunk's nodes where they are now, from its centre, and clears its forces.
     unsafe fn prepare(&self, shared: Shared, chunk: &Chunk, positions: &mut [Node]) {
+        // SAFETY: the caller's: the chunk's slots are this worker's in this phase.
         unsafe {
             let rest = &self.partition.rest[chunk.first..chunk.first + chunk.slot_count()];
             (self.kernels.place)(
@@ -250,6 +252,7 @@ impl March<'_> {
 
     /// Adds ghost forces to the chunk's own nodes, in ascending slot order.
     unsafe fn collect(&self, shared: Shared, chunk: &Chunk) {
+        // SAFETY: the caller's: the chunk's slots are this worker's in this phase.
         unsafe {
             for (own, ghost) in &chunk.contributions {
                 let source = *shared.force.add(*ghost as usize);
@@ -263,6 +266,7 @@ impl March<'_> {
 
     /// Nodal `J - 1` from the nodal volumes, for average-pressure elements.
     unsafe fn nodal_dilatation(&self, shared: Shared, chunk: &Chunk) {
+        // SAFETY: the caller's: the chunk's slots are this worker's in this phase.
         unsafe {
             self.collect(shared, chunk);
             for slot in chunk.first..chunk.first + chunk.owned {
@@ -274,6 +278,7 @@ impl March<'_> {
 
     /// Moves the chunk's own nodes by one inner step.
     unsafe fn node_phase(&self, shared: Shared, index: usize, step: u32) {
+        // SAFETY: the caller's: the chunk's slots are this worker's in this phase.
         unsafe {
             let chunk = &self.partition.chunks[index];
             self.collect(shared, chunk);
@@ -329,6 +334,7 @@ impl March<'_> {
     /// the force that the discrete equation of motion asks for, times the mean of both increments.
     unsafe fn follow(&self, shared: Shared, path: &Path, step: u32) -> f64 {
         let slot = path.slot as usize;
+        // SAFETY: the caller's: the chunk's slots are this worker's in this phase.
         let (force, before) = unsafe { (*shared.force.add(slot), *shared.increment.add(slot)) };
         let (start, end) = (path.at(step - 1, self.steps), path.at(step, self.steps));
         let mass = f64::from(self.mass[slot]);

@@ -30,13 +30,16 @@ pub(in crate::solver) struct Access {
 
 impl Access {
     unsafe fn vector(node: *const Node) -> Vector {
+        // SAFETY: the caller's.
         let [x, y, z, _] = unsafe { (*node).0 };
         Vector::new(x, y, z)
     }
 
     unsafe fn position(&self, touch: &Touch, node: u32) -> Vector {
         let slot = touch.scene.slot_of_node[node as usize] as usize;
-        touch.scene.rest[node as usize] + unsafe { Self::vector(self.displacement.add(slot)) }
+        // SAFETY: the caller's; every node has a slot.
+        let u = unsafe { Self::vector(self.displacement.add(slot)) };
+        touch.scene.rest[node as usize] + u
     }
 }
 
@@ -51,6 +54,7 @@ impl Touch {
             let scene = self.scene.clone();
             self.look(step, |node| {
                 let slot = scene.slot_of_node[node as usize] as usize;
+                // SAFETY: the caller's; every node has a slot.
                 let u = unsafe { Access::vector(access.displacement.add(slot)) };
                 scene.rest[node as usize] + u
             });
