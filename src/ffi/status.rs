@@ -71,7 +71,7 @@ pub const UPT_LOG_TRACE: i32 = 5;
 
 /// 32-bit floats: the reference. Of a scene's options: what its model has.
 pub const UPT_PRECISION_F32: i32 = 0;
-/// bfloat16 products where the CPU has them.
+/// bfloat16 products where the CPU is faster with them, 32-bit floats elsewhere; the statistics say which.
 pub const UPT_PRECISION_BF16: i32 = 1;
 /// 16-bit floats: the bundle's `*.f16.onnx`, or a GPU provider's own.
 pub const UPT_PRECISION_F16: i32 = 2;

@@ -128,9 +128,10 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
         } else {
             folder.join(boundary)
         };
+        let command = report_command(workspace, options, &library, &own, &out);
         match options.scheme {
-            Some(_) => report(workspace, options, &library, &trajectory, &own, &out)?,
-            None => report_tool(workspace, options, &library, &trajectory, &own, &out)?,
+            Some(_) => replay(options, command, &trajectory, &out)?,
+            None => drive(options, command, &trajectory, &out)?,
         }
     }
     Ok(true)
@@ -266,93 +267,53 @@ fn simulate(
     Ok(file)
 }
 
-fn report(
+/// `upt report` of the bundles: what each demo has in common.
+fn report_command(
     workspace: &Workspace,
     options: &Options,
     library: &Path,
-    trajectory: &Path,
     bundles: &[&Bundle],
     out: &Path,
-) -> Result<()> {
-    eprintln!(
-        "3/4 replaying the contact through {} bundle(s) and the plain methods",
-        bundles.len()
-    );
+) -> Command {
+    let (organ, words) = (options.organ.name(), options.words());
     let mut command = Command::new(workspace.upt());
-    command
-        .current_dir(&workspace.root)
-        .arg("report")
-        .arg("--trajectory")
-        .arg(trajectory)
-        .arg("--out")
-        .arg(out);
+    command.current_dir(&workspace.root).stdout(Stdio::null());
+    command.arg("report").arg("--out").arg(out);
+    command.args(["--title", &format!("A {organ} pushed by libupt: {words}")]);
     for bundle in bundles {
         command.arg("--bundle").arg(&bundle.path);
     }
-    command
-        .args([
-            "--region",
-            "all,surface",
-            "--plain",
-            options.organ.plain(),
-            "--tled-frames",
-            "20",
-        ])
-        .args([
-            "--title",
-            &format!(
-                "A {} pushed by libupt: {}",
-                options.organ.name(),
-                options.words()
-            ),
-        ]);
     ort::set_environment(&mut command, library);
-    run_visibly(command.stdout(Stdio::null()), "upt report")?;
+    command
+}
+
+/// The paper's own measure: the nodes and vectors of the contact, given to the library.
+fn replay(options: &Options, mut command: Command, trajectory: &Path, out: &Path) -> Result<()> {
+    eprintln!("3/4 replaying the contact through the bundles and the plain methods");
+    let plain = options.organ.plain();
+    command.arg("--trajectory").arg(trajectory);
+    command.args(["--region", "all,surface", "--tled-frames", "20"]);
+    run_visibly(command.args(["--plain", plain]), "upt report")?;
     print_table(&out.join("report.json"))?;
-    println!(
-        "4/4 pictures and curves: {}",
-        out.join("report.html").display()
-    );
+    let page = out.join("report.html");
+    println!("4/4 pictures and curves: {}", page.display());
     Ok(())
 }
 
 /// The library driven by the poses of the tool alone.
-fn report_tool(
-    workspace: &Workspace,
-    options: &Options,
-    library: &Path,
-    trajectory: &Path,
-    bundles: &[&Bundle],
-    out: &Path,
-) -> Result<()> {
-    eprintln!(
-        "3/4 driving {} bundle(s) by the tool's poses alone: {}",
-        bundles.len(),
-        match options.tool.as_str() {
-            "stroke" => "it presses, slides and lifts",
-            other => other,
-        }
-    );
-    let mut command = Command::new(workspace.upt());
-    command.current_dir(&workspace.root).arg("report");
-    command.arg("--tools").arg(trajectory).arg("--out").arg(out);
-    for bundle in bundles {
-        command.arg("--bundle").arg(&bundle.path);
-    }
-    command.args([
-        "--title",
-        &format!(
-            "A {} pushed by libupt: {}",
-            options.organ.name(),
-            options.words()
-        ),
-    ]);
-    ort::set_environment(&mut command, library);
-    run_visibly(command.stdout(Stdio::null()), "upt report --tools")?;
+fn drive(options: &Options, mut command: Command, trajectory: &Path, out: &Path) -> Result<()> {
+    let does = match options.tool.as_str() {
+        "stroke" => "it presses, slides and lifts",
+        other => other,
+    };
+    eprintln!("3/4 driving the bundles by the tool's poses alone: {does}");
+    command.arg("--tools").arg(trajectory);
+    run_visibly(&mut command, "upt report --tools")?;
     print_tool_table(&out.join("tools.json"))?;
+    let page = out.join("tools.html");
     println!(
         "4/4 the dent in cross-section, forces over time: {}",
-        out.join("tools.html").display()
+        page.display()
     );
     Ok(())
 }

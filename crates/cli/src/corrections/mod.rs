@@ -12,7 +12,7 @@ mod workbench;
 
 pub use constraint::Constraint;
 pub use patches::differences;
-pub use pushes::{Push, Pushes, Random};
+pub use pushes::{Push, Pushes};
 pub use workbench::Workbench;
 
 use std::path::{Path, PathBuf};

@@ -3,11 +3,12 @@
 
 use anyhow::Result;
 use elements::ElementForces;
+use tissue::schemes::SplitMix;
 use upt::kernels::{Isa, Pool};
 use upt::prior::ContactResponse;
 
 use super::constraint::Constraint;
-use super::pushes::{Push, Random};
+use super::pushes::Push;
 use super::workbench::Workbench;
 use crate::progress;
 
@@ -21,7 +22,7 @@ pub fn differences(
     seed: u64,
     quiet: bool,
 ) -> Result<Vec<Vec<f32>>> {
-    let mut random = Random(seed);
+    let mut random = SplitMix(seed);
     let forces = source.element_forces();
     let mut response = ContactResponse::new(&source.prior)?;
     let pool = Pool::new(1)?;

@@ -1,6 +1,7 @@
 //! Pushes of the envelope's areas and depths, at sites that are spread over the domain.
 
 use tissue::mesh::Mesh;
+use tissue::schemes::SplitMix;
 
 /// Depths of the pushes over the envelope's deepest.
 const DEPTH: [f64; 2] = [0.4, 0.93];
@@ -11,28 +12,6 @@ const CANDIDATES: usize = 12;
 pub struct Push {
     pub nodes: Vec<u32>,
     pub vectors: Vec<f32>,
-}
-
-/// SplitMix64, uniform in [0, 1).
-pub struct Random(pub u64);
-
-impl Random {
-    pub fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    fn within(&mut self, [low, high]: [f64; 2]) -> f64 {
-        low + (high - low) * self.unit()
-    }
-
-    /// One of `count` things.
-    pub fn below(&mut self, count: usize) -> usize {
-        ((self.unit() * count as f64) as usize).min(count.saturating_sub(1))
-    }
 }
 
 /// Where pushes may be and how large they are.
@@ -56,7 +35,7 @@ impl Pushes<'_> {
     }
 
     /// Sites far from each other and from those of `before`: each the farthest of a few random ones.
-    pub fn spread(&self, count: usize, before: &[u32], random: &mut Random) -> Vec<u32> {
+    pub fn spread(&self, count: usize, before: &[u32], random: &mut SplitMix) -> Vec<u32> {
         let mut sites = before.to_vec();
         for _ in 0..count {
             let best = (0..CANDIDATES)
@@ -72,7 +51,7 @@ impl Pushes<'_> {
     }
 
     /// A push at the site, of random area, depth and direction.
-    pub fn at(&self, site: u32, random: &mut Random) -> Push {
+    pub fn at(&self, site: u32, random: &mut SplitMix) -> Push {
         let mesh = self.mesh;
         let centre = mesh.positions[site as usize].map(f64::from);
         let radii = self

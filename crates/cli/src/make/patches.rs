@@ -3,28 +3,16 @@
 use anyhow::Result;
 use tissue::linear::{Compliance, contact_forces};
 use tissue::mesh::Mesh;
+use tissue::schemes::SplitMix;
 
 use super::options::Sizes;
 
 /// Forces of one contact, mN: dof of the contact nodes (`3 * row + axis`) and value.
 pub type Forces = Vec<(u32, f32)>;
 
-/// SplitMix64, uniform in [0, 1).
-pub struct Random(pub u64);
-
-impl Random {
-    pub fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    /// About normal: variance 1, bounded.
-    fn normal(&mut self) -> f64 {
-        (0..12).map(|_| self.unit()).sum::<f64>() - 6.0
-    }
+/// About normal: variance 1, bounded.
+fn normal(random: &mut SplitMix) -> f64 {
+    (0..12).map(|_| random.unit()).sum::<f64>() - 6.0
 }
 
 /// `count` random patches of the domain, each pushed by two thirds of the deepest push in a random direction; a hundredth of it
@@ -36,7 +24,7 @@ pub fn sample(
     count: usize,
     seed: u64,
 ) -> Result<Vec<Forces>> {
-    let mut random = Random(seed);
+    let mut random = SplitMix(seed);
     let points: Vec<[f64; 3]> = compliance
         .nodes
         .iter()
@@ -45,7 +33,7 @@ pub fn sample(
     let push = sizes.push_mm * 2.0 / 3.0;
     let mut samples = Vec::with_capacity(count);
     for _ in 0..count {
-        let centre = points[(random.unit() * points.len() as f64) as usize];
+        let centre = points[random.below(points.len())];
         let [low, high] = sizes.area_mm2;
         let radius = ((low + (high - low) * random.unit()) / std::f64::consts::PI).sqrt();
         let mut near: Vec<(f64, usize)> = points
@@ -62,7 +50,7 @@ pub fn sample(
         near.truncate(inside.max(3));
         let mut rows: Vec<usize> = near.into_iter().map(|(_, row)| row).collect();
         rows.sort_unstable();
-        let direction = [0; 3].map(|_| random.normal());
+        let direction = [0; 3].map(|_| normal(&mut random));
         let length = direction
             .iter()
             .map(|x| x * x)
@@ -71,7 +59,7 @@ pub fn sample(
             .max(1e-9);
         let vectors: Vec<[f64; 3]> = rows
             .iter()
-            .map(|_| direction.map(|x| push * x / length + 0.01 * push * random.normal()))
+            .map(|_| direction.map(|x| push * x / length + 0.01 * push * normal(&mut random)))
             .collect();
         let forces = contact_forces(compliance, &rows, &vectors)?.forces;
         samples.push(

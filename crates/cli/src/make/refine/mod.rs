@@ -11,13 +11,14 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 use serde::{Deserialize, Serialize};
 use tissue::mesh::Mesh;
+use tissue::schemes::SplitMix;
 use tissue::tensors::{Dtype, Tensor, f32_values, write_file, write_whole};
 
 use super::options::Options;
 use super::stages::{Stage, key_of};
 use super::{bundle, vibration};
 use crate::check;
-use crate::corrections::{Push, Pushes, Random, Workbench, principal};
+use crate::corrections::{Push, Pushes, Workbench, principal};
 
 /// Equilibria of a round.
 const EQUILIBRIA: usize = 24;
@@ -197,7 +198,7 @@ fn make(
 ) -> Result<Round> {
     let options = rounds.options;
     let pushes = bench.pushes();
-    let mut random = Random(options.seed ^ 0x7A11);
+    let mut random = SplitMix(options.seed ^ 0x7A11);
     let sites = pushes.spread(VALIDATED, &[], &mut random);
     let validation: Vec<Push> = sites
         .iter()
@@ -263,7 +264,7 @@ fn make(
 /// Pushes of a round: half at sites far from the validation's and from each other, half near the validation's sites in
 /// proportion to their errors.
 fn choose(pushes: &Pushes<'_>, validated: &[u32], errors: &[f64], seed: u64) -> Vec<Push> {
-    let mut random = Random(seed);
+    let mut random = SplitMix(seed);
     let mut sites = pushes.spread(EQUILIBRIA / 2, validated, &mut random);
     let total: f64 = errors.iter().sum();
     while sites.len() < EQUILIBRIA {
