@@ -170,7 +170,7 @@
 #define UPT_PRECISION_F32 0
 
 /**
- * bfloat16 products where the CPU has them.
+ * bfloat16 products where the CPU is faster with them, 32-bit floats elsewhere; the statistics say which.
  */
 #define UPT_PRECISION_BF16 1
 

@@ -104,7 +104,7 @@ class Precision(IntEnum):
     F32 = 0
     """32-bit floats: the reference. Of a scene's options: what its model has."""
     BF16 = 1
-    """bfloat16 products where the CPU has them."""
+    """bfloat16 products where the CPU is faster with them, 32-bit floats elsewhere; the statistics say which."""
     F16 = 2
     """16-bit floats: the bundle's `*.f16.onnx`, or a GPU provider's own."""
     INT8 = 3

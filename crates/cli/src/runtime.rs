@@ -87,7 +87,11 @@ fn of_the_user() -> Option<PathBuf> {
 /// After a command that found no ONNX Runtime: asks a person, fetches it and starts the command again; tells anyone else how.
 /// None where that is not what went wrong.
 pub fn offer(error: &anyhow::Error) -> Option<ExitCode> {
-    if !error.chain().any(|cause| cause.is::<NoRuntime>()) || is_named() {
+    let missing = |cause: &(dyn std::error::Error + 'static)| {
+        let told = cause.downcast_ref::<upt::Error>();
+        cause.is::<NoRuntime>() || matches!(told, Some(upt::Error::Runtime(_)))
+    };
+    if !error.chain().any(missing) || is_named() {
         return None;
     }
     eprintln!("error: {error:#}");

@@ -95,12 +95,35 @@ fn half_a_library_is_not_taken() {
     );
 }
 
+/// Without a terminal nobody is asked: the message says which command fetches it.
+#[test]
+fn without_a_library_the_command_that_fetches_it_is_named() {
+    let upt = Installed::new();
+    let log = upt.folder.path().join("soak.csv");
+    let log = log.to_str().unwrap();
+    let bundle = "tests/fixtures/tiny-upt";
+    let ran = upt.run(
+        &["soak", "--bundle", bundle, "--steps", "3", "--log", log],
+        "",
+    );
+    if ran.status.success() {
+        println!("not asked: this machine has an ONNX Runtime in the system's search path");
+        return;
+    }
+    let said = String::from_utf8_lossy(&ran.stderr);
+    assert_eq!(ran.status.code(), Some(2), "{said}");
+    assert!(said.contains("`upt runtime` fetches"), "{said}");
+}
+
 /// Who named a library is told of that library, and is not offered another.
 #[test]
 fn a_library_that_the_user_named_and_that_is_missing_is_told_by_its_name() {
     let upt = Installed::new();
+    let log = upt.folder.path().join("soak.csv");
+    let log = log.to_str().unwrap();
+    let bundle = "tests/fixtures/tiny-upt";
     let ran = upt.run(
-        &["stress", "tests/fixtures/tiny-upt"],
+        &["soak", "--bundle", bundle, "--log", log],
         "/nowhere/libonnxruntime.so",
     );
     let said = String::from_utf8_lossy(&ran.stderr);

@@ -411,7 +411,7 @@ namespace Upt.Interop
         public const int UPT_LOG_TRACE = 5;
         /// <summary>32-bit floats: the reference. Of a scene's options: what its model has.</summary>
         public const int UPT_PRECISION_F32 = 0;
-        /// <summary>bfloat16 products where the CPU has them.</summary>
+        /// <summary>bfloat16 products where the CPU is faster with them, 32-bit floats elsewhere; the statistics say which.</summary>
         public const int UPT_PRECISION_BF16 = 1;
         /// <summary>16-bit floats: the bundle's `*.f16.onnx`, or a GPU provider's own.</summary>
         public const int UPT_PRECISION_F16 = 2;
