@@ -157,6 +157,8 @@ impl ContactFactor {
         for (to, &from) in self.right.iter_mut().zip(displacement) {
             *to = f64::from(from);
         }
+        // Rows are short and their ends many: wider registers take 1.2 times as long, with the same bits.
+        let isa = isa.min(Isa::Avx2);
         solve_upper(isa, &self.upper, &mut self.right);
         for (to, &from) in forces.iter_mut().zip(&self.right) {
             *to = from as f32;
