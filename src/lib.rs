@@ -5,6 +5,8 @@
 //! of the instruments, and gives the next displacement, `u[t+dt] = M(u[t], c[t])`.
 //! Lengths are mm, forces mN, fields row-major `[K,3]` float32.
 
+#[cfg(feature = "ndarray")]
+mod arrays;
 #[cfg(feature = "haptics")]
 pub mod haptics;
 #[cfg(feature = "contact")]
