@@ -80,13 +80,14 @@ impl EnvelopeCheck {
         4 * lists + self.in_domain.len()
     }
 
-    /// Compares a step's contact, and the one of the step before, with the envelope.
+    /// Compares a step's contact, and the one of the step before, with the envelope; `step`: the length of a step in the bundle's.
     pub fn check(
         &mut self,
         mesh: &Mesh,
         envelope: &Envelope,
         now: &ContactSet,
         before: &ContactSet,
+        step: f32,
     ) -> EnvelopeReport {
         if now.nodes != self.nodes {
             self.nodes.clear();
@@ -102,7 +103,7 @@ impl EnvelopeCheck {
         if push > SLACK {
             report.flags |= flag::PUSH;
         }
-        let rate = largest_rate(now, before) / envelope.max_push_rate_mm;
+        let rate = largest_rate(now, before) / (step * envelope.max_push_rate_mm);
         if rate > SLACK {
             report.flags |= flag::RATE;
         }

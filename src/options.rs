@@ -179,7 +179,15 @@ pub struct SceneOptions {
     pub corrections: Corrections,
     /// Raise [`crate::flag::ERROR`] where the estimated error is above this, mm; 0 for never.
     pub error_limit_mm: f32,
+    /// Length of a step, s: [`SHORTEST_STEP_S`] to [`LONGEST_STEP_S`], or 0 for the bundle's. Steps of another length than the bundle's have no
+    /// learned part: corrections by the elements make them all, with contact and without.
+    pub step_s: f64,
 }
+
+/// Bounds of [`SceneOptions::step_s`], s.
+pub const SHORTEST_STEP_S: f64 = 0.01;
+/// See [`SHORTEST_STEP_S`].
+pub const LONGEST_STEP_S: f64 = 0.05;
 
 /// How many corrections a step gets while there is contact.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -217,6 +225,7 @@ impl Default for SceneOptions {
             interpolate_points: false,
             corrections: Corrections::Recommended,
             error_limit_mm: 0.0,
+            step_s: 0.0,
         }
     }
 }

@@ -3,6 +3,7 @@
 use std::time::Instant;
 
 use super::Corrections;
+use super::pace::Pace;
 use super::precondition::Env;
 use crate::kernels::{Isa, Pool};
 use crate::prior::PriorTable;
@@ -59,6 +60,8 @@ pub struct Lent<'a> {
     pub pool: &'a Pool,
     pub prior: &'a PriorTable,
     pub corrections: &'a Corrections,
+    /// The length of the scene's steps.
+    pub pace: &'a Pace,
 }
 
 impl<'a> Lent<'a> {
@@ -69,6 +72,7 @@ impl<'a> Lent<'a> {
             prior: self.prior,
             space: &self.corrections.space,
             body: &self.corrections.body,
+            pace: self.pace,
         }
     }
 }

@@ -11,53 +11,41 @@ mod body;
 mod input;
 #[cfg(feature = "contact")]
 mod loaded;
+mod free;
 mod memory;
 mod motion;
+mod pace;
 mod precondition;
 mod space;
 mod stage;
+
+use std::sync::Arc;
+
+use elements::Material;
 
 use crate::bundle::{BundleFiles, CorrectionsEntry, Manifest, Mesh};
 use crate::error::{Error, Result};
 use crate::kernels::Isa;
 use crate::prior::PriorTable;
+use pace::Diagonal;
 
 pub use body::Body;
 pub use input::{Enough, Input, Lent, Report};
 pub use memory::PAIRS;
 pub use motion::Motion;
+pub use pace::{Integrator, Pace};
 pub use space::CoarseSpace;
 pub use stage::{SMALLEST_DET, Stage};
 
 /// Most iterations a step.
 pub const LIMIT: u32 = 64;
 
-/// BDF2 over steps of one length.
-#[derive(Debug, Clone, Copy)]
-pub struct Integrator {
-    /// Step `h`, s.
-    pub step_s: f64,
-    /// Mass-proportional damping `alpha`, 1/s.
-    pub damping_per_s: f64,
-}
-
-impl Integrator {
-    /// The same over another time, s.
-    pub fn over(self, step_s: f64) -> Integrator {
-        Integrator { step_s, ..self }
-    }
-
-    /// `kappa = 9/(4h²) + 3 alpha/(2h)`, 1/s²: what a displacement costs in inertia and damping, over its mass.
-    pub fn kappa(&self) -> f64 {
-        2.25 / (self.step_s * self.step_s) + 1.5 * self.damping_per_s / self.step_s
-    }
-}
-
 /// The tables and elements of a bundle's corrections.
 pub struct Corrections {
     pub space: CoarseSpace,
     pub body: Body,
-    pub integrator: Integrator,
+    /// Steps as long as the bundle's.
+    pub pace: Arc<Pace>,
 }
 
 impl Corrections {
@@ -80,16 +68,26 @@ impl Corrections {
             step_s: manifest.dt_s,
             damping_per_s: material.damping_per_s,
         };
+        let diagonal = Diagonal::of(mesh, material)?;
         Ok(Corrections {
             space: CoarseSpace::parse(&files.tensors(&entry.file)?, prior)?,
-            body: Body::new(mesh, material, integrator.kappa(), Isa::detect()),
-            integrator,
+            body: Body::new(mesh, material, &diagonal, Isa::detect()),
+            pace: Arc::new(Pace::new(&diagonal, integrator)?),
         })
+    }
+
+    /// Steps of another length.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`].
+    pub fn pace(&self, mesh: &Mesh, material: &Material, step_s: f64) -> Result<Pace> {
+        let integrator = self.pace.integrator.over(step_s);
+        Pace::new(&Diagonal::of(mesh, material)?, integrator)
     }
 
     /// Bytes held.
     pub fn memory_bytes(&self) -> usize {
-        self.space.memory_bytes() + self.body.memory_bytes()
+        self.space.memory_bytes() + self.body.memory_bytes() + self.pace.memory_bytes()
     }
 }
 

@@ -13,6 +13,7 @@
 mod response;
 
 use super::body::Body;
+use super::pace::Pace;
 use super::space::CoarseSpace;
 use crate::error::{Error, Result};
 use crate::kernels::contact::ContactFactor;
@@ -37,6 +38,7 @@ pub struct Env<'a> {
     pub prior: &'a PriorTable,
     pub space: &'a CoarseSpace,
     pub body: &'a Body,
+    pub pace: &'a Pace,
 }
 
 pub(super) fn pooled<T>(result: std::result::Result<T, crate::kernels::PoolError>) -> Result<T> {
@@ -78,7 +80,8 @@ impl Preconditioner {
     ///
     /// # Errors
     /// [`Error::OutOfMemory`].
-    pub fn new(env: Env<'_>, kappa: f64) -> Result<Preconditioner> {
+    pub fn new(env: Env<'_>) -> Result<Preconditioner> {
+        let kappa = env.pace.integrator.kappa();
         let count = env.space.count();
         let dofs = 3 * env.prior.contact_nodes.len();
         let room = dofs.min(ROOM);
@@ -269,7 +272,7 @@ impl Preconditioner {
             &self.coordinates,
             z,
         ))?;
-        let blocks = env.body.inverse_blocks.iter();
+        let blocks = env.pace.inverse_blocks.iter();
         for ((z, r), [xx, xy, xz, yy, yz, zz]) in z
             .as_chunks_mut::<3>()
             .0

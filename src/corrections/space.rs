@@ -105,7 +105,6 @@ impl CoarseSpace {
     }
 
     /// Frequency (rad/s) and mass (g) of each natural mode.
-    #[cfg(feature = "haptics")]
     pub fn natural(&self) -> Vec<(f32, f32)> {
         let count = self.count();
         let frequencies = self.frequency.iter().enumerate();

@@ -2,10 +2,11 @@
 
 use std::time::Instant;
 
-use super::Integrator;
+use super::free::Free;
 use super::input::{Input, Lent, Report};
 use super::memory::Memory;
 use super::motion::Motion;
+use super::pace::Integrator;
 use super::precondition::{Preconditioner, mask, mask_held};
 use crate::error::{Error, Result};
 use crate::memory;
@@ -39,9 +40,9 @@ pub struct Stage {
     pub(super) u: Vec<f32>,
     /// `M p`: inertia of the step at the last displacement, µN.
     pub(super) drift: Vec<f32>,
-    /// What a load moves.
-    #[cfg(feature = "contact")]
+    /// What a load moves; in a free step what the natural modes' velocities lack.
     pub(super) scratch_field: Vec<f32>,
+    pub(super) free: Free,
 }
 
 pub(super) fn dot(a: &[f32], b: &[f32]) -> f64 {
@@ -70,7 +71,7 @@ impl Stage {
         let len = 3 * env.body.mass.len();
         let field = || memory::zeros(len, "the corrections of a scene");
         Ok(Stage {
-            preconditioner: Preconditioner::new(env, lent.corrections.integrator.kappa())?,
+            preconditioner: Preconditioner::new(env)?,
             memory: Memory::new(len)?,
             scratch: (env.body.forces.scratch(lent.pool.threads())).map_err(|_| {
                 Error::OutOfMemory("no memory for the element forces of a scene".into())
@@ -88,8 +89,8 @@ impl Stage {
             q: field()?,
             u: field()?,
             drift: field()?,
-            #[cfg(feature = "contact")]
             scratch_field: field()?,
+            free: Free::default(),
         })
     }
 
@@ -146,6 +147,7 @@ impl Stage {
         self.memory.memory_bytes()
             + self.preconditioner.memory_bytes()
             + self.scratch.bytes()
+            + self.free.memory_bytes()
             + fields
     }
 
@@ -162,7 +164,7 @@ impl Stage {
         let Integrator {
             step_s,
             damping_per_s,
-        } = lent.corrections.integrator;
+        } = lent.pace.integrator;
         let (half, alpha) = ((0.5 / step_s) as f32, damping_per_s as f32);
         let mass = &lent.corrections.body.mass;
         for i in 0..self.drift.len() {
@@ -180,7 +182,7 @@ impl Stage {
         let Integrator {
             step_s,
             damping_per_s,
-        } = lent.corrections.integrator;
+        } = lent.pace.integrator;
         let (half, alpha) = ((0.5 / step_s) as f32, damping_per_s as f32);
         let known = if input.still { 0.0 } else { 1.0 };
         let mass = &lent.corrections.body.mass;
@@ -226,7 +228,7 @@ impl Stage {
         if let Some(error) = failed.unwrap_or_else(std::sync::PoisonError::into_inner) {
             return Err(Error::Panic(error.to_string()));
         }
-        let kappa = lent.corrections.integrator.kappa() as f32;
+        let kappa = lent.pace.integrator.kappa() as f32;
         for i in 0..out.len() {
             out[i] += self.drift[i] + body.mass[i / 3] * kappa * (u[i] - last[i]);
         }
@@ -387,7 +389,20 @@ impl Stage {
         g: &mut [f32],
         report: &mut Report,
     ) -> Result<()> {
-        let mut det = self.guess(lent, input, u, g, report)?;
+        let det = self.guess(lent, input, u, g, report)?;
+        self.relax(lent, input, det, u, g, report)
+    }
+
+    /// The iterations from a guess whose smallest det F is `det`.
+    pub(super) fn relax(
+        &mut self,
+        lent: Lent<'_>,
+        input: &Input<'_>,
+        mut det: f32,
+        u: &mut [f32],
+        g: &mut [f32],
+        report: &mut Report,
+    ) -> Result<()> {
         let start = dot(g, g).sqrt();
         for iteration in 0..input.enough.iterations {
             let size = dot(g, g).sqrt();

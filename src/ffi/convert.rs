@@ -261,6 +261,7 @@ pub(super) unsafe fn scene_options(raw: &upt_scene_options) -> Result<SceneOptio
         interpolate_points: flag("interpolate_points", raw.interpolate_points)?,
         corrections: corrections(raw)?,
         error_limit_mm: raw.error_limit_mm,
+        step_s: raw.step_s,
     })
 }
 

@@ -153,6 +153,9 @@ pub struct upt_scene_options {
     pub corrections_target_mm: f32,
     /// `UPT_FLAG_ERROR` rises where the estimated error is above this, mm; 0: never.
     pub error_limit_mm: f32,
+    /// Length of a step, s: 0.01 to 0.05, or 0 for the bundle's. Another length than the bundle's needs corrections
+    /// (`UPT_ERR_UNSUPPORTED` without); the learned part is left out then.
+    pub step_s: f64,
 }
 
 /// A rigid instrument; the input of `upt_scene_step_instruments` and `upt_scene_contacts_from_instruments`.

@@ -92,8 +92,8 @@ pub fn join(
     let (out, slow) = triple_buffer(&slow);
     let (at, pose) = triple_buffer(&tool.pose);
     let ends = Arc::new(Ends::default());
-    let modes = Modes::new(&natural, corrections.integrator.damping_per_s)?;
-    let kappa = corrections.integrator.over(AT_ONCE_S).kappa();
+    let modes = Modes::new(&natural, corrections.pace.integrator.damping_per_s)?;
+    let kappa = corrections.pace.integrator.over(AT_ONCE_S).kappa();
     let nodes = corrections.body.mass.len();
     let count = natural.len();
     let link = Link {

@@ -16,4 +16,4 @@ mod vibration;
 pub use numbers::Numbers;
 pub use response::{ContactResponse, SolveReport};
 pub use table::PriorTable;
-pub use vibration::FreeVibration;
+pub use vibration::{FreeVibration, propagator};

@@ -110,7 +110,7 @@ impl FreeVibration {
 }
 
 /// The exact step of `z'' + damping z' + omega^2 z = 0`, velocities times `dt`.
-fn propagator(omega: f64, damping: f64, dt: f64) -> [f32; 4] {
+pub fn propagator(omega: f64, damping: f64, dt: f64) -> [f32; 4] {
     let half = 0.5 * damping;
     let squared = omega * omega - half * half;
     let root = squared.abs().sqrt();

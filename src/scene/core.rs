@@ -231,7 +231,8 @@ impl Core {
             self.publish_rest(published);
         } else {
             if !self.drive(published, near, start, &mut stats)? {
-                let learned = self.corrected.is_none() || self.incoming.is_empty();
+                let learned = self.learns()
+                    && (self.corrected.is_none() || self.incoming.is_empty());
                 self.predict_and_decode(published, given, learned, &mut stats)?;
                 self.correct(published, given, start, &mut stats)?;
             }
@@ -285,6 +286,7 @@ impl Core {
             &self.model.manifest.envelope,
             &self.incoming,
             &self.contact,
+            (self.step_s() / self.model.manifest.dt_s) as f32,
         );
         stats.flags |= envelope.flags;
         stats.indicator = envelope.ratio;
@@ -482,7 +484,7 @@ impl Core {
             + self
                 .corrected
                 .as_ref()
-                .map_or(0, |corrected| corrected.stage.memory_bytes())
+                .map_or(0, Corrected::memory_bytes)
             + own_mesh
     }
 }

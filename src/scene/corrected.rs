@@ -7,11 +7,11 @@ use super::core::{Core, lock_read};
 use super::engine::Engine;
 use super::published::Published;
 use super::timing::Stopwatch;
-use crate::corrections::{Enough, Input, LIMIT, Lent, Motion, Report, Stage};
+use crate::corrections::{Enough, Input, LIMIT, Lent, Motion, Pace, Report, Stage};
 use crate::error::{Error, Result};
 use crate::kernels::{Compute, Isa, Pool};
 use crate::model::Model;
-use crate::options::{Corrections, SceneOptions};
+use crate::options::{Corrections, LONGEST_STEP_S, SHORTEST_STEP_S, SceneOptions};
 use crate::stats::{SceneStats, flag};
 
 /// The stage of a scene that corrects, and how far it goes.
@@ -23,6 +23,10 @@ pub struct Corrected {
     error_limit_mm: f32,
     calibration: f32,
     basis_starts: Vec<usize>,
+    /// The length of the scene's steps.
+    pub pace: Arc<Pace>,
+    /// It is not the bundle's.
+    own_pace: bool,
 }
 
 impl Corrected {
@@ -34,13 +38,14 @@ impl Corrected {
         pool: &Pool,
     ) -> Result<Option<Corrected>> {
         let entry = model.manifest.corrections.as_ref();
+        let own_pace = own_step(model, options)?;
         let (most, target_mm, budget_us) = match options.corrections {
-            Corrections::None => return Ok(None),
+            Corrections::None => return none(own_pace),
             Corrections::Recommended => match entry {
                 Some(entry) if entry.recommended > 0 && !options.free_boundary => {
                     (entry.recommended, 0.0, 0)
                 }
-                _ => return Ok(None),
+                _ => return none(own_pace),
             },
             Corrections::Fixed(count @ 1..=LIMIT) => (count, 0.0, 0),
             Corrections::Fixed(count) => {
@@ -78,11 +83,18 @@ impl Corrected {
         let prior = model.prior.as_ref().ok_or_else(|| {
             Error::Unsupported("corrections: the bundle has no linear response".into())
         })?;
+        let pace = match own_pace {
+            None => Arc::clone(&corrections.pace),
+            Some(step_s) => {
+                Arc::new(corrections.pace(&model.mesh, &model.manifest.material, step_s)?)
+            }
+        };
         let lent = Lent {
             isa,
             pool,
             prior,
             corrections,
+            pace: &pace,
         };
         Ok(Some(Corrected {
             stage: Box::new(Stage::new(lent)?),
@@ -92,7 +104,35 @@ impl Corrected {
             error_limit_mm: options.error_limit_mm,
             calibration: entry.map_or(1.0, |entry| entry.calibration),
             basis_starts: prior.basis_starts(),
+            own_pace: own_pace.is_some(),
+            pace,
         }))
+    }
+}
+
+/// The length of step that a scene has for its own, s.
+fn own_step(model: &Model, options: &SceneOptions) -> Result<Option<f64>> {
+    let (step_s, own) = (options.step_s, model.manifest.dt_s);
+    if !step_s.is_finite() {
+        return Err(Error::NonFinite(format!("step_s is {step_s}")));
+    }
+    // A host's numbers may have been float32.
+    let [shortest, longest] = [SHORTEST_STEP_S - 1e-6, LONGEST_STEP_S + 1e-6];
+    if step_s != 0.0 && !(shortest..=longest).contains(&step_s) {
+        return Err(Error::Argument(format!(
+            "step_s is {step_s}, must be {SHORTEST_STEP_S} to {LONGEST_STEP_S}, or 0 for the bundle's {own}"
+        )));
+    }
+    Ok((step_s != 0.0 && (step_s - own).abs() > 1e-6).then_some(step_s))
+}
+
+/// A scene that does not correct.
+fn none(own_pace: Option<f64>) -> Result<Option<Corrected>> {
+    match own_pace {
+        None => Ok(None),
+        Some(step_s) => Err(Error::Unsupported(format!(
+            "step_s is {step_s}: only corrections by the elements can step at another length than the bundle's, and this scene has none; leave step_s at 0, set `corrections`, or run `upt corrections BUNDLE`"
+        ))),
     }
 }
 
@@ -105,6 +145,15 @@ impl Corrected {
             until: (self.budget_us > 0)
                 .then(|| start + std::time::Duration::from_micros(self.budget_us.into())),
         }
+    }
+
+    /// Bytes held; the bundle's pace is the model's.
+    pub(super) fn memory_bytes(&self) -> usize {
+        let own = match self.own_pace {
+            true => self.pace.memory_bytes(),
+            false => 0,
+        };
+        self.stage.memory_bytes() + own
     }
 
     /// Puts what the iterations report into the statistics.
@@ -146,6 +195,7 @@ impl Core {
             pool: &self.pool,
             prior,
             corrections,
+            pace: &corrected.pace,
         };
         let shared = lock_read(published);
         let input = Input {
@@ -161,12 +211,26 @@ impl Core {
                 .stage
                 .correct(lent, &input, &mut self.next.field)?;
             corrected.tell(&report, stats);
+        } else if corrected.own_pace {
+            let report = corrected.stage.swing(lent, &input, &mut self.next.field)?;
+            corrected.tell(&report, stats);
         } else {
             corrected.stage.follow(lent, &input, &self.next.field);
         }
         drop(shared);
         stats.corrections_ms = watch.lap();
         Ok(())
+    }
+
+    /// Whether a step without contact is the learned part's, or of the vibration that a bundle has instead.
+    pub(super) fn learns(&self) -> bool {
+        !self.corrected.as_ref().is_some_and(|own| own.own_pace)
+    }
+
+    /// The length of a step, s.
+    pub(super) fn step_s(&self) -> f64 {
+        let corrected = self.corrected.as_ref();
+        corrected.map_or(self.model.manifest.dt_s, |own| own.pace.integrator.step_s)
     }
 
     /// The reaction of the last published state; false where it was not corrected.
@@ -240,6 +304,7 @@ impl Core {
             pool: &self.pool,
             prior,
             corrections: self.model.corrections()?,
+            pace: &corrected.pace,
         };
         corrected.stage.restore(lent, &motion, &pairs)
     }

@@ -95,7 +95,7 @@ impl Core {
             *stats = before;
         }
         // Nothing pushes: the model's own free motion, unless that runs into a tool.
-        self.predict_and_decode(published, None, true, stats)?;
+        self.predict_and_decode(published, None, self.learns(), stats)?;
         self.correct(published, None, start, stats)?;
         let intrudes = {
             let shared = lock_read(published);
@@ -132,6 +132,7 @@ impl Core {
             pool: &self.pool,
             prior,
             corrections: self.model.corrections()?,
+            pace: &corrected.pace,
         };
         let shared = lock_read(published);
         let input = Input {

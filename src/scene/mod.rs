@@ -104,6 +104,7 @@ pub struct Scene {
     shared: Arc<Shared>,
     model: Arc<Model>,
     mesh: Arc<Mesh>,
+    step_s: f64,
     tools: tools::Tools,
     // Dropped last.
     _given_back: memory::GivenBack,
@@ -119,6 +120,7 @@ impl Scene {
         let _span = tracing::info_span!("scene").entered();
         let core = build(&model, options)?;
         let mesh = Arc::clone(&core.mesh);
+        let step_s = core.step_s();
         let count = mesh.node_count();
         let earlier = options.cubic_sampling.then(|| Frame::rest(count));
         let published = Published {
@@ -141,6 +143,7 @@ impl Scene {
             shared: Arc::new(Shared::new(core, published)),
             model,
             mesh,
+            step_s,
             tools: tools::Tools::default(),
             _given_back: memory::GivenBack,
         })
@@ -154,6 +157,11 @@ impl Scene {
     /// The scene's mesh: the bundle's, or its own.
     pub fn mesh(&self) -> &Arc<Mesh> {
         &self.mesh
+    }
+
+    /// The length of a step, s: the bundle's, or the scene's own.
+    pub fn step_s(&self) -> f64 {
+        self.step_s
     }
 
     /// Nodes of the scene's mesh, `K`.

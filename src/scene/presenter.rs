@@ -80,7 +80,7 @@ impl Presenter {
         }
         let natural = corrections
             .space
-            .held_back(corrections.integrator.kappa())
+            .held_back(corrections.pace.integrator.kappa())
             .len();
         Ok(Presenter {
             values,
@@ -162,7 +162,7 @@ impl Presenter {
             return Ok(());
         };
         // In contact the instruments keep the velocities up; free, the damping takes them.
-        let alpha = corrections.integrator.damping_per_s;
+        let alpha = corrections.pace.integrator.damping_per_s;
         let along = match self.problem.pushed() || alpha <= 0.0 {
             true => tau as f32,
             false => (-(-alpha * tau).exp_m1() / alpha) as f32,
@@ -179,7 +179,7 @@ impl Presenter {
         };
         let mut pushed = false;
         if tau > AT_ONCE_S && self.problem.is_near(state) {
-            let kappa = corrections.integrator.over(tau).kappa();
+            let kappa = corrections.pace.integrator.over(tau).kappa();
             self.held_back
                 .copy_from_slice(&corrections.space.held_back(kappa));
             let compliance = Compliance {
@@ -233,7 +233,7 @@ impl Presenter {
         tools: &[Tool],
         out: &mut [f32],
     ) -> Result<()> {
-        let step_s = scene.model.manifest.dt_s;
+        let step_s = scene.step_s();
         let tau = seconds.min(MOST_STEPS * step_s);
         let step = {
             let shared = lock_read(&scene.shared.published);
@@ -281,7 +281,7 @@ impl Presenter {
         tools: &[Tool],
         out: &mut [f32],
     ) -> Result<()> {
-        let step_s = scene.model.manifest.dt_s;
+        let step_s = scene.step_s();
         let known = self.step;
         let mut since_s = 0.0;
         if let Some(known) = known {

@@ -21,6 +21,8 @@ pub struct ModelSettings {
     pub exact: bool,
     /// Corrections a step; none: as many as the bundle recommends.
     pub corrections: Option<u32>,
+    /// Length of its scenes' steps, s; 0: the bundle's.
+    pub step_s: f64,
 }
 
 impl Default for ModelSettings {
@@ -31,6 +33,7 @@ impl Default for ModelSettings {
             precision: ffi::UPT_PRECISION_F32,
             exact: false,
             corrections: None,
+            step_s: 0.0,
         }
     }
 }
@@ -38,6 +41,7 @@ impl Default for ModelSettings {
 /// An open model; closed when dropped.
 pub struct Model {
     corrections: Option<u32>,
+    step_s: f64,
     handle: *mut ffi::upt_model,
     info: ffi::upt_model_info,
 }
@@ -119,6 +123,7 @@ impl Model {
             info.struct_size = size::<ffi::upt_model_info>();
             let mut model = Self {
                 corrections: settings.corrections,
+                step_s: settings.step_s,
                 handle,
                 info,
             };
@@ -182,6 +187,7 @@ impl Scene {
                 Some(0) => ffi::UPT_CORRECTIONS_NONE,
                 Some(count) => count as i32,
             };
+            options.step_s = model.step_s;
             let mut handle = std::ptr::null_mut();
             check(ffi::upt_scene_create(model.handle, &options, &mut handle))?;
             Ok(Self { handle })

@@ -161,6 +161,35 @@ impl Preconditioner {
         self.add_decoded(env, scratch, u)
     }
 
+    /// `N^T r` of a field `[K,3]` that is zero at held nodes: what it has of each natural mode.
+    pub fn on_natural(&mut self, env: Env<'_>, r: &[f32], out: &mut [f32]) -> Result<()> {
+        let (isa, pool) = (env.isa, env.pool);
+        let q = &mut self.coordinates;
+        pooled(project_field(
+            isa,
+            pool,
+            &env.prior.basis(),
+            &self.starts,
+            r,
+            q,
+        ))?;
+        let rows = &env.space.rows()[..out.len()];
+        pooled(row_dots(isa, pool, env.space.modes(), rows, q, out))
+    }
+
+    /// `out = N y [K,3]` of natural modes' amplitudes.
+    pub fn of_natural(&mut self, env: Env<'_>, y: &[f32], out: &mut [f32]) -> Result<()> {
+        let (isa, pool) = (env.isa, env.pool);
+        let q = &mut self.coordinates;
+        let rows = &env.space.rows()[..y.len()];
+        let modes = env.space.modes();
+        pooled(accumulate_rows(isa, pool, modes, rows, y, false, q))?;
+        let basis = env.prior.basis();
+        pooled(decode_rows(isa, pool, &basis, &self.plan, q, out))?;
+        mask_held(&env.body.held, out);
+        Ok(())
+    }
+
     /// Adds the field of `coordinates`.
     fn add_decoded(&mut self, env: Env<'_>, scratch: &mut [f32], u: &mut [f32]) -> Result<()> {
         let basis = env.prior.basis();

@@ -25,7 +25,7 @@ use crate::memory;
 use bytes::{Reader, Writer};
 
 const MAGIC: &[u8; 8] = b"UPTSNAP\0";
-const VERSION: u32 = 5;
+const VERSION: u32 = 6;
 const DIGEST: usize = 32;
 
 /// L-BFGS pairs.
@@ -79,6 +79,11 @@ impl Core {
         1024 + contacts + latents + fields + past
     }
 
+    /// The length of a step in whole microseconds.
+    fn step_us(&self) -> u32 {
+        (1e6 * self.step_s()).round() as u32
+    }
+
     /// The state as bytes.
     pub(super) fn save(&mut self, published: &RwLock<Published>) -> Result<Vec<u8>> {
         let most = self.most_bytes();
@@ -95,6 +100,7 @@ impl Core {
         w.u32(source_code(self.source));
         w.u32(source_code(self.source_before));
         w.u32(self.max_displacement.to_bits());
+        w.u32(self.step_us());
         for contact in [&self.contact, &self.contact_before] {
             w.indices(&contact.nodes);
             w.floats(&contact.vectors);
@@ -186,6 +192,12 @@ impl Core {
         let rest_frames = r.u32()?;
         let (source, source_before) = (r.source()?, r.source()?);
         let max_displacement = r.f32()?;
+        let (step_us, own_us) = (r.u32()?, self.step_us());
+        if step_us != own_us {
+            return Err(Error::Snapshot(format!(
+                "was saved by a scene with steps of {step_us} µs; restore it in one with that `step_s`, here {own_us} µs"
+            )));
+        }
         let contact = r.contact(count)?;
         let contact_before = r.contact(count)?;
         let mut latents = Vec::new();

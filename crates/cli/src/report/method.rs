@@ -158,6 +158,7 @@ impl Stepper {
                     precision: precision.code(),
                     exact: true,
                     corrections: Some(*corrections),
+                    ..host::ModelSettings::default()
                 };
                 Self::Surrogate(Box::new(SurrogateStepper::new(bundle, &settings, *region)?))
             }

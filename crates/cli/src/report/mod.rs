@@ -48,6 +48,7 @@ use setting::{Precision, Provider, Region};
   upt report --data data/brain-fixed --threads 1,2 --region all,surface --precision f32,bf16 --json
   upt report --tools data/brain-tools --bundle onnx/brain-reduced --corrections 0,3,5 --out target/tools
   upt report --shown 90 --tools data/brain-frames --split all --bundle onnx/brain-reduced --out target/shown
+  upt report --step-ms 10,20,25,50 --tools data/brain-frames --split all --bundle onnx/brain-reduced
 
 report.json and report.html are written to --out (with --tools: tools.json and tools.html); the table goes to the terminal.")]
 pub struct Options {
@@ -76,6 +77,11 @@ pub struct Options {
     /// With --shown: time from a step's moment to the arrival of its state, ms.
     #[arg(long, default_value_t = 10.0, requires = "shown")]
     arrival_ms: f64,
+    /// Lengths of step, ms, 10 to 50. With --shown: frames between such steps are measured besides. Without: the error of the steps by their
+    /// length, against the same frames shorter than a step; --markdown replaces the part between the markers
+    /// `upt report --step-ms BUNDLE`.
+    #[arg(long, value_name = "MS", value_delimiter = ',', requires = "tools")]
+    step_ms: Vec<f64>,
     /// Page whose part between the markers `upt report --tools MESH` is replaced by the tables of --tools, or by a narrow one
     /// where the markers end in `summary` (repeat for several).
     #[arg(long, value_name = "FILE", requires = "tools")]
@@ -149,8 +155,22 @@ pub fn run(options: &Options) -> Result<ExitCode> {
             per_programme: options.cases,
             bundles: &options.bundles,
             corrections: options.corrections.first().copied(),
+            step_ms: &options.step_ms,
             threads,
             out: options.out.clone(),
+            markdown: &options.markdown,
+            json: options.json,
+        });
+    }
+    if !options.step_ms.is_empty() {
+        return shown::steps::report(&shown::steps::Plan {
+            step_ms: &options.step_ms,
+            paths: &options.tools,
+            split: options.split,
+            per_programme: options.cases,
+            bundles: &options.bundles,
+            corrections: &options.corrections,
+            threads,
             markdown: &options.markdown,
             json: options.json,
         });

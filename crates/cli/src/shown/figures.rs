@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::host::{LATE, Shown, WAYS};
+use super::host::{LATE, PRESENT, Shown, WAYS};
 use crate::report::quantile;
 use crate::tools::cases::ToolCase;
 
@@ -12,6 +12,7 @@ pub const ALL: &str = "all";
 /// One case in one way.
 #[derive(Clone, Debug, Serialize)]
 pub struct WayFigures {
+    pub way: String,
     /// Over the frames without those of slip-offs.
     pub mse_mm2: f64,
     pub worst_frame_mm2: f64,
@@ -36,7 +37,7 @@ pub struct CaseFigures {
 /// A row of the table.
 #[derive(Clone, Debug, Serialize)]
 pub struct Row {
-    pub way: &'static str,
+    pub way: String,
     pub programme: String,
     pub cases: usize,
     /// Medians over the cases.
@@ -64,6 +65,7 @@ impl CaseFigures {
                 counted().map(|f| value(&f.drawn[way])).fold(0.0, f64::max)
             };
             WayFigures {
+                way: WAYS[way].into(),
                 mse_mm2: counted().map(|f| f.drawn[way].mse_mm2).sum::<f64>() / count,
                 worst_frame_mm2: largest(|d| d.mse_mm2),
                 penetration_mm: largest(|d| d.penetration_mm),
@@ -82,6 +84,13 @@ impl CaseFigures {
             ways: ways.collect(),
         }
     }
+
+    /// The presented frames of the same case by a scene with steps of another length.
+    pub fn add(&mut self, case: &ToolCase, shown: &Shown, step_s: f64) {
+        let mut own = Self::of(case, shown).ways.swap_remove(PRESENT);
+        own.way = format!("{}, steps of {:.0} ms", WAYS[PRESENT], 1e3 * step_s);
+        self.ways.push(own);
+    }
 }
 
 fn median(values: impl Iterator<Item = f64>) -> f64 {
@@ -97,7 +106,7 @@ fn row(way: usize, programme: &str, cases: &[&CaseFigures]) -> Row {
     let over =
         |other: &dyn Fn(&&CaseFigures) -> f64| median(cases.iter().map(|c| own(c) / other(c)));
     Row {
-        way: WAYS[way],
+        way: cases[0].ways[way].way.clone(),
         programme: programme.into(),
         cases: cases.len(),
         mse_mm2: median(each(|w| w.mse_mm2)),
@@ -126,7 +135,10 @@ pub fn rows(figures: &[CaseFigures]) -> Vec<Row> {
         }
     }
     let all: Vec<&CaseFigures> = figures.iter().collect();
-    let ways = 0..WAYS.len();
+    let Some(first) = figures.first() else {
+        return Vec::new();
+    };
+    let ways = 0..first.ways.len();
     let mut rows: Vec<Row> = ways.clone().map(|way| row(way, ALL, &all)).collect();
     for programme in programmes {
         let own: Vec<&CaseFigures> = all

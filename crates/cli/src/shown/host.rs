@@ -26,6 +26,8 @@ const LATENCIES_MS: [i32; 3] = [-20, 120, 5];
 pub struct Clock {
     pub frame_s: f64,
     pub arrival_s: f64,
+    /// Length of a step.
+    pub step_s: f64,
 }
 
 impl Clock {
@@ -44,12 +46,18 @@ impl Clock {
         Ok(Self {
             frame_s: 1.0 / hz,
             arrival_s: 1e-3 * arrival_ms,
+            step_s: FRAME_S,
         })
+    }
+
+    /// The same with steps of another length.
+    pub fn stepping(self, step_s: f64) -> Self {
+        Self { step_s, ..self }
     }
 
     /// The step whose state has arrived last at a moment; 0 is rest.
     pub fn arrived(&self, seconds: f64) -> usize {
-        ((seconds - self.arrival_s + 1e-9) / FRAME_S)
+        ((seconds - self.arrival_s + 1e-9) / self.step_s)
             .max(0.0)
             .floor() as usize
     }
@@ -124,21 +132,22 @@ pub fn show(
         let mut jumps = [0.0; 3];
         while step < clock.arrived(seconds) {
             // The same moment is drawn before and after the state arrives.
-            let arrival = (step + 1) as f64 * FRAME_S + clock.arrival_s;
+            let arrival = (step + 1) as f64 * clock.step_s + clock.arrival_s;
             if step > 0 {
-                draw(case, truth, driver, (arrival, step), &state, &mut drawn)?;
+                draw((case, truth, clock), driver, (arrival, step), &state, &mut drawn)?;
             }
             step += 1;
             before.copy_from_slice(&state);
-            let at = step as f64 * FRAME_S;
+            let at = step as f64 * clock.step_s;
             driver.step(&truth.poses(case, at), &mut state)?;
             if !truth.slips(at) {
-                let mse = metrics::mse_mm2(case.trajectory.frame(step * truth.parts), &state);
+                truth.field(case, at, &mut true_field);
+                let mse = metrics::mse_mm2(&true_field, &state);
                 shown.step_mse_mm2.push(mse);
             }
             if step > 1 {
                 let mut after = [field(), field(), field()];
-                draw(case, truth, driver, (arrival, step), &state, &mut after)?;
+                draw((case, truth, clock), driver, (arrival, step), &state, &mut after)?;
                 for (way, jumped) in jumps.iter_mut().enumerate() {
                     *jumped = jump(&drawn[way], &after[way]);
                 }
@@ -147,7 +156,7 @@ pub fn show(
         if step == 0 {
             continue;
         }
-        draw(case, truth, driver, (seconds, step), &state, &mut drawn)?;
+        draw((case, truth, clock), driver, (seconds, step), &state, &mut drawn)?;
         truth.field(case, seconds, &mut true_field);
         let poses = places(&truth.poses(case, seconds));
         let slips = truth.slips(seconds) || truth.slips(seconds - FRAME_S);
@@ -191,15 +200,14 @@ pub fn show(
 
 /// One moment in all ways, from the state of `step`.
 fn draw(
-    case: &ToolCase,
-    truth: &Truth,
+    (case, truth, clock): (&ToolCase, &Truth, &Clock),
     driver: &mut Driver,
     (seconds, step): (f64, usize),
     state: &[[f32; 3]],
     drawn: &mut [Vec<[f32; 3]>; 3],
 ) -> Result<()> {
-    let since = (seconds - step as f64 * FRAME_S).max(0.0);
-    driver.sample(since / FRAME_S, &mut drawn[LATE])?;
+    let since = (seconds - step as f64 * clock.step_s).max(0.0);
+    driver.sample(since / clock.step_s, &mut drawn[LATE])?;
     drawn[LAST].copy_from_slice(state);
     let poses = truth.poses(case, seconds);
     driver.present(since, &poses, &mut drawn[PRESENT])?;

@@ -8,11 +8,13 @@
 //! | [`host`] | one case through the virtual host |
 //! | [`figures`] | rows over cases |
 //! | [`timing`] | the time of a present call |
+//! | [`steps`] | the error of steps by their length, without frames between (`upt report --step-ms`) |
 //! | [`page`] | tables and pictures |
 
 mod figures;
 mod host;
 mod page;
+pub mod steps;
 mod timing;
 mod truth;
 
@@ -47,6 +49,8 @@ pub struct Plan<'a> {
     pub bundles: &'a [PathBuf],
     /// Corrections a step; none: as many as a bundle recommends.
     pub corrections: Option<u32>,
+    /// Lengths of step whose frames are measured besides the bundle's, ms.
+    pub step_ms: &'a [f64],
     pub threads: u32,
     pub out: PathBuf,
     pub markdown: &'a [PathBuf],
@@ -94,6 +98,23 @@ pub fn report(plan: &Plan) -> Result<ExitCode> {
             bar.inc(1);
         }
         bar.finish_and_clear();
+        for step_s in plan.step_ms.iter().map(|ms| 1e-3 * ms) {
+            let settings = ModelSettings {
+                step_s,
+                ..settings.clone()
+            };
+            let model = Model::open(&bundle.path, &settings)?;
+            let mut driver = Driver::new(&model, Drive::Solved)?;
+            let clock = clock.stepping(step_s);
+            let bar = progress(cases.list.len(), &bundle.name);
+            for ((case, truth), figures) in cases.list.iter().zip(&truths).zip(&mut figures) {
+                let shown = host::show(case, truth, &clock, &mut driver, &mut yard)
+                    .with_context(|| case.name.clone())?;
+                figures.add(case, &shown, step_s);
+                bar.inc(1);
+            }
+            bar.finish_and_clear();
+        }
         let times = timing::measure(&mut driver, &mesh, &cases, &truths, &clock)?;
         let rows = figures::rows(&figures);
         let k = plan.corrections.or(bundle.corrections).unwrap_or(0);
