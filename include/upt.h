@@ -639,6 +639,11 @@ typedef struct upt_scene_options {
    * `UPT_FLAG_ERROR` rises where the estimated error is above this, mm; 0: never.
    */
   float error_limit_mm;
+  /**
+   * Length of a step, s: 0.01 to 0.05, or 0 for the bundle's. Another length than the bundle's needs corrections
+   * (`UPT_ERR_UNSUPPORTED` without); the learned part is left out then.
+   */
+  double step_s;
 } upt_scene_options;
 
 /**
@@ -1427,50 +1432,6 @@ upt_status upt_scene_submit_instruments(struct upt_scene *scene,
                                         uint64_t instrument_count);
 
 /**
- * The tissue at a moment between steps, with the instruments where they are at that moment: frames without lag.
- *
- * The velocities of the last published state continue, and contact is solved at the poses given here with the compliance
- * of that time. Use any frame rate, even an uneven one, and call it while a submitted step is in flight too. When a step
- * arrives, the frame goes on from where it would have been without it, and over to it within 20 ms, or at 40 mm/s where that
- * takes longer.
- *
- * - `seconds`: time since the last published step, 0 or more; velocities are followed for two steps at most.
- * - `instruments`: as `upt_scene_step_instruments`.
- * - `out`: `[n,3]`, mm, in the region's order.
- * - `out_count`: number of floats in `out`, 3 n.
- *
- * Threads: one thread at a time presents; another may step or submit meanwhile.
- * Errors: `UPT_ERR_BUSY` while another thread presents, and if a step is in flight at the first call;
- * `UPT_ERR_UNSUPPORTED` in a build without feature "contact", for a bundle without a linear response or corrections, and
- * for a scene without corrections; `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`,
- * `UPT_ERR_NON_FINITE`, `UPT_ERR_STATE`, `UPT_ERR_RUNTIME`, `UPT_ERR_IO`, `UPT_ERR_BUNDLE`, `UPT_ERR_OUT_OF_MEMORY`,
- * `UPT_ERR_PANIC`.
- */
-upt_status upt_scene_present(struct upt_scene *scene,
-                             double seconds,
-                             const struct upt_instrument *instruments,
-                             uint64_t instrument_count,
-                             float *out,
-                             uint64_t out_count);
-
-/**
- * As `upt_scene_present`, at the attached points.
- *
- * - `seconds`, `instruments`: as `upt_scene_present`.
- * - `out`: `[n,3]`, mm.
- * - `out_count`: number of floats in `out`, 3 n.
- *
- * Threads: one thread at a time presents, the region or points; another may step or submit meanwhile.
- * Errors: those of `upt_scene_present`; `UPT_ERR_STATE` when no points are attached.
- */
-upt_status upt_scene_present_points(struct upt_scene *scene,
-                                    double seconds,
-                                    const struct upt_instrument *instruments,
-                                    uint64_t instrument_count,
-                                    float *out,
-                                    uint64_t out_count);
-
-/**
  * Copies the force, torque and penetration of each instrument at the end of the last step.
  *
  * - `out`: `[count]`, in the order of the step's instruments; set `struct_size` of every element.
@@ -1521,6 +1482,92 @@ upt_status upt_hull_create(const float *points,
  * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also if it was destroyed before).
  */
 upt_status upt_hull_destroy(struct upt_hull *hull);
+
+/**
+ * The tissue at a moment between steps, with the instruments where they are at that moment: frames without lag.
+ *
+ * The velocities of the last published state continue as far as the instruments do, and contact is solved at the poses given here with
+ * the compliance of that time. Use any frame rate, even an uneven one, and call it while a submitted step is in flight too. When a step
+ * arrives, the frame goes on from where it would have been without it, and over to it within two fifths of a step, or at 40 mm/s where
+ * that takes longer.
+ *
+ * - `seconds`: time since the last published step, 0 or more; velocities are followed for two steps at most.
+ * - `instruments`: as `upt_scene_step_instruments`.
+ * - `out`: `[n,3]`, mm, in the region's order.
+ * - `out_count`: number of floats in `out`, 3 n.
+ *
+ * Threads: one thread at a time presents; another may step or submit meanwhile.
+ * Errors: `UPT_ERR_BUSY` while another thread presents, and if a step is in flight at the first call;
+ * `UPT_ERR_UNSUPPORTED` in a build without feature "contact", for a bundle without a linear response or corrections, and
+ * for a scene without corrections; `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`,
+ * `UPT_ERR_NON_FINITE`, `UPT_ERR_STATE`, `UPT_ERR_RUNTIME`, `UPT_ERR_IO`, `UPT_ERR_BUNDLE`, `UPT_ERR_OUT_OF_MEMORY`,
+ * `UPT_ERR_PANIC`.
+ */
+upt_status upt_scene_present(struct upt_scene *scene,
+                             double seconds,
+                             const struct upt_instrument *instruments,
+                             uint64_t instrument_count,
+                             float *out,
+                             uint64_t out_count);
+
+/**
+ * As `upt_scene_present`, at the attached points.
+ *
+ * - `seconds`, `instruments`: as `upt_scene_present`.
+ * - `out`: `[n,3]`, mm.
+ * - `out_count`: number of floats in `out`, 3 n.
+ *
+ * Threads: one thread at a time presents, the region or points; another may step or submit meanwhile.
+ * Errors: those of `upt_scene_present`; `UPT_ERR_STATE` when no points are attached.
+ */
+upt_status upt_scene_present_points(struct upt_scene *scene,
+                                    double seconds,
+                                    const struct upt_instrument *instruments,
+                                    uint64_t instrument_count,
+                                    float *out,
+                                    uint64_t out_count);
+
+/**
+ * As `upt_scene_present`, with a collision field in place of instruments, for scenes that `upt_scene_step_contacts` drives.
+ *
+ * Nodes go where the list says, by the compliance of that time. Nodes of the last step that are no longer listed are released: they
+ * lose the force that held them.
+ *
+ * - `seconds`: as `upt_scene_present`.
+ * - `contact_nodes`: `[m]` node indices, each at most once, in any order.
+ * - `contact_vectors`: `[m,3]`, mm: the displacement of these nodes at that moment.
+ * - `contact_count`: m; 0 means no contact and both may be NULL.
+ * - `out`: `[n,3]`, mm, in the region's order.
+ * - `out_count`: number of floats in `out`, 3 n.
+ *
+ * Threads: as `upt_scene_present`.
+ * Errors: those of `upt_scene_present`; also `UPT_ERR_ARGUMENT` for an index or a count beyond K.
+ */
+upt_status upt_scene_present_contacts(struct upt_scene *scene,
+                                      double seconds,
+                                      const uint32_t *contact_nodes,
+                                      const float *contact_vectors,
+                                      uint64_t contact_count,
+                                      float *out,
+                                      uint64_t out_count);
+
+/**
+ * As `upt_scene_present_contacts`, at the attached points.
+ *
+ * - `seconds`, `contact_nodes`, `contact_vectors`, `contact_count`: as `upt_scene_present_contacts`.
+ * - `out`: `[n,3]`, mm.
+ * - `out_count`: number of floats in `out`, 3 n.
+ *
+ * Threads: as `upt_scene_present_points`.
+ * Errors: those of `upt_scene_present_contacts`; `UPT_ERR_STATE` when no points are attached.
+ */
+upt_status upt_scene_present_points_contacts(struct upt_scene *scene,
+                                             double seconds,
+                                             const uint32_t *contact_nodes,
+                                             const float *contact_vectors,
+                                             uint64_t contact_count,
+                                             float *out,
+                                             uint64_t out_count);
 
 /**
  * Lets a hand feel a tool: from now on, each step of the scene prepares what `upt_haptics_render` needs.

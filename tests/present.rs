@@ -211,6 +211,94 @@ fn points_at_nodes_go_with_them() {
     scene.wait(std::time::Duration::from_secs(600)).unwrap();
 }
 
+/// A tool that comes in at 8 mm/s and stops half way to the next step.
+#[test]
+fn tissue_stops_with_its_tool() {
+    let scene = scene(&model("tiny-corrected"), &corrected());
+    let mut u = Vec::new();
+    for t in 1..6 {
+        // The frames tell where the tool was in the steps.
+        u = step(&scene, &pressing(&scene, f64::from(t)));
+        present(&scene, 0.0, &pressing(&scene, f64::from(t)));
+    }
+    let on = present(&scene, 0.025, &pressing(&scene, 5.5));
+    let runs = farthest(&on, &u);
+    assert!(runs > 0.1, "{runs}");
+    // It has stopped where the step left it: the tissue has, too.
+    let stopped = present(&scene, 0.025, &pressing(&scene, 5.0));
+    let left = farthest(&stopped, &u);
+    assert!(left < 0.3 * runs, "{left} of {runs}");
+}
+
+fn present_contacts(scene: &Scene, seconds: f64, nodes: &[u32], vectors: &[f32]) -> Vec<f32> {
+    let mut u = vec![f32::NAN; 3 * scene.region_count()];
+    scene
+        .present_contacts(seconds, nodes, vectors, &mut u)
+        .unwrap();
+    u
+}
+
+#[test]
+fn a_collision_field_is_presented_as_instruments_are() {
+    let scene = scene(&model("tiny-corrected"), &corrected());
+    let mesh = scene.mesh();
+    let free = |node: &&u32| !mesh.held_nodes.contains(node);
+    let nodes: Vec<u32> = mesh
+        .domain_nodes
+        .iter()
+        .filter(free)
+        .take(4)
+        .copied()
+        .collect();
+    let at = |t: f64| [0.0, 0.0, -0.3 * t as f32].repeat(4);
+    let step = |t: f64| {
+        let vectors = at(t);
+        let contact = Contact::Sparse {
+            nodes: &nodes,
+            vectors: &vectors,
+        };
+        let input = StepInput {
+            displacement: None,
+            contact,
+        };
+        let mut u = vec![0.0; 3 * scene.node_count()];
+        scene.step(input, Some(&mut u)).unwrap();
+        u
+    };
+    let (mut of_frames, mut of_last) = (0.0, 0.0);
+    let mut last = Vec::new();
+    for t in 1..8 {
+        let now = f64::from(t);
+        last = step(now);
+        let own = present_contacts(&scene, 0.0, &nodes, &at(now));
+        assert_eq!(bits(&own), bits(&last), "its own time");
+        // Nodes are where they are asked to be, at any time.
+        let half = present_contacts(&scene, 0.5 * DT, &nodes, &at(now + 0.5));
+        for &node in &nodes {
+            let place = half[3 * node as usize + 2];
+            assert!(
+                (place + 0.3 * (now as f32 + 0.5)).abs() < 1e-3,
+                "{place} at {now}"
+            );
+        }
+        if t > 3 {
+            let whole = present_contacts(&scene, DT, &nodes, &at(now + 1.0));
+            let next = step(now + 1.0);
+            of_frames += farthest(&whole, &next);
+            of_last += farthest(&last, &next);
+            last = next;
+            break;
+        }
+    }
+    assert!(of_frames < 0.3 * of_last, "{of_frames} of {of_last}");
+    // Let go: the tissue moves back.
+    let node = nodes[0] as usize;
+    let free = present_contacts(&scene, 0.03, &[], &[]);
+    assert!(free[3 * node + 2] > last[3 * node + 2] + 0.05);
+    let wrong = scene.present_contacts(0.01, &[1 << 30], &[0.0; 3], &mut vec![0.0; free.len()]);
+    assert!(matches!(wrong, Err(Error::Argument(_))));
+}
+
 #[test]
 fn what_cannot_be_is_refused() {
     let model = model("tiny-corrected");

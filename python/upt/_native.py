@@ -420,6 +420,9 @@ class SceneOptions(Record):
     """`UPT_CORRECTIONS_AUTO`: enough where the estimated error is below this, mm; 0: no target."""
     error_limit_mm: float
     """`UPT_FLAG_ERROR` rises where the estimated error is above this, mm; 0: never."""
+    step_s: float
+    """Length of a step, s: 0.01 to 0.05, or 0 for the bundle's. Another length than the bundle's needs corrections
+    (`UPT_ERR_UNSUPPORTED` without); the learned part is left out then."""
 
     _fields_ = [
         ("struct_size", ctypes.c_uint32),
@@ -440,6 +443,7 @@ class SceneOptions(Record):
         ("_corrections_budget_us", ctypes.c_uint32),
         ("corrections_target_mm", ctypes.c_float),
         ("error_limit_mm", ctypes.c_float),
+        ("step_s", ctypes.c_double),
     ]
 
 
@@ -479,6 +483,9 @@ class SceneOptionsKeywords(TypedDict, total=False):
     """`UPT_CORRECTIONS_AUTO`: enough where the estimated error is below this, mm; 0: no target."""
     error_limit_mm: float
     """`UPT_FLAG_ERROR` rises where the estimated error is above this, mm; 0: never."""
+    step_s: float
+    """Length of a step, s: 0.01 to 0.05, or 0 for the bundle's. Another length than the bundle's needs corrections
+    (`UPT_ERR_UNSUPPORTED` without); the learned part is left out then."""
 
 
 class Instrument(Record):
@@ -847,12 +854,14 @@ FUNCTIONS: dict[str, tuple[Any, list[Any]]] = {
     "upt_scene_sample_points": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p, ctypes.c_uint64]),
     "upt_scene_step_instruments": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p, ctypes.c_uint64]),
     "upt_scene_submit_instruments": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
-    "upt_scene_present": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p, ctypes.c_uint64]),
-    "upt_scene_present_points": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p, ctypes.c_uint64]),
     "upt_scene_instrument_readings": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
     "upt_scene_instrument_contacts": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p]),
     "upt_hull_create": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p]),
     "upt_hull_destroy": (ctypes.c_int32, [ctypes.c_void_p]),
+    "upt_scene_present": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p, ctypes.c_uint64]),
+    "upt_scene_present_points": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p, ctypes.c_uint64]),
+    "upt_scene_present_contacts": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p, ctypes.c_uint64]),
+    "upt_scene_present_points_contacts": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p, ctypes.c_uint64]),
     "upt_haptics_create": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p]),
     "upt_haptics_render": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p]),
     "upt_haptics_destroy": (ctypes.c_int32, [ctypes.c_void_p]),

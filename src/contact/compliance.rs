@@ -51,15 +51,14 @@ pub struct Delassus {
     /// `W [3n,3n]`, mm/mN, and the samples that it is of.
     w: Vec<f32>,
     of: Vec<u32>,
+    /// Places in `a` and weights of all samples' columns, and where each sample's end.
+    entries: Vec<(usize, f32)>,
+    ends: Vec<usize>,
+    /// `W` less what inertia holds back in [`Delassus::between`].
+    varied: Vec<f32>,
 }
 
 impl Delassus {
-    /// Forgets the columns: the next call reads them anew.
-    pub fn forget(&mut self) {
-        self.columns.clear();
-        self.of.clear();
-    }
-
     /// `W` of samples, `[3n,3n]`, row-major; read again only where they are others than those of the last call.
     ///
     /// # Errors
@@ -68,27 +67,99 @@ impl Delassus {
         &mut self,
         compliance: Compliance<'_>,
         all: &[Sample],
-        rows: impl Iterator<Item = u32> + Clone,
+        rows: &[u32],
     ) -> Result<&[f32]> {
-        let samples = rows.clone().map(|row| all[row as usize]);
+        self.read(compliance, all, rows)?;
+        Ok(&self.w)
+    }
+
+    /// As [`Delassus::of`] where the inertia changes from call to call: the static part and the modes at the samples are kept.
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
+    pub fn between(
+        &mut self,
+        compliance: Compliance<'_>,
+        all: &[Sample],
+        rows: &[u32],
+    ) -> Result<&[f32]> {
+        let Some((space, held_back)) = compliance.inertia else {
+            return self.of(compliance, all, rows);
+        };
+        let alone = Compliance {
+            inertia: None,
+            ..compliance
+        };
+        let order = 3 * rows.len();
+        if self.read(alone, all, rows)? || self.modes.len() != held_back.len() * order {
+            memory::reserve(&mut self.varied, order * order, WHAT)?;
+            self.modes.clear();
+            memory::reserve(&mut self.modes, held_back.len() * order, WHAT)?;
+            self.modes.resize(held_back.len() * order, 0.0);
+            for (at, &row) in rows.iter().enumerate() {
+                for (column, weight) in compliance.entries(all[row as usize]) {
+                    for axis in 0..3 {
+                        let own = space.at_contact(3 * column as usize + axis);
+                        let to = self.modes.chunks_exact_mut(order.max(1));
+                        for (to, own) in to.zip(own) {
+                            to[3 * at + axis] += weight * own;
+                        }
+                    }
+                }
+            }
+        }
+        self.varied.clear();
+        self.varied.extend_from_slice(&self.w);
+        // A row of blocks at a time stays in the cache; the upper triangle is enough to compute.
+        for at in 0..order {
+            let row = &mut self.varied[at * order + at..(at + 1) * order];
+            for (mode, lost) in self.modes.chunks_exact(order).zip(held_back) {
+                let factor = lost * mode[at];
+                for (w, value) in row.iter_mut().zip(&mode[at..]) {
+                    *w -= factor * value;
+                }
+            }
+        }
+        for at in 0..order {
+            for other in 0..at {
+                self.varied[at * order + other] = self.varied[other * order + at];
+            }
+        }
+        Ok(&self.varied)
+    }
+
+    /// Makes `w` that of the samples; tells whether it was another's.
+    fn read(&mut self, compliance: Compliance<'_>, all: &[Sample], rows: &[u32]) -> Result<bool> {
+        let samples = rows.iter().map(|row| all[*row as usize]);
         let read = self.gather(compliance, samples.clone())?;
-        if !read && self.of.iter().copied().eq(rows.clone()) {
-            return Ok(&self.w);
+        if !read && self.of == rows {
+            return Ok(false);
         }
         self.of.clear();
-        let (order, count) = (3 * self.columns.len(), samples.clone().count());
+        let (order, count) = (3 * self.columns.len(), rows.len());
+        // Where the columns of each sample lie in `a`.
+        self.ends.clear();
+        self.entries.clear();
+        memory::reserve(&mut self.ends, count, WHAT)?;
+        for sample in samples {
+            let columns = &self.columns;
+            let place = |column: u32| 3 * columns.partition_point(|c| *c < column);
+            let own = compliance.entries(sample);
+            self.entries
+                .extend(own.map(|(column, weight)| (place(column), weight)));
+            self.ends.push(self.entries.len());
+        }
         self.w.clear();
         memory::reserve(&mut self.w, 9 * count * count, WHAT)?;
-        self.of.extend(rows);
+        self.of.extend_from_slice(rows);
         self.w.resize(9 * count * count, 0.0);
-        let place = |column: u32| 3 * self.columns.partition_point(|c| *c < column);
-        for (i, row) in samples.clone().enumerate() {
-            for (j, other) in samples.clone().enumerate().skip(i) {
+        let (ends, entries) = (&self.ends, &self.entries);
+        let of = |at: usize| &entries[if at == 0 { 0 } else { ends[at - 1] }..ends[at]];
+        for i in 0..count {
+            for j in i..count {
                 let mut block = [0.0f32; 9];
-                for (a, x) in compliance.entries(row) {
-                    let from = place(a);
-                    for (b, y) in compliance.entries(other) {
-                        let to = place(b);
+                for &(from, x) in of(i) {
+                    for &(to, y) in of(j) {
                         for axis in 0..3 {
                             let line = &self.a[(from + axis) * order + to..][..3];
                             for (sum, value) in block[3 * axis..].iter_mut().zip(line) {
@@ -104,7 +175,7 @@ impl Delassus {
                 }
             }
         }
-        Ok(&self.w)
+        Ok(true)
     }
 
     /// Reads the columns that samples need, unless they are there; tells whether it has.
@@ -201,7 +272,8 @@ impl Delassus {
             + self.modes.capacity()
             + self.a.capacity()
             + self.w.capacity()
+            + self.varied.capacity()
             + self.of.capacity())
-            + 8 * self.upper.capacity()
+            + 8 * (self.upper.capacity() + self.ends.capacity() + 2 * self.entries.capacity())
     }
 }

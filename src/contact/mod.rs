@@ -24,6 +24,7 @@ pub(crate) use compliance::Delassus;
 pub use past::Past;
 pub use problem::Problem;
 pub use rows::State;
+pub(crate) use rows::vector;
 #[cfg(feature = "haptics")]
-pub(crate) use rows::{Pair, outward, vector};
+pub(crate) use rows::{Pair, outward};
 pub use tool::{MAX_TOOLS, Mode, Push, Reading, Told, Tool};

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use ::contact::grasp::REACH_MM;
-use ::contact::{Contact, Limits, Pose, Samples, Search, Sweeps, Vector};
+use ::contact::{Contact, Limits, Pose, Sample, Samples, Search, Sweeps, Vector};
 
 use super::compliance::{Compliance, Delassus};
 use super::past::{Force, Held, Past};
@@ -107,11 +107,6 @@ impl Problem {
         self.before.clear();
         self.allowed.clear();
         self.next.clear();
-    }
-
-    /// Another body's compliance: nothing that was read of the last one holds.
-    pub fn forget_columns(&mut self) {
-        self.delassus.forget();
     }
 
     /// Wall time of the step's solves, ms.
@@ -230,6 +225,23 @@ impl Problem {
         self.next.forces.clear();
     }
 
+    /// As [`Problem::solve`] at the tools' ends, with what does not depend on how long ago the step was kept from call to call.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`].
+    pub fn solve_between(
+        &mut self,
+        compliance: Compliance<'_>,
+        state: State<'_>,
+    ) -> Result<Change<'_>> {
+        self.solve_by(compliance, state, 1.0, Delassus::between)
+    }
+
+    /// The sample of a force.
+    pub fn sample(&self, row: u32) -> Sample {
+        self.samples.rows()[row as usize]
+    }
+
     /// Solves for the forces at `state`, which is the tissue under the forces so far, with the tools at part `part` in `(0, 1]` of
     /// their way. Gives what has changed.
     ///
@@ -241,6 +253,16 @@ impl Problem {
         state: State<'_>,
         part: f32,
     ) -> Result<Change<'_>> {
+        self.solve_by(compliance, state, part, Delassus::of)
+    }
+
+    fn solve_by(
+        &mut self,
+        compliance: Compliance<'_>,
+        state: State<'_>,
+        part: f32,
+        read: impl for<'d> Fn(&'d mut Delassus, Compliance<'_>, &[Sample], &[u32]) -> Result<&'d [f32]>,
+    ) -> Result<Change<'_>> {
         let start = Instant::now();
         self.kept.clear();
         self.kept.extend_from_slice(&self.next.forces);
@@ -248,9 +270,14 @@ impl Problem {
         self.forces.clear();
         self.forces.extend(self.rows.iter().map(|row| row.force));
         let samples = &self.samples;
-        let rows = &self.rows;
-        let of = rows.iter().map(|row| row.sample);
-        let w = self.delassus.of(compliance, samples.rows(), of)?;
+        self.columns.clear();
+        self.columns.extend(self.rows.iter().map(|row| row.sample));
+        let w = read(
+            &mut self.delassus,
+            compliance,
+            samples.rows(),
+            &self.columns,
+        )?;
         for pass in 0..LINEARISATIONS {
             self.contacts.clear();
             for (at, row) in self.rows.iter_mut().enumerate() {
@@ -275,8 +302,10 @@ impl Problem {
         self.columns.clear();
         for (row, force) in self.rows.iter().zip(&self.forces) {
             let sample = self.samples.rows()[row.sample as usize];
-            self.columns
-                .extend(compliance.entries(sample).map(|entry| entry.0));
+            if *force != row.force {
+                self.columns
+                    .extend(compliance.entries(sample).map(|entry| entry.0));
+            }
             if *force != Vector::ZERO {
                 self.next.forces.push(Force {
                     tool: row.tool,
@@ -292,6 +321,9 @@ impl Problem {
         for (row, force) in self.rows.iter().zip(&self.forces) {
             let sample = self.samples.rows()[row.sample as usize];
             let change = *force - row.force;
+            if *force == row.force {
+                continue;
+            }
             for (column, weight) in compliance.entries(sample) {
                 let at = 3 * self.columns.partition_point(|c| *c < column);
                 for (sum, value) in self.change[at..at + 3].iter_mut().zip(change.to_array()) {

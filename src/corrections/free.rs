@@ -109,12 +109,7 @@ impl Oscillator {
 
 impl Stage {
     /// Makes the free step from `input.last`.
-    pub fn swing(
-        &mut self,
-        lent: Lent<'_>,
-        input: &Input<'_>,
-        next: &mut [f32],
-    ) -> Result<Report> {
+    pub fn swing(&mut self, lent: Lent<'_>, input: &Input<'_>, next: &mut [f32]) -> Result<Report> {
         let mut report = Report::default();
         self.memory.begin();
         let rests = |field: &[f32]| field.iter().all(|value| *value == 0.0);
@@ -264,8 +259,8 @@ mod tests {
                 drift: a + alpha * half,
                 inner: omega * omega * u[0] - push,
             };
-            let next = (mode.forced(h, kappa) + push + kappa * u[0] - mode.drift)
-                / (mode.square + kappa);
+            let next =
+                (mode.forced(h, kappa) + push + kappa * u[0] - mode.drift) / (mode.square + kappa);
             let bdf = (3.0 * (next - u[0]) - (u[0] - u[1])) / (2.0 * h);
             let velocity = bdf + mode.faster(h);
             (u, v) = ([next, u[0]], [velocity, v[0]]);
@@ -280,6 +275,9 @@ mod tests {
             assert!((u[0] - exact.0).abs() < 1e-4, "{} is not {}", u[0], exact.0);
             assert!((v[0] - exact.1).abs() < 4e-3, "{} is not {}", v[0], exact.1);
         }
-        assert!((exact.0 - rest).abs() > 0.05 || exact.1.abs() > 1.0, "still swinging");
+        assert!(
+            (exact.0 - rest).abs() > 0.05 || exact.1.abs() > 1.0,
+            "still swinging"
+        );
     }
 }

@@ -8,10 +8,10 @@
 //! Displacements mm, forces µN, masses g, times s.
 
 mod body;
+mod free;
 mod input;
 #[cfg(feature = "contact")]
 mod loaded;
-mod free;
 mod memory;
 mod motion;
 mod pace;

@@ -106,90 +106,6 @@ pub unsafe extern "C" fn upt_scene_submit_instruments(
     })
 }
 
-/// The tissue at a moment between steps, with the instruments where they are at that moment: frames without lag.
-///
-/// The velocities of the last published state continue, and contact is solved at the poses given here with the compliance
-/// of that time. Use any frame rate, even an uneven one, and call it while a submitted step is in flight too. When a step
-/// arrives, the frame goes on from where it would have been without it, and over to it within 20 ms, or at 40 mm/s where that
-/// takes longer.
-///
-/// - `seconds`: time since the last published step, 0 or more; velocities are followed for two steps at most.
-/// - `instruments`: as `upt_scene_step_instruments`.
-/// - `out`: `[n,3]`, mm, in the region's order.
-/// - `out_count`: number of floats in `out`, 3 n.
-///
-/// Threads: one thread at a time presents; another may step or submit meanwhile.
-/// Errors: `UPT_ERR_BUSY` while another thread presents, and if a step is in flight at the first call;
-/// `UPT_ERR_UNSUPPORTED` in a build without feature "contact", for a bundle without a linear response or corrections, and
-/// for a scene without corrections; `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`,
-/// `UPT_ERR_NON_FINITE`, `UPT_ERR_STATE`, `UPT_ERR_RUNTIME`, `UPT_ERR_IO`, `UPT_ERR_BUNDLE`, `UPT_ERR_OUT_OF_MEMORY`,
-/// `UPT_ERR_PANIC`.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn upt_scene_present(
-    scene: *mut upt_scene,
-    seconds: f64,
-    instruments: *const upt_instrument,
-    instrument_count: u64,
-    out: *mut f32,
-    out_count: u64,
-) -> upt_status {
-    call_scene("upt_scene_present", scene, |_scene| {
-        #[cfg(feature = "contact")]
-        {
-            let mut tools = _scene.frame_tools()?;
-            // SAFETY: the host passes that many instruments, as the header asks.
-            unsafe { read_tools(instruments, instrument_count, &mut tools) }?;
-            // SAFETY: the host passes that many elements, as the header asks.
-            _scene.check_out(unsafe { slice(out.cast_const(), out_count, "out") }?.len())?;
-            // SAFETY: the host passes room for that many elements, as the header asks.
-            let out = unsafe { slice_mut(out, out_count, "out") }?;
-            _scene.present(seconds, &tools, out)?;
-            Ok(UPT_OK)
-        }
-        #[cfg(not(feature = "contact"))]
-        {
-            let _ = (seconds, instruments, instrument_count, out, out_count);
-            fail(UPT_ERR_UNSUPPORTED, WITHOUT)
-        }
-    })
-}
-
-/// As `upt_scene_present`, at the attached points.
-///
-/// - `seconds`, `instruments`: as `upt_scene_present`.
-/// - `out`: `[n,3]`, mm.
-/// - `out_count`: number of floats in `out`, 3 n.
-///
-/// Threads: one thread at a time presents, the region or points; another may step or submit meanwhile.
-/// Errors: those of `upt_scene_present`; `UPT_ERR_STATE` when no points are attached.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn upt_scene_present_points(
-    scene: *mut upt_scene,
-    seconds: f64,
-    instruments: *const upt_instrument,
-    instrument_count: u64,
-    out: *mut f32,
-    out_count: u64,
-) -> upt_status {
-    call_scene("upt_scene_present_points", scene, |_scene| {
-        #[cfg(feature = "contact")]
-        {
-            let mut tools = _scene.frame_tools()?;
-            // SAFETY: the caller's arrays hold what their counts say.
-            unsafe { read_tools(instruments, instrument_count, &mut tools) }?;
-            // SAFETY: the caller's array holds what its count says.
-            let out = unsafe { slice_mut(out, out_count, "out") }?;
-            _scene.present_points(seconds, &tools, out)?;
-            Ok(UPT_OK)
-        }
-        #[cfg(not(feature = "contact"))]
-        {
-            let _ = (seconds, instruments, instrument_count, out, out_count);
-            fail(UPT_ERR_UNSUPPORTED, WITHOUT)
-        }
-    })
-}
-
 /// Copies the force, torque and penetration of each instrument at the end of the last step.
 ///
 /// - `out`: `[count]`, in the order of the step's instruments; set `struct_size` of every element.
@@ -358,7 +274,7 @@ pub unsafe extern "C" fn upt_hull_destroy(hull: *mut upt_hull) -> upt_status {
 
 /// The host's instruments as tools.
 #[cfg(feature = "contact")]
-unsafe fn read_tools(
+pub(super) unsafe fn read_tools(
     instruments: *const upt_instrument,
     count: u64,
     tools: &mut Vec<Tool>,

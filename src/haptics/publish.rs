@@ -48,6 +48,8 @@ pub struct Link {
     held_back: Vec<f32>,
     /// Nearest samples: distance, row.
     found: Vec<(f32, u32)>,
+    /// Their rows alone.
+    sampled: Vec<u32>,
     starts: Vec<usize>,
     coordinates: Vec<f32>,
     field: Vec<f32>,
@@ -109,6 +111,7 @@ pub fn join(
         delassus: Delassus::default(),
         held_back: corrections.space.held_back(kappa),
         found: memory::room(4 * MOST_SAMPLES, WHAT)?,
+        sampled: memory::room(MOST_SAMPLES, WHAT)?,
         starts: prior.basis_starts(),
         coordinates: memory::zeros(prior.width(), WHAT)?,
         field: memory::zeros(3 * nodes, WHAT)?,
@@ -170,8 +173,9 @@ impl Link {
         };
         let rows = self.samples.rows();
         let of = self.found.iter().map(|(_, row)| rows[*row as usize]);
-        let sampled = self.found.iter().map(|(_, row)| *row);
-        let w = self.delassus.of(compliance, rows, sampled)?;
+        self.sampled.clear();
+        self.sampled.extend(self.found.iter().map(|(_, row)| *row));
+        let w = self.delassus.of(compliance, rows, &self.sampled)?;
         let slow = self.out.input_buffer_mut();
         slow.delassus[..w.len()].copy_from_slice(w);
         let modes = self.rows.len();

@@ -231,8 +231,8 @@ impl Core {
             self.publish_rest(published);
         } else {
             if !self.drive(published, near, start, &mut stats)? {
-                let learned = self.learns()
-                    && (self.corrected.is_none() || self.incoming.is_empty());
+                let learned =
+                    self.learns() && (self.corrected.is_none() || self.incoming.is_empty());
                 self.predict_and_decode(published, given, learned, &mut stats)?;
                 self.correct(published, given, start, &mut stats)?;
             }

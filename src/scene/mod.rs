@@ -206,6 +206,14 @@ impl Scene {
         lock_read(&self.shared.published).check_len(Values::Region, len)
     }
 
+    /// Whether an output for the attached points has `len` floats.
+    ///
+    /// # Errors
+    /// [`Error::Argument`], [`Error::State`] where none are attached.
+    pub fn check_points_out(&self, len: usize) -> Result<()> {
+        lock_read(&self.shared.published).check_len(Values::Points, len)
+    }
+
     /// One step of `dt`; `out` is `[n,3]` (n: `K`, or the region's count).
     ///
     /// # Errors

@@ -2,11 +2,11 @@
 
 use std::sync::{Mutex, RwLock};
 
-use super::Scene;
 use super::core::{Core, lock_read, lock_write};
 use super::presenter::Presenter;
 use super::published::{Published, Values};
 use super::tools::lock;
+use super::{Contact, Scene};
 use crate::contact::{Past, Tool};
 use crate::error::{Error, Result};
 use crate::kernels::FlushToZero;
@@ -21,6 +21,9 @@ pub struct Moment {
     pub velocity: Vec<f32>,
     /// Where the tools were, and their forces.
     pub past: Past,
+    /// Nodes in contact, ascending, and the forces on them, mN `[m,3]`; none where tools push.
+    pub nodes: Vec<u32>,
+    pub forces: Vec<f32>,
     /// Steps made, by which a new one is known.
     pub step: u64,
 }
@@ -32,7 +35,7 @@ impl Scene {
     /// [`Error::NonFinite`] and [`Error::Argument`] for a time or an instrument, [`Error::Unsupported`] for a bundle without linear response or
     /// corrections or a scene that does not correct, [`Error::Busy`] while another thread presents, and at the first call while a step is in flight.
     pub fn present(&self, seconds: f64, tools: &[Tool], out: &mut [f32]) -> Result<()> {
-        self.frame(Values::Region, seconds, tools, out)
+        self.frame(Values::Region, seconds, Contact::Tools(tools), out)
     }
 
     /// As [`Scene::present`], at the attached points.
@@ -40,10 +43,46 @@ impl Scene {
     /// # Errors
     /// Those of [`Scene::present`], and [`Error::State`] where no points are attached.
     pub fn present_points(&self, seconds: f64, tools: &[Tool], out: &mut [f32]) -> Result<()> {
-        self.frame(Values::Points, seconds, tools, out)
+        self.frame(Values::Points, seconds, Contact::Tools(tools), out)
     }
 
-    fn frame(&self, values: Values, seconds: f64, tools: &[Tool], out: &mut [f32]) -> Result<()> {
+    /// As [`Scene::present`], with a collision field in place of instruments: the nodes where they are then, of scenes that such fields drive.
+    ///
+    /// # Errors
+    /// Those of [`Scene::present`], and [`Error::Argument`] for nodes that are not of the mesh or there twice.
+    pub fn present_contacts(
+        &self,
+        seconds: f64,
+        nodes: &[u32],
+        vectors: &[f32],
+        out: &mut [f32],
+    ) -> Result<()> {
+        let contact = Contact::Sparse { nodes, vectors };
+        self.frame(Values::Region, seconds, contact, out)
+    }
+
+    /// As [`Scene::present_contacts`], at the attached points.
+    ///
+    /// # Errors
+    /// Those of [`Scene::present_contacts`], and [`Error::State`] where no points are attached.
+    pub fn present_points_contacts(
+        &self,
+        seconds: f64,
+        nodes: &[u32],
+        vectors: &[f32],
+        out: &mut [f32],
+    ) -> Result<()> {
+        let contact = Contact::Sparse { nodes, vectors };
+        self.frame(Values::Points, seconds, contact, out)
+    }
+
+    fn frame(
+        &self,
+        values: Values,
+        seconds: f64,
+        contact: Contact<'_>,
+        out: &mut [f32],
+    ) -> Result<()> {
         if !seconds.is_finite() {
             return Err(Error::NonFinite(format!("seconds is {seconds}")));
         }
@@ -66,7 +105,7 @@ impl Scene {
             *place = Some(made);
         }
         match place.as_mut() {
-            Some(presenter) => presenter.frame(self, seconds, tools, out),
+            Some(presenter) => presenter.frame(self, seconds, contact, out),
             None => Ok(()),
         }
     }
@@ -94,6 +133,8 @@ impl Core {
             shared.moment = Some(Moment {
                 velocity: memory::zeros(len, WHAT)?,
                 past: Past::with_room(1024)?,
+                nodes: memory::room(1024, WHAT)?,
+                forces: memory::room(3 * 1024, WHAT)?,
                 step: 0,
             });
         }
@@ -112,6 +153,15 @@ impl Core {
         match &self.problem {
             Some(problem) => moment.past.take(&problem.past),
             None => moment.past.clear(),
+        }
+        moment.nodes.clear();
+        moment.forces.clear();
+        let reaction = &corrected.stage.motion.reaction;
+        if moment.past.forces.is_empty() && reaction.len() == 3 * self.contact.len() {
+            moment.nodes.extend_from_slice(&self.contact.nodes);
+            moment
+                .forces
+                .extend(reaction.iter().map(|force| 1e-3 * force));
         }
         moment.step += 1;
     }

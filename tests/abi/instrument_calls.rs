@@ -64,6 +64,36 @@ impl World<'_> {
                     let status = upt_scene_submit_instruments(scene, tools, count);
                     ("upt_scene_submit_instruments", status)
                 }
+                Function::PresentContacts | Function::PresentPointsContacts => {
+                    let contacts = call.seed as usize % 5;
+                    let mut listed: Vec<u32> = (0..contacts)
+                        .map(|i| ((call.seed as usize / 5 + 3 * i) % nodes) as u32)
+                        .collect();
+                    if let (Odd::Wrong, Some(first)) = (call.odd, listed.first_mut()) {
+                        *first = nodes as u32;
+                    }
+                    let mut imposed: Vec<f32> = (0..3 * contacts)
+                        .map(|i| 0.5 * ((call.seed as usize + i) % 5) as f32)
+                        .collect();
+                    spoil(&mut imposed, call.odd, call.seed as usize);
+                    let count = absurd(contacts, nodes, call);
+                    let seconds = f64::from((call.seed % 120) as u32) * 1e-3;
+                    if call.function == Function::PresentPointsContacts {
+                        let points = self.points.get(&scene.addr()).copied().unwrap_or(1);
+                        let status = Self::output(call, 1, 3 * points, true, |out, floats| {
+                            let (at, to) = (pointer(&listed, call, 0), pointer(&imposed, call, 0));
+                            upt_scene_present_points_contacts(
+                                scene, seconds, at, to, count, out, floats,
+                            )
+                        });
+                        return ("upt_scene_present_points_contacts", status);
+                    }
+                    let status = Self::output(call, 1, 3 * nodes, true, |out, floats| {
+                        let (at, to) = (pointer(&listed, call, 0), pointer(&imposed, call, 0));
+                        upt_scene_present_contacts(scene, seconds, at, to, count, out, floats)
+                    });
+                    ("upt_scene_present_contacts", status)
+                }
                 Function::Present | Function::PresentPoints => {
                     let tools = self.instruments(call, 4);
                     let count = absurd(tools.len(), 64, call);

@@ -12,7 +12,7 @@ const BEGIN: &str = "<!-- cargo xtask header: begin -->\n";
 const END: &str = "<!-- cargo xtask header: end -->";
 
 /// Headings of the calls, by the file of `src/ffi/` that holds them.
-const CHAPTERS: [(&str, &str); 10] = [
+const CHAPTERS: [(&str, &str); 11] = [
     ("library.rs", "Library"),
     ("model.rs", "Models"),
     ("scene.rs", "Scenes and steps"),
@@ -20,6 +20,7 @@ const CHAPTERS: [(&str, &str); 10] = [
     ("region.rs", "Parts of the mesh"),
     ("points.rs", "Attached points"),
     ("driven.rs", "Steps driven by instruments"),
+    ("present.rs", "Frames between steps"),
     ("haptics.rs", "Forces for a hand"),
     ("instrument.rs", "Contact found by geometry, and forces"),
     ("state.rs", "Statistics and snapshots"),

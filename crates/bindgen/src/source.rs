@@ -9,7 +9,7 @@ use syn::{Attribute, Expr, FnArg, Item, Lit, Pat, ReturnType, Type};
 pub const FOLDER: &str = "src/ffi";
 
 /// The files with exported items, in the order of the header.
-pub const FILES: [&str; 12] = [
+pub const FILES: [&str; 13] = [
     "status.rs",
     "structs.rs",
     "library.rs",
@@ -19,6 +19,7 @@ pub const FILES: [&str; 12] = [
     "region.rs",
     "points.rs",
     "driven.rs",
+    "present.rs",
     "haptics.rs",
     "instrument.rs",
     "state.rs",

@@ -134,7 +134,13 @@ pub fn show(
             // The same moment is drawn before and after the state arrives.
             let arrival = (step + 1) as f64 * clock.step_s + clock.arrival_s;
             if step > 0 {
-                draw((case, truth, clock), driver, (arrival, step), &state, &mut drawn)?;
+                draw(
+                    (case, truth, clock),
+                    driver,
+                    (arrival, step),
+                    &state,
+                    &mut drawn,
+                )?;
             }
             step += 1;
             before.copy_from_slice(&state);
@@ -147,7 +153,13 @@ pub fn show(
             }
             if step > 1 {
                 let mut after = [field(), field(), field()];
-                draw((case, truth, clock), driver, (arrival, step), &state, &mut after)?;
+                draw(
+                    (case, truth, clock),
+                    driver,
+                    (arrival, step),
+                    &state,
+                    &mut after,
+                )?;
                 for (way, jumped) in jumps.iter_mut().enumerate() {
                     *jumped = jump(&drawn[way], &after[way]);
                 }
@@ -156,7 +168,13 @@ pub fn show(
         if step == 0 {
             continue;
         }
-        draw((case, truth, clock), driver, (seconds, step), &state, &mut drawn)?;
+        draw(
+            (case, truth, clock),
+            driver,
+            (seconds, step),
+            &state,
+            &mut drawn,
+        )?;
         truth.field(case, seconds, &mut true_field);
         let poses = places(&truth.poses(case, seconds));
         let slips = truth.slips(seconds) || truth.slips(seconds - FRAME_S);

@@ -138,7 +138,11 @@ pub fn report(plan: &Plan) -> Result<ExitCode> {
             table(&rows)
         );
         for path in plan.markdown {
-            replace_between(path, &format!("upt report --step-ms {}", bundle.name), &text)?;
+            replace_between(
+                path,
+                &format!("upt report --step-ms {}", bundle.name),
+                &text,
+            )?;
         }
         if !plan.json {
             println!("{text}");
@@ -241,14 +245,19 @@ fn row(bundle: &str, corrections: u32, step_ms: f64, sums: &[Sums]) -> Row {
         free_mse_mm2: mse(1),
         worst_case_mm2: sums.iter().map(Sums::all).fold(0.0, f64::max),
         force_error: (force(0) / force(1).max(f64::MIN_POSITIVE)).sqrt(),
-        penetration_mm: sums.iter().map(|own| own.penetration_mm).fold(0.0, f64::max),
+        penetration_mm: sums
+            .iter()
+            .map(|own| own.penetration_mm)
+            .fold(0.0, f64::max),
         contact_ms: ms(0),
         free_ms: ms(1),
     }
 }
 
 fn table(rows: &[Row]) -> String {
-    let mut out = String::from("| k | step, ms | MSE in contact, mm² | MSE without, mm² | worst case, mm² | force error | deepest in a tool, mm | ms a step in contact | ms a step without | of real time, in contact |\n");
+    let mut out = String::from(
+        "| k | step, ms | MSE in contact, mm² | MSE without, mm² | worst case, mm² | force error | deepest in a tool, mm | ms a step in contact | ms a step without | of real time, in contact |\n",
+    );
     out += "|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n";
     for row in rows {
         out += &format!(

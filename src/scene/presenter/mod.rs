@@ -1,23 +1,29 @@
 //! What makes frames between steps.
 //!
-//! A time `tau` after the last published step `n`, `u = u_n + tau v_n + A_k(tau) B^T (f - f_n)`: the last velocities go on, and contact is solved at the
-//! instruments' poses with the compliance of that time, `kappa = 9/(4 tau²) + 3 alpha/(2 tau)`. When a step arrives, the frame goes on
+//! A time `tau` after the last published step `n`, `u = u_n + tau v_n + A_k(tau) B^T (f - f_n)`: the last velocities go on, as far as the tools
+//! do ([`along`]), and contact is solved at the instruments' poses with the compliance of that time, `kappa = 9/(4 tau²) + 3 alpha/(2 tau)`. When a step arrives, the frame goes on
 //! from where it would have been without it, and over to it within two fifths of a step, or at 40 mm/s where that takes longer.
+
+mod along;
+mod nodes;
 
 use std::sync::Arc;
 
-use super::Scene;
 use super::core::lock_read;
 use super::points::AttachedPoints;
 use super::present::Moment;
 use super::published::{Published, Values};
-use crate::contact::{Compliance, Problem, State, Tool};
+use super::{Contact, Scene};
+use crate::contact::problem::Change;
+use crate::contact::{Compliance, Problem, State};
 use crate::error::{Error, Result};
 use crate::kernels::respond::accumulate_rows;
 use crate::kernels::rows::{RowPlan, decode_rows};
 use crate::kernels::{Isa, Pool};
 use crate::memory;
 use crate::model::Model;
+use along::Along;
+use nodes::{Means, Nodes};
 
 const WHAT: &str = "the present state of a scene";
 /// Below this nothing has moved since the step, s.
@@ -26,7 +32,7 @@ const AT_ONCE_S: f64 = 1e-5;
 const MOST_STEPS: f64 = 2.0;
 /// A frame goes over from one step to the next within this many steps (longer carries the older step's error on), or at this
 /// speed, mm/s, where the way is long (faster is seen as a jerk).
-const BLEND_STEPS: f64 = 0.4;
+const BLEND_STEPS: f64 = 0.4; // KNOB
 const BLEND_MM_S: f64 = 40.0;
 
 /// What makes frames. One thread at a time.
@@ -60,6 +66,8 @@ pub struct Presenter {
     rows: Vec<u32>,
     /// Time of the last frame before the last step was seen, after that step: from there the way over to it goes.
     seen_s: f64,
+    along: Along,
+    nodes: Box<Nodes>,
     /// Time of the last frame, after its step.
     before_s: f64,
 }
@@ -105,6 +113,8 @@ impl Presenter {
             held_back: memory::zeros(natural, WHAT)?,
             rows: memory::collected(natural, 0..natural as u32, WHAT)?,
             seen_s: 0.0,
+            along: Along::new()?,
+            nodes: Box::default(),
             before_s: 0.0,
         })
     }
@@ -149,46 +159,86 @@ impl Presenter {
     }
 
     /// Takes a new step.
-    fn take_step(&mut self, shared: &Published, moment: &Moment) {
+    fn take_step(&mut self, shared: &Published, moment: &Moment, later_s: Option<f64>) {
+        match later_s {
+            Some(seconds) => self.along.keep(&self.problem, seconds),
+            None => self.along.forget(),
+        }
         self.last.copy_from_slice(&shared.last.field);
         self.velocity.copy_from_slice(&moment.velocity);
         self.problem.past.take(&moment.past);
+        self.nodes.then.clear();
+        self.nodes.then.extend_from_slice(&moment.nodes);
+        self.nodes.forces.clear();
+        self.nodes.forces.extend_from_slice(&moment.forces);
     }
 
     /// The region's displacements, `tau` after the last step, into `out`; nothing blended in.
-    fn compute(&mut self, scene: &Scene, tau: f64, tools: &[Tool], out: &mut [f32]) -> Result<()> {
+    fn compute(
+        &mut self,
+        scene: &Scene,
+        tau: f64,
+        driven: Contact<'_>,
+        out: &mut [f32],
+    ) -> Result<()> {
         let model = &scene.model;
         let (Some(prior), corrections) = (&model.prior, model.corrections()?) else {
             return Ok(());
         };
-        // In contact the instruments keep the velocities up; free, the damping takes them.
         let alpha = corrections.pace.integrator.damping_per_s;
-        let along = match self.problem.pushed() || alpha <= 0.0 {
-            true => tau as f32,
-            false => (-(-alpha * tau).exp_m1() / alpha) as f32,
-        };
-        for ((free, last), velocity) in self.free.iter_mut().zip(&self.last).zip(&self.velocity) {
-            *free = last + along * velocity;
-        }
         let rest = &scene.mesh.positions;
-        self.problem.begin(tools, rest, &self.last)?;
-        let state = State {
-            rest,
-            u: &self.free,
-            start: &self.last,
+        let kappa = corrections.pace.integrator.over(tau.max(AT_ONCE_S)).kappa();
+        self.held_back
+            .copy_from_slice(&corrections.space.held_back(kappa));
+        let (last, velocity) = (&self.last, &self.velocity);
+        let change = match driven {
+            Contact::Tools(tools) => {
+                self.along
+                    .look(&self.problem, tools, (rest, last), (tau, alpha));
+                self.along.follow(rest, last, velocity, &mut self.free);
+                self.problem.begin(tools, rest, last)?;
+                let state = State {
+                    rest,
+                    u: &self.free,
+                    start: last,
+                };
+                let compliance = Compliance {
+                    prior,
+                    held: &self.held,
+                    inertia: Some((&corrections.space, &self.held_back)),
+                };
+                match tau > AT_ONCE_S && self.problem.is_near(state) {
+                    true => Some(self.problem.solve_between(compliance, state)?),
+                    false => None,
+                }
+            }
+            nodes => {
+                self.nodes.take(nodes, self.held.len())?;
+                let stretch = self.nodes.stretch(last, velocity, tau);
+                self.along.follow_evenly(stretch, (tau, alpha));
+                self.along.follow(rest, last, velocity, &mut self.free);
+                let near = !self.nodes.now.is_empty() || !self.nodes.then.is_empty();
+                match tau > AT_ONCE_S && near {
+                    true => {
+                        let means = Means {
+                            isa: self.isa,
+                            prior,
+                            space: &corrections.space,
+                            held_back: &self.held_back,
+                            held: &self.held,
+                        };
+                        self.nodes.solve(&means, &self.free)?;
+                        Some(Change {
+                            dofs: &self.nodes.dofs,
+                            forces: &self.nodes.change,
+                        })
+                    }
+                    false => None,
+                }
+            }
         };
-        let mut pushed = false;
-        if tau > AT_ONCE_S && self.problem.is_near(state) {
-            let kappa = corrections.pace.integrator.over(tau).kappa();
-            self.held_back
-                .copy_from_slice(&corrections.space.held_back(kappa));
-            let compliance = Compliance {
-                prior,
-                held: &self.held,
-                inertia: Some((&corrections.space, &self.held_back)),
-            };
-            self.problem.forget_columns();
-            let change = self.problem.solve(compliance, state, 1.0)?;
+        let pushed = change.is_some();
+        if let Some(change) = change {
             self.natural.fill(0.0);
             for (&dof, force) in change.dofs.iter().zip(change.forces) {
                 let own = corrections.space.at_contact(dof as usize);
@@ -206,7 +256,6 @@ impl Presenter {
                 .map_err(failed)?;
             decode_rows(isa, pool, &prior.basis(), &self.plan, q, &mut self.moved)
                 .map_err(failed)?;
-            pushed = true;
         }
         for (i, &node) in self.region.iter().enumerate() {
             let at = 3 * node as usize;
@@ -230,7 +279,7 @@ impl Presenter {
         &mut self,
         scene: &Scene,
         seconds: f64,
-        tools: &[Tool],
+        driven: Contact<'_>,
         out: &mut [f32],
     ) -> Result<()> {
         let step_s = scene.step_s();
@@ -242,8 +291,8 @@ impl Presenter {
         };
         let mut nodal = std::mem::take(&mut self.nodal);
         let made = match self.step == Some(step) {
-            true => self.go_on(scene, tau, tools, &mut nodal),
-            false => self.arrive(scene, (step, tau), tools, &mut nodal),
+            true => self.go_on(scene, tau, driven, &mut nodal),
+            false => self.arrive(scene, (step, tau), driven, &mut nodal),
         };
         if made.is_ok() {
             self.before_s = tau;
@@ -264,13 +313,19 @@ impl Presenter {
     }
 
     /// A frame of the step that is known.
-    fn go_on(&mut self, scene: &Scene, tau: f64, tools: &[Tool], out: &mut [f32]) -> Result<()> {
+    fn go_on(
+        &mut self,
+        scene: &Scene,
+        tau: f64,
+        driven: Contact<'_>,
+        out: &mut [f32],
+    ) -> Result<()> {
         if tau < self.seen_s {
             // The host took the step for the one before when it first saw it.
             self.forget_apart();
             self.seen_s = tau;
         }
-        self.compute(scene, tau, tools, out)
+        self.compute(scene, tau, driven, out)
     }
 
     /// The first frame of a step.
@@ -278,7 +333,7 @@ impl Presenter {
         &mut self,
         scene: &Scene,
         (step, tau): (u64, f64),
-        tools: &[Tool],
+        driven: Contact<'_>,
         out: &mut [f32],
     ) -> Result<()> {
         let step_s = scene.step_s();
@@ -290,7 +345,7 @@ impl Presenter {
             let then = (tau + steps * step_s).min(MOST_STEPS * step_s);
             since_s = (then - self.before_s).max(0.0);
             let mut shown = std::mem::take(&mut self.shown);
-            let made = self.compute(scene, then, tools, &mut shown);
+            let made = self.compute(scene, then, driven, &mut shown);
             self.blend(then, step_s, &mut shown);
             self.shown = shown;
             made?;
@@ -298,11 +353,12 @@ impl Presenter {
         {
             let shared = lock_read(&scene.shared.published);
             self.step = Some(step_of(&shared)?);
+            let later = known.map(|known| self.step.unwrap_or(known).saturating_sub(known));
             if let Some(moment) = &shared.moment {
-                self.take_step(&shared, moment);
+                self.take_step(&shared, moment, later.map(|steps| steps as f64 * step_s));
             }
         }
-        self.compute(scene, tau, tools, out)?;
+        self.compute(scene, tau, driven, out)?;
         self.seen_s = tau - since_s;
         match known {
             Some(_) if tau > AT_ONCE_S => self.keep_apart(out),
@@ -332,8 +388,8 @@ impl Presenter {
             return;
         }
         let since = (tau - self.seen_s).max(0.0);
-        let part = (1.0 - since / (BLEND_STEPS * step_s)).max(0.0) as f32;
-        let gone = (BLEND_MM_S * since) as f32;
+        let part = (1.0 - since / (knob("KB",BLEND_STEPS) * step_s)).max(0.0) as f32;
+        let gone = (knob("KM",BLEND_MM_S) * since) as f32;
         if part == 0.0 && self.longest <= gone {
             return;
         }
@@ -358,7 +414,12 @@ impl Presenter {
             + self.offset.len()
             + self.nodal.len()
             + self.coordinates.len();
-        4 * lists + self.held.len() + self.plan.memory_bytes() + self.problem.memory_bytes()
+        4 * lists
+            + self.along.memory_bytes()
+            + self.nodes.memory_bytes()
+            + self.held.len()
+            + self.plan.memory_bytes()
+            + self.problem.memory_bytes()
     }
 }
 
@@ -373,3 +434,5 @@ fn step_of(shared: &Published) -> Result<u64> {
         None => Err(Error::State("present: the scene keeps no moments".into())),
     }
 }
+
+pub fn knob(name: &str, or: f64) -> f64 { std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(or) }

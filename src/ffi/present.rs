@@ -1,0 +1,212 @@
+//! `upt_scene`: frames between steps.
+
+#[cfg(not(feature = "contact"))]
+use super::call::fail;
+use super::registry::call_scene;
+use super::status::*;
+use super::structs::*;
+#[cfg(feature = "contact")]
+use {
+    super::call::Failure,
+    super::driven::read_tools,
+    super::pointers::{slice, slice_mut},
+    super::scene::contacts,
+    crate::Scene,
+};
+
+#[cfg(not(feature = "contact"))]
+const WITHOUT: &str = "this build has no feature \"contact\"";
+
+/// The host's room, after its count has been checked for the region or the points.
+#[cfg(feature = "contact")]
+unsafe fn room<'a>(
+    scene: &Scene,
+    points: bool,
+    out: *mut f32,
+    out_count: u64,
+) -> Result<&'a mut [f32], Failure> {
+    // SAFETY: the host passes that many elements, as the header asks.
+    let len = unsafe { slice(out.cast_const(), out_count, "out") }?.len();
+    match points {
+        true => scene.check_points_out(len)?,
+        false => scene.check_out(len)?,
+    }
+    // SAFETY: the host passes room for that many elements, as the header asks.
+    unsafe { slice_mut(out, out_count, "out") }
+}
+
+/// The tissue at a moment between steps, with the instruments where they are at that moment: frames without lag.
+///
+/// The velocities of the last published state continue as far as the instruments do, and contact is solved at the poses given here with
+/// the compliance of that time. Use any frame rate, even an uneven one, and call it while a submitted step is in flight too. When a step
+/// arrives, the frame goes on from where it would have been without it, and over to it within two fifths of a step, or at 40 mm/s where
+/// that takes longer.
+///
+/// - `seconds`: time since the last published step, 0 or more; velocities are followed for two steps at most.
+/// - `instruments`: as `upt_scene_step_instruments`.
+/// - `out`: `[n,3]`, mm, in the region's order.
+/// - `out_count`: number of floats in `out`, 3 n.
+///
+/// Threads: one thread at a time presents; another may step or submit meanwhile.
+/// Errors: `UPT_ERR_BUSY` while another thread presents, and if a step is in flight at the first call;
+/// `UPT_ERR_UNSUPPORTED` in a build without feature "contact", for a bundle without a linear response or corrections, and
+/// for a scene without corrections; `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`,
+/// `UPT_ERR_NON_FINITE`, `UPT_ERR_STATE`, `UPT_ERR_RUNTIME`, `UPT_ERR_IO`, `UPT_ERR_BUNDLE`, `UPT_ERR_OUT_OF_MEMORY`,
+/// `UPT_ERR_PANIC`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn upt_scene_present(
+    scene: *mut upt_scene,
+    seconds: f64,
+    instruments: *const upt_instrument,
+    instrument_count: u64,
+    out: *mut f32,
+    out_count: u64,
+) -> upt_status {
+    call_scene("upt_scene_present", scene, |_scene| {
+        #[cfg(feature = "contact")]
+        {
+            let mut tools = _scene.frame_tools()?;
+            // SAFETY: the host passes that many instruments, as the header asks.
+            unsafe { read_tools(instruments, instrument_count, &mut tools) }?;
+            // SAFETY: the host passes room for that many elements, as the header asks.
+            let out = unsafe { room(_scene, false, out, out_count) }?;
+            _scene.present(seconds, &tools, out)?;
+            Ok(UPT_OK)
+        }
+        #[cfg(not(feature = "contact"))]
+        {
+            let _ = (seconds, instruments, instrument_count, out, out_count);
+            fail(UPT_ERR_UNSUPPORTED, WITHOUT)
+        }
+    })
+}
+
+/// As `upt_scene_present`, at the attached points.
+///
+/// - `seconds`, `instruments`: as `upt_scene_present`.
+/// - `out`: `[n,3]`, mm.
+/// - `out_count`: number of floats in `out`, 3 n.
+///
+/// Threads: one thread at a time presents, the region or points; another may step or submit meanwhile.
+/// Errors: those of `upt_scene_present`; `UPT_ERR_STATE` when no points are attached.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn upt_scene_present_points(
+    scene: *mut upt_scene,
+    seconds: f64,
+    instruments: *const upt_instrument,
+    instrument_count: u64,
+    out: *mut f32,
+    out_count: u64,
+) -> upt_status {
+    call_scene("upt_scene_present_points", scene, |_scene| {
+        #[cfg(feature = "contact")]
+        {
+            let mut tools = _scene.frame_tools()?;
+            // SAFETY: the host passes that many instruments, as the header asks.
+            unsafe { read_tools(instruments, instrument_count, &mut tools) }?;
+            // SAFETY: the host passes room for that many elements, as the header asks.
+            let out = unsafe { room(_scene, true, out, out_count) }?;
+            _scene.present_points(seconds, &tools, out)?;
+            Ok(UPT_OK)
+        }
+        #[cfg(not(feature = "contact"))]
+        {
+            let _ = (seconds, instruments, instrument_count, out, out_count);
+            fail(UPT_ERR_UNSUPPORTED, WITHOUT)
+        }
+    })
+}
+
+/// As `upt_scene_present`, with a collision field in place of instruments, for scenes that `upt_scene_step_contacts` drives.
+///
+/// Nodes go where the list says, by the compliance of that time. Nodes of the last step that are no longer listed are released: they
+/// lose the force that held them.
+///
+/// - `seconds`: as `upt_scene_present`.
+/// - `contact_nodes`: `[m]` node indices, each at most once, in any order.
+/// - `contact_vectors`: `[m,3]`, mm: the displacement of these nodes at that moment.
+/// - `contact_count`: m; 0 means no contact and both may be NULL.
+/// - `out`: `[n,3]`, mm, in the region's order.
+/// - `out_count`: number of floats in `out`, 3 n.
+///
+/// Threads: as `upt_scene_present`.
+/// Errors: those of `upt_scene_present`; also `UPT_ERR_ARGUMENT` for an index or a count beyond K.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn upt_scene_present_contacts(
+    scene: *mut upt_scene,
+    seconds: f64,
+    contact_nodes: *const u32,
+    contact_vectors: *const f32,
+    contact_count: u64,
+    out: *mut f32,
+    out_count: u64,
+) -> upt_status {
+    call_scene("upt_scene_present_contacts", scene, |_scene| {
+        #[cfg(feature = "contact")]
+        {
+            let (nodes, vectors) =
+                // SAFETY: the host passes that many nodes and vectors, as the header asks.
+                unsafe { contacts(_scene, contact_nodes, contact_vectors, contact_count) }?;
+            // SAFETY: the host passes room for that many elements, as the header asks.
+            let out = unsafe { room(_scene, false, out, out_count) }?;
+            _scene.present_contacts(seconds, nodes, vectors, out)?;
+            Ok(UPT_OK)
+        }
+        #[cfg(not(feature = "contact"))]
+        {
+            let _ = (
+                seconds,
+                contact_nodes,
+                contact_vectors,
+                contact_count,
+                out,
+                out_count,
+            );
+            fail(UPT_ERR_UNSUPPORTED, WITHOUT)
+        }
+    })
+}
+
+/// As `upt_scene_present_contacts`, at the attached points.
+///
+/// - `seconds`, `contact_nodes`, `contact_vectors`, `contact_count`: as `upt_scene_present_contacts`.
+/// - `out`: `[n,3]`, mm.
+/// - `out_count`: number of floats in `out`, 3 n.
+///
+/// Threads: as `upt_scene_present_points`.
+/// Errors: those of `upt_scene_present_contacts`; `UPT_ERR_STATE` when no points are attached.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn upt_scene_present_points_contacts(
+    scene: *mut upt_scene,
+    seconds: f64,
+    contact_nodes: *const u32,
+    contact_vectors: *const f32,
+    contact_count: u64,
+    out: *mut f32,
+    out_count: u64,
+) -> upt_status {
+    call_scene("upt_scene_present_points_contacts", scene, |_scene| {
+        #[cfg(feature = "contact")]
+        {
+            let (nodes, vectors) =
+                // SAFETY: the host passes that many nodes and vectors, as the header asks.
+                unsafe { contacts(_scene, contact_nodes, contact_vectors, contact_count) }?;
+            // SAFETY: the host passes room for that many elements, as the header asks.
+            let out = unsafe { room(_scene, true, out, out_count) }?;
+            _scene.present_points_contacts(seconds, nodes, vectors, out)?;
+            Ok(UPT_OK)
+        }
+        #[cfg(not(feature = "contact"))]
+        {
+            let _ = (
+                seconds,
+                contact_nodes,
+                contact_vectors,
+                contact_count,
+                out,
+                out_count,
+            );
+            fail(UPT_ERR_UNSUPPORTED, WITHOUT)
+        }
+    })
+}

@@ -1,0 +1,228 @@
+//! How far a step's velocities are followed between steps.
+//!
+//! Tissue that a tool drives goes as far as the tool goes: its velocity is that of the tool's way in the step before. Where the tool stops,
+//! turns back or speeds up between two steps, so does the tissue: the time is stretched by how far the tool has come of what it would have come
+//! at the step's speed. Tissue that nothing drives is slowed by the damping.
+
+use ::contact::{Pose, Vector};
+
+use crate::contact::vector;
+use crate::contact::{MAX_TOOLS, Problem, Tool};
+use crate::error::Result;
+use crate::memory;
+
+/// The time is stretched by this much at most, back and forth.
+const STRETCH: [f32; 2] = [-1.0, 1.5];
+/// Ways shorter than this do not stretch it, mm.
+const SMALL_MM: f32 = 0.05;
+/// A tool that goes farther in a step than this has been put there, mm.
+const PUT_MM: f32 = 40.0;
+
+/// The tools' ways of the last step, and the tissue that each drives.
+#[derive(Default)]
+pub(super) struct Along {
+    /// Poses at the step before the last and at the one before it, and how far apart they are, s.
+    before: [Vec<Pose>; 2],
+    before_s: [f64; 2],
+    /// Where tools push, and how far velocities are followed there, s.
+    driven: Vec<(Vector, f32)>,
+    /// Where none does.
+    free: f32,
+}
+
+impl Along {
+    pub(super) fn new() -> Result<Along> {
+        const WHAT: &str = "the present state of a scene";
+        Ok(Along {
+            before: [
+                memory::room(MAX_TOOLS, WHAT)?,
+                memory::room(MAX_TOOLS, WHAT)?,
+            ],
+            driven: memory::room(MAX_TOOLS, WHAT)?,
+            ..Along::default()
+        })
+    }
+
+    /// Keeps the tools' poses of the state that is last, before that of `seconds` later is taken.
+    pub(super) fn keep(&mut self, problem: &Problem, seconds: f64) {
+        self.before.swap(0, 1);
+        self.before[0].clear();
+        let tools = problem.past.tools.iter();
+        self.before[0].extend(tools.map(|held| held.pose));
+        self.before_s = [seconds, self.before_s[0]];
+    }
+
+    /// Nothing is known of the tools' ways.
+    pub(super) fn forget(&mut self) {
+        self.before.iter_mut().for_each(Vec::clear);
+    }
+
+    /// Looks at the tools `tau` after the last state `u`.
+    pub(super) fn look(
+        &mut self,
+        problem: &Problem,
+        tools: &[Tool],
+        (rest, u): (&[f32], &[f32]),
+        (tau, alpha): (f64, f64),
+    ) {
+        self.driven.clear();
+        self.free = slowed(tau, alpha);
+        for (index, held) in problem.past.tools.iter().enumerate() {
+            let own = problem.past.forces.iter();
+            let own = own.filter(|force| force.tool as usize == index);
+            let (mut centre, mut sum) = (Vector::ZERO, 0.0);
+            for force in own {
+                let sample = problem.sample(force.sample);
+                let point = sample.gather(|node| vector(rest, node) + vector(u, node));
+                let size = force.force.length();
+                centre += point * size;
+                sum += size;
+            }
+            if sum <= 0.0 {
+                continue;
+            }
+            centre /= sum;
+            let place = held.pose.inverse_transform_point(centre);
+            let stretch = match (tools.get(index), self.speed(index, place, centre)) {
+                (Some(tool), Some(speed)) => {
+                    let gone = tool.pose.transform_point(place) - centre;
+                    stretch(speed * tau as f32, gone)
+                }
+                _ => 1.0,
+            };
+            self.driven.push((centre, stretch * tau as f32));
+        }
+    }
+
+    /// The speed of a tool at a place of its own, which is at `now`, at the end of the last step, mm/s: by BDF2, as the tissue's.
+    fn speed(&self, index: usize, place: Vector, now: Vector) -> Option<Vector> {
+        let at = |poses: &[Pose]| poses.get(index).map(|pose| pose.transform_point(place));
+        let [seconds, earlier_s] = self.before_s;
+        let before = at(&self.before[0]).filter(|_| seconds > 0.0)?;
+        let far = |a: Vector, b: Vector| a.distance(b) > PUT_MM;
+        if far(now, before) {
+            return None;
+        }
+        let even = (seconds - earlier_s).abs() < 1e-6;
+        let speed = match at(&self.before[1]).filter(|earlier| even && !far(before, *earlier)) {
+            Some(earlier) => (now * 3.0 - before * 4.0 + earlier) * 0.5,
+            None => now - before,
+        };
+        Some(speed / seconds as f32)
+    }
+
+    /// The same time everywhere: stretched where nodes are driven, that of free tissue where none is.
+    pub(super) fn follow_evenly(&mut self, stretch: Option<f32>, (tau, alpha): (f64, f64)) {
+        self.driven.clear();
+        self.free = match stretch {
+            Some(stretch) => stretch * tau as f32,
+            None => slowed(tau, alpha),
+        };
+    }
+
+    /// `out = last + along velocity`.
+    pub(super) fn follow(&self, rest: &[f32], last: &[f32], velocity: &[f32], out: &mut [f32]) {
+        let even = match self.driven.as_slice() {
+            [] => Some(self.free),
+            [(_, only)] => Some(*only),
+            _ => None,
+        };
+        if let Some(along) = even {
+            for ((out, last), velocity) in out.iter_mut().zip(last).zip(velocity) {
+                *out = last + along * velocity;
+            }
+            return;
+        }
+        let nodes = out.as_chunks_mut::<3>().0.iter_mut();
+        let rest = rest.as_chunks::<3>().0.iter();
+        let last = last.as_chunks::<3>().0.iter();
+        let velocity = velocity.as_chunks::<3>().0.iter();
+        for (((out, rest), last), velocity) in nodes.zip(rest).zip(last).zip(velocity) {
+            let place = Vector::from(*rest) + Vector::from(*last);
+            // Each tool's share falls with the square of the distance.
+            let (mut along, mut sum) = (0.0, 0.0);
+            for (centre, own) in &self.driven {
+                let weight = 1.0 / (1.0 + place.distance_squared(*centre));
+                along += weight * own;
+                sum += weight;
+            }
+            let along = along / sum;
+            for (out, (last, velocity)) in out.iter_mut().zip(last.iter().zip(velocity)) {
+                *out = last + along * velocity;
+            }
+        }
+    }
+
+    pub(super) fn memory_bytes(&self) -> usize {
+        size_of::<Pose>() * (self.before[0].capacity() + self.before[1].capacity())
+            + size_of::<(Vector, f32)>() * self.driven.capacity()
+    }
+}
+
+/// The time that free tissue goes on for, s: the damping slows it.
+fn slowed(tau: f64, alpha: f64) -> f32 {
+    match alpha > 0.0 {
+        true => (-(-alpha * tau).exp_m1() / alpha) as f32,
+        false => tau as f32,
+    }
+}
+
+/// How far a tool has `gone` beside where its speed would have taken it.
+fn stretch(wanted: Vector, gone: Vector) -> f32 {
+    if gone.length() > PUT_MM {
+        return 1.0;
+    }
+    let small = SMALL_MM * SMALL_MM;
+    let [least, most] = STRETCH;
+    ((gone.dot(wanted) + small) / (wanted.length_squared() + small)).clamp(super::knob("KL",least as f64) as f32, super::knob("KU",most as f64) as f32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tool_that_stops_stops_the_tissue_and_one_that_turns_takes_it_back() {
+        let wanted = Vector::new(0.0, 0.0, -1.25);
+        let near = |a: f32, b: f32| (a - b).abs() < 0.01;
+        assert!(near(stretch(wanted, wanted), 1.0));
+        assert!(near(stretch(wanted, Vector::ZERO), 0.0));
+        assert!(near(stretch(wanted, -wanted), -1.0));
+        assert!(near(stretch(wanted, wanted * 5.0), 1.5));
+        // A tool that rests leaves the tissue to itself, and so does one that was put elsewhere.
+        assert!(near(stretch(Vector::ZERO, Vector::ZERO), 1.0));
+        assert!(near(stretch(wanted, wanted * 100.0), 1.0));
+    }
+
+    #[test]
+    fn a_tool_that_slows_down_has_the_speed_of_its_end() {
+        let at = |z: f32| vec![Pose::from_translation(Vector::new(0.0, 0.0, z))];
+        // 4 mm, then 2 mm: at the end 1 mm a step.
+        let mut along = Along {
+            before: [at(4.0), at(0.0)],
+            before_s: [0.05; 2],
+            ..Along::default()
+        };
+        let now = Vector::new(0.0, 0.0, 6.0);
+        let speed = along.speed(0, Vector::ZERO, now).unwrap();
+        assert!((speed.z - 20.0).abs() < 1e-3, "{speed}");
+        along.before_s[1] = 0.1;
+        assert!((along.speed(0, Vector::ZERO, now).unwrap().z - 40.0).abs() < 1e-3);
+        assert!(along.speed(1, Vector::ZERO, now).is_none());
+    }
+
+    #[test]
+    fn each_tool_drives_the_tissue_around_it() {
+        let along = Along {
+            driven: vec![(Vector::ZERO, 0.0), (Vector::new(100.0, 0.0, 0.0), 1.0)],
+            ..Along::default()
+        };
+        let rest = [0.0, 0.0, 0.0, 100.0, 0.0, 0.0, 50.0, 0.0, 0.0];
+        let mut out = [0.0; 9];
+        along.follow(&rest, &[0.0; 9], &[1.0; 9], &mut out);
+        assert!(
+            out[0] < 1e-3 && out[3] > 0.999 && (out[6] - 0.5).abs() < 1e-6,
+            "{out:?}"
+        );
+    }
+}

@@ -1,0 +1,178 @@
+//! A frame with a collision field in place of instruments: nodes go where the host says, by the compliance of that time; those that it has let
+//! go of since the step lose the force that held them.
+
+use crate::contact::vector;
+use crate::corrections::CoarseSpace;
+use crate::error::{Error, Result};
+use crate::kernels::Isa;
+use crate::kernels::contact::ContactFactor;
+use crate::memory;
+use crate::prior::PriorTable;
+use crate::scene::{Contact, ContactSet};
+
+/// What forces at nodes are solved with.
+pub(super) struct Means<'a> {
+    pub isa: Isa,
+    pub prior: &'a PriorTable,
+    pub space: &'a CoarseSpace,
+    /// [`CoarseSpace::held_back`].
+    pub held_back: &'a [f32],
+    pub held: &'a [bool],
+}
+
+/// The nodes of a frame and of the step before it.
+#[derive(Default)]
+pub(super) struct Nodes {
+    /// Where the host has nodes now.
+    pub now: ContactSet,
+    /// Nodes in contact in the step, and the forces on them, mN `[m,3]`.
+    pub then: Vec<u32>,
+    pub forces: Vec<f32>,
+    /// Columns of both, ascending, and whether a node is in contact now.
+    columns: Vec<(u32, bool)>,
+    only: Vec<u32>,
+    upper: Vec<f64>,
+    widened: Vec<f32>,
+    factor: ContactFactor,
+    /// Of all columns and of those in contact now.
+    pub dofs: Vec<u32>,
+    pub change: Vec<f32>,
+    held: Vec<u32>,
+    wanted: Vec<f32>,
+    solved: Vec<f32>,
+}
+
+impl Nodes {
+    /// Takes a frame's field over a mesh of `count` nodes.
+    ///
+    /// # Errors
+    /// As a step's.
+    pub fn take(&mut self, contact: Contact<'_>, count: usize) -> Result<()> {
+        self.now.gather(contact, count)
+    }
+
+    /// How far of the way that the nodes would have gone at the step's velocities (mm/s) within `tau` they have gone; none where there are none.
+    pub fn stretch(&self, last: &[f32], velocity: &[f32], tau: f64) -> Option<f32> {
+        /// mm².
+        const SMALL: f32 = 0.05 * 0.05;
+        let (mut gone, mut wanted, mut known) = (SMALL, SMALL, false);
+        for &node in &self.then {
+            let Some(to) = self.now.at(node) else {
+                continue;
+            };
+            let way = vector(velocity, node) * tau as f32;
+            gone += way.dot(::contact::Vector::from(to) - vector(last, node));
+            wanted += way.length_squared();
+            known = true;
+        }
+        known.then(|| (gone / wanted).clamp(-1.0, 1.5))
+    }
+
+    /// The change of the forces, in `dofs` and `change`, that takes the nodes from where the tissue is without them, `free`.
+    ///
+    /// # Errors
+    /// [`Error::Bundle`] for a compliance that has no factor, [`Error::OutOfMemory`].
+    pub fn solve(&mut self, means: &Means<'_>, free: &[f32]) -> Result<()> {
+        const WHAT: &str = "the present state of a scene";
+        let own = |node: u32| match means.prior.column_for(means.held, node) {
+            Some((column, true)) => Some(column as u32),
+            _ => None,
+        };
+        self.columns.clear();
+        let now = self.now.nodes.iter().filter_map(|&node| own(node));
+        self.columns.extend(now.map(|column| (column, true)));
+        for &node in &self.then {
+            if self.now.at(node).is_none()
+                && let Some(column) = own(node)
+            {
+                self.columns.push((column, false));
+            }
+        }
+        self.columns.sort_unstable();
+        self.only.clear();
+        self.only.extend(self.columns.iter().map(|column| column.0));
+        let order = 3 * self.only.len();
+        let grown = (order * order).saturating_sub(self.upper.len());
+        memory::reserve(&mut self.upper, grown, WHAT)?;
+        self.upper.clear();
+        self.upper.resize(order * order, 0.0);
+        let prior = means.prior;
+        prior.gather_compliance(&self.only, &mut self.upper, &mut self.widened);
+        self.dofs.clear();
+        for column in &self.only {
+            self.dofs.extend([0, 1, 2].map(|axis| 3 * column + axis));
+        }
+        for i in 0..order {
+            let own = means.space.at_contact(self.dofs[i] as usize);
+            for j in i..order {
+                let other = means.space.at_contact(self.dofs[j] as usize);
+                let pairs = means.held_back.iter().zip(own).zip(other);
+                let lost: f32 = pairs.map(|((lost, a), b)| lost * a * b).sum();
+                self.upper[i * order + j] -= f64::from(lost);
+            }
+        }
+        // What the released nodes were pushed with is taken back, ...
+        self.change.clear();
+        self.change.resize(order, 0.0);
+        for (at, &(column, stays)) in self.columns.iter().enumerate() {
+            let node = prior.contact_nodes[column as usize];
+            if !stays && let Ok(row) = self.then.binary_search(&node) {
+                let force = &self.forces[3 * row..3 * row + 3];
+                for (to, force) in self.change[3 * at..3 * at + 3].iter_mut().zip(force) {
+                    *to = -force;
+                }
+            }
+        }
+        // ... and the others are pushed to their places.
+        self.held.clear();
+        let stays = |at: &usize| self.columns[at / 3].1;
+        self.held
+            .extend((0..order).filter(stays).map(|at| at as u32));
+        let upper = &self.upper;
+        let between = |i: usize, j: usize| upper[i.min(j) * order + i.max(j)];
+        self.wanted.clear();
+        for &at in &self.held {
+            let at = at as usize;
+            let node = prior.contact_nodes[self.only[at / 3] as usize];
+            let place = free[3 * node as usize + at % 3];
+            let wanted = self.now.at(node).map_or(place, |to| to[at % 3]);
+            let released = (0..order).filter(|other| !self.columns[other / 3].1);
+            let moved: f64 = released
+                .map(|other| between(at, other) * f64::from(self.change[other]))
+                .sum();
+            self.wanted.push(wanted - place - moved as f32);
+        }
+        let count = self.held.len();
+        if count == 0 {
+            return Ok(());
+        }
+        self.factor.reserve(count)?;
+        let held = &self.held;
+        self.factor
+            .factor(means.isa, held, |out| {
+                for (i, &row) in held.iter().enumerate() {
+                    for (j, &column) in held.iter().enumerate().skip(i) {
+                        out[i * count + j] = between(row as usize, column as usize);
+                    }
+                }
+            })
+            .map_err(|error| Error::bundle("prior.safetensors", error.to_string()))?;
+        self.solved.clear();
+        self.solved.resize(count, 0.0);
+        self.factor.solve(means.isa, &self.wanted, &mut self.solved);
+        for (&at, &force) in self.held.iter().zip(&self.solved) {
+            self.change[at as usize] = force;
+        }
+        Ok(())
+    }
+
+    /// Bytes held.
+    pub fn memory_bytes(&self) -> usize {
+        self.now.memory_bytes()
+            + 4 * (self.then.capacity() + self.forces.capacity() + self.only.capacity())
+            + 8 * (self.columns.capacity() + self.upper.capacity())
+            + 4 * (self.dofs.capacity() + self.change.capacity() + self.held.capacity())
+            + 4 * (self.wanted.capacity() + self.solved.capacity() + self.widened.capacity())
+            + self.factor.memory_bytes()
+    }
+}

@@ -1,0 +1,205 @@
+//! Scenes whose steps are shorter than the bundle's: what they refuse, and that they are the same tissue.
+
+mod fixture;
+
+use contact::Shape;
+use fixture::{bits, model, plain, scene};
+use upt::contact::Tool;
+use upt::{Contact, Corrections, Error, Scene, SceneOptions, StepInput};
+
+const DT: f64 = 0.05;
+
+fn stepping(step_s: f64) -> SceneOptions {
+    SceneOptions {
+        corrections: Corrections::Fixed(8),
+        step_s,
+        ..plain()
+    }
+}
+
+/// A ball of radius 3 mm over the middle of the top, `depth` mm inside of it.
+fn ball(scene: &Scene, depth: f64) -> Vec<Tool> {
+    let mesh = scene.mesh();
+    let place = |node: u32| [0, 1, 2].map(|axis| mesh.positions[3 * node as usize + axis]);
+    let nodes = || mesh.domain_nodes.iter().map(|&node| place(node));
+    let count = mesh.domain_nodes.len() as f32;
+    let middle = [0, 1].map(|axis| nodes().map(|at| at[axis]).sum::<f32>() / count);
+    let far = |at: &[f32; 3]| (0..2).map(|k| (at[k] - middle[k]).powi(2)).sum::<f32>();
+    let [x, y, z] = nodes().min_by(|a, b| far(a).total_cmp(&far(b))).unwrap();
+    let centre = [x, y, z + 3.0 - depth as f32];
+    let shape = Shape::Sphere { radius: 3.0 };
+    vec![Tool::new(0, &shape, centre, [0.0, 0.0, 0.0, 1.0]).unwrap()]
+}
+
+/// In within 0.2 s, held until 0.4 s, gone after.
+fn depth(seconds: f64) -> f64 {
+    match seconds {
+        0.0..0.2 => 10.0 * seconds,
+        0.2..0.4 => 2.0,
+        _ => -20.0,
+    }
+}
+
+fn step(scene: &Scene, seconds: f64) -> Vec<f32> {
+    let mut u = vec![0.0; 3 * scene.node_count()];
+    let tools = ball(scene, depth(seconds));
+    let input = StepInput {
+        displacement: None,
+        contact: Contact::Tools(&tools),
+    };
+    scene.step(input, Some(&mut u)).unwrap();
+    u
+}
+
+fn farthest(a: &[f32], b: &[f32]) -> f32 {
+    let pairs = a.as_chunks::<3>().0.iter().zip(b.as_chunks::<3>().0);
+    let far = |a: &[f32; 3], b: &[f32; 3]| (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f32>();
+    pairs.map(|(a, b)| far(a, b)).fold(0.0, f32::max).sqrt()
+}
+
+#[test]
+fn what_cannot_be_is_refused() {
+    let model = model("tiny-corrected");
+    let refused = |options: &SceneOptions| Scene::new(model.clone(), options).err().unwrap();
+    for step_s in [0.009, 0.051, -0.02, 1.0] {
+        assert!(
+            matches!(refused(&stepping(step_s)), Error::Argument(_)),
+            "{step_s}"
+        );
+    }
+    for step_s in [f64::NAN, f64::INFINITY] {
+        assert!(matches!(refused(&stepping(step_s)), Error::NonFinite(_)));
+    }
+    // A learned map has one length of step.
+    let learned = SceneOptions {
+        corrections: Corrections::None,
+        step_s: 0.02,
+        ..plain()
+    };
+    assert!(matches!(refused(&learned), Error::Unsupported(_)));
+    // That of the bundle needs nothing.
+    let own = SceneOptions {
+        step_s: DT,
+        ..learned
+    };
+    assert!(Scene::new(model.clone(), &own).is_ok());
+}
+
+#[test]
+fn the_bundles_own_length_changes_no_bit() {
+    let model = model("tiny-corrected");
+    let (a, b) = (scene(&model, &stepping(0.0)), scene(&model, &stepping(DT)));
+    for index in 1..14 {
+        let seconds = f64::from(index) * DT;
+        assert_eq!(bits(&step(&a, seconds)), bits(&step(&b, seconds)));
+    }
+}
+
+#[test]
+fn shorter_steps_are_the_same_tissue() {
+    let model = model("tiny-corrected");
+    let long = scene(&model, &stepping(0.0));
+    let pressed = (1..8)
+        .map(|index| step(&long, f64::from(index) * DT))
+        .last()
+        .unwrap();
+    let size = farthest(&pressed, &vec![0.0; pressed.len()]);
+    assert!(size > 1.0, "the ball presses: {size}");
+    for parts in [2u32, 5] {
+        let short = scene(&model, &stepping(DT / f64::from(parts)));
+        assert!((short.step_s() - DT / f64::from(parts)).abs() < 1e-12);
+        let mut u = Vec::new();
+        for index in 1..8 * parts {
+            u = step(&short, f64::from(index) * DT / f64::from(parts));
+        }
+        // At rest under a still tool the equation of motion is the same.
+        let apart = farthest(&u, &pressed);
+        assert!(apart < 0.05 * size, "{parts} parts: {apart} of {size}");
+    }
+}
+
+#[test]
+fn after_a_release_it_comes_to_rest_and_sleeps() {
+    let model = model("tiny-corrected");
+    let options = SceneOptions {
+        no_sleep: false,
+        ..stepping(0.01)
+    };
+    let scene = scene(&model, &options);
+    let mut largest = Vec::new();
+    for index in 1..=600 {
+        let u = step(&scene, 0.01 * f64::from(index));
+        assert!(u.iter().all(|x| x.is_finite()));
+        largest.push(farthest(&u, &vec![0.0; u.len()]));
+    }
+    assert!(largest[35] > 1.0);
+    let after = &largest[41..];
+    let most = largest[..40].iter().copied().fold(0.0, f32::max);
+    assert!(after.iter().all(|now| *now < 1.5 * most), "it swings up");
+    assert!(scene.stats().sleeping, "{}", largest[599]);
+    assert_eq!(largest[599], 0.0);
+}
+
+#[test]
+fn a_snapshot_goes_on_to_the_bit_and_only_at_its_own_length() {
+    let model = model("tiny-corrected");
+    let first = scene(&model, &stepping(0.02));
+    for index in 1..=23 {
+        step(&first, 0.02 * f64::from(index));
+    }
+    let saved = first.save().unwrap();
+    let other = scene(&model, &stepping(0.02));
+    other.restore(&saved).unwrap();
+    for index in 24..=30 {
+        let seconds = 0.02 * f64::from(index);
+        assert_eq!(bits(&step(&first, seconds)), bits(&step(&other, seconds)));
+    }
+    let long = scene(&model, &stepping(0.0));
+    assert!(matches!(long.restore(&saved), Err(Error::Snapshot(_))));
+}
+
+#[test]
+fn threads_change_no_bit() {
+    let model = model("tiny-corrected");
+    let run = |threads| {
+        let scene = scene(
+            &model,
+            &SceneOptions {
+                threads,
+                ..stepping(0.025)
+            },
+        );
+        (1..=24)
+            .map(|index| bits(&step(&scene, 0.025 * f64::from(index))))
+            .last()
+    };
+    assert_eq!(run(1), run(3));
+}
+
+/// Nodes and vectors drive such scenes as well.
+#[test]
+fn a_collision_field_drives_it_too() {
+    let model = model("tiny-corrected");
+    let scene = scene(&model, &stepping(0.01));
+    let node = scene.mesh().domain_nodes[0];
+    let mut u = vec![0.0; 3 * scene.node_count()];
+    for index in 1..=60 {
+        let pushed = [0.0, 0.0, -0.05 * index.min(20) as f32];
+        let (nodes, vectors): (&[u32], &[f32]) = match index <= 30 {
+            true => (&[node], &pushed),
+            false => (&[], &[]),
+        };
+        let contact = Contact::Sparse { nodes, vectors };
+        let input = StepInput {
+            displacement: None,
+            contact,
+        };
+        scene.step(input, Some(&mut u)).unwrap();
+        let at = &u[3 * node as usize..][..3];
+        if index == 30 {
+            assert_eq!(at, [0.0, 0.0, -1.0]);
+        }
+    }
+    let size = farthest(&u, &vec![0.0; u.len()]);
+    assert!(size < 0.5, "released 0.3 s ago: {size}");
+}
