@@ -169,6 +169,13 @@ pub const STAGES: &[Stage] = &[
         run: view,
     },
     Stage {
+        name: "haptics",
+        about: "a day of simulated haptics, or what fits into 20 minutes",
+        needs: &[system::NATIVE],
+        nightly: true,
+        run: haptics,
+    },
+    Stage {
         name: "windows",
         about: "built by MinGW, run by Wine",
         needs: &[system::WINDOWS],
@@ -188,6 +195,20 @@ fn cargo(workspace: &Workspace) -> Command {
     let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     command.current_dir(&workspace.root);
     command
+}
+
+/// No leak, no force that is no number or that stays: 24 simulated hours, or as many as 20 minutes hold; the log says how many.
+fn haptics(workspace: &Workspace) -> Result<Outcome> {
+    let mut command = cargo(workspace);
+    command.args(["run", "--release", "--package", "upt-cli", "--", "haptics"]);
+    command.args([
+        "onnx/brain-coarse-reduced",
+        "--hours",
+        "24",
+        "--within",
+        "20",
+    ]);
+    check(workspace, "upt haptics", &mut command)
 }
 
 /// A check that passes or fails as a whole.

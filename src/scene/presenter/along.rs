@@ -1,8 +1,8 @@
 //! How far a step's velocities are followed between steps.
 //!
-//! Tissue that a tool drives goes as far as the tool goes: its velocity is that of the tool's way in the step before. Where the tool stops,
-//! turns back or speeds up between two steps, so does the tissue: the time is stretched by how far the tool has come of what it would have come
-//! at the step's speed. Tissue that nothing drives is slowed by the damping.
+//! Tissue around a tool goes no farther than the tool: where that slows down, stops or turns back between two steps, the time is shortened by
+//! how far it has come of what its speed at the end of the step would have made. Farther off the tissue does not know of it yet. Tissue that nothing
+//! drives is slowed by the damping.
 
 use ::contact::{Pose, Vector};
 
@@ -11,10 +11,13 @@ use crate::contact::{MAX_TOOLS, Problem, Tool};
 use crate::error::Result;
 use crate::memory;
 
-/// The time is stretched by this much at most, back and forth.
-const STRETCH: [f32; 2] = [-1.0, 1.5];
+/// What the time is stretched by. A tool that goes faster than it did pushes by itself; following it (up to 1.5) or taking tissue back (down
+/// to -1) was no better.
+const STRETCH: [f32; 2] = [0.0, 1.0];
 /// Ways shorter than this do not stretch it, mm.
 const SMALL_MM: f32 = 0.05;
+/// A tool drives the tissue around it, to half at this distance, mm.
+const NEAR_MM: f32 = 24.0;
 /// A tool that goes farther in a step than this has been put there, mm.
 const PUT_MM: f32 = 40.0;
 
@@ -66,7 +69,10 @@ impl Along {
         (tau, alpha): (f64, f64),
     ) {
         self.driven.clear();
-        self.free = slowed(tau, alpha);
+        self.free = match problem.pushed() {
+            true => tau as f32,
+            false => slowed(tau, alpha),
+        };
         for (index, held) in problem.past.tools.iter().enumerate() {
             let own = problem.past.forces.iter();
             let own = own.filter(|force| force.tool as usize == index);
@@ -122,31 +128,25 @@ impl Along {
 
     /// `out = last + along velocity`.
     pub(super) fn follow(&self, rest: &[f32], last: &[f32], velocity: &[f32], out: &mut [f32]) {
-        let even = match self.driven.as_slice() {
-            [] => Some(self.free),
-            [(_, only)] => Some(*only),
-            _ => None,
-        };
-        if let Some(along) = even {
+        let even = self.driven.iter().all(|(_, along)| *along == self.free);
+        if even {
             for ((out, last), velocity) in out.iter_mut().zip(last).zip(velocity) {
-                *out = last + along * velocity;
+                *out = last + self.free * velocity;
             }
             return;
         }
+        let near = NEAR_MM.powi(-2);
         let nodes = out.as_chunks_mut::<3>().0.iter_mut();
         let rest = rest.as_chunks::<3>().0.iter();
         let last = last.as_chunks::<3>().0.iter();
         let velocity = velocity.as_chunks::<3>().0.iter();
         for (((out, rest), last), velocity) in nodes.zip(rest).zip(last).zip(velocity) {
             let place = Vector::from(*rest) + Vector::from(*last);
-            // Each tool's share falls with the square of the distance.
-            let (mut along, mut sum) = (0.0, 0.0);
+            let mut along = self.free;
             for (centre, own) in &self.driven {
-                let weight = 1.0 / (1.0 + place.distance_squared(*centre));
-                along += weight * own;
-                sum += weight;
+                let weight = 1.0 / (1.0 + near * place.distance_squared(*centre));
+                along += weight * (own - self.free);
             }
-            let along = along / sum;
             for (out, (last, velocity)) in out.iter_mut().zip(last.iter().zip(velocity)) {
                 *out = last + along * velocity;
             }
@@ -174,7 +174,7 @@ fn stretch(wanted: Vector, gone: Vector) -> f32 {
     }
     let small = SMALL_MM * SMALL_MM;
     let [least, most] = STRETCH;
-    ((gone.dot(wanted) + small) / (wanted.length_squared() + small)).clamp(super::knob("KL",least as f64) as f32, super::knob("KU",most as f64) as f32)
+    ((gone.dot(wanted) + small) / (wanted.length_squared() + small)).clamp(least, most)
 }
 
 #[cfg(test)]
@@ -182,13 +182,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_tool_that_stops_stops_the_tissue_and_one_that_turns_takes_it_back() {
+    fn a_tool_that_stops_stops_the_tissue() {
         let wanted = Vector::new(0.0, 0.0, -1.25);
         let near = |a: f32, b: f32| (a - b).abs() < 0.01;
         assert!(near(stretch(wanted, wanted), 1.0));
         assert!(near(stretch(wanted, Vector::ZERO), 0.0));
-        assert!(near(stretch(wanted, -wanted), -1.0));
-        assert!(near(stretch(wanted, wanted * 5.0), 1.5));
+        assert!(near(stretch(wanted, -wanted), 0.0));
+        assert!(near(stretch(wanted, wanted * 5.0), 1.0));
         // A tool that rests leaves the tissue to itself, and so does one that was put elsewhere.
         assert!(near(stretch(Vector::ZERO, Vector::ZERO), 1.0));
         assert!(near(stretch(wanted, wanted * 100.0), 1.0));
@@ -215,6 +215,7 @@ mod tests {
     fn each_tool_drives_the_tissue_around_it() {
         let along = Along {
             driven: vec![(Vector::ZERO, 0.0), (Vector::new(100.0, 0.0, 0.0), 1.0)],
+            free: 1.0,
             ..Along::default()
         };
         let rest = [0.0, 0.0, 0.0, 100.0, 0.0, 0.0, 50.0, 0.0, 0.0];

@@ -2,7 +2,7 @@
 //!
 //! A time `tau` after the last published step `n`, `u = u_n + tau v_n + A_k(tau) B^T (f - f_n)`: the last velocities go on, as far as the tools
 //! do ([`along`]), and contact is solved at the instruments' poses with the compliance of that time, `kappa = 9/(4 tau²) + 3 alpha/(2 tau)`. When a step arrives, the frame goes on
-//! from where it would have been without it, and over to it within two fifths of a step, or at 40 mm/s where that takes longer.
+//! from where it would have been without it, and over to it within two fifths of a step, or at 25 mm/s where that takes longer.
 
 mod along;
 mod nodes;
@@ -32,8 +32,8 @@ const AT_ONCE_S: f64 = 1e-5;
 const MOST_STEPS: f64 = 2.0;
 /// A frame goes over from one step to the next within this many steps (longer carries the older step's error on), or at this
 /// speed, mm/s, where the way is long (faster is seen as a jerk).
-const BLEND_STEPS: f64 = 0.4; // KNOB
-const BLEND_MM_S: f64 = 40.0;
+const BLEND_STEPS: f64 = 0.4;
+const BLEND_MM_S: f64 = 25.0;
 
 /// What makes frames. One thread at a time.
 pub struct Presenter {
@@ -388,8 +388,8 @@ impl Presenter {
             return;
         }
         let since = (tau - self.seen_s).max(0.0);
-        let part = (1.0 - since / (knob("KB",BLEND_STEPS) * step_s)).max(0.0) as f32;
-        let gone = (knob("KM",BLEND_MM_S) * since) as f32;
+        let part = (1.0 - since / (BLEND_STEPS * step_s)).max(0.0) as f32;
+        let gone = (BLEND_MM_S * since) as f32;
         if part == 0.0 && self.longest <= gone {
             return;
         }
@@ -434,5 +434,3 @@ fn step_of(shared: &Published) -> Result<u64> {
         None => Err(Error::State("present: the scene keeps no moments".into())),
     }
 }
-
-pub fn knob(name: &str, or: f64) -> f64 { std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(or) }

@@ -65,7 +65,7 @@ impl Nodes {
             wanted += way.length_squared();
             known = true;
         }
-        known.then(|| (gone / wanted).clamp(-1.0, 1.5))
+        known.then(|| (gone / wanted).clamp(0.0, 1.0))
     }
 
     /// The change of the forces, in `dofs` and `change`, that takes the nodes from where the tissue is without them, `free`.

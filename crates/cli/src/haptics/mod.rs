@@ -18,6 +18,8 @@ mod truth;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 use tissue::mesh::{Boundary, Mesh};
@@ -32,7 +34,7 @@ use table::{Account, Row};
 
 #[derive(clap::Args)]
 #[command(
-    after_help = "Examples:\n  upt haptics onnx/brain-coarse-reduced --minutes 1\n  upt haptics onnx/brain-reduced --minutes 10 --reference 4 --markdown docs/guide/frames-and-haptics.md --plot force.svg"
+    after_help = "Examples:\n  upt haptics onnx/brain-coarse-reduced --minutes 1 --load 2\n  upt haptics onnx/brain-coarse-reduced --hours 24 --within 20\n  upt haptics onnx/brain-reduced --minutes 10 --reference 4 --markdown docs/guide/frames-and-haptics.md --plot force.svg"
 )]
 pub struct Options {
     /// Bundle folder with corrections.
@@ -40,6 +42,18 @@ pub struct Options {
     /// Simulated time, minutes.
     #[arg(long, default_value_t = 1.0)]
     minutes: f64,
+    /// The same in hours.
+    #[arg(long, conflicts_with = "minutes")]
+    hours: Option<f64>,
+    /// End after so many minutes of wall time, with what was simulated by then.
+    #[arg(long, value_name = "MINUTES")]
+    within: Option<f64>,
+    /// Threads that do nothing but keep the machine busy meanwhile.
+    #[arg(long, default_value_t = 0)]
+    load: usize,
+    /// Length of a step, ms, 10 to 50; by default the bundle's.
+    #[arg(long, value_name = "MS")]
+    step_ms: Option<f64>,
     /// Seconds of each gesture that the reference solver replays; 0: none.
     #[arg(long, default_value_t = 0.0)]
     reference: f64,
@@ -65,8 +79,9 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     if options.plot.is_some() && options.reference <= 0.0 {
         bail!("--plot shows the solver's force too: say for how many seconds with --reference");
     }
-    if !(options.minutes > 0.0 && options.minutes <= 10_000.0) {
-        bail!("--minutes is {}, must be above 0", options.minutes);
+    let minutes = options.hours.map_or(options.minutes, |hours| 60.0 * hours);
+    if !(minutes > 0.0 && minutes <= 10_000.0) {
+        bail!("--minutes is {minutes}, must be above 0 and at most 10000");
     }
     if !(0.0..=40.0).contains(&options.latency_ms) {
         bail!("--latency-ms is {}, must be 0 to 40", options.latency_ms);
@@ -82,9 +97,12 @@ pub fn run(options: &Options) -> Result<ExitCode> {
             Some(count) => Corrections::Fixed(count),
             None => Corrections::Recommended,
         },
+        step_s: options.step_ms.map_or(0.0, |ms| 1e-3 * ms),
         ..SceneOptions::default()
     };
-    let seconds = 60.0 * options.minutes;
+    let load = Load::start(options.load);
+    let started = Instant::now();
+    let seconds = 60.0 * minutes;
     let each: f64 = GESTURES.iter().map(|gesture| gesture.seconds).sum();
     let rounds = (seconds / each).ceil().max(1.0) as u64;
     let bar = progress(rounds as usize * GESTURES.len(), "gestures");
@@ -111,14 +129,51 @@ pub fn run(options: &Options) -> Result<ExitCode> {
             }
             bar.inc(1);
         }
+        account.end_round(round);
+        let spent = started.elapsed().as_secs_f64() / 60.0;
+        if options.within.is_some_and(|most| spent >= most) {
+            break;
+        }
     }
+    drop(load);
     bar.finish_and_clear();
     let text = table::markdown(&rows, &account, options.reference > 0.0);
     println!("{text}");
     if let Some(page) = &options.markdown {
-        write(page, &bundle.name, mesh.node_count(), options, &text)?;
+        let step_ms = 1e3 * scene_step(&model, &scene);
+        write(
+            page,
+            &bundle.name,
+            (mesh.node_count(), step_ms),
+            options,
+            &text,
+        )?;
     }
     Ok(ExitCode::from(u8::from(account.is_bad())))
+}
+
+/// Threads that spin until it is dropped.
+struct Load(Arc<AtomicBool>);
+
+impl Load {
+    fn start(threads: usize) -> Load {
+        let over = Arc::new(AtomicBool::new(false));
+        for _ in 0..threads {
+            let over = Arc::clone(&over);
+            std::thread::spawn(move || {
+                while !over.load(Ordering::Relaxed) {
+                    std::hint::spin_loop();
+                }
+            });
+        }
+        Load(over)
+    }
+}
+
+impl Drop for Load {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
 }
 
 /// Compares a gesture's row with the solver's forces on its way, and into the plot where it is the one that is shown.
@@ -143,15 +198,33 @@ fn compare(
     }
 }
 
-fn write(page: &Path, name: &str, nodes: usize, options: &Options, text: &str) -> Result<()> {
+/// The length of a step, s.
+fn scene_step(model: &Model, scene: &SceneOptions) -> f64 {
+    match scene.step_s {
+        0.0 => model.manifest.dt_s,
+        own => own,
+    }
+}
+
+fn write(
+    page: &Path,
+    name: &str,
+    (nodes, step_ms): (usize, f64),
+    options: &Options,
+    text: &str,
+) -> Result<()> {
     let machine = Machine::this();
     let lead = format!(
-        "\n`{name}`, {nodes} nodes, steps of 50 ms that arrive {} ms late, {} minutes of simulated time; {} ({} cores), busy with other work.\n\n",
-        options.latency_ms, options.minutes, machine.cpu, machine.cores
+        "\n`{name}`, {nodes} nodes, steps of {step_ms:.0} ms that arrive {} ms late; {} ({} cores), {} threads of load.\n\n",
+        options.latency_ms, machine.cpu, machine.cores, options.load
     );
+    let own = match options.step_ms {
+        Some(ms) => format!(" --step-ms {ms}"),
+        None => String::new(),
+    };
     replace_between(
         page,
-        &format!("upt haptics {name}"),
+        &format!("upt haptics {name}{own}"),
         &format!("{lead}{text}"),
     )
 }

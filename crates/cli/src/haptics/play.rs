@@ -12,9 +12,6 @@ use upt::{Contact, Model, Scene, SceneOptions, StepInput};
 use super::device::{Device, Random};
 use super::gesture::{Gesture, Site};
 
-/// Between steps, s.
-const STEP_S: f64 = 0.05;
-
 /// What happened at one tick.
 pub struct Tick {
     pub time_s: f64,
@@ -76,7 +73,7 @@ impl Player {
         seed: u64,
     ) -> Result<Track> {
         let scene = Scene::new(Arc::clone(&self.model), &self.options)?;
-        let count = self.tools.len();
+        let (count, step_s) = (self.tools.len(), scene.step_s());
         let mut devices: Vec<Device> = (0..count)
             .map(|tool| Device::new(site.wanted(gesture, tool, 0.0), gesture.stiffness))
             .collect();
@@ -104,7 +101,7 @@ impl Player {
                     tool.pose.translation = device.read();
                 }
                 waiting = Some(due + self.latency_s);
-                due += STEP_S;
+                due += step_s;
             }
             if waiting.is_some_and(|at| time >= at) {
                 waiting = None;

@@ -6,7 +6,11 @@ use contact::Vector;
 
 use super::play::Track;
 use super::truth::{FRAME_S, Forces, resample};
+use crate::report::memory::Resident;
 use crate::report::plot::{Axes, Scale, colour};
+
+/// Memory that may grow after the first rounds, MB: the allocator's own.
+const LEAK_MB: f64 = 32.0;
 
 /// A gesture over all its rounds.
 pub struct Row {
@@ -34,25 +38,76 @@ struct Against {
 /// All gestures together.
 #[derive(Default)]
 pub struct Account {
-    calls_us: Vec<f64>,
-    ticks: usize,
+    calls: Calls,
+    seconds: f64,
+    /// Memory after the second round, and how much more there is now, MB.
+    settled: Option<Resident>,
+    growth_mb: f64,
     given_j: f64,
     not_finite: usize,
     stuck: usize,
 }
 
+/// Times of calls in classes of 2 %: a day of them is not kept one by one.
+#[derive(Default)]
+struct Calls {
+    classes: Vec<u64>,
+    count: u64,
+    missed: u64,
+    largest: f64,
+}
+
+impl Calls {
+    const STEP: f64 = 1.02;
+
+    fn add(&mut self, us: f64) {
+        let class = (us.max(1e-3) / 1e-3).log(Self::STEP) as usize;
+        if class >= self.classes.len() {
+            self.classes.resize(class + 1, 0);
+        }
+        self.classes[class] += 1;
+        self.count += 1;
+        self.missed += u64::from(us > 1000.0);
+        self.largest = self.largest.max(us);
+    }
+
+    /// µs.
+    fn quantile(&self, part: f64) -> f64 {
+        let mut left = (part * self.count as f64) as u64;
+        for (class, count) in self.classes.iter().enumerate() {
+            if left < *count {
+                return 1e-3 * Self::STEP.powf(class as f64 + 0.5);
+            }
+            left -= count;
+        }
+        self.largest
+    }
+}
+
 impl Account {
     pub fn add(&mut self, track: &Track) {
-        self.calls_us.extend_from_slice(&track.calls_us);
-        self.ticks += track.ticks.len();
+        for &us in &track.calls_us {
+            self.calls.add(us);
+        }
+        self.seconds += track.ticks.last().map_or(0.0, |tick| tick.time_s);
         self.given_j += track.given_j;
         self.not_finite += track.not_finite;
         self.stuck += usize::from(track.stuck);
     }
 
-    /// A force that is no number, or that stays.
+    /// All gestures have been played once more.
+    pub fn end_round(&mut self, round: u64) {
+        // The first rounds fill buffers that stay.
+        match (&self.settled, round) {
+            (None, 1..) => self.settled = Some(Resident::now()),
+            (Some(settled), _) => self.growth_mb = settled.growth_mb(),
+            _ => {}
+        }
+    }
+
+    /// A force that is no number, or that stays, or memory that is not given back.
     pub fn is_bad(&self) -> bool {
-        self.not_finite + self.stuck > 0
+        self.not_finite + self.stuck > 0 || self.growth_mb > LEAK_MB
     }
 }
 
@@ -127,9 +182,11 @@ impl Row {
     }
 }
 
-fn quantile(sorted: &[f64], part: f64) -> f64 {
-    let at = (part * sorted.len() as f64) as usize;
-    sorted[at.min(sorted.len() - 1)]
+fn simulated(seconds: f64) -> String {
+    match seconds {
+        0.0..7200.0 => format!("{:.1} minutes", seconds / 60.0),
+        _ => format!("{:.1} hours", seconds / 3600.0),
+    }
 }
 
 /// The tables as Markdown.
@@ -169,21 +226,22 @@ pub fn markdown(rows: &[Row], account: &Account, compared: bool) -> String {
             );
         }
     }
-    let mut calls = account.calls_us.clone();
-    calls.sort_unstable_by(f64::total_cmp);
-    let missed = calls.iter().filter(|us| **us > 1000.0).count();
+    let calls = &account.calls;
     let _ = write!(
         text,
-        "\n{} calls: p50 {:.0} µs, p99 {:.0} µs, p99.9 {:.0} µs, largest {:.0} µs; {missed} took longer than 1 ms. Energy given in all: {:.4} mJ. \
-         Forces that are no numbers: {}. Gestures that end with a force: {}.\n",
-        calls.len(),
-        quantile(&calls, 0.5),
-        quantile(&calls, 0.99),
-        quantile(&calls, 0.999),
-        calls[calls.len() - 1],
+        "\n{} calls: p50 {:.0} µs, p99 {:.0} µs, p99.9 {:.0} µs, largest {:.0} µs; {} took longer than 1 ms. Simulated: {}. Energy given in all: {:.4} mJ. \
+         Forces that are no numbers: {}. Gestures that end with a force: {}. Memory grew by {:.1} MB.\n",
+        calls.count,
+        calls.quantile(0.5),
+        calls.quantile(0.99),
+        calls.quantile(0.999),
+        calls.largest,
+        calls.missed,
+        simulated(account.seconds),
         1e3 * account.given_j,
         account.not_finite,
-        account.stuck
+        account.stuck,
+        account.growth_mb
     );
     text
 }

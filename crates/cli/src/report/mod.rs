@@ -9,7 +9,7 @@ mod choose;
 pub mod errors;
 pub mod html;
 mod measure;
-mod memory;
+pub mod memory;
 pub mod method;
 mod paper_split;
 pub mod pictures;
