@@ -388,6 +388,18 @@ public:
     return check(upt_scene_present_points(handle_, seconds, instruments.data(), instruments.size(),
                                           out.data(), out.size()));
   }
+  /// The same with nodes where they are then, [m], [m,3], in place of instruments.
+  upt_status present_contacts(double seconds, span<const std::uint32_t> nodes,
+                              span<const float> vectors, span<float> out) {
+    return check(upt_scene_present_contacts(handle_, seconds, nodes.data(), vectors.data(),
+                                            nodes.size(), out.data(), out.size()));
+  }
+  /// The same at the attached points.
+  upt_status present_points_contacts(double seconds, span<const std::uint32_t> nodes,
+                                     span<const float> vectors, span<float> out) {
+    return check(upt_scene_present_points_contacts(handle_, seconds, nodes.data(), vectors.data(),
+                                                   nodes.size(), out.data(), out.size()));
+  }
   /// What the tissue did to each instrument of the last step; out has one element for each.
   upt_status readings(span<upt_instrument_reading> out) {
     for (upt_instrument_reading &reading : out) {
@@ -544,7 +556,7 @@ private:
 /// from where it is: the time that is lost makes no steps. Used by one thread.
 class FrameClock {
 public:
-  /// dt: the model's step, s (`model.info().dt`).
+  /// dt: the scene's step, s: `model.info().dt`, or `step_s` of its options.
   explicit FrameClock(double dt) : dt_(dt) {}
 
   /// One frame: takes a finished step, writes the tissue at `now` with the instruments where they

@@ -211,6 +211,38 @@ class Scene:
         check(lib.upt_scene_sample(self._handle, alpha, address(result), result.size))
         return result
 
+    def present(self, seconds: float, instruments: Sequence[Instrument], out: Floats | None = None) -> Floats:
+        """The tissue at a moment between steps, with the instruments where they are at that moment.
+
+        Args:
+            seconds: time since the last published step, 0 or more; it is followed for two steps at most.
+            instruments: as in `step_instruments`, at their poses of that moment.
+            out: as in `step`.
+
+        Returns:
+            `[n, 3]`, mm, in the region's order.
+
+        Raises:
+            upt.UnsupportedError: the scene does not correct; use `sample`.
+        """
+        array, count = records(instruments)
+        result = output(out, self.out_count)
+        check(lib.upt_scene_present(self._handle, seconds, array, count, address(result), result.size))
+        return result
+
+    def present_contacts(
+        self, seconds: float, nodes: ArrayLike = (), contact: ArrayLike = (), out: Floats | None = None
+    ) -> Floats:
+        """As `present`, with nodes `[m]` and where they are at that moment, `[m, 3]`, mm, in place of instruments."""
+        n, c = _contacts(nodes, contact)
+        result = output(out, self.out_count)
+        check(
+            lib.upt_scene_present_contacts(
+                self._handle, seconds, address(n), address(c), len(n), address(result), result.size
+            )
+        )
+        return result
+
     def set_region(self, nodes: ArrayLike | None) -> None:
         """Restricts what a step decodes and returns to these nodes `[n]`, in this order; None: all nodes."""
         chosen = indices(() if nodes is None else nodes, "nodes")

@@ -260,6 +260,37 @@ namespace Upt.Interop
             finally { Leave(); }
         }
 
+        /// <summary>As <see cref="Present"/>, with the first <paramref name="count"/> entries of a contact list, where the nodes are
+        /// then, in place of instruments.</summary>
+        public void PresentContacts(double seconds, uint[] nodes, float[] vectors, int count, float[] output)
+        {
+            RequireContacts(nodes, vectors, count);
+            IntPtr scene = Enter();
+            try
+            {
+                fixed (uint* n = nodes)
+                fixed (float* v = vectors)
+                fixed (float* o = output)
+                    Status.Check(Native.upt_scene_present_contacts(scene, seconds, n, v, (ulong)count, o, Length(output)));
+            }
+            finally { Leave(); }
+        }
+
+        /// <summary>The same at the attached points. The pointer may be a <c>NativeArray</c>'s.</summary>
+        public void PresentPointsContacts(double seconds, uint[] nodes, float[] vectors, int count, float* output, int floats)
+        {
+            RequireContacts(nodes, vectors, count);
+            IntPtr scene = Enter();
+            try
+            {
+                fixed (uint* n = nodes)
+                fixed (float* v = vectors)
+                    Status.Check(Native.upt_scene_present_points_contacts(scene, seconds, n, v, (ulong)count, output,
+                                                                          checked((ulong)floats)));
+            }
+            finally { Leave(); }
+        }
+
         /// <summary>One step from the scene's own state that the first <paramref name="count"/> instruments drive: their
         /// contact is solved. Throws <c>UPT_ERR_UNSUPPORTED</c> for a bundle without a linear response.</summary>
         public void StepInstruments(upt_instrument[] instruments, int count, float[] output)

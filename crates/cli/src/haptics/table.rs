@@ -9,6 +9,8 @@ use super::truth::{FRAME_S, Forces, resample};
 use crate::report::memory::Resident;
 use crate::report::plot::{Axes, Scale, colour};
 
+/// Samples of a mean, ms.
+const MEAN: usize = 11;
 /// Memory that may grow after the first rounds, MB: the allocator's own.
 const LEAK_MB: f64 = 32.0;
 
@@ -31,6 +33,10 @@ struct Against {
     /// Relative L2 error of the force, and of the last step's force held.
     error: f64,
     held: f64,
+    /// The first of means over [`MEAN`] samples: impulses of the solver's contact left out.
+    mean_error: f64,
+    /// How far the solver's own forces are from their means.
+    noise: f64,
     /// Largest change within a millisecond: rendered and the solver's, N.
     jumps: [f32; 2],
 }
@@ -117,6 +123,16 @@ fn forces(track: &Track, tool: usize, count: usize) -> Vec<Vector> {
     (0..count).map(at).collect()
 }
 
+/// Each sample's mean with its neighbours.
+fn means(forces: &[Vector]) -> Vec<Vector> {
+    let half = MEAN / 2;
+    let at = |k: usize| {
+        let near = &forces[k.saturating_sub(half)..(k + half + 1).min(forces.len())];
+        near.iter().sum::<Vector>() / near.len() as f32
+    };
+    (0..forces.len()).map(at).collect()
+}
+
 fn largest_change(forces: &[Vector]) -> f32 {
     let pairs = forces.windows(2);
     pairs
@@ -161,6 +177,7 @@ impl Row {
     pub fn compare(&mut self, track: &Track, truth: &Forces) {
         let square = |v: Vector| f64::from(v.length_squared());
         let (mut off, mut held, mut size) = (0.0, 0.0, 0.0);
+        let (mut mean_off, mut noise) = (0.0, 0.0);
         let mut jumps = [0.0f32; 2];
         for tool in 0..truth[0].len() {
             let felt = forces(track, tool, truth.len());
@@ -171,12 +188,19 @@ impl Row {
                 held += square(told - *real);
                 size += square(*real);
             }
+            let means = [means(&felt), means(&real)];
+            for ((felt, mean), real) in means[0].iter().zip(&means[1]).zip(&real) {
+                mean_off += square(*felt - *mean);
+                noise += square(*real - *mean);
+            }
             jumps[0] = jumps[0].max(largest_change(&felt));
             jumps[1] = jumps[1].max(largest_change(&real));
         }
         self.against = Some(Against {
             error: (off / size).sqrt(),
             held: (held / size).sqrt(),
+            mean_error: (mean_off / size).sqrt(),
+            noise: (noise / size).sqrt(),
             jumps,
         });
     }
@@ -208,7 +232,7 @@ pub fn markdown(rows: &[Row], account: &Account, compared: bool) -> String {
         );
     }
     if compared {
-        text += "\n| against the solver | force error, relative L2 | the last step's force held | largest change in 1 ms: rendered / solver, mN | ratio |\n|---|---|---|---|---|\n";
+        text += "\n| against the solver | force error, relative L2 | of means over 11 ms | the solver's own noise about those | the last step's force held | largest change in 1 ms: rendered / solver, mN | ratio |\n|---|---|---|---|---|---|---|\n";
         for row in rows {
             let Some(against) = &row.against else {
                 continue;
@@ -216,9 +240,11 @@ pub fn markdown(rows: &[Row], account: &Account, compared: bool) -> String {
             let [felt, real] = against.jumps;
             let _ = writeln!(
                 text,
-                "| {} | {:.1} % | {:.1} % | {:.2} / {:.2} | {:.2} |",
+                "| {} | {:.1} % | {:.1} % | {:.1} % | {:.1} % | {:.2} / {:.2} | {:.2} |",
                 row.name,
                 100.0 * against.error,
+                100.0 * against.mean_error,
+                100.0 * against.noise,
                 100.0 * against.held,
                 1e3 * felt,
                 1e3 * real,
