@@ -11,10 +11,14 @@ pub struct Body {
     pub forces: ElementForces,
     /// Lumped mass `[K]`, g.
     pub mass: Vec<f32>,
+    /// The same by degree of freedom `[3K]`.
+    pub mass_of_dof: Vec<f32>,
     /// Inverse of each node's block of `K + kappa M`, symmetric: xx, xy, xz, yy, yz, zz; mm/µN.
     pub inverse_blocks: Vec<[f32; 6]>,
     /// Held nodes `[K]`.
     pub held: Vec<bool>,
+    /// The same as a list, ascending.
+    pub held_nodes: Vec<u32>,
 }
 
 impl Body {
@@ -52,9 +56,13 @@ impl Body {
         for &node in &mesh.held_nodes {
             held[node as usize] = true;
         }
+        let mass: Vec<f32> = mass.into_iter().map(|mass| mass as f32).collect();
+        let ascending = (0..count as u32).filter(|node| held[*node as usize]);
         Body {
+            held_nodes: ascending.collect(),
+            mass_of_dof: mass.iter().flat_map(|&mass| [mass; 3]).collect(),
             forces: ElementForces::new(body, material, simd(isa)),
-            mass: mass.into_iter().map(|mass| mass as f32).collect(),
+            mass,
             inverse_blocks,
             held,
         }
@@ -62,7 +70,7 @@ impl Body {
 
     /// Bytes held.
     pub fn memory_bytes(&self) -> usize {
-        self.forces.bytes() + self.mass.len() * (4 + 24 + 1)
+        self.forces.bytes() + self.mass.len() * (4 + 12 + 24 + 1) + 4 * self.held_nodes.len()
     }
 }
 

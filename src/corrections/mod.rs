@@ -13,6 +13,7 @@ mod input;
 mod loaded;
 mod memory;
 mod motion;
+mod passes;
 mod precondition;
 mod space;
 mod stage;
@@ -74,7 +75,7 @@ impl Corrections {
         let (entry, prior) = needed(manifest, prior)?;
         let material = &manifest.material;
         // Made of many lists: what they take together is asked for first.
-        let bytes = 160 * mesh.tets.len() / 4 + 200 * mesh.node_count();
+        let bytes = 160 * mesh.tets.len() / 4 + 212 * mesh.node_count();
         crate::memory::probe(bytes, "the elements of the corrections")?;
         let integrator = Integrator {
             step_s: manifest.dt_s,

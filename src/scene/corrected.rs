@@ -162,7 +162,7 @@ impl Core {
                 .correct(lent, &input, &mut self.next.field)?;
             corrected.tell(&report, stats);
         } else {
-            corrected.stage.follow(lent, &input, &self.next.field);
+            corrected.stage.follow(lent, &input, &self.next.field)?;
         }
         drop(shared);
         stats.corrections_ms = watch.lap();
