@@ -70,7 +70,7 @@ fn measured(model: &Model, isa: Isa, pool: &Pool) -> upt::Result<Vec<Part>> {
     let (mut partial, mut sums) = (PartialSums::default(), [0.0f64; PAIRS]);
     let factors = [0.1f32; PAIRS];
     let mut sum = wave(3);
-    let mut once = |run: &mut dyn FnMut()| 1e3 * medians(&mut [Box::new(run)])[0];
+    let once = |run: &mut dyn FnMut()| 1e3 * medians(&mut [Box::new(run)])[0];
     let times = [
         once(&mut || {
             forces.evaluate(&u, &mut scratch, &mut out, &|count, task| {

@@ -256,9 +256,9 @@ impl Delassus {
                     end += 1;
                 }
                 if is_known {
-                    for column in start..end {
-                        row[column] =
-                            self.a_before[was as usize * order_before + before(column) as usize];
+                    let line = &self.a_before[was as usize * order_before..][..order_before];
+                    for (value, column) in row[start..end].iter_mut().zip(start..) {
+                        *value = line[before(column) as usize];
                     }
                 } else {
                     for (mode, lost) in held_back.iter().enumerate() {

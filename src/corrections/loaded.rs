@@ -64,6 +64,7 @@ impl Stage {
                 self.stop_next();
             }
             self.next.min_det = report.min_det;
+            self.estimate(&mut report);
         }
         (self.u, self.g) = (u, g);
         result.map(|()| report)
@@ -96,7 +97,7 @@ impl Stage {
             size = self.unbalanced(env, problem, at.g)?;
             let moved = self.moved / (at.u.len() / 3) as f64;
             report.remaining_mm = (moved.sqrt() * size / before.max(f64::MIN_POSITIVE)) as f32;
-            if report.remaining_mm < input.enough.remaining_mm {
+            if self.suffices(report.remaining_mm, input.enough) {
                 break;
             }
         }

@@ -8,7 +8,9 @@
 //! Displacements mm, forces µN, masses g, times s.
 
 mod body;
+mod estimate;
 mod input;
+mod integrate;
 #[cfg(feature = "contact")]
 mod loaded;
 mod memory;

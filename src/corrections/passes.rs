@@ -49,6 +49,20 @@ impl<'a> Sums<'a> {
     }
 }
 
+/// Sum of the squares of `value(0..count)`, in lanes.
+pub(super) fn sum_of_squares(count: usize, value: impl Fn(usize) -> f32) -> f32 {
+    let mut lanes = [0.0f32; 16];
+    let whole = count / 16 * 16;
+    for start in (0..whole).step_by(16) {
+        for (lane, sum) in lanes.iter_mut().enumerate() {
+            let value = value(start + lane);
+            *sum += value * value;
+        }
+    }
+    let rest = (whole..count).map(|at| value(at).powi(2));
+    lanes.into_iter().sum::<f32>() + rest.sum::<f32>()
+}
+
 /// `r += sum_i factors_i ys_i`, `t = w D^-1 r`, `work_i = ys_i . t`.
 pub(super) fn smooth(
     env: Env<'_>,

@@ -2,14 +2,12 @@
 
 use std::time::Instant;
 
-use super::Integrator;
 use super::input::{Input, Lent, Report};
 use super::memory::{Memory, PAIRS};
 use super::motion::Motion;
 use super::passes;
 use super::precondition::{Env, Preconditioner, mask, mask_held, pooled};
 use crate::error::{Error, Result};
-use crate::kernels::parts::Parts;
 use crate::kernels::vectors::{PartialSums, dots};
 use crate::memory;
 use crate::scene::ContactSet;
@@ -161,76 +159,6 @@ impl Stage {
         self.finish(lent, input, next)
     }
 
-    /// Inertia and damping of the step at the last displacement.
-    pub(super) fn prepare(&mut self, lent: Lent<'_>, input: &Input<'_>) -> Result<()> {
-        let env = lent.env();
-        let (last, before) = (input.last, input.before);
-        let known = if input.still { 0.0 } else { 1.0 };
-        let Integrator {
-            step_s,
-            damping_per_s,
-        } = lent.corrections.integrator;
-        let (half, alpha) = ((0.5 / step_s) as f32, damping_per_s as f32);
-        let (mass, motion) = (&env.body.mass_of_dof, &self.motion);
-        let len = self.drift.len();
-        let drift = Parts::new(&mut self.drift);
-        passes::each(env.pool, len, 6, |range, _| {
-            // SAFETY: this part belongs to this piece alone.
-            let drift = unsafe { drift.part(range.start, range.len()) };
-            let (last, before) = (&last[range.clone()], &before[range.clone()]);
-            let velocity = &motion.velocity[range.clone()];
-            let velocity_before = &motion.velocity_before[range.clone()];
-            let mass = &mass[range];
-            for i in 0..drift.len() {
-                let v = (before[i] - last[i]) * half;
-                let v_n = known * velocity[i];
-                let v_before = known * velocity_before[i];
-                let a = (3.0 * (v - v_n) - (v_n - v_before)) * half;
-                drift[i] = mass[i] * (a + alpha * v);
-            }
-        })
-    }
-
-    /// Velocity and inertia at `next`, the end of the step from `last`.
-    pub(super) fn finish(&mut self, lent: Lent<'_>, input: &Input<'_>, next: &[f32]) -> Result<()> {
-        let env = lent.env();
-        let (last, before) = (input.last, input.before);
-        let Integrator {
-            step_s,
-            damping_per_s,
-        } = lent.corrections.integrator;
-        let (half, alpha) = ((0.5 / step_s) as f32, damping_per_s as f32);
-        let known = if input.still { 0.0 } else { 1.0 };
-        let (mass, motion) = (&env.body.mass_of_dof, &self.motion);
-        let own = &mut self.next;
-        let outputs = [
-            Parts::new(&mut own.velocity),
-            Parts::new(&mut own.velocity_before),
-            Parts::new(&mut own.inertia),
-        ];
-        passes::each(env.pool, next.len(), 9, |range, _| {
-            // SAFETY: these parts belong to this piece alone.
-            let [velocity, velocity_before, inertia] =
-                [0, 1, 2].map(|i| unsafe { outputs[i].part(range.start, range.len()) });
-            let (last, before) = (&last[range.clone()], &before[range.clone()]);
-            let known_v = &motion.velocity[range.clone()];
-            let known_before = &motion.velocity_before[range.clone()];
-            let (next, mass) = (&next[range.clone()], &mass[range]);
-            for i in 0..next.len() {
-                let v = (3.0 * (next[i] - last[i]) - (last[i] - before[i])) * half;
-                let v_n = known * known_v[i];
-                let v_before = known * known_before[i];
-                let a = (3.0 * (v - v_n) - (v_n - v_before)) * half;
-                velocity[i] = v;
-                velocity_before[i] = v_n;
-                inertia[i] = mass[i] * (a + alpha * v);
-            }
-        })?;
-        own.min_det = 1.0;
-        own.reaction.clear();
-        Ok(())
-    }
-
     /// `r(u)` to `out`, zero at held and prescribed nodes; returns the smallest det F and `r . d` with a field that is zero there.
     pub(super) fn residual(
         &mut self,
@@ -304,6 +232,7 @@ impl Stage {
                 self.stop_next();
             }
             self.next.min_det = report.min_det;
+            self.estimate(&mut report);
         }
         let result = result.and_then(|()| self.take_reaction(lent, input.contact, &g));
         (self.u, self.g) = (u, g);
@@ -434,7 +363,7 @@ impl Stage {
             det = self.improve(lent, input.last, u, g, det, report)?;
             report.iterations += 1;
             report.remaining_mm = self.remaining(env, g, size)?;
-            if report.remaining_mm < input.enough.remaining_mm {
+            if self.suffices(report.remaining_mm, input.enough) {
                 break;
             }
         }
@@ -448,13 +377,6 @@ impl Stage {
         report.residual = (end / start.max(f64::MIN_POSITIVE)) as f32;
         report.min_det = det;
         Ok(())
-    }
-
-    /// What a further iteration would move, from the last one's step and by how much it lessened the residual, mm.
-    fn remaining(&mut self, env: Env<'_>, g: &[f32], before: f64) -> Result<f32> {
-        let moved = passes::square(env, &self.d, &mut self.partial)? / (self.d.len() / 3) as f64;
-        let left = self.size(env, g)? / before.max(f64::MIN_POSITIVE);
-        Ok((moved.sqrt() * left) as f32)
     }
 
     /// One iteration: `u`, its residual `g` and its smallest det F become those of a better state.

@@ -25,7 +25,7 @@ use crate::memory;
 use bytes::{Reader, Writer};
 
 const MAGIC: &[u8; 8] = b"UPTSNAP\0";
-const VERSION: u32 = 5;
+const VERSION: u32 = 6;
 const DIGEST: usize = 32;
 
 /// L-BFGS pairs.
@@ -122,7 +122,8 @@ impl Core {
                 w.floats(&stage.motion.velocity);
                 w.floats(&stage.motion.velocity_before);
                 w.floats(&stage.motion.inertia);
-                w.floats(&[stage.motion.min_det]);
+                let motion = &stage.motion;
+                w.floats(&[motion.min_det, motion.truncated_mm, motion.error_mm]);
                 // The guard may have dropped the contact that they belonged to.
                 let contacts = 3 * self.contact.len();
                 w.u32(contacts as u32);

@@ -88,7 +88,7 @@ fn row(bench: &Bench, k: u32, steps: usize) -> Result<Row> {
         ..SceneOptions::default()
     };
     let scene = Scene::new(Arc::clone(&bench.model), &options)?;
-    let mut yard = Yard::new(&bench.mesh, bench.boundary);
+    let yard = Yard::new(&bench.mesh, bench.boundary);
     let faces = bench.domain.face_count();
     let sites = (0..16).map(|at| bench.patch(at * faces / 16, bench.area));
     let sites = sites.collect::<Result<Vec<_>>>()?;
