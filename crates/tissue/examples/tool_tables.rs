@@ -1,8 +1,7 @@
 //! Writes the tables of contact with tools in docs/results/reference-solver.md:
 //! `cargo run --release -p tissue --example tool_tables`.
 //!
-//! The text between `<!-- hertz -->`, `<!-- tools -->` or `<!-- penetration -->` and the next `<!-- end -->` is replaced; names after
-//! `--` choose some of them.
+//! The text between `<!-- tools -->` or `<!-- hertz -->` and the next `<!-- end -->` is replaced.
 
 use contact::{Body, Pose, Rotation, Samples, Shape, Vector};
 use std::error::Error;
@@ -19,16 +18,7 @@ fn main() -> Outcome<()> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let page = root.join("docs/results/reference-solver.md");
     let brain = Mesh::read(&root.join("onnx/meshes/brain-coarse.mesh.safetensors"))?;
-    let asked: Vec<String> = std::env::args().skip(1).collect();
-    for marker in ["hertz", "tools", "penetration"] {
-        if !asked.is_empty() && !asked.iter().any(|name| name == marker) {
-            continue;
-        }
-        let table = match marker {
-            "hertz" => half_space()?,
-            "tools" => properties(&brain)?,
-            _ => penetration_over_time(&brain)?,
-        };
+    for (marker, table) in [("hertz", half_space()?), ("tools", properties(&brain)?)] {
         print!("{table}");
         let text = std::fs::read_to_string(&page)?;
         std::fs::write(&page, replace(&text, marker, &table)?)?;
@@ -178,46 +168,19 @@ fn properties(brain: &Mesh) -> Outcome<String> {
         "| undamped block, frictionless press of 3 mm and release: energy above the tool's work | {:+.3} % of the largest energy at most |\n",
         100.0 * energy_gain()?
     );
+    for name in ["press", "stroke", "retract", "poke", "lift", "wobble"] {
+        let case = ToolCase::new(name.parse()?, brain, 1, None)?;
+        let deepest = penetration(brain, &case)?;
+        table += &format!(
+            "| coarse brain, `{name}`, seed 1: deepest point of 1 mm samples in the tool over all frames | {deepest:.3} mm |\n"
+        );
+    }
     for name in ["press", "stroke", "two"] {
         let case = ToolCase::new(name.parse()?, brain, 1, None)?;
         let [coarse, usual, fine] = spacing(brain, &case)?;
         table += &format!(
             "| coarse brain, `{name}`, seed 1: MSE of samples 2.8, 1.7 and 0.85 mm apart against 0.42 mm | {coarse:.1e}, {usual:.1e}, {fine:.1e} mm² |\n"
         );
-    }
-    Ok(table)
-}
-
-/// Deepest point of 1 mm samples by programme, over all frames and in each part of the time.
-fn penetration_over_time(brain: &Mesh) -> Outcome<String> {
-    // Frames a column: 0.4 s.
-    const FRAMES: usize = 8;
-    let names = [
-        "press", "stroke", "retract", "poke", "lift", "two", "wobble", "edge",
-    ];
-    let mut rows = Vec::new();
-    for name in names {
-        let case = ToolCase::new(name.parse()?, brain, 1, None)?;
-        rows.push((name, penetration(brain, &case)?));
-    }
-    let columns = rows.iter().map(|(_, series)| series.len().div_ceil(FRAMES));
-    let columns = columns.max().unwrap_or(0);
-    let mut table = String::from("| programme, seed 1 | deepest, mm |");
-    for column in 1..=columns {
-        table += &format!(" {:.1} s |", (column * FRAMES) as f64 * FRAME_S);
-    }
-    table += &format!("\n|---{}|\n", "|---:".repeat(columns + 1));
-    let deepest = |part: &[f32]| part.iter().fold(0.0f32, |most, depth| most.max(*depth));
-    for (name, series) in rows {
-        table += &format!("| `{name}` | {:.3} |", deepest(&series));
-        let mut parts = series.chunks(FRAMES);
-        for _ in 0..columns {
-            table += &match parts.next() {
-                Some(part) => format!(" {:.3} |", deepest(part)),
-                None => " |".into(),
-            };
-        }
-        table.push('\n');
     }
     Ok(table)
 }
@@ -244,14 +207,13 @@ fn apart(mesh: &Mesh, spacing: f32) -> Samples {
     Samples::of_domain(positions, surface, &mesh.domain, &mesh.fixed, spacing)
 }
 
-/// Deepest point, mm, of samples 1 mm apart at each frame's end.
-fn penetration(mesh: &Mesh, case: &ToolCase) -> Outcome<Vec<f32>> {
+/// Deepest point, mm, of samples 1 mm apart at the frames' ends.
+fn penetration(mesh: &Mesh, case: &ToolCase) -> Outcome<f32> {
     let dense = apart(mesh, 1.0);
     let bodies = case.tools.iter().map(|t| Body::new(&t.shape));
     let bodies: Vec<Body> = bodies.collect::<Result<_, _>>()?;
-    let mut series = Vec::new();
+    let mut deepest = 0.0f32;
     run(mesh, mesh.samples(Boundary::Fixed), case, |u, poses| {
-        let mut deepest = 0.0f32;
         let position =
             |n: u32| Vector::from(mesh.positions[n as usize]) + Vector::from(u[n as usize]);
         for sample in dense.rows() {
@@ -260,9 +222,8 @@ fn penetration(mesh: &Mesh, case: &ToolCase) -> Outcome<Vec<f32>> {
                 deepest = deepest.max(-body.nearest_at(&to.pose, point).distance);
             }
         }
-        series.push(deepest);
     })?;
-    Ok(series)
+    Ok(deepest)
 }
 
 /// Mean squared difference, mm², of spacings from the finest.
