@@ -211,6 +211,36 @@ class Scene:
         check(lib.upt_scene_sample(self._handle, alpha, address(result), result.size))
         return result
 
+    def present(self, seconds: float, instruments: Sequence[Instrument] = (), out: Floats | None = None) -> Floats:
+        """The tissue at this moment, between steps, with the instruments where they are now: frames without lag.
+
+        Works beside a step in flight; the first call comes before the first submit. Another thread may step meanwhile.
+
+        Args:
+            seconds: time since the last published step, 0 or more; velocities are followed for two steps at most.
+            instruments: as in `step_instruments`, where they are at this moment.
+            out: `[n, 3]` to write to, in the region's order.
+
+        Returns:
+            `[n, 3]`, mm.
+
+        Raises:
+            upt.UnsupportedError: the scene has no linear response or does not correct; use `sample`.
+        """
+        array, count = records(instruments)
+        result = output(out, self.out_count)
+        check(lib.upt_scene_present(self._handle, seconds, array, count, address(result), result.size))
+        return result
+
+    def present_points(
+        self, seconds: float, instruments: Sequence[Instrument] = (), out: Floats | None = None
+    ) -> Floats:
+        """As `present`, at the attached points."""
+        array, count = records(instruments)
+        result = output(out, self._point_count)
+        check(lib.upt_scene_present_points(self._handle, seconds, array, count, address(result), result.size))
+        return result
+
     def set_region(self, nodes: ArrayLike | None) -> None:
         """Restricts what a step decodes and returns to these nodes `[n]`, in this order; None: all nodes."""
         chosen = indices(() if nodes is None else nodes, "nodes")

@@ -141,10 +141,20 @@ class Browser:
 
     def drag(self, points: list[tuple[int, int]], release: bool) -> None:
         """The left button pressed at the first point, moved through the others, 100 ms each."""
-        move = [{"type": "pointerMove", "duration": 100, "x": x, "y": y, "origin": "viewport"} for x, y in points]
+        move = self._moves(points)
         actions = [move[0], {"type": "pointerDown", "button": 0}, *move[1:]]
         if release:
             actions.append({"type": "pointerUp", "button": 0})
+        self._act(actions)
+
+    def move(self, points: list[tuple[int, int]]) -> None:
+        """On through more points with the button as it is, 100 ms each."""
+        self._act(self._moves(points))
+
+    def _moves(self, points: list[tuple[int, int]]) -> list[dict]:
+        return [{"type": "pointerMove", "duration": 100, "x": x, "y": y, "origin": "viewport"} for x, y in points]
+
+    def _act(self, actions: list[dict]) -> None:
         mouse = {"type": "pointer", "id": "mouse", "parameters": {"pointerType": "mouse"}, "actions": actions}
         self._call("POST", f"/session/{self.session}/actions", {"actions": [mouse]})
 
