@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import glob
 import json
 import os
 import shutil
@@ -90,6 +91,13 @@ class RawClient:
         self.socket.close()
 
 
+def drawing() -> list[str]:
+    """How a browser draws 3D without a graphics card: by Mesa where it is installed, twice as fast as Chromium's own SwiftShader."""
+    if glob.glob("/usr/lib/*/libEGL_mesa.so.0") and glob.glob("/usr/lib/*/dri/swrast_dri.so"):
+        return ["--use-gl=angle", "--use-angle=gl-egl", "--ignore-gpu-blocklist", "--disable-gpu-compositing"]
+    return ["--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+
+
 class Browser:
     """Headless Chromium by chromedriver."""
 
@@ -103,8 +111,8 @@ class Browser:
             self.port = free.getsockname()[1]
         command = [driver, f"--port={self.port}"]
         self.driver = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.STDOUT)
-        arguments = ["--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--use-angle=swiftshader"]
-        arguments += ["--enable-unsafe-swiftshader", "--hide-scrollbars", f"--window-size={width},{height}"]
+        arguments = ["--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--hide-scrollbars"]
+        arguments += [*drawing(), f"--window-size={width},{height}"]
         options = {"binary": browser, "args": arguments}
         wanted = {"capabilities": {"alwaysMatch": {"goog:chromeOptions": options}}}
         for _ in range(100):

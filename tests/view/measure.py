@@ -3,8 +3,8 @@
     python3 tests/view/measure.py --bundle onnx/brain-reduced --markdown docs/guide/view.md
 
 The mouse presses the middle of the page and strokes to and fro, by chromedriver. A picture counts when its last pixel is drawn
-(`readPixels` waits for it); the mouse's time is the event's own. Chromium draws by software (SwiftShader), so that page, library
-and drawing share the same cores. `--markdown` writes the table between the page's marks.
+(`readPixels` waits for it); the mouse's time is the event's own. Without a graphics card Chromium draws by the processor, so that page,
+library and drawing share the same cores. `--markdown` writes the table between the page's marks.
 """
 
 from __future__ import annotations

@@ -24,7 +24,7 @@ const MOST_MESSAGES: usize = 64;
 const MOST_CONNECTIONS: usize = 16;
 
 /// What the page is made of.
-const FILES: [(&str, &str, &[u8]); 4] = [
+const FILES: [(&str, &str, &[u8]); 5] = [
     (
         "/",
         "text/html; charset=utf-8",
@@ -34,6 +34,11 @@ const FILES: [(&str, &str, &[u8]); 4] = [
         "/view.js",
         "text/javascript",
         include_bytes!("page/view.js"),
+    ),
+    (
+        "/drawing.js",
+        "text/javascript",
+        include_bytes!("page/drawing.js"),
     ),
     (
         "/gltf.js",

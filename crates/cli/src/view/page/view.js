@@ -1,6 +1,7 @@
 // The page of `upt view`: shows the surface that the server streams, sends the tool that the mouse drags.
 // What the two say to each other: protocol.rs. Each picture asks for the frame of the next one.
 import * as three from "./three.js";
+import { finish, makeRenderer, software, steelMaterial, tissueMaterial, turnNormals } from "./drawing.js";
 import { gltf } from "./gltf.js";
 
 const HEADER = 24;
@@ -17,7 +18,7 @@ const show = (id, text) => {
   if (at(id).textContent !== text) at(id).textContent = text;
 };
 
-const renderer = new three.WebGLRenderer({ canvas: at("picture"), antialias: true });
+const renderer = makeRenderer(at("picture"));
 const scene = new three.Scene();
 scene.background = new three.Color(0x16181d);
 const camera = new three.PerspectiveCamera(35, 1, 1, 5000);
@@ -39,7 +40,7 @@ let latest; // the frame that has come and is not shown yet
 let told = 0; // when the readouts were written
 const sent = new Map(); // sequence: when the mouse was there, until it is seen
 const pictures = []; // when the last ones were shown
-const status = { shown: 0, largest: 0, force: 0, contacts: 0, latency: [], made: [], intervals: [], steps: 0, sequence: 0 };
+const status = { shown: 0, largest: 0, force: 0, contacts: 0, latency: [], made: [], intervals: [], steps: 0, sequence: 0, software };
 window.uptView = status; // for tests
 
 const socket = new WebSocket(`ws://${location.host}/socket${location.search}`);
@@ -82,10 +83,10 @@ function build(data) {
   }
   middle.divideScalar(domain.reduce((sum, x) => sum + x, 0));
   moving.setAttribute("color", new three.BufferAttribute(restColours.slice(), 3));
-  surface = new three.Mesh(moving, new three.MeshStandardMaterial({ vertexColors: true, roughness: 0.55 }));
+  surface = new three.Mesh(moving, tissueMaterial());
   surface.frustumCulled = false;
   rest = new three.Mesh(geometry(restPositions), surface.material);
-  tool = new three.Mesh(new three.CapsuleGeometry(1, 1), new three.MeshStandardMaterial({ color: 0x9fb4c8, metalness: 0.6, roughness: 0.35 }));
+  tool = new three.Mesh(new three.CapsuleGeometry(1, 1), steelMaterial());
   tool.visible = false;
   scene.add(surface, tool);
   const { center, radius } = rest.geometry.boundingSphere;
@@ -115,7 +116,7 @@ function take(data) {
     colours[i + 1] = restColours[i + 1] + share * (RED.g - restColours[i + 1]);
     colours[i + 2] = restColours[i + 2] + share * (RED.b - restColours[i + 2]);
   }
-  turnNormals();
+  turnNormals(surface.geometry);
   position.needsUpdate = true;
   color.needsUpdate = true;
   status.sequence = words[0];
@@ -133,45 +134,6 @@ function take(data) {
   status.errorMm = numbers[13];
   status.penetration = numbers[14];
   placeTool(words[15] !== 0, numbers.subarray(16));
-}
-
-// Normals of the corners: the sum of their faces' normals, each as long as its face is large.
-function turnNormals() {
-  const { position, normal } = surface.geometry.attributes;
-  const p = position.array;
-  const n = normal.array;
-  const faces = surface.geometry.index.array;
-  n.fill(0);
-  for (let f = 0; f < faces.length; f += 3) {
-    const a = 3 * faces[f];
-    const b = 3 * faces[f + 1];
-    const c = 3 * faces[f + 2];
-    const ux = p[b] - p[a];
-    const uy = p[b + 1] - p[a + 1];
-    const uz = p[b + 2] - p[a + 2];
-    const vx = p[c] - p[a];
-    const vy = p[c + 1] - p[a + 1];
-    const vz = p[c + 2] - p[a + 2];
-    const x = uy * vz - uz * vy;
-    const y = uz * vx - ux * vz;
-    const z = ux * vy - uy * vx;
-    n[a] += x;
-    n[a + 1] += y;
-    n[a + 2] += z;
-    n[b] += x;
-    n[b + 1] += y;
-    n[b + 2] += z;
-    n[c] += x;
-    n[c + 1] += y;
-    n[c + 2] += z;
-  }
-  for (let i = 0; i < n.length; i += 3) {
-    const length = Math.sqrt(n[i] * n[i] + n[i + 1] * n[i + 1] + n[i + 2] * n[i + 2]) || 1;
-    n[i] /= length;
-    n[i + 1] /= length;
-    n[i + 2] /= length;
-  }
-  normal.needsUpdate = true;
 }
 
 // The tool as it is in the frame: dragged, or replayed.
@@ -299,13 +261,6 @@ at("save").addEventListener("click", () => {
   link.click();
 });
 
-// A picture is there when its last pixel is: what follows waits for it. For measurements alone.
-const pixel = new Uint8Array(4);
-function finish() {
-  const gl = renderer.getContext();
-  gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
-}
-
 const keep = (list, value) => {
   list.push(value);
   if (list.length > 2000) list.shift();
@@ -334,7 +289,7 @@ renderer.setAnimationLoop((now) => {
   controls.update();
   renderer.render(scene, camera);
   if (!data) return;
-  if (status.finish) finish();
+  if (status.finish) finish(renderer);
   const when = seen();
   if (when !== undefined) keep(status.latency, performance.now() - when);
   keep(status.made, status.frameMs);
