@@ -92,7 +92,7 @@ class RawClient:
 
 
 def drawing() -> list[str]:
-    """How a browser draws 3D without a graphics card: by Mesa where it is installed, twice as fast as Chromium's own SwiftShader."""
+    """How 3D is drawn without a graphics card: by Mesa where it is there, twice as fast as Chromium's SwiftShader."""
     if glob.glob("/usr/lib/*/libEGL_mesa.so.0") and glob.glob("/usr/lib/*/dri/swrast_dri.so"):
         return ["--use-gl=angle", "--use-angle=gl-egl", "--ignore-gpu-blocklist", "--disable-gpu-compositing"]
     return ["--use-angle=swiftshader", "--enable-unsafe-swiftshader"]

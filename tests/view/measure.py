@@ -2,9 +2,9 @@
 
     python3 tests/view/measure.py --bundle onnx/brain-reduced --markdown docs/guide/view.md
 
-The mouse presses the middle of the page and strokes to and fro, by chromedriver. A picture counts when its last pixel is drawn
-(`readPixels` waits for it); the mouse's time is the event's own. Without a graphics card Chromium draws by the processor, so that page,
-library and drawing share the same cores. `--markdown` writes the table between the page's marks.
+The mouse presses the middle of the page and strokes to and fro, by chromedriver. A picture counts when its last pixel
+is drawn (`readPixels` waits for it); the mouse's time is the event's own. Without a graphics card Chromium draws by the
+processor, so that page, library and drawing share the same cores. `--markdown` writes the table between the marks.
 """
 
 from __future__ import annotations
@@ -69,7 +69,8 @@ def stroke(browser: Browser, seconds: float) -> dict:
         forces.append(now[1])
     found = browser.run(
         "return {pictures: uptView.shown - uptView.before, ms: performance.now() - uptView.begun, "
-        "latency: uptView.latency, intervals: uptView.intervals, made: uptView.made, steps: uptView.steps - uptView.steps0}"
+        "latency: uptView.latency, intervals: uptView.intervals, made: uptView.made, "
+        "steps: uptView.steps - uptView.steps0}"
     )
     used = [processor_seconds(browser.driver.pid), processor_seconds(os.getpid())]
     browser.release()
@@ -104,19 +105,26 @@ def main() -> None:
         browser.close()
     rate = 1000 * found["pictures"] / found["ms"]
     middle = statistics.median
+    size = f"{arguments.width} x {arguments.height} pixels"
+    drag = (
+        f"{found['ms'] / 1000:.0f} s of strokes ({found['steps']} steps, median force {middle(found['force']):.0f} mN)"
+    )
+
+    def row(what: str, values: list[float], digits: int = 1) -> str:
+        return f"| {what} | {middle(values):.{digits}f} | {percentile(values, 0.99):.{digits}f} |"
+
     lines = [
-        f"`{arguments.bundle.name}`, {nodes} nodes, {arguments.width} x {arguments.height} pixels, {found['ms'] / 1000:.0f} s of strokes"
-        f" ({found['steps']} steps, median force {middle(found['force']):.0f} mN). {machine()}, {datetime.date.today()}.",
+        f"`{arguments.bundle.name}`, {nodes} nodes, {size}, {drag}. {machine()}, {datetime.date.today()}.",
         "",
         "| | median | 99 % |",
         "|---|---:|---:|",
-        f"| pictures a second | {rate:.1f} | |",
-        f"| from picture to picture, ms | {middle(found['intervals']):.1f} | {percentile(found['intervals'], 0.99):.1f} |",
-        f"| mouse to picture, ms ({len(found['latency'])} moves) | {middle(found['latency']):.1f} | "
-        f"{percentile(found['latency'], 0.99):.1f} |",
-        f"| tissue of the picture's moment, ms | {middle(found['made']):.2f} | {percentile(found['made'], 0.99):.2f} |",
-        f"| processor time a picture, ms: drawing, page, library | {', '.join(f'{ms:.1f}' for ms in found['processor'])} | |",
-        f"| step beside it, ms | {middle(found['step']):.1f} | {max(found['step']):.1f} |",
+        f"| pictures a second (mean) | {rate:.1f} | |",
+        row("from picture to picture, ms", found["intervals"]),
+        row(f"mouse to picture, ms ({len(found['latency'])} moves)", found["latency"]),
+        row("making the tissue of a picture's moment, ms", found["made"], 2),
+        row("step beside it, ms", found["step"]),
+        "",
+        "Processor time a picture: drawing {:.1f} ms, page {:.1f} ms, library {:.1f} ms.".format(*found["processor"]),
     ]
     text = "\n".join(lines)
     print(text)
