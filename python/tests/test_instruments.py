@@ -154,3 +154,25 @@ def test_a_frame_shows_the_tool_where_it_is(corrected):
             scene.present(-1.0)
     with upt.Model(FIXTURES / "tiny-upt").scene() as scene, pytest.raises(upt.UnsupportedError, match="sample"):
         scene.present(0.0)
+
+
+def test_the_fast_way_to_a_struct_is_the_slow_one():
+    """Byte for byte, for each shape; what does not fit is refused by the name of its field."""
+    hull = upt.Instrument.hull(CUBE, position=(1, 2, 3), rotation=(0, 0.6, 0, 0.8), friction=0.3, tear_off=5)
+    tools = [
+        upt.Instrument.capsule(3.0, 7.0, position=np.array([1.5, -2, 3]), grasp=True),
+        upt.Instrument.box((1, 2, 3), friction=0.25),
+        upt.Instrument("spatula", (4, 5, 6), half_extents=(1, 2, 3), radius=0.5, sticking=True),
+        hull,
+    ]
+    array, count = upt.instrument.records(tools)
+    assert count == 4
+    for packed, tool in zip(array, tools, strict=True):
+        assert bytes(packed) == bytes(tool.record()), tool.shape
+    assert upt.instrument.records([]) == (None, 0)
+    for wrong in ({"position": (1, 2)}, {"rotation": (0, 0, 0, 0, 1)}):
+        tool = upt.Instrument.capsule(1.0)
+        for field, value in wrong.items():
+            setattr(tool, field, value)
+            with pytest.raises(ValueError, match=f"{field} has [34] numbers, not {len(value)}"):
+                upt.instrument.records([tool])

@@ -314,7 +314,7 @@ class Scene:
 
 def _contacts(nodes: ArrayLike, contact: ArrayLike) -> tuple[Indices, Floats]:
     n = indices(nodes, "nodes")
-    if not len(n) and not np.size(contact):
+    if not n.size and not np.size(contact):
         return n, np.empty((0, 3), np.float32)
     return n, vectors(contact, "contact", len(n))
 
