@@ -2,8 +2,8 @@
 
     python python/benches/overhead.py --bundle onnx/brain-coarse-reduced --markdown docs/guide/python.md
 
-A step by nodes in contact and one by an instrument. Prints the median time of a call in each language over all turns, and
-the difference in microseconds of turns side by side. `--markdown` writes it between the page's marks.
+A step by nodes in contact, and one by an instrument beside the tissue. Prints the median time of a call in each language
+over all turns, and the difference of turns side by side. `--markdown` writes it between the page's marks.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ ROOT = Path(__file__).resolve().parents[2]
 def in_python(bundle: str, calls: int, by_tool: bool) -> list[float]:
     with upt.Model(bundle) as model, model.scene(no_sleep=True) as scene:
         nodes, vectors = model.domain_nodes[:4], np.tile(np.float32([0, 0, -1]), (4, 1))
-        tool = upt.Instrument.capsule(3.0, position=model.positions[nodes[0]])
+        tool = upt.Instrument.capsule(3.0, position=(500, 0, 0))
         out, seconds = np.empty((model.node_count, 3), np.float32), []
         for _ in range(calls):
             begin = time.perf_counter()

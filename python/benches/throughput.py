@@ -62,8 +62,8 @@ def main() -> None:
     processor = statistics.median(b[1] / s[1] for s, b in turns)
     text = (
         f"One scene of `{Path(arguments.bundle).name}` {single:.0f} steps/s, {arguments.scenes} scenes on {cores} "
-        f"cores {both:.0f} steps/s: {wall:.2f} times cores times one scene by the clock, {processor:.2f} by processor time "
-        f"(medians of {arguments.turns} turns). {about}."
+        f"cores {both:.0f} steps/s: {wall:.2f} times cores times one scene by the clock, {processor:.2f} by processor "
+        f"time (medians of {arguments.turns} turns). {about}."
     )
     write(arguments.markdown, "python/benches/throughput.py", text)
 

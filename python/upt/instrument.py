@@ -171,7 +171,7 @@ class Instrument:
         )
 
 
-#: `upt_instrument` as it lies in memory; `record` is the same by its fields' names, slower and with errors that name them.
+#: `upt_instrument` as it lies in memory. `record` is the same by the fields' names: slower, with errors that name them.
 _LAYOUT = struct.Struct("@Ii3f4f3ffBB2xffP")
 assert _LAYOUT.size == ctypes.sizeof(_native.Instrument)
 

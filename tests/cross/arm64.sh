@@ -6,6 +6,7 @@ export UPT_CROSS_ORT_NAME=libonnxruntime.so UPT_CROSS_ROLLOUT=rollout UPT_CROSS_
 rollout_tolerance=1e-5
 solver_tolerance=1e-3
 
+source "$root/tests/cross/python_arm64.sh"
 qemu="$(command -v qemu-aarch64-static || command -v qemu-aarch64 || true)"
 if [ -z "$qemu" ]; then
   echo "skipped: qemu-user-static is not installed"
@@ -61,4 +62,27 @@ more() {
   local text
   text="$(run "$1/upt" doctor onnx/brain-coarse-reduced 2>/dev/null)"
   check "upt doctor opens a bundle with NEON kernels" grep -q 'kernels neon' <<<"$text"
+  echo "lanes that ran: $(sed -n 's/^.*\(kernels [a-z0-9]*\).*$/\1/p' <<<"$text" | head -n 1), and scalar in the unit tests that compare them"
+  wheel "$1"
+}
+
+# The wheel in Debian's Python for arm64: it finds its own libupt, and ONNX Runtime in the package onnxruntime.
+wheel() {
+  make_wheel "$1/libupt.so" linux_aarch64
+  check "the wheel is tagged manylinux for aarch64" compgen -G "$build/wheels/*-manylinux_*_aarch64.whl"
+  local python="$root/target/cross/python-arm64"
+  if ! debian_python "$python"; then
+    fail "Debian's Python for arm64 was not unpacked"
+    return
+  fi
+  local libraries="$python/root/usr/lib/aarch64-linux-gnu:$python/root/lib/aarch64-linux-gnu:/usr/aarch64-linux-gnu/lib"
+  (
+    cd "$build"
+    unset ORT_DYLIB_PATH UPT_LIBRARY
+    UPT_CROSS_LIBRARIES="$libraries" PYTHONHOME="$python/root/usr" PYTHONPATH="$build/wheel:$python/packages" \
+      run "$python/root/usr/bin/python3" -m pytest -q -p no:cacheprovider "$root"/python/tests/test_scene.py \
+      "$root"/python/tests/test_instruments.py "$root"/python/tests/test_batch.py >"$build/pytest.log" 2>&1
+  ) || true
+  count_pytest "$build/pytest.log"
+  leave_out 3 "files of the wheel's tests, which need more packages or time: examples, errors, haptics"
 }
