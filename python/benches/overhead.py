@@ -2,8 +2,8 @@
 
     python python/benches/overhead.py --bundle onnx/brain-coarse-reduced --markdown docs/guide/python.md
 
-A step by nodes in contact, and one by an instrument beside the tissue. Prints the median time of a call in each language
-over all turns, and the difference of turns side by side. `--markdown` writes it between the page's marks.
+A step by nodes in contact, and one by an instrument beside the tissue. Prints the median time of a call in each
+language over all turns, and the difference of turns side by side. `--markdown` writes it between the page's marks.
 """
 
 from __future__ import annotations
