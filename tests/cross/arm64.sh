@@ -2,8 +2,10 @@
 export UPT_CROSS_TRIPLE=aarch64-unknown-linux-gnu
 export UPT_CROSS_SYSTEM=Linux UPT_CROSS_PROCESSOR=aarch64 UPT_CROSS_PREFIX=aarch64-linux-gnu-
 export UPT_CROSS_ORT_NAME=libonnxruntime.so UPT_CROSS_ROLLOUT=rollout UPT_CROSS_COMMAND=upt
-# mm: other vector lanes, another build of ONNX Runtime (8e-7 was seen). The solver adds up thousands of steps.
+# mm: other vector lanes, another build of ONNX Runtime (5e-7 was seen). Corrected steps iterate until they are good enough, some 0.01 mm
+# of their own, and carry a rounding on (3e-4 was seen). The solver adds up thousands of steps.
 rollout_tolerance=1e-5
+corrected_tolerance=2e-3
 solver_tolerance=1e-3
 
 source "$root/tests/cross/python_arm64.sh"
@@ -48,8 +50,9 @@ installed() {
 }
 
 compare() {
-  check "$1: displacements of x86-64 within $rollout_tolerance mm" \
-    python3 tests/cross/difference.py "$2" "$3" "$rollout_tolerance"
+  local tolerance="$rollout_tolerance"
+  if grep -q '"corrections"' onnx/"$1"/bundle.json 2>/dev/null; then tolerance="$corrected_tolerance"; fi
+  check "$1: displacements of x86-64 within $tolerance mm" python3 tests/cross/difference.py "$2" "$3" "$tolerance"
 }
 
 compare_trajectories() {
@@ -62,7 +65,7 @@ more() {
   local text
   text="$(run "$1/upt" doctor onnx/brain-coarse-reduced 2>/dev/null)"
   check "upt doctor opens a bundle with NEON kernels" grep -q 'kernels neon' <<<"$text"
-  echo "lanes that ran: $(sed -n 's/^.*\(kernels [a-z0-9]*\).*$/\1/p' <<<"$text" | head -n 1), and scalar in the unit tests that compare them"
+  lanes "$text"
   wheel "$1"
 }
 

@@ -65,3 +65,10 @@ count_pytest() {
   failed=$((failed + bad))
   echo "${ok:-0} passed, $bad failed (pytest of the wheel)"
 }
+
+# What `upt doctor` (its output is $1) says about the lanes of the kernels that ran.
+lanes() {
+  local ran
+  ran="$(sed -n 's/^.*kernels \([a-z0-9]*\).*$/\1/p' <<<"$1" | head -n 1)"
+  check "lanes that ran: ${ran:-none}, and scalar ones beside them in the unit tests" test -n "$ran"
+}

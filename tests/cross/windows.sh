@@ -54,6 +54,7 @@ more() {
   local text
   text="$(run "$1/upt.exe" doctor onnx/brain-coarse-reduced 2>/dev/null | tr -d '\r')"
   check "upt doctor opens a bundle" grep -q '^ok  bundle .*brain-coarse-reduced' <<<"$text"
+  lanes "$text"
   # A reader that goes away: the command ends without a panic.
   (run "$1/upt.exe" completions bash 2>"$build/pipe.log" || true) | head -c 1 >/dev/null || true
   check "a closed pipe ends the command quietly" bash -c '! grep -qi panicked "$1"' _ "$build/pipe.log"
