@@ -57,8 +57,8 @@ count_ctest() {
 # The last line of pytest's log $1.
 count_pytest() {
   local ok bad
-  ok="$(tail -n 1 "$1" | sed -n 's/^.*\b\([0-9]*\) passed.*$/\1/p')"
-  bad="$(tail -n 1 "$1" | grep -oE '[0-9]+ (failed|error)' | awk '{s += $1} END {print s + 0}')"
+  ok="$(tail -n 1 "$1" | { grep -oE '[0-9]+ passed' || true; } | cut -d' ' -f1)"
+  bad="$(tail -n 1 "$1" | { grep -oE '[0-9]+ (failed|error)' || true; } | awk '{s += $1} END {print s + 0}')"
   if [ -z "$ok" ] && [ "$bad" -eq 0 ]; then bad=1; fi
   if [ "$bad" -gt 0 ]; then tail -n 60 "$1"; fi
   passed=$((passed + ${ok:-0}))
