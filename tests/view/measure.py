@@ -24,7 +24,8 @@ MARK = "tests/view/measure.py"
 
 def machine() -> str:
     names = [line.split(":")[1].strip() for line in open("/proc/cpuinfo") if line.startswith("model name")]
-    return f"{names[0] if names else 'unknown processor'} ({len(os.sched_getaffinity(0))} cores, load {os.getloadavg()[0]:.0f})"
+    cores, load = len(os.sched_getaffinity(0)), os.getloadavg()[0]
+    return f"{names[0] if names else 'unknown processor'} ({cores} cores, load {load:.0f})"
 
 
 def processor_seconds(root: int) -> dict[str, float]:
