@@ -20,7 +20,7 @@ int main(int argc, char **argv) {
   long calls = argc > 2 ? atol(argv[2]) : 0;
   if (calls < 1 || upt_init(&start) < 0 || upt_model_open(argv[1], NULL, &model) < 0 ||
       upt_scene_create(model, &options, &scene) < 0 || upt_model_get_info(model, &info) < 0) {
-    fprintf(stderr, "usage: overhead BUNDLE CALLS ONNXRUNTIME; %s\n", upt_last_error());
+    fprintf(stderr, "usage: overhead BUNDLE CALLS ONNXRUNTIME [tool]; %s\n", upt_last_error());
     return 1;
   }
   float *out = malloc(3 * info.node_count * sizeof *out);
@@ -32,9 +32,16 @@ int main(int argc, char **argv) {
   for (int i = 0; i < 4; i++) {
     nodes[i] = domain[i];
   }
+  upt_instrument tool = {.struct_size = sizeof tool, .shape = UPT_SHAPE_CAPSULE, .radius = 3};
+  tool.position[0] = 500;
+  tool.rotation[3] = 1;
+  int by_tool = argc > 4 && argv[4][0] == 't';
   for (long i = 0; i < calls; i++) {
     double begin = now();
-    if (upt_scene_step_contacts(scene, nodes, vectors, 4, out, 3 * info.node_count) < 0) {
+    upt_status status =
+        by_tool ? upt_scene_step_instruments(scene, &tool, 1, out, 3 * info.node_count)
+                : upt_scene_step_contacts(scene, nodes, vectors, 4, out, 3 * info.node_count);
+    if (status < 0) {
       fprintf(stderr, "%s\n", upt_last_error());
       return 1;
     }

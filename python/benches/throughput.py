@@ -2,7 +2,7 @@
 
 By the clock it is true only where nothing else runs; processor time says what the batch itself costs more.
 
-    python python/benches/throughput.py --bundle onnx/brain-reduced --scenes 8
+    python python/benches/throughput.py --bundle onnx/brain-reduced --scenes 8 --markdown docs/guide/python.md
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import upt
+from page import machine, write
 from upt.batch import core_count
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -26,8 +27,10 @@ def main() -> None:
     parser.add_argument("--scenes", type=int, default=8)
     parser.add_argument("--steps", type=int, default=60, help="steps of each scene a turn")
     parser.add_argument("--turns", type=int, default=9)
+    parser.add_argument("--markdown", type=Path)
     arguments = parser.parse_args()
 
+    about = machine()
     model = upt.Model(arguments.bundle)
     batch = upt.BatchedScenes(model, arguments.scenes, no_sleep=True)
     domain = model.domain_nodes
@@ -57,8 +60,12 @@ def main() -> None:
     single, both = (statistics.median(turn[i][0] for turn in turns) for i in range(2))
     wall = statistics.median(b[0] / (cores * s[0]) for s, b in turns)
     processor = statistics.median(b[1] / s[1] for s, b in turns)
-    print(f"one scene {single:.0f} steps/s, {arguments.scenes} scenes on {cores} cores {both:.0f} steps/s")
-    print(f"batch / (cores x one scene): {wall:.2f} by the clock, {processor:.2f} by processor time")
+    text = (
+        f"One scene of `{Path(arguments.bundle).name}` {single:.0f} steps/s, {arguments.scenes} scenes on {cores} "
+        f"cores {both:.0f} steps/s: {wall:.2f} times cores times one scene by the clock, {processor:.2f} by processor "
+        f"time (medians of {arguments.turns} turns). {about}."
+    )
+    write(arguments.markdown, "python/benches/throughput.py", text)
 
 
 if __name__ == "__main__":

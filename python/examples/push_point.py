@@ -1,9 +1,10 @@
-"""A Gymnasium environment: move a point inside the tissue to a place by pushing a patch of the surface.
+"""A Gymnasium environment: move a point inside the tissue to a place with a ball that presses on the surface.
 
     python python/examples/push_point.py --bundle onnx/brain-coarse-reduced
 
 plays the environment with a random policy and with a linear one that it learns by the cross-entropy method
-(seconds). Lengths in mm; a step is `model.dt` (50 ms of tissue).
+(seconds). It learns in steps of one correction, which are fast, and plays in those of the bundle, which are accurate.
+Lengths in mm; a step is `model.dt` (50 ms of tissue).
 """
 
 from __future__ import annotations
@@ -19,10 +20,11 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 class PushPoint(gymnasium.Env):
-    """Observation `[9]`: where the point is, where it should be, how far the patch is pushed. Action `[3]`: how the
-    patch moves in this step, at most `reach` mm along each axis. Reward: minus the distance that is left, mm.
+    """Observation `[9]`: where the point is, where it should be, how far the ball is from where it began. Action `[3]`:
+    how the ball moves in this step, at most `reach` mm along each axis. Reward: minus the distance that is left, mm.
 
-    The patch is a site of the domain and its neighbours, the point lies `depth` mm below the site.
+    The ball begins where it touches the site in the middle of the domain; the point lies `depth` mm below that site.
+    `corrections`: as in `upt.SceneOptions`; 0: as many as the bundle recommends.
     """
 
     metadata = {"render_modes": []}
@@ -30,60 +32,65 @@ class PushPoint(gymnasium.Env):
     def __init__(
         self,
         model: upt.Model,
-        patch: int = 6,
-        depth: float = 8.0,
+        radius: float = 6.0,
+        friction: float = 1.0,
+        depth: float = 6.0,
         reach: float = 1.0,
         push: float = 8.0,
-        steps: int = 30,
+        steps: int = 20,
+        corrections: int | str = 0,
     ) -> None:
-        self.scene = model.scene()
+        self.scene = model.scene(corrections=corrections, threads=1)  # environments run side by side
         self.reach, self.push, self.steps = reach, push, steps
-        rest, domain = model.positions, model.domain_nodes
-        # The site in the middle of the domain, its nearest neighbours, and inward: away from their mean normal.
-        site = domain[np.argmin(np.linalg.norm(rest[domain] - rest[domain].mean(axis=0), axis=1))]
-        self.nodes = domain[np.argsort(np.linalg.norm(rest[domain] - rest[site], axis=1))[:patch]]
-        faces = rest[model.domain_faces[np.isin(model.domain_faces, self.nodes).any(axis=1)]]
-        normal = np.cross(faces[:, 1] - faces[:, 0], faces[:, 2] - faces[:, 0]).sum(axis=0)
+        rest, domain, faces = model.positions, model.domain_nodes, model.domain_faces
+        site = rest[domain[np.argmin(np.linalg.norm(rest[domain] - rest[domain].mean(axis=0), axis=1))]]
+        # Inward: away from the mean normal of the faces that the ball will touch.
+        near = rest[faces][np.linalg.norm(rest[faces].mean(axis=1) - site, axis=1) < 2 * radius]
+        normal = np.cross(near[:, 1] - near[:, 0], near[:, 2] - near[:, 0]).sum(axis=0)
         self.inward = -normal / np.linalg.norm(normal)
-        self.scene.attach_points((rest[site] + depth * self.inward)[None])
-        self.scene.set_region(self.nodes)  # nothing else is looked at
+        self.start = site - radius * self.inward
+        self.ball = upt.Instrument.capsule(radius, friction=friction)
+        self.scene.attach_points((site + depth * self.inward)[None])
+        self.scene.set_region(domain[:1])  # nothing but the point is looked at
         limit = np.full(9, 4.0 * push, np.float32)
         self.observation_space = gymnasium.spaces.Box(-limit, limit)
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (3,), np.float32)
 
     def reset(self, *, seed=None, options=None):
         super().reset(seed=seed)
+        # A place that can be reached: where a press of the ball takes the point.
+        press = self.push * (0.7 * self.inward + 0.4 * self.np_random.uniform(-1.0, 1.0, 3))
         self.scene.reset()
-        self.pushed, self.time = np.zeros(3, np.float32), 0
-        # A place that can be reached: where a push of the patch takes the point.
-        push = self.push * (0.7 * self.inward + 0.5 * self.np_random.uniform(-1.0, 1.0, 3))
-        for k in range(4):
-            self._step(push * (k + 1) / 4)
-        for _ in range(8):
-            self._step(push)
+        for part in np.linspace(0.0, 1.0, 6):
+            self._step(part * press)
         self.goal = self.scene.read_points()[0].copy()
         self.scene.reset()
+        self.moved, self.time = np.zeros(3), 0
         return self._observe(), {}
 
     def step(self, action):
-        move = self.reach * np.clip(action, -1.0, 1.0)
-        self.pushed = np.clip(self.pushed + move, -self.push, self.push).astype(np.float32)
-        self._step(self.pushed)
+        self.moved = np.clip(self.moved + self.reach * np.clip(action, -1.0, 1.0), -self.push, self.push)
+        try:
+            self._step(self.moved)
+        except upt.GuardError:  # far beyond what the model knows: the state is the last good one, and the episode ends
+            return self._observe(), -self.push, False, True, {"left_mm": self.push, "force_mn": 0.0}
         self.time += 1
         left = float(np.linalg.norm(self._point() - self.goal))
-        return self._observe(), -left, False, self.time >= self.steps, {"left_mm": left}
+        force = float(np.linalg.norm(self.scene.readings()[0].force))
+        return self._observe(), -left, False, self.time >= self.steps, {"left_mm": left, "force_mn": force}
 
     def close(self):
         self.scene.close()
 
-    def _step(self, push: np.ndarray) -> None:
-        self.scene.step_contacts(self.nodes, np.tile(np.float32(push), (len(self.nodes), 1)))
+    def _step(self, moved: np.ndarray) -> None:
+        self.ball.position = self.start + moved
+        self.scene.step_instruments([self.ball])
 
     def _point(self) -> np.ndarray:
         return self.scene.read_points()[0] if self.time else np.zeros(3, np.float32)
 
     def _observe(self) -> np.ndarray:
-        return np.concatenate([self._point(), self.goal, self.pushed]).astype(np.float32)
+        return np.concatenate([self._point(), self.goal, self.moved]).astype(np.float32)
 
 
 class LinearPolicy:
@@ -109,7 +116,7 @@ def play(environment: PushPoint, policy, seeds) -> float:
 
 
 def learn(
-    environment: PushPoint, rounds: int = 12, population: int = 24, elite: int = 6, seed: int = 0
+    environment: PushPoint, rounds: int = 12, population: int = 16, elite: int = 4, seed: int = 0
 ) -> LinearPolicy:
     """Cross-entropy method over the nine weights, three episodes a candidate."""
     draw = np.random.default_rng(seed)
@@ -128,11 +135,12 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=12)
     arguments = parser.parse_args()
 
-    environment = PushPoint(upt.Model(arguments.bundle))
+    model = upt.Model(arguments.bundle)
+    environment = PushPoint(model)
     held_out = range(10_000, 10_020)
     environment.action_space.seed(0)
     random = play(environment, lambda _: environment.action_space.sample(), held_out)
-    learned = play(environment, learn(environment, arguments.rounds), held_out)
+    learned = play(environment, learn(PushPoint(model, corrections=1), arguments.rounds), held_out)
     print(f"distance left: random policy {random:.2f} mm, learned policy {learned:.2f} mm")
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import upt
-from conftest import push
+from conftest import FIXTURES, push
+from test_instruments import pressing
 
 
 @pytest.mark.parametrize("workers", [1, 2, 5])
@@ -36,6 +37,22 @@ def test_dense_fields(model):
         np.testing.assert_array_equal(out[1], model.scene(no_sleep=True).step_contacts(nodes, vectors))
         with pytest.raises(ValueError, match="collision has shape"):
             batch.step(None, collision[:1])
+
+
+def test_instruments():
+    model = upt.Model(FIXTURES / "tiny-corrected")
+    tools = [[upt.Instrument.capsule(3.0, position=pressing(model, 0.3 * i))] if i else [] for i in range(3)]
+    expected = []
+    for one in tools:
+        with model.scene(threads=1, no_sleep=True) as scene:
+            expected.append([scene.step_instruments(one).copy() for _ in range(3)])
+    with upt.BatchedScenes(model, 3, no_sleep=True) as batch:
+        for step in range(3):
+            np.testing.assert_array_equal(batch.step_instruments(tools), [states[step] for states in expected])
+        assert [len(scene.readings()) for scene in batch.scenes] == [0, 1, 1]
+        assert batch.scenes[2].readings()[0].contact_count > 0
+        with pytest.raises(ValueError, match="instruments has 1 entries, must have one for each of 3"):
+            batch.step_instruments(tools[:1])
 
 
 def test_one_failure_stops_no_other_scene(model):

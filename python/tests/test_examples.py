@@ -22,9 +22,14 @@ def example():
     return module
 
 
+@pytest.fixture(scope="module")
+def model():
+    return upt.Model(ROOT / "onnx" / "brain-coarse-reduced")
+
+
 @pytest.fixture
-def environment(example):
-    environment = example.PushPoint(upt.Model(ROOT / "onnx" / "brain-coarse-reduced"))
+def environment(example, model):
+    environment = example.PushPoint(model)
     yield environment
     environment.close()
 
@@ -38,11 +43,11 @@ def test_gymnasium_accepts_the_environment(environment):
         check_env(environment, skip_render_check=True)
 
 
-def test_a_learned_policy_beats_a_random_one(example, environment):
+def test_a_learned_policy_beats_a_random_one(example, environment, model):
     environment.action_space.seed(0)
     held_out = range(10_000, 10_008)
     random = example.play(environment, lambda _: environment.action_space.sample(), held_out)
-    learned = example.play(environment, example.learn(environment, rounds=5, population=16), held_out)
+    learned = example.play(environment, example.learn(example.PushPoint(model, corrections=1), rounds=3), held_out)
     assert learned < 0.8 * random, f"{learned} mm against {random} mm"
 
 

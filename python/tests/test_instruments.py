@@ -131,3 +131,48 @@ def test_nodes_and_vectors_for_hosts_that_want_them(model, scene):
     far = upt.Instrument(shape="box", position=(1e3, 0, 0), half_extents=(1, 1, 1))
     nodes, vectors = model.scene().contacts([far])
     assert len(nodes) == 0 and vectors.shape == (0, 3)
+
+
+def test_a_frame_shows_the_tool_where_it_is(corrected):
+    """Between steps the tissue follows the tool; at the step's own moment it is the step."""
+    with corrected.scene(no_sleep=True) as scene:
+        ball = upt.Instrument.capsule(3.0, position=pressing(corrected, 0.3))
+        scene.present(0.0)  # before the first step
+        state = scene.step_instruments([ball])
+        np.testing.assert_array_equal(scene.present(0.0, [ball]), state)
+        ball.position = pressing(corrected, 1.2)
+        out = np.empty_like(state)
+        assert scene.present(0.02, [ball], out) is out
+        assert np.abs(out).max() > 1.5 * np.abs(state).max()
+        np.testing.assert_array_equal(scene.read(), state)
+        scene.submit_instruments([ball])
+        assert np.isfinite(scene.present(0.03, [ball])).all()
+        assert scene.wait()
+        scene.attach_points(corrected.positions[:5])
+        assert scene.present_points(0.01, [ball]).shape == (5, 3)
+        with pytest.raises(upt.ArgumentError, match="seconds is -1"):
+            scene.present(-1.0)
+    with upt.Model(FIXTURES / "tiny-upt").scene() as scene, pytest.raises(upt.UnsupportedError, match="sample"):
+        scene.present(0.0)
+
+
+def test_the_fast_way_to_a_struct_is_the_slow_one():
+    """Byte for byte, for each shape; what does not fit is refused by the name of its field."""
+    hull = upt.Instrument.hull(CUBE, position=(1, 2, 3), rotation=(0, 0.6, 0, 0.8), friction=0.3, tear_off=5)
+    tools = [
+        upt.Instrument.capsule(3.0, 7.0, position=np.array([1.5, -2, 3]), grasp=True),
+        upt.Instrument.box((1, 2, 3), friction=0.25),
+        upt.Instrument("spatula", (4, 5, 6), half_extents=(1, 2, 3), radius=0.5, sticking=True),
+        hull,
+    ]
+    array, count = upt.instrument.records(tools)
+    assert count == 4
+    for packed, tool in zip(array, tools, strict=True):
+        assert bytes(packed) == bytes(tool.record()), tool.shape
+    assert upt.instrument.records([]) == (None, 0)
+    for wrong in ({"position": (1, 2)}, {"rotation": (0, 0, 0, 0, 1)}):
+        tool = upt.Instrument.capsule(1.0)
+        for field, value in wrong.items():
+            setattr(tool, field, value)
+            with pytest.raises(ValueError, match=f"{field} has [34] numbers, not {len(value)}"):
+                upt.instrument.records([tool])

@@ -1,7 +1,11 @@
-"""NumPy arrays at the C boundary: an address where an array fits as it is, a copy where an input does not."""
+"""NumPy arrays at the C boundary: an address where an array fits as it is, a copy where an input does not.
+
+This runs in every step, with caches that the step has emptied: what fits is recognised in few operations.
+"""
 
 from __future__ import annotations
 
+from ctypes import addressof, c_char
 from typing import Any
 
 import numpy as np
@@ -10,16 +14,23 @@ from numpy.typing import ArrayLike, NDArray
 Floats = NDArray[np.float32]
 Indices = NDArray[np.uint32]
 
+_F32, _U32 = np.dtype(np.float32), np.dtype(np.uint32)
+
 
 def address(array: NDArray[Any]) -> int:
     """Where the data lie; the caller keeps the array alive over the call."""
+    flags = array.flags
+    if flags.writeable and flags.c_contiguous and array.size:
+        # A third of the time of the attribute below.
+        return addressof(c_char.from_buffer(array))  # type: ignore[arg-type]
     data: int = array.__array_interface__["data"][0]
     return data
 
 
 def vectors(values: ArrayLike, name: str, count: int | None = None) -> Floats:
     """`[count, 3]` float32 in one piece; the array itself where it is that already."""
-    array = np.ascontiguousarray(values, np.float32)
+    fits = type(values) is np.ndarray and values.dtype is _F32 and values.flags.c_contiguous
+    array: Floats = values if fits else np.ascontiguousarray(values, np.float32)  # type: ignore[assignment]
     if array.ndim != 2 or array.shape[1] != 3 or (count is not None and len(array) != count):
         wanted = f"({'n' if count is None else count}, 3)"
         raise ValueError(f"{name} has shape {array.shape}, expected {wanted}")
@@ -28,6 +39,8 @@ def vectors(values: ArrayLike, name: str, count: int | None = None) -> Floats:
 
 def indices(values: ArrayLike, name: str) -> Indices:
     """`[n]` uint32 in one piece; the array itself where it is that already."""
+    if type(values) is np.ndarray and values.dtype is _U32 and values.ndim == 1 and values.flags.c_contiguous:
+        return values
     array = np.asarray(values)
     if array.ndim != 1:
         raise ValueError(f"{name} has shape {array.shape}, expected (n,)")
@@ -43,12 +56,6 @@ def output(out: Floats | None, count: int, name: str = "out") -> Floats:
     """Where a result goes: a new array, or the caller's own, which must fit without a copy."""
     if out is None:
         return np.empty((count, 3), np.float32)
-    if (
-        not isinstance(out, np.ndarray)
-        or out.dtype != np.float32
-        or out.shape != (count, 3)
-        or not out.flags.c_contiguous
-        or not out.flags.writeable
-    ):
+    if not isinstance(out, np.ndarray) or out.dtype != _F32 or out.shape != (count, 3) or not out.flags.carray:
         raise ValueError(f"{name} must be a writeable C-contiguous float32 array of shape ({count}, 3)")
     return out

@@ -414,7 +414,7 @@ class SceneOptions(Record):
     corrections: Corrections = choice("_corrections", Corrections)
     """Corrections by the elements while there is contact: 1 to 64 a step, 0 as many as the bundle recommends,
     `UPT_CORRECTIONS_NONE`, or `UPT_CORRECTIONS_AUTO`."""
-    corrections_budget_us: Corrections = choice("_corrections_budget_us", Corrections)
+    corrections_budget_us: int
     """`UPT_CORRECTIONS_AUTO`: no correction starts later than this in a step, µs; 0: no budget."""
     corrections_target_mm: float
     """`UPT_CORRECTIONS_AUTO`: enough where the estimated error is below this, mm; 0: no target."""
@@ -440,7 +440,7 @@ class SceneOptions(Record):
         ("_reserved", ctypes.c_uint8 * 2),
         ("_step_path", ctypes.c_int32),
         ("_corrections", ctypes.c_int32),
-        ("_corrections_budget_us", ctypes.c_uint32),
+        ("corrections_budget_us", ctypes.c_uint32),
         ("corrections_target_mm", ctypes.c_float),
         ("error_limit_mm", ctypes.c_float),
         ("step_s", ctypes.c_double),
@@ -477,7 +477,7 @@ class SceneOptionsKeywords(TypedDict, total=False):
     corrections: Corrections | str | int
     """Corrections by the elements while there is contact: 1 to 64 a step, 0 as many as the bundle recommends,
     `UPT_CORRECTIONS_NONE`, or `UPT_CORRECTIONS_AUTO`."""
-    corrections_budget_us: Corrections | str | int
+    corrections_budget_us: int
     """`UPT_CORRECTIONS_AUTO`: no correction starts later than this in a step, µs; 0: no budget."""
     corrections_target_mm: float
     """`UPT_CORRECTIONS_AUTO`: enough where the estimated error is below this, mm; 0: no target."""

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from upt._arrays import Floats
+from upt.instrument import Instrument
 from upt.model import Model
 from upt.scene import Scene
 
@@ -99,10 +100,7 @@ class BatchedScenes:
         self, contacts: Sequence[tuple[ArrayLike, ArrayLike] | None], out: Floats | None = None
     ) -> Floats:
         """One step of each scene with its own `(nodes [m], vectors [m, 3])`, None for no contact; `[N, n, 3]`, mm."""
-        if len(contacts) != len(self.scenes):
-            raise ValueError(
-                f"contacts has {len(contacts)} entries, must have one for each of {len(self.scenes)} scenes"
-            )
+        self._one_each(contacts, "contacts")
         result = self._output(out)
 
         def step(i: int, scene: Scene) -> None:
@@ -110,6 +108,16 @@ class BatchedScenes:
             scene.step_contacts(nodes, vectors, result[i])
 
         self.map(step)
+        return result
+
+    def step_instruments(self, instruments: Sequence[Sequence[Instrument]], out: Floats | None = None) -> Floats:
+        """One step of each scene with its own instruments, as `Scene.step_instruments`; `[N, n, 3]`, mm.
+
+        What the tissue does to them: `batch.scenes[i].readings()`.
+        """
+        self._one_each(instruments, "instruments")
+        result = self._output(out)
+        self.map(lambda i, scene: scene.step_instruments(instruments[i], result[i]))
         return result
 
     def read(self, out: Floats | None = None) -> Floats:
@@ -142,6 +150,10 @@ class BatchedScenes:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+    def _one_each(self, entries: Sequence[object], name: str) -> None:
+        if len(entries) != len(self.scenes):
+            raise ValueError(f"{name} has {len(entries)} entries, must have one for each of {len(self.scenes)} scenes")
 
     def _each(self, fields: ArrayLike | None, name: str) -> NDArray[np.float32] | None:
         if fields is None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import struct
 import weakref
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -134,6 +135,26 @@ class Instrument:
             hull_of=made,
         )
 
+    def _pack_into(self, array: ctypes.Array[_native.Instrument], place: int) -> None:
+        """As `record`, into an array. Any error means: let `record` say what is wrong."""
+        if not (len(self.position) == 3 and len(self.rotation) == 4 and len(self.half_extents) == 3):
+            raise ValueError
+        _LAYOUT.pack_into(
+            array,
+            place * _LAYOUT.size,
+            _LAYOUT.size,
+            self.shape,
+            *self.position,
+            *self.rotation,
+            *self.half_extents,
+            self.radius,
+            bool(self.sticking),
+            Mode.GRASP if self.grasp else Mode.SLIDE,
+            self.friction,
+            self.tear_off,
+            0 if self.hull_of is None else self.hull_of._handle,
+        )
+
     def record(self) -> _native.Instrument:
         """As the C ABI's struct. It does not keep the hull alive."""
         return _native.Instrument(
@@ -150,7 +171,20 @@ class Instrument:
         )
 
 
+#: `upt_instrument` as it lies in memory. `record` is the same by the fields' names: slower, with errors that name them.
+_LAYOUT = struct.Struct("@Ii3f4f3ffBB2xffP")
+assert _LAYOUT.size == ctypes.sizeof(_native.Instrument)
+
+
 def records(instruments: Sequence[Instrument]) -> tuple[ctypes.Array[_native.Instrument] | None, int]:
     """As an array for the C ABI (None where there are no instruments), and its length."""
-    made = [one.record() for one in instruments]
-    return ((_native.Instrument * len(made))(*made) if made else None), len(made)
+    count = len(instruments)
+    if not count:
+        return None, 0
+    array = (_native.Instrument * count)()
+    try:
+        for place, one in enumerate(instruments):
+            one._pack_into(array, place)
+    except (TypeError, ValueError, OverflowError, struct.error):
+        array = (_native.Instrument * count)(*[one.record() for one in instruments])
+    return array, count

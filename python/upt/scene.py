@@ -211,19 +211,21 @@ class Scene:
         check(lib.upt_scene_sample(self._handle, alpha, address(result), result.size))
         return result
 
-    def present(self, seconds: float, instruments: Sequence[Instrument], out: Floats | None = None) -> Floats:
-        """The tissue at a moment between steps, with the instruments where they are at that moment.
+    def present(self, seconds: float, instruments: Sequence[Instrument] = (), out: Floats | None = None) -> Floats:
+        """The tissue at this moment, between steps, with the instruments where they are now: frames without lag.
+
+        Works beside a step in flight; the first call comes before the first submit. Another thread may step meanwhile.
 
         Args:
-            seconds: time since the last published step, 0 or more; it is followed for two steps at most.
-            instruments: as in `step_instruments`, at their poses of that moment.
-            out: as in `step`.
+            seconds: time since the last published step, 0 or more; velocities are followed for two steps at most.
+            instruments: as in `step_instruments`, where they are at this moment.
+            out: `[n, 3]` to write to, in the region's order.
 
         Returns:
-            `[n, 3]`, mm, in the region's order.
+            `[n, 3]`, mm.
 
         Raises:
-            upt.UnsupportedError: the scene does not correct; use `sample`.
+            upt.UnsupportedError: the scene has no linear response or does not correct; use `sample`.
         """
         array, count = records(instruments)
         result = output(out, self.out_count)
@@ -241,6 +243,15 @@ class Scene:
                 self._handle, seconds, address(n), address(c), len(n), address(result), result.size
             )
         )
+        return result
+
+    def present_points(
+        self, seconds: float, instruments: Sequence[Instrument] = (), out: Floats | None = None
+    ) -> Floats:
+        """As `present`, at the attached points."""
+        array, count = records(instruments)
+        result = output(out, self._point_count)
+        check(lib.upt_scene_present_points(self._handle, seconds, array, count, address(result), result.size))
         return result
 
     def set_region(self, nodes: ArrayLike | None) -> None:
@@ -316,7 +327,7 @@ class Scene:
 
 def _contacts(nodes: ArrayLike, contact: ArrayLike) -> tuple[Indices, Floats]:
     n = indices(nodes, "nodes")
-    if not len(n) and not np.size(contact):
+    if not n.size and not np.size(contact):
         return n, np.empty((0, 3), np.float32)
     return n, vectors(contact, "contact", len(n))
 

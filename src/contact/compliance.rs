@@ -34,7 +34,15 @@ impl Compliance<'_> {
     }
 }
 
-/// `A` at some columns, and `W` of samples on them.
+/// A sample's place among the columns, and its weight there, for up to three nodes.
+#[derive(Clone, Copy, Debug, Default)]
+struct Entries {
+    count: usize,
+    places: [(u32, f32); 3],
+}
+
+/// `A` at some columns, and `W` of samples on them. From call to call only what is new is computed: each value is a function of its
+/// two columns, or samples, alone, so what was kept has the bits of what would be made anew.
 #[derive(Debug, Default)]
 pub struct Delassus {
     /// Ascending.
@@ -42,23 +50,36 @@ pub struct Delassus {
     wanted: Vec<u32>,
     upper: Vec<f64>,
     widened: Vec<f32>,
-    /// Scaled modes of a row, and all modes by mode `[n,3m]`.
+    /// All natural modes at the columns, by mode `[n,3m]`.
     modes: Vec<f32>,
     /// `A [3m,3m]`, mm/mN.
     a: Vec<f32>,
+    /// The same of the columns before, which `wanted` holds then.
+    a_before: Vec<f32>,
     /// The natural modes' part was left out of it.
     is_static: bool,
     /// `W [3n,3n]`, mm/mN, and the samples that it is of.
     w: Vec<f32>,
     of: Vec<u32>,
-    /// Places in `a` and weights of all samples' columns, and where each sample's end.
-    entries: Vec<(usize, f32)>,
-    ends: Vec<usize>,
-    /// `W` less what inertia holds back in [`Delassus::between`].
+    /// The same of the call before.
+    w_before: Vec<f32>,
+    of_before: Vec<u32>,
+    /// Samples of the call before, ascending, and their rows there.
+    known: Vec<(u32, u32)>,
+    entries: Vec<Entries>,
+    /// `W` less what inertia holds back in [`Delassus::between`], which keeps `modes` at the samples.
     varied: Vec<f32>,
 }
 
+const NONE: u32 = u32::MAX;
+
 impl Delassus {
+    /// Forgets the columns: the next call reads them anew.
+    fn forget(&mut self) {
+        self.columns.clear();
+        self.of.clear();
+    }
+
     /// `W` of samples, `[3n,3n]`, row-major; read again only where they are others than those of the last call.
     ///
     /// # Errors
@@ -92,9 +113,13 @@ impl Delassus {
         };
         let order = 3 * rows.len();
         if self.read(alone, all, rows)? || self.modes.len() != held_back.len() * order {
-            memory::reserve(&mut self.varied, order * order, WHAT)?;
             self.modes.clear();
-            memory::reserve(&mut self.modes, held_back.len() * order, WHAT)?;
+            let made = memory::reserve(&mut self.varied, order * order, WHAT)
+                .and_then(|()| memory::reserve(&mut self.modes, held_back.len() * order, WHAT));
+            if let Err(error) = made {
+                self.forget();
+                return Err(error);
+            }
             self.modes.resize(held_back.len() * order, 0.0);
             for (at, &row) in rows.iter().enumerate() {
                 for (column, weight) in compliance.entries(all[row as usize]) {
@@ -131,43 +156,47 @@ impl Delassus {
     /// Makes `w` that of the samples; tells whether it was another's.
     fn read(&mut self, compliance: Compliance<'_>, all: &[Sample], rows: &[u32]) -> Result<bool> {
         let samples = rows.iter().map(|row| all[*row as usize]);
-        let read = self.gather(compliance, samples.clone())?;
-        if !read && self.of == rows {
+        self.gather(compliance, samples.clone())?;
+        if self.of == rows {
             return Ok(false);
         }
+        std::mem::swap(&mut self.w, &mut self.w_before);
+        std::mem::swap(&mut self.of, &mut self.of_before);
+        self.known.clear();
+        let before = self.of_before.iter().enumerate();
+        self.known
+            .extend(before.map(|(at, &sample)| (sample, at as u32)));
+        self.known.sort_unstable();
         self.of.clear();
-        let (order, count) = (3 * self.columns.len(), rows.len());
-        // Where the columns of each sample lie in `a`.
-        self.ends.clear();
-        self.entries.clear();
-        memory::reserve(&mut self.ends, count, WHAT)?;
-        for sample in samples {
-            let columns = &self.columns;
-            let place = |column: u32| 3 * columns.partition_point(|c| *c < column);
-            let own = compliance.entries(sample);
-            self.entries
-                .extend(own.map(|(column, weight)| (place(column), weight)));
-            self.ends.push(self.entries.len());
-        }
         self.w.clear();
+        let count = rows.len();
         memory::reserve(&mut self.w, 9 * count * count, WHAT)?;
-        self.of.extend_from_slice(rows);
         self.w.resize(9 * count * count, 0.0);
-        let (ends, entries) = (&self.ends, &self.entries);
-        let of = |at: usize| &entries[if at == 0 { 0 } else { ends[at - 1] }..ends[at]];
+        self.of.extend_from_slice(rows);
+        self.entries.clear();
+        for sample in samples {
+            let mut entries = Entries::default();
+            for (column, weight) in compliance.entries(sample) {
+                let place = 3 * self.columns.partition_point(|c| *c < column) as u32;
+                entries.places[entries.count] = (place, weight);
+                entries.count += 1;
+            }
+            self.entries.push(entries);
+        }
+        let size_before = 3 * self.of_before.len();
         for i in 0..count {
+            let was_i = self.was(i);
             for j in i..count {
-                let mut block = [0.0f32; 9];
-                for &(from, x) in of(i) {
-                    for &(to, y) in of(j) {
-                        for axis in 0..3 {
-                            let line = &self.a[(from + axis) * order + to..][..3];
-                            for (sum, value) in block[3 * axis..].iter_mut().zip(line) {
-                                *sum += x * y * value;
-                            }
-                        }
+                let was_j = self.was(j);
+                let block = match was_i != NONE && was_j != NONE {
+                    true => {
+                        let from = 3 * was_i as usize * size_before + 3 * was_j as usize;
+                        std::array::from_fn(|at| {
+                            self.w_before[from + (at / 3) * size_before + at % 3]
+                        })
                     }
-                }
+                    false => self.block(i, j),
+                };
                 for (at, &value) in block.iter().enumerate() {
                     let (r, c) = (3 * i + at / 3, 3 * j + at % 3);
                     self.w[r * 3 * count + c] = value;
@@ -178,12 +207,46 @@ impl Delassus {
         Ok(true)
     }
 
-    /// Reads the columns that samples need, unless they are there; tells whether it has.
+    /// The row that a sample had in the call before.
+    fn was(&self, at: usize) -> u32 {
+        let sample = self.of[at];
+        match self.known.binary_search_by_key(&sample, |known| known.0) {
+            Ok(found) => self.known[found].1,
+            Err(_) => NONE,
+        }
+    }
+
+    /// The block of two samples, summed from the lower one of them: the same from both sides.
+    fn block(&self, i: usize, j: usize) -> [f32; 9] {
+        let order = 3 * self.columns.len();
+        let turned = self.of[i] > self.of[j];
+        let (row, other) = match turned {
+            true => (self.entries[j], self.entries[i]),
+            false => (self.entries[i], self.entries[j]),
+        };
+        let mut block = [0.0f32; 9];
+        for (from, x) in &row.places[..row.count] {
+            for (to, y) in &other.places[..other.count] {
+                for axis in 0..3 {
+                    let line = &self.a[(*from as usize + axis) * order + *to as usize..][..3];
+                    for (sum, value) in block[3 * axis..].iter_mut().zip(line) {
+                        *sum += x * y * value;
+                    }
+                }
+            }
+        }
+        match turned {
+            true => std::array::from_fn(|at| block[3 * (at % 3) + at / 3]),
+            false => block,
+        }
+    }
+
+    /// Reads the columns that samples need, unless they are there.
     fn gather(
         &mut self,
         compliance: Compliance<'_>,
         samples: impl Iterator<Item = Sample>,
-    ) -> Result<bool> {
+    ) -> Result<()> {
         self.wanted.clear();
         for sample in samples {
             self.wanted
@@ -192,23 +255,27 @@ impl Delassus {
         self.wanted.sort_unstable();
         self.wanted.dedup();
         let known = |column: &u32| self.columns.binary_search(column).is_ok();
-        if self.is_static == compliance.inertia.is_none()
+        let same_kind = self.is_static == compliance.inertia.is_none();
+        if same_kind
             && !self.columns.is_empty()
             && self.columns.len() <= 2 * self.wanted.len()
             && self.wanted.iter().all(known)
         {
-            return Ok(false);
+            return Ok(());
         }
-        self.of.clear();
+        if !same_kind {
+            self.forget();
+        }
         self.is_static = compliance.inertia.is_none();
         std::mem::swap(&mut self.columns, &mut self.wanted);
+        std::mem::swap(&mut self.a, &mut self.a_before);
         let order = 3 * self.columns.len();
         self.upper.clear();
         self.a.clear();
         let made = memory::reserve(&mut self.upper, order * order, WHAT)
             .and_then(|()| memory::reserve(&mut self.a, order * order, WHAT));
         if let Err(error) = made {
-            self.columns.clear();
+            self.forget();
             return Err(error);
         }
         self.upper.resize(order * order, 0.0);
@@ -224,10 +291,10 @@ impl Delassus {
                 self.a[i * order + j] = self.a[j * order + i];
             }
         }
-        Ok(true)
+        Ok(())
     }
 
-    /// Takes the natural modes' part off the upper triangle.
+    /// Takes the natural modes' part off the upper triangle, where it is not known from before.
     fn hold_back(&mut self, space: &CoarseSpace, held_back: &[f32], order: usize) {
         let dof = |at: usize| 3 * self.columns[at / 3] as usize + at % 3;
         self.modes.clear();
@@ -238,14 +305,38 @@ impl Delassus {
                 self.modes[mode * order + at] = *value;
             }
         }
+        let order_before = 3 * self.wanted.len();
+        let before = |at: usize| match self.wanted.binary_search(&self.columns[at / 3]) {
+            Ok(place) => (3 * place + at % 3) as u32,
+            Err(_) => NONE,
+        };
         for at in 0..order {
-            let row = &mut self.a[at * order + at..(at + 1) * order];
-            for (mode, lost) in held_back.iter().enumerate() {
-                let values = &self.modes[mode * order + at..(mode + 1) * order];
-                let factor = lost * values[0];
-                for (a, value) in row.iter_mut().zip(values) {
-                    *a -= factor * value;
+            let row = &mut self.a[at * order..(at + 1) * order];
+            let was = before(at);
+            // Runs of columns that were known with this row, and of those that were not.
+            let mut start = at;
+            while start < order {
+                let known = |column: usize| was != NONE && before(column) != NONE;
+                let is_known = known(start);
+                let mut end = start + 1;
+                while end < order && known(end) == is_known {
+                    end += 1;
                 }
+                if is_known {
+                    let line = &self.a_before[was as usize * order_before..][..order_before];
+                    for (value, column) in row[start..end].iter_mut().zip(start..) {
+                        *value = line[before(column) as usize];
+                    }
+                } else {
+                    for (mode, lost) in held_back.iter().enumerate() {
+                        let values = &self.modes[mode * order..(mode + 1) * order];
+                        let factor = lost * values[at];
+                        for (a, value) in row[start..end].iter_mut().zip(&values[start..end]) {
+                            *a -= factor * value;
+                        }
+                    }
+                }
+                start = end;
             }
         }
     }
@@ -271,9 +362,14 @@ impl Delassus {
             + self.widened.capacity()
             + self.modes.capacity()
             + self.a.capacity()
+            + self.a_before.capacity()
             + self.w.capacity()
+            + self.w_before.capacity()
             + self.varied.capacity()
-            + self.of.capacity())
-            + 8 * (self.upper.capacity() + self.ends.capacity() + 2 * self.entries.capacity())
+            + self.of.capacity()
+            + self.of_before.capacity()
+            + 2 * self.known.capacity())
+            + size_of::<Entries>() * self.entries.capacity()
+            + 8 * self.upper.capacity()
     }
 }

@@ -12,8 +12,12 @@ pub struct Body {
     pub forces: ElementForces,
     /// Lumped mass `[K]`, g.
     pub mass: Vec<f32>,
+    /// The same by degree of freedom `[3K]`.
+    pub mass_of_dof: Vec<f32>,
     /// Held nodes `[K]`.
     pub held: Vec<bool>,
+    /// The same as a list, ascending.
+    pub held_nodes: Vec<u32>,
 }
 
 impl Body {
@@ -30,16 +34,20 @@ impl Body {
         for &node in &mesh.held_nodes {
             held[node as usize] = true;
         }
+        let mass: Vec<f32> = diagonal.mass.iter().map(|mass| *mass as f32).collect();
+        let ascending = (0..mass.len() as u32).filter(|node| held[*node as usize]);
         Body {
+            held_nodes: ascending.collect(),
+            mass_of_dof: mass.iter().flat_map(|&mass| [mass; 3]).collect(),
             forces: ElementForces::new(body, material, simd(isa)),
-            mass: diagonal.mass.iter().map(|mass| *mass as f32).collect(),
+            mass,
             held,
         }
     }
 
     /// Bytes held.
     pub fn memory_bytes(&self) -> usize {
-        self.forces.bytes() + self.mass.len() * (4 + 1)
+        self.forces.bytes() + self.mass.len() * (4 + 12 + 1) + 4 * self.held_nodes.len()
     }
 }
 

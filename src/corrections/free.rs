@@ -18,6 +18,8 @@ pub(super) struct Free {
     modes: Vec<Oscillator>,
     /// A number a mode.
     values: Vec<f32>,
+    /// What BDF2's velocities lack `[K,3]`, mm/s.
+    faster: Vec<f32>,
 }
 
 /// A natural mode in a step, per unit mass where it is a force.
@@ -56,6 +58,7 @@ impl Free {
             }
         });
         self.values = memory::zeros(natural.len(), WHAT)?;
+        self.faster = memory::zeros(3 * lent.corrections.body.mass.len(), WHAT)?;
         self.modes = memory::collected(natural.len(), oscillators, WHAT)?;
         Ok(())
     }
@@ -75,7 +78,7 @@ impl Free {
     }
 
     pub(super) fn memory_bytes(&self) -> usize {
-        size_of::<Oscillator>() * self.modes.len() + 4 * self.values.len()
+        size_of::<Oscillator>() * self.modes.len() + 4 * (self.values.len() + self.faster.len())
     }
 }
 
@@ -115,25 +118,27 @@ impl Stage {
         let rests = |field: &[f32]| field.iter().all(|value| *value == 0.0);
         if rests(input.last) && rests(input.before) && (input.still || self.rests()) {
             next.fill(0.0);
-            self.finish(lent, input, next);
+            self.finish(lent, input, next)?;
             report.min_det = 1.0;
             return Ok(report);
         }
         self.nodes.clear();
         self.preconditioner.prescribe(lent.env(), &[])?;
         self.memory.mask(&[]);
-        self.prepare(lent, input);
+        self.prepare(lent, input)?;
         let mut u = std::mem::take(&mut self.u);
         let mut g = std::mem::take(&mut self.g);
-        let result = self.swing_from(lent, input, &mut u, &mut g, &mut report);
+        let result = self
+            .swing_from(lent, input, &mut u, &mut g, &mut report)
+            .and_then(|()| self.finish(lent, input, &u));
         if result.is_ok() {
             next.copy_from_slice(&u);
-            self.finish(lent, input, next);
             self.finish_free(lent, input.last, next);
             if report.fell_back {
                 self.stop_next();
             }
             self.next.min_det = report.min_det;
+            self.estimate(&mut report);
         }
         (self.u, self.g) = (u, g);
         result.map(|()| report)
@@ -154,7 +159,8 @@ impl Stage {
     ) -> Result<()> {
         let (h, kappa) = (lent.pace.integrator.step_s, lent.pace.integrator.kappa());
         self.free.ready(lent)?;
-        let det = self.residual(lent, input.last, input.last, g, report)?;
+        let still = input.last;
+        let (det, _) = self.residual(lent, [still, still, still], g, report)?;
         self.measure(lent, input, g)?;
         let env = lent.env();
         // What the modes lack under BDF2 goes into the inertia of the step, ...
@@ -168,7 +174,7 @@ impl Stage {
         // ... and into the velocities at its end.
         self.free.give(|mode| mode.faster(h));
         self.preconditioner
-            .of_natural(env, &self.free.values, &mut self.scratch_field)?;
+            .of_natural(env, &self.free.values, &mut self.free.faster)?;
         self.free.give(|mode| mode.after(h).0 - mode.place);
         self.preconditioner
             .of_natural(env, &self.free.values, &mut self.d)?;
@@ -177,10 +183,10 @@ impl Stage {
         }
         mask_held(&env.body.held, u);
         let lost = det.is_nan() || det < SMALLEST_DET;
-        let mut det = self.residual(lent, input.last, u, g, report)?;
+        let mut det = self.residual(lent, [input.last, u, u], g, report)?.0;
         if !lost && (det.is_nan() || det < SMALLEST_DET) {
             u.copy_from_slice(input.last);
-            det = self.residual(lent, input.last, u, g, report)?;
+            det = self.residual(lent, [input.last, u, u], g, report)?.0;
         }
         report.parts = 1;
         self.relax(lent, input, det, u, g, report)
@@ -227,7 +233,7 @@ impl Stage {
         let kappa = lent.pace.integrator.kappa() as f32;
         let masses = &lent.corrections.body.mass;
         for i in 0..next.len() {
-            self.next.velocity[i] += self.scratch_field[i];
+            self.next.velocity[i] += self.free.faster[i];
             self.next.inertia[i] = masses[i / 3] * kappa * (next[i] - last[i]) + self.drift[i];
         }
     }

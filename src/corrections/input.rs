@@ -20,6 +20,8 @@ pub struct Report {
     pub residual: f32,
     /// Root mean square over the nodes of what a further iteration would move, estimated, mm.
     pub remaining_mm: f32,
+    /// Root mean square error over the nodes, estimated before the bundle's calibration, mm.
+    pub error_mm: f32,
     /// Smallest det F at the end.
     pub min_det: f32,
     /// The load was taken in this many parts.
@@ -47,8 +49,8 @@ pub struct Input<'a> {
 pub struct Enough {
     /// Iterations at most.
     pub iterations: u32,
-    /// [`Report::remaining_mm`] that suffices; 0 for never.
-    pub remaining_mm: f32,
+    /// [`Report::error_mm`] that suffices; 0 for never.
+    pub error_mm: f32,
     /// No iteration starts after this.
     pub until: Option<Instant>,
 }

@@ -10,20 +10,24 @@
 //! ```
 //!
 //! The pairs hold `F` without the loads: they survive any change of contact.
+//!
+//! What moves the whole field stays in the block coordinates until the elements ask for it: the contact is solved where the tissue
+//! would be at the nodes of the domain, and an iteration decodes once and projects once.
 
 use std::time::Instant;
 
 use super::input::{Input, Lent, Report};
-use super::precondition::{Preconditioner, mask_held};
-use super::stage::{MOST_PARTS, SHORTENINGS, SLOPE, SMALLEST_DET, Stage, dot};
+use super::passes;
+use super::precondition::{Env, Preconditioner, mask_held};
+use super::stage::{MOST_PARTS, SHORTENINGS, SLOPE, SMALLEST_DET, Stage};
 use crate::contact::{Compliance, Problem, State};
 use crate::error::Result;
 
 /// The state of an iteration.
 struct Iterate<'a> {
-    u: &'a mut [f32],
+    u: &'a mut Vec<f32>,
     /// `F(u)`, µN.
-    g: &'a mut [f32],
+    g: &'a mut Vec<f32>,
     /// Smallest det F.
     det: f32,
 }
@@ -38,11 +42,11 @@ impl Stage {
         problem: &mut Problem,
         next: &mut [f32],
     ) -> Result<Report> {
+        let _awake = lent.pool.keep_awake();
         self.nodes.clear();
-        self.preconditioner.prescribe(lent.env(), &[])?;
         self.memory.begin();
         self.memory.mask(&[]);
-        self.prepare(lent, input);
+        self.prepare(lent, input)?;
         let mut report = Report::default();
         let mut u = std::mem::take(&mut self.u);
         let mut g = std::mem::take(&mut self.g);
@@ -51,14 +55,16 @@ impl Stage {
             g: &mut g,
             det: 1.0,
         };
-        let result = self.iterate_loaded(lent, input, rest, problem, &mut at, &mut report);
+        let result = self
+            .iterate_loaded(lent, input, rest, problem, &mut at, &mut report)
+            .and_then(|()| self.finish(lent, input, at.u));
         if result.is_ok() {
             next.copy_from_slice(&u);
-            self.finish(lent, input, next);
             if report.fell_back {
                 self.stop_next();
             }
             self.next.min_det = report.min_det;
+            self.estimate(&mut report);
         }
         (self.u, self.g) = (u, g);
         result.map(|()| report)
@@ -73,10 +79,11 @@ impl Stage {
         at: &mut Iterate<'_>,
         report: &mut Report,
     ) -> Result<()> {
+        let env = lent.env();
         self.guess_loaded(lent, input, rest, problem, at, report)?;
-        let touched = problem.touched(&lent.corrections.body.held);
-        self.preconditioner.engage(lent.env(), touched)?;
-        let start = self.unbalanced(lent, problem, at.g);
+        let touched = problem.touched(&env.body.held);
+        self.preconditioner.engage(env, touched)?;
+        let start = self.unbalanced(env, problem, at.g)?;
         let mut size = start;
         for iteration in 0..input.enough.iterations {
             let until = input.enough.until;
@@ -87,10 +94,10 @@ impl Stage {
             self.improve_at(lent, input, rest, problem, at, 1.0, report)?;
             report.iterations += 1;
             let before = size;
-            size = self.unbalanced(lent, problem, at.g);
-            let moved = (dot(&self.d, &self.d) / (self.d.len() / 3) as f64).sqrt();
-            report.remaining_mm = (moved * size / before.max(f64::MIN_POSITIVE)) as f32;
-            if report.remaining_mm < input.enough.remaining_mm {
+            size = self.unbalanced(env, problem, at.g)?;
+            let moved = self.moved / (at.u.len() / 3) as f64;
+            report.remaining_mm = (moved.sqrt() * size / before.max(f64::MIN_POSITIVE)) as f32;
+            if self.suffices(report.remaining_mm, input.enough) {
                 break;
             }
         }
@@ -98,14 +105,16 @@ impl Stage {
             // Linear elasticity from rest, with the tools where they are.
             problem.let_go();
             at.u.fill(0.0);
+            self.preconditioner.coordinates.fill(0.0);
             self.press(lent, input, rest, problem, 1.0, at.u)?;
-            at.det = self.residual(lent, input.last, at.u, at.g, report)?;
+            self.settle(env, at.u)?;
+            self.evaluate(lent, input, at, report)?;
             let sound = self.motion.min_det >= SMALLEST_DET && !input.still;
             if at.det < SMALLEST_DET && sound {
                 // Inverted too: the tissue stays where it was.
                 problem.let_go();
                 at.u.copy_from_slice(input.last);
-                at.det = self.residual(lent, input.last, at.u, at.g, report)?;
+                self.evaluate(lent, input, at, report)?;
             }
             report.fell_back = true;
             self.memory.clear();
@@ -115,11 +124,29 @@ impl Stage {
         Ok(())
     }
 
-    /// `|F - B^T f|`, left in `q`.
-    fn unbalanced(&mut self, lent: Lent<'_>, problem: &Problem, g: &[f32]) -> f64 {
+    /// `F(u)` and det F of a state that no iteration led to.
+    fn evaluate(
+        &mut self,
+        lent: Lent<'_>,
+        input: &Input<'_>,
+        at: &mut Iterate<'_>,
+        report: &mut Report,
+    ) -> Result<()> {
+        (at.det, _) = self.residual(lent, [input.last, at.u, at.u], at.g, report)?;
+        self.is_projected = false;
+        Ok(())
+    }
+
+    /// `F - B^T f`, left in `q`; returns its length.
+    fn unbalanced(&mut self, env: Env<'_>, problem: &Problem, g: &[f32]) -> Result<f64> {
         self.q.copy_from_slice(g);
-        unload(problem, &lent.corrections.body.held, &mut self.q);
-        dot(&self.q, &self.q).sqrt()
+        each_free_load(problem, &env.body.held, |node, force| {
+            let at = 3 * node as usize;
+            for (r, f) in self.q[at..at + 3].iter_mut().zip(force) {
+                *r -= f;
+            }
+        });
+        Ok(passes::square(env, &self.q, &mut self.partial)?.sqrt())
     }
 
     /// The first guess: the last state, the free motion of the natural modes, and the linear response to the tools, in parts of
@@ -133,6 +160,7 @@ impl Stage {
         at: &mut Iterate<'_>,
         report: &mut Report,
     ) -> Result<()> {
+        let env = lent.env();
         let lost = self.motion.min_det < SMALLEST_DET && !input.still;
         let least = SMALLEST_DET.max(0.5 * self.motion.min_det.min(1.0));
         let ways = problem.parts();
@@ -141,10 +169,11 @@ impl Stage {
             problem.restart();
             if lost {
                 at.u.fill(0.0);
+                self.preconditioner.coordinates.fill(0.0);
                 problem.let_go();
             } else {
                 at.u.copy_from_slice(input.last);
-                self.move_freely(lent, at.u)?;
+                self.move_freely(env)?;
             }
             let parts = ways.max(iterated);
             for part in 1..=parts {
@@ -153,13 +182,18 @@ impl Stage {
                 // An iteration after each of `iterated` parts of the load but the last.
                 let due = part * iterated / parts > (part - 1) * iterated / parts;
                 if due && part < parts {
-                    at.det = self.residual(lent, input.last, at.u, at.g, report)?;
+                    self.settle(env, at.u)?;
+                    self.evaluate(lent, input, at, report)?;
                     if at.det > SMALLEST_DET {
+                        self.preconditioner.prescribe(env, &[])?;
+                        self.unbalanced(env, problem, at.g)?;
                         self.improve_at(lent, input, rest, problem, at, way, report)?;
                     }
+                    self.preconditioner.coordinates.fill(0.0);
                 }
             }
-            at.det = self.residual(lent, input.last, at.u, at.g, report)?;
+            self.settle(env, at.u)?;
+            self.evaluate(lent, input, at, report)?;
             report.parts = parts;
             if at.det > least || iterated >= MOST_PARTS {
                 return Ok(());
@@ -168,17 +202,21 @@ impl Stage {
         }
     }
 
-    /// `u += -N diag(1 / (m (w² + kappa))) N^T [I_{n+1}(u_n) - I_n]`: what the natural modes do by themselves.
-    fn move_freely(&mut self, lent: Lent<'_>, u: &mut [f32]) -> Result<()> {
-        for ((q, drift), inertia) in self.q.iter_mut().zip(&self.drift).zip(&self.motion.inertia) {
-            *q = drift - inertia;
-        }
-        mask_held(&lent.corrections.body.held, &mut self.q);
-        self.preconditioner
-            .move_natural(lent.env(), &self.q, &mut self.d, u)
+    /// The coordinates become `-N diag(1 / (m (w² + kappa))) N^T [I_{n+1}(u_n) - I_n]`: what the natural modes do by themselves.
+    fn move_freely(&mut self, env: Env<'_>) -> Result<()> {
+        passes::difference(env, &self.drift, &self.motion.inertia, &mut self.q)?;
+        mask_held(&env.body.held, &mut self.q);
+        self.preconditioner.move_natural(env, &self.q)
     }
 
-    /// Contact at `u`, the tools at part `way` of their way: `u` becomes `u + A_k B^T (f' - f)`.
+    /// `u` and what the coordinates hold become one.
+    fn settle(&mut self, env: Env<'_>, u: &mut [f32]) -> Result<()> {
+        self.preconditioner.decode(env, &mut self.q)?;
+        passes::add(env, &mut self.q, u)
+    }
+
+    /// Contact where the tissue is with the coordinates' field on `u`, the tools at part `way` of their way; the
+    /// coordinates take on `A_k B^T (f' - f)`.
     fn press(
         &mut self,
         lent: Lent<'_>,
@@ -186,25 +224,42 @@ impl Stage {
         rest: &[f32],
         problem: &mut Problem,
         way: f32,
-        u: &mut [f32],
+        u: &[f32],
     ) -> Result<()> {
+        let env = lent.env();
+        self.preconditioner.decode_domain(env, &mut self.touched)?;
+        for &node in &self.preconditioner.domain_nodes {
+            let range = 3 * node as usize..3 * node as usize + 3;
+            let base = &u[range.clone()];
+            let touched = &mut self.touched[range];
+            match env.body.held[node as usize] {
+                true => touched.copy_from_slice(base),
+                false => touched.iter_mut().zip(base).for_each(|(t, u)| *t += u),
+            }
+        }
         let state = State {
             rest,
-            u,
+            u: &self.touched,
             start: input.last,
         };
         let compliance = compliance(lent, &self.preconditioner);
         let change = problem.solve(compliance, state, way)?;
-        self.preconditioner.load(
-            lent.env(),
-            change.dofs,
-            change.forces,
-            &mut self.scratch_field,
-            u,
-        )
+        self.preconditioner
+            .add_load(env, change.dofs, change.forces)
     }
 
-    /// One iteration with the tools at part `way` of their way.
+    /// `U^T F(u)` of the state that stands.
+    fn project_standing(&mut self, env: Env<'_>, g: &[f32]) -> Result<()> {
+        if !self.is_projected {
+            self.preconditioner.project(env, g)?;
+            self.projected
+                .copy_from_slice(&self.preconditioner.coordinates);
+            self.is_projected = true;
+        }
+        Ok(())
+    }
+
+    /// One iteration with the tools at part `way` of their way, from the residual in `q`.
     #[allow(clippy::too_many_arguments)]
     fn improve_at(
         &mut self,
@@ -217,41 +272,60 @@ impl Stage {
         report: &mut Report,
     ) -> Result<()> {
         let env = lent.env();
-        let held = &env.body.held;
         let (mut d, mut q) = (std::mem::take(&mut self.d), std::mem::take(&mut self.q));
         let mut g_new = std::mem::take(&mut self.g_new);
-        // The total residual is the right side; `g_new` holds it until it is overwritten.
-        g_new.copy_from_slice(at.g);
-        unload(problem, held, &mut g_new);
-        let preconditioner = &mut self.preconditioner;
-        self.memory.direction(env, &g_new, &mut q, &mut d, |q, z| {
-            preconditioner.apply(env, q, z)
-        })?;
-        mask_held(held, &mut d);
-        for ((q, u), d) in q.iter_mut().zip(&*at.u).zip(&d) {
-            *q = u + d;
+        // The coordinates of the residual: those of F less those of the loads.
+        self.project_standing(env, at.g)?;
+        let pre = &mut self.preconditioner;
+        pre.coordinates.copy_from_slice(&self.projected);
+        each_free_load(problem, &env.body.held, |node, force| {
+            env.prior
+                .add_row(node, force.map(|f| -f), &mut pre.coordinates);
+        });
+        let starts = &pre.starts;
+        let recursion = self
+            .memory
+            .descend(env, starts, &mut q, &mut d, &mut pre.coordinates)?;
+        pre.coarse(env)?;
+        self.memory
+            .ascend(env, recursion, &pre.coordinates, &mut d)?;
+        pre.coordinates.iter_mut().for_each(|c| *c = -*c);
+        // Where the tissue would be is u + d and the coordinates' field, which takes on what the contact changes.
+        for &node in &pre.domain_nodes {
+            let range = 3 * node as usize..3 * node as usize + 3;
+            for ((q, u), d) in q[range.clone()]
+                .iter_mut()
+                .zip(&at.u[range.clone()])
+                .zip(&d[range])
+            {
+                *q = u + d;
+            }
         }
-        self.press(lent, input, rest, problem, way, &mut q)?;
-        for ((d, q), u) in d.iter_mut().zip(&q).zip(&*at.u) {
-            *d = q - u;
-        }
-        mask_held(held, &mut d);
+        self.press(lent, input, rest, problem, way, &q)?;
+        self.preconditioner.decode(env, &mut q)?;
+        let [along, moved] = passes::advance(env, [at.u, at.g], &mut d, &mut q, &mut self.partial)?;
+        self.moved = moved;
         let work = work(problem, &d);
-        let slope = dot(at.g, &d) - work;
+        let slope = along - work;
         let mut t = 1.0f32;
         for attempt in 0..=SHORTENINGS {
-            for ((q, u), d) in q.iter_mut().zip(&*at.u).zip(&d) {
-                *q = u + t * d;
+            if attempt > 0 {
+                passes::shorten(env, at.u, &d, t, &mut q)?;
             }
-            let det = self.residual(lent, input.last, &q, &mut g_new, report)?;
-            let slope_new = dot(&g_new, &d) - work;
+            let (det, slope_new) = self.residual(lent, [input.last, &q, &d], &mut g_new, report)?;
+            let slope_new = slope_new - work;
             if det > SMALLEST_DET && 0.5 * (slope + slope_new) <= SLOPE * slope {
-                at.u.copy_from_slice(&q);
-                for ((q, new), old) in q.iter_mut().zip(&g_new).zip(&*at.g) {
-                    *q = new - old;
+                std::mem::swap(at.u, &mut q);
+                passes::difference(env, &g_new, at.g, &mut q)?;
+                if self.memory.store(env, &d, t, &q)? {
+                    let starts = &self.preconditioner.starts;
+                    let change = self.memory.newest(env, starts)?;
+                    let own = self.projected.iter_mut();
+                    own.zip(change).for_each(|(own, change)| *own += change);
+                } else {
+                    self.is_projected = false;
                 }
-                self.memory.store(env, &d, t, &q)?;
-                at.g.copy_from_slice(&g_new);
+                std::mem::swap(at.g, &mut g_new);
                 at.det = det;
                 if t < 1.0 {
                     problem.blend(t);
@@ -282,14 +356,11 @@ fn compliance<'a>(lent: Lent<'a>, preconditioner: &'a Preconditioner) -> Complia
     }
 }
 
-/// Takes the tools' loads off a residual, µN.
-fn unload(problem: &Problem, held: &[bool], residual: &mut [f32]) {
+/// Calls with each free node's share of the tools' loads, µN.
+fn each_free_load(problem: &Problem, held: &[bool], mut take: impl FnMut(u32, [f32; 3])) {
     problem.each_load(|node, force| {
         if !held[node as usize] {
-            let at = 3 * node as usize;
-            for (r, f) in residual[at..at + 3].iter_mut().zip(force.to_array()) {
-                *r -= 1e3 * f;
-            }
+            take(node, force.to_array().map(|f| 1e3 * f));
         }
     });
 }

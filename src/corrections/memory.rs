@@ -4,6 +4,9 @@
 //! Prescribed nodes are masked: their rows of `s` and `y` are left out of every product, so the pairs need not be dropped when the
 //! contact changes.
 
+#[cfg(feature = "contact")]
+mod recursion;
+
 use super::precondition::{Env, pooled};
 use crate::error::Result;
 use crate::kernels::vectors::{PartialSums, add_scaled, dots};
@@ -23,34 +26,42 @@ pub struct Memory {
     order: Vec<usize>,
     /// The same of the last published state.
     published: Vec<usize>,
-    /// `s_i . y_j` over all nodes, by slot.
+    /// `U^T y` in the block bases, of the slots of which it is known.
+    #[cfg(feature = "contact")]
+    coordinates: Vec<Vec<f32>>,
+    #[cfg(feature = "contact")]
+    projected: [bool; SLOTS],
+    /// `s_i . y_j` over all nodes, by slot, where `i` is not newer than `j`: the recursions ask for no others.
     products: Vec<[f64; SLOTS]>,
     /// The same without the masked nodes.
     masked: Vec<[f64; SLOTS]>,
     partial: PartialSums,
-    first: [f64; PAIRS],
 }
 
 impl Memory {
-    /// Room for vectors of `len`.
+    /// Room for vectors of `len` with `width` coordinates.
     ///
     /// # Errors
     /// [`crate::Error::OutOfMemory`].
-    pub fn new(len: usize) -> Result<Memory> {
-        let vectors = || -> Result<Vec<Vec<f32>>> {
+    #[cfg_attr(not(feature = "contact"), allow(unused_variables))]
+    pub fn new(len: usize, width: usize) -> Result<Memory> {
+        let vectors = |len: usize| -> Result<Vec<Vec<f32>>> {
             (0..SLOTS)
                 .map(|_| memory::zeros(len, "L-BFGS pairs"))
                 .collect()
         };
         Ok(Memory {
-            steps: vectors()?,
-            changes: vectors()?,
+            steps: vectors(len)?,
+            changes: vectors(len)?,
+            #[cfg(feature = "contact")]
+            coordinates: vectors(width)?,
+            #[cfg(feature = "contact")]
+            projected: [false; SLOTS],
             order: Vec::with_capacity(SLOTS),
             published: Vec::with_capacity(SLOTS),
             products: memory::filled(SLOTS, [0.0; SLOTS], "L-BFGS pairs")?,
             masked: memory::filled(SLOTS, [0.0; SLOTS], "L-BFGS pairs")?,
             partial: PartialSums::with_capacity(len, PAIRS),
-            first: [0.0; PAIRS],
         })
     }
 
@@ -71,7 +82,11 @@ impl Memory {
 
     /// Bytes held.
     pub fn memory_bytes(&self) -> usize {
-        8 * SLOTS * self.steps[0].len()
+        #[cfg(feature = "contact")]
+        let width = self.coordinates[0].len();
+        #[cfg(not(feature = "contact"))]
+        let width = 0;
+        SLOTS * (8 * self.steps[0].len() + 4 * width)
     }
 
     /// The pairs, oldest first: what a snapshot holds.
@@ -83,8 +98,8 @@ impl Memory {
     /// Leaves the nodes out of every product until the next call.
     pub fn mask(&mut self, nodes: &[u32]) {
         self.masked.copy_from_slice(&self.products);
-        for &i in &self.order {
-            for &j in &self.order {
+        for (at, &i) in self.order.iter().enumerate() {
+            for &j in &self.order[at..] {
                 for &node in nodes {
                     let at = 3 * node as usize;
                     let pairs = self.steps[i][at..at + 3]
@@ -97,8 +112,8 @@ impl Memory {
         }
     }
 
-    /// Stores `s = t d` and `y` (both zero at masked nodes) in place of the oldest pair, if it has curvature.
-    pub fn store(&mut self, env: Env<'_>, d: &[f32], t: f32, y: &[f32]) -> Result<()> {
+    /// Stores `s = t d` and `y` (both zero at masked nodes) in place of the oldest pair, if it has curvature; tells whether it has.
+    pub fn store(&mut self, env: Env<'_>, d: &[f32], t: f32, y: &[f32]) -> Result<bool> {
         if self.order.len() == PAIRS {
             self.order.remove(0);
         }
@@ -110,7 +125,8 @@ impl Memory {
         }
         self.changes[slot].copy_from_slice(y);
         self.order.push(slot);
-        self.fill_products(env, slot)
+        self.fill_products(env, slot)?;
+        Ok(self.order.last() == Some(&slot))
     }
 
     fn fill_products(&mut self, env: Env<'_>, slot: usize) -> Result<()> {
@@ -131,24 +147,52 @@ impl Memory {
             self.products[i][slot] = value;
             self.masked[i][slot] = value;
         }
-        let views = self::views(&self.changes, &self.order);
-        let s = &self.steps[slot];
-        pooled(dots(
-            isa,
-            pool,
-            &views[..count],
-            s,
-            &mut self.partial,
-            &mut out[..count],
-        ))?;
-        for (&j, value) in self.order.iter().zip(out) {
-            self.products[slot][j] = value;
-            self.masked[slot][j] = value;
+        #[cfg(feature = "contact")]
+        {
+            self.projected[slot] = false;
         }
         if self.products[slot][slot] <= 0.0 {
             self.order.retain(|&other| other != slot);
         }
         Ok(())
+    }
+
+    /// The pairs with curvature on the free nodes, oldest first, and how many.
+    fn used(&self) -> ([usize; PAIRS], usize) {
+        let mut used = [0usize; PAIRS];
+        let mut count = 0;
+        for &slot in &self.order {
+            if self.masked[slot][slot] > 1e-12 * self.products[slot][slot] {
+                used[count] = slot;
+                count += 1;
+            }
+        }
+        (used, count)
+    }
+
+    /// `alpha_i = s_i . (g - sum_{j > i} alpha_j y_j) / (s_i . y_i)`, newest first, from `first = s . g`.
+    fn alpha(&self, used: &[usize], first: &[f64]) -> [f64; PAIRS] {
+        let mut alpha = [0.0f64; PAIRS];
+        for i in (0..used.len()).rev() {
+            let later: f64 = (i + 1..used.len())
+                .map(|j| alpha[j] * self.masked[used[i]][used[j]])
+                .sum();
+            alpha[i] = (first[i] - later) / self.masked[used[i]][used[i]];
+        }
+        alpha
+    }
+
+    /// `alpha_i - beta_i` with `beta_i = y_i . (z + sum_{j < i} (alpha_j - beta_j) s_j) / (s_i . y_i)`, oldest first, from
+    /// `first = y . z`.
+    fn weight(&self, used: &[usize], alpha: &[f64; PAIRS], first: &[f64]) -> [f64; PAIRS] {
+        let mut weight = [0.0f64; PAIRS];
+        for i in 0..used.len() {
+            let earlier: f64 = (0..i)
+                .map(|j| weight[j] * self.masked[used[j]][used[i]])
+                .sum();
+            weight[i] = alpha[i] - (first[i] + earlier) / self.masked[used[i]][used[i]];
+        }
+        weight
     }
 
     /// `d = -H g` with `H` from the pairs around `precondition`; `q` is scratch. All `[K,3]`, `g` zero at masked nodes.
@@ -161,18 +205,11 @@ impl Memory {
         mut precondition: impl FnMut(&mut [f32], &mut [f32]) -> Result<()>,
     ) -> Result<()> {
         let (isa, pool) = (env.isa, env.pool);
-        // A pair without curvature on the free nodes is left out.
-        let mut used = [0usize; PAIRS];
-        let mut count = 0;
-        for &slot in &self.order {
-            if self.masked[slot][slot] > 1e-12 * self.products[slot][slot] {
-                used[count] = slot;
-                count += 1;
-            }
-        }
+        let (used, count) = self.used();
         let used = &used[..count];
         let views = views(&self.steps, used);
-        let first = &mut self.first[..count];
+        let mut first = [0.0f64; PAIRS];
+        let first = &mut first[..count];
         pooled(dots(
             isa,
             pool,
@@ -181,14 +218,7 @@ impl Memory {
             &mut self.partial,
             first,
         ))?;
-        // alpha_i = s_i . (g - sum_{j > i} alpha_j y_j) / (s_i . y_i), newest first.
-        let mut alpha = [0.0f64; PAIRS];
-        for i in (0..count).rev() {
-            let later: f64 = (i + 1..count)
-                .map(|j| alpha[j] * self.masked[used[i]][used[j]])
-                .sum();
-            alpha[i] = (first[i] - later) / self.masked[used[i]][used[i]];
-        }
+        let alpha = self.alpha(used, first);
         q.copy_from_slice(g);
         let views = self::views(&self.changes, used);
         let factors = alpha.map(|a| -a as f32);
@@ -202,14 +232,7 @@ impl Memory {
             &mut self.partial,
             first,
         ))?;
-        // beta_i = y_i . (z + sum_{j < i} (alpha_j - beta_j) s_j) / (s_i . y_i), oldest first.
-        let mut weight = [0.0f64; PAIRS];
-        for i in 0..count {
-            let earlier: f64 = (0..i)
-                .map(|j| weight[j] * self.masked[used[j]][used[i]])
-                .sum();
-            weight[i] = alpha[i] - (first[i] + earlier) / self.masked[used[i]][used[i]];
-        }
+        let weight = self.weight(used, &alpha, first);
         let views = self::views(&self.steps, used);
         let factors = weight.map(|w| w as f32);
         pooled(add_scaled(isa, pool, &views[..count], &factors[..count], d))?;

@@ -8,13 +8,16 @@
 //! Displacements mm, forces µN, masses g, times s.
 
 mod body;
+mod estimate;
 mod free;
 mod input;
+mod integrate;
 #[cfg(feature = "contact")]
 mod loaded;
 mod memory;
 mod motion;
 mod pace;
+mod passes;
 mod precondition;
 mod space;
 mod stage;
@@ -62,7 +65,7 @@ impl Corrections {
         let (entry, prior) = needed(manifest, prior)?;
         let material = &manifest.material;
         // Made of many lists: what they take together is asked for first.
-        let bytes = 160 * mesh.tets.len() / 4 + 200 * mesh.node_count();
+        let bytes = 160 * mesh.tets.len() / 4 + 228 * mesh.node_count();
         crate::memory::probe(bytes, "the elements of the corrections")?;
         let integrator = Integrator {
             step_s: manifest.dt_s,

@@ -14,6 +14,10 @@ pub struct Motion {
     pub inertia: Vec<f32>,
     /// Smallest det F of the last corrected state.
     pub min_det: f32,
+    /// What a step of this length leaves out in the last state, and the whole estimated error of it, before the bundle's
+    /// calibration: root mean squares over the nodes, mm. The error is 0 where nothing was corrected.
+    pub truncated_mm: f32,
+    pub error_mm: f32,
     /// `r` at the contact nodes of the last corrected state `[m,3]`, in their order, zero at held ones, µN.
     pub reaction: Vec<f32>,
 }
@@ -25,6 +29,8 @@ impl Motion {
             velocity_before: memory::zeros(len, "velocities")?,
             inertia: memory::zeros(len, "inertia")?,
             min_det: 1.0,
+            truncated_mm: 0.0,
+            error_mm: 0.0,
             reaction: memory::room(len, "contact forces")?,
         })
     }
@@ -40,6 +46,8 @@ impl Motion {
             velocity_before: copied(&self.velocity_before)?,
             inertia: copied(&self.inertia)?,
             min_det: self.min_det,
+            truncated_mm: self.truncated_mm,
+            error_mm: self.error_mm,
             reaction: copied(&self.reaction)?,
         })
     }
@@ -50,6 +58,8 @@ impl Motion {
         self.velocity_before.copy_from_slice(&other.velocity_before);
         self.inertia.copy_from_slice(&other.inertia);
         self.min_det = other.min_det;
+        self.truncated_mm = other.truncated_mm;
+        self.error_mm = other.error_mm;
         self.reaction.clear();
         self.reaction.extend_from_slice(&other.reaction);
     }
@@ -59,6 +69,8 @@ impl Motion {
         self.velocity_before.fill(0.0);
         self.inertia.fill(0.0);
         self.min_det = 1.0;
+        self.truncated_mm = 0.0;
+        self.error_mm = 0.0;
         self.reaction.clear();
     }
 }

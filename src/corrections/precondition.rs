@@ -16,7 +16,7 @@ use super::body::Body;
 use super::pace::Pace;
 use super::space::CoarseSpace;
 use crate::error::{Error, Result};
-use crate::kernels::contact::ContactFactor;
+use crate::kernels::contact::{ContactFactor, subtract_gram};
 use crate::kernels::project::{project_field, row_dots};
 use crate::kernels::rows::{RowPlan, decode_rows};
 use crate::kernels::{Isa, Pool};
@@ -24,7 +24,7 @@ use crate::memory;
 use crate::prior::PriorTable;
 
 /// Weight of the diagonal level; 1.0 and 0.15 are three to seven times worse.
-const DIAGONAL_WEIGHT: f32 = 0.4;
+pub(super) const DIAGONAL_WEIGHT: f32 = 0.4;
 
 /// Degrees of freedom in contact for which there is room from the start.
 const ROOM: usize = 768;
@@ -51,8 +51,13 @@ pub struct Preconditioner {
     /// `1 / (m (w² + kappa))` of each natural mode, mm/µN.
     #[cfg(feature = "contact")]
     moved_freely: Vec<f32>,
-    starts: Vec<usize>,
+    pub(super) starts: Vec<usize>,
     plan: RowPlan,
+    /// Nodes of the domain, which tools touch.
+    #[cfg(feature = "contact")]
+    domain: RowPlan,
+    #[cfg(feature = "contact")]
+    pub(super) domain_nodes: Vec<u32>,
     /// Contact dofs with columns, as rows of the prior's tables.
     dofs: Vec<u32>,
     columns: Vec<u32>,
@@ -60,12 +65,15 @@ pub struct Preconditioner {
     nodes: Vec<u32>,
     /// `A_k,CC`.
     compliance: ContactFactor,
-    /// `A_k,CC^-1 Phi_C [3m,r]`, mN/mm.
-    through: Vec<f32>,
+    /// `R^-T Phi_C [3m,r]` with `R^T R = A_k,CC`.
+    whitened: Vec<f64>,
+    /// A row of what inertia takes off the compliance, and the natural modes at the contact by mode `[n,3m]`.
+    lost: Vec<f32>,
+    natural: Vec<f32>,
     galerkin: ContactFactor,
     galerkin_free: Vec<f64>,
     widened: Vec<f32>,
-    coordinates: Vec<f32>,
+    pub(super) coordinates: Vec<f32>,
     on_modes: Vec<f32>,
     solved: Vec<f32>,
     at_contact: Vec<f32>,
@@ -86,17 +94,31 @@ impl Preconditioner {
         let dofs = 3 * env.prior.contact_nodes.len();
         let room = dofs.min(ROOM);
         let nodes = memory::collected(env.body.mass.len(), 0..env.body.mass.len() as u32, WHAT)?;
+        #[cfg(feature = "contact")]
+        let domain_nodes = {
+            let inside = nodes
+                .iter()
+                .copied()
+                .filter(|node| env.prior.in_domain[*node as usize]);
+            memory::collected(nodes.len(), inside, WHAT)?
+        };
         Ok(Preconditioner {
             held_back: env.space.held_back(kappa),
             #[cfg(feature = "contact")]
             moved_freely: env.space.moved_freely(kappa),
             starts: env.prior.basis_starts(),
             plan: RowPlan::try_region(&env.prior.basis(), &nodes, false)?,
+            #[cfg(feature = "contact")]
+            domain: RowPlan::try_region(&env.prior.basis(), &domain_nodes, false)?,
+            #[cfg(feature = "contact")]
+            domain_nodes,
             dofs: memory::room(dofs, WHAT)?,
             columns: memory::room(dofs / 3, WHAT)?,
             nodes,
             compliance: ContactFactor::try_with_capacity(room)?,
-            through: memory::room(room * count, WHAT)?,
+            whitened: memory::room(room * count, WHAT)?,
+            lost: memory::room(room, WHAT)?,
+            natural: memory::room(room * env.space.natural_count(), WHAT)?,
             galerkin: ContactFactor::try_with_capacity(count)?,
             galerkin_free: env.space.galerkin(kappa)?,
             widened: memory::zeros(6 * env.prior.widest_block(), WHAT)?,
@@ -113,8 +135,12 @@ impl Preconditioner {
     /// Makes room for `order` prescribed degrees of freedom; contacts of up to [`ROOM`] have it.
     fn reserve(&mut self, order: usize, count: usize) -> Result<()> {
         self.compliance.reserve(order)?;
+        let more = (order * count).saturating_sub(self.whitened.len());
+        memory::reserve(&mut self.whitened, more, WHAT)?;
+        self.whitened.resize(order * count, 0.0);
         for (list, wanted) in [
-            (&mut self.through, order * count),
+            (&mut self.natural, order * self.held_back.len()),
+            (&mut self.lost, order),
             (&mut self.at_contact, order),
             (&mut self.forces, order),
         ] {
@@ -160,50 +186,36 @@ impl Preconditioner {
         };
         self.reserve(order, count)?;
         if order > 0 {
-            let (columns, dofs, widened) = (&self.columns, &self.dofs, &mut self.widened);
-            let held_back = &self.held_back;
+            for (at, &dof) in self.dofs.iter().enumerate() {
+                let own = env.space.at_contact(dof as usize);
+                for (mode, value) in own[..self.held_back.len()].iter().enumerate() {
+                    self.natural[mode * order + at] = *value;
+                }
+                for (to, &from) in self.whitened[at * count..][..count].iter_mut().zip(own) {
+                    *to = f64::from(from);
+                }
+            }
+            let (columns, widened) = (&self.columns, &mut self.widened);
+            let (held_back, natural) = (&self.held_back, &self.natural);
+            let lost = &mut self.lost;
             self.compliance
-                .factor(env.isa, dofs, |upper| {
+                .factor(env.isa, &self.dofs, |upper| {
                     env.prior.gather_compliance(columns, upper, widened);
-                    for (i, &row) in dofs.iter().enumerate() {
-                        let own = env.space.at_contact(row as usize);
-                        for (j, &column) in dofs.iter().enumerate().skip(i) {
-                            let other = env.space.at_contact(column as usize);
-                            let lost: f32 = held_back
-                                .iter()
-                                .zip(own)
-                                .zip(other)
-                                .map(|((d, a), b)| d * a * b)
-                                .sum();
-                            upper[i * order + j] -= f64::from(lost);
+                    for (at, row) in upper.chunks_exact_mut(order).enumerate() {
+                        lose(held_back, natural, at, lost);
+                        for (value, lost) in row[at..].iter_mut().zip(&lost[at..]) {
+                            *value -= f64::from(*lost);
                         }
                     }
                 })
                 .map_err(bad)?;
-            for mode in 0..count {
-                for (value, &dof) in self.at_contact.iter_mut().zip(&self.dofs) {
-                    *value = env.space.at_contact(dof as usize)[mode];
-                }
-                self.compliance
-                    .solve(env.isa, &self.at_contact, &mut self.forces);
-                for (row, &force) in self.through.chunks_exact_mut(count).zip(&self.forces) {
-                    row[mode] = force;
-                }
-            }
+            self.compliance.whiten(env.isa, count, &mut self.whitened);
         }
-        let (dofs, through, free) = (&self.dofs, &self.through, &self.galerkin_free);
+        let (whitened, free) = (&self.whitened, &self.galerkin_free);
         self.galerkin
             .factor(env.isa, env.space.rows(), |upper| {
                 upper.copy_from_slice(free);
-                for (&dof, through) in dofs.iter().zip(through.chunks_exact(count)) {
-                    let own = env.space.at_contact(dof as usize);
-                    for (row, &own) in upper.chunks_exact_mut(count).zip(own) {
-                        let own = 1e3 * f64::from(own);
-                        for (value, &through) in row.iter_mut().zip(through) {
-                            *value -= own * f64::from(through);
-                        }
-                    }
-                }
+                subtract_gram(env.isa, whitened, count, 1e3, upper);
             })
             .map_err(bad)?;
         self.ready = true;
@@ -222,48 +234,7 @@ impl Preconditioner {
             r,
             &mut self.coordinates,
         ))?;
-        let modes = env.space.modes();
-        let rows = env.space.rows();
-        pooled(row_dots(
-            isa,
-            pool,
-            modes,
-            rows,
-            &self.coordinates,
-            &mut self.on_modes,
-        ))?;
-        self.contact_work(env)?;
-        // Psi^T r.
-        for (force, through) in self
-            .at_contact
-            .iter()
-            .zip(self.through.chunks_exact(rows.len()))
-        {
-            for (sum, &through) in self.on_modes.iter_mut().zip(through) {
-                *sum -= force * through;
-            }
-        }
-        self.galerkin.solve(isa, &self.on_modes, &mut self.solved);
-        // Forces at the contact, mN: those that keep it where it is, and under loads what it lacks besides.
-        if self.loaded && !self.dofs.is_empty() {
-            self.compliance
-                .solve(isa, &self.at_contact, &mut self.forces);
-            self.forces.iter_mut().for_each(|force| *force *= 1e-3);
-        } else {
-            self.forces.fill(0.0);
-        }
-        for (force, through) in self
-            .forces
-            .iter_mut()
-            .zip(self.through.chunks_exact(rows.len()))
-        {
-            *force -= through
-                .iter()
-                .zip(&self.solved)
-                .map(|(t, y)| t * y)
-                .sum::<f32>();
-        }
-        self.spread(env)?;
+        self.coarse(env)?;
         pooled(decode_rows(
             isa,
             pool,
@@ -292,6 +263,44 @@ impl Preconditioner {
         Ok(())
     }
 
+    /// The coarse level in coordinates: `coordinates` of a residual become those of the field that it asks for.
+    pub(super) fn coarse(&mut self, env: Env<'_>) -> Result<()> {
+        let (isa, pool) = (env.isa, env.pool);
+        let rows = env.space.rows();
+        pooled(row_dots(
+            isa,
+            pool,
+            env.space.modes(),
+            rows,
+            &self.coordinates,
+            &mut self.on_modes,
+        ))?;
+        if self.dofs.is_empty() {
+            self.galerkin.solve(isa, &self.on_modes, &mut self.solved);
+            return self.spread(env);
+        }
+        self.contact_work(env)?;
+        // Psi^T r = Phi^T r - Phi_C^T A_k,CC^-1 W^T r.
+        self.compliance
+            .solve(isa, &self.at_contact, &mut self.forces);
+        for (force, &dof) in self.forces.iter().zip(&self.dofs) {
+            let own = env.space.at_contact(dof as usize);
+            for (sum, own) in self.on_modes.iter_mut().zip(own) {
+                *sum -= force * own;
+            }
+        }
+        self.galerkin.solve(isa, &self.on_modes, &mut self.solved);
+        // Forces at the contact, mN: those that keep it where it is, and under loads what it lacks besides.
+        let lacking = if self.loaded { 1e-3 } else { 0.0 };
+        for (value, &dof) in self.at_contact.iter_mut().zip(&self.dofs) {
+            let own = env.space.at_contact(dof as usize);
+            *value = lacking * *value - inner(own, &self.solved);
+        }
+        self.compliance
+            .solve(isa, &self.at_contact, &mut self.forces);
+        self.spread(env)
+    }
+
     /// `at_contact = W^T r` of the columns in contact, from `coordinates = U^T r` and `on_modes = Phi^T r`.
     fn contact_work(&mut self, env: Env<'_>) -> Result<()> {
         pooled(row_dots(
@@ -313,7 +322,9 @@ impl Preconditioner {
 
     /// Bytes held.
     pub fn memory_bytes(&self) -> usize {
-        let lists = self.through.capacity()
+        let lists = self.lost.capacity()
+            + self.natural.capacity()
+            + 2 * self.whitened.capacity()
             + self.dofs.capacity()
             + self.columns.capacity()
             + self.nodes.capacity()
@@ -326,7 +337,39 @@ impl Preconditioner {
             + self.compliance.memory_bytes()
             + self.galerkin.memory_bytes()
             + self.plan.memory_bytes()
+            + self.domain_bytes()
     }
+
+    fn domain_bytes(&self) -> usize {
+        #[cfg(feature = "contact")]
+        return self.domain.memory_bytes() + 4 * self.domain_nodes.capacity();
+        #[cfg(not(feature = "contact"))]
+        0
+    }
+}
+
+/// Row `at` of what inertia takes off the compliance, from its diagonal on: `sum_n held_back_n N_n,at N_n`.
+fn lose(held_back: &[f32], natural: &[f32], at: usize, lost: &mut [f32]) {
+    let order = lost.len();
+    let lost = &mut lost[at..];
+    lost.fill(0.0);
+    for (mode, held_back) in natural.chunks_exact(order).zip(held_back) {
+        let factor = held_back * mode[at];
+        for (lost, value) in lost.iter_mut().zip(&mode[at..]) {
+            *lost += factor * value;
+        }
+    }
+}
+
+/// An inner product in lanes.
+fn inner(a: &[f32], b: &[f32]) -> f32 {
+    let mut lanes = [0.0f32; 16];
+    for (a, b) in a.chunks(16).zip(b.chunks(16)) {
+        for ((lane, a), b) in lanes.iter_mut().zip(a).zip(b) {
+            *lane += a * b;
+        }
+    }
+    lanes.iter().sum()
 }
 
 /// Zero at the nodes.

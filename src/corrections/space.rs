@@ -89,6 +89,11 @@ impl CoarseSpace {
         self.rows.len()
     }
 
+    /// Natural modes, the first of all.
+    pub fn natural_count(&self) -> usize {
+        self.frequency.len()
+    }
+
     /// `[r,Q]`, as the kernels take it.
     pub fn modes(&self) -> Stored<'_> {
         Stored::F16(&self.modes)

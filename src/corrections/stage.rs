@@ -4,11 +4,12 @@ use std::time::Instant;
 
 use super::free::Free;
 use super::input::{Input, Lent, Report};
-use super::memory::Memory;
+use super::memory::{Memory, PAIRS};
 use super::motion::Motion;
-use super::pace::Integrator;
-use super::precondition::{Preconditioner, mask, mask_held};
+use super::passes;
+use super::precondition::{Env, Preconditioner, mask, mask_held, pooled};
 use crate::error::{Error, Result};
+use crate::kernels::vectors::{PartialSums, dots};
 use crate::memory;
 use crate::scene::ContactSet;
 
@@ -40,25 +41,20 @@ pub struct Stage {
     pub(super) u: Vec<f32>,
     /// `M p`: inertia of the step at the last displacement, µN.
     pub(super) drift: Vec<f32>,
-    /// What a load moves; in a free step what the natural modes' velocities lack.
-    pub(super) scratch_field: Vec<f32>,
+    pub(super) partial: PartialSums,
+    /// Where the tissue would be, at the nodes of the domain.
+    #[cfg(feature = "contact")]
+    pub(super) touched: Vec<f32>,
+    /// `U^T g` of the state that stands.
+    #[cfg(feature = "contact")]
+    pub(super) projected: Vec<f32>,
+    /// Whether that is known.
+    #[cfg(feature = "contact")]
+    pub(super) is_projected: bool,
+    /// `d . d` of the last iteration.
+    #[cfg(feature = "contact")]
+    pub(super) moved: f64,
     pub(super) free: Free,
-}
-
-pub(super) fn dot(a: &[f32], b: &[f32]) -> f64 {
-    // Pieces in f32 lanes, sums in f64: the same bits on one thread or many.
-    a.chunks(1024)
-        .zip(b.chunks(1024))
-        .map(|(a, b)| {
-            let mut lanes = [0.0f32; 16];
-            for (a, b) in a.chunks(16).zip(b.chunks(16)) {
-                for ((lane, a), b) in lanes.iter_mut().zip(a).zip(b) {
-                    *lane += a * b;
-                }
-            }
-            f64::from(lanes.iter().sum::<f32>())
-        })
-        .sum()
 }
 
 impl Stage {
@@ -72,7 +68,7 @@ impl Stage {
         let field = || memory::zeros(len, "the corrections of a scene");
         Ok(Stage {
             preconditioner: Preconditioner::new(env)?,
-            memory: Memory::new(len)?,
+            memory: Memory::new(len, env.prior.width())?,
             scratch: (env.body.forces.scratch(lent.pool.threads())).map_err(|_| {
                 Error::OutOfMemory("no memory for the element forces of a scene".into())
             })?,
@@ -89,7 +85,15 @@ impl Stage {
             q: field()?,
             u: field()?,
             drift: field()?,
-            scratch_field: field()?,
+            partial: PartialSums::with_capacity(len, PAIRS),
+            #[cfg(feature = "contact")]
+            touched: field()?,
+            #[cfg(feature = "contact")]
+            projected: memory::zeros(env.prior.width(), "the corrections of a scene")?,
+            #[cfg(feature = "contact")]
+            is_projected: false,
+            #[cfg(feature = "contact")]
+            moved: 0.0,
             free: Free::default(),
         })
     }
@@ -144,6 +148,8 @@ impl Stage {
     pub fn memory_bytes(&self) -> usize {
         // Seven fields, two velocities and the inertia of two states; contact forces of two states and two evaluations, contact nodes.
         let fields = (7 + 6 + 4) * 4 * self.g.len() + 4 * self.g.len() / 3;
+        #[cfg(feature = "contact")]
+        let fields = fields + 4 * self.projected.len();
         self.memory.memory_bytes()
             + self.preconditioner.memory_bytes()
             + self.scratch.bytes()
@@ -152,70 +158,23 @@ impl Stage {
     }
 
     /// Velocities of a state that the model predicted and nothing corrected.
-    pub fn follow(&mut self, lent: Lent<'_>, input: &Input<'_>, next: &[f32]) {
+    pub fn follow(&mut self, lent: Lent<'_>, input: &Input<'_>, next: &[f32]) -> Result<()> {
         self.memory.begin();
-        self.finish(lent, input, next);
+        self.finish(lent, input, next)
     }
 
-    /// Inertia and damping of the step at the last displacement.
-    pub(super) fn prepare(&mut self, lent: Lent<'_>, input: &Input<'_>) {
-        let (last, before) = (input.last, input.before);
-        let known = if input.still { 0.0 } else { 1.0 };
-        let Integrator {
-            step_s,
-            damping_per_s,
-        } = lent.pace.integrator;
-        let (half, alpha) = ((0.5 / step_s) as f32, damping_per_s as f32);
-        let mass = &lent.corrections.body.mass;
-        for i in 0..self.drift.len() {
-            let v = (before[i] - last[i]) * half;
-            let v_n = known * self.motion.velocity[i];
-            let v_before = known * self.motion.velocity_before[i];
-            let a = (3.0 * (v - v_n) - (v_n - v_before)) * half;
-            self.drift[i] = mass[i / 3] * (a + alpha * v);
-        }
-    }
-
-    /// Velocity and inertia at `next`, the end of the step from `last`.
-    pub(super) fn finish(&mut self, lent: Lent<'_>, input: &Input<'_>, next: &[f32]) {
-        let (last, before) = (input.last, input.before);
-        let Integrator {
-            step_s,
-            damping_per_s,
-        } = lent.pace.integrator;
-        let (half, alpha) = ((0.5 / step_s) as f32, damping_per_s as f32);
-        let known = if input.still { 0.0 } else { 1.0 };
-        let mass = &lent.corrections.body.mass;
-        for i in 0..next.len() {
-            let v = (3.0 * (next[i] - last[i]) - (last[i] - before[i])) * half;
-            let v_n = known * self.motion.velocity[i];
-            let v_before = known * self.motion.velocity_before[i];
-            let a = (3.0 * (v - v_n) - (v_n - v_before)) * half;
-            self.next.velocity[i] = v;
-            self.next.inertia[i] = mass[i / 3] * (a + alpha * v);
-        }
-        if input.still {
-            self.next.velocity_before.fill(0.0);
-        } else {
-            let before = &mut self.next.velocity_before;
-            before.copy_from_slice(&self.motion.velocity);
-        }
-        self.next.min_det = 1.0;
-        self.next.reaction.clear();
-    }
-
-    /// `r(u)` to `out`, zero at held and prescribed nodes; returns the smallest det F.
+    /// `r(u)` to `out`, zero at held and prescribed nodes; returns the smallest det F and `r . d` with a field that is zero there.
     pub(super) fn residual(
         &mut self,
         lent: Lent<'_>,
-        last: &[f32],
-        u: &[f32],
+        [last, u, d]: [&[f32]; 3],
         out: &mut [f32],
         report: &mut Report,
-    ) -> Result<f32> {
-        let body = &lent.corrections.body;
+    ) -> Result<(f32, f64)> {
+        let env = lent.env();
         let failed = std::sync::Mutex::new(None);
-        let det = body
+        let det = env
+            .body
             .forces
             .evaluate(u, &mut self.scratch, out, &|count, task| {
                 if let Err(error) = lent.pool.run(count, task) {
@@ -229,10 +188,8 @@ impl Stage {
             return Err(Error::Panic(error.to_string()));
         }
         let kappa = lent.pace.integrator.kappa() as f32;
-        for i in 0..out.len() {
-            out[i] += self.drift[i] + body.mass[i / 3] * kappa * (u[i] - last[i]);
-        }
-        mask_held(&body.held, out);
+        let fields = [self.drift.as_slice(), u, last, d];
+        let slope = passes::inertia(env, kappa, fields, out, &mut self.partial)?;
         self.at_nodes[0].clear();
         for &node in &self.nodes {
             let at = 3 * node as usize;
@@ -240,7 +197,12 @@ impl Stage {
         }
         mask(&self.nodes, out);
         report.evaluations += 1;
-        Ok(det)
+        Ok((det, slope))
+    }
+
+    /// `|a|`.
+    pub(super) fn size(&mut self, env: Env<'_>, a: &[f32]) -> Result<f64> {
+        Ok(passes::square(env, a, &mut self.partial)?.sqrt())
     }
 
     /// Corrects `next`, which holds the model's prediction with the boundary conditions on it.
@@ -251,6 +213,7 @@ impl Stage {
         next: &mut [f32],
     ) -> Result<Report> {
         let env = lent.env();
+        let _awake = lent.pool.keep_awake();
         let held = &env.body.held;
         self.nodes.clear();
         let nodes = input.contact.nodes.iter();
@@ -259,19 +222,21 @@ impl Stage {
         self.preconditioner.prescribe(env, &self.nodes)?;
         self.memory.begin();
         self.memory.mask(&self.nodes);
-        self.prepare(lent, input);
+        self.prepare(lent, input)?;
         let mut report = Report::default();
 
         let mut u = std::mem::take(&mut self.u);
         let mut g = std::mem::take(&mut self.g);
-        let result = self.iterate(lent, input, &mut u, &mut g, &mut report);
+        let result = self
+            .iterate(lent, input, &mut u, &mut g, &mut report)
+            .and_then(|()| self.finish(lent, input, &u));
         if result.is_ok() {
             next.copy_from_slice(&u);
-            self.finish(lent, input, next);
             if report.fell_back {
                 self.stop_next();
             }
             self.next.min_det = report.min_det;
+            self.estimate(&mut report);
         }
         let result = result.and_then(|()| self.take_reaction(lent, input.contact, &g));
         (self.u, self.g) = (u, g);
@@ -302,7 +267,7 @@ impl Stage {
             u[at..at + 3].copy_from_slice(&target(index));
         }
         mask_held(&env.body.held, u);
-        let det = self.residual(lent, input.last, u, g, report)?;
+        let (det, _) = self.residual(lent, [input.last, u, u], g, report)?;
         self.stand();
         Ok(det)
     }
@@ -403,9 +368,10 @@ impl Stage {
         g: &mut [f32],
         report: &mut Report,
     ) -> Result<()> {
-        let start = dot(g, g).sqrt();
+        let env = lent.env();
+        let start = self.size(env, g)?;
         for iteration in 0..input.enough.iterations {
-            let size = dot(g, g).sqrt();
+            let size = self.size(env, g)?;
             let until = input.enough.until;
             let late = until.is_some_and(|until| Instant::now() >= until);
             if !size.is_finite() || det < SMALLEST_DET || (iteration > 0 && late) {
@@ -413,12 +379,12 @@ impl Stage {
             }
             det = self.improve(lent, input.last, u, g, det, report)?;
             report.iterations += 1;
-            report.remaining_mm = self.remaining(g, size);
-            if report.remaining_mm < input.enough.remaining_mm {
+            report.remaining_mm = self.remaining(env, g, size)?;
+            if self.suffices(report.remaining_mm, input.enough) {
                 break;
             }
         }
-        let end = dot(g, g).sqrt();
+        let end = self.size(env, g)?;
         if !end.is_finite() || det < SMALLEST_DET {
             u.fill(0.0);
             det = self.lead(lent, input, 1.0, u, g, report)?;
@@ -428,12 +394,6 @@ impl Stage {
         report.residual = (end / start.max(f64::MIN_POSITIVE)) as f32;
         report.min_det = det;
         Ok(())
-    }
-
-    /// What a further iteration would move, from the last one's step and by how much it lessened the residual, mm.
-    fn remaining(&self, g: &[f32], before: f64) -> f32 {
-        let moved = (dot(&self.d, &self.d) / (self.d.len() / 3) as f64).sqrt();
-        (moved * dot(g, g).sqrt() / before.max(f64::MIN_POSITIVE)) as f32
     }
 
     /// One iteration: `u`, its residual `g` and its smallest det F become those of a better state.
@@ -456,21 +416,25 @@ impl Stage {
             preconditioner.apply(env, q, z)
         })?;
         mask(&self.nodes, &mut d);
-        let slope = dot(g, &d);
+        let mut slope = [0.0];
+        pooled(dots(
+            env.isa,
+            env.pool,
+            &[g],
+            &d,
+            &mut self.partial,
+            &mut slope,
+        ))?;
+        let [slope] = slope;
         let mut t = 1.0f32;
         let mut accepted = det;
         for attempt in 0..=SHORTENINGS {
-            for i in 0..q.len() {
-                q[i] = u[i] + t * d[i];
-            }
-            let det_new = self.residual(lent, last, &q, &mut g_new, report)?;
-            let slope_new = dot(&g_new, &d);
+            passes::shorten(env, u, &d, t, &mut q)?;
+            let (det_new, slope_new) = self.residual(lent, [last, &q, &d], &mut g_new, report)?;
             if det_new > SMALLEST_DET && 0.5 * (slope + slope_new) <= SLOPE * slope {
                 self.stand();
                 u.copy_from_slice(&q);
-                for i in 0..q.len() {
-                    q[i] = g_new[i] - g[i];
-                }
+                passes::difference(env, &g_new, g, &mut q)?;
                 self.memory.store(env, &d, t, &q)?;
                 g.copy_from_slice(&g_new);
                 accepted = det_new;

@@ -1,14 +1,17 @@
 //! Instrument poses to a collision field, for hosts without a collision system.
 //!
 //! A surface node whose present position lies inside an instrument is in contact, and the collision
-//! field `c` puts it on the instrument's surface: the shortest way out. If that way leads out of the
-//! tissue (the instrument's middle has passed the surface within one step), the node goes along
-//! its inward normal instead, provided that the instrument moves into this side of the tissue and the
-//! way is within the shell; nodes that an instrument reaches from the inside are left alone.
+//! field `c` puts it on the instrument's surface: along the instrument's motion where that leads into the tissue,
+//! else along the tissue's inward normal. Where either is far longer than the shortest way out, on a flank, it
+//! takes the shortest. If the shortest way leads out of the tissue (the instrument's middle has passed the surface
+//! within one step), the instrument must move into this side of the tissue; nodes that it reaches from the inside
+//! are left alone.
 //!
-//! *Sliding*: a touched node is projected anew each time, and follows a retreating surface (at most
-//! the skin's depth a call) until it is back at rest. *Sticking*: a touched node keeps its place on
-//! the instrument until that would pull it beyond its rest position. Neither can pull tissue out.
+//! *Sliding*: a touched node is projected anew each time, and follows a retreating surface within [`SKIN_MM`] and the
+//! instrument's own motion, until it is back at rest. *Sticking*: a touched node keeps its place on
+//! the instrument until that would pull it beyond its rest position. Neither pulls tissue out: both are let go where their place lies
+//! outward of their rest position, along the tissue's normal at rest. A node that was let go is touched again only where it is
+//! [`HYSTERESIS_MM`] deep, so that one at the edge of a contact does not come and go.
 //!
 //! Every surface node is looked at, from where it is now, so large displacements need no care:
 //! a bounding-box test a node, and the exact query for the few that pass. Lengths in mm.
@@ -18,11 +21,15 @@ mod shape;
 pub use shape::{Instrument, Shape};
 
 use crate::error::{Error, Result};
-use parry3d::math::{Vec3A, Vec4, Vector};
+use parry3d::math::{Pose, Vec3A, Vec4, Vector};
 use shape::Placed;
 
-/// How far outside an instrument a node that was touched still follows it, mm.
+/// How far outside an instrument that does not move a node that was touched still follows it, mm.
 pub const SKIN_MM: f32 = 0.5;
+/// A node that was let go is touched again where it is this deep, mm.
+pub const HYSTERESIS_MM: f32 = 0.1;
+/// A way along the motion or the inward normal is taken up to this many times the shortest way out.
+const FLANK: f32 = 3.0;
 /// The longest way along the inward normal that is still taken as a contact, mm.
 pub const SHELL_MM: f32 = 10.0;
 /// Instruments at once.
@@ -42,10 +49,12 @@ pub struct InstrumentContacts {
     positions: Vec<f32>,
     /// Instrument plus one that touched the node at the last call; 0: none.
     touched_by: Vec<u8>,
+    /// Instrument plus one that let the node go, while it is near; 0: none.
+    left: Vec<u8>,
     /// Place on a sticking instrument, in its frame.
     anchor: Vec<[f32; 3]>,
-    /// Centres at the last call.
-    centres: Vec<Vector>,
+    /// Poses at the last call.
+    poses: Vec<Pose>,
     /// Rows of `surface` that the search looks at closely, and their positions.
     near: Vec<(u32, Vec3A)>,
     nodes: Vec<u32>,
@@ -95,8 +104,9 @@ impl InstrumentContacts {
             faces,
             positions: positions.to_vec(),
             touched_by: vec![0; count],
+            left: vec![0; count],
             anchor: vec![[0.0; 3]; count],
-            centres: Vec::with_capacity(MAX_INSTRUMENTS),
+            poses: Vec::with_capacity(MAX_INSTRUMENTS),
             near: Vec::with_capacity(count),
             nodes: Vec::with_capacity(count),
             vectors: Vec::with_capacity(3 * count),
@@ -107,7 +117,8 @@ impl InstrumentContacts {
     /// Forgets what is touched; the next call sees the instruments for the first time.
     pub fn reset(&mut self) {
         self.touched_by.fill(0);
-        self.centres.clear();
+        self.left.fill(0);
+        self.poses.clear();
     }
 
     /// Finds the contacts of instruments with the tissue at `displacement [K,3]`, mm. The list's
@@ -143,7 +154,7 @@ impl InstrumentContacts {
             placed[index] = Some(Placed::new(instrument, index)?);
         }
         let placed = &placed[..instruments.len()];
-        if self.centres.len() != instruments.len() {
+        if self.poses.len() != instruments.len() {
             self.reset();
         }
         self.nodes.clear();
@@ -162,19 +173,25 @@ impl InstrumentContacts {
             let before = std::mem::replace(&mut self.touched_by[i], 0);
             let point = Vector::from(p);
             let target = match self.holder(i, point, before, placed) {
-                Some((by, instrument)) => self.keep(i, point, instrument).map(|to| (by, to)),
+                Some((by, instrument)) => {
+                    let kept = self.keep(i, by, point, instrument);
+                    if kept.is_none() {
+                        self.left[i] = before;
+                    }
+                    kept.map(|to| (by, to))
+                }
                 None => self.touch(i, point, displacement, placed, before),
             };
             if let Some((by, target)) = target {
                 self.touched_by[i] = by as u8 + 1;
+                self.left[i] = 0;
                 self.nodes.push(node);
                 let c = target - Vector::from(self.rest[i]);
                 self.vectors.extend([c.x, c.y, c.z]);
             }
         }
-        self.centres.clear();
-        self.centres
-            .extend(placed.iter().flatten().map(Placed::centre));
+        self.poses.clear();
+        self.poses.extend(placed.iter().flatten().map(Placed::pose));
         Ok((&self.nodes, &self.vectors))
     }
 
@@ -187,8 +204,10 @@ impl InstrumentContacts {
     #[inline(never)]
     fn sift(&mut self, displacement: &[f32], low: Vec3A, high: Vec3A) {
         self.near.clear();
+        let away = Vec3A::splat(SKIN_MM);
         let nodes = self.surface.iter().zip(&self.rest).zip(&self.touched_by);
-        for (i, ((&node, &rest), &touched)) in nodes.enumerate() {
+        let nodes = nodes.zip(&mut self.left);
+        for (i, (((&node, &rest), &touched), left)) in nodes.enumerate() {
             let at = 3 * node as usize;
             // A load of four where there is a fourth number.
             let u = match displacement.get(at..at + 4) {
@@ -198,6 +217,8 @@ impl InstrumentContacts {
             let p = rest + u;
             if (p.cmpge(low) & p.cmple(high)).all() || touched != 0 {
                 self.near.push((i as u32, p));
+            } else if *left != 0 && !(p.cmpge(low - away) & p.cmple(high + away)).all() {
+                *left = 0;
             }
         }
     }
@@ -218,17 +239,29 @@ impl InstrumentContacts {
         follows.then_some((by, instrument))
     }
 
+    /// How instrument `by` has moved since the last call at a point that it is at now, mm; none at its first.
+    fn motion(&self, by: usize, point: Vector, instrument: &Placed) -> Option<Vector> {
+        let from = self.poses.get(by)?;
+        Some(point - from.transform_point(instrument.to_local(point)))
+    }
+
     /// Where a node goes that was touched before, or `None` where the instrument has left it.
-    fn keep(&self, i: usize, point: Vector, instrument: &Placed) -> Option<Vector> {
+    fn keep(&self, i: usize, by: usize, point: Vector, instrument: &Placed) -> Option<Vector> {
         let rest = Vector::from(self.rest[i]);
-        if instrument.sticking {
-            let target = instrument.to_world(Vector::from(self.anchor[i]));
-            let normal = instrument.nearest(target, point - rest).normal;
-            return ((target - rest).dot(normal) > 0.0).then_some(target);
-        }
-        let nearest = instrument.nearest(point, point - rest);
-        let pushed = (nearest.point - rest).dot(nearest.normal) > 0.0;
-        (nearest.distance <= SKIN_MM && pushed).then_some(nearest.point)
+        let target = match instrument.sticking {
+            true => instrument.to_world(Vector::from(self.anchor[i])),
+            false => {
+                let nearest = instrument.nearest(point, point - rest);
+                let moved = self.motion(by, point, instrument).unwrap_or_default();
+                if nearest.distance > SKIN_MM + moved.length() {
+                    return None;
+                }
+                nearest.point
+            }
+        };
+        // Along the tissue's own normal, at rest: the instrument's may point anywhere on a flank, as may that of a dragged surface.
+        let outward = self.outward(i, |_| Vector::ZERO);
+        ((target - rest).dot(outward) <= 0.0).then_some(target)
     }
 
     /// Where a node inside an instrument goes, and by which; `None` where none touches it. An
@@ -251,14 +284,21 @@ impl InstrumentContacts {
             if point.cmplt(low).any() || point.cmpgt(high).any() {
                 continue;
             }
-            let outward = *normal.get_or_insert_with(|| self.outward(i, displacement));
+            let moved = |node| Vector::from(triple(displacement, node));
+            let outward = *normal.get_or_insert_with(|| self.outward(i, moved));
             let nearest = instrument.nearest(point, -outward);
-            if nearest.distance >= 0.0 || deepest.is_some_and(|(d, _, _)| d <= nearest.distance) {
+            // One that was let go must come some way in before it is touched again.
+            let shallow = match usize::from(self.left[i]) == by + 1 {
+                true => -HYSTERESIS_MM,
+                false => 0.0,
+            };
+            if nearest.distance >= shallow || deepest.is_some_and(|(d, _, _)| d <= nearest.distance)
+            {
                 continue;
             }
+            let motion = self.motion(by, point, instrument);
             let mut target = nearest.point;
             if nearest.normal.dot(outward) > 0.0 {
-                let motion = self.centres.get(by).map(|from| instrument.centre() - *from);
                 let known = usize::from(before) == by + 1;
                 if !known && motion.is_some_and(|motion| motion.dot(outward) >= 0.0) {
                     continue;
@@ -266,6 +306,14 @@ impl InstrumentContacts {
                 match instrument.way_out(point, -outward, SHELL_MM) {
                     Some(length) => target = point - outward * length,
                     None => continue,
+                }
+            } else {
+                let into = motion.map(Vector::normalize_or_zero);
+                let into = into.filter(|into| into.dot(outward) < -0.5);
+                let direction = into.unwrap_or(-outward);
+                let most = SHELL_MM.min(-FLANK * nearest.distance);
+                if let Some(length) = instrument.way_out(point, direction, most) {
+                    target = point + direction * length;
                 }
             }
             deepest = Some((nearest.distance, by, target));
@@ -277,11 +325,9 @@ impl InstrumentContacts {
         Some((by, target))
     }
 
-    /// The surface's outward normal at a node of the deformed mesh; zero where it has none.
-    fn outward(&self, i: usize, displacement: &[f32]) -> Vector {
-        let at = |node| {
-            Vector::from(triple(&self.positions, node)) + Vector::from(triple(displacement, node))
-        };
+    /// The surface's outward normal at a node of the mesh under a displacement; zero where it has none.
+    fn outward(&self, i: usize, displacement: impl Fn(u32) -> Vector) -> Vector {
+        let at = |node| Vector::from(triple(&self.positions, node)) + displacement(node);
         let row = self.face_offsets[i] as usize..self.face_offsets[i + 1] as usize;
         self.faces[row]
             .iter()

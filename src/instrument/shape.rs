@@ -185,7 +185,7 @@ impl Placed {
         self.pose.transform_point(local)
     }
 
-    pub fn centre(&self) -> Vector {
-        self.pose.translation
+    pub fn pose(&self) -> Pose {
+        self.pose
     }
 }

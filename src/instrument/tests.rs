@@ -128,6 +128,88 @@ fn a_held_instrument_keeps_its_contacts_and_a_leaving_one_lets_go() {
 }
 
 #[test]
+fn a_first_touch_pushes_along_the_motion_or_inwards_not_aside() {
+    let (positions, faces) = slab(20);
+    let zero = vec![0.0; positions.len()];
+    let mut contacts = InstrumentContacts::new(&positions, &faces, &[]);
+    let (nodes, vectors) = contacts.find(&[capsule(2.5, false)], &zero).unwrap();
+    assert!(nodes.len() > 10);
+    for c in vectors.chunks_exact(3) {
+        assert!(c[0] == 0.0 && c[1] == 0.0 && c[2] < 0.0, "{c:?}");
+    }
+    // Obliquely into the tissue.
+    contacts.reset();
+    let moved = |x: f32, z: f32| Instrument {
+        position: [20.0 + x, 20.0, z],
+        ..capsule(z, false)
+    };
+    assert!(
+        contacts
+            .find(&[moved(0.0, 4.5)], &zero)
+            .unwrap()
+            .0
+            .is_empty()
+    );
+    let (nodes, vectors) = contacts.find(&[moved(1.0, 2.5)], &zero).unwrap();
+    assert!(nodes.len() > 10);
+    let oblique = vectors
+        .chunks_exact(3)
+        .filter(|c| (c[0] + 0.5 * c[2]).abs() < 1e-4);
+    assert!(oblique.count() > 10, "{vectors:?}");
+}
+
+#[test]
+fn a_fast_lift_keeps_what_it_pressed_until_rest_and_lets_go_once() {
+    let (positions, faces) = slab(20);
+    for sticking in [false, true] {
+        let mut contacts = InstrumentContacts::new(&positions, &faces, &[]);
+        let mut u = vec![0.0; positions.len()];
+        let mut counts = Vec::new();
+        // 2 mm a call: 40 mm/s.
+        for z in [3.5, 2.5, 1.5, 3.5, 5.5, 5.5] {
+            let (nodes, vectors) = contacts.find(&[capsule(z, sticking)], &u).unwrap();
+            counts.push(nodes.len());
+            assert!(vectors.chunks_exact(3).all(|c| c[2] <= 1e-4), "{vectors:?}");
+            u = follow(u.len(), nodes, vectors);
+        }
+        assert!(counts[3] > 0, "lost: {counts:?}");
+        assert_eq!(counts[4..], [0, 0], "found again: {counts:?}");
+    }
+}
+
+#[test]
+fn a_sticking_instrument_that_slides_off_lets_go_above_the_rest_surface() {
+    let (positions, faces) = slab(20);
+    let mut contacts = InstrumentContacts::new(&positions, &faces, &[]);
+    let mut u = vec![0.0; positions.len()];
+    // Pressed 2 mm, dragged 6 mm, lifted to 0.5 mm above the tissue.
+    for (x, z) in [
+        (0.0, 3.0),
+        (0.0, 2.0),
+        (3.0, 2.0),
+        (6.0, 2.0),
+        (6.0, 3.5),
+        (6.0, 4.5),
+    ] {
+        let dragged = Instrument {
+            position: [20.0 + x, 20.0, z],
+            ..capsule(z, true)
+        };
+        let (nodes, vectors) = contacts.find(&[dragged], &u).unwrap();
+        assert!(
+            vectors.chunks_exact(3).all(|c| c[2] <= 1e-4),
+            "pulled out: {vectors:?}"
+        );
+        u = follow(u.len(), nodes, vectors);
+    }
+    assert!(
+        contacts.found().0.is_empty(),
+        "glued: {:?}",
+        contacts.found()
+    );
+}
+
+#[test]
 fn sticking_drags_and_sliding_does_not() {
     let (positions, faces) = slab(20);
     let mut drag = [0.0; 2];

@@ -166,6 +166,98 @@ impl ContactFactor {
     }
 }
 
+impl ContactFactor {
+    /// `R^-T Z` with `A_CC = R^T R`, in place: `z [3m,n]`, row-major. The Gram matrix of the columns of the result is `Z^T A_CC^-1 Z`.
+    ///
+    /// # Panics
+    /// If there is no factor or `z` has another length.
+    pub fn whiten(&self, isa: Isa, columns: usize, z: &mut [f64]) {
+        assert!(self.ready, "no factor: call factor first");
+        assert_eq!(z.len(), self.order * columns, "z must be [3m,n]");
+        whiten_rows(isa, &self.upper, columns, z);
+    }
+}
+
+fn whiten_rows_scalar(u: &[f64], columns: usize, z: &mut [f64]) {
+    let n = z.len() / columns.max(1);
+    for k in 0..n {
+        for at in 0..columns {
+            let known: f64 = (0..k).map(|i| u[i * n + k] * z[i * columns + at]).sum();
+            z[k * columns + at] = (z[k * columns + at] - known) / u[k * n + k];
+        }
+    }
+}
+
+by_isa! { fn whiten_rows(u: &[f64], columns: usize, z: &mut [f64]) = whiten_rows_body, whiten_rows_scalar; }
+
+/// The same, by rows of `u`. Only the compiler's vector instructions depend on `V`.
+#[inline(always)]
+unsafe fn whiten_rows_body<V: Lanes>(u: &[f64], columns: usize, z: &mut [f64]) {
+    let n = z.len() / columns.max(1);
+    for k in 0..n {
+        let (above, below) = z.split_at_mut((k + 1) * columns);
+        let row = &mut above[k * columns..];
+        let inverse = 1.0 / u[k * n + k];
+        row.iter_mut().for_each(|x| *x *= inverse);
+        for (to, &factor) in below.chunks_exact_mut(columns).zip(&u[k * n + k + 1..]) {
+            for (to, &x) in to.iter_mut().zip(&*row) {
+                *to = (-factor).mul_add(x, *to);
+            }
+        }
+    }
+}
+
+/// `upper -= scale Z^T Z` for `z [m,n]` in the upper triangle of `upper [n,n]`; what it writes below is never read.
+///
+/// # Panics
+/// If a length does not fit.
+pub fn subtract_gram(isa: Isa, z: &[f64], columns: usize, scale: f64, upper: &mut [f64]) {
+    assert_eq!(upper.len(), columns * columns, "upper must be [n,n]");
+    assert!(z.len().is_multiple_of(columns.max(1)), "z must be [m,n]");
+    gram(isa, z, columns, scale, upper);
+}
+
+fn gram_scalar(z: &[f64], columns: usize, scale: f64, upper: &mut [f64]) {
+    for (i, row) in upper.chunks_exact_mut(columns).enumerate() {
+        for (j, to) in row.iter_mut().enumerate().skip(i) {
+            let rows = z.chunks_exact(columns);
+            *to -= scale * rows.map(|z| z[i] * z[j]).sum::<f64>();
+        }
+    }
+}
+
+by_isa! { fn gram(z: &[f64], columns: usize, scale: f64, upper: &mut [f64]) = gram_body, gram_scalar; }
+
+#[inline(always)]
+unsafe fn gram_body<V: Lanes>(z: &[f64], columns: usize, scale: f64, upper: &mut [f64]) {
+    let n = columns;
+    let mut i = 0;
+    while i + 4 <= n {
+        let rows = &mut upper[i * n..][..4 * n];
+        let mut j = i;
+        while j + 16 <= n {
+            subtract_scaled_tile::<4, 16>(z, rows, n, i, j, scale);
+            j += 16;
+        }
+        while j + 4 <= n {
+            subtract_scaled_tile::<4, 4>(z, rows, n, i, j, scale);
+            j += 4;
+        }
+        while j < n {
+            subtract_scaled_tile::<4, 1>(z, rows, n, i, j, scale);
+            j += 1;
+        }
+        i += 4;
+    }
+    while i < n {
+        let rows = &mut upper[i * n..][..n];
+        for j in i..n {
+            subtract_scaled_tile::<1, 1>(z, rows, n, i, j, scale);
+        }
+        i += 1;
+    }
+}
+
 /// Whether a pivot stands out of the rounding of its diagonal `pivot + removed`; a NaN does not.
 fn is_sound(pivot: f64, removed: f64) -> bool {
     pivot > PIVOT_FLOOR * (pivot + removed)
@@ -269,6 +361,19 @@ fn subtract_tile<const R: usize, const C: usize>(
     i: usize,
     j: usize,
 ) {
+    subtract_scaled_tile::<R, C>(block, rows, n, i, j, 1.0);
+}
+
+/// The same, the sum times `scale`.
+#[inline(always)]
+fn subtract_scaled_tile<const R: usize, const C: usize>(
+    block: &[f64],
+    rows: &mut [f64],
+    n: usize,
+    i: usize,
+    j: usize,
+    scale: f64,
+) {
     let mut sum = [[0.0f64; C]; R];
     for row in block.chunks_exact(n) {
         let left: &[f64; R] = row[i..i + R].try_into().expect("R numbers");
@@ -281,7 +386,7 @@ fn subtract_tile<const R: usize, const C: usize>(
     }
     for (r, sum) in sum.iter().enumerate() {
         for (to, sum) in rows[r * n + j..][..C].iter_mut().zip(sum) {
-            *to -= sum;
+            *to -= scale * sum;
         }
     }
 }

@@ -66,10 +66,10 @@ impl MaskExceptions {
     }
 }
 
-/// MXCSR: bits 7 to 12 mask an exception.
+/// MXCSR: bits 7 to 12 mask an exception; bits 0 to 5, those that were met before, begin at none.
 #[cfg(target_arch = "x86_64")]
 fn masked(word: u64) -> u64 {
-    word | 0x1f80
+    (word | 0x1f80) & !0x3f
 }
 
 /// FPCR: bits 8 to 12 and 15 let an exception trap.

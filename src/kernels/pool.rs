@@ -2,13 +2,15 @@
 //!
 //! A job is `chunk_count` independent chunks, taken in order from one counter. What a chunk
 //! computes may depend on its index only, never on the thread that runs it, so results have the
-//! same bits for any thread count. Between jobs workers sleep on a condition variable (no
-//! spinning: the game owns the cores); `run` allocates nothing. A worker that wakes late finds
-//! the job closed and goes back to sleep, so `run` never waits for a thread that has not started.
+//! same bits for any thread count. Between jobs workers sleep on a condition variable: the game owns
+//! the cores. Only while a caller holds [`Pool::keep_awake`], for the few milliseconds of many short jobs
+//! in a row, does a worker look for the next one for [`LOOKS`] turns before it sleeps. `run` allocates
+//! nothing. A worker that wakes late finds the job closed and goes back to sleep, so `run` never waits
+//! for a thread that has not started.
 
 use super::flush::FlushToZero;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 
@@ -17,6 +19,12 @@ use std::thread::JoinHandle;
 /// their memory with others): reading alone gains nothing from a second thread up to 32 MB and loses below 4 MB; the products over the
 /// tables of a large mesh, which also compute, take a quarter less time on two (`brain-fine-reduced` in docs/results/performance.md).
 const SPLIT_BYTES: usize = 8 << 20;
+
+/// The same while workers are kept awake: the next job costs a look at one number in place of waking a thread.
+const SPLIT_AWAKE_BYTES: usize = 256 << 10;
+
+/// Looks of a worker that is kept awake for the next job, and of a caller for the end of one, before it sleeps: about 0.1 ms.
+const LOOKS: u32 = 2000;
 
 /// Why a pool could not be made or a job not be finished.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -64,9 +72,28 @@ struct Shared {
     done: Condvar,
     next: AtomicUsize,
     failed: AtomicBool,
+    /// Callers that hold [`Pool::keep_awake`].
+    awake: AtomicUsize,
+    /// `State::epoch` and `State::active` for those that look without the lock.
+    epoch: AtomicU64,
+    active: AtomicUsize,
 }
 
 impl Shared {
+    fn is_awake(&self) -> bool {
+        self.awake.load(Ordering::Relaxed) > 0
+    }
+
+    /// Looks, for a while, until `found`.
+    fn look(&self, found: impl Fn() -> bool) {
+        for _ in 0..LOOKS {
+            if found() || !self.is_awake() {
+                return;
+            }
+            std::hint::spin_loop();
+        }
+    }
+
     fn lock(&self) -> MutexGuard<'_, State> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -115,6 +142,9 @@ impl Pool {
             done: Condvar::new(),
             next: AtomicUsize::new(0),
             failed: AtomicBool::new(false),
+            awake: AtomicUsize::new(0),
+            epoch: AtomicU64::new(0),
+            active: AtomicUsize::new(0),
         });
         let mut pool = Self {
             shared,
@@ -176,6 +206,7 @@ impl Pool {
                 task: task_address,
                 chunk_count,
             });
+            shared.epoch.store(state.epoch, Ordering::Release);
         }
         for _ in 0..self.workers.len().min(chunk_count - 1) {
             shared.wake.notify_one();
@@ -183,6 +214,11 @@ impl Pool {
         shared.work(task, chunk_count, 0);
         let mut state = shared.lock();
         state.job = None;
+        if state.active > 0 && shared.is_awake() {
+            drop(state);
+            shared.look(|| shared.active.load(Ordering::Acquire) == 0);
+            state = shared.lock();
+        }
         while state.active > 0 {
             state = shared
                 .done
@@ -200,8 +236,23 @@ impl Pool {
     }
 }
 
+/// Workers stay awake between jobs while this lives.
+pub struct Awake<'a>(&'a Shared);
+
+impl Drop for Awake<'_> {
+    fn drop(&mut self) {
+        self.0.awake.fetch_sub(1, Ordering::Relaxed);
+    }
+}
+
 impl Pool {
-    /// As [`Pool::run`], for a job that does little but read `bytes` of a table: below [`SPLIT_BYTES`] it stays on the
+    /// Keeps workers from going to sleep between the short jobs of the next milliseconds.
+    pub fn keep_awake(&self) -> Awake<'_> {
+        self.shared.awake.fetch_add(1, Ordering::Relaxed);
+        Awake(&self.shared)
+    }
+
+    /// As [`Pool::run`], for a job that does little but read `bytes` of a table: a small one stays on the
     /// calling thread, since waking another costs more than it saves. The same bits either way.
     ///
     /// # Errors
@@ -212,7 +263,11 @@ impl Pool {
         chunk_count: usize,
         task: &Task<'_>,
     ) -> Result<(), PoolError> {
-        if bytes >= SPLIT_BYTES {
+        let least = match self.shared.is_awake() {
+            true => SPLIT_AWAKE_BYTES,
+            false => SPLIT_BYTES,
+        };
+        if bytes >= least {
             return self.run(chunk_count, task);
         }
         let _flush = FlushToZero::enter();
@@ -246,7 +301,7 @@ fn run_alone(chunk_count: usize, task: &Task<'_>) -> Result<(), PoolError> {
 
 fn worker_loop(shared: &Shared, worker: usize) {
     let _flush = FlushToZero::enter();
-    let mut seen = 0;
+    let (mut seen, mut looked) = (0, false);
     let mut state = shared.lock();
     loop {
         if state.closing {
@@ -254,18 +309,28 @@ fn worker_loop(shared: &Shared, worker: usize) {
         }
         match state.job {
             Some(job) if state.epoch != seen => {
-                seen = state.epoch;
+                (seen, looked) = (state.epoch, false);
                 state.active += 1;
+                shared.active.store(state.active, Ordering::Relaxed);
                 drop(state);
                 // SAFETY: `run` keeps the task alive while a job is published or `active > 0`.
                 shared.work(unsafe { &*job.task }, job.chunk_count, worker);
                 state = shared.lock();
                 state.active -= 1;
+                shared.active.store(state.active, Ordering::Release);
                 if state.active == 0 {
                     shared.done.notify_all();
                 }
             }
+            _ if shared.is_awake() && !looked => {
+                looked = true;
+                let last = state.epoch;
+                drop(state);
+                shared.look(|| shared.epoch.load(Ordering::Acquire) != last);
+                state = shared.lock();
+            }
             _ => {
+                looked = false;
                 state = shared
                     .wake
                     .wait(state)
@@ -325,13 +390,46 @@ mod tests {
     fn many_short_jobs_do_not_lose_a_wake_up() {
         let pool = Pool::new(3).unwrap();
         let total = AtomicUsize::new(0);
-        for _ in 0..20_000 {
+        let mut awake = None;
+        for job in 0..20_000 {
+            // Workers that sleep, that look, and that stop looking.
+            if job % 1000 == 500 {
+                awake = match awake {
+                    None => Some(pool.keep_awake()),
+                    Some(_) => None,
+                };
+            }
             pool.run(4, &|_, _| {
                 total.fetch_add(1, Ordering::Relaxed);
             })
             .unwrap();
         }
+        drop(awake);
         assert_eq!(total.load(Ordering::Relaxed), 80_000);
+    }
+
+    #[test]
+    fn a_pool_that_is_kept_awake_splits_small_tables_and_ends() {
+        let pool = Pool::new(3).unwrap();
+        let run = || {
+            let hits: Vec<AtomicU32> = (0..100).map(|_| AtomicU32::new(0)).collect();
+            pool.run_streaming(SPLIT_AWAKE_BYTES, 100, &|chunk, _| {
+                hits[chunk].fetch_add(1, Ordering::Relaxed);
+            })
+            .unwrap();
+            hits.iter().all(|hit| hit.load(Ordering::Relaxed) == 1)
+        };
+        let awake = pool.keep_awake();
+        let inner = pool.keep_awake();
+        assert!(run());
+        drop(inner);
+        assert!(pool.shared.is_awake() && run());
+        drop(awake);
+        assert!(!pool.shared.is_awake() && run());
+        // Workers that look when the pool ends.
+        let awake = pool.keep_awake();
+        std::mem::forget(awake);
+        assert!(run());
     }
 
     #[test]

@@ -81,13 +81,21 @@ unsafe fn block_body<V: Lanes>(basis: &[impl Number], nodes: &[u32], r: &[f32], 
     let mut column = 0;
     // SAFETY: rows and columns are inside `basis` by the checks above.
     unsafe {
-        while column + 8 * V::N <= rank {
-            tile::<V, 8>(basis.as_ptr().add(column), rank, nodes, r, &mut q[column..]);
-            column += 8 * V::N;
-        }
+        // Every sweep reads the whole block: as few of them as there are registers for.
         while column < rank {
-            tile::<V, 1>(basis.as_ptr().add(column), rank, nodes, r, &mut q[column..]);
-            column += V::N;
+            let (from, to) = (basis.as_ptr().add(column), &mut q[column..]);
+            let registers = ((rank - column) / V::N).min(8);
+            match registers {
+                8 => tile::<V, 8>(from, rank, nodes, r, to),
+                7 => tile::<V, 7>(from, rank, nodes, r, to),
+                6 => tile::<V, 6>(from, rank, nodes, r, to),
+                5 => tile::<V, 5>(from, rank, nodes, r, to),
+                4 => tile::<V, 4>(from, rank, nodes, r, to),
+                3 => tile::<V, 3>(from, rank, nodes, r, to),
+                2 => narrow_tile::<V, 2>(from, rank, nodes, r, to),
+                _ => narrow_tile::<V, 1>(from, rank, nodes, r, to),
+            }
+            column += registers * V::N;
         }
     }
 }
@@ -115,6 +123,37 @@ unsafe fn tile<V: Lanes, const M: usize>(
         }
         for v in 0..M {
             sum[v].store(q.as_mut_ptr().add(v * V::N));
+        }
+    }
+}
+
+/// The same with a sum an axis: few sums would wait for each other.
+#[inline(always)]
+unsafe fn narrow_tile<V: Lanes, const M: usize>(
+    basis: *const impl Number,
+    rank: usize,
+    nodes: &[u32],
+    r: &[f32],
+    q: &mut [f32],
+) {
+    // SAFETY: the caller's.
+    unsafe {
+        let mut sums = [[V::splat(0.0); M]; 3];
+        let mut row = basis;
+        for &node in nodes {
+            let forces = &r[3 * node as usize..3 * node as usize + 3];
+            for (sum, &force) in sums.iter_mut().zip(forces) {
+                let force = V::splat(force);
+                for v in 0..M {
+                    sum[v] = Number::lanes::<V>(row.add(v * V::N)).mul_add(force, sum[v]);
+                }
+                row = row.wrapping_add(rank);
+            }
+        }
+        for v in 0..M {
+            let one = V::splat(1.0);
+            let total = sums[0][v].mul_add(one, sums[1][v]).mul_add(one, sums[2][v]);
+            total.store(q.as_mut_ptr().add(v * V::N));
         }
     }
 }

@@ -18,7 +18,19 @@ pub struct PartialSums(Vec<f32>);
 impl PartialSums {
     /// Room for `count` products of vectors of `len`.
     pub fn with_capacity(len: usize, count: usize) -> Self {
-        Self(Vec::with_capacity(len.div_ceil(PIECE) * count))
+        // Another cut of the vectors may have a piece more.
+        Self(Vec::with_capacity((len.div_ceil(PIECE) + 1) * count))
+    }
+
+    /// Makes room for `count` sums, all zero.
+    pub(crate) fn resize(&mut self, count: usize) {
+        self.0.clear();
+        self.0.resize(count, 0.0);
+    }
+
+    /// The sums.
+    pub(crate) fn values(&mut self) -> &mut [f32] {
+        &mut self.0
     }
 }
 
@@ -63,7 +75,7 @@ pub fn dots(
 }
 
 by_isa! {
-    fn piece_dots(rows: &[&[f32]], x: &[f32], start: usize, sums: &mut [f32]) = dots_body, dots_scalar;
+    pub(crate) fn piece_dots(rows: &[&[f32]], x: &[f32], start: usize, sums: &mut [f32]) = dots_body, dots_scalar;
 }
 
 fn dots_scalar(rows: &[&[f32]], x: &[f32], start: usize, sums: &mut [f32]) {
@@ -139,7 +151,7 @@ pub fn add_scaled(
 }
 
 by_isa! {
-    fn piece_add(rows: &[&[f32]], factors: &[f32], start: usize, to: &mut [f32]) = add_body, add_scalar;
+    pub(crate) fn piece_add(rows: &[&[f32]], factors: &[f32], start: usize, to: &mut [f32]) = add_body, add_scalar;
 }
 
 fn add_scalar(rows: &[&[f32]], factors: &[f32], start: usize, to: &mut [f32]) {

@@ -180,6 +180,18 @@ impl PriorTable {
             .sum()
     }
 
+    /// `q += U^T f` of a vector on one node.
+    pub fn add_row(&self, node: u32, f: [f32; 3], q: &mut [f32]) {
+        let (row, start, rank) = self.places[node as usize];
+        let (row, start, rank) = (row as usize, start as usize, rank as usize);
+        for (axis, f) in f.into_iter().enumerate() {
+            let from = row + axis * rank;
+            for (at, q) in q[start..start + rank].iter_mut().enumerate() {
+                *q += f * self.basis.at(from + at);
+            }
+        }
+    }
+
     /// Where each block's rows start in the basis `[B+1]`.
     pub fn basis_starts(&self) -> Vec<usize> {
         let mut starts = vec![0];

@@ -141,7 +141,7 @@ impl Corrected {
     pub(super) fn enough(&self, start: Instant) -> Enough {
         Enough {
             iterations: self.most,
-            remaining_mm: self.target_mm / self.calibration,
+            error_mm: self.target_mm / self.calibration,
             until: (self.budget_us > 0)
                 .then(|| start + std::time::Duration::from_micros(self.budget_us.into())),
         }
@@ -162,7 +162,7 @@ impl Corrected {
         stats.evaluations = report.evaluations;
         stats.residual = report.residual;
         stats.min_det = report.min_det;
-        stats.error_mm = report.remaining_mm * self.calibration;
+        stats.error_mm = report.error_mm * self.calibration;
         if report.fell_back {
             stats.flags |= flag::FELL_BACK;
         }
@@ -215,7 +215,7 @@ impl Core {
             let report = corrected.stage.swing(lent, &input, &mut self.next.field)?;
             corrected.tell(&report, stats);
         } else {
-            corrected.stage.follow(lent, &input, &self.next.field);
+            corrected.stage.follow(lent, &input, &self.next.field)?;
         }
         drop(shared);
         stats.corrections_ms = watch.lap();

@@ -418,5 +418,5 @@ fn build(model: &Arc<Model>, options: &SceneOptions) -> Result<Core> {
     })
 }
 
-#[cfg(test)]
+#[cfg(all(test, target_arch = "x86_64"))] // MXCSR tells what was met
 mod tests;

@@ -5,10 +5,8 @@ use crate::kernels::flush::RAISED;
 use crate::options::{GuardPolicy, ModelOptions};
 
 /// MXCSR: an invalid operation.
-#[cfg(target_arch = "x86_64")]
 const INVALID: u64 = 1;
 
-#[cfg(target_arch = "x86_64")]
 #[test]
 fn a_step_makes_no_invalid_operation() {
     for name in ["tiny-reduced", "tiny-upt", "tiny-upt-prior"] {

@@ -2,10 +2,13 @@
 export UPT_CROSS_TRIPLE=aarch64-unknown-linux-gnu
 export UPT_CROSS_SYSTEM=Linux UPT_CROSS_PROCESSOR=aarch64 UPT_CROSS_PREFIX=aarch64-linux-gnu-
 export UPT_CROSS_ORT_NAME=libonnxruntime.so UPT_CROSS_ROLLOUT=rollout UPT_CROSS_COMMAND=upt
-# mm: other vector lanes, another build of ONNX Runtime (8e-7 was seen). The solver adds up thousands of steps.
+# mm: other vector lanes, another build of ONNX Runtime (5e-7 was seen). Corrected steps iterate until they are good enough, some 0.01 mm
+# of their own, and carry a rounding on (3e-4 was seen). The solver adds up thousands of steps.
 rollout_tolerance=1e-5
+corrected_tolerance=2e-3
 solver_tolerance=1e-3
 
+source "$root/tests/cross/python_arm64.sh"
 qemu="$(command -v qemu-aarch64-static || command -v qemu-aarch64 || true)"
 if [ -z "$qemu" ]; then
   echo "skipped: qemu-user-static is not installed"
@@ -47,8 +50,9 @@ installed() {
 }
 
 compare() {
-  check "$1: displacements of x86-64 within $rollout_tolerance mm" \
-    python3 tests/cross/difference.py "$2" "$3" "$rollout_tolerance"
+  local tolerance="$rollout_tolerance"
+  if grep -q '"corrections"' onnx/"$1"/bundle.json 2>/dev/null; then tolerance="$corrected_tolerance"; fi
+  check "$1: displacements of x86-64 within $tolerance mm" python3 tests/cross/difference.py "$2" "$3" "$tolerance"
 }
 
 compare_trajectories() {
@@ -61,4 +65,27 @@ more() {
   local text
   text="$(run "$1/upt" doctor onnx/brain-coarse-reduced 2>/dev/null)"
   check "upt doctor opens a bundle with NEON kernels" grep -q 'kernels neon' <<<"$text"
+  lanes "$text"
+  wheel "$1"
+}
+
+# The wheel in Debian's Python for arm64: it finds its own libupt, and ONNX Runtime in the package onnxruntime.
+wheel() {
+  make_wheel "$1/libupt.so" linux_aarch64
+  check "the wheel is tagged manylinux for aarch64" compgen -G "$build/wheels/*-manylinux_*_aarch64.whl"
+  local python="$root/target/cross/python-arm64"
+  if ! debian_python "$python"; then
+    fail "Debian's Python for arm64 was not unpacked"
+    return
+  fi
+  local libraries="$python/root/usr/lib/aarch64-linux-gnu:$python/root/lib/aarch64-linux-gnu:/usr/aarch64-linux-gnu/lib"
+  (
+    cd "$build"
+    unset ORT_DYLIB_PATH UPT_LIBRARY
+    UPT_CROSS_LIBRARIES="$libraries" PYTHONHOME="$python/root/usr" PYTHONPATH="$build/wheel:$python/packages" \
+      run "$python/root/usr/bin/python3" -m pytest -q -p no:cacheprovider "$root"/python/tests/test_scene.py \
+      "$root"/python/tests/test_instruments.py "$root"/python/tests/test_batch.py >"$build/pytest.log" 2>&1
+  ) || true
+  count_pytest "$build/pytest.log"
+  leave_out 3 "files of the wheel's tests, which need more packages or time: examples, errors, haptics"
 }

@@ -53,3 +53,22 @@ count_ctest() {
   if [ "$ok" -ne "$total" ] || [ "$total" -eq 0 ]; then tail -n 60 "$1"; fi
   echo "$ok of $total C and C++ tests passed"
 }
+
+# The last line of pytest's log $1.
+count_pytest() {
+  local ok bad
+  ok="$(tail -n 1 "$1" | { grep -oE '[0-9]+ passed' || true; } | cut -d' ' -f1)"
+  bad="$(tail -n 1 "$1" | { grep -oE '[0-9]+ (failed|error)' || true; } | awk '{s += $1} END {print s + 0}')"
+  if [ -z "$ok" ] && [ "$bad" -eq 0 ]; then bad=1; fi
+  if [ "$bad" -gt 0 ]; then tail -n 60 "$1"; fi
+  passed=$((passed + ${ok:-0}))
+  failed=$((failed + bad))
+  echo "${ok:-0} passed, $bad failed (pytest of the wheel)"
+}
+
+# What `upt doctor` (its output is $1) says about the lanes of the kernels that ran.
+lanes() {
+  local ran
+  ran="$(sed -n 's/^.*kernels \([a-z0-9]*\).*$/\1/p' <<<"$1" | head -n 1)"
+  check "lanes that ran: ${ran:-none}, and scalar ones beside them in the unit tests" test -n "$ran"
+}

@@ -15,6 +15,7 @@ nightly="${UPT_NIGHTLY:-0}"
 cd "$root"
 mkdir -p "$build"
 source "$root/tests/cross/count.sh"
+source "$root/tests/cross/wheel.sh"
 source "$root/tests/cross/$name.sh"
 
 cargo_cross() {
@@ -39,6 +40,14 @@ export ORT_DYLIB_PATH="$UPT_CROSS_ORT/$UPT_CROSS_ORT_NAME"
 UPT_FUZZ_SECONDS=0 cargo_cross test --release --no-fail-fast -q "${packages[@]}" --no-default-features --features upt/default "${tests[@]}" \
   >"$build/unit.log" 2>&1 || true
 count_cargo "$build/unit.log"
+
+echo "== equilibria, by the sparse factorisation"
+if [ "$nightly" = 1 ]; then
+  cargo_cross test --release --no-fail-fast -q -p tissue --lib >"$build/statics.log" 2>&1 || true
+  count_cargo "$build/statics.log"
+else
+  leave_out "$(grep -c '#\[test\]' crates/tissue/src/statics/tests.rs)" "unit tests of equilibria, whose factorisation takes minutes to build: nightly"
+fi
 
 echo "== C and C++"
 prefix="$build/prefix"

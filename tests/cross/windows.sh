@@ -54,6 +54,7 @@ more() {
   local text
   text="$(run "$1/upt.exe" doctor onnx/brain-coarse-reduced 2>/dev/null | tr -d '\r')"
   check "upt doctor opens a bundle" grep -q '^ok  bundle .*brain-coarse-reduced' <<<"$text"
+  lanes "$text"
   # A reader that goes away: the command ends without a panic.
   (run "$1/upt.exe" completions bash 2>"$build/pipe.log" || true) | head -c 1 >/dev/null || true
   check "a closed pipe ends the command quietly" bash -c '! grep -qi panicked "$1"' _ "$build/pipe.log"
@@ -63,5 +64,21 @@ more() {
   check "lld-link links a host against upt.lib" bash tests/cross/lld_link.sh "$build"
   check "and the host runs" run "$build/msvc.exe"
   leave_out 1 "the Unity package's C# under Mono for Windows: Debian has no Mono for Windows; the dll's exports are compared instead"
+  wheel "$1"
   check "upt.dll exports what upt.h declares" bash tests/cross/exports.sh "$1/upt.dll" include/upt.h
+}
+
+# Neither Debian nor PyPI has a Python for Windows: a C program loads the wheel's library in its place.
+wheel() {
+  make_wheel "$1/upt.dll" win_amd64
+  local inside="$build/wheel/upt/lib/upt.dll"
+  check "the wheel is tagged win_amd64 and holds upt.dll" test -e "$build"/wheels/*-win_amd64.whl -a -e "$inside"
+  x86_64-w64-mingw32-objdump -p "$inside" | sed -n 's/^.*\[ *[0-9]*\].* \(upt_[a-z_]*\)$/\1/p' >"$build/wheel.exports"
+  check "its dll exports what the package calls" python3 tests/cross/wheel_calls.py "$build/wheel" "$build/wheel.exports"
+  local path
+  path="$(printf 'Z:%s;Z:%s' "${inside%/*}" "$UPT_CROSS_ORT" | tr / '\\')"
+  WINEPATH="$path" run "$build/tests/$UPT_CROSS_ROLLOUT" tests/fixtures/tiny-reduced "$steps" "$build/wheel.there" \
+    >"$build/wheel.log" 2>&1 || cat "$build/wheel.log"
+  check "and steps as on Linux, to the bit" cmp "$build/tiny-reduced.here" "$build/wheel.there"
+  leave_out 1 "the wheel in a Python for Windows: neither Debian nor PyPI has one"
 }

@@ -58,8 +58,8 @@ pub fn configure(workspace: &Workspace, platform: Platform, command: &mut Comman
         .env("UPT_CROSS_PREFIX", cross.prefix);
 }
 
-/// Builds libupt and the command `upt`; the folder with them.
-pub fn build(workspace: &Workspace, platform: Platform) -> Result<PathBuf> {
+/// Builds `packages`, such as `upt` (the library) and `upt-cli` (the command); the folder with what they make.
+pub fn build(workspace: &Workspace, platform: Platform, packages: &[&str]) -> Result<PathBuf> {
     let (Some(cross), Ok(Platform::LinuxX64)) = (of(platform), Platform::host()) else {
         bail!(
             "{} is not built for on this machine: run `cargo xtask package` there",
@@ -69,15 +69,8 @@ pub fn build(workspace: &Workspace, platform: Platform) -> Result<PathBuf> {
     let mut command = Command::new("bash");
     command
         .arg(workspace.path("xtask/cross/cargo.sh"))
-        .args([
-            cross.triple,
-            "build",
-            "--release",
-            "-p",
-            "upt",
-            "-p",
-            "upt-cli",
-        ])
+        .args([cross.triple, "build", "--release"])
+        .args(packages.iter().flat_map(|name| ["-p", name]))
         .current_dir(&workspace.root);
     let label = format!("cargo build for {}", platform.name());
     let log = workspace.logs().join("cross-build.log");

@@ -183,7 +183,7 @@ fn foreign(workspace: &Workspace, platform: Platform, out: &Path) -> Result<Path
              The library has not been run on macOS by its authors.\n",
         )?;
     } else {
-        let built = cross::build(workspace, platform)?;
+        let built = cross::build(workspace, platform, &["upt", "upt-cli"])?;
         install(workspace, Some(platform), &built, &root)?;
         if platform == Platform::WindowsX64 {
             copy(&built.join("upt.exe"), &root.join("bin/upt.exe"))?;

@@ -117,6 +117,14 @@ pub const CSHARP: &[Package] = &[
 pub const BROWSER: &[Package] = &[
     program(&["chromium", "google-chrome"], "chromium", "the page"),
     program(&["chromedriver"], "chromium-driver", "the page"),
+    file(
+        &[
+            "/usr/lib/x86_64-linux-gnu/libEGL_mesa.so.0",
+            "/usr/lib/aarch64-linux-gnu/libEGL_mesa.so.0",
+        ],
+        "libegl-mesa0",
+        "drawing the page without a graphics card",
+    ),
 ];
 
 /// What the tests for Windows need.

@@ -31,7 +31,7 @@ pub fn make(workspace: &Workspace, out: &Path) -> Result<PathBuf> {
 
 /// A wheel with the libupt of another platform, built here.
 pub fn make_for(workspace: &Workspace, platform: Platform, out: &Path) -> Result<PathBuf> {
-    let built = cross::build(workspace, platform)?;
+    let built = cross::build(workspace, platform, &["upt"])?;
     let name = if platform == Platform::WindowsX64 {
         "upt.dll"
     } else {

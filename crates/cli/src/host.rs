@@ -265,6 +265,32 @@ impl Scene {
         })
     }
 
+    /// `upt_scene_submit_instruments`: as [`Scene::step_instruments`], on the scene's worker.
+    pub fn submit_instruments(&mut self, instruments: &[ffi::upt_instrument]) -> Result<()> {
+        // SAFETY: the pointer and count describe the list, which the call copies.
+        check(unsafe {
+            ffi::upt_scene_submit_instruments(
+                self.handle,
+                instruments.as_ptr(),
+                instruments.len() as u64,
+            )
+        })
+    }
+
+    /// `upt_scene_poll`: whether the submitted step has finished.
+    pub fn poll(&mut self) -> Result<bool> {
+        // SAFETY: the handle is live.
+        let status = unsafe { ffi::upt_scene_poll(self.handle) };
+        check(status)?;
+        Ok(status != ffi::UPT_PENDING)
+    }
+
+    /// `upt_scene_wait`: until no step is in flight; what became of it does not matter here.
+    pub fn settle(&mut self) {
+        // SAFETY: the handle is live.
+        unsafe { ffi::upt_scene_wait(self.handle, u32::MAX) };
+    }
+
     /// `upt_scene_instrument_readings` of the last step's `count` instruments.
     pub fn readings(&self, count: usize) -> Result<Vec<ffi::upt_instrument_reading>> {
         // SAFETY: zeros are valid numbers.

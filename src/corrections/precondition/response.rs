@@ -102,16 +102,9 @@ impl Preconditioner {
         &self.held_back
     }
 
-    /// `u += A_k f` of forces `f` (mN) on degrees of freedom with columns; `scratch [K,3]`.
+    /// `coordinates += A_k f` of forces `f` (mN) on degrees of freedom with columns.
     #[cfg(feature = "contact")]
-    pub fn load(
-        &mut self,
-        env: Env<'_>,
-        dofs: &[u32],
-        forces: &[f32],
-        scratch: &mut [f32],
-        u: &mut [f32],
-    ) -> Result<()> {
+    pub fn add_load(&mut self, env: Env<'_>, dofs: &[u32], forces: &[f32]) -> Result<()> {
         let count = self.held_back.len();
         self.solved.fill(0.0);
         for (&dof, force) in dofs.iter().zip(forces) {
@@ -123,42 +116,65 @@ impl Preconditioner {
         let (isa, pool, q) = (env.isa, env.pool, &mut self.coordinates);
         let rows = &env.space.rows()[..count];
         let natural = &self.solved[..count];
-        pooled(accumulate_rows(
-            isa,
-            pool,
-            env.space.modes(),
-            rows,
-            natural,
-            false,
-            q,
-        ))?;
+        let modes = env.space.modes();
+        pooled(accumulate_rows(isa, pool, modes, rows, natural, true, q))?;
         let response = env.prior.response.stored();
-        pooled(accumulate_rows(isa, pool, response, dofs, forces, true, q))?;
-        self.add_decoded(env, scratch, u)
+        pooled(accumulate_rows(isa, pool, response, dofs, forces, true, q))
     }
 
-    /// `u -= N diag(1 / (m (w² + kappa))) N^T r` of a residual `[K,3]`, µN, that is zero at held nodes; `scratch [K,3]`.
+    /// `coordinates = -N diag(1 / (m (w² + kappa))) N^T r` of a residual `[K,3]`, µN, that is zero at held nodes.
     #[cfg(feature = "contact")]
-    pub fn move_natural(
-        &mut self,
-        env: Env<'_>,
-        r: &[f32],
-        scratch: &mut [f32],
-        u: &mut [f32],
-    ) -> Result<()> {
+    pub fn move_natural(&mut self, env: Env<'_>, r: &[f32]) -> Result<()> {
         let (isa, pool) = (env.isa, env.pool);
         let count = self.held_back.len();
-        let basis = env.prior.basis();
+        self.project(env, r)?;
         let q = &mut self.coordinates;
-        pooled(project_field(isa, pool, &basis, &self.starts, r, q))?;
         let (modes, rows) = (env.space.modes(), &env.space.rows()[..count]);
         let natural = &mut self.on_modes[..count];
         pooled(row_dots(isa, pool, modes, rows, q, natural))?;
         for (value, moved) in natural.iter_mut().zip(&self.moved_freely) {
             *value *= -moved;
         }
-        pooled(accumulate_rows(isa, pool, modes, rows, natural, false, q))?;
-        self.add_decoded(env, scratch, u)
+        pooled(accumulate_rows(isa, pool, modes, rows, natural, false, q))
+    }
+
+    /// `coordinates = U^T r` of a field `[K,3]`.
+    #[cfg(feature = "contact")]
+    pub fn project(&mut self, env: Env<'_>, r: &[f32]) -> Result<()> {
+        pooled(project_field(
+            env.isa,
+            env.pool,
+            &env.prior.basis(),
+            &self.starts,
+            r,
+            &mut self.coordinates,
+        ))
+    }
+
+    /// `to = U coordinates`, `[K,3]`.
+    #[cfg(feature = "contact")]
+    pub fn decode(&mut self, env: Env<'_>, to: &mut [f32]) -> Result<()> {
+        pooled(decode_rows(
+            env.isa,
+            env.pool,
+            &env.prior.basis(),
+            &self.plan,
+            &self.coordinates,
+            to,
+        ))
+    }
+
+    /// The same at the nodes of the domain only; other rows keep their values.
+    #[cfg(feature = "contact")]
+    pub fn decode_domain(&mut self, env: Env<'_>, to: &mut [f32]) -> Result<()> {
+        pooled(decode_rows(
+            env.isa,
+            env.pool,
+            &env.prior.basis(),
+            &self.domain,
+            &self.coordinates,
+            to,
+        ))
     }
 
     /// `N^T r` of a field `[K,3]` that is zero at held nodes: what it has of each natural mode.

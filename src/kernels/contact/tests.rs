@@ -135,3 +135,41 @@ fn nonsense_is_an_error() {
         factor.solve(isa, &[], &mut []);
     }
 }
+
+#[test]
+fn whitened_columns_have_the_gram_matrix_of_the_inverse() {
+    let mut random = Random::new(8);
+    let a = compliance(&mut random, 20);
+    for count in [3, 16, 41] {
+        let dofs: Vec<u32> = (0..45).collect();
+        let z: Vec<f64> = random
+            .normal(45 * count, 1.0)
+            .iter()
+            .map(|&x| f64::from(x))
+            .collect();
+        for isa in Isa::available() {
+            let mut factor = ContactFactor::default();
+            factor.factor(isa, &dofs, block(&a, 60, &dofs)).unwrap();
+            let mut white = z.clone();
+            factor.whiten(isa, count, &mut white);
+            let mut found = vec![0.0; count * count];
+            subtract_gram(isa, &white, count, 2.0, &mut found);
+            for j in 0..count {
+                let column: Vec<f32> = (0..45).map(|i| z[i * count + j] as f32).collect();
+                let mut forces = vec![0.0; 45];
+                factor.solve(isa, &column, &mut forces);
+                for i in 0..=j {
+                    let work = (0..45).map(|k| z[k * count + i] * f64::from(forces[k]));
+                    let want = -2.0 * work.sum::<f64>();
+                    let got = found[i * count + j];
+                    let size = found[i * count + i].abs() + found[j * count + j].abs();
+                    assert!(
+                        (got - want).abs() < 1e-4 * size,
+                        "{} {got} {want}",
+                        isa.name()
+                    );
+                }
+            }
+        }
+    }
+}

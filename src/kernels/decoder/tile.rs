@@ -37,6 +37,10 @@ pub(super) struct Layout {
     /// Scores of one head, or the MLP's hidden layer.
     pub hidden: usize,
     /// Room behind for bf16 pairs of the widest input.
+    #[cfg_attr(
+        not(target_arch = "x86_64"),
+        expect(dead_code, reason = "only x86-64 multiplies bf16")
+    )]
     pub pairs: usize,
     pub total: usize,
 }

@@ -100,11 +100,16 @@ impl<'a> Reader<'a> {
         let Some(count) = self.u32()?.checked_sub(1) else {
             return Ok(None);
         };
+        let [velocity, velocity_before, inertia] =
+            [self.floats(len)?, self.floats(len)?, self.floats(len)?];
+        let numbers = self.floats(3)?;
         let motion = Motion {
-            velocity: self.floats(len)?,
-            velocity_before: self.floats(len)?,
-            inertia: self.floats(len)?,
-            min_det: self.floats(1)?[0],
+            velocity,
+            velocity_before,
+            inertia,
+            min_det: numbers[0],
+            truncated_mm: numbers[1],
+            error_mm: numbers[2],
             reaction: self.floats(3 * contacts)?,
         };
         let pairs: Result<Pairs> = (0..count)

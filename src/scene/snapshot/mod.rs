@@ -128,7 +128,8 @@ impl Core {
                 w.floats(&stage.motion.velocity);
                 w.floats(&stage.motion.velocity_before);
                 w.floats(&stage.motion.inertia);
-                w.floats(&[stage.motion.min_det]);
+                let motion = &stage.motion;
+                w.floats(&[motion.min_det, motion.truncated_mm, motion.error_mm]);
                 // The guard may have dropped the contact that they belonged to.
                 let contacts = 3 * self.contact.len();
                 w.u32(contacts as u32);

@@ -7,6 +7,7 @@ mod inputs;
 mod jump;
 mod outside;
 mod reference;
+mod storm;
 mod surrogate;
 mod tools;
 

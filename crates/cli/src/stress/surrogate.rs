@@ -7,12 +7,12 @@ use anyhow::Result;
 use tissue::schemes::{Programme, Scheme};
 
 use super::bench::{Bench, Run, Touch, largest, push, ramp};
-use super::{Row, half, inputs, outside, progress, tools};
+use super::{Row, half, inputs, outside, progress, storm, tools};
 
 /// All cases of the bundle at `path`.
 pub fn rows(path: &Path, quick: bool) -> Result<Vec<Row>> {
     let bench = Bench::open(path, quick)?;
-    let bar = progress(7, &bench.subject);
+    let bar = progress(8, &bench.subject);
     let mut rows = inside(&bench)?;
     bar.inc(1);
     rows.extend(long_runs(&bench)?);
@@ -23,6 +23,8 @@ pub fn rows(path: &Path, quick: bool) -> Result<Vec<Row>> {
     rows.push(half::row(&bench, path)?);
     bar.inc(1);
     rows.extend(inputs::same_bits(&bench)?);
+    bar.inc(1);
+    rows.extend(storm::rows(&bench)?);
     bar.inc(1);
     rows.extend(tools::rows(&bench, path)?);
     bar.finish_and_clear();

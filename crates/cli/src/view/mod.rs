@@ -4,6 +4,7 @@
 //! Only 127.0.0.1 is served, and only who knows the token of the printed address. What the two sides say to each other is
 //! in `protocol.rs`; a bad message closes the client that sent it and nothing else.
 
+mod clock;
 mod http;
 mod protocol;
 mod server;

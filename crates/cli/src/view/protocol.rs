@@ -3,12 +3,15 @@
 //! From the page, JSON text of at most 1,024 bytes:
 //!
 //! ```json
-//! {"tool": {"position": [0,0,0], "rotation": [0,0,0,1], "radius": 5, "half_length": 20, "sticking": true}, "sequence": 7}
-//! {"tool": null, "sequence": 8}      the tool is lifted
+//! {"tool": {"position": [0,0,0], "rotation": [0,0,0,1], "radius": 5, "half_length": 20, "friction": 0.3}, "sequence": 7}
+//! {"tool": null, "sequence": 8}      no tool
 //! {"reset": true}                    back to rest
 //! {"record": true}                   start a recording (false: end it)
 //! {"replay": true}                   from rest through the recording
 //! ```
+//!
+//! A message about the tool asks for a frame: the page sends one for each picture that it draws, so that nothing piles up where it is
+//! slow, and each picture shows the tissue of its own moment. Several that have come at once get one answer, with the last one's sequence.
 //!
 //! To the page: first JSON text (`Hello`), then a binary message of the surface, rest positions `[n,3]` f32, faces `[m,3]`
 //! u32 and 1 for each node of the domain `[n]` u32, then a binary message a frame: [`HEADER`] numbers of 32 bits, little-endian, then displacements
@@ -19,11 +22,14 @@ use serde::{Deserialize, Serialize};
 /// Bytes that a message from the page may have.
 pub const LONGEST_MESSAGE: usize = 1024;
 /// Numbers before the displacements of a frame: sequence, flags, contacts, state (u32: 1 recording, 2 replaying, 4 asleep),
-/// step ms, indicator, force x y z (mN), largest displacement (mm), ms that the pose waited for its step, steps (u32),
-/// corrections (u32), their estimated error (mm), deepest tissue inside of the tool (mm).
-pub const HEADER: usize = 15;
+/// step ms, indicator, force x y z (mN), largest displacement (mm), ms that the frame took to make, steps (u32),
+/// corrections (u32), their estimated error (mm), deepest tissue inside of the tool (mm), then where the tool is in this frame: 1 or 0
+/// (u32), position x y z, rotation x y z w, radius.
+pub const HEADER: usize = 24;
 /// No organ and no tool is larger, mm.
 const FARTHEST: f32 = 10_000.0;
+/// No tool rubs more.
+const STICKIEST: f32 = 2.0;
 
 /// A capsule; its axis is local y.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
@@ -34,7 +40,8 @@ pub struct Tool {
     pub rotation: [f32; 4],
     pub radius: f32,
     pub half_length: f32,
-    pub sticking: bool,
+    /// Coulomb's coefficient.
+    pub friction: f32,
 }
 
 /// One wish of the page.
@@ -90,7 +97,7 @@ impl Tool {
     fn check(&self) -> Result<(), String> {
         let all = self.position.iter().chain(&self.rotation);
         if !all
-            .chain([&self.radius, &self.half_length])
+            .chain([&self.radius, &self.half_length, &self.friction])
             .all(|x| x.is_finite() && x.abs() <= FARTHEST)
         {
             return Err("tool: a number is not finite or too large".into());
@@ -101,6 +108,12 @@ impl Tool {
         }
         if !(0.1..=50.0).contains(&self.radius) || !(0.0..=200.0).contains(&self.half_length) {
             return Err("tool: radius is 0.1 to 50 mm, half_length 0 to 200 mm".into());
+        }
+        if !(0.0..=STICKIEST).contains(&self.friction) {
+            return Err(format!(
+                "tool.friction is {}, 0 to {STICKIEST}",
+                self.friction
+            ));
         }
         Ok(())
     }
@@ -117,6 +130,8 @@ pub struct Hello {
     /// Seconds.
     pub dt: f32,
     pub max_push_mm: f32,
+    /// Whether frames show the tissue of their own moment; otherwise they run one step behind.
+    pub presents: bool,
     /// Names of the bits of a frame's flags.
     pub flags: Vec<(u32, &'static str)>,
 }
@@ -127,7 +142,7 @@ mod tests {
 
     #[test]
     fn each_wish_is_read() {
-        let tool = r#"{"tool":{"position":[1,2,3],"rotation":[0,0,0,1],"radius":5,"half_length":20,"sticking":true},"sequence":7}"#;
+        let tool = r#"{"tool":{"position":[1,2,3],"rotation":[0,0,0,1],"radius":5,"half_length":20,"friction":0.3},"sequence":7}"#;
         let Ok(Wish::Tool(Some(read), 7)) = Wish::parse(tool) else {
             panic!()
         };
@@ -148,7 +163,7 @@ mod tests {
                 ("rotation", "[0,0,0,1]"),
                 ("radius", "5"),
                 ("half_length", "20"),
-                ("sticking", "true"),
+                ("friction", "0.3"),
             ]);
             fields.insert(field, value);
             let fields: Vec<String> = fields.iter().map(|(k, v)| format!("\"{k}\":{v}")).collect();
@@ -172,11 +187,16 @@ mod tests {
             with("rotation", "[0,0,0,2]"),
             with("radius", "0"),
             with("radius", "-1"),
+            with("friction", "-0.1"),
+            with("friction", "3"),
+            with("friction", "NaN"),
+            with("friction", "null"),
             with("colour", "1"),
         ]);
         for text in bad {
             assert!(Wish::parse(&text).is_err(), "{text}");
         }
         assert!(Wish::parse(&with("radius", "6")).is_ok());
+        assert!(Wish::parse(&with("friction", "0")).is_ok());
     }
 }

@@ -16,13 +16,15 @@ use super::protocol::{LONGEST_MESSAGE, Wish};
 use super::session::Session;
 use crate::host::{Model, ModelSettings};
 
-/// Frames a second.
-const FRAME_RATE: f64 = 60.0;
+/// Least time between two frames: 240 a second.
+const SOONEST: Duration = Duration::from_micros(4_166);
+/// Messages that are read before a frame is made; a page has one or two waiting.
+const MOST_MESSAGES: usize = 64;
 /// Connections that are served at once; more are closed.
 const MOST_CONNECTIONS: usize = 16;
 
 /// What the page is made of.
-const FILES: [(&str, &str, &[u8]); 3] = [
+const FILES: [(&str, &str, &[u8]); 5] = [
     (
         "/",
         "text/html; charset=utf-8",
@@ -32,6 +34,16 @@ const FILES: [(&str, &str, &[u8]); 3] = [
         "/view.js",
         "text/javascript",
         include_bytes!("page/view.js"),
+    ),
+    (
+        "/drawing.js",
+        "text/javascript",
+        include_bytes!("page/drawing.js"),
+    ),
+    (
+        "/gltf.js",
+        "text/javascript",
+        include_bytes!("page/gltf.js"),
     ),
     (
         "/three.js",
@@ -195,18 +207,15 @@ impl Server {
         let hello = serde_json::to_string(&session.hello(&self.bundle, &self.model))?;
         socket.send(Message::text(hello))?;
         socket.send(Message::binary(session.geometry()))?;
-        let period = Duration::from_secs_f64(1.0 / FRAME_RATE);
-        let mut next = Instant::now();
+        // A page that is hidden asks for no frames, and may do so for ever.
+        socket.get_ref().set_read_timeout(None)?;
+        let mut sent = Instant::now();
         loop {
-            // What the client says is taken while it is waited for the next frame.
-            loop {
-                let left = next.saturating_duration_since(Instant::now());
-                if left.is_zero() {
-                    break;
-                }
-                socket
-                    .get_ref()
-                    .set_read_timeout(Some(left.max(Duration::from_micros(200))))?;
+            // One message is waited for, the others that are there already are taken with it.
+            let mut left = MOST_MESSAGES;
+            let mut waits = !session.asked();
+            while left > 0 {
+                socket.get_ref().set_nonblocking(!waits)?;
                 match socket.read() {
                     Ok(Message::Text(text)) => {
                         let wish = Wish::parse(text.as_str()).map_err(anyhow::Error::msg)?;
@@ -214,24 +223,33 @@ impl Server {
                     }
                     Ok(Message::Binary(_)) => anyhow::bail!("messages are JSON text"),
                     Ok(_) => {}
-                    Err(Error::Io(error))
-                        if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) =>
-                    {
-                        break;
-                    }
+                    Err(Error::Io(error)) if error.kind() == ErrorKind::WouldBlock => break,
                     Err(Error::ConnectionClosed | Error::AlreadyClosed | Error::Io(_)) => {
                         return Ok(());
                     }
                     Err(error) => return Err(error.into()),
                 }
+                left -= 1;
+                waits = false;
             }
+            socket.get_ref().set_nonblocking(false)?;
+            if !session.asked() {
+                continue;
+            }
+            let early = SOONEST.saturating_sub(sent.elapsed());
+            if !early.is_zero() {
+                // Newer poses come meanwhile.
+                std::thread::sleep(early);
+                sent = Instant::now().checked_sub(SOONEST).unwrap_or(sent);
+                continue;
+            }
+            sent = Instant::now();
             let frame = session.frame()?.to_vec();
             match socket.send(Message::binary(frame)) {
                 Ok(()) => {}
                 Err(Error::ConnectionClosed | Error::AlreadyClosed | Error::Io(_)) => return Ok(()),
                 Err(error) => return Err(error.into()),
             }
-            next = (next + period).max(Instant::now());
         }
     }
 }

@@ -1,4 +1,7 @@
 //! One client's tissue: a scene that keeps step with the clock, a tool, a recording.
+//!
+//! Steps run on the scene's worker; each frame shows the tissue of its own moment (`upt_scene_present`). A bundle that cannot present is
+//! shown one step behind (`upt_scene_sample`), and one without a linear response is driven by the nodes that the tool touches.
 
 use std::collections::BTreeMap;
 use std::time::Instant;
@@ -6,14 +9,12 @@ use std::time::Instant;
 use anyhow::Result;
 use upt::ffi;
 
+use super::clock::{Clock, between};
 use super::protocol::{HEADER, Hello, Tool, Wish};
-use crate::host::{Model, Scene};
+use crate::host::{Model, Scene, instrument};
 
-/// Steps that may be made up for at once when the clock has run ahead; the rest is dropped.
-const MOST_STEPS: u32 = 2;
-/// Coulomb's coefficient of a tool that sticks, and of one that slips, such as wet steel.
-const STICKS: f32 = 1.0;
-const SLIPS: f32 = 0.1;
+/// From this friction on, nodes that are moved by the tool stick to it.
+const STICKS: f32 = 0.5;
 /// A recording ends after so many steps: a quarter of an hour at 20 Hz.
 const LONGEST_RECORDING: usize = 18_000;
 
@@ -27,20 +28,27 @@ pub struct Session {
     /// 1 where the model was trained to be touched.
     domain: Vec<u32>,
     dt: f64,
+    begun: Instant,
+    clock: Clock,
+    /// As the page has it, and as the frame shows it.
     tool: Option<Tool>,
+    shown: Option<Tool>,
     sequence: u32,
-    /// When the pose came that no step has taken yet.
-    came: Option<Instant>,
-    waited_ms: f32,
-    /// When the last step was due.
-    due: Instant,
+    /// A frame was asked for.
+    asked: bool,
+    /// The tool at each step.
     recording: Option<Vec<Option<Tool>>>,
     recorded: Vec<Option<Tool>>,
+    /// The recorded step that comes next.
     replayed: Option<usize>,
     contacts: u32,
-    /// Whether the library solves the tool's contact.
+    /// Whether the library solves the tool's contact, and whether it presents.
     solves: bool,
+    presents: bool,
+    /// Tools of the step in flight.
+    count: usize,
     penetration_mm: f32,
+    frame_ms: f32,
     displacement: Vec<[f32; 3]>,
     force: [f32; 3],
     bytes: Vec<u8>,
@@ -63,6 +71,8 @@ impl Session {
         let mut displacement = vec![[0.0; 3]; nodes.len()];
         let solves = scene.step_instruments(&[], &mut displacement).is_ok();
         scene.reset()?;
+        let presents = solves && scene.present(0.0, &[], &mut displacement).is_ok();
+        let dt = f64::from(model.info().dt);
         Ok(Self {
             faces: faces.iter().map(|node| place[node]).collect(),
             rest: nodes.iter().map(|node| positions[*node as usize]).collect(),
@@ -70,18 +80,22 @@ impl Session {
             nodes,
             domain,
             scene,
-            dt: f64::from(model.info().dt),
+            dt,
+            begun: Instant::now(),
+            clock: Clock::new(dt),
             tool: None,
+            shown: None,
             sequence: 0,
-            came: None,
-            waited_ms: 0.0,
-            due: Instant::now(),
+            asked: false,
             recording: None,
             recorded: Vec::new(),
             replayed: None,
             contacts: 0,
             solves,
+            presents,
+            count: 0,
             penetration_mm: 0.0,
+            frame_ms: 0.0,
             force: [0.0; 3],
             bytes: Vec::new(),
         })
@@ -96,6 +110,7 @@ impl Session {
             surface_face_count: self.faces.len() / 3,
             dt: info.dt,
             max_push_mm: info.max_push_mm,
+            presents: self.presents,
             flags: vec![
                 (ffi::UPT_FLAG_PUSH, "push longer than trained"),
                 (ffi::UPT_FLAG_CONTACT_AREA, "contact area not trained"),
@@ -127,7 +142,7 @@ impl Session {
             Wish::Tool(tool, sequence) => {
                 self.tool = tool;
                 self.sequence = sequence;
-                self.came.get_or_insert_with(Instant::now);
+                self.asked = true;
             }
             Wish::Reset => self.rest_again()?,
             Wish::Record(true) => self.recording = Some(Vec::new()),
@@ -145,53 +160,83 @@ impl Session {
         Ok(())
     }
 
+    /// Whether a frame was asked for since the last one.
+    pub fn asked(&self) -> bool {
+        self.asked
+    }
+
     fn rest_again(&mut self) -> Result<()> {
+        self.scene.settle();
+        self.clock = Clock::new(self.dt);
         self.tool = None;
         self.replayed = None;
+        self.contacts = 0;
+        self.penetration_mm = 0.0;
         self.force = [0.0; 3];
         self.scene.reset()
     }
 
-    /// Steps as often as the clock asks, and writes the frame of this moment.
+    /// Takes the step that has finished, writes the frame of this moment, and submits the step that is due.
     pub fn frame(&mut self) -> Result<&[u8]> {
-        let mut steps = 0;
-        while self.due.elapsed().as_secs_f64() >= self.dt {
-            if steps == MOST_STEPS {
-                self.due = Instant::now();
-                break;
-            }
-            self.due += std::time::Duration::from_secs_f64(self.dt);
-            self.step()?;
-            steps += 1;
+        let asked = Instant::now();
+        let now = self.begun.elapsed().as_secs_f64();
+        if self.clock.in_flight() && self.scene.poll()? {
+            self.clock.finished();
+            self.read()?;
         }
-        let alpha = (self.due.elapsed().as_secs_f64() / self.dt).clamp(0.0, 1.0);
-        self.scene.sample(alpha, &mut self.displacement)?;
+        self.shown = match self.replayed {
+            None => self.tool,
+            Some(next) => {
+                let at = |step: usize| self.recorded.get(step).copied().flatten();
+                between(at(next.saturating_sub(1)), at(next), self.clock.part(now))
+            }
+        };
+        self.clock.moved(now, self.shown);
+        let since = self.clock.since(now);
+        if self.presents {
+            let instruments: Vec<ffi::upt_instrument> = self.shown.iter().map(capsule).collect();
+            self.scene
+                .present(since, &instruments, &mut self.displacement)?;
+        } else {
+            let alpha = (since / self.dt).min(1.0);
+            self.scene.sample(alpha, &mut self.displacement)?;
+        }
+        self.frame_ms = asked.elapsed().as_secs_f32() * 1e3;
+        if self.clock.due(now) {
+            self.step(now)?;
+        }
+        self.asked = false;
         self.encode()
     }
 
-    fn step(&mut self) -> Result<()> {
-        if let Some(at) = &mut self.replayed {
-            self.tool = self.recorded.get(*at).copied().flatten();
-            *at += 1;
-            if *at > self.recorded.len() {
+    fn step(&mut self, now: f64) -> Result<()> {
+        let mut tool = self.clock.begin(now);
+        if let Some(next) = &mut self.replayed {
+            // The very poses of the recording: its steps again, to the bit.
+            tool = self.recorded.get(*next).copied().flatten();
+            *next += 1;
+            if *next > self.recorded.len() {
                 self.replayed = None;
             }
         }
         if let Some(recording) = &mut self.recording
             && recording.len() < LONGEST_RECORDING
         {
-            recording.push(self.tool);
+            recording.push(tool);
         }
-        if let Some(came) = self.came.take() {
-            self.waited_ms = came.elapsed().as_secs_f32() * 1e3;
-        }
-        let instruments: Vec<ffi::upt_instrument> = self.tool.iter().map(instrument).collect();
+        let instruments: Vec<ffi::upt_instrument> = tool.iter().map(capsule).collect();
         if !self.solves {
-            return self.step_nodes(&instruments);
+            self.step_nodes(&instruments)?;
+            self.clock.finished();
+            return Ok(());
         }
-        self.scene
-            .step_instruments(&instruments, &mut self.displacement)?;
-        let readings = self.scene.readings(instruments.len())?;
+        self.count = instruments.len();
+        self.scene.submit_instruments(&instruments)
+    }
+
+    /// What the finished step says about its tool.
+    fn read(&mut self) -> Result<()> {
+        let readings = self.scene.readings(self.count)?;
         let first = readings.first();
         self.force = first.map_or([0.0; 3], |reading| reading.force);
         self.penetration_mm = first.map_or(0.0, |reading| reading.penetration_mm);
@@ -221,6 +266,11 @@ impl Session {
         let state = u32::from(self.recording.is_some())
             | (u32::from(self.replayed.is_some()) << 1)
             | (u32::from(stats.sleeping) << 2);
+        let (place, turn, radius) = self
+            .shown
+            .map_or(([0.0; 3], [0.0, 0.0, 0.0, 1.0], 0.0f32), |tool| {
+                (tool.position, tool.rotation, tool.radius)
+            });
         let header: [[u8; 4]; HEADER] = [
             self.sequence.to_le_bytes(),
             stats.flags.to_le_bytes(),
@@ -232,11 +282,20 @@ impl Session {
             self.force[1].to_le_bytes(),
             self.force[2].to_le_bytes(),
             stats.max_displacement_mm.to_le_bytes(),
-            self.waited_ms.to_le_bytes(),
+            self.frame_ms.to_le_bytes(),
             (stats.step_count as u32).to_le_bytes(),
             stats.corrections.to_le_bytes(),
             stats.error_mm.to_le_bytes(),
             self.penetration_mm.to_le_bytes(),
+            u32::from(self.shown.is_some()).to_le_bytes(),
+            place[0].to_le_bytes(),
+            place[1].to_le_bytes(),
+            place[2].to_le_bytes(),
+            turn[0].to_le_bytes(),
+            turn[1].to_le_bytes(),
+            turn[2].to_le_bytes(),
+            turn[3].to_le_bytes(),
+            radius.to_le_bytes(),
         ];
         self.bytes.clear();
         self.bytes.extend(header.as_flattened());
@@ -247,19 +306,15 @@ impl Session {
     }
 }
 
-fn instrument(tool: &Tool) -> ffi::upt_instrument {
+fn capsule(tool: &Tool) -> ffi::upt_instrument {
     ffi::upt_instrument {
-        struct_size: size_of::<ffi::upt_instrument>() as u32,
         shape: ffi::UPT_SHAPE_CAPSULE,
         position: tool.position,
         rotation: tool.rotation,
         half_extents: [0.0, tool.half_length, 0.0],
         radius: tool.radius,
-        sticking: u8::from(tool.sticking),
-        mode: ffi::UPT_MODE_SLIDE,
-        reserved: [0; 2],
-        friction: if tool.sticking { STICKS } else { SLIPS },
-        tear_off_mn: 0.0,
-        hull: std::ptr::null(),
+        sticking: u8::from(tool.friction >= STICKS),
+        friction: tool.friction,
+        ..instrument()
     }
 }

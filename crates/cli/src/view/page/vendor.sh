@@ -10,7 +10,7 @@ npm install --silent --no-save --no-audit --no-fund three@0.187.0 esbuild@0.28.0
 cat >entry.js <<'JS'
 export {
   AmbientLight, BufferAttribute, BufferGeometry, CapsuleGeometry, Color, DirectionalLight, Mesh, MeshStandardMaterial,
-  PerspectiveCamera, Quaternion, Raycaster, Scene, Vector2, Vector3, WebGLRenderer,
+  PerspectiveCamera, Quaternion, Raycaster, Scene, ShaderMaterial, Vector2, Vector3, WebGLRenderer,
 } from "three";
 export { OrbitControls } from "three/addons/controls/OrbitControls.js";
 JS

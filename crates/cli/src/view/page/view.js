@@ -1,20 +1,24 @@
 // The page of `upt view`: shows the surface that the server streams, sends the tool that the mouse drags.
-// What the two say to each other: protocol.rs.
+// What the two say to each other: protocol.rs. Each picture asks for the frame of the next one.
 import * as three from "./three.js";
+import { finish, makeRenderer, software, steelMaterial, tissueMaterial, turnNormals } from "./drawing.js";
+import { gltf } from "./gltf.js";
 
-const HEADER = 15;
+const HEADER = 24;
 const HALF_LENGTH = 25; // of the tool, mm
 const PRESS = 250; // ms until the tool is at its depth
+const READOUTS = 100; // ms between two of the readouts
+const AHEAD = 2; // frames that are asked for and have not come
 const PALE = new three.Color(0xd8bfb0);
 const GREY = new three.Color(0x8f9399); // where the model was not trained to be touched
 const RED = new three.Color(0xc8402a);
 
 const at = (id) => document.getElementById(id);
 const show = (id, text) => {
-  at(id).textContent = text;
+  if (at(id).textContent !== text) at(id).textContent = text;
 };
 
-const renderer = new three.WebGLRenderer({ canvas: at("picture"), antialias: true });
+const renderer = makeRenderer(at("picture"));
 const scene = new three.Scene();
 scene.background = new three.Color(0x16181d);
 const camera = new three.PerspectiveCamera(35, 1, 1, 5000);
@@ -29,12 +33,14 @@ let rest; // at rest and not shown: where the mouse finds its place
 let restPositions;
 let restColours;
 let tool; // the capsule that is shown
+let pointer; // {x, y, when} while the tool is held: where the mouse is
 let pressed; // {point, normal, since} while the tool is held
 let sequence = 0;
-let fresh = false; // a frame has come that is not shown yet
-const sent = new Map(); // sequence: when, until it is seen
+let latest; // the frame that has come and is not shown yet
+let told = 0; // when the readouts were written
+const sent = new Map(); // sequence: when the mouse was there, until it is seen
 const pictures = []; // when the last ones were shown
-const status = { frames: 0, shown: 0, largest: 0, force: 0, contacts: 0, latency: [], steps: 0 };
+const status = { shown: 0, largest: 0, force: 0, contacts: 0, latency: [], made: [], intervals: [], steps: 0, sequence: 0, software };
 window.uptView = status; // for tests
 
 const socket = new WebSocket(`ws://${location.host}/socket${location.search}`);
@@ -50,7 +56,7 @@ socket.onmessage = ({ data }) => {
   } else if (!surface) {
     build(data);
   } else {
-    take(data);
+    latest = data;
   }
 };
 socket.onclose = ({ reason }) => show("message", reason || "The connection is closed: run upt view again, or close its other page.");
@@ -77,10 +83,10 @@ function build(data) {
   }
   middle.divideScalar(domain.reduce((sum, x) => sum + x, 0));
   moving.setAttribute("color", new three.BufferAttribute(restColours.slice(), 3));
-  surface = new three.Mesh(moving, new three.MeshStandardMaterial({ vertexColors: true, roughness: 0.55 }));
+  surface = new three.Mesh(moving, tissueMaterial());
   surface.frustumCulled = false;
   rest = new three.Mesh(geometry(restPositions), surface.material);
-  tool = new three.Mesh(new three.CapsuleGeometry(1, 1), new three.MeshStandardMaterial({ color: 0x9fb4c8, metalness: 0.6, roughness: 0.35 }));
+  tool = new three.Mesh(new three.CapsuleGeometry(1, 1), steelMaterial());
   tool.visible = false;
   scene.add(surface, tool);
   const { center, radius } = rest.geometry.boundingSphere;
@@ -89,15 +95,19 @@ function build(data) {
   controls.update();
 }
 
+// The frame that has come, into the surface and the tool.
 function take(data) {
   const words = new Uint32Array(data, 0, HEADER);
   const numbers = new Float32Array(data, 0, HEADER);
   const displacement = new Float32Array(data, 4 * HEADER);
-  const positions = surface.geometry.attributes.position.array;
-  const colours = surface.geometry.attributes.color.array;
+  const { position, color } = surface.geometry.attributes;
+  const positions = position.array;
+  const colours = color.array;
   const most = 0.8 * hello.max_push_mm;
   for (let i = 0; i < displacement.length; i += 3) {
-    const [x, y, z] = [displacement[i], displacement[i + 1], displacement[i + 2]];
+    const x = displacement[i];
+    const y = displacement[i + 1];
+    const z = displacement[i + 2];
     positions[i] = restPositions[i] + x;
     positions[i + 1] = restPositions[i + 1] + y;
     positions[i + 2] = restPositions[i + 2] + z;
@@ -106,28 +116,55 @@ function take(data) {
     colours[i + 1] = restColours[i + 1] + share * (RED.g - restColours[i + 1]);
     colours[i + 2] = restColours[i + 2] + share * (RED.b - restColours[i + 2]);
   }
-  status.frames += 1;
+  turnNormals(surface.geometry);
+  position.needsUpdate = true;
+  color.needsUpdate = true;
   status.sequence = words[0];
+  status.flags = words[1];
   status.contacts = words[2];
   status.recording = (words[3] & 1) !== 0;
   status.replaying = (words[3] & 2) !== 0;
   status.stepMs = numbers[4];
+  status.indicator = numbers[5];
   status.force = Math.hypot(numbers[6], numbers[7], numbers[8]);
   status.largest = numbers[9];
-  status.waited = numbers[10];
+  status.frameMs = numbers[10];
   status.steps = words[11];
-  fresh = true;
-  show("step", `${numbers[4].toFixed(2)} ms`);
-  show("indicator", numbers[5].toFixed(2));
-  show("force", `${status.force.toFixed(0)} mN`);
+  status.corrections = words[12];
+  status.errorMm = numbers[13];
   status.penetration = numbers[14];
-  show("corrections", words[12] > 0 ? `${words[12]}, ± ${numbers[13].toFixed(3)} mm` : "none");
-  show("penetration", `${numbers[14].toFixed(2)} mm`);
-  show("largest", `${numbers[9].toFixed(1)} mm`);
-  show("contacts", words[2]);
+  placeTool(words[15] !== 0, numbers.subarray(16));
+}
+
+// The tool as it is in the frame: dragged, or replayed.
+function placeTool(there, [x, y, z, qx, qy, qz, qw, radius]) {
+  tool.visible = there;
+  if (!there) return;
+  if (tool.userData.radius !== radius) {
+    tool.geometry.dispose();
+    tool.geometry = new three.CapsuleGeometry(radius, 2 * HALF_LENGTH, 8, 24);
+    tool.userData.radius = radius;
+  }
+  tool.position.set(x, y, z);
+  tool.quaternion.set(qx, qy, qz, qw);
+}
+
+function readOut() {
+  show("step", `${status.stepMs.toFixed(2)} ms`);
+  show("indicator", status.indicator.toFixed(2));
+  show("force", `${status.force.toFixed(0)} mN`);
+  show("corrections", status.corrections > 0 ? `${status.corrections}, ± ${status.errorMm.toFixed(3)} mm` : "none");
+  show("penetration", `${status.penetration.toFixed(2)} mm`);
+  show("largest", `${status.largest.toFixed(1)} mm`);
+  show("contacts", String(status.contacts));
   show("record", status.recording ? "Stop" : "Record");
-  const raised = hello.flags.filter(([bit]) => (words[1] & bit) !== 0).map(([, name]) => name);
+  const raised = hello.flags.filter(([bit]) => (status.flags & bit) !== 0).map(([, name]) => name);
   show("flags", raised.join(", "));
+  if (status.rate) show("rate", `${status.rate.toFixed(0)} /s`);
+  if (status.latency.length > 0) {
+    const sorted = [...status.latency].sort((a, b) => a - b);
+    show("latency", `${sorted[sorted.length >> 1].toFixed(0)} ms`);
+  }
 }
 
 // The tool: its tip `depth` below the place at rest that the mouse points at, its axis along the normal there.
@@ -137,43 +174,41 @@ function pose(now) {
   const up = HALF_LENGTH + radius - ramp * Number(at("depth").value);
   const position = pressed.point.clone().addScaledVector(pressed.normal, up);
   const rotation = new three.Quaternion().setFromUnitVectors(new three.Vector3(0, 1, 0), pressed.normal);
-  return { position, rotation, radius, ramp };
+  return { position, rotation, radius };
 }
 
-function sendTool(now) {
+// Asks for the next frame, with the tool where it is now.
+function ask(now) {
+  if (sequence - status.sequence >= AHEAD) return;
   sequence += 1;
   if (!pressed) {
-    tool.visible = false;
     say({ tool: null, sequence });
     return;
   }
-  const { position, rotation, radius } = pose(now);
-  if (tool.userData.radius !== radius) {
-    tool.geometry.dispose();
-    tool.geometry = new three.CapsuleGeometry(radius, 2 * HALF_LENGTH, 8, 24);
-    tool.userData.radius = radius;
+  if (pointer.when) {
+    const found = place(pointer);
+    if (found) Object.assign(pressed, found);
+    sent.set(sequence, pointer.when);
+    pointer.when = 0;
   }
-  tool.position.copy(position);
-  tool.quaternion.copy(rotation);
-  tool.visible = true;
-  sent.set(sequence, performance.now());
+  const { position, rotation, radius } = pose(now);
   say({
     tool: {
       position: position.toArray(),
       rotation: rotation.toArray(),
       radius,
       half_length: HALF_LENGTH,
-      sticking: at("sticking").checked,
+      friction: Number(at("friction").value),
     },
     sequence,
   });
 }
 
 const ray = new three.Raycaster();
-function place(event) {
+function place({ x: left, y: top }) {
   const frame = renderer.domElement.getBoundingClientRect();
-  const x = (2 * (event.clientX - frame.left)) / frame.width - 1;
-  const y = 1 - (2 * (event.clientY - frame.top)) / frame.height;
+  const x = (2 * (left - frame.left)) / frame.width - 1;
+  const y = 1 - (2 * (top - frame.top)) / frame.height;
   ray.setFromCamera(new three.Vector2(x, y), camera);
   const [hit] = rest ? ray.intersectObject(rest) : [];
   if (!hit) return null;
@@ -185,34 +220,31 @@ function place(event) {
 }
 
 const canvas = renderer.domElement;
+const where = (event) => ({ x: event.clientX, y: event.clientY, when: event.timeStamp });
 canvas.addEventListener(
   "pointerdown",
   (event) => {
-    const found = event.button === 0 && place(event);
+    const found = event.button === 0 && place(where(event));
     if (!found) return;
     event.stopImmediatePropagation(); // the camera stays
     canvas.setPointerCapture(event.pointerId);
+    pointer = where(event);
     pressed = { ...found, since: performance.now() };
   },
   { capture: true },
 );
 canvas.addEventListener("pointermove", (event) => {
-  if (!pressed) return;
-  const found = place(event);
-  if (found) Object.assign(pressed, found);
-  sendTool(performance.now());
+  if (pressed) pointer = where(event);
 });
 const lift = () => {
-  if (!pressed) return;
   pressed = null;
-  sendTool(performance.now());
 };
 canvas.addEventListener("pointerup", lift);
 canvas.addEventListener("pointercancel", lift);
 
-for (const id of ["depth", "radius"]) {
+for (const [id, unit] of [["depth", " mm"], ["radius", " mm"], ["friction", ""]]) {
   const label = () => {
-    at(id).nextElementSibling.textContent = `${at(id).value} mm`;
+    at(id).nextElementSibling.textContent = `${at(id).value}${unit}`;
   };
   at(id).addEventListener("input", label);
   label();
@@ -220,55 +252,26 @@ for (const id of ["depth", "radius"]) {
 at("reset").addEventListener("click", () => say({ reset: true }));
 at("record").addEventListener("click", () => say({ record: !status.recording }));
 at("replay").addEventListener("click", () => say({ replay: true }));
+status.nodes = () => hello.node_count;
+status.gltf = () => gltf(surface.geometry, hello.bundle);
 at("save").addEventListener("click", () => {
   const link = document.createElement("a");
-  link.href = URL.createObjectURL(new Blob([gltf()], { type: "model/gltf+json" }));
+  link.href = URL.createObjectURL(new Blob([status.gltf()], { type: "model/gltf+json" }));
   link.download = `${hello.bundle}.gltf`;
   link.click();
 });
 
-// The surface as it is shown, in glTF's frame: metres, y up.
-function gltf() {
-  const { position, normal } = surface.geometry.attributes;
-  const indices = surface.geometry.index.array;
-  const turned = (source, scale) => {
-    const out = new Float32Array(source.length);
-    for (let i = 0; i < source.length; i += 3) {
-      out[i] = scale * source[i];
-      out[i + 1] = scale * source[i + 2];
-      out[i + 2] = -scale * source[i + 1];
-    }
-    return out;
-  };
-  const parts = [turned(position.array, 1e-3), turned(normal.array, 1), new Uint32Array(indices)];
-  const bounds = (pick) => [0, 1, 2].map((axis) => parts[0].reduce((found, x, i) => (i % 3 === axis ? pick(found, x) : found), pick === Math.min ? Infinity : -Infinity));
-  let offset = 0;
-  const views = parts.map((part) => {
-    const view = { buffer: 0, byteOffset: offset, byteLength: part.byteLength };
-    offset += part.byteLength;
-    return view;
-  });
-  const bytes = new Uint8Array(offset);
-  parts.forEach((part, i) => bytes.set(new Uint8Array(part.buffer), views[i].byteOffset));
-  let text = "";
-  for (let i = 0; i < bytes.length; i += 0x8000) text += String.fromCharCode(...bytes.subarray(i, i + 0x8000));
-  const vectors = (bufferView, more) => ({ bufferView, componentType: 5126, count: position.count, type: "VEC3", ...more });
-  return JSON.stringify({
-    asset: { version: "2.0", generator: "upt view" },
-    scene: 0,
-    scenes: [{ nodes: [0] }],
-    nodes: [{ mesh: 0, name: hello.bundle }],
-    meshes: [{ primitives: [{ attributes: { POSITION: 0, NORMAL: 1 }, indices: 2 }] }],
-    accessors: [
-      vectors(0, { min: bounds(Math.min), max: bounds(Math.max) }),
-      vectors(1),
-      { bufferView: 2, componentType: 5125, count: indices.length, type: "SCALAR" },
-    ],
-    bufferViews: views,
-    buffers: [{ byteLength: bytes.length, uri: `data:application/octet-stream;base64,${btoa(text)}` }],
-  });
+const keep = (list, value) => {
+  list.push(value);
+  if (list.length > 2000) list.shift();
+};
+
+// Since when the mouse had been where this picture shows it, ms; undefined where it has not moved.
+function seen() {
+  const when = sent.get(status.sequence) ?? [...sent].findLast(([old]) => old <= status.sequence)?.[1];
+  for (const old of sent.keys()) if (old <= status.sequence) sent.delete(old);
+  return when;
 }
-status.gltf = gltf;
 
 renderer.setAnimationLoop((now) => {
   const { clientWidth: width, clientHeight: height } = canvas;
@@ -277,28 +280,26 @@ renderer.setAnimationLoop((now) => {
     camera.aspect = width / height;
     camera.updateProjectionMatrix();
   }
-  if (pressed && now - pressed.since < PRESS + 100) sendTool(now); // until it is pressed in
-  if (fresh) {
-    fresh = false;
-    surface.geometry.attributes.position.needsUpdate = true;
-    surface.geometry.attributes.color.needsUpdate = true;
-    surface.geometry.computeVertexNormals();
-    // The pose whose step is shown now: how long ago the mouse was there, less what it waited for its turn.
-    const since = sent.get(status.sequence);
-    if (since !== undefined) {
-      for (const old of sent.keys()) if (old <= status.sequence) sent.delete(old);
-      status.latency.push(Math.max(performance.now() - since - status.waited, 0));
-      if (status.latency.length > 120) status.latency.shift();
-      const sorted = [...status.latency].sort((a, b) => a - b);
-      show("latency", `${sorted[sorted.length >> 1].toFixed(0)} ms`);
-    }
-    pictures.push(now);
-    while (pictures[0] < now - 2000) pictures.shift();
-    status.rate = (1000 * (pictures.length - 1)) / Math.max(now - pictures[0], 1);
-    show("rate", `${status.rate.toFixed(0)} /s`);
-    status.shown += 1;
-  }
+  if (!surface) return;
+  const data = latest;
+  latest = undefined;
+  if (data) take(data);
+  ask(now); // it is made while this picture is drawn
   light.position.copy(camera.position);
   controls.update();
   renderer.render(scene, camera);
+  if (!data) return;
+  if (status.finish) finish(renderer);
+  const when = seen();
+  if (when !== undefined) keep(status.latency, performance.now() - when);
+  keep(status.made, status.frameMs);
+  if (pictures.length > 0) keep(status.intervals, now - pictures[pictures.length - 1]);
+  pictures.push(now);
+  while (pictures[0] < now - 2000) pictures.shift();
+  status.rate = (1000 * (pictures.length - 1)) / Math.max(now - pictures[0], 1);
+  status.shown += 1;
+  if (now - told > READOUTS) {
+    told = now;
+    readOut();
+  }
 });

@@ -1,0 +1,101 @@
+//! BDF2 over the steps of a stage: what it knows before a step, velocities and inertia after it, and what it leaves out.
+
+use super::Integrator;
+use super::input::{Input, Lent};
+use super::passes;
+use super::stage::Stage;
+use crate::error::Result;
+use crate::kernels::parts::Parts;
+
+/// Parts of the second difference of the displacement, and of that of the velocity over a step, by which a step of BDF2 errs.
+const BEND: f64 = 0.02;
+const JERK: f64 = 0.05;
+
+impl Stage {
+    /// Inertia and damping of the step at the last displacement.
+    pub(super) fn prepare(&mut self, lent: Lent<'_>, input: &Input<'_>) -> Result<()> {
+        let env = lent.env();
+        let (last, before) = (input.last, input.before);
+        let known = if input.still { 0.0 } else { 1.0 };
+        let Integrator {
+            step_s,
+            damping_per_s,
+        } = lent.pace.integrator;
+        let (half, alpha) = ((0.5 / step_s) as f32, damping_per_s as f32);
+        let (mass, motion) = (&env.body.mass_of_dof, &self.motion);
+        let len = self.drift.len();
+        let drift = Parts::new(&mut self.drift);
+        passes::each(env.pool, len, 6, |range, _| {
+            // SAFETY: this part belongs to this piece alone.
+            let drift = unsafe { drift.part(range.start, range.len()) };
+            let (last, before) = (&last[range.clone()], &before[range.clone()]);
+            let velocity = &motion.velocity[range.clone()];
+            let velocity_before = &motion.velocity_before[range.clone()];
+            let mass = &mass[range];
+            for i in 0..drift.len() {
+                let v = (before[i] - last[i]) * half;
+                let v_n = known * velocity[i];
+                let v_before = known * velocity_before[i];
+                let a = (3.0 * (v - v_n) - (v_n - v_before)) * half;
+                drift[i] = mass[i] * (a + alpha * v);
+            }
+        })
+    }
+
+    /// Velocity and inertia at `next`, the end of the step from `last`, and what a step of this length leaves out.
+    pub(super) fn finish(&mut self, lent: Lent<'_>, input: &Input<'_>, next: &[f32]) -> Result<()> {
+        let env = lent.env();
+        let (last, before) = (input.last, input.before);
+        let Integrator {
+            step_s,
+            damping_per_s,
+        } = lent.pace.integrator;
+        let (half, alpha) = ((0.5 / step_s) as f32, damping_per_s as f32);
+        let known = if input.still { 0.0 } else { 1.0 };
+        let (mass, motion) = (&env.body.mass_of_dof, &self.motion);
+        let time = step_s as f32;
+        let mut sums = passes::Sums::new(&mut self.partial, next.len(), 2);
+        let parts = sums.parts();
+        let own = &mut self.next;
+        let outputs = [
+            Parts::new(&mut own.velocity),
+            Parts::new(&mut own.velocity_before),
+            Parts::new(&mut own.inertia),
+        ];
+        passes::each(env.pool, next.len(), 9, |range, piece| {
+            // SAFETY: these parts belong to this piece alone.
+            let [velocity, velocity_before, inertia] =
+                [0, 1, 2].map(|i| unsafe { outputs[i].part(range.start, range.len()) });
+            let (last, before) = (&last[range.clone()], &before[range.clone()]);
+            let known_v = &motion.velocity[range.clone()];
+            let known_before = &motion.velocity_before[range.clone()];
+            let (next, mass) = (&next[range.clone()], &mass[range]);
+            for i in 0..next.len() {
+                let v = (3.0 * (next[i] - last[i]) - (last[i] - before[i])) * half;
+                let v_n = known * known_v[i];
+                let v_before = known * known_before[i];
+                let a = (3.0 * (v - v_n) - (v_n - v_before)) * half;
+                velocity[i] = v;
+                velocity_before[i] = v_n;
+                inertia[i] = mass[i] * (a + alpha * v);
+            }
+            // SAFETY: these sums belong to this piece alone.
+            let sums = unsafe { parts.part(2 * piece, 2) };
+            sums[0] = passes::sum_of_squares(next.len(), |i| next[i] - 2.0 * last[i] + before[i]);
+            sums[1] = passes::sum_of_squares(next.len(), |i| {
+                time * (velocity[i] - 2.0 * velocity_before[i] + known * known_before[i])
+            });
+        })?;
+        let nodes = (next.len() / 3) as f64;
+        let [bend, jerk] = [0, 1].map(|at| (sums.total(at) / nodes).sqrt());
+        let truncated = (BEND * bend).hypot(JERK * jerk);
+        own.min_det = 1.0;
+        own.truncated_mm = match truncated.is_finite() {
+            true => truncated as f32,
+            false => 0.0,
+        };
+        own.error_mm = 0.0;
+        own.reaction.clear();
+        Ok(())
+    }
+}

@@ -1,0 +1,250 @@
+//! Passes over fields `[K,3]` in pieces of whole nodes that threads share, each of them several operations at once: a field is read from
+//! memory as seldom as can be. Sums over pieces are in f64 and in order, so the bits do not depend on the number of threads.
+
+use std::ops::Range;
+
+use super::precondition::{DIAGONAL_WEIGHT, Env, pooled};
+use crate::error::Result;
+use crate::kernels::Pool;
+use crate::kernels::parts::Parts;
+use crate::kernels::vectors::{PartialSums, piece_add, piece_dots};
+
+/// Numbers a piece.
+const PIECE: usize = 3 * 1360;
+
+/// Calls `task(range, piece)` for each piece of a field of `len` numbers, which the pass reads or writes `streams` times.
+pub(super) fn each(
+    pool: &Pool,
+    len: usize,
+    streams: usize,
+    task: impl Fn(Range<usize>, usize) + Sync,
+) -> Result<()> {
+    pooled(
+        pool.run_streaming(4 * len * streams, len.div_ceil(PIECE), &|piece, _| {
+            let start = piece * PIECE;
+            task(start..(start + PIECE).min(len), piece);
+        }),
+    )
+}
+
+/// Sums of [`each`]: `count` a piece.
+pub(super) struct Sums<'a> {
+    partial: &'a mut PartialSums,
+    count: usize,
+}
+
+impl<'a> Sums<'a> {
+    pub(super) fn new(partial: &'a mut PartialSums, len: usize, count: usize) -> Sums<'a> {
+        partial.resize(len.div_ceil(PIECE) * count);
+        Sums { partial, count }
+    }
+
+    pub(super) fn parts(&mut self) -> Parts<f32> {
+        Parts::new(self.partial.values())
+    }
+
+    pub(super) fn total(&mut self, at: usize) -> f64 {
+        let own = self.partial.values().iter().skip(at).step_by(self.count);
+        own.map(|&sum| f64::from(sum)).sum()
+    }
+}
+
+/// Sum of the squares of `value(0..count)`, in lanes.
+pub(super) fn sum_of_squares(count: usize, value: impl Fn(usize) -> f32) -> f32 {
+    let mut lanes = [0.0f32; 16];
+    let whole = count / 16 * 16;
+    for start in (0..whole).step_by(16) {
+        for (lane, sum) in lanes.iter_mut().enumerate() {
+            let value = value(start + lane);
+            *sum += value * value;
+        }
+    }
+    let rest = (whole..count).map(|at| value(at).powi(2));
+    lanes.into_iter().sum::<f32>() + rest.sum::<f32>()
+}
+
+/// `r += sum_i factors_i ys_i`, `t = w D^-1 r`, `work_i = ys_i . t`.
+pub(super) fn smooth(
+    env: Env<'_>,
+    (ys, factors): (&[&[f32]], &[f32]),
+    [r, t]: [&mut [f32]; 2],
+    partial: &mut PartialSums,
+    work: &mut [f64],
+) -> Result<()> {
+    let (len, count) = (r.len(), ys.len());
+    let mut sums = Sums::new(partial, len, count);
+    let (r, t, parts) = (Parts::new(r), Parts::new(t), sums.parts());
+    let blocks = &env.pace.inverse_blocks;
+    each(env.pool, len, count + 4, |range, piece| {
+        // SAFETY: these parts belong to this piece alone.
+        let (r, t, sums) = unsafe {
+            (
+                r.part(range.start, range.len()),
+                t.part(range.start, range.len()),
+                parts.part(piece * count, count),
+            )
+        };
+        piece_add(env.isa, ys, factors, range.start, r);
+        diagonal(&blocks[range.start / 3..range.end / 3], r, t);
+        piece_dots(env.isa, ys, t, range.start, sums);
+    })?;
+    for (at, work) in work.iter_mut().enumerate() {
+        *work = sums.total(at);
+    }
+    Ok(())
+}
+
+/// `t = w D^-1 r`.
+fn diagonal(blocks: &[[f32; 6]], r: &[f32], t: &mut [f32]) {
+    let w = DIAGONAL_WEIGHT;
+    let rows = r.as_chunks::<3>().0.iter();
+    for ((t, r), [xx, xy, xz, yy, yz, zz]) in
+        t.as_chunks_mut::<3>().0.iter_mut().zip(rows).zip(blocks)
+    {
+        t[0] = w * (xx * r[0] + xy * r[1] + xz * r[2]);
+        t[1] = w * (xy * r[0] + yy * r[1] + yz * r[2]);
+        t[2] = w * (xz * r[0] + yz * r[1] + zz * r[2]);
+    }
+}
+
+/// `t = -(t + sum_i factors_i rows_i)`.
+pub(super) fn negative_sum(
+    env: Env<'_>,
+    rows: &[&[f32]],
+    factors: &[f32],
+    t: &mut [f32],
+) -> Result<()> {
+    let len = t.len();
+    let parts = Parts::new(t);
+    each(env.pool, len, rows.len() + 1, |range, _| {
+        // SAFETY: this part belongs to this piece alone.
+        let t = unsafe { parts.part(range.start, range.len()) };
+        piece_add(env.isa, rows, factors, range.start, t);
+        t.iter_mut().for_each(|t| *t = -*t);
+    })
+}
+
+/// `d += change` where nodes are free and zero where they are held, `moved = u + d`; gives `g . d` and `d . d`.
+pub(super) fn advance(
+    env: Env<'_>,
+    [u, g]: [&[f32]; 2],
+    d: &mut [f32],
+    moved: &mut [f32],
+    partial: &mut PartialSums,
+) -> Result<[f64; 2]> {
+    let len = d.len();
+    let mut sums = Sums::new(partial, len, 2);
+    let (d, moved, parts) = (Parts::new(d), Parts::new(moved), sums.parts());
+    each(env.pool, len, 4, |range, piece| {
+        // SAFETY: these parts belong to this piece alone; `moved` holds the change.
+        let (d, moved, sums) = unsafe {
+            (
+                d.part(range.start, range.len()),
+                moved.part(range.start, range.len()),
+                parts.part(2 * piece, 2),
+            )
+        };
+        d.iter_mut()
+            .zip(&*moved)
+            .for_each(|(d, change)| *d += change);
+        hold(env, &range, d);
+        let u = &u[range.clone()];
+        for ((moved, u), d) in moved.iter_mut().zip(u).zip(&*d) {
+            *moved = u + d;
+        }
+        let rows: [&[f32]; 2] = [&g[range.clone()], d];
+        piece_dots(env.isa, &rows, d, 0, sums);
+    })?;
+    Ok([sums.total(0), sums.total(1)])
+}
+
+/// `u += change` where nodes are free; the change is lost at held ones.
+pub(super) fn add(env: Env<'_>, change: &mut [f32], u: &mut [f32]) -> Result<()> {
+    let len = u.len();
+    let (u, change) = (Parts::new(u), Parts::new(change));
+    each(env.pool, len, 2, |range, _| {
+        // SAFETY: these parts belong to this piece alone.
+        let [u, change] =
+            unsafe { [&u, &change].map(|field| field.part(range.start, range.len())) };
+        hold(env, &range, change);
+        u.iter_mut()
+            .zip(&*change)
+            .for_each(|(u, change)| *u += change);
+    })
+}
+
+/// `moved = u + t d`.
+pub(super) fn shorten(env: Env<'_>, u: &[f32], d: &[f32], t: f32, moved: &mut [f32]) -> Result<()> {
+    let len = moved.len();
+    let moved = Parts::new(moved);
+    each(env.pool, len, 3, |range, _| {
+        // SAFETY: this part belongs to this piece alone.
+        let moved = unsafe { moved.part(range.start, range.len()) };
+        for ((moved, u), d) in moved.iter_mut().zip(&u[range.clone()]).zip(&d[range]) {
+            *moved = u + t * d;
+        }
+    })
+}
+
+/// `out += drift + kappa M (u - last)` where nodes are free and zero where they are held; gives `out . d`.
+pub(super) fn inertia(
+    env: Env<'_>,
+    kappa: f32,
+    [drift, u, last, d]: [&[f32]; 4],
+    out: &mut [f32],
+    partial: &mut PartialSums,
+) -> Result<f64> {
+    let len = out.len();
+    let mut sums = Sums::new(partial, len, 1);
+    let (out, parts) = (Parts::new(out), sums.parts());
+    let masses = &env.body.mass_of_dof;
+    each(env.pool, len, 6, |range, piece| {
+        // SAFETY: these parts belong to this piece alone.
+        let (out, sums) = unsafe { (out.part(range.start, range.len()), parts.part(piece, 1)) };
+        let [drift, u, last, d, masses] =
+            [drift, u, last, d, masses].map(|field| &field[range.clone()]);
+        for i in 0..out.len() {
+            out[i] += drift[i] + masses[i] * kappa * (u[i] - last[i]);
+        }
+        hold(env, &range, out);
+        piece_dots(env.isa, &[&*out], d, 0, sums);
+    })?;
+    Ok(sums.total(0))
+}
+
+/// `to = a - b`.
+pub(super) fn difference(env: Env<'_>, a: &[f32], b: &[f32], to: &mut [f32]) -> Result<()> {
+    let len = to.len();
+    let to = Parts::new(to);
+    each(env.pool, len, 3, |range, _| {
+        // SAFETY: this part belongs to this piece alone.
+        let to = unsafe { to.part(range.start, range.len()) };
+        for ((to, a), b) in to.iter_mut().zip(&a[range.clone()]).zip(&b[range]) {
+            *to = a - b;
+        }
+    })
+}
+
+/// `a . a`.
+pub(super) fn square(env: Env<'_>, a: &[f32], partial: &mut PartialSums) -> Result<f64> {
+    let mut sums = Sums::new(partial, a.len(), 1);
+    let parts = sums.parts();
+    each(env.pool, a.len(), 1, |range, piece| {
+        // SAFETY: this sum belongs to this piece alone.
+        let sums = unsafe { parts.part(piece, 1) };
+        let a = &a[range];
+        piece_dots(env.isa, &[a], a, 0, sums);
+    })?;
+    Ok(sums.total(0))
+}
+
+/// Zero at the held nodes of a piece.
+fn hold(env: Env<'_>, range: &Range<usize>, field: &mut [f32]) {
+    let nodes = (range.start / 3) as u32..(range.end / 3) as u32;
+    let held = &env.body.held_nodes;
+    let first = held.partition_point(|node| *node < nodes.start);
+    for node in held[first..].iter().take_while(|node| **node < nodes.end) {
+        let at = 3 * (node - nodes.start) as usize;
+        field[at..at + 3].fill(0.0);
+    }
+}
