@@ -12,6 +12,10 @@ use crate::error::Result;
 use crate::memory;
 use crate::prior::propagator;
 
+/// Modes that turn by more than this in a step are left to BDF2, which damps them: in closed form they would ring undamped, and what the
+/// iterations leave of them would grow from step to step, rad.
+const RESOLVED: f64 = 2.0;
+
 /// The oscillators of a scene whose free steps are made here; empty before the first.
 #[derive(Debug, Default)]
 pub(super) struct Free {
@@ -42,13 +46,16 @@ struct Oscillator {
 
 impl Free {
     fn ready(&mut self, lent: Lent<'_>) -> Result<()> {
-        if !self.modes.is_empty() {
+        if !self.faster.is_empty() {
             return Ok(());
         }
         const WHAT: &str = "the free motion of a scene";
         let natural = lent.corrections.space.natural();
         let integrator = lent.pace.integrator;
-        let oscillators = natural.iter().map(|&(omega, mass)| {
+        let turned = |omega: f32| f64::from(omega) * integrator.step_s;
+        let resolved = natural.iter().take_while(|mode| turned(mode.0) <= RESOLVED);
+        let count = resolved.clone().count();
+        let oscillators = resolved.map(|&(omega, mass)| {
             let omega = f64::from(omega);
             Oscillator {
                 square: omega * omega,
@@ -57,9 +64,9 @@ impl Free {
                 ..Oscillator::default()
             }
         });
-        self.values = memory::zeros(natural.len(), WHAT)?;
+        self.values = memory::zeros(count, WHAT)?;
         self.faster = memory::zeros(3 * lent.corrections.body.mass.len(), WHAT)?;
-        self.modes = memory::collected(natural.len(), oscillators, WHAT)?;
+        self.modes = memory::collected(count, oscillators, WHAT)?;
         Ok(())
     }
 
