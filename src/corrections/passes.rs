@@ -3,11 +3,15 @@
 
 use std::ops::Range;
 
-use super::precondition::{DIAGONAL_WEIGHT, Env, pooled};
+#[cfg(feature = "contact")]
+use super::precondition::DIAGONAL_WEIGHT;
+use super::precondition::{Env, pooled};
 use crate::error::Result;
 use crate::kernels::Pool;
 use crate::kernels::parts::Parts;
-use crate::kernels::vectors::{PartialSums, piece_add, piece_dots};
+#[cfg(feature = "contact")]
+use crate::kernels::vectors::piece_add;
+use crate::kernels::vectors::{PartialSums, piece_dots};
 
 /// Numbers a piece.
 const PIECE: usize = 3 * 1360;
@@ -64,6 +68,7 @@ pub(super) fn sum_of_squares(count: usize, value: impl Fn(usize) -> f32) -> f32 
 }
 
 /// `r += sum_i factors_i ys_i`, `t = w D^-1 r`, `work_i = ys_i . t`.
+#[cfg(feature = "contact")]
 pub(super) fn smooth(
     env: Env<'_>,
     (ys, factors): (&[&[f32]], &[f32]),
@@ -95,6 +100,7 @@ pub(super) fn smooth(
 }
 
 /// `t = w D^-1 r`.
+#[cfg(feature = "contact")]
 fn diagonal(blocks: &[[f32; 6]], r: &[f32], t: &mut [f32]) {
     let w = DIAGONAL_WEIGHT;
     let rows = r.as_chunks::<3>().0.iter();
@@ -108,6 +114,7 @@ fn diagonal(blocks: &[[f32; 6]], r: &[f32], t: &mut [f32]) {
 }
 
 /// `t = -(t + sum_i factors_i rows_i)`.
+#[cfg(feature = "contact")]
 pub(super) fn negative_sum(
     env: Env<'_>,
     rows: &[&[f32]],
@@ -125,6 +132,7 @@ pub(super) fn negative_sum(
 }
 
 /// `d += change` where nodes are free and zero where they are held, `moved = u + d`; gives `g . d` and `d . d`.
+#[cfg(feature = "contact")]
 pub(super) fn advance(
     env: Env<'_>,
     [u, g]: [&[f32]; 2],
@@ -159,6 +167,7 @@ pub(super) fn advance(
 }
 
 /// `u += change` where nodes are free; the change is lost at held ones.
+#[cfg(feature = "contact")]
 pub(super) fn add(env: Env<'_>, change: &mut [f32], u: &mut [f32]) -> Result<()> {
     let len = u.len();
     let (u, change) = (Parts::new(u), Parts::new(change));
