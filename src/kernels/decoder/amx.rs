@@ -13,7 +13,8 @@ pub(super) const OUTPUTS: usize = 16;
 /// Depth of a tile.
 pub(super) const DEPTH: usize = 32;
 
-/// Whether this process may multiply on tiles.
+/// Whether this process may multiply on tiles. The first call asks the system, which from then on wants larger signal stacks of the
+/// host: only a scene that asks for bf16 gets here.
 pub(super) fn is_available() -> bool {
     static ALLOWED: OnceLock<bool> = OnceLock::new();
     *ALLOWED.get_or_init(allowed)
@@ -21,17 +22,11 @@ pub(super) fn is_available() -> bool {
 
 #[cfg(all(target_arch = "x86_64", target_os = "linux"))]
 fn allowed() -> bool {
-    use core::arch::x86_64::{__cpuid, __cpuid_count};
     /// `arch_prctl`: ask for a feature of the extended state.
     const ARCH_REQ_XCOMP_PERM: libc::c_long = 0x1023;
     /// The tiles' data.
     const XFEATURE_XTILEDATA: libc::c_long = 18;
-    if __cpuid(0).eax < 7 {
-        return false;
-    }
-    let features = __cpuid_count(7, 0).edx;
-    let (bf16, tiles) = (features & 1 << 22 != 0, features & 1 << 24 != 0);
-    if !(bf16 && tiles && crate::kernels::Isa::has_bf16()) {
+    if !is_built_in() {
         return false;
     }
     // SAFETY: reads and changes nothing but this process's leave to use the tiles.
@@ -47,6 +42,23 @@ fn allowed() -> bool {
 
 #[cfg(not(all(target_arch = "x86_64", target_os = "linux")))]
 fn allowed() -> bool {
+    false
+}
+
+/// Whether the CPU has the tiles, and this library a way to them; asks nobody.
+#[cfg(all(target_arch = "x86_64", target_os = "linux"))]
+pub(super) fn is_built_in() -> bool {
+    use core::arch::x86_64::{__cpuid, __cpuid_count};
+    if __cpuid(0).eax < 7 {
+        return false;
+    }
+    let features = __cpuid_count(7, 0).edx;
+    let (bf16, tiles) = (features & 1 << 22 != 0, features & 1 << 24 != 0);
+    bf16 && tiles && crate::kernels::Isa::has_bf16()
+}
+
+#[cfg(not(all(target_arch = "x86_64", target_os = "linux")))]
+pub(super) fn is_built_in() -> bool {
     false
 }
 

@@ -123,7 +123,7 @@ pub(super) fn pair_count(outputs: usize, depth: usize) -> usize {
 
 /// Numbers of a matrix as blocks; none where the machine has no matrix tiles.
 fn block_count(outputs: usize, depth: usize) -> usize {
-    if !amx::is_available() {
+    if !amx::is_built_in() {
         return 0;
     }
     outputs.next_multiple_of(amx::OUTPUTS) * depth.next_multiple_of(amx::DEPTH)
