@@ -90,7 +90,7 @@ fn argument(text: &mut String, one: &Arg) -> std::fmt::Result {
         .iter()
         .map(|value| format!("`{}`", value.to_string_lossy()))
         .collect();
-    let defaults = if one.get_action().takes_values() {
+    let defaults = if one.get_action().takes_values() && !one.is_hide_default_value_set() {
         defaults.join(" ")
     } else {
         String::new()

@@ -92,7 +92,8 @@ pub struct Options {
     /// Folder for report.json, report.html and the finished rows.
     #[arg(long, default_value = "target/report")]
     out: PathBuf,
-    #[arg(long, value_delimiter = ',', default_values_t = default_threads())]
+    /// Threads of the library; default: 1, and all of this machine's.
+    #[arg(long, value_delimiter = ',', default_values_t = default_threads(), hide_default_value = true)]
     threads: Vec<u32>,
     #[arg(long, value_delimiter = ',', default_value = "all,surface")]
     region: Vec<Region>,
