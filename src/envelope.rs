@@ -1,6 +1,6 @@
 //! The envelope: whether a step's contact is inside what the model was trained on, as flags and a number.
 
-use crate::bundle::{Envelope, Mesh};
+use crate::bundle::{Envelope, Mesh, ToolEnvelope};
 use crate::error::Result;
 use crate::memory;
 use crate::scene::ContactSet;
@@ -19,6 +19,17 @@ pub struct EnvelopeReport {
     pub ratio: f32,
     /// Largest `|c|`, mm.
     pub max_push: f32,
+}
+
+/// The tools that push in a step, as the envelope sees them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Used {
+    /// Smallest and largest of their sizes (half their smallest extent), mm.
+    pub size_mm: [f32; 2],
+    /// Of the fastest point of any of them, mm/s.
+    pub speed_mm_s: f32,
+    /// How many push.
+    pub count: usize,
 }
 
 /// Contact patches of a mesh, found by its surface edges; kept while the contact nodes stay the same.
@@ -108,6 +119,41 @@ impl EnvelopeCheck {
             report.flags |= flag::RATE;
         }
         report.ratio = report.ratio.max(push).max(rate);
+        report
+    }
+
+    /// Compares tools that push with those that the bundle is good for, in their own terms: [`flag::PUSH`] says too deep,
+    /// [`flag::RATE`] too fast, [`flag::CONTACT_AREA`] a size outside of the range, [`flag::SITES`] too many. `touched`: the nodes
+    /// that they push and where these are.
+    pub fn check_tools(
+        &self,
+        limits: &ToolEnvelope,
+        used: &Used,
+        touched: &ContactSet,
+    ) -> EnvelopeReport {
+        let max_push = touched.max_push();
+        let mut report = EnvelopeReport {
+            max_push,
+            ..EnvelopeReport::default()
+        };
+        let [low, high] = limits.size_mm;
+        let [smallest, largest] = used.size_mm;
+        for (flag, ratio) in [
+            (flag::PUSH, max_push / limits.depth_mm),
+            (flag::RATE, used.speed_mm_s / limits.speed_mm_s),
+            (flag::CONTACT_AREA, (largest / high).max(low / smallest)),
+            (flag::SITES, used.count as f32 / limits.max_tools as f32),
+        ] {
+            report.ratio = report.ratio.max(ratio);
+            if ratio > SLACK {
+                report.flags |= flag;
+            }
+        }
+        let outside = |node: &u32| !self.in_domain[*node as usize];
+        if touched.nodes.iter().any(outside) {
+            report.flags |= flag::SITE;
+            report.ratio = report.ratio.max(2.0);
+        }
         report
     }
 

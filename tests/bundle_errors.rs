@@ -100,6 +100,42 @@ fn manifest_errors_name_the_field() {
             "envelope.max_push_mm",
         ),
         (
+            "tiny-corrected",
+            "/envelope/tools",
+            serde_json::json!({"corrections": 0, "size_mm": [2, 4], "depth_mm": 9, "speed_mm_s": 50, "max_tools": 1}),
+            "envelope.tools.corrections",
+        ),
+        (
+            "tiny-corrected",
+            "/envelope/tools",
+            serde_json::json!({"corrections": 3, "size_mm": [4, 2], "depth_mm": 9, "speed_mm_s": 50, "max_tools": 1}),
+            "envelope.tools.size_mm",
+        ),
+        (
+            "tiny-corrected",
+            "/envelope/tools",
+            serde_json::json!({"corrections": 3, "size_mm": [2, 4], "depth_mm": 0, "speed_mm_s": 50, "max_tools": 1}),
+            "envelope.tools.depth_mm",
+        ),
+        (
+            "tiny-corrected",
+            "/envelope/tools",
+            serde_json::json!({"corrections": 3, "size_mm": [2, 4], "depth_mm": 9, "speed_mm_s": 1e30, "max_tools": 1}),
+            "envelope.tools.speed_mm_s",
+        ),
+        (
+            "tiny-corrected",
+            "/envelope/tools",
+            serde_json::json!({"corrections": 3, "size_mm": [2, 4], "depth_mm": 9, "speed_mm_s": 50, "max_tools": 0}),
+            "envelope.tools.max_tools",
+        ),
+        (
+            "tiny-corrected",
+            "/envelope/tools",
+            serde_json::json!({"corrections": 3, "size_mm": [2, 4], "depth_mm": 9, "speed_mm_s": 50}),
+            "max_tools",
+        ),
+        (
             "tiny-upt",
             "/upt/coordinates/scale",
             serde_json::json!(0),

@@ -1,6 +1,6 @@
 //! What the values of a manifest must satisfy; every failure names the field.
 
-use super::manifest::{Envelope, Manifest, ManifestKind, ReducedEntry, UptEntry};
+use super::manifest::{Envelope, Manifest, ManifestKind, ReducedEntry, ToolEnvelope, UptEntry};
 use crate::error::{Error, Result};
 
 /// File that the messages name.
@@ -178,6 +178,39 @@ impl Envelope {
             positive(self.displacement_bound_mm),
             "envelope.displacement_bound_mm",
             "must be positive and at most 1e6 mm",
+        )?;
+        self.tools.as_ref().map_or(Ok(()), ToolEnvelope::check)
+    }
+}
+
+impl ToolEnvelope {
+    fn check(&self) -> Result<()> {
+        let positive = |x: f32| x > 0.0 && x <= crate::scene::INPUT_LIMIT;
+        check(
+            (1..=crate::corrections::LIMIT).contains(&self.corrections),
+            "envelope.tools.corrections",
+            "must be in 1..=64",
+        )?;
+        let [low, high] = self.size_mm;
+        check(
+            positive(low) && positive(high) && low <= high,
+            "envelope.tools.size_mm",
+            "must be a range [low, high] of positive lengths",
+        )?;
+        check(
+            positive(self.depth_mm),
+            "envelope.tools.depth_mm",
+            "must be positive and at most 1e6 mm",
+        )?;
+        check(
+            positive(self.speed_mm_s),
+            "envelope.tools.speed_mm_s",
+            "must be positive and at most 1e6 mm/s",
+        )?;
+        check(
+            (1..=1 << 20).contains(&self.max_tools),
+            "envelope.tools.max_tools",
+            "must be in 1..=1048576",
         )
     }
 }

@@ -61,6 +61,17 @@ const KEYS: &[(&str, &[&str])] = &[
             "contact_area_mm2",
             "max_sites",
             "displacement_bound_mm",
+            "tools",
+        ],
+    ),
+    (
+        "envelope.tools",
+        &[
+            "corrections",
+            "size_mm",
+            "depth_mm",
+            "speed_mm_s",
+            "max_tools",
         ],
     ),
     ("prior", &["file", "vibration"]),

@@ -54,6 +54,23 @@ pub struct Envelope {
     pub max_sites: usize,
     /// Guard: a larger `|u|` is not published, mm.
     pub displacement_bound_mm: f32,
+    /// Rigid tools that the bundle is good for; where it has none, they are judged by what they do to the nodes.
+    pub tools: Option<ToolEnvelope>,
+}
+
+/// The rigid tools that a bundle with corrections was measured with and found good for (`upt envelope`).
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+pub struct ToolEnvelope {
+    /// Corrections a step of the measurement; with fewer these limits say nothing.
+    pub corrections: u32,
+    /// Range of half the smallest extent of a tool, the radius of a rod, mm.
+    pub size_mm: [f32; 2],
+    /// Largest displacement of the tissue under a tool, mm.
+    pub depth_mm: f32,
+    /// Largest speed of any point of a tool that touches, mm/s.
+    pub speed_mm_s: f32,
+    /// Tools that push at once.
+    pub max_tools: usize,
 }
 
 /// The prior's file.

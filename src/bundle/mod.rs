@@ -13,7 +13,7 @@ pub(crate) use files::{hex, read_regular};
 pub use manifest::{
     Base, Bound, Boundary, Coordinates, CorrectionsEntry, Dims, Envelope, Fade, Feature, FileEntry,
     Graph, Manifest, ManifestKind, MeshEntry, Normalisation, PriorEntry, ReducedEntry,
-    ReducedInput, UptEntry,
+    ReducedInput, ToolEnvelope, UptEntry,
 };
 pub use mesh::Mesh;
 pub(crate) use mesh::volume;

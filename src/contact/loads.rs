@@ -7,6 +7,7 @@ use super::past::Force;
 use super::problem::Problem;
 use super::rows::{State, vector};
 use super::tool::{Push, Reading, Told};
+use crate::envelope::Used;
 
 impl Problem {
     /// Whether a grasp has torn off in this step.
@@ -77,6 +78,24 @@ impl Problem {
                 torn,
             };
         }
+    }
+
+    /// What the tools that push in this step are like; `step_s`: how long it takes. None pushes: no tools.
+    pub fn used(&self, step_s: f32) -> Used {
+        let mut used = Used {
+            size_mm: [f32::INFINITY, 0.0],
+            speed_mm_s: 0.0,
+            count: 0,
+        };
+        let each = self.tools.iter().zip(&self.before).zip(&self.next.tools);
+        for ((tool, from), _) in each.filter(|(_, held)| held.reading.contacts > 0) {
+            let size = tool.body.size();
+            used.size_mm = [used.size_mm[0].min(size), used.size_mm[1].max(size)];
+            let speed = tool.body.motion(from, &tool.pose) / step_s;
+            used.speed_mm_s = used.speed_mm_s.max(speed);
+            used.count += 1;
+        }
+        used
     }
 
     /// Makes the last step's readings and forces readable; displacements `[K,3]`, mm.

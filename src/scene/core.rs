@@ -15,7 +15,7 @@ use super::timing::Stopwatch;
 use crate::bundle::Mesh;
 #[cfg(feature = "contact")]
 use crate::contact::Problem;
-use crate::envelope::EnvelopeCheck;
+use crate::envelope::{EnvelopeCheck, Used};
 use crate::error::Result;
 use crate::guard;
 use crate::kernels::{Compute, FlushToZero, Isa, Pool};
@@ -59,6 +59,8 @@ pub struct Core {
     /// Contact of tools, from the first step that has one.
     #[cfg(feature = "contact")]
     pub(super) problem: Option<Box<Problem>>,
+    /// The tools of the step being made, where the bundle's limits for tools say something about it.
+    pub(super) used: Option<Used>,
     /// Tools that hands feel, and how long the step being made took, s.
     #[cfg(feature = "haptics")]
     pub(super) hands: Vec<crate::haptics::publish::Link>,
@@ -153,6 +155,7 @@ impl Core {
             corrected: parts.corrected,
             #[cfg(feature = "contact")]
             problem: None,
+            used: None,
             #[cfg(feature = "haptics")]
             hands: Vec::new(),
             #[cfg(feature = "haptics")]
@@ -281,13 +284,17 @@ impl Core {
         learned: bool,
         stats: &mut SceneStats,
     ) -> Result<()> {
-        let envelope = self.envelope.check(
-            &self.mesh,
-            &self.model.manifest.envelope,
-            &self.incoming,
-            &self.contact,
-            (self.step_s() / self.model.manifest.dt_s) as f32,
-        );
+        let limits = &self.model.manifest.envelope;
+        let envelope = match (self.used.take(), &limits.tools) {
+            (Some(used), Some(tools)) => self.envelope.check_tools(tools, &used, &self.incoming),
+            _ => self.envelope.check(
+                &self.mesh,
+                limits,
+                &self.incoming,
+                &self.contact,
+                (self.step_s() / self.model.manifest.dt_s) as f32,
+            ),
+        };
         stats.flags |= envelope.flags;
         stats.indicator = envelope.ratio;
         let shared = lock_read(published);

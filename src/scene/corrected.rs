@@ -147,6 +147,12 @@ impl Corrected {
         }
     }
 
+    /// Corrections that a step may get.
+    #[cfg(feature = "contact")]
+    pub(super) fn most(&self) -> u32 {
+        self.most
+    }
+
     /// Bytes held; the bundle's pace is the model's.
     pub(super) fn memory_bytes(&self) -> usize {
         let own = match self.own_pace {

@@ -170,8 +170,23 @@ impl Core {
         // What a collision field would say: the envelope, the engine's record and the host's list of contacts go by it.
         self.incoming
             .take_nodes(problem.touched(&self.held), &self.next.field);
+        self.used = self
+            .covers_tools()
+            .then(|| problem.used(self.step_s() as f32));
         stats.corrections_ms = watch.lap();
         self.predict_and_decode(published, None, false, stats)
+    }
+
+    /// Whether the steps get as many corrections as the bundle's limits for tools were measured with.
+    fn covers_tools(&self) -> bool {
+        let needed = self
+            .model
+            .manifest
+            .envelope
+            .tools
+            .map(|tools| tools.corrections);
+        let corrected = self.corrected.as_ref();
+        needed.is_some_and(|needed| corrected.is_some_and(|stage| stage.most() >= needed))
     }
 
     /// Contact once on the linear response, as a collision field for the model.

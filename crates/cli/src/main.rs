@@ -12,6 +12,7 @@ mod completions;
 mod corrections;
 mod dataset;
 mod doctor;
+mod envelope;
 #[cfg(feature = "files")]
 mod export;
 mod haptics;
@@ -21,6 +22,7 @@ mod left_out;
 mod machine;
 #[cfg(all(feature = "files", feature = "linear"))]
 mod make;
+mod manifest;
 mod mesh;
 #[cfg(feature = "files")]
 mod mesh_files;
@@ -122,6 +124,8 @@ enum Command {
     Rollout(rollout::Options),
     /// Compare bundles and plain methods on the same contacts: error against run time.
     Report(report::Options),
+    /// Find out which rigid tools a bundle is good for, and write them into its manifest.
+    Envelope(envelope::Options),
     /// Run stiff and extreme cases, and say whether each came out as it must.
     Stress(stress::Options),
     /// Run a bundle and the reference solver side by side: error over random steps, warnings, forces, release.
@@ -175,6 +179,7 @@ fn main() -> ExitCode {
         Command::Dataset(options) => dataset::run(&options),
         Command::Rollout(options) => rollout::run(&options),
         Command::Report(options) => report::run(&options),
+        Command::Envelope(options) => envelope::run(&options),
         Command::Stress(options) => stress::run(&options),
         Command::Beside(options) => beside::run(&options),
         Command::Haptics(options) => haptics::run(&options),

@@ -100,6 +100,11 @@ impl Body {
         self.radius
     }
 
+    /// Half its smallest extent: the radius of a rod, half the thickness of a blade, mm.
+    pub fn size(&self) -> f32 {
+        self.half.min_element()
+    }
+
     /// Signed distance and outward normal at a point of the tool's own frame.
     pub fn nearest(&self, point: Vector) -> Nearest {
         let (distance, normal) = match &self.core {

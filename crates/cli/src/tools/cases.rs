@@ -96,6 +96,18 @@ impl ToolCase {
         )
     }
 
+    /// Nodes of the samples that are pushed or held at a frame.
+    pub fn pushed_nodes(&self, frame: usize, samples: &Samples) -> Vec<u32> {
+        let tracks = self.tracks();
+        let rows = tracks.sample_offsets[frame] as usize..tracks.sample_offsets[frame + 1] as usize;
+        let mut nodes = Vec::new();
+        for row in rows {
+            let sample = samples.rows()[tracks.sample_rows[row] as usize];
+            nodes.extend(sample.entries().map(|(node, _)| node));
+        }
+        nodes
+    }
+
     /// The longest way that a point of any tool goes within a frame, mm.
     pub fn motion(&self, frame: usize) -> f32 {
         let ends = self.poses[frame - 1].iter().zip(&self.poses[frame]);

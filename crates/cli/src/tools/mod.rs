@@ -36,7 +36,8 @@ use crate::stress::{progress, replace_between};
 use cases::{Split, ToolCases};
 use drive::{Drive, Driver};
 use measure::{Outcome, Truth};
-use row::{ALL, CaseFigures, Label, Row};
+pub use row::CaseFigures;
+use row::{ALL, Label, Row};
 use yard::Yard;
 
 /// What is measured.
@@ -125,7 +126,7 @@ pub fn report(plan: &Plan) -> Result<ExitCode> {
     let mut all = Vec::new();
     for method in methods(plan, &bundles) {
         let name = method.name();
-        match measure_all(&method, plan, &cases, &mesh, &truths, &mut yard) {
+        match measure_all(&method, plan.threads, &cases, &mesh, &truths, &mut yard) {
             Ok(measured) => {
                 details.push(json!({"method": name, "cases": measured.figures}));
                 rows.extend(measured.rows.iter().cloned());
@@ -177,14 +178,14 @@ fn methods(plan: &Plan, bundles: &[BundleFolder]) -> Vec<Method> {
 
 fn measure_all(
     method: &Method,
-    plan: &Plan,
+    threads: u32,
     cases: &ToolCases,
     mesh: &Mesh,
     truths: &[Truth],
     yard: &mut Yard,
 ) -> Result<Measured> {
     let settings = host::ModelSettings {
-        threads: plan.threads,
+        threads,
         corrections: Some(method.corrections),
         ..host::ModelSettings::default()
     };
@@ -196,7 +197,7 @@ fn measure_all(
             mesh,
             cases.boundary.parse().map_err(anyhow::Error::msg)?,
             cases.release_decay(),
-            plan.threads,
+            threads,
         )?,
         drive => Driver::new(&model, drive)?,
     };
@@ -217,6 +218,29 @@ fn measure_all(
         outcomes,
         figures,
     })
+}
+
+/// The figures of a bundle that tools drive, with `corrections` a step, case by case.
+///
+/// # Errors
+/// Names the case or the bundle.
+pub fn solved(
+    bundle: &BundleFolder,
+    corrections: u32,
+    cases: &ToolCases,
+    mesh: &Mesh,
+    threads: u32,
+) -> Result<Vec<CaseFigures>> {
+    let boundary: Boundary = cases.boundary.parse().map_err(anyhow::Error::msg)?;
+    let mut yard = Yard::new(mesh, boundary);
+    let truth = |case| Truth::of(case, mesh, boundary, &mut yard);
+    let truths: Vec<Truth> = cases.list.iter().map(truth).collect();
+    let method = Method {
+        bundle: bundle.clone(),
+        drive: Drive::Solved,
+        corrections,
+    };
+    Ok(measure_all(&method, threads, cases, mesh, &truths, &mut yard)?.figures)
 }
 
 /// The first case of each programme, with every method in it.
