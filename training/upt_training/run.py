@@ -128,7 +128,8 @@ def train_command(options) -> int:
             flush=True,
         )
     if ranks > 1:
-        # A rank that ends while another still talks to it aborts in gloo's threads ("terminate called without an active exception").
+        # A rank that ends while another still talks to it aborts in gloo's threads
+        # ("terminate called without an active exception").
         distributed.barrier()
         distributed.destroy_process_group()
     return 0
