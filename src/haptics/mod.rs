@@ -29,8 +29,8 @@ use crate::contact::Tool;
 #[cfg(test)]
 pub(crate) fn test_hand(options: &HapticOptions) -> Haptics {
     let modes = modes::Modes::new(&[], 0.0).unwrap();
-    let (_, slow) = triple_buffer::triple_buffer(&slow::Slow::new(0).unwrap());
-    let (pose, _) = triple_buffer::triple_buffer(&options.tool.pose);
+    let (_, slow) = exchange::exchange(&slow::Slow::new(0).unwrap());
+    let (pose, _) = exchange::exchange(&options.tool.pose);
     Haptics::new(options, modes, slow, pose, Default::default()).unwrap()
 }
 

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use ::contact::{Body, Placed, Pose, Samples, Search, Vector};
-use triple_buffer::{Input, Output, triple_buffer};
+use exchange::{Reader, Writer, exchange};
 
 use super::HapticOptions;
 use super::modes::Modes;
@@ -39,8 +39,10 @@ pub struct Link {
     body: Body,
     friction: f32,
     grasps: bool,
-    out: Input<Slow>,
-    pose: Output<Pose>,
+    out: Writer<Slow>,
+    pose: Reader<Pose>,
+    /// Of one buffer.
+    slow_bytes: usize,
     ends: Arc<Ends>,
     samples: Arc<Samples>,
     search: Search,
@@ -90,9 +92,10 @@ pub fn join(
     let natural = corrections.space.natural();
     let slow = Slow::new(natural.len())?;
     // Three of them, and what both ends keep.
-    memory::probe(4 * slow.memory_bytes(), WHAT)?;
-    let (out, slow) = triple_buffer(&slow);
-    let (at, pose) = triple_buffer(&tool.pose);
+    let slow_bytes = slow.memory_bytes();
+    memory::probe(4 * slow_bytes, WHAT)?;
+    let (out, slow) = exchange(&slow);
+    let (at, pose) = exchange(&tool.pose);
     let ends = Arc::new(Ends::default());
     let modes = Modes::new(&natural, corrections.pace.integrator.damping_per_s)?;
     let kappa = corrections.pace.integrator.over(AT_ONCE_S).kappa();
@@ -105,6 +108,7 @@ pub fn join(
         grasps: tool.mode == Mode::Grasp,
         out,
         pose,
+        slow_bytes,
         ends: Arc::clone(&ends),
         samples,
         search: Search::default(),
@@ -176,7 +180,7 @@ impl Link {
         self.sampled.clear();
         self.sampled.extend(self.found.iter().map(|(_, row)| *row));
         let w = self.delassus.of(compliance, rows, &self.sampled)?;
-        let slow = self.out.input_buffer_mut();
+        let slow = self.out.buffer();
         slow.delassus[..w.len()].copy_from_slice(w);
         let modes = self.rows.len();
         for (at, sample) in of.enumerate() {
@@ -303,7 +307,7 @@ impl Link {
 
     /// Bytes held, of both ends.
     pub fn memory_bytes(&self) -> usize {
-        3 * self.out.input_buffer().memory_bytes()
+        3 * self.slow_bytes
             + self.delassus.memory_bytes()
             + 4 * (self.coordinates.len() + self.field.len() + 2 * self.starts.len())
             + 8 * self.found.capacity()

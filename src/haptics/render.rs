@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
 use ::contact::{Body, Contact, Law, Limits, Pose, Sweeps, Vector, pose};
-use triple_buffer::{Input, Output};
+use exchange::{Reader, Writer};
 
 use super::modes::Modes;
 use super::passivity::Observer;
@@ -46,8 +46,8 @@ pub struct Haptics {
     passivity: bool,
     damping_limit: f32,
     force_limit_mn: f32,
-    slow: Output<Slow>,
-    pose: Input<Pose>,
+    slow: Reader<Slow>,
+    pose: Writer<Pose>,
     ends: Arc<Ends>,
     /// Time and pose of the last call.
     last: Option<(f64, Pose)>,
@@ -83,8 +83,8 @@ impl Haptics {
     pub(super) fn new(
         options: &HapticOptions,
         modes: Modes,
-        slow: Output<Slow>,
-        pose: Input<Pose>,
+        slow: Reader<Slow>,
+        pose: Writer<Pose>,
         ends: Arc<Ends>,
     ) -> Result<Haptics> {
         let vectors = |count| memory::filled(count, Vector::ZERO, WHAT);
@@ -148,7 +148,7 @@ impl Haptics {
         self.observer.observe(&from, &now);
 
         let arrived = self.slow.update();
-        let slow = self.slow.output_buffer();
+        let slow = self.slow.buffer();
         let (mut before, mut time) = (from, seconds);
         if arrived {
             self.contact.begin(slow);

@@ -80,8 +80,8 @@ impl Slow {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use exchange::exchange;
     use std::sync::atomic::{AtomicBool, Ordering};
-    use triple_buffer::triple_buffer;
 
     /// One number in every field.
     fn write(slow: &mut Slow, number: u64) {
@@ -106,12 +106,12 @@ mod tests {
     fn a_problem_is_never_torn() {
         // Miri is slow, and looks at each access.
         let count = if cfg!(miri) { 3 } else { 20_000 };
-        let (mut out, mut slow) = triple_buffer(&Slow::new(4).unwrap());
+        let (mut out, mut slow) = exchange(&Slow::new(4).unwrap());
         let done = AtomicBool::new(false);
         std::thread::scope(|scope| {
             scope.spawn(|| {
                 for number in 1..=count {
-                    write(out.input_buffer_mut(), number);
+                    write(out.buffer(), number);
                     out.publish();
                 }
                 done.store(true, Ordering::Release);
@@ -120,7 +120,7 @@ mod tests {
             loop {
                 let over = done.load(Ordering::Acquire);
                 slow.update();
-                let now = slow.output_buffer();
+                let now = slow.buffer();
                 assert!(is_whole(now), "torn at {}", now.number);
                 assert!(now.number >= last);
                 last = now.number;

@@ -23,7 +23,7 @@ cargo_cross() {
 }
 
 # The library and the command, without mesh files and sparse factorisation: half of the compiling.
-packages=(-p upt -p tissue -p elements -p contact)
+packages=(-p upt -p tissue -p elements -p contact -p exchange)
 echo "== build"
 cargo_cross build --release -q -p upt -p upt-cli --no-default-features
 out="$root/target/cross/build/$UPT_CROSS_TRIPLE/release"
