@@ -113,6 +113,13 @@ pub const STAGES: &[Stage] = &[
         run: rust,
     },
     Stage {
+        name: "loom",
+        about: "every interleaving of what threads share without a lock",
+        needs: &[],
+        nightly: false,
+        run: loom,
+    },
+    Stage {
         name: "python",
         about: "pytest of training/",
         needs: &[],
@@ -176,6 +183,13 @@ pub const STAGES: &[Stage] = &[
         run: haptics,
     },
     Stage {
+        name: "races",
+        about: "what threads share: Miri, ThreadSanitizer",
+        needs: &[],
+        nightly: true,
+        run: races,
+    },
+    Stage {
         name: "windows",
         about: "built by MinGW, run by Wine",
         needs: &[system::WINDOWS],
@@ -209,6 +223,18 @@ fn haptics(workspace: &Workspace) -> Result<Outcome> {
         "20",
     ]);
     check(workspace, "upt haptics", &mut command)
+}
+
+fn loom(workspace: &Workspace) -> Result<Outcome> {
+    script_with(workspace, "loom", "tests/races/run.sh", |command| {
+        command.arg("loom");
+    })
+}
+
+fn races(workspace: &Workspace) -> Result<Outcome> {
+    script_with(workspace, "races", "tests/races/run.sh", |command| {
+        command.arg("nightly");
+    })
 }
 
 /// A check that passes or fails as a whole.
