@@ -148,6 +148,23 @@ fn a_host_that_took_a_step_for_the_one_before_shows_the_step_as_it_is() {
     assert!(farthest(&shown, &u) < 0.05);
 }
 
+/// Velocities are followed for two steps; the way over to a step that has arrived goes on after them.
+#[test]
+fn a_host_that_is_behind_sees_new_steps() {
+    let scene = scene(&model("tiny-corrected"), &corrected());
+    for t in 1..8 {
+        step(&scene, &pressing(&scene, f64::from(t)));
+        present(&scene, DT, &pressing(&scene, f64::from(t + 1)));
+    }
+    for _ in 0..60 {
+        present(&scene, 2.5 * DT, &[]);
+        step(&scene, &[]);
+    }
+    let u = step(&scene, &[]);
+    let shown = present(&scene, 2.5 * DT, &[]);
+    assert!(farthest(&shown, &u) < 0.05, "{}", farthest(&shown, &u));
+}
+
 #[test]
 fn a_frame_may_be_made_while_a_step_is_in_flight_and_changes_nothing() {
     let scene = scene(&model("tiny-corrected"), &corrected());

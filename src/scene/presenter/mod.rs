@@ -185,6 +185,7 @@ impl Presenter {
         let (Some(prior), corrections) = (&model.prior, model.corrections()?) else {
             return Ok(());
         };
+        let tau = tau.min(MOST_STEPS * scene.step_s());
         let alpha = corrections.pace.integrator.damping_per_s;
         let rest = &scene.mesh.positions;
         let kappa = corrections.pace.integrator.over(tau.max(AT_ONCE_S)).kappa();
@@ -274,16 +275,15 @@ impl Presenter {
         Ok(())
     }
 
-    /// The region or the points `seconds` after the last published step, into `out`.
+    /// The region or the points `tau` after the last published step, into `out`.
     pub fn frame(
         &mut self,
         scene: &Scene,
-        seconds: f64,
+        tau: f64,
         driven: Contact<'_>,
         out: &mut [f32],
     ) -> Result<()> {
         let step_s = scene.step_s();
-        let tau = seconds.min(MOST_STEPS * step_s);
         let step = {
             let shared = lock_read(&scene.shared.published);
             self.take_region(&scene.model, &shared, out.len())?;
@@ -342,7 +342,7 @@ impl Presenter {
         if let Some(known) = known {
             // What the frame would have been without the new step: it goes on from there.
             let steps = step.saturating_sub(known) as f64;
-            let then = (tau + steps * step_s).min(MOST_STEPS * step_s);
+            let then = tau + steps * step_s;
             since_s = (then - self.before_s).max(0.0);
             let mut shown = std::mem::take(&mut self.shown);
             let made = self.compute(scene, then, driven, &mut shown);
