@@ -9,6 +9,10 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* Sizes of Godot's opaque values in a 64-bit single-precision build (extension_api.json, float_64).
  */
 typedef struct {
@@ -66,5 +70,9 @@ void godot_string_name(GodotStringName *out, const char *text);
 void godot_string_name_free(GodotStringName *name);
 void godot_register_method(const char *class_name, const GodotMethod *method);
 void godot_error(const char *message);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -1,15 +1,18 @@
-# A brain and a spatula. Arguments after "--":
+# A brain and a spatula. Each frame shows the tissue of its own moment, steps of 50 ms run beside it. Arguments after "--":
 #   --bundle=PATH       the model (default: UPT_BUNDLE in the environment)
-#   --frames=N          steps to run, then quit (default: run until the window is closed)
+#   --seconds=S         how long, then quit (default: until the window is closed)
+#   --wait              each frame waits for the step in flight: the same pictures on every machine
 #   --screenshot=FILE   PNG of the window at the deepest push (needs a display)
-#   --check             assert the displacements; exit code 1 and a line FAILED when one is wrong
+#   --check             assert what was shown; exit code 1 and a line FAILED when something is wrong
 extends Node3D
 
 const SPATULA := 2
 const DEPTH := 0.012
+# Of the whole blade, mm; its edges are rounded.
 const HALF_EXTENTS := Vector3(6.0, 12.0, 1.0)
 const ROUNDING := 1.0
-const PERIOD := 80
+const PERIOD := 2.0
+const STEP := 0.05
 
 var tissue: SoftTissue3D
 var spatula: MeshInstance3D
@@ -17,15 +20,24 @@ var rest := PackedVector3Array()
 var faces := PackedInt32Array()
 var site := Vector3.ZERO
 var outward := Vector3.ZERO
-var step := 0
+# Of the middle of the blade over the site, where it touches nothing yet.
+var above := 0.0
+var now := 0.0
+var frames := 0
 var options := {}
+var finished := false
+var pictured := false
+# Of all frames.
 var largest := 0.0
 var most_contacts := 0
 var largest_force := 0.0
-var deepest := 0.0
 var seen_flags := 0
+var shown := PackedVector3Array()
+var driven := 0
+var stale := 0
+var inside := 0.0
+var frame_ms := 0.0
 var upload_ms := 0.0
-var finished := false
 
 
 func _ready() -> void:
@@ -38,6 +50,7 @@ func _ready() -> void:
 		finish("could not open the bundle: " + tissue.message())
 		return
 	rest = tissue.rest()
+	shown = rest
 	faces = tissue.faces()
 	add_child(tissue)
 	var material := StandardMaterial3D.new()
@@ -50,56 +63,95 @@ func _ready() -> void:
 	show_surface(rest)
 
 
-func _physics_process(_delta: float) -> void:
+func _process(delta: float) -> void:
 	if finished or rest.is_empty():
 		return
-	step += 1
-	var press := 0.5 - 0.5 * cos(TAU * step / PERIOD)
-	var clearance := 0.001 * (HALF_EXTENTS.z + ROUNDING)
-	var pose := Transform3D(Basis(Quaternion(Vector3.BACK, outward)), site + outward * (clearance + 0.002 - press * (DEPTH + 0.002)))
+	now += delta
+	frames += 1
+	var before := spatula.position if frames > 1 else Vector3.INF
+	var press := 0.5 - 0.5 * cos(TAU * now / PERIOD)
+	var pose := Transform3D(Basis(Quaternion(Vector3.BACK, outward)), site + outward * (above - press * DEPTH))
 	spatula.transform = pose
-	if not tissue.press(SPATULA, pose.origin, pose.basis.get_rotation_quaternion(), HALF_EXTENTS, ROUNDING):
-		finish("a step failed: " + tissue.message())
+	tissue.press(SPATULA, pose.origin, pose.basis.get_rotation_quaternion(), HALF_EXTENTS, ROUNDING)
+	var started := Time.get_ticks_usec()
+	if not tissue.frame(now):
+		finish("a frame failed: " + tissue.message())
 		return
+	frame_ms = maxf(frame_ms, 0.001 * (Time.get_ticks_usec() - started))
+	if options.has("wait"):
+		tissue.wait()
 	most_contacts = maxi(most_contacts, tissue.contact_count())
 	largest_force = maxf(largest_force, tissue.force().length())
-	deepest = maxf(deepest, tissue.penetration())
 	seen_flags |= tissue.flags()
-	var started := Time.get_ticks_usec()
-	var now := tissue.vertices()
-	show_surface(now)
+	started = Time.get_ticks_usec()
+	var points := tissue.vertices()
+	show_surface(points)
 	upload_ms = maxf(upload_ms, 0.001 * (Time.get_ticks_usec() - started))
-	for i in now.size():
-		largest = maxf(largest, now[i].distance_to(rest[i]))
-	if options.has("screenshot") and step == PERIOD / 2:
+	look(points, pose, before.distance_to(pose.origin) if before.is_finite() else 0.0)
+	if options.has("screenshot") and now >= 0.5 * PERIOD and not pictured:
+		pictured = true
 		await RenderingServer.frame_post_draw
 		var saved := get_viewport().get_texture().get_image().save_png(options["screenshot"])
 		if saved != OK:
 			finish("could not write " + options["screenshot"])
 			return
-	if options.has("frames") and step >= int(options["frames"]):
-		check_rest()
+	if options.has("seconds") and now >= float(options["seconds"]):
+		check_all()
 
 
-func check_rest() -> void:
-	if options.has("check"):
-		if most_contacts == 0:
-			finish("the spatula never touched the tissue")
-			return
-		if largest < 0.005 or largest > 0.03:
-			finish("the largest displacement is %.1f mm, expected 5 to 30" % (1000.0 * largest))
-			return
-		for i in 200:
-			tissue.release()
-		var left := 0.0
-		var now := tissue.vertices()
-		for i in now.size():
-			left = maxf(left, now[i].distance_to(rest[i]))
-		if left > 0.0005:
-			finish("10 s after release %.2f mm are left" % (1000.0 * left))
-			return
-	print("OK %d steps, %d points in contact at most, force at most %.0f mN, penetration at most %.2f mm, flags %d, largest displacement %.2f mm, step %.2f ms, mesh upload at most %.2f ms for %d vertices" % [step, most_contacts, largest_force, deepest, seen_flags, 1000.0 * largest, tissue.step_ms(), upload_ms, rest.size()])
-	finish("")
+# What a viewer would see: the tissue goes with the tool in every frame, and the tool is not inside of it.
+func look(points: PackedVector3Array, pose: Transform3D, way: float) -> void:
+	var moved := 0.0
+	var back := pose.affine_inverse()
+	var core := 0.001 * (HALF_EXTENTS - Vector3.ONE * ROUNDING)
+	for i in points.size():
+		moved = maxf(moved, points[i].distance_to(shown[i]))
+		largest = maxf(largest, points[i].distance_to(rest[i]))
+		# Into the rounded box: the distance to its core, less the rounding.
+		var outside := (back * points[i]).abs() - core
+		var depth := 0.001 * ROUNDING - outside.max(Vector3.ZERO).length() - minf(0.0, outside[outside.max_axis_index()])
+		inside = maxf(inside, depth)
+	# The spatula drives the tissue while it goes in, and moves visibly from one frame to the next.
+	if tissue.contact_count() > 0 and fposmod(now, PERIOD) < 0.5 * PERIOD and way > 0.00005:
+		driven += 1
+		if moved < 0.2 * way:
+			stale += 1
+	shown = points
+
+
+func problem_of_all() -> String:
+	if most_contacts == 0:
+		return "the spatula never touched the tissue"
+	if largest < 0.005 or largest > 0.03:
+		return "the largest displacement is %.1f mm, expected 5 to 30" % (1000.0 * largest)
+	if options.has("wait"):
+		if driven < 20:
+			return "the spatula drives the tissue in %d frames, expected 20" % driven
+		if stale > 0:
+			return "in %d of %d frames the tissue does not go with the spatula" % [stale, driven]
+		if inside > 0.0005:
+			return "a point is shown %.2f mm inside of the spatula" % (1000.0 * inside)
+	# Ten seconds later, a frame a step.
+	tissue.release()
+	for i in 200:
+		now += STEP
+		tissue.frame(now)
+		tissue.wait()
+	var left := 0.0
+	var points := tissue.vertices()
+	for i in points.size():
+		left = maxf(left, points[i].distance_to(rest[i]))
+	if left > 0.0005:
+		return "10 s after release %.2f mm are left" % (1000.0 * left)
+	return ""
+
+
+func check_all() -> void:
+	finished = true
+	var problem := problem_of_all() if options.has("check") else ""
+	if problem == "":
+		print("OK %d frames, %d points in contact at most, force at most %.0f mN, flags %d, largest displacement %.2f mm, %.2f mm inside of the spatula at most, still in %d of %d frames, frame at most %.2f ms, mesh upload at most %.2f ms for %d vertices" % [frames, most_contacts, largest_force, seen_flags, 1000.0 * largest, 1000.0 * inside, stale, driven, frame_ms, upload_ms, rest.size()])
+	finish(problem)
 
 
 func finish(problem: String) -> void:
@@ -124,12 +176,19 @@ func find_site() -> void:
 		if a.distance_to(site) < 0.008:
 			normal += (rest[faces[f + 2]] - a).cross(rest[faces[f + 1]] - a)
 	outward = normal.normalized()
+	# Free of all of the surface under the blade, which is nowhere flat.
+	var turn := Basis(Quaternion(Vector3.BACK, outward)).inverse()
+	for point in rest:
+		var local := turn * (point - site)
+		if absf(local.x) < 0.001 * HALF_EXTENTS.x and absf(local.y) < 0.001 * HALF_EXTENTS.y and local.length() < 0.02:
+			above = maxf(above, local.z + 0.001 * HALF_EXTENTS.z)
+	above += 0.0005
 
 
 func build_scene() -> void:
 	spatula = MeshInstance3D.new()
 	var blade := BoxMesh.new()
-	blade.size = 0.002 * (HALF_EXTENTS + Vector3(0, 0, ROUNDING))
+	blade.size = 0.002 * HALF_EXTENTS
 	spatula.mesh = blade
 	var steel := StandardMaterial3D.new()
 	steel.albedo_color = Color(0.55, 0.6, 0.68)

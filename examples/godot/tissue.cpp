@@ -1,0 +1,73 @@
+#include "tissue.hpp"
+
+#include <algorithm>
+
+Tissue::Tissue(const std::string &bundle)
+    : model_(upt::Model::open(bundle)), scene_(model_), clock_(model_.info().dt),
+      dt_(model_.info().dt) {
+  try {
+    scene_.step_instruments({});
+    scene_.reset();
+  } catch (const upt::error &error) {
+    // No linear response, or a library without feature "contact".
+    if (error.status() != UPT_ERR_UNSUPPORTED) {
+      throw;
+    }
+    solves_contact_ = false;
+  }
+  // Only the surface is drawn, so only the surface is worked out.
+  const std::vector<std::uint32_t> surface = model_.indices(UPT_SET_SURFACE_NODES);
+  scene_.set_region(surface);
+  const std::vector<float> positions = model_.positions();
+  std::vector<std::uint32_t> vertex_of(positions.size() / 3, 0);
+  for (std::size_t vertex = 0; vertex < surface.size(); vertex++) {
+    vertex_of[surface[vertex]] = static_cast<std::uint32_t>(vertex);
+    const float *p = &positions[3 * static_cast<std::size_t>(surface[vertex])];
+    rest_.insert(rest_.end(), p, p + 3);
+  }
+  faces_ = model_.indices(UPT_SET_SURFACE_FACES);
+  for (std::uint32_t &node : faces_) {
+    node = vertex_of[node];
+  }
+  displacement_.assign(rest_.size(), 0);
+  nodes_.assign(surface.size(), 0);
+  vectors_.assign(rest_.size(), 0);
+}
+
+void Tissue::frame(double now) {
+  const upt::span<const upt_instrument> tools(&tool, in_hand ? 1 : 0);
+  if (!solves_contact_) {
+    follow(now, tools);
+    return;
+  }
+  const std::size_t in_step = clock_.step_instruments().size();
+  clock_.frame(scene_, now, tools, displacement_);
+  if (clock_.landed()) {
+    reading_ = in_step > 0 ? scene_.readings(in_step).front() : upt_instrument_reading{};
+  }
+}
+
+// As upt::FrameClock::frame, for a bundle that a collision field drives: between its last two
+// steps.
+void Tissue::follow(double now, upt::span<const upt_instrument> tools) {
+  clock_.moved(now, tools);
+  if (clock_.in_flight() && upt_scene_poll(scene_.get()) != UPT_PENDING) {
+    clock_.finished();
+    counted_steps_ = stats().step_count;
+    reading_.contact_count = static_cast<std::uint32_t>(contact_count_);
+  }
+  // It may have landed since it was asked.
+  const bool landed = clock_.in_flight() && stats().step_count != counted_steps_;
+  const double since = landed ? std::max(0.0, now - clock_.step_time()) : clock_.since(now);
+  scene_.sample(std::min(1.0, since / dt_), displacement_);
+  if (clock_.due(now)) {
+    scene_.contacts_from_instruments(clock_.start(now), nodes_, vectors_, contact_count_);
+    scene_.submit({nodes_.data(), contact_count_}, {vectors_.data(), 3 * contact_count_});
+  }
+}
+
+void Tissue::wait() {
+  if (clock_.in_flight()) {
+    scene_.wait(0xFFFFFFFF);
+  }
+}

@@ -1,0 +1,45 @@
+// The tissue of a SoftTissue3D, without Godot: libupt steps on the scene's own worker, each frame
+// shows the surface at its own moment (upt::FrameClock). RAS, mm.
+#pragma once
+
+#include "upt.hpp"
+
+#include <string>
+#include <vector>
+
+class Tissue {
+public:
+  explicit Tissue(const std::string &bundle);
+
+  // One frame: the surface at `now` (s) with the tool where it is now. A step that has landed is
+  // taken, the next one is started when it is due; neither is waited for.
+  void frame(double now);
+  // Until the step in flight has landed: for pictures that must not depend on the machine's speed.
+  void wait();
+
+  upt_instrument tool = upt::make<upt_instrument>();
+  bool in_hand = false; // whether the tool is there
+
+  const std::vector<float> &rest() const { return rest_; }                 // [n,3]
+  const std::vector<float> &displacement() const { return displacement_; } // [n,3]
+  const std::vector<std::uint32_t> &faces() const { return faces_; }       // vertices, three a face
+  // Of the last step that a frame took: zero without a tool.
+  const upt_instrument_reading &reading() const { return reading_; }
+  upt_scene_stats stats() const { return scene_.stats(); }
+
+private:
+  void follow(double now, upt::span<const upt_instrument> tools);
+
+  upt::Model model_;
+  upt::Scene scene_;
+  upt::FrameClock clock_;
+  double dt_;
+  std::vector<std::uint32_t> faces_;
+  std::vector<float> rest_, displacement_;
+  upt_instrument_reading reading_{};
+  // For a bundle that cannot solve contact: what the tool pushes, found by geometry.
+  bool solves_contact_ = true;
+  std::vector<std::uint32_t> nodes_;
+  std::vector<float> vectors_;
+  std::uint64_t contact_count_ = 0, counted_steps_ = 0;
+};
