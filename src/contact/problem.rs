@@ -12,7 +12,7 @@ use ::contact::{Contact, Limits, Pose, Sample, Samples, Search, Sweeps, Vector};
 
 use super::compliance::{Compliance, Delassus};
 use super::past::{Force, Held, Past};
-use super::rows::{Row, State, measure, vector};
+use super::rows::{Moving, Row, State, vector};
 use super::tool::{MAX_TOOLS, Mode, Reading, Tool};
 use crate::error::{Error, Result};
 use crate::memory;
@@ -278,22 +278,22 @@ impl Problem {
             samples.rows(),
             &self.columns,
         )?;
+        let moving = Moving {
+            tools: &self.tools,
+            before: &self.before,
+            allowed: &self.allowed,
+            held: &self.next.tools,
+            samples,
+            state,
+            part,
+        };
         for pass in 0..LINEARISATIONS {
             self.contacts.clear();
             for (at, row) in self.rows.iter_mut().enumerate() {
                 if pass > 0 {
                     row.point += self.sweeps.shift(at);
                 }
-                self.contacts.push(measure(
-                    &self.tools,
-                    &self.before,
-                    &self.allowed,
-                    &self.next.tools,
-                    &self.samples,
-                    row,
-                    state,
-                    part,
-                ));
+                self.contacts.push(moving.measure(row));
             }
             self.sweeps
                 .solve(w, &self.contacts, &mut self.forces, Limits::default());

@@ -218,31 +218,40 @@ const RELEASED: Contact = Contact {
     slip: Vector::ZERO,
 };
 
-/// Gap and slip of a row at its point, with the tools at part `part` of their way.
-#[allow(clippy::too_many_arguments)]
-pub(super) fn measure(
-    tools: &[Tool],
-    before: &[Pose],
-    allowed: &[f32],
-    held: &[Held],
-    samples: &Samples,
-    row: &Row,
-    state: State<'_>,
-    part: f32,
-) -> Contact {
-    let index = row.tool as usize;
-    let Some(tool) = tools.get(index) else {
-        return RELEASED;
-    };
-    let pair = Pair {
-        body: &tool.body,
-        friction: tool.friction,
-        from: &before[index],
-        now: &pose::between(&before[index], &tool.pose, part),
-        anchor: held[index].grasp.place(row.sample),
-        allowed: allowed[index],
-    };
-    let sample = samples.rows()[row.sample as usize];
-    let start = sample.gather(|node| vector(state.rest, node) + vector(state.start, node));
-    pair.contact(row.point, start, row.outward, row.force != Vector::ZERO)
+/// The tools of a step on their way, over the tissue's surface.
+pub(super) struct Moving<'a> {
+    pub tools: &'a [Tool],
+    /// Where they were at the start of the step.
+    pub before: &'a [Pose],
+    /// How far inside each may be, mm.
+    pub allowed: &'a [f32],
+    /// What each holds.
+    pub held: &'a [Held],
+    pub samples: &'a Samples,
+    pub state: State<'a>,
+    /// The part of their way that they have gone.
+    pub part: f32,
+}
+
+impl Moving<'_> {
+    /// Gap and slip of a row at its point.
+    pub(super) fn measure(&self, row: &Row) -> Contact {
+        let index = row.tool as usize;
+        let Some(tool) = self.tools.get(index) else {
+            return RELEASED;
+        };
+        let before = &self.before[index];
+        let pair = Pair {
+            body: &tool.body,
+            friction: tool.friction,
+            from: before,
+            now: &pose::between(before, &tool.pose, self.part),
+            anchor: self.held[index].grasp.place(row.sample),
+            allowed: self.allowed[index],
+        };
+        let sample = self.samples.rows()[row.sample as usize];
+        let State { rest, start, .. } = self.state;
+        let start = sample.gather(|node| vector(rest, node) + vector(start, node));
+        pair.contact(row.point, start, row.outward, row.force != Vector::ZERO)
+    }
 }

@@ -32,6 +32,9 @@ pub struct Report {
 
 /// The step being corrected.
 pub struct Input<'a> {
+    /// Rest positions `[K,3]`, mm.
+    #[cfg(feature = "contact")]
+    pub rest: &'a [f32],
     /// Prescribed nodes and where they end, mm.
     pub contact: &'a ContactSet,
     /// `u_n [K,3]`.

@@ -38,7 +38,6 @@ impl Stage {
         &mut self,
         lent: Lent<'_>,
         input: &Input<'_>,
-        rest: &[f32],
         problem: &mut Problem,
         next: &mut [f32],
     ) -> Result<Report> {
@@ -56,7 +55,7 @@ impl Stage {
             det: 1.0,
         };
         let result = self
-            .iterate_loaded(lent, input, rest, problem, &mut at, &mut report)
+            .iterate_loaded(lent, input, problem, &mut at, &mut report)
             .and_then(|()| self.finish(lent, input, at.u));
         if result.is_ok() {
             next.copy_from_slice(&u);
@@ -74,13 +73,12 @@ impl Stage {
         &mut self,
         lent: Lent<'_>,
         input: &Input<'_>,
-        rest: &[f32],
         problem: &mut Problem,
         at: &mut Iterate<'_>,
         report: &mut Report,
     ) -> Result<()> {
         let env = lent.env();
-        self.guess_loaded(lent, input, rest, problem, at, report)?;
+        self.guess_loaded(lent, input, problem, at, report)?;
         let touched = problem.touched(&env.body.held);
         self.preconditioner.engage(env, touched)?;
         let start = self.unbalanced(env, problem, at.g)?;
@@ -91,7 +89,7 @@ impl Stage {
             if !size.is_finite() || at.det < SMALLEST_DET || (iteration > 0 && late) {
                 break;
             }
-            self.improve_at(lent, input, rest, problem, at, 1.0, report)?;
+            self.improve_at(lent, input, problem, at, 1.0, report)?;
             report.iterations += 1;
             let before = size;
             size = self.unbalanced(env, problem, at.g)?;
@@ -106,7 +104,7 @@ impl Stage {
             problem.let_go();
             at.u.fill(0.0);
             self.preconditioner.coordinates.fill(0.0);
-            self.press(lent, input, rest, problem, 1.0, at.u)?;
+            self.press(lent, input, problem, 1.0, at.u)?;
             self.settle(env, at.u)?;
             self.evaluate(lent, input, at, report)?;
             let sound = self.motion.min_det >= SMALLEST_DET && !input.still;
@@ -155,7 +153,6 @@ impl Stage {
         &mut self,
         lent: Lent<'_>,
         input: &Input<'_>,
-        rest: &[f32],
         problem: &mut Problem,
         at: &mut Iterate<'_>,
         report: &mut Report,
@@ -178,7 +175,7 @@ impl Stage {
             let parts = ways.max(iterated);
             for part in 1..=parts {
                 let way = part as f32 / parts as f32;
-                self.press(lent, input, rest, problem, way, at.u)?;
+                self.press(lent, input, problem, way, at.u)?;
                 // An iteration after each of `iterated` parts of the load but the last.
                 let due = part * iterated / parts > (part - 1) * iterated / parts;
                 if due && part < parts {
@@ -187,7 +184,7 @@ impl Stage {
                     if at.det > SMALLEST_DET {
                         self.preconditioner.prescribe(env, &[])?;
                         self.unbalanced(env, problem, at.g)?;
-                        self.improve_at(lent, input, rest, problem, at, way, report)?;
+                        self.improve_at(lent, input, problem, at, way, report)?;
                     }
                     self.preconditioner.coordinates.fill(0.0);
                 }
@@ -221,7 +218,6 @@ impl Stage {
         &mut self,
         lent: Lent<'_>,
         input: &Input<'_>,
-        rest: &[f32],
         problem: &mut Problem,
         way: f32,
         u: &[f32],
@@ -238,7 +234,7 @@ impl Stage {
             }
         }
         let state = State {
-            rest,
+            rest: input.rest,
             u: &self.touched,
             start: input.last,
         };
@@ -260,12 +256,10 @@ impl Stage {
     }
 
     /// One iteration with the tools at part `way` of their way, from the residual in `q`.
-    #[allow(clippy::too_many_arguments)]
     fn improve_at(
         &mut self,
         lent: Lent<'_>,
         input: &Input<'_>,
-        rest: &[f32],
         problem: &mut Problem,
         at: &mut Iterate<'_>,
         way: f32,
@@ -301,7 +295,7 @@ impl Stage {
                 *q = u + d;
             }
         }
-        self.press(lent, input, rest, problem, way, &q)?;
+        self.press(lent, input, problem, way, &q)?;
         self.preconditioner.decode(env, &mut q)?;
         let [along, moved] = passes::advance(env, [at.u, at.g], &mut d, &mut q, &mut self.partial)?;
         self.moved = moved;

@@ -7,7 +7,7 @@
 #[cfg(feature = "contact")]
 mod recursion;
 
-use super::precondition::{Env, pooled};
+use super::precondition::Env;
 use crate::error::Result;
 use crate::kernels::vectors::{PartialSums, add_scaled, dots};
 use crate::memory;
@@ -135,14 +135,14 @@ impl Memory {
         let views = views(&self.steps, &self.order);
         let y = &self.changes[slot];
         let (isa, pool) = (env.isa, env.pool);
-        pooled(dots(
+        dots(
             isa,
             pool,
             &views[..count],
             y,
             &mut self.partial,
             &mut out[..count],
-        ))?;
+        )?;
         for (&i, value) in self.order.iter().zip(out) {
             self.products[i][slot] = value;
             self.masked[i][slot] = value;
@@ -210,32 +210,18 @@ impl Memory {
         let views = views(&self.steps, used);
         let mut first = [0.0f64; PAIRS];
         let first = &mut first[..count];
-        pooled(dots(
-            isa,
-            pool,
-            &views[..count],
-            g,
-            &mut self.partial,
-            first,
-        ))?;
+        dots(isa, pool, &views[..count], g, &mut self.partial, first)?;
         let alpha = self.alpha(used, first);
         q.copy_from_slice(g);
         let views = self::views(&self.changes, used);
         let factors = alpha.map(|a| -a as f32);
-        pooled(add_scaled(isa, pool, &views[..count], &factors[..count], q))?;
+        add_scaled(isa, pool, &views[..count], &factors[..count], q)?;
         precondition(q, d)?;
-        pooled(dots(
-            isa,
-            pool,
-            &views[..count],
-            d,
-            &mut self.partial,
-            first,
-        ))?;
+        dots(isa, pool, &views[..count], d, &mut self.partial, first)?;
         let weight = self.weight(used, &alpha, first);
         let views = self::views(&self.steps, used);
         let factors = weight.map(|w| w as f32);
-        pooled(add_scaled(isa, pool, &views[..count], &factors[..count], d))?;
+        add_scaled(isa, pool, &views[..count], &factors[..count], d)?;
         d.iter_mut().for_each(|d| *d = -*d);
         Ok(())
     }

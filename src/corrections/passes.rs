@@ -5,7 +5,7 @@ use std::ops::Range;
 
 #[cfg(feature = "contact")]
 use super::precondition::DIAGONAL_WEIGHT;
-use super::precondition::{Env, pooled};
+use super::precondition::Env;
 use crate::error::Result;
 use crate::kernels::Pool;
 use crate::kernels::parts::Parts;
@@ -23,11 +23,11 @@ pub(super) fn each(
     streams: usize,
     task: impl Fn(Range<usize>, usize) + Sync,
 ) -> Result<()> {
-    pooled(
+    Ok(
         pool.run_streaming(4 * len * streams, len.div_ceil(PIECE), &|piece, _| {
             let start = piece * PIECE;
             task(start..(start + PIECE).min(len), piece);
-        }),
+        })?,
     )
 }
 

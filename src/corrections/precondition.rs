@@ -41,10 +41,6 @@ pub struct Env<'a> {
     pub pace: &'a Pace,
 }
 
-pub(super) fn pooled<T>(result: std::result::Result<T, crate::kernels::PoolError>) -> Result<T> {
-    result.map_err(|error| Error::Panic(error.to_string()))
-}
-
 /// The preconditioner for one set of prescribed nodes, and its buffers.
 pub struct Preconditioner {
     held_back: Vec<f32>,
@@ -226,23 +222,9 @@ impl Preconditioner {
     pub fn apply(&mut self, env: Env<'_>, r: &[f32], z: &mut [f32]) -> Result<()> {
         let (isa, pool) = (env.isa, env.pool);
         let basis = env.prior.basis();
-        pooled(project_field(
-            isa,
-            pool,
-            &basis,
-            &self.starts,
-            r,
-            &mut self.coordinates,
-        ))?;
+        project_field(isa, pool, &basis, &self.starts, r, &mut self.coordinates)?;
         self.coarse(env)?;
-        pooled(decode_rows(
-            isa,
-            pool,
-            &basis,
-            &self.plan,
-            &self.coordinates,
-            z,
-        ))?;
+        decode_rows(isa, pool, &basis, &self.plan, &self.coordinates, z)?;
         let blocks = env.pace.inverse_blocks.iter();
         for ((z, r), [xx, xy, xz, yy, yz, zz]) in z
             .as_chunks_mut::<3>()
@@ -267,14 +249,14 @@ impl Preconditioner {
     pub(super) fn coarse(&mut self, env: Env<'_>) -> Result<()> {
         let (isa, pool) = (env.isa, env.pool);
         let rows = env.space.rows();
-        pooled(row_dots(
+        row_dots(
             isa,
             pool,
             env.space.modes(),
             rows,
             &self.coordinates,
             &mut self.on_modes,
-        ))?;
+        )?;
         if self.dofs.is_empty() {
             self.galerkin.solve(isa, &self.on_modes, &mut self.solved);
             return self.spread(env);
@@ -303,14 +285,14 @@ impl Preconditioner {
 
     /// `at_contact = W^T r` of the columns in contact, from `coordinates = U^T r` and `on_modes = Phi^T r`.
     fn contact_work(&mut self, env: Env<'_>) -> Result<()> {
-        pooled(row_dots(
+        row_dots(
             env.isa,
             env.pool,
             env.prior.response.stored(),
             &self.dofs,
             &self.coordinates,
             &mut self.at_contact,
-        ))?;
+        )?;
         for (work, &dof) in self.at_contact.iter_mut().zip(&self.dofs) {
             let own = env.space.at_contact(dof as usize);
             for ((held_back, own), on_mode) in self.held_back.iter().zip(own).zip(&self.on_modes) {

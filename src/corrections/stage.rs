@@ -7,7 +7,7 @@ use super::input::{Input, Lent, Report};
 use super::memory::{Memory, PAIRS};
 use super::motion::Motion;
 use super::passes;
-use super::precondition::{Env, Preconditioner, mask, mask_held, pooled};
+use super::precondition::{Env, Preconditioner, mask, mask_held};
 use crate::error::{Error, Result};
 use crate::kernels::vectors::{PartialSums, dots};
 use crate::memory;
@@ -417,14 +417,7 @@ impl Stage {
         })?;
         mask(&self.nodes, &mut d);
         let mut slope = [0.0];
-        pooled(dots(
-            env.isa,
-            env.pool,
-            &[g],
-            &d,
-            &mut self.partial,
-            &mut slope,
-        ))?;
+        dots(env.isa, env.pool, &[g], &d, &mut self.partial, &mut slope)?;
         let [slope] = slope;
         let mut t = 1.0f32;
         let mut accepted = det;

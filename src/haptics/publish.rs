@@ -205,11 +205,10 @@ impl Link {
                 *to = if held[i / 3] { 0.0 } else { mass * from };
             }
             let (isa, pool, q) = (step.isa, step.pool, &mut self.coordinates);
-            let failed = |error: crate::kernels::PoolError| Error::Panic(error.to_string());
             let basis = step.prior.basis();
-            project_field(isa, pool, &basis, &self.starts, &self.field, q).map_err(failed)?;
+            project_field(isa, pool, &basis, &self.starts, &self.field, q)?;
             let modes = step.corrections.space.modes();
-            row_dots(isa, pool, modes, &self.rows, q, out).map_err(failed)?;
+            row_dots(isa, pool, modes, &self.rows, q, out)?;
             for (out, mass) in out.iter_mut().zip(&self.masses) {
                 *out /= mass;
             }

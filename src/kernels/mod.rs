@@ -39,3 +39,21 @@ pub struct Compute<'a> {
     /// Threads.
     pub pool: &'a Pool,
 }
+
+/// What a scene's computations run on, owned.
+pub struct Machine {
+    /// Instruction set of the kernels.
+    pub isa: Isa,
+    /// Threads.
+    pub pool: Pool,
+}
+
+impl Machine {
+    /// Lent to a computation.
+    pub fn compute(&self) -> Compute<'_> {
+        Compute {
+            isa: self.isa,
+            pool: &self.pool,
+        }
+    }
+}

@@ -18,7 +18,7 @@ use crate::contact::Problem;
 use crate::envelope::{EnvelopeCheck, Used};
 use crate::error::Result;
 use crate::guard;
-use crate::kernels::{Compute, FlushToZero, Isa, Pool};
+use crate::kernels::{FlushToZero, Isa, Machine, Pool};
 use crate::memory;
 use crate::model::Model;
 use crate::options::SceneOptions;
@@ -52,8 +52,7 @@ pub struct Core {
     pub(super) model: Arc<Model>,
     pub(super) mesh: Arc<Mesh>,
     pub(super) options: SceneOptions,
-    pub(super) pool: Pool,
-    pub(super) isa: Isa,
+    pub(super) machine: Machine,
     pub(super) engine: Engine,
     pub(super) corrected: Option<Corrected>,
     /// Contact of tools, from the first step that has one.
@@ -131,7 +130,6 @@ impl Core {
                 Vec::new()
             },
             contact_elements: None,
-            isa: Isa::detect(),
             held,
             plan,
             points: Arc::default(),
@@ -150,7 +148,10 @@ impl Core {
             model: parts.model,
             mesh: parts.mesh,
             options: parts.options,
-            pool: parts.pool,
+            machine: Machine {
+                isa: Isa::detect(),
+                pool: parts.pool,
+            },
             engine: parts.engine,
             corrected: parts.corrected,
             #[cfg(feature = "contact")]
@@ -188,7 +189,7 @@ impl Core {
             decoded_node_count: 0,
             contact_count: 0,
             memory_bytes: self.memory_bytes() as u64,
-            threads: self.pool.threads() as u32,
+            threads: self.machine.pool.threads() as u32,
             kernel: self.engine.kernel(),
             provider: self.engine.provider(),
             precision: self.engine.precision(),
@@ -301,10 +302,7 @@ impl Core {
         if learned {
             self.absorb(&shared)?;
         }
-        let compute = Compute {
-            isa: self.isa,
-            pool: &self.pool,
-        };
+        let compute = self.machine.compute();
         self.engine.predict(
             compute,
             &Inputs {

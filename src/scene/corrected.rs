@@ -9,7 +9,7 @@ use super::published::Published;
 use super::timing::Stopwatch;
 use crate::corrections::{Enough, Input, LIMIT, Lent, Motion, Pace, Report, Stage};
 use crate::error::{Error, Result};
-use crate::kernels::{Compute, Isa, Pool};
+use crate::kernels::{Isa, Pool};
 use crate::model::Model;
 use crate::options::{Corrections, LONGEST_STEP_S, SHORTEST_STEP_S, SceneOptions};
 use crate::stats::{SceneStats, flag};
@@ -197,14 +197,16 @@ impl Core {
         let mut watch = Stopwatch::start();
         let _span = tracing::trace_span!("corrections").entered();
         let lent = Lent {
-            isa: self.isa,
-            pool: &self.pool,
+            isa: self.machine.isa,
+            pool: &self.machine.pool,
             prior,
             corrections,
             pace: &corrected.pace,
         };
         let shared = lock_read(published);
         let input = Input {
+            #[cfg(feature = "contact")]
+            rest: &self.mesh.positions,
             contact: &self.incoming,
             last: given.unwrap_or(&shared.last.field),
             before: given.unwrap_or(&shared.before.field),
@@ -272,10 +274,7 @@ impl Core {
             // A network reads the field itself.
             Engine::Upt(_) => return Ok(()),
         };
-        let compute = Compute {
-            isa: self.isa,
-            pool: &self.pool,
-        };
+        let compute = self.machine.compute();
         if self.was_corrected[0] {
             engine.swing_from(
                 compute,
@@ -306,8 +305,8 @@ impl Core {
             return Ok(());
         };
         let lent = Lent {
-            isa: self.isa,
-            pool: &self.pool,
+            isa: self.machine.isa,
+            pool: &self.machine.pool,
             prior,
             corrections: self.model.corrections()?,
             pace: &corrected.pace,

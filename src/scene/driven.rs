@@ -128,25 +128,26 @@ impl Core {
         let mut watch = Stopwatch::start();
         let span = tracing::trace_span!("corrections").entered();
         let lent = Lent {
-            isa: self.isa,
-            pool: &self.pool,
+            isa: self.machine.isa,
+            pool: &self.machine.pool,
             prior,
             corrections: self.model.corrections()?,
             pace: &corrected.pace,
         };
         let shared = lock_read(published);
+        let rest = &self.mesh.positions;
         let input = Input {
+            rest,
             contact: &self.incoming,
             last: &shared.last.field,
             before: &shared.before.field,
             still: false,
             enough: corrected.enough(start),
         };
-        let rest = &self.mesh.positions;
         let next = &mut self.next.field;
         let mut report = corrected
             .stage
-            .correct_loaded(lent, &input, rest, problem, next)?;
+            .correct_loaded(lent, &input, problem, next)?;
         let end = |u: &[f32], problem: &mut Problem| {
             problem.finish(State {
                 rest,
@@ -159,7 +160,7 @@ impl Core {
             // A grasp that tears off in this step holds nothing at its end.
             report = corrected
                 .stage
-                .correct_loaded(lent, &input, rest, problem, next)?;
+                .correct_loaded(lent, &input, problem, next)?;
             end(next, problem);
         }
         corrected.tell(&report, stats);

@@ -63,8 +63,8 @@ impl Core {
         };
         let shared = lock_read(published);
         let step = Stepped {
-            isa: self.isa,
-            pool: &self.pool,
+            isa: self.machine.isa,
+            pool: &self.machine.pool,
             prior,
             corrections,
             motion: &corrected.stage.motion,

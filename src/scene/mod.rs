@@ -267,7 +267,7 @@ impl Scene {
                 && !core.options.interpolate_points
                 && points.len() > 0
             {
-                let threads = core.pool.threads();
+                let threads = core.machine.pool.threads();
                 let queries = kind.queries(points.places(), core.model.runtime()?, threads)?;
                 points.set_queries(queries)?;
             }

@@ -9,7 +9,7 @@ use super::points::AttachedPoints;
 use super::published::{Frame, Published};
 use super::verdict::enforce;
 use crate::error::{Error, Result};
-use crate::kernels::{Compute, FlushToZero};
+use crate::kernels::FlushToZero;
 use crate::memory;
 
 const WHAT: &str = "a scene's region and points";
@@ -125,10 +125,7 @@ impl Core {
             field.copy_from_slice(&frame.field);
             return Ok(());
         }
-        let compute = Compute {
-            isa: self.isa,
-            pool: &self.pool,
-        };
+        let compute = self.machine.compute();
         match source {
             Source::Rest => {
                 detail.fill(0.0);
@@ -179,10 +176,7 @@ impl Core {
             _ => NodePlan::all(count, table)?,
         };
         let _flush = FlushToZero::enter();
-        let compute = Compute {
-            isa: self.isa,
-            pool: &self.pool,
-        };
+        let compute = self.machine.compute();
         self.engine.replan(compute, &plan)?;
         let mut frames = [Frame::default(), Frame::default()];
         for (which, frame) in [Which::Last, Which::Before].into_iter().zip(&mut frames) {

@@ -10,7 +10,6 @@ use super::published::Published;
 use super::timing::Stopwatch;
 use crate::error::{Error, Result};
 use crate::guard;
-use crate::kernels::Compute;
 use crate::kernels::largest::largest;
 use crate::options::GuardPolicy;
 use crate::stats::{SceneStats, flag};
@@ -30,7 +29,7 @@ impl Core {
 
     /// Largest displacement of the planned nodes in `next`, mm.
     pub(super) fn largest_of_next(&self) -> f32 {
-        largest(self.isa, &self.next.field, self.plan.nodes())
+        largest(self.machine.isa, &self.next.field, self.plan.nodes())
     }
 
     pub(super) fn judge(&mut self, stats: &mut SceneStats) -> Result<u32> {
@@ -42,7 +41,7 @@ impl Core {
         if self.options.check_inversion
             && verdict & flag::NON_FINITE == 0
             && guard::inverted(
-                &self.pool,
+                &self.machine.pool,
                 &self.mesh.positions,
                 &self.next.field,
                 &self.planned_tets,
@@ -132,10 +131,7 @@ impl Core {
 
     /// Replaces `next` by the linear response, or by the imposed contact alone where the bundle has none.
     fn fall_back(&mut self) -> Result<()> {
-        let compute = Compute {
-            isa: self.isa,
-            pool: &self.pool,
-        };
+        let compute = self.machine.compute();
         self.engine
             .fall_back(compute, &self.plan, &mut self.next.field)?;
         self.enforce_next();

@@ -3,7 +3,7 @@
 
 use super::{Memory, PAIRS, views};
 use crate::corrections::passes;
-use crate::corrections::precondition::{Env, pooled};
+use crate::corrections::precondition::Env;
 use crate::error::Result;
 use crate::kernels::project::project_field;
 use crate::kernels::vectors::{add_scaled, dots};
@@ -36,14 +36,14 @@ impl Memory {
         }
         let steps = views(&self.steps, &used[..count]);
         let mut first = [0.0; PAIRS];
-        pooled(dots(
+        dots(
             env.isa,
             env.pool,
             &steps[..count],
             r,
             &mut self.partial,
             &mut first[..count],
-        ))?;
+        )?;
         let alpha = self.alpha(&used[..count], &first);
         let factors = alpha.map(|a| -a as f32);
         let changes = views(&self.changes, &used[..count]);
@@ -56,13 +56,13 @@ impl Memory {
             work_of,
         )?;
         let projected = views(&self.coordinates, &used[..count]);
-        pooled(add_scaled(
+        add_scaled(
             env.isa,
             env.pool,
             &projected[..count],
             &factors[..count],
             coordinates,
-        ))?;
+        )?;
         Ok(Recursion {
             used,
             count,
@@ -83,14 +83,14 @@ impl Memory {
         let projected = views(&self.coordinates, used);
         let mut first = [0.0; PAIRS];
         let first = &mut first[..used.len()];
-        pooled(dots(
+        dots(
             env.isa,
             env.pool,
             &projected[..used.len()],
             coordinates,
             &mut self.partial,
             first,
-        ))?;
+        )?;
         for (first, work) in first.iter_mut().zip(recursion.work) {
             *first += work;
         }
@@ -109,14 +109,14 @@ impl Memory {
 
     fn project(&mut self, env: Env<'_>, starts: &[usize], slot: usize) -> Result<()> {
         if !self.projected[slot] {
-            pooled(project_field(
+            project_field(
                 env.isa,
                 env.pool,
                 &env.prior.basis(),
                 starts,
                 &self.changes[slot],
                 &mut self.coordinates[slot],
-            ))?;
+            )?;
             self.projected[slot] = true;
         }
         Ok(())

@@ -1,7 +1,7 @@
 //! Responses of `K + kappa M` through the prior's columns and the modes: to prescribed nodes, to loads, to what the natural modes do
 //! by themselves.
 
-use super::{Env, Preconditioner, mask_held, pooled};
+use super::{Env, Preconditioner, mask_held};
 use crate::error::Result;
 use crate::kernels::project::{project_field, row_dots};
 use crate::kernels::respond::accumulate_rows;
@@ -22,9 +22,9 @@ impl Preconditioner {
         }
         let basis = env.prior.basis();
         let q = &mut self.coordinates;
-        pooled(project_field(isa, pool, &basis, &self.starts, r, q))?;
+        project_field(isa, pool, &basis, &self.starts, r, q)?;
         let (modes, rows) = (env.space.modes(), env.space.rows());
-        pooled(row_dots(isa, pool, modes, rows, q, &mut self.on_modes))?;
+        row_dots(isa, pool, modes, rows, q, &mut self.on_modes)?;
         self.contact_work(env)?;
         self.compliance
             .solve(isa, &self.at_contact, &mut self.forces);
@@ -44,17 +44,9 @@ impl Preconditioner {
         }
         let (isa, pool, q) = (env.isa, env.pool, &mut self.coordinates);
         let rows = env.space.rows();
-        pooled(accumulate_rows(
-            isa,
-            pool,
-            env.space.modes(),
-            rows,
-            &self.solved,
-            false,
-            q,
-        ))?;
+        accumulate_rows(isa, pool, env.space.modes(), rows, &self.solved, false, q)?;
         let response = env.prior.response.stored();
-        pooled(accumulate_rows(
+        Ok(accumulate_rows(
             isa,
             pool,
             response,
@@ -62,7 +54,7 @@ impl Preconditioner {
             &self.forces,
             true,
             q,
-        ))
+        )?)
     }
 
     /// Adds the response of `K + kappa M` that takes the prescribed nodes to their targets: `u += L_C(target - u_C)`.
@@ -117,9 +109,9 @@ impl Preconditioner {
         let rows = &env.space.rows()[..count];
         let natural = &self.solved[..count];
         let modes = env.space.modes();
-        pooled(accumulate_rows(isa, pool, modes, rows, natural, true, q))?;
+        accumulate_rows(isa, pool, modes, rows, natural, true, q)?;
         let response = env.prior.response.stored();
-        pooled(accumulate_rows(isa, pool, response, dofs, forces, true, q))
+        Ok(accumulate_rows(isa, pool, response, dofs, forces, true, q)?)
     }
 
     /// `coordinates = -N diag(1 / (m (w² + kappa))) N^T r` of a residual `[K,3]`, µN, that is zero at held nodes.
@@ -131,66 +123,59 @@ impl Preconditioner {
         let q = &mut self.coordinates;
         let (modes, rows) = (env.space.modes(), &env.space.rows()[..count]);
         let natural = &mut self.on_modes[..count];
-        pooled(row_dots(isa, pool, modes, rows, q, natural))?;
+        row_dots(isa, pool, modes, rows, q, natural)?;
         for (value, moved) in natural.iter_mut().zip(&self.moved_freely) {
             *value *= -moved;
         }
-        pooled(accumulate_rows(isa, pool, modes, rows, natural, false, q))
+        Ok(accumulate_rows(isa, pool, modes, rows, natural, false, q)?)
     }
 
     /// `coordinates = U^T r` of a field `[K,3]`.
     #[cfg(feature = "contact")]
     pub fn project(&mut self, env: Env<'_>, r: &[f32]) -> Result<()> {
-        pooled(project_field(
+        Ok(project_field(
             env.isa,
             env.pool,
             &env.prior.basis(),
             &self.starts,
             r,
             &mut self.coordinates,
-        ))
+        )?)
     }
 
     /// `to = U coordinates`, `[K,3]`.
     #[cfg(feature = "contact")]
     pub fn decode(&mut self, env: Env<'_>, to: &mut [f32]) -> Result<()> {
-        pooled(decode_rows(
+        Ok(decode_rows(
             env.isa,
             env.pool,
             &env.prior.basis(),
             &self.plan,
             &self.coordinates,
             to,
-        ))
+        )?)
     }
 
     /// The same at the nodes of the domain only; other rows keep their values.
     #[cfg(feature = "contact")]
     pub fn decode_domain(&mut self, env: Env<'_>, to: &mut [f32]) -> Result<()> {
-        pooled(decode_rows(
+        Ok(decode_rows(
             env.isa,
             env.pool,
             &env.prior.basis(),
             &self.domain,
             &self.coordinates,
             to,
-        ))
+        )?)
     }
 
     /// `N^T r` of a field `[K,3]` that is zero at held nodes: what it has of each natural mode.
     pub fn on_natural(&mut self, env: Env<'_>, r: &[f32], out: &mut [f32]) -> Result<()> {
         let (isa, pool) = (env.isa, env.pool);
         let q = &mut self.coordinates;
-        pooled(project_field(
-            isa,
-            pool,
-            &env.prior.basis(),
-            &self.starts,
-            r,
-            q,
-        ))?;
+        project_field(isa, pool, &env.prior.basis(), &self.starts, r, q)?;
         let rows = &env.space.rows()[..out.len()];
-        pooled(row_dots(isa, pool, env.space.modes(), rows, q, out))
+        Ok(row_dots(isa, pool, env.space.modes(), rows, q, out)?)
     }
 
     /// `out = N y [K,3]` of natural modes' amplitudes.
@@ -199,9 +184,9 @@ impl Preconditioner {
         let q = &mut self.coordinates;
         let rows = &env.space.rows()[..y.len()];
         let modes = env.space.modes();
-        pooled(accumulate_rows(isa, pool, modes, rows, y, false, q))?;
+        accumulate_rows(isa, pool, modes, rows, y, false, q)?;
         let basis = env.prior.basis();
-        pooled(decode_rows(isa, pool, &basis, &self.plan, q, out))?;
+        decode_rows(isa, pool, &basis, &self.plan, q, out)?;
         mask_held(&env.body.held, out);
         Ok(())
     }
@@ -209,14 +194,14 @@ impl Preconditioner {
     /// Adds the field of `coordinates`.
     fn add_decoded(&mut self, env: Env<'_>, scratch: &mut [f32], u: &mut [f32]) -> Result<()> {
         let basis = env.prior.basis();
-        pooled(decode_rows(
+        decode_rows(
             env.isa,
             env.pool,
             &basis,
             &self.plan,
             &self.coordinates,
             scratch,
-        ))?;
+        )?;
         mask_held(&env.body.held, scratch);
         for (u, change) in u.iter_mut().zip(&*scratch) {
             *u += change;

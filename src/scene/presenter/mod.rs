@@ -247,16 +247,12 @@ impl Presenter {
                     *y -= held_back * own * force;
                 }
             }
-            let failed = |error: crate::kernels::PoolError| Error::Panic(error.to_string());
             let (isa, pool, q) = (self.isa, &self.pool, &mut self.coordinates);
             let modes = corrections.space.modes();
-            accumulate_rows(isa, pool, modes, &self.rows, &self.natural, false, q)
-                .map_err(failed)?;
+            accumulate_rows(isa, pool, modes, &self.rows, &self.natural, false, q)?;
             let response = prior.response.stored();
-            accumulate_rows(isa, pool, response, change.dofs, change.forces, true, q)
-                .map_err(failed)?;
-            decode_rows(isa, pool, &prior.basis(), &self.plan, q, &mut self.moved)
-                .map_err(failed)?;
+            accumulate_rows(isa, pool, response, change.dofs, change.forces, true, q)?;
+            decode_rows(isa, pool, &prior.basis(), &self.plan, q, &mut self.moved)?;
         }
         for (i, &node) in self.region.iter().enumerate() {
             let at = 3 * node as usize;

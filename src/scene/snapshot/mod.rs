@@ -20,7 +20,7 @@ use super::reduced::ReducedRecord;
 use super::upt::UptRecord;
 use crate::corrections::{Motion, PAIRS};
 use crate::error::{Error, Result};
-use crate::kernels::{Compute, FlushToZero};
+use crate::kernels::FlushToZero;
 use crate::memory;
 use bytes::{Reader, Writer};
 
@@ -296,10 +296,7 @@ impl Core {
     fn recompute(&mut self, published: &RwLock<Published>) -> Result<()> {
         if let Engine::Reduced(engine) = &mut self.engine {
             engine.rebuild(
-                Compute {
-                    isa: self.isa,
-                    pool: &self.pool,
-                },
+                self.machine.compute(),
                 &self.held,
                 &self.contact_before,
                 &self.contact,

@@ -28,7 +28,7 @@ use upt::{Corrections, Model, ModelOptions, SceneOptions};
 use crate::machine::Machine;
 use crate::report::method::BundleFolder;
 use crate::stress::{progress, replace_between};
-use gesture::{GESTURES, Gesture, Site};
+use gesture::{GESTURES, Site};
 use play::Player;
 use table::{Account, Row};
 
@@ -122,9 +122,13 @@ pub fn run(options: &Options) -> Result<ExitCode> {
                 let mut bare = Player::new(&model, &scene, options.latency_ms, &site)?;
                 row.add_bare(&bare.play(gesture, &site, false, options.seed)?);
                 if options.reference > 0.0 {
-                    compare(
-                        options, &model, &mesh, boundary, gesture, &site, &track, row,
-                    )?;
+                    let seconds = options.reference.min(gesture.seconds);
+                    let truth = truth::replay(&model, &mesh, boundary, &site, &track, seconds)?;
+                    row.compare(&track, &truth);
+                    if let (Some(path), true) = (&options.plot, gesture.shown) {
+                        std::fs::write(path, table::plot(&track, &truth))
+                            .with_context(|| path.display().to_string())?;
+                    }
                 }
             }
             bar.inc(1);
@@ -173,28 +177,6 @@ impl Load {
 impl Drop for Load {
     fn drop(&mut self) {
         self.0.store(true, Ordering::Relaxed);
-    }
-}
-
-/// Compares a gesture's row with the solver's forces on its way, and into the plot where it is the one that is shown.
-#[allow(clippy::too_many_arguments)]
-fn compare(
-    options: &Options,
-    model: &Arc<Model>,
-    mesh: &Mesh,
-    boundary: Boundary,
-    gesture: &Gesture,
-    site: &Site,
-    track: &play::Track,
-    row: &mut Row,
-) -> Result<()> {
-    let seconds = options.reference.min(gesture.seconds);
-    let truth = truth::replay(model, mesh, boundary, site, track, seconds)?;
-    row.compare(track, &truth);
-    match &options.plot {
-        Some(path) if gesture.shown => std::fs::write(path, table::plot(track, &truth))
-            .with_context(|| path.display().to_string()),
-        _ => Ok(()),
     }
 }
 

@@ -138,12 +138,21 @@ pub fn report(plan: &Plan) -> Result<ExitCode> {
     if all.is_empty() {
         bail!("nothing could be measured: {}", notes.join("; "));
     }
-    let report = write(plan, &cases, &mesh, &truths, &all, &rows, &details, &notes)?;
+    let made = Made {
+        cases,
+        mesh,
+        truths,
+        all,
+        rows,
+        details,
+        notes,
+    };
+    let report = write(plan, &made)?;
     if plan.json {
         println!("{}", serde_json::to_string_pretty(&report)?);
     } else {
-        print!("{}", table::text(&rows));
-        for note in &notes {
+        print!("{}", table::text(&made.rows));
+        for note in &made.notes {
             println!("left out: {note}");
         }
         println!("{}", plan.out.join("tools.html").display());
@@ -279,17 +288,27 @@ fn pictures(
     pictured
 }
 
-#[allow(clippy::too_many_arguments)]
-fn write(
-    plan: &Plan,
-    cases: &ToolCases,
-    mesh: &Mesh,
-    truths: &[Truth],
-    all: &[Measured],
-    rows: &[Row],
-    details: &[serde_json::Value],
-    notes: &[String],
-) -> Result<serde_json::Value> {
+/// What a report is written from.
+struct Made {
+    cases: ToolCases,
+    mesh: Mesh,
+    truths: Vec<Truth>,
+    all: Vec<Measured>,
+    rows: Vec<Row>,
+    details: Vec<serde_json::Value>,
+    notes: Vec<String>,
+}
+
+fn write(plan: &Plan, made: &Made) -> Result<serde_json::Value> {
+    let Made {
+        cases,
+        mesh,
+        truths,
+        all,
+        rows,
+        details,
+        notes,
+    } = made;
     std::fs::create_dir_all(&plan.out)
         .with_context(|| format!("cannot make {}", plan.out.display()))?;
     let machine = Machine::this();
