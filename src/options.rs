@@ -201,6 +201,8 @@ pub enum Corrections {
     Fixed(u32),
     /// As many as a target asks for and a budget lets in.
     Auto {
+        /// At most this many, 1 to 64.
+        most: u32,
         /// Stop where the estimated error is below this, mm; 0 for no target.
         target_mm: f32,
         /// Start no iteration after this time, µs; 0 for no budget.

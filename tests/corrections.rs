@@ -74,6 +74,7 @@ fn a_target_stops_early_and_a_budget_leaves_one() {
         counts.collect::<Vec<_>>()
     };
     let target = |target_mm| Corrections::Auto {
+        most: 64,
         target_mm,
         budget_us: 0,
     };
@@ -84,7 +85,15 @@ fn a_target_stops_early_and_a_budget_leaves_one() {
         "{loose:?} {tight:?}"
     );
     // A microsecond is over before the first ends: one is made all the same.
+    let capped = made(Corrections::Auto {
+        most: 2,
+        target_mm: 1e-4,
+        budget_us: 0,
+    });
+    let most: Vec<u32> = tight.iter().map(|count| (*count).min(2)).collect();
+    assert_eq!(capped, most, "{tight:?}");
     let hurried = made(Corrections::Auto {
+        most: 64,
         target_mm: 0.0,
         budget_us: 1,
     });
@@ -103,8 +112,15 @@ fn what_cannot_be_is_refused() {
             "{count}: {error:?}"
         );
     }
-    for (target_mm, budget_us) in [(0.0, 0), (-1.0, 5), (f32::NAN, 5)] {
+    for (most, target_mm, budget_us) in [
+        (64, 0.0, 0),
+        (64, -1.0, 5),
+        (64, f32::NAN, 5),
+        (0, 0.1, 0),
+        (65, 0.1, 0),
+    ] {
         let options = with(Corrections::Auto {
+            most,
             target_mm,
             budget_us,
         });

@@ -59,6 +59,11 @@ impl Manifest {
                 "must be at most 64",
             )?;
             check(
+                corrections.target_mm.is_finite() && corrections.target_mm >= 0.0,
+                "corrections.target_mm",
+                "must be zero or positive",
+            )?;
+            check(
                 corrections.calibration.is_finite() && corrections.calibration > 0.0,
                 "corrections.calibration",
                 "must be positive",

@@ -75,7 +75,10 @@ const KEYS: &[(&str, &[&str])] = &[
         ],
     ),
     ("prior", &["file", "vibration"]),
-    ("corrections", &["file", "recommended", "calibration"]),
+    (
+        "corrections",
+        &["file", "recommended", "target_mm", "calibration"],
+    ),
     (
         "upt",
         &[

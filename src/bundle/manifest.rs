@@ -89,6 +89,9 @@ pub struct CorrectionsEntry {
     pub file: String,
     /// Iterations a step that the bundle recommends; 0 leaves them off unless a host asks.
     pub recommended: u32,
+    /// Fewer where the estimated error is below this, mm; 0: never.
+    #[serde(default)]
+    pub target_mm: f32,
     /// Estimated over measured error on held-out cases: what [`crate::SceneStats::error_mm`] is multiplied by.
     #[serde(default = "one")]
     pub calibration: f32,

@@ -4,6 +4,7 @@ use super::call::{Failure, fail};
 use super::pointers::{optional_path, slice};
 use super::status::*;
 use super::structs::*;
+use crate::corrections::LIMIT;
 use crate::{
     Corrections, DecoderKernel, GuardPolicy, IndexSet, InitOptions, ModelOptions, Precision,
     Provider, SceneOptions, StepPath, UserStream,
@@ -227,14 +228,18 @@ pub(super) unsafe fn model_options(raw: &upt_model_options) -> Result<ModelOptio
 }
 
 fn corrections(raw: &upt_scene_options) -> Result<Corrections, Failure> {
+    let limited = raw.corrections_budget_us != 0 || raw.corrections_target_mm != 0.0;
+    let until = |most| Corrections::Auto {
+        most,
+        target_mm: raw.corrections_target_mm,
+        budget_us: raw.corrections_budget_us,
+    };
     match raw.corrections {
-        UPT_CORRECTIONS_AUTO => Ok(Corrections::Auto {
-            target_mm: raw.corrections_target_mm,
-            budget_us: raw.corrections_budget_us,
-        }),
-        _ if raw.corrections_budget_us != 0 || raw.corrections_target_mm != 0.0 => fail(
+        UPT_CORRECTIONS_AUTO => Ok(until(LIMIT)),
+        count @ 1.. if limited => Ok(until(count as u32)),
+        _ if limited => fail(
             UPT_ERR_ARGUMENT,
-            "corrections_budget_us and corrections_target_mm are for UPT_CORRECTIONS_AUTO",
+            "corrections_budget_us and corrections_target_mm are for UPT_CORRECTIONS_AUTO and for counts from 1",
         ),
         0 => Ok(Corrections::Recommended),
         UPT_CORRECTIONS_NONE => Ok(Corrections::None),

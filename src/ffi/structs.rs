@@ -145,11 +145,11 @@ pub struct upt_scene_options {
     /// `UPT_STEP_*`: who makes a step of a `UPT_KIND_UPT` bundle.
     pub step_path: i32,
     /// Corrections by the elements while there is contact: 1 to 64 a step, 0 as many as the bundle recommends,
-    /// `UPT_CORRECTIONS_NONE`, or `UPT_CORRECTIONS_AUTO`.
+    /// `UPT_CORRECTIONS_NONE`, or `UPT_CORRECTIONS_AUTO` for up to 64. A count with a budget or a target is the most that a step gets.
     pub corrections: i32,
-    /// `UPT_CORRECTIONS_AUTO`: no correction starts later than this in a step, µs; 0: no budget.
+    /// No correction starts later than this in a step, µs; 0: no budget. Only with a count or `UPT_CORRECTIONS_AUTO`.
     pub corrections_budget_us: u32,
-    /// `UPT_CORRECTIONS_AUTO`: enough where the estimated error is below this, mm; 0: no target.
+    /// Enough where the estimated error is below this, mm; 0: no target. Only with a count or `UPT_CORRECTIONS_AUTO`.
     pub corrections_target_mm: f32,
     /// `UPT_FLAG_ERROR` rises where the estimated error is above this, mm; 0: never.
     pub error_limit_mm: f32,

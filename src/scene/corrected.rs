@@ -43,17 +43,13 @@ impl Corrected {
             Corrections::None => return none(own_pace),
             Corrections::Recommended => match entry {
                 Some(entry) if entry.recommended > 0 && !options.free_boundary => {
-                    (entry.recommended, 0.0, 0)
+                    (entry.recommended, entry.target_mm, 0)
                 }
                 _ => return none(own_pace),
             },
-            Corrections::Fixed(count @ 1..=LIMIT) => (count, 0.0, 0),
-            Corrections::Fixed(count) => {
-                return Err(Error::Argument(format!(
-                    "corrections is {count}, must be at most {LIMIT}"
-                )));
-            }
+            Corrections::Fixed(count) => (count, 0.0, 0),
             Corrections::Auto {
+                most,
                 target_mm,
                 budget_us,
             } => {
@@ -64,9 +60,14 @@ impl Corrected {
                         "corrections: `auto` needs a budget in µs or a target in mm, finite and above 0".into(),
                     ));
                 }
-                (LIMIT, target_mm, budget_us)
+                (most, target_mm, budget_us)
             }
         };
+        if !(1..=LIMIT).contains(&most) {
+            return Err(Error::Argument(format!(
+                "corrections is {most}, must be 1 to {LIMIT}"
+            )));
+        }
         if !(options.error_limit_mm.is_finite() && options.error_limit_mm >= 0.0) {
             return Err(Error::Argument(format!(
                 "error_limit_mm is {}, must be finite and not negative",
