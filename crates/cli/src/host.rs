@@ -3,6 +3,7 @@
 //! What is measured here is what a C or C# program gets. One row of `upt report` reaches behind the ABI, since no host can ask
 //! for it: a bundle's linear response alone (`report/prior_alone.rs`).
 
+use crate::effort::Effort;
 use std::ffi::{CStr, CString};
 use std::path::Path;
 
@@ -20,7 +21,7 @@ pub struct ModelSettings {
     /// Fail rather than take another provider.
     pub exact: bool,
     /// Corrections a step; none: as many as the bundle recommends.
-    pub corrections: Option<u32>,
+    pub corrections: Option<Effort>,
     /// Length of its scenes' steps, s; 0: the bundle's.
     pub step_s: f64,
 }
@@ -40,7 +41,7 @@ impl Default for ModelSettings {
 
 /// An open model; closed when dropped.
 pub struct Model {
-    corrections: Option<u32>,
+    corrections: Option<Effort>,
     step_s: f64,
     handle: *mut ffi::upt_model,
     info: ffi::upt_model_info,
@@ -184,9 +185,11 @@ impl Scene {
             options.guard_policy = ffi::UPT_GUARD_REPORT;
             options.corrections = match model.corrections {
                 None => 0,
-                Some(0) => ffi::UPT_CORRECTIONS_NONE,
-                Some(count) => count as i32,
+                Some(Effort { most: 0, .. }) => ffi::UPT_CORRECTIONS_NONE,
+                Some(effort) => effort.most as i32,
             };
+            options.corrections_target_mm =
+                model.corrections.map_or(0.0, |effort| effort.target_mm);
             options.step_s = model.step_s;
             let mut handle = std::ptr::null_mut();
             check(ffi::upt_scene_create(model.handle, &options, &mut handle))?;

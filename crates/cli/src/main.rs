@@ -12,6 +12,7 @@ mod completions;
 mod corrections;
 mod dataset;
 mod doctor;
+mod effort;
 mod envelope;
 #[cfg(feature = "files")]
 mod export;

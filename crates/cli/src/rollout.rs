@@ -9,6 +9,7 @@ use serde_json::json;
 use tissue::mesh::Mesh;
 use tissue::trajectory::Trajectory;
 
+use crate::effort::Effort;
 use crate::render::Palette;
 use crate::report::errors::{CaseErrors, step_errors};
 use crate::report::method::{BundleFolder, Method, Stepper};
@@ -39,7 +40,7 @@ pub struct Options {
     png: Option<PathBuf>,
     /// Corrections a step, 0 to 64; left out: as many as the bundle recommends.
     #[arg(long)]
-    corrections: Option<u32>,
+    corrections: Option<Effort>,
     /// Leave out the Hausdorff distance (the slowest of the metrics).
     #[arg(long)]
     no_hausdorff: bool,
@@ -67,7 +68,7 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     }
     let corrections = match (options.corrections, bundle.corrections) {
         (Some(count), _) => count,
-        (None, recommended) => recommended.unwrap_or(0),
+        (None, recommended) => recommended.unwrap_or(Effort::NONE),
     };
     let method = Method::Surrogate {
         bundle,

@@ -13,6 +13,7 @@ use clap::Args;
 use serde_json::{Value, json};
 use tissue::mesh::{Boundary, Mesh};
 
+use crate::effort::Effort;
 use crate::manifest::Manifest;
 use crate::report::method::BundleFolder;
 use crate::tools::bundles;
@@ -38,7 +39,7 @@ pub struct Options {
     cases: usize,
     /// Corrections a step; left out: as many as the bundle recommends.
     #[arg(long)]
-    corrections: Option<u32>,
+    corrections: Option<Effort>,
     /// Mean squared error of a case that is good, mm².
     #[arg(long, default_value_t = 0.05)]
     limit_mm2: f64,
@@ -75,7 +76,7 @@ pub fn run(options: &Options) -> Result<ExitCode> {
             "{}: has no corrections, and tools are judged by them; `upt corrections` gives it what they need",
             bundle.name
         ),
-        (Some(count), _) | (None, Some(count)) => count.max(1),
+        (Some(effort), _) | (None, Some(effort)) => effort,
     };
     let mesh = Mesh::read(&bundle.mesh_file)?;
     cases.check(&mesh)?;
@@ -104,7 +105,7 @@ pub fn run(options: &Options) -> Result<ExitCode> {
             options.limit_mm2
         )
     })?;
-    let entry = limits.entry(corrections);
+    let entry = limits.entry(corrections.most);
     if !options.dry_run {
         write(options, &entry)?;
     }
@@ -138,7 +139,7 @@ fn check(options: &Options) -> Result<()> {
     if !(0.0..1.0).contains(&options.share) {
         bail!("--share is {}; it must be from 0 to below 1", options.share);
     }
-    if options.corrections == Some(0) {
+    if options.corrections == Some(Effort::NONE) {
         bail!(
             "--corrections is 0; the limits of tools hold for corrected steps, so it must be 1 to 64"
         );

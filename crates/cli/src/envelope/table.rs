@@ -1,6 +1,7 @@
 //! What was measured, as a document's table: the limits, and errors by size, depth, speed and number of the tools.
 
 use super::limits::{Limits, Tried};
+use crate::effort::Effort;
 use crate::report::{plot::label, quantile};
 
 /// A range of one quantity.
@@ -29,7 +30,7 @@ const PARTS: &[Part] = &[
 /// The tables of one bundle.
 pub fn markdown(
     bundle: &str,
-    corrections: u32,
+    corrections: Effort,
     limit_mm2: f64,
     cases: &[Tried],
     limits: &Limits,

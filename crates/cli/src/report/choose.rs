@@ -9,6 +9,7 @@ use super::cases::Cases;
 use super::method::{BundleFolder, Method};
 use super::prior_alone::PriorAlone;
 use super::{Options, Region, paper_split, same_body};
+use crate::effort::Effort;
 
 /// The bundles whose mesh and boundary are the cases'; the others are named in `notes`.
 pub fn fitting_bundles(
@@ -72,17 +73,22 @@ const FRONTIER: [u32; 5] = [0, 1, 3, 5, 10];
 
 /// Corrections a step that a bundle is measured with: those asked for; else none and as many as it recommends, and the frontier
 /// in the configuration whose field is whole and has the most threads.
-fn corrections(options: &Options, bundle: &BundleFolder, region: Region, threads: u32) -> Vec<u32> {
+fn corrections(
+    options: &Options,
+    bundle: &BundleFolder,
+    region: Region,
+    threads: u32,
+) -> Vec<Effort> {
     let most = options.threads.iter().max() == Some(&threads);
     let mut counts = match bundle.corrections {
-        None => vec![0],
+        None => vec![Effort::NONE],
         Some(_) if !options.corrections.is_empty() => options.corrections.clone(),
         Some(recommended) if region == Region::All && most => {
-            [FRONTIER.as_slice(), &[recommended]].concat()
+            [FRONTIER.map(Effort::fixed).as_slice(), &[recommended]].concat()
         }
-        Some(recommended) => vec![0, recommended],
+        Some(recommended) => vec![Effort::NONE, recommended],
     };
-    counts.sort_unstable();
+    counts.sort_by(|a, b| a.partial_cmp(b).expect("targets are numbers"));
     counts.dedup();
     counts
 }

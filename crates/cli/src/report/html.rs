@@ -7,6 +7,7 @@ use base64::Engine;
 use super::plot::{self, Band, Latencies, Point, Stages, escape};
 use super::row::{Measurement, Row};
 use super::table::COLUMNS;
+use crate::effort::Effort;
 
 /// Facts above the figures: name and value.
 pub type Facts = Vec<(String, String)>;
@@ -199,7 +200,10 @@ pub fn points(measurements: &[Measurement]) -> Vec<Point> {
         .map(|one| Point {
             family: group(&one.row),
             label: one.row.variant(),
-            corrections: one.row.curve().map_or(0, |(_, corrections)| corrections),
+            corrections: one
+                .row
+                .curve()
+                .map_or(Effort::NONE, |(_, corrections)| corrections),
             milliseconds: one.row.ms_p50.max(1e-4),
             mse: one.row.mse_mm2,
             plain: one.row.is_plain(),

@@ -14,6 +14,7 @@ use upt::ffi;
 use upt::kernels::decoder::DecoderPrecision;
 
 use super::setting::{Precision, Provider, Region};
+use crate::effort::Effort;
 use crate::host;
 
 /// A bundle on disk, as its manifest describes it.
@@ -28,7 +29,7 @@ pub struct BundleFolder {
     /// Float32, the variants of the graphs that the manifest lists, and bfloat16 where kind and CPU have it.
     pub precisions: Vec<Precision>,
     /// Corrections a step that the manifest recommends; none where the bundle has no tables for them.
-    pub corrections: Option<u32>,
+    pub corrections: Option<Effort>,
 }
 
 /// A method in one configuration.
@@ -41,7 +42,7 @@ pub enum Method {
         region: Region,
         threads: u32,
         /// Corrections a step in contact.
-        corrections: u32,
+        corrections: Effort,
     },
     PaperSplit {
         bundle: BundleFolder,
@@ -128,7 +129,10 @@ impl BundleFolder {
             precisions,
             corrections: fields["corrections"]["recommended"]
                 .as_u64()
-                .map(|count| count as u32),
+                .map(|count| Effort {
+                    most: count as u32,
+                    target_mm: fields["corrections"]["target_mm"].as_f64().unwrap_or(0.0) as f32,
+                }),
             path: path.to_path_buf(),
             name: text(&fields["name"], "name")?,
             boundary: text(&fields["boundary"], "boundary")?,

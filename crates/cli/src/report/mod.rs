@@ -28,6 +28,7 @@ use anyhow::{Result, bail};
 use clap::Args;
 use tissue::mesh::Mesh;
 
+use crate::effort::Effort;
 use crate::machine::Machine;
 use crate::shown;
 use crate::tools::{self, cases::Split};
@@ -102,9 +103,9 @@ pub struct Options {
     precision: Vec<Precision>,
     #[arg(long, value_delimiter = ',', default_value = "cpu")]
     provider: Vec<Provider>,
-    /// Corrections a step in contact ; default: none and as many as a bundle recommends, and 0, 1, 3, 5, 10 with all nodes and the most threads.
+    /// Corrections a step in contact: counts, or COUNT@MM for at most COUNT, fewer where the estimated error is below MM; default: none and as many as a bundle recommends, and 0, 1, 3, 5, 10 with all nodes and the most threads.
     #[arg(long, value_delimiter = ',')]
-    corrections: Vec<u32>,
+    corrections: Vec<Effort>,
     /// Plain methods to compare with: zero, linear, prior (the bundles' linear response alone), coarse, tled, paper; or none.
     #[arg(
         long,

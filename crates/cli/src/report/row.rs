@@ -1,5 +1,6 @@
 //! A row of the report and all that was measured for it.
 
+use crate::effort::Effort;
 use serde::{Deserialize, Serialize};
 
 /// The method of rows that run a bundle's linear response without what the bundle learned.
@@ -20,8 +21,8 @@ pub struct Row {
     pub region: String,
     pub boundary: String,
     /// Corrections a step in contact; 0 for none and for other methods.
-    #[serde(default)]
-    pub corrections: u32,
+    #[serde(flatten)]
+    pub corrections: Effort,
     pub threads: u32,
     /// Nodes of the mesh, `K`.
     pub nodes: u64,
@@ -78,7 +79,7 @@ impl Row {
     /// A short name for legends: what it is, without what all share.
     pub fn family(&self) -> String {
         match (self.method.as_str(), self.bundle.as_str()) {
-            ("surrogate", bundle) if self.corrections > 0 => {
+            ("surrogate", bundle) if self.corrections.most > 0 => {
                 format!("{bundle}, k = {}", self.corrections)
             }
             ("surrogate", bundle) => bundle.to_owned(),
@@ -88,7 +89,7 @@ impl Row {
     }
 
     /// The family without its number of corrections, and that number, for rows of a bundle: the points of one curve.
-    pub fn curve(&self) -> Option<(String, u32)> {
+    pub fn curve(&self) -> Option<(String, Effort)> {
         (self.method == "surrogate").then(|| (self.bundle.clone(), self.corrections))
     }
 

@@ -25,6 +25,7 @@ use anyhow::{Context, Result, bail};
 use serde_json::json;
 use tissue::mesh::{Boundary, Mesh};
 
+use crate::effort::Effort;
 use crate::host::{Model, ModelSettings};
 use crate::machine::Machine;
 use crate::stress::{progress, replace_between};
@@ -48,7 +49,7 @@ pub struct Plan<'a> {
     pub per_programme: usize,
     pub bundles: &'a [PathBuf],
     /// Corrections a step; none: as many as a bundle recommends.
-    pub corrections: Option<u32>,
+    pub corrections: Option<Effort>,
     /// Lengths of step whose frames are measured besides the bundle's, ms.
     pub step_ms: &'a [f64],
     pub threads: u32,
@@ -117,7 +118,10 @@ pub fn report(plan: &Plan) -> Result<ExitCode> {
         }
         let times = timing::measure(&mut driver, &mesh, &cases, &truths, &clock)?;
         let rows = figures::rows(&figures);
-        let k = plan.corrections.or(bundle.corrections).unwrap_or(0);
+        let k = plan
+            .corrections
+            .or(bundle.corrections)
+            .unwrap_or(Effort::NONE);
         let lead = format!(
             "`{}`, k = {k}, {} cases on {} ({} nodes), frames at {} Hz, each state {} ms after its step's moment, {} thread. {} ({} cores), {date}.",
             bundle.name,
@@ -141,7 +145,7 @@ pub fn report(plan: &Plan) -> Result<ExitCode> {
         for path in pictures.iter().filter(|_| !plan.json) {
             println!("{}", path.display());
         }
-        reports.push(json!({"bundle": bundle.name, "corrections": k, "rows": rows, "present": times, "cases": figures}));
+        reports.push(json!({"bundle": bundle.name, "corrections": k.to_string(), "rows": rows, "present": times, "cases": figures}));
     }
     if reports.is_empty() {
         bail!("nothing could be measured: {}", notes.join("; "));

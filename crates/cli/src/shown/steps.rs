@@ -12,6 +12,7 @@ use tissue::metrics;
 use tissue::schemes::FRAME_S;
 
 use super::truth::{Truth, places};
+use crate::effort::Effort;
 use crate::host::{Model, ModelSettings};
 use crate::machine::Machine;
 use crate::report::plot::label;
@@ -34,7 +35,7 @@ pub struct Plan<'a> {
     pub per_programme: usize,
     pub bundles: &'a [PathBuf],
     /// Corrections a step; none: as many as a bundle recommends.
-    pub corrections: &'a [u32],
+    pub corrections: &'a [Effort],
     pub threads: u32,
     pub markdown: &'a [PathBuf],
     pub json: bool,
@@ -44,7 +45,8 @@ pub struct Plan<'a> {
 #[derive(Debug, Serialize)]
 struct Row {
     bundle: String,
-    corrections: u32,
+    #[serde(flatten)]
+    corrections: Effort,
     step_ms: f64,
     /// Medians over the cases of the mean over steps in which the truth touches, and in which it does not.
     contact_mse_mm2: f64,
@@ -233,7 +235,7 @@ fn median(values: impl Iterator<Item = f64>) -> f64 {
     quantile(&values, 0.5)
 }
 
-fn row(bundle: &str, corrections: u32, step_ms: f64, sums: &[Sums]) -> Row {
+fn row(bundle: &str, corrections: Effort, step_ms: f64, sums: &[Sums]) -> Row {
     let force = |at: usize| sums.iter().map(|own| own.force[at]).sum::<f64>();
     let ms = |free: usize| median(sums.iter().flat_map(|own| own.ms[free].iter().copied()));
     let mse = |free: usize| median(sums.iter().filter_map(|own| own.mean(free)));

@@ -27,6 +27,7 @@ use anyhow::{Context, Result, bail};
 use serde_json::json;
 use tissue::mesh::{Boundary, Mesh};
 
+use crate::effort::Effort;
 use crate::host;
 use crate::machine::Machine;
 use crate::report::method::BundleFolder;
@@ -49,7 +50,7 @@ pub struct Plan<'a> {
     pub per_programme: usize,
     pub bundles: &'a [PathBuf],
     /// Corrections a step; none: 0 and as many as a bundle recommends.
-    pub corrections: &'a [u32],
+    pub corrections: &'a [Effort],
     pub threads: u32,
     pub out: PathBuf,
     pub title: &'a str,
@@ -62,7 +63,7 @@ pub struct Plan<'a> {
 struct Method {
     bundle: BundleFolder,
     drive: Drive,
-    corrections: u32,
+    corrections: Effort,
 }
 
 impl Method {
@@ -119,7 +120,7 @@ pub fn report(plan: &Plan) -> Result<ExitCode> {
     let label = Label {
         bundle: String::new(),
         drive: "reference solver",
-        corrections: 0,
+        corrections: Effort::NONE,
     };
     let mut rows = row::rows(&label, &figures);
     let mut details = vec![json!({"method": label.drive, "cases": figures})];
@@ -164,12 +165,12 @@ fn methods(plan: &Plan, bundles: &[BundleFolder]) -> Vec<Method> {
     let mut methods = Vec::new();
     for bundle in bundles {
         let mut counts = match bundle.corrections {
-            None => vec![0],
-            Some(recommended) if plan.corrections.is_empty() => vec![0, recommended],
+            None => vec![Effort::NONE],
+            Some(recommended) if plan.corrections.is_empty() => vec![Effort::NONE, recommended],
             Some(_) => plan.corrections.to_vec(),
         };
         counts.dedup();
-        let mut add = |drive, counts: &[u32]| {
+        let mut add = |drive, counts: &[Effort]| {
             methods.extend(counts.iter().map(|corrections| Method {
                 bundle: bundle.clone(),
                 drive,
@@ -178,7 +179,7 @@ fn methods(plan: &Plan, bundles: &[BundleFolder]) -> Vec<Method> {
         };
         add(Drive::Solved, &counts);
         if PriorAlone::available(bundle) {
-            add(Drive::Linear, &[0]);
+            add(Drive::Linear, &[Effort::NONE]);
         }
         add(Drive::Geometric, &counts);
     }
@@ -235,7 +236,7 @@ fn measure_all(
 /// Names the case or the bundle.
 pub fn solved(
     bundle: &BundleFolder,
-    corrections: u32,
+    corrections: Effort,
     cases: &ToolCases,
     mesh: &Mesh,
     threads: u32,
@@ -392,11 +393,15 @@ fn document(path: &Path, mesh: &str, made: &str, rows: &[Row]) -> Result<()> {
     let page = std::fs::read_to_string(path).with_context(|| format!("{}", path.display()))?;
     if page.contains(&format!("begin: {summary} ")) {
         // The geometric rule once, with the most corrections: their number hardly matters to it.
-        let most = rows.iter().map(|row| row.corrections).max().unwrap_or(0);
+        let most = rows
+            .iter()
+            .map(|row| row.corrections.most)
+            .max()
+            .unwrap_or(0);
         let methods: Vec<&Row> = over_all
             .into_iter()
             .filter(|row| !row.bundle.is_empty())
-            .filter(|row| row.drive != Drive::Geometric.name() || row.corrections == most)
+            .filter(|row| row.drive != Drive::Geometric.name() || row.corrections.most == most)
             .collect();
         let text = table::markdown(table::FEW, &methods);
         return replace_between(path, &summary, &format!("\n{made}\n\n{text}"));
@@ -404,7 +409,7 @@ fn document(path: &Path, mesh: &str, made: &str, rows: &[Row]) -> Result<()> {
     let each: Vec<&Row> = table::by_programme(rows)
         .into_iter()
         .filter(|row| {
-            row.bundle.is_empty() || row.corrections > 0 && row.drive == Drive::Solved.name()
+            row.bundle.is_empty() || row.corrections.most > 0 && row.drive == Drive::Solved.name()
         })
         .collect();
     let text = format!(

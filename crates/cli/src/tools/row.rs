@@ -5,6 +5,7 @@ use serde::Serialize;
 use super::cases::ToolCase;
 use super::drive::Felt;
 use super::measure::{Moment, Outcome, Truth};
+use crate::effort::Effort;
 use crate::report::quantile;
 
 /// Programme of the row over all programmes without a grasp.
@@ -52,7 +53,8 @@ pub struct CaseFigures {
 pub struct Row {
     pub bundle: String,
     pub drive: &'static str,
-    pub corrections: u32,
+    #[serde(flatten)]
+    pub corrections: Effort,
     pub programme: String,
     pub cases: usize,
     /// Mean and median over the cases.
@@ -300,7 +302,7 @@ impl Row {
 pub struct Label {
     pub bundle: String,
     pub drive: &'static str,
-    pub corrections: u32,
+    pub corrections: Effort,
 }
 
 /// A row a programme, in the order in which they occur, and one over all but grasp where there are several.

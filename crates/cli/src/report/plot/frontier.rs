@@ -1,6 +1,7 @@
 //! The frontier: error against run time, both logarithmic, with the Pareto front drawn.
 
 use super::axes::{Axes, Scale, label, legend};
+use crate::effort::Effort;
 
 /// Below this an error is round-off of the reference itself, mm².
 const EXACT: f64 = 1e-7;
@@ -13,7 +14,7 @@ pub struct Point {
     /// What distinguishes it within its family, beside its corrections.
     pub label: String,
     /// Corrections a step in contact: points of one family and label with several of them are one curve.
-    pub corrections: u32,
+    pub corrections: Effort,
     pub milliseconds: f64,
     /// mm²; zero (the reference itself) is drawn at the bottom edge.
     pub mse: f64,
@@ -42,7 +43,7 @@ pub fn pareto_front(points: &[Point]) -> Vec<usize> {
 /// The family, and the corrections where there are any.
 fn named(point: &Point) -> String {
     match point.corrections {
-        0 => point.family.clone(),
+        Effort { most: 0, .. } => point.family.clone(),
         count => format!("{}, k = {count}", point.family),
     }
 }
@@ -50,7 +51,9 @@ fn named(point: &Point) -> String {
 /// Indices of the points that differ by their corrections alone, by ascending corrections; sets of two or more.
 fn curves(points: &[Point]) -> Vec<Vec<usize>> {
     let mut curves: Vec<Vec<usize>> = Vec::new();
-    for (index, point) in points.iter().enumerate() {
+    // A point whose corrections go by a target lies off the curve of counts.
+    let counted = |point: &&Point| point.corrections.target_mm == 0.0;
+    for (index, point) in points.iter().enumerate().filter(|(_, p)| counted(p)) {
         let same = |other: &&mut Vec<usize>| {
             let first = &points[other[0]];
             first.family == point.family && first.label == point.label
@@ -62,7 +65,7 @@ fn curves(points: &[Point]) -> Vec<Vec<usize>> {
     }
     curves.retain(|curve| curve.len() > 1);
     for curve in &mut curves {
-        curve.sort_by_key(|&index| points[index].corrections);
+        curve.sort_by_key(|&index| points[index].corrections.most);
     }
     curves
 }
@@ -184,7 +187,7 @@ mod tests {
         Point {
             family: "a".into(),
             label: String::new(),
-            corrections: 0,
+            corrections: Effort::NONE,
             milliseconds,
             mse,
             plain: false,
@@ -196,7 +199,7 @@ mod tests {
         let of = |family: &str, label: &str, corrections| Point {
             family: family.into(),
             label: label.into(),
-            corrections,
+            corrections: Effort::fixed(corrections),
             ..point(1.0, 1.0)
         };
         let points = [
