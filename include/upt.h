@@ -624,15 +624,15 @@ typedef struct upt_scene_options {
   int32_t step_path;
   /**
    * Corrections by the elements while there is contact: 1 to 64 a step, 0 as many as the bundle recommends,
-   * `UPT_CORRECTIONS_NONE`, or `UPT_CORRECTIONS_AUTO`.
+   * `UPT_CORRECTIONS_NONE`, or `UPT_CORRECTIONS_AUTO` for up to 64. A count with a budget or a target is the most that a step gets.
    */
   int32_t corrections;
   /**
-   * `UPT_CORRECTIONS_AUTO`: no correction starts later than this in a step, µs; 0: no budget.
+   * No correction starts later than this in a step, µs; 0: no budget. Only with a count or `UPT_CORRECTIONS_AUTO`.
    */
   uint32_t corrections_budget_us;
   /**
-   * `UPT_CORRECTIONS_AUTO`: enough where the estimated error is below this, mm; 0: no target.
+   * Enough where the estimated error is below this, mm; 0: no target. Only with a count or `UPT_CORRECTIONS_AUTO`.
    */
   float corrections_target_mm;
   /**

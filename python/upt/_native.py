@@ -413,11 +413,11 @@ class SceneOptions(Record):
     """`UPT_STEP_*`: who makes a step of a `UPT_KIND_UPT` bundle."""
     corrections: Corrections = choice("_corrections", Corrections)
     """Corrections by the elements while there is contact: 1 to 64 a step, 0 as many as the bundle recommends,
-    `UPT_CORRECTIONS_NONE`, or `UPT_CORRECTIONS_AUTO`."""
+    `UPT_CORRECTIONS_NONE`, or `UPT_CORRECTIONS_AUTO` for up to 64. A count with a budget or a target is the most that a step gets."""
     corrections_budget_us: int
-    """`UPT_CORRECTIONS_AUTO`: no correction starts later than this in a step, µs; 0: no budget."""
+    """No correction starts later than this in a step, µs; 0: no budget. Only with a count or `UPT_CORRECTIONS_AUTO`."""
     corrections_target_mm: float
-    """`UPT_CORRECTIONS_AUTO`: enough where the estimated error is below this, mm; 0: no target."""
+    """Enough where the estimated error is below this, mm; 0: no target. Only with a count or `UPT_CORRECTIONS_AUTO`."""
     error_limit_mm: float
     """`UPT_FLAG_ERROR` rises where the estimated error is above this, mm; 0: never."""
     step_s: float
@@ -476,11 +476,11 @@ class SceneOptionsKeywords(TypedDict, total=False):
     """`UPT_STEP_*`: who makes a step of a `UPT_KIND_UPT` bundle."""
     corrections: Corrections | str | int
     """Corrections by the elements while there is contact: 1 to 64 a step, 0 as many as the bundle recommends,
-    `UPT_CORRECTIONS_NONE`, or `UPT_CORRECTIONS_AUTO`."""
+    `UPT_CORRECTIONS_NONE`, or `UPT_CORRECTIONS_AUTO` for up to 64. A count with a budget or a target is the most that a step gets."""
     corrections_budget_us: int
-    """`UPT_CORRECTIONS_AUTO`: no correction starts later than this in a step, µs; 0: no budget."""
+    """No correction starts later than this in a step, µs; 0: no budget. Only with a count or `UPT_CORRECTIONS_AUTO`."""
     corrections_target_mm: float
-    """`UPT_CORRECTIONS_AUTO`: enough where the estimated error is below this, mm; 0: no target."""
+    """Enough where the estimated error is below this, mm; 0: no target. Only with a count or `UPT_CORRECTIONS_AUTO`."""
     error_limit_mm: float
     """`UPT_FLAG_ERROR` rises where the estimated error is above this, mm; 0: never."""
     step_s: float

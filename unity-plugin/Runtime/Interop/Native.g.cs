@@ -117,12 +117,12 @@ namespace Upt.Interop
         public int step_path;
         /// <summary>
         /// Corrections by the elements while there is contact: 1 to 64 a step, 0 as many as the bundle recommends,
-        /// `UPT_CORRECTIONS_NONE`, or `UPT_CORRECTIONS_AUTO`.
+        /// `UPT_CORRECTIONS_NONE`, or `UPT_CORRECTIONS_AUTO` for up to 64. A count with a budget or a target is the most that a step gets.
         /// </summary>
         public int corrections;
-        /// <summary>`UPT_CORRECTIONS_AUTO`: no correction starts later than this in a step, µs; 0: no budget.</summary>
+        /// <summary>No correction starts later than this in a step, µs; 0: no budget. Only with a count or `UPT_CORRECTIONS_AUTO`.</summary>
         public uint corrections_budget_us;
-        /// <summary>`UPT_CORRECTIONS_AUTO`: enough where the estimated error is below this, mm; 0: no target.</summary>
+        /// <summary>Enough where the estimated error is below this, mm; 0: no target. Only with a count or `UPT_CORRECTIONS_AUTO`.</summary>
         public float corrections_target_mm;
         /// <summary>`UPT_FLAG_ERROR` rises where the estimated error is above this, mm; 0: never.</summary>
         public float error_limit_mm;

@@ -21,7 +21,10 @@ use std::time::Instant;
 
 use anyhow::{Result, bail};
 use clap::Args;
-use serde_json::json;
+use serde_json::{Value, json};
+
+use crate::effort::Effort;
+use crate::manifest::Manifest;
 
 const FILE: &str = "corrections.safetensors";
 
@@ -29,7 +32,8 @@ const FILE: &str = "corrections.safetensors";
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   upt corrections onnx/brain-reduced
-  upt corrections my-bundle --natural 60 --patches 160 --recommended 3")]
+  upt corrections my-bundle --natural 60 --patches 160 --recommended 3
+  upt corrections my-bundle --keep --recommended 10@0.02")]
 pub struct Options {
     /// Bundle folder with a linear response; `corrections.safetensors` and the manifest's entry are written there.
     pub bundle: PathBuf,
@@ -45,12 +49,16 @@ pub struct Options {
     /// Use the bundle's own residual modes (kind `reduced`) in place of patches.
     #[arg(long)]
     pub residual: bool,
-    /// Corrections a step that the bundle recommends.
-    #[arg(long, default_value_t = 3)]
-    pub recommended: u32,
+    /// Corrections a step that the bundle recommends; COUNT@MM: at most COUNT, fewer where the estimated error is below MM.
+    #[arg(long, default_value_t = Effort::fixed(3))]
+    pub recommended: Effort,
     /// Factor of the estimated error: `truth over estimate` of `training/scripts/corrections_table.py` on held-out cases.
-    #[arg(long, default_value_t = 1.0)]
-    pub calibration: f32,
+    /// Default: 1, with --keep the bundle's own.
+    #[arg(long)]
+    pub calibration: Option<f32>,
+    /// Keep the bundle's file: only what the manifest says of it changes.
+    #[arg(long)]
+    pub keep: bool,
     /// Seed of the patches.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
@@ -64,6 +72,21 @@ pub struct Options {
 
 /// Runs the command.
 pub fn run(args: &Options) -> Result<ExitCode> {
+    if let Some(calibration) = args.calibration
+        && !(calibration.is_finite() && calibration > 0.0)
+    {
+        bail!("--calibration is {calibration}, must be positive");
+    }
+    if args.keep {
+        recommend(&args.bundle, args.recommended, args.calibration)?;
+        let path = args.bundle.join("bundle.json");
+        if args.json {
+            println!("{}", json!({"file": path, "recommended": args.recommended}));
+        } else {
+            println!("{}: recommends {}", path.display(), args.recommended);
+        }
+        return Ok(ExitCode::SUCCESS);
+    }
     let started = Instant::now();
     let count = write(args)?;
     let seconds = started.elapsed().as_secs_f64();
@@ -82,27 +105,44 @@ pub fn run(args: &Options) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Changes how many corrections the bundle recommends and what their estimated error is multiplied by.
-pub fn set_calibration(bundle: &Path, recommended: u32, calibration: f32) -> Result<()> {
-    manifest::add(
-        bundle,
-        FILE,
-        &json!({"file": FILE, "recommended": recommended, "calibration": calibration}),
-    )
+/// Changes how many corrections the bundle recommends and what their estimated error is multiplied by (none: as before).
+pub fn recommend(bundle: &Path, recommended: Effort, calibration: Option<f32>) -> Result<()> {
+    let before: Option<Value> = Manifest::read(bundle)?.get("corrections")?;
+    let Some(before) = before else {
+        bail!(
+            "{}: has no corrections; leave --keep out, and they are made",
+            bundle.display()
+        );
+    };
+    let calibration = calibration.map_or_else(
+        || before["calibration"].clone(),
+        |calibration| json!(calibration),
+    );
+    manifest::add(bundle, FILE, &entry(recommended, calibration))
+}
+
+/// The manifest's entry.
+fn entry(recommended: Effort, calibration: Value) -> Value {
+    let mut entry = json!({"file": FILE, "recommended": recommended.most});
+    if recommended.target_mm > 0.0 {
+        entry["target_mm"] = short(recommended.target_mm);
+    }
+    if !calibration.is_null() {
+        entry["calibration"] = calibration;
+    }
+    entry
+}
+
+/// A float32 with the digits that it was given.
+fn short(value: f32) -> Value {
+    value
+        .to_string()
+        .parse::<f64>()
+        .map_or(Value::Null, Value::from)
 }
 
 /// Writes the file and the manifest's entry; returns the number of modes.
 pub fn write(args: &Options) -> Result<usize> {
-    if !(args.calibration.is_finite() && args.calibration > 0.0) {
-        bail!("--calibration is {}, must be positive", args.calibration);
-    }
-    if args.recommended > upt::corrections::LIMIT {
-        bail!(
-            "--recommended is {}, must be at most {}",
-            args.recommended,
-            upt::corrections::LIMIT
-        );
-    }
     if args.natural == 0 {
         bail!("--natural is 0; corrections need natural modes");
     }
@@ -124,7 +164,7 @@ pub fn write(args: &Options) -> Result<usize> {
         &args.bundle,
         more.into_iter(),
         args.recommended,
-        args.calibration,
+        args.calibration.unwrap_or(1.0),
     )
 }
 

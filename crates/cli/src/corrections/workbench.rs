@@ -4,7 +4,6 @@ use std::path::Path;
 
 use anyhow::{Context, Result, bail};
 use elements::{ElementForces, Material, Simd};
-use serde_json::json;
 use tissue::linear::{Factor, Lame, NaturalModes, Stiffness, natural_modes};
 use tissue::mesh::{Boundary, Mesh};
 use upt::bundle::BundleFiles;
@@ -12,7 +11,8 @@ use upt::prior::PriorTable;
 
 use super::pushes::Pushes;
 use super::space::Space;
-use super::{FILE, manifest};
+use super::{FILE, entry, manifest, short};
+use crate::effort::Effort;
 use crate::progress::spinner;
 
 pub struct Workbench {
@@ -106,7 +106,7 @@ impl Workbench {
         &self,
         bundle: &Path,
         more: impl Iterator<Item = Vec<f32>>,
-        recommended: u32,
+        recommended: Effort,
         calibration: f32,
     ) -> Result<usize> {
         let density = self.material.density_kg_m3;
@@ -117,11 +117,7 @@ impl Workbench {
         let count = space
             .write(&path, &frequency)
             .with_context(|| format!("{}: cannot be written", path.display()))?;
-        manifest::add(
-            bundle,
-            FILE,
-            &json!({"file": FILE, "recommended": recommended, "calibration": calibration}),
-        )?;
+        manifest::add(bundle, FILE, &entry(recommended, short(calibration)))?;
         Ok(count)
     }
 }

@@ -29,6 +29,7 @@ use tissue::mesh::{Boundary, Mesh};
 
 use crate::check;
 use crate::corrections::{Workbench, principal};
+use crate::effort::Effort;
 use crate::{corrections, modes, preview, prior};
 use options::Sizes;
 use stages::{Work, key_of};
@@ -179,7 +180,7 @@ pub fn run(options: &Options) -> Result<ExitCode> {
             let count = bench.write_space(
                 &draft,
                 principal(&found, options.patches.div_ceil(3).min(60)).into_iter(),
-                options.recommended,
+                Effort::fixed(options.recommended),
                 1.0,
             )?;
             bundle::publish(&draft, &options.out)?;
@@ -222,7 +223,7 @@ pub fn run(options: &Options) -> Result<ExitCode> {
         ));
     };
     if let Some(factor) = certificate.calibration() {
-        corrections::set_calibration(&certified, corrections, factor)?;
+        corrections::recommend(&certified, Effort::fixed(corrections), Some(factor))?;
     }
     certificate.finish(
         &certified,
@@ -278,7 +279,7 @@ fn certify(
     let copy = work.file(&name);
     bundle::copy(draft, &copy)?;
     if corrections != options.recommended {
-        corrections::set_calibration(&copy, corrections, 1.0)?;
+        corrections::recommend(&copy, Effort::fixed(corrections), Some(1.0))?;
     }
     let files = [format!("{name}.json"), format!("{name}.errors")];
     let paths = files.each_ref().map(|file| work.file(file));
