@@ -311,7 +311,7 @@
 #define UPT_FLAG_REGULARISED 1024
 
 /**
- * The corrections ended inverted, and the linear response took their place.
+ * The corrections ended inverted: under tools the tissue stays where it was, else the linear response takes their place.
  */
 #define UPT_FLAG_FELL_BACK 2048
 

@@ -186,7 +186,7 @@ class Flag(IntFlag):
     REGULARISED = 1024
     """The contact block was nearly singular and was regularised."""
     FELL_BACK = 2048
-    """The corrections ended inverted, and the linear response took their place."""
+    """The corrections ended inverted: under tools the tissue stays where it was, else the linear response takes their place."""
     ERROR = 4096
     """The estimated error is above the scene's `error_limit_mm`."""
     DEEP = 8192

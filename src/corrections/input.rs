@@ -26,7 +26,7 @@ pub struct Report {
     pub min_det: f32,
     /// The load was taken in this many parts.
     pub parts: u32,
-    /// The iterations ended inverted and the linear response took their place.
+    /// The iterations ended inverted and something else took their place.
     pub fell_back: bool,
 }
 

@@ -77,8 +77,58 @@ impl Stage {
         at: &mut Iterate<'_>,
         report: &mut Report,
     ) -> Result<()> {
-        let env = lent.env();
         self.guess_loaded(lent, input, problem, at, report)?;
+        let mut size = self.improve_loaded(lent, input, problem, at, report)?;
+        let sound = self.motion.min_det >= SMALLEST_DET && !input.still;
+        if !is_sound(size, at.det) && sound {
+            // The guess inverts, however short its parts: the tools push their way in by iterations alone.
+            self.stay(lent, input, problem, at, report)?;
+            size = self.improve_loaded(lent, input, problem, at, report)?;
+        }
+        if !is_sound(size, at.det) {
+            report.fell_back = true;
+            self.memory.clear();
+            if sound {
+                // As it was, under the forces that held it there.
+                self.stay(lent, input, problem, at, report)?;
+            } else {
+                // Linear elasticity from rest, with the tools where they are.
+                problem.let_go();
+                at.u.fill(0.0);
+                self.preconditioner.coordinates.fill(0.0);
+                self.press(lent, input, problem, 1.0, at.u)?;
+                self.settle(lent.env(), at.u)?;
+                self.evaluate(lent, input, at, report)?;
+            }
+        }
+        report.min_det = at.det;
+        Ok(())
+    }
+
+    /// The state of the step before, with the forces that it had.
+    fn stay(
+        &mut self,
+        lent: Lent<'_>,
+        input: &Input<'_>,
+        problem: &mut Problem,
+        at: &mut Iterate<'_>,
+        report: &mut Report,
+    ) -> Result<()> {
+        problem.restart();
+        at.u.copy_from_slice(input.last);
+        self.evaluate(lent, input, at, report)
+    }
+
+    /// The iterations from a guess; returns the length of what they left unbalanced.
+    fn improve_loaded(
+        &mut self,
+        lent: Lent<'_>,
+        input: &Input<'_>,
+        problem: &mut Problem,
+        at: &mut Iterate<'_>,
+        report: &mut Report,
+    ) -> Result<f64> {
+        let env = lent.env();
         let touched = problem.touched(&env.body.held);
         self.preconditioner.engage(env, touched)?;
         let start = self.unbalanced(env, problem, at.g)?;
@@ -86,7 +136,7 @@ impl Stage {
         for iteration in 0..input.enough.iterations {
             let until = input.enough.until;
             let late = until.is_some_and(|until| Instant::now() >= until);
-            if !size.is_finite() || at.det < SMALLEST_DET || (iteration > 0 && late) {
+            if !is_sound(size, at.det) || (iteration > 0 && late) {
                 break;
             }
             self.improve_at(lent, input, problem, at, 1.0, report)?;
@@ -99,27 +149,8 @@ impl Stage {
                 break;
             }
         }
-        if !size.is_finite() || at.det < SMALLEST_DET {
-            // Linear elasticity from rest, with the tools where they are.
-            problem.let_go();
-            at.u.fill(0.0);
-            self.preconditioner.coordinates.fill(0.0);
-            self.press(lent, input, problem, 1.0, at.u)?;
-            self.settle(env, at.u)?;
-            self.evaluate(lent, input, at, report)?;
-            let sound = self.motion.min_det >= SMALLEST_DET && !input.still;
-            if at.det < SMALLEST_DET && sound {
-                // Inverted too: the tissue stays where it was.
-                problem.let_go();
-                at.u.copy_from_slice(input.last);
-                self.evaluate(lent, input, at, report)?;
-            }
-            report.fell_back = true;
-            self.memory.clear();
-        }
         report.residual = (size / start.max(f64::MIN_POSITIVE)) as f32;
-        report.min_det = at.det;
-        Ok(())
+        Ok(size)
     }
 
     /// `F(u)` and det F of a state that no iteration led to.
@@ -340,6 +371,11 @@ impl Stage {
         (self.d, self.q, self.g_new) = (d, q, g_new);
         Ok(())
     }
+}
+
+/// Whether the elements can go on from a state.
+fn is_sound(unbalanced: f64, min_det: f32) -> bool {
+    unbalanced.is_finite() && min_det >= SMALLEST_DET
 }
 
 fn compliance<'a>(lent: Lent<'a>, preconditioner: &'a Preconditioner) -> Compliance<'a> {

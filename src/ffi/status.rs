@@ -133,7 +133,7 @@ pub const UPT_FLAG_GROWTH: u32 = 256;
 pub const UPT_FLAG_CLAMPED: u32 = 512;
 /// The contact block was nearly singular and was regularised.
 pub const UPT_FLAG_REGULARISED: u32 = 1024;
-/// The corrections ended inverted, and the linear response took their place.
+/// The corrections ended inverted: under tools the tissue stays where it was, else the linear response takes their place.
 pub const UPT_FLAG_FELL_BACK: u32 = 2048;
 /// The estimated error is above the scene's `error_limit_mm`.
 pub const UPT_FLAG_ERROR: u32 = 4096;

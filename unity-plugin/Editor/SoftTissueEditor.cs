@@ -21,7 +21,7 @@ namespace Upt.Editor
             "guard: growth",
             "correction bounded",
             "contact block regularised",
-            "corrections ended inverted: the linear response is shown",
+            "corrections ended inverted and were given up",
             "estimated error above the limit",
             "tissue more than 1 mm inside of an instrument",
         };

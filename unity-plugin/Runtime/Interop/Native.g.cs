@@ -475,7 +475,7 @@ namespace Upt.Interop
         public const uint UPT_FLAG_CLAMPED = 512;
         /// <summary>The contact block was nearly singular and was regularised.</summary>
         public const uint UPT_FLAG_REGULARISED = 1024;
-        /// <summary>The corrections ended inverted, and the linear response took their place.</summary>
+        /// <summary>The corrections ended inverted: under tools the tissue stays where it was, else the linear response takes their place.</summary>
         public const uint UPT_FLAG_FELL_BACK = 2048;
         /// <summary>The estimated error is above the scene's `error_limit_mm`.</summary>
         public const uint UPT_FLAG_ERROR = 4096;

@@ -123,7 +123,7 @@ impl Session {
                 (ffi::UPT_FLAG_GROWTH, "guard: growth"),
                 (ffi::UPT_FLAG_CLAMPED, "correction bounded"),
                 (ffi::UPT_FLAG_REGULARISED, "contact regularised"),
-                (ffi::UPT_FLAG_FELL_BACK, "fell back on linear elasticity"),
+                (ffi::UPT_FLAG_FELL_BACK, "corrections given up"),
                 (ffi::UPT_FLAG_DEEP, "tool deep in the tissue"),
             ],
         }
