@@ -50,8 +50,7 @@ impl Problem {
     /// Tells each tool what it feels, tears grasps that are pulled too hard. `state` is that at the end of the step.
     pub fn finish(&mut self, state: State<'_>) {
         for index in 0..self.tools.len() {
-            let pose = self.tools[index].pose;
-            let penetration_mm = self.deepest(index, &pose, state).max(0.0);
+            let penetration_mm = self.deepest(index, state);
             let tool = &self.tools[index];
             let (mut force, mut torque) = (Vector::ZERO, Vector::ZERO);
             let (mut pull, mut normal) = (Vector::ZERO, Vector::ZERO);

@@ -19,8 +19,6 @@ use crate::memory;
 
 /// A tool that moves farther in a step was put there, not moved, mm.
 const PUT_MM: f32 = 40.0;
-/// What lies deeper inside of a tool at the start of a step comes out by this much a step, mm.
-const RECOVERY_MM: f32 = 3.0;
 /// Linearisations of the gap.
 const LINEARISATIONS: usize = 2;
 /// Parts of a step's way at most.
@@ -32,8 +30,8 @@ pub struct Problem {
     pub(super) tools: Vec<Tool>,
     /// Where each tool was when the step began.
     pub(super) before: Vec<Pose>,
-    /// Depth that each tool may keep in this step, mm.
-    pub(super) allowed: Vec<f32>,
+    /// Which of them were put there in this step.
+    pub(super) put: Vec<bool>,
     /// At the end of the last published step.
     pub past: Past,
     /// Of the step being made.
@@ -76,7 +74,7 @@ impl Problem {
         Ok(Problem {
             tools: memory::room(MAX_TOOLS, WHAT)?,
             before: memory::room(MAX_TOOLS, WHAT)?,
-            allowed: memory::room(MAX_TOOLS, WHAT)?,
+            put: memory::room(MAX_TOOLS, WHAT)?,
             past: Past::with_room(room)?,
             next: Past::with_room(room)?,
             search: Search::default(),
@@ -105,7 +103,7 @@ impl Problem {
     pub fn leave(&mut self) {
         self.tools.clear();
         self.before.clear();
-        self.allowed.clear();
+        self.put.clear();
         self.next.clear();
     }
 
@@ -144,12 +142,13 @@ impl Problem {
             start,
         };
         self.before.clear();
-        self.allowed.clear();
+        self.put.clear();
         for (index, tool) in tools.iter().enumerate() {
             let known = self.past.tools.get(index).map(|held| held.pose);
             let moved = known.filter(|from| tool.body.motion(from, &tool.pose) <= PUT_MM);
             let from = moved.unwrap_or(tool.pose);
             self.before.push(from);
+            self.put.push(moved.is_none());
             if self.next.tools.len() <= index {
                 self.next.tools.push(Held::default());
             }
@@ -165,10 +164,6 @@ impl Problem {
                 held.grasp.open();
             }
             held.closed = closes;
-        }
-        for index in 0..tools.len() {
-            let deepest = self.deepest(index, &self.before[index].clone(), state);
-            self.allowed.push((deepest - RECOVERY_MM).max(0.0));
         }
         Ok(())
     }
@@ -194,8 +189,7 @@ impl Problem {
 
     /// Whether the tissue lies inside of a tool deeper than `depth_mm`, tools at their ends.
     pub fn intrudes(&mut self, state: State<'_>, depth_mm: f32) -> bool {
-        (0..self.tools.len())
-            .any(|index| self.deepest(index, &self.tools[index].pose.clone(), state) > depth_mm)
+        (0..self.tools.len()).any(|index| self.deepest(index, state) > depth_mm)
     }
 
     /// Whether a grasper holds a sample.
@@ -281,7 +275,7 @@ impl Problem {
         let moving = Moving {
             tools: &self.tools,
             before: &self.before,
-            allowed: &self.allowed,
+            put: &self.put,
             held: &self.next.tools,
             samples,
             state,

@@ -2,7 +2,7 @@
 
 use ::contact::{Body, Contact, Law, Placed, Pose, SKIN_MM, Samples, Vector, pose};
 
-use super::past::Held;
+use super::past::{Force, Held};
 use super::problem::Problem;
 use super::tool::{MAX_TOOLS, Tool};
 
@@ -10,6 +10,10 @@ use super::tool::{MAX_TOOLS, Tool};
 const MOST_ROWS: usize = 256;
 /// Longest way through a tool, mm.
 const THROUGH_MM: f32 = 30.0;
+/// What lies deeper inside of a tool at the start of a step comes out by this much a step, mm.
+const RECOVERY_MM: f32 = 3.0;
+/// A sample no deeper than this in a tool has not been gone through by it, mm.
+const SHALLOW_MM: f32 = 0.5;
 /// A tool's normal may lean this much (cosine) to the outside of the tissue; beyond, the tool reaches the sample from within.
 const LEAN: f32 = 0.2;
 
@@ -120,28 +124,41 @@ impl Problem {
         self.rows.sort_unstable_by_key(|row| (row.tool, row.sample));
     }
 
-    /// How deep the deepest sample lies inside of a tool at a pose, mm; not positive where none does.
-    pub(super) fn deepest(&mut self, index: usize, at: &Pose, state: State<'_>) -> f32 {
+    /// How deep the deepest sample lies inside of a tool at its end, the way that it has to come out, mm; 0 where none does.
+    pub(super) fn deepest(&mut self, index: usize, state: State<'_>) -> f32 {
         let tool = &self.tools[index];
         let placed = Placed {
             body: &tool.body,
-            pose: *at,
+            pose: tool.pose,
             skin: 0.0,
         };
-        let samples = &self.samples;
-        let found = self
-            .search
-            .find(samples, &[placed], |node| state.position(node));
-        let mut deepest = 0.0f32;
-        for candidate in found {
-            let outward = outward(samples, candidate.sample, state);
-            let depth = match candidate.normal.dot(outward) > LEAN {
-                true => tool.body.way_out(at, candidate.point, -outward, THROUGH_MM),
-                false => Some(-candidate.distance),
+        let search = &mut self.search;
+        search.find(&self.samples, &[placed], |node| state.position(node));
+        let moving = Moving {
+            tools: &self.tools,
+            before: &self.before,
+            put: &self.put,
+            held: &self.next.tools,
+            samples: &self.samples,
+            state,
+            part: 1.0,
+        };
+        let depths = self.search.found().iter().map(|candidate| {
+            let (tool, sample) = (index as u32, candidate.sample);
+            let place = self
+                .next
+                .forces
+                .binary_search_by_key(&(tool, sample), Force::key);
+            let row = Row {
+                tool,
+                sample,
+                force: place.map_or(Vector::ZERO, |at| self.next.forces[at].force),
+                point: candidate.point,
+                outward: outward(&self.samples, sample, state),
             };
-            deepest = deepest.max(depth.unwrap_or(0.0));
-        }
-        deepest
+            -moving.contact(&row, 1.0).gap
+        });
+        depths.fold(0.0, f32::max)
     }
 }
 
@@ -161,18 +178,21 @@ pub(crate) struct Pair<'a> {
     pub(crate) now: &'a Pose,
     /// Place of a held sample in the tool's frame.
     pub(crate) anchor: Option<Vector>,
-    /// Depth that may stay, mm.
-    pub(crate) allowed: f32,
+    /// The tool was put where it is: nobody knows which way it came.
+    pub(crate) put: bool,
 }
 
 impl Pair<'_> {
-    /// Gap and slip of a sample that was at `start` and is at `point`, on a surface with normal `outward`, `pushed` so far or not.
+    /// Gap and slip of a sample that was at `start` and is at `point`, on a surface with normal `outward`, under `force` so far.
+    ///
+    /// It comes out of the tool where it is nearest to its surface, unless the tool has gone through the tissue's surface there: then
+    /// into the tissue, the way that the tool came.
     pub(crate) fn contact(
         &self,
         point: Vector,
         start: Vector,
         outward: Vector,
-        pushed: bool,
+        force: Vector,
     ) -> Contact {
         let nearest = self.body.nearest_at(self.now, point);
         if let Some(place) = self.anchor {
@@ -185,16 +205,21 @@ impl Pair<'_> {
         }
         let (mut normal, mut gap) = (nearest.normal, nearest.distance);
         if normal.dot(outward) > LEAN {
+            let pushed = force != Vector::ZERO;
             let advance = self.now.translation - self.from.translation;
-            let from_within = !pushed && advance.dot(outward) > 0.0;
-            let way = match gap < 0.0 && !from_within {
-                true => self.body.way_out(self.now, point, -outward, THROUGH_MM),
-                false => None,
-            };
-            let Some(way) = way else {
+            if !pushed && (gap >= 0.0 || advance.dot(outward) > 0.0) {
                 return RELEASED;
-            };
-            (normal, gap) = (-outward, -way);
+            }
+            if gap < 0.0 {
+                let way = self.body.way_out(self.now, point, -outward, THROUGH_MM);
+                let back = force.dot(outward) < -force.dot(normal);
+                if self.put || back || self.went(point, start, way.unwrap_or(THROUGH_MM)) {
+                    let Some(way) = way else {
+                        return RELEASED;
+                    };
+                    (normal, gap) = (-outward, -way);
+                }
+            }
         }
         let carried = self
             .now
@@ -204,9 +229,17 @@ impl Pair<'_> {
                 friction: self.friction,
             },
             normal,
-            gap: gap + self.allowed,
+            gap,
             slip: point - start - (carried - start),
         }
+    }
+
+    /// Whether a sample may have come `way` into the tool since it was at `start`, or lay in it already.
+    fn went(&self, point: Vector, start: Vector, way: f32) -> bool {
+        let depth = -self.body.nearest_at(self.from, start).distance;
+        let [now, then] = [(self.now, point), (self.from, start)]
+            .map(|(pose, point)| pose.inverse_transform_point(point));
+        depth > SHALLOW_MM || way <= now.distance(then) + SHALLOW_MM
     }
 }
 
@@ -223,8 +256,8 @@ pub(super) struct Moving<'a> {
     pub tools: &'a [Tool],
     /// Where they were at the start of the step.
     pub before: &'a [Pose],
-    /// How far inside each may be, mm.
-    pub allowed: &'a [f32],
+    /// Which of them were put there in this step.
+    pub put: &'a [bool],
     /// What each holds.
     pub held: &'a [Held],
     pub samples: &'a Samples,
@@ -234,8 +267,20 @@ pub(super) struct Moving<'a> {
 }
 
 impl Moving<'_> {
-    /// Gap and slip of a row at its point.
+    /// Gap and slip of a row at its point. What lay deep inside of the tool when the step began may stay so, but for [`RECOVERY_MM`].
     pub(super) fn measure(&self, row: &Row) -> Contact {
+        let mut contact = self.contact(row, self.part);
+        if contact.gap < 0.0 {
+            let sample = self.samples.rows()[row.sample as usize];
+            let point = sample.gather(|node| self.start(node));
+            let then = self.contact(&Row { point, ..*row }, 0.0);
+            contact.gap += (-then.gap - RECOVERY_MM).max(0.0);
+        }
+        contact
+    }
+
+    /// The same, with the tool at part `part` of its way and nothing allowed.
+    fn contact(&self, row: &Row, part: f32) -> Contact {
         let index = row.tool as usize;
         let Some(tool) = self.tools.get(index) else {
             return RELEASED;
@@ -245,13 +290,70 @@ impl Moving<'_> {
             body: &tool.body,
             friction: tool.friction,
             from: before,
-            now: &pose::between(before, &tool.pose, self.part),
+            now: &pose::between(before, &tool.pose, part),
             anchor: self.held[index].grasp.place(row.sample),
-            allowed: self.allowed[index],
+            put: self.put[index],
         };
         let sample = self.samples.rows()[row.sample as usize];
-        let State { rest, start, .. } = self.state;
-        let start = sample.gather(|node| vector(rest, node) + vector(start, node));
-        pair.contact(row.point, start, row.outward, row.force != Vector::ZERO)
+        let start = sample.gather(|node| self.start(node));
+        pair.contact(row.point, start, row.outward, row.force)
+    }
+
+    /// Where a node was when the step began.
+    fn start(&self, node: u32) -> Vector {
+        vector(self.state.rest, node) + vector(self.state.start, node)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ::contact::Shape;
+
+    /// A plate, 20 by 2 by 20 mm, that went from height `from` to height `to`, and a sample that did not move: its contact.
+    fn plate(from: f32, to: f32, at: Vector, outward: Vector, force: Vector, put: bool) -> Contact {
+        let half_extents = [10.0, 1.0, 10.0];
+        let body = Body::new(&Shape::Box { half_extents }).unwrap();
+        let pose = |height| Pose::from_translation(Vector::new(0.0, height, 0.0));
+        let pair = Pair {
+            body: &body,
+            friction: 0.0,
+            from: &pose(from),
+            now: &pose(to),
+            anchor: None,
+            put,
+        };
+        pair.contact(at, at, outward, force)
+    }
+
+    #[test]
+    fn a_surface_that_a_tool_went_through_comes_back_the_way_it_came() {
+        // From above the surface at 0 to 0.6 below it: the near way out is up, out of the tissue.
+        let contact = plate(1.5, -0.6, Vector::ZERO, Vector::Y, Vector::ZERO, false);
+        assert_eq!(contact.normal, -Vector::Y);
+        assert!((contact.gap + 1.6).abs() < 1e-2, "{contact:?}");
+        // And goes on so while it is pushed, and where the tool was put there.
+        for (force, put) in [(-Vector::Y, false), (Vector::ZERO, true)] {
+            let contact = plate(-0.6, -0.6, Vector::ZERO, Vector::Y, force, put);
+            assert_eq!(contact.normal, -Vector::Y, "{contact:?}");
+        }
+    }
+
+    #[test]
+    fn a_surface_that_leans_over_an_edge_is_pushed_off_it_and_not_through_the_tool() {
+        // It lies 0.05 mm deep at the side of the plate and its normal has come round: across the plate it would be 19 mm.
+        let (at, outward) = (
+            Vector::new(9.95, 0.0, 0.0),
+            Vector::new(0.3, 0.0, 1.0).normalize(),
+        );
+        for force in [Vector::ZERO, Vector::X] {
+            let contact = plate(0.0, 0.0, at, outward, force, false);
+            assert_eq!(contact.normal, Vector::X);
+            assert!((contact.gap + 0.05).abs() < 1e-4, "{contact:?}");
+        }
+        // What a tool reaches from within the tissue is not pushed out of it.
+        let (at, outward) = (Vector::new(0.0, 0.9, 0.0), Vector::Y);
+        let contact = plate(-0.1, 0.0, at, outward, Vector::ZERO, false);
+        assert_eq!(contact.gap, f32::MAX);
     }
 }

@@ -249,10 +249,10 @@ impl Link {
                     from: &pose,
                     now: &pose,
                     anchor,
-                    allowed: 0.0,
+                    put: false,
                 };
                 let pushed = force != Vector::ZERO;
-                let contact = pair.contact(point, point, slow.outward[at], pushed);
+                let contact = pair.contact(point, point, slow.outward[at], force);
                 match (anchor, pushed) {
                     (Some(_), _) => contact.slip,
                     _ if contact.gap == f32::MAX => Vector::ZERO,

@@ -336,10 +336,10 @@ impl Solver {
                 from,
                 now,
                 anchor: slow.anchors[at],
-                allowed: 0.0,
+                put: false,
             };
             let (point, start) = (self.place(slow, at), self.points[at]);
-            let mut contact = pair.contact(point, start, slow.outward[at], force != Vector::ZERO);
+            let mut contact = pair.contact(point, start, slow.outward[at], force);
             match contact.law {
                 Law::Bound => contact.slip -= error,
                 Law::Touch { .. } if contact.gap < f32::MAX => contact.gap -= error.x,
