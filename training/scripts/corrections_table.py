@@ -1,7 +1,7 @@
 """What corrections are worth: error, time and estimate by their number, into docs/results/corrections.md.
 
     python training/scripts/corrections_table.py --upt target/release/upt --bundle onnx/brain-reduced --data DIR \
-        --counts 0,1,3,5,10 --page docs/results/corrections.md
+        --counts 0,1,3,5,10,10@0.02 --page docs/results/corrections.md
 
 Each case of the data is replayed through `upt rollout --json` with each count. The contact force is that of
 `upt_scene_contact_force`, summed over the nodes of a step, against the solver's over all steps with contact. The
@@ -48,14 +48,14 @@ def spearman(pairs: list[tuple[float, float]]) -> str:
     return f"{statistics.correlation(ranks(list(estimate)), ranks(list(true))):.2f}"
 
 
-def replay(upt: str, bundle: str, case: pathlib.Path, count: int, threads: int) -> dict:
+def replay(upt: str, bundle: str, case: pathlib.Path, count: str, threads: int) -> dict:
     """One rollout as `upt rollout --json` gives it."""
-    command = [upt, "rollout", bundle, str(case), "--corrections", str(count), "--json"]
+    command = [upt, "rollout", bundle, str(case), "--corrections", count, "--json"]
     command += ["--no-hausdorff", "--threads", str(threads)]
     return json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
 
 
-def rows(upt: str, bundle: str, cases: list[pathlib.Path], counts: list[int], threads: int) -> list[str]:
+def rows(upt: str, bundle: str, cases: list[pathlib.Path], counts: list[str], threads: int) -> list[str]:
     """Table rows, one a scheme and one for the estimate."""
     by_scheme: dict[str, list[pathlib.Path]] = {}
     for case in cases:
@@ -77,7 +77,7 @@ def rows(upt: str, bundle: str, cases: list[pathlib.Path], counts: list[int], th
                             group = GROUPS[scheme.startswith("hard")]
                             pairs[group][count].append((estimate, step["mse_mm2"] ** 0.5))
                         times[count].append(ms)
-                    elif count == 0:
+                    elif count == "0":
                         times[count].append(ms)
                 for force in filter(None, result["force_mn"]):
                     apart = zip(force["found"], force["wanted"], strict=True)
@@ -107,11 +107,11 @@ def main() -> None:
     parser.add_argument("--upt", default="target/release/upt")
     parser.add_argument("--bundle", required=True)
     parser.add_argument("--data", action="append", required=True, type=pathlib.Path)
-    parser.add_argument("--counts", default="0,1,3,5,10")
+    parser.add_argument("--counts", default="0,1,3,5,10,10@0.02", help="COUNT, or COUNT@MM")
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--page", type=pathlib.Path)
     options = parser.parse_args()
-    counts = [int(count) for count in options.counts.split(",")]
+    counts = options.counts.split(",")
     cases = sorted(case for folder in options.data for case in folder.glob("*.trajectory.safetensors"))
     if not cases:
         parser.error("no *.trajectory.safetensors in --data")
