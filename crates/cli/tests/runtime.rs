@@ -1,5 +1,6 @@
 //! Which ONNX Runtime the command `upt` takes, and what it says without one.
 
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
@@ -33,14 +34,22 @@ impl Installed {
     }
 
     fn run(&self, arguments: &[&str], library: &str) -> Output {
-        Command::new(self.folder.path().join("bin").join("upt"))
+        let mut command = Command::new(self.folder.path().join("bin").join("upt"));
+        command
             .current_dir(root())
             .args(arguments)
             .env("ORT_DYLIB_PATH", library)
             .env("XDG_CACHE_HOME", self.folder.path().join("cache"))
-            .env_remove("UPT_PYTHON")
-            .output()
-            .expect("upt starts")
+            .env_remove("UPT_PYTHON");
+        loop {
+            match command.output() {
+                // A test beside this one has just started a process, which holds the copy open for writing until it runs its program.
+                Err(error) if error.kind() == ErrorKind::ExecutableFileBusy => {
+                    std::thread::yield_now();
+                }
+                started => return started.expect("upt starts"),
+            }
+        }
     }
 }
 
