@@ -214,6 +214,14 @@ impl Problem {
         self.next.forces.extend_from_slice(&self.past.forces);
     }
 
+    /// Back to the forces at the start of the step, without those of tools that are gone.
+    pub fn stay(&mut self) {
+        self.restart();
+        let count = self.tools.len();
+        let there = |force: &Force| (force.tool as usize) < count;
+        self.next.forces.retain(there);
+    }
+
     /// Gives up all forces: the tissue starts from rest.
     pub fn let_go(&mut self) {
         self.next.forces.clear();

@@ -156,7 +156,8 @@ impl Problem {
                 point: candidate.point,
                 outward: outward(&self.samples, sample, state),
             };
-            -moving.contact(&row, 1.0).gap
+            // What no tool touches, because it is reached from within, lies in it all the same.
+            (-moving.contact(&row, 1.0).gap).max(-candidate.distance)
         });
         depths.fold(0.0, f32::max)
     }

@@ -114,7 +114,7 @@ impl Stage {
         at: &mut Iterate<'_>,
         report: &mut Report,
     ) -> Result<()> {
-        problem.restart();
+        problem.stay();
         at.u.copy_from_slice(input.last);
         self.evaluate(lent, input, at, report)
     }
