@@ -223,6 +223,24 @@ fn manifest_errors_name_the_field() {
             "prior.vibration",
         ),
         (
+            "tiny-upt-prior",
+            "/prior/release",
+            "none.safetensors".into(),
+            "prior.release",
+        ),
+        (
+            "tiny-upt-prior",
+            "/prior/release",
+            "vibration.safetensors".into(),
+            "prior.release",
+        ),
+        (
+            "tiny-reduced",
+            "/prior/release",
+            "latent.onnx".into(),
+            "prior.release",
+        ),
+        (
             "tiny-upt",
             "/envelope/max_push_mm",
             serde_json::json!(0),

@@ -93,6 +93,14 @@ impl Manifest {
                     "kind `reduced` has it only without a learned map (field `reduced`)",
                 )?;
             }
+            if let Some(release) = &prior.release {
+                self.listed(release, "prior.release")?;
+                check(
+                    self.kind == ManifestKind::Reduced && prior.vibration.is_some(),
+                    "prior.release",
+                    "goes on from the free vibration of kind `reduced` (field `prior.vibration`)",
+                )?;
+            }
         }
         match self.kind {
             ManifestKind::Upt => {

@@ -8,7 +8,14 @@ use crate::error::{Error, Result};
 
 /// What `requires` may name: each changes what a step gives, and a library without it must refuse the bundle. A new one is
 /// one line here, beside its keys in [`KEYS`].
-const REQUIREMENTS: &[&str] = &["anchors", "corrections", "law", "unlearned", "vibration"];
+const REQUIREMENTS: &[&str] = &[
+    "anchors",
+    "corrections",
+    "law",
+    "release",
+    "unlearned",
+    "vibration",
+];
 
 /// The keys of each object of `bundle.json`. What lies below `provenance` and `errors` is for people, `files` is a list.
 const KEYS: &[(&str, &[&str])] = &[
@@ -74,7 +81,7 @@ const KEYS: &[(&str, &[&str])] = &[
             "max_tools",
         ],
     ),
-    ("prior", &["file", "vibration"]),
+    ("prior", &["file", "release", "vibration"]),
     (
         "corrections",
         &["file", "recommended", "target_mm", "calibration"],

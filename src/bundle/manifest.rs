@@ -80,6 +80,8 @@ pub struct PriorEntry {
     pub file: String,
     /// File with the free vibration that follows a release; not beside a learned map of kind `reduced`.
     pub vibration: Option<String>,
+    /// File with the learned map of a release, beside the free vibration of kind `reduced`.
+    pub release: Option<String>,
 }
 
 /// The corrections' file.

@@ -9,6 +9,7 @@ mod compliance;
 mod numbers;
 #[cfg(feature = "forces")]
 mod reaction;
+mod release;
 mod response;
 mod table;
 mod vibration;

@@ -48,13 +48,17 @@ impl PriorTable {
         let manifest = &files.manifest;
         let mut table = PriorTable::parse(&files.tensors(&entry.file)?, manifest, mesh)?;
         if let Some(name) = &entry.vibration {
-            table.vibration = Some(FreeVibration::parse(
+            let mut vibration = FreeVibration::parse(
                 &files.tensors(name)?,
                 &table,
                 manifest.material.damping_per_s,
                 manifest.dt_s,
                 manifest.kind == ManifestKind::Reduced,
-            )?);
+            )?;
+            if let Some(name) = &entry.release {
+                vibration.learn(&files.tensors(name)?, &table)?;
+            }
+            table.vibration = Some(vibration);
         }
         Ok(table)
     }

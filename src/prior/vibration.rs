@@ -2,7 +2,11 @@
 //!
 //! The held, damped, linear-elastic body swings from the last response: `M u'' + alpha M u' + K u = 0`. Its eigenmodes
 //! are independent oscillators, each advanced over a step exactly.
+//!
+//! A corrected state is more than its modes. What they leave out, `b = Phi (q - sum_k z_k modes[k])`, a learned linear map may carry on
+//! (`release.safetensors`).
 
+use super::release::Release;
 use super::table::PriorTable;
 use crate::bundle::TensorFile;
 use crate::error::Result;
@@ -23,8 +27,11 @@ pub struct FreeVibration {
     modes: Vec<f32>,
     /// Amplitudes of a field in block coordinates `[m,Q]`; empty where the file has none.
     projection: Vec<f32>,
-    /// `0..m`, as the row list of the product with `modes`.
+    /// `0..m`, as the row list of the product with `modes`; of the learned modes its first `r`.
     rows: Vec<u32>,
+    count: usize,
+    /// The learned map; empty where the file has none.
+    release: Release,
     /// For each mode `A, B, C, D` of `z' = A z + B w`, `w' = C z + D w`.
     propagator: Vec<[f32; 4]>,
 }
@@ -57,6 +64,8 @@ impl FreeVibration {
                 Vec::new()
             },
             rows: (0..count as u32).collect(),
+            count,
+            release: Release::default(),
             propagator: frequency
                 .iter()
                 .map(|&omega| propagator(f64::from(omega), damping, dt))
@@ -64,9 +73,21 @@ impl FreeVibration {
         })
     }
 
+    /// Reads the learned map that carries on what the modes leave out.
+    pub fn learn(&mut self, file: &TensorFile, prior: &PriorTable) -> Result<()> {
+        self.release = Release::parse(file, prior)?;
+        self.rows = (0..self.count.max(self.release.count) as u32).collect();
+        Ok(())
+    }
+
     /// Number of modes, `m`.
     pub fn count(&self) -> usize {
-        self.rows.len()
+        self.count
+    }
+
+    /// Numbers of a state: `m` amplitudes, `m` velocities times the step, and of a learned map `b` and the `b` before it, mm.
+    pub fn state_len(&self) -> usize {
+        2 * (self.count + self.release.count)
     }
 
     /// The table from contact forces to mode amplitudes, `[3D,m]`.
@@ -74,9 +95,12 @@ impl FreeVibration {
         Stored::F32(&self.force_to_mode)
     }
 
-    /// One step without contact. A state is `m` amplitudes, mm, and then `m` velocities times the step, mm.
+    /// One step without contact.
     pub fn advance(&self, state: &[f32], next: &mut [f32]) {
         let count = self.count();
+        let (state, b) = state.split_at(2 * count);
+        let (next, b_next) = next.split_at_mut(2 * count);
+        self.release.advance(b, b_next);
         let (z, w) = state.split_at(count);
         let (z_next, w_next) = next.split_at_mut(count);
         for (i, &[a, b, c, d]) in self.propagator.iter().enumerate() {
@@ -87,17 +111,48 @@ impl FreeVibration {
 
     /// The field of a state in block coordinates `[Q]`.
     pub fn field(&self, isa: Isa, pool: &Pool, state: &[f32], q: &mut [f32]) -> Result<()> {
-        let modes = Stored::F32(&self.modes);
-        let amplitudes = &state[..self.count()];
-        Ok(accumulate_rows(
-            isa, pool, modes, &self.rows, amplitudes, false, q,
-        )?)
+        let (modes, rows) = (Stored::F32(&self.modes), &self.rows[..self.count]);
+        accumulate_rows(isa, pool, modes, rows, &state[..self.count], false, q)?;
+        let (modes, rows) = (
+            Stored::F32(&self.release.modes),
+            &self.rows[..self.release.count],
+        );
+        let b = &state[2 * self.count..][..self.release.count];
+        if !rows.is_empty() {
+            accumulate_rows(isa, pool, modes, rows, b, true, q)?;
+        }
+        Ok(())
+    }
+
+    /// Sets `b` (`before`: the one before it) of a state from what its amplitudes `z` leave out of a field in block coordinates, which
+    /// they are taken from.
+    pub fn leave(
+        &self,
+        isa: Isa,
+        pool: &Pool,
+        z: &[f32],
+        q: &mut [f32],
+        state: &mut [f32],
+        before: bool,
+    ) -> Result<()> {
+        let count = self.release.count;
+        if count == 0 {
+            return Ok(());
+        }
+        for (z, mode) in z.iter().zip(self.modes.chunks_exact(q.len())) {
+            q.iter_mut().zip(mode).for_each(|(q, mode)| *q -= z * mode);
+        }
+        let start = 2 * self.count + if before { count } else { 0 };
+        let modes = Stored::F32(&self.release.modes);
+        let b = &mut state[start..start + count];
+        Ok(row_dots(isa, pool, modes, &self.rows[..count], q, b)?)
     }
 
     /// The amplitudes `[m]`, mm, of a field in block coordinates `[Q]`: its mass-weighted projection on the modes.
     pub fn amplitudes(&self, isa: Isa, pool: &Pool, q: &[f32], out: &mut [f32]) -> Result<()> {
         let rows = Stored::F32(&self.projection);
-        Ok(row_dots(isa, pool, rows, &self.rows, q, out)?)
+        let list = &self.rows[..self.count];
+        Ok(row_dots(isa, pool, rows, list, q, out)?)
     }
 
     /// Bytes held.
@@ -105,7 +160,9 @@ impl FreeVibration {
         4 * (self.force_to_mode.len()
             + self.modes.len()
             + self.projection.len()
-            + 5 * self.rows.len())
+            + 4 * self.propagator.len()
+            + self.rows.len())
+            + self.release.memory_bytes()
     }
 }
 

@@ -280,7 +280,7 @@ impl Core {
             engine.swing_from(
                 compute,
                 &corrected.basis_starts,
-                &shared.last.field,
+                [&shared.last.field, &shared.before.field],
                 &corrected.stage.motion.velocity,
                 self.model.manifest.dt_s as f32,
             )?;

@@ -1,5 +1,6 @@
 //! A bundle without a learned map swings freely after a release, from the last corrected state: `z = N^T M u` and
-//! `dz/dt = N^T M v` in the natural modes `N` (`docs/reference/formats.md`, "`vibration.safetensors`").
+//! `dz/dt = N^T M v` in the natural modes `N` (`docs/reference/formats.md`, "`vibration.safetensors`"). What they leave out goes to the file's
+//! learned map, where it has one.
 
 use super::reduced::ReducedEngine;
 use crate::error::Result;
@@ -15,16 +16,18 @@ impl ReducedEngine {
         };
         self.given_q.fill(0.0);
         table.project(given, &mut self.given_q);
-        let amplitudes = &mut self.last.vibration[..vibration.count()];
+        let (state, learned) = self.last.vibration.split_at_mut(2 * vibration.count());
+        learned.fill(0.0);
+        let amplitudes = &mut state[..vibration.count()];
         vibration.amplitudes(compute.isa, compute.pool, &self.given_q, amplitudes)
     }
 
-    /// The last state swings on from a corrected field `[K,3]`, mm, with its velocity `[K,3]`, mm/s; the step in s.
+    /// The last state swings on from a corrected field `[K,3]` and the one before it, mm, with its velocity `[K,3]`, mm/s; the step in s.
     pub(super) fn swing_from(
         &mut self,
         compute: Compute<'_>,
         starts: &[usize],
-        field: &[f32],
+        [field, before]: [&[f32]; 2],
         velocity: &[f32],
         step_s: f32,
     ) -> Result<()> {
@@ -33,10 +36,16 @@ impl ReducedEngine {
         let Some(vibration) = &table.vibration else {
             return Ok(());
         };
-        let (place, speed) = self.last.vibration.split_at_mut(vibration.count());
-        let q = &mut self.given_q;
-        project_field(isa, pool, &table.basis(), starts, field, q)?;
-        vibration.amplitudes(isa, pool, q, place)?;
+        let count = vibration.count();
+        let (q, swing) = (&mut self.given_q, &mut self.swing);
+        let state = &mut self.last.vibration;
+        for (field, earlier) in [(before, true), (field, false)] {
+            project_field(isa, pool, &table.basis(), starts, field, q)?;
+            vibration.amplitudes(isa, pool, q, swing)?;
+            vibration.leave(isa, pool, swing, q, state, earlier)?;
+        }
+        let (place, speed) = state[..2 * count].split_at_mut(count);
+        place.copy_from_slice(swing);
         project_field(isa, pool, &table.basis(), starts, velocity, q)?;
         vibration.amplitudes(isa, pool, q, speed)?;
         speed.iter_mut().for_each(|speed| *speed *= step_s);

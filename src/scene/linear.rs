@@ -35,7 +35,7 @@ impl Linear {
         self.solve.solve(isa, &self.table, held, nodes, vectors)
     }
 
-    /// Block coordinates `[Q]` and state of the free vibration `[2m]` (empty where the tables have none) after `contact`, which
+    /// Block coordinates `[Q]` and state of the free vibration (empty where the tables have none) after `contact`, which
     /// has been met: static while it lasts, swinging on from the state `last` without it.
     pub fn respond(
         &self,
@@ -54,6 +54,8 @@ impl Linear {
             return vibration.field(isa, pool, next, q);
         }
         self.solve.field(isa, pool, &self.table, q)?;
+        let (next, learned) = next.split_at_mut(2 * vibration.count());
+        learned.fill(0.0);
         let (place, velocity) = next.split_at_mut(vibration.count());
         self.solve
             .expand(isa, pool, vibration.force_to_mode(), place)?;

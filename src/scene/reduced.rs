@@ -36,7 +36,7 @@ pub struct ReducedRecord {
     pub q_prior: Vec<f32>,
     /// The whole field in block coordinates `[Q]`.
     pub q: Vec<f32>,
-    /// Amplitudes and velocities times the step of the free vibration `[2m]`, mm; empty beside a learned map.
+    /// State of the free vibration, mm; empty beside a learned map.
     pub vibration: Vec<f32>,
     /// `|L|` over all nodes, mm.
     pub prior_norm: f32,
@@ -50,7 +50,7 @@ impl ReducedRecord {
     fn new(model: &ReducedModel, table: &PriorTable) -> Result<ReducedRecord> {
         let entry = model.learned.as_ref().map(|map| &map.entry);
         let (modes, response_modes) = entry.map_or((0, 0), |e| (e.modes, e.response_modes));
-        let swinging = table.vibration.as_ref().map_or(0, |v| 2 * v.count());
+        let swinging = table.vibration.as_ref().map_or(0, |v| v.state_len());
         Ok(ReducedRecord {
             b: memory::zeros(modes, STATE)?,
             z: memory::zeros(response_modes, STATE)?,
@@ -113,6 +113,8 @@ pub struct ReducedEngine {
     kind: Arc<ReducedModel>,
     learned: Option<LearnedStage>,
     pub(super) given_q: Vec<f32>,
+    /// Amplitudes of the natural modes in a field `[m]`.
+    pub(super) swing: Vec<f32>,
     /// The step being made, the last published one, the one before it.
     pub next: ReducedRecord,
     /// Last published.
@@ -176,6 +178,7 @@ impl ReducedEngine {
                 .map(|map| LearnedStage::new(model, map))
                 .transpose()?,
             given_q: memory::zeros(table.width(), STATE)?,
+            swing: memory::zeros(table.vibration.as_ref().map_or(0, |v| v.count()), STATE)?,
             next: ReducedRecord::new(kind, table)?,
             last: ReducedRecord::new(kind, table)?,
             before: ReducedRecord::new(kind, table)?,
@@ -394,7 +397,7 @@ impl ReducedEngine {
     /// Bytes of the buffers.
     pub fn memory_bytes(&self) -> usize {
         3 * self.next.memory_bytes()
-            + 4 * self.given_q.len()
+            + 4 * (self.given_q.len() + self.swing.len())
             + self.linear.solve.memory_bytes()
             + self.learned.as_ref().map_or(0, |learned| {
                 4 * (learned.given_b.len() + learned.mode_rows.len()) + learned.stage.memory_bytes()

@@ -30,7 +30,8 @@ def test_committed_manifests_are_sealed_and_say_what_they_require(bundle):
     stated, found = digest_of(bundle)
     assert stated == found and re.fullmatch("[0-9a-f]{64}", stated)
     manifest = read_manifest(bundle)
-    parts = {"anchors": manifest.get("upt", {}), "corrections": manifest, "vibration": manifest.get("prior", {})}
+    prior = manifest.get("prior", {})
+    parts = {"anchors": manifest.get("upt", {}), "corrections": manifest, "release": prior, "vibration": prior}
     needed = [name for name, entry in parts.items() if name in entry]
     if manifest["kind"] == "reduced" and "reduced" not in manifest:
         needed.append("unlearned")

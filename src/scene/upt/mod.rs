@@ -100,7 +100,7 @@ impl UptEngine {
                 values: zeros(kv)?,
                 q_prior: zeros(table.map_or(0, |table| table.width()))?,
                 prior_field: zeros(table.map_or(0, |_| 3 * node_count))?,
-                vibration: zeros(vibration.map_or(0, |vibration| 2 * vibration.count()))?,
+                vibration: zeros(vibration.map_or(0, |vibration| vibration.state_len()))?,
             })
         };
         let (runtime, plan, threads) = (model.runtime()?, &model.plan, pool.threads());
