@@ -138,6 +138,13 @@ fn a_small_organ_end_to_end_and_checked_again() {
     let certificate: serde_json::Value = serde_json::from_slice(&certificate).unwrap();
     let share = certificate["contact"]["share_of_linear"].as_f64().unwrap();
     assert!(share < 0.2, "{certificate:#}");
+    // What simulated tools taught about releases is in the bundle, and better than linear elasticity.
+    let share = certificate["free"]["share_of_linear"].as_f64().unwrap();
+    assert!(share < 0.5, "{certificate:#}");
+    let manifest = std::fs::read(out.join("bundle.json")).unwrap();
+    let manifest: serde_json::Value = serde_json::from_slice(&manifest).unwrap();
+    assert_eq!(manifest["prior"]["release"], "release.safetensors");
+    assert!(out.join("release.safetensors").is_file());
     assert!(out.join("certificate.html").is_file());
     assert!(folder.path().join("organ.preview.html").is_file());
 
@@ -157,7 +164,7 @@ fn a_small_organ_end_to_end_and_checked_again() {
     let kept = command(&surface, &out, &HELD).output().unwrap();
     assert_eq!(
         text(&kept).matches("kept from an earlier run").count(),
-        7,
+        8,
         "{}",
         text(&kept)
     );
@@ -198,7 +205,9 @@ fn killed_after_each_stage_it_leaves_nothing_or_a_bundle_that_works_and_goes_on(
     let (surface, out) = (folder.path().join("organ.obj"), folder.path().join("organ"));
     plain(&surface);
     let work = folder.path().join("organ.work");
-    for stage in ["body", "columns", "modes", "tables", "coarse", "refine"] {
+    for stage in [
+        "body", "columns", "modes", "tables", "coarse", "refine", "learn",
+    ] {
         let record = work.join(format!("{stage}.stage.json"));
         let mut child = command(&surface, &out, &HELD)
             .stdout(Stdio::null())

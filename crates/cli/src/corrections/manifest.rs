@@ -1,4 +1,4 @@
-//! A file and an entry more in `bundle.json`.
+//! A file more in `bundle.json`, with what names it.
 
 use std::path::Path;
 
@@ -8,8 +8,20 @@ use serde_json::{Value, json};
 
 use crate::manifest::{Manifest, hex};
 
-/// Lists `file`, sets the entry and the requirement `corrections`, and seals the manifest.
+/// Lists `file` and sets the entry `corrections`.
 pub fn add(bundle: &Path, file: &str, entry: &Value) -> Result<()> {
+    list(bundle, file, "corrections", |manifest| {
+        manifest.set("corrections", entry, "prior")
+    })
+}
+
+/// Lists `file`, changes the manifest, sets the requirement, and seals it.
+pub fn list(
+    bundle: &Path,
+    file: &str,
+    requirement: &str,
+    change: impl FnOnce(&mut Manifest) -> Result<()>,
+) -> Result<()> {
     let mut manifest = Manifest::read(bundle)?;
     let bytes = std::fs::read(bundle.join(file))?;
     let mut files: IndexMap<String, Value> = manifest.get("files")?.unwrap_or_default();
@@ -19,12 +31,30 @@ pub fn add(bundle: &Path, file: &str, entry: &Value) -> Result<()> {
     );
     files.sort_keys();
     manifest.set("files", &json!(files), "")?;
-    manifest.set("corrections", entry, "prior")?;
+    change(&mut manifest)?;
     let mut requires: Vec<String> = manifest.get("requires")?.unwrap_or_default();
-    if !requires.iter().any(|name| name == "corrections") {
-        requires.push("corrections".to_owned());
+    if !requires.iter().any(|name| name == requirement) {
+        requires.push(requirement.to_owned());
         requires.sort();
         manifest.set("requires", &json!(requires), "version")?;
     }
+    manifest.write()
+}
+
+/// Takes the learned map of releases out of a bundle.
+pub fn remove_release(bundle: &Path, file: &str) -> Result<()> {
+    let mut manifest = Manifest::read(bundle)?;
+    let mut files: IndexMap<String, Value> = manifest.get("files")?.unwrap_or_default();
+    files.shift_remove(file);
+    manifest.set("files", &json!(files), "")?;
+    let mut prior: Value = manifest.get("prior")?.unwrap_or_default();
+    if let Some(entry) = prior.as_object_mut() {
+        entry.remove("release");
+    }
+    manifest.set("prior", &prior, "")?;
+    let mut requires: Vec<String> = manifest.get("requires")?.unwrap_or_default();
+    requires.retain(|name| name != "release");
+    manifest.set("requires", &json!(requires), "version")?;
+    std::fs::remove_file(bundle.join(file))?;
     manifest.write()
 }

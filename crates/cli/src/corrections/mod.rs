@@ -4,7 +4,7 @@
 //! (what a few quasi-Newton steps add to the linear response of pushes all over the domain).
 
 mod constraint;
-mod manifest;
+pub mod manifest;
 mod patches;
 mod pushes;
 mod space;

@@ -9,6 +9,7 @@ mod body;
 mod bundle;
 mod emit;
 mod foreign;
+mod learn;
 mod options;
 mod patches;
 mod refine;
@@ -37,7 +38,9 @@ use stages::{Work, key_of};
 /// The bundles of `upt make` hold the mesh's set `fixed`.
 const BOUNDARY: Boundary = Boundary::Fixed;
 /// Part of the time after which no round of equilibria starts.
-const REFINED: f64 = 0.6;
+const REFINED: f64 = 0.4;
+/// Part of it after which no tool is simulated but by the check.
+const LEARNED: f64 = 0.75;
 /// Corrections that are added where `--target-error` is missed, and the most that are tried.
 const MORE_CORRECTIONS: u32 = 3;
 const MOST_CORRECTIONS: u32 = 11;
@@ -195,18 +198,35 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     let budget = 60.0 * options.minutes;
     let refine_key = key_of(&[coarse_key.as_bytes(), budget.to_string().as_bytes()]);
     let seconds = REFINED * budget - work.spent();
-    let made = work.stage("refine", &refine_key, &["refined/bundle.json"], |stage| {
-        let rounds = refine::Rounds {
+    let made = work.stage(
+        "refine",
+        &refine_key,
+        &["refined/bundle.json", refine::ERRORS],
+        |stage| {
+            let rounds = refine::Rounds {
+                options,
+                mesh: &mesh,
+                draft: &draft,
+                columns: &columns_file,
+                key: coarse_key.clone(),
+                seconds,
+            };
+            refine::run(&rounds, stage)
+        },
+    )?;
+    let work_refined = work.file("refined");
+    let seconds = LEARNED * budget - work.spent();
+    let made = work.stage("learn", &made.key, &["learned/bundle.json"], |stage| {
+        let learning = learn::Learning {
             options,
             mesh: &mesh,
-            draft: &draft,
-            columns: &columns_file,
-            key: coarse_key.clone(),
+            sizes: &sizes,
+            refined: &work_refined,
             seconds,
         };
-        refine::run(&rounds, stage)
+        learn::run(&learning, stage)
     })?;
-    let draft = work.file("refined");
+    let draft = work.file("learned");
 
     let mut corrections = options.recommended;
     let (mut certificate, certified) = loop {

@@ -24,17 +24,31 @@ impl Programme {
     ///
     /// A seed face whose part of `domain` is too small is passed over for the next draw.
     pub fn new(scheme: Scheme, domain: &ContactDomain, seed: u64) -> Result<Self, ContactError> {
+        Self::at(scheme, domain, seed, &[])
+    }
+
+    /// The same with the first patches at these rows of `domain`, as far as they have room for them.
+    pub fn at(
+        scheme: Scheme,
+        domain: &ContactDomain,
+        seed: u64,
+        faces: &[usize],
+    ) -> Result<Self, ContactError> {
+        let mut wanted = faces.iter();
         let mut random = SplitMix(seed);
         let draw = Draw::new(&mut random);
         let area = scheme.face_count(draw) * FACE_AREA_MM2;
         let mut place = |area: f64| -> Result<Patch, ContactError> {
             let mut outcome = Err(ContactError::EmptyDomain);
-            for _ in 0..64 {
-                let face = (random.unit() * domain.face_count() as f64) as usize;
+            if let Some(&face) = wanted.next() {
                 outcome = domain.grow(face, area);
+            }
+            for _ in 0..64 {
                 if outcome.is_ok() {
                     break;
                 }
+                let face = (random.unit() * domain.face_count() as f64) as usize;
+                outcome = domain.grow(face, area);
             }
             outcome
         };

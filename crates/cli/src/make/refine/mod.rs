@@ -35,6 +35,8 @@ const PATIENCE: usize = 2;
 
 /// What the coarse stage's pushes added to the linear response, in the work folder.
 pub const PATCHES: &str = "patches.safetensors";
+/// The best round and its errors, in the work folder.
+pub const ERRORS: &str = "errors.json";
 /// The bundle of the round in work.
 const CANDIDATE: &str = "candidate";
 /// What a round changes in a bundle.
@@ -66,6 +68,13 @@ struct Round {
     /// Whether its coarse space is the best so far.
     taken: bool,
     seconds: f64,
+}
+
+/// The best round, kept for what comes after.
+#[derive(Serialize, Deserialize)]
+struct Best {
+    round: usize,
+    errors: Vec<f64>,
 }
 
 /// Path of a file of a round.
@@ -148,6 +157,15 @@ pub fn run(rounds: &Rounds<'_>, stage: &mut Stage) -> Result<()> {
             break;
         }
     }
+    let found = Best {
+        round: best.as_ref().map_or(0, |(number, _)| *number),
+        errors: best
+            .as_ref()
+            .map_or(Vec::new(), |(_, round)| round.errors.clone()),
+    };
+    let path = folder.join(ERRORS);
+    std::fs::write(&path, serde_json::to_vec_pretty(&found)?)
+        .with_context(|| format!("{}: cannot be written", path.display()))?;
     let refined = folder.join("refined");
     bundle::copy(rounds.draft, &refined)?;
     match best {
@@ -199,8 +217,7 @@ fn make(
 ) -> Result<Round> {
     let options = rounds.options;
     let pushes = bench.pushes();
-    let mut random = SplitMix(options.seed ^ 0x7A11);
-    let sites = pushes.spread(VALIDATED, &[], &mut random);
+    let (sites, mut random) = validated(&pushes, options.seed);
     let validation: Vec<Push> = sites
         .iter()
         .map(|&site| pushes.at(site, &mut random))
@@ -212,6 +229,7 @@ fn make(
             &pushes,
             &sites,
             &best.errors,
+            options.seed,
             options.seed ^ (number as u64) << 32,
         );
         let found = equilibria::differences(
@@ -262,19 +280,54 @@ fn make(
     })
 }
 
-/// Pushes of a round: half at sites far from the validation's and from each other, half near the validation's sites in
-/// proportion to their errors.
-fn choose(pushes: &Pushes<'_>, validated: &[u32], errors: &[f64], seed: u64) -> Vec<Push> {
-    let mut random = SplitMix(seed);
-    let mut sites = pushes.spread(EQUILIBRIA / 2, validated, &mut random);
+/// Errors of the validation's sites with the best bundle; empty where there was no time for them.
+pub fn best_errors(folder: &Path) -> Result<Vec<f64>> {
+    let path = folder.join(ERRORS);
+    let text =
+        std::fs::read(&path).with_context(|| format!("{}: cannot be read", path.display()))?;
+    Ok(serde_json::from_slice::<Best>(&text)
+        .with_context(|| format!("{}", path.display()))?
+        .errors)
+}
+
+/// All that the best coarse space was made from.
+pub fn rows(folder: &Path) -> Result<Vec<Vec<f32>>> {
+    let path = folder.join(ERRORS);
+    let text =
+        std::fs::read(&path).with_context(|| format!("{}: cannot be read", path.display()))?;
+    let best: Best =
+        serde_json::from_slice(&text).with_context(|| format!("{}", path.display()))?;
+    let mut all = read_differences(&folder.join(PATCHES))?;
+    for round in 1..=best.round {
+        all.extend(read_differences(&file(folder, round, "safetensors"))?);
+    }
+    Ok(all)
+}
+
+/// Sites of the validation.
+fn validated(pushes: &Pushes<'_>, seed: u64) -> (Vec<u32>, SplitMix) {
+    let mut random = SplitMix(seed ^ 0x7A11);
+    (pushes.spread(VALIDATED, &[], &mut random), random)
+}
+
+/// Sites near the validation's, in proportion to their errors.
+pub fn near_errors(
+    pushes: &Pushes<'_>,
+    errors: &[f64],
+    count: usize,
+    seed: u64,
+    random: &mut SplitMix,
+) -> Vec<u32> {
+    let (centres, _) = validated(pushes, seed);
     let total: f64 = errors.iter().sum();
-    while sites.len() < EQUILIBRIA {
+    let mut sites = Vec::with_capacity(count);
+    while sites.len() < count {
         let mut left = random.unit() * total;
         let at = errors.iter().position(|error| {
             left -= error;
             left <= 0.0
         });
-        let centre = validated[at.unwrap_or(0)];
+        let centre = centres[at.unwrap_or(0)];
         // The nearest of a few random ones: near, and another one each time.
         let near = (0..pushes.nodes.len().div_ceil(VALIDATED).max(4))
             .map(|_| pushes.nodes[random.below(pushes.nodes.len())])
@@ -283,8 +336,30 @@ fn choose(pushes: &Pushes<'_>, validated: &[u32], errors: &[f64], seed: u64) -> 
                     .distance(a, centre)
                     .total_cmp(&pushes.distance(b, centre))
             });
-        sites.extend(near);
+        sites.push(near.unwrap_or(centre));
     }
+    sites
+}
+
+/// Pushes of a round: half at sites far from the validation's and from each other, half near the validation's sites in
+/// proportion to their errors.
+fn choose(
+    pushes: &Pushes<'_>,
+    validated: &[u32],
+    errors: &[f64],
+    seed_of_sites: u64,
+    seed: u64,
+) -> Vec<Push> {
+    let mut random = SplitMix(seed);
+    let mut sites = pushes.spread(EQUILIBRIA / 2, validated, &mut random);
+    let more = EQUILIBRIA - sites.len();
+    sites.extend(near_errors(
+        pushes,
+        errors,
+        more,
+        seed_of_sites,
+        &mut random,
+    ));
     sites
         .into_iter()
         .map(|site| pushes.at(site, &mut random))

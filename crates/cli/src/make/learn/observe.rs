@@ -1,0 +1,143 @@
+//! Reference simulations at chosen sites, as what is learned from: what the tissue does beyond the linear response in contact, and how it
+//! moves after each release, both in block coordinates.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
+
+use anyhow::{Result, bail};
+use tissue::contact::ContactDomain;
+use tissue::mesh::Mesh;
+use tissue::schemes::{FRAME_S, FRAMES, Programme, Scheme};
+use tissue::solver::{ContactNode, Solver, SolverOptions};
+use upt::kernels::{Isa, Pool};
+use upt::prior::ContactResponse;
+
+use crate::corrections::Workbench;
+use crate::progress;
+
+/// Push of the programmes as they are written, mm.
+const PROGRAMME_PUSH_MM: f64 = 15.0;
+/// Of the frames in contact one in so many is kept.
+const EVERY: usize = 4;
+/// Frames of a release: two in contact, and those after them.
+pub const RELEASE_FRAMES: usize = 10;
+
+/// What simulations showed.
+#[derive(Default)]
+pub struct Observed {
+    /// What the law adds to the linear response in contact, `[Q]` each.
+    pub contact: Vec<Vec<f32>>,
+    /// Frames of each release, `[RELEASE_FRAMES][Q]`.
+    pub releases: Vec<Vec<Vec<f32>>>,
+}
+
+/// Simulates a `probe` programme for each list of sites (rows of the domain).
+pub fn observe(
+    bench: &Workbench,
+    push_mm: f64,
+    sites: &[Vec<usize>],
+    seed: u64,
+    threads: usize,
+    quiet: bool,
+) -> Result<Observed> {
+    let bar = progress::bar(quiet, (sites.len() * FRAMES) as u64, "tool trajectories");
+    let next = AtomicUsize::new(0);
+    let found: Mutex<Vec<(usize, Observed)>> = Mutex::default();
+    let work = || -> Result<()> {
+        loop {
+            let at = next.fetch_add(1, Ordering::Relaxed);
+            let Some(faces) = sites.get(at) else {
+                return Ok(());
+            };
+            let case = simulate(bench, push_mm, faces, seed.wrapping_add(at as u64), &|| {
+                bar.inc(1);
+            })?;
+            found
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner)
+                .push((at, case));
+        }
+    };
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let workers = if threads == 0 { cores } else { threads };
+    std::thread::scope(|scope| {
+        let threads: Vec<_> = (0..workers).map(|_| scope.spawn(work)).collect();
+        threads.into_iter().try_for_each(|thread| {
+            thread
+                .join()
+                .unwrap_or_else(|_| bail!("a thread of the trajectories panicked"))
+        })
+    })?;
+    bar.finish_and_clear();
+    let mut found = found.into_inner().unwrap_or_else(PoisonError::into_inner);
+    found.sort_by_key(|(at, _)| *at);
+    let mut all = Observed::default();
+    for (_, case) in found {
+        all.contact.extend(case.contact);
+        all.releases.extend(case.releases);
+    }
+    Ok(all)
+}
+
+fn simulate(
+    bench: &Workbench,
+    push_mm: f64,
+    faces: &[usize],
+    seed: u64,
+    done: &dyn Fn(),
+) -> Result<Observed> {
+    let mesh: &Mesh = &bench.mesh;
+    // Programmes are written for a brain.
+    let scale = push_mm / PROGRAMME_PUSH_MM;
+    let mut enlarged = mesh.clone();
+    for x in enlarged.positions.iter_mut().flatten() {
+        *x = (f64::from(*x) / scale) as f32;
+    }
+    let domain = ContactDomain::new(&enlarged, bench.boundary)?;
+    let programme = Programme::at(Scheme::Probe, &domain, seed, faces)?;
+    let mut solver = Solver::new(
+        mesh,
+        bench.boundary,
+        SolverOptions {
+            material: bench.material,
+            ..SolverOptions::default()
+        },
+    )?;
+    let (isa, pool) = (Isa::detect(), Pool::new(1)?);
+    let mut response = ContactResponse::new(&bench.prior)?;
+    let mut truth = vec![[0.0f32; 3]; mesh.node_count()];
+    let mut frames: Vec<(bool, Vec<f32>)> = Vec::with_capacity(FRAMES);
+    let mut observed = Observed::default();
+    for frame in 1..FRAMES {
+        let mut contact: Vec<ContactNode> = programme.contact(frame);
+        for entry in &mut contact {
+            entry.displacement = entry.displacement.map(|x| (f64::from(x) * scale) as f32);
+        }
+        solver.step_frame(&contact, FRAME_S)?;
+        solver.displacement(&mut truth);
+        let mut q = vec![0.0; bench.prior.width()];
+        bench.prior.project(truth.as_flattened(), &mut q);
+        if !contact.is_empty() && frame % EVERY == 0 {
+            let nodes: Vec<u32> = contact.iter().map(|entry| entry.node).collect();
+            let vectors: Vec<f32> = contact
+                .iter()
+                .flat_map(|entry| entry.displacement)
+                .collect();
+            let mut linear = vec![0.0; q.len()];
+            response.solve(isa, &bench.prior, &bench.held_flags, &nodes, &vectors)?;
+            response.field(isa, &pool, &bench.prior, &mut linear)?;
+            let beyond = q.iter().zip(&linear).map(|(a, b)| a - b).collect();
+            observed.contact.push(beyond);
+        }
+        frames.push((!contact.is_empty(), q));
+        done();
+    }
+    for window in frames.windows(RELEASE_FRAMES) {
+        let (touched, free) = window.split_at(2);
+        if touched.iter().all(|(contact, _)| *contact) && free.iter().all(|(contact, _)| !contact) {
+            let fields = window.iter().map(|(_, q)| q.clone());
+            observed.releases.push(fields.collect());
+        }
+    }
+    Ok(observed)
+}
