@@ -250,3 +250,35 @@ fn a_fine_mesh_comes_to_rest_in_short_steps() {
     let end = scene.stats().max_displacement_mm;
     assert!(end < 0.1, "{end} mm are left after 1.5 s");
 }
+
+/// Pulled out of shape until elements invert, and let go: no free motion leads back, and the field dies away.
+#[test]
+fn what_is_inverted_dies_away_and_does_not_jump() {
+    let scene = scene(&model("tiny-corrected"), &stepping(0.01));
+    let nodes = scene.mesh().domain_nodes[..4].to_vec();
+    let mut u = vec![0.0; 3 * scene.node_count()];
+    let rest = u.clone();
+    let mut fell_back = 0;
+    for index in 0..120 {
+        let vectors = [0.0, 0.0, -40.0].repeat(4);
+        let (nodes, vectors): (&[u32], &[f32]) = match index < 4 {
+            true => (&nodes, &vectors),
+            false => (&[], &[]),
+        };
+        let contact = Contact::Sparse { nodes, vectors };
+        let input = StepInput {
+            displacement: None,
+            contact,
+        };
+        let before = u.clone();
+        scene.step(input, Some(&mut u)).unwrap();
+        if index >= 4 && scene.stats().flags & upt::flag::FELL_BACK != 0 {
+            fell_back += 1;
+            let (way, size) = (farthest(&u, &before), farthest(&before, &rest));
+            assert!(way < 0.25 * size, "{way} of {size} mm in a step");
+        }
+    }
+    assert!(fell_back > 0, "no free step fell back");
+    let left = farthest(&u, &rest);
+    assert!(left < 5.0, "released 1.2 s ago: {left} mm");
+}

@@ -156,6 +156,24 @@ def test_a_frame_shows_the_tool_where_it_is(corrected):
         scene.present(0.0)
 
 
+def test_a_collision_field_is_presented_too(corrected):
+    """Listed nodes are where they are asked to be; points at nodes go with them."""
+    nodes = corrected.domain_nodes[:4]
+    with corrected.scene(no_sleep=True) as scene:
+        scene.attach_points(corrected.positions[nodes])
+        for depth in (0.2, 0.4):
+            scene.step_contacts(nodes, np.tile([0, 0, -depth], (4, 1)))
+            scene.present_contacts(0.0, nodes, np.tile([0, 0, -depth], (4, 1)))
+        contact = np.tile(np.float32([0, 0, -0.5]), (4, 1))
+        field = scene.present_contacts(0.025, nodes, contact)
+        np.testing.assert_allclose(field[nodes], contact, atol=2e-3)
+        out = np.empty((4, 3), np.float32)
+        assert scene.present_points_contacts(0.025, nodes, contact, out) is out
+        np.testing.assert_allclose(out, contact, atol=2e-3)
+        with pytest.raises(upt.ArgumentError):
+            scene.present_points_contacts(0.01, [10**6], contact[:1])
+
+
 def test_the_fast_way_to_a_struct_is_the_slow_one():
     """Byte for byte, for each shape; what does not fit is refused by the name of its field."""
     hull = upt.Instrument.hull(CUBE, position=(1, 2, 3), rotation=(0, 0.6, 0, 0.8), friction=0.3, tear_off=5)

@@ -254,6 +254,19 @@ class Scene:
         check(lib.upt_scene_present_points(self._handle, seconds, array, count, address(result), result.size))
         return result
 
+    def present_points_contacts(
+        self, seconds: float, nodes: ArrayLike = (), contact: ArrayLike = (), out: Floats | None = None
+    ) -> Floats:
+        """As `present_contacts`, at the attached points."""
+        n, c = _contacts(nodes, contact)
+        result = output(out, self._point_count)
+        check(
+            lib.upt_scene_present_points_contacts(
+                self._handle, seconds, address(n), address(c), len(n), address(result), result.size
+            )
+        )
+        return result
+
     def set_region(self, nodes: ArrayLike | None) -> None:
         """Restricts what a step decodes and returns to these nodes `[n]`, in this order; None: all nodes."""
         chosen = indices(() if nodes is None else nodes, "nodes")

@@ -6,6 +6,7 @@
 //! velocity becomes the oscillator's. Without `g` a law that is not linear is given two thirds of its impulse.
 
 use super::input::{Input, Lent, Report};
+use super::passes;
 use super::precondition::mask_held;
 use super::stage::{SMALLEST_DET, Stage};
 use crate::error::Result;
@@ -15,6 +16,8 @@ use crate::prior::propagator;
 /// Modes that turn by more than this in a step are left to BDF2, which damps them: in closed form they would ring undamped, and what the
 /// iterations leave of them would grow from step to step, rad.
 const RESOLVED: f64 = 2.0;
+/// What of the last field stays in a step where no free motion was found.
+const KEPT: f32 = 0.8;
 
 /// The oscillators of a scene whose free steps are made here; empty before the first.
 #[derive(Debug, Default)]
@@ -129,6 +132,7 @@ impl Stage {
             report.min_det = 1.0;
             return Ok(report);
         }
+        let _awake = lent.pool.keep_awake();
         self.nodes.clear();
         self.preconditioner.prescribe(lent.env(), &[])?;
         self.memory.mask(&[]);
@@ -185,9 +189,7 @@ impl Stage {
         self.free.give(|mode| mode.after(h).0 - mode.place);
         self.preconditioner
             .of_natural(env, &self.free.values, &mut self.d)?;
-        for ((u, last), change) in u.iter_mut().zip(input.last).zip(&self.d) {
-            *u = last + change;
-        }
+        passes::shorten(env, input.last, &self.d, 1.0, u)?;
         mask_held(&env.body.held, u);
         let lost = det.is_nan() || det < SMALLEST_DET;
         let mut det = self.residual(lent, [input.last, u, u], g, report)?.0;
@@ -196,7 +198,16 @@ impl Stage {
             det = self.residual(lent, [input.last, u, u], g, report)?.0;
         }
         report.parts = 1;
-        self.relax(lent, input, det, u, g, report)
+        self.relax(lent, input, det, u, g, report)?;
+        if report.fell_back {
+            // Without contact that was rest. The field dies away instead of a jump there.
+            for (u, last) in u.iter_mut().zip(input.last) {
+                *u = KEPT * last;
+            }
+            report.min_det = self.residual(lent, [input.last, u, u], g, report)?.0;
+            self.stand();
+        }
+        Ok(())
     }
 
     /// Places, velocities, drifts and forces of the modes, from the residual `g` of the last state.

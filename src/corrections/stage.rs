@@ -273,7 +273,7 @@ impl Stage {
     }
 
     /// The state of the last evaluation is the one that stands.
-    fn stand(&mut self) {
+    pub(super) fn stand(&mut self) {
         let [last, stands] = &mut self.at_nodes;
         std::mem::swap(last, stands);
     }

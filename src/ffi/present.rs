@@ -17,22 +17,99 @@ use {
 #[cfg(not(feature = "contact"))]
 const WITHOUT: &str = "this build has no feature \"contact\"";
 
-/// The host's room, after its count has been checked for the region or the points.
-#[cfg(feature = "contact")]
-unsafe fn room<'a>(
-    scene: &Scene,
+/// What the tissue is driven by at the moment of a frame.
+#[cfg_attr(
+    not(feature = "contact"),
+    expect(dead_code, reason = "without it every frame is refused")
+)]
+enum Driver {
+    Instruments(*const upt_instrument, u64),
+    Contacts(*const u32, *const f32, u64),
+}
+
+/// The frame that the host wants, of the region or of the points.
+#[cfg_attr(
+    not(feature = "contact"),
+    expect(dead_code, reason = "without it every frame is refused")
+)]
+struct Frame {
+    seconds: f64,
     points: bool,
     out: *mut f32,
     out_count: u64,
-) -> Result<&'a mut [f32], Failure> {
-    // SAFETY: the host passes that many elements, as the header asks.
-    let len = unsafe { slice(out.cast_const(), out_count, "out") }?.len();
-    match points {
+}
+
+/// Makes a frame.
+///
+/// # Safety
+/// The host passes as many elements as it says, in `driver` and in `out`.
+unsafe fn present(
+    name: &'static str,
+    scene: *mut upt_scene,
+    driver: Driver,
+    frame: Frame,
+) -> upt_status {
+    call_scene(name, scene, |_scene| {
+        #[cfg(feature = "contact")]
+        {
+            // SAFETY: the caller's.
+            unsafe { made(_scene, driver, frame) }?;
+            Ok(UPT_OK)
+        }
+        #[cfg(not(feature = "contact"))]
+        {
+            let _ = (driver, frame);
+            fail(UPT_ERR_UNSUPPORTED, WITHOUT)
+        }
+    })
+}
+
+/// # Safety
+/// As [`present`].
+#[cfg(feature = "contact")]
+unsafe fn made(scene: &Scene, driver: Driver, frame: Frame) -> Result<(), Failure> {
+    let seconds = frame.seconds;
+    match driver {
+        Driver::Instruments(instruments, count) => {
+            let mut tools = scene.frame_tools()?;
+            // SAFETY: the host passes that many instruments, as the header asks.
+            unsafe { read_tools(instruments, count, &mut tools) }?;
+            // SAFETY: the caller's.
+            let out = unsafe { room(scene, &frame) }?;
+            match frame.points {
+                true => scene.present_points(seconds, &tools, out)?,
+                false => scene.present(seconds, &tools, out)?,
+            }
+        }
+        Driver::Contacts(nodes, vectors, count) => {
+            // SAFETY: the host passes that many nodes and vectors, as the header asks.
+            let (nodes, vectors) = unsafe { contacts(scene, nodes, vectors, count) }?;
+            // SAFETY: the caller's.
+            let out = unsafe { room(scene, &frame) }?;
+            match frame.points {
+                true => scene.present_points_contacts(seconds, nodes, vectors, out)?,
+                false => scene.present_contacts(seconds, nodes, vectors, out)?,
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The host's room, after its count has been checked for the region or the points.
+///
+/// # Safety
+/// The host passes room for that many elements, as the header asks.
+#[cfg(feature = "contact")]
+unsafe fn room<'a>(scene: &Scene, frame: &Frame) -> Result<&'a mut [f32], Failure> {
+    let (out, count) = (frame.out, frame.out_count);
+    // SAFETY: the caller's.
+    let len = unsafe { slice(out.cast_const(), count, "out") }?.len();
+    match frame.points {
         true => scene.check_points_out(len)?,
         false => scene.check_out(len)?,
     }
-    // SAFETY: the host passes room for that many elements, as the header asks.
-    unsafe { slice_mut(out, out_count, "out") }
+    // SAFETY: the caller's.
+    unsafe { slice_mut(out, count, "out") }
 }
 
 /// The tissue at a moment between steps, with the instruments where they are at that moment: frames without lag.
@@ -62,23 +139,15 @@ pub unsafe extern "C" fn upt_scene_present(
     out: *mut f32,
     out_count: u64,
 ) -> upt_status {
-    call_scene("upt_scene_present", scene, |_scene| {
-        #[cfg(feature = "contact")]
-        {
-            let mut tools = _scene.frame_tools()?;
-            // SAFETY: the host passes that many instruments, as the header asks.
-            unsafe { read_tools(instruments, instrument_count, &mut tools) }?;
-            // SAFETY: the host passes room for that many elements, as the header asks.
-            let out = unsafe { room(_scene, false, out, out_count) }?;
-            _scene.present(seconds, &tools, out)?;
-            Ok(UPT_OK)
-        }
-        #[cfg(not(feature = "contact"))]
-        {
-            let _ = (seconds, instruments, instrument_count, out, out_count);
-            fail(UPT_ERR_UNSUPPORTED, WITHOUT)
-        }
-    })
+    let frame = Frame {
+        seconds,
+        points: false,
+        out,
+        out_count,
+    };
+    let driver = Driver::Instruments(instruments, instrument_count);
+    // SAFETY: the host's promise in the header.
+    unsafe { present("upt_scene_present", scene, driver, frame) }
 }
 
 /// As `upt_scene_present`, at the attached points.
@@ -98,23 +167,15 @@ pub unsafe extern "C" fn upt_scene_present_points(
     out: *mut f32,
     out_count: u64,
 ) -> upt_status {
-    call_scene("upt_scene_present_points", scene, |_scene| {
-        #[cfg(feature = "contact")]
-        {
-            let mut tools = _scene.frame_tools()?;
-            // SAFETY: the host passes that many instruments, as the header asks.
-            unsafe { read_tools(instruments, instrument_count, &mut tools) }?;
-            // SAFETY: the host passes room for that many elements, as the header asks.
-            let out = unsafe { room(_scene, true, out, out_count) }?;
-            _scene.present_points(seconds, &tools, out)?;
-            Ok(UPT_OK)
-        }
-        #[cfg(not(feature = "contact"))]
-        {
-            let _ = (seconds, instruments, instrument_count, out, out_count);
-            fail(UPT_ERR_UNSUPPORTED, WITHOUT)
-        }
-    })
+    let frame = Frame {
+        seconds,
+        points: true,
+        out,
+        out_count,
+    };
+    let driver = Driver::Instruments(instruments, instrument_count);
+    // SAFETY: the host's promise in the header.
+    unsafe { present("upt_scene_present_points", scene, driver, frame) }
 }
 
 /// As `upt_scene_present`, with a collision field in place of instruments, for scenes that `upt_scene_step_contacts` drives.
@@ -141,30 +202,15 @@ pub unsafe extern "C" fn upt_scene_present_contacts(
     out: *mut f32,
     out_count: u64,
 ) -> upt_status {
-    call_scene("upt_scene_present_contacts", scene, |_scene| {
-        #[cfg(feature = "contact")]
-        {
-            let (nodes, vectors) =
-                // SAFETY: the host passes that many nodes and vectors, as the header asks.
-                unsafe { contacts(_scene, contact_nodes, contact_vectors, contact_count) }?;
-            // SAFETY: the host passes room for that many elements, as the header asks.
-            let out = unsafe { room(_scene, false, out, out_count) }?;
-            _scene.present_contacts(seconds, nodes, vectors, out)?;
-            Ok(UPT_OK)
-        }
-        #[cfg(not(feature = "contact"))]
-        {
-            let _ = (
-                seconds,
-                contact_nodes,
-                contact_vectors,
-                contact_count,
-                out,
-                out_count,
-            );
-            fail(UPT_ERR_UNSUPPORTED, WITHOUT)
-        }
-    })
+    let frame = Frame {
+        seconds,
+        points: false,
+        out,
+        out_count,
+    };
+    let driver = Driver::Contacts(contact_nodes, contact_vectors, contact_count);
+    // SAFETY: the host's promise in the header.
+    unsafe { present("upt_scene_present_contacts", scene, driver, frame) }
 }
 
 /// As `upt_scene_present_contacts`, at the attached points.
@@ -185,28 +231,13 @@ pub unsafe extern "C" fn upt_scene_present_points_contacts(
     out: *mut f32,
     out_count: u64,
 ) -> upt_status {
-    call_scene("upt_scene_present_points_contacts", scene, |_scene| {
-        #[cfg(feature = "contact")]
-        {
-            let (nodes, vectors) =
-                // SAFETY: the host passes that many nodes and vectors, as the header asks.
-                unsafe { contacts(_scene, contact_nodes, contact_vectors, contact_count) }?;
-            // SAFETY: the host passes room for that many elements, as the header asks.
-            let out = unsafe { room(_scene, true, out, out_count) }?;
-            _scene.present_points_contacts(seconds, nodes, vectors, out)?;
-            Ok(UPT_OK)
-        }
-        #[cfg(not(feature = "contact"))]
-        {
-            let _ = (
-                seconds,
-                contact_nodes,
-                contact_vectors,
-                contact_count,
-                out,
-                out_count,
-            );
-            fail(UPT_ERR_UNSUPPORTED, WITHOUT)
-        }
-    })
+    let frame = Frame {
+        seconds,
+        points: true,
+        out,
+        out_count,
+    };
+    let driver = Driver::Contacts(contact_nodes, contact_vectors, contact_count);
+    // SAFETY: the host's promise in the header.
+    unsafe { present("upt_scene_present_points_contacts", scene, driver, frame) }
 }

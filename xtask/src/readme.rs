@@ -71,6 +71,16 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
     Ok(true)
 }
 
+/// Corrections a step of a row: `5`, or `10@0.02` for at most 10, fewer where the estimated error is below 0.02 mm.
+pub fn effort(row: &serde_json::Value) -> String {
+    let most = row["corrections"].as_u64().unwrap_or(0);
+    match row["corrections_target_mm"].as_f64() {
+        // It was a float32.
+        Some(target) => format!("{most}@{}", target as f32),
+        None => most.to_string(),
+    }
+}
+
 /// One report as a paragraph and a table, rows by ascending time.
 fn section(path: &Path) -> Result<String> {
     let report: serde_json::Value = serde_json::from_slice(
@@ -108,9 +118,9 @@ fn section(path: &Path) -> Result<String> {
                 } else {
                     format!(", {}", text(&row["precision"]))
                 };
-                let corrections = match row["corrections"].as_u64().unwrap_or(0) {
-                    0 => String::new(),
-                    count => format!(", {count} corrections"),
+                let corrections = match effort(row).as_str() {
+                    "0" => String::new(),
+                    k => format!(", k = {k}"),
                 };
                 format!("**libupt, `{bundle}`**, {nodes}{precision}{corrections}")
             }

@@ -4,6 +4,8 @@ use std::path::Path;
 
 use anyhow::{Context, Result};
 
+use crate::readme::effort;
+
 /// Error, penetration, force and time from the rows of a report by tools.
 pub fn print_tool_table(path: &Path) -> Result<()> {
     let report: serde_json::Value = serde_json::from_slice(&std::fs::read(path)?)?;
@@ -12,7 +14,7 @@ pub fn print_tool_table(path: &Path) -> Result<()> {
         .context("tools.json has no rows")?;
     println!();
     println!(
-        "{:<58} {:>2} {:>10} {:>8} {:>8} {:>10} {:>10}",
+        "{:<58} {:>7} {:>10} {:>8} {:>8} {:>10} {:>10}",
         "from the tool's pose alone", "k", "MSE mm²", "max mm", "deep mm", "force", "ms touched"
     );
     for row in rows {
@@ -29,8 +31,8 @@ pub fn print_tool_table(path: &Path) -> Result<()> {
             format!("{:.1} % off", 100.0 * error)
         });
         println!(
-            "{method:<58} {:>2} {:>10} {:>8} {:>8} {force:>10} {:>10}",
-            row["corrections"].as_u64().unwrap_or(0),
+            "{method:<58} {:>7} {:>10} {:>8} {:>8} {force:>10} {:>10}",
+            effort(row),
             told("mse_mean_mm2", 5),
             told("max_error_mm", 2),
             told("penetration_mm", 2),
@@ -64,9 +66,9 @@ pub fn print_table(path: &Path) -> Result<()> {
     for row in rows {
         let text = |field: &str| row[field].as_str().unwrap_or("?");
         let method = match (text("method"), text("bundle")) {
-            ("surrogate", bundle) => match row["corrections"].as_u64().unwrap_or(0) {
-                0 => bundle.to_owned(),
-                count => format!("{bundle}, {count} corrections"),
+            ("surrogate", bundle) => match effort(row).as_str() {
+                "0" => bundle.to_owned(),
+                k => format!("{bundle}, k = {k}"),
             },
             (method, "") => method.to_owned(),
             (method, bundle) => format!("{bundle}, {method}"),

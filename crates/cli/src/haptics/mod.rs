@@ -100,6 +100,13 @@ pub fn run(options: &Options) -> Result<ExitCode> {
         step_s: options.step_ms.map_or(0.0, |ms| 1e-3 * ms),
         ..SceneOptions::default()
     };
+    let step_ms = 1e3 * scene_step(&model, &scene);
+    if options.latency_ms >= step_ms {
+        bail!(
+            "--latency-ms is {}: a step of {step_ms:.0} ms must arrive before the next one starts",
+            options.latency_ms
+        );
+    }
     let load = Load::start(options.load);
     let started = Instant::now();
     let seconds = 60.0 * minutes;
