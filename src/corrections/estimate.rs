@@ -10,6 +10,8 @@ use crate::error::Result;
 
 /// Part of a state's error that the next one keeps.
 const KEPT: f32 = 0.7;
+/// Iterations that a target does not end: what the first one moves says little of what the next would.
+const LEAST: u32 = 2;
 
 impl Stage {
     /// The estimated error of the state being made: what further iterations would move, what a step of this length leaves out, and
@@ -24,12 +26,13 @@ impl Stage {
         };
     }
 
-    /// Whether a step has been corrected enough: the error is as small as was asked, or further iterations could not make it smaller, by
+    /// Whether `iterations` have corrected a step enough: the error is as small as was asked, or further iterations could not make it smaller, by
     /// what the last step left and left out.
-    pub(super) fn suffices(&self, remaining_mm: f32, enough: Enough) -> bool {
+    pub(super) fn suffices(&self, iterations: u32, remaining_mm: f32, enough: Enough) -> bool {
         let rest = self.motion.truncated_mm.hypot(KEPT * self.motion.error_mm);
         let wanted = enough.error_mm;
         wanted > 0.0
+            && iterations >= LEAST
             && (remaining_mm.hypot(rest) < wanted || (rest >= wanted && remaining_mm < 0.1 * rest))
     }
 

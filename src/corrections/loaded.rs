@@ -145,7 +145,7 @@ impl Stage {
             size = self.unbalanced(env, problem, at.g)?;
             let moved = self.moved / (at.u.len() / 3) as f64;
             report.remaining_mm = (moved.sqrt() * size / before.max(f64::MIN_POSITIVE)) as f32;
-            if self.suffices(report.remaining_mm, input.enough) {
+            if self.suffices(iteration + 1, report.remaining_mm, input.enough) {
                 break;
             }
         }

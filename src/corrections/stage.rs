@@ -380,7 +380,7 @@ impl Stage {
             det = self.improve(lent, input.last, u, g, det, report)?;
             report.iterations += 1;
             report.remaining_mm = self.remaining(env, g, size)?;
-            if self.suffices(report.remaining_mm, input.enough) {
+            if self.suffices(iteration + 1, report.remaining_mm, input.enough) {
                 break;
             }
         }
