@@ -1,8 +1,9 @@
-"""What training runs got and reached: `run_table.py RUN [RUN ...] --evaluation JSON --page docs/results/training.md`.
+"""What training runs got and reached: `run_table.py RUN[=JSON] ... --evaluation JSON --page docs/results/training.md`.
 
 Reads the last scores in `log.csv` and the steps and CPU time in `last.pt` of each run folder; a run that has not been
-scored yet has no error in the table. `--evaluation` is the JSON of `evaluate` of a bundle on the same data, to compare
-with on the same cases. Bars and goals are of all held-out cases: scores of a few of them can miss, not reach them.
+scored yet has no error in the table. `RUN=JSON` takes the scores that `evaluate` gave its bundle. `--evaluation` is
+the JSON of `evaluate` of a bundle on the same data, to compare with on the same cases. Bars and goals are of all
+held-out cases: scores of a few of them can miss, not reach them.
 """
 
 from __future__ import annotations
@@ -34,14 +35,23 @@ def verdict(mse: float | None, limit: float, cases: int, every: int) -> str:
     return f"{limit} reached" if cases >= every else f"{limit} open: {cases} of {every} cases"
 
 
-def row(run: Path, bundle: Reference) -> str:
+def row(named: str, bundle: Reference) -> str:
+    folder, _, scores = named.partition("=")
+    run = Path(folder)
     checkpoint = load_checkpoint(run / "last.pt")
     settings = settings_from_dict(checkpoint["settings"], str(run))
     t, scored = settings.train, None
     if (run / "log.csv").exists():
         with (run / "log.csv").open() as file:
             scored = list(csv.DictReader(file))[-1]
-    mse = None if scored is None else float(scored["test_mse_mm2"])
+    cases, mse, largest = t.evaluate_cases, None, None
+    if scores:
+        own = read_reference(Path(scores))
+        cases = len(own.cases)
+        mse, largest = own.mean(cases), own.mean(cases, "max_mm")
+    elif scored is not None:
+        mse, largest = float(scored["test_mse_mm2"]), float(scored["test_max_mm"])
+    after = "" if scored is None else f", after step {int(scored['step']):,}"
     epochs = t.epochs + t.autoregressive_epochs
     steps = f"{t.steps_per_epoch * epochs:,}" if t.steps_per_epoch else f"{epochs} epochs"
     cells = [
@@ -51,18 +61,18 @@ def row(run: Path, bundle: Reference) -> str:
         steps,
         f"{checkpoint['step_count'] * t.samples_per_step:,}",
         f"{checkpoint['core_seconds'] / 3600:.2f}",
-        "not scored" if mse is None else f"{mse:.4f} ({t.evaluate_cases}, after step {int(scored['step']):,})",
-        "-" if scored is None else f"{float(scored['test_max_mm']):.2f}",
+        "not scored" if mse is None else f"{mse:.4f} ({cases}{after})",
+        "-" if largest is None else f"{largest:.2f}",
     ]
-    cells.append(f"{bundle.mean(t.evaluate_cases):.4f}")
+    cells.append(f"{bundle.mean(cases):.4f}")
     every = len(bundle.cases)
-    cells += [verdict(mse, limit, t.evaluate_cases, every) for limit in BARS.get(settings.name, ())]
+    cells += [verdict(mse, limit, cases, every) for limit in BARS.get(settings.name, ())]
     return "| " + " | ".join(cells + ["-"] * (11 - len(cells))) + " |"
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("run", type=Path, nargs="+", help="run folders")
+    parser.add_argument("run", nargs="+", help="run folders, each with `=JSON` of `evaluate` of its bundle")
     parser.add_argument("--page", type=Path, help="page to write into, between the marks `paper runs`")
     parser.add_argument("--evaluation", type=Path, required=True, help="JSON of `evaluate` of a bundle")
     options = parser.parse_args()

@@ -108,6 +108,12 @@ def test_the_table_of_runs_says_what_a_run_got(trained, tmp_path):
     cells = [cell.strip() for cell in page.read_text().splitlines()[3].strip("|").split("|")]
     assert cells[:5] == ["`tiny-replay`", "10,691", "1,400", "1,400", "22,400"] and float(cells[5]) >= 0
     assert cells[6].endswith("after step 1,400)") and cells[8:] == ["2.0000", "-", "-"]
+    own = [{"index": i, "bundle": {"mse_mm2": 0.5, "max_mm": 3.0}} for i in (1, 3)]
+    other.with_name("own.json").write_text(json.dumps({"bundle": "own", "cases": own}))
+    command[2] = f"{trained}={other.with_name('own.json')}"
+    subprocess.run(command, check=True, capture_output=True)
+    cells = [cell.strip() for cell in page.read_text().splitlines()[3].strip("|").split("|")]
+    assert cells[6:8] == ["0.5000 (2, after step 1,400)", "3.00"]
 
 
 def test_a_reference_that_is_no_evaluation_names_its_file(tmp_path):
