@@ -111,8 +111,9 @@ def train_command(options) -> int:
     if ranks > 1 and distributed.get_rank() == 0:
         distributed.barrier()
     out.mkdir(parents=True, exist_ok=True)
-    if not options.resume and trainer.rank == 0:
-        shutil.copyfile(options.config, out / "config.toml")
+    kept = out / "config.toml"
+    if not options.resume and trainer.rank == 0 and not (kept.exists() and kept.samefile(options.config)):
+        shutil.copyfile(options.config, kept)
     if options.resume and (out / "last.pt").exists():
         trainer.resume(out / "last.pt")
     elif options.init:
