@@ -6,6 +6,7 @@ use std::time::Instant;
 use super::StepInput;
 use super::contact::{ContactSet, check_displacement};
 use super::corrected::Corrected;
+use super::counters::{Counters, Source};
 use super::engine::{Decode, Engine, Inputs, Which};
 use super::inversion::ContactElements;
 use super::plan::NodePlan;
@@ -36,17 +37,6 @@ pub const STILL_CHANGE: f32 = 0.002;
 
 pub(super) const SCENE: &str = "a scene's states";
 
-/// Where a published state came from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Source {
-    /// Rest: zero everywhere.
-    Rest,
-    /// The model.
-    Model,
-    /// The linear response alone, or the imposed contact alone (the guard's blend).
-    Fallback,
-}
-
 /// Everything of a scene that only its stepping thread touches.
 pub struct Core {
     pub(super) model: Arc<Model>,
@@ -65,8 +55,6 @@ pub struct Core {
     pub(super) hands: Vec<crate::haptics::publish::Link>,
     #[cfg(feature = "haptics")]
     pub(super) took_s: f64,
-    /// Whether the last published state was corrected, and the one before it.
-    pub(super) was_corrected: [bool; 2],
     /// Whether the state being made is.
     pub(super) next_corrected: bool,
     pub(super) held: Vec<bool>,
@@ -77,14 +65,7 @@ pub struct Core {
     pub(super) incoming: ContactSet,
     pub(super) contact: ContactSet,
     pub(super) contact_before: ContactSet,
-    pub(super) source: Source,
-    pub(super) source_before: Source,
-    pub(super) step_count: u64,
-    pub(super) quiet: u32,
-    pub(super) sleeping: bool,
-    /// Published frames that hold exactly rest since the scene fell asleep.
-    pub(super) rest_frames: u32,
-    pub(super) max_displacement: f32,
+    pub(super) counters: Counters,
     /// Flags of the last step, of which the log has told.
     pub(super) told: u32,
     envelope: EnvelopeCheck,
@@ -136,13 +117,7 @@ impl Core {
             incoming: ContactSet::with_capacity(count)?,
             contact_before: ContactSet::with_capacity(count)?,
             contact,
-            source: Source::Rest,
-            source_before: Source::Rest,
-            step_count: 0,
-            quiet: 0,
-            sleeping: false,
-            rest_frames: 0,
-            max_displacement: 0.0,
+            counters: Counters::REST,
             told: 0,
             next: Frame::rest(count)?,
             model: parts.model,
@@ -161,7 +136,6 @@ impl Core {
             hands: Vec::new(),
             #[cfg(feature = "haptics")]
             took_s: 0.0,
-            was_corrected: [false; 2],
             next_corrected: false,
         })
     }
@@ -170,7 +144,7 @@ impl Core {
     pub(super) fn blank_stats(&self) -> SceneStats {
         SceneStats {
             flags: 0,
-            step_count: self.step_count,
+            step_count: self.counters.step_count,
             step_ms: 0.0,
             check_ms: 0.0,
             prior_ms: 0.0,
@@ -196,10 +170,10 @@ impl Core {
             step_path: self.engine.path(),
             upload_ms: 0.0,
             download_ms: 0.0,
-            max_displacement_mm: self.max_displacement,
+            max_displacement_mm: self.counters.max_displacement,
             indicator: 0.0,
             prior_forces: self.engine.linear().is_some() && self.corrected.is_none(),
-            sleeping: self.sleeping,
+            sleeping: self.counters.sleeping,
             poisoned: false,
         }
     }
@@ -213,7 +187,7 @@ impl Core {
     ) -> Result<()> {
         let _flush = FlushToZero::enter();
         let start = Instant::now();
-        let _span = tracing::debug_span!("step", step = self.step_count).entered();
+        let _span = tracing::debug_span!("step", step = self.counters.step_count).entered();
         let mut stats = self.blank_stats();
         let mut watch = Stopwatch::start();
         let count = self.mesh.node_count();
@@ -231,7 +205,7 @@ impl Core {
         stats.check_ms = watch.lap();
         let near = self.meet_tools(published, &input)?;
 
-        if self.sleeping && given.is_none() && self.incoming.is_empty() && !near {
+        if self.counters.sleeping && given.is_none() && self.incoming.is_empty() && !near {
             self.publish_rest(published);
         } else {
             if !self.drive(published, near, start, &mut stats)? {
@@ -251,10 +225,10 @@ impl Core {
             self.took_s = start.elapsed().as_secs_f64();
             self.tell_hands(published);
         }
-        self.step_count += 1;
-        stats.step_count = self.step_count;
-        stats.sleeping = self.sleeping;
-        stats.max_displacement_mm = self.max_displacement;
+        self.counters.step_count += 1;
+        stats.step_count = self.counters.step_count;
+        stats.sleeping = self.counters.sleeping;
+        stats.max_displacement_mm = self.counters.max_displacement;
         stats.contact_count = self.contact.len() as u64;
         if let Some(out) = out {
             lock_read(published).read(Values::Region, out)?;
@@ -355,7 +329,10 @@ impl Core {
             }
             corrected.stage.commit();
         }
-        self.was_corrected = [self.next_corrected && !replaced, self.was_corrected[0]];
+        self.counters.was_corrected = [
+            self.next_corrected && !replaced,
+            self.counters.was_corrected[0],
+        ];
         #[cfg(feature = "contact")]
         if let Some(problem) = &mut self.problem {
             if replaced {
@@ -363,27 +340,27 @@ impl Core {
             }
             problem.commit();
         }
-        self.source_before = self.source;
-        self.source = if replaced {
+        self.counters.source_before = self.counters.source;
+        self.counters.source = if replaced {
             Source::Fallback
         } else {
             Source::Model
         };
         std::mem::swap(&mut self.contact_before, &mut self.contact);
         std::mem::swap(&mut self.contact, &mut self.incoming);
-        self.max_displacement = if replaced {
+        self.counters.max_displacement = if replaced {
             self.largest_of_next()
         } else {
             stats.max_displacement_mm
         };
         let quiet = self.contact.is_empty()
-            && !self.was_corrected[0]
+            && !self.counters.was_corrected[0]
             && !was_given
-            && (self.max_displacement <= QUIET_DISPLACEMENT || self.is_still(published))
+            && (self.counters.max_displacement <= QUIET_DISPLACEMENT || self.is_still(published))
             && self.engine.is_quiet(QUIET_DISPLACEMENT);
-        self.quiet = if quiet { self.quiet + 1 } else { 0 };
-        self.sleeping = !self.options.no_sleep && self.quiet >= QUIET_STEPS;
-        self.rest_frames = 0;
+        self.counters.quiet = if quiet { self.counters.quiet + 1 } else { 0 };
+        self.counters.sleeping = !self.options.no_sleep && self.counters.quiet >= QUIET_STEPS;
+        self.counters.rest_frames = 0;
         self.rotate(published);
     }
 
@@ -391,7 +368,8 @@ impl Core {
     /// what is left is then that model's bias, not motion.
     fn is_still(&self, published: &RwLock<Published>) -> bool {
         let bias = self.model.manifest.rest_displacement_mm;
-        if self.max_displacement > bias + STILL_DISPLACEMENT || self.engine.comes_to_rest() {
+        if self.counters.max_displacement > bias + STILL_DISPLACEMENT || self.engine.comes_to_rest()
+        {
             return false;
         }
         let shared = lock_read(published);
@@ -407,21 +385,21 @@ impl Core {
     fn publish_rest(&mut self, published: &RwLock<Published>) {
         self.contact_before.clear();
         self.contact.clear();
-        self.max_displacement = 0.0;
+        self.counters.max_displacement = 0.0;
         #[cfg(feature = "contact")]
         self.rest_tools(published);
         let frames = if self.options.cubic_sampling { 4 } else { 3 };
-        if self.rest_frames >= frames {
+        if self.counters.rest_frames >= frames {
             return;
         }
-        self.rest_frames += 1;
+        self.counters.rest_frames += 1;
         self.engine.reset();
         if let Some(corrected) = &mut self.corrected {
             corrected.stage.reset();
         }
-        self.was_corrected = [false; 2];
-        self.source_before = Source::Rest;
-        self.source = Source::Rest;
+        self.counters.was_corrected = [false; 2];
+        self.counters.source_before = Source::Rest;
+        self.counters.source = Source::Rest;
         self.next.field.fill(0.0);
         self.next.points.fill(0.0);
         self.rotate(published);

@@ -276,7 +276,7 @@ impl Core {
             Engine::Upt(_) => return Ok(()),
         };
         let compute = self.machine.compute();
-        if self.was_corrected[0] {
+        if self.counters.was_corrected[0] {
             engine.swing_from(
                 compute,
                 &corrected.basis_starts,
@@ -289,8 +289,8 @@ impl Core {
             compute,
             &corrected.basis_starts,
             [
-                self.was_corrected[0].then_some(shared.last.field.as_slice()),
-                self.was_corrected[1].then_some(shared.before.field.as_slice()),
+                self.counters.was_corrected[0].then_some(shared.last.field.as_slice()),
+                self.counters.was_corrected[1].then_some(shared.before.field.as_slice()),
             ],
         )
     }

@@ -5,6 +5,7 @@
 mod contact;
 mod core;
 mod corrected;
+mod counters;
 #[cfg(feature = "contact")]
 mod driven;
 mod engine;

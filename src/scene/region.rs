@@ -2,7 +2,8 @@
 
 use std::sync::{Arc, RwLock};
 
-use super::core::{Core, Source, lock_read, lock_write};
+use super::core::{Core, lock_read, lock_write};
+use super::counters::{Counters, Source};
 use super::engine::{Decode, Which};
 use super::plan::NodePlan;
 use super::points::AttachedPoints;
@@ -30,20 +31,13 @@ impl Core {
         if let Some(corrected) = &mut self.corrected {
             corrected.stage.reset();
         }
-        self.was_corrected = [false; 2];
         #[cfg(feature = "contact")]
         if let Some(problem) = &mut self.problem {
             problem.reset();
         }
         self.contact.clear();
         self.contact_before.clear();
-        self.source = Source::Rest;
-        self.source_before = Source::Rest;
-        self.step_count = 0;
-        self.quiet = 0;
-        self.sleeping = false;
-        self.rest_frames = 0;
-        self.max_displacement = 0.0;
+        self.counters = Counters::REST;
         self.told = 0;
         let stats = self.blank_stats();
         let mut guard = lock_write(published);
@@ -86,7 +80,7 @@ impl Core {
         if nodes.is_empty() {
             return Ok(());
         }
-        if self.step_count == 0 {
+        if self.counters.step_count == 0 {
             return Err(Error::State("decode before the first step".into()));
         }
         let _flush = FlushToZero::enter();
@@ -109,8 +103,8 @@ impl Core {
         detail: &mut [f32],
     ) -> Result<()> {
         let (source, contact) = match which {
-            Which::Last => (self.source, &self.contact),
-            _ => (self.source_before, &self.contact_before),
+            Which::Last => (self.counters.source, &self.contact),
+            _ => (self.counters.source_before, &self.contact_before),
         };
         let shared = lock_read(published);
         let frame = if which == Which::Last {

@@ -37,7 +37,12 @@ impl Core {
         let _span = tracing::trace_span!("guard").entered();
         let max = self.largest_of_next();
         let bound = self.model.manifest.envelope.displacement_bound_mm;
-        let mut verdict = guard::judge(bound, max, self.max_displacement, self.incoming.max_push());
+        let mut verdict = guard::judge(
+            bound,
+            max,
+            self.counters.max_displacement,
+            self.incoming.max_push(),
+        );
         if self.options.check_inversion
             && verdict & flag::NON_FINITE == 0
             && guard::inverted(
@@ -83,7 +88,7 @@ impl Core {
         self.told = stats.flags;
         if risen != 0 {
             tracing::warn!(
-                step = self.step_count,
+                step = self.counters.step_count,
                 indicator = stats.indicator,
                 largest_mm = stats.max_displacement_mm,
                 "{}",
@@ -124,7 +129,7 @@ impl Core {
         }
         self.tell_flags(stats);
         let mut shared = lock_write(published);
-        stats.max_displacement_mm = self.max_displacement;
+        stats.max_displacement_mm = self.counters.max_displacement;
         shared.stats = *stats;
         Err(error)
     }

@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::memory;
 use crate::scene::Contact;
 use crate::scene::contact::ContactSet;
-use crate::scene::core::Source;
+use crate::scene::counters::{Counters, Source};
 
 /// What is written.
 pub(super) struct Writer(pub(super) Vec<u8>);
@@ -26,6 +26,36 @@ impl Writer {
     pub(super) fn indices(&mut self, values: &[u32]) {
         self.u32(values.len() as u32);
         values.iter().for_each(|&value| self.u32(value));
+    }
+
+    /// All counters but `was_corrected`, which stands behind the lists of corrections.
+    pub(super) fn counters(&mut self, counters: &Counters) {
+        let Counters {
+            step_count,
+            quiet,
+            sleeping,
+            rest_frames,
+            source,
+            source_before,
+            max_displacement,
+            was_corrected: _,
+        } = *counters;
+        self.u32(step_count as u32);
+        self.u32((step_count >> 32) as u32);
+        self.u32(quiet);
+        self.u32(u32::from(sleeping));
+        self.u32(rest_frames);
+        self.u32(source_code(source));
+        self.u32(source_code(source_before));
+        self.u32(max_displacement.to_bits());
+    }
+}
+
+fn source_code(source: Source) -> u32 {
+    match source {
+        Source::Rest => 0,
+        Source::Model => 1,
+        Source::Fallback => 2,
     }
 }
 
@@ -118,7 +148,21 @@ impl<'a> Reader<'a> {
         Ok(Some((motion, pairs?)))
     }
 
-    pub(super) fn source(&mut self) -> Result<Source> {
+    /// What [`Writer::counters`] wrote.
+    pub(super) fn counters(&mut self) -> Result<Counters> {
+        Ok(Counters {
+            step_count: u64::from(self.u32()?) | (u64::from(self.u32()?) << 32),
+            quiet: self.u32()?,
+            sleeping: self.u32()? != 0,
+            rest_frames: self.u32()?,
+            source: self.source()?,
+            source_before: self.source()?,
+            max_displacement: self.f32()?,
+            was_corrected: [false; 2],
+        })
+    }
+
+    fn source(&mut self) -> Result<Source> {
         match self.u32()? {
             0 => Ok(Source::Rest),
             1 => Ok(Source::Model),

@@ -13,7 +13,8 @@ use std::sync::RwLock;
 use sha2::{Digest, Sha256};
 
 use super::contact::ContactSet;
-use super::core::{Core, Source, lock_read, lock_write};
+use super::core::{Core, lock_read, lock_write};
+use super::counters::Counters;
 use super::engine::Engine;
 use super::published::Published;
 use super::reduced::ReducedRecord;
@@ -30,14 +31,6 @@ const DIGEST: usize = 32;
 
 /// L-BFGS pairs.
 type Pairs = Vec<[Vec<f32>; 2]>;
-
-fn source_code(source: Source) -> u32 {
-    match source {
-        Source::Rest => 0,
-        Source::Model => 1,
-        Source::Fallback => 2,
-    }
-}
 
 /// Latent lists of a record, in the order in which they are stored.
 fn lists(engine: &mut Engine) -> Vec<&mut Vec<f32>> {
@@ -92,14 +85,7 @@ impl Core {
         w.u32(VERSION);
         w.0.extend_from_slice(&self.model.hash);
         w.0.extend_from_slice(&Sha256::digest(self.mesh.sha256.as_bytes()));
-        w.u32(self.step_count as u32);
-        w.u32((self.step_count >> 32) as u32);
-        w.u32(self.quiet);
-        w.u32(u32::from(self.sleeping));
-        w.u32(self.rest_frames);
-        w.u32(source_code(self.source));
-        w.u32(source_code(self.source_before));
-        w.u32(self.max_displacement.to_bits());
+        w.counters(&self.counters);
         w.u32(self.step_us());
         for contact in [&self.contact, &self.contact_before] {
             w.indices(&contact.nodes);
@@ -143,7 +129,7 @@ impl Core {
                 }
             }
         }
-        for was in self.was_corrected {
+        for was in self.counters.was_corrected {
             w.u32(u32::from(was));
         }
         #[cfg(feature = "contact")]
@@ -187,12 +173,7 @@ impl Core {
             return Err(Error::Snapshot("is of another mesh".into()));
         }
         let count = self.mesh.node_count();
-        let step_count = u64::from(r.u32()?) | (u64::from(r.u32()?) << 32);
-        let quiet = r.u32()?;
-        let sleeping = r.u32()? != 0;
-        let rest_frames = r.u32()?;
-        let (source, source_before) = (r.source()?, r.source()?);
-        let max_displacement = r.f32()?;
+        let mut counters = r.counters()?;
         let (step_us, own_us) = (r.u32()?, self.step_us());
         if step_us != own_us {
             return Err(Error::Snapshot(format!(
@@ -223,7 +204,7 @@ impl Core {
                 "was saved by a scene with other `corrections`; restore it in one that corrects where that one did".into(),
             ));
         }
-        let was_corrected = [r.u32()? != 0, r.u32()? != 0];
+        counters.was_corrected = [r.u32()? != 0, r.u32()? != 0];
         #[cfg(feature = "contact")]
         let driven = self.read_tools(&mut r)?;
         #[cfg(not(feature = "contact"))]
@@ -255,14 +236,7 @@ impl Core {
         }
         self.contact = contact;
         self.contact_before = contact_before;
-        self.source = source;
-        self.source_before = source_before;
-        self.step_count = step_count;
-        self.quiet = quiet;
-        self.sleeping = sleeping;
-        self.rest_frames = rest_frames;
-        self.max_displacement = max_displacement;
-        self.was_corrected = was_corrected;
+        self.counters = counters;
         #[cfg(feature = "contact")]
         let old_tools = self.swap_tools(driven)?;
         if let [last, before] = fields.as_slice() {
@@ -326,13 +300,7 @@ impl Core {
                 }
             },
             contacts: [self.contact.copy()?, self.contact_before.copy()?],
-            sources: [self.source, self.source_before],
-            step_count: self.step_count,
-            quiet: self.quiet,
-            sleeping: self.sleeping,
-            rest_frames: self.rest_frames,
-            max_displacement: self.max_displacement,
-            was_corrected: self.was_corrected,
+            counters: self.counters,
             fields,
             past: match &self.corrected {
                 None => None,
@@ -362,13 +330,7 @@ impl Core {
         let [contact, contact_before] = &kept.contacts;
         self.contact.copy_from(contact);
         self.contact_before.copy_from(contact_before);
-        [self.source, self.source_before] = kept.sources;
-        self.step_count = kept.step_count;
-        self.quiet = kept.quiet;
-        self.sleeping = kept.sleeping;
-        self.rest_frames = kept.rest_frames;
-        self.max_displacement = kept.max_displacement;
-        self.was_corrected = kept.was_corrected;
+        self.counters = kept.counters;
         // Fails only where a worker panics, which has been reported by then.
         let _ = self.restore_past(kept.past);
         if let Some([last, before]) = kept.fields {
@@ -389,13 +351,7 @@ enum Records {
 struct Kept {
     records: Records,
     contacts: [ContactSet; 2],
-    sources: [Source; 2],
-    step_count: u64,
-    quiet: u32,
-    sleeping: bool,
-    rest_frames: u32,
-    max_displacement: f32,
-    was_corrected: [bool; 2],
+    counters: Counters,
     fields: Option<[Vec<f32>; 2]>,
     past: Option<(Motion, Pairs)>,
 }

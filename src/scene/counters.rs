@@ -1,0 +1,47 @@
+//! What a scene knows of its last two steps in single numbers.
+
+/// Where a published state came from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Source {
+    /// Rest: zero everywhere.
+    Rest,
+    /// The model.
+    Model,
+    /// The linear response alone, or the imposed contact alone (the guard's blend).
+    Fallback,
+}
+
+/// Reset writes [`Counters::REST`], a snapshot saves all of it, a failed restore puts it back.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Counters {
+    /// Steps since rest.
+    pub step_count: u64,
+    /// Quiet steps in a row.
+    pub quiet: u32,
+    /// Whether the scene sleeps.
+    pub sleeping: bool,
+    /// Published frames that hold exactly rest since the scene fell asleep.
+    pub rest_frames: u32,
+    /// Where the last published state came from.
+    pub source: Source,
+    /// Where the one before it came from.
+    pub source_before: Source,
+    /// Largest displacement of the last published state, in mm.
+    pub max_displacement: f32,
+    /// Whether the last published state was corrected, and the one before it.
+    pub was_corrected: [bool; 2],
+}
+
+impl Counters {
+    /// A scene before its first step.
+    pub const REST: Self = Self {
+        step_count: 0,
+        quiet: 0,
+        sleeping: false,
+        rest_frames: 0,
+        source: Source::Rest,
+        source_before: Source::Rest,
+        max_displacement: 0.0,
+        was_corrected: [false; 2],
+    };
+}
