@@ -182,3 +182,22 @@ def test_heads_one_after_another_are_the_same_attention(committed, monkeypatch):
     assert more > nodes
     for a, b in zip(*(s.run(None, {"supernodes": supernodes}) for s in (together, apart)), strict=True):
         assert np.abs(a - b).max() < 1e-6 * np.abs(a).max()
+
+
+def test_weights_in_half_precision_are_the_same_bundle_in_a_smaller_file(bundle, committed, data, mesh_path, tmp_path):
+    out = tmp_path / "half"
+    command = ["export", str(committed), "--out", str(out), "--mesh", str(mesh_path), "--data", str(data)]
+    assert main([*command, "--half-weights"]) == 0
+    check = json.loads((out / "bundle.json").read_text())["provenance"]["export_check"]
+    assert all(0 <= v < TOLERANCE for v in check.values())
+    assert (out / "latent.onnx").stat().st_size < 0.8 * (bundle / "latent.onnx").stat().st_size
+    case = open_dataset(data, load_mesh(mesh_path)).select("test")[0]
+    trajectory = open_trajectory(case.path, load_mesh(mesh_path))
+    contacts = [trajectory.contact(t) for t in range(1, 20)]
+    ends = []
+    for folder in (bundle, out):
+        runner = BundleRunner(folder)
+        for nodes, vectors in contacts:
+            state = runner.step(nodes, vectors)
+        ends.append(np.array(state))
+    assert 0 < np.abs(ends[0] - ends[1]).max() < 0.02 * np.abs(ends[0]).max()

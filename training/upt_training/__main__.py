@@ -67,6 +67,7 @@ def parser() -> argparse.ArgumentParser:
     export.add_argument("--paper-split", action="store_true", help="also the paper's two halves")
     export.add_argument("--step", action="store_true", help="also the whole step in one graph")
     export.add_argument("--f16", action="store_true", help="also half-precision graphs")
+    export.add_argument("--half-weights", action="store_true", help="store large weights in half precision")
     export.add_argument("--int8", action="store_true", help="also dynamically quantised graphs")
 
     variants = commands.add_parser("variants", help="a copy of a bundle with f16 and int8 graphs too")

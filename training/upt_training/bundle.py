@@ -21,6 +21,7 @@ from upt_training import onnx_graph
 from upt_training.bundle_folder import new_bundle, write_manifest
 from upt_training.errors import InputError
 from upt_training.graph import Graph, build_graph
+from upt_training.half_weights import round_weights, store_in_half
 from upt_training.mesh_file import Mesh
 from upt_training.model import Upt
 from upt_training.reference_step import write_reference
@@ -198,20 +199,28 @@ def write_bundle(
     step: bool = False,
     precisions: tuple[str, ...] = ("f32",),
     check_features: list[np.ndarray] | None = None,
+    half_weights: bool = False,
 ) -> dict:
-    """Write the folder `out` (made new beside it, then moved into place) and return its manifest."""
+    """Write the folder `out` (made new beside it, then moved into place) and return its manifest.
+
+    `half_weights` rounds large weights to half precision and stores those of `latent.onnx` so; it computes in float32.
+    """
     out = Path(out)
     if model.settings.uses_prior and prior is None:
         raise InputError(f"{out}: the model's features or base use the prior: pass --prior prior.safetensors")
     if model.settings.vibration and vibration is None:
         raise InputError(f"{out}: the model uses free vibration: pass --vibration vibration.safetensors")
     model = model.eval().float().cpu()
+    if half_weights:
+        model = round_weights(copy.deepcopy(model))
     s = model.settings
     graph = build_graph(mesh, s.graph)
     with new_bundle(out) as folder:
         with torch.no_grad():
             exact = copy.deepcopy(model).double()
             for file, proto in graphs_of(exact, paper_split, step).items():
+                if half_weights and file == "latent.onnx":
+                    store_in_half(proto)
                 onnx.save(proto, str(folder / file))
             save_file(kernel_weights(exact), str(folder / "weights.safetensors"))
         if paper_split and not s.uses_prior:

@@ -124,6 +124,7 @@ def export_command(options) -> int:
         step=options.step,
         precisions=("f32", *(["f16"] if options.f16 else []), *(["int8"] if options.int8 else [])),
         check_features=real_features(model, mesh, dataset, prior) if dataset else None,
+        half_weights=options.half_weights,
     )
     write_rest(Path(options.out))
     check = {k: f"{v:.1e}" for k, v in manifest["provenance"]["export_check"].items()}
