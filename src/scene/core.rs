@@ -218,6 +218,10 @@ impl Core {
             let verdict = self.judge(&mut stats)?;
             let replaced = verdict & guard::REFUSED != 0
                 && self.refuse(published, verdict, given.is_some(), &mut stats)?;
+            #[cfg(feature = "contact")]
+            if replaced {
+                self.give_up_tools(published, &mut stats);
+            }
             self.publish(published, given.is_some(), replaced, &stats);
         }
         #[cfg(feature = "haptics")]
@@ -335,9 +339,6 @@ impl Core {
         ];
         #[cfg(feature = "contact")]
         if let Some(problem) = &mut self.problem {
-            if replaced {
-                problem.let_go();
-            }
             problem.commit();
         }
         self.counters.source_before = self.counters.source;

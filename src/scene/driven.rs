@@ -241,6 +241,15 @@ impl Core {
         Self::tell_depth(problem, stats);
     }
 
+    /// The state that tools drove was refused, and `next` is another: nothing pushes it, and it may lie in a tool.
+    pub(super) fn give_up_tools(&mut self, published: &RwLock<Published>, stats: &mut SceneStats) {
+        if let Some(mut problem) = self.problem.take() {
+            problem.let_go();
+            self.finish_tools(published, &mut problem, stats);
+            self.problem = Some(problem);
+        }
+    }
+
     fn tell_depth(problem: &Problem, stats: &mut SceneStats) {
         stats.contact_ms = problem.spent_ms();
         let readings = problem.next.tools.iter().map(|held| held.reading);
