@@ -22,8 +22,9 @@ use hand::{any, at, between, central, moved, rod, sites};
 
 /// Flags that say that elements are inside out, or that the answer is the linear one.
 const INVERTED: u32 = flag::INVERTED | flag::FELL_BACK;
-/// A tool this deep in the tissue must raise a flag, mm.
-const DEEP_MM: f64 = 1.5;
+/// A tool this deep in the tissue must raise a flag, mm: the library tells of 1 mm at its samples, and a point between samples that are
+/// 1.7 mm apart lies at most 1 mm from one.
+const DEEP_MM: f64 = 2.0;
 /// Steps without tools after which the tissue must be at rest, and how near, mm.
 const REST_STEPS: usize = 400;
 const REST_MM: f32 = 0.05;
