@@ -6,80 +6,78 @@ from pathlib import Path
 import numpy as np
 
 
-def write_tets(out, points, tets, groups):
-    """A .vtu with the tetrahedra, and an array `group` of their part's number."""
-    import meshio
-
-    if not len(tets):
-        sys.exit("the file holds no linear tetrahedra (C3D4, tet4)")
-    data = {"group": [np.asarray(groups, dtype=np.int32)]}
-    meshio.Mesh(points, [("tetra", tets)], cell_data=data).write(out, file_format="vtu", binary=False)
-
-
-def abaqus(path, out):
-    import meshio
-
-    mesh = meshio.read(path, file_format="abaqus")
-    tets, groups = [], []
-    for at, block in enumerate(mesh.cells):
-        if block.type != "tetra":
+def isosurface(field):
+    """Triangles where a field on a grid is 0, counter-clockwise from where it is below: each cell as six tetrahedra."""
+    field = np.where(np.abs(field) < 1e-6, 1e-6, field)
+    shape = np.array(field.shape)
+    strides = np.array([shape[1] * shape[2], shape[2], 1])
+    cells = np.indices(shape - 1).reshape(3, -1).T @ strides
+    values = field.ravel()
+    corner = {bits: np.array(bits) @ strides for bits in np.ndindex(2, 2, 2)}
+    # Around the diagonal from (0, 0, 0) to (1, 1, 1): along the axes in every order; half of the orders are mirrored.
+    tets = []
+    for order, even in [((0, 1, 2), 1), ((1, 2, 0), 1), ((2, 0, 1), 1), ((0, 2, 1), 0), ((2, 1, 0), 0), ((1, 0, 2), 0)]:
+        one, two = (tuple(int(axis in order[:n]) for axis in range(3)) for n in (1, 2))
+        way = [corner[0, 0, 0], corner[one], corner[two], corner[1, 1, 1]]
+        tets.append(cells[:, None] + np.array(way if even else [way[0], way[2], way[1], way[3]]))
+    tets = np.concatenate(tets)
+    inside = values[tets] > 0
+    tets, inside = tets[inside.any(1) & ~inside.all(1)], inside[inside.any(1) & ~inside.all(1)]
+    triangles = []
+    for kind in np.ndindex(2, 2, 2, 2):
+        rows = tets[(inside == np.array(kind, bool)).all(1)]
+        ins, outs = [i for i in range(4) if kind[i]], [i for i in range(4) if not kind[i]]
+        if len(ins) in (1, 3):
+            [apex] = ins if len(ins) == 1 else outs
+            a, b, c = (i for i in range(4) if i != apex)
+            corners = [[(apex, a), (apex, b), (apex, c)]]
+        elif len(ins) == 2:
+            (a, b), (c, d) = ins, outs
+            corners = [[(a, c), (b, c), (b, d)], [(a, c), (b, d), (a, d)]]
+        else:
             continue
-        group = np.zeros(len(block.data), dtype=np.int32)
-        for number, (_, sets) in enumerate(sorted(mesh.cell_sets.items()), 1):
-            rows = sets[at] if sets[at] is not None else []
-            group[np.asarray(rows, dtype=int)] = number
-        tets.append(block.data)
-        groups.append(group)
-    for number, name in enumerate(sorted(mesh.cell_sets), 1):
-        print(f"element set {name} is group:group={number}")
-    empty = np.zeros((0, 4), dtype=int)
-    write_tets(out, mesh.points, np.concatenate(tets or [empty]), np.concatenate(groups or [[]]))
-
-
-def febio(path, out):
-    from xml.etree import ElementTree
-
-    root = ElementTree.parse(path).getroot()
-    body = root.find("Mesh") if root.find("Mesh") is not None else root.find("Geometry")
-    if body is None:
-        sys.exit("the file has neither <Mesh> nor <Geometry>")
-    number_of, points = {}, []
-    for nodes in body.findall("Nodes"):
-        for node in nodes.findall("node"):
-            number_of[node.get("id")] = len(points)
-            points.append([float(x) for x in node.text.split(",")])
-    tets, groups = [], []
-    for group, elements in enumerate(body.findall("Elements"), 1):
-        if elements.get("type", "").lower() != "tet4":
-            continue
-        print(f"part {elements.get('name') or elements.get('mat') or group} is group:group={group}")
-        for element in elements.findall("elem"):
-            tets.append([number_of[name.strip()] for name in element.text.split(",")])
-            groups.append(group)
-    write_tets(out, np.array(points), np.array(tets), groups)
+        # Which way round, by a tetrahedron of the same orientation as all of these.
+        unit = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
+        for three in corners:
+            p, q, r = (unit[list(edge)].mean(0) for edge in three)
+            away = unit[outs].mean(0) - unit[ins].mean(0)
+            if np.cross(q - p, r - p) @ away < 0:
+                three = three[::-1]
+            triangles.append(np.stack([rows[:, list(edge)] for edge in three], 1))
+    edges = np.sort(np.concatenate(triangles), axis=2)
+    edges, faces = np.unique(edges.reshape(-1, 2), axis=0, return_inverse=True)
+    place = values[edges]
+    # Not quite at a corner, where triangles would shrink to nothing.
+    share = np.clip(place[:, 0] / (place[:, 0] - place[:, 1]), 0.05, 0.95)[:, None]
+    ends = [np.stack(np.unravel_index(edges[:, k], shape), 1) for k in (0, 1)]
+    return (1 - share) * ends[0] + share * ends[1], faces.reshape(-1, 3)
 
 
 def nifti(path, out):
     """The surface of all labels together as a .ply in mm, and one of each label beside it."""
     import nibabel
-    from skimage.filters import gaussian
-    from skimage.measure import label, marching_cubes
+    from scipy.ndimage import gaussian_filter, label
 
-    image = nibabel.load(path)
-    labels = np.asarray(image.dataobj)
-    if labels.ndim != 3 or not np.all(labels == np.round(labels)):
+    try:
+        image = nibabel.load(path)
+        labels = np.asarray(image.dataobj)
+    except Exception as error:  # the library has no base class for what may be wrong with a file
+        sys.exit(f"{error}".splitlines()[0] + ": is the file a NIfTI volume, and whole?")
+    if labels.ndim != 3 or labels.dtype.kind not in "iuf" or not np.all(labels == np.round(labels)):
         sys.exit("a label volume has three axes and whole numbers")
     names = [int(name) for name in np.unique(labels) if name != 0]
     if not names:
         sys.exit("the volume holds no label but 0")
 
     def surface(inside, file):
-        parts = label(inside)
+        parts, _ = label(inside)
         inside = parts == 1 + np.argmax(np.bincount(parts.ravel())[1:])
-        field = gaussian(np.pad(inside, 2).astype(float), 0.8)
-        points, faces, _, _ = marching_cubes(field, 0.5)
-        points = (points - 2) @ image.affine[:3, :3].T + image.affine[:3, 3]
-        if np.linalg.det(image.affine[:3, :3]) > 0:
+        field = gaussian_filter(np.pad(inside, 3).astype(float), 0.8) - 0.5
+        if not np.any(field > 0):
+            return False
+        points, faces = isosurface(field)
+        points = (points - 3) @ image.affine[:3, :3].T + image.affine[:3, 3]
+        if np.linalg.det(image.affine[:3, :3]) < 0:
             faces = faces[:, ::-1]
         head = f"ply\nformat ascii 1.0\nelement vertex {len(points)}\n"
         head += "property double x\nproperty double y\nproperty double z\n"
@@ -87,15 +85,19 @@ def nifti(path, out):
         lines = [" ".join(f"{x:.5f}" for x in point) for point in points]
         lines += [f"3 {a} {b} {c}" for a, b, c in faces]
         file.write_text(head + "\n".join(lines) + "\n")
+        return True
 
-    surface(labels != 0, Path(out))
+    if not surface(labels != 0, Path(out)):
+        sys.exit("what the volume labels is thinner than two voxels")
     if len(names) > 1:
         for name in names:
             file = Path(out).with_name(f"label-{name}.ply")
-            surface(labels == name, file)
-            print(f"label {name}: {np.sum(labels == name)} voxels; --stiffness inside:{file}=FACTOR")
+            if surface(labels == name, file):
+                print(f"label {name}: {np.sum(labels == name)} voxels; --stiffness inside:{file}=FACTOR")
+            else:
+                print(f"label {name}: {np.sum(labels == name)} voxels, too few for a surface")
 
 
 if __name__ == "__main__":
     kind, path, out = sys.argv[1:]
-    {"inp": abaqus, "feb": febio, "nifti": nifti}[kind](path, out)
+    {"nifti": nifti}[kind](path, out)

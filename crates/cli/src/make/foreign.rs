@@ -1,5 +1,5 @@
-//! Files that a kept library of Python reads: Abaqus and CalculiX (`.inp`, meshio), FEBio (`.feb`, XML), NIfTI label volumes
-//! (nibabel, scikit-image). They become a `.vtu` or a `.ply` in the work folder, and go on from there like any other file.
+//! Files that a kept library of Python reads: NIfTI label volumes (nibabel, SciPy). They become a `.ply` in the work folder, and go
+//! on from there like any other file.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -15,15 +15,11 @@ const SCRIPT: &str = include_str!("foreign.py");
 fn kind(input: &Path) -> Option<(&'static str, &'static str, &'static [&'static str])> {
     let name = input.file_name()?.to_string_lossy().to_lowercase();
     let ends = |end: &str| name.ends_with(end);
-    if ends(".inp") {
-        Some(("inp", "converted.vtu", &["meshio==5.3.5"]))
-    } else if ends(".feb") {
-        Some(("feb", "converted.vtu", &["meshio==5.3.5"]))
-    } else if ends(".nii") || ends(".nii.gz") {
+    if ends(".nii") || ends(".nii.gz") {
         Some((
             "nifti",
             "converted.ply",
-            &["nibabel==5.3.2", "scikit-image==0.25.2"],
+            &["nibabel==5.3.2", "scipy>=1.14,<2"],
         ))
     } else {
         None

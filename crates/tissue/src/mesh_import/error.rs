@@ -13,7 +13,7 @@ pub enum ImportError {
         source: std::io::Error,
     },
     #[error(
-        "{path}: unknown extension; use .vtk, .vtu, .msh (tetrahedra), .stl, .obj, .ply or .vtp (closed surface)"
+        "{path}: unknown extension; use .vtk, .vtu, .msh, .inp, .feb (tetrahedra), .stl, .obj, .ply or .vtp (closed surface)"
     )]
     Extension { path: PathBuf },
     #[error("{path}: {reason}")]

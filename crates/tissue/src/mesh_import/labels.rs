@@ -1,10 +1,10 @@
 //! Names that a mesh file gives to parts of itself: groups, objects and materials of an OBJ, vertex colours of a PLY, physical
-//! groups of Gmsh, values of VTK arrays. A [`super::Region`] `group:NAME` chooses by them.
+//! groups of Gmsh, values of VTK arrays, sets of Abaqus and FEBio. A [`super::Region`] `group:NAME` chooses by them.
 //!
 //! Names belong to places, not to node numbers, so they survive repair and filling: a point on the surface has the name of the
 //! file's nearest triangle, or of that triangle's nearest corner; a tetrahedron has that of its centroid.
 
-use super::{ImportError, gmsh, surface_files, vtk_labels};
+use super::{ImportError, gmsh, named_tets, surface_files, vtk_labels};
 use parry3d_f64::math::Vector;
 use parry3d_f64::query::PointQueryWithLocation;
 use parry3d_f64::shape::{TriMesh, TrianglePointLocation};
@@ -38,6 +38,7 @@ impl Labels {
             "ply" => surface_files::ply_labels(path),
             "msh" => Ok(of_gmsh(gmsh::read_groups(path)?)),
             "vtk" | "vtu" | "vtp" => vtk_labels::read(path),
+            "inp" | "feb" => named_tets::read_labels(path),
             _ => Ok(Self::default()),
         }
     }

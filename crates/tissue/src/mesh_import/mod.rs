@@ -4,19 +4,24 @@
 //! |---|---|
 //! | `.vtk`, `.vtu` | linear tetrahedra of a VTK legacy or XML unstructured grid |
 //! | `.msh` | linear tetrahedra of a Gmsh file, version 2.2 or 4.1, text or binary, or version 1 |
+//! | `.inp` | linear tetrahedra (C3D4) of an Abaqus or CalculiX input file |
+//! | `.feb` | linear tetrahedra (tet4) of a FEBio model |
 //! | `.stl`, `.obj`, `.ply`, VTK polydata (`.vtk`, `.vtp`) | a closed surface, filled with tetrahedra of a chosen spacing |
 //!
 //! Coordinates are taken as millimetres times [`ImportOptions::scale`]. What is wrong with a file is
 //! an [`ImportError`] that names the element; with [`ImportOptions::repair`] the fault is removed
 //! where that is safe and listed in [`Imported::repairs`].
 
+mod abaqus;
 mod closed_surface;
 mod distance;
 mod error;
+mod febio;
 mod gmsh;
 mod gmsh_1;
 mod gmsh_groups;
 mod labels;
+mod named_tets;
 mod region;
 mod repair;
 mod self_crossing;
@@ -122,6 +127,7 @@ pub fn import(path: &Path, options: &ImportOptions) -> Result<Imported, ImportEr
     let body = match extension.as_str() {
         "vtk" | "vtu" | "vtp" => vtk::read(path)?,
         "msh" => vtk::Body::Tets(gmsh::read(path)?),
+        "inp" | "feb" => vtk::Body::Tets(named_tets::read(path)?),
         "stl" | "obj" | "ply" => vtk::Body::Surface(surface_files::read(path, &extension)?),
         _ => return Err(ImportError::Extension { path: path.into() }),
     };

@@ -1,0 +1,269 @@
+//! Abaqus, CalculiX (`.inp`) and FEBio (`.feb`) files: what is read, what their sets are called, and what is refused.
+#![cfg(feature = "files")]
+
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+use tissue::mesh::Mesh;
+use tissue::mesh_import::{ImportOptions, Labels, Region, import, nodes_in, tets_in};
+
+/// Corners of a cube of 10 mm; the first four are its floor.
+const CORNERS: [[f64; 3]; 8] = [
+    [0.0, 0.0, 0.0],
+    [10.0, 0.0, 0.0],
+    [10.0, 10.0, 0.0],
+    [0.0, 10.0, 0.0],
+    [0.0, 0.0, 10.0],
+    [10.0, 0.0, 10.0],
+    [10.0, 10.0, 10.0],
+    [0.0, 10.0, 10.0],
+];
+/// The cube around its diagonal from corner 0 to 6; the first three are one half.
+const TETS: [[usize; 4]; 6] = [
+    [0, 1, 2, 6],
+    [0, 2, 3, 6],
+    [0, 3, 7, 6],
+    [0, 7, 4, 6],
+    [0, 4, 5, 6],
+    [0, 5, 1, 6],
+];
+
+/// Numbers in the files begin at 11, with gaps.
+fn number(place: usize) -> usize {
+    11 + 3 * place
+}
+
+fn inp() -> String {
+    let mut text = "** a comment, in 10\u{b0}\n*HEADING\na cube\n*NODE, NSET=all\n".to_owned();
+    for (at, [x, y, z]) in CORNERS.into_iter().enumerate() {
+        writeln!(text, "{}, {x}, {y:e}, {z:.1}D0", number(at)).unwrap();
+    }
+    text += "*ELEMENT, type=S3, ELSET=skin\n900, 11, 14, 17\n*ELEMENT, TYPE=C3D4,\n ELSET=body\n";
+    for (at, tet) in TETS.into_iter().enumerate() {
+        let [a, b, c, d] = tet.map(number);
+        writeln!(text, "{}, {a}, {b}, {c}, {d}", at + 1).unwrap();
+    }
+    text +=
+        "*ELSET, ELSET=lower, GENERATE\n1, 3, 1\n*ELSET, ELSET=\"both halves\"\nlower, 4,\n5, 6\n";
+    text + "*NSET, NSET=Floor\n11, 14,\n17, 20\n*MATERIAL, NAME=tissue\n*ELASTIC\n3000., 0.49\n"
+}
+
+fn feb() -> String {
+    let mut text = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<febio_spec version=\"4.0\">\n<Material><material id=\"1\" \
+                    name=\"tissue\"/></Material>\n<Mesh>\n<Nodes name=\"all\">\n"
+        .to_owned();
+    for (at, [x, y, z]) in CORNERS.into_iter().enumerate() {
+        writeln!(text, "<node id=\"{}\">{x}, {y:e},{z}</node>", number(at)).unwrap();
+    }
+    text += "</Nodes>\n<Elements type=\"tri3\" name=\"skin\"><elem id=\"900\">11,14,17</elem></Elements>\n";
+    for (name, half) in [("lower", 0..3), ("upper", 3..6)] {
+        writeln!(text, "<Elements type=\"tet4\" name=\"{name}\">").unwrap();
+        for at in half {
+            let [a, b, c, d] = TETS[at].map(number);
+            writeln!(text, "<elem id=\"{}\">{a},{b},{c},{d}</elem>", at + 1).unwrap();
+        }
+        text += "</Elements>\n";
+    }
+    text + "<NodeSet name=\"Floor\">11, 14,\n17,20</NodeSet>\n<ElementSet name=\"some\"><e id=\"2\"/><e id=\"5\"></e></ElementSet>\n\
+            </Mesh>\n</febio_spec>\n"
+}
+
+fn write(folder: &Path, name: &str, text: &str) -> PathBuf {
+    let path = folder.join(name);
+    std::fs::write(&path, text).unwrap();
+    path
+}
+
+fn read(path: &Path) -> Mesh {
+    import(path, &ImportOptions::default()).unwrap().mesh
+}
+
+fn open(text: &str, path: &Path) -> tissue::mesh_import::Opened {
+    let region: Region = text.parse().unwrap();
+    region.open(path, 1.0).unwrap()
+}
+
+#[test]
+fn both_become_the_same_cube_and_keep_their_sets() {
+    let folder = tempfile::tempdir().unwrap();
+    let files = [("cube.inp", inp()), ("cube.feb", feb())];
+    for (name, text) in files {
+        let path = write(folder.path(), name, &text);
+        let mesh = read(&path);
+        let corners: Vec<[f32; 3]> = CORNERS.iter().map(|p| p.map(|x| x as f32)).collect();
+        assert_eq!(mesh.positions, corners, "{name}");
+        let tets: Vec<[u32; 4]> = TETS.iter().map(|t| t.map(|n| n as u32)).collect();
+        assert_eq!(mesh.tets, tets, "{name}");
+        assert_eq!(
+            nodes_in(&mesh, &[open("group:floor", &path)]),
+            [0, 1, 2, 3],
+            "{name}"
+        );
+        assert_eq!(
+            tets_in(&mesh, &open("group:lower", &path)),
+            [0, 1, 2],
+            "{name}"
+        );
+    }
+    let named = |name: &str| -> Vec<String> {
+        let labels = Labels::read(&folder.path().join(name)).unwrap();
+        labels.names().into_iter().map(str::to_owned).collect()
+    };
+    assert_eq!(
+        named("cube.inp"),
+        ["Floor", "all", "body", "both halves", "lower"]
+    );
+    assert_eq!(
+        named("cube.feb"),
+        ["Floor", "all", "lower", "some", "upper"]
+    );
+    let path = folder.path().join("cube.inp");
+    let mesh = read(&path);
+    assert_eq!(tets_in(&mesh, &open("group:both halves", &path)).len(), 6);
+    let path = folder.path().join("cube.feb");
+    assert_eq!(tets_in(&mesh, &open("group:some", &path)), [1, 4]);
+}
+
+#[test]
+fn what_is_wrong_with_a_file_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let refused = |name: &str, text: String, words: &[&str]| {
+        let path = write(folder.path(), name, &text);
+        let error = import(&path, &ImportOptions::default()).unwrap_err();
+        let said = error.to_string();
+        for word in words.iter().chain([&name]) {
+            assert!(said.contains(word), "`{word}` is not in: {said}");
+        }
+    };
+    let (inp, feb) = (inp(), feb());
+    // Another kind of volume, alone or among tetrahedra.
+    refused(
+        "kind.inp",
+        inp.replace("TYPE=C3D4", "TYPE=C3D10"),
+        &["C3D10", "line 15", "only linear tetrahedra"],
+    );
+    refused(
+        "mixed.inp",
+        format!("{inp}*ELEMENT, TYPE=C3D8R\n901, 11, 14, 17, 20, 23, 26, 29, 32\n"),
+        &["C3D8R", "only linear tetrahedra"],
+    );
+    refused(
+        "kind.feb",
+        feb.replacen("type=\"tet4\"", "type=\"tet10\"", 1),
+        &["tet10", "lower", "only linear tetrahedra"],
+    );
+    let hexes = "<Elements type=\"hex8\" name=\"bone\"><elem id=\"901\">11,14,17,20,23,26,29,32</elem></Elements></Mesh>";
+    refused(
+        "mixed.feb",
+        feb.replace("</Mesh>", hexes),
+        &["hex8", "bone"],
+    );
+    // No volume at all.
+    refused(
+        "skin.inp",
+        inp.replace("TYPE=C3D4", "TYPE=S4"),
+        &["holds no linear tetrahedra"],
+    );
+    refused(
+        "skin.feb",
+        feb.replace("tet4", "quad4"),
+        &["holds no linear tetrahedra"],
+    );
+    refused("empty.inp", String::new(), &["holds no linear tetrahedra"]);
+    refused(
+        "empty.feb",
+        String::new(),
+        &["neither <Mesh> nor <Geometry>"],
+    );
+    // Cut off within nodes, within elements, and between lines so that nodes are missing.
+    let before =
+        |text: &str, words: &str, more: usize| text[..text.find(words).unwrap() + more].to_owned();
+    refused(
+        "nodes.inp",
+        before(&inp, "\n32, 0", 5),
+        &["line 12", "cut off"],
+    );
+    refused(
+        "elements.inp",
+        before(&inp, "\n4, 11", 9),
+        &["line 20", "cut off"],
+    );
+    let missing = inp.replace(
+        &inp[inp.find("\n32, 0").unwrap()..inp.find("\n*ELEMENT").unwrap()],
+        "",
+    );
+    refused("missing.inp", missing, &["names node 32", "not there"]);
+    refused(
+        "nodes.feb",
+        before(&feb, "<node id=\"32\"", 9),
+        &["cut off"],
+    );
+    refused(
+        "elements.feb",
+        before(&feb, "<elem id=\"4\"", 16),
+        &["cut off"],
+    );
+    refused(
+        "between.feb",
+        before(&feb, "</Elements>\n<NodeSet", 11),
+        &["inside of <Mesh>", "cut off"],
+    );
+    // Numbers that are none, lists of another length, the same number twice.
+    refused(
+        "word.inp",
+        inp.replace("11, 0, 0e0", "11, 0, zero"),
+        &["line 5", "`zero` is no number"],
+    );
+    refused(
+        "word.feb",
+        feb.replace("id=\"14\">10", "id=\"14\">ten"),
+        &["`ten` is no number"],
+    );
+    refused(
+        "short.feb",
+        feb.replace("<elem id=\"1\">11,", "<elem id=\"1\">"),
+        &["element 1", "has 3 nodes"],
+    );
+    refused(
+        "twice.inp",
+        inp.replace("\n14, ", "\n11, "),
+        &["node 11 is there twice"],
+    );
+    refused(
+        "twice.feb",
+        feb.replace("<elem id=\"2\"", "<elem id=\"1\""),
+        &["element 1 is there twice"],
+    );
+    refused(
+        "set.inp",
+        inp.replace("lower, 4", "lowest, 4"),
+        &["no set `lowest`"],
+    );
+    refused(
+        "parts.inp",
+        format!("*PART, NAME=a\n{inp}*PART, NAME=b\n"),
+        &["a second *PART"],
+    );
+    refused(
+        "include.inp",
+        format!("*INCLUDE, INPUT=mesh.inp\n{inp}"),
+        &["*INCLUDE is not followed"],
+    );
+    // Elements turned inside out are found after reading, as in every file.
+    let path = write(
+        folder.path(),
+        "turned.inp",
+        &inp.replace("\n1, 11, 14,", "\n1, 14, 11,"),
+    );
+    assert!(
+        import(&path, &ImportOptions::default())
+            .unwrap_err()
+            .to_string()
+            .contains("tet 0 is inverted")
+    );
+    let repaired = ImportOptions {
+        repair: true,
+        ..ImportOptions::default()
+    };
+    assert_eq!(import(&path, &repaired).unwrap().repairs.len(), 1);
+}
