@@ -145,6 +145,18 @@ fn a_small_organ_end_to_end_and_checked_again() {
     let manifest: serde_json::Value = serde_json::from_slice(&manifest).unwrap();
     assert_eq!(manifest["prior"]["release"], "release.safetensors");
     assert!(out.join("release.safetensors").is_file());
+    // The limit of the bundles that ship, and the target for this body's pushes; the estimate was calibrated on other contacts.
+    let corrections = &manifest["corrections"];
+    assert_eq!(corrections["recommended"], 10);
+    let target = 0.02 * manifest["envelope"]["max_push_mm"].as_f64().unwrap() / 15.0;
+    let stated = corrections["target_mm"].as_f64().unwrap();
+    assert!((stated - target).abs() < 0.06 * target, "{corrections}");
+    assert!(corrections["calibration"].as_f64().unwrap() != 1.0);
+    assert_eq!(certificate["tested"]["corrections_target_mm"], stated);
+    let mean = certificate["tested"]["corrections_mean"].as_f64().unwrap();
+    assert!((1.0..=10.0).contains(&mean), "{certificate:#}");
+    let left = certificate["truth_over_estimate"].as_f64().unwrap();
+    assert!((0.3..3.0).contains(&left), "{certificate:#}");
     assert!(out.join("certificate.html").is_file());
     assert!(folder.path().join("organ.preview.html").is_file());
 
@@ -168,6 +180,18 @@ fn a_small_organ_end_to_end_and_checked_again() {
         "{}",
         text(&kept)
     );
+
+    // Another recommendation leaves what it does not change.
+    let count = |more: &[&str]| {
+        let output = command(&surface, &out, &[&HELD, more].concat()).output();
+        let said = text(&output.unwrap());
+        (said.matches("kept from an earlier run").count(), said)
+    };
+    let (kept, said) = count(&["--corrections", "7@0.1"]);
+    assert_eq!(kept, 6, "{said}");
+    assert!(said.contains("check-7@0.1"), "{said}");
+    let (_, said) = count(&["--corrections", "7@-1"]);
+    assert!(said.contains("is not a number of corrections"), "{said}");
 }
 
 #[test]

@@ -17,6 +17,7 @@ const PROGRAMME_PUSH_MM: f64 = 15.0;
 const TIMED: usize = 400;
 
 /// A programme and the seed of its sites.
+#[derive(Clone, Copy)]
 pub struct Case {
     pub scheme: Scheme,
     pub seed: u64,
@@ -25,32 +26,81 @@ pub struct Case {
 /// Nodes and vectors of one step's contact.
 pub type Touch = (Vec<u32>, Vec<f32>);
 
+/// What is simulated and replayed.
+#[derive(Clone, Copy)]
+pub struct Body<'a> {
+    pub mesh: &'a Mesh,
+    pub boundary: Boundary,
+    pub regions: &'a Regions,
+}
+
+/// A frame of the reference solver.
+pub struct Frame<'a> {
+    pub touch: &'a Touch,
+    pub truth: &'a [[f32; 3]],
+    /// Force at each contact node, mN.
+    pub reaction: &'a [[f32; 3]],
+}
+
 impl Case {
-    /// Simulates and replays. Programmes are written for a brain: lengths are multiplied by the bundle's deepest push over theirs.
-    pub fn run(
+    /// Simulates the first frames. Programmes are written for a brain: lengths are multiplied by the bundle's deepest push over theirs.
+    pub fn simulate(
         &self,
-        model: &Arc<Model>,
-        mesh: &Mesh,
-        boundary: Boundary,
-        regions: &Regions,
-        done: &(dyn Fn() + Sync),
-    ) -> Result<Score> {
+        model: &Model,
+        body: &Body<'_>,
+        frames: usize,
+        each: &mut dyn FnMut(&Frame<'_>) -> Result<()>,
+    ) -> Result<()> {
         let scale = f64::from(model.manifest.envelope.max_push_mm) / PROGRAMME_PUSH_MM;
-        let mut enlarged = mesh.clone();
+        let mut enlarged = body.mesh.clone();
         for x in enlarged.positions.iter_mut().flatten() {
             *x = (f64::from(*x) / scale) as f32;
         }
-        let domain = ContactDomain::new(&enlarged, boundary)?;
+        let domain = ContactDomain::new(&enlarged, body.boundary)?;
         let programme = Programme::new(self.scheme, &domain, self.seed)?;
-        let stated = &model.manifest.material;
         let mut solver = Solver::new(
-            mesh,
-            boundary,
+            body.mesh,
+            body.boundary,
             SolverOptions {
-                material: *stated,
+                material: model.manifest.material,
                 ..SolverOptions::default()
             },
         )?;
+        let mut truth = vec![[0.0f32; 3]; body.mesh.node_count()];
+        for frame in 1..frames.min(FRAMES) {
+            let mut contact = programme.contact(frame);
+            for entry in &mut contact {
+                entry.displacement = entry.displacement.map(|x| (f64::from(x) * scale) as f32);
+            }
+            let report = solver.step_frame(&contact, FRAME_S)?;
+            solver.displacement(&mut truth);
+            let nodes = contact.iter().map(|entry| entry.node).collect();
+            let vectors = contact.iter().flat_map(|entry| entry.displacement);
+            each(&Frame {
+                touch: &(nodes, vectors.collect()),
+                truth: &truth,
+                reaction: &report.reaction,
+            })?;
+        }
+        Ok(())
+    }
+}
+
+/// A case through a bundle: a scene with corrections and one without.
+pub struct Replay<'a> {
+    body: Body<'a>,
+    scenes: [Scene; 2],
+    fields: [Vec<[f32; 3]>; 2],
+    score: Score,
+}
+
+impl<'a> Replay<'a> {
+    pub fn new(
+        case: Case,
+        model: &Arc<Model>,
+        corrections: Corrections,
+        body: Body<'a>,
+    ) -> Result<Self> {
         let scene = |corrections| {
             let options = SceneOptions {
                 corrections,
@@ -59,62 +109,49 @@ impl Case {
             };
             Scene::new(Arc::clone(model), &options)
         };
-        let scenes = [scene(Corrections::Recommended)?, scene(Corrections::None)?];
-        let mut truth = vec![[0.0f32; 3]; mesh.node_count()];
-        let mut fields = [truth.clone(), truth.clone()];
-        let mut score = Score::new(
-            self.scheme.name(),
-            self.seed,
-            mesh.node_count(),
-            regions.len(),
-        );
-        for frame in 1..FRAMES {
-            let mut contact = programme.contact(frame);
-            for entry in &mut contact {
-                entry.displacement = entry.displacement.map(|x| (f64::from(x) * scale) as f32);
+        let count = body.mesh.node_count();
+        Ok(Self {
+            body,
+            scenes: [scene(corrections)?, scene(Corrections::None)?],
+            fields: [vec![[0.0; 3]; count], vec![[0.0; 3]; count]],
+            score: Score::new(case.scheme.name(), case.seed, count, body.regions.len()),
+        })
+    }
+
+    /// Steps both scenes and compares them with the frame.
+    pub fn step(&mut self, frame: &Frame<'_>) -> Result<()> {
+        let (nodes, vectors) = frame.touch;
+        for (scene, field) in self.scenes.iter().zip(&mut self.fields) {
+            let input = StepInput {
+                displacement: None,
+                contact: Contact::Sparse { nodes, vectors },
+            };
+            match scene.step(input, Some(field.as_flattened_mut())) {
+                Ok(()) => {}
+                Err(Error::Guard(_)) => self.score.refused += 1,
+                Err(error) => return Err(error.into()),
             }
-            let report = solver.step_frame(&contact, FRAME_S)?;
-            solver.displacement(&mut truth);
-            let nodes: Vec<u32> = contact.iter().map(|entry| entry.node).collect();
-            let vectors: Vec<f32> = contact
-                .iter()
-                .flat_map(|entry| entry.displacement)
-                .collect();
-            for (scene, field) in scenes.iter().zip(&mut fields) {
-                let input = StepInput {
-                    displacement: None,
-                    contact: Contact::Sparse {
-                        nodes: &nodes,
-                        vectors: &vectors,
-                    },
-                };
-                match scene.step(input, Some(field.as_flattened_mut())) {
-                    Ok(()) => {}
-                    Err(Error::Guard(_)) => score.refused += 1,
-                    Err(error) => return Err(error.into()),
-                }
-            }
-            let mut forces = vec![[0.0f32; 3]; nodes.len()];
-            if scenes[0].last_contacts()?.0 == nodes {
-                scenes[0].contact_force(forces.as_flattened_mut())?;
-            }
-            score.add(
-                &Step {
-                    truth: &truth,
-                    field: &fields[0],
-                    baseline: &fields[1],
-                    stats: scenes[0].stats(),
-                    forces: &forces,
-                    true_forces: &report.reaction,
-                    nodes: &nodes,
-                },
-                mesh,
-                regions,
-            );
-            score.touches.push((nodes, vectors));
-            done();
         }
-        Ok(score)
+        let mut forces = vec![[0.0f32; 3]; nodes.len()];
+        if self.scenes[0].last_contacts()?.0 == *nodes {
+            self.scenes[0].contact_force(forces.as_flattened_mut())?;
+        }
+        let step = Step {
+            truth: frame.truth,
+            field: &self.fields[0],
+            baseline: &self.fields[1],
+            stats: self.scenes[0].stats(),
+            forces: &forces,
+            true_forces: frame.reaction,
+            nodes,
+        };
+        self.score.add(&step, self.body.mesh, self.body.regions);
+        self.score.touches.push(frame.touch.clone());
+        Ok(())
+    }
+
+    pub fn finish(self) -> Score {
+        self.score
     }
 }
 

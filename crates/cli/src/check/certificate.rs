@@ -51,6 +51,7 @@ impl Certificate {
         let mut by_region = vec![Part::default(); regions];
         let mut force = [0.0f64; 2];
         let mut ratios = Vec::new();
+        let corrections: u64 = scores.iter().map(|score| score.corrections).sum();
         let mut node_errors = vec![0.0f64; mesh.node_count()];
         for score in &scores {
             contact.join(&score.contact);
@@ -96,6 +97,8 @@ impl Certificate {
                     "contact": part(&score.contact), "free": part(&score.free),
                 })).collect::<Vec<Value>>(),
                 "corrections": stated.corrections.as_ref().map_or(0, |entry| entry.recommended),
+                "corrections_target_mm": stated.corrections.as_ref().map_or(Value::Null, |entry| short(f64::from(entry.target_mm))),
+                "corrections_mean": short(corrections as f64 / contact.steps.max(1) as f64),
                 "linear_is": if unlearned { "linear elasticity, static in contact, swinging freely after it" } else { "the bundle without corrections" },
             },
             "contact": part(&contact),
@@ -153,7 +156,7 @@ impl Certificate {
             .unwrap_or(f64::NAN)
     }
 
-    /// What the estimated error should be multiplied by; none where nothing was corrected.
+    /// What the estimated error should be multiplied by once more; none where nothing was corrected.
     pub fn calibration(&self) -> Option<f32> {
         let ratio = self.value["truth_over_estimate"].as_f64()?;
         (ratio.is_finite() && ratio > 0.0).then_some(ratio as f32)

@@ -7,27 +7,30 @@
 mod case;
 mod certificate;
 mod page;
+mod parallel;
+mod recording;
 mod score;
 
 pub use certificate::Certificate;
+pub use recording::Recording;
 pub use score::{nearest, regions};
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::Arc;
 use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use serde_json::Value;
 use tissue::mesh::{Boundary, Mesh};
-use tissue::schemes::Scheme;
-use upt::{Model, ModelOptions};
+use tissue::schemes::{FRAMES, Scheme};
+use upt::{Corrections, Model, ModelOptions};
 
 use crate::progress;
-use case::Case;
-use score::Score;
+use case::{Body, Case, Replay};
+use parallel::{in_parallel, workers};
+use score::{Regions, Score};
 
 /// Programmes in the order in which they are run: `probe` has five sites, the others are the paper's.
 const ORDER: [Scheme; 8] = [
@@ -144,80 +147,91 @@ pub fn run(options: &Options) -> Result<ExitCode> {
 /// Simulates and replays; the certificate lacks the bundle's identity until it is finished.
 pub fn measure(plan: &Plan) -> Result<Certificate> {
     let started = Instant::now();
-    let model = Model::open(
-        &plan.bundle,
-        &ModelOptions {
-            threads: 1,
-            ..Default::default()
-        },
-    )?;
-    if model.prior.is_none() {
-        bail!(
-            "{}: has no linear response to compare with; use `upt report`",
-            plan.bundle.display()
-        );
-    }
-    let mesh = Mesh::read(&plan.bundle.join(&model.manifest.mesh.file))?;
-    let boundary = match model.manifest.boundary {
-        upt::bundle::Boundary::Fixed => Boundary::Fixed,
-        upt::bundle::Boundary::Supported => Boundary::Supported,
-    };
+    let bundle = Bundle::open(&plan.bundle)?;
     let most = plan.cases.unwrap_or(ORDER.len());
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    let workers = match plan.threads {
-        0 => cores,
-        threads => threads,
-    }
-    .min(most);
-    let bar = progress::bar(
-        plan.quiet,
-        (most * tissue::schemes::FRAMES) as u64,
-        "held-out contacts",
-    );
-    let next = AtomicUsize::new(0);
-    let finished: Mutex<Vec<(usize, Score)>> = Mutex::new(Vec::new());
-    let regions = score::regions(&mesh);
-    let work = || -> Result<()> {
-        loop {
-            let at = next.fetch_add(1, Ordering::Relaxed);
-            let spent = started.elapsed().as_secs_f64();
-            // Another case takes about as long as those before it.
-            let rounds = (at / workers) as f64;
-            let late = plan.cases.is_none()
-                && at >= workers
-                && spent * (rounds + 1.0) / rounds > plan.seconds;
-            if at >= most || late {
-                return Ok(());
-            }
-            let case = Case {
-                scheme: ORDER[at % ORDER.len()],
-                seed: plan.seed.wrapping_mul(1000).wrapping_add(at as u64),
-            };
-            let score = case.run(&model, &mesh, boundary, &regions, &|| bar.inc(1))?;
-            if let Ok(mut list) = finished.lock() {
-                list.push((at, score));
-            }
-        }
+    let workers = workers(plan.threads).min(most);
+    let bar = progress::bar(plan.quiet, (most * FRAMES) as u64, "held-out contacts");
+    let late = |at: usize| {
+        let spent = started.elapsed().as_secs_f64();
+        // Another case takes about as long as those before it.
+        let rounds = (at / workers) as f64;
+        plan.cases.is_none() && at >= workers && spent * (rounds + 1.0) / rounds > plan.seconds
     };
-    std::thread::scope(|scope| {
-        let threads: Vec<_> = (0..workers).map(|_| scope.spawn(work)).collect();
-        threads.into_iter().try_for_each(|thread| {
-            thread
-                .join()
-                .unwrap_or_else(|_| bail!("a thread of the check panicked"))
-        })
+    let scores = in_parallel(workers, &|at| at < most && !late(at), &|at| {
+        let case = held_out(plan.seed, at);
+        let body = bundle.body();
+        let mut replay = Replay::new(case, &bundle.model, Corrections::Recommended, body)?;
+        case.simulate(&bundle.model, &body, FRAMES, &mut |frame| {
+            bar.inc(1);
+            replay.step(frame)
+        })?;
+        Ok(replay.finish())
     })?;
     bar.finish_and_clear();
-    let mut scores = finished.into_inner().unwrap_or_default();
-    scores.sort_by_key(|(at, _)| *at);
-    let scores: Vec<Score> = scores.into_iter().map(|(_, score)| score).collect();
-    let speed = case::speed(&model, &scores)?;
-    Ok(Certificate::of(
-        &model,
-        &mesh,
-        plan.seed,
-        scores,
-        regions.len(),
-        &speed,
-    ))
+    bundle.certificate(plan.seed, scores)
+}
+
+/// The case at a place of a plan.
+fn held_out(seed: u64, at: usize) -> Case {
+    Case {
+        scheme: ORDER[at % ORDER.len()],
+        seed: seed.wrapping_mul(1000).wrapping_add(at as u64),
+    }
+}
+
+/// A bundle with what a check needs of it.
+struct Bundle {
+    model: Arc<Model>,
+    mesh: Mesh,
+    boundary: Boundary,
+    regions: Regions,
+}
+
+impl Bundle {
+    fn open(folder: &Path) -> Result<Self> {
+        let options = ModelOptions {
+            threads: 1,
+            ..Default::default()
+        };
+        let model = Model::open(folder, &options)?;
+        if model.prior.is_none() {
+            bail!(
+                "{}: has no linear response to compare with; use `upt report`",
+                folder.display()
+            );
+        }
+        let mesh = Mesh::read(&folder.join(&model.manifest.mesh.file))?;
+        let boundary = match model.manifest.boundary {
+            upt::bundle::Boundary::Fixed => Boundary::Fixed,
+            upt::bundle::Boundary::Supported => Boundary::Supported,
+        };
+        let regions = score::regions(&mesh);
+        Ok(Self {
+            model,
+            mesh,
+            boundary,
+            regions,
+        })
+    }
+
+    fn body(&self) -> Body<'_> {
+        Body {
+            mesh: &self.mesh,
+            boundary: self.boundary,
+            regions: &self.regions,
+        }
+    }
+
+    fn certificate(&self, seed: u64, scores: Vec<Score>) -> Result<Certificate> {
+        let speed = case::speed(&self.model, &scores)?;
+        let regions = self.regions.len();
+        Ok(Certificate::of(
+            &self.model,
+            &self.mesh,
+            seed,
+            scores,
+            regions,
+            &speed,
+        ))
+    }
 }

@@ -107,6 +107,8 @@ pub struct Score {
     pub refused: usize,
     /// Squared error of each node, summed over the steps in contact, mm².
     pub nodes: Vec<f32>,
+    /// Corrections of all steps in contact.
+    pub corrections: u64,
     /// What touched in each step.
     pub touches: Vec<Touch>,
 }
@@ -123,6 +125,7 @@ impl Score {
             estimates: Vec::new(),
             refused: 0,
             nodes: vec![0.0; nodes],
+            corrections: 0,
             touches: Vec::new(),
         }
     }
@@ -141,6 +144,7 @@ impl Score {
             return;
         }
         self.contact.add(mse, baseline, size, largest);
+        self.corrections += u64::from(step.stats.corrections);
         let places = step
             .nodes
             .iter()

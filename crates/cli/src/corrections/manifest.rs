@@ -40,21 +40,3 @@ pub fn list(
     }
     manifest.write()
 }
-
-/// Takes the learned map of releases out of a bundle.
-pub fn remove_release(bundle: &Path, file: &str) -> Result<()> {
-    let mut manifest = Manifest::read(bundle)?;
-    let mut files: IndexMap<String, Value> = manifest.get("files")?.unwrap_or_default();
-    files.shift_remove(file);
-    manifest.set("files", &json!(files), "")?;
-    let mut prior: Value = manifest.get("prior")?.unwrap_or_default();
-    if let Some(entry) = prior.as_object_mut() {
-        entry.remove("release");
-    }
-    manifest.set("prior", &prior, "")?;
-    let mut requires: Vec<String> = manifest.get("requires")?.unwrap_or_default();
-    requires.retain(|name| name != "release");
-    manifest.set("requires", &json!(requires), "version")?;
-    std::fs::remove_file(bundle.join(file))?;
-    manifest.write()
-}

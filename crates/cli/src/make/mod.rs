@@ -41,9 +41,9 @@ const BOUNDARY: Boundary = Boundary::Fixed;
 const REFINED: f64 = 0.4;
 /// Part of it after which no tool is simulated but by the check.
 const LEARNED: f64 = 0.75;
-/// Corrections that are added where `--target-error` is missed, and the most that are tried.
+/// Where `--target-error` is missed, so many corrections are added and a target is halved, at most up to so many corrections.
 const MORE_CORRECTIONS: u32 = 3;
-const MOST_CORRECTIONS: u32 = 11;
+const MOST_CORRECTIONS: u32 = 16;
 
 /// Runs the command.
 pub fn run(options: &Options) -> Result<ExitCode> {
@@ -73,6 +73,7 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     let mesh_file = work.file("mesh.safetensors");
     let mesh = Mesh::read(&mesh_file)?;
     let sizes = Sizes::of(options, &mesh)?;
+    let effort = sizes.corrections(options);
     work.tell(&sizes.words());
     let page = options.out.with_extension("preview.html");
     preview::write(&page, &mesh, &preview::Error::None, &sizes.scene(&mesh))?;
@@ -164,7 +165,7 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     let coarse_key = key_of(&[
         tables_key.as_bytes(),
         format!("{:?} {} {}", material, options.natural, options.patches).as_bytes(),
-        options.recommended.to_string().as_bytes(),
+        options.draft().to_string().as_bytes(),
     ]);
     let draft = work.file("bundle");
     work.stage(
@@ -183,13 +184,13 @@ pub fn run(options: &Options) -> Result<ExitCode> {
             let count = bench.write_space(
                 &draft,
                 principal(&found, options.patches.div_ceil(3).min(60)).into_iter(),
-                Effort::fixed(options.recommended),
+                options.draft(),
                 1.0,
             )?;
             bundle::publish(&draft, &options.out)?;
             stage.decided(&format!(
-                "{count} modes of the coarse space, {} corrections a step",
-                options.recommended
+                "{count} modes of the coarse space, {} corrections a step until their estimated error is calibrated",
+                options.draft()
             ));
             Ok(())
         },
@@ -216,11 +217,13 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     )?;
     let work_refined = work.file("refined");
     let seconds = LEARNED * budget - work.spent();
-    let made = work.stage("learn", &made.key, &["learned/bundle.json"], |stage| {
+    let learn_key = key_of(&[made.key.as_bytes(), effort.to_string().as_bytes()]);
+    let made = work.stage("learn", &learn_key, &["learned/bundle.json"], |stage| {
         let learning = learn::Learning {
             options,
             mesh: &mesh,
             sizes: &sizes,
+            effort,
             refined: &work_refined,
             seconds,
         };
@@ -228,23 +231,20 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     })?;
     let draft = work.file("learned");
 
-    let mut corrections = options.recommended;
+    let mut corrections = effort;
     let (mut certificate, certified) = loop {
-        let name = format!("check-{corrections}");
         let found = certify(options, &mut work, &made.key, &draft, corrections, budget)?;
         let error = found.mse_in_contact();
         let missed = options.target_error.is_some_and(|target| error > target);
-        if !missed || corrections >= MOST_CORRECTIONS || work.spent() > budget {
-            break (found, work.file(&name));
+        if !missed || corrections.most >= MOST_CORRECTIONS || work.spent() > budget {
+            break (found, work.file(&name_of_check(corrections)));
         }
-        corrections = (corrections + MORE_CORRECTIONS).min(MOST_CORRECTIONS);
+        corrections.most = (corrections.most + MORE_CORRECTIONS).min(MOST_CORRECTIONS);
+        corrections.target_mm *= 0.5;
         work.tell(&format!(
             "{error:.2e} mm² is above --target-error: {corrections} corrections a step"
         ));
     };
-    if let Some(factor) = certificate.calibration() {
-        corrections::recommend(&certified, Effort::fixed(corrections), Some(factor))?;
-    }
     certificate.finish(
         &certified,
         &json!({
@@ -281,16 +281,20 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
+fn name_of_check(corrections: Effort) -> String {
+    format!("check-{corrections}")
+}
+
 /// Held-out contacts of the bundle with so many corrections a step, in a copy of its own.
 fn certify(
     options: &Options,
     work: &mut Work,
     key: &str,
     draft: &Path,
-    corrections: u32,
+    corrections: Effort,
     budget: f64,
 ) -> Result<check::Certificate> {
-    let name = format!("check-{corrections}");
+    let name = name_of_check(corrections);
     let key = key_of(&[
         key.as_bytes(),
         format!("{corrections} {} {:?}", options.seed, options.cases).as_bytes(),
@@ -298,9 +302,7 @@ fn certify(
     let left = (budget - work.spent()).max(20.0);
     let copy = work.file(&name);
     bundle::copy(draft, &copy)?;
-    if corrections != options.recommended {
-        corrections::recommend(&copy, Effort::fixed(corrections), Some(1.0))?;
-    }
+    corrections::recommend(&copy, corrections, None)?;
     let files = [format!("{name}.json"), format!("{name}.errors")];
     let paths = files.each_ref().map(|file| work.file(file));
     work.stage(

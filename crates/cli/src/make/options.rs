@@ -9,9 +9,18 @@ use serde_json::{Value, json};
 use tissue::mesh::{Mesh, face_area};
 use tissue::mesh_import::Region;
 
+use crate::effort::Effort;
+
 /// Pushes and areas that the checks' programmes have at scale 1, mm and mm² (`tissue::schemes`).
 const PUSH_MM: f64 = 15.0;
 const AREA_MM2: [f64; 2] = [60.0, 280.0];
+/// Corrections that are recommended for pushes of [`PUSH_MM`], as the bundles that ship.
+const CORRECTIONS: Effort = Effort {
+    most: 10,
+    target_mm: 0.02,
+};
+/// Until the estimated error is calibrated a bundle recommends so many, and coarse spaces are compared with so many.
+const DRAFT: u32 = 5;
 /// The body whose tools have scale 1 is so wide across its second longest axis, mm.
 const REFERENCE_WIDTH_MM: f64 = 70.0;
 
@@ -24,7 +33,7 @@ const REFERENCE_WIDTH_MM: f64 = 70.0;
   upt make liver.obj --out liver --fixed plane:0,0,-1,-20 --emit slurm jobs")]
 pub struct Options {
     /// A closed surface (.stl, .obj, .ply, .vtp), tetrahedra (.msh, .vtk, .vtu, .inp, .feb, .mesh.safetensors) or a label volume
-    /// (.nii, .nii.gz). Those of .inp, .feb and NIfTI are read by Python libraries, which the command installs for itself.
+    /// (.nii, .nii.gz; read by Python libraries, which the command installs for itself).
     pub input: PathBuf,
     /// Folder of the bundle.
     #[arg(long)]
@@ -77,9 +86,10 @@ pub struct Options {
     /// Fail where the mean squared error in contact is above this, mm².
     #[arg(long, value_name = "MM2")]
     pub target_error: Option<f64>,
-    /// Corrections a step that the bundle recommends.
-    #[arg(long = "corrections", default_value_t = 5)]
-    pub recommended: u32,
+    /// Corrections a step that the bundle recommends: COUNT, or COUNT@MM for at most COUNT, fewer where the estimated error is below MM.
+    /// Left out: 10@0.02 for pushes of 15 mm, with the target in proportion to the deepest push.
+    #[arg(long, value_name = "COUNT[@MM]")]
+    pub corrections: Option<Effort>,
     /// Natural modes.
     #[arg(long, default_value_t = 60)]
     pub natural: usize,
@@ -163,13 +173,6 @@ impl Options {
                 bail!("{name} must be positive");
             }
         }
-        if self.recommended > upt::corrections::LIMIT {
-            bail!(
-                "--corrections is {}, must be at most {}",
-                self.recommended,
-                upt::corrections::LIMIT
-            );
-        }
         self.scale()?;
         self.material()?.validate()?;
         Ok(())
@@ -251,9 +254,19 @@ impl Options {
         json!({
             "unit": self.unit, "stiffness": self.stiffness.iter().map(|(region, factor)| format!("{region}={factor}")).collect::<Vec<String>>(),
             "fixed": list(&self.fixed), "domain": list(&self.domain), "nodes": self.nodes,
-            "material": self.material, "corrections": self.recommended, "natural": self.natural, "patches": self.patches,
+            "material": self.material, "corrections": self.corrections.map(|effort| effort.to_string()), "natural": self.natural, "patches": self.patches,
             "tolerance_mm": self.tolerance_mm, "minutes": self.minutes,
         })
+    }
+}
+
+impl Options {
+    /// A fixed number of corrections, for as long as the estimated error is not calibrated.
+    pub fn draft(&self) -> Effort {
+        Effort::fixed(
+            self.corrections
+                .map_or(DRAFT, |effort| effort.most.min(DRAFT)),
+        )
     }
 }
 
@@ -295,6 +308,21 @@ impl Sizes {
             push_mm: PUSH_MM * scale,
             area_mm2,
             chosen: options.push.is_some(),
+        })
+    }
+
+    /// Corrections a step that the bundle recommends: as asked, or with a target that is the same part of the deepest push for every body.
+    pub fn corrections(&self, options: &Options) -> Effort {
+        options.corrections.unwrap_or_else(|| {
+            let target = f64::from(CORRECTIONS.target_mm) * self.push_mm / PUSH_MM;
+            // Two digits say enough.
+            let short = format!("{target:.1e}")
+                .parse()
+                .unwrap_or(CORRECTIONS.target_mm);
+            Effort {
+                target_mm: short,
+                ..CORRECTIONS
+            }
         })
     }
 

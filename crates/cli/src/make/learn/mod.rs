@@ -1,6 +1,6 @@
 //! What simulated tools teach: probes at the sites where the validation found the largest errors. What they show in contact joins the coarse
-//! space; how the tissue moves after they let go becomes a learned map of releases. Each is kept where it lessens the error of
-//! simulated contacts that neither it nor the certificate has seen.
+//! space; how the tissue moves after they let go becomes a learned map of releases. Each is kept on its own account where it lessens
+//! the error of simulated contacts that neither it nor the certificate has seen. The same contacts calibrate the estimated error.
 
 mod observe;
 mod release;
@@ -11,17 +11,24 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 use serde_json::json;
 use tissue::mesh::Mesh;
-use tissue::schemes::SplitMix;
+use tissue::schemes::{FRAMES, SplitMix};
+use upt::Corrections;
 
 use super::options::{Options, Sizes};
 use super::stages::Stage;
 use super::{bundle, refine, vibration};
-use crate::check::{self, Certificate};
-use crate::corrections::{Pushes, Workbench, manifest, principal};
+use crate::check::{Certificate, Recording};
+use crate::corrections::{self, Pushes, Workbench, manifest, principal};
 use crate::effort::Effort;
 
 /// Simulated contacts that decide.
 const VALIDATED: usize = 4;
+/// Where there is no time for them: cases and frames that only calibrate.
+const CALIBRATED: (usize, usize) = (2, 60);
+/// Corrections after which the estimated error is calibrated.
+const CALIBRATED_AFTER: u32 = 3;
+/// Time to replay the contacts through the bundles that are compared, in that of simulating one.
+const REPLAYS: f64 = 4.0;
 /// Probes, each of so many sites: at least, at most.
 const LEAST: usize = 6;
 const MOST: usize = 40;
@@ -30,8 +37,11 @@ const SITES: usize = 5;
 const MOST_MODES: usize = 120;
 /// Something is kept where the error falls below this part of what it was.
 const BETTER: f64 = 0.97;
+/// The map of releases must not raise the error in contact, which later contacts begin with, by more than this factor.
+const NO_WORSE: f64 = 1.05;
 const RELEASE: &str = "release.safetensors";
-/// The bundle with all that was learned.
+/// The bundle that this stage leaves, and one that may take its place.
+const LEARNED: &str = "learned";
 const CANDIDATE: &str = "candidate";
 
 /// What there is to learn from.
@@ -41,30 +51,55 @@ pub struct Learning<'a> {
     pub sizes: &'a Sizes,
     /// The best bundle without simulations.
     pub refined: &'a Path,
+    /// What the bundle will recommend.
+    pub effort: Effort,
     /// Time for it, seconds.
     pub seconds: f64,
 }
 
-/// Leaves the better of both in the folder `learned`.
+/// Leaves the best bundle in the folder `learned`, with as many corrections as it is made for and their estimated error calibrated.
 pub fn run(learning: &Learning<'_>, stage: &mut Stage) -> Result<()> {
     let (folder, options) = (stage.folder.clone(), learning.options);
-    let learned = folder.join("learned");
+    let learned = folder.join(LEARNED);
     bundle::copy(learning.refined, &learned)?;
     let started = Instant::now();
+    let (cases, frames) = match learning.seconds > 0.0 {
+        true => (VALIDATED, FRAMES),
+        false => CALIBRATED,
+    };
+    let recording = Recording::make(
+        learning.refined,
+        cases,
+        frames,
+        options.seed ^ 0x5EEC,
+        options.threads,
+        options.json,
+    )?;
+    let each = started.elapsed().as_secs_f64() / cases as f64;
+    let left = learning.seconds - started.elapsed().as_secs_f64() - REPLAYS * each;
+    let count = ((left / each) as usize).min(MOST);
     if learning.seconds <= 0.0 {
         stage.decided("no time for tool trajectories; a larger --minutes has it");
-        return Ok(());
-    }
-    let before = validate(options, learning.refined)?;
-    let each = started.elapsed().as_secs_f64() / VALIDATED as f64;
-    let left = learning.seconds - 2.3 * each * VALIDATED as f64;
-    let count = ((left / each) as usize).min(MOST);
-    if count < LEAST {
+    } else if count < LEAST {
         stage.decided(&format!(
             "no time for {LEAST} tool trajectories of {each:.1} s; a larger --minutes has it"
         ));
-        return Ok(());
+    } else {
+        teach(learning, stage, &recording, count)?;
     }
+    calibrate(learning.effort, &recording, &learned, stage)?;
+    bundle::publish(&learned, &options.out)
+}
+
+/// Simulates tools; the bundle in `learned` gets what lessens the recording's errors.
+fn teach(
+    learning: &Learning<'_>,
+    stage: &mut Stage,
+    recording: &Recording,
+    count: usize,
+) -> Result<()> {
+    let (folder, options) = (stage.folder.clone(), learning.options);
+    let started = Instant::now();
     let natural = vibration::count(learning.mesh, options.natural);
     let bench = Workbench::open(learning.refined, natural, options.threads, options.json)?;
     let errors = refine::best_errors(&folder)?;
@@ -89,59 +124,89 @@ pub fn run(learning: &Learning<'_>, stage: &mut Stage) -> Result<()> {
         started.elapsed().as_secs_f64()
     ));
 
-    let candidate = folder.join(CANDIDATE);
-    bundle::copy(learning.refined, &candidate)?;
+    let (learned, candidate) = (folder.join(LEARNED), folder.join(CANDIDATE));
+    bundle::copy(&learned, &candidate)?;
     let mut rows = refine::rows(&folder)?;
     rows.extend(observed.contact);
     let modes = bench.write_space(
         &candidate,
         principal(&rows, MOST_MODES).into_iter(),
-        Effort::fixed(options.recommended),
+        options.draft(),
         1.0,
     )?;
-    let fitted = match observed.releases.is_empty() {
-        true => None,
-        false => Some(add_release(&candidate, &bench, &observed.releases)?),
-    };
-    let after = validate(options, &candidate)?;
+    // Both with the same number of corrections: a target would hide what the space is worth.
+    let [before, after] =
+        [&learned, &candidate].map(|folder| recording.measure(folder, Corrections::Recommended));
+    let (before, after) = (before?, after?);
     let coarse = better(&before, &after);
-    let [free, free_after] = [&before, &after].map(|found| part(found, "free", "mse_mm2"));
-    let map = fitted.is_some() && free_after < BETTER * free;
-    let kept = |kept: bool| if kept { "kept" } else { "left out" };
     stage.decided(&format!(
         "trajectories in the coarse space, {modes} modes: {:.2e} mm² in contact after {:.2e}, worst region {:.1} times the mean after {:.1}: {}",
         after.mse_in_contact(), before.mse_in_contact(), worst(&after), worst(&before), kept(coarse)
     ));
-    if let Some(count) = fitted {
-        stage.decided(&format!(
-            "a learned map of releases, {count} modes: {free_after:.2e} mm² after a release, {free:.2e} without it: {}",
-            kept(map)
-        ));
-    }
     if coarse {
         bundle::copy(&candidate, &learned)?;
-        if !map && fitted.is_some() {
-            manifest::remove_release(&learned, RELEASE)?;
-        }
-    } else if map {
-        add_release(&learned, &bench, &observed.releases)?;
     }
-    if coarse || map {
-        bundle::publish(&learned, &options.out)?;
+    if !observed.releases.is_empty() {
+        teach_release(learning, stage, recording, &bench, &observed.releases)?;
     }
     Ok(())
 }
 
-/// Contacts of seeds of their own, through a bundle and the reference solver.
-fn validate(options: &Options, bundle: &Path) -> Result<Certificate> {
-    check::measure(&check::Plan {
-        bundle: bundle.into(),
-        cases: Some(VALIDATED),
-        seconds: f64::INFINITY,
-        seed: options.seed ^ 0x5EEC,
-        threads: options.threads,
-        quiet: options.json,
-    })
+/// The map of releases, with the corrections that the bundle will recommend: they are what a release starts from.
+fn teach_release(
+    learning: &Learning<'_>,
+    stage: &mut Stage,
+    recording: &Recording,
+    bench: &Workbench,
+    releases: &[Vec<Vec<f32>>],
+) -> Result<()> {
+    let (learned, candidate) = (stage.folder.join(LEARNED), stage.folder.join(CANDIDATE));
+    calibrate(learning.effort, recording, &learned, stage)?;
+    bundle::copy(&learned, &candidate)?;
+    let modes = add_release(&candidate, bench, releases)?;
+    let [without, with] =
+        [&learned, &candidate].map(|folder| recording.measure(folder, Corrections::Recommended));
+    let (without, with) = (without?, with?);
+    let [free, free_with] = [&without, &with].map(|found| part(found, "free", "mse_mm2"));
+    let [contact, contact_with] = [&without, &with].map(Certificate::mse_in_contact);
+    let map = free_with < BETTER * free && contact_with <= NO_WORSE * contact;
+    stage.decided(&format!(
+        "a learned map of releases, {modes} modes: {free_with:.2e} mm² after a release, {free:.2e} without it; {contact_with:.2e} mm² in contact, {contact:.2e} without it (at most {NO_WORSE} times as much): {}",
+        kept(map)
+    ));
+    if map {
+        bundle::copy(&candidate, &learned)?;
+    }
+    Ok(())
+}
+
+/// Sets what a bundle recommends, and what its estimated error is multiplied by: the median of the true error over the estimated one
+/// after a few corrections, where a target mostly ends a step.
+fn calibrate(
+    effort: Effort,
+    recording: &Recording,
+    bundle: &Path,
+    stage: &mut Stage,
+) -> Result<()> {
+    let few = effort.most.min(CALIBRATED_AFTER);
+    corrections::recommend(bundle, effort, Some(1.0))?;
+    let factor = match few {
+        0 => None,
+        few => recording
+            .measure(bundle, Corrections::Fixed(few))?
+            .calibration(),
+    };
+    if let Some(factor) = factor {
+        corrections::recommend(bundle, effort, Some(factor))?;
+        stage.decided(&format!(
+            "{effort} corrections a step; the true error is {factor:.2} times the estimated one after {few}"
+        ));
+    }
+    Ok(())
+}
+
+fn kept(kept: bool) -> &'static str {
+    if kept { "kept" } else { "left out" }
 }
 
 fn part(found: &Certificate, name: &str, value: &str) -> f64 {

@@ -19,7 +19,6 @@ use super::stages::{Stage, key_of};
 use super::{bundle, vibration};
 use crate::check;
 use crate::corrections::{Push, Pushes, Workbench, principal};
-use crate::effort::Effort;
 
 /// Equilibria of a round.
 const EQUILIBRIA: usize = 24;
@@ -247,7 +246,7 @@ fn make(
         let count = (all.len() / 2).min(MOST_MODES);
         bundle::copy(rounds.draft, &candidate)?;
         let space = principal(&all, count).into_iter();
-        modes = bench.write_space(&candidate, space, Effort::fixed(options.recommended), 1.0)?;
+        modes = bench.write_space(&candidate, space, options.draft(), 1.0)?;
         for part in PARTS {
             let to = file(folder, number, part);
             std::fs::copy(candidate.join(part), &to)
@@ -260,7 +259,7 @@ fn make(
     let errors = validate::errors(
         bench,
         bundle,
-        options.recommended,
+        options.draft().most,
         &validation,
         options.json,
     )?;

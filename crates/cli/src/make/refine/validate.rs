@@ -58,7 +58,10 @@ fn error(
     push: &Push,
 ) -> Result<f64> {
     let options = SceneOptions {
-        corrections: Corrections::Fixed(corrections),
+        corrections: match corrections {
+            0 => Corrections::None,
+            count => Corrections::Fixed(count),
+        },
         threads: 1,
         ..SceneOptions::default()
     };

@@ -1,0 +1,79 @@
+//! Held-out contacts that are simulated once and replayed through several bundles of the same body, to choose between them.
+
+use std::path::Path;
+
+use anyhow::Result;
+use upt::Corrections;
+
+use super::case::{Case, Frame, Replay, Touch};
+use super::parallel::{in_parallel, workers};
+use super::{Bundle, Certificate, held_out};
+use crate::progress;
+
+/// A frame that was kept: 12 bytes a node.
+struct Kept {
+    touch: Touch,
+    truth: Vec<[f32; 3]>,
+    reaction: Vec<[f32; 3]>,
+}
+
+/// Frames of some cases.
+pub struct Recording {
+    seed: u64,
+    threads: usize,
+    cases: Vec<(Case, Vec<Kept>)>,
+}
+
+impl Recording {
+    /// Simulates the first frames of `count` cases of a seed, within the bundle's envelope.
+    pub fn make(
+        folder: &Path,
+        count: usize,
+        frames: usize,
+        seed: u64,
+        threads: usize,
+        quiet: bool,
+    ) -> Result<Self> {
+        let bundle = Bundle::open(folder)?;
+        let bar = progress::bar(quiet, (count * frames) as u64, "contacts to choose by");
+        let cases = in_parallel(workers(threads).min(count), &|at| at < count, &|at| {
+            let case = held_out(seed, at);
+            let mut kept = Vec::with_capacity(frames);
+            case.simulate(&bundle.model, &bundle.body(), frames, &mut |frame| {
+                bar.inc(1);
+                kept.push(Kept {
+                    touch: frame.touch.clone(),
+                    truth: frame.truth.to_vec(),
+                    reaction: frame.reaction.to_vec(),
+                });
+                Ok(())
+            })?;
+            Ok((case, kept))
+        })?;
+        bar.finish_and_clear();
+        Ok(Self {
+            seed,
+            threads,
+            cases,
+        })
+    }
+
+    /// What a bundle makes of them with so many corrections.
+    pub fn measure(&self, folder: &Path, corrections: Corrections) -> Result<Certificate> {
+        let bundle = Bundle::open(folder)?;
+        let count = self.cases.len();
+        let scores = in_parallel(workers(self.threads).min(count), &|at| at < count, &|at| {
+            let (case, frames) = &self.cases[at];
+            let mut replay = Replay::new(*case, &bundle.model, corrections, bundle.body())?;
+            for kept in frames {
+                replay.step(&Frame {
+                    touch: &kept.touch,
+                    truth: &kept.truth,
+                    reaction: &kept.reaction,
+                })?;
+            }
+            Ok(replay.finish())
+        })?;
+        bundle.certificate(self.seed, scores)
+    }
+}
