@@ -1,4 +1,4 @@
-"""`upt view`: what is refused, and the page in headless Chromium.
+"""`upt view`: what is refused, and its page and that of `upt report` in headless Chromium.
 
     python3 tests/view/run.py
 
@@ -11,9 +11,11 @@ from __future__ import annotations
 import base64
 import json
 import os
+import re
 import struct
 import subprocess
 import sys
+import tempfile
 import time
 import traceback
 import urllib.error
@@ -272,6 +274,39 @@ def check_gltf(surface: dict) -> None:
     assert max(numbers) < positions["count"] and indices["count"] % 3 == 0
 
 
+def a_report_plays_its_first_case(browser: Browser, bundle: str) -> None:
+    """The page is one file; the organ in it moves as the solver says, and stands where it is told to."""
+    mesh = str(BUNDLES / bundle / "mesh.safetensors")
+    material = json.loads((BUNDLES / bundle / "bundle.json").read_text(encoding="utf-8"))["material"]
+    with tempfile.TemporaryDirectory() as folder:
+        case = os.path.join(folder, "case.trajectory.safetensors")
+        simulate = [COMMAND, "simulate", "--mesh", mesh, "--scheme", "4", "--seed", "5", "--out", case]
+        simulate += ["--young", str(material["young_pa"]), "--density", str(material["density_kg_m3"])]
+        said = subprocess.run(simulate, check=True, capture_output=True, text=True).stdout
+        largest = float(re.search(r"largest displacement ([0-9.]+) mm", said)[1])
+        report = [COMMAND, "report", "--bundle", str(BUNDLES / bundle), "--trajectory", case, "--plain", "zero"]
+        report += ["--threads", "1", "--corrections", "3", "--out", folder]
+        subprocess.run(report, check=True, capture_output=True)
+        text = Path(folder, "report.html").read_text(encoding="utf-8")
+        assert not re.search(r"(src|href)=.?https?:", text)
+        browser.open(Path(folder, "report.html").as_uri())
+        page = "document.querySelector('iframe').contentWindow"
+        frames = browser.wait(f"{page}.uptPreview && {page}.uptPreview.frames")
+        assert frames == 160, frames
+        time_shown = f"{page}.document.getElementById('time').textContent"
+        first = browser.wait(time_shown)
+        browser.wait(f"{time_shown} !== '{first}'")
+        deepest = 0.0
+        for frame in range(0, frames, 4):
+            browser.run(f"{page}.uptPreview.stopAt({frame})")
+            browser.wait(f"{time_shown} === '{frame * 0.05:.2f} s'")
+            deepest = max(deepest, browser.run(f"return {page}.uptPreview.deepest()"))
+            if frame == 40:
+                browser.screenshot(str(PICTURES / f"{bundle}-report.png"))
+        # The largest component of any node; the solver's line has the largest length.
+        assert 0.55 * largest < deepest < 1.02 * largest, (deepest, largest)
+
+
 def main() -> int:
     PICTURES.mkdir(parents=True, exist_ok=True)
     tests = [
@@ -292,6 +327,7 @@ def main() -> int:
     runs = [(test.__name__, test) for test in tests]
     if browser:
         runs.append(("a_drag_moves_the_surface", lambda: a_drag_moves_the_surface(browser, "brain-reduced")))
+        runs.append(("a_report_plays_its_first_case", lambda: a_report_plays_its_first_case(browser, "liver-coarse")))
     try:
         for name, test in runs:
             try:

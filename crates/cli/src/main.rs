@@ -29,7 +29,6 @@ mod mesh;
 mod mesh_files;
 #[cfg(feature = "linear")]
 mod modes;
-#[cfg(feature = "linear")]
 mod preview;
 #[cfg(feature = "linear")]
 mod prior;

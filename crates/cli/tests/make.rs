@@ -157,7 +157,8 @@ fn a_small_organ_end_to_end_and_checked_again() {
     assert!((1.0..=10.0).contains(&mean), "{certificate:#}");
     let left = certificate["truth_over_estimate"].as_f64().unwrap();
     assert!((0.3..3.0).contains(&left), "{certificate:#}");
-    assert!(out.join("certificate.html").is_file());
+    let page = std::fs::read_to_string(out.join("certificate.html")).unwrap();
+    assert!(page.contains("\"film\":{\"count\":160"), "no contact plays");
     assert!(folder.path().join("organ.preview.html").is_file());
 
     let again = Command::new(env!("CARGO_BIN_EXE_upt"))

@@ -10,6 +10,7 @@ use tissue::solver::{Solver, SolverOptions};
 use upt::{Contact, Corrections, Error, Model, Scene, SceneOptions, StepInput};
 
 use super::score::{Regions, Score, Step};
+use crate::preview::Film;
 
 /// Push of the programmes as they are written, mm.
 const PROGRAMME_PUSH_MM: f64 = 15.0;
@@ -116,6 +117,13 @@ impl<'a> Replay<'a> {
             fields: [vec![[0.0; 3]; count], vec![[0.0; 3]; count]],
             score: Score::new(case.scheme.name(), case.seed, count, body.regions.len()),
         })
+    }
+
+    /// Keeps the steps to be played.
+    pub fn filmed(mut self) -> Self {
+        let title = format!("A held-out contact (scheme {})", self.score.scheme);
+        self.score.film = Some(Film::new(self.body.mesh, title, FRAME_S));
+        self
     }
 
     /// Steps both scenes and compares them with the frame.

@@ -1,6 +1,6 @@
 //! `certificate.json`: what was tested and how large the errors, forces and times are (`docs/guide/make.md`).
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use serde_json::{Value, json};
@@ -12,14 +12,16 @@ use upt::Model;
 use super::page;
 use super::score::{Part, Score};
 use crate::machine::Machine;
+use crate::preview::Film;
 
 /// A region with fewer steps than this says nothing.
 const ENOUGH_STEPS: usize = 20;
 
-/// The certificate, and the root mean square error of each node in contact, mm.
+/// The certificate, the root mean square error of each node in contact, mm, and the first case as a film.
 pub struct Certificate {
     value: Value,
     node_errors: Vec<f32>,
+    film: Value,
 }
 
 /// Four significant digits: what another machine finds too.
@@ -121,11 +123,15 @@ impl Certificate {
                 .iter()
                 .map(|sum| (sum / steps).sqrt() as f32)
                 .collect(),
+            film: (scores.first().and_then(|score| score.film.as_ref()))
+                .map_or(Value::Null, Film::json),
         }
     }
 
     /// Takes what a stage kept.
-    pub fn read(path: &Path, errors: &Path) -> Result<Self> {
+    pub fn read([path, errors, film]: &[PathBuf; 3]) -> Result<Self> {
+        let text_of_film =
+            std::fs::read(film).with_context(|| format!("{}: cannot be read", film.display()))?;
         let text =
             std::fs::read(path).with_context(|| format!("{}: cannot be read", path.display()))?;
         let bytes = std::fs::read(errors)
@@ -133,6 +139,8 @@ impl Certificate {
         Ok(Self {
             value: serde_json::from_slice(&text).with_context(|| format!("{}", path.display()))?,
             node_errors: f32_values(&bytes).collect(),
+            film: serde_json::from_slice(&text_of_film)
+                .with_context(|| format!("{}", film.display()))?,
         })
     }
 
@@ -142,6 +150,11 @@ impl Certificate {
             .iter()
             .flat_map(|e| e.to_le_bytes())
             .collect()
+    }
+
+    /// The first case, for the page.
+    pub fn film(&self) -> &Value {
+        &self.film
     }
 
     /// The certificate.
@@ -190,6 +203,7 @@ impl Certificate {
             &self.value,
             mesh,
             &self.node_errors,
+            &self.film,
             facts,
         )
     }

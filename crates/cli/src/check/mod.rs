@@ -161,6 +161,9 @@ pub fn measure(plan: &Plan) -> Result<Certificate> {
         let case = held_out(plan.seed, at);
         let body = bundle.body();
         let mut replay = Replay::new(case, &bundle.model, Corrections::Recommended, body)?;
+        if at == 0 {
+            replay = replay.filmed();
+        }
         case.simulate(&bundle.model, &body, FRAMES, &mut |frame| {
             bar.inc(1);
             replay.step(frame)

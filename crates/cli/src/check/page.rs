@@ -1,4 +1,4 @@
-//! `certificate.html`: the numbers as tables, and the organ coloured by its error.
+//! `certificate.html`: the numbers as tables, and the organ coloured by its error, with the first held-out contact playing.
 
 use std::path::Path;
 
@@ -6,7 +6,7 @@ use anyhow::Result;
 use serde_json::Value;
 use tissue::mesh::Mesh;
 
-use crate::preview::{self, Error};
+use crate::preview::{self, Content};
 
 /// Writes the page.
 pub fn write(
@@ -14,6 +14,7 @@ pub fn write(
     certificate: &Value,
     mesh: &Mesh,
     node_errors: &[f32],
+    film: &Value,
     facts: &[(String, String)],
 ) -> Result<()> {
     let number = |value: &Value| match value.as_f64() {
@@ -65,5 +66,14 @@ pub fn write(
             );
         }
     }
-    preview::write(path, mesh, &Error::Nodes(node_errors), &rows)
+    preview::write(
+        path,
+        &Content {
+            mesh,
+            node_errors: Some(node_errors),
+            facts: &rows,
+            film,
+            pick: false,
+        },
+    )
 }

@@ -5,6 +5,7 @@ use tissue::metrics;
 use upt::SceneStats;
 
 use super::case::Touch;
+use crate::preview::Film;
 
 /// Regions of the domain.
 const REGIONS: usize = 6;
@@ -111,6 +112,8 @@ pub struct Score {
     pub corrections: u64,
     /// What touched in each step.
     pub touches: Vec<Touch>,
+    /// The steps to play, where they are wanted.
+    pub film: Option<Film>,
 }
 
 impl Score {
@@ -127,6 +130,7 @@ impl Score {
             nodes: vec![0.0; nodes],
             corrections: 0,
             touches: Vec::new(),
+            film: None,
         }
     }
 
@@ -136,6 +140,9 @@ impl Score {
         let baseline = metrics::mse_mm2(step.truth, step.baseline);
         let size = metrics::mse_mm2(step.truth, &vec![[0.0; 3]; step.truth.len()]);
         let largest = metrics::max_error_mm(step.truth, step.field);
+        if let Some(film) = &mut self.film {
+            film.add(mesh, step.field, step.truth, step.nodes);
+        }
         if step.nodes.is_empty() {
             // Before the first contact there is nothing to be wrong about.
             if self.contact.steps > 0 {

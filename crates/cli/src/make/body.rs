@@ -317,7 +317,14 @@ pub fn preview_of_failure(options: &Options) {
         ("name".to_owned(), mesh.name.clone()),
         ("nodes".to_owned(), mesh.node_count().to_string()),
     ];
-    if preview::write(&page, &mesh, &preview::Error::None, &facts).is_ok() && !options.json {
+    let content = preview::Content {
+        mesh: &mesh,
+        node_errors: None,
+        facts: &facts,
+        film: &serde_json::Value::Null,
+        pick: true,
+    };
+    if preview::write(&page, &content).is_ok() && !options.json {
         eprintln!(
             "{}: open it in a browser and click to get coordinates",
             page.display()

@@ -76,7 +76,16 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     let effort = sizes.corrections(options);
     work.tell(&sizes.words());
     let page = options.out.with_extension("preview.html");
-    preview::write(&page, &mesh, &preview::Error::None, &sizes.scene(&mesh))?;
+    preview::write(
+        &page,
+        &preview::Content {
+            mesh: &mesh,
+            node_errors: None,
+            facts: &sizes.scene(&mesh),
+            film: &serde_json::Value::Null,
+            pick: true,
+        },
+    )?;
     work.tell(&format!(
         "{}: open it in a browser to see what is held and touched",
         page.display()
@@ -303,7 +312,7 @@ fn certify(
     let copy = work.file(&name);
     bundle::copy(draft, &copy)?;
     corrections::recommend(&copy, corrections, None)?;
-    let files = [format!("{name}.json"), format!("{name}.errors")];
+    let files = ["json", "errors", "film"].map(|end| format!("{name}.{end}"));
     let paths = files.each_ref().map(|file| work.file(file));
     work.stage(
         &name,
@@ -321,8 +330,9 @@ fn certify(
             stage.decided(&found.words());
             std::fs::write(&paths[0], serde_json::to_vec_pretty(&found.json())?)?;
             std::fs::write(&paths[1], found.node_errors_bytes())?;
+            std::fs::write(&paths[2], serde_json::to_vec(found.film())?)?;
             Ok(())
         },
     )?;
-    check::Certificate::read(&paths[0], &paths[1])
+    check::Certificate::read(&paths)
 }

@@ -1,36 +1,39 @@
 //! A self-contained page with the organ in 3D: what is held, what may be touched, stiffness, quality of the elements, and where
-//! there is one the error of a check. A click gives coordinates to paste into a command.
+//! there is one the error of a check, and a contact that plays. A click gives coordinates to paste into a command.
 
-use std::path::Path;
+mod film;
 
-use anyhow::{Context, Result, bail};
+pub use film::Film;
+
+use anyhow::{Result, bail};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde_json::json;
 use tissue::mesh::Mesh;
 use tissue::mesh_quality::dihedral_angles;
-use tissue::tensors::write_whole;
 
 const PAGE: &str = include_str!("page.html");
 const SCRIPT: &str = include_str!("page.js");
 const THREE: &str = include_str!("../view/page/three.js");
 
-/// What a check found.
-pub enum Error<'a> {
-    /// Nothing was checked.
-    None,
-    /// Root mean square error of each node, mm.
-    Nodes(&'a [f32]),
+/// What a page shows.
+pub struct Content<'a> {
+    pub mesh: &'a Mesh,
+    /// Root mean square error of each node in a check, mm.
+    pub node_errors: Option<&'a [f32]>,
+    /// Shown beside the picture.
+    pub facts: &'a [(String, String)],
+    /// What [`Film::json`] made, or null.
+    pub film: &'a serde_json::Value,
+    /// Whether a click gives coordinates.
+    pub pick: bool,
 }
 
-/// Writes the page; `facts` are shown beside the picture.
-pub fn write(
-    path: &Path,
-    mesh: &Mesh,
-    error: &Error<'_>,
-    facts: &[(String, String)],
-) -> Result<()> {
-    let text = page(mesh, error, facts)?;
+/// Writes the page.
+#[cfg(feature = "linear")]
+pub fn write(path: &std::path::Path, content: &Content<'_>) -> Result<()> {
+    use anyhow::Context;
+    let text = page(content)?;
     if let Some(folder) = path
         .parent()
         .filter(|folder| !folder.as_os_str().is_empty())
@@ -38,13 +41,14 @@ pub fn write(
         std::fs::create_dir_all(folder)
             .with_context(|| format!("{}: cannot be made", folder.display()))?;
     }
-    write_whole(path, |file| {
+    tissue::tensors::write_whole(path, |file| {
         std::io::Write::write_all(file, text.as_bytes())
     })
     .with_context(|| format!("{}: cannot be written", path.display()))
 }
 
-fn page(mesh: &Mesh, error: &Error<'_>, facts: &[(String, String)]) -> Result<String> {
+/// Place of each node among those of the surface, and these.
+fn surface_nodes(mesh: &Mesh) -> (Vec<u32>, Vec<u32>) {
     let mut place = vec![u32::MAX; mesh.node_count()];
     let mut nodes = Vec::new();
     for &node in mesh.surface.iter().flatten() {
@@ -53,6 +57,13 @@ fn page(mesh: &Mesh, error: &Error<'_>, facts: &[(String, String)]) -> Result<St
             nodes.push(node);
         }
     }
+    (place, nodes)
+}
+
+/// The page as text.
+pub fn page(content: &Content<'_>) -> Result<String> {
+    let mesh = content.mesh;
+    let (place, nodes) = surface_nodes(mesh);
     let mut held = vec![false; mesh.node_count()];
     mesh.fixed
         .iter()
@@ -79,17 +90,16 @@ fn page(mesh: &Mesh, error: &Error<'_>, facts: &[(String, String)]) -> Result<St
     let rows = || 0..mesh.surface.len();
     let data = json!({
         "name": mesh.name,
-        "facts": facts,
+        "facts": content.facts,
+        "film": content.film,
+        "pick": content.pick,
         "positions": floats(&mut nodes.iter().flat_map(|&node| mesh.positions[node as usize])),
         "faces": STANDARD.encode(faces),
         "held": floats(&mut nodes.iter().map(|&node| f32::from(held[node as usize]))),
         "domain": floats(&mut touched.iter().copied()),
         "stiffness": floats(&mut rows().map(|row| mesh.stiffness_of(inner[row]))),
         "quality": floats(&mut rows().map(angle)),
-        "error": match error {
-            Error::None => json!(null),
-            Error::Nodes(errors) => json!(floats(&mut nodes.iter().map(|&node| errors[node as usize]))),
-        },
+        "error": content.node_errors.map(|errors| floats(&mut nodes.iter().map(|&node| errors[node as usize]))),
     });
     // A tag's end inside of the data would end the script.
     let data = data.to_string().replace("</", "<\\/");
@@ -140,7 +150,7 @@ fn elements_behind(mesh: &Mesh) -> Vec<usize> {
     behind
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "linear"))]
 mod tests {
     use super::*;
 
@@ -148,11 +158,13 @@ mod tests {
     fn the_page_holds_all_that_it_needs() {
         let mesh = tissue::mesh::box_phantom([20.0, 20.0, 10.0], [3, 3, 2]).unwrap();
         let errors = vec![0.25; mesh.node_count()];
-        let page = page(
-            &mesh,
-            &Error::Nodes(&errors),
-            &[("a".into(), "</script>".into())],
-        )
+        let page = page(&Content {
+            mesh: &mesh,
+            node_errors: Some(&errors),
+            facts: &[("a".into(), "</script>".into())],
+            film: &Film::new(&mesh, "none".into(), 0.05).json(),
+            pick: true,
+        })
         .unwrap();
         assert!(!page.contains("src=") && !page.contains("<!-- data"));
         assert_eq!(

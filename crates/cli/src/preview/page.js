@@ -1,4 +1,4 @@
-// The page of `upt make --preview` and of certificates: one organ, coloured by what is known of it.
+// The page of `upt make --preview`, of certificates and reports: one organ, coloured by what is known of it, and a contact that plays.
 const at = (id) => document.getElementById(id);
 const data = JSON.parse(at("data").textContent);
 const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer;
@@ -76,12 +76,80 @@ function paint(choice) {
   at("low").textContent = choice.low ?? "";
   at("high").textContent = choice.high ?? "";
 }
+
+// The film: displacements and errors of the surface's nodes, frame by frame; between frames in proportion.
+const film = data.film && data.film.count > 1 ? data.film : null;
+const nodes = positions.length / 3;
+const moved = new Float32Array(film ? positions.length : 0);
+const errors = new Float32Array(film ? nodes : 0);
+let [time, playing, shown] = [0, Boolean(film), -1];
+// Shown through the organ: the site is often in a dent.
+const seen = { color: 0xffffff, transparent: true, opacity: 0.75, depthTest: false };
+const touch = new three.Mesh(new three.CapsuleGeometry(1, 0.01), new three.MeshStandardMaterial(seen));
+touch.visible = false;
+scene.add(touch);
+if (film) {
+  film.moved = new Int16Array(bytes(film.moved));
+  film.error = new Uint8Array(bytes(film.error));
+  const high = (largest) => 0.75 * largest; // The largest is at a few nodes.
+  const lengths = (face, i) => Math.hypot(...moved.subarray(3 * faces[i], 3 * faces[i] + 3)) / high(film.largest_moved_mm);
+  const wrong = (face, i) => errors[faces[i]] / high(film.largest_error_mm);
+  choices.push(
+    { name: "displacement now, mm", low: "0", high: high(film.largest_moved_mm).toPrecision(2), colour: (face, i) => ramp(lengths(face, i)), plays: true },
+    { name: "error now, mm", low: "0", high: high(film.largest_error_mm).toPrecision(2), colour: (face, i) => ramp(wrong(face, i)), plays: true },
+  );
+  at("film").hidden = false;
+  at("title").textContent = film.title;
+  at("place").max = film.count - 1;
+  touch.scale.setScalar(0.025 * radius);
+  // From where most of it is touched.
+  const towards = new three.Vector3();
+  for (const place of film.touched) if (place) towards.add(new three.Vector3(...place).sub(center));
+  if (towards.length() > 0) {
+    towards.normalize().addScaledVector(camera.up, 0.3);
+    camera.position.copy(center).add(towards.setLength(3.4 * radius));
+    controls.update();
+  }
+}
+function show(place) {
+  if (place === shown) return;
+  shown = place;
+  const first = Math.min(Math.floor(place), film.count - 2);
+  const part = place - first;
+  const [a, b] = [first * nodes, (first + 1) * nodes];
+  const [unit, small] = [film.largest_moved_mm / 32767, film.largest_error_mm / 255];
+  for (let i = 0; i < moved.length; i += 1) moved[i] = unit * ((1 - part) * film.moved[3 * a + i] + part * film.moved[3 * b + i]);
+  for (let i = 0; i < nodes; i += 1) errors[i] = small * ((1 - part) * film.error[a + i] + part * film.error[b + i]);
+  faces.forEach((node, i) => {
+    for (let k = 0; k < 3; k += 1) corners[3 * i + k] = positions[3 * node + k] + moved[3 * node + k];
+  });
+  geometry.attributes.position.needsUpdate = true;
+  geometry.computeVertexNormals();
+  const [from, to] = [film.touched[first], film.touched[first + 1]];
+  touch.visible = Boolean(from && to);
+  if (touch.visible) touch.position.set(...from.map((x, k) => (1 - part) * x + part * to[k]));
+  const choice = choices[at("choice").value];
+  if (choice.plays) paint(choice);
+  at("time").textContent = `${(place * film.step_s).toFixed(2)} s`;
+  if (document.activeElement !== at("place") || playing) at("place").value = place;
+}
+function play(now) {
+  playing = now;
+  at("play").textContent = playing ? "❚❚" : "▶";
+}
+at("play").addEventListener("click", () => play(!playing));
+at("place").addEventListener("input", () => {
+  play(false);
+  time = Number(at("place").value) * film.step_s;
+});
 at("bar").style.background = `linear-gradient(90deg, ${SCALE.map((colour) => `#${colour.getHexString()}`).join(", ")})`;
 choices.forEach((choice, i) => at("choice").add(new Option(choice.name, i)));
 at("choice").addEventListener("change", () => paint(choices[at("choice").value]));
-at("choice").value = data.error ? 1 : 0;
+at("choice").value = film ? choices.findIndex((choice) => choice.plays) : data.error ? 1 : 0;
 paint(choices[at("choice").value]);
 at("name").textContent = data.name;
+document.title = data.name;
+if (data.pick) at("hint").textContent += " Click on the organ for coordinates:";
 for (const [name, value] of data.facts) {
   for (const [tag, text] of [["dt", name], ["dd", value]]) {
     const made = document.createElement(tag);
@@ -96,7 +164,7 @@ renderer.domElement.addEventListener("pointerdown", (event) => {
   down = [event.clientX, event.clientY];
 });
 renderer.domElement.addEventListener("pointerup", (event) => {
-  if (!down || Math.hypot(event.clientX - down[0], event.clientY - down[1]) > 4) return;
+  if (!data.pick || !down || Math.hypot(event.clientX - down[0], event.clientY - down[1]) > 4) return;
   const frame = renderer.domElement.getBoundingClientRect();
   const x = (2 * (event.clientX - frame.left)) / frame.width - 1;
   const y = 1 - (2 * (event.clientY - frame.top)) / frame.height;
@@ -115,9 +183,24 @@ renderer.domElement.addEventListener("pointerup", (event) => {
     }),
   );
 });
-window.uptPreview = { faces: count, choices: choices.length, pick: (x, y) => renderer.domElement.dispatchEvent(new PointerEvent("pointerup", { clientX: x, clientY: y })) };
+window.uptPreview = {
+  faces: count,
+  choices: choices.length,
+  frames: film ? film.count : 0,
+  stopAt: (place) => (play(false), (time = place * film.step_s)),
+  deepest: () => moved.reduce((most, x) => Math.max(most, Math.abs(x)), 0),
+  pick: (x, y) => renderer.domElement.dispatchEvent(new PointerEvent("pointerup", { clientX: x, clientY: y })),
+};
 
-renderer.setAnimationLoop(() => {
+let before;
+renderer.setAnimationLoop((now) => {
+  if (film) {
+    const length = (film.count - 1) * film.step_s;
+    // A hidden page must not jump.
+    if (playing) time = (time + Math.min((now - (before ?? now)) / 1000, 0.1)) % length;
+    show(Math.min(time / film.step_s, film.count - 1));
+  }
+  before = now;
   const canvas = renderer.domElement;
   const { clientWidth: width, clientHeight: height } = canvas;
   if (canvas.width !== width || canvas.height !== height) {

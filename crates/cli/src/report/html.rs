@@ -35,6 +35,8 @@ pub struct Page<'a> {
     /// Indices of the measurements that the curves, histogram and stages show.
     pub shown: Vec<usize>,
     pub galleries: Vec<Gallery>,
+    /// A page of [`crate::preview`] in which the first case plays.
+    pub viewer: Option<String>,
     pub dt: f64,
     /// Remarks under the table: what was left out and why.
     pub notes: Vec<String>,
@@ -68,6 +70,9 @@ figcaption{font-size:13px;color:#44505c;margin-top:4px}
 ul{margin:8px 0 0;padding-left:20px;color:#44505c;font-size:14px}
 ";
 
+const VIEWER_STYLE: &str =
+    "iframe{display:block;width:100%;height:560px;border:0;border-radius:6px}";
+
 /// The page up to its first section; `style` is added to that of all pages.
 pub fn opening(title: &str, lead: &str, style: &str) -> String {
     format!(
@@ -94,7 +99,19 @@ pub fn closing(mut out: String, facts: &Facts) -> String {
 }
 
 pub fn page(page: &Page<'_>) -> String {
-    let mut out = opening(page.title, &page.lead, "");
+    let mut out = opening(page.title, &page.lead, VIEWER_STYLE);
+    if let Some(viewer) = &page.viewer {
+        let body = format!(
+            "<iframe title=\"the first case, playing\" srcdoc=\"{}\"></iframe>",
+            viewer.replace('&', "&amp;").replace('"', "&quot;")
+        );
+        section(
+            &mut out,
+            "The first case, playing",
+            "Turn it and zoom; stop it and move through its time. Colours show the displacement or the error of that moment.",
+            &body,
+        );
+    }
     for gallery in &page.galleries {
         out.push_str(&gallery_section(gallery));
     }

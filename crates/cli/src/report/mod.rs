@@ -7,6 +7,7 @@ mod cache;
 pub mod cases;
 mod choose;
 pub mod errors;
+mod film;
 pub mod html;
 mod measure;
 pub mod memory;
@@ -216,6 +217,7 @@ pub fn run(options: &Options) -> Result<ExitCode> {
         &moments,
         &machine,
         &notes,
+        film::viewer(&cases, &mesh, &methods)?,
     )?;
     if options.json {
         println!("{}", serde_json::to_string_pretty(&report)?);
@@ -311,7 +313,7 @@ fn measure_all(
     Ok(measurements)
 }
 
-/// The first case by the plain float32 path of the method's bundle: CPU, one thread, all nodes.
+/// The frames of the first case, from the second on, by the plain float32 path of the method's bundle: CPU, one thread, all nodes.
 fn float32_frames(method: &Method, plan: &Plan<'_>) -> Result<Option<Vec<Vec<[f32; 3]>>>> {
     let Method::Surrogate {
         bundle,

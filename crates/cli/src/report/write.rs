@@ -10,6 +10,7 @@ use super::{Options, html, pictures};
 use crate::machine::Machine;
 
 /// Writes report.json and report.html; returns the former.
+#[expect(clippy::too_many_arguments, reason = "all that a report is made from")]
 pub fn write(
     options: &Options,
     cases: &Cases,
@@ -18,6 +19,7 @@ pub fn write(
     moments: &[(usize, usize)],
     machine: &Machine,
     notes: &[String],
+    viewer: Option<String>,
 ) -> Result<serde_json::Value> {
     std::fs::create_dir_all(&options.out)
         .with_context(|| format!("cannot make {}", options.out.display()))?;
@@ -113,6 +115,7 @@ pub fn write(
         facts,
         measurements,
         galleries: pictures::galleries(mesh, &cases.list, moments, &in_pictures)?,
+        viewer,
         shown,
         dt: header.dt_s,
         notes: notes
