@@ -12,8 +12,10 @@ const MOST_ROWS: usize = 256;
 const THROUGH_MM: f32 = 30.0;
 /// What lies deeper inside of a tool at the start of a step comes out by this much a step, mm.
 const RECOVERY_MM: f32 = 3.0;
-/// A sample no deeper than this in a tool has not been gone through by it, mm.
+/// A sample no deeper than this in a tool has not been gone through by it, mm, ...
 const SHALLOW_MM: f32 = 0.5;
+/// ... nor one from which the way back through the tool is more than so many times its depth: that way grazes the tool's side.
+const LONG_WAY: f32 = 4.0;
 /// A tool's normal may lean this much (cosine) to the outside of the tissue; beyond, the tool reaches the sample from within.
 const LEAN: f32 = 0.2;
 
@@ -213,8 +215,10 @@ impl Pair<'_> {
             }
             if gap < 0.0 {
                 let way = self.body.way_out(self.now, point, -outward, THROUGH_MM);
-                let back = force.dot(outward) < -force.dot(normal);
-                if self.put || back || self.went(point, start, way.unwrap_or(THROUGH_MM)) {
+                let length = way.unwrap_or(THROUGH_MM);
+                let back = force.dot(outward) < -force.dot(normal)
+                    && length <= self.moved(point, start) + RECOVERY_MM;
+                if self.put || back || self.went(point, start, length) {
                     let Some(way) = way else {
                         return RELEASED;
                     };
@@ -238,9 +242,15 @@ impl Pair<'_> {
     /// Whether a sample may have come `way` into the tool since it was at `start`, or lay in it already.
     fn went(&self, point: Vector, start: Vector, way: f32) -> bool {
         let depth = -self.body.nearest_at(self.from, start).distance;
+        let lay_in_it = depth > SHALLOW_MM && way <= LONG_WAY * depth;
+        lay_in_it || way <= self.moved(point, start) + SHALLOW_MM
+    }
+
+    /// How far a sample has come since it was at `start`, as the tool sees it, mm.
+    fn moved(&self, point: Vector, start: Vector) -> f32 {
         let [now, then] = [(self.now, point), (self.from, start)]
             .map(|(pose, point)| pose.inverse_transform_point(point));
-        depth > SHALLOW_MM || way <= now.distance(then) + SHALLOW_MM
+        now.distance(then)
     }
 }
 
