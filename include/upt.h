@@ -615,9 +615,14 @@ typedef struct upt_scene_options {
    */
   uint8_t interpolate_points;
   /**
+   * Substeps of a step that instruments drive, at most, where it alone would err by more than the corrections' target: 1 for none, up to
+   * 8, 0 as many as the bundle recommends. From 2 only with a target.
+   */
+  uint8_t substeps;
+  /**
    * Zero.
    */
-  uint8_t reserved[2];
+  uint8_t reserved[1];
   /**
    * `UPT_STEP_*`: who makes a step of a `UPT_KIND_UPT` bundle.
    */
@@ -987,9 +992,13 @@ typedef struct upt_scene_stats {
    */
   uint8_t prior_forces;
   /**
+   * Substeps that the last step was made of; 0 where it is one.
+   */
+  uint8_t substeps;
+  /**
    * Zero.
    */
-  uint8_t reserved[5];
+  uint8_t reserved[4];
   /**
    * Of the stages' times, copies to a device, ms; 0 on the CPU.
    */

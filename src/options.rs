@@ -182,6 +182,9 @@ pub struct SceneOptions {
     /// Length of a step, s: [`SHORTEST_STEP_S`] to [`LONGEST_STEP_S`], or 0 for the bundle's. Steps of another length than the bundle's have no
     /// learned part: corrections by the elements make them all, with contact and without.
     pub step_s: f64,
+    /// Substeps of a step that tools drive, at most, where it alone would err by more than the corrections' target: 1 for none, up to 8, 0 as
+    /// many as the bundle recommends. From 2 only with a target.
+    pub substeps: u32,
 }
 
 /// Bounds of [`SceneOptions::step_s`], s.
@@ -228,6 +231,7 @@ impl Default for SceneOptions {
             corrections: Corrections::Recommended,
             error_limit_mm: 0.0,
             step_s: 0.0,
+            substeps: 0,
         }
     }
 }

@@ -90,6 +90,8 @@ pub struct SceneStats {
     pub corrections: u32,
     /// Evaluations of the element forces.
     pub evaluations: u32,
+    /// Substeps that the step was made of; 0 where it is one.
+    pub substeps: u32,
     /// `|r|` after the corrections over `|r|` before them; 0 without corrections.
     pub residual: f32,
     /// Estimated root mean square error of the corrected state over all nodes, mm; 0 without corrections.

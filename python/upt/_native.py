@@ -407,6 +407,9 @@ class SceneOptions(Record):
     """1: sample with a cubic through the last states instead of a line."""
     interpolate_points: bool = boolean("_interpolate_points")
     """1: attached points are interpolated between nodes, not decoded (kind `upt`)."""
+    substeps: int
+    """Substeps of a step that instruments drive, at most, where it alone would err by more than the corrections' target: 1 for none, up to
+    8, 0 as many as the bundle recommends. From 2 only with a target."""
     reserved: tuple[int, ...] = vector("_reserved")
     """Zero."""
     step_path: StepPath = choice("_step_path", StepPath)
@@ -437,7 +440,8 @@ class SceneOptions(Record):
         ("_latest_wins", ctypes.c_uint8),
         ("_cubic_sampling", ctypes.c_uint8),
         ("_interpolate_points", ctypes.c_uint8),
-        ("_reserved", ctypes.c_uint8 * 2),
+        ("substeps", ctypes.c_uint8),
+        ("_reserved", ctypes.c_uint8 * 1),
         ("_step_path", ctypes.c_int32),
         ("_corrections", ctypes.c_int32),
         ("corrections_budget_us", ctypes.c_uint32),
@@ -472,6 +476,9 @@ class SceneOptionsKeywords(TypedDict, total=False):
     """1: sample with a cubic through the last states instead of a line."""
     interpolate_points: bool
     """1: attached points are interpolated between nodes, not decoded (kind `upt`)."""
+    substeps: int
+    """Substeps of a step that instruments drive, at most, where it alone would err by more than the corrections' target: 1 for none, up to
+    8, 0 as many as the bundle recommends. From 2 only with a target."""
     step_path: StepPath | str | int
     """`UPT_STEP_*`: who makes a step of a `UPT_KIND_UPT` bundle."""
     corrections: Corrections | str | int
@@ -760,6 +767,8 @@ class SceneStats(Record):
     """1: a bug was caught in an earlier call; only destroy is left."""
     prior_forces: bool = boolean("_prior_forces")
     """1: `upt_scene_contact_force` gives the contact forces of the linear response; 0: the elements' elastic forces."""
+    substeps: int
+    """Substeps that the last step was made of; 0 where it is one."""
     reserved: tuple[int, ...] = vector("_reserved")
     """Zero."""
     upload_ms: float
@@ -807,7 +816,8 @@ class SceneStats(Record):
         ("_sleeping", ctypes.c_uint8),
         ("_poisoned", ctypes.c_uint8),
         ("_prior_forces", ctypes.c_uint8),
-        ("_reserved", ctypes.c_uint8 * 5),
+        ("substeps", ctypes.c_uint8),
+        ("_reserved", ctypes.c_uint8 * 4),
         ("upload_ms", ctypes.c_double),
         ("download_ms", ctypes.c_double),
         ("_step_path", ctypes.c_int32),

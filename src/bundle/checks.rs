@@ -64,6 +64,11 @@ impl Manifest {
                 "must be zero or positive",
             )?;
             check(
+                (1..=crate::corrections::MOST_SUBSTEPS).contains(&corrections.substeps),
+                "corrections.substeps",
+                "must be 1 to 8",
+            )?;
+            check(
                 corrections.calibration.is_finite() && corrections.calibration > 0.0,
                 "corrections.calibration",
                 "must be positive",

@@ -84,7 +84,13 @@ const KEYS: &[(&str, &[&str])] = &[
     ("prior", &["file", "release", "vibration"]),
     (
         "corrections",
-        &["file", "recommended", "target_mm", "calibration"],
+        &[
+            "file",
+            "recommended",
+            "target_mm",
+            "substeps",
+            "calibration",
+        ],
     ),
     (
         "upt",

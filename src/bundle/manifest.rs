@@ -94,6 +94,9 @@ pub struct CorrectionsEntry {
     /// Fewer where the estimated error is below this, mm; 0: never.
     #[serde(default)]
     pub target_mm: f32,
+    /// Substeps at most of a step that tools drive, where it alone would err by more than the target; 1: none.
+    #[serde(default = "no_substeps")]
+    pub substeps: u32,
     /// Estimated over measured error on held-out cases: what [`crate::SceneStats::error_mm`] is multiplied by.
     #[serde(default = "one")]
     pub calibration: f32,
@@ -101,6 +104,10 @@ pub struct CorrectionsEntry {
 
 fn one() -> f32 {
     1.0
+}
+
+fn no_substeps() -> u32 {
+    1
 }
 
 /// One group of node features, in the order of the encoder's input.

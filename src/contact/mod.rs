@@ -19,7 +19,6 @@ pub mod rows;
 pub mod tool;
 
 pub use compliance::Compliance;
-#[cfg(feature = "haptics")]
 pub(crate) use compliance::Delassus;
 pub use past::Past;
 pub use problem::Problem;

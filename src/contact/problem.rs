@@ -112,16 +112,35 @@ impl Problem {
         1e3 * self.spent.as_secs_f64()
     }
 
+    /// Takes other responses, and gives its own: they hold what steps of one length leave of the compliance.
+    pub(crate) fn exchange(&mut self, responses: &mut Delassus) {
+        std::mem::swap(&mut self.delassus, responses);
+    }
+
     /// The tools of this step.
     pub fn tools(&self) -> &[Tool] {
         &self.tools
     }
 
-    /// Takes the tools of a step that begins at `state.start`. A tool's place in the list is its identity from step to step.
+    /// Where each of them was when the step began.
+    pub fn before(&self) -> &[Pose] {
+        &self.before
+    }
+
+    /// Takes the tools of a step that begins at `start`. A tool's place in the list is its identity from step to step.
     ///
     /// # Errors
     /// [`Error::Argument`] for friction, tear-off force or number; the past stays.
     pub fn begin(&mut self, tools: &[Tool], rest: &[f32], start: &[f32]) -> Result<()> {
+        self.spent = Duration::ZERO;
+        self.enter(tools, rest, start)
+    }
+
+    /// The same in the middle of a step.
+    ///
+    /// # Errors
+    /// As [`Problem::begin`].
+    pub fn enter(&mut self, tools: &[Tool], rest: &[f32], start: &[f32]) -> Result<()> {
         if tools.len() > MAX_TOOLS {
             return Err(Error::Argument(format!(
                 "{} instruments; at most {MAX_TOOLS} at once",
@@ -131,7 +150,6 @@ impl Problem {
         for (index, tool) in tools.iter().enumerate() {
             tool.check(index)?;
         }
-        self.spent = Duration::ZERO;
         self.tools.clear();
         self.tools.extend_from_slice(tools);
         self.next.take(&self.past);

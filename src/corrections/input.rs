@@ -28,6 +28,20 @@ pub struct Report {
     pub parts: u32,
     /// The iterations ended inverted and something else took their place.
     pub fell_back: bool,
+    /// The step was made of this many shorter ones; 0 where it is one.
+    pub substeps: u32,
+}
+
+#[cfg(feature = "contact")]
+impl Report {
+    /// Of both together, the second of which is the state's.
+    pub(super) fn and(&self, second: &Report) -> Report {
+        Report {
+            iterations: self.iterations + second.iterations,
+            evaluations: self.evaluations + second.evaluations,
+            ..*second
+        }
+    }
 }
 
 /// The step being corrected.

@@ -17,6 +17,7 @@
 use std::time::Instant;
 
 use super::input::{Input, Lent, Report};
+use super::memory::Memory;
 use super::passes;
 use super::precondition::{Env, Preconditioner, mask_held};
 use super::stage::{MOST_PARTS, SHORTENINGS, SLOPE, SMALLEST_DET, Stage};
@@ -33,17 +34,52 @@ struct Iterate<'a> {
 }
 
 impl Stage {
-    /// Makes the step from `input.last` that the tools of `problem` cause.
-    pub fn correct_loaded(
+    /// Makes the step from `input.last` that the tools of `problem` cause, and tells them what they feel.
+    pub(super) fn correct_loaded(
         &mut self,
         lent: Lent<'_>,
         input: &Input<'_>,
         problem: &mut Problem,
         next: &mut [f32],
     ) -> Result<Report> {
+        self.make_loaded(lent, input, problem, next, Memory::begin)
+    }
+
+    /// The same with the pairs that `remember` leaves; once more where a grasp tears off, which then holds nothing at the end.
+    pub(super) fn make_loaded(
+        &mut self,
+        lent: Lent<'_>,
+        input: &Input<'_>,
+        problem: &mut Problem,
+        next: &mut [f32],
+        remember: impl Fn(&mut Memory),
+    ) -> Result<Report> {
         let _awake = lent.pool.keep_awake();
+        let mut made = |problem: &mut Problem| {
+            remember(&mut self.memory);
+            let report = self.balance_loaded(lent, input, problem, next)?;
+            problem.finish(State {
+                rest: input.rest,
+                u: next,
+                start: input.last,
+            });
+            Ok(report)
+        };
+        let report = made(problem)?;
+        match problem.tears() {
+            true => made(problem),
+            false => Ok(report),
+        }
+    }
+
+    fn balance_loaded(
+        &mut self,
+        lent: Lent<'_>,
+        input: &Input<'_>,
+        problem: &mut Problem,
+        next: &mut [f32],
+    ) -> Result<Report> {
         self.nodes.clear();
-        self.memory.begin();
         self.memory.mask(&[]);
         self.prepare(lent, input)?;
         let mut report = Report::default();

@@ -21,6 +21,8 @@ mod passes;
 mod precondition;
 mod space;
 mod stage;
+#[cfg(feature = "contact")]
+mod substeps;
 
 use std::sync::Arc;
 
@@ -39,9 +41,13 @@ pub use motion::Motion;
 pub use pace::{Integrator, Pace};
 pub use space::CoarseSpace;
 pub use stage::{SMALLEST_DET, Stage};
+#[cfg(feature = "contact")]
+pub use substeps::Substeps;
 
 /// Most iterations a step.
 pub const LIMIT: u32 = 64;
+/// Most substeps of a step.
+pub const MOST_SUBSTEPS: u32 = 8;
 
 /// The tables and elements of a bundle's corrections.
 pub struct Corrections {

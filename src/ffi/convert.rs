@@ -267,6 +267,7 @@ pub(super) unsafe fn scene_options(raw: &upt_scene_options) -> Result<SceneOptio
         corrections: corrections(raw)?,
         error_limit_mm: raw.error_limit_mm,
         step_s: raw.step_s,
+        substeps: raw.substeps.into(),
     })
 }
 

@@ -140,8 +140,11 @@ pub struct upt_scene_options {
     pub cubic_sampling: u8,
     /// 1: attached points are interpolated between nodes, not decoded (kind `upt`).
     pub interpolate_points: u8,
+    /// Substeps of a step that instruments drive, at most, where it alone would err by more than the corrections' target: 1 for none, up to
+    /// 8, 0 as many as the bundle recommends. From 2 only with a target.
+    pub substeps: u8,
     /// Zero.
-    pub reserved: [u8; 2],
+    pub reserved: [u8; 1],
     /// `UPT_STEP_*`: who makes a step of a `UPT_KIND_UPT` bundle.
     pub step_path: i32,
     /// Corrections by the elements while there is contact: 1 to 64 a step, 0 as many as the bundle recommends,
@@ -355,8 +358,10 @@ pub struct upt_scene_stats {
     pub poisoned: u8,
     /// 1: `upt_scene_contact_force` gives the contact forces of the linear response; 0: the elements' elastic forces.
     pub prior_forces: u8,
+    /// Substeps that the last step was made of; 0 where it is one.
+    pub substeps: u8,
     /// Zero.
-    pub reserved: [u8; 5],
+    pub reserved: [u8; 4],
     /// Of the stages' times, copies to a device, ms; 0 on the CPU.
     pub upload_ms: f64,
     /// Of the stages' times, copies back from a device, ms; 0 on the CPU.

@@ -157,6 +157,7 @@ impl Core {
             contact_ms: 0.0,
             corrections: 0,
             evaluations: 0,
+            substeps: 0,
             residual: 0.0,
             error_mm: 0.0,
             min_det: 0.0,

@@ -7,7 +7,9 @@ use super::core::{Core, lock_read};
 use super::engine::Engine;
 use super::published::Published;
 use super::timing::Stopwatch;
-use crate::corrections::{Enough, Input, LIMIT, Lent, Motion, Pace, Report, Stage};
+#[cfg(feature = "contact")]
+use crate::corrections::Substeps;
+use crate::corrections::{Enough, Input, LIMIT, Lent, MOST_SUBSTEPS, Motion, Pace, Report, Stage};
 use crate::error::{Error, Result};
 use crate::kernels::{Isa, Pool};
 use crate::model::Model;
@@ -17,6 +19,11 @@ use crate::stats::{SceneStats, flag};
 /// The stage of a scene that corrects, and how far it goes.
 pub struct Corrected {
     pub stage: Box<Stage>,
+    /// From the first contact of tools, where the steps may have any.
+    #[cfg(feature = "contact")]
+    pub substeps: Option<Box<Substeps>>,
+    #[cfg_attr(not(feature = "contact"), allow(dead_code))]
+    most_substeps: u32,
     most: u32,
     target_mm: f32,
     budget_us: u32,
@@ -40,12 +47,12 @@ impl Corrected {
         let entry = model.manifest.corrections.as_ref();
         let own_pace = own_step(model, options)?;
         let (most, target_mm, budget_us) = match options.corrections {
-            Corrections::None => return none(own_pace),
+            Corrections::None => return none(own_pace, options.substeps),
             Corrections::Recommended => match entry {
                 Some(entry) if entry.recommended > 0 && !options.free_boundary => {
                     (entry.recommended, entry.target_mm, 0)
                 }
-                _ => return none(own_pace),
+                _ => return none(own_pace, options.substeps),
             },
             Corrections::Fixed(count) => (count, 0.0, 0),
             Corrections::Auto {
@@ -68,6 +75,24 @@ impl Corrected {
                 "corrections is {most}, must be 1 to {LIMIT}"
             )));
         }
+        let most_substeps = match options.substeps {
+            0 => match (entry, own_pace) {
+                (Some(entry), None) if target_mm > 0.0 && budget_us == 0 => entry.substeps,
+                _ => 1,
+            },
+            1 => 1,
+            count if count > MOST_SUBSTEPS => {
+                return Err(Error::Argument(format!(
+                    "substeps is {count}, must be at most {MOST_SUBSTEPS}, or 0 for the bundle's"
+                )));
+            }
+            count if target_mm == 0.0 => {
+                return Err(Error::Argument(format!(
+                    "substeps is {count}: which steps need them is known by a target; give corrections a target in mm"
+                )));
+            }
+            count => count,
+        };
         if !(options.error_limit_mm.is_finite() && options.error_limit_mm >= 0.0) {
             return Err(Error::Argument(format!(
                 "error_limit_mm is {}, must be finite and not negative",
@@ -99,6 +124,9 @@ impl Corrected {
         };
         Ok(Some(Corrected {
             stage: Box::new(Stage::new(lent)?),
+            #[cfg(feature = "contact")]
+            substeps: None,
+            most_substeps,
             most,
             target_mm,
             budget_us,
@@ -128,7 +156,12 @@ fn own_step(model: &Model, options: &SceneOptions) -> Result<Option<f64>> {
 }
 
 /// A scene that does not correct.
-fn none(own_pace: Option<f64>) -> Result<Option<Corrected>> {
+fn none(own_pace: Option<f64>, substeps: u32) -> Result<Option<Corrected>> {
+    if substeps > 1 {
+        return Err(Error::Argument(format!(
+            "substeps is {substeps}: only corrections have them, and this scene has none; leave substeps at 0, or set `corrections`"
+        )));
+    }
     match own_pace {
         None => Ok(None),
         Some(step_s) => Err(Error::Unsupported(format!(
@@ -154,19 +187,40 @@ impl Corrected {
         self.most
     }
 
+    /// Makes what substeps need, where the steps may have any.
+    #[cfg(feature = "contact")]
+    pub(super) fn be_ready(&mut self, lent: Lent<'_>, model: &Model) -> Result<()> {
+        if self.most_substeps < 2 || self.substeps.is_some() {
+            return Ok(());
+        }
+        let count = self.most_substeps;
+        let step_s = self.pace.integrator.step_s / f64::from(count);
+        let corrections = lent.corrections;
+        let pace = corrections.pace(&model.mesh, &model.manifest.material, step_s)?;
+        let limit_mm = self.target_mm / self.calibration;
+        let substeps = Substeps::new(lent, Arc::new(pace), count, limit_mm)?;
+        self.substeps = Some(Box::new(substeps));
+        Ok(())
+    }
+
     /// Bytes held; the bundle's pace is the model's.
     pub(super) fn memory_bytes(&self) -> usize {
+        #[cfg(feature = "contact")]
+        let substeps = self.substeps.as_ref().map_or(0, |own| own.memory_bytes());
+        #[cfg(not(feature = "contact"))]
+        let substeps = 0;
         let own = match self.own_pace {
             true => self.pace.memory_bytes(),
             false => 0,
         };
-        self.stage.memory_bytes() + own
+        self.stage.memory_bytes() + own + substeps
     }
 
     /// Puts what the iterations report into the statistics.
     pub(super) fn tell(&self, report: &Report, stats: &mut SceneStats) {
         stats.corrections = report.iterations;
         stats.evaluations = report.evaluations;
+        stats.substeps = report.substeps;
         stats.residual = report.residual;
         stats.min_det = report.min_det;
         stats.error_mm = report.error_mm * self.calibration;

@@ -1,10 +1,11 @@
 //! A step that tools drive: where the bundle has corrections their contact is solved inside of them; with `corrections = 0` once, on
 //! the linear response.
 
-use std::sync::RwLock;
+use std::sync::{Arc, RwLock};
 use std::time::Instant;
 
 use super::core::{Core, lock_read, lock_write};
+use super::corrected::Corrected;
 use super::published::Published;
 use super::timing::Stopwatch;
 use super::{Contact, StepInput};
@@ -127,13 +128,15 @@ impl Core {
         };
         let mut watch = Stopwatch::start();
         let span = tracing::trace_span!("corrections").entered();
+        let pace = Arc::clone(&corrected.pace);
         let lent = Lent {
             isa: self.machine.isa,
             pool: &self.machine.pool,
             prior,
             corrections: self.model.corrections()?,
-            pace: &corrected.pace,
+            pace: &pace,
         };
+        corrected.be_ready(lent, &self.model)?;
         let shared = lock_read(published);
         let rest = &self.mesh.positions;
         let input = Input {
@@ -145,24 +148,10 @@ impl Core {
             enough: corrected.enough(start),
         };
         let next = &mut self.next.field;
-        let mut report = corrected
-            .stage
-            .correct_loaded(lent, &input, problem, next)?;
-        let end = |u: &[f32], problem: &mut Problem| {
-            problem.finish(State {
-                rest,
-                u,
-                start: &shared.last.field,
-            });
-        };
-        end(next, problem);
-        if problem.tears() {
-            // A grasp that tears off in this step holds nothing at its end.
-            report = corrected
-                .stage
-                .correct_loaded(lent, &input, problem, next)?;
-            end(next, problem);
-        }
+        let Corrected {
+            stage, substeps, ..
+        } = corrected;
+        let report = stage.drive(lent, &input, problem, substeps.as_deref_mut(), next)?;
         corrected.tell(&report, stats);
         drop(shared);
         drop(span);
@@ -171,9 +160,10 @@ impl Core {
         // What a collision field would say: the envelope, the engine's record and the host's list of contacts go by it.
         self.incoming
             .take_nodes(problem.touched(&self.held), &self.next.field);
+        let made_of = report.substeps.max(1) as f32;
         self.used = self
             .covers_tools()
-            .then(|| problem.used(self.step_s() as f32));
+            .then(|| problem.used(self.step_s() as f32 / made_of));
         stats.corrections_ms = watch.lap();
         self.predict_and_decode(published, None, false, stats)
     }

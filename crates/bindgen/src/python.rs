@@ -127,9 +127,7 @@ fn seen(source: &Source, item: &Struct, field: &Named) -> Result<Seen> {
     };
     Ok(match &field.kind {
         Kind::Number(number)
-            if number == "u8"
-                && !name.starts_with("reserved")
-                && !field.doc.join(" ").contains("_*`") =>
+            if number == "u8" && field.doc.iter().any(|line| line.contains("1: ")) =>
         {
             of("bool", "bool", Some(format!("boolean(\"_{name}\")")))
         }

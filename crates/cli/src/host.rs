@@ -190,6 +190,7 @@ impl Scene {
             };
             options.corrections_target_mm =
                 model.corrections.map_or(0.0, |effort| effort.target_mm);
+            options.substeps = model.corrections.map_or(0, |effort| effort.substeps) as u8;
             options.step_s = model.step_s;
             let mut handle = std::ptr::null_mut();
             check(ffi::upt_scene_create(model.handle, &options, &mut handle))?;

@@ -111,8 +111,13 @@ namespace Upt.Interop
         public byte cubic_sampling;
         /// <summary>1: attached points are interpolated between nodes, not decoded (kind `upt`).</summary>
         public byte interpolate_points;
+        /// <summary>
+        /// Substeps of a step that instruments drive, at most, where it alone would err by more than the corrections' target: 1 for none, up to
+        /// 8, 0 as many as the bundle recommends. From 2 only with a target.
+        /// </summary>
+        public byte substeps;
         /// <summary>Zero.</summary>
-        public fixed byte reserved[2];
+        public fixed byte reserved[1];
         /// <summary>`UPT_STEP_*`: who makes a step of a `UPT_KIND_UPT` bundle.</summary>
         public int step_path;
         /// <summary>
@@ -323,8 +328,10 @@ namespace Upt.Interop
         public byte poisoned;
         /// <summary>1: `upt_scene_contact_force` gives the contact forces of the linear response; 0: the elements' elastic forces.</summary>
         public byte prior_forces;
+        /// <summary>Substeps that the last step was made of; 0 where it is one.</summary>
+        public byte substeps;
         /// <summary>Zero.</summary>
-        public fixed byte reserved[5];
+        public fixed byte reserved[4];
         /// <summary>Of the stages' times, copies to a device, ms; 0 on the CPU.</summary>
         public double upload_ms;
         /// <summary>Of the stages' times, copies back from a device, ms; 0 on the CPU.</summary>

@@ -33,7 +33,7 @@ const FILE: &str = "corrections.safetensors";
 #[command(after_help = "Examples:
   upt corrections onnx/brain-reduced
   upt corrections my-bundle --natural 60 --patches 160 --recommended 3
-  upt corrections my-bundle --keep --recommended 10@0.02")]
+  upt corrections my-bundle --keep --recommended 10@0.02/4")]
 pub struct Options {
     /// Bundle folder with a linear response; `corrections.safetensors` and the manifest's entry are written there.
     pub bundle: PathBuf,
@@ -49,7 +49,8 @@ pub struct Options {
     /// Use the bundle's own residual modes (kind `reduced`) in place of patches.
     #[arg(long)]
     pub residual: bool,
-    /// Corrections a step that the bundle recommends; COUNT@MM: at most COUNT, fewer where the estimated error is below MM.
+    /// Corrections a step that the bundle recommends; COUNT@MM: at most COUNT, fewer where the estimated error is below MM;
+    /// COUNT@MM/SUBSTEPS: that many substeps where a step that instruments drive would miss MM.
     #[arg(long, default_value_t = Effort::fixed(3))]
     pub recommended: Effort,
     /// Factor of the estimated error: `truth over estimate` of `training/scripts/corrections_table.py` on held-out cases.
@@ -126,6 +127,9 @@ fn entry(recommended: Effort, calibration: Value) -> Value {
     let mut entry = json!({"file": FILE, "recommended": recommended.most});
     if recommended.target_mm > 0.0 {
         entry["target_mm"] = short(recommended.target_mm);
+    }
+    if recommended.substeps > 1 {
+        entry["substeps"] = json!(recommended.substeps);
     }
     if !calibration.is_null() {
         entry["calibration"] = calibration;

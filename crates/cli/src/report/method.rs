@@ -132,6 +132,7 @@ impl BundleFolder {
                 .map(|count| Effort {
                     most: count as u32,
                     target_mm: fields["corrections"]["target_mm"].as_f64().unwrap_or(0.0) as f32,
+                    substeps: 0,
                 }),
             path: path.to_path_buf(),
             name: text(&fields["name"], "name")?,
