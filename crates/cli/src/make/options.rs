@@ -18,6 +18,7 @@ const AREA_MM2: [f64; 2] = [60.0, 280.0];
 const CORRECTIONS: Effort = Effort {
     most: 10,
     target_mm: 0.02,
+    substeps: 2,
 };
 /// Until the estimated error is calibrated a bundle recommends so many, and coarse spaces are compared with so many.
 const DRAFT: u32 = 5;
@@ -87,7 +88,7 @@ pub struct Options {
     #[arg(long, value_name = "MM2")]
     pub target_error: Option<f64>,
     /// Corrections a step that the bundle recommends: COUNT, or COUNT@MM for at most COUNT, fewer where the estimated error is below MM.
-    /// Left out: 10@0.02 for pushes of 15 mm, with the target in proportion to the deepest push.
+    /// Left out: 10@0.02/2 for pushes of 15 mm, with the target in proportion to the deepest push.
     #[arg(long, value_name = "COUNT[@MM]")]
     pub corrections: Option<Effort>,
     /// Natural modes.
