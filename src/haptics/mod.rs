@@ -8,7 +8,8 @@
 //! | [`slow`] | what a step publishes: samples near the tool, how they move, forces, velocities |
 //! | [`publish`] | the scene's end: fills it |
 //! | [`modes`] | the natural modes between two steps |
-//! | [`render`] | the hand's end: contact at a pose |
+//! | [`render`] | the hand's end: a wrench at a pose |
+//! | [`solver`] | the samples between two steps, and contact at a pose |
 //! | [`stiffness`] | how the wrench changes with the pose |
 //! | [`passivity`] | no more energy to the hand than came from it |
 //!
@@ -19,6 +20,7 @@ mod passivity;
 pub(crate) mod publish;
 mod render;
 mod slow;
+mod solver;
 mod stiffness;
 
 pub use render::Haptics;

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use ::contact::{Body, Placed, Pose, Samples, Search, Vector};
+use ::contact::{Body, Placed, Pose, Sample, Samples, Search, Vector};
 use exchange::{Reader, Writer, exchange};
 
 use super::HapticOptions;
@@ -23,6 +23,10 @@ const WHAT: &str = "the haptics of a scene";
 const REACH_MM: f32 = 6.0;
 /// Time over which samples move at once, s: the modes take no part.
 const AT_ONCE_S: f64 = 1e-3;
+
+/// Times the impedance of a sample's mass on its spring. With 1 taps on two meshes lag behind the solver's force, with 2 strokes feel
+/// too much of it (`docs/guide/frames-and-haptics.md`).
+const IMPEDANCE: f32 = 1.5;
 
 /// What both ends see of each other.
 #[derive(Debug, Default)]
@@ -128,6 +132,25 @@ pub fn join(
     Ok((link, haptics))
 }
 
+/// Mass that a force on a sample has to move first, g.
+fn mass(sample: Sample, masses: &[f32], held: &[bool]) -> f32 {
+    let free = sample.entries().filter(|entry| !held[entry.0 as usize]);
+    let eased: f32 = free.map(|(node, w)| w * w / masses[node as usize]).sum();
+    if eased > 0.0 { 1.0 / eased } else { 0.0 }
+}
+
+/// [`IMPEDANCE`] times the mean over samples of `sqrt(m w)`, `w` the sample's own compliance in the matrix `[3n,3n]`, mm/mN; s. With it a
+/// sample resists a velocity by as many times `sqrt(m / w)`, the impedance of its mass on its spring: what a hit radiates into the tissue.
+fn delay(delassus: &[f32], masses: impl ExactSizeIterator<Item = f32>) -> f32 {
+    let count = masses.len();
+    let own = |row: usize| delassus[row * 3 * count + row];
+    let delays = masses.enumerate().map(|(at, mass)| {
+        let w: f32 = (3 * at..3 * at + 3).map(own).sum();
+        (1e-3 * mass * (w / 3.0).max(0.0)).sqrt()
+    });
+    IMPEDANCE * delays.sum::<f32>() / count.max(1) as f32
+}
+
 fn check(options: &HapticOptions) -> Result<()> {
     let most = crate::contact::MAX_TOOLS as u32;
     if options.instrument >= most {
@@ -177,11 +200,15 @@ impl Link {
         };
         let rows = self.samples.rows();
         let of = self.found.iter().map(|(_, row)| rows[*row as usize]);
+        let masses = of
+            .clone()
+            .map(|sample| mass(sample, &step.corrections.body.mass, held));
         self.sampled.clear();
         self.sampled.extend(self.found.iter().map(|(_, row)| *row));
         let w = self.delassus.of(compliance, rows, &self.sampled)?;
         let slow = self.out.buffer();
         slow.delassus[..w.len()].copy_from_slice(w);
+        slow.delay_s = delay(w, masses);
         let modes = self.rows.len();
         for (at, sample) in of.enumerate() {
             let out = &mut slow.at_samples[3 * at * modes..3 * (at + 1) * modes];
@@ -316,5 +343,22 @@ impl Link {
 impl Drop for Link {
     fn drop(&mut self) {
         self.ends.scene_gone.store(true, Ordering::Release);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_delay_is_of_the_mass_that_a_force_moves_first() {
+        // Two samples of 0.01 and 0.04 mm/mN, 0.1 and 0.4 g: 1 and 4 ms.
+        let mut delassus = [0.0; 36];
+        for row in 0..6 {
+            delassus[7 * row] = if row < 3 { 0.01 } else { 0.04 };
+        }
+        let found = delay(&delassus, [0.1f32, 0.4].into_iter());
+        assert!((found / IMPEDANCE - 2.5e-3).abs() < 1e-6, "{found}");
+        assert_eq!(delay(&[], [0.0f32; 0].into_iter()), 0.0);
     }
 }

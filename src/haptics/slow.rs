@@ -33,6 +33,8 @@ pub struct Slow {
     pub errors: Vec<Vector>,
     /// How samples move at once under forces on samples `[3n,3n]`, mm/mN: the compliance without the natural modes.
     pub delassus: Vec<f32>,
+    /// Time that samples take to follow a force at once: of their mass on the spring of `delassus`, s.
+    pub delay_s: f32,
     /// Natural modes, `m`.
     pub modes: usize,
     /// The modes at the samples `[3n,m]`.
@@ -62,6 +64,7 @@ impl Slow {
             anchors: memory::filled(MOST_SAMPLES, None, WHAT)?,
             errors: vectors()?,
             delassus: memory::zeros(rows * rows, WHAT)?,
+            delay_s: 0.0,
             modes,
             at_samples: memory::zeros(rows * modes, WHAT)?,
             velocity: memory::zeros(modes, WHAT)?,

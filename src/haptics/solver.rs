@@ -1,0 +1,297 @@
+//! The samples between two steps: where they are, and the forces of a tool at a pose on them.
+
+use ::contact::{Body, Contact, Law, Limits, Pose, Sweeps, Vector};
+
+use super::modes::Modes;
+use super::slow::{MOST_SAMPLES, Slow};
+use super::stiffness::{Direction, Stiffness};
+use crate::contact::Pair;
+use crate::error::Result;
+use crate::memory;
+
+const WHAT: &str = "haptics";
+/// Samples in one solve at most; those that push come first.
+const MOST_ROWS: usize = 64;
+/// Samples this near to the tool are solved for, and farther by its motion, mm.
+const SKIN_MM: f32 = 0.5;
+/// What a step put elsewhere fades out to nothing this far outside of the tissue, mm.
+pub const FADE_MM: f32 = 0.5;
+/// Of a solve that goes on from the one a millisecond before.
+const LIMITS: Limits = Limits {
+    tolerance_mm: 1e-4,
+    least_sweeps: 4,
+    most_sweeps: 40,
+};
+
+/// The samples between two steps.
+pub struct Solver {
+    pub modes: Modes,
+    /// By sample: force, place, what forces have moved it since the step `[3n]`, and what they will have if they stay.
+    forces: Vec<Vector>,
+    points: Vec<Vector>,
+    moved: Vec<f32>,
+    aim: Vec<f32>,
+    /// Of the samples in a solve.
+    rows: Vec<(f32, usize)>,
+    contacts: Vec<Contact>,
+    solved: Vec<Vector>,
+    w: Vec<f32>,
+    sweeps: Sweeps,
+    stiffness: Stiffness,
+    /// Distance to the nearest sample, mm.
+    pub nearest: f32,
+}
+
+impl Solver {
+    /// Of a body with these modes.
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
+    pub fn new(modes: Modes) -> Result<Solver> {
+        let vectors = |count| memory::filled(count, Vector::ZERO, WHAT);
+        Ok(Solver {
+            modes,
+            forces: vectors(MOST_SAMPLES)?,
+            points: vectors(MOST_SAMPLES)?,
+            moved: memory::zeros(3 * MOST_SAMPLES, WHAT)?,
+            aim: memory::zeros(3 * MOST_SAMPLES, WHAT)?,
+            rows: memory::room(MOST_SAMPLES, WHAT)?,
+            contacts: memory::room(MOST_ROWS, WHAT)?,
+            solved: memory::room(MOST_ROWS, WHAT)?,
+            w: memory::room(9 * MOST_ROWS * MOST_ROWS, WHAT)?,
+            sweeps: Sweeps::with_capacity(MOST_ROWS),
+            stiffness: Stiffness::new(),
+            nearest: f32::MAX,
+        })
+    }
+
+    /// From the state of a step.
+    pub fn begin(&mut self, slow: &Slow) {
+        self.modes.begin(&slow.velocity);
+        self.forces[..slow.count].copy_from_slice(&slow.forces[..slow.count]);
+        self.points[..slow.count].copy_from_slice(&slow.points[..slow.count]);
+        self.moved.fill(0.0);
+        self.aim.fill(0.0);
+    }
+
+    /// A change of the force on a sample, and the part of what it moves that it moves now.
+    fn change(&mut self, slow: &Slow, at: usize, change: Vector, part: f32) {
+        if change == Vector::ZERO {
+            return;
+        }
+        let all = 3 * slow.count;
+        for (axis, change) in change.to_array().into_iter().enumerate() {
+            // Symmetric: a row is a column.
+            let row = &slow.delassus[(3 * at + axis) * all..][..all];
+            let moves = self.moved.iter_mut().zip(&mut self.aim).zip(row);
+            for ((moved, aim), w) in moves {
+                *aim += change * w;
+                *moved += part * change * w;
+            }
+        }
+    }
+
+    /// Samples with a force.
+    pub fn pushing(&self, count: usize) -> impl Iterator<Item = usize> {
+        (0..count).filter(|at| self.forces[*at] != Vector::ZERO)
+    }
+
+    /// Where a sample is: the step's place, the modes, what forces have moved.
+    fn place(&self, slow: &Slow, at: usize) -> Vector {
+        let m = slow.modes;
+        let axis = |k: usize| {
+            let row = 3 * at + k;
+            self.moved[row] + self.modes.moved(&slow.at_samples[row * m..(row + 1) * m])
+        };
+        slow.points[at] + Vector::new(axis(0), axis(1), axis(2))
+    }
+
+    /// Lets samples follow the forces so far, `delay_s x' + x = W f` by backward Euler. Gives the part of a change of the forces that
+    /// moves them within that time.
+    pub fn follow(&mut self, slow: &Slow, seconds: f32) -> f32 {
+        let whole = seconds + slow.delay_s;
+        let part = if whole > 0.0 { seconds / whole } else { 1.0 };
+        for (moved, aim) in self.moved.iter_mut().zip(&self.aim) {
+            *moved += part * (aim - *moved);
+        }
+        part
+    }
+
+    /// Forces with the tool at `now`, which was at `from` when the samples were where they are; a change of them moves samples by
+    /// `part` of what it will.
+    pub fn solve(
+        &mut self,
+        slow: &Slow,
+        body: &Body,
+        friction: f32,
+        [from, now]: [&Pose; 2],
+        part: f32,
+    ) {
+        let skin = SKIN_MM + body.motion(from, now);
+        let (low, high) = body.bounds(now, skin.max(FADE_MM));
+        self.rows.clear();
+        self.nearest = f32::MAX;
+        for at in 0..slow.count {
+            let pushed = self.forces[at] != Vector::ZERO;
+            let point = self.place(slow, at);
+            let outside = point.cmplt(low).any() || point.cmpgt(high).any();
+            let held = slow.anchors[at].is_some();
+            let distance = match outside && !pushed && !held {
+                true => f32::MAX,
+                false => body.nearest_at(now, point).distance,
+            };
+            self.nearest = self.nearest.min(distance);
+            if pushed || held {
+                self.rows.push((f32::MIN, at));
+            } else if distance <= skin {
+                self.rows.push((distance, at));
+            }
+        }
+        if self.rows.len() > MOST_ROWS {
+            self.rows
+                .sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            for row in MOST_ROWS..self.rows.len() {
+                let (_, at) = self.rows[row];
+                let force = std::mem::take(&mut self.forces[at]);
+                self.change(slow, at, -force, part);
+            }
+            self.rows.truncate(MOST_ROWS);
+            self.rows.sort_unstable_by_key(|row| row.1);
+        }
+        let (n, all) = (self.rows.len(), 3 * slow.count);
+        self.contacts.clear();
+        self.solved.clear();
+        self.w.clear();
+        for &(_, at) in &self.rows {
+            let force = self.forces[at];
+            let error = slow.errors[at];
+            let pair = Pair {
+                body,
+                friction,
+                from,
+                now,
+                anchor: slow.anchors[at],
+                put: false,
+            };
+            let (point, start) = (self.place(slow, at), self.points[at]);
+            let mut contact = pair.contact(point, start, slow.outward[at], force);
+            match contact.law {
+                Law::Bound => contact.slip -= error,
+                Law::Touch { .. } if contact.gap < f32::MAX => contact.gap -= error.x,
+                Law::Touch { .. } => {}
+            }
+            self.contacts.push(contact);
+            self.solved.push(force);
+            for axis in 0..3 {
+                let row = &slow.delassus[(3 * at + axis) * all..][..all];
+                for &(_, other) in &self.rows {
+                    let block = &row[3 * other..3 * other + 3];
+                    self.w.extend(block.iter().map(|w| part * w));
+                }
+            }
+        }
+        debug_assert_eq!(self.w.len(), 9 * n * n);
+        self.sweeps
+            .solve(&self.w, &self.contacts, &mut self.solved, LIMITS);
+        for row in 0..self.rows.len() {
+            let ((_, at), force) = (self.rows[row], self.solved[row]);
+            let change = force - self.forces[at];
+            self.forces[at] = force;
+            self.change(slow, at, change, part);
+        }
+        for at in 0..slow.count {
+            self.points[at] = self.place(slow, at);
+        }
+        let m = slow.modes;
+        self.modes.push.fill(0.0);
+        for at in 0..slow.count {
+            let change = self.forces[at] - slow.forces[at];
+            if change == Vector::ZERO {
+                continue;
+            }
+            for (axis, change) in change.to_array().into_iter().enumerate() {
+                let row = 3 * at + axis;
+                let own = &slow.at_samples[row * m..(row + 1) * m];
+                self.modes.add_push(own, change);
+            }
+        }
+    }
+
+    /// Force and torque on a tool about its position, mN and mN mm.
+    pub fn wrench(&self, count: usize, about: Vector) -> [Vector; 2] {
+        let (mut force, mut torque) = (Vector::ZERO, Vector::ZERO);
+        for at in self.pushing(count) {
+            force -= self.forces[at];
+            torque -= (self.points[at] - about).cross(self.forces[at]);
+        }
+        [force, torque]
+    }
+
+    pub fn stiffness(&mut self, slow: &Slow, about: Vector) -> [f32; 36] {
+        self.stiffness.directions.clear();
+        for (&(_, at), contact) in self.rows.iter().zip(&self.contacts) {
+            let force = self.forces[at];
+            if force == Vector::ZERO {
+                continue;
+            }
+            let along = force.dot(contact.normal);
+            let across = (force - contact.normal * along).length();
+            let sticks = match contact.law {
+                Law::Bound => true,
+                Law::Touch { friction } => across < 0.999 * friction * along,
+            };
+            let frame = ::contact::friction::frame(contact.normal);
+            let axes = [frame.x_axis, frame.y_axis, frame.z_axis];
+            for along in &axes[..if sticks { 3 } else { 1 }] {
+                self.stiffness.add(Direction {
+                    sample: at,
+                    along: *along,
+                    arm: self.points[at] - about,
+                });
+            }
+        }
+        let all = 3 * slow.count;
+        self.stiffness.of(|i, j| slow.delassus[i * all + j])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A force that begins moves a sample over a delay to where it holds it, and the spring and damper between take energy, never give.
+    #[test]
+    fn a_sample_follows_a_force_with_a_delay() {
+        let mut solver = Solver::new(Modes::new(&[], 0.0).unwrap()).unwrap();
+        let mut slow = Slow::new(0).unwrap();
+        slow.count = 1;
+        slow.delay_s = 4e-3;
+        for axis in 0..3 {
+            slow.delassus[4 * axis] = 0.02;
+        }
+        solver.begin(&slow);
+        let mut force = Vector::new(50.0, 0.0, 0.0);
+        let part = solver.follow(&slow, 1e-3);
+        solver.change(&slow, 0, force, part);
+        let mut places = vec![solver.moved[0]];
+        let mut work = force.x * places[0];
+        for tick in 1..200 {
+            let part = solver.follow(&slow, 1e-3);
+            let wanted = if tick < 100 { 50.0 } else { 0.0 };
+            solver.change(&slow, 0, Vector::new(wanted, 0.0, 0.0) - force, part);
+            force.x = wanted;
+            work += force.x * (solver.moved[0] - places[tick - 1]);
+            places.push(solver.moved[0]);
+        }
+        // One part in five of what is left in each millisecond, to 50 mN on 0.02 mm/mN.
+        assert!((places[0] - 0.2).abs() < 1e-5, "{}", places[0]);
+        assert!((places[1] - 0.36).abs() < 1e-5, "{}", places[1]);
+        assert!((places[99] - 1.0).abs() < 1e-4, "{}", places[99]);
+        assert!(places[199].abs() < 1e-4, "{}", places[199]);
+        assert!(work > 0.0, "{work} µJ");
+        // Without a delay it is there at once.
+        slow.delay_s = 0.0;
+        assert_eq!(solver.follow(&slow, 1e-3), 1.0);
+        assert_eq!(solver.follow(&slow, 0.0), 1.0);
+    }
+}
