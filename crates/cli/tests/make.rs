@@ -63,16 +63,11 @@ fn command(surface: &Path, out: &Path, more: &[&str]) -> Command {
         .arg(surface)
         .arg("--out")
         .arg(out)
-        .args([
-            "--nodes",
-            "350",
-            "--cases",
-            "1",
-            "--patches",
-            "24",
-            "--natural",
-            "24",
-        ])
+        .args(["--nodes", "350", "--patches", "24", "--natural", "24"])
+        .args(match more.contains(&"--cases") {
+            true => &[][..],
+            false => &["--cases", "1"],
+        })
         .args(more)
         // A bundle without a graph needs no ONNX Runtime.
         .env("ORT_DYLIB_PATH", "/nowhere/libonnxruntime.so");
@@ -200,8 +195,8 @@ fn an_organ_of_another_law_is_corrected_by_that_law() {
     let folder = tempfile::tempdir().unwrap();
     let (surface, out) = (folder.path().join("organ.obj"), folder.path().join("organ"));
     plain(&surface);
-    let law = ["--law", "mooney-rivlin:1"];
-    let output = command(&surface, &out, &[HELD, law].concat())
+    let asked = ["--law", "mooney-rivlin:1", "--tools", "press,lift"];
+    let output = command(&surface, &out, &[&HELD[..], &asked].concat())
         .output()
         .unwrap();
     assert!(output.status.success(), "{}", text(&output));
@@ -219,9 +214,45 @@ fn an_organ_of_another_law_is_corrected_by_that_law() {
     let share = certificate["contact"]["share_of_linear"].as_f64().unwrap();
     assert!(share < 0.05, "{certificate:#}");
 
+    // So are the tools that it was asked to be good for.
+    let tools = certificate["tools"].as_array().unwrap();
+    assert_eq!(tools.len(), 2);
+    for (row, name) in tools.iter().zip(["press", "lift"]) {
+        assert_eq!(row["programme"], name);
+        assert_eq!(row["cases"], 2);
+        assert!(row["mse_mm2"].as_f64().unwrap() < 0.1, "{row}");
+        assert_eq!(row["inverted_steps"], 0, "{row}");
+    }
+    // An error that no number of corrections reaches ends the command, with the bundle in place.
+    let wanted = [&HELD[..], &asked, &["--target-error", "1e-9"]].concat();
+    let output = command(&surface, &out, &wanted).output().unwrap();
+    let said = text(&output);
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(
+        said.contains("13@0.01 corrections") && said.contains("above --target-error"),
+        "{said}"
+    );
+    works(&out);
+
     let output = command(&surface, &out, &["--law", "ogden"]).output();
     let said = text(&output.unwrap());
     assert!(said.contains("law `ogden` is unknown"), "{said}");
+}
+
+/// A tool that goes too deep somewhere ends its simulation, not the command.
+#[test]
+fn pushes_that_invert_the_solvers_elements_are_told_and_what_came_before_counts() {
+    let folder = tempfile::tempdir().unwrap();
+    let (surface, out) = (folder.path().join("organ.obj"), folder.path().join("organ"));
+    plain(&surface);
+    let deep = ["--push", "26", "--minutes", "0.7", "--cases", "2"];
+    let output = command(&surface, &out, &[&HELD[..], &deep].concat())
+        .output()
+        .unwrap();
+    let said = text(&output);
+    assert!(output.status.success(), "{said}");
+    assert!(said.contains("of them ended early at a load"), "{said}");
+    works(&out);
 }
 
 #[test]
@@ -331,6 +362,11 @@ fn input_that_cannot_become_a_bundle_is_named_with_what_to_do() {
     has(
         refused(&good, &["--fixed", "plane:0,0,-1,-20", "--poisson", "0.5"]),
         &["poisson"],
+    );
+
+    has(
+        refused(&good, &[HELD[0], HELD[1], "--tools", "press,saw"]),
+        &["--tools: ", "`saw` is unknown", "stroke"],
     );
 
     let open = file("open.obj");

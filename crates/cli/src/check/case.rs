@@ -44,14 +44,14 @@ pub struct Frame<'a> {
 }
 
 impl Case {
-    /// Simulates the first frames. Programmes are written for a brain: lengths are multiplied by the bundle's deepest push over theirs.
+    /// Simulates the first frames, or those before a load that the mesh cannot carry; then it says which. Programmes are written for a brain: lengths are multiplied by the bundle's deepest push over theirs.
     pub fn simulate(
         &self,
         model: &Model,
         body: &Body<'_>,
         frames: usize,
         each: &mut dyn FnMut(&Frame<'_>) -> Result<()>,
-    ) -> Result<()> {
+    ) -> Result<Option<String>> {
         let scale = f64::from(model.manifest.envelope.max_push_mm) / PROGRAMME_PUSH_MM;
         let mut enlarged = body.mesh.clone();
         for x in enlarged.positions.iter_mut().flatten() {
@@ -73,7 +73,11 @@ impl Case {
             for entry in &mut contact {
                 entry.displacement = entry.displacement.map(|x| (f64::from(x) * scale) as f32);
             }
-            let report = solver.step_frame(&contact, FRAME_S)?;
+            let report = match solver.step_frame(&contact, FRAME_S) {
+                Ok(report) => report,
+                Err(error) if error.is_load() => return Ok(Some(error.to_string())),
+                Err(error) => return Err(error.into()),
+            };
             solver.displacement(&mut truth);
             let nodes = contact.iter().map(|entry| entry.node).collect();
             let vectors = contact.iter().flat_map(|entry| entry.displacement);
@@ -83,7 +87,7 @@ impl Case {
                 reaction: &report.reaction,
             })?;
         }
-        Ok(())
+        Ok(None)
     }
 }
 
@@ -158,7 +162,9 @@ impl<'a> Replay<'a> {
         Ok(())
     }
 
-    pub fn finish(self) -> Score {
+    /// `ended`: why before its end, if it did.
+    pub fn finish(mut self, ended: Option<String>) -> Score {
+        self.score.ended = ended;
         self.score
     }
 }

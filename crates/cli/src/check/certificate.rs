@@ -25,7 +25,7 @@ pub struct Certificate {
 }
 
 /// Four significant digits: what another machine finds too.
-fn short(x: f64) -> Value {
+pub fn short(x: f64) -> Value {
     format!("{x:.3e}")
         .parse::<f64>()
         .map_or(Value::Null, |x| json!(x))
@@ -95,7 +95,7 @@ impl Certificate {
             "tested": {
                 "seed": seed, "cases": scores.len(), "against": tissue::simulate::SOLVER_NAME,
                 "programmes": scores.iter().map(|score| json!({
-                    "scheme": score.scheme, "seed": score.seed, "refused_steps": score.refused,
+                    "scheme": score.scheme, "seed": score.seed, "refused_steps": score.refused, "ended": score.ended,
                     "contact": part(&score.contact), "free": part(&score.free),
                 })).collect::<Vec<Value>>(),
                 "corrections": stated.corrections.as_ref().map_or(0, |entry| entry.recommended),
@@ -152,6 +152,11 @@ impl Certificate {
             .collect()
     }
 
+    /// What rigid tools came to, a row a programme.
+    pub fn add_tools(&mut self, rows: Value) {
+        self.value["tools"] = rows;
+    }
+
     /// The first case, for the page.
     pub fn film(&self) -> &Value {
         &self.film
@@ -167,6 +172,13 @@ impl Certificate {
         self.value["contact"]["mse_mm2"]
             .as_f64()
             .unwrap_or(f64::NAN)
+    }
+
+    /// The largest of that and of the errors of the programmes of tools, mm².
+    pub fn worst_mse(&self) -> f64 {
+        let rows = self.value["tools"].as_array().into_iter().flatten();
+        rows.filter_map(|row| row["mse_mm2"].as_f64())
+            .fold(self.mse_in_contact(), f64::max)
     }
 
     /// What the estimated error should be multiplied by once more; none where nothing was corrected.
@@ -243,8 +255,38 @@ impl Certificate {
                 part["max_mm"]
             )
         };
+        let tools: String = v["tools"]
+            .as_array()
+            .into_iter()
+            .flatten()
+            .map(|row| {
+                format!(
+                    "\ntool {:9} {:>11} mm²  worst of {} {:>11}  force error {}, {} of {} steps inverted",
+                    row["programme"].as_str().unwrap_or_default(),
+                    row["mse_mm2"].to_string(),
+                    row["cases"],
+                    row["worst_mse_mm2"].to_string(),
+                    row["force_error"],
+                    row["inverted_steps"],
+                    row["steps"]
+                )
+            })
+            .collect();
+        let ended: String = v["tested"]["programmes"]
+            .as_array()
+            .into_iter()
+            .flatten()
+            .filter_map(|case| {
+                let why = case["ended"].as_str()?;
+                Some(format!(
+                    "\nscheme {}, seed {}: ended early, {why}",
+                    case["scheme"].as_str()?,
+                    case["seed"]
+                ))
+            })
+            .collect();
         format!(
-            "{}\n{}\n{}\nworst region over the mean {}, force error {}, {} ms a step (median, 1 thread), p99 {}{}",
+            "{}\n{}\n{}{tools}{ended}\nworst region over the mean {}, force error {}, {} ms a step (median, 1 thread), p99 {}{}",
             self.words(),
             row("in contact", &v["contact"]),
             row("after release", &v["free"]),

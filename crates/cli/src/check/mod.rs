@@ -10,6 +10,7 @@ mod page;
 mod parallel;
 mod recording;
 mod score;
+mod tools;
 
 pub use certificate::Certificate;
 pub use recording::Recording;
@@ -24,6 +25,7 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 use serde_json::Value;
 use tissue::mesh::{Boundary, Mesh};
+use tissue::programmes::ToolProgramme;
 use tissue::schemes::{FRAMES, Scheme};
 use upt::{Corrections, Model, ModelOptions};
 
@@ -49,7 +51,8 @@ const SAME: f64 = 0.1;
 #[derive(Args)]
 #[command(after_help = "Examples:
   upt check liver
-  upt check liver --cases 4 --json")]
+  upt check liver --cases 4 --json
+  upt check liver --tools press,stroke")]
 pub struct Options {
     /// Bundle folder with a certificate, as `upt make` leaves it.
     bundle: PathBuf,
@@ -59,6 +62,9 @@ pub struct Options {
     /// Another seed: other sites than the certificate's.
     #[arg(long)]
     seed: Option<u64>,
+    /// Programmes of rigid tools, such as press,stroke or all; left out: those of the certificate.
+    #[arg(long)]
+    tools: Option<String>,
     /// Rewrite certificate.json and certificate.html.
     #[arg(long)]
     write: bool,
@@ -77,6 +83,8 @@ pub struct Plan {
     pub cases: Option<usize>,
     pub seconds: f64,
     pub seed: u64,
+    /// Programmes of rigid tools beside the contacts.
+    pub tools: Vec<ToolProgramme>,
     pub threads: usize,
     pub quiet: bool,
 }
@@ -100,7 +108,15 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     let cases = options
         .cases
         .or(stated("cases").map(|count| count as usize));
+    let tools = match (&options.tools, &before) {
+        (Some(list), _) => ToolProgramme::parse_list(list).map_err(anyhow::Error::msg)?,
+        (None, Some(text)) => (text["tools"].as_array().into_iter().flatten())
+            .filter_map(|row| row["programme"].as_str()?.parse().ok())
+            .collect(),
+        (None, None) => Vec::new(),
+    };
     let plan = Plan {
+        tools,
         bundle: options.bundle.clone(),
         cases: Some(cases.unwrap_or(4)),
         seconds: f64::INFINITY,
@@ -164,14 +180,18 @@ pub fn measure(plan: &Plan) -> Result<Certificate> {
         if at == 0 {
             replay = replay.filmed();
         }
-        case.simulate(&bundle.model, &body, FRAMES, &mut |frame| {
+        let ended = case.simulate(&bundle.model, &body, FRAMES, &mut |frame| {
             bar.inc(1);
             replay.step(frame)
         })?;
-        Ok(replay.finish())
+        Ok(replay.finish(ended))
     })?;
     bar.finish_and_clear();
-    bundle.certificate(plan.seed, scores)
+    let mut certificate = bundle.certificate(plan.seed, scores)?;
+    if !plan.tools.is_empty() {
+        certificate.add_tools(tools::measure(plan, &bundle)?);
+    }
+    Ok(certificate)
 }
 
 /// The case at a place of a plan.

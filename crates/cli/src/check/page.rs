@@ -48,6 +48,15 @@ pub fn write(
             number(&certificate["speed"]["ms_p99"])
         ),
     );
+    for row in certificate["tools"].as_array().into_iter().flatten() {
+        add(
+            &format!(
+                "tool {}, mm²",
+                row["programme"].as_str().unwrap_or_default()
+            ),
+            number(&row["mse_mm2"]),
+        );
+    }
     add("held-out cases", certificate["tested"]["cases"].to_string());
     add(
         "deepest push, mm",

@@ -72,7 +72,7 @@ impl Recording {
                     reaction: &kept.reaction,
                 })?;
             }
-            Ok(replay.finish())
+            Ok(replay.finish(None))
         })?;
         bundle.certificate(self.seed, scores)
     }

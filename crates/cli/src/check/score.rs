@@ -104,6 +104,8 @@ pub struct Score {
     pub force: [f64; 2],
     /// Estimated and true root mean square error of each corrected step, mm.
     pub estimates: Vec<[f64; 2]>,
+    /// Why the reference solver did not make all of it.
+    pub ended: Option<String>,
     /// Steps that the guard refused.
     pub refused: usize,
     /// Squared error of each node, summed over the steps in contact, mm².
@@ -126,6 +128,7 @@ impl Score {
             regions: vec![Part::default(); regions],
             force: [0.0; 2],
             estimates: Vec::new(),
+            ended: None,
             refused: 0,
             nodes: vec![0.0; nodes],
             corrections: 0,

@@ -8,6 +8,7 @@ use elements::{Law, Material};
 use serde_json::{Value, json};
 use tissue::mesh::{Mesh, face_area};
 use tissue::mesh_import::Region;
+use tissue::programmes::ToolProgramme;
 
 use crate::effort::Effort;
 
@@ -63,6 +64,10 @@ pub struct Options {
     /// Held-out cases of the check; left out: as many as there is time for, at most 8.
     #[arg(long)]
     pub cases: Option<usize>,
+    /// Programmes of rigid tools that it must be good for, such as press,stroke or all: two cases of each are part of the certificate and of
+    /// --target-error. Their sizes are those of `upt simulate --tool`, whatever the size of the body.
+    #[arg(long)]
+    pub tools: Option<String>,
     /// brain, liver, kidney, heart or fat: Young's modulus, density and damping; or left out for brain.
     #[arg(long, default_value = "brain")]
     pub material: String,
@@ -84,7 +89,7 @@ pub struct Options {
     /// Deepest push that it is made for, mm; left out: 15 for a body of a brain's size, less for a smaller one.
     #[arg(long)]
     pub push: Option<f64>,
-    /// Fail where the mean squared error in contact is above this, mm².
+    /// Fail where the mean squared error in contact, or that of a programme of --tools, is above this, mm².
     #[arg(long, value_name = "MM2")]
     pub target_error: Option<f64>,
     /// Corrections a step that the bundle recommends: COUNT, or COUNT@MM for at most COUNT, fewer where the estimated error is below MM.
@@ -174,6 +179,7 @@ impl Options {
                 bail!("{name} must be positive");
             }
         }
+        self.programmes()?;
         self.scale()?;
         self.material()?.validate()?;
         Ok(())
@@ -210,6 +216,14 @@ impl Options {
             damping_per_s: self.damping.unwrap_or(damping),
             law: self.law,
         })
+    }
+
+    /// The programmes of `--tools`.
+    pub fn programmes(&self) -> Result<Vec<ToolProgramme>> {
+        let list = self.tools.as_deref().map(ToolProgramme::parse_list);
+        list.transpose()
+            .map(Option::unwrap_or_default)
+            .map_err(|error| anyhow::anyhow!("--tools: {error}"))
     }
 
     /// Where stages are kept.
@@ -256,7 +270,7 @@ impl Options {
             "unit": self.unit, "stiffness": self.stiffness.iter().map(|(region, factor)| format!("{region}={factor}")).collect::<Vec<String>>(),
             "fixed": list(&self.fixed), "domain": list(&self.domain), "nodes": self.nodes,
             "material": self.material, "corrections": self.corrections.map(|effort| effort.to_string()), "natural": self.natural, "patches": self.patches,
-            "tolerance_mm": self.tolerance_mm, "minutes": self.minutes,
+            "tolerance_mm": self.tolerance_mm, "minutes": self.minutes, "tools": self.tools,
         })
     }
 }

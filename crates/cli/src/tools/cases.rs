@@ -41,6 +41,15 @@ pub struct ToolCase {
 impl ToolCase {
     fn read(path: &Path) -> Result<Self> {
         let trajectory = Trajectory::read(path)?;
+        let programme = trajectory.header.scheme.trim_start_matches("tool-");
+        let file = path.file_name().unwrap_or_default().to_string_lossy();
+        let stem = file.trim_end_matches(".trajectory.safetensors");
+        let name = format!("{programme}, {stem}");
+        Self::of(trajectory, &name, path)
+    }
+
+    /// A case by its name; messages speak of `path`.
+    pub fn of(trajectory: Trajectory, name: &str, path: &Path) -> Result<Self> {
         let Some(tracks) = trajectory.tools.as_ref().filter(|t| !t.tools.is_empty()) else {
             bail!(
                 "{}: has no tools (scheme {}); write one with `upt simulate --tool NAME` or `upt dataset --tools NAMES`",
@@ -53,10 +62,8 @@ impl ToolCase {
                 .with_context(|| format!("{}: field `tools`, tool {index}", path.display()))
         });
         let programme = trajectory.header.scheme.trim_start_matches("tool-");
-        let file = path.file_name().unwrap_or_default().to_string_lossy();
-        let stem = file.trim_end_matches(".trajectory.safetensors");
         Ok(Self {
-            name: format!("{programme}, {stem}"),
+            name: name.to_owned(),
             programme: programme.to_owned(),
             tools: tracks.tools.clone(),
             bodies: bodies.collect::<Result<_>>()?,
@@ -194,22 +201,27 @@ impl ToolCases {
                 );
             }
         }
-        let list: Vec<ToolCase> = files
-            .iter()
-            .map(|path| ToolCase::read(path))
-            .collect::<Result<_>>()?;
+        let list = files.iter().map(|path| ToolCase::read(path));
+        Self::of(list.collect::<Result<_>>()?)
+    }
+
+    /// Cases of one mesh under one boundary condition.
+    ///
+    /// # Errors
+    /// Names the case of another mesh.
+    pub fn of(list: Vec<ToolCase>) -> Result<Self> {
         let first = &list
             .first()
             .context("no cases: name a dataset with tools, or a trajectory")?
             .trajectory
             .header;
         let (mesh_sha256, boundary) = (first.mesh_sha256.clone(), first.boundary.clone());
-        for (case, path) in list.iter().zip(&files) {
+        for case in &list {
             let header = &case.trajectory.header;
             if header.mesh_sha256 != mesh_sha256 || header.boundary != boundary {
                 bail!(
                     "{}: mesh {} with boundary `{}` differs from the first case's; write one report for each",
-                    path.display(),
+                    case.name,
                     header.mesh_name,
                     header.boundary
                 );

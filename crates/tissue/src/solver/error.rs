@@ -61,3 +61,10 @@ pub enum SolverError {
         step_ms: f64,
     },
 }
+
+impl SolverError {
+    /// Whether the load is more than the mesh can carry, so that the frames before it are sound.
+    pub fn is_load(&self) -> bool {
+        matches!(self, Self::Inverted { .. } | Self::Diverged { .. })
+    }
+}

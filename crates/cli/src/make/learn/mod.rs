@@ -124,6 +124,12 @@ fn teach(
         observed.releases.len(),
         started.elapsed().as_secs_f64()
     ));
+    if observed.ended > 0 {
+        stage.decided(&format!(
+            "{} of them ended early at a load that inverts the mesh's elements; what came before counts",
+            observed.ended
+        ));
+    }
 
     let (learned, candidate) = (folder.join(LEARNED), folder.join(CANDIDATE));
     bundle::copy(&learned, &candidate)?;
