@@ -145,6 +145,7 @@ fn a_small_organ_end_to_end_and_checked_again() {
     assert_eq!(corrections["recommended"], 10);
     let target = 0.02 * manifest["envelope"]["max_push_mm"].as_f64().unwrap() / 15.0;
     let stated = corrections["target_mm"].as_f64().unwrap();
+    assert_eq!(corrections["substeps"], 2);
     assert!((stated - target).abs() < 0.06 * target, "{corrections}");
     assert!(corrections["calibration"].as_f64().unwrap() != 1.0);
     assert_eq!(certificate["tested"]["corrections_target_mm"], stated);
@@ -229,7 +230,7 @@ fn an_organ_of_another_law_is_corrected_by_that_law() {
     let said = text(&output);
     assert_eq!(output.status.code(), Some(2), "{said}");
     assert!(
-        said.contains("13@0.01 corrections") && said.contains("above --target-error"),
+        said.contains("13@0.01/2 corrections") && said.contains("above --target-error"),
         "{said}"
     );
     works(&out);

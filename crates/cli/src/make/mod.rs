@@ -290,8 +290,9 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
+/// The name of a stage is that of its files.
 fn name_of_check(corrections: Effort) -> String {
-    format!("check-{corrections}")
+    format!("check-{corrections}").replace('/', "-")
 }
 
 /// Held-out contacts of the bundle with so many corrections a step, in a copy of its own.
