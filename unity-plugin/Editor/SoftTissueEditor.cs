@@ -34,6 +34,9 @@ namespace Upt.Editor
             upt_scene_stats stats = tissue.LastStats;
             EditorGUILayout.LabelField("Step", stats.step_ms.ToString("0.000") + " ms, " + tissue.ContactCount +
                                                    " contacts" + (stats.sleeping != 0 ? ", asleep" : ""));
+            if (stats.corrections > 0)
+                EditorGUILayout.LabelField("Corrections", stats.corrections + ", estimated error " +
+                                                              stats.error_mm.ToString("0.000") + " mm");
             foreach (Instrument instrument in tissue.instruments)
             {
                 InstrumentReading reading;

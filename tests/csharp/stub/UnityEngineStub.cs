@@ -232,6 +232,8 @@ namespace UnityEngine
     }
 
     public sealed class TooltipAttribute : Attribute { public TooltipAttribute(string text) { } }
+    public sealed class RangeAttribute : Attribute { public RangeAttribute(float min, float max) { } }
+    public sealed class MinAttribute : Attribute { public MinAttribute(float min) { } }
     public sealed class RequireComponent : Attribute { public RequireComponent(Type type) { } }
     public sealed class CreateAssetMenuAttribute : Attribute { public string fileName, menuName; }
 }

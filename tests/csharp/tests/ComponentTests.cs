@@ -386,6 +386,45 @@ namespace Upt.Tests
         }
 
         [Test]
+        public void CorrectionsOfTheInspectorReachTheSteps()
+        {
+            PushedBrain sample = Sample();
+            SoftTissue tissue = sample.Tissue;
+            if (!tissue.Presents) Assert.Ignore("the test bundle has no corrections");
+            foreach (int most in new[] { 1, 3, -1 })
+            {
+                tissue.gameObject.SetActive(false);
+                tissue.corrections = most;
+                tissue.gameObject.SetActive(true);
+                Assert.That(Debug.Errors, Is.Empty);
+                Assert.That(tissue.Presents, Is.EqualTo(most > 0));
+                uint made = 0;
+                Play(sample.gameObject, tissue, 60, frame => made = Math.Max(made, tissue.LastStats.corrections));
+                Assert.That(made, Is.EqualTo((uint)Math.Max(most, 0)));
+            }
+            // A target far above any error: the least that a target leaves.
+            tissue.gameObject.SetActive(false);
+            tissue.corrections = 20;
+            tissue.correctionsTarget = 100f;
+            tissue.gameObject.SetActive(true);
+            uint few = 0;
+            Play(sample.gameObject, tissue, 60, frame => few = Math.Max(few, tissue.LastStats.corrections));
+            Assert.That(few, Is.GreaterThan(0).And.LessThan(20));
+        }
+
+        [Test]
+        public void CorrectionsThatCannotBeStopTheTissueWithAMessage()
+        {
+            SoftTissue tissue = Tissue();
+            tissue.corrections = 0;
+            tissue.correctionsTarget = 0.1f;
+            tissue.gameObject.SetActive(true);
+            Assert.That(tissue.IsRunning, Is.False);
+            Assert.That(Debug.Errors, Has.Count.EqualTo(1));
+            Assert.That(Debug.Errors[0], Is.StringContaining("corrections_target_mm"));
+        }
+
+        [Test]
         public void FramesMakeNoGarbage()
         {
             PushedBrain sample = Sample();

@@ -28,6 +28,15 @@ namespace Upt
         [Tooltip("Instruments that push this tissue.")]
         public List<Instrument> instruments = new List<Instrument>();
 
+        [Range(-1, 64)]
+        [Tooltip("Corrections by the elements that a step in contact gets at most: 1 to 64; 0: what the bundle recommends, with its own " +
+                 "target; -1: none, the fastest and least accurate. Read when the tissue starts.")]
+        public int corrections;
+
+        [Min(0f)]
+        [Tooltip("With corrections from 1: fewer where the estimated error is below this, mm; 0: always so many.")]
+        public float correctionsTarget;
+
         [Tooltip("Recompute normals each frame.")]
         public bool recalculateNormals = true;
 
@@ -210,7 +219,11 @@ namespace Upt
             shownBefore = filter.sharedMesh;
             surface = new SurfaceMesh(native, renderMesh != null ? renderMesh : shownBefore, unitsPerMillimetre);
             // Render vertices between nodes are interpolated: decoding them costs a step more and is no more accurate.
-            scene = new Scene(native, new upt_scene_options { interpolate_points = 1 });
+            scene = new Scene(native, new upt_scene_options {
+                interpolate_points = 1,
+                corrections = corrections,
+                corrections_target_mm = correctionsTarget,
+            });
             solvesContact = Solves(scene);
             uint[] touchable = native.Indices(Native.UPT_SET_SURFACE_NODES);
             // What instruments touch; the attached points' nodes are decoded beside it, the rest of the volume is not.
