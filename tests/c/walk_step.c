@@ -26,9 +26,13 @@ void walk_scene_create(const char *reduced_bundle) {
   options.guard_policy = -1;
   EXPECT(upt_scene_create(model, &options, &scene), UPT_ERR_ARGUMENT);
   options.guard_policy = UPT_GUARD_HOLD;
-  options.reserved[1] = 1;
+  options.reserved[0] = 1;
   EXPECT(upt_scene_create(model, &options, &scene), UPT_ERR_ARGUMENT);
-  options.reserved[1] = 0;
+  options.reserved[0] = 0;
+  /* Substeps need corrections with a target, and are at most 8. */
+  options.substeps = 4;
+  EXPECT(upt_scene_create(model, &options, &scene), UPT_ERR_ARGUMENT);
+  options.substeps = 0;
   options.mesh_path = "no/such.mesh.safetensors";
   EXPECT_TRUE(upt_scene_create(model, &options, &scene) < 0);
   /* A reduced bundle's tables belong to its own mesh. */
