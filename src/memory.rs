@@ -3,7 +3,8 @@
 
 use crate::error::{Error, Result};
 
-fn none(bytes: usize, what: &str) -> Error {
+/// The error of what there is no memory for.
+pub fn none(bytes: usize, what: &str) -> Error {
     Error::OutOfMemory(format!("no memory for {what}: {bytes} bytes"))
 }
 

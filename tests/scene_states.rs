@@ -5,8 +5,9 @@ mod fixture;
 use std::time::Duration;
 
 use fixture::{BUNDLES, bits, largest_difference, model, plain, push, rollout, scene, sparse};
+use sha2::{Digest, Sha256};
 use upt::scene::{QUIET_DISPLACEMENT, QUIET_STEPS};
-use upt::{Contact, Error, Progress, SceneOptions, StepInput};
+use upt::{Contact, Corrections, Error, Progress, SceneOptions, StepInput};
 
 /// Longer than any machine takes for a step.
 const FOREVER: Duration = Duration::from_secs(86_400);
@@ -147,6 +148,56 @@ fn a_bad_snapshot_is_refused_and_changes_nothing() {
     scene.read(&mut after).unwrap();
     assert_eq!(bits(&state), bits(&after));
     scene.restore(&snapshot).unwrap();
+}
+
+/// A snapshot with another body, and the checksum of that.
+fn sealed(body: &[u8]) -> Vec<u8> {
+    [body, &Sha256::digest(body)].concat()
+}
+
+#[test]
+fn a_snapshot_that_ends_early_is_refused_wherever_it_ends() {
+    for name in BUNDLES {
+        let scene = scene(&model(name), &plain());
+        rollout(&scene, 5);
+        let saved = scene.save().unwrap();
+        let body = &saved[..saved.len() - 32];
+        // Behind magic and version.
+        for length in (12..body.len()).step_by(1 + body.len() / 400) {
+            let error = scene.restore(&sealed(&body[..length])).unwrap_err();
+            assert_eq!(error.status(), -33, "{name}, {length} bytes: {error}");
+        }
+        let longer = [body, &[0]].concat();
+        let error = scene.restore(&sealed(&longer)).unwrap_err();
+        assert!(error.to_string().contains("too many"), "{error}");
+        assert_eq!(saved, scene.save().unwrap(), "{name}: nothing has changed");
+    }
+}
+
+#[test]
+fn a_snapshot_of_another_build_or_of_other_corrections_says_so() {
+    let model = model("tiny-corrected");
+    let with = |corrections| {
+        let options = SceneOptions {
+            corrections,
+            ..plain()
+        };
+        let scene = scene(&model, &options);
+        rollout(&scene, 5);
+        scene
+    };
+    let [corrected, plain] = [Corrections::Fixed(3), Corrections::None].map(with);
+    let saved = corrected.save().unwrap();
+    let mut older = saved[..saved.len() - 32].to_vec();
+    older[8] -= 1;
+    let error = corrected.restore(&sealed(&older)).unwrap_err();
+    assert!(matches!(error, Error::Version(_)), "{error}");
+    for (scene, of) in [(&plain, &corrected), (&corrected, &plain)] {
+        let own = scene.save().unwrap();
+        let error = scene.restore(&of.save().unwrap()).unwrap_err();
+        assert!(error.to_string().contains("`corrections`"), "{error}");
+        assert_eq!(own, scene.save().unwrap(), "nothing has changed");
+    }
 }
 
 #[test]

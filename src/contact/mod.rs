@@ -16,6 +16,7 @@ mod loads;
 pub mod past;
 pub mod problem;
 pub mod rows;
+mod stored;
 pub mod tool;
 
 pub use compliance::Compliance;

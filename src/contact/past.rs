@@ -1,21 +1,26 @@
 //! What contact remembers from step to step: where the tools were, with which force each sample was pushed, what is grasped.
 
+use ::contact::grasp::Anchor;
 use ::contact::{Grasp, Pose, Vector};
 
+use serde::{Deserialize, Serialize};
+
+use super::stored;
 use super::tool::{MAX_TOOLS, Reading};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::memory;
 
 const WHAT: &str = "the forces of instruments";
 
 /// The force on one sample, mN.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Force {
     /// Place in the list of tools.
     pub tool: u32,
     /// Row of the samples.
     pub sample: u32,
     /// On the tissue.
+    #[serde(with = "stored::vector")]
     pub force: Vector,
 }
 
@@ -27,20 +32,23 @@ impl Force {
 }
 
 /// A tool's own part.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Held {
     /// Where it was at the end of the step.
+    #[serde(with = "stored::pose")]
     pub pose: Pose,
     /// What it holds.
+    #[serde(with = "stored::grasp")]
     pub grasp: Grasp,
     /// It was asked to hold.
     pub closed: bool,
-    /// What it was told.
+    /// What it was told: of the step alone.
+    #[serde(skip)]
     pub reading: Reading,
 }
 
 /// The state of contact at the end of a step.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Past {
     /// One a tool, in the host's order.
     pub tools: Vec<Held>,
@@ -58,6 +66,47 @@ impl Past {
             tools: memory::room(MAX_TOOLS, WHAT)?,
             forces: memory::room(samples, WHAT)?,
         })
+    }
+
+    /// Checks what was read: `samples` of the surface there are.
+    ///
+    /// # Errors
+    /// [`Error::Snapshot`].
+    pub fn check(&self, samples: u32) -> Result<()> {
+        let bad = |what: &str| Err(Error::Snapshot(format!("holds {what} that no scene has")));
+        let Past { tools, forces } = self;
+        if tools.len() > MAX_TOOLS {
+            return bad("a number of instruments");
+        }
+        for Held {
+            pose,
+            grasp,
+            closed: _,
+            reading: _,
+        } in tools
+        {
+            if !pose.translation.is_finite() {
+                return bad("a position");
+            }
+            // Not a number is no length either.
+            if !matches!((pose.rotation.length() - 1.0).abs(), 0.0..=1e-2) {
+                return bad("a rotation");
+            }
+            let anchors = grasp.anchors();
+            let ascends = anchors.is_sorted_by(|a, b| a.sample < b.sample);
+            let known = |anchor: &Anchor| anchor.sample < samples && anchor.place.is_finite();
+            if !ascends || !anchors.iter().all(known) {
+                return bad("a grasp");
+            }
+        }
+        let ascends = forces.is_sorted_by(|a, b| a.key() < b.key());
+        let known = |one: &Force| {
+            (one.tool as usize) < tools.len() && one.sample < samples && one.force.is_finite()
+        };
+        if !ascends || !forces.iter().all(known) {
+            return bad("a force");
+        }
+        Ok(())
     }
 
     /// Takes another one's values; the room stays.

@@ -7,6 +7,7 @@
 #[cfg(feature = "contact")]
 mod recursion;
 
+use super::history::Pair;
 use super::precondition::Env;
 use crate::error::Result;
 use crate::kernels::vectors::{PartialSums, add_scaled, dots};
@@ -89,10 +90,18 @@ impl Memory {
         SLOTS * (8 * self.steps[0].len() + 4 * width)
     }
 
-    /// The pairs, oldest first: what a snapshot holds.
-    pub fn pairs(&self) -> impl Iterator<Item = (&[f32], &[f32])> {
+    /// A copy of the published pairs, oldest first.
+    pub fn pairs(&self) -> Result<Vec<Pair>> {
+        let copied = |values: &[f32]| memory::copied(values, "a copy of L-BFGS pairs");
         let slots = self.published.iter();
-        slots.map(|&slot| (self.steps[slot].as_slice(), self.changes[slot].as_slice()))
+        slots
+            .map(|&slot| {
+                Ok(Pair {
+                    step: copied(&self.steps[slot])?,
+                    change: copied(&self.changes[slot])?,
+                })
+            })
+            .collect()
     }
 
     /// Leaves the nodes out of every product until the next call.

@@ -10,6 +10,7 @@
 mod body;
 mod estimate;
 mod free;
+mod history;
 mod input;
 mod integrate;
 #[cfg(feature = "contact")]
@@ -35,6 +36,7 @@ use crate::prior::PriorTable;
 use pace::Diagonal;
 
 pub use body::Body;
+pub use history::History;
 pub use input::{Enough, Input, Lent, Report};
 pub use memory::PAIRS;
 pub use motion::Motion;

@@ -1,16 +1,21 @@
 //! What corrections know of the past: velocities of two states, and the contact forces of the last.
 
+use serde::{Deserialize, Serialize};
+
 use crate::error::Result;
-use crate::memory;
+use crate::{memory, stored};
 
 /// What BDF2 knows of the past, `[K,3]` each.
-#[derive(Debug, PartialEq)]
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
 pub struct Motion {
     /// Velocity at the last state, mm/s.
+    #[serde(with = "stored")]
     pub velocity: Vec<f32>,
     /// Velocity at the state before.
+    #[serde(with = "stored")]
     pub velocity_before: Vec<f32>,
     /// `M (a + alpha v)` at the last state, µN.
+    #[serde(with = "stored")]
     pub inertia: Vec<f32>,
     /// Smallest det F of the last corrected state.
     pub min_det: f32,
@@ -19,6 +24,7 @@ pub struct Motion {
     pub truncated_mm: f32,
     pub error_mm: f32,
     /// `r` at the contact nodes of the last corrected state `[m,3]`, in their order, zero at held ones, µN.
+    #[serde(with = "stored")]
     pub reaction: Vec<f32>,
 }
 
@@ -33,6 +39,24 @@ impl Motion {
             error_mm: 0.0,
             reaction: memory::room(len, "contact forces")?,
         })
+    }
+
+    /// Checks what was read: fields of `len` numbers, forces at `contacts` nodes.
+    pub(super) fn check(&self, len: usize, contacts: usize) -> Result<()> {
+        let Motion {
+            velocity,
+            velocity_before,
+            inertia,
+            min_det,
+            truncated_mm,
+            error_mm,
+            reaction,
+        } = self;
+        for field in [velocity, velocity_before, inertia] {
+            stored::check(field, len)?;
+        }
+        stored::check(&[*min_det, *truncated_mm, *error_mm], 3)?;
+        stored::check(reaction, 3 * contacts)
     }
 
     /// A copy.

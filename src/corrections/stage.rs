@@ -3,6 +3,7 @@
 use std::time::Instant;
 
 use super::free::Free;
+use super::history::{History, Pair};
 use super::input::{Input, Lent, Report};
 use super::memory::{Memory, PAIRS};
 use super::motion::Motion;
@@ -119,25 +120,32 @@ impl Stage {
         self.memory.clear();
     }
 
-    /// The L-BFGS pairs, oldest first, for a snapshot.
-    pub fn pairs(&self) -> impl Iterator<Item = (&[f32], &[f32])> {
-        self.memory.pairs()
+    /// A copy of what is remembered, with the forces at `contacts` nodes.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`].
+    pub fn history(&self, contacts: usize) -> Result<History> {
+        let mut motion = self.motion.copy()?;
+        // The guard may have dropped the contact that they belonged to.
+        let missing = (3 * contacts).saturating_sub(motion.reaction.len());
+        memory::reserve(&mut motion.reaction, missing, "contact forces")?;
+        motion.reaction.resize(3 * contacts, 0.0);
+        Ok(History {
+            motion,
+            pairs: self.memory.pairs()?,
+        })
     }
 
-    /// Takes a saved past.
+    /// Takes what was remembered.
     ///
     /// # Errors
     /// A panic on another thread of the pool.
-    pub fn restore(
-        &mut self,
-        lent: Lent<'_>,
-        motion: &Motion,
-        pairs: &[[Vec<f32>; 2]],
-    ) -> Result<()> {
+    pub fn restore(&mut self, lent: Lent<'_>, history: &History) -> Result<()> {
+        let History { motion, pairs } = history;
         self.motion.take(motion);
         self.memory.clear();
         self.memory.commit();
-        for [step, change] in pairs {
+        for Pair { step, change } in pairs {
             self.memory.store(lent.env(), step, 1.0, change)?;
         }
         self.memory.commit();
@@ -185,7 +193,7 @@ impl Stage {
             });
         let failed = failed.into_inner();
         if let Some(error) = failed.unwrap_or_else(std::sync::PoisonError::into_inner) {
-            return Err(Error::Panic(error.to_string()));
+            return Err(error.into());
         }
         let kappa = lent.pace.integrator.kappa() as f32;
         let fields = [self.drift.as_slice(), u, last, d];

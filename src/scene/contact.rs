@@ -1,8 +1,10 @@
 //! The collision field of a step, as a sparse set in ascending node order, checked.
 
+use serde::{Deserialize, Serialize};
+
 use super::Contact;
 use crate::error::{Error, Result};
-use crate::memory;
+use crate::{memory, stored};
 
 /// Displacements beyond this are refused as input, mm.
 pub const INPUT_LIMIT: f32 = 1e6;
@@ -10,13 +12,16 @@ pub const INPUT_LIMIT: f32 = 1e6;
 const CONTACTS: &str = "a step's contacts";
 
 /// Nodes in contact and what is imposed there.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, Serialize, Deserialize)]
 pub struct ContactSet {
     /// Ascending.
+    #[serde(with = "stored")]
     pub nodes: Vec<u32>,
     /// `[m,3]`, mm.
+    #[serde(with = "stored")]
     pub vectors: Vec<f32>,
-    /// Place of each entry in the host's list.
+    /// Place of each entry in the host's list; ascending in a restored state.
+    #[serde(skip)]
     pub order: Vec<u32>,
 }
 
@@ -50,6 +55,21 @@ impl ContactSet {
         self.nodes.clear();
         self.vectors.clear();
         self.order.clear();
+    }
+
+    /// Checks what was read for a mesh of `node_count` nodes.
+    pub fn admit(&mut self, node_count: usize) -> Result<()> {
+        let mut set = ContactSet::default();
+        let contact = Contact::Sparse {
+            nodes: &self.nodes,
+            vectors: &self.vectors,
+        };
+        match set.gather(contact, node_count) {
+            Ok(()) => *self = set,
+            Err(error @ Error::OutOfMemory(_)) => return Err(error),
+            Err(error) => return Err(Error::Snapshot(error.to_string())),
+        }
+        Ok(())
     }
 
     /// A copy.

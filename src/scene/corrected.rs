@@ -9,7 +9,7 @@ use super::published::Published;
 use super::timing::Stopwatch;
 #[cfg(feature = "contact")]
 use crate::corrections::Substeps;
-use crate::corrections::{Enough, Input, LIMIT, Lent, MOST_SUBSTEPS, Motion, Pace, Report, Stage};
+use crate::corrections::{Enough, History, Input, LIMIT, Lent, MOST_SUBSTEPS, Pace, Report, Stage};
 use crate::error::{Error, Result};
 use crate::kernels::{Isa, Pool};
 use crate::model::Model;
@@ -349,13 +349,10 @@ impl Core {
         )
     }
 
-    /// Takes the past of a snapshot.
-    pub(super) fn restore_past(
-        &mut self,
-        past: Option<(Motion, Vec<[Vec<f32>; 2]>)>,
-    ) -> Result<()> {
-        let (Some(corrected), Some((motion, pairs)), Some(prior)) =
-            (&mut self.corrected, past, &self.model.prior)
+    /// Takes what corrections remembered in another state.
+    pub(super) fn put_history(&mut self, history: Option<History>) -> Result<()> {
+        let (Some(corrected), Some(history), Some(prior)) =
+            (&mut self.corrected, history, &self.model.prior)
         else {
             return Ok(());
         };
@@ -366,7 +363,7 @@ impl Core {
             corrections: self.model.corrections()?,
             pace: &corrected.pace,
         };
-        corrected.stage.restore(lent, &motion, &pairs)
+        corrected.stage.restore(lent, &history)
     }
 
     /// Whether every node is decoded in each step, and kept.

@@ -1,7 +1,9 @@
 //! What a scene knows of its last two steps in single numbers.
 
+use serde::{Deserialize, Serialize};
+
 /// Where a published state came from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Source {
     /// Rest: zero everywhere.
     Rest,
@@ -11,8 +13,8 @@ pub enum Source {
     Fallback,
 }
 
-/// Reset writes [`Counters::REST`], a snapshot saves all of it, a failed restore puts it back.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// The numbers of a scene's state ([`super::state::State`]).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Counters {
     /// Steps since rest.
     pub step_count: u64,

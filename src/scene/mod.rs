@@ -27,6 +27,7 @@ mod reduced;
 mod region;
 mod shared;
 mod snapshot;
+mod state;
 mod timing;
 mod tools;
 #[cfg(not(feature = "contact"))]
@@ -263,14 +264,14 @@ impl Scene {
                 Some(points) => AttachedPoints::new(&core.mesh, points)?,
                 None => AttachedPoints::default(),
             };
-            if core.corrected.is_none()
-                && let KindModel::Upt(kind) = &core.model.kind
-                && !core.options.interpolate_points
-                && points.len() > 0
-            {
-                let threads = core.machine.pool.threads();
-                let queries = kind.queries(points.places(), core.model.runtime()?, threads)?;
-                points.set_queries(queries)?;
+            let interpolated = core.corrected.is_some() || core.options.interpolate_points;
+            match &core.model.kind {
+                KindModel::Upt(kind) if !interpolated && points.len() > 0 => {
+                    let threads = core.machine.pool.threads();
+                    let queries = kind.queries(points.places(), core.model.runtime()?, threads)?;
+                    points.set_queries(queries)?;
+                }
+                KindModel::Upt(_) | KindModel::Reduced(_) => {}
             }
             let region = core.region_copy(published)?;
             core.set_plan(published, region, Arc::new(points))

@@ -4,6 +4,8 @@
 
 use std::sync::Arc;
 
+use serde::{Deserialize, Serialize};
+
 use super::contact::ContactSet;
 use super::engine::Inputs;
 use super::linear::Linear;
@@ -14,29 +16,35 @@ use crate::kernels::Compute;
 use crate::kernels::project::{project_field, row_dots};
 use crate::kernels::respond::accumulate_rows;
 use crate::kernels::rows::Stored;
-use crate::memory;
 use crate::model::{LearnedMap, Model, ReducedModel};
 use crate::onnx::Stage;
 use crate::options::{Precision, Provider};
 use crate::prior::{PriorTable, SolveReport};
 use crate::stats::{SceneStats, flag};
+use crate::{memory, stored};
 
 const STATE: &str = "a scene's reduced states";
 
 /// The reduced state after one step.
-#[derive(Debug)]
+#[derive(Debug, Serialize, Deserialize)]
 pub struct ReducedRecord {
     /// Residual state `[r]`, mm.
+    #[serde(with = "stored")]
     pub b: Vec<f32>,
-    /// Linear response in its leading modes `[r_z]`.
+    /// Linear response in its leading modes `[r_z]`; this and the next three follow from the rest ([`ReducedEngine::rebuild`]).
+    #[serde(skip)]
     pub z: Vec<f32>,
     /// Linear response in the residual modes `[r]`, mm.
+    #[serde(skip)]
     pub p: Vec<f32>,
     /// Linear response in block coordinates `[Q]`.
+    #[serde(skip)]
     pub q_prior: Vec<f32>,
     /// The whole field in block coordinates `[Q]`.
+    #[serde(skip)]
     pub q: Vec<f32>,
     /// State of the free vibration, mm; empty beside a learned map.
+    #[serde(with = "stored")]
     pub vibration: Vec<f32>,
     /// `|L|` over all nodes, mm.
     pub prior_norm: f32,
@@ -77,7 +85,31 @@ impl ReducedRecord {
         })
     }
 
-    fn memory_bytes(&self) -> usize {
+    /// Checks what was read against a record of the scene, and makes room for what follows from it.
+    pub fn admit(&mut self, own: &ReducedRecord) -> Result<()> {
+        let ReducedRecord {
+            b,
+            z,
+            p,
+            q_prior,
+            q,
+            vibration,
+            prior_norm: _,
+            bound: _,
+            contact: _,
+        } = own;
+        stored::check(&self.b, b.len())?;
+        stored::check(&self.vibration, vibration.len())?;
+        stored::check(&[self.prior_norm, self.bound], 2)?;
+        self.z = memory::copied(z, STATE)?;
+        self.p = memory::copied(p, STATE)?;
+        self.q_prior = memory::copied(q_prior, STATE)?;
+        self.q = memory::copied(q, STATE)?;
+        Ok(())
+    }
+
+    /// Bytes held.
+    pub fn memory_bytes(&self) -> usize {
         let lists = [
             &self.b,
             &self.z,

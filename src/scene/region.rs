@@ -3,7 +3,7 @@
 use std::sync::{Arc, RwLock};
 
 use super::core::{Core, lock_read, lock_write};
-use super::counters::{Counters, Source};
+use super::counters::Source;
 use super::engine::{Decode, Which};
 use super::plan::NodePlan;
 use super::points::AttachedPoints;
@@ -23,42 +23,6 @@ impl Core {
         region
             .map(|region| memory::copied(region, WHAT))
             .transpose()
-    }
-
-    /// Back to rest.
-    pub(super) fn reset(&mut self, published: &RwLock<Published>) {
-        self.engine.reset();
-        if let Some(corrected) = &mut self.corrected {
-            corrected.stage.reset();
-        }
-        #[cfg(feature = "contact")]
-        if let Some(problem) = &mut self.problem {
-            problem.reset();
-        }
-        self.contact.clear();
-        self.contact_before.clear();
-        self.counters = Counters::REST;
-        self.told = 0;
-        let stats = self.blank_stats();
-        let mut guard = lock_write(published);
-        let shared = &mut *guard;
-        for frame in [&mut shared.last, &mut shared.before]
-            .into_iter()
-            .chain(shared.earlier.as_mut())
-        {
-            frame.field.fill(0.0);
-            frame.points.fill(0.0);
-        }
-        shared.stats = stats;
-        shared.contact_nodes.clear();
-        shared.contact_vectors.clear();
-        #[cfg(feature = "contact")]
-        shared.tools.clear();
-        #[cfg(feature = "contact")]
-        self.leave_moment(shared);
-        drop(guard);
-        #[cfg(feature = "haptics")]
-        self.tell_hands(published);
     }
 
     /// Decodes any nodes of the last state into `out [n,3]`.
@@ -104,7 +68,7 @@ impl Core {
     ) -> Result<()> {
         let (source, contact) = match which {
             Which::Last => (self.counters.source, &self.contact),
-            _ => (self.counters.source_before, &self.contact_before),
+            Which::Next | Which::Before => (self.counters.source_before, &self.contact_before),
         };
         let shared = lock_read(published);
         let frame = if which == Which::Last {

@@ -1,0 +1,50 @@
+//! What corrections remember from step to step.
+
+use serde::{Deserialize, Serialize};
+
+use super::memory::PAIRS;
+use super::motion::Motion;
+use crate::error::{Error, Result};
+use crate::stored;
+
+/// An L-BFGS pair, `[K,3]` each.
+#[derive(Debug, Serialize, Deserialize)]
+pub struct Pair {
+    /// Change of the displacement, mm.
+    #[serde(with = "stored")]
+    pub step: Vec<f32>,
+    /// Change of the residual, µN.
+    #[serde(with = "stored")]
+    pub change: Vec<f32>,
+}
+
+/// All that a [`super::Stage`] knows of the past.
+#[derive(Debug, Serialize, Deserialize)]
+pub struct History {
+    /// Velocities and contact forces.
+    pub motion: Motion,
+    /// L-BFGS pairs, oldest first.
+    pub pairs: Vec<Pair>,
+}
+
+impl History {
+    /// Checks what was read: fields of `len` numbers, forces at `contacts` nodes.
+    ///
+    /// # Errors
+    /// [`Error::Snapshot`].
+    pub fn check(&self, len: usize, contacts: usize) -> Result<()> {
+        let History { motion, pairs } = self;
+        motion.check(len, contacts)?;
+        if pairs.len() > PAIRS {
+            return Err(Error::Snapshot(format!(
+                "holds {} pairs of corrections, more than any scene",
+                pairs.len()
+            )));
+        }
+        for Pair { step, change } in pairs {
+            stored::check(step, len)?;
+            stored::check(change, len)?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,139 @@
+//! Snapshots: the state of a scene as bytes, from which it resumes to the bit.
+//!
+//! A magic and a version, little-endian; then in postcard's format the scene's origin and its [`State`]; at the end the SHA-256 of all
+//! before it (`docs/decisions/013-state.md`).
+
+use std::sync::RwLock;
+
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use super::core::Core;
+use super::published::Published;
+use super::state::State;
+use crate::error::{Error, Result};
+use crate::kernels::FlushToZero;
+use crate::stored;
+
+const MAGIC: &[u8; 8] = b"UPTSNAP\0";
+const VERSION: u32 = 7;
+/// Magic and version.
+const HEAD: usize = MAGIC.len() + 4;
+const DIGEST: usize = 32;
+
+/// Which scenes may take a state. What follows it is read only where this fits.
+#[derive(Serialize, Deserialize)]
+struct Origin {
+    /// SHA-256 of the bundle's manifest.
+    model: [u8; 32],
+    /// SHA-256 of the mesh's name, which is a hash itself.
+    mesh: [u8; 32],
+    /// Length of a step, µs.
+    step_us: u32,
+    /// Whether it has instruments.
+    driven: bool,
+}
+
+impl Core {
+    fn origin(&self, driven: bool) -> Origin {
+        Origin {
+            model: self.model.hash,
+            mesh: Sha256::digest(self.mesh.sha256.as_bytes()).into(),
+            step_us: (1e6 * self.step_s()).round() as u32,
+            driven,
+        }
+    }
+
+    /// The state as bytes.
+    pub(super) fn save(&self, published: &RwLock<Published>) -> Result<Vec<u8>> {
+        let state = self.state(published)?;
+        let mut bytes = stored::write(&(self.origin(state.is_driven()), state), HEAD, DIGEST)?;
+        bytes[..MAGIC.len()].copy_from_slice(MAGIC);
+        bytes[MAGIC.len()..HEAD].copy_from_slice(&VERSION.to_le_bytes());
+        let end = bytes.len() - DIGEST;
+        let (body, digest) = bytes.split_at_mut(end);
+        digest.copy_from_slice(&Sha256::digest(body));
+        Ok(bytes)
+    }
+
+    /// Takes a saved state; on error nothing has changed.
+    pub(super) fn restore(&mut self, published: &RwLock<Published>, bytes: &[u8]) -> Result<()> {
+        let state = self.read(bytes)?;
+        // What is computed from it may still fail: the old state is kept until then.
+        let _flush = FlushToZero::enter();
+        let old = self.state(published)?;
+        let taken = self.put(published, state);
+        if let Err(error) = taken.and_then(|()| self.recompute(published)) {
+            // Fails only where a worker panics, which has been reported by then.
+            let _ = self.put(published, old);
+            return Err(error);
+        }
+        self.tell_state(published);
+        Ok(())
+    }
+
+    /// Reads a snapshot of this scene's.
+    fn read(&self, bytes: &[u8]) -> Result<State> {
+        // Asked first: a count that was never set is not followed to the end of the host's memory.
+        if bytes.len() > HEAD + self.most_bytes() + DIGEST {
+            return Err(Error::Snapshot(format!(
+                "has {} bytes, more than any of this scene",
+                bytes.len()
+            )));
+        }
+        let Some(rest) = bytes.strip_prefix(MAGIC) else {
+            return Err(Error::Snapshot("is not a snapshot of a scene".into()));
+        };
+        let Some((version, rest)) = rest.split_first_chunk() else {
+            return Err(Error::Snapshot("is cut short".into()));
+        };
+        let version = u32::from_le_bytes(*version);
+        if version != VERSION {
+            return Err(Error::Version(format!(
+                "snapshot: version {version}, this library reads version {VERSION}"
+            )));
+        }
+        let Some((rest, digest)) = rest.split_last_chunk::<DIGEST>() else {
+            return Err(Error::Snapshot("is cut short".into()));
+        };
+        if Sha256::digest(&bytes[..bytes.len() - DIGEST]).as_slice() != digest {
+            return Err(Error::Snapshot(
+                "is damaged: its checksum does not match".into(),
+            ));
+        }
+        let (saved, rest) = stored::read::<Origin>(rest)?;
+        self.check_origin(&saved)?;
+        let (mut state, rest) = stored::read::<State>(rest)?;
+        if !rest.is_empty() {
+            return Err(Error::Snapshot(format!(
+                "has {} bytes too many",
+                rest.len()
+            )));
+        }
+        self.admit(&mut state)?;
+        Ok(state)
+    }
+
+    fn check_origin(&self, saved: &Origin) -> Result<()> {
+        let own = self.origin(saved.driven);
+        if saved.model != own.model {
+            return Err(Error::Snapshot("is of another model".into()));
+        }
+        if saved.mesh != own.mesh {
+            return Err(Error::Snapshot("is of another mesh".into()));
+        }
+        if saved.step_us != own.step_us {
+            return Err(Error::Snapshot(format!(
+                "was saved by a scene with steps of {} µs; restore it in one with that `step_s`, here {} µs",
+                saved.step_us, own.step_us
+            )));
+        }
+        if saved.driven && cfg!(not(feature = "contact")) {
+            return Err(Error::Snapshot(
+                "was saved by a scene with instruments; this build has no feature \"contact\""
+                    .into(),
+            ));
+        }
+        Ok(())
+    }
+}

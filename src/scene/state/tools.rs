@@ -1,0 +1,40 @@
+//! The instruments' part of a state.
+
+use crate::contact::{MAX_TOOLS, Past, Problem};
+use crate::error::Result;
+use crate::scene::core::Core;
+
+pub type Tools = Past;
+
+impl Core {
+    /// A copy of what contact of instruments remembers.
+    pub(super) fn tools(&self) -> Option<Tools> {
+        let past = &self.problem.as_ref()?.past;
+        (!past.tools.is_empty()).then(|| past.clone())
+    }
+
+    pub(super) fn admit_tools(&self, tools: &mut Tools) -> Result<()> {
+        tools.check(self.model.samples()?.len() as u32)
+    }
+
+    pub(super) fn put_tools(&mut self, tools: Option<Tools>) -> Result<()> {
+        match (&mut self.problem, tools) {
+            (Some(problem), Some(past)) => problem.past.take(&past),
+            (Some(problem), None) => problem.past.clear(),
+            (none @ None, Some(past)) => {
+                let mut problem = Problem::new(self.model.samples()?)?;
+                problem.past.take(&past);
+                *none = Some(Box::new(problem));
+            }
+            (None, None) => {}
+        }
+        Ok(())
+    }
+
+    /// Bytes of them at most.
+    pub(super) fn tool_bytes(&self) -> usize {
+        // A sample may be pushed and held by each of the tools; more than all samples once is never seen.
+        let faces = self.mesh.domain_faces.len() / 3;
+        64 * MAX_TOOLS + 4096 + 16 * 64 * faces
+    }
+}
