@@ -92,16 +92,24 @@ impl Manifest {
             self.listed(&prior.file, "prior.file")?;
             if let Some(vibration) = &prior.vibration {
                 self.listed(vibration, "prior.vibration")?;
+                let swings = match self.kind {
+                    ManifestKind::Upt => true,
+                    ManifestKind::Reduced => self.reduced.is_none(),
+                };
                 check(
-                    self.kind == ManifestKind::Upt || self.reduced.is_none(),
+                    swings,
                     "prior.vibration",
                     "kind `reduced` has it only without a learned map (field `reduced`)",
                 )?;
             }
             if let Some(release) = &prior.release {
                 self.listed(release, "prior.release")?;
+                let swings = match self.kind {
+                    ManifestKind::Upt => false,
+                    ManifestKind::Reduced => prior.vibration.is_some(),
+                };
                 check(
-                    self.kind == ManifestKind::Reduced && prior.vibration.is_some(),
+                    swings,
                     "prior.release",
                     "goes on from the free vibration of kind `reduced` (field `prior.vibration`)",
                 )?;

@@ -158,7 +158,7 @@ impl Model {
         // Whatever is wrong with a bundle's graphs, a library that is missing is told of first.
         let runtime = match (manifest.kind, &manifest.reduced) {
             (ManifestKind::Reduced, None) => None,
-            _ => Some(load()?),
+            (ManifestKind::Reduced, Some(_)) | (ManifestKind::Upt, _) => Some(load()?),
         };
         let plan = ProviderPlan::new(options);
         let threads = match (options.threads, process.threads) {
@@ -283,16 +283,16 @@ impl Model {
             .collect();
         let native = "native";
         let latent = self.choice.provider.name();
-        let stages = match self.info().kind {
-            Kind::Upt => serde_json::json!({
+        let stages = match &self.kind {
+            KindModel::Upt(kind) => serde_json::json!({
                 "encode": native, "aggregate": native, "latent": latent,
                 "decode": "native, or onnxruntime where the scene asks for it",
-                "step_graph": matches!(&self.kind, KindModel::Upt(kind) if kind.has_step()),
+                "step_graph": kind.has_step(),
             }),
-            Kind::Reduced if self.runtime.is_none() => {
+            KindModel::Reduced(_) if self.runtime.is_none() => {
                 serde_json::json!({"prior": native, "decode": native})
             }
-            Kind::Reduced => {
+            KindModel::Reduced(_) => {
                 serde_json::json!({"prior": native, "latent": latent, "decode": native})
             }
         };

@@ -53,7 +53,10 @@ impl PriorTable {
                 &table,
                 manifest.material.damping_per_s,
                 manifest.dt_s,
-                manifest.kind == ManifestKind::Reduced,
+                match manifest.kind {
+                    ManifestKind::Upt => false,
+                    ManifestKind::Reduced => true,
+                },
             )?;
             if let Some(name) = &entry.release {
                 vibration.learn(&files.tensors(name)?, &table)?;
