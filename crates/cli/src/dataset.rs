@@ -1,6 +1,7 @@
 //! `upt dataset`: many cases in a folder, resumable and shardable (docs/guide/datasets.md).
 
 use crate::simulate::SolverArguments;
+use crate::tool_scale;
 use anyhow::{Context, bail};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -8,7 +9,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use tissue::dataset::{Dataset, DatasetPlan, Load};
 use tissue::mesh::{Boundary, Mesh};
-use tissue::programmes::ToolProgramme;
+use tissue::programmes::{ToolProgramme, ToolScale};
 use tissue::schemes::{FRAME_S, Scheme};
 use tissue::solver::SolverOptions;
 
@@ -29,6 +30,8 @@ pub struct Options {
     /// Programmes of rigid tools: `press`, `probe`, `stroke`, `retract`, `poke`, `lift`, `two`, `wobble`, `grasp`, `edge`; `all`.
     #[arg(long, value_parser = ToolProgramme::parse_list)]
     tools: Option<std::vec::Vec<ToolProgramme>>,
+    #[command(flatten)]
+    sizes: tool_scale::Arguments,
     /// Number of cases over all shards.
     #[arg(long)]
     count: usize,
@@ -107,6 +110,14 @@ pub fn run(options: &Options) -> anyhow::Result<ExitCode> {
         bail!("--jobs must be at least 1");
     }
     let mesh = Mesh::read(&options.mesh)?;
+    let tool_scale = match &options.tools {
+        Some(_) => {
+            let sizes = tool_scale::Chosen::of(options.sizes, &mesh, None);
+            eprintln!("{}", sizes.words());
+            sizes.scale
+        }
+        None => ToolScale::TABLE,
+    };
     let plan = DatasetPlan {
         boundary: options.boundary,
         loads: options.loads(),
@@ -114,6 +125,7 @@ pub fn run(options: &Options) -> anyhow::Result<ExitCode> {
         seed: options.seed,
         half: options.half,
         frames_per_step: options.frames_per_step()?,
+        tool_scale,
         training: options.training(),
         columns: options.columns.clone(),
         options: options.solver.options(1),

@@ -44,6 +44,7 @@ mod shown;
 mod simulate;
 mod soak;
 mod stress;
+mod tool_scale;
 mod tools;
 mod view;
 

@@ -1,5 +1,6 @@
 //! `upt simulate`: one case of a scheme on a mesh, as a trajectory file.
 
+use crate::tool_scale;
 use anyhow::Context;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -27,6 +28,8 @@ pub struct Options {
     #[cfg(feature = "files")]
     #[arg(long, requires = "tool")]
     tool_shape: Option<PathBuf>,
+    #[command(flatten)]
+    sizes: tool_scale::Arguments,
     /// Seed of the contact site.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -128,8 +131,11 @@ pub fn run(options: &Options) -> anyhow::Result<ExitCode> {
                 bar.set_position(frame as u64);
             };
             let own = options.own_shape()?;
+            let sizes = tool_scale::Chosen::of(options.sizes, &mesh, None);
+            bar.suspend(|| eprintln!("{}", sizes.words()));
             let order = ToolOrder {
                 own: own.as_ref(),
+                scale: sizes.scale,
                 ..ToolOrder::new(tool, seed)
             };
             let case = simulate_tools(&mesh, boundary, order, &settings, advance);

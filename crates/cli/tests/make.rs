@@ -224,6 +224,22 @@ fn an_organ_of_another_law_is_corrected_by_that_law() {
         assert!(row["mse_mm2"].as_f64().unwrap() < 0.1, "{row}");
         assert_eq!(row["inverted_steps"], 0, "{row}");
     }
+    // Their sizes are the table's: 80 mm wide. Half of them are asked for, and said.
+    assert_eq!(certificate["tool_sizes"]["factor"], 1.0, "{certificate:#}");
+    let asked_half = ["--tools", "press", "--tool-scale", "0.5", "--json"];
+    let half = Command::new(env!("CARGO_BIN_EXE_upt"))
+        .args(["check".as_ref(), out.as_os_str()])
+        .args(asked_half)
+        .output()
+        .unwrap();
+    let half: serde_json::Value = serde_json::from_slice(&half.stdout).unwrap();
+    assert_eq!(half["tool_sizes"]["factor"], 0.5);
+    assert_eq!(half["tool_sizes"]["deepest_share_of_thickness"], 0.3);
+    let (whole, half) = (&certificate["tools"][0], &half["tools"][0]);
+    assert!(
+        half["mse_mm2"].as_f64() < whole["mse_mm2"].as_f64(),
+        "{half}"
+    );
     // An error that no number of corrections reaches ends the command, with the bundle in place.
     let wanted = [&HELD[..], &asked, &["--target-error", "1e-9"]].concat();
     let output = command(&surface, &out, &wanted).output().unwrap();

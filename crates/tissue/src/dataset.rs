@@ -9,6 +9,7 @@
 pub use crate::load::Load;
 use crate::material::Material;
 use crate::mesh::{Boundary, Mesh};
+use crate::programmes::ToolScale;
 use crate::schemes::SplitMix;
 use crate::simulate::{SOLVER_NAME, ToolOrder, simulate, simulate_tools};
 use crate::solver::SolverOptions;
@@ -31,6 +32,8 @@ pub struct DatasetPlan {
     pub half: bool,
     /// Frames that each step of a tool's programme is recorded in; 1, or more for what hosts show between steps.
     pub frames_per_step: usize,
+    /// What the sizes of tools are multiplied by.
+    pub tool_scale: ToolScale,
     pub options: SolverOptions,
     /// Settings for the split `train` where they differ: longer inner steps with mass scaling.
     pub training: Option<SolverOptions>,
@@ -150,6 +153,9 @@ impl DatasetPlan {
         }
         if self.frames_per_step > 1 {
             key += &format!("; {} frames a step", self.frames_per_step);
+        }
+        if self.tool_scale != ToolScale::TABLE {
+            key += &format!("; tools of {}", self.tool_scale);
         }
         if let Some(training) = &self.training {
             key += &format!(
@@ -291,6 +297,7 @@ impl<'a> Dataset<'a> {
                 let progress = |frame, _| progress(frame);
                 let order = ToolOrder {
                     frames_per_step: self.plan.frames_per_step,
+                    scale: self.plan.tool_scale,
                     ..ToolOrder::new(tools, case.seed)
                 };
                 simulate_tools(mesh, boundary, order, options, progress)

@@ -2,7 +2,7 @@
 
 use crate::contact::{ContactDomain, ContactError};
 use crate::mesh::{Boundary, Mesh};
-use crate::programmes::{ProgrammeError, ToolCase, ToolProgramme};
+use crate::programmes::{ProgrammeError, ToolCase, ToolProgramme, ToolScale};
 use crate::schemes::{FRAME_S, FRAMES, Programme, Scheme};
 use crate::solver::{ContactNode, FrameReport, SampleForce, Solver, SolverError, SolverOptions};
 use crate::tool_tracks::ToolTracks;
@@ -76,17 +76,20 @@ pub struct ToolOrder<'a> {
     /// A shape of one's own in place of the table's.
     pub own: Option<&'a Shape>,
     pub seed: u64,
+    /// What the table's sizes are multiplied by.
+    pub scale: ToolScale,
     /// Frames that each step of the programme is recorded in.
     pub frames_per_step: usize,
 }
 
 impl ToolOrder<'_> {
-    /// A programme with the table's shape, a frame a step.
+    /// A programme with the table's shape and sizes, a frame a step.
     pub fn new(programme: ToolProgramme, seed: u64) -> Self {
         Self {
             programme,
             own: None,
             seed,
+            scale: ToolScale::TABLE,
             frames_per_step: 1,
         }
     }
@@ -107,10 +110,11 @@ pub fn simulate_tools(
         programme,
         own,
         seed,
+        scale,
         ..
     } = order;
     let parts = order.frames_per_step.max(1);
-    let case = ToolCase::new(programme, mesh, seed, own)?.split(parts);
+    let case = ToolCase::scaled(programme, mesh, seed, own, scale)?.split(parts);
     let frame_s = FRAME_S / parts as f64;
     let mut solver = Solver::new(mesh, boundary, options.clone())?;
     let samples = mesh.samples(boundary);

@@ -13,6 +13,7 @@ use super::page;
 use super::score::{Part, Score};
 use crate::machine::Machine;
 use crate::preview::Film;
+use crate::tool_scale::Chosen;
 
 /// A region with fewer steps than this says nothing.
 const ENOUGH_STEPS: usize = 20;
@@ -152,9 +153,10 @@ impl Certificate {
             .collect()
     }
 
-    /// What rigid tools came to, a row a programme.
-    pub fn add_tools(&mut self, rows: Value) {
+    /// What rigid tools came to, a row a programme, and how large they were.
+    pub fn add_tools(&mut self, rows: Value, sizes: &Chosen) {
         self.value["tools"] = rows;
+        self.value["tool_sizes"] = sizes.json();
     }
 
     /// The first case, for the page.
@@ -272,6 +274,7 @@ impl Certificate {
                 )
             })
             .collect();
+        let sizes = Chosen::stated(v).map_or(String::new(), |sizes| format!("\n{}", sizes.words()));
         let ended: String = v["tested"]["programmes"]
             .as_array()
             .into_iter()
@@ -286,7 +289,7 @@ impl Certificate {
             })
             .collect();
         format!(
-            "{}\n{}\n{}{tools}{ended}\nworst region over the mean {}, force error {}, {} ms a step (median, 1 thread), p99 {}{}",
+            "{}\n{}\n{}{sizes}{tools}{ended}\nworst region over the mean {}, force error {}, {} ms a step (median, 1 thread), p99 {}{}",
             self.words(),
             row("in contact", &v["contact"]),
             row("after release", &v["free"]),

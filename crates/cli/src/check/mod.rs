@@ -30,6 +30,7 @@ use tissue::schemes::{FRAMES, Scheme};
 use upt::{Corrections, Model, ModelOptions};
 
 use crate::progress;
+use crate::tool_scale::{self, Chosen};
 use case::{Body, Case, Replay};
 use parallel::{in_parallel, workers};
 use score::{Regions, Score};
@@ -65,6 +66,8 @@ pub struct Options {
     /// Programmes of rigid tools, such as press,stroke or all; left out: those of the certificate.
     #[arg(long)]
     tools: Option<String>,
+    #[command(flatten)]
+    sizes: tool_scale::Arguments,
     /// Rewrite certificate.json and certificate.html.
     #[arg(long)]
     write: bool,
@@ -76,6 +79,27 @@ pub struct Options {
     json: bool,
 }
 
+/// Where the sizes of tools come from.
+#[derive(Clone)]
+pub enum ToolSizes {
+    /// From the user, the body and the bundle's deepest push.
+    Asked(tool_scale::Arguments),
+    /// From a certificate that is repeated.
+    Stated(Chosen),
+}
+
+impl ToolSizes {
+    fn choose(&self, bundle: &Bundle) -> Chosen {
+        match self {
+            Self::Stated(chosen) => chosen.clone(),
+            Self::Asked(arguments) => {
+                let push = f64::from(bundle.model.manifest.envelope.max_push_mm);
+                Chosen::of(*arguments, &bundle.mesh, Some(push))
+            }
+        }
+    }
+}
+
 /// What to measure.
 pub struct Plan {
     pub bundle: PathBuf,
@@ -85,6 +109,8 @@ pub struct Plan {
     pub seed: u64,
     /// Programmes of rigid tools beside the contacts.
     pub tools: Vec<ToolProgramme>,
+    /// Their sizes.
+    pub sizes: ToolSizes,
     pub threads: usize,
     pub quiet: bool,
 }
@@ -115,7 +141,12 @@ pub fn run(options: &Options) -> Result<ExitCode> {
             .collect(),
         (None, None) => Vec::new(),
     };
+    // A programme that the certificate has not seen has no sizes there.
+    let sizes = (before.as_ref())
+        .filter(|_| options.sizes.tool_scale.is_none())
+        .and_then(Chosen::stated);
     let plan = Plan {
+        sizes: sizes.map_or(ToolSizes::Asked(options.sizes), ToolSizes::Stated),
         tools,
         bundle: options.bundle.clone(),
         cases: Some(cases.unwrap_or(4)),
@@ -189,7 +220,8 @@ pub fn measure(plan: &Plan) -> Result<Certificate> {
     bar.finish_and_clear();
     let mut certificate = bundle.certificate(plan.seed, scores)?;
     if !plan.tools.is_empty() {
-        certificate.add_tools(tools::measure(plan, &bundle)?);
+        let sizes = plan.sizes.choose(&bundle);
+        certificate.add_tools(tools::measure(plan, &bundle, sizes.scale)?, &sizes);
     }
     Ok(certificate)
 }

@@ -48,6 +48,9 @@ pub fn write(
             number(&certificate["speed"]["ms_p99"])
         ),
     );
+    if let Some(factor) = certificate["tool_sizes"]["factor"].as_f64() {
+        add("tools, of the table's sizes", factor.to_string());
+    }
     for row in certificate["tools"].as_array().into_iter().flatten() {
         add(
             &format!(

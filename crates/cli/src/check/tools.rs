@@ -4,6 +4,7 @@ use std::path::Path;
 
 use anyhow::{Context, Result};
 use serde_json::{Value, json};
+use tissue::programmes::ToolScale;
 use tissue::simulate::{ToolOrder, simulate_tools};
 use tissue::solver::SolverOptions;
 
@@ -18,8 +19,8 @@ use crate::tools::solved;
 /// Cases of a programme.
 const CASES: usize = 2;
 
-/// Simulates and replays the plan's programmes.
-pub fn measure(plan: &Plan, bundle: &Bundle) -> Result<Value> {
+/// Simulates and replays the plan's programmes, at a scale.
+pub fn measure(plan: &Plan, bundle: &Bundle, scale: ToolScale) -> Result<Value> {
     let count = CASES * plan.tools.len();
     let settings = SolverOptions {
         material: bundle.model.manifest.material,
@@ -29,7 +30,10 @@ pub fn measure(plan: &Plan, bundle: &Bundle) -> Result<Value> {
     let list = in_parallel(workers(plan.threads).min(count), &|at| at < count, &|at| {
         let programme = plan.tools[at / CASES];
         let seed = plan.seed.wrapping_mul(1000).wrapping_add(at as u64);
-        let order = ToolOrder::new(programme, seed);
+        let order = ToolOrder {
+            scale,
+            ..ToolOrder::new(programme, seed)
+        };
         let simulated = simulate_tools(&bundle.mesh, bundle.boundary, order, &settings, |_, _| ());
         bar.inc(1);
         let trajectory = simulated.with_context(|| format!("--tools {}", programme.name()))?;

@@ -308,8 +308,8 @@ fn certify(
     let key = key_of(&[
         key.as_bytes(),
         format!(
-            "{corrections} {} {:?} {:?}",
-            options.seed, options.cases, options.tools
+            "{corrections} {} {:?} {:?} {:?}",
+            options.seed, options.cases, options.tools, options.sizes.tool_scale
         )
         .as_bytes(),
     ]);
@@ -330,6 +330,7 @@ fn certify(
                 seconds: 0.7 * left,
                 seed: options.seed ^ 0xCE27,
                 tools: options.programmes()?,
+                sizes: check::ToolSizes::Asked(options.sizes),
                 threads: options.threads,
                 quiet: options.json,
             })?;

@@ -8,12 +8,12 @@ use elements::{Law, Material};
 use serde_json::{Value, json};
 use tissue::mesh::{Mesh, face_area};
 use tissue::mesh_import::Region;
-use tissue::programmes::ToolProgramme;
+use tissue::programmes::{BodySize, REFERENCE_WIDTH_MM, ToolProgramme};
 
 use crate::effort::Effort;
+use crate::tool_scale::{self, PUSH_MM};
 
-/// Pushes and areas that the checks' programmes have at scale 1, mm and mm² (`tissue::schemes`).
-const PUSH_MM: f64 = 15.0;
+/// Areas that the checks' programmes have at scale 1, mm² (`tissue::schemes`).
 const AREA_MM2: [f64; 2] = [60.0, 280.0];
 /// Corrections that are recommended for pushes of [`PUSH_MM`], as the bundles that ship.
 const CORRECTIONS: Effort = Effort {
@@ -23,8 +23,6 @@ const CORRECTIONS: Effort = Effort {
 };
 /// Until the estimated error is calibrated a bundle recommends so many, and coarse spaces are compared with so many.
 const DRAFT: u32 = 5;
-/// The body whose tools have scale 1 is so wide across its second longest axis, mm.
-const REFERENCE_WIDTH_MM: f64 = 70.0;
 
 #[derive(Args, Clone, Debug)]
 #[command(after_help = "Examples:
@@ -65,9 +63,11 @@ pub struct Options {
     #[arg(long)]
     pub cases: Option<usize>,
     /// Programmes of rigid tools that it must be good for, such as press,stroke or all: two cases of each are part of the certificate and of
-    /// --target-error. Their sizes are those of `upt simulate --tool`, whatever the size of the body.
+    /// --target-error.
     #[arg(long)]
     pub tools: Option<String>,
+    #[command(flatten)]
+    pub sizes: tool_scale::Arguments,
     /// brain, liver, kidney, heart or fat: Young's modulus, density and damping; or left out for brain.
     #[arg(long, default_value = "brain")]
     pub material: String,
@@ -270,7 +270,7 @@ impl Options {
             "unit": self.unit, "stiffness": self.stiffness.iter().map(|(region, factor)| format!("{region}={factor}")).collect::<Vec<String>>(),
             "fixed": list(&self.fixed), "domain": list(&self.domain), "nodes": self.nodes,
             "material": self.material, "corrections": self.corrections.map(|effort| effort.to_string()), "natural": self.natural, "patches": self.patches,
-            "tolerance_mm": self.tolerance_mm, "minutes": self.minutes, "tools": self.tools,
+            "tolerance_mm": self.tolerance_mm, "minutes": self.minutes, "tools": self.tools, "tool_scale": self.sizes.tool_scale,
         })
     }
 }
@@ -298,13 +298,7 @@ pub struct Sizes {
 impl Sizes {
     /// From the option, or from the body's width; a contact has room in the domain, and at least about three nodes.
     pub fn of(options: &Options, mesh: &Mesh) -> Result<Self> {
-        let mut extent = [0, 1, 2].map(|k| {
-            let values = mesh.positions.iter().map(|p| p[k]);
-            let low = values.clone().fold(f32::INFINITY, f32::min);
-            f64::from(values.fold(f32::NEG_INFINITY, f32::max) - low)
-        });
-        extent.sort_by(f64::total_cmp);
-        let by_width = (extent[1] / REFERENCE_WIDTH_MM).min(1.0);
+        let by_width = (BodySize::width(mesh) / REFERENCE_WIDTH_MM).min(1.0);
         let scale = options.push.map_or(by_width, |push| push / PUSH_MM);
         let domain: f64 = mesh
             .domain

@@ -2,6 +2,7 @@
 
 use super::approach::Surface;
 use super::legs::{Legs, draw};
+use super::scale::{Thickness, ToolScale};
 use super::site::{Site, Sites};
 use super::{Specification, Tip, ToolProgramme};
 use crate::mesh::Mesh;
@@ -57,7 +58,7 @@ struct Hand {
 
 impl ToolCase {
     /// Draws a case from `seed`: the same one on every machine. A shape of one's own takes the place of the row's: its
-    /// y axis is the shaft, and the end that touches the lowest.
+    /// y axis is the shaft, and the end that touches the lowest. Sizes are the table's.
     ///
     /// # Errors
     /// [`ProgrammeError`] where the mesh has no domain, or no site of [`TRIES`] passes the checks.
@@ -67,20 +68,38 @@ impl ToolCase {
         seed: u64,
         own: Option<&Shape>,
     ) -> Result<Self, ProgrammeError> {
+        Self::scaled(programme, mesh, seed, own, ToolScale::TABLE)
+    }
+
+    /// The same with the table's sizes at a scale; a shape of one's own stays as large as it is.
+    ///
+    /// # Errors
+    /// As of [`ToolCase::new`].
+    pub fn scaled(
+        programme: ToolProgramme,
+        mesh: &Mesh,
+        seed: u64,
+        own: Option<&Shape>,
+        scale: ToolScale,
+    ) -> Result<Self, ProgrammeError> {
         if mesh.domain.is_empty() {
             return Err(ProgrammeError::EmptyDomain);
         }
-        let specification = programme.specification();
+        let specification = &scale.of(programme.specification());
         if let Some(shape) = own {
             Body::new(shape)?;
         }
         let surface = Surface::new(mesh);
-        let sites = Sites::new(mesh);
+        let place = Place {
+            sites: Sites::new(mesh),
+            thickness: Thickness::new(mesh),
+            scale,
+        };
         // Programmes of one seed go to different sites.
         let mut random = SplitMix(seed);
         random.0 ^= SplitMix(programme.row as u64).next();
         for _ in 0..TRIES {
-            if let Some(hands) = hands(specification, own, &surface, &sites, &mut random)
+            if let Some(hands) = hands(specification, own, &surface, &place, &mut random)
                 && let Some(case) = Self::of(&hands, specification, &surface)
             {
                 return Ok(case);
@@ -145,24 +164,32 @@ impl ToolCase {
     }
 }
 
+/// Where tools go, and how deep they may.
+struct Place {
+    sites: Sites,
+    thickness: Thickness,
+    scale: ToolScale,
+}
+
 fn hands(
     specification: &Specification,
     own: Option<&Shape>,
     surface: &Surface,
-    sites: &Sites,
+    place: &Place,
     random: &mut SplitMix,
 ) -> Option<Vec<Hand>> {
     // All numbers are drawn before anything can fail, so that tries do not hang together.
     let radius = draw(specification.radius_mm, random) as f32;
     let unit = random.unit();
     let (turn, distance) = (random.unit(), random.unit());
-    let first = hand(specification, own, radius, random, |reach| {
+    let sites = &place.sites;
+    let first = hand(specification, own, radius, place, random, |reach| {
         sites.draw(unit, specification.border, reach)
     });
     let second = specification.second_mm.map(|range| {
         let from = sites.draw(unit, false, radius).map(|s| s.at);
         let away = (range[0] + (range[1] - range[0]) * distance) as f32;
-        hand(specification, own, radius, random, |reach| {
+        hand(specification, own, radius, place, random, |reach| {
             sites.beside(from?, away, turn, reach)
         })
     });
@@ -183,6 +210,7 @@ fn hand(
     specification: &Specification,
     own: Option<&Shape>,
     radius: f32,
+    place: &Place,
     random: &mut SplitMix,
     site: impl Fn(f32) -> Option<Site>,
 ) -> Option<Hand> {
@@ -191,8 +219,16 @@ fn hand(
     let tears = random.unit() < 0.5;
     let (lean, round, spin) = (random.unit(), random.unit(), random.unit());
     let wait = random.unit();
-    let legs = Legs::new(specification, random);
-    let site = site(radius.max(5.0))?;
+    // Draws nothing: the numbers that follow are the same wherever the site is.
+    let site = site(radius.max(5.0));
+    let deepest = site.map_or(0.0, |site| {
+        let Place {
+            thickness, scale, ..
+        } = place;
+        scale.deepest(thickness, site.at, -site.outward)
+    });
+    let legs = Legs::new(specification, deepest, random);
+    let site = site?;
     let blade = |[thick, edge]: [f32; 2]| Shape::Spatula {
         half_extents: [radius, SHAFT_MM, thick],
         radius: edge,

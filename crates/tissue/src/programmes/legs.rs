@@ -41,8 +41,9 @@ pub(super) fn draw_speed(range: Range, random: &mut SplitMix) -> f64 {
 }
 
 impl Legs {
-    pub fn new(specification: &Specification, random: &mut SplitMix) -> Self {
-        let depth = draw(specification.depth_mm, random);
+    /// Draws them; none goes in farther than `deepest`, mm.
+    pub fn new(specification: &Specification, deepest: f64, random: &mut SplitMix) -> Self {
+        let depth = draw(specification.depth_mm, random).min(deepest);
         let press = draw_speed(specification.press_mm_s, random);
         let slide = draw(specification.slide_mm, random);
         let slide_speed = draw_speed(specification.slide_mm_s, random);

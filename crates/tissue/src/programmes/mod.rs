@@ -8,9 +8,11 @@
 mod approach;
 mod case;
 mod legs;
+mod scale;
 mod site;
 
 pub use case::{ProgrammeError, ToolCase};
+pub use scale::{BodySize, DEEPEST_SHARE, REFERENCE_THICKNESS_MM, REFERENCE_WIDTH_MM, ToolScale};
 
 /// Lowest and highest value of a draw.
 pub type Range = [f64; 2];

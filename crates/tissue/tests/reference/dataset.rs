@@ -3,6 +3,7 @@
 use std::path::Path;
 use tissue::dataset::{Dataset, DatasetPlan, Load, Manifest};
 use tissue::mesh::{Boundary, Mesh, box_phantom};
+use tissue::programmes::ToolScale;
 use tissue::schemes::Scheme;
 use tissue::solver::SolverOptions;
 use tissue::trajectory::Trajectory;
@@ -21,6 +22,7 @@ fn plan(schemes: &[Scheme]) -> DatasetPlan {
         seed: 11,
         half: false,
         frames_per_step: 1,
+        tool_scale: ToolScale::TABLE,
         options: SolverOptions {
             // The phantom is stable well above the default.
             inner_step_s: 5e-4,

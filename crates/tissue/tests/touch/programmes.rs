@@ -3,7 +3,7 @@
 use contact::{Body, Samples, Shape, Vector};
 use tissue::dataset::{Dataset, DatasetPlan, Load};
 use tissue::mesh::{Boundary, Mesh, ellipsoid_phantom};
-use tissue::programmes::{TABLE, ToolCase, ToolProgramme};
+use tissue::programmes::{BodySize, DEEPEST_SHARE, TABLE, ToolCase, ToolProgramme, ToolScale};
 use tissue::simulate::{ToolOrder, simulate_tools};
 use tissue::solver::SolverOptions;
 use tissue::trajectory::Trajectory;
@@ -172,6 +172,7 @@ fn a_dataset_of_tools_has_a_test_split_and_says_what_it_holds() {
         seed: 11,
         half: false,
         frames_per_step: 1,
+        tool_scale: ToolScale::TABLE,
         options: options(),
     };
     let splits: Vec<String> = (0..10).map(|i| plan.case(i).split).collect();
@@ -229,6 +230,56 @@ fn a_tool_of_ones_own_takes_the_place_of_the_tables() {
     };
     let error = ToolCase::new("poke".parse().unwrap(), &mesh, 1, Some(&flat)).unwrap_err();
     assert!(error.to_string().contains("no volume"), "{error}");
+}
+
+/// How deep the case's tools go in the surface at rest, mm.
+fn deepest(mesh: &Mesh, case: &ToolCase) -> f32 {
+    let samples = Samples::new(&mesh.positions, mesh.surface.iter().copied(), &[], 1.7);
+    let position = |n: u32| Vector::from(mesh.positions[n as usize]);
+    let surface: Vec<Vector> = samples.rows().iter().map(|s| s.gather(position)).collect();
+    let body = Body::new(&case.tools[0].shape).unwrap();
+    let mut deepest = 0.0f32;
+    for frame in &case.frames {
+        let depths = (surface.iter()).map(|p| -body.nearest_at(&frame[0].pose, *p).distance);
+        deepest = depths.fold(deepest, f32::max);
+    }
+    deepest
+}
+
+#[test]
+fn a_thin_body_has_smaller_tools_that_do_not_go_through_it() {
+    let mesh = ellipsoid_phantom([60.0, 60.0, 8.0], 10).unwrap();
+    let size = BodySize::of(&mesh);
+    assert!(
+        size.thickness_mm < 16.0 && size.width_mm > 100.0,
+        "{size:?}"
+    );
+    let scale = ToolScale::of_body(size);
+    assert!(scale.factor < 0.4, "{scale}");
+    assert_eq!(scale.deepest_share, Some(DEEPEST_SHARE));
+    let deep = |case: &ToolCase| deepest(&mesh, case);
+    for name in ["press", "poke", "stroke"] {
+        let programme: ToolProgramme = name.parse().unwrap();
+        for seed in 1..5 {
+            let case = ToolCase::scaled(programme, &mesh, seed, None, scale).unwrap();
+            let most = 16.0 * DEEPEST_SHARE as f32 + 0.2;
+            assert!(
+                (0.1..most).contains(&deep(&case)),
+                "{name} {seed}: {}",
+                deep(&case)
+            );
+        }
+    }
+    // A body as large as a brain has the table's tools, to the bit.
+    let large = ellipsoid_phantom([70.0, 70.0, 50.0], 8).unwrap();
+    assert_eq!(ToolScale::of_body(BodySize::of(&large)), ToolScale::TABLE);
+    for programme in all() {
+        let table = ToolCase::new(programme, &large, 1, None);
+        assert_eq!(
+            ToolCase::scaled(programme, &large, 1, None, ToolScale::TABLE),
+            table
+        );
+    }
 }
 
 #[test]
