@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import base64
 import json
+import math
 import os
 import re
 import struct
@@ -307,6 +308,37 @@ def a_report_plays_its_first_case(browser: Browser, bundle: str) -> None:
         assert 0.55 * largest < deepest < 1.02 * largest, (deepest, largest)
 
 
+def a_report_of_tools_shows_them(browser: Browser, bundle: str) -> None:
+    """The first case plays in tools.html too, and its tool goes where the case says."""
+    mesh = str(BUNDLES / bundle / "mesh.safetensors")
+    material = json.loads((BUNDLES / bundle / "bundle.json").read_text(encoding="utf-8"))["material"]
+    with tempfile.TemporaryDirectory() as folder:
+        case = os.path.join(folder, "case.trajectory.safetensors")
+        simulate = [COMMAND, "simulate", "--mesh", mesh, "--tool", "two", "--seed", "5", "--out", case]
+        simulate += ["--young", str(material["young_pa"]), "--density", str(material["density_kg_m3"])]
+        subprocess.run(simulate, check=True, capture_output=True)
+        report = [COMMAND, "report", "--tools", case, "--bundle", str(BUNDLES / bundle), "--out", folder]
+        subprocess.run(report, check=True, capture_output=True)
+        browser.open(Path(folder, "tools.html").as_uri())
+        page = "document.querySelector('iframe').contentWindow"
+        frames = browser.wait(f"{page}.uptPreview && {page}.uptPreview.frames")
+        assert browser.run(f"return {page}.uptPreview.tools") == 2
+        time_shown = f"{page}.document.getElementById('time').textContent"
+        ways, deepest = [], 0.0
+        for frame in range(0, frames, 4):
+            browser.run(f"{page}.uptPreview.stopAt({frame})")
+            browser.wait(f"{time_shown} === '{frame * 0.05:.2f} s'")
+            deepest = max(deepest, browser.run(f"return {page}.uptPreview.deepest()"))
+            ways.append(browser.run(f"return {page}.uptPreview.place(0)"))
+            if frame == frames // 8 * 4:
+                browser.run("document.querySelector('iframe').scrollIntoView()")
+                browser.screenshot(str(PICTURES / f"{bundle}-tools.png"))
+        assert 1.0 < deepest < 20.0, deepest
+        # In by 3 mm or more, and out again.
+        far = max(math.dist(ways[0], place) for place in ways)
+        assert 2.0 < far < 20.0, far
+
+
 def main() -> int:
     PICTURES.mkdir(parents=True, exist_ok=True)
     tests = [
@@ -328,6 +360,7 @@ def main() -> int:
     if browser:
         runs.append(("a_drag_moves_the_surface", lambda: a_drag_moves_the_surface(browser, "brain-reduced")))
         runs.append(("a_report_plays_its_first_case", lambda: a_report_plays_its_first_case(browser, "liver-coarse")))
+        runs.append(("a_report_of_tools_shows_them", lambda: a_report_of_tools_shows_them(browser, "liver-coarse")))
     try:
         for name, test in runs:
             try:

@@ -79,6 +79,9 @@ fn tools_are_driven_by_poses_and_measured() {
     // The dent of each case by each method, and a force a tool.
     assert!(html.matches("<svg").count() >= 2 * 2 + 2);
     assert!(html.contains("reference solver") && html.contains("press, press"));
+    // The first case plays, with a pose of its tool for each frame.
+    let (_, tools) = html.split_once("&quot;tools&quot;:[{").unwrap();
+    assert!(tools.contains("&quot;poses&quot;:[["));
 
     let marked = "before\n<!-- begin: upt report --tools box -->\n<!-- end: upt report --tools box -->\nafter\n";
     std::fs::write(&page, marked).unwrap();

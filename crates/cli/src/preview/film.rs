@@ -4,8 +4,9 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde_json::{Value, json};
 use tissue::mesh::Mesh;
+use tissue::solver::{Tool, ToolPose};
 
-use super::surface_nodes;
+use super::{surface_nodes, tools};
 
 /// Bytes of a film before they become text, about: beyond them frames are left out.
 const MOST_BYTES: usize = 6_000_000;
@@ -16,6 +17,7 @@ pub struct Film {
     step_s: f64,
     nodes: Vec<u32>,
     frames: Vec<Frame>,
+    tools: Vec<Tool>,
 }
 
 struct Frame {
@@ -25,6 +27,8 @@ struct Frame {
     error: Vec<f32>,
     /// Middle of the touched nodes, mm.
     touched: Option<[f32; 3]>,
+    /// Where the tools are.
+    poses: Vec<ToolPose>,
 }
 
 impl Film {
@@ -34,6 +38,26 @@ impl Film {
             step_s,
             nodes: surface_nodes(mesh).1,
             frames: Vec::new(),
+            tools: Vec::new(),
+        }
+    }
+
+    /// Tools that are shown, in frames that give their poses.
+    pub fn take(&mut self, tools: &[Tool]) {
+        self.tools = tools.to_vec();
+    }
+
+    /// Adds a frame with the tools at `poses`.
+    pub fn add_tools(
+        &mut self,
+        mesh: &Mesh,
+        field: &[[f32; 3]],
+        truth: &[[f32; 3]],
+        poses: &[ToolPose],
+    ) {
+        self.add(mesh, field, truth, &[]);
+        if let Some(frame) = self.frames.last_mut() {
+            frame.poses = poses.to_vec();
         }
     }
 
@@ -54,6 +78,7 @@ impl Film {
             moved: moved.collect(),
             error: error.collect(),
             touched: (!touched.is_empty()).then(|| [0, 1, 2].map(middle)),
+            poses: Vec::new(),
         });
     }
 
@@ -84,6 +109,7 @@ impl Film {
             "moved": STANDARD.encode(shorts.collect::<Vec<u8>>()),
             "error": STANDARD.encode(small.collect::<Vec<u8>>()),
             "touched": touched.collect::<Vec<_>>(),
+            "tools": tools::json(&self.tools, kept().map(|frame| &frame.poses)),
         })
     }
 }

@@ -2,6 +2,7 @@
 //! there is one the error of a check, and a contact that plays. A click gives coordinates to paste into a command.
 
 mod film;
+mod tools;
 
 pub use film::Film;
 

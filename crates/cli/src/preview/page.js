@@ -88,6 +88,18 @@ const seen = { color: 0xffffff, transparent: true, opacity: 0.75, depthTest: fal
 const touch = new three.Mesh(new three.CapsuleGeometry(1, 0.01), new three.MeshStandardMaterial(seen));
 touch.visible = false;
 scene.add(touch);
+// Steel bodies that follow their poses.
+const tools = (film?.tools ?? []).map(({ points, faces: corners, poses }) => {
+  const made = new three.BufferGeometry();
+  made.setAttribute("position", new three.BufferAttribute(new Float32Array(points), 3));
+  made.setIndex(corners);
+  made.computeVertexNormals();
+  const steel = new three.MeshStandardMaterial({ color: 0xdde3ea, metalness: 0.1, roughness: 0.5, transparent: true, opacity: 0.85 });
+  const mesh = new three.Mesh(made, steel);
+  scene.add(mesh);
+  return { mesh, poses };
+});
+const turn = new three.Quaternion();
 if (film) {
   film.moved = new Int16Array(bytes(film.moved));
   film.error = new Uint8Array(bytes(film.error));
@@ -105,8 +117,11 @@ if (film) {
   // From where most of it is touched.
   const towards = new three.Vector3();
   for (const place of film.touched) if (place) towards.add(new three.Vector3(...place).sub(center));
+  for (const [x, y, z] of tools.flatMap((tool) => tool.poses)) towards.add(new three.Vector3(x, y, z).sub(center));
   if (towards.length() > 0) {
     towards.normalize().addScaledVector(camera.up, 0.3);
+    // A tool is not seen along its shaft.
+    if (tools.length > 0) towards.addScaledVector(new three.Vector3().crossVectors(towards, camera.up), 0.8);
     camera.position.copy(center).add(towards.setLength(3.4 * radius));
     controls.update();
   }
@@ -128,6 +143,11 @@ function show(place) {
   const [from, to] = [film.touched[first], film.touched[first + 1]];
   touch.visible = Boolean(from && to);
   if (touch.visible) touch.position.set(...from.map((x, k) => (1 - part) * x + part * to[k]));
+  for (const { mesh, poses } of tools) {
+    const [before, after] = [poses[first], poses[first + 1]];
+    mesh.position.set(...[0, 1, 2].map((k) => (1 - part) * before[k] + part * after[k]));
+    mesh.quaternion.set(...before.slice(3)).slerp(turn.set(...after.slice(3)), part);
+  }
   const choice = choices[at("choice").value];
   if (choice.plays) paint(choice);
   at("time").textContent = `${(place * film.step_s).toFixed(2)} s`;
@@ -188,6 +208,8 @@ window.uptPreview = {
   choices: choices.length,
   frames: film ? film.count : 0,
   stopAt: (place) => (play(false), (time = place * film.step_s)),
+  tools: tools.length,
+  place: (tool) => tools[tool].mesh.position.toArray(),
   deepest: () => moved.reduce((most, x) => Math.max(most, Math.abs(x)), 0),
   pick: (x, y) => renderer.domElement.dispatchEvent(new PointerEvent("pointerup", { clientX: x, clientY: y })),
 };

@@ -70,7 +70,7 @@ figcaption{font-size:13px;color:#44505c;margin-top:4px}
 ul{margin:8px 0 0;padding-left:20px;color:#44505c;font-size:14px}
 ";
 
-const VIEWER_STYLE: &str =
+pub const VIEWER_STYLE: &str =
     "iframe{display:block;width:100%;height:560px;border:0;border-radius:6px}";
 
 /// The page up to its first section; `style` is added to that of all pages.
@@ -98,19 +98,24 @@ pub fn closing(mut out: String, facts: &Facts) -> String {
     out
 }
 
+/// The section with a page of [`crate::preview`] in it.
+pub fn playing(out: &mut String, viewer: &str) {
+    let body = format!(
+        "<iframe title=\"the first case, playing\" srcdoc=\"{}\"></iframe>",
+        viewer.replace('&', "&amp;").replace('"', "&quot;")
+    );
+    section(
+        out,
+        "The first case, playing",
+        "Turn it and zoom; stop it and move through its time. Colours show the displacement or the error of that moment.",
+        &body,
+    );
+}
+
 pub fn page(page: &Page<'_>) -> String {
     let mut out = opening(page.title, &page.lead, VIEWER_STYLE);
     if let Some(viewer) = &page.viewer {
-        let body = format!(
-            "<iframe title=\"the first case, playing\" srcdoc=\"{}\"></iframe>",
-            viewer.replace('&', "&amp;").replace('"', "&quot;")
-        );
-        section(
-            &mut out,
-            "The first case, playing",
-            "Turn it and zoom; stop it and move through its time. Colours show the displacement or the error of that moment.",
-            &body,
-        );
+        playing(&mut out, viewer);
     }
     for gallery in &page.galleries {
         out.push_str(&gallery_section(gallery));

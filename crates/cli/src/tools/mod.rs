@@ -7,11 +7,12 @@
 //! | [`drive`] | how the library is driven |
 //! | [`yard`] | det F and penetration of one state |
 //! | [`measure`], [`row`] | a case, and the rows over cases |
-//! | [`section`], [`force`], [`table`], [`page`] | what is shown |
+//! | [`film`], [`section`], [`force`], [`table`], [`page`] | what is shown |
 
 pub mod bundles;
 pub mod cases;
 pub mod drive;
+mod film;
 mod force;
 pub mod measure;
 mod page;
@@ -125,9 +126,10 @@ pub fn report(plan: &Plan) -> Result<ExitCode> {
     let mut rows = row::rows(&label, &figures);
     let mut details = vec![json!({"method": label.drive, "cases": figures})];
     let mut all = Vec::new();
-    for method in methods(plan, &bundles) {
+    let methods = methods(plan, &bundles);
+    for method in &methods {
         let name = method.name();
-        match measure_all(&method, plan.threads, &cases, &mesh, &truths, &mut yard) {
+        match measure_all(method, plan.threads, &cases, &mesh, &truths, &mut yard) {
             Ok(measured) => {
                 details.push(json!({"method": name, "cases": measured.figures}));
                 rows.extend(measured.rows.iter().cloned());
@@ -139,9 +141,11 @@ pub fn report(plan: &Plan) -> Result<ExitCode> {
     if all.is_empty() {
         bail!("nothing could be measured: {}", notes.join("; "));
     }
+    let viewer = film::viewer(&methods, &cases, &mesh, plan.threads)?;
     let made = Made {
         cases,
         mesh,
+        viewer,
         truths,
         all,
         rows,
@@ -293,6 +297,7 @@ fn pictures(
 struct Made {
     cases: ToolCases,
     mesh: Mesh,
+    viewer: Option<String>,
     truths: Vec<Truth>,
     all: Vec<Measured>,
     rows: Vec<Row>,
@@ -304,6 +309,7 @@ fn write(plan: &Plan, made: &Made) -> Result<serde_json::Value> {
     let Made {
         cases,
         mesh,
+        viewer,
         truths,
         all,
         rows,
@@ -370,6 +376,7 @@ fn write(plan: &Plan, made: &Made) -> Result<serde_json::Value> {
             .map(|(at, one)| (one.name.clone(), colour(at)))
             .collect(),
         pictured: pictures(cases, mesh, truths, all),
+        viewer: viewer.clone(),
         notes: notes.iter().map(|n| format!("Left out: {n}")).collect(),
         facts,
     };

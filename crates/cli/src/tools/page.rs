@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use crate::report::html::{Facts, closing, opening, section};
+use crate::report::html::{Facts, VIEWER_STYLE, closing, opening, playing, section};
 use crate::report::plot::{escape, legend};
 
 use super::row::{ALL, Row};
@@ -23,6 +23,8 @@ pub struct Page<'a> {
     /// Names of the methods in the pictures, with their colours.
     pub keys: Vec<(String, &'static str)>,
     pub pictured: Vec<Pictured>,
+    /// A page of [`crate::preview`] in which the first case plays with its tools.
+    pub viewer: Option<String>,
     pub notes: Vec<String>,
     pub facts: Facts,
 }
@@ -33,7 +35,11 @@ const STYLE: &str = "svg.section{background:#fbfbfc;border:1px solid #eef0f3;bor
     .gallery.forces{grid-template-columns:repeat(auto-fill,minmax(560px,1fr))}table{font-size:12px}";
 
 pub fn page(page: &Page<'_>) -> String {
-    let mut out = opening(page.title, &page.lead, STYLE);
+    let style = format!("{STYLE}{VIEWER_STYLE}");
+    let mut out = opening(page.title, &page.lead, &style);
+    if let Some(viewer) = &page.viewer {
+        playing(&mut out, viewer);
+    }
     let over_all: Vec<&Row> = page
         .rows
         .iter()
