@@ -13,6 +13,7 @@ pub mod haptics;
 pub mod instrument;
 
 mod memory;
+mod output;
 mod stored;
 
 // For the repository's own commands, benches and tests: no part of the interface, and it changes without notice.

@@ -3,9 +3,8 @@
 use super::call::call;
 #[cfg(not(feature = "contact"))]
 use super::call::fail;
-use super::pointers::{copy_out, place, slice};
-#[cfg(feature = "contact")]
-use super::pointers::{fill, slice_mut};
+use super::output::{copy_out, place};
+use super::pointers::slice;
 use super::registry::call_scene;
 use super::status::*;
 use super::structs::*;
@@ -13,6 +12,7 @@ use super::structs::*;
 use {
     super::call::Failure,
     super::convert,
+    super::output::{fill, optional_output},
     super::pointers::each,
     super::registry::{add_hull, remove_hull},
     crate::contact::{MAX_TOOLS, Tool},
@@ -54,18 +54,9 @@ pub unsafe extern "C" fn upt_scene_step_instruments(
                     displacement: None,
                     contact: Contact::Tools(tools),
                 };
-                let out = match out.is_null() && out_count == 0 {
-                    true => None,
-                    false => {
-                        _scene.check_out(
-                            // SAFETY: the host passes that many elements, as the header asks.
-                            unsafe { slice(out.cast_const(), out_count, "out") }?.len(),
-                        )?;
-                        // SAFETY: the host passes room for that many elements, as the header asks.
-                        Some(unsafe { slice_mut(out, out_count, "out") }?)
-                    }
-                };
-                _scene.step(input, out)?;
+                // SAFETY: the host passes room for that many elements, as the header asks.
+                let out = unsafe { optional_output(out, out_count, "out") }?;
+                _scene.step_to(input, out)?;
                 Ok(UPT_OK)
             })
         }
@@ -217,7 +208,8 @@ pub unsafe extern "C" fn upt_hull_create(
         "upt_hull_create",
         || (),
         || {
-            let _out = place(out, "out")?;
+            // SAFETY: the header asks for a place to write.
+            let _out = unsafe { place(out, "out") }?;
             #[cfg(feature = "contact")]
             {
                 const MOST: u64 = 100_000;
@@ -234,8 +226,7 @@ pub unsafe extern "C" fn upt_hull_create(
                     |error: ::contact::ShapeError| Error::Argument(format!("points: {error}"));
                 let shape = Shape::hull_of(points.as_chunks().0).map_err(bad)?;
                 let body = Body::new(&shape).map_err(bad)?;
-                // SAFETY: `place` found it aligned and not NULL, and the header asks for a place to write.
-                unsafe { _out.write(add_hull(body)) };
+                _out.set(add_hull(body));
                 Ok(UPT_OK)
             }
             #[cfg(not(feature = "contact"))]

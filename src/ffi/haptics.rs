@@ -3,7 +3,8 @@
 use super::call::call;
 #[cfg(not(feature = "haptics"))]
 use super::call::fail;
-use super::pointers::{fill, place, required};
+use super::output::{fill, place};
+use super::pointers::required;
 use super::registry::call_scene;
 use super::status::*;
 use super::structs::*;
@@ -38,7 +39,8 @@ pub unsafe extern "C" fn upt_haptics_create(
     out: *mut *mut upt_haptics,
 ) -> upt_status {
     call_scene("upt_haptics_create", scene, |_scene| {
-        let _out = place(out, "out")?;
+        // SAFETY: the header asks for a place to write.
+        let _out = unsafe { place(out, "out") }?;
         // SAFETY: the host passes a struct whose first field is its size, as the header asks.
         let raw = unsafe { required(options, "options") }?;
         convert::reserved(&raw.reserved)?;
@@ -59,8 +61,7 @@ pub unsafe extern "C" fn upt_haptics_create(
                 ..HapticOptions::new(raw.instrument, tool)
             };
             let hand = hands::add(_scene.haptics(&options)?)?;
-            // SAFETY: `place` found it aligned and not NULL, and the header asks for a place to write.
-            unsafe { _out.write(without_provenance_mut(hand)) };
+            _out.set(without_provenance_mut(hand));
             Ok(UPT_OK)
         }
         #[cfg(not(feature = "haptics"))]

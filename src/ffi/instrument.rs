@@ -5,7 +5,8 @@ use super::call::Failure;
 #[cfg(any(not(feature = "contact"), not(feature = "forces")))]
 use super::call::fail;
 use super::convert;
-use super::pointers::{each, place, slice_mut};
+use super::output::{output, place};
+use super::pointers::each;
 use super::registry::call_scene;
 use super::status::*;
 use super::structs::*;
@@ -39,21 +40,21 @@ pub unsafe extern "C" fn upt_scene_contacts_from_instruments(
     contact_count: *mut u64,
 ) -> upt_status {
     call_scene("upt_scene_contacts_from_instruments", scene, |_scene| {
-        let count_out = place(contact_count, "contact_count")?;
+        // SAFETY: the header asks for a place to write.
+        let count_out = unsafe { place(contact_count, "contact_count") }?;
         let capacity_floats = capacity.saturating_mul(3);
         // SAFETY: the host passes room for that many elements, as the header asks.
-        let nodes_out = unsafe { slice_mut(contact_nodes, capacity, "contact_nodes") }?;
+        let nodes_out = unsafe { output(contact_nodes, capacity, "contact_nodes") }?;
         let vectors_out =
             // SAFETY: the host passes room for that many elements, as the header asks.
-            unsafe { slice_mut(contact_vectors, capacity_floats, "contact_vectors") }?;
+            unsafe { output(contact_vectors, capacity_floats, "contact_vectors") }?;
         #[cfg(feature = "contact")]
         {
             // SAFETY: the host passes that many instruments, as the header asks.
             let list = unsafe { read_instruments(instruments, instrument_count) }?;
             let list = &list.0[..list.1];
             _scene.contacts_from_instruments(list, |nodes, vectors| {
-                // SAFETY: `place` found it aligned and not NULL, and the header asks for a place to write.
-                unsafe { count_out.write(nodes.len() as u64) };
+                count_out.set(nodes.len() as u64);
                 if capacity == 0 {
                     return Ok(());
                 }
@@ -63,8 +64,8 @@ pub unsafe extern "C" fn upt_scene_contacts_from_instruments(
                         nodes.len()
                     )));
                 }
-                nodes_out[..nodes.len()].copy_from_slice(nodes);
-                vectors_out[..vectors.len()].copy_from_slice(vectors);
+                nodes_out.first(nodes.len()).copy_from(nodes);
+                vectors_out.first(vectors.len()).copy_from(vectors);
                 Ok(())
             })?;
             Ok(UPT_OK)
@@ -140,10 +141,10 @@ pub unsafe extern "C" fn upt_scene_contact_force(
 ) -> upt_status {
     call_scene("upt_scene_contact_force", scene, |_scene| {
         // SAFETY: the host passes room for that many elements, as the header asks.
-        let _out = unsafe { slice_mut(out, out_count, "out") }?;
+        let _out = unsafe { output(out, out_count, "out") }?;
         #[cfg(feature = "forces")]
         {
-            _scene.contact_force(_out)?;
+            _scene.contact_force_to(_out)?;
             Ok(UPT_OK)
         }
         #[cfg(not(feature = "forces"))]

@@ -5,7 +5,7 @@ use core::ffi::{c_char, c_void};
 use super::call::{Answer, call, fail, last_error};
 use super::status::*;
 use super::structs::*;
-use super::{convert, log, pointers};
+use super::{convert, log, output, pointers};
 
 /// Version of the C ABI that `upt_abi_version` returns. Bindings compare it at load.
 pub const UPT_ABI_VERSION: u32 = 1;
@@ -129,7 +129,7 @@ pub unsafe extern "C" fn upt_providers(
         || -> Answer {
             let text = crate::providers_json()?;
             // SAFETY: `out` has room for `capacity` elements and `needed` is NULL or writable, as the header asks.
-            unsafe { pointers::copy_text(&text, out, capacity, needed) }
+            unsafe { output::copy_text(&text, out, capacity, needed) }
         },
     )
 }

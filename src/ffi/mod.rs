@@ -15,6 +15,7 @@ mod instrument;
 mod library;
 mod log;
 mod model;
+mod output;
 mod pointers;
 mod points;
 mod present;

@@ -6,7 +6,7 @@ use super::call::call;
 use super::registry::{add_model, find_model, remove_model};
 use super::status::*;
 use super::structs::*;
-use super::{convert, pointers};
+use super::{convert, output, pointers};
 use crate::Model;
 
 /// Opens a bundle, checks it (sizes, dtypes, the SHA-256 of the manifest and of every file that is read) and makes it
@@ -29,15 +29,15 @@ pub unsafe extern "C" fn upt_model_open(
         "upt_model_open",
         || (),
         || {
-            let out = pointers::place(out, "out")?;
+            // SAFETY: the header asks for a place to write.
+            let out = unsafe { output::place(out, "out") }?;
             // SAFETY: NULL or a C string, as the header asks.
             let path = unsafe { pointers::path(path, "path") }?;
             // SAFETY: NULL, or a struct whose first field is its size, as the header asks.
             let raw = unsafe { pointers::options(options) }?;
             // SAFETY: the pointers in the struct are NULL or what the header asks for.
             let model = Model::open(&path, &unsafe { convert::model_options(&raw) }?)?;
-            // SAFETY: `place` found it aligned and not NULL, and the header asks for a place to write.
-            unsafe { out.write(add_model(model)) };
+            out.set(add_model(model));
             Ok(UPT_OK)
         },
     )
@@ -93,7 +93,7 @@ pub unsafe extern "C" fn upt_model_get_info(
                 })
             };
             // SAFETY: `out` points to a struct whose first field is its size, as the header asks.
-            unsafe { pointers::fill(out, fill) }
+            unsafe { output::fill(out, fill) }
         },
     )
 }
@@ -118,7 +118,7 @@ pub unsafe extern "C" fn upt_model_describe(
         || {
             let text = find_model(model)?.describe_json();
             // SAFETY: `out` has room for `capacity` elements and `needed` is NULL or writable, as the header asks.
-            unsafe { pointers::copy_text(&text, out, capacity, needed) }
+            unsafe { output::copy_text(&text, out, capacity, needed) }
         },
     )
 }
@@ -152,7 +152,7 @@ pub unsafe extern "C" fn upt_model_positions(
                 );
             }
             // SAFETY: the host passes room for that many elements, as the header asks.
-            unsafe { pointers::slice_mut(out, count, "out") }?.copy_from_slice(positions);
+            unsafe { output::output(out, count, "out") }?.copy_from(positions);
             Ok(UPT_OK)
         },
     )
@@ -182,7 +182,7 @@ pub unsafe extern "C" fn upt_model_indices(
             let model = find_model(model)?;
             let indices = model.indices(convert::index_set(set)?);
             // SAFETY: `out` has room for `capacity` elements and `needed` is NULL or writable, as the header asks.
-            unsafe { pointers::copy_out(indices, out, capacity, needed) }
+            unsafe { output::copy_out(indices, out, capacity, needed) }
         },
     )
 }

@@ -1,13 +1,12 @@
-//! Raw pointers of the host -> slices, paths, structs. Checks what can be checked: NULL, alignment, size.
+//! Raw pointers of the host -> slices, paths, structs to read. Checks what can be checked: NULL, alignment, size.
+//! What the host wants to be written is in `output.rs`.
 
-use std::borrow::Cow;
 use std::ffi::{CStr, c_char};
 use std::path::PathBuf;
 
-use super::call::{Answer, Failure, fail};
+use super::call::{Failure, fail};
 use super::status::*;
 use super::structs::*;
-use crate::memory;
 
 /// A struct that starts with `struct_size`. Later versions only grow; each size ever published stays known.
 ///
@@ -43,7 +42,7 @@ unsafe impl Sized32 for upt_instrument {
     const KNOWN: &'static [usize] = &[std::mem::offset_of!(Self, friction), size_of::<Self>()];
 }
 
-fn check<T>(pointer: *const T, name: &str) -> Result<(), Failure> {
+pub(super) fn check<T>(pointer: *const T, name: &str) -> Result<(), Failure> {
     if pointer.is_null() {
         return fail(UPT_ERR_NULL, format!("{name} is NULL"));
     }
@@ -57,7 +56,7 @@ fn check<T>(pointer: *const T, name: &str) -> Result<(), Failure> {
     Ok(())
 }
 
-fn length<T>(count: u64, name: &str) -> Result<usize, Failure> {
+pub(super) fn length<T>(count: u64, name: &str) -> Result<usize, Failure> {
     match usize::try_from(count) {
         Ok(count) if count <= isize::MAX as usize / size_of::<T>().max(1) => Ok(count),
         _ => fail(
@@ -93,26 +92,6 @@ pub(super) unsafe fn optional<'a, T>(
     }
     // SAFETY: the host passes that many elements, as the header asks.
     unsafe { slice(pointer, count, name) }.map(Some)
-}
-
-/// `count` elements to write.
-pub(super) unsafe fn slice_mut<'a, T>(
-    pointer: *mut T,
-    count: u64,
-    name: &str,
-) -> Result<&'a mut [T], Failure> {
-    let count = length::<T>(count, name)?;
-    if count == 0 {
-        return Ok(&mut []);
-    }
-    check(pointer, name)?;
-    // SAFETY: checked above: aligned, not NULL, of a size that fits; the caller promises the elements.
-    Ok(unsafe { std::slice::from_raw_parts_mut(pointer, count) })
-}
-
-/// A place for one value.
-pub(super) fn place<T>(pointer: *mut T, name: &str) -> Result<*mut T, Failure> {
-    check(pointer, name).map(|()| pointer)
 }
 
 /// A UTF-8 path.
@@ -169,7 +148,10 @@ pub(super) unsafe fn each<T: Sized32>(
     Ok(())
 }
 
-unsafe fn struct_size<T: Sized32>(pointer: *const T, name: &str) -> Result<usize, Failure> {
+pub(super) unsafe fn struct_size<T: Sized32>(
+    pointer: *const T,
+    name: &str,
+) -> Result<usize, Failure> {
     check(pointer, name)?;
     // SAFETY: checked above: aligned and not NULL; every struct begins with a `u32`.
     let size = unsafe { pointer.cast::<u32>().read() } as usize;
@@ -207,72 +189,4 @@ pub(super) unsafe fn required<T: Sized32>(pointer: *const T, name: &str) -> Resu
         std::ptr::copy_nonoverlapping(pointer.cast::<u8>(), (&raw mut value).cast(), size);
     }
     Ok(value)
-}
-
-/// A struct to fill: `make` is called once `struct_size` is accepted; only the caller's fields are written.
-pub(super) unsafe fn fill<T: Sized32>(
-    out: *mut T,
-    make: impl FnOnce(u32) -> Result<T, Failure>,
-) -> Answer {
-    // SAFETY: the pointer leads to a struct, as this function's caller promises.
-    let size = unsafe { struct_size(out, "out") }?;
-    let value = make(size as u32)?;
-    // SAFETY: both have `size` bytes, one that this library knows, and are apart.
-    unsafe { std::ptr::copy_nonoverlapping((&raw const value).cast::<u8>(), out.cast(), size) };
-    Ok(UPT_OK)
-}
-
-/// Copies `values` to the host. `needed` (may be NULL) is always written; a NULL `out` with capacity 0 only asks.
-pub(super) unsafe fn copy_out<T: Copy>(
-    values: &[T],
-    out: *mut T,
-    capacity: u64,
-    needed: *mut u64,
-) -> Answer {
-    if out.is_null() && capacity == 0 && needed.is_null() {
-        return fail(UPT_ERR_NULL, "out and needed are both NULL");
-    }
-    if !needed.is_null() {
-        // SAFETY: not NULL here, and `place` finds it aligned; the header asks for a place to write.
-        unsafe { place(needed, "needed")?.write(values.len() as u64) };
-    }
-    if out.is_null() && capacity == 0 {
-        return Ok(UPT_OK);
-    }
-    if capacity < values.len() as u64 {
-        return fail(
-            UPT_ERR_ARGUMENT,
-            format!("capacity is {capacity}, {} are needed", values.len()),
-        );
-    }
-    // SAFETY: the host passes room for that many elements, as the header asks.
-    unsafe { slice_mut(out, values.len() as u64, "out") }?.copy_from_slice(values);
-    Ok(UPT_OK)
-}
-
-/// Copies text with its NUL to the host, as [`copy_out`].
-pub(super) unsafe fn copy_text(
-    text: &str,
-    out: *mut c_char,
-    capacity: u64,
-    needed: *mut u64,
-) -> Answer {
-    let mut bytes: Vec<u8> = text.bytes().filter(|&byte| byte != 0).collect();
-    bytes.push(0);
-    // SAFETY: `out` has room for `capacity` elements and `needed` is NULL or writable, as the header asks.
-    unsafe { copy_out(&bytes, out.cast(), capacity, needed) }
-}
-
-/// An input that shares no memory with an output: itself, or a copy.
-pub(super) fn apart<'a, T: Copy>(input: &'a [T], out: &[f32]) -> Result<Cow<'a, [T]>, Failure> {
-    let (a, b) = (input.as_ptr_range(), out.as_ptr_range());
-    let overlap = a.start.addr() < b.end.addr() && b.start.addr() < a.end.addr();
-    Ok(if overlap {
-        Cow::Owned(memory::copied(
-            input,
-            "a copy of an input that out overlaps",
-        )?)
-    } else {
-        Cow::Borrowed(input)
-    })
 }

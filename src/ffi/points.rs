@@ -1,9 +1,11 @@
 //! `upt_scene`: points that move with the tissue, such as a render mesh's vertices.
 
-use super::pointers::{optional, slice_mut};
+use super::output::output;
+use super::pointers::optional;
 use super::registry::call_scene;
 use super::status::*;
 use super::structs::*;
+use crate::scene::Values;
 
 /// Attaches points to the tissue. They replace those attached before. A bundle of kind `upt` decodes each point in every
 /// step (unless the scene has `interpolate_points`); one of kind `reduced` interpolates between nodes.
@@ -45,7 +47,7 @@ pub unsafe extern "C" fn upt_scene_read_points(
 ) -> upt_status {
     call_scene("upt_scene_read_points", scene, |scene| {
         // SAFETY: the host passes room for that many elements, as the header asks.
-        scene.read_points(unsafe { slice_mut(out, out_count, "out") }?)?;
+        scene.read_to(Values::Points, unsafe { output(out, out_count, "out") }?)?;
         Ok(UPT_OK)
     })
 }
@@ -67,7 +69,8 @@ pub unsafe extern "C" fn upt_scene_sample_points(
 ) -> upt_status {
     call_scene("upt_scene_sample_points", scene, |scene| {
         // SAFETY: the host passes room for that many elements, as the header asks.
-        scene.sample_points(alpha, unsafe { slice_mut(out, out_count, "out") }?)?;
+        let out = unsafe { output(out, out_count, "out") }?;
+        scene.sample_to(Values::Points, alpha, out)?;
         Ok(UPT_OK)
     })
 }

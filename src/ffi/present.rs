@@ -5,13 +5,14 @@ use super::call::fail;
 use super::registry::call_scene;
 use super::status::*;
 use super::structs::*;
+use crate::scene::Values;
 #[cfg(feature = "contact")]
 use {
     super::call::Failure,
     super::driven::read_tools,
-    super::pointers::{slice, slice_mut},
+    super::output::output,
     super::scene::contacts,
-    crate::Scene,
+    crate::{Contact, Scene},
 };
 
 #[cfg(not(feature = "contact"))]
@@ -34,7 +35,7 @@ enum Driver {
 )]
 struct Frame {
     seconds: f64,
-    points: bool,
+    values: Values,
     out: *mut f32,
     out_count: u64,
 }
@@ -68,48 +69,31 @@ unsafe fn present(
 /// As [`present`].
 #[cfg(feature = "contact")]
 unsafe fn made(scene: &Scene, driver: Driver, frame: Frame) -> Result<(), Failure> {
-    let seconds = frame.seconds;
     match driver {
         Driver::Instruments(instruments, count) => {
             let mut tools = scene.frame_tools()?;
             // SAFETY: the host passes that many instruments, as the header asks.
             unsafe { read_tools(instruments, count, &mut tools) }?;
             // SAFETY: the caller's.
-            let out = unsafe { room(scene, &frame) }?;
-            match frame.points {
-                true => scene.present_points(seconds, &tools, out)?,
-                false => scene.present(seconds, &tools, out)?,
-            }
+            unsafe { shown(scene, Contact::Tools(&tools), frame) }
         }
         Driver::Contacts(nodes, vectors, count) => {
             // SAFETY: the host passes that many nodes and vectors, as the header asks.
             let (nodes, vectors) = unsafe { contacts(scene, nodes, vectors, count) }?;
             // SAFETY: the caller's.
-            let out = unsafe { room(scene, &frame) }?;
-            match frame.points {
-                true => scene.present_points_contacts(seconds, nodes, vectors, out)?,
-                false => scene.present_contacts(seconds, nodes, vectors, out)?,
-            }
+            unsafe { shown(scene, Contact::Sparse { nodes, vectors }, frame) }
         }
     }
-    Ok(())
 }
 
-/// The host's room, after its count has been checked for the region or the points.
-///
 /// # Safety
 /// The host passes room for that many elements, as the header asks.
 #[cfg(feature = "contact")]
-unsafe fn room<'a>(scene: &Scene, frame: &Frame) -> Result<&'a mut [f32], Failure> {
-    let (out, count) = (frame.out, frame.out_count);
+unsafe fn shown(scene: &Scene, contact: Contact<'_>, frame: Frame) -> Result<(), Failure> {
     // SAFETY: the caller's.
-    let len = unsafe { slice(out.cast_const(), count, "out") }?.len();
-    match frame.points {
-        true => scene.check_points_out(len)?,
-        false => scene.check_out(len)?,
-    }
-    // SAFETY: the caller's.
-    unsafe { slice_mut(out, count, "out") }
+    let out = unsafe { output(frame.out, frame.out_count, "out") }?;
+    scene.frame_to(frame.values, frame.seconds, contact, out)?;
+    Ok(())
 }
 
 /// The tissue at a moment between steps, with the instruments where they are at that moment: frames without lag.
@@ -141,7 +125,7 @@ pub unsafe extern "C" fn upt_scene_present(
 ) -> upt_status {
     let frame = Frame {
         seconds,
-        points: false,
+        values: Values::Region,
         out,
         out_count,
     };
@@ -169,7 +153,7 @@ pub unsafe extern "C" fn upt_scene_present_points(
 ) -> upt_status {
     let frame = Frame {
         seconds,
-        points: true,
+        values: Values::Points,
         out,
         out_count,
     };
@@ -204,7 +188,7 @@ pub unsafe extern "C" fn upt_scene_present_contacts(
 ) -> upt_status {
     let frame = Frame {
         seconds,
-        points: false,
+        values: Values::Region,
         out,
         out_count,
     };
@@ -233,7 +217,7 @@ pub unsafe extern "C" fn upt_scene_present_points_contacts(
 ) -> upt_status {
     let frame = Frame {
         seconds,
-        points: true,
+        values: Values::Points,
         out,
         out_count,
     };

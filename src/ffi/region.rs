@@ -1,6 +1,7 @@
 //! `upt_scene`: which nodes are decoded.
 
-use super::pointers::{optional, slice, slice_mut};
+use super::output::output;
+use super::pointers::{optional, slice};
 use super::registry::call_scene;
 use super::status::*;
 use super::structs::*;
@@ -49,7 +50,7 @@ pub unsafe extern "C" fn upt_scene_decode(
         // SAFETY: the host passes that many elements, as the header asks.
         let nodes = unsafe { slice(nodes, count, "nodes") }?;
         // SAFETY: the host passes room for that many elements, as the header asks.
-        scene.decode(nodes, unsafe { slice_mut(out, out_count, "out") }?)?;
+        scene.decode_to(nodes, unsafe { output(out, out_count, "out") }?)?;
         Ok(UPT_OK)
     })
 }

@@ -1,11 +1,13 @@
 //! `upt_scene`: make, end, reset, step, read.
 
 use super::call::{Failure, call};
-use super::pointers::{apart, slice, slice_mut};
+use super::output::{apart, optional_output, output, place};
+use super::pointers::slice;
 use super::registry::{add_scene, call_scene, find_model, remove_scene};
 use super::status::*;
 use super::structs::*;
 use super::{convert, pointers};
+use crate::scene::Values;
 use crate::{Contact, Scene, StepInput};
 
 /// Creates a scene at rest.
@@ -26,14 +28,14 @@ pub unsafe extern "C" fn upt_scene_create(
         "upt_scene_create",
         || (),
         || {
-            let out = pointers::place(out, "out")?;
+            // SAFETY: the header asks for a place to write.
+            let out = unsafe { place(out, "out") }?;
             let model = find_model(model)?;
             // SAFETY: NULL, or a struct whose first field is its size, as the header asks.
             let raw = unsafe { pointers::options(options) }?;
             // SAFETY: the pointers in the struct are NULL or what the header asks for.
             let scene = Scene::new(model, &unsafe { convert::scene_options(&raw) }?)?;
-            // SAFETY: `place` found it aligned and not NULL, and the header asks for a place to write.
-            unsafe { out.write(add_scene(scene)) };
+            out.set(add_scene(scene));
             Ok(UPT_OK)
         },
     )
@@ -153,7 +155,7 @@ pub unsafe extern "C" fn upt_scene_read(
 ) -> upt_status {
     call_scene("upt_scene_read", scene, |scene| {
         // SAFETY: the host passes room for that many elements, as the header asks.
-        scene.read(unsafe { slice_mut(out, out_count, "out") }?)?;
+        scene.read_to(Values::Region, unsafe { output(out, out_count, "out") }?)?;
         Ok(UPT_OK)
     })
 }
@@ -180,28 +182,27 @@ unsafe fn step(
     out: *mut f32,
     out_count: u64,
 ) -> super::call::Answer {
-    if out.is_null() && out_count == 0 {
+    // SAFETY: the host passes room for that many elements, as the header asks.
+    let Some(out) = unsafe { optional_output(out, out_count, "out") }? else {
         scene.step(input, None)?;
         return Ok(UPT_OK);
-    }
-    // SAFETY: the host passes that many elements, as the header asks.
-    let out_view = unsafe { slice(out.cast_const(), out_count, "out") }?;
-    scene.check_out(out_view.len())?;
-    let displacement = input.displacement.map(|u| apart(u, out_view)).transpose()?;
+    };
+    scene.check_len(Values::Region, out.len())?;
+    let displacement = input.displacement.map(|u| apart(u, &out)).transpose()?;
     let (dense, nodes, vectors);
     let contact = match input.contact {
         Contact::None => Contact::None,
         #[cfg(feature = "contact")]
         Contact::Tools(tools) => Contact::Tools(tools),
         Contact::Dense(field) => {
-            dense = apart(field, out_view)?;
+            dense = apart(field, &out)?;
             Contact::Dense(&dense)
         }
         Contact::Sparse {
             nodes: n,
             vectors: v,
         } => {
-            (nodes, vectors) = (apart(n, out_view)?, apart(v, out_view)?);
+            (nodes, vectors) = (apart(n, &out)?, apart(v, &out)?);
             Contact::Sparse {
                 nodes: &nodes,
                 vectors: &vectors,
@@ -212,7 +213,6 @@ unsafe fn step(
         displacement: displacement.as_deref(),
         contact,
     };
-    // SAFETY: the host passes room for that many elements, as the header asks.
-    scene.step(input, Some(unsafe { slice_mut(out, out_count, "out") }?))?;
+    scene.step_to(input, Some(out))?;
     Ok(UPT_OK)
 }

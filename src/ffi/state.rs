@@ -3,10 +3,10 @@
 use std::sync::atomic::Ordering;
 
 use super::call::call;
-use super::pointers;
 use super::registry::{call_scene, find_scene};
 use super::status::*;
 use super::structs::*;
+use super::{output, pointers};
 
 /// Reports what the last step did and how long it took. Set `out->struct_size` first. Works while a step is in flight and
 /// on a poisoned scene.
@@ -64,7 +64,7 @@ pub unsafe extern "C" fn upt_scene_get_stats(
                 })
             };
             // SAFETY: `out` points to a struct whose first field is its size, as the header asks.
-            unsafe { pointers::fill(out, fill) }
+            unsafe { output::fill(out, fill) }
         },
     )
 }
@@ -88,7 +88,7 @@ pub unsafe extern "C" fn upt_scene_save(
     call_scene("upt_scene_save", scene, |scene| {
         let snapshot = scene.save()?;
         // SAFETY: `out` has room for `capacity` elements and `needed` is NULL or writable, as the header asks.
-        unsafe { pointers::copy_out(&snapshot, out, capacity, needed) }
+        unsafe { output::copy_out(&snapshot, out, capacity, needed) }
     })
 }
 

@@ -3,12 +3,13 @@
 use std::time::Duration;
 
 use super::call::Answer;
-use super::pointers::slice_mut;
+use super::output::output;
 use super::registry::call_scene;
 use super::scene::contacts;
 use super::status::*;
 use super::structs::*;
 use crate::Progress;
+use crate::scene::Values;
 
 /// Starts a step on the scene's worker thread and returns at once. An error of an earlier step that was not reported yet
 /// is still reported.
@@ -79,7 +80,8 @@ pub unsafe extern "C" fn upt_scene_sample(
 ) -> upt_status {
     call_scene("upt_scene_sample", scene, |scene| {
         // SAFETY: the host passes room for that many elements, as the header asks.
-        scene.sample(alpha, unsafe { slice_mut(out, out_count, "out") }?)?;
+        let out = unsafe { output(out, out_count, "out") }?;
+        scene.sample_to(Values::Region, alpha, out)?;
         Ok(UPT_OK)
     })
 }

@@ -23,6 +23,7 @@ use crate::kernels::{FlushToZero, Isa, Machine, Pool};
 use crate::memory;
 use crate::model::Model;
 use crate::options::SceneOptions;
+use crate::output::Output;
 use crate::stats::SceneStats;
 
 /// A scene is asleep after this many steps without contact ...
@@ -184,7 +185,7 @@ impl Core {
         &mut self,
         published: &RwLock<Published>,
         input: StepInput<'_>,
-        out: Option<&mut [f32]>,
+        out: Option<Output<'_, f32>>,
     ) -> Result<()> {
         let _flush = FlushToZero::enter();
         let start = Instant::now();

@@ -23,6 +23,7 @@ mod presenter;
 mod published;
 #[cfg(feature = "forces")]
 mod reaction;
+mod read;
 mod reduced;
 mod region;
 mod shared;
@@ -42,6 +43,7 @@ use std::time::Duration;
 pub use contact::{ContactSet, INPUT_LIMIT};
 pub use core::{QUIET_DISPLACEMENT, QUIET_STEPS};
 pub use points::check_point_count;
+pub(crate) use published::Values;
 
 use crate::bundle::{Mesh, TensorFile};
 #[cfg(feature = "contact")]
@@ -51,12 +53,12 @@ use crate::kernels::{Isa, Pool};
 use crate::memory;
 use crate::model::{KindModel, Model};
 use crate::options::{SceneOptions, StepPath};
-use crate::stats::SceneStats;
-use core::{Core, CoreParts, lock_read};
+use crate::output::Output;
+use core::{Core, CoreParts};
 use corrected::Corrected;
 use engine::Engine;
 use points::AttachedPoints;
-use published::{Frame, Published, Values};
+use published::{Frame, Published};
 use region::check_nodes;
 use shared::Shared;
 use worker::Worker;
@@ -200,39 +202,18 @@ impl Scene {
         contact::check_count(name, count, self.node_count())
     }
 
-    /// Whether an output for the region has `len` floats.
-    ///
-    /// # Errors
-    /// [`Error::Argument`].
-    pub fn check_out(&self, len: usize) -> Result<()> {
-        lock_read(&self.shared.published).check_len(Values::Region, len)
-    }
-
-    /// Whether an output for the attached points has `len` floats.
-    ///
-    /// # Errors
-    /// [`Error::Argument`], [`Error::State`] where none are attached.
-    pub fn check_points_out(&self, len: usize) -> Result<()> {
-        lock_read(&self.shared.published).check_len(Values::Points, len)
-    }
-
     /// One step of `dt`; `out` is `[n,3]` (n: `K`, or the region's count).
     ///
     /// # Errors
     /// [`Error::Argument`], [`Error::NonFinite`] for inputs, [`Error::Guard`] for a refused state: the last good state
     /// stays.
     pub fn step(&self, input: StepInput<'_>, out: Option<&mut [f32]>) -> Result<()> {
+        self.step_to(input, out.map(Output::from))
+    }
+
+    /// [`Scene::step`] into memory that need not be initialised.
+    pub(crate) fn step_to(&self, input: StepInput<'_>, out: Option<Output<'_, f32>>) -> Result<()> {
         self.with(|core, published| core.step(published, input, out))
-    }
-
-    /// The last published state, `[n,3]`, mm, region order.
-    pub fn read(&self, out: &mut [f32]) -> Result<()> {
-        lock_read(&self.shared.published).read(Values::Region, out)
-    }
-
-    /// Nodes of `read` (`K`, or the region's count).
-    pub fn region_count(&self) -> usize {
-        lock_read(&self.shared.published).count(Values::Region)
     }
 
     /// Restricts output to these nodes (any order); `None` is all nodes. Both published states are decoded for the new
@@ -246,14 +227,6 @@ impl Scene {
             let nodes = nodes.map(|nodes| memory::copied(nodes, "a region"));
             core.set_plan(published, nodes.transpose()?, points)
         })
-    }
-
-    /// Displacement `[n,3]` of any nodes in the last state.
-    ///
-    /// # Errors
-    /// [`Error::State`] before the first step.
-    pub fn decode(&self, nodes: &[u32], out: &mut [f32]) -> Result<()> {
-        self.with(|core, published| core.decode(published, nodes, out))
     }
 
     /// Attaches points `[n,3]` in rest mm; `None` detaches. A `upt` bundle decodes them, unless the scene was made with
@@ -276,28 +249,6 @@ impl Scene {
             let region = core.region_copy(published)?;
             core.set_plan(published, region, Arc::new(points))
         })
-    }
-
-    /// Number of attached points.
-    pub fn point_count(&self) -> usize {
-        lock_read(&self.shared.published).count(Values::Points)
-    }
-
-    /// Displacement `[n,3]` at the attached points in the last state.
-    pub fn read_points(&self, out: &mut [f32]) -> Result<()> {
-        lock_read(&self.shared.published).read(Values::Points, out)
-    }
-
-    /// Between the state before (`alpha` 0) and the last state (1), region order. `alpha` is clamped to `[0, 1]`.
-    ///
-    /// What is shown is up to one `dt` old: at `alpha` 0 the state before, at 1 the newest.
-    pub fn sample(&self, alpha: f64, out: &mut [f32]) -> Result<()> {
-        lock_read(&self.shared.published).sample(Values::Region, alpha, out)
-    }
-
-    /// As [`Scene::sample`], at the attached points.
-    pub fn sample_points(&self, alpha: f64, out: &mut [f32]) -> Result<()> {
-        lock_read(&self.shared.published).sample(Values::Points, alpha, out)
     }
 
     /// Starts a step on the scene's worker.
@@ -333,23 +284,6 @@ impl Scene {
     /// [`Error::Snapshot`] when it is damaged or of another model or mesh, [`Error::Version`].
     pub fn restore(&self, bytes: &[u8]) -> Result<()> {
         self.with(|core, published| core.restore(published, bytes))
-    }
-
-    /// Statistics of the last step.
-    pub fn stats(&self) -> SceneStats {
-        let mut stats = lock_read(&self.shared.published).stats;
-        stats.poisoned = self.shared.is_poisoned();
-        #[cfg(feature = "contact")]
-        {
-            stats.memory_bytes += self.presenter_bytes() as u64;
-        }
-        stats
-    }
-
-    /// Nodes in contact in the last step, in the host's order, and `[m,3]` their displacements, mm.
-    pub fn last_contacts(&self) -> Result<(Vec<u32>, Vec<f32>)> {
-        let shared = lock_read(&self.shared.published);
-        Ok((shared.contact_nodes.clone(), shared.contact_vectors.clone()))
     }
 }
 

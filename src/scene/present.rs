@@ -11,6 +11,7 @@ use crate::contact::{Past, Tool};
 use crate::error::{Error, Result};
 use crate::kernels::FlushToZero;
 use crate::memory;
+use crate::output::Output;
 
 const WHAT: &str = "the present state of a scene";
 
@@ -35,7 +36,7 @@ impl Scene {
     /// [`Error::NonFinite`] and [`Error::Argument`] for a time or an instrument, [`Error::Unsupported`] for a bundle without linear response or
     /// corrections or a scene that does not correct, [`Error::Busy`] while another thread presents, and at the first call while a step is in flight.
     pub fn present(&self, seconds: f64, tools: &[Tool], out: &mut [f32]) -> Result<()> {
-        self.frame(Values::Region, seconds, Contact::Tools(tools), out)
+        self.frame_to(Values::Region, seconds, Contact::Tools(tools), out.into())
     }
 
     /// As [`Scene::present`], at the attached points.
@@ -43,7 +44,7 @@ impl Scene {
     /// # Errors
     /// Those of [`Scene::present`], and [`Error::State`] where no points are attached.
     pub fn present_points(&self, seconds: f64, tools: &[Tool], out: &mut [f32]) -> Result<()> {
-        self.frame(Values::Points, seconds, Contact::Tools(tools), out)
+        self.frame_to(Values::Points, seconds, Contact::Tools(tools), out.into())
     }
 
     /// As [`Scene::present`], with a collision field in place of instruments: the nodes where they are then, of scenes that such fields drive.
@@ -58,7 +59,7 @@ impl Scene {
         out: &mut [f32],
     ) -> Result<()> {
         let contact = Contact::Sparse { nodes, vectors };
-        self.frame(Values::Region, seconds, contact, out)
+        self.frame_to(Values::Region, seconds, contact, out.into())
     }
 
     /// As [`Scene::present_contacts`], at the attached points.
@@ -73,15 +74,16 @@ impl Scene {
         out: &mut [f32],
     ) -> Result<()> {
         let contact = Contact::Sparse { nodes, vectors };
-        self.frame(Values::Points, seconds, contact, out)
+        self.frame_to(Values::Points, seconds, contact, out.into())
     }
 
-    fn frame(
+    /// Any of these frames, into memory that need not be initialised.
+    pub(crate) fn frame_to(
         &self,
         values: Values,
         seconds: f64,
         contact: Contact<'_>,
-        out: &mut [f32],
+        out: Output<'_, f32>,
     ) -> Result<()> {
         if !seconds.is_finite() {
             return Err(Error::NonFinite(format!("seconds is {seconds}")));

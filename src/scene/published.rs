@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::memory;
+use crate::output::Output;
 use crate::stats::SceneStats;
 
 /// One published state.
@@ -30,16 +31,14 @@ impl Frame {
     }
 
     /// Copies the points, or the nodes of `region` (`None`: all), to `out`.
-    fn copy(&self, values: Values, region: Option<&[u32]>, out: &mut [f32]) {
+    fn copy(&self, values: Values, region: Option<&[u32]>, out: Output<'_, f32>) {
         let from = self.values(values);
         match region {
             Some(region) if values == Values::Region => {
-                for (out, &node) in out.chunks_exact_mut(3).zip(region) {
-                    let at = 3 * node as usize;
-                    out.copy_from_slice(&from[at..at + 3]);
-                }
+                let from = from.as_chunks::<3>().0;
+                out.write_rows(region.iter().map(|&node| from[node as usize]));
             }
-            _ => out.copy_from_slice(from),
+            _ => out.copy_from(from),
         }
     }
 }
@@ -112,14 +111,14 @@ impl Published {
     }
 
     /// Copies the last state.
-    pub fn read(&self, values: Values, out: &mut [f32]) -> Result<()> {
+    pub fn read(&self, values: Values, out: Output<'_, f32>) -> Result<()> {
         self.check_len(values, out.len())?;
         self.last.copy(values, self.region.as_deref(), out);
         Ok(())
     }
 
     /// Interpolates between the state before (`alpha` 0) and the last state (1). `alpha` is clamped to `[0, 1]`.
-    pub fn sample(&self, values: Values, alpha: f64, out: &mut [f32]) -> Result<()> {
+    pub fn sample(&self, values: Values, alpha: f64, out: Output<'_, f32>) -> Result<()> {
         if !alpha.is_finite() {
             return Err(Error::NonFinite("alpha is not finite".into()));
         }
@@ -143,23 +142,22 @@ impl Published {
         Ok(())
     }
 
-    fn each(&self, values: Values, out: &mut [f32], combine: impl Fn(f32, f32, f32) -> f32) {
+    fn each(&self, values: Values, out: Output<'_, f32>, combine: impl Fn(f32, f32, f32) -> f32) {
         let last = self.last.values(values);
         let before = self.before.values(values);
         let earlier = self.earlier.as_ref().unwrap_or(&self.before).values(values);
         match (&self.region, values) {
             (Some(region), Values::Region) => {
-                for (out, &node) in out.chunks_exact_mut(3).zip(region) {
-                    for (axis, out) in out.iter_mut().enumerate() {
-                        let i = 3 * node as usize + axis;
-                        *out = combine(earlier[i], before[i], last[i]);
-                    }
-                }
+                let [earlier, before, last] = [earlier, before, last].map(|v| v.as_chunks::<3>().0);
+                out.write_rows(region.iter().map(|&node| {
+                    let node = node as usize;
+                    let (e, b, l) = (earlier[node], before[node], last[node]);
+                    [0, 1, 2].map(|axis| combine(e[axis], b[axis], l[axis]))
+                }));
             }
             _ => {
-                for (((out, &e), &b), &l) in out.iter_mut().zip(earlier).zip(before).zip(last) {
-                    *out = combine(e, b, l);
-                }
+                let all = earlier.iter().zip(before).zip(last);
+                out.write(all.map(|((&e, &b), &l)| combine(e, b, l)));
             }
         }
     }

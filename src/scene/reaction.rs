@@ -17,7 +17,9 @@ use crate::bundle::Mesh;
 use crate::error::{Error, Result};
 use crate::forces::ReactionForces;
 use crate::kernels::FlushToZero;
+use crate::memory;
 use crate::model::Model;
+use crate::output::Output;
 
 /// The elements' forces of a scene without a prior.
 pub struct Haptics {
@@ -40,6 +42,11 @@ impl Scene {
     /// # Errors
     /// [`Error::Argument`] for a wrong length, [`Error::Busy`].
     pub fn contact_force(&self, out: &mut [f32]) -> Result<()> {
+        self.contact_force_to(out.into())
+    }
+
+    /// [`Scene::contact_force`] into memory that need not be initialised; a failed call leaves it as it is.
+    pub(crate) fn contact_force_to(&self, out: Output<'_, f32>) -> Result<()> {
         self.with(|core, published| {
             let want = 3 * core.contact.len();
             if out.len() != want {
@@ -48,18 +55,29 @@ impl Scene {
                     out.len()
                 )));
             }
-            if core.corrected_reaction(out) || core.prior_reaction(out)? {
-                return Ok(());
-            }
-            let mut haptics = lock(&self.tools.forces)?;
-            if haptics.is_none() {
-                // Made of many lists: what they take together is asked for first.
-                let bytes = 160 * self.mesh.tets.len() / 4 + 8 * self.mesh.positions.len();
-                crate::memory::probe(bytes, "the elements' forces")?;
-            }
-            let haptics = haptics.get_or_insert_with(|| Haptics::new(&self.mesh, &self.model));
-            haptics.reaction(core, published, out)
+            let mut reaction = lock(&self.tools.reaction)?;
+            reaction.clear();
+            memory::reserve(&mut reaction, want, "the contact forces")?;
+            reaction.resize(want, 0.0);
+            self.react(core, published, &mut reaction)?;
+            out.copy_from(&reaction);
+            Ok(())
         })
+    }
+
+    /// The reaction of corrections, of the linear response, or of the elements: of the first that there is.
+    fn react(&self, core: &mut Core, published: &RwLock<Published>, out: &mut [f32]) -> Result<()> {
+        if core.corrected_reaction(out) || core.prior_reaction(out)? {
+            return Ok(());
+        }
+        let mut haptics = lock(&self.tools.forces)?;
+        if haptics.is_none() {
+            // Made of many lists: what they take together is asked for first.
+            let bytes = 160 * self.mesh.tets.len() / 4 + 8 * self.mesh.positions.len();
+            memory::probe(bytes, "the elements' forces")?;
+        }
+        let haptics = haptics.get_or_insert_with(|| Haptics::new(&self.mesh, &self.model));
+        haptics.reaction(core, published, out)
     }
 }
 
@@ -116,7 +134,7 @@ impl Haptics {
         self.forces.neighbourhood(&nodes, &mut self.around);
         self.decoded.resize(3 * self.around.len(), 0.0);
         if !self.around.is_empty() {
-            core.decode(published, &self.around, &mut self.decoded)?;
+            core.decode(published, &self.around, self.decoded.as_mut_slice().into())?;
         }
         for (&node, u) in self.around.iter().zip(self.decoded.chunks_exact(3)) {
             self.field[3 * node as usize..][..3].copy_from_slice(u);

@@ -12,6 +12,7 @@ use super::verdict::enforce;
 use crate::error::{Error, Result};
 use crate::kernels::FlushToZero;
 use crate::memory;
+use crate::output::Output;
 
 const WHAT: &str = "a scene's region and points";
 
@@ -30,7 +31,7 @@ impl Core {
         &mut self,
         published: &RwLock<Published>,
         nodes: &[u32],
-        out: &mut [f32],
+        out: Output<'_, f32>,
     ) -> Result<()> {
         let count = self.mesh.node_count();
         if out.len() != 3 * nodes.len() {
@@ -51,9 +52,8 @@ impl Core {
         let plan = NodePlan::new(&[nodes], count, self.engine.planned_prior())?;
         let points = AttachedPoints::default();
         self.decode_published(published, Which::Last, &plan, &points, &mut [])?;
-        for (out, &node) in out.chunks_exact_mut(3).zip(nodes) {
-            out.copy_from_slice(&self.next.field[3 * node as usize..3 * node as usize + 3]);
-        }
+        let field = self.next.field.as_chunks::<3>().0;
+        out.write_rows(nodes.iter().map(|&node| field[node as usize]));
         Ok(())
     }
 

@@ -41,6 +41,9 @@ pub struct Tools {
     frame_list: Mutex<Vec<Tool>>,
     #[cfg(feature = "forces")]
     pub(super) forces: Mutex<Option<Haptics>>,
+    /// The contact forces of the last call that asked for them.
+    #[cfg(feature = "forces")]
+    pub(super) reaction: Mutex<Vec<f32>>,
 }
 
 impl Tools {

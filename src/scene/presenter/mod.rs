@@ -22,6 +22,7 @@ use crate::kernels::rows::{RowPlan, decode_rows};
 use crate::kernels::{Isa, Pool};
 use crate::memory;
 use crate::model::Model;
+use crate::output::Output;
 use along::Along;
 use nodes::{Means, Nodes};
 
@@ -277,7 +278,7 @@ impl Presenter {
         scene: &Scene,
         tau: f64,
         driven: Contact<'_>,
-        out: &mut [f32],
+        out: Output<'_, f32>,
     ) -> Result<()> {
         let step_s = scene.step_s();
         let step = {
@@ -294,12 +295,12 @@ impl Presenter {
             self.before_s = tau;
             self.blend(tau, step_s, &mut nodal);
             match self.values {
-                Values::Region => out.copy_from_slice(&nodal),
+                Values::Region => out.copy_from(&nodal),
                 Values::Points => {
                     for (u, &node) in nodal.as_chunks::<3>().0.iter().zip(&self.region) {
                         self.free[3 * node as usize..][..3].copy_from_slice(u);
                     }
-                    out.fill(0.0);
+                    let out = out.filled(0.0);
                     self.attached.add_interpolated(1.0, &self.free, out);
                 }
             }

@@ -1,0 +1,90 @@
+//! What a scene shows: its states at the region and at the attached points, the contacts of its last step, statistics.
+
+use super::Scene;
+use super::core::lock_read;
+use super::published::Values;
+use crate::error::Result;
+use crate::output::Output;
+use crate::stats::SceneStats;
+
+impl Scene {
+    /// The last published state, `[n,3]`, mm, region order.
+    pub fn read(&self, out: &mut [f32]) -> Result<()> {
+        self.read_to(Values::Region, out.into())
+    }
+
+    /// Nodes of `read` (`K`, or the region's count).
+    pub fn region_count(&self) -> usize {
+        lock_read(&self.shared.published).count(Values::Region)
+    }
+
+    /// Number of attached points.
+    pub fn point_count(&self) -> usize {
+        lock_read(&self.shared.published).count(Values::Points)
+    }
+
+    /// Displacement `[n,3]` at the attached points in the last state.
+    pub fn read_points(&self, out: &mut [f32]) -> Result<()> {
+        self.read_to(Values::Points, out.into())
+    }
+
+    /// Between the state before (`alpha` 0) and the last state (1), region order. `alpha` is clamped to `[0, 1]`.
+    ///
+    /// What is shown is up to one `dt` old: at `alpha` 0 the state before, at 1 the newest.
+    pub fn sample(&self, alpha: f64, out: &mut [f32]) -> Result<()> {
+        self.sample_to(Values::Region, alpha, out.into())
+    }
+
+    /// As [`Scene::sample`], at the attached points.
+    pub fn sample_points(&self, alpha: f64, out: &mut [f32]) -> Result<()> {
+        self.sample_to(Values::Points, alpha, out.into())
+    }
+
+    /// Displacement `[n,3]` of any nodes in the last state.
+    ///
+    /// # Errors
+    /// [`Error::State`] before the first step.
+    pub fn decode(&self, nodes: &[u32], out: &mut [f32]) -> Result<()> {
+        self.decode_to(nodes, out.into())
+    }
+
+    /// The last published state at the region or the points, into memory that need not be initialised.
+    pub(crate) fn read_to(&self, values: Values, out: Output<'_, f32>) -> Result<()> {
+        lock_read(&self.shared.published).read(values, out)
+    }
+
+    /// [`Scene::sample`] at the region or the points, into memory that need not be initialised.
+    pub(crate) fn sample_to(&self, values: Values, alpha: f64, out: Output<'_, f32>) -> Result<()> {
+        lock_read(&self.shared.published).sample(values, alpha, out)
+    }
+
+    /// [`Scene::decode`] into memory that need not be initialised.
+    pub(crate) fn decode_to(&self, nodes: &[u32], out: Output<'_, f32>) -> Result<()> {
+        self.with(|core, published| core.decode(published, nodes, out))
+    }
+
+    /// Whether an output for the region or the points has `len` floats.
+    ///
+    /// # Errors
+    /// [`Error::Argument`]; [`Error::State`] where no points are attached.
+    pub(crate) fn check_len(&self, values: Values, len: usize) -> Result<()> {
+        lock_read(&self.shared.published).check_len(values, len)
+    }
+
+    /// Statistics of the last step.
+    pub fn stats(&self) -> SceneStats {
+        let mut stats = lock_read(&self.shared.published).stats;
+        stats.poisoned = self.shared.is_poisoned();
+        #[cfg(feature = "contact")]
+        {
+            stats.memory_bytes += self.presenter_bytes() as u64;
+        }
+        stats
+    }
+
+    /// Nodes in contact in the last step, in the host's order, and `[m,3]` their displacements, mm.
+    pub fn last_contacts(&self) -> Result<(Vec<u32>, Vec<f32>)> {
+        let shared = lock_read(&self.shared.published);
+        Ok((shared.contact_nodes.clone(), shared.contact_vectors.clone()))
+    }
+}
