@@ -17,6 +17,11 @@ import pathlib
 import statistics
 import struct
 import subprocess
+import sys
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
+
+from upt_training.loads import OTHER_DAMPING, SCHEMES  # noqa: E402
 
 BEGIN = "<!-- corrections_table.py: begin {} -->"
 END = "<!-- corrections_table.py: end {} -->"
@@ -73,8 +78,8 @@ def rows(upt: str, bundle: str, cases: list[pathlib.Path], counts: list[str], th
                 largest.append(result["overall"]["max_mm"])
                 for step, estimate, ms in zip(result["steps"], result["estimated_mm"], result["ms"], strict=True):
                     if estimate is not None:
-                        if scheme != "hard-ring":
-                            group = GROUPS[scheme.startswith("hard")]
+                        if scheme not in OTHER_DAMPING:
+                            group = GROUPS[SCHEMES[scheme]["group"] == "hard"]
                             pairs[group][count].append((estimate, step["mse_mm2"] ** 0.5))
                         times[count].append(ms)
                     elif count == "0":

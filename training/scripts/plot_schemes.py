@@ -14,6 +14,14 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "training"))
+
+from upt_training.loads import SCHEMES  # noqa: E402
+
+
+def span(low, high):
+    """A range as `20 to 40`."""
+    return f"{low:g}" if low == high else f"{low:g} to {high:g}"
 
 
 def main():
@@ -28,7 +36,8 @@ def main():
         time = [row["t_s"] for row in rows]
         axis.plot(time, [row["push"] for row in rows], color="tab:blue", label="push factor")
         axis.set_ylim(-0.05, 1.1)
-        axis.set_title(f"{name}: {rows[0]['magnitude_mm']:.4g} mm, {rows[0]['faces']:.3g} faces", fontsize=10)
+        spec = SCHEMES[name]
+        axis.set_title(f"{name}: {span(*spec['magnitude_mm'])} mm, {span(*spec['faces'])} faces", fontsize=10)
         angles = axis.twinx()
         angles.plot(time, [row["phi_deg"] for row in rows], color="tab:orange", lw=1, label="tilt phi")
         angles.plot(time, [row["theta_deg"] for row in rows], color="tab:green", lw=1, ls="--", label="turn theta")

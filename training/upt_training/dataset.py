@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from upt_training.errors import InputError
+from upt_training.loads import STATIC
 from upt_training.mesh_file import Mesh
 
 DTYPES = {
@@ -162,7 +163,7 @@ def open_dataset(folder: Path | str, mesh: Mesh) -> Dataset:
         )
     cases = []
     for entry in manifest["cases"]:
-        if entry.get("status") != "done" or str(entry["scheme"]).startswith("static"):
+        if entry.get("status") != "done" or str(entry["scheme"]) in STATIC:
             continue
         file = folder / entry["file"]
         open_trajectory(file, mesh)

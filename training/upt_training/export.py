@@ -12,6 +12,7 @@ from upt_training.bundle import MATERIAL, write_bundle
 from upt_training.config import settings_from_dict
 from upt_training.dataset import Dataset, open_dataset, open_trajectory
 from upt_training.envelope import measure_envelope
+from upt_training.loads import TRAINED
 from upt_training.mesh_file import Mesh, load_mesh
 from upt_training.model import Upt, load_state
 from upt_training.prior_table import PriorTable
@@ -74,7 +75,7 @@ def bundle_errors(path: Path) -> dict:
         "all": result["all"],
     }.items():
         out[name] = {k: round(v["mean"], 6) for k, v in table["bundle"].items()}
-    inner = [c["bundle"] for c in result["cases"] if c["scheme"] in "1234"]
+    inner = [c["bundle"] for c in result["cases"] if c["scheme"] in TRAINED]
     if inner:
         out["schemes_1_4"] = {k: round(float(np.mean([c[k] for c in inner])), 6) for k in inner[0]}
     return out

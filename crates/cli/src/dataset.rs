@@ -1,7 +1,7 @@
 //! `upt dataset`: many cases in a folder, resumable and shardable (docs/guide/datasets.md).
 
 use crate::simulate::SolverArguments;
-use crate::tool_scale;
+use crate::{loads, tool_scale};
 use anyhow::{Context, bail};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -24,11 +24,9 @@ pub struct Options {
     /// Held nodes: `fixed` or `supported`.
     #[arg(long, default_value = "fixed")]
     boundary: Boundary,
-    /// Schemes: `1-4`, `5`, `1,3`, `hard`, `probe`, a regime's name; `static`, `static-two`, `static-deep` are equilibria.
-    #[arg(long, value_parser = Scheme::parse_list, required_unless_present = "tools")]
+    #[arg(long, help = loads::schemes_help(), value_parser = Scheme::parse_list, required_unless_present = "tools")]
     schemes: Option<std::vec::Vec<Scheme>>,
-    /// Programmes of rigid tools: `press`, `probe`, `stroke`, `retract`, `poke`, `lift`, `two`, `wobble`, `grasp`, `edge`; `all`.
-    #[arg(long, value_parser = ToolProgramme::parse_list)]
+    #[arg(long, help = loads::programmes_help(), value_parser = ToolProgramme::parse_list)]
     tools: Option<std::vec::Vec<ToolProgramme>>,
     #[command(flatten)]
     sizes: tool_scale::Arguments,

@@ -20,6 +20,7 @@ mod haptics;
 mod host;
 #[cfg(not(all(feature = "files", feature = "linear")))]
 mod left_out;
+mod loads;
 mod machine;
 #[cfg(all(feature = "files", feature = "linear"))]
 mod make;
@@ -117,6 +118,8 @@ enum Command {
     /// Left out of this build.
     #[cfg(not(feature = "linear"))]
     Modes(left_out::Options),
+    /// List the schemes and the programmes of tools, with the ranges that their cases are drawn from.
+    Loads(loads::Options),
     /// Run one reference simulation and write its trajectory.
     Simulate(simulate::Options),
     /// Run many reference simulations into a folder; resumes, and splits over machines.
@@ -176,6 +179,7 @@ fn main() -> ExitCode {
         Command::Modes(options) => modes::run(&options),
         #[cfg(not(feature = "linear"))]
         Command::Modes(options) => left_out::run("linear", &options),
+        Command::Loads(options) => loads::run(&options),
         Command::Simulate(options) => simulate::run(&options),
         Command::Dataset(options) => dataset::run(&options),
         Command::Rollout(options) => rollout::run(&options),

@@ -1,6 +1,6 @@
 //! `upt simulate`: one case of a scheme on a mesh, as a trajectory file.
 
-use crate::tool_scale;
+use crate::{loads, tool_scale};
 use anyhow::Context;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -18,11 +18,11 @@ pub struct Options {
     /// Mesh file (*.mesh.safetensors).
     #[arg(long)]
     mesh: PathBuf,
-    /// Scheme: 1 to 5, or a hard regime (hard-deep, hard-fast, hard-two, hard-slide, hard-ring).
-    #[arg(long, required_unless_present = "tool")]
+    /// Scheme of prescribed contact.
+    #[arg(long, value_parser = loads::scheme(), required_unless_present = "tool")]
     scheme: Option<Scheme>,
-    /// Programme of rigid tools: press, probe, stroke, retract, poke, lift, two, wobble, grasp, edge.
-    #[arg(long, conflicts_with = "scheme")]
+    /// Programme of rigid tools.
+    #[arg(long, value_parser = loads::programme(), conflicts_with = "scheme")]
     tool: Option<ToolProgramme>,
     /// Convex hull of this STL, OBJ or PLY file (mm; y up the shaft, the lowest end touches) in place of the programme's tool.
     #[cfg(feature = "files")]

@@ -29,14 +29,6 @@ pub struct Options {
 /// Growth of the resident memory after the first line that still counts as flat, KiB.
 const FLAT_KIB: u64 = 1024;
 
-const SCHEMES: [Scheme; 5] = [
-    Scheme::One,
-    Scheme::Two,
-    Scheme::Three,
-    Scheme::Four,
-    Scheme::Five,
-];
-
 /// Exit code 1 when memory grew or a step failed.
 pub fn run(options: &Options) -> Result<ExitCode> {
     let bench = Bench::open(&options.bundle, false)
@@ -49,9 +41,11 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     let (mut done, mut case, mut refused) = (0, 0u64, 0);
     let (mut largest, mut memory) = (0.0f32, Vec::new());
     while done < options.steps {
-        let Ok(programme) =
-            Programme::new(SCHEMES[case as usize % 5], &bench.domain, 200_000 + case)
-        else {
+        let Ok(programme) = Programme::new(
+            Scheme::NUMBERED[case as usize % 5],
+            &bench.domain,
+            200_000 + case,
+        ) else {
             case += 1;
             continue;
         };

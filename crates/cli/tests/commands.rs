@@ -84,6 +84,30 @@ fn wrong_input_is_exit_code_2_with_a_message() {
 }
 
 #[test]
+fn loads_are_listed_and_their_names_are_values() {
+    let tables = json(&run(&["loads", "--json"]));
+    let names = |table: &str| -> Vec<String> {
+        let rows = tables[table].as_array().expect("rows");
+        let names = rows.iter().map(|row| row["name"].as_str().expect("a name"));
+        names.map(str::to_owned).collect()
+    };
+    let page = String::from_utf8(run(&["loads"]).stdout).unwrap();
+    for name in names("schemes").iter().chain(&names("programmes")) {
+        assert!(page.contains(&format!("| `{name}`")), "{name}: {page}");
+    }
+    // A name of the table is taken, and the mesh is what is wrong; another name is refused with those that there are.
+    for (option, name) in [("--scheme", "hard-ring"), ("--tool", "wobble")] {
+        let with = |value: &str| {
+            let output = run(&["simulate", "--mesh", "no-such", "--out", "x", option, value]);
+            assert_eq!(output.status.code(), Some(2));
+            String::from_utf8_lossy(&output.stderr).into_owned()
+        };
+        assert!(with(name).contains("no-such"), "{}", with(name));
+        assert!(with("shove").contains(name), "{}", with("shove"));
+    }
+}
+
+#[test]
 fn a_closed_pipe_is_not_a_panic() {
     let mut child = upt(&["completions", "zsh"])
         .stdout(Stdio::piped())

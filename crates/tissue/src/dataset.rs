@@ -6,7 +6,7 @@
 //! leaves a small record beside its trajectory; the manifest is put together from
 //! the records, so it is right whoever writes it last.
 
-pub use crate::load::Load;
+pub use crate::loads::Load;
 use crate::material::Material;
 use crate::mesh::{Boundary, Mesh};
 use crate::programmes::ToolScale;

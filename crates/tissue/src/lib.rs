@@ -23,7 +23,7 @@ pub mod dataset;
 pub mod export;
 #[cfg(feature = "linear")]
 pub mod linear;
-mod load;
+pub mod loads;
 pub mod mesh;
 #[cfg(feature = "files")]
 pub mod mesh_import;

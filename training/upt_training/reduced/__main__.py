@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from upt_training.errors import InputError
+from upt_training.loads import WITHHELD
 from upt_training.mesh_file import load_mesh
 from upt_training.reduced.build import Options, Progress, build
 from upt_training.reduced.columns import load_columns
@@ -132,7 +133,7 @@ def run_evaluate(args: argparse.Namespace) -> None:
     mesh = load_mesh(args.bundle / "mesh.safetensors")
     cases = [case for folder in args.data for case in open_dataset(folder, mesh.sha256)]
     if not args.all:
-        cases = [case for case in cases if case.split == "test" or case.scheme == "5"]
+        cases = [case for case in cases if case.split == "test" or case.scheme == WITHHELD]
     if not cases:
         raise InputError("no case to evaluate: the datasets have no finished test case (use --all for every case)")
     result = evaluate(args.bundle, cases, Progress("evaluation"))

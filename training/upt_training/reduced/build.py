@@ -19,6 +19,7 @@ import torch
 
 from upt_training.bundle_folder import write_manifest
 from upt_training.errors import InputError
+from upt_training.loads import TWO_INSTRUMENTS, WITHHELD
 from upt_training.mesh_file import Mesh, load_mesh
 from upt_training.reduced.columns import Columns, load_columns
 from upt_training.reduced.evaluate import evaluate, table
@@ -146,7 +147,9 @@ def projected_statics(options: Options, sources: list[tuple[str, Source]], modes
 def trainable(cases: list[Case]) -> list[Case]:
     """Cases of the split `train` with the bundle's own damping, scheme 5 never."""
     return [
-        case for case in cases if case.split == "train" and case.scheme != "5" and case.damping_per_s == DAMPING_PER_S
+        case
+        for case in cases
+        if case.split == "train" and case.scheme != WITHHELD and case.damping_per_s == DAMPING_PER_S
     ]
 
 
@@ -157,8 +160,8 @@ def split_states(states: States) -> tuple[States, States, States]:
     coarse ones do. Interpolated coarse cases (split `coarse`; their test cases are not used at all) are trained on, but
     for those of the same index as a validation case: equal seeds may choose the same site.
     """
-    own = np.flatnonzero((states.split == "train") & (states.scheme != "5"))
-    coarse = (states.split == "coarse") & (states.scheme != "5")
+    own = np.flatnonzero((states.split == "train") & (states.scheme != WITHHELD))
+    coarse = (states.split == "coarse") & (states.scheme != WITHHELD)
     pool = own if len(own) > 3 else np.flatnonzero(coarse)
     held_out = np.zeros(states.cases, bool)
     held_out[pool[3::5] if coarse.any() else pool[5::9]] = True
@@ -173,12 +176,12 @@ def split_states(states: States) -> tuple[States, States, States]:
 
 def training_states(states: States) -> States:
     """Every training case, those that validate too."""
-    return states.pick(np.isin(states.split, ["train", "coarse"]) & (states.scheme != "5"))
+    return states.pick(np.isin(states.split, ["train", "coarse"]) & (states.scheme != WITHHELD))
 
 
 def own_scheme_5(states: States) -> np.ndarray:
     """Cases of scheme 5 on the model's own mesh."""
-    return (states.scheme == "5") & ~np.char.startswith(states.split, "coarse")
+    return (states.scheme == WITHHELD) & ~np.char.startswith(states.split, "coarse")
 
 
 def bound_limits(states: States, statics: Statics | None = None) -> Limits:
@@ -227,9 +230,6 @@ def tables(options: Options, mesh: Mesh, columns: Columns, modes: Modes) -> tupl
     save_prior(path, prior, np.float32)
     info_path.write_text(json.dumps(info))
     return prior, info
-
-
-TWO_INSTRUMENTS = ("hard-two", "static-two")
 
 
 def envelope_of(cases: list[Case], mesh: Mesh) -> dict:
@@ -339,7 +339,7 @@ def finish(options: Options, settings: Settings, description: str, made: Prepare
     manifest = write_reduced_bundle(
         options.out, made.mesh, made.columns, made.prior, model, limits, about, dtype, options.near_mm
     )
-    tested = [case for case in made.own if case.split == "test" or case.scheme == "5"]
+    tested = [case for case in made.own if case.split == "test" or case.scheme == WITHHELD]
     result = evaluate(options.out, tested, Progress("evaluation")) if tested else {"reduced": {}}
     manifest["errors"] = {group: _published(e) for group, e in result["reduced"].items()}
     write_manifest(options.out, manifest)

@@ -13,6 +13,7 @@ import numpy as np
 
 from upt_training.bundle_rollout import BundleRunner
 from upt_training.errors import InputError
+from upt_training.loads import WITHHELD
 from upt_training.mesh_file import load_mesh
 from upt_training.reduced.evaluate import CaseError, roll_case, zero_error
 from upt_training.reduced.runner import ReducedRunner
@@ -39,7 +40,7 @@ def compare(
     for label, folder in regimes:
         cases = open_dataset(folder, mesh.sha256)
         if not every_case:
-            cases = [case for case in cases if case.split == "test" or case.scheme == "5"]
+            cases = [case for case in cases if case.split == "test" or case.scheme == WITHHELD]
         if not cases:
             raise InputError(f"{folder}: no finished case to compare on (use --all for every case)")
         found: dict[str, list[CaseError]] = {}

@@ -14,6 +14,7 @@ from typing import Protocol
 import numpy as np
 
 from upt_training.errors import InputError
+from upt_training.loads import TRAINED, WITHHELD
 from upt_training.reduced.runner import ReducedRunner
 from upt_training.reduced.trajectories import Case
 
@@ -84,9 +85,9 @@ def zero_error(case: Case) -> CaseError:
 
 def group_of(scheme: str) -> str:
     """`schemes_1_4`, `scheme_5`, or `hard`."""
-    if scheme in ("1", "2", "3", "4"):
+    if scheme in TRAINED:
         return "schemes_1_4"
-    return "scheme_5" if scheme == "5" else "hard"
+    return "scheme_5" if scheme == WITHHELD else "hard"
 
 
 def summarise(errors: list[CaseError]) -> dict[str, dict]:

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from upt_training.loads import WITHHELD
 from upt_training.reduced.build import Options, Prepared, finish, prepare
 from upt_training.reduced.evaluate import group_of
 from upt_training.reduced.prior import Prior
@@ -40,7 +41,7 @@ def leading_prior(prior: Prior, modes: int) -> Prior:
 def floor(states: States, modes: int, group: str) -> float:
     """Mean squared error of the truth projected on `L(c)` and `modes` modes, mm², over the group's unseen cases."""
     schemes = np.array([group_of(str(scheme)) for scheme in states.scheme])
-    unseen = (states.split == "test") | ((states.scheme == "5") & (states.split == "train"))
+    unseen = (states.split == "test") | ((states.scheme == WITHHELD) & (states.split == "train"))
     part = states.pick(unseen & (schemes == group))
     outside = part.residual_square - (part.b[:, :, :modes].astype(np.float64) ** 2).sum(2)
     return float(np.maximum(outside, 0.0)[:, 2:].mean() / part.nodes) if part.cases else float("nan")

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
+from upt_training.loads import TRAINED, WITHHELD
 from upt_training.reduced.base import Equilibria, fit_base
 from upt_training.reduced.network import Correction
 from upt_training.reduced.rollout import (
@@ -112,8 +113,8 @@ def summary(states: States, b: np.ndarray) -> dict[str, float]:
     """Mean squared errors of full rollouts, mm²: all cases, schemes 1-4, scheme 5, after abrupt release."""
     mse = field_mse(states, b)
     out = {"mse": float(mse[:, 2:].mean())}
-    trained = np.isin(states.scheme, ["1", "2", "3", "4"])
-    for name, mask in (("schemes_1_4", trained), ("scheme_5", states.scheme == "5")):
+    trained = np.isin(states.scheme, TRAINED)
+    for name, mask in (("schemes_1_4", trained), ("scheme_5", states.scheme == WITHHELD)):
         if mask.any():
             out[name] = float(mse[mask][:, 2:].mean())
     released = release_frames(states)

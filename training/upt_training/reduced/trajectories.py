@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from upt_training.errors import InputError
+from upt_training.loads import STATIC
 from upt_training.reduced.columns import Columns, map_tensors
 from upt_training.reduced.prior import trajectory_forces
 
@@ -36,7 +37,7 @@ class Case:
     @property
     def is_static(self) -> bool:
         """Whether the frames are equilibria without an order in time."""
-        return self.scheme.startswith("static")
+        return self.scheme in STATIC
 
     def contact_row(self, frame: int) -> np.ndarray:
         return self.nodes[self.offsets[frame] : self.offsets[frame + 1]]

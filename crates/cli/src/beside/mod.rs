@@ -57,14 +57,6 @@ pub struct Options {
 const CASE: usize = 160;
 /// Steps in contact before the release.
 const HELD: usize = 20;
-const SCHEMES: [Scheme; 5] = [
-    Scheme::One,
-    Scheme::Two,
-    Scheme::Three,
-    Scheme::Four,
-    Scheme::Five,
-];
-
 /// What a release came to.
 struct Release {
     moments: Vec<Moment>,
@@ -146,7 +138,11 @@ fn random_steps(bench: &Bench, steps: usize) -> Result<Vec<Moment>> {
     let mut pair = Pair::new(bench)?;
     let mut moments = Vec::with_capacity(steps);
     for case in 0..steps / CASE {
-        let programme = Programme::new(SCHEMES[case % 5], &bench.domain, 70_000 + case as u64)?;
+        let programme = Programme::new(
+            Scheme::NUMBERED[case % 5],
+            &bench.domain,
+            70_000 + case as u64,
+        )?;
         for step in 1..=CASE {
             let contact = programme.contact(step);
             moments.push(pair.step(&contact)?);

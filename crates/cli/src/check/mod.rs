@@ -29,8 +29,8 @@ use tissue::programmes::ToolProgramme;
 use tissue::schemes::{FRAMES, Scheme};
 use upt::{Corrections, Model, ModelOptions};
 
-use crate::progress;
 use crate::tool_scale::{self, Chosen};
+use crate::{loads, progress};
 use case::{Body, Case, Replay};
 use parallel::{in_parallel, workers};
 use score::{Regions, Score};
@@ -63,8 +63,7 @@ pub struct Options {
     /// Another seed: other sites than the certificate's.
     #[arg(long)]
     seed: Option<u64>,
-    /// Programmes of rigid tools, such as press,stroke or all; left out: those of the certificate.
-    #[arg(long)]
+    #[arg(long, help = loads::programmes_help() + ". Left out: those of the certificate")]
     tools: Option<String>,
     #[command(flatten)]
     sizes: tool_scale::Arguments,

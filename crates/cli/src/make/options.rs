@@ -11,6 +11,7 @@ use tissue::mesh_import::Region;
 use tissue::programmes::{BodySize, REFERENCE_WIDTH_MM, ToolProgramme};
 
 use crate::effort::Effort;
+use crate::loads;
 use crate::tool_scale::{self, PUSH_MM};
 
 /// Areas that the checks' programmes have at scale 1, mm² (`tissue::schemes`).
@@ -62,9 +63,7 @@ pub struct Options {
     /// Held-out cases of the check; left out: as many as there is time for, at most 8.
     #[arg(long)]
     pub cases: Option<usize>,
-    /// Programmes of rigid tools that it must be good for, such as press,stroke or all: two cases of each are part of the certificate and of
-    /// --target-error.
-    #[arg(long)]
+    #[arg(long, help = loads::programmes_help() + ". Two cases of each are part of the certificate and of --target-error")]
     pub tools: Option<String>,
     #[command(flatten)]
     pub sizes: tool_scale::Arguments,

@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use anyhow::Result;
-use tissue::schemes::{Programme, Scheme};
+use tissue::schemes::{Group, Programme, Scheme};
 
 use super::bench::{Bench, Run, Touch, largest, push, ramp};
 use super::{Row, half, inputs, outside, progress, storm, tools};
@@ -38,7 +38,7 @@ fn inside(bench: &Bench) -> Result<Vec<Row>> {
         finite: true,
         ..Run::default()
     };
-    for scheme in [Scheme::One, Scheme::Two, Scheme::Three, Scheme::Four] {
+    for scheme in Scheme::of(Group::Trained) {
         for case in 0..cases {
             let scene = bench.scene()?;
             let programme = Programme::new(scheme, &bench.domain, 9_000 + case)?;
@@ -75,13 +75,6 @@ fn long_runs(bench: &Bench) -> Result<Vec<Row>> {
     let (mut first, mut worst) = (0.0f32, 0.0f32);
     let mut seed = 0;
     let mut programme = Programme::new(Scheme::One, &bench.domain, seed)?;
-    let all = [
-        Scheme::One,
-        Scheme::Two,
-        Scheme::Three,
-        Scheme::Four,
-        Scheme::Five,
-    ];
     let chunk = 160;
     let mut total = Run {
         finite: true,
@@ -89,7 +82,11 @@ fn long_runs(bench: &Bench) -> Result<Vec<Row>> {
     };
     for start in (0..steps).step_by(chunk) {
         seed += 1;
-        if let Ok(next) = Programme::new(all[seed as usize % 5], &bench.domain, 40_000 + seed) {
+        if let Ok(next) = Programme::new(
+            Scheme::NUMBERED[seed as usize % 5],
+            &bench.domain,
+            40_000 + seed,
+        ) {
             programme = next;
         }
         let mut imposed = 1.0f32;

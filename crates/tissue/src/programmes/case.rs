@@ -13,8 +13,8 @@ use contact::{Body, Matrix, Pose, Rotation, Shape, Vector, pose};
 /// Half the length of a shaft, mm.
 const SHAFT_MM: f32 = 20.0;
 /// Half the thickness of a blade and a foot, and the radius of their edges, mm.
-const BLADE_MM: [f32; 2] = [1.5, 1.0];
-const FOOT_MM: [f32; 2] = [3.0, 2.0];
+pub(crate) const BLADE_MM: [f32; 2] = [1.5, 1.0];
+pub(crate) const FOOT_MM: [f32; 2] = [3.0, 2.0];
 /// How deep a tool may be in what it cannot touch, the surface outside of the domain at rest, mm.
 const STRAY_MM: f32 = 1.0;
 /// Sites that are tried for one seed.
@@ -252,7 +252,7 @@ fn hand(
     let body = Body::new(&shape).ok()?;
     // The shaft leans from the normal by an angle whose sine is even in the disc.
     let frame = contact::friction::frame(site.outward);
-    let angle = (lean.sqrt() * specification.lean) as f32;
+    let angle = (lean.sqrt() * specification.lean_rad) as f32;
     let round = (round * std::f64::consts::TAU) as f32;
     let (sin, cos) = angle.sin_cos();
     let up = site.outward * cos + (frame.y_axis * round.cos() + frame.z_axis * round.sin()) * sin;

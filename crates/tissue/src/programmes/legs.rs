@@ -1,6 +1,7 @@
 //! A motion as legs: where the tool is relative to its start, and how long it takes to get there.
 
-use super::{Range, Specification};
+use super::Specification;
+use crate::loads::Range;
 use crate::schemes::SplitMix;
 use contact::{Pose, Rotation, Vector};
 
@@ -63,8 +64,8 @@ impl Legs {
             now.along = slide;
             legs.go(now, slide / slide_speed);
         }
-        if specification.wobble[0] > 0.0 {
-            let [tilt, turn] = specification.wobble;
+        if specification.wobble_rad[0] > 0.0 {
+            let [tilt, turn] = specification.wobble_rad;
             for sign in [1.0, -1.0, 0.0] {
                 (now.tilt, now.turn) = (sign * tilt, -sign * turn);
                 legs.go(now, 0.5);

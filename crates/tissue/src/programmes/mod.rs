@@ -11,14 +11,17 @@ mod legs;
 mod scale;
 mod site;
 
+pub(crate) use case::{BLADE_MM, FOOT_MM};
 pub use case::{ProgrammeError, ToolCase};
 pub use scale::{BodySize, DEEPEST_SHARE, REFERENCE_THICKNESS_MM, REFERENCE_WIDTH_MM, ToolScale};
 
-/// Lowest and highest value of a draw.
-pub type Range = [f64; 2];
+use serde::Serialize;
+
+use crate::loads::Range;
 
 /// What touches the tissue.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Tip {
     /// A rod with a round end of the drawn radius.
     Rod,
@@ -29,9 +32,12 @@ pub enum Tip {
 }
 
 /// A row of the table.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Specification {
+    /// Name on the command line.
     pub name: &'static str,
+    /// What it does, in one phrase.
+    pub summary: &'static str,
     pub tip: Tip,
     /// Radius of a rod or half width of a blade or foot, mm.
     pub radius_mm: Range,
@@ -44,7 +50,7 @@ pub struct Specification {
     /// mm/s.
     pub slide_mm_s: Range,
     /// Largest tilt and turn about the tip while pressed, radians; to and fro twice.
-    pub wobble: [f64; 2],
+    pub wobble_rad: [f64; 2],
     /// Way out while it grasps, mm.
     pub pull_mm: Range,
     /// Pull at which every second grasp tears off, mN.
@@ -56,7 +62,7 @@ pub struct Specification {
     /// Coulomb's coefficient.
     pub friction: Range,
     /// Largest angle between the way in and the surface's normal, radians.
-    pub lean: f64,
+    pub lean_rad: f64,
     /// Distance of a second tool's site, mm.
     pub second_mm: Option<Range>,
     /// The site lies on the border of the domain.
@@ -66,19 +72,20 @@ pub struct Specification {
 /// What most rows share.
 const PLAIN: Specification = Specification {
     name: "",
+    summary: "",
     tip: Tip::Rod,
     radius_mm: [4.0, 8.0],
     depth_mm: [4.0, 8.0],
     press_mm_s: [10.0, 25.0],
     slide_mm: [0.0, 0.0],
     slide_mm_s: [10.0, 10.0],
-    wobble: [0.0, 0.0],
+    wobble_rad: [0.0, 0.0],
     pull_mm: [0.0, 0.0],
     tear_off_mn: [0.0, 0.0],
     hold_s: [0.4, 0.8],
     lift_mm_s: [10.0, 30.0],
     friction: [0.0, 0.3],
-    lean: 0.35,
+    lean_rad: 0.35,
     second_mm: None,
     border: false,
 };
@@ -87,37 +94,42 @@ const PLAIN: Specification = Specification {
 pub const TABLE: [Specification; 10] = [
     Specification {
         name: "press",
+        summary: "presses, holds, leaves",
         radius_mm: [4.0, 12.0],
         depth_mm: [2.0, 15.0],
         ..PLAIN
     },
     Specification {
         name: "probe",
+        summary: "presses with a fine tip",
         radius_mm: [2.0, 2.0],
         depth_mm: [2.0, 6.0],
         ..PLAIN
     },
     Specification {
         name: "stroke",
+        summary: "presses, then slides along the surface",
         radius_mm: [3.0, 6.0],
         slide_mm: [10.0, 25.0],
         slide_mm_s: [5.0, 50.0],
-        lean: 0.2,
+        lean_rad: 0.2,
         ..PLAIN
     },
     Specification {
         name: "retract",
+        summary: "pushes tissue aside with the flat of a blade, and holds it",
         tip: Tip::Blade,
         radius_mm: [4.0, 10.0],
         depth_mm: [3.0, 6.0],
         slide_mm: [4.0, 8.0],
         slide_mm_s: [5.0, 10.0],
         hold_s: [1.0, 1.5],
-        lean: 0.2,
+        lean_rad: 0.2,
         ..PLAIN
     },
     Specification {
         name: "poke",
+        summary: "presses and leaves fast",
         radius_mm: [3.0, 6.0],
         depth_mm: [4.0, 10.0],
         press_mm_s: [50.0, 100.0],
@@ -127,40 +139,45 @@ pub const TABLE: [Specification; 10] = [
     },
     Specification {
         name: "lift",
+        summary: "presses, and leaves at any speed",
         depth_mm: [3.0, 5.0],
         lift_mm_s: [1.0, 200.0],
         ..PLAIN
     },
     Specification {
         name: "two",
+        summary: "two rods press, together or one after the other",
         radius_mm: [3.0, 5.0],
         depth_mm: [3.0, 8.0],
-        lean: 0.15,
+        lean_rad: 0.15,
         second_mm: Some([10.0, 40.0]),
         ..PLAIN
     },
     Specification {
         name: "wobble",
+        summary: "presses, then tilts and turns to and fro",
         tip: Tip::Foot,
         radius_mm: [4.0, 7.0],
         depth_mm: [4.0, 6.0],
-        wobble: [0.35, 0.8],
-        lean: 0.15,
+        wobble_rad: [0.35, 0.8],
+        lean_rad: 0.15,
         ..PLAIN
     },
     Specification {
         name: "grasp",
+        summary: "touches, closes, pulls; every second one tears off",
         radius_mm: [3.0, 4.0],
         depth_mm: [1.0, 2.0],
         pull_mm: [5.0, 8.0],
         tear_off_mn: [40.0, 120.0],
-        lean: 0.2,
+        lean_rad: 0.2,
         ..PLAIN
     },
     Specification {
         name: "edge",
+        summary: "presses on the border of `domain`",
         border: true,
-        lean: 0.15,
+        lean_rad: 0.15,
         ..PLAIN
     },
 ];

@@ -1,7 +1,8 @@
 //! How large the table's tools are on a body: as they are on a brain, smaller on a smaller or thinner body.
 
+use super::Specification;
 use super::site::Sites;
-use super::{Range, Specification};
+use crate::loads::Range;
 use crate::mesh::Mesh;
 use contact::Vector;
 

@@ -1,4 +1,4 @@
-//! What each scheme does: depth, patch size, and push factor and angles as functions of time.
+//! What each scheme does: its row's ranges at a case's draw, and push factor and angles as functions of time.
 
 use std::f64::consts::PI;
 
@@ -6,16 +6,9 @@ use super::random::SplitMix;
 use super::{FRAME_S, Scheme};
 
 /// One site of `probe` takes this long, s.
-pub(super) const PROBE_S: f64 = 1.6;
+pub const PROBE_S: f64 = 1.6;
 /// When the contact of a probe is lifted, s.
 pub(super) const PROBE_LIFT_S: f64 = 0.8;
-/// Sites of `probe`.
-pub(super) const PROBE_SITES: usize = 5;
-
-/// Sites of a static case: they are solved together, so a case's bytes do not depend on what else is computed.
-pub(super) const STATIC_SITES: usize = 8;
-/// Depths at each of them, equally spaced.
-pub(super) const STATIC_DEPTHS: usize = 4;
 
 /// Push factor and angles at one time.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -66,41 +59,20 @@ impl Draw {
 impl Scheme {
     /// Largest displacement, mm.
     pub fn magnitude_mm(self, draw: Draw) -> f64 {
-        match self {
-            Scheme::One => 12.0,
-            Scheme::Two => 10.0,
-            Scheme::Three | Scheme::HardRing => 13.0,
-            Scheme::Four => 15.0,
-            Scheme::Five => 12.5,
-            Scheme::HardDeep => 20.0 + 20.0 * draw.depth,
-            Scheme::HardFast | Scheme::HardTwo => 10.0 + 5.0 * draw.depth,
-            Scheme::HardSlide => 8.0 + 4.0 * draw.depth,
-            Scheme::Probe => 8.0 + 7.0 * draw.depth,
-            Scheme::Static => 8.0 + 8.0 * draw.depth,
-            Scheme::StaticTwo => 5.0 + 11.0 * draw.depth,
-            Scheme::StaticDeep => 20.0 + 20.0 * draw.depth,
-        }
+        let [low, high] = self.specification().magnitude_mm;
+        low + (high - low) * draw.depth
     }
 
     /// Patch area as a number of the paper's collision faces.
     pub fn face_count(self, draw: Draw) -> f64 {
-        match self {
-            Scheme::One => 50.0,
-            Scheme::Two => 25.0,
-            Scheme::Three | Scheme::HardRing => 60.0,
-            Scheme::Four => 100.0,
-            Scheme::Five => 75.0,
-            // Deep pushes on few faces would only tear the mesh.
-            Scheme::HardDeep => 60.0 + 40.0 * draw.size,
-            Scheme::HardFast | Scheme::HardTwo | Scheme::HardSlide => 25.0 + 50.0 * draw.size,
-            Scheme::Probe | Scheme::Static | Scheme::StaticTwo => 25.0 + 75.0 * draw.size,
-            Scheme::StaticDeep => 50.0 + 50.0 * draw.size,
-        }
+        let [low, high] = self.specification().faces;
+        low + (high - low) * draw.size
     }
 
     /// Push factor and angles at `t` seconds. At a site of a static scheme frame `k` is its `k`-th depth.
     pub fn pose(self, t: f64, draw: Draw) -> Pose {
         let spin = 2.0 * PI * draw.angle;
+        let [_, tilt] = self.specification().tilt_rad;
         match self {
             Scheme::One => Pose {
                 push: rise(t, 0.0, 2.5) * (1.0 - rise(t, 4.5, 7.5)),
@@ -109,17 +81,17 @@ impl Scheme {
             },
             Scheme::Two => Pose {
                 push: 0.6 * bump(t, 0.0, 2.2) + 0.8 * bump(t, 2.4, 4.6) + bump(t, 4.8, 7.0),
-                phi: PI / 6.0 * (2.0 * PI * t / 3.5).sin().abs(),
+                phi: tilt * (2.0 * PI * t / 3.5).sin().abs(),
                 theta: PI * rise(t, 0.0, 7.0),
             },
             Scheme::Three | Scheme::HardRing => Pose {
                 push: if t < 6.5 { (t / 6.0).min(1.0) } else { 0.0 },
-                phi: PI / 8.0,
+                phi: tilt,
                 theta: 2.0 * PI * (t / 6.5).min(1.0),
             },
             Scheme::Four => Pose {
                 push: rise(t, 0.0, 1.0) * (1.0 - 0.5 * rise(t, 4.0, 5.0) - 0.5 * rise(t, 6.0, 7.2)),
-                phi: PI / 5.0 * rise(t, 1.0, 2.5) - 2.0 * PI / 5.0 * rise(t, 2.5, 5.5),
+                phi: tilt * rise(t, 1.0, 2.5) - 2.0 * tilt * rise(t, 2.5, 5.5),
                 theta: PI / 2.0 * rise(t, 0.0, 8.0),
             },
             Scheme::Five => Pose {
@@ -128,12 +100,12 @@ impl Scheme {
                 } else {
                     0.0
                 },
-                phi: PI / 7.0 * rise(t, 0.0, 4.0),
+                phi: tilt * rise(t, 0.0, 4.0),
                 theta: PI / 2.0 * (2.0 * PI * t / 4.0).sin() + PI * t / 8.0,
             },
             Scheme::HardDeep => Pose {
                 push: rise(t, 0.0, 3.0) * (1.0 - rise(t, 5.0, 6.5)),
-                phi: PI / 12.0,
+                phi: tilt,
                 theta: spin,
             },
             Scheme::HardFast => Pose {
@@ -151,12 +123,12 @@ impl Scheme {
                         0.0
                     }
                 },
-                phi: PI / 10.0,
+                phi: tilt,
                 theta: spin,
             },
             Scheme::HardTwo => Pose {
                 push: rise(t, 0.0, 2.0) * (1.0 - rise(t, 5.0, 7.0)),
-                phi: PI / 8.0 * rise(t, 2.0, 4.0),
+                phi: tilt * rise(t, 2.0, 4.0),
                 theta: spin,
             },
             Scheme::HardSlide => Pose {
@@ -180,14 +152,10 @@ impl Scheme {
             Scheme::Static | Scheme::StaticTwo | Scheme::StaticDeep => {
                 // Each depth with a direction of its own: neighbours on the path stay good guesses of each other.
                 let depth = t / FRAME_S;
-                let widest = if self == Scheme::StaticDeep {
-                    PI / 6.0
-                } else {
-                    PI / 4.0
-                };
+                let deepest = self.specification().depths as f64;
                 Pose {
-                    push: (depth / STATIC_DEPTHS as f64).min(1.0),
-                    phi: widest * (7.0 * draw.angle + 0.31 * depth).fract(),
+                    push: (depth / deepest).min(1.0),
+                    phi: tilt * (7.0 * draw.angle + 0.31 * depth).fract(),
                     theta: spin + 0.5 * depth,
                 }
             }

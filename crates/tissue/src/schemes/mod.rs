@@ -6,17 +6,18 @@
 //! inward normal and the turn `theta(t)` about it. Contact nodes are prescribed to
 //! `magnitude * p(t) * direction(phi, theta)`; there is no contact where `p(t)` is
 //! zero. As in the paper, only the site varies between the cases of a scheme.
-//! Scheme 3 is the paper's; the others follow its description (10 to 15 mm, 25 to
-//! 100 faces, continuous functions). See `docs/guide/datasets.md` for a plot of each.
+//! Names, ranges and sources are in [`TABLE`]; `docs/guide/datasets.md` shows it, with a plot of each.
 
 mod load;
 mod programme;
 mod random;
 mod slide;
+mod table;
 
-pub use load::{Draw, Pose};
+pub use load::{Draw, PROBE_S, Pose};
 pub use programme::Programme;
 pub use random::SplitMix;
+pub use table::{Group, PAPER_SECTION, Specification, TABLE};
 
 /// Length of every simulation, s.
 pub const DURATION_S: f64 = 8.0;
@@ -25,41 +26,31 @@ pub const FRAME_S: f64 = 0.05;
 /// Frames of a trajectory, rest included.
 pub const FRAMES: usize = 161;
 
-/// A loading programme.
+/// A row of [`TABLE`], by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Scheme {
-    /// Straight push, hold, slow release: 12 mm, 50 faces.
     One,
-    /// Three presses of growing depth, tilt swinging to and fro: 10 mm, 25 faces.
     Two,
-    /// The paper's: tilt pi/8, one full turn while pushing in, lifted at 6.5 s: 13 mm, 60 faces.
     Three,
-    /// Quick push, then the direction slides while held, two-stage retreat: 15 mm, 100 faces.
     Four,
-    /// Withheld from training: pulsating push, tilt growing, turning back and forth, lifted at 5.5 s: 12.5 mm, 75 faces.
+    /// Withheld from training.
     Five,
-    /// 20 to 40 mm.
     HardDeep,
-    /// Full depth in one or two frames, abrupt lift.
     HardFast,
-    /// Two instruments at once.
     HardTwo,
-    /// The contact slides along the surface.
     HardSlide,
-    /// Scheme 3's load with a tenth of the damping.
     HardRing,
-    /// For training: five sites in a row, each pushed, tilted and let go within 1.6 s. Sites are what a learned
-    /// correction lacks, and 160 frames at one site say little more about it than 32.
+    /// Many sites in a row. Sites are what a learned correction lacks, and 160 frames at one site say little more
+    /// about it than 32.
     Probe,
-    /// For training: static equilibria, eight sites with four depths each, up to 8 to 16 mm.
     Static,
-    /// The same with two instruments at once.
     StaticTwo,
-    /// The same with one instrument, up to 20 to 40 mm.
     StaticDeep,
 }
 
 impl Scheme {
+    /// Number of schemes.
+    pub const COUNT: usize = Scheme::StaticDeep as usize + 1;
     /// The paper's five.
     pub const NUMBERED: [Scheme; 5] = [
         Scheme::One,
@@ -68,50 +59,34 @@ impl Scheme {
         Scheme::Four,
         Scheme::Five,
     ];
-    /// Regimes beyond them.
-    pub const HARD: [Scheme; 5] = [
-        Scheme::HardDeep,
-        Scheme::HardFast,
-        Scheme::HardTwo,
-        Scheme::HardSlide,
-        Scheme::HardRing,
-    ];
 
-    /// Lists of static equilibria.
-    pub const STATIC: [Scheme; 3] = [Scheme::Static, Scheme::StaticTwo, Scheme::StaticDeep];
+    /// Its row.
+    pub fn specification(self) -> &'static Specification {
+        &TABLE[self as usize]
+    }
+
+    /// The schemes of a group, in the table's order.
+    pub fn of(group: Group) -> impl Iterator<Item = Scheme> {
+        let rows = TABLE.iter().filter(move |row| row.group == group);
+        rows.map(|row| row.scheme)
+    }
 
     /// Whether its frames are equilibria of their own, found without time ([`crate::statics`]).
     pub fn is_static(self) -> bool {
-        Self::STATIC.contains(&self)
+        self.specification().group == Group::Static
     }
 
     /// Frames of a case, rest included.
     pub fn frames(self) -> usize {
-        if self.is_static() {
-            1 + load::STATIC_SITES * load::STATIC_DEPTHS
-        } else {
-            FRAMES
+        match self.specification() {
+            row if self.is_static() => 1 + row.sites * row.depths,
+            _ => FRAMES,
         }
     }
 
     /// Name in files and on the command line.
     pub fn name(self) -> &'static str {
-        match self {
-            Scheme::One => "1",
-            Scheme::Two => "2",
-            Scheme::Three => "3",
-            Scheme::Four => "4",
-            Scheme::Five => "5",
-            Scheme::HardDeep => "hard-deep",
-            Scheme::HardFast => "hard-fast",
-            Scheme::HardTwo => "hard-two",
-            Scheme::HardSlide => "hard-slide",
-            Scheme::HardRing => "hard-ring",
-            Scheme::Probe => "probe",
-            Scheme::Static => "static",
-            Scheme::StaticTwo => "static-two",
-            Scheme::StaticDeep => "static-deep",
-        }
+        self.specification().name
     }
 
     /// Parses a list: `3`, `1-4`, `1,3`, `hard`, `hard-deep`.
@@ -119,7 +94,7 @@ impl Scheme {
         let mut schemes = Vec::new();
         for part in text.split(',').map(str::trim) {
             if part == "hard" {
-                schemes.extend(Self::HARD);
+                schemes.extend(Self::of(Group::Hard));
                 continue;
             }
             let range = part
@@ -137,10 +112,7 @@ impl Scheme {
 
     /// Damping of the regime relative to the material's.
     pub fn damping_factor(self) -> f64 {
-        match self {
-            Scheme::HardRing => 0.1,
-            _ => 1.0,
-        }
+        self.specification().damping
     }
 }
 
@@ -148,18 +120,12 @@ impl std::str::FromStr for Scheme {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        Self::NUMBERED
-            .into_iter()
-            .chain(Self::HARD)
-            .chain([Scheme::Probe])
-            .chain(Self::STATIC)
-            .find(|scheme| scheme.name() == text)
-            .ok_or_else(|| {
-                format!(
-                    "scheme `{text}` is unknown; use 1 to 5, a range such as 1-4, `hard`, `probe`, or one of {}, {}",
-                    Self::HARD.map(Scheme::name).join(", "),
-                    Self::STATIC.map(Scheme::name).join(", ")
-                )
-            })
+        let row = TABLE.iter().find(|row| row.name == text);
+        row.map(|row| row.scheme).ok_or_else(|| {
+            format!(
+                "scheme `{text}` is unknown; use a range such as 1-4, `hard` for all hard ones, or one of {}",
+                TABLE.map(|row| row.name).join(", ")
+            )
+        })
     }
 }

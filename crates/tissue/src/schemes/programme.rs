@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::load::{Draw, PROBE_S, PROBE_SITES, STATIC_DEPTHS, STATIC_SITES};
+use super::load::{Draw, PROBE_S};
 use super::random::SplitMix;
 use super::slide::{SLIDE_STOPS, slide};
 use super::{FRAME_S, Scheme};
@@ -77,12 +77,8 @@ impl Programme {
             }
             Scheme::HardSlide => patches = slide(domain, &patches[0], draw, area)?,
             Scheme::Probe | Scheme::Static | Scheme::StaticDeep | Scheme::StaticTwo => {
-                let count = match scheme {
-                    Scheme::Probe => PROBE_SITES,
-                    Scheme::StaticTwo => 2 * STATIC_SITES,
-                    _ => STATIC_SITES,
-                };
-                for at in 1..count {
+                let row = scheme.specification();
+                for at in 1..row.sites * row.instruments {
                     let draw = Draw::new(&mut others);
                     let area = scheme.face_count(draw) * FACE_AREA_MM2;
                     patches.push(if scheme == Scheme::StaticTwo && at % 2 == 1 {
@@ -110,6 +106,7 @@ impl Programme {
     /// Patches that touch at `frame`, and the time since the contact with their site began, s.
     fn active(&self, frame: usize) -> (Range<usize>, f64) {
         let t = frame as f64 * FRAME_S;
+        let row = self.scheme.specification();
         match self.scheme {
             Scheme::HardSlide => {
                 let stop = (t / 7.5 * SLIDE_STOPS as f64) as usize;
@@ -117,17 +114,19 @@ impl Programme {
                 (stop..stop + 1, t)
             }
             Scheme::Probe => {
-                let site = ((t / PROBE_S + 1e-9) as usize).min(PROBE_SITES - 1);
+                let site = ((t / PROBE_S + 1e-9) as usize).min(row.sites - 1);
                 // Whole frames: 1.6 s is a multiple of them, and the remainder of a rounded time is not.
                 let since = (t - site as f64 * PROBE_S).clamp(0.0, PROBE_S - 1e-9);
                 (site..site + 1, since)
             }
             Scheme::Static | Scheme::StaticTwo | Scheme::StaticDeep => {
                 let at = frame.saturating_sub(1);
-                let (site, depth) = (at / STATIC_DEPTHS, at % STATIC_DEPTHS + 1);
-                let each = self.patches.len() / STATIC_SITES;
-                let end = ((site + 1) * each).min(self.patches.len());
-                ((site * each).min(end)..end, depth as f64 * FRAME_S)
+                let (site, depth) = (at / row.depths, at % row.depths + 1);
+                let end = ((site + 1) * row.instruments).min(self.patches.len());
+                (
+                    (site * row.instruments).min(end)..end,
+                    depth as f64 * FRAME_S,
+                )
             }
             _ => (0..self.patches.len(), t),
         }

@@ -2,7 +2,7 @@
 
 use tissue::contact::{ContactDomain, ContactError, FACE_AREA_MM2};
 use tissue::mesh::{Boundary, FaceAdjacency, box_phantom, ellipsoid_phantom};
-use tissue::schemes::{Draw, FRAMES, Programme, Scheme};
+use tissue::schemes::{Draw, FRAMES, Group, Programme, Scheme};
 
 #[test]
 fn a_patch_is_connected_centred_and_as_large_as_asked() {
@@ -112,7 +112,7 @@ fn every_scheme_stays_in_its_bounds_and_jumps_only_where_it_says() {
 fn programmes_follow_their_seed_and_hard_regimes_do_what_their_names_say() {
     let mesh = box_phantom([80.0, 80.0, 40.0], [16, 16, 6]).unwrap();
     let domain = ContactDomain::new(&mesh, Boundary::Fixed).unwrap();
-    for scheme in Scheme::NUMBERED.into_iter().chain(Scheme::HARD) {
+    for scheme in Scheme::NUMBERED.into_iter().chain(Scheme::of(Group::Hard)) {
         let frames = |seed: u64| -> Vec<_> {
             let programme = Programme::new(scheme, &domain, seed).unwrap();
             (0..FRAMES).map(|frame| programme.contact(frame)).collect()
