@@ -209,16 +209,16 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     if measurements.is_empty() {
         bail!("nothing could be measured: {}", notes.join("; "));
     }
-    let report = write::write(
-        options,
-        &cases,
-        &mesh,
-        &measurements,
-        &moments,
-        &machine,
-        &notes,
-        film::viewer(&cases, &mesh, &methods)?,
-    )?;
+    let findings = write::Findings {
+        cases: &cases,
+        mesh: &mesh,
+        measurements: &measurements,
+        moments: &moments,
+        machine: &machine,
+        notes: &notes,
+        viewer: film::viewer(&cases, &mesh, &methods)?,
+    };
+    let report = findings.write(options)?;
     if options.json {
         println!("{}", serde_json::to_string_pretty(&report)?);
     } else {

@@ -3,128 +3,165 @@
 use anyhow::{Context, Result};
 use serde_json::json;
 use tissue::mesh::Mesh;
+use tissue::trajectory::TrajectoryHeader;
 
 use super::cases::Cases;
 use super::row::{Measurement, Row};
 use super::{Options, html, pictures};
 use crate::machine::Machine;
 
-/// Writes report.json and report.html; returns the former.
-#[expect(clippy::too_many_arguments, reason = "all that a report is made from")]
-pub fn write(
-    options: &Options,
-    cases: &Cases,
-    mesh: &Mesh,
-    measurements: &[Measurement],
-    moments: &[(usize, usize)],
-    machine: &Machine,
-    notes: &[String],
-    viewer: Option<String>,
-) -> Result<serde_json::Value> {
-    std::fs::create_dir_all(&options.out)
-        .with_context(|| format!("cannot make {}", options.out.display()))?;
-    let header = &cases.list[0].trajectory.header;
-    let runtime = upt::onnx::Runtime::get(None).map_or_else(
-        |error| error.to_string(),
-        |runtime| runtime.version().to_owned(),
-    );
-    let date = date();
-    let rows: Vec<&Row> = measurements.iter().map(|one| &one.row).collect();
-    let report = json!({
-        "machine": machine,
-        "date": date,
-        "versions": {"upt": env!("CARGO_PKG_VERSION"), "onnxruntime": runtime, "solver": header.solver},
-        "mesh": {"name": header.mesh_name, "sha256": cases.mesh_sha256, "nodes": mesh.node_count(), "boundary": cases.boundary},
-        "cases": cases.list.iter().map(|case| case.name.as_str()).collect::<Vec<_>>(),
-        "left_out": notes,
-        "rows": rows,
-    });
-    std::fs::write(
-        options.out.join("report.json"),
-        serde_json::to_string_pretty(&report)? + "\n",
-    )?;
+/// What was measured on which cases: all that a report says.
+pub struct Findings<'a> {
+    pub cases: &'a Cases,
+    pub mesh: &'a Mesh,
+    pub measurements: &'a [Measurement],
+    /// Case and frame of each picture.
+    pub moments: &'a [(usize, usize)],
+    pub machine: &'a Machine,
+    /// What was left out, and why.
+    pub notes: &'a [String],
+    /// A film in 3D for the page.
+    pub viewer: Option<String>,
+}
 
-    let shown = one_a_family(measurements);
-    let shown_measurements: Vec<&Measurement> =
-        shown.iter().map(|index| &measurements[*index]).collect();
-    let in_pictures: Vec<&Measurement> = shown_measurements
-        .iter()
-        .copied()
-        .filter(|one| !matches!(one.row.method.as_str(), "TLED" | "predict zero"))
-        .collect();
-    let mut facts: html::Facts = vec![
-        (
-            "machine".into(),
-            format!(
-                "{}, {} cores, {} GB, {}",
-                machine.cpu, machine.cores, machine.memory_gb, machine.os
-            ),
-        ),
-        ("features".into(), machine.features.join(" ")),
-        ("date".into(), date),
-        (
-            "versions".into(),
-            format!(
-                "upt {}, ONNX Runtime {runtime}, reference {}",
-                env!("CARGO_PKG_VERSION"),
-                header.solver
-            ),
-        ),
-        (
-            "mesh".into(),
-            format!(
-                "{}, {} nodes, boundary `{}`, {}",
-                header.mesh_name,
-                mesh.node_count(),
-                cases.boundary,
-                cases.mesh_sha256
-            ),
-        ),
-        (
-            "cases".into(),
-            cases
-                .list
-                .iter()
-                .map(|case| case.name.as_str())
-                .collect::<Vec<_>>()
-                .join("; "),
-        ),
-    ];
-    let mut seen = Vec::new();
-    for one in measurements.iter().filter(|one| !one.row.bundle.is_empty()) {
-        if !seen.contains(&&one.row.bundle_sha256) {
-            seen.push(&one.row.bundle_sha256);
-            facts.push((
-                format!("bundle {}", one.row.bundle),
-                one.row.bundle_sha256.clone(),
-            ));
+/// When a report was made, and with which ONNX Runtime.
+struct Made {
+    date: String,
+    runtime: String,
+}
+
+impl Made {
+    fn now() -> Self {
+        let runtime = upt::onnx::Runtime::get(None);
+        Self {
+            date: date(),
+            runtime: runtime.map_or_else(|error| error.to_string(), |r| r.version().to_owned()),
         }
     }
-    let page = html::Page {
-        title: options.title.as_deref().unwrap_or("Error against run time"),
-        lead: format!(
+}
+
+impl Findings<'_> {
+    /// Writes report.json and report.html; returns the former.
+    pub fn write(self, options: &Options) -> Result<serde_json::Value> {
+        std::fs::create_dir_all(&options.out)
+            .with_context(|| format!("cannot make {}", options.out.display()))?;
+        let made = Made::now();
+        let report = self.json(&made);
+        std::fs::write(
+            options.out.join("report.json"),
+            serde_json::to_string_pretty(&report)? + "\n",
+        )?;
+        let title = options.title.as_deref();
+        let page = self.page(&made, title.unwrap_or("Error against run time"))?;
+        std::fs::write(options.out.join("report.html"), page)?;
+        Ok(report)
+    }
+
+    fn header(&self) -> &TrajectoryHeader {
+        &self.cases.list[0].trajectory.header
+    }
+
+    fn names(&self) -> Vec<&str> {
+        let cases = self.cases.list.iter();
+        cases.map(|case| case.name.as_str()).collect()
+    }
+
+    fn json(&self, made: &Made) -> serde_json::Value {
+        let header = self.header();
+        let rows: Vec<&Row> = self.measurements.iter().map(|one| &one.row).collect();
+        json!({
+            "machine": self.machine,
+            "date": made.date,
+            "versions": {"upt": env!("CARGO_PKG_VERSION"), "onnxruntime": made.runtime, "solver": header.solver},
+            "mesh": {
+                "name": header.mesh_name,
+                "sha256": self.cases.mesh_sha256,
+                "nodes": self.mesh.node_count(),
+                "boundary": self.cases.boundary,
+            },
+            "cases": self.names(),
+            "left_out": self.notes,
+            "rows": rows,
+        })
+    }
+
+    /// The lines above the page's tables: machine, versions, mesh, cases, and the digest of each bundle.
+    fn facts(&self, made: &Made) -> html::Facts {
+        let (machine, header) = (self.machine, self.header());
+        let mut facts: html::Facts = [
+            (
+                "machine",
+                format!(
+                    "{}, {} cores, {} GB, {}",
+                    machine.cpu, machine.cores, machine.memory_gb, machine.os
+                ),
+            ),
+            ("features", machine.features.join(" ")),
+            ("date", made.date.clone()),
+            (
+                "versions",
+                format!(
+                    "upt {}, ONNX Runtime {}, reference {}",
+                    env!("CARGO_PKG_VERSION"),
+                    made.runtime,
+                    header.solver
+                ),
+            ),
+            (
+                "mesh",
+                format!(
+                    "{}, {} nodes, boundary `{}`, {}",
+                    header.mesh_name,
+                    self.mesh.node_count(),
+                    self.cases.boundary,
+                    self.cases.mesh_sha256
+                ),
+            ),
+            ("cases", self.names().join("; ")),
+        ]
+        .map(|(name, text)| (name.into(), text))
+        .into();
+        let mut seen = Vec::new();
+        let rows = self.measurements.iter().map(|one| &one.row);
+        for row in rows.filter(|row| !row.bundle.is_empty()) {
+            if !seen.contains(&&row.bundle_sha256) {
+                seen.push(&row.bundle_sha256);
+                facts.push((format!("bundle {}", row.bundle), row.bundle_sha256.clone()));
+            }
+        }
+        facts
+    }
+
+    fn page(self, made: &Made, title: &str) -> Result<String> {
+        let shown = one_a_family(self.measurements);
+        let in_pictures: Vec<&Measurement> = (shown.iter())
+            .map(|index| &self.measurements[*index])
+            .filter(|one| !matches!(one.row.method.as_str(), "TLED" | "predict zero"))
+            .collect();
+        let cases = &self.cases.list;
+        let lead = format!(
             "{} on {} ({} nodes), replayed autoregressively by every method on {}.",
-            match cases.list.len() {
+            match cases.len() {
                 1 => "One contact".to_owned(),
                 count => format!("{count} contacts"),
             },
-            header.mesh_name,
-            mesh.node_count(),
-            machine.cpu
-        ),
-        facts,
-        measurements,
-        galleries: pictures::galleries(mesh, &cases.list, moments, &in_pictures)?,
-        viewer,
-        shown,
-        dt: header.dt_s,
-        notes: notes
-            .iter()
-            .map(|note| format!("Left out: {note}"))
-            .collect(),
-    };
-    std::fs::write(options.out.join("report.html"), html::page(&page))?;
-    Ok(report)
+            self.header().mesh_name,
+            self.mesh.node_count(),
+            self.machine.cpu
+        );
+        let notes = self.notes.iter().map(|note| format!("Left out: {note}"));
+        Ok(html::page(&html::Page {
+            title,
+            lead,
+            facts: self.facts(made),
+            measurements: self.measurements,
+            galleries: pictures::galleries(self.mesh, cases, self.moments, &in_pictures)?,
+            dt: self.header().dt_s,
+            notes: notes.collect(),
+            viewer: self.viewer,
+            shown,
+        }))
+    }
 }
 
 /// One row a family for the curves: float32, all nodes, most threads.
