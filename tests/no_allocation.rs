@@ -76,6 +76,40 @@ fn tools_allocate_nothing() {
     }
 }
 
+/// Frames of the region and of attached points between the steps.
+fn frames_allocate_nothing() {
+    let model = model("tiny-corrected");
+    let scene = scene(&model, &plain());
+    let node = model.indices(IndexSet::DomainNodes)[0] as usize;
+    let at: Vec<f32> = model.positions()[3 * node..3 * node + 3].to_vec();
+    let shape = contact::Shape::Sphere { radius: 3.0 };
+    let tool = |depth: f32| {
+        let centre = [at[0], at[1], at[2] + 3.0 - depth];
+        [upt::contact::Tool::new(0, &shape, centre, [0.0, 0.0, 0.0, 1.0]).unwrap()]
+    };
+    let depths = [0.5, 0.8, 1.1, 0.8].map(|depth| [tool(depth), tool(depth + 0.1)]);
+    scene.attach_points(Some(&model.positions()[..9])).unwrap();
+    let (mut out, mut points) = (vec![0.0; 3 * scene.node_count()], [0.0; 9]);
+    let mut turn = || {
+        let before = ALLOCATIONS.load(Ordering::Relaxed);
+        for [now, later] in &depths {
+            let input = StepInput {
+                displacement: None,
+                contact: Contact::Tools(now),
+            };
+            scene.step(input, None).unwrap();
+            for part in [0.01, 0.02, 0.03] {
+                scene.present(part, later, &mut out).unwrap();
+                scene.present_points(part, later, &mut points).unwrap();
+            }
+        }
+        ALLOCATIONS.load(Ordering::Relaxed) - before
+    };
+    turn();
+    let count = (0..5).map(|_| turn()).min().unwrap();
+    assert_eq!(count, 0, "frames between steps");
+}
+
 /// The hand's thread and a scene that a hand feels.
 #[cfg(feature = "haptics")]
 fn haptics_allocate_nothing() {
@@ -128,6 +162,7 @@ fn steps_allocate_nothing_and_keep_the_floating_point_mode() {
         return;
     }
     tools_allocate_nothing();
+    frames_allocate_nothing();
     #[cfg(feature = "haptics")]
     haptics_allocate_nothing();
     for name in BUNDLES {

@@ -80,6 +80,17 @@ impl Tool {
         })
     }
 
+    /// Whether another tool is this one at the same place, told from their bits; equal hulls made twice are two.
+    pub(crate) fn is_same(&self, other: &Tool) -> bool {
+        let bits = |tool: &Tool| {
+            let (at, turn) = (tool.pose.translation, tool.pose.rotation);
+            let [x, y, z] = at.to_array();
+            let [i, j, k, w] = turn.to_array();
+            [x, y, z, i, j, k, w, tool.friction, tool.tear_off_mn].map(f32::to_bits)
+        };
+        self.mode == other.mode && bits(self) == bits(other) && self.body.is_same(&other.body)
+    }
+
     /// Friction and tear-off force are numbers that a tool can have; `index` names it.
     ///
     /// # Errors

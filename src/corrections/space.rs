@@ -119,15 +119,18 @@ impl CoarseSpace {
 
     /// For each natural mode `kappa / (m w² (w² + kappa))`: what inertia takes off its part of the compliance, mm/mN.
     pub fn held_back(&self, kappa: f64) -> Vec<f32> {
+        self.holds_back(kappa).collect()
+    }
+
+    /// The same, mode by mode.
+    pub fn holds_back(&self, kappa: f64) -> impl Iterator<Item = f32> {
         let count = self.count();
         let frequencies = self.frequency.iter().enumerate();
-        frequencies
-            .map(|(i, &omega)| {
-                let square = f64::from(omega).powi(2);
-                let mass = f64::from(self.mass[i * (count + 1)]);
-                (1e3 * kappa / (mass * square * (square + kappa))) as f32
-            })
-            .collect()
+        frequencies.map(move |(i, &omega)| {
+            let square = f64::from(omega).powi(2);
+            let mass = f64::from(self.mass[i * (count + 1)]);
+            (1e3 * kappa / (mass * square * (square + kappa))) as f32
+        })
     }
 
     /// For each natural mode `1 / (m (w² + kappa))`: what a force on it moves, mm/µN.

@@ -1,9 +1,8 @@
 //! The tissue at the present moment: between steps, and while one is in flight, with the instruments where they are now.
 
-use std::sync::{Mutex, RwLock};
+use std::sync::RwLock;
 
 use super::core::{Core, lock_read, lock_write};
-use super::presenter::Presenter;
 use super::published::{Published, Values};
 use super::tools::lock;
 use super::{Contact, Scene};
@@ -95,29 +94,20 @@ impl Scene {
         }
         lock_read(&self.shared.published).check_len(values, out.len())?;
         let _flush = FlushToZero::enter();
-        let mut place = lock(match values {
-            Values::Region => &self.tools.presenter,
-            Values::Points => &self.tools.point_presenter,
-        })?;
-        if place.is_none() {
-            let made = Box::new(Presenter::new(self, values)?);
-            if lock_read(&self.shared.published).moment.is_none() {
-                self.with(|core, published| core.begin_moments(published))?;
+        let mut presenters = lock(&self.tools.presenters)?;
+        presenters.prepare(self, values, || {
+            let begun = lock_read(&self.shared.published).moment.is_some();
+            match begun {
+                true => Ok(()),
+                false => self.with(|core, published| core.begin_moments(published)),
             }
-            *place = Some(made);
-        }
-        match place.as_mut() {
-            Some(presenter) => presenter.frame(self, seconds, contact, out),
-            None => Ok(()),
-        }
+        })?;
+        presenters.frame(self, (values, seconds), contact, out)
     }
 
     /// Bytes of what presents.
     pub(super) fn presenter_bytes(&self) -> usize {
-        let bytes = |place: &Mutex<Option<Box<Presenter>>>| {
-            lock(place).map_or(0, |place| place.as_ref().map_or(0, |p| p.memory_bytes()))
-        };
-        bytes(&self.tools.presenter) + bytes(&self.tools.point_presenter)
+        lock(&self.tools.presenters).map_or(0, |presenters| presenters.memory_bytes())
     }
 }
 

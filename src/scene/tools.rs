@@ -29,10 +29,7 @@ pub struct Tools {
     #[cfg(feature = "contact")]
     contacts: Mutex<Option<Asked>>,
     #[cfg(feature = "contact")]
-    pub(super) presenter: Mutex<Option<Box<super::presenter::Presenter>>>,
-    /// The same of the attached points.
-    #[cfg(feature = "contact")]
-    pub(super) point_presenter: Mutex<Option<Box<super::presenter::Presenter>>>,
+    pub(super) presenters: Mutex<super::presenter::Presenters>,
     /// What a host's instruments are read into.
     #[cfg(feature = "contact")]
     list: Mutex<Vec<Tool>>,

@@ -41,6 +41,17 @@ pub struct Nearest {
 }
 
 impl Body {
+    /// Whether another body is of the same shape and size; equal hulls made twice are two.
+    pub fn is_same(&self, other: &Body) -> bool {
+        let same = match (&self.core, &other.core) {
+            (Core::Segment { half_length: a }, Core::Segment { half_length: b }) => a == b,
+            (Core::Cuboid { half: a }, Core::Cuboid { half: b }) => a == b,
+            (Core::Triangles(a), Core::Triangles(b)) => Arc::ptr_eq(a, b),
+            _ => false,
+        };
+        same && self.radius == other.radius
+    }
+
     /// Checks a shape and prepares it.
     ///
     /// # Errors

@@ -126,30 +126,52 @@ impl Along {
         };
     }
 
+    /// How far velocities are followed where tools push, and where none does, s.
+    pub(super) fn times(&self) -> (&[(Vector, f32)], f32) {
+        (&self.driven, self.free)
+    }
+
     /// `out = last + along velocity`.
     pub(super) fn follow(&self, rest: &[f32], last: &[f32], velocity: &[f32], out: &mut [f32]) {
-        let even = self.driven.iter().all(|(_, along)| *along == self.free);
-        if even {
-            for ((out, last), velocity) in out.iter_mut().zip(last).zip(velocity) {
-                *out = last + self.free * velocity;
-            }
-            return;
+        let at = self.each();
+        let [rest, last, velocity] = [rest, last, velocity].map(|field| field.as_chunks::<3>().0);
+        let nodes = out.as_chunks_mut::<3>().0.iter_mut().zip(rest);
+        for ((out, rest), (last, velocity)) in nodes.zip(last.iter().zip(velocity)) {
+            *out = at(rest, last, velocity);
         }
+    }
+
+    /// The same at some nodes alone.
+    pub(super) fn follow_at(
+        &self,
+        nodes: &[u32],
+        (rest, last, velocity): (&[f32], &[f32], &[f32]),
+        out: &mut [f32],
+    ) {
+        let at = self.each();
+        let [rest, last, velocity] = [rest, last, velocity].map(|field| field.as_chunks::<3>().0);
+        let out = out.as_chunks_mut::<3>().0;
+        for &node in nodes {
+            let node = node as usize;
+            out[node] = at(&rest[node], &last[node], &velocity[node]);
+        }
+    }
+
+    /// Where a node at a rest position, a displacement and a velocity goes.
+    fn each(&self) -> impl Fn(&[f32; 3], &[f32; 3], &[f32; 3]) -> [f32; 3] {
+        let even = self.driven.iter().all(|(_, along)| *along == self.free);
+        let driven: &[_] = if even { &[] } else { &self.driven };
         let near = NEAR_MM.powi(-2);
-        let nodes = out.as_chunks_mut::<3>().0.iter_mut();
-        let rest = rest.as_chunks::<3>().0.iter();
-        let last = last.as_chunks::<3>().0.iter();
-        let velocity = velocity.as_chunks::<3>().0.iter();
-        for (((out, rest), last), velocity) in nodes.zip(rest).zip(last).zip(velocity) {
-            let place = Vector::from(*rest) + Vector::from(*last);
+        move |rest, last, velocity| {
             let mut along = self.free;
-            for (centre, own) in &self.driven {
-                let weight = 1.0 / (1.0 + near * place.distance_squared(*centre));
-                along += weight * (own - self.free);
+            if !driven.is_empty() {
+                let place = Vector::from(*rest) + Vector::from(*last);
+                for (centre, own) in driven {
+                    let weight = 1.0 / (1.0 + near * place.distance_squared(*centre));
+                    along += weight * (own - self.free);
+                }
             }
-            for (out, (last, velocity)) in out.iter_mut().zip(last.iter().zip(velocity)) {
-                *out = last + along * velocity;
-            }
+            std::array::from_fn(|k| last[k] + along * velocity[k])
         }
     }
 

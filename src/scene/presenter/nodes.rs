@@ -8,7 +8,7 @@ use crate::kernels::Isa;
 use crate::kernels::contact::ContactFactor;
 use crate::memory;
 use crate::prior::PriorTable;
-use crate::scene::{Contact, ContactSet};
+use crate::scene::ContactSet;
 
 /// What forces at nodes are solved with.
 pub(super) struct Means<'a> {
@@ -20,11 +20,9 @@ pub(super) struct Means<'a> {
     pub held: &'a [bool],
 }
 
-/// The nodes of a frame and of the step before it.
+/// The nodes of the step before a frame, and the change of their forces.
 #[derive(Default)]
 pub(super) struct Nodes {
-    /// Where the host has nodes now.
-    pub now: ContactSet,
     /// Nodes in contact in the step, and the forces on them, mN `[m,3]`.
     pub then: Vec<u32>,
     pub forces: Vec<f32>,
@@ -43,21 +41,19 @@ pub(super) struct Nodes {
 }
 
 impl Nodes {
-    /// Takes a frame's field over a mesh of `count` nodes.
-    ///
-    /// # Errors
-    /// As a step's.
-    pub fn take(&mut self, contact: Contact<'_>, count: usize) -> Result<()> {
-        self.now.gather(contact, count)
-    }
-
     /// How far of the way that the nodes would have gone at the step's velocities (mm/s) within `tau` they have gone; none where there are none.
-    pub fn stretch(&self, last: &[f32], velocity: &[f32], tau: f64) -> Option<f32> {
+    pub fn stretch(
+        &self,
+        now: &ContactSet,
+        last: &[f32],
+        velocity: &[f32],
+        tau: f64,
+    ) -> Option<f32> {
         /// mm².
         const SMALL: f32 = 0.05 * 0.05;
         let (mut gone, mut wanted, mut known) = (SMALL, SMALL, false);
         for &node in &self.then {
-            let Some(to) = self.now.at(node) else {
+            let Some(to) = now.at(node) else {
                 continue;
             };
             let way = vector(velocity, node) * tau as f32;
@@ -68,21 +64,22 @@ impl Nodes {
         known.then(|| (gone / wanted).clamp(0.0, 1.0))
     }
 
-    /// The change of the forces, in `dofs` and `change`, that takes the nodes from where the tissue is without them, `free`.
+    /// The change of the forces, in `dofs` and `change`, that takes the nodes from where the tissue is without them, `free`, to where the host
+    /// has them now.
     ///
     /// # Errors
     /// [`Error::Bundle`] for a compliance that has no factor, [`Error::OutOfMemory`].
-    pub fn solve(&mut self, means: &Means<'_>, free: &[f32]) -> Result<()> {
+    pub fn solve(&mut self, means: &Means<'_>, now: &ContactSet, free: &[f32]) -> Result<()> {
         const WHAT: &str = "the present state of a scene";
         let own = |node: u32| match means.prior.column_for(means.held, node) {
             Some((column, true)) => Some(column as u32),
             _ => None,
         };
         self.columns.clear();
-        let now = self.now.nodes.iter().filter_map(|&node| own(node));
-        self.columns.extend(now.map(|column| (column, true)));
+        let there = now.nodes.iter().filter_map(|&node| own(node));
+        self.columns.extend(there.map(|column| (column, true)));
         for &node in &self.then {
-            if self.now.at(node).is_none()
+            if now.at(node).is_none()
                 && let Some(column) = own(node)
             {
                 self.columns.push((column, false));
@@ -135,7 +132,7 @@ impl Nodes {
             let at = at as usize;
             let node = prior.contact_nodes[self.only[at / 3] as usize];
             let place = free[3 * node as usize + at % 3];
-            let wanted = self.now.at(node).map_or(place, |to| to[at % 3]);
+            let wanted = now.at(node).map_or(place, |to| to[at % 3]);
             let released = (0..order).filter(|other| !self.columns[other / 3].1);
             let moved: f64 = released
                 .map(|other| between(at, other) * f64::from(self.change[other]))
@@ -168,8 +165,7 @@ impl Nodes {
 
     /// Bytes held.
     pub fn memory_bytes(&self) -> usize {
-        self.now.memory_bytes()
-            + 4 * (self.then.capacity() + self.forces.capacity() + self.only.capacity())
+        4 * (self.then.capacity() + self.forces.capacity() + self.only.capacity())
             + 8 * (self.columns.capacity() + self.upper.capacity())
             + 4 * (self.dofs.capacity() + self.change.capacity() + self.held.capacity())
             + 4 * (self.wanted.capacity() + self.solved.capacity() + self.widened.capacity())

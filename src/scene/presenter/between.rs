@@ -1,0 +1,246 @@
+//! The tissue a time `tau` after a step `n`: `u = u_n + tau v_n + A_k(tau) B^T (f - f_n)`.
+//!
+//! The last velocities go on, as far as the tools do ([`super::along`]), and contact is solved at the instruments' poses with the compliance of
+//! that time, `kappa = 9/(4 tau²) + 3 alpha/(2 tau)`.
+
+use super::along::Along;
+use super::nodes::{Means, Nodes};
+use super::solves::{Drive, Question, Solves};
+use super::{AT_ONCE_S, WHAT};
+use crate::contact::problem::Change;
+use crate::contact::{Compliance, Problem, State};
+use crate::error::{Error, Result};
+use crate::kernels::respond::accumulate_rows;
+use crate::kernels::rows::{RowPlan, decode_rows};
+use crate::kernels::{Isa, Pool};
+use crate::memory;
+use crate::scene::present::Moment;
+use crate::scene::{Contact, ContactSet, Scene};
+
+/// The last velocities are followed for at most this many steps.
+const MOST_STEPS: f64 = 2.0;
+
+/// The nodes that are shown.
+pub(super) struct View<'a> {
+    pub region: &'a [u32],
+    /// Their rows of the linear response.
+    pub plan: &'a RowPlan,
+    /// Room for what the contact moves there, `[n,3]`.
+    pub moved: &'a mut [f32],
+}
+
+/// A step, and what its tissue does after it.
+pub(super) struct Between {
+    problem: Problem,
+    pool: Pool,
+    isa: Isa,
+    held: Vec<bool>,
+    /// State of the step, its velocity, and its tissue at the moment asked for, `[K,3]`.
+    last: Vec<f32>,
+    velocity: Vec<f32>,
+    pub free: Vec<f32>,
+    /// Which step that is.
+    pub step: Option<u64>,
+    natural: Vec<f32>,
+    held_back: Vec<f32>,
+    rows: Vec<u32>,
+    along: Along,
+    nodes: Box<Nodes>,
+    /// Where the host has nodes in this frame.
+    now: ContactSet,
+}
+
+impl Between {
+    pub(super) fn new(scene: &Scene) -> Result<Between> {
+        let model = &scene.model;
+        let (true, Ok(corrections)) = (model.prior.is_some(), model.corrections()) else {
+            return Err(Error::Unsupported(
+                "present: the bundle has no linear response or no corrections; show its steps by upt_scene_sample".into(),
+            ));
+        };
+        let count = scene.node_count();
+        let field = || memory::zeros(3 * count, WHAT);
+        let mut held = memory::filled(count, false, WHAT)?;
+        for &node in &scene.mesh.held_nodes {
+            held[node as usize] = true;
+        }
+        let natural = corrections
+            .space
+            .held_back(corrections.pace.integrator.kappa())
+            .len();
+        Ok(Between {
+            problem: Problem::new(model.samples()?)?,
+            pool: Pool::new(1).map_err(|error| Error::Argument(error.to_string()))?,
+            isa: Isa::detect(),
+            held,
+            last: field()?,
+            velocity: field()?,
+            free: field()?,
+            step: None,
+            natural: memory::zeros(natural, WHAT)?,
+            held_back: memory::zeros(natural, WHAT)?,
+            rows: memory::collected(natural, 0..natural as u32, WHAT)?,
+            along: Along::new()?,
+            nodes: Box::default(),
+            now: ContactSet::default(),
+        })
+    }
+
+    /// Takes a step's state `[K,3]` and moment, which are `later_s` after those of the step before; none where nothing was known before.
+    pub(super) fn take(&mut self, state: &[f32], moment: &Moment, later_s: Option<f64>) {
+        match later_s {
+            Some(seconds) => self.along.keep(&self.problem, seconds),
+            None => self.along.forget(),
+        }
+        self.last.copy_from_slice(state);
+        self.velocity.copy_from_slice(&moment.velocity);
+        self.problem.past.take(&moment.past);
+        self.nodes.then.clear();
+        self.nodes.then.extend_from_slice(&moment.nodes);
+        self.nodes.forces.clear();
+        self.nodes.forces.extend_from_slice(&moment.forces);
+        self.step = Some(moment.step);
+    }
+
+    /// The displacements of a view's nodes `tau` after the step, into `out [n,3]`.
+    ///
+    /// # Errors
+    /// Those of [`Scene::present`] for the tools or nodes.
+    pub(super) fn show(
+        &mut self,
+        scene: &Scene,
+        tau: f64,
+        driven: Contact<'_>,
+        (view, solves): (View<'_>, &mut Solves),
+        out: &mut [f32],
+    ) -> Result<()> {
+        let model = &scene.model;
+        let (Some(prior), corrections, Some(step)) =
+            (&model.prior, model.corrections()?, self.step)
+        else {
+            return Ok(());
+        };
+        let tau = tau.min(MOST_STEPS * scene.step_s());
+        let alpha = corrections.pace.integrator.damping_per_s;
+        let rest = &scene.mesh.positions;
+        let (last, velocity) = (&self.last, &self.velocity);
+        match driven {
+            Contact::Tools(tools) => {
+                self.along
+                    .look(&self.problem, tools, (rest, last), (tau, alpha));
+            }
+            nodes => {
+                self.now.gather(nodes, self.held.len())?;
+                let stretch = self.nodes.stretch(&self.now, last, velocity, tau);
+                self.along.follow_evenly(stretch, (tau, alpha));
+            }
+        }
+        let question = Question {
+            step,
+            tau,
+            along: &self.along,
+            drive: match driven {
+                Contact::Tools(tools) => Drive::Tools(tools),
+                _ => Drive::Nodes(&self.now),
+            },
+        };
+        let known = solves.find(&question);
+        match known {
+            Some(_) => self
+                .along
+                .follow_at(view.region, (rest, last, velocity), &mut self.free),
+            None => self.along.follow(rest, last, velocity, &mut self.free),
+        }
+        let make = |q: &mut [f32]| -> Result<bool> {
+            let kappa = corrections.pace.integrator.over(tau.max(AT_ONCE_S)).kappa();
+            self.held_back.clear();
+            self.held_back.extend(corrections.space.holds_back(kappa));
+            let change = match question.drive {
+                Drive::Tools(tools) => {
+                    self.problem.begin(tools, rest, last)?;
+                    let state = State {
+                        rest,
+                        u: &self.free,
+                        start: last,
+                    };
+                    if tau <= AT_ONCE_S || !self.problem.is_near(state) {
+                        return Ok(false);
+                    }
+                    let compliance = Compliance {
+                        prior,
+                        held: &self.held,
+                        inertia: Some((&corrections.space, &self.held_back)),
+                    };
+                    self.problem.solve_between(compliance, state)?
+                }
+                Drive::Nodes(now) => {
+                    let near = !now.is_empty() || !self.nodes.then.is_empty();
+                    if tau <= AT_ONCE_S || !near {
+                        return Ok(false);
+                    }
+                    let means = Means {
+                        isa: self.isa,
+                        prior,
+                        space: &corrections.space,
+                        held_back: &self.held_back,
+                        held: &self.held,
+                    };
+                    self.nodes.solve(&means, now, &self.free)?;
+                    Change {
+                        dofs: &self.nodes.dofs,
+                        forces: &self.nodes.change,
+                    }
+                }
+            };
+            self.natural.fill(0.0);
+            for (&dof, force) in change.dofs.iter().zip(change.forces) {
+                let own = corrections.space.at_contact(dof as usize);
+                for ((y, held_back), own) in self.natural.iter_mut().zip(&self.held_back).zip(own) {
+                    *y -= held_back * own * force;
+                }
+            }
+            let (isa, pool) = (self.isa, &self.pool);
+            let modes = corrections.space.modes();
+            accumulate_rows(isa, pool, modes, &self.rows, &self.natural, false, q)?;
+            let response = prior.response.stored();
+            accumulate_rows(isa, pool, response, change.dofs, change.forces, true, q)?;
+            Ok(true)
+        };
+        let place = match known {
+            Some(place) => place,
+            None => solves.make(&question, prior.width(), make)?,
+        };
+        let moves = solves.moves(place);
+        if let Some(q) = moves {
+            decode_rows(
+                self.isa,
+                &self.pool,
+                &prior.basis(),
+                view.plan,
+                q,
+                view.moved,
+            )?;
+        }
+        let nodes = out.as_chunks_mut::<3>().0.iter_mut().zip(view.region);
+        for ((out, &node), moved) in nodes.zip(view.moved.as_chunks::<3>().0) {
+            let free = &self.free.as_chunks::<3>().0[node as usize];
+            *out = match (self.held[node as usize], moves) {
+                (true, _) => [0.0; 3],
+                (false, Some(_)) => std::array::from_fn(|k| free[k] + moved[k]),
+                (false, None) => *free,
+            };
+        }
+        Ok(())
+    }
+
+    /// Bytes held.
+    pub(super) fn memory_bytes(&self) -> usize {
+        // The published moment holds velocities too.
+        4 * (self.last.len() + 2 * self.velocity.len() + self.free.len())
+            + self.along.memory_bytes()
+            + self.nodes.memory_bytes()
+            + self.now.memory_bytes()
+            + self.held.len()
+            + self.problem.memory_bytes()
+    }
+}

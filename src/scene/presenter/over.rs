@@ -1,0 +1,87 @@
+//! The way of the frames over to a step that has arrived: from where they would have been without it to where they are with it, within two fifths
+//! of a step, or at 25 mm/s where that takes longer.
+
+use super::AT_ONCE_S;
+use crate::error::Result;
+use crate::memory;
+
+/// A frame goes over from one step to the next within this many steps (longer carries the older step's error on), or at this
+/// speed, mm/s, where the way is long (faster is seen as a jerk).
+const BLEND_STEPS: f64 = 0.4;
+const BLEND_MM_S: f64 = 25.0;
+
+/// How far the frames without the last step are from those with it.
+#[derive(Default)]
+pub(super) struct Over {
+    /// At the region's nodes when the step was first seen, `[n,3]`, mm.
+    offset: Vec<f32>,
+    /// Longest of them, mm.
+    longest: f32,
+    /// Time of the last frame before the last step was seen, after that step: there the way begins.
+    seen_s: f64,
+}
+
+impl Over {
+    /// Nodes of another region.
+    pub(super) fn of(nodes: usize) -> Result<Over> {
+        Ok(Over {
+            offset: memory::zeros(3 * nodes, "the present state of a scene")?,
+            ..Over::default()
+        })
+    }
+
+    /// A step is seen for the first time, by a host that has last seen a frame at `seen_s` after it: without the step it would have `shown` what with
+    /// it is `out`.
+    pub(super) fn begin(&mut self, seen_s: f64, shown: &[f32], out: &[f32]) {
+        self.seen_s = seen_s;
+        for ((offset, shown), out) in self.offset.iter_mut().zip(shown).zip(out) {
+            *offset = shown - out;
+        }
+        let lengths = self.offset.as_chunks::<3>().0.iter();
+        self.longest = lengths.map(length).fold(0.0, f32::max);
+    }
+
+    /// A step is shown as it is from `seen_s` after it.
+    pub(super) fn forget(&mut self, seen_s: f64) {
+        self.seen_s = seen_s;
+        self.offset.fill(0.0);
+        self.longest = 0.0;
+    }
+
+    /// A frame at `tau`: if it lies before the way began, the host took the step for the one before when it first saw it.
+    pub(super) fn look(&mut self, tau: f64) {
+        if tau < self.seen_s {
+            self.forget(tau);
+        }
+    }
+
+    /// Takes a frame to its place on the way.
+    pub(super) fn blend(&self, tau: f64, step_s: f64, out: &mut [f32]) {
+        // At its own time a step is shown as it is.
+        if tau <= AT_ONCE_S {
+            return;
+        }
+        let since = (tau - self.seen_s).max(0.0);
+        let part = (1.0 - since / (BLEND_STEPS * step_s)).max(0.0) as f32;
+        let gone = (BLEND_MM_S * since) as f32;
+        if part == 0.0 && self.longest <= gone {
+            return;
+        }
+        let pairs = out.as_chunks_mut::<3>().0.iter_mut();
+        for (out, offset) in pairs.zip(self.offset.as_chunks::<3>().0) {
+            let part = part.max(1.0 - gone / length(offset).max(f32::MIN_POSITIVE));
+            for (out, offset) in out.iter_mut().zip(offset) {
+                *out += part * offset;
+            }
+        }
+    }
+
+    /// Bytes held.
+    pub(super) fn memory_bytes(&self) -> usize {
+        4 * self.offset.capacity()
+    }
+}
+
+fn length(v: &[f32; 3]) -> f32 {
+    (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt()
+}

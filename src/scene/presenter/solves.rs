@@ -1,0 +1,146 @@
+//! The contact of the last frames, solved once for all that show them: the region and the attached points of one frame ask the same question.
+//!
+//! A solve follows from the step, the time after it, how far the velocities are followed, and the tools or nodes of the frame; it is kept by the
+//! bits of these. A frame in which a step arrives has two: without that step and with it.
+
+use ::contact::Vector;
+
+use super::along::Along;
+use crate::contact::Tool;
+use crate::error::Result;
+use crate::memory;
+use crate::scene::ContactSet;
+
+/// What drives a frame.
+#[derive(Clone, Copy)]
+pub(super) enum Drive<'a> {
+    Tools(&'a [Tool]),
+    Nodes(&'a ContactSet),
+}
+
+/// What a solve follows from.
+#[derive(Clone, Copy)]
+pub(super) struct Question<'a> {
+    pub step: u64,
+    /// Time after the step, s.
+    pub tau: f64,
+    pub along: &'a Along,
+    pub drive: Drive<'a>,
+}
+
+/// A solve, and what it followed from.
+#[derive(Default)]
+struct Solve {
+    /// None where it has no answer.
+    step: Option<u64>,
+    tau: f64,
+    driven: Vec<(Vector, f32)>,
+    free: f32,
+    by_tools: bool,
+    tools: Vec<Tool>,
+    nodes: ContactSet,
+    /// Whether contact moves anything, ...
+    pushed: bool,
+    /// ... and what it moves.
+    coordinates: Vec<f32>,
+}
+
+/// The last two solves.
+#[derive(Default)]
+pub struct Solves {
+    kept: [Solve; 2],
+    /// The older of them.
+    next: usize,
+    #[cfg(test)]
+    pub made: u64,
+}
+
+impl Solve {
+    fn answers(&self, question: &Question<'_>) -> bool {
+        let (driven, free) = question.along.times();
+        self.step == Some(question.step)
+            && self.tau.to_bits() == question.tau.to_bits()
+            && self.free.to_bits() == free.to_bits()
+            && self.driven == driven
+            && match question.drive {
+                Drive::Tools(tools) => {
+                    let pairs = || self.tools.iter().zip(tools);
+                    self.by_tools
+                        && self.tools.len() == tools.len()
+                        && pairs().all(|(own, tool)| own.is_same(tool))
+                }
+                Drive::Nodes(nodes) => {
+                    !self.by_tools
+                        && self.nodes.nodes == nodes.nodes
+                        && self.nodes.vectors == nodes.vectors
+                }
+            }
+    }
+
+    fn take(&mut self, question: &Question<'_>) {
+        let (driven, free) = question.along.times();
+        self.tau = question.tau;
+        self.free = free;
+        self.driven.clear();
+        self.driven.extend_from_slice(driven);
+        self.tools.clear();
+        self.nodes.clear();
+        match question.drive {
+            Drive::Tools(tools) => self.tools.extend_from_slice(tools),
+            Drive::Nodes(nodes) => self.nodes.copy_from(nodes),
+        }
+        self.by_tools = matches!(question.drive, Drive::Tools(_));
+    }
+
+    fn memory_bytes(&self) -> usize {
+        4 * self.coordinates.capacity()
+            + size_of::<(Vector, f32)>() * self.driven.capacity()
+            + size_of::<Tool>() * self.tools.capacity()
+            + self.nodes.memory_bytes()
+    }
+}
+
+impl Solves {
+    /// A question's answer of before.
+    pub(super) fn find(&self, question: &Question<'_>) -> Option<usize> {
+        self.kept.iter().position(|kept| kept.answers(question))
+    }
+
+    /// What the contact of an answer moves, in the coordinates of the linear response; none where it moves nothing.
+    pub(super) fn moves(&self, place: usize) -> Option<&[f32]> {
+        let solve = &self.kept[place];
+        solve.pushed.then_some(&*solve.coordinates)
+    }
+
+    /// Makes the answer to a question, in place of the older one: `make` fills `width` coordinates and tells whether contact moves anything.
+    ///
+    /// # Errors
+    /// What `make` gives, [`crate::Error::OutOfMemory`]; that answer is gone then.
+    pub(super) fn make(
+        &mut self,
+        question: &Question<'_>,
+        width: usize,
+        make: impl FnOnce(&mut [f32]) -> Result<bool>,
+    ) -> Result<usize> {
+        let place = self.next;
+        let solve = &mut self.kept[place];
+        solve.step = None;
+        if solve.coordinates.len() != width {
+            solve.coordinates = memory::zeros(width, "the present state of a scene")?;
+        }
+        solve.take(question);
+        solve.pushed = make(&mut solve.coordinates)?;
+        solve.step = Some(question.step);
+        self.next = 1 - place;
+        #[cfg(test)]
+        {
+            self.made += 1;
+        }
+        Ok(place)
+    }
+
+    /// Bytes held.
+    pub fn memory_bytes(&self) -> usize {
+        self.kept.iter().map(Solve::memory_bytes).sum()
+    }
+}
