@@ -6,7 +6,7 @@
 
 GodotApi godot;
 
-enum { MAX_ARGUMENTS = 6, PROPERTY_USAGE_DEFAULT = 6 };
+enum { MAX_ARGUMENTS = 6, PROPERTY_HINT_RANGE = 1, PROPERTY_USAGE_DEFAULT = 6 };
 
 void godot_error(const char *message) {
   godot.print_error("libupt", message, "libupt", __FILE__, __LINE__, 0);
@@ -54,6 +54,8 @@ bool godot_api_load(GDExtensionInterfaceGetProcAddress lookup, GDExtensionClassL
        "classdb_register_extension_class3")
   FIND(register_method, GDExtensionInterfaceClassdbRegisterExtensionClassMethod,
        "classdb_register_extension_class_method")
+  FIND(register_property, GDExtensionInterfaceClassdbRegisterExtensionClassProperty,
+       "classdb_register_extension_class_property")
   FIND(unregister_class, GDExtensionInterfaceClassdbUnregisterExtensionClass,
        "classdb_unregister_extension_class")
   FIND(variant_from_type, GDExtensionInterfaceGetVariantFromTypeConstructor,
@@ -178,5 +180,26 @@ void godot_register_method(const char *class_name, const GodotMethod *method) {
   godot.ptr_destructor(GDEXTENSION_VARIANT_TYPE_STRING)(&hint);
   godot_string_name_free(&empty);
   godot_string_name_free(&method_id);
+  godot_string_name_free(&class_id);
+}
+
+void godot_register_property(const char *class_name, const GodotProperty *property) {
+  GodotStringName class_id, name, setter, getter, empty;
+  GodotString range;
+  GDExtensionPropertyInfo info;
+  godot_string_name(&class_id, class_name);
+  godot_string_name(&name, property->name);
+  godot_string_name(&setter, property->setter);
+  godot_string_name(&getter, property->getter);
+  godot_string_name(&empty, "");
+  godot.string_new(&range, property->range);
+  info = (GDExtensionPropertyInfo){property->type,      &name,  &empty,
+                                   PROPERTY_HINT_RANGE, &range, PROPERTY_USAGE_DEFAULT};
+  godot.register_property(godot.library, &class_id, &info, &setter, &getter);
+  godot.ptr_destructor(GDEXTENSION_VARIANT_TYPE_STRING)(&range);
+  godot_string_name_free(&empty);
+  godot_string_name_free(&getter);
+  godot_string_name_free(&setter);
+  godot_string_name_free(&name);
   godot_string_name_free(&class_id);
 }

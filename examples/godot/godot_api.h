@@ -37,6 +37,7 @@ typedef struct {
   GDExtensionInterfaceObjectSetInstance object_set_instance;
   GDExtensionInterfaceClassdbRegisterExtensionClass3 register_class;
   GDExtensionInterfaceClassdbRegisterExtensionClassMethod register_method;
+  GDExtensionInterfaceClassdbRegisterExtensionClassProperty register_property;
   GDExtensionInterfaceClassdbUnregisterExtensionClass unregister_class;
   GDExtensionInterfaceGetVariantFromTypeConstructor variant_from_type;
   GDExtensionInterfaceGetVariantToTypeConstructor variant_to_type;
@@ -64,11 +65,20 @@ typedef struct {
   } arguments[6];
 } GodotMethod;
 
+/* A property of the class, in the inspector with a slider or a box from `range`
+ * ("least,most,step"). Its methods are registered before it. */
+typedef struct {
+  const char *name;
+  GDExtensionVariantType type;
+  const char *range, *setter, *getter;
+} GodotProperty;
+
 /* Looks up the functions; false (after a message) when the engine is older than 4.3. */
 bool godot_api_load(GDExtensionInterfaceGetProcAddress lookup, GDExtensionClassLibraryPtr library);
 void godot_string_name(GodotStringName *out, const char *text);
 void godot_string_name_free(GodotStringName *name);
 void godot_register_method(const char *class_name, const GodotMethod *method);
+void godot_register_property(const char *class_name, const GodotProperty *property);
 void godot_error(const char *message);
 
 #ifdef __cplusplus

@@ -1,6 +1,8 @@
 # A brain and a spatula. Each frame shows the tissue of its own moment, steps of 50 ms run beside it. Arguments after "--":
 #   --bundle=PATH       the model (default: UPT_BUNDLE in the environment)
 #   --seconds=S         how long, then quit (default: until the window is closed)
+#   --corrections=N, --target=MM, --substeps=N
+#                       the tissue's properties of these names (default: what the bundle recommends)
 #   --wait              each frame waits for the step in flight: the same pictures on every machine
 #   --screenshot=FILE   PNG of the window at the deepest push (needs a display)
 #   --check             assert what was shown; exit code 1 and a line FAILED when something is wrong
@@ -32,6 +34,8 @@ var largest := 0.0
 var most_contacts := 0
 var largest_force := 0.0
 var seen_flags := 0
+var most_corrections := 0
+var largest_error := 0.0
 var shown := PackedVector3Array()
 var driven := 0
 var stale := 0
@@ -46,6 +50,9 @@ func _ready() -> void:
 		options[parts[0]] = parts[1] if parts.size() > 1 else ""
 	var bundle: String = options.get("bundle", OS.get_environment("UPT_BUNDLE"))
 	tissue = SoftTissue3D.new()
+	tissue.corrections = int(options.get("corrections", "0"))
+	tissue.corrections_target_mm = float(options.get("target", "0"))
+	tissue.substeps = int(options.get("substeps", "0"))
 	if not tissue.open(bundle):
 		finish("could not open the bundle: " + tissue.message())
 		return
@@ -83,6 +90,8 @@ func _process(delta: float) -> void:
 	most_contacts = maxi(most_contacts, tissue.contact_count())
 	largest_force = maxf(largest_force, tissue.force().length())
 	seen_flags |= tissue.flags()
+	most_corrections = maxi(most_corrections, tissue.corrections_made())
+	largest_error = maxf(largest_error, tissue.error_mm())
 	started = Time.get_ticks_usec()
 	var points := tissue.vertices()
 	show_surface(points)
@@ -131,6 +140,12 @@ func problem_of_all() -> String:
 			return "in %d of %d frames the tissue does not go with the spatula" % [stale, driven]
 		if inside > 0.0005:
 			return "a point is shown %.2f mm inside of the spatula" % (1000.0 * inside)
+	# Without a target each step in contact, which is one step, gets all of them.
+	var most := tissue.corrections
+	if most != 0 and tissue.corrections_target_mm == 0.0 and most_corrections != maxi(most, 0):
+		return "%d corrections were made in a step, the property says %d" % [most_corrections, most]
+	if most > 0 and tissue.substeps == 1 and most_corrections > most:
+		return "%d corrections were made in a step, %d at most are wanted" % [most_corrections, most]
 	# Ten seconds later, a frame a step.
 	tissue.release()
 	for i in 200:
@@ -150,7 +165,7 @@ func check_all() -> void:
 	finished = true
 	var problem := problem_of_all() if options.has("check") else ""
 	if problem == "":
-		print("OK %d frames, %d points in contact at most, force at most %.0f mN, flags %d, largest displacement %.2f mm, %.2f mm inside of the spatula at most, still in %d of %d frames, frame at most %.2f ms, mesh upload at most %.2f ms for %d vertices" % [frames, most_contacts, largest_force, seen_flags, 1000.0 * largest, 1000.0 * inside, stale, driven, frame_ms, upload_ms, rest.size()])
+		print("OK %d frames, %d points in contact at most, force at most %.0f mN, flags %d, at most %d corrections a step with an error of %.3f mm, largest displacement %.2f mm, %.2f mm inside of the spatula at most, still in %d of %d frames, frame at most %.2f ms, mesh upload at most %.2f ms for %d vertices" % [frames, most_contacts, largest_force, seen_flags, most_corrections, largest_error, 1000.0 * largest, 1000.0 * inside, stale, driven, frame_ms, upload_ms, rest.size()])
 	finish(problem)
 
 

@@ -68,16 +68,28 @@ check() { # name command...
 # A frame waits for the step that runs beside it, so that every machine shows the same.
 check headless "$godot" --headless --path "$project" --fixed-fps 60 -- --bundle="$bundle" --seconds=2.5 --wait --check
 
-# A bundle that is not there: a message, exit code 1, no crash.
-status=0
-"$godot" --headless --path "$project" -- --bundle="$build/no-such-bundle" --seconds=1 >"$build/missing.log" 2>&1 || status=$?
-if [ "$status" -eq 1 ] && grep -q "FAILED could not open the bundle" "$build/missing.log"; then
-  passed=$((passed + 1))
-else
-  failed=$((failed + 1))
-  echo "missing bundle: exit code $status"
-  tail -n 20 "$build/missing.log"
+# The properties of the inspector reach the steps; what cannot be is a message.
+if grep -q '"corrections"' "$bundle/bundle.json"; then
+  check corrections "$godot" --headless --path "$project" --fixed-fps 60 -- --bundle="$bundle" --corrections=3 --seconds=1.1 --wait --check
+  check target "$godot" --headless --path "$project" --fixed-fps 60 -- --bundle="$bundle" --corrections=20 --target=0.05 --substeps=1 --seconds=1.1 --wait --check
 fi
+refused() { # name message options...
+  local name=$1 message=$2 status=0
+  shift 2
+  "$godot" --headless --path "$project" -- --seconds=1 "$@" >"$build/$name.log" 2>&1 || status=$?
+  if [ "$status" -eq 1 ] && grep -q "FAILED could not open the bundle.*$message" "$build/$name.log"; then
+    passed=$((passed + 1))
+  else
+    failed=$((failed + 1))
+    echo "$name: exit code $status"
+    tail -n 20 "$build/$name.log"
+  fi
+}
+refused lone-target corrections_target_mm --bundle="$bundle" --target=0.1
+refused substeps substeps --bundle="$bundle" --corrections=3 --target=0.1 --substeps=300
+
+# A bundle that is not there: a message, exit code 1, no crash.
+refused missing "" --bundle="$build/no-such-bundle"
 
 if command -v Xvfb >/dev/null; then
   rm -f "$build/brain.png"

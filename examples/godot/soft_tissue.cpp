@@ -6,8 +6,14 @@
  *
  * Script side: open(bundle), rest(), faces(), hold(friction, grasp, tear_off_mn), press(shape,
  * position, rotation, half_extents, radius), release(), frame(now), wait(), vertices(), step_ms(),
- * contact_count(), force(), penetration(), flags(), message(). `press` and `release` say where the
- * tool is now, `frame` makes the surface of this moment; steps run on a worker meanwhile. */
+ * contact_count(), force(), penetration(), flags(), corrections_made(), error_mm(), message().
+ * `press` and `release` say where the tool is now, `frame` makes the surface of this moment; steps
+ * run on a worker meanwhile.
+ *
+ * Properties, in the inspector too; `open` reads them: corrections (1 to 64: the most that a step
+ * in contact gets, 0: what the bundle recommends, -1: none), corrections_target_mm (fewer where the
+ * estimated error is below this, 0: always so many), substeps (1 to 8: the most of a step that
+ * would err by more than the target, 0: what the bundle recommends). */
 #include "godot_api.h"
 #include "tissue.hpp"
 
@@ -22,6 +28,7 @@ static const float METRES = 0.001f;
 
 struct SoftTissue {
   std::unique_ptr<Tissue> tissue;
+  Effort effort;                                     // of the steps, from the next open on
   upt_instrument hold = upt::make<upt_instrument>(); // how the tool holds the tissue
   std::string message;                               // of the last failed call
 };
@@ -58,7 +65,7 @@ static void open_bundle(void *instance, const GDExtensionConstTypePtr *arguments
         std::string path(static_cast<std::size_t>(godot.string_to_utf8(arguments[0], nullptr, 0)),
                          0);
         godot.string_to_utf8(arguments[0], path.data(), static_cast<GDExtensionInt>(path.size()));
-        self->tissue = std::make_unique<Tissue>(path);
+        self->tissue = std::make_unique<Tissue>(path, self->effort);
       }));
 }
 
@@ -195,6 +202,52 @@ static void flags(void *instance, const GDExtensionConstTypePtr *, GDExtensionTy
   opened(instance, [&](const Tissue &tissue) { out = tissue.stats().flags; });
 }
 
+/* corrections_made() -> int: in the last step. */
+static void corrections_made(void *instance, const GDExtensionConstTypePtr *,
+                             GDExtensionTypePtr result) {
+  auto &out = *static_cast<int64_t *>(result);
+  out = 0;
+  opened(instance, [&](const Tissue &tissue) { out = tissue.stats().corrections; });
+}
+
+/* error_mm() -> float: the estimated error of the last step; 0 without corrections. */
+static void error_mm(void *instance, const GDExtensionConstTypePtr *, GDExtensionTypePtr result) {
+  auto &out = *static_cast<double *>(result);
+  out = 0;
+  opened(instance, [&](const Tissue &tissue) { out = tissue.stats().error_mm; });
+}
+
+static Effort &effort(void *instance) { return static_cast<SoftTissue *>(instance)->effort; }
+
+static void set_corrections(void *instance, const GDExtensionConstTypePtr *arguments,
+                            GDExtensionTypePtr) {
+  effort(instance).corrections = *static_cast<const int64_t *>(arguments[0]);
+}
+
+static void get_corrections(void *instance, const GDExtensionConstTypePtr *,
+                            GDExtensionTypePtr result) {
+  *static_cast<int64_t *>(result) = effort(instance).corrections;
+}
+
+static void set_target(void *instance, const GDExtensionConstTypePtr *arguments,
+                       GDExtensionTypePtr) {
+  effort(instance).target_mm = real(arguments[0]);
+}
+
+static void get_target(void *instance, const GDExtensionConstTypePtr *, GDExtensionTypePtr result) {
+  *static_cast<double *>(result) = effort(instance).target_mm;
+}
+
+static void set_substeps(void *instance, const GDExtensionConstTypePtr *arguments,
+                         GDExtensionTypePtr) {
+  effort(instance).substeps = *static_cast<const int64_t *>(arguments[0]);
+}
+
+static void get_substeps(void *instance, const GDExtensionConstTypePtr *,
+                         GDExtensionTypePtr result) {
+  *static_cast<int64_t *>(result) = effort(instance).substeps;
+}
+
 static void message(void *instance, const GDExtensionConstTypePtr *, GDExtensionTypePtr result) {
   godot.ptr_destructor(GDEXTENSION_VARIANT_TYPE_STRING)(result);
   godot.string_new(result, static_cast<SoftTissue *>(instance)->message.c_str());
@@ -244,7 +297,21 @@ static const GodotMethod METHODS[] = {
     {"force", force, T(VECTOR3), 0, {}},
     {"penetration", penetration, T(FLOAT), 0, {}},
     {"flags", flags, T(INT), 0, {}},
+    {"corrections_made", corrections_made, T(INT), 0, {}},
+    {"error_mm", error_mm, T(FLOAT), 0, {}},
     {"message", message, T(STRING), 0, {}},
+    {"set_corrections", set_corrections, T(NIL), 1, {{"most", T(INT)}}},
+    {"get_corrections", get_corrections, T(INT), 0, {}},
+    {"set_corrections_target_mm", set_target, T(NIL), 1, {{"target", T(FLOAT)}}},
+    {"get_corrections_target_mm", get_target, T(FLOAT), 0, {}},
+    {"set_substeps", set_substeps, T(NIL), 1, {{"most", T(INT)}}},
+    {"get_substeps", get_substeps, T(INT), 0, {}},
+};
+static const GodotProperty PROPERTIES[] = {
+    {"corrections", T(INT), "-1,64,1", "set_corrections", "get_corrections"},
+    {"corrections_target_mm", T(FLOAT), "0,1,0.001,or_greater", "set_corrections_target_mm",
+     "get_corrections_target_mm"},
+    {"substeps", T(INT), "0,8,1", "set_substeps", "get_substeps"},
 };
 #undef T
 
@@ -264,6 +331,9 @@ static void initialize(void *, GDExtensionInitializationLevel level) {
   godot_string_name_free(&name);
   for (const GodotMethod &method : METHODS) {
     godot_register_method(CLASS_NAME, &method);
+  }
+  for (const GodotProperty &property : PROPERTIES) {
+    godot_register_property(CLASS_NAME, &property);
   }
 }
 

@@ -1,10 +1,25 @@
 #include "tissue.hpp"
 
 #include <algorithm>
+#include <limits>
+#include <stdexcept>
 
-Tissue::Tissue(const std::string &bundle)
-    : model_(upt::Model::open(bundle)), scene_(model_), clock_(model_.info().dt),
-      dt_(model_.info().dt) {
+// The library says what it can do with them; here they only have to fit into its fields.
+static upt::Scene make_scene(const upt::Model &model, const Effort &effort) {
+  if (effort.substeps < 0 || effort.substeps > std::numeric_limits<std::uint8_t>::max()) {
+    throw std::runtime_error("substeps is " + std::to_string(effort.substeps));
+  }
+  auto options = upt::make<upt_scene_options>();
+  const std::int64_t most = std::numeric_limits<std::int32_t>::max();
+  options.corrections = static_cast<std::int32_t>(std::clamp(effort.corrections, -most, most));
+  options.corrections_target_mm = static_cast<float>(effort.target_mm);
+  options.substeps = static_cast<std::uint8_t>(effort.substeps);
+  return upt::Scene(model, &options);
+}
+
+Tissue::Tissue(const std::string &bundle, const Effort &effort)
+    : model_(upt::Model::open(bundle)), scene_(make_scene(model_, effort)),
+      clock_(model_.info().dt), dt_(model_.info().dt) {
   try {
     scene_.step_instruments({});
     scene_.reset();

@@ -7,9 +7,16 @@
 #include <string>
 #include <vector>
 
+// How much work a step in contact gets; as upt_scene_options. Zeros: what the bundle recommends.
+struct Effort {
+  std::int64_t corrections = 0; // at most; UPT_CORRECTIONS_NONE: none
+  double target_mm = 0;         // enough where the estimated error is below; with `corrections`
+  std::int64_t substeps = 0;    // at most; from 2 with a target
+};
+
 class Tissue {
 public:
-  explicit Tissue(const std::string &bundle);
+  Tissue(const std::string &bundle, const Effort &effort);
 
   // One frame: the surface at `now` (s) with the tool where it is now. A step that has landed is
   // taken, the next one is started when it is due; neither is waited for.
