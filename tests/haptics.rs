@@ -1,4 +1,5 @@
 //! The force of one tool between steps: what a hand feels.
+#![cfg(feature = "haptics")]
 
 mod fixture;
 

@@ -1,5 +1,6 @@
 //! A step in steady state makes no heap allocation through Rust's allocator, and leaves the host's floating-point
 //! mode as it was.
+#![cfg(all(feature = "contact", feature = "forces"))]
 #![allow(
     clippy::undocumented_unsafe_blocks,
     reason = "a host in a test: every call keeps to the header, or breaks it on purpose"

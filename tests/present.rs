@@ -1,4 +1,5 @@
 //! The tissue between steps: what a frame shows of it.
+#![cfg(feature = "contact")]
 
 mod fixture;
 

@@ -46,6 +46,7 @@ fn a_reduced_scene_falls_asleep_and_wakes_at_once() {
         "a sleeping scene is exactly at rest"
     );
     assert_eq!(scene.stats().decoded_node_count, 0);
+    #[cfg(feature = "forces")]
     scene.contact_force(&mut []).unwrap();
     scene.step(sparse(&contact), Some(&mut out)).unwrap();
     assert!(!scene.stats().sleeping);

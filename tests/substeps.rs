@@ -1,4 +1,5 @@
 //! Steps that are made of shorter ones where one alone would miss the target: when, what they gain, and what is refused.
+#![cfg(feature = "contact")]
 
 mod fixture;
 

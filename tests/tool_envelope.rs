@@ -1,4 +1,5 @@
 //! Flags in the terms of tools: a bundle whose manifest says which rigid tools it is good for (`envelope.tools`).
+#![cfg(feature = "contact")]
 
 mod fixture;
 

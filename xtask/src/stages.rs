@@ -93,7 +93,7 @@ pub const STAGES: &[Stage] = &[
     },
     Stage {
         name: "clippy",
-        about: "cargo clippy, warnings are errors",
+        about: "cargo clippy, warnings are errors; also of builds with a single feature or none",
         needs: &[],
         nightly: false,
         run: clippy,
@@ -262,36 +262,35 @@ fn fmt(workspace: &Workspace) -> Result<Outcome> {
     )
 }
 
+/// Builds of a package without its other features, each of which must compile, tests included.
+const PARTIAL: [(&str, &[&str]); 3] = [
+    ("upt", &["", "contact", "forces", "haptics", "ndarray"]),
+    ("tissue", &["", "files", "linear"]),
+    ("upt-cli", &["", "files"]), // the first is the demo's
+];
+
 fn clippy(workspace: &Workspace) -> Result<Outcome> {
-    let mut command = cargo(workspace);
-    command.args([
-        "clippy",
-        "--release",
-        "--workspace",
-        "--all-targets",
-        "--",
-        "-D",
-        "warnings",
-    ]);
-    let whole = check(workspace, "cargo clippy", &mut command)?;
-    // As the demo builds it.
-    let mut command = cargo(workspace);
-    command.args([
-        "clippy",
-        "--release",
-        "--package",
-        "upt-cli",
-        "--no-default-features",
-        "--",
-        "-D",
-        "warnings",
-    ]);
-    let least = check(
-        workspace,
-        "cargo clippy, upt-cli without its features",
-        &mut command,
-    )?;
-    Ok(joined(vec![whole, least]))
+    let run = |label: &str, arguments: &[&str]| {
+        let mut command = cargo(workspace);
+        command.args(["clippy", "--release", "--all-targets"]);
+        command.args(arguments).args(["--", "-D", "warnings"]);
+        check(workspace, label, &mut command)
+    };
+    let mut outcomes = vec![run("cargo clippy", &["--workspace"])?];
+    for (package, builds) in PARTIAL {
+        for &features in builds {
+            let label = match features {
+                "" => format!("cargo clippy, {package} without features"),
+                _ => format!("cargo clippy, {package} with {features} alone"),
+            };
+            let alone = ["--no-default-features", "--features", features];
+            outcomes.push(run(
+                &label,
+                &[&["--package", package], &alone[..]].concat(),
+            )?);
+        }
+    }
+    Ok(joined(outcomes))
 }
 
 fn style(workspace: &Workspace) -> Result<Outcome> {

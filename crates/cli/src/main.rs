@@ -18,11 +18,11 @@ mod envelope;
 mod export;
 mod haptics;
 mod host;
-#[cfg(not(all(feature = "files", feature = "linear")))]
+#[cfg(not(feature = "linear"))]
 mod left_out;
 mod loads;
 mod machine;
-#[cfg(all(feature = "files", feature = "linear"))]
+#[cfg(feature = "linear")]
 mod make;
 mod manifest;
 mod mesh;
@@ -57,8 +57,7 @@ use clap::{Parser, Subcommand};
 const VERSION: &str = match (cfg!(feature = "files"), cfg!(feature = "linear")) {
     (true, true) => env!("CARGO_PKG_VERSION"),
     (true, false) => concat!(env!("CARGO_PKG_VERSION"), " (without linear)"),
-    (false, true) => concat!(env!("CARGO_PKG_VERSION"), " (without files)"),
-    (false, false) => concat!(env!("CARGO_PKG_VERSION"), " (without files, linear)"),
+    (false, _) => concat!(env!("CARGO_PKG_VERSION"), " (without files, linear)"),
 };
 
 #[derive(Parser)]
@@ -77,10 +76,10 @@ struct Arguments {
 #[derive(Subcommand)]
 enum Command {
     /// Make a bundle from an organ's surface or mesh, with a certificate.
-    #[cfg(all(feature = "files", feature = "linear"))]
+    #[cfg(feature = "linear")]
     Make(Box<make::Options>),
     /// Left out of this build.
-    #[cfg(not(all(feature = "files", feature = "linear")))]
+    #[cfg(not(feature = "linear"))]
     Make(left_out::Options),
     /// Check a bundle on held-out contacts against the reference solver.
     #[cfg(feature = "linear")]
@@ -152,10 +151,10 @@ fn main() -> ExitCode {
     // SAFETY: no other thread runs yet.
     unsafe { runtime::take() };
     let outcome = match Arguments::parse().command {
-        #[cfg(all(feature = "files", feature = "linear"))]
+        #[cfg(feature = "linear")]
         Command::Make(options) => make::run(&options),
-        #[cfg(not(all(feature = "files", feature = "linear")))]
-        Command::Make(options) => left_out::run("files,linear", &options),
+        #[cfg(not(feature = "linear"))]
+        Command::Make(options) => left_out::run("linear", &options),
         #[cfg(feature = "linear")]
         Command::Check(options) => check::run(&options),
         #[cfg(not(feature = "linear"))]

@@ -48,7 +48,7 @@ pub fn interpreter(tell: &mut dyn FnMut(&str)) -> Result<PathBuf> {
 }
 
 /// The interpreter, with packages; one that the user named has what the user gave it.
-#[cfg(all(feature = "files", feature = "linear"))]
+#[cfg(feature = "linear")]
 pub fn with(packages: &[&str], tell: &mut dyn FnMut(&str)) -> Result<PathBuf> {
     let python = interpreter(tell)?;
     if named().is_some() {

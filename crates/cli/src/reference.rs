@@ -111,7 +111,7 @@ fn cell(text: &str) -> String {
     line.join(" ").replace('|', "\\|").replace('<', "&lt;")
 }
 
-#[cfg(all(test, feature = "files", feature = "linear"))]
+#[cfg(all(test, feature = "linear"))]
 mod tests {
     #[test]
     fn the_committed_page_is_fresh() {

@@ -1,4 +1,5 @@
 //! Exported files, read back by readers that this project did not write.
+#![cfg(feature = "files")]
 
 use tissue::export::{Cells, Collection, SurfaceFormat, write_frame, write_surface};
 use tissue::mesh::{Mesh, box_phantom};

@@ -1,4 +1,5 @@
 //! Import: files of Gmsh and VTK (fixtures/import/make.py), and each fault by hand.
+#![cfg(feature = "files")]
 
 use contact::Shape;
 use std::path::{Path, PathBuf};

@@ -1,4 +1,5 @@
 //! Isosurface stuffing: no slivers, a manifold boundary, the right volume, the same bits.
+#![cfg(feature = "files")]
 
 use tissue::mesh::Mesh;
 use tissue::mesh_import::{RawTets, from_tets};
