@@ -3,10 +3,10 @@
 use ::contact::Vector;
 use ::contact::grasp::tension;
 
-use super::past::Force;
-use super::problem::Problem;
-use super::rows::{State, vector};
-use super::tool::{Push, Reading, Told};
+use super::Problem;
+use crate::contact::past::Force;
+use crate::contact::rows::{State, vector};
+use crate::contact::tool::{Push, Reading, Told};
 use crate::envelope::Used;
 
 impl Problem {
