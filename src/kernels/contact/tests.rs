@@ -1,4 +1,5 @@
 use super::super::random::Random;
+use super::upper::factor_upper_scalar;
 use super::*;
 
 /// A compliance-like matrix: points on a patch, `1 / (distance + a)` between them, 3 axes.
