@@ -1,7 +1,6 @@
 //! The learned map of a release (`release.safetensors` of `docs/reference/formats.md`): `b' = [b, b_before] W` for what the natural
 //! modes leave out of a released field. Linear, and it dies away.
 
-use super::table::PriorTable;
 use crate::bundle::TensorFile;
 use crate::error::Result;
 
@@ -21,10 +20,10 @@ pub struct Release {
 }
 
 impl Release {
-    /// Reads and checks the file for a prior.
-    pub fn parse(file: &TensorFile, prior: &PriorTable) -> Result<Release> {
-        let modes = file.f32("modes", &[None, Some(prior.width())])?;
-        let count = modes.len() / prior.width().max(1);
+    /// Reads and checks the file for fields of `width` block coordinates, `Q`.
+    pub fn parse(file: &TensorFile, width: usize) -> Result<Release> {
+        let modes = file.f32("modes", &[None, Some(width)])?;
+        let count = modes.len() / width.max(1);
         if count == 0 || count > LIMIT {
             return Err(file.bad("modes", format!("must hold 1 to {LIMIT} modes")));
         }

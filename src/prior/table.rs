@@ -1,19 +1,15 @@
-//! `prior.safetensors`, checked: compliance, block-wise basis, response, residual modes.
+//! The tables of the linear response: compliance, block-wise basis, response, residual modes.
+
+mod read;
 
 use super::compliance::{Bases, Compliance};
 use super::numbers::Numbers;
 use super::vibration::FreeVibration;
-use crate::bundle::{BundleFiles, Manifest, ManifestKind, Mesh, PriorEntry, TensorFile};
-use crate::error::Result;
-use crate::grid::{PointGrid, squared_distance};
 use crate::kernels::rows::BlockBasis;
 
 /// A node without a column near it.
 pub const NO_COLUMN: u32 = u32::MAX;
-/// How far outside the domain a contact node borrows a column, in typical edges of the domain.
-const REACH: f64 = 4.0;
-
-/// The tables of the linear response.
+/// The tables of the linear response, as `prior.safetensors` has them.
 #[derive(Debug)]
 pub struct PriorTable {
     /// Nodes with compliance columns `[D]`, ascending.
@@ -32,7 +28,7 @@ pub struct PriorTable {
     /// `[3D,r]`; empty where the bundle has none.
     pub force_to_p: Vec<f32>,
     /// For each node the column (index into `contact_nodes`) of itself or of the nearest contact node within
-    /// [`REACH`] typical edges of the domain; [`NO_COLUMN`] for nodes farther away.
+    /// four typical edges of the domain; [`NO_COLUMN`] for nodes farther away.
     pub nearest_column: Vec<u32>,
     /// Whether a node belongs to the domain `[K]`. A bundle may have columns of a part of the domain only.
     pub in_domain: Vec<bool>,
@@ -43,118 +39,6 @@ pub struct PriorTable {
 }
 
 impl PriorTable {
-    /// Reads and checks the tables that the manifest's entry names.
-    pub fn open(files: &BundleFiles, entry: &PriorEntry, mesh: &Mesh) -> Result<PriorTable> {
-        let manifest = &files.manifest;
-        let mut table = PriorTable::parse(&files.tensors(&entry.file)?, manifest, mesh)?;
-        if let Some(name) = &entry.vibration {
-            let mut vibration = FreeVibration::parse(
-                &files.tensors(name)?,
-                &table,
-                manifest.material.damping_per_s,
-                manifest.dt_s,
-                match manifest.kind {
-                    ManifestKind::Upt => false,
-                    ManifestKind::Reduced => true,
-                },
-            )?;
-            if let Some(name) = &entry.release {
-                vibration.learn(&files.tensors(name)?, &table)?;
-            }
-            table.vibration = Some(vibration);
-        }
-        Ok(table)
-    }
-
-    fn parse(file: &TensorFile, manifest: &Manifest, mesh: &Mesh) -> Result<PriorTable> {
-        let count = mesh.node_count();
-        let contact_nodes = file.ascending("contact_nodes", count)?;
-        if contact_nodes.is_empty() {
-            return Err(file.bad("contact_nodes", "must not be empty"));
-        }
-        let dofs = 3 * contact_nodes.len();
-        let block_nodes = file.indices("block_nodes", &[Some(count)], count)?;
-        let mut seen = vec![false; count];
-        for (at, &node) in block_nodes.iter().enumerate() {
-            if std::mem::replace(&mut seen[node as usize], true) {
-                return Err(file.bad(
-                    "block_nodes",
-                    format!("element {at}: node {node} is there twice"),
-                ));
-            }
-        }
-        let block_offsets = file.offsets("block_offsets", count)?;
-        if block_offsets.last() != Some(&count) {
-            return Err(file.bad("block_offsets", format!("must end with {count}")));
-        }
-        let rank_offsets = file.offsets("rank_offsets", 1 << 28)?;
-        if rank_offsets.len() != block_offsets.len() {
-            return Err(file.bad(
-                "rank_offsets",
-                format!(
-                    "has {} elements, must have {}",
-                    rank_offsets.len(),
-                    block_offsets.len()
-                ),
-            ));
-        }
-        if let Some(at) = rank_offsets
-            .windows(2)
-            .position(|pair| !(pair[1] - pair[0]).is_multiple_of(8))
-        {
-            return Err(file.bad(
-                "rank_offsets",
-                format!("rank of block {at} is not a multiple of 8"),
-            ));
-        }
-        let width = *rank_offsets.last().unwrap_or(&0);
-        let size: usize = block_offsets
-            .windows(2)
-            .zip(rank_offsets.windows(2))
-            .map(|(nodes, ranks)| 3 * (nodes[1] - nodes[0]) * (ranks[1] - ranks[0]))
-            .sum();
-        let places = basis_places(&block_nodes, &block_offsets, &rank_offsets);
-        let compliance = Compliance::read(file, contact_nodes.len(), |i| {
-            places[contact_nodes[i] as usize]
-        })?;
-        let optional = |name: &str, shape: [usize; 2]| {
-            if shape[1] > 0 {
-                file.float(name, &[Some(shape[0]), Some(shape[1])])
-            } else {
-                Ok(Vec::new())
-            }
-        };
-        let (modes, response_modes) = manifest
-            .reduced
-            .as_ref()
-            .map_or((0, 0), |reduced| (reduced.modes, reduced.response_modes));
-        let mut in_domain = vec![false; count];
-        for &node in &mesh.domain_nodes {
-            in_domain[node as usize] = true;
-        }
-        let narrow = |values: Vec<usize>| values.into_iter().map(|value| value as u32).collect();
-        Ok(PriorTable {
-            nearest_column: nearest_columns(mesh, &contact_nodes)?,
-            in_domain,
-            contact_nodes,
-            compliance,
-            block_nodes,
-            block_offsets: narrow(block_offsets),
-            rank_offsets: narrow(rank_offsets),
-            basis: Numbers::read(file, "basis", &[Some(size)])?,
-            response: Numbers::read(file, "response", &[Some(dofs), Some(width)])?,
-            residual: if modes > 0 {
-                file.float("residual", &[Some(modes), Some(width)])?
-            } else {
-                Vec::new()
-            },
-            force_to_z: optional("force_to_z", [dofs, response_modes])?,
-            force_to_p: optional("force_to_p", [dofs, modes])?,
-            places,
-            vibration: None,
-        })
-    }
-
     /// Length of `q`.
     pub fn width(&self) -> usize {
         self.rank_offsets.last().map_or(0, |&width| width as usize)
@@ -280,51 +164,6 @@ impl PriorTable {
                 .as_ref()
                 .map_or(0, FreeVibration::memory_bytes)
     }
-}
-
-/// By node: where its three rows in the basis start, where the coordinates of its block start, and how many.
-fn basis_places(
-    block_nodes: &[u32],
-    block_offsets: &[usize],
-    rank_offsets: &[usize],
-) -> Vec<(u32, u32, u32)> {
-    let mut places = vec![(0, 0, 0); block_nodes.len()];
-    let mut start = 0;
-    for (nodes, ranks) in block_offsets.windows(2).zip(rank_offsets.windows(2)) {
-        let rank = ranks[1] - ranks[0];
-        for &node in &block_nodes[nodes[0]..nodes[1]] {
-            places[node as usize] = (start as u32, ranks[0] as u32, rank as u32);
-            start += 3 * rank;
-        }
-    }
-    places
-}
-
-/// For each node the nearest of `contact_nodes` (ties: the smallest index), by a cell grid.
-fn nearest_columns(mesh: &Mesh, contact_nodes: &[u32]) -> Result<Vec<u32>> {
-    let grid = PointGrid::try_new(
-        contact_nodes
-            .iter()
-            .flat_map(|&node| mesh.position(node))
-            .collect(),
-    )?;
-    let area: f64 = contact_nodes
-        .iter()
-        .map(|&node| mesh.node_area[node as usize] as f64)
-        .sum();
-    let edge = (area / contact_nodes.len() as f64).sqrt();
-    Ok((0..mesh.node_count() as u32)
-        .map(|node| {
-            let p = mesh.position(node);
-            let column = grid.nearest(p);
-            let d2 = squared_distance(p, mesh.position(contact_nodes[column as usize]));
-            if d2.sqrt() <= REACH * edge {
-                column
-            } else {
-                NO_COLUMN
-            }
-        })
-        .collect())
 }
 
 #[cfg(test)]

@@ -7,7 +7,6 @@
 //! (`release.safetensors`).
 
 use super::release::Release;
-use super::table::PriorTable;
 use crate::bundle::TensorFile;
 use crate::error::Result;
 use crate::kernels::project::row_dots;
@@ -37,11 +36,11 @@ pub struct FreeVibration {
 }
 
 impl FreeVibration {
-    /// Reads and checks the tables for a prior; `damping` in 1/s, `dt` in s. `projected`: the amplitudes of
-    /// fields are needed too.
+    /// Reads and checks the tables for a response of shape `[3D,Q]`; `damping` in 1/s, `dt` in s. `projected`: the
+    /// amplitudes of fields are needed too.
     pub fn parse(
         file: &TensorFile,
-        prior: &PriorTable,
+        [dofs, width]: [usize; 2],
         damping: f64,
         dt: f64,
         projected: bool,
@@ -54,12 +53,11 @@ impl FreeVibration {
         if let Some(at) = frequency.iter().position(|&omega| omega <= 0.0) {
             return Err(file.bad("frequency", format!("element {at} is not positive")));
         }
-        let dofs = 3 * prior.contact_nodes.len();
         Ok(FreeVibration {
             force_to_mode: file.f32("force_to_mode", &[Some(dofs), Some(count)])?,
-            modes: file.f32("modes", &[Some(count), Some(prior.width())])?,
+            modes: file.f32("modes", &[Some(count), Some(width)])?,
             projection: if projected {
-                file.f32("projection", &[Some(count), Some(prior.width())])?
+                file.f32("projection", &[Some(count), Some(width)])?
             } else {
                 Vec::new()
             },
@@ -73,9 +71,9 @@ impl FreeVibration {
         })
     }
 
-    /// Reads the learned map that carries on what the modes leave out.
-    pub fn learn(&mut self, file: &TensorFile, prior: &PriorTable) -> Result<()> {
-        self.release = Release::parse(file, prior)?;
+    /// Reads the learned map that carries on what the modes leave out; `width`: that of the prior, `Q`.
+    pub fn learn(&mut self, file: &TensorFile, width: usize) -> Result<()> {
+        self.release = Release::parse(file, width)?;
         self.rows = (0..self.count.max(self.release.count) as u32).collect();
         Ok(())
     }
