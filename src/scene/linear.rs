@@ -8,6 +8,7 @@ use crate::error::Result;
 use crate::kernels::rows::decode_rows;
 use crate::kernels::{Compute, Isa};
 use crate::prior::{ContactResponse, PriorTable, SolveReport};
+use crate::stats::flag;
 
 /// Tables, and the solve of the last contact.
 pub struct Linear {
@@ -83,4 +84,16 @@ impl Linear {
             field,
         )?)
     }
+}
+
+/// Envelope flags of a contact solve.
+pub fn solve_flags(report: SolveReport) -> u32 {
+    let mut flags = 0;
+    if report.outside {
+        flags |= flag::SITE;
+    }
+    if report.regularised {
+        flags |= flag::REGULARISED;
+    }
+    flags
 }

@@ -12,6 +12,7 @@ mod engine;
 mod free_motion;
 #[cfg(feature = "haptics")]
 mod haptics;
+mod inputs;
 mod inversion;
 mod linear;
 mod plan;

@@ -2,13 +2,13 @@
 //! linear response and faded out beyond the trained pushes (`docs/reference/formats.md`). A bundle without a learned map has `b' = 0`
 //! and swings freely after a release ([`super::free_motion`]).
 
+mod record;
+
 use std::sync::Arc;
 
-use serde::{Deserialize, Serialize};
-
 use super::contact::ContactSet;
-use super::engine::Inputs;
-use super::linear::Linear;
+use super::inputs::Inputs;
+use super::linear::{Linear, solve_flags};
 use super::timing::Stopwatch;
 use crate::bundle::ReducedInput;
 use crate::error::Result;
@@ -16,127 +16,16 @@ use crate::kernels::Compute;
 use crate::kernels::project::{project_field, row_dots};
 use crate::kernels::respond::accumulate_rows;
 use crate::kernels::rows::Stored;
+use crate::memory;
 use crate::model::{LearnedMap, Model, ReducedModel};
 use crate::onnx::Stage;
 use crate::options::{Precision, Provider};
-use crate::prior::{PriorTable, SolveReport};
+use crate::prior::PriorTable;
 use crate::stats::{SceneStats, flag};
-use crate::{memory, stored};
+
+pub use record::ReducedRecord;
 
 const STATE: &str = "a scene's reduced states";
-
-/// The reduced state after one step.
-#[derive(Debug, Serialize, Deserialize)]
-pub struct ReducedRecord {
-    /// Residual state `[r]`, mm.
-    #[serde(with = "stored")]
-    pub b: Vec<f32>,
-    /// Linear response in its leading modes `[r_z]`; this and the next three follow from the rest ([`ReducedEngine::rebuild`]).
-    #[serde(skip)]
-    pub z: Vec<f32>,
-    /// Linear response in the residual modes `[r]`, mm.
-    #[serde(skip)]
-    pub p: Vec<f32>,
-    /// Linear response in block coordinates `[Q]`.
-    #[serde(skip)]
-    pub q_prior: Vec<f32>,
-    /// The whole field in block coordinates `[Q]`.
-    #[serde(skip)]
-    pub q: Vec<f32>,
-    /// State of the free vibration, mm; empty beside a learned map.
-    #[serde(with = "stored")]
-    pub vibration: Vec<f32>,
-    /// `|L|` over all nodes, mm.
-    pub prior_norm: f32,
-    /// Bound of `|b|`, mm.
-    pub bound: f32,
-    /// In contact.
-    pub contact: bool,
-}
-
-impl ReducedRecord {
-    fn new(model: &ReducedModel, table: &PriorTable) -> Result<ReducedRecord> {
-        let entry = model.learned.as_ref().map(|map| &map.entry);
-        let (modes, response_modes) = entry.map_or((0, 0), |e| (e.modes, e.response_modes));
-        let swinging = table.vibration.as_ref().map_or(0, |v| v.state_len());
-        Ok(ReducedRecord {
-            b: memory::zeros(modes, STATE)?,
-            z: memory::zeros(response_modes, STATE)?,
-            p: memory::zeros(modes, STATE)?,
-            vibration: memory::zeros(swinging, STATE)?,
-            q_prior: memory::zeros(table.width(), STATE)?,
-            q: memory::zeros(table.width(), STATE)?,
-            prior_norm: 0.0,
-            bound: 0.0,
-            contact: false,
-        })
-    }
-
-    /// A copy.
-    pub fn copy(&self) -> Result<ReducedRecord> {
-        Ok(ReducedRecord {
-            b: memory::copied(&self.b, STATE)?,
-            z: memory::copied(&self.z, STATE)?,
-            p: memory::copied(&self.p, STATE)?,
-            q_prior: memory::copied(&self.q_prior, STATE)?,
-            q: memory::copied(&self.q, STATE)?,
-            vibration: memory::copied(&self.vibration, STATE)?,
-            ..*self
-        })
-    }
-
-    /// Checks what was read against a record of the scene, and makes room for what follows from it.
-    pub fn admit(&mut self, own: &ReducedRecord) -> Result<()> {
-        let ReducedRecord {
-            b,
-            z,
-            p,
-            q_prior,
-            q,
-            vibration,
-            prior_norm: _,
-            bound: _,
-            contact: _,
-        } = own;
-        stored::check(&self.b, b.len())?;
-        stored::check(&self.vibration, vibration.len())?;
-        stored::check(&[self.prior_norm, self.bound], 2)?;
-        self.z = memory::copied(z, STATE)?;
-        self.p = memory::copied(p, STATE)?;
-        self.q_prior = memory::copied(q_prior, STATE)?;
-        self.q = memory::copied(q, STATE)?;
-        Ok(())
-    }
-
-    /// Bytes held.
-    pub fn memory_bytes(&self) -> usize {
-        let lists = [
-            &self.b,
-            &self.z,
-            &self.p,
-            &self.q_prior,
-            &self.q,
-            &self.vibration,
-        ];
-        lists.iter().map(|list| 4 * list.len()).sum()
-    }
-
-    fn clear(&mut self) {
-        for values in [
-            &mut self.b,
-            &mut self.z,
-            &mut self.p,
-            &mut self.q_prior,
-            &mut self.q,
-            &mut self.vibration,
-        ] {
-            values.fill(0.0);
-        }
-        self.prior_norm = 0.0;
-        self.bound = 0.0;
-        self.contact = false;
-    }
-}
 
 /// Buffers and session of a scene of kind `reduced`.
 pub struct ReducedEngine {
@@ -263,7 +152,7 @@ impl ReducedEngine {
         let next = &mut self.next;
         let (last, swung, q) = (&self.last.vibration, &mut next.vibration, &mut next.q_prior);
         self.linear.respond(compute, next.contact, last, swung, q)?;
-        self.linear.leading(compute, next)?;
+        leading(&self.linear, compute, next)?;
         next.prior_norm = norm(&next.q_prior);
         let (Some(map), Some(own), true) = (&self.kind.learned, &mut self.learned, inputs.learned)
         else {
@@ -414,7 +303,7 @@ impl ReducedEngine {
             }
             record.q.copy_from_slice(&record.q_prior);
             if let Some(learned) = &self.learned {
-                linear.leading(compute, record)?;
+                leading(linear, compute, record)?;
                 combine(compute, table, &learned.mode_rows, record)?;
             }
         }
@@ -437,17 +326,15 @@ impl ReducedEngine {
     }
 }
 
-impl Linear {
-    /// The response in the learned map's coordinates.
-    fn leading(&self, compute: Compute<'_>, record: &mut ReducedRecord) -> Result<()> {
-        let (Compute { isa, pool }, table) = (compute, &self.table);
-        let (to_z, to_p) = (
-            Stored::F32(&table.force_to_z),
-            Stored::F32(&table.force_to_p),
-        );
-        self.solve.expand(isa, pool, to_z, &mut record.z)?;
-        self.solve.expand(isa, pool, to_p, &mut record.p)
-    }
+/// The response in the learned map's coordinates.
+fn leading(linear: &Linear, compute: Compute<'_>, record: &mut ReducedRecord) -> Result<()> {
+    let (Compute { isa, pool }, table) = (compute, &linear.table);
+    let (to_z, to_p) = (
+        Stored::F32(&table.force_to_z),
+        Stored::F32(&table.force_to_p),
+    );
+    linear.solve.expand(isa, pool, to_z, &mut record.z)?;
+    linear.solve.expand(isa, pool, to_p, &mut record.p)
 }
 
 /// `q = q_prior + sum_j b_j residual[j]`.
@@ -469,16 +356,4 @@ fn combine(
         true,
         &mut record.q,
     )?)
-}
-
-/// Envelope flags of a contact solve.
-pub fn solve_flags(report: SolveReport) -> u32 {
-    let mut flags = 0;
-    if report.outside {
-        flags |= flag::SITE;
-    }
-    if report.regularised {
-        flags |= flag::REGULARISED;
-    }
-    flags
 }

@@ -4,7 +4,7 @@ use std::sync::{Arc, RwLock};
 
 use super::core::{Core, lock_read, lock_write};
 use super::counters::Source;
-use super::engine::{Decode, Which};
+use super::inputs::{Decode, Which};
 use super::plan::NodePlan;
 use super::points::AttachedPoints;
 use super::published::{Frame, Published};

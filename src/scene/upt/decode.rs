@@ -7,7 +7,7 @@ use super::{Path, UptEngine, UptRecord};
 use crate::error::Result;
 use crate::kernels::Compute;
 use crate::kernels::decoder::{DecoderRows, Decoding, decode};
-use crate::scene::engine::Which;
+use crate::scene::inputs::Which;
 
 impl UptEngine {
     /// A record.

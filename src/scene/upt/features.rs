@@ -5,7 +5,7 @@ use std::hint::black_box;
 use super::record::UptRecord;
 use crate::bundle::Feature;
 use crate::model::{UptModel, UptTables};
-use crate::scene::engine::Inputs;
+use crate::scene::inputs::Inputs;
 
 /// Writes every row. `next` and `last` hold the linear response of this step and of the one before.
 pub(super) fn fill_features(

@@ -12,10 +12,9 @@ pub use record::UptRecord;
 
 use std::sync::Arc;
 
-use super::engine::Inputs;
-use super::linear::Linear;
+use super::inputs::Inputs;
+use super::linear::{Linear, solve_flags};
 use super::plan::NodePlan;
-use super::reduced::solve_flags;
 use super::timing::Stopwatch;
 use anchors::AnchorField;
 use decoders::Decoders;

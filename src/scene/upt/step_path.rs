@@ -12,7 +12,7 @@ use crate::kernels::{Compute, Isa, Pool};
 use crate::memory;
 use crate::model::{Model, UptModel, UptTables};
 use crate::options::{DecoderKernel, Precision, Provider, SceneOptions, StepPath};
-use crate::scene::engine::Which;
+use crate::scene::inputs::Which;
 
 /// Runs before the timed ones: a CUDA graph is captured in the second.
 const WARM_UP: usize = 3;
