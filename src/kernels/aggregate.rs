@@ -9,7 +9,7 @@
 use super::Compute;
 use super::encode::LowRank;
 use super::isa::{Isa, by_isa};
-use super::lanes::Lanes;
+use super::lanes::{Lanes, load_some, store_some};
 use super::math::{gelu, gelu_lanes};
 use super::parts::Parts;
 use super::pool::{Pool, PoolError};
@@ -273,32 +273,6 @@ unsafe fn fused_row_body<V: Lanes>(
             }
             store_some(sum.mul(mean), out.as_mut_ptr().add(column), count);
             column += count;
-        }
-    }
-}
-
-/// `count <= N` lanes from memory.
-#[inline(always)]
-pub(super) unsafe fn load_some<V: Lanes>(from: *const f32, count: usize) -> V {
-    // SAFETY: the caller's.
-    unsafe {
-        if count == V::N {
-            V::load(from)
-        } else {
-            V::load_part(from, count)
-        }
-    }
-}
-
-/// `count <= N` lanes to memory.
-#[inline(always)]
-pub(super) unsafe fn store_some<V: Lanes>(x: V, to: *mut f32, count: usize) {
-    // SAFETY: the caller's.
-    unsafe {
-        if count == V::N {
-            x.store(to)
-        } else {
-            x.store_part(to, count)
         }
     }
 }

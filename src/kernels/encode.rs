@@ -3,9 +3,8 @@
 //!
 //! `table [n,d]`, `features [n,f]` (6 to 16 numbers a node), `W [d,f]` stored transposed `[f,d]`.
 
-use super::aggregate::{load_some, store_some};
 use super::isa::{Isa, by_isa};
-use super::lanes::Lanes;
+use super::lanes::{Lanes, load_some, store_some};
 use super::parts::Parts;
 use super::pool::{Pool, PoolError};
 

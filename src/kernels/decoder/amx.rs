@@ -6,8 +6,8 @@
 
 use std::sync::OnceLock;
 
-use super::bf16::NODES;
-
+/// Nodes that a bf16 product takes at once, on matrix tiles or vectors.
+pub(super) const NODES: usize = 48;
 /// Outputs of a tile.
 pub(super) const OUTPUTS: usize = 16;
 /// Depth of a tile.

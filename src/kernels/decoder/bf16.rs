@@ -4,12 +4,10 @@
 //! Inputs are stored as pairs of successive features, `[in/2][nodes][2]`: a 32-bit lane holds what one `vdpbf16ps` consumes, and
 //! sixteen rows of sixteen lanes are a matrix tile. Behind the last feature are zeros up to a whole tile.
 
+use super::amx::NODES;
 #[cfg(target_arch = "x86_64")]
 use super::tile::MAX_NODES;
 use super::weights::{DecoderTokens, PackedDecoder};
-
-/// Nodes of a tile.
-pub(super) const NODES: usize = 48;
 
 /// Decodes the `NODES` nodes `rows` to `out [3][NODES]`; the caller has checked `Isa::has_bf16`, and for matrix tiles
 /// `amx::is_available`.

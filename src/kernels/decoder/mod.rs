@@ -193,7 +193,7 @@ pub fn decode(
     let tiles = precision == DecoderPrecision::Bf16Tiles && isa == Isa::Avx512;
     let vectors = precision == DecoderPrecision::Bf16Vectors && isa == Isa::Avx512;
     let bf16 = tiles && amx::is_available() || vectors && Isa::has_bf16();
-    let nodes = if bf16 { bf16::NODES } else { tile::nodes(isa) };
+    let nodes = if bf16 { amx::NODES } else { tile::nodes(isa) };
     let (parts, a_worker) = (Parts::new(out), scratch.a_worker);
     let scratch = Parts::new(&mut scratch.blocks);
     pool.run(count.div_ceil(nodes), &|chunk, worker| {

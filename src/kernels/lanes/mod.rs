@@ -60,3 +60,35 @@ pub(crate) trait Lanes: Copy {
     /// `to[j * stride + i] = from[row_offset[i] + j]`.
     unsafe fn transpose(from: *const f32, row_offset: &[usize], to: *mut f32, stride: usize);
 }
+
+/// `count <= N` lanes from memory; zeros behind them.
+///
+/// # Safety
+/// As [`Lanes`].
+#[inline(always)]
+pub(crate) unsafe fn load_some<V: Lanes>(from: *const f32, count: usize) -> V {
+    // SAFETY: the caller's.
+    unsafe {
+        if count == V::N {
+            V::load(from)
+        } else {
+            V::load_part(from, count)
+        }
+    }
+}
+
+/// `count <= N` lanes to memory.
+///
+/// # Safety
+/// As [`Lanes`].
+#[inline(always)]
+pub(crate) unsafe fn store_some<V: Lanes>(x: V, to: *mut f32, count: usize) {
+    // SAFETY: the caller's.
+    unsafe {
+        if count == V::N {
+            x.store(to)
+        } else {
+            x.store_part(to, count)
+        }
+    }
+}
