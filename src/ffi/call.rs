@@ -6,36 +6,10 @@ use std::ffi::c_char;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicU32, Ordering};
 
+use super::failure::{Answer, Failure, fail};
 use super::log;
 use super::status::{UPT_ERR_PANIC, UPT_ERR_STATE, upt_status};
-use crate::error::Error;
 use crate::kernels::MaskExceptions;
-
-/// A status with its message.
-pub(super) struct Failure {
-    pub status: upt_status,
-    pub message: String,
-}
-
-/// What the body of an exported function gives.
-pub(super) type Answer = Result<upt_status, Failure>;
-
-/// A failure of the boundary itself (pointers, sizes, handles).
-pub(super) fn fail<T>(status: upt_status, message: impl Into<String>) -> Result<T, Failure> {
-    Err(Failure {
-        status,
-        message: message.into(),
-    })
-}
-
-impl From<Error> for Failure {
-    fn from(error: Error) -> Self {
-        Failure {
-            status: error.status(),
-            message: error.to_string(),
-        }
-    }
-}
 
 thread_local! {
     /// NUL-terminated message of the last failed call of this thread.

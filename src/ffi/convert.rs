@@ -1,6 +1,6 @@
 //! Integers of the host -> the library's enums and options.
 
-use super::call::{Failure, fail};
+use super::failure::{Failure, fail};
 use super::pointers::{optional_path, slice};
 use super::status::*;
 use super::structs::*;

@@ -2,7 +2,7 @@
 
 use super::call::call;
 #[cfg(not(feature = "contact"))]
-use super::call::fail;
+use super::failure::fail;
 use super::output::{copy_out, place};
 use super::pointers::slice;
 use super::registry::call_scene;
@@ -10,8 +10,8 @@ use super::status::*;
 use super::structs::*;
 #[cfg(feature = "contact")]
 use {
-    super::call::Failure,
     super::convert,
+    super::failure::Failure,
     super::output::{fill, optional_output},
     super::pointers::each,
     super::registry::{add_hull, remove_hull},
@@ -290,8 +290,8 @@ impl Scene {
     /// Calls with the list that instruments are read into.
     fn with_tools(
         &self,
-        call: impl FnOnce(&mut Vec<Tool>) -> super::call::Answer,
-    ) -> super::call::Answer {
+        call: impl FnOnce(&mut Vec<Tool>) -> super::failure::Answer,
+    ) -> super::failure::Answer {
         let mut list = self.tool_list()?;
         call(&mut list)
     }

@@ -4,7 +4,7 @@
 use std::cell::UnsafeCell;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use super::call::{Failure, fail};
+use super::failure::{Failure, fail};
 use super::registry::{next_hand, refuse_hand};
 use super::status::*;
 use crate::haptics::Haptics;

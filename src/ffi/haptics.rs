@@ -2,7 +2,7 @@
 
 use super::call::call;
 #[cfg(not(feature = "haptics"))]
-use super::call::fail;
+use super::failure::fail;
 use super::output::{fill, place};
 use super::pointers::required;
 use super::registry::call_scene;
@@ -11,7 +11,7 @@ use super::structs::*;
 use super::{convert, pointers};
 #[cfg(feature = "haptics")]
 use {
-    super::{call::Failure, hands},
+    super::{failure::Failure, hands},
     crate::haptics::{HapticForce, HapticOptions, HapticPose},
     std::ptr::without_provenance_mut,
 };

@@ -1,10 +1,10 @@
 //! `upt_scene`: instruments -> contacts, displacement -> forces.
 
-#[cfg(feature = "contact")]
-use super::call::Failure;
-#[cfg(any(not(feature = "contact"), not(feature = "forces")))]
-use super::call::fail;
 use super::convert;
+#[cfg(feature = "contact")]
+use super::failure::Failure;
+#[cfg(any(not(feature = "contact"), not(feature = "forces")))]
+use super::failure::fail;
 use super::output::{output, place};
 use super::pointers::each;
 use super::registry::call_scene;

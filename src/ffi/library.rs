@@ -2,7 +2,8 @@
 
 use core::ffi::{c_char, c_void};
 
-use super::call::{Answer, call, fail, last_error};
+use super::call::{call, last_error};
+use super::failure::{Answer, fail};
 use super::status::*;
 use super::structs::*;
 use super::{convert, log, output, pointers};

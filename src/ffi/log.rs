@@ -17,7 +17,7 @@ use tracing::span::{Attributes, Id, Record};
 use tracing::subscriber::Interest;
 use tracing::{Event, Level, Metadata, Subscriber};
 
-use super::call::{Answer, fail};
+use super::failure::{Answer, fail};
 use super::status::*;
 use super::structs::upt_log_fn;
 

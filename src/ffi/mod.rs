@@ -8,6 +8,7 @@
 mod call;
 mod convert;
 mod driven;
+mod failure;
 #[cfg(feature = "haptics")]
 mod hands;
 mod haptics;

@@ -143,7 +143,7 @@ pub unsafe extern "C" fn upt_model_positions(
             let model = find_model(model)?;
             let positions = model.positions();
             if count != positions.len() as u64 {
-                return super::call::fail(
+                return super::failure::fail(
                     UPT_ERR_ARGUMENT,
                     format!(
                         "count is {count}; 3 K = {} floats are needed",

@@ -4,7 +4,7 @@
 use std::ffi::{CStr, c_char};
 use std::path::PathBuf;
 
-use super::call::{Failure, fail};
+use super::failure::{Failure, fail};
 use super::status::*;
 use super::structs::*;
 

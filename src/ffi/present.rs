@@ -1,15 +1,15 @@
 //! `upt_scene`: frames between steps.
 
 #[cfg(not(feature = "contact"))]
-use super::call::fail;
+use super::failure::fail;
 use super::registry::call_scene;
 use super::status::*;
 use super::structs::*;
 use crate::scene::Values;
 #[cfg(feature = "contact")]
 use {
-    super::call::Failure,
     super::driven::read_tools,
+    super::failure::Failure,
     super::output::output,
     super::scene::contacts,
     crate::{Contact, Scene},

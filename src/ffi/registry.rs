@@ -7,7 +7,8 @@ use std::ptr::without_provenance_mut;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, LazyLock, PoisonError, RwLock};
 
-use super::call::{Answer, Failure, call, fail};
+use super::call::call;
+use super::failure::{Answer, Failure, fail};
 use super::status::*;
 #[cfg(feature = "contact")]
 use super::structs::upt_hull;

@@ -1,6 +1,7 @@
 //! `upt_scene`: make, end, reset, step, read.
 
-use super::call::{Failure, call};
+use super::call::call;
+use super::failure::Failure;
 use super::output::{apart, optional_output, output, place};
 use super::pointers::slice;
 use super::registry::{add_scene, call_scene, find_model, remove_scene};
@@ -181,7 +182,7 @@ unsafe fn step(
     input: StepInput,
     out: *mut f32,
     out_count: u64,
-) -> super::call::Answer {
+) -> super::failure::Answer {
     // SAFETY: the host passes room for that many elements, as the header asks.
     let Some(out) = unsafe { optional_output(out, out_count, "out") }? else {
         scene.step(input, None)?;

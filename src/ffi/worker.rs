@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::call::Answer;
+use super::failure::Answer;
 use super::output::output;
 use super::registry::call_scene;
 use super::scene::contacts;
