@@ -7,6 +7,7 @@
 //! |---|---|
 //! | [`slow`] | what a step publishes: samples near the tool, how they move, forces, velocities |
 //! | [`publish`] | the scene's end: fills it |
+//! | [`ends`] | what both ends see of each other |
 //! | [`modes`] | the natural modes between two steps |
 //! | [`render`] | the hand's end: a wrench at a pose |
 //! | [`solver`] | the samples between two steps, and contact at a pose |
@@ -15,6 +16,7 @@
 //!
 //! At this boundary metres, newtons and newton metres; inside millimetres and millinewtons.
 
+mod ends;
 mod modes;
 mod passivity;
 pub(crate) mod publish;

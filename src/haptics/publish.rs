@@ -1,12 +1,13 @@
 //! The scene's end: after each published state the contact problem near the tool.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 
 use ::contact::{Body, Placed, Pose, Sample, Samples, Search, Vector};
 use exchange::{Reader, Writer, exchange};
 
 use super::HapticOptions;
+use super::ends::Ends;
 use super::modes::Modes;
 use super::render::Haptics;
 use super::slow::{MOST_SAMPLES, Slow};
@@ -27,15 +28,6 @@ const AT_ONCE_S: f64 = 1e-3;
 /// Times the impedance of a sample's mass on its spring. With 1 taps on two meshes lag behind the solver's force, with 2 strokes feel
 /// too much of it (`docs/guide/frames-and-haptics.md`).
 const IMPEDANCE: f32 = 1.5;
-
-/// What both ends see of each other.
-#[derive(Debug, Default)]
-pub struct Ends {
-    /// The scene is there no more.
-    pub scene_gone: AtomicBool,
-    /// The hand is there no more.
-    pub hand_gone: AtomicBool,
-}
 
 /// A tool of a scene that a hand feels.
 pub struct Link {

@@ -6,9 +6,9 @@ use std::sync::atomic::Ordering;
 use ::contact::{Body, Pose, Vector, pose};
 use exchange::{Reader, Writer};
 
+use super::ends::Ends;
 use super::modes::Modes;
 use super::passivity::Observer;
-use super::publish::Ends;
 use super::slow::Slow;
 use super::solver::{FADE_MM, Solver};
 use super::{HapticForce, HapticOptions, HapticPose};
