@@ -3,9 +3,9 @@
 #[cfg(any(feature = "cuda", feature = "tensorrt", feature = "tensorrt-rtx"))]
 use ort::ep::{self, ExecutionProvider};
 
+use super::choice::Wish;
 #[cfg(feature = "tensorrt-rtx")]
 use super::plugin;
-use super::providers::Wish;
 #[cfg(feature = "tensorrt-rtx")]
 use super::runtime::Runtime;
 #[cfg(feature = "tensorrt")]

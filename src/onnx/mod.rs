@@ -2,6 +2,7 @@
 //!
 //! Nothing here is touched, and no library is opened, until a model is opened or the providers are asked for.
 
+mod choice;
 mod engine_cache;
 mod gpu;
 mod graph;
@@ -17,8 +18,9 @@ mod stage;
 mod status;
 mod version;
 
+pub use choice::ProviderChoice;
 pub use graph::Tensors;
-pub use providers::{ProviderChoice, ProviderPlan, providers_json};
+pub use providers::{ProviderPlan, providers_json};
 pub use runtime::Runtime;
 pub use stage::{Stage, StageOptions, StageTimes};
 

@@ -1,11 +1,10 @@
-//! Execution providers: an ordered wish, what really runs, and why the others do not.
+//! Execution providers: which are tried for a session, in order, and which this machine offers.
 
 use std::collections::BTreeMap;
 
-#[cfg(any(feature = "cuda", feature = "tensorrt", feature = "tensorrt-rtx"))]
-use ort::ep::ExecutionProviderDispatch;
 use ort::session::Session;
 
+use super::choice::{ProviderChoice, Wish};
 use super::engine_cache::{engine_folder, engine_key};
 use super::gpu;
 use super::graph::Tensors;
@@ -34,44 +33,6 @@ pub struct ProviderPlan {
     options: ModelOptions,
     /// Shared by the clones of a plan.
     pub(super) sessions: Sessions,
-}
-
-/// How a session is told which provider to use.
-pub(super) enum Wish {
-    /// Nothing to tell: the CPU.
-    Cpu,
-    /// A provider of the library.
-    #[cfg(any(feature = "cuda", feature = "tensorrt", feature = "tensorrt-rtx"))]
-    Builtin(ExecutionProviderDispatch),
-    /// The devices that a plugin provider offers, and its options.
-    #[cfg(feature = "tensorrt-rtx")]
-    Plugin(&'static str, Vec<(String, String)>),
-}
-
-/// What runs a session and why providers before it in the list do not.
-#[derive(Debug, Clone)]
-pub struct ProviderChoice {
-    /// What runs.
-    pub provider: Provider,
-    /// Nodes of the session's graph by ONNX Runtime's name of the provider that runs them: a GPU provider may leave
-    /// some to the CPU. Empty where the library does not tell.
-    pub nodes: BTreeMap<String, usize>,
-    /// Where the stage's tensors lie: `host`, `device`, or `bound anew in each run` where device memory is not to be had.
-    pub memory: &'static str,
-    /// Provider and reason, for each that was asked for and not taken.
-    pub refused: Vec<(Provider, String)>,
-}
-
-impl ProviderChoice {
-    /// The CPU, which nobody refused.
-    pub(super) fn cpu() -> ProviderChoice {
-        ProviderChoice {
-            provider: Provider::Cpu,
-            nodes: BTreeMap::new(),
-            memory: "host",
-            refused: Vec::new(),
-        }
-    }
 }
 
 impl ProviderPlan {

@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use ort::session::Session;
 
-use super::providers::ProviderChoice;
+use super::choice::ProviderChoice;
 
 /// A graph's file and the threads of its session.
 type Key = (String, usize);

@@ -14,8 +14,8 @@ use ort::value::Tensor;
 
 pub use make::StageOptions;
 
+use super::choice::ProviderChoice;
 use super::memory::{Memory, copy};
-use super::providers::ProviderChoice;
 use super::runtime::Runtime;
 use super::status;
 use crate::error::{Error, Result};

@@ -10,10 +10,11 @@ use ort::value::Tensor;
 
 use super::{Buffer, Stage, StageTimes};
 use crate::error::{Error, Result};
+use crate::onnx::choice::{ProviderChoice, Wish};
 use crate::onnx::graph::Tensors;
 use crate::onnx::memory::Memory;
 use crate::onnx::placement;
-use crate::onnx::providers::{ProviderChoice, ProviderPlan, Wish};
+use crate::onnx::providers::ProviderPlan;
 use crate::onnx::runtime::Runtime;
 use crate::options::Provider;
 

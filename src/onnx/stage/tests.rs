@@ -1,8 +1,9 @@
 use super::make::configure;
 use super::*;
+use crate::onnx::choice::Wish;
 use crate::onnx::graph::Tensors;
 use crate::onnx::memory::round_trip;
-use crate::onnx::providers::{ProviderPlan, Wish};
+use crate::onnx::providers::ProviderPlan;
 
 const FILE: &str = "latent.onnx";
 
