@@ -1,18 +1,8 @@
 //! What the values of a manifest must satisfy; every failure names the field.
 
+use super::faults::{bad, check};
 use super::manifest::{Envelope, Manifest, ManifestKind, ReducedEntry, ToolEnvelope, UptEntry};
-use crate::error::{Error, Result};
-
-/// File that the messages name.
-pub(super) const FILE: &str = "bundle.json";
-
-pub(super) fn bad(field: &str, message: impl std::fmt::Display) -> Error {
-    Error::bundle(FILE, format!("field `{field}`: {message}"))
-}
-
-pub(super) fn check(ok: bool, field: &str, message: &str) -> Result<()> {
-    if ok { Ok(()) } else { Err(bad(field, message)) }
-}
+use crate::error::Result;
 
 impl Manifest {
     pub(super) fn check(&self) -> Result<()> {

@@ -3,7 +3,7 @@
 
 use serde_json::Value;
 
-use super::checks::{FILE, bad};
+use super::faults::{FILE, bad};
 use crate::error::{Error, Result};
 
 /// What `requires` may name: each changes what a step gives, and a library without it must refuse the bundle. A new one is

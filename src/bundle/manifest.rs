@@ -4,12 +4,6 @@ use std::collections::BTreeMap;
 
 use serde::Deserialize;
 
-use super::checks::{FILE, bad, check};
-use super::{known, seal};
-use crate::error::{Error, Result};
-
-const VERSION: u64 = 1;
-
 /// The kinds a manifest may name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -337,50 +331,6 @@ pub struct Manifest {
     pub errors: serde_json::Value,
     /// All files but `bundle.json`.
     pub files: BTreeMap<String, FileEntry>,
-}
-
-#[derive(Deserialize)]
-struct Header {
-    format: String,
-    version: u64,
-}
-
-fn parse<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<T> {
-    let mut deserializer = serde_json::Deserializer::from_slice(bytes);
-    serde_path_to_error::deserialize(&mut deserializer).map_err(|error| {
-        let path = error.path().to_string();
-        bad(
-            &path,
-            format!(
-                "{}; export with `python -m upt_training export`",
-                error.inner()
-            ),
-        )
-    })
-}
-
-impl Manifest {
-    /// Parses and checks the bytes of `bundle.json`.
-    pub fn parse(bytes: &[u8]) -> Result<Manifest> {
-        let header: Header = parse(bytes)?;
-        check(
-            header.format == "upt-bundle",
-            "format",
-            "must be `upt-bundle`",
-        )?;
-        if header.version != VERSION {
-            return Err(Error::Version(format!(
-                "{FILE}: field `version` is {}, this library reads version {VERSION}",
-                header.version
-            )));
-        }
-        let fields: serde_json::Value = parse(bytes)?;
-        seal::check(bytes, &fields)?;
-        known::check(&fields)?;
-        let manifest: Manifest = parse(bytes)?;
-        manifest.check()?;
-        Ok(manifest)
-    }
 }
 
 impl ReducedEntry {

@@ -1,10 +1,12 @@
 //! Bundles: bytes on disk -> checked values. The format is `docs/reference/formats.md`.
 
 mod checks;
+mod faults;
 mod files;
 mod known;
 mod manifest;
 mod mesh;
+mod parse;
 mod seal;
 mod tensors;
 

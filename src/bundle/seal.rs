@@ -3,7 +3,7 @@
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
-use super::checks::{FILE, bad};
+use super::faults::{FILE, bad};
 use super::files::hex;
 use crate::error::{Error, Result};
 
