@@ -15,6 +15,8 @@ mod haptics;
 mod inputs;
 mod inversion;
 mod linear;
+#[cfg(feature = "contact")]
+mod moment;
 mod plan;
 mod points;
 #[cfg(feature = "contact")]

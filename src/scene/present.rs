@@ -3,8 +3,9 @@
 use std::sync::RwLock;
 
 use super::core::{Core, lock_read, lock_write};
+use super::moment::Moment;
 use super::published::{Published, Values};
-use super::tools::lock;
+use super::shared::lock;
 use super::{Contact, Scene};
 use crate::contact::{Past, Tool};
 use crate::error::{Error, Result};
@@ -13,20 +14,6 @@ use crate::memory;
 use crate::output::Output;
 
 const WHAT: &str = "the present state of a scene";
-
-/// What a published step leaves for frames after it.
-#[derive(Debug, Default)]
-pub struct Moment {
-    /// `[K,3]`, mm/s.
-    pub velocity: Vec<f32>,
-    /// Where the tools were, and their forces.
-    pub past: Past,
-    /// Nodes in contact, ascending, and the forces on them, mN `[m,3]`; none where tools push.
-    pub nodes: Vec<u32>,
-    pub forces: Vec<f32>,
-    /// Steps made, by which a new one is known.
-    pub step: u64,
-}
 
 impl Scene {
     /// The displacements `[n,3]` of the region `seconds` after the last published step, with instruments where they are then.

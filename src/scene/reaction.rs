@@ -12,7 +12,7 @@ use std::sync::RwLock;
 use super::Scene;
 use super::core::{Core, lock_read};
 use super::published::Published;
-use super::tools::lock;
+use super::shared::lock;
 use crate::bundle::Mesh;
 use crate::error::{Error, Result};
 use crate::forces::ReactionForces;

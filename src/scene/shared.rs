@@ -64,14 +64,7 @@ impl Shared {
         &self,
         call: impl FnOnce(&mut Core, &RwLock<Published>) -> Result<T>,
     ) -> Result<T> {
-        let core = match self.core.try_lock() {
-            Ok(core) => core,
-            Err(TryLockError::Poisoned(poisoned)) => poisoned.into_inner(),
-            Err(TryLockError::WouldBlock) => {
-                return Err(Error::Busy("another thread is using the scene".into()));
-            }
-        };
-        self.guarded(core, call)
+        self.guarded(lock(&self.core)?, call)
     }
 
     /// A step of the scene's worker, which waits for a call in progress.
@@ -83,4 +76,18 @@ impl Shared {
 
 fn poison_error() -> Error {
     Error::Panic("a panic was caught in this scene; it can only be destroyed".into())
+}
+
+/// What one thread at a time uses.
+///
+/// # Errors
+/// [`Error::Busy`] while another has it.
+pub(super) fn lock<T>(mutex: &Mutex<T>) -> Result<MutexGuard<'_, T>> {
+    match mutex.try_lock() {
+        Ok(guard) => Ok(guard),
+        Err(TryLockError::Poisoned(poisoned)) => Ok(poisoned.into_inner()),
+        Err(TryLockError::WouldBlock) => {
+            Err(Error::Busy("another thread is using the scene".into()))
+        }
+    }
 }

@@ -7,13 +7,17 @@ use super::core::lock_read;
 #[cfg(feature = "forces")]
 use super::reaction::Haptics;
 #[cfg(feature = "contact")]
+use super::shared::lock;
+#[cfg(feature = "contact")]
 use crate::contact::{Told, Tool};
-#[cfg(any(feature = "contact", feature = "forces"))]
-use crate::error::{Error, Result};
+#[cfg(feature = "contact")]
+use crate::error::Result;
 #[cfg(feature = "contact")]
 use crate::instrument::{Instrument, InstrumentContacts};
 #[cfg(any(feature = "contact", feature = "forces"))]
-use std::sync::{Mutex, MutexGuard, TryLockError};
+use std::sync::Mutex;
+#[cfg(feature = "contact")]
+use std::sync::MutexGuard;
 
 /// The contacts that a host asks for, and what it asked last: the same question of the same state has the same answer.
 #[cfg(feature = "contact")]
@@ -52,17 +56,6 @@ impl Tools {
         {
             contacts.contacts.reset();
             contacts.step = None;
-        }
-    }
-}
-
-#[cfg(any(feature = "contact", feature = "forces"))]
-pub(super) fn lock<T>(mutex: &Mutex<T>) -> Result<MutexGuard<'_, T>> {
-    match mutex.try_lock() {
-        Ok(guard) => Ok(guard),
-        Err(TryLockError::Poisoned(poisoned)) => Ok(poisoned.into_inner()),
-        Err(TryLockError::WouldBlock) => {
-            Err(Error::Busy("another thread is using the scene".into()))
         }
     }
 }

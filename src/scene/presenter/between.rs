@@ -14,7 +14,7 @@ use crate::kernels::respond::accumulate_rows;
 use crate::kernels::rows::{RowPlan, decode_rows};
 use crate::kernels::{Isa, Pool};
 use crate::memory;
-use crate::scene::present::Moment;
+use crate::scene::moment::Moment;
 use crate::scene::{Contact, ContactSet, Scene};
 
 /// The last velocities are followed for at most this many steps.
