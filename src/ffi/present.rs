@@ -101,7 +101,7 @@ unsafe fn shown(scene: &Scene, contact: Contact<'_>, frame: Frame) -> Result<(),
 /// The velocities of the last published state continue as far as the instruments do, and contact is solved at the poses given here with
 /// the compliance of that time. Use any frame rate, even an uneven one, and call it while a submitted step is in flight too. When a step
 /// arrives, the frame goes on from where it would have been without it, and over to it within two fifths of a step, or at 25 mm/s where
-/// that takes longer.
+/// that takes longer, within two steps in any case.
 ///
 /// - `seconds`: time since the last published step, 0 or more; velocities are followed for two steps at most.
 /// - `instruments`: as `upt_scene_step_instruments`.
