@@ -649,6 +649,11 @@ typedef struct upt_scene_options {
    * (`UPT_ERR_UNSUPPORTED` without); the learned part is left out then.
    */
   double step_s;
+  /**
+   * Mass-proportional damping of the tissue, 1/s: 0.01 to 1000, or 0 for the bundle's. Another than the bundle's needs
+   * corrections (`UPT_ERR_UNSUPPORTED` without); the learned part is left out then.
+   */
+  double damping_per_s;
 } upt_scene_options;
 
 /**

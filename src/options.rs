@@ -185,12 +185,19 @@ pub struct SceneOptions {
     /// Substeps of a step that tools drive, at most, where it alone would err by more than the corrections' target: 1 for none, up to 8, 0 as
     /// many as the bundle recommends. From 2 only with a target.
     pub substeps: u32,
+    /// Mass-proportional damping of the tissue, 1/s: [`SMALLEST_DAMPING_PER_S`] to [`LARGEST_DAMPING_PER_S`], or 0 for the bundle's. With another
+    /// than the bundle's, corrections by the elements make all steps, with contact and without.
+    pub damping_per_s: f64,
 }
 
 /// Bounds of [`SceneOptions::step_s`], s.
 pub const SHORTEST_STEP_S: f64 = 0.01;
 /// See [`SHORTEST_STEP_S`].
 pub const LONGEST_STEP_S: f64 = 0.05;
+/// Bounds of [`SceneOptions::damping_per_s`], 1/s.
+pub const SMALLEST_DAMPING_PER_S: f64 = 0.01;
+/// See [`SMALLEST_DAMPING_PER_S`].
+pub const LARGEST_DAMPING_PER_S: f64 = 1000.0;
 
 /// How many corrections a step gets while there is contact.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -232,6 +239,7 @@ impl Default for SceneOptions {
             error_limit_mm: 0.0,
             step_s: 0.0,
             substeps: 0,
+            damping_per_s: 0.0,
         }
     }
 }

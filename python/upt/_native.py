@@ -426,6 +426,9 @@ class SceneOptions(Record):
     step_s: float
     """Length of a step, s: 0.01 to 0.05, or 0 for the bundle's. Another length than the bundle's needs corrections
     (`UPT_ERR_UNSUPPORTED` without); the learned part is left out then."""
+    damping_per_s: float
+    """Mass-proportional damping of the tissue, 1/s: 0.01 to 1000, or 0 for the bundle's. Another than the bundle's needs
+    corrections (`UPT_ERR_UNSUPPORTED` without); the learned part is left out then."""
 
     _fields_ = [
         ("struct_size", ctypes.c_uint32),
@@ -448,6 +451,7 @@ class SceneOptions(Record):
         ("corrections_target_mm", ctypes.c_float),
         ("error_limit_mm", ctypes.c_float),
         ("step_s", ctypes.c_double),
+        ("damping_per_s", ctypes.c_double),
     ]
 
 
@@ -493,6 +497,9 @@ class SceneOptionsKeywords(TypedDict, total=False):
     step_s: float
     """Length of a step, s: 0.01 to 0.05, or 0 for the bundle's. Another length than the bundle's needs corrections
     (`UPT_ERR_UNSUPPORTED` without); the learned part is left out then."""
+    damping_per_s: float
+    """Mass-proportional damping of the tissue, 1/s: 0.01 to 1000, or 0 for the bundle's. Another than the bundle's needs
+    corrections (`UPT_ERR_UNSUPPORTED` without); the learned part is left out then."""
 
 
 class Instrument(Record):

@@ -121,10 +121,14 @@ impl Oscillator {
 }
 
 impl Stage {
-    /// Makes the free step from `input.last`.
-    pub fn swing(&mut self, lent: Lent<'_>, input: &Input<'_>, next: &mut [f32]) -> Result<Report> {
+    /// Makes the free step from `input.last` in one.
+    pub(super) fn swing_once(
+        &mut self,
+        lent: Lent<'_>,
+        input: &Input<'_>,
+        next: &mut [f32],
+    ) -> Result<Report> {
         let mut report = Report::default();
-        self.memory.begin();
         let rests = |field: &[f32]| field.iter().all(|value| *value == 0.0);
         if rests(input.last) && rests(input.before) && (input.still || self.rests()) {
             next.fill(0.0);

@@ -32,7 +32,6 @@ pub struct Report {
     pub substeps: u32,
 }
 
-#[cfg(feature = "contact")]
 impl Report {
     /// Of both together, the second of which is the state's.
     pub(super) fn and(&self, second: &Report) -> Report {

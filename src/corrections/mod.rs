@@ -20,6 +20,7 @@ mod motion;
 mod pace;
 mod passes;
 mod precondition;
+mod shorter;
 mod space;
 mod stage;
 #[cfg(feature = "contact")]
@@ -41,6 +42,7 @@ pub use input::{Enough, Input, Lent, Report};
 pub use memory::PAIRS;
 pub use motion::Motion;
 pub use pace::{Integrator, Pace};
+pub use shorter::Shorter;
 pub use space::CoarseSpace;
 pub use stage::{SMALLEST_DET, Stage};
 #[cfg(feature = "contact")]
@@ -87,12 +89,11 @@ impl Corrections {
         })
     }
 
-    /// Steps of another length.
+    /// Steps of another length or damping.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`].
-    pub fn pace(&self, mesh: &Mesh, material: &Material, step_s: f64) -> Result<Pace> {
-        let integrator = self.pace.integrator.over(step_s);
+    pub fn pace(&self, mesh: &Mesh, material: &Material, integrator: Integrator) -> Result<Pace> {
         Pace::new(&Diagonal::of(mesh, material)?, integrator)
     }
 

@@ -268,6 +268,7 @@ pub(super) unsafe fn scene_options(raw: &upt_scene_options) -> Result<SceneOptio
         error_limit_mm: raw.error_limit_mm,
         step_s: raw.step_s,
         substeps: raw.substeps.into(),
+        damping_per_s: raw.damping_per_s,
     })
 }
 

@@ -159,6 +159,9 @@ pub struct upt_scene_options {
     /// Length of a step, s: 0.01 to 0.05, or 0 for the bundle's. Another length than the bundle's needs corrections
     /// (`UPT_ERR_UNSUPPORTED` without); the learned part is left out then.
     pub step_s: f64,
+    /// Mass-proportional damping of the tissue, 1/s: 0.01 to 1000, or 0 for the bundle's. Another than the bundle's needs
+    /// corrections (`UPT_ERR_UNSUPPORTED` without); the learned part is left out then.
+    pub damping_per_s: f64,
 }
 
 /// A rigid instrument; the input of `upt_scene_step_instruments` and `upt_scene_contacts_from_instruments`.

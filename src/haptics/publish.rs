@@ -12,7 +12,7 @@ use super::modes::Modes;
 use super::render::Haptics;
 use super::slow::{MOST_SAMPLES, Slow};
 use crate::contact::{Compliance, Delassus, Mode, Pair, Problem, State, outward, vector};
-use crate::corrections::{Corrections, Motion};
+use crate::corrections::{Corrections, Integrator, Motion};
 use crate::error::{Error, Result};
 use crate::kernels::project::{project_field, row_dots};
 use crate::kernels::{Isa, Pool};
@@ -81,6 +81,7 @@ pub fn join(
     options: &HapticOptions,
     prior: &PriorTable,
     corrections: &Corrections,
+    integrator: Integrator,
     samples: Arc<Samples>,
 ) -> Result<(Link, Haptics)> {
     check(options)?;
@@ -93,8 +94,8 @@ pub fn join(
     let (out, slow) = exchange(&slow);
     let (at, pose) = exchange(&tool.pose);
     let ends = Arc::new(Ends::default());
-    let modes = Modes::new(&natural, corrections.pace.integrator.damping_per_s)?;
-    let kappa = corrections.pace.integrator.over(AT_ONCE_S).kappa();
+    let modes = Modes::new(&natural, integrator.damping_per_s)?;
+    let kappa = integrator.over(AT_ONCE_S).kappa();
     let nodes = corrections.body.mass.len();
     let count = natural.len();
     let link = Link {

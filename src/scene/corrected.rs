@@ -5,15 +5,18 @@ use std::time::Instant;
 
 use super::core::{Core, lock_read};
 use super::engine::Engine;
+use super::own_pace::OwnPace;
 use super::published::Published;
 use super::timing::Stopwatch;
 #[cfg(feature = "contact")]
 use crate::corrections::Substeps;
-use crate::corrections::{Enough, History, Input, LIMIT, Lent, MOST_SUBSTEPS, Pace, Report, Stage};
+use crate::corrections::{
+    Enough, History, Input, Integrator, LIMIT, Lent, MOST_SUBSTEPS, Pace, Report, Shorter, Stage,
+};
 use crate::error::{Error, Result};
 use crate::kernels::{Isa, Pool};
 use crate::model::Model;
-use crate::options::{Corrections, LONGEST_STEP_S, SHORTEST_STEP_S, SceneOptions};
+use crate::options::{Corrections, SceneOptions};
 use crate::stats::{SceneStats, flag};
 
 /// The stage of a scene that corrects, and how far it goes.
@@ -24,15 +27,19 @@ pub struct Corrected {
     pub substeps: Option<Box<Substeps>>,
     #[cfg_attr(not(feature = "contact"), allow(dead_code))]
     most_substeps: u32,
+    /// Of how many shorter ones a free step is made.
+    swings: u32,
+    /// From the first step that needs them.
+    pub shorter: Option<Box<Shorter>>,
     most: u32,
     target_mm: f32,
     budget_us: u32,
     error_limit_mm: f32,
     calibration: f32,
     basis_starts: Vec<usize>,
-    /// The length of the scene's steps.
+    /// The length of the scene's steps, and the damping.
     pub pace: Arc<Pace>,
-    /// It is not the bundle's.
+    /// One of them is not the bundle's.
     own_pace: bool,
 }
 
@@ -45,14 +52,14 @@ impl Corrected {
         pool: &Pool,
     ) -> Result<Option<Corrected>> {
         let entry = model.manifest.corrections.as_ref();
-        let own_pace = own_step(model, options)?;
+        let own = OwnPace::new(model, options)?;
         let (most, target_mm, budget_us) = match options.corrections {
-            Corrections::None => return none(own_pace, options.substeps),
+            Corrections::None => return none(own, options.substeps),
             Corrections::Recommended => match entry {
                 Some(entry) if entry.recommended > 0 && !options.free_boundary => {
                     (entry.recommended, entry.target_mm, 0)
                 }
-                _ => return none(own_pace, options.substeps),
+                _ => return none(own, options.substeps),
             },
             Corrections::Fixed(count) => (count, 0.0, 0),
             Corrections::Auto {
@@ -76,8 +83,10 @@ impl Corrected {
             )));
         }
         let most_substeps = match options.substeps {
-            0 => match (entry, own_pace) {
-                (Some(entry), None) if target_mm > 0.0 && budget_us == 0 => entry.substeps,
+            0 => match entry {
+                Some(entry) if target_mm > 0.0 && budget_us == 0 && !own.has_step() => {
+                    entry.substeps
+                }
                 _ => 1,
             },
             1 => 1,
@@ -109,10 +118,11 @@ impl Corrected {
         let prior = model.prior.as_ref().ok_or_else(|| {
             Error::Unsupported("corrections: the bundle has no linear response".into())
         })?;
-        let pace = match own_pace {
-            None => Arc::clone(&corrections.pace),
-            Some(step_s) => {
-                Arc::new(corrections.pace(&model.mesh, &model.manifest.material, step_s)?)
+        let integrator = own.integrator(corrections.pace.integrator);
+        let pace = match own.is_some() {
+            false => Arc::clone(&corrections.pace),
+            true => {
+                Arc::new(corrections.pace(&model.mesh, &model.manifest.material, integrator)?)
             }
         };
         let lent = Lent {
@@ -127,47 +137,29 @@ impl Corrected {
             #[cfg(feature = "contact")]
             substeps: None,
             most_substeps,
+            swings: own.swings(integrator.step_s),
+            shorter: None,
             most,
             target_mm,
             budget_us,
             error_limit_mm: options.error_limit_mm,
             calibration: entry.map_or(1.0, |entry| entry.calibration),
             basis_starts: prior.basis_starts(),
-            own_pace: own_pace.is_some(),
+            own_pace: own.is_some(),
             pace,
         }))
     }
 }
 
-/// The length of step that a scene has for its own, s.
-fn own_step(model: &Model, options: &SceneOptions) -> Result<Option<f64>> {
-    let (step_s, own) = (options.step_s, model.manifest.dt_s);
-    if !step_s.is_finite() {
-        return Err(Error::NonFinite(format!("step_s is {step_s}")));
-    }
-    // A host's numbers may have been float32.
-    let [shortest, longest] = [SHORTEST_STEP_S - 1e-6, LONGEST_STEP_S + 1e-6];
-    if step_s != 0.0 && !(shortest..=longest).contains(&step_s) {
-        return Err(Error::Argument(format!(
-            "step_s is {step_s}, must be {SHORTEST_STEP_S} to {LONGEST_STEP_S}, or 0 for the bundle's {own}"
-        )));
-    }
-    Ok((step_s != 0.0 && (step_s - own).abs() > 1e-6).then_some(step_s))
-}
-
 /// A scene that does not correct.
-fn none(own_pace: Option<f64>, substeps: u32) -> Result<Option<Corrected>> {
+fn none(own: OwnPace, substeps: u32) -> Result<Option<Corrected>> {
     if substeps > 1 {
         return Err(Error::Argument(format!(
             "substeps is {substeps}: only corrections have them, and this scene has none; leave substeps at 0, or set `corrections`"
         )));
     }
-    match own_pace {
-        None => Ok(None),
-        Some(step_s) => Err(Error::Unsupported(format!(
-            "step_s is {step_s}: only corrections by the elements can step at another length than the bundle's, and this scene has none; leave step_s at 0, set `corrections`, or run `upt corrections BUNDLE`"
-        ))),
-    }
+    own.refuse()?;
+    Ok(None)
 }
 
 impl Corrected {
@@ -193,13 +185,23 @@ impl Corrected {
         if self.most_substeps < 2 || self.substeps.is_some() {
             return Ok(());
         }
-        let count = self.most_substeps;
-        let step_s = self.pace.integrator.step_s / f64::from(count);
-        let corrections = lent.corrections;
-        let pace = corrections.pace(&model.mesh, &model.manifest.material, step_s)?;
+        self.be_shorter(lent, model)?;
         let limit_mm = self.target_mm / self.calibration;
-        let substeps = Substeps::new(lent, Arc::new(pace), count, limit_mm)?;
-        self.substeps = Some(Box::new(substeps));
+        self.substeps = Some(Box::new(Substeps::new(limit_mm)?));
+        Ok(())
+    }
+
+    /// Makes what shorter steps need: they are as long under tools as without.
+    fn be_shorter(&mut self, lent: Lent<'_>, model: &Model) -> Result<()> {
+        let count = self.most_substeps.max(self.swings);
+        if count < 2 || self.shorter.is_some() {
+            return Ok(());
+        }
+        let whole = self.pace.integrator;
+        let integrator = whole.over(whole.step_s / f64::from(count));
+        let pace = (lent.corrections).pace(&model.mesh, &model.manifest.material, integrator)?;
+        let shorter = Shorter::new(lent, Arc::new(pace), count)?;
+        self.shorter = Some(Box::new(shorter));
         Ok(())
     }
 
@@ -209,11 +211,12 @@ impl Corrected {
         let substeps = self.substeps.as_ref().map_or(0, |own| own.memory_bytes());
         #[cfg(not(feature = "contact"))]
         let substeps = 0;
+        let shorter = self.shorter.as_ref().map_or(0, |own| own.memory_bytes());
         let own = match self.own_pace {
             true => self.pace.memory_bytes(),
             false => 0,
         };
-        self.stage.memory_bytes() + own + substeps
+        self.stage.memory_bytes() + own + shorter + substeps
     }
 
     /// Puts what the iterations report into the statistics.
@@ -251,13 +254,18 @@ impl Core {
         };
         let mut watch = Stopwatch::start();
         let _span = tracing::trace_span!("corrections").entered();
+        let pace = Arc::clone(&corrected.pace);
         let lent = Lent {
             isa: self.machine.isa,
             pool: &self.machine.pool,
             prior,
             corrections,
-            pace: &corrected.pace,
+            pace: &pace,
         };
+        self.next_corrected = !self.incoming.is_empty();
+        if !self.next_corrected && corrected.swings > 1 {
+            corrected.be_shorter(lent, &self.model)?;
+        }
         let shared = lock_read(published);
         let input = Input {
             #[cfg(feature = "contact")]
@@ -268,14 +276,18 @@ impl Core {
             still: given.is_some(),
             enough: corrected.enough(start),
         };
-        self.next_corrected = !self.incoming.is_empty();
         if self.next_corrected {
             let report = corrected
                 .stage
                 .correct(lent, &input, &mut self.next.field)?;
             corrected.tell(&report, stats);
         } else if corrected.own_pace {
-            let report = corrected.stage.swing(lent, &input, &mut self.next.field)?;
+            let shorter = match corrected.swings {
+                0..2 => None,
+                _ => corrected.shorter.as_deref_mut(),
+            };
+            let next = &mut self.next.field;
+            let report = corrected.stage.swing(lent, &input, shorter, next)?;
             corrected.tell(&report, stats);
         } else {
             corrected.stage.follow(lent, &input, &self.next.field)?;
@@ -290,10 +302,20 @@ impl Core {
         !self.corrected.as_ref().is_some_and(|own| own.own_pace)
     }
 
+    /// The length of a step and the damping.
+    pub(super) fn integrator(&self) -> Integrator {
+        let manifest = &self.model.manifest;
+        let of_bundle = Integrator {
+            step_s: manifest.dt_s,
+            damping_per_s: manifest.material.damping_per_s,
+        };
+        let corrected = self.corrected.as_ref();
+        corrected.map_or(of_bundle, |own| own.pace.integrator)
+    }
+
     /// The length of a step, s.
     pub(super) fn step_s(&self) -> f64 {
-        let corrected = self.corrected.as_ref();
-        corrected.map_or(self.model.manifest.dt_s, |own| own.pace.integrator.step_s)
+        self.integrator().step_s
     }
 
     /// The reaction of the last published state; false where it was not corrected.

@@ -149,9 +149,13 @@ impl Core {
         };
         let next = &mut self.next.field;
         let Corrected {
-            stage, substeps, ..
+            stage,
+            substeps,
+            shorter,
+            ..
         } = corrected;
-        let report = stage.drive(lent, &input, problem, substeps.as_deref_mut(), next)?;
+        let parts = substeps.as_deref_mut().zip(shorter.as_deref_mut());
+        let report = stage.drive(lent, &input, problem, parts, next)?;
         corrected.tell(&report, stats);
         drop(shared);
         drop(span);

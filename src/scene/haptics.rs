@@ -43,7 +43,8 @@ impl Core {
         }
         memory::reserve(&mut self.hands, 1, "the haptics of a scene")?;
         let samples = self.model.samples()?;
-        let (link, haptics) = join(options, prior, self.model.corrections()?, samples)?;
+        let corrections = self.model.corrections()?;
+        let (link, haptics) = join(options, prior, corrections, self.integrator(), samples)?;
         self.hands.push(link);
         self.took_s = 0.0;
         self.tell_hands(published);

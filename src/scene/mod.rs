@@ -17,6 +17,7 @@ mod inversion;
 mod linear;
 #[cfg(feature = "contact")]
 mod moment;
+mod own_pace;
 mod plan;
 mod points;
 #[cfg(feature = "contact")]
@@ -51,6 +52,7 @@ pub(crate) use published::Values;
 use crate::bundle::{Mesh, TensorFile};
 #[cfg(feature = "contact")]
 use crate::contact::Tool;
+use crate::corrections::Integrator;
 use crate::error::{Error, Result};
 use crate::kernels::{Isa, Pool};
 use crate::memory;
@@ -111,7 +113,7 @@ pub struct Scene {
     shared: Arc<Shared>,
     model: Arc<Model>,
     mesh: Arc<Mesh>,
-    step_s: f64,
+    integrator: Integrator,
     tools: tools::Tools,
     // Dropped last.
     _given_back: memory::GivenBack,
@@ -127,7 +129,7 @@ impl Scene {
         let _span = tracing::info_span!("scene").entered();
         let core = build(&model, options)?;
         let mesh = Arc::clone(&core.mesh);
-        let step_s = core.step_s();
+        let integrator = core.integrator();
         let count = mesh.node_count();
         let earlier = options.cubic_sampling.then(|| Frame::rest(count));
         let published = Published {
@@ -150,7 +152,7 @@ impl Scene {
             shared: Arc::new(Shared::new(core, published)),
             model,
             mesh,
-            step_s,
+            integrator,
             tools: tools::Tools::default(),
             _given_back: memory::GivenBack,
         })
@@ -168,7 +170,13 @@ impl Scene {
 
     /// The length of a step, s: the bundle's, or the scene's own.
     pub fn step_s(&self) -> f64 {
-        self.step_s
+        self.integrator.step_s
+    }
+
+    /// The length of a step and the damping.
+    #[cfg(feature = "contact")]
+    pub(crate) fn integrator(&self) -> Integrator {
+        self.integrator
     }
 
     /// Nodes of the scene's mesh, `K`.

@@ -16,7 +16,7 @@ use crate::kernels::FlushToZero;
 use crate::stored;
 
 const MAGIC: &[u8; 8] = b"UPTSNAP\0";
-const VERSION: u32 = 7;
+const VERSION: u32 = 8;
 /// Magic and version.
 const HEAD: usize = MAGIC.len() + 4;
 const DIGEST: usize = 32;
@@ -30,6 +30,8 @@ struct Origin {
     mesh: [u8; 32],
     /// Length of a step, µs.
     step_us: u32,
+    /// Damping, 1/s.
+    damping_per_s: f64,
     /// Whether it has instruments.
     driven: bool,
 }
@@ -40,6 +42,7 @@ impl Core {
             model: self.model.hash,
             mesh: Sha256::digest(self.mesh.sha256.as_bytes()).into(),
             step_us: (1e6 * self.step_s()).round() as u32,
+            damping_per_s: self.integrator().damping_per_s,
             driven,
         }
     }
@@ -126,6 +129,13 @@ impl Core {
             return Err(Error::Snapshot(format!(
                 "was saved by a scene with steps of {} µs; restore it in one with that `step_s`, here {} µs",
                 saved.step_us, own.step_us
+            )));
+        }
+        // To the bit: a scene takes its host's number as it is.
+        if saved.damping_per_s.to_bits() != own.damping_per_s.to_bits() {
+            return Err(Error::Snapshot(format!(
+                "was saved by a scene with a damping of {} 1/s; restore it in one with that `damping_per_s`, here {} 1/s",
+                saved.damping_per_s, own.damping_per_s
             )));
         }
         if saved.driven && cfg!(not(feature = "contact")) {

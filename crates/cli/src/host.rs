@@ -24,6 +24,8 @@ pub struct ModelSettings {
     pub corrections: Option<Effort>,
     /// Length of its scenes' steps, s; 0: the bundle's.
     pub step_s: f64,
+    /// Damping of its scenes' tissue, 1/s; 0: the bundle's.
+    pub damping_per_s: f64,
 }
 
 impl Default for ModelSettings {
@@ -35,6 +37,7 @@ impl Default for ModelSettings {
             exact: false,
             corrections: None,
             step_s: 0.0,
+            damping_per_s: 0.0,
         }
     }
 }
@@ -43,6 +46,7 @@ impl Default for ModelSettings {
 pub struct Model {
     corrections: Option<Effort>,
     step_s: f64,
+    damping_per_s: f64,
     handle: *mut ffi::upt_model,
     info: ffi::upt_model_info,
 }
@@ -125,6 +129,7 @@ impl Model {
             let mut model = Self {
                 corrections: settings.corrections,
                 step_s: settings.step_s,
+                damping_per_s: settings.damping_per_s,
                 handle,
                 info,
             };
@@ -192,6 +197,7 @@ impl Scene {
                 model.corrections.map_or(0.0, |effort| effort.target_mm);
             options.substeps = model.corrections.map_or(0, |effort| effort.substeps) as u8;
             options.step_s = model.step_s;
+            options.damping_per_s = model.damping_per_s;
             let mut handle = std::ptr::null_mut();
             check(ffi::upt_scene_create(model.handle, &options, &mut handle))?;
             Ok(Self { handle })

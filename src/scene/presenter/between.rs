@@ -66,7 +66,7 @@ impl Between {
         }
         let natural = corrections
             .space
-            .held_back(corrections.pace.integrator.kappa())
+            .held_back(scene.integrator().kappa())
             .len();
         Ok(Between {
             problem: Problem::new(model.samples()?)?,
@@ -121,7 +121,7 @@ impl Between {
             return Ok(());
         };
         let tau = tau.min(MOST_STEPS * scene.step_s());
-        let alpha = corrections.pace.integrator.damping_per_s;
+        let alpha = scene.integrator().damping_per_s;
         let rest = &scene.mesh.positions;
         let (last, velocity) = (&self.last, &self.velocity);
         match driven {
@@ -152,7 +152,7 @@ impl Between {
             None => self.along.follow(rest, last, velocity, &mut self.free),
         }
         let make = |q: &mut [f32]| -> Result<bool> {
-            let kappa = corrections.pace.integrator.over(tau.max(AT_ONCE_S)).kappa();
+            let kappa = scene.integrator().over(tau.max(AT_ONCE_S)).kappa();
             self.held_back.clear();
             self.held_back.extend(corrections.space.holds_back(kappa));
             let change = match question.drive {

@@ -136,6 +136,11 @@ namespace Upt.Interop
         /// (`UPT_ERR_UNSUPPORTED` without); the learned part is left out then.
         /// </summary>
         public double step_s;
+        /// <summary>
+        /// Mass-proportional damping of the tissue, 1/s: 0.01 to 1000, or 0 for the bundle's. Another than the bundle's needs
+        /// corrections (`UPT_ERR_UNSUPPORTED` without); the learned part is left out then.
+        /// </summary>
+        public double damping_per_s;
     }
 
     /// <summary>A rigid instrument; the input of `upt_scene_step_instruments` and `upt_scene_contacts_from_instruments`.</summary>

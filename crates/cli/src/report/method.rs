@@ -163,6 +163,11 @@ impl Stepper {
                     precision: precision.code(),
                     exact: true,
                     corrections: Some(*corrections),
+                    // Without corrections the bundle knows one damping only: what it errs by then is part of the row.
+                    damping_per_s: match corrections.most {
+                        0 => 0.0,
+                        _ => header.material.damping_per_s,
+                    },
                     ..host::ModelSettings::default()
                 };
                 Self::Surrogate(Box::new(SurrogateStepper::new(bundle, &settings, *region)?))

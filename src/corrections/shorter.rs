@@ -1,0 +1,198 @@
+//! Steps of which several make one of the scene's, between two states that the host sees.
+//!
+//! The first starts from the last two states and their velocities, by the cubic through them, and without L-BFGS pairs. So what lasts from
+//! step to step is the same with them and without, in snapshots too.
+
+use std::mem::swap;
+use std::sync::Arc;
+
+use super::free::Free;
+use super::input::{Input, Lent, Report};
+use super::motion::Motion;
+use super::pace::Pace;
+use super::precondition::Preconditioner;
+use super::stage::Stage;
+use crate::error::Result;
+use crate::memory;
+
+/// What a scene has for them.
+pub struct Shorter {
+    count: u32,
+    pub(super) pace: Arc<Pace>,
+    preconditioner: Preconditioner,
+    free: Free,
+    pub(super) motion: Motion,
+    /// The states that one starts from, the last and the one before, and where it ends.
+    pub(super) last: Vec<f32>,
+    pub(super) before: Vec<f32>,
+    pub(super) next: Vec<f32>,
+}
+
+impl Shorter {
+    /// `count` of them to a step of `lent`, of the length of `pace`.
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
+    pub fn new(lent: Lent<'_>, pace: Arc<Pace>, count: u32) -> Result<Shorter> {
+        let len = 3 * lent.corrections.body.mass.len();
+        let field = || memory::zeros(len, "the shorter steps of a scene");
+        let short = Lent {
+            pace: &pace,
+            ..lent
+        };
+        Ok(Shorter {
+            count,
+            preconditioner: Preconditioner::new(short.env())?,
+            pace,
+            free: Free::default(),
+            motion: Motion::at_rest(len)?,
+            last: field()?,
+            before: field()?,
+            next: field()?,
+        })
+    }
+
+    /// How many make a step.
+    pub fn count(&self) -> u32 {
+        self.count
+    }
+
+    /// Bytes held.
+    pub fn memory_bytes(&self) -> usize {
+        let fields = 3 * self.last.len() + 3 * self.motion.velocity.len();
+        4 * fields
+            + self.pace.memory_bytes()
+            + self.preconditioner.memory_bytes()
+            + self.free.memory_bytes()
+    }
+
+    /// The state a shorter step before `input.last`, and the velocity there: the cubic through two states `step_s` apart.
+    pub(super) fn start(&mut self, whole: &Motion, input: &Input<'_>, step_s: f32) {
+        self.motion.take(whole);
+        self.last.copy_from_slice(input.last);
+        if input.still {
+            self.motion.velocity.fill(0.0);
+            self.motion.velocity_before.fill(0.0);
+            self.before.copy_from_slice(input.last);
+            return;
+        }
+        let s = 1.0 - 1.0 / self.count as f32;
+        let (s2, s3) = (s * s, s * s * s);
+        let place = [
+            2.0 * s3 - 3.0 * s2 + 1.0,
+            3.0 * s2 - 2.0 * s3,
+            step_s * (s3 - 2.0 * s2 + s),
+            step_s * (s3 - s2),
+        ];
+        let speed = [
+            6.0 * (s2 - s) / step_s,
+            6.0 * (s - s2) / step_s,
+            3.0 * s2 - 4.0 * s + 1.0,
+            3.0 * s2 - 2.0 * s,
+        ];
+        for (i, before) in self.before.iter_mut().enumerate() {
+            let known = [
+                input.before[i],
+                input.last[i],
+                whole.velocity_before[i],
+                whole.velocity[i],
+            ];
+            let at = |weights: &[f32; 4]| -> f32 {
+                let products = weights.iter().zip(&known);
+                products.map(|(weight, value)| weight * value).sum()
+            };
+            *before = at(&place);
+            self.motion.velocity_before[i] = at(&speed);
+        }
+    }
+
+    /// The end of a step becomes the start of the next.
+    pub(super) fn advance(&mut self) {
+        swap(&mut self.before, &mut self.last);
+        swap(&mut self.last, &mut self.next);
+    }
+}
+
+impl Stage {
+    /// The stage makes shorter steps from here on; or whole ones again.
+    pub(super) fn exchange(&mut self, shorter: &mut Shorter) {
+        swap(&mut self.motion, &mut shorter.motion);
+        swap(&mut self.preconditioner, &mut shorter.preconditioner);
+        swap(&mut self.free, &mut shorter.free);
+    }
+
+    /// Takes the end of the last shorter step as that of the step from `input.last`.
+    pub(super) fn arrive(
+        &mut self,
+        lent: Lent<'_>,
+        input: &Input<'_>,
+        shorter: &Shorter,
+        next: &mut [f32],
+    ) -> Result<()> {
+        next.copy_from_slice(&shorter.last);
+        // What a whole step would have left out, for the choice of the next; the rest is that of the last shorter one.
+        self.finish(lent, input, next)?;
+        let (own, last) = (&mut self.next, &shorter.motion);
+        own.velocity.copy_from_slice(&last.velocity);
+        own.inertia.copy_from_slice(&last.inertia);
+        own.min_det = last.min_det;
+        own.error_mm = last.error_mm;
+        Ok(())
+    }
+
+    /// Makes the free step from `input.last`, of shorter ones where the scene has them for that.
+    ///
+    /// # Errors
+    /// A panic on another thread of the pool; the past of the stage stays.
+    pub fn swing(
+        &mut self,
+        lent: Lent<'_>,
+        input: &Input<'_>,
+        shorter: Option<&mut Shorter>,
+        next: &mut [f32],
+    ) -> Result<Report> {
+        self.memory.begin();
+        let Some(shorter) = shorter else {
+            return self.swing_once(lent, input, next);
+        };
+        shorter.start(&self.motion, input, lent.pace.integrator.step_s as f32);
+        self.exchange(shorter);
+        self.memory.clear();
+        let result = self.swing_each(lent, input, shorter);
+        self.exchange(shorter);
+        // The pairs are those of shorter steps.
+        self.memory.begin();
+        let report = result?;
+        self.arrive(lent, input, shorter, next)?;
+        Ok(report)
+    }
+
+    fn swing_each(
+        &mut self,
+        lent: Lent<'_>,
+        input: &Input<'_>,
+        shorter: &mut Shorter,
+    ) -> Result<Report> {
+        let mut told = Report::default();
+        for _ in 0..shorter.count {
+            let short = Lent {
+                pace: &shorter.pace,
+                ..lent
+            };
+            let own = Input {
+                last: &shorter.last,
+                before: &shorter.before,
+                still: false,
+                ..*input
+            };
+            let report = self.swing_once(short, &own, &mut shorter.next)?;
+            told = told.and(&report);
+            swap(&mut self.motion, &mut self.next);
+            shorter.advance();
+        }
+        Ok(Report {
+            substeps: shorter.count,
+            ..told
+        })
+    }
+}
