@@ -1209,8 +1209,8 @@ upt_status upt_model_indices(const struct upt_model *model,
  * - `out`: the new scene. The scene keeps what it needs of the model.
  *
  * Threads: any.
- * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_UNSUPPORTED`,
- * `UPT_ERR_IO`, `UPT_ERR_BUNDLE`, `UPT_ERR_OUT_OF_MEMORY`.
+ * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NON_FINITE`,
+ * `UPT_ERR_UNSUPPORTED`, `UPT_ERR_IO`, `UPT_ERR_BUNDLE`, `UPT_ERR_OUT_OF_MEMORY`.
  */
 upt_status upt_scene_create(const struct upt_model *model,
                             const struct upt_scene_options *options,

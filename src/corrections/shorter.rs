@@ -7,13 +7,16 @@ use std::mem::swap;
 use std::sync::Arc;
 
 use super::free::Free;
-use super::input::{Input, Lent, Report};
+use super::input::{Enough, Input, Lent, Report};
 use super::motion::Motion;
 use super::pace::Pace;
 use super::precondition::Preconditioner;
 use super::stage::Stage;
 use crate::error::Result;
 use crate::memory;
+
+/// Iterations that a free step gets at least: after one alone, what it leaves grows from step to step.
+const LEAST_SWING: u32 = 2;
 
 /// What a scene has for them.
 pub struct Shorter {
@@ -140,7 +143,8 @@ impl Stage {
         Ok(())
     }
 
-    /// Makes the free step from `input.last`, of shorter ones where the scene has them for that.
+    /// Makes the free step from `input.last`, of shorter ones where the scene has them for that; each with at least [`LEAST_SWING`] iterations
+    /// that its time lets in.
     ///
     /// # Errors
     /// A panic on another thread of the pool; the past of the stage stays.
@@ -152,6 +156,11 @@ impl Stage {
         next: &mut [f32],
     ) -> Result<Report> {
         self.memory.begin();
+        let enough = Enough {
+            iterations: input.enough.iterations.max(LEAST_SWING),
+            ..input.enough
+        };
+        let input = &Input { enough, ..*input };
         let Some(shorter) = shorter else {
             return self.swing_once(lent, input, next);
         };

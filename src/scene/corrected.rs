@@ -19,6 +19,10 @@ use crate::model::Model;
 use crate::options::{Corrections, SceneOptions};
 use crate::stats::{SceneStats, flag};
 
+/// Tissue that tools let go swings by the elements while the last state is displaced by more than this, mm: they see what the tools did, where the
+/// learned part goes on from a field that it did not predict.
+const SWUNG_MM: f32 = 0.1;
+
 /// The stage of a scene that corrects, and how far it goes.
 pub struct Corrected {
     pub stage: Box<Stage>,
@@ -246,6 +250,7 @@ impl Core {
         start: Instant,
         stats: &mut SceneStats,
     ) -> Result<()> {
+        let learns = self.learns();
         let Some(corrected) = &mut self.corrected else {
             return Ok(());
         };
@@ -262,8 +267,12 @@ impl Core {
             corrections,
             pace: &pace,
         };
-        self.next_corrected = !self.incoming.is_empty();
-        if !self.next_corrected && corrected.swings > 1 {
+        let touched = !self.incoming.is_empty();
+        // The learned part goes on from what the elements swung, some steps later; at the scene's own pace it never does.
+        self.next_corrected = touched || (!learns && !corrected.own_pace);
+        // Steps of the scene's own length that are short enough stay whole.
+        let in_parts = corrected.swings > 1 || !corrected.own_pace;
+        if !touched && !learns && in_parts {
             corrected.be_shorter(lent, &self.model)?;
         }
         let shared = lock_read(published);
@@ -276,16 +285,13 @@ impl Core {
             still: given.is_some(),
             enough: corrected.enough(start),
         };
-        if self.next_corrected {
+        if touched {
             let report = corrected
                 .stage
                 .correct(lent, &input, &mut self.next.field)?;
             corrected.tell(&report, stats);
-        } else if corrected.own_pace {
-            let shorter = match corrected.swings {
-                0..2 => None,
-                _ => corrected.shorter.as_deref_mut(),
-            };
+        } else if !learns {
+            let shorter = corrected.shorter.as_deref_mut().filter(|_| in_parts);
             let next = &mut self.next.field;
             let report = corrected.stage.swing(lent, &input, shorter, next)?;
             corrected.tell(&report, stats);
@@ -297,9 +303,14 @@ impl Core {
         Ok(())
     }
 
-    /// Whether a step without contact is the learned part's, or of the vibration that a bundle has instead.
+    /// Whether a step without contact is the learned part's, or of the vibration that a bundle has instead; by the last state.
     pub(super) fn learns(&self) -> bool {
-        !self.corrected.as_ref().is_some_and(|own| own.own_pace)
+        let Some(corrected) = &self.corrected else {
+            return true;
+        };
+        let lifted =
+            corrected.most_substeps > 1 && self.driven && self.counters.max_displacement > SWUNG_MM;
+        !(corrected.own_pace || lifted)
     }
 
     /// The length of a step and the damping.

@@ -188,6 +188,7 @@ impl World<'_> {
         options.guard_policy = (call.seed / 3 % 3) as i32;
         options.check_inversion = (call.seed / 9 % 2) as u8;
         options.step_s = [0.0, 0.0, 0.01, 0.025, 0.2][(call.seed % 5) as usize];
+        options.damping_per_s = [0.0, 0.0, 2.0, f64::NAN][(call.seed / 5 % 4) as usize];
         options.latest_wins = (call.seed / 18 % 2) as u8;
         options.cubic_sampling = (call.seed / 36 % 2) as u8;
         options.interpolate_points = (call.seed / 72 % 2) as u8;

@@ -33,6 +33,14 @@ void walk_scene_create(const char *reduced_bundle) {
   options.substeps = 4;
   EXPECT(upt_scene_create(model, &options, &scene), UPT_ERR_ARGUMENT);
   options.substeps = 0;
+  /* So does a damping of the scene's own, which has bounds. */
+  options.damping_per_s = 2.0;
+  EXPECT(upt_scene_create(model, &options, &scene), UPT_ERR_UNSUPPORTED);
+  options.damping_per_s = -2.0;
+  EXPECT(upt_scene_create(model, &options, &scene), UPT_ERR_ARGUMENT);
+  options.damping_per_s = NAN;
+  EXPECT(upt_scene_create(model, &options, &scene), UPT_ERR_NON_FINITE);
+  options.damping_per_s = 0.0;
   options.mesh_path = "no/such.mesh.safetensors";
   EXPECT_TRUE(upt_scene_create(model, &options, &scene) < 0);
   /* A reduced bundle's tables belong to its own mesh. */
