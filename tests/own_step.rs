@@ -121,12 +121,19 @@ fn shorter_steps_are_the_same_tissue() {
 
 #[test]
 fn after_a_release_it_comes_to_rest_and_sleeps() {
+    for corrections in [8, 1] {
+        let options = SceneOptions {
+            no_sleep: false,
+            corrections: Corrections::Fixed(corrections),
+            ..stepping(0.01)
+        };
+        comes_to_rest(&options);
+    }
+}
+
+fn comes_to_rest(options: &SceneOptions) {
     let model = model("tiny-corrected");
-    let options = SceneOptions {
-        no_sleep: false,
-        ..stepping(0.01)
-    };
-    let scene = scene(&model, &options);
+    let scene = scene(&model, options);
     let mut largest = Vec::new();
     for index in 1..=600 {
         let u = step(&scene, 0.01 * f64::from(index));

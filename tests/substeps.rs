@@ -172,3 +172,41 @@ fn what_cannot_be_is_refused() {
     };
     assert!(refused(none).contains("corrections"));
 }
+
+#[test]
+fn tissue_that_a_tool_lets_go_swings_as_in_shorter_steps() {
+    let model = model("tiny-corrected");
+    let [whole, parts] = [1, 4].map(|substeps| scene(&model, &with(substeps, 0.002)));
+    let short = SceneOptions {
+        step_s: 0.0125,
+        ..with(1, 0.0005)
+    };
+    let short = scene(&model, &short);
+    // Pressed within four steps, held for four, and away within a quarter of a step.
+    let depth = |time: f32| match time {
+        ..4.0 => 0.5 * time,
+        ..8.0 => 2.0,
+        _ => 2.0 - 40.0 * (time - 8.0),
+    };
+    let mut errors = [0.0f32; 2];
+    let mut made = Vec::new();
+    for t in 1..=14 {
+        let mut wanted = Vec::new();
+        for part in 1..=4 {
+            let time = (t - 1) as f32 + 0.25 * part as f32;
+            wanted = step(&short, ball(&short, depth(time), 0.0));
+        }
+        for (sum, scene) in errors.iter_mut().zip([&whole, &parts]) {
+            let state = step(scene, ball(scene, depth(t as f32), 0.0));
+            if t > 9 {
+                *sum += error(&state, &wanted);
+            }
+        }
+        if t > 9 {
+            assert_eq!(whole.stats().evaluations, 0, "the learned part's step");
+            made.push(parts.stats().substeps);
+        }
+    }
+    assert_eq!(made[0], 4, "{made:?}");
+    assert!(errors[1] < 0.7 * errors[0], "{errors:?}");
+}

@@ -59,6 +59,8 @@ pub struct Core {
     pub(super) took_s: f64,
     /// Whether the state being made is.
     pub(super) next_corrected: bool,
+    /// Whether tools drive the step being made.
+    pub(super) driven: bool,
     pub(super) held: Vec<bool>,
     pub(super) plan: NodePlan,
     pub(super) points: Arc<AttachedPoints>,
@@ -139,6 +141,7 @@ impl Core {
             #[cfg(feature = "haptics")]
             took_s: 0.0,
             next_corrected: false,
+            driven: false,
         })
     }
 

@@ -26,6 +26,7 @@ impl Core {
         published: &RwLock<Published>,
         input: &StepInput<'_>,
     ) -> Result<bool> {
+        self.driven = matches!(input.contact, Contact::Tools(_));
         let Contact::Tools(tools) = input.contact else {
             if let Some(problem) = &mut self.problem {
                 problem.leave();
