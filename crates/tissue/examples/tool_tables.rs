@@ -1,14 +1,14 @@
 //! Writes the tables of contact with tools in docs/results/reference-solver.md:
 //! `cargo run --release -p tissue --example tool_tables`.
 //!
-//! The text between `<!-- tools -->` or `<!-- hertz -->` and the next `<!-- end -->` is replaced.
+//! The text between `<!-- tools -->`, `<!-- penetration -->` or `<!-- hertz -->` and the next `<!-- end -->` is replaced.
 
 use contact::{Body, Pose, Rotation, Samples, Shape, Vector};
 use std::error::Error;
 use std::path::Path;
 use tissue::material::Material;
 use tissue::mesh::{Boundary, Mesh, boundary_faces, box_phantom, regular_box};
-use tissue::programmes::ToolCase;
+use tissue::programmes::{TABLE, ToolCase};
 use tissue::schemes::FRAME_S;
 use tissue::solver::{Solver, SolverOptions, Tool, ToolPose};
 
@@ -18,7 +18,11 @@ fn main() -> Outcome<()> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let page = root.join("docs/results/reference-solver.md");
     let brain = Mesh::read(&root.join("onnx/meshes/brain-coarse.mesh.safetensors"))?;
-    for (marker, table) in [("hertz", half_space()?), ("tools", properties(&brain)?)] {
+    for (marker, table) in [
+        ("penetration", over_time(&brain)?),
+        ("tools", properties(&brain)?),
+        ("hertz", half_space()?),
+    ] {
         print!("{table}");
         let text = std::fs::read_to_string(&page)?;
         std::fs::write(&page, replace(&text, marker, &table)?)?;
@@ -168,13 +172,6 @@ fn properties(brain: &Mesh) -> Outcome<String> {
         "| undamped block, frictionless press of 3 mm and release: energy above the tool's work | {:+.3} % of the largest energy at most |\n",
         100.0 * energy_gain()?
     );
-    for name in ["press", "stroke", "retract", "poke", "lift", "wobble"] {
-        let case = ToolCase::new(name.parse()?, brain, 1, None)?;
-        let deepest = penetration(brain, &case)?;
-        table += &format!(
-            "| coarse brain, `{name}`, seed 1: deepest point of 1 mm samples in the tool over all frames | {deepest:.3} mm |\n"
-        );
-    }
     for name in ["press", "stroke", "two"] {
         let case = ToolCase::new(name.parse()?, brain, 1, None)?;
         let [coarse, usual, fine] = spacing(brain, &case)?;
@@ -207,23 +204,54 @@ fn apart(mesh: &Mesh, spacing: f32) -> Samples {
     Samples::of_domain(positions, surface, &mesh.domain, &mesh.fixed, spacing)
 }
 
-/// Deepest point, mm, of samples 1 mm apart at the frames' ends.
-fn penetration(mesh: &Mesh, case: &ToolCase) -> Outcome<f32> {
+/// Penetration over time: a row a programme, a column a half second.
+fn over_time(brain: &Mesh) -> Outcome<String> {
+    const HALF_SECOND: usize = (0.5 / FRAME_S + 0.5) as usize;
+    let mut rows = Vec::new();
+    for programme in TABLE.iter().map(|row| row.name) {
+        let case = ToolCase::new(programme.parse()?, brain, 1, None)?;
+        let series = penetration(brain, &case)?;
+        let deepest = series
+            .chunks(HALF_SECOND)
+            .map(|part| part.iter().copied().fold(0.0, f32::max));
+        rows.push((programme, deepest.collect::<Vec<f32>>()));
+    }
+    let columns = rows.iter().map(|(_, row)| row.len()).max().unwrap_or(0);
+    let mut table = String::from("| programme |");
+    for column in 1..=columns {
+        table += &format!(" to {} s |", 0.5 * column as f64);
+    }
+    table += &format!("\n|---|{}\n", "---|".repeat(columns));
+    for (programme, row) in rows {
+        table += &format!("| `{programme}` |");
+        for column in 0..columns {
+            let cell = row.get(column);
+            table += &cell.map_or(" |".into(), |deepest| format!(" {deepest:.3} |"));
+        }
+        table += "\n";
+    }
+    Ok(table)
+}
+
+/// Deepest point, mm, of samples 1 mm apart at each frame's end.
+fn penetration(mesh: &Mesh, case: &ToolCase) -> Outcome<Vec<f32>> {
     let dense = apart(mesh, 1.0);
     let bodies = case.tools.iter().map(|t| Body::new(&t.shape));
     let bodies: Vec<Body> = bodies.collect::<Result<_, _>>()?;
-    let mut deepest = 0.0f32;
+    let mut series = Vec::new();
     run(mesh, mesh.samples(Boundary::Fixed), case, |u, poses| {
         let position =
             |n: u32| Vector::from(mesh.positions[n as usize]) + Vector::from(u[n as usize]);
+        let mut deepest = 0.0f32;
         for sample in dense.rows() {
             let point = sample.gather(position);
             for (body, to) in bodies.iter().zip(poses) {
                 deepest = deepest.max(-body.nearest_at(&to.pose, point).distance);
             }
         }
+        series.push(deepest);
     })?;
-    Ok(deepest)
+    Ok(series)
 }
 
 /// Mean squared difference, mm², of spacings from the finest.
