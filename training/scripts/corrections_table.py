@@ -7,8 +7,11 @@ Each case of the data is replayed through `upt rollout --json` with each count. 
 `upt_scene_contact_force`, summed over the nodes of a step, against the solver's over all steps with contact. The
 estimate is compared with the true root mean square error in the steps with contact: rank correlation, of the regimes
 that bundles learn from and of the hard ones, and their ratio (times the bundle's `calibration` the better one).
-`hard-ring` is left out of that: its tissue has another damping than the bundle says, which no estimate by the bundle's
-own equations can see.
+`hard-ring` is left out of that: its tissue has another damping than the bundle says. With corrections `upt rollout`
+takes the damping of the trajectory; without them the bundle's is all that there is.
+
+With `--rows` the table stays as it is but for the rows of the data's schemes. Times, forces and estimates, which are of
+all schemes together, stay too.
 """
 
 import argparse
@@ -106,6 +109,16 @@ def rows(upt: str, bundle: str, cases: list[pathlib.Path], counts: list[str], th
     return lines
 
 
+def with_rows(old: str, new: list[str]) -> str:
+    """The table of the page with the new rows in place of those of the same schemes."""
+    named = {line.split(" |", 1)[0]: line for line in new}
+    lines = old.strip().splitlines()
+    missing = named.keys() - {line.split(" |", 1)[0] for line in lines}
+    if missing:
+        raise SystemExit(f"the page has no row {', '.join(sorted(missing))}: the data has other cases than its table")
+    return "\n".join(named.get(line.split(" |", 1)[0], line) for line in lines)
+
+
 def main() -> None:
     """Replays and writes."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -115,6 +128,7 @@ def main() -> None:
     parser.add_argument("--counts", default="0,1,3,5,10,10@0.02", help="COUNT, or COUNT@MM")
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--page", type=pathlib.Path)
+    parser.add_argument("--rows", action="store_true", help="replace the rows of the data's schemes only")
     options = parser.parse_args()
     counts = options.counts.split(",")
     cases = sorted(case for folder in options.data for case in folder.glob("*.trajectory.safetensors"))
@@ -131,6 +145,9 @@ def main() -> None:
         if begin not in page:
             raise SystemExit(f"{options.page}: the marker {begin} is missing")
         before, rest = page.split(begin, 1)
+        if options.rows:
+            schemes = [line for line in table[2:] if line[2:].split(" (", 1)[0] in SCHEMES]
+            text = with_rows(rest.split(end, 1)[0], schemes)
         options.page.write_text(f"{before}{begin}\n{text}\n{end}{rest.split(end, 1)[1]}")
 
 
