@@ -20,6 +20,7 @@ mod motion;
 mod pace;
 mod passes;
 mod precondition;
+mod prescribed;
 mod shorter;
 mod space;
 mod stage;

@@ -4,6 +4,7 @@
 
 mod contact;
 mod core;
+mod correct;
 mod corrected;
 mod counters;
 #[cfg(feature = "contact")]
@@ -24,6 +25,7 @@ mod points;
 mod present;
 #[cfg(feature = "contact")]
 mod presenter;
+mod publish;
 mod published;
 #[cfg(feature = "forces")]
 mod reaction;
@@ -45,8 +47,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 pub use contact::{ContactSet, INPUT_LIMIT};
-pub use core::{QUIET_DISPLACEMENT, QUIET_STEPS};
 pub use points::check_point_count;
+pub use publish::{QUIET_DISPLACEMENT, QUIET_STEPS};
 pub(crate) use published::Values;
 
 use crate::bundle::{Mesh, TensorFile};

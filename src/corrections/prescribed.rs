@@ -1,0 +1,156 @@
+//! A step whose contact is prescribed: where the nodes in contact end is known, and the rest of the field follows.
+
+use super::input::{Input, Lent, Report};
+use super::precondition::mask_held;
+use super::stage::{MOST_PARTS, SMALLEST_DET, Stage};
+use crate::error::Result;
+use crate::scene::ContactSet;
+
+impl Stage {
+    /// Corrects `next`, which holds the model's prediction with the boundary conditions on it.
+    pub fn correct(
+        &mut self,
+        lent: Lent<'_>,
+        input: &Input<'_>,
+        next: &mut [f32],
+    ) -> Result<Report> {
+        let env = lent.env();
+        let _awake = lent.pool.keep_awake();
+        let held = &env.body.held;
+        self.nodes.clear();
+        let nodes = input.contact.nodes.iter();
+        self.nodes
+            .extend(nodes.filter(|&&node| !held[node as usize]));
+        self.preconditioner.prescribe(env, &self.nodes)?;
+        self.memory.begin();
+        self.memory.mask(&self.nodes);
+        self.prepare(lent, input)?;
+        let mut report = Report::default();
+
+        let mut u = std::mem::take(&mut self.u);
+        let mut g = std::mem::take(&mut self.g);
+        let result = self
+            .iterate(lent, input, &mut u, &mut g, &mut report)
+            .and_then(|()| self.finish(lent, input, &u));
+        if result.is_ok() {
+            next.copy_from_slice(&u);
+            if report.fell_back {
+                self.stop_next();
+            }
+            self.next.min_det = report.min_det;
+            self.estimate(&mut report);
+        }
+        let result = result.and_then(|()| self.take_reaction(lent, input.contact, &g));
+        (self.u, self.g) = (u, g);
+        result.map(|()| report)
+    }
+
+    /// Takes `u` to where the contact is after `part` of this step, by the response of `K + kappa M`; returns the smallest det F, with the
+    /// residual in `g`.
+    pub(super) fn lead(
+        &mut self,
+        lent: Lent<'_>,
+        input: &Input<'_>,
+        part: f32,
+        u: &mut [f32],
+        g: &mut [f32],
+        report: &mut Report,
+    ) -> Result<f32> {
+        let env = lent.env();
+        let target = |index: usize| {
+            let node = self.nodes[index];
+            let c = input.contact.at(node).unwrap_or_default();
+            let at = 3 * node as usize;
+            [0, 1, 2].map(|k| input.last[at + k] + part * (c[k] - input.last[at + k]))
+        };
+        self.preconditioner.respond(env, target, &mut self.d, u)?;
+        for index in 0..self.nodes.len() {
+            let at = 3 * self.nodes[index] as usize;
+            u[at..at + 3].copy_from_slice(&target(index));
+        }
+        mask_held(&env.body.held, u);
+        let (det, _) = self.residual(lent, [input.last, u, u], g, report)?;
+        self.stand();
+        Ok(det)
+    }
+
+    /// Contact forces of the state that stands, `L_C^T r`: the virtual work of the whole residual on the response to each contact.
+    fn take_reaction(&mut self, lent: Lent<'_>, contact: &ContactSet, g: &[f32]) -> Result<()> {
+        let env = lent.env();
+        let held = &env.body.held;
+        let reaction = &mut self.next.reaction;
+        let mut rows = self.at_nodes[1].as_chunks::<3>().0.iter();
+        for &node in &contact.nodes {
+            let row = match held[node as usize] {
+                true => None,
+                false => rows.next(),
+            };
+            reaction.extend(row.copied().unwrap_or_default());
+        }
+        self.preconditioner.reaction(env, g, |node, force| {
+            if let Ok(i) = contact.nodes.binary_search(&node) {
+                for (sum, force) in reaction[3 * i..3 * i + 3].iter_mut().zip(force) {
+                    *sum += force;
+                }
+            }
+        })
+    }
+
+    /// Force of the tissue on the instruments at the contact nodes of the last published state, in the host's order, mN.
+    pub fn reaction(&self, contact: &ContactSet, out: &mut [f32]) {
+        let rows = self.motion.reaction.as_chunks::<3>().0;
+        for (&place, row) in contact.order.iter().zip(rows) {
+            let at = 3 * place as usize;
+            out[at..at + 3].copy_from_slice(&row.map(|force| -1e-3 * force));
+        }
+    }
+
+    /// The first guess: the last state and the response to what the contact did since, in so many parts that the first of them does not
+    /// halve the smallest det F; all parts but the last get an iteration each.
+    fn guess(
+        &mut self,
+        lent: Lent<'_>,
+        input: &Input<'_>,
+        u: &mut [f32],
+        g: &mut [f32],
+        report: &mut Report,
+    ) -> Result<f32> {
+        // From an inverted state no path leads back but the one from rest.
+        let lost = self.motion.min_det < SMALLEST_DET && !input.still;
+        let least = SMALLEST_DET.max(0.5 * self.motion.min_det.min(1.0));
+        let mut parts = 1;
+        let mut det = loop {
+            if lost {
+                u.fill(0.0);
+            } else {
+                u.copy_from_slice(input.last);
+            }
+            let part = 1.0 / parts as f32;
+            let det = self.lead(lent, input, part, u, g, report)?;
+            if det > least || parts == MOST_PARTS {
+                break det;
+            }
+            parts *= 2;
+        };
+        for part in 2..=parts {
+            if det > SMALLEST_DET {
+                self.improve(lent, input.last, u, g, det, report)?;
+            }
+            det = self.lead(lent, input, part as f32 / parts as f32, u, g, report)?;
+        }
+        report.parts = parts;
+        Ok(det)
+    }
+
+    fn iterate(
+        &mut self,
+        lent: Lent<'_>,
+        input: &Input<'_>,
+        u: &mut [f32],
+        g: &mut [f32],
+        report: &mut Report,
+    ) -> Result<()> {
+        let det = self.guess(lent, input, u, g, report)?;
+        self.relax(lent, input, det, u, g, report)
+    }
+}

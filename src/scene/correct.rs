@@ -1,0 +1,180 @@
+//! Corrections inside a step: after the prediction, before the guard.
+
+use std::sync::{Arc, RwLock};
+use std::time::Instant;
+
+use super::core::{Core, lock_read};
+use super::engine::Engine;
+use super::published::Published;
+use super::timing::Stopwatch;
+use crate::corrections::{History, Input, Integrator, Lent};
+use crate::error::Result;
+use crate::stats::SceneStats;
+
+/// Tissue that tools let go swings by the elements while the last state is displaced by more than this, mm: they see what the tools did, where the
+/// learned part goes on from a field that it did not predict.
+const SWUNG_MM: f32 = 0.1;
+
+impl Core {
+    /// Corrects `next` while there is contact; otherwise lets the velocities follow it.
+    pub(super) fn correct(
+        &mut self,
+        published: &RwLock<Published>,
+        given: Option<&[f32]>,
+        start: Instant,
+        stats: &mut SceneStats,
+    ) -> Result<()> {
+        let learns = self.learns();
+        let Some(corrected) = &mut self.corrected else {
+            return Ok(());
+        };
+        let (Some(prior), corrections) = (&self.model.prior, self.model.corrections()?) else {
+            return Ok(());
+        };
+        let mut watch = Stopwatch::start();
+        let _span = tracing::trace_span!("corrections").entered();
+        let pace = Arc::clone(&corrected.pace);
+        let lent = Lent {
+            isa: self.machine.isa,
+            pool: &self.machine.pool,
+            prior,
+            corrections,
+            pace: &pace,
+        };
+        let touched = !self.incoming.is_empty();
+        // The learned part goes on from what the elements swung, some steps later; at the scene's own pace it never does.
+        self.next_corrected = touched || (!learns && !corrected.own_pace);
+        // Steps of the scene's own length that are short enough stay whole.
+        let in_parts = corrected.swings > 1 || !corrected.own_pace;
+        if !touched && !learns && in_parts {
+            corrected.be_shorter(lent, &self.model)?;
+        }
+        let shared = lock_read(published);
+        let input = Input {
+            #[cfg(feature = "contact")]
+            rest: &self.mesh.positions,
+            contact: &self.incoming,
+            last: given.unwrap_or(&shared.last.field),
+            before: given.unwrap_or(&shared.before.field),
+            still: given.is_some(),
+            enough: corrected.enough(start),
+        };
+        if touched {
+            let report = corrected
+                .stage
+                .correct(lent, &input, &mut self.next.field)?;
+            corrected.tell(&report, stats);
+        } else if !learns {
+            let shorter = corrected.shorter.as_deref_mut().filter(|_| in_parts);
+            let next = &mut self.next.field;
+            let report = corrected.stage.swing(lent, &input, shorter, next)?;
+            corrected.tell(&report, stats);
+        } else {
+            corrected.stage.follow(lent, &input, &self.next.field)?;
+        }
+        drop(shared);
+        stats.corrections_ms = watch.lap();
+        Ok(())
+    }
+
+    /// Whether a step without contact is the learned part's, or of the vibration that a bundle has instead; by the last state.
+    pub(super) fn learns(&self) -> bool {
+        let Some(corrected) = &self.corrected else {
+            return true;
+        };
+        let lifted =
+            corrected.most_substeps > 1 && self.driven && self.counters.max_displacement > SWUNG_MM;
+        !(corrected.own_pace || lifted)
+    }
+
+    /// The length of a step and the damping.
+    pub(super) fn integrator(&self) -> Integrator {
+        let manifest = &self.model.manifest;
+        let of_bundle = Integrator {
+            step_s: manifest.dt_s,
+            damping_per_s: manifest.material.damping_per_s,
+        };
+        let corrected = self.corrected.as_ref();
+        corrected.map_or(of_bundle, |own| own.pace.integrator)
+    }
+
+    /// The length of a step, s.
+    pub(super) fn step_s(&self) -> f64 {
+        self.integrator().step_s
+    }
+
+    /// The reaction of the last published state; false where it was not corrected.
+    #[cfg(feature = "forces")]
+    pub(super) fn corrected_reaction(&self, out: &mut [f32]) -> bool {
+        let Some(corrected) = &self.corrected else {
+            return false;
+        };
+        #[cfg(feature = "contact")]
+        if let Some(problem) = &self.problem
+            && !problem.past.forces.is_empty()
+        {
+            return self.loads_at_contacts(problem, out);
+        }
+        // A state that fell back has inverted elements, and what they push with means nothing.
+        let motion = &corrected.stage.motion;
+        let sound = motion.min_det >= crate::corrections::SMALLEST_DET
+            && motion.reaction.len() == out.len();
+        if self.contact.is_empty() || !sound {
+            return false;
+        }
+        corrected.stage.reaction(&self.contact, out);
+        true
+    }
+
+    /// Before a step that the learned part makes: it goes on from the corrected states, which it did not predict.
+    pub(super) fn absorb(&mut self, shared: &Published) -> Result<()> {
+        let Some(corrected) = &self.corrected else {
+            return Ok(());
+        };
+        let engine = match &mut self.engine {
+            Engine::Reduced(engine) => engine,
+            // A network reads the field itself.
+            Engine::Upt(_) => return Ok(()),
+        };
+        let compute = self.machine.compute();
+        if self.counters.was_corrected[0] {
+            engine.swing_from(
+                compute,
+                &corrected.basis_starts,
+                [&shared.last.field, &shared.before.field],
+                &corrected.stage.motion.velocity,
+                self.model.manifest.dt_s as f32,
+            )?;
+        }
+        engine.absorb(
+            compute,
+            &corrected.basis_starts,
+            [
+                self.counters.was_corrected[0].then_some(shared.last.field.as_slice()),
+                self.counters.was_corrected[1].then_some(shared.before.field.as_slice()),
+            ],
+        )
+    }
+
+    /// Takes what corrections remembered in another state.
+    pub(super) fn put_history(&mut self, history: Option<History>) -> Result<()> {
+        let (Some(corrected), Some(history), Some(prior)) =
+            (&mut self.corrected, history, &self.model.prior)
+        else {
+            return Ok(());
+        };
+        let lent = Lent {
+            isa: self.machine.isa,
+            pool: &self.machine.pool,
+            prior,
+            corrections: self.model.corrections()?,
+            pace: &corrected.pace,
+        };
+        corrected.stage.restore(lent, &history)
+    }
+
+    /// Whether every node is decoded in each step, and kept.
+    pub(super) fn keeps_all_nodes(&self) -> bool {
+        self.corrected.is_some() || self.engine.keeps_all_nodes()
+    }
+}
