@@ -413,6 +413,40 @@ namespace Upt.Tests
         }
 
         [Test]
+        public void DampingOfTheInspectorReachesTheTissue()
+        {
+            PushedBrain sample = Sample();
+            SoftTissue tissue = sample.Tissue;
+            if (!tissue.Presents) Assert.Ignore("the test bundle has no corrections");
+            tissue.gameObject.SetActive(false);
+            tissue.damping = 2000f;
+            tissue.gameObject.SetActive(true);
+            Assert.That(tissue.IsRunning, Is.False);
+            Assert.That(Debug.Errors, Has.Count.EqualTo(1));
+            Assert.That(Debug.Errors[0], Is.StringContaining("damping_per_s"));
+            Debug.Errors.Clear();
+            tissue.gameObject.SetActive(false);
+            tissue.damping = 2f;
+            tissue.gameObject.SetActive(true);
+            Assert.That(Debug.Errors, Is.Empty);
+            uint made = 0;
+            Play(sample.gameObject, tissue, 60, frame => made = Math.Max(made, tissue.LastStats.evaluations));
+            Assert.That(made, Is.GreaterThan(0));
+        }
+
+        [Test]
+        public void SubstepsOfTheInspectorNeedATarget()
+        {
+            SoftTissue tissue = Tissue();
+            tissue.corrections = 3;
+            tissue.substeps = 4;
+            tissue.gameObject.SetActive(true);
+            Assert.That(tissue.IsRunning, Is.False);
+            Assert.That(Debug.Errors, Has.Count.EqualTo(1));
+            Assert.That(Debug.Errors[0], Is.StringContaining("substeps"));
+        }
+
+        [Test]
         public void CorrectionsThatCannotBeStopTheTissueWithAMessage()
         {
             SoftTissue tissue = Tissue();

@@ -37,6 +37,15 @@ namespace Upt
         [Tooltip("With corrections from 1: fewer where the estimated error is below this, mm; 0: always so many.")]
         public float correctionsTarget;
 
+        [Range(0, 8)]
+        [Tooltip("Shorter steps that a step under instruments is made of at most, where it alone would miss the target: 2 to 8; 1: none; " +
+                 "0: what the bundle recommends. From 2 only with a target.")]
+        public int substeps;
+
+        [Min(0f)]
+        [Tooltip("Damping of the tissue, 1/s: 0.01 to 1000, less swings longer; 0: the bundle's. Needs corrections.")]
+        public float damping;
+
         [Tooltip("Recompute normals each frame.")]
         public bool recalculateNormals = true;
 
@@ -223,6 +232,8 @@ namespace Upt
                 interpolate_points = 1,
                 corrections = corrections,
                 corrections_target_mm = correctionsTarget,
+                substeps = (byte)substeps,
+                damping_per_s = damping,
             });
             solvesContact = Solves(scene);
             uint[] touchable = native.Indices(Native.UPT_SET_SURFACE_NODES);
