@@ -1,10 +1,11 @@
 #!/usr/bin/env bash
 # Runs on the GPU machine, in the unpacked folder:  run.sh OUT [--rehearse] [PROVIDERS]
 #   PROVIDERS   a list like cpu,cuda,tensorrt,tensorrt-rtx; default cpu,cuda
-#   --rehearse  a few steps on the CPU alone: all parts run, and report.json says what was not measured
-# Writes OUT/report.json (rows, bars, floor, what was not measured and why), OUT/doctor.json, OUT/errors-P/ (`upt report`:
-# errors of rollouts against the reference solver), OUT/log and OUT/machine. Bring back all of OUT. One process a provider
-# and a rival: one that crashes leaves the others' rows. Needs nothing but the folder; PyTorch rows need python3 with torch.
+#   --rehearse  a few steps on the CPU alone: all parts run, and OUT/missing says what was not measured
+# Writes OUT/rows.jsonl (a row a line, also of what a provider refused), OUT/rows-torch.json (PyTorch's, and the card's rates),
+# OUT/missing (what else was not measured: why), OUT/doctor.json, OUT/errors-P/ (`upt report`: errors of rollouts against
+# the reference solver), OUT/log and OUT/machine. Bring back all of OUT. One process a provider and a rival: one that
+# crashes leaves the others' rows. Needs nothing but the folder; PyTorch rows need python3 with torch.
 set -euo pipefail
 
 out=${1:?usage: run.sh OUT [--rehearse] [PROVIDERS]}
@@ -20,7 +21,7 @@ fi
 providers=${1:-$providers}
 python=${PYTHON:-python3}
 here=$(cd "$(dirname "$0")" && pwd)
-rm -rf "$out"/rows-*.json "$out/missing" "$out/log"
+rm -rf "$out"/rows* "$out/missing" "$out/log"
 mkdir -p "$out"
 out=$(cd "$out" && pwd)
 
@@ -45,8 +46,8 @@ missing() { printf '%s: %s\n' "$1" "$2" | tee -a "$out/log" >>"$out/missing"; }
 if [ -x upt ]; then ./upt doctor --json bundles/* >"$out/doctor.json" 2>>"$out/log" || true; fi
 for provider in ${providers//,/ }; do
   echo "provider $provider" | tee -a "$out/log"
-  ./gpu-measure rows --provider "$provider" --steps "$steps" --scenes "$scenes" --out "$out/rows-$provider.json" bundles/* \
-    >>"$out/log" 2>&1 || missing "rows of $provider" "gpu-measure ended with status $?; see log"
+  ./gpu-measure "$provider" "$steps" "$scenes" bundles/* >>"$out/rows.jsonl" 2>>"$out/log" ||
+    missing "rows of $provider" "gpu-measure ended with status $?; see log"
 done
 random=()
 for bundle in bundles/*; do
@@ -75,5 +76,5 @@ for card in cuda tensorrt tensorrt-rtx; do
     *) missing "all rows of $card" "${rehearse:+a rehearsal on the CPU; }it was not asked for" ;;
   esac
 done
-./gpu-measure report "$out"
-echo "report: $out/report.json"
+missing "TLED step on the card" "there is no CUDA port of the reference solver"
+echo "rows: $out/rows.jsonl, what was not measured: $out/missing"

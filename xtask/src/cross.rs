@@ -6,9 +6,10 @@ use std::process::Command;
 
 use anyhow::{Result, bail};
 
+use crate::counts::Outcome;
 use crate::ort::{self, Platform};
 use crate::process::run_checked;
-use crate::stages::{self, Outcome};
+use crate::stages;
 use crate::workspace::Workspace;
 
 /// What is particular to a platform that is built for from Linux x86-64.
@@ -16,9 +17,8 @@ struct Cross {
     triple: &'static str,
     /// The compiler's prefix, as in `x86_64-w64-mingw32-gcc`.
     prefix: &'static str,
-    /// CMake's names.
-    system: &'static str,
-    processor: &'static str,
+    /// CMake's names of system and processor.
+    system: [&'static str; 2],
     wheel: &'static str,
 }
 
@@ -27,15 +27,13 @@ fn of(platform: Platform) -> Option<Cross> {
         Platform::WindowsX64 => Some(Cross {
             triple: "x86_64-pc-windows-gnu",
             prefix: "x86_64-w64-mingw32-",
-            system: "Windows",
-            processor: "x86_64",
+            system: ["Windows", "x86_64"],
             wheel: "win_amd64",
         }),
         Platform::LinuxArm64 => Some(Cross {
             triple: "aarch64-unknown-linux-gnu",
             prefix: "aarch64-linux-gnu-",
-            system: "Linux",
-            processor: "aarch64",
+            system: ["Linux", "aarch64"],
             wheel: "linux_aarch64",
         }),
         Platform::LinuxX64 | Platform::MacosArm64 => None,
@@ -53,41 +51,28 @@ pub fn configure(workspace: &Workspace, platform: Platform, command: &mut Comman
     let file = workspace.path("xtask/cross/toolchain.cmake");
     command
         .arg(format!("-DCMAKE_TOOLCHAIN_FILE={}", file.display()))
-        .env("UPT_CROSS_SYSTEM", cross.system)
-        .env("UPT_CROSS_PROCESSOR", cross.processor)
+        .env("UPT_CROSS_SYSTEM", cross.system[0])
+        .env("UPT_CROSS_PROCESSOR", cross.system[1])
         .env("UPT_CROSS_PREFIX", cross.prefix);
 }
 
-/// Builds `packages`, such as `upt` (the library) and `upt-cli` (the command); the folder with what they make.
-pub fn build(workspace: &Workspace, platform: Platform, packages: &[&str]) -> Result<PathBuf> {
+/// Builds packages, as `-p upt -p upt-cli` (library and command); the folder with what they make.
+pub fn build(workspace: &Workspace, platform: Platform, packages: &str) -> Result<PathBuf> {
     let (Some(cross), Ok(Platform::LinuxX64)) = (of(platform), Platform::host()) else {
-        bail!(
-            "{} is not built for on this machine: run `cargo xtask package` there",
-            platform.name()
-        );
+        let name = platform.name();
+        bail!("{name} is not built for on this machine: run `cargo xtask package` there");
     };
-    let mut command = Command::new("bash");
-    command
-        .arg(workspace.path("xtask/cross/cargo.sh"))
-        .args([cross.triple, "build", "--release"])
-        .args(packages.iter().flat_map(|name| ["-p", name]))
-        .current_dir(&workspace.root);
+    let triple = cross.triple;
+    let words = format!("xtask/cross/cargo.sh {triple} build --release {packages}");
     let label = format!("cargo build for {}", platform.name());
-    let log = workspace.logs().join("cross-build.log");
-    run_checked(&label, &mut command, &log)?;
-    let folder = workspace.path("target/cross/build").join(cross.triple);
-    Ok(folder.join("release"))
+    run_checked(workspace, &label, &mut workspace.bash(&words))?;
+    Ok(workspace.path(&format!("target/cross/build/{triple}/release")))
 }
 
 /// `upt.lib`, which hosts of Microsoft's toolchain link against, into `folder`.
 pub fn import_library(workspace: &Workspace, built: &Path, folder: &Path) -> Result<()> {
-    let mut command = Command::new("bash");
-    command
-        .arg(workspace.path("xtask/cross/import_library.sh"))
-        .args([built, folder]);
-    let log = workspace.logs().join("import-library.log");
-    run_checked("dlltool", &mut command, &log)?;
-    Ok(())
+    let mut command = workspace.bash("xtask/cross/import_library.sh");
+    run_checked(workspace, "dlltool", command.args([built, folder]))
 }
 
 /// `cargo xtask test --only windows`.
@@ -102,14 +87,11 @@ pub fn arm64(workspace: &Workspace) -> Result<Outcome> {
 
 fn stage(workspace: &Workspace, name: &str, platform: Platform) -> Result<Outcome> {
     if !matches!(Platform::host(), Ok(Platform::LinuxX64)) {
-        return Ok(Outcome::skipped("is built on Linux x86-64 only".into()));
+        return Ok(Outcome::skipped("is built on Linux x86-64 only"));
     }
     let theirs = ort::fetch(workspace, platform, ort::VERSION)?;
     let ours = ort::host_library(workspace)?;
-    stages::script_with(workspace, name, "tests/cross/run.sh", |command| {
-        command
-            .arg(name)
-            .env("UPT_CROSS_ORT", &theirs)
-            .env("UPT_CROSS_HOST_ORT", &ours);
-    })
+    let environment = [("UPT_CROSS_ORT", &*theirs), ("UPT_CROSS_HOST_ORT", &*ours)];
+    let words = format!("tests/cross/run.sh {name}");
+    stages::script(workspace, name, &words, &environment)
 }

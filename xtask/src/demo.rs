@@ -4,18 +4,16 @@
 //! the tool's poses alone; a table and a page. With `--scheme` the paper's own measure instead: a collision field, replayed.
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::Command;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, bail, ensure};
 use clap::{Args, ValueEnum};
 use sha2::{Digest, Sha256};
+use walkdir::WalkDir;
 
+use crate::process::run_visibly;
 use crate::workspace::Workspace;
-use crate::{ort, stages, system, venv};
-
-mod tables;
-
-use tables::{print_table, print_tool_table};
+use crate::{ort, system, venv};
 
 /// An organ with committed bundles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -25,26 +23,19 @@ pub enum Organ {
 }
 
 impl Organ {
-    /// The mesh whose bundles are shown.
-    fn mesh(self) -> &'static str {
+    /// Its name, the mesh whose bundles are shown, and what they are compared with: there is no coarser mesh of the liver.
+    fn traits(self) -> [&'static str; 3] {
         match self {
-            Self::Brain => "onnx/meshes/brain.mesh.safetensors",
-            Self::Liver => "onnx/liver-coarse/mesh.safetensors",
-        }
-    }
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::Brain => "brain",
-            Self::Liver => "liver",
-        }
-    }
-
-    /// What it is compared with: there is no coarser mesh of the liver.
-    fn plain(self) -> &'static str {
-        match self {
-            Self::Brain => "zero,prior,coarse,tled",
-            Self::Liver => "zero,prior,tled",
+            Self::Brain => [
+                "brain",
+                "onnx/meshes/brain.mesh.safetensors",
+                "zero,prior,coarse,tled",
+            ],
+            Self::Liver => [
+                "liver",
+                "onnx/liver-coarse/mesh.safetensors",
+                "zero,prior,tled",
+            ],
         }
     }
 }
@@ -96,52 +87,41 @@ struct Bundle {
 
 pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
     let missing = system::provide(workspace, &[system::BASE], !options.no_install)?;
-    if !missing.is_empty() {
-        bail!("install {} first", missing.join(", "));
-    }
+    ensure!(missing.is_empty(), "install {} first", missing.join(", "));
     eprintln!("1/4 set-up");
-    venv::create(workspace)?;
-    let library = ort::host_library(workspace)?;
-    stages::build_for_demo(workspace)?;
+    venv::create(workspace, "target/venv")?;
+    workspace.build_for_demo()?;
 
-    let bundles = bundles_of(workspace, options.organ)?;
-    let mut boundaries: Vec<&str> = bundles
-        .iter()
-        .map(|bundle| bundle.boundary.as_str())
-        .collect();
+    let [organ, mesh, _] = options.organ.traits();
+    let bundles = bundles_of(workspace, mesh)?;
+    let mut boundaries: Vec<&str> = bundles.iter().map(|one| one.boundary.as_str()).collect();
     boundaries.sort_unstable();
     boundaries.dedup();
     let folder = match options.organ {
         Organ::Brain => workspace.path("target/demo"),
-        organ => workspace.path("target/demo").join(organ.name()),
+        Organ::Liver => workspace.path("target/demo").join(organ),
     };
     std::fs::create_dir_all(&folder)?;
     for boundary in &boundaries {
         let own: Vec<&Bundle> = bundles
             .iter()
-            .filter(|bundle| bundle.boundary == *boundary)
+            .filter(|one| one.boundary == *boundary)
             .collect();
         let trajectory = simulate(workspace, options, own[0], &folder)?;
         // The paper's boundary condition gets the plain names; another one its own folder.
-        let out = if *boundary == boundaries[0] {
-            folder.clone()
-        } else {
-            folder.join(boundary)
+        let out = match *boundary == boundaries[0] {
+            true => folder.clone(),
+            false => folder.join(boundary),
         };
-        let command = report_command(workspace, options, &library, &own, &out);
-        match options.scheme {
-            Some(_) => replay(options, command, &trajectory, &out)?,
-            None => drive(options, command, &trajectory, &out)?,
-        }
+        report(workspace, options, &own, &trajectory, &out)?;
     }
     Ok(true)
 }
 
 /// The committed bundles of the mesh that the demo simulates.
-fn bundles_of(workspace: &Workspace, organ: Organ) -> Result<Vec<Bundle>> {
-    let mut found = Vec::new();
-    let mut left_out = Vec::new();
-    let nodes = mesh_nodes(&workspace.path(organ.mesh()))?;
+fn bundles_of(workspace: &Workspace, mesh: &str) -> Result<Vec<Bundle>> {
+    let (mut found, mut left_out) = (Vec::new(), Vec::new());
+    let nodes = mesh_nodes(&workspace.path(mesh))?;
     for entry in std::fs::read_dir(workspace.path("onnx"))? {
         let path = entry?.path();
         let Ok(text) = std::fs::read_to_string(path.join("bundle.json")) else {
@@ -149,9 +129,11 @@ fn bundles_of(workspace: &Workspace, organ: Organ) -> Result<Vec<Bundle>> {
         };
         let manifest: serde_json::Value = serde_json::from_str(&text)
             .with_context(|| format!("{}/bundle.json", path.display()))?;
-        let name = manifest["name"].as_str().unwrap_or("?").to_owned();
         if manifest["mesh"]["nodes"].as_u64() != Some(nodes) {
-            left_out.push(format!("{name} (another mesh)"));
+            left_out.push(format!(
+                "{} (another mesh)",
+                manifest["name"].as_str().unwrap_or("?")
+            ));
             continue;
         }
         found.push(Bundle {
@@ -164,65 +146,54 @@ fn bundles_of(workspace: &Workspace, organ: Organ) -> Result<Vec<Bundle>> {
     if !left_out.is_empty() {
         eprintln!("left out: {}", left_out.join(", "));
     }
-    if found.is_empty() {
-        bail!("no bundle below onnx/ fits {}", organ.mesh());
-    }
+    ensure!(!found.is_empty(), "no bundle below onnx/ fits {mesh}");
     Ok(found)
 }
 
-/// Node count of the demo's mesh, from the header of its file.
+/// Node count of a mesh, from the header of its file.
 fn mesh_nodes(path: &Path) -> Result<u64> {
     let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
-    let length = u64::from_le_bytes(
-        bytes
-            .get(..8)
-            .context("the mesh file is cut short")?
-            .try_into()?,
-    ) as usize;
-    let header: serde_json::Value = serde_json::from_slice(
-        bytes
-            .get(8..8 + length)
-            .context("the mesh file is cut short")?,
-    )?;
-    header["positions"]["shape"][0]
-        .as_u64()
-        .context("the mesh file has no `positions`")
+    let header = bytes.split_first_chunk().and_then(|(length, rest)| {
+        let header = rest.get(..u64::from_le_bytes(*length) as usize)?;
+        serde_json::from_slice::<serde_json::Value>(header).ok()
+    });
+    let nodes = header.and_then(|header| header["positions"]["shape"][0].as_u64());
+    nodes.with_context(|| {
+        format!(
+            "{}: the file has no header with `positions`",
+            path.display()
+        )
+    })
 }
 
-/// The reference simulation, made once for each mesh, scheme, seed, boundary and version of the solver's source.
+/// The reference simulation, made once for each mesh, load, seed, boundary and version of the solver's source.
 fn simulate(
     workspace: &Workspace,
     options: &Options,
     bundle: &Bundle,
     folder: &Path,
 ) -> Result<PathBuf> {
-    let mesh = options.organ.mesh();
-    let boundary = bundle.boundary.as_str();
+    let Bundle {
+        boundary, material, ..
+    } = bundle;
+    let [_, mesh, _] = options.organ.traits();
+    let (option, name) = options.driver();
+    let load = format!(
+        "{option} {name} --seed {} --boundary {boundary}",
+        options.seed
+    );
     let mut hash = Sha256::new();
+    hash.update(format!("{load} {material}"));
     hash.update(std::fs::read(workspace.path(mesh))?);
-    let mut folders = ["contact", "elements", "tissue"]
-        .map(|name| workspace.path(&format!("crates/{name}/src")))
-        .to_vec();
-    let mut files = Vec::new();
-    while let Some(folder) = folders.pop() {
-        for entry in std::fs::read_dir(folder)? {
-            let path = entry?.path();
-            if path.is_dir() {
-                folders.push(path);
-            } else {
-                files.push(path);
+    for part in ["contact", "elements", "tissue"] {
+        let source = workspace.path(&format!("crates/{part}/src"));
+        for entry in WalkDir::new(source).sort_by_file_name() {
+            let entry = entry?;
+            if entry.file_type().is_file() {
+                hash.update(std::fs::read(entry.path())?);
             }
         }
     }
-    files.sort();
-    for file in files {
-        hash.update(std::fs::read(file)?);
-    }
-    let (option, name) = options.driver();
-    hash.update(format!(
-        "{option} {name} {} {boundary} {}",
-        options.seed, bundle.material
-    ));
     let key = format!("{:x}", hash.finalize());
     let file = folder.join(format!("contact-{}.trajectory.safetensors", &key[..16]));
     if file.is_file() {
@@ -232,98 +203,76 @@ fn simulate(
         );
         return Ok(file);
     }
+    let words = options.words();
     eprintln!(
-        "2/4 simulating {}, boundary `{boundary}`, with the reference solver: frames of 50 ms",
-        options.words()
+        "2/4 simulating {words}, boundary `{boundary}`, with the reference solver: frames of 50 ms"
     );
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    let mut command = Command::new(workspace.upt());
-    command
-        .current_dir(&workspace.root)
-        .args([
-            "simulate",
-            "--mesh",
-            mesh,
-            option,
-            name,
-            "--seed",
-            &options.seed.to_string(),
-            "--boundary",
-            boundary,
-        ])
-        .args(["--threads", &threads.to_string(), "--out"])
-        .arg(&file);
+    let words = format!("simulate --mesh {mesh} {load} --threads {threads} --out");
+    let mut command = workspace.command(workspace.upt(), &words);
+    command.arg(&file);
     for (option, key) in [
         ("--young", "young_pa"),
         ("--poisson", "poisson"),
         ("--density", "density_kg_m3"),
         ("--damping", "damping_per_s"),
     ] {
-        if let Some(value) = bundle.material[key].as_f64() {
+        if let Some(value) = material[key].as_f64() {
             command.args([option, &value.to_string()]);
         }
     }
-    run_visibly(&mut command, "upt simulate")?;
+    succeed(&mut command)?;
     Ok(file)
 }
 
-/// `upt report` of the bundles: what each demo has in common.
-fn report_command(
+/// `upt report` of the bundles: driven by the poses of the tool alone, or given the nodes and vectors of a contact scheme,
+/// the paper's own measure.
+fn report(
     workspace: &Workspace,
     options: &Options,
-    library: &Path,
     bundles: &[&Bundle],
+    trajectory: &Path,
     out: &Path,
-) -> Command {
-    let (organ, words) = (options.organ.name(), options.words());
-    let mut command = Command::new(workspace.upt());
-    command.current_dir(&workspace.root).stdout(Stdio::null());
-    command.arg("report").arg("--out").arg(out);
-    command.args(["--title", &format!("A {organ} pushed by libupt: {words}")]);
+) -> Result<()> {
+    let [organ, _, plain] = options.organ.traits();
+    let mut command = workspace.command(workspace.upt(), "report --out");
+    ort::set_environment(workspace, &mut command)?;
+    command.arg(out);
+    command.args([
+        "--title",
+        &format!("A {organ} pushed by libupt: {}", options.words()),
+    ]);
     for bundle in bundles {
         command.arg("--bundle").arg(&bundle.path);
     }
-    ort::set_environment(&mut command, library);
-    command
-}
-
-/// The paper's own measure: the nodes and vectors of the contact, given to the library.
-fn replay(options: &Options, mut command: Command, trajectory: &Path, out: &Path) -> Result<()> {
-    eprintln!("3/4 replaying the contact through the bundles and the plain methods");
-    let plain = options.organ.plain();
-    command.arg("--trajectory").arg(trajectory);
-    command.args(["--region", "all,surface", "--tled-frames", "20"]);
-    run_visibly(command.args(["--plain", plain]), "upt report")?;
-    print_table(&out.join("report.json"))?;
-    let page = out.join("report.html");
-    println!("4/4 pictures and curves: {}", page.display());
-    Ok(())
-}
-
-/// The library driven by the poses of the tool alone.
-fn drive(options: &Options, mut command: Command, trajectory: &Path, out: &Path) -> Result<()> {
-    let does = match options.tool.as_str() {
-        "stroke" => "it presses, slides and lifts",
-        other => other,
+    let shows = match options.scheme {
+        Some(_) => {
+            eprintln!("3/4 replaying the contact through the bundles and the plain methods");
+            command.args([
+                "--region",
+                "all,surface",
+                "--tled-frames",
+                "20",
+                "--plain",
+                plain,
+            ]);
+            command.arg("--trajectory");
+            "pictures and curves: report.html"
+        }
+        None => {
+            eprintln!("3/4 driving the bundles by the tool's poses alone");
+            command.arg("--tools");
+            "the dent in cross-section, forces over time: tools.html"
+        }
     };
-    eprintln!("3/4 driving the bundles by the tool's poses alone: {does}");
-    command.arg("--tools").arg(trajectory);
-    run_visibly(&mut command, "upt report --tools")?;
-    print_tool_table(&out.join("tools.json"))?;
-    let page = out.join("tools.html");
-    println!(
-        "4/4 the dent in cross-section, forces over time: {}",
-        page.display()
-    );
+    succeed(command.arg(trajectory))?;
+    println!("4/4 in {}: {shows}", out.display());
     Ok(())
 }
 
-fn run_visibly(command: &mut Command, name: &str) -> Result<()> {
-    let status = command
-        .status()
-        .with_context(|| format!("cannot start {name}"))?;
-    if !status.success() {
-        bail!("{name} failed");
+fn succeed(command: &mut Command) -> Result<()> {
+    if !run_visibly(command)? {
+        bail!("{:?} failed", command.get_program());
     }
     Ok(())
 }

@@ -2,8 +2,10 @@
 
 use std::path::{Component, Path, PathBuf};
 
-use anyhow::{Context, Result};
+use anyhow::Result;
+use walkdir::WalkDir;
 
+use crate::package;
 use crate::workspace::Workspace;
 
 /// Where in the archive a file or folder of the repository is, seen from the folder of the documents.
@@ -27,30 +29,17 @@ const PAGES: &[&str] = &[
 /// Copies the pages and pictures into `folder`, each at its place in the repository.
 pub fn copy(workspace: &Workspace, folder: &Path) -> Result<()> {
     let mut files: Vec<PathBuf> = PAGES.iter().map(PathBuf::from).collect();
-    list(&workspace.root, Path::new("docs"), &mut files)?;
-    for file in &files {
-        let (from, to) = (workspace.root.join(file), folder.join(file));
-        let context = || format!("cannot copy {}", from.display());
-        std::fs::create_dir_all(to.parent().context("a file has a folder")?)?;
-        if file.extension().is_some_and(|extension| extension == "md") {
-            let text = std::fs::read_to_string(&from).with_context(context)?;
-            std::fs::write(&to, relinked(&text, file, &files)).with_context(context)?;
-        } else {
-            std::fs::copy(&from, &to).with_context(context)?;
+    for entry in WalkDir::new(workspace.path("docs")) {
+        let entry = entry?;
+        if entry.file_type().is_file() {
+            files.push(entry.path().strip_prefix(&workspace.root)?.into());
         }
     }
-    Ok(())
-}
-
-fn list(root: &Path, folder: &Path, files: &mut Vec<PathBuf>) -> Result<()> {
-    let mut entries: Vec<_> = std::fs::read_dir(root.join(folder))?.collect::<Result<_, _>>()?;
-    entries.sort_by_key(std::fs::DirEntry::file_name);
-    for entry in entries {
-        let path = folder.join(entry.file_name());
-        if entry.path().is_dir() {
-            list(root, &path, files)?;
-        } else {
-            files.push(path);
+    for file in &files {
+        package::copy(&workspace.root.join(file), &folder.join(file))?;
+        if file.extension().is_some_and(|extension| extension == "md") {
+            let text = std::fs::read_to_string(workspace.root.join(file))?;
+            std::fs::write(folder.join(file), relinked(&text, file, &files))?;
         }
     }
     Ok(())
@@ -60,59 +49,40 @@ fn list(root: &Path, folder: &Path, files: &mut Vec<PathBuf>) -> Result<()> {
 fn relinked(text: &str, page: &Path, files: &[PathBuf]) -> String {
     let mut out = String::with_capacity(text.len());
     let mut rest = text;
-    while let Some(open) = rest.find("](") {
-        let Some(length) = rest[open + 2..].find(')') else {
+    while let Some((before, after)) = rest.split_once("](") {
+        let Some((link, behind)) = after.split_once(')') else {
             break;
         };
-        let link = &rest[open + 2..open + 2 + length];
-        let label = rest[..open].rfind('[');
-        match (label, place(link, page, files)) {
-            (_, Place::Here) | (None, _) => out.push_str(&rest[..open + length + 3]),
-            (Some(_), Place::There(to)) => {
-                out.push_str(&rest[..open]);
-                out.push_str(&format!("]({to})"));
-            }
-            (Some(label), Place::Nowhere) => {
-                out.push_str(rest[..label].trim_end_matches('!'));
-                out.push_str(&rest[label + 1..open]);
+        match (before.rfind('['), place(link, page, files)) {
+            (None, _) => out.push_str(&format!("{before}]({link})")),
+            (Some(_), Some(to)) => out.push_str(&format!("{before}]({to})")),
+            (Some(label), None) => {
+                out.push_str(before[..label].trim_end_matches('!'));
+                out.push_str(&before[label + 1..]);
             }
         }
-        rest = &rest[open + length + 3..];
+        rest = behind;
     }
-    out.push_str(rest);
-    out
+    out + rest
 }
 
-enum Place {
-    /// The link is right as it stands.
-    Here,
-    /// The target is in the package at this place, seen from the page.
-    There(String),
-    /// The package does not have it.
-    Nowhere,
-}
-
-fn place(link: &str, page: &Path, files: &[PathBuf]) -> Place {
+/// Where a link of a page leads in the package; none where the package does not have its target.
+fn place(link: &str, page: &Path, files: &[PathBuf]) -> Option<String> {
     let target = link.split('#').next().unwrap_or_default();
     if target.is_empty() || link.contains(':') || link.contains(char::is_whitespace) {
-        return Place::Here;
+        return Some(link.into());
     }
     let folder = page.parent().unwrap_or(Path::new(""));
     let target = normal(&folder.join(target));
     if files.contains(&target) {
-        return Place::Here;
+        return Some(link.into());
     }
     let up = "../".repeat(folder.components().count());
-    for (begin, to) in ELSEWHERE {
-        if let Ok(rest) = target.strip_prefix(begin) {
-            let to = Path::new(to).join(rest);
-            return Place::There(format!(
-                "{up}{}",
-                to.to_string_lossy().trim_end_matches('/')
-            ));
-        }
-    }
-    Place::Nowhere
+    let elsewhere = ELSEWHERE.iter().find_map(|(begin, to)| {
+        let to = Path::new(to).join(target.strip_prefix(begin).ok()?);
+        Some(to.to_string_lossy().trim_end_matches('/').to_owned())
+    });
+    elsewhere.map(|to| up + &to)
 }
 
 /// A path without `.` and `..`.
@@ -120,9 +90,7 @@ fn normal(path: &Path) -> PathBuf {
     let mut out = PathBuf::new();
     for component in path.components() {
         match component {
-            Component::ParentDir => {
-                out.pop();
-            }
+            Component::ParentDir => drop(out.pop()),
             Component::CurDir => {}
             other => out.push(other),
         }

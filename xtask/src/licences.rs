@@ -5,10 +5,10 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::process::Command;
 
 use anyhow::{Context, Result, bail, ensure};
 
+use crate::process::output;
 use crate::workspace::Workspace;
 
 /// Licences under which a crate may be linked.
@@ -63,11 +63,8 @@ pub fn notice(workspace: &Workspace) -> Result<String> {
     let mut texts: Vec<_> = texts.into_iter().collect();
     texts.sort_by(|a, b| a.1.cmp(&b.1));
     for (text, names) in texts {
-        notice.push_str(&format!(
-            "\n{}\n{}\n\n{text}\n",
-            "-".repeat(80),
-            names.join(", ")
-        ));
+        let (rule, names) = ("-".repeat(80), names.join(", "));
+        notice.push_str(&format!("\n{rule}\n{names}\n\n{text}\n"));
     }
     Ok(notice)
 }
@@ -83,12 +80,8 @@ fn is_accepted(expression: &str) -> bool {
 
 /// What `cargo tree` links, with what `cargo metadata` says of it.
 fn linked(workspace: &Workspace) -> Result<Vec<Linked>> {
-    let tree = cargo(
-        workspace,
-        &[
-            "tree", "-p", "upt", "-p", "upt-cli", "--edges", "normal", "--prefix", "none",
-            "--format", "{p}",
-        ],
+    let tree = output(
+        &mut workspace.cargo("tree -p upt -p upt-cli --edges normal --prefix none --format {p}"),
     )?;
     let names: Vec<(&str, &str)> = tree
         .lines()
@@ -96,7 +89,7 @@ fn linked(workspace: &Workspace) -> Result<Vec<Linked>> {
         .filter_map(|line| line.split_once(" v"))
         .filter_map(|(name, rest)| Some((name, rest.split_whitespace().next()?)))
         .collect();
-    let metadata = cargo(workspace, &["metadata", "--format-version", "1"])?;
+    let metadata = output(&mut workspace.cargo("metadata --format-version 1"))?;
     let metadata: serde_json::Value = serde_json::from_str(&metadata)?;
     let mut crates = Vec::new();
     for package in metadata["packages"].as_array().context("packages")? {
@@ -151,24 +144,23 @@ fn own_texts(folder: &Path) -> Result<Vec<String>> {
 
 /// For a crate that ships no text: this repository's own copies of the two licences.
 fn standard_text(workspace: &Workspace, one: &Linked) -> Result<String> {
-    let whose = if one.authors.is_empty() {
-        format!("the authors of {}", one.name)
-    } else {
-        one.authors.clone()
-    };
+    let read = |name: &str| std::fs::read_to_string(workspace.path(name));
     if one.licence.contains("MIT") {
-        let text = std::fs::read_to_string(workspace.path("LICENSE-MIT"))?;
+        let whose = match one.authors.as_str() {
+            "" => format!("the authors of {}", one.name),
+            authors => authors.to_owned(),
+        };
+        let text = read("LICENSE-MIT")?;
         let (_, terms) = text
             .split_once("Permission is")
             .context("LICENSE-MIT has no line `Permission is`")?;
+        let terms = terms.trim_end();
         return Ok(format!(
-            "MIT License\n\nCopyright (c) {whose}\n\nPermission is{}",
-            terms.trim_end()
+            "MIT License\n\nCopyright (c) {whose}\n\nPermission is{terms}"
         ));
     }
     if one.licence.contains("Apache-2.0") {
-        let text = std::fs::read_to_string(workspace.path("LICENSE-APACHE"))?;
-        return Ok(text.trim().to_owned());
+        return Ok(read("LICENSE-APACHE")?.trim().to_owned());
     }
     bail!(
         "{} {} ships no licence text, and there is none here for {}",
@@ -176,20 +168,6 @@ fn standard_text(workspace: &Workspace, one: &Linked) -> Result<String> {
         one.version,
         one.licence
     )
-}
-
-fn cargo(workspace: &Workspace, arguments: &[&str]) -> Result<String> {
-    let output = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
-        .current_dir(&workspace.root)
-        .args(arguments)
-        .output()?;
-    ensure!(
-        output.status.success(),
-        "cargo {}: {}",
-        arguments[0],
-        String::from_utf8_lossy(&output.stderr)
-    );
-    Ok(String::from_utf8(output.stdout)?)
 }
 
 #[cfg(test)]

@@ -12,7 +12,6 @@ mod licences;
 mod ort;
 mod package;
 mod process;
-mod readme;
 mod stages;
 mod system;
 mod test;
@@ -65,14 +64,19 @@ enum Task {
         after_help = "Examples:\n  cargo xtask package\n  cargo xtask package --unity\n  cargo xtask package --wheel\n  cargo xtask package --platform windows-x64"
     )]
     Package(package::Options),
-    /// Write the measured table of docs/results/README.md, and the still picture.
-    #[command(
-        after_help = "Example:\n  cargo xtask readme --report target/report/report.json --bundle onnx/brain-reduced --trajectory push.trajectory.safetensors"
-    )]
-    Readme(readme::Options),
+    /// Put tables that `upt report` wrote into a page, such as that of docs/results/README.md.
+    #[command(after_help = "Example:\n  cargo xtask readme --report target/report/report.md")]
+    Readme {
+        /// report.md files of `upt report`, in the order in which they should appear.
+        #[arg(long = "report", value_name = "FILE", required = true)]
+        reports: Vec<std::path::PathBuf>,
+        /// The page that takes them, between its markers; from the repository's root.
+        #[arg(long, value_name = "FILE", default_value = "docs/results/README.md")]
+        page: std::path::PathBuf,
+    },
     /// Build libupt for each cargo feature and write what it adds to docs/results/footprint.md.
     #[command(after_help = "Example:\n  cargo xtask footprint")]
-    Footprint(footprint::Options),
+    Footprint,
     /// Write include/upt.h and the C# bindings from the library's source.
     #[command(after_help = "Examples:\n  cargo xtask header\n  cargo xtask header --check")]
     Header {
@@ -126,10 +130,15 @@ fn run(workspace: &Workspace, task: Task) -> Result<bool> {
         Task::Bench(options) => bench::run(workspace, &options),
         Task::View { bundle } => upkeep::view(workspace, &bundle),
         Task::Package(options) => package::run(workspace, &options),
-        Task::Readme(options) => readme::run(workspace, &options),
-        Task::Footprint(options) => footprint::run(workspace, &options),
+        Task::Readme { reports, page } => upkeep::readme(workspace, &page, &reports),
+        Task::Footprint => footprint::run(workspace),
         Task::Header { check } => upkeep::header(workspace, check),
         Task::Bundle { module, arguments } => upkeep::bundle(workspace, &module, &arguments),
-        Task::Ort { platform, version } => ort::run(workspace, platform, &version).map(|()| true),
+        Task::Ort { platform, version } => {
+            let platform = platform.map_or_else(ort::Platform::host, Ok)?;
+            let folder = ort::fetch(workspace, platform, &version)?;
+            println!("{}", folder.join(platform.library()).display());
+            Ok(true)
+        }
     }
 }

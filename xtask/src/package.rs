@@ -11,20 +11,16 @@
 //! ```
 
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, ensure};
 use clap::Args;
+use walkdir::WalkDir;
 
-use crate::archive;
-use crate::cross;
-use crate::documents;
-use crate::licences;
 use crate::ort::{self, Platform};
-use crate::process::{has_program, run_checked};
-use crate::stages;
-use crate::wheel;
+use crate::process::run_checked;
+use crate::system::has_program;
 use crate::workspace::Workspace;
+use crate::{archive, cross, documents, licences, wheel};
 
 #[derive(Args)]
 pub struct Options {
@@ -43,30 +39,25 @@ pub struct Options {
 }
 
 pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
-    let out = if options.out.is_absolute() {
-        options.out.clone()
-    } else {
-        workspace.root.join(&options.out)
-    };
+    let out = workspace.root.join(&options.out);
     std::fs::create_dir_all(&out)?;
-    let made = if options.wheel {
-        match options.platform {
-            Some(platform) if platform != Platform::host()? => {
-                wheel::make_for(workspace, platform, &out)?
-            }
-            _ => wheel::make(workspace, &out)?,
-        }
-    } else if options.unity {
-        unity(workspace, &out)?
-    } else {
-        let host = Platform::host()?;
-        match options.platform {
-            Some(platform) if platform != host => foreign(workspace, platform, &out)?,
-            _ => native(workspace, host, &out)?,
-        }
+    let platform = options.platform.map_or_else(Platform::host, Ok)?;
+    let made = match (options.wheel, options.unity) {
+        (true, _) => wheel::make(workspace, platform, &out)?,
+        (_, true) => unity(workspace, &out)?,
+        _ => native(workspace, platform, &out)?,
     };
     println!("{}", made.display());
     Ok(true)
+}
+
+/// libupt's name on a platform.
+pub fn library(platform: Platform) -> &'static str {
+    match platform {
+        Platform::WindowsX64 => "upt.dll",
+        Platform::MacosArm64 => "libupt.dylib",
+        Platform::LinuxX64 | Platform::LinuxArm64 => "libupt.so",
+    }
 }
 
 fn version(workspace: &Workspace) -> Result<String> {
@@ -79,33 +70,38 @@ fn version(workspace: &Workspace) -> Result<String> {
 }
 
 /// Copies a file or a folder; links are followed.
-fn copy(from: &Path, to: &Path) -> Result<()> {
-    let context = || format!("cannot copy {} to {}", from.display(), to.display());
-    if from.is_dir() {
-        std::fs::create_dir_all(to).with_context(context)?;
-        for entry in std::fs::read_dir(from).with_context(context)? {
-            let entry = entry?;
-            copy(&entry.path(), &to.join(entry.file_name()))?;
+pub fn copy(from: &Path, to: &Path) -> Result<()> {
+    for entry in WalkDir::new(from).follow_links(true) {
+        let entry = entry?;
+        let place = match entry.depth() {
+            0 => to.to_owned(),
+            _ => to.join(entry.path().strip_prefix(from)?),
+        };
+        let context = || {
+            format!(
+                "cannot copy {} to {}",
+                entry.path().display(),
+                place.display()
+            )
+        };
+        if entry.file_type().is_dir() {
+            std::fs::create_dir_all(&place).with_context(context)?;
+        } else {
+            std::fs::create_dir_all(place.parent().context("a file has a folder")?)?;
+            std::fs::copy(entry.path(), &place).with_context(context)?;
         }
-        return Ok(());
     }
-    if let Some(folder) = to.parent() {
-        std::fs::create_dir_all(folder)?;
-    }
-    std::fs::copy(from, to).with_context(context)?;
     Ok(())
 }
 
 /// What is the same on every platform: bundles, examples, licences.
 fn shared(workspace: &Workspace, root: &Path, ort_folder: &Path) -> Result<()> {
     for entry in std::fs::read_dir(workspace.path("onnx"))? {
-        let path = entry?.path();
-        if path.join("bundle.json").is_file() {
+        let entry = entry?;
+        if entry.path().join("bundle.json").is_file() {
             copy(
-                &path,
-                &root
-                    .join("share/upt/bundles")
-                    .join(path.file_name().context("a bundle has a name")?),
+                &entry.path(),
+                &root.join("share/upt/bundles").join(entry.file_name()),
             )?;
         }
     }
@@ -120,59 +116,26 @@ fn shared(workspace: &Workspace, root: &Path, ort_folder: &Path) -> Result<()> {
     for name in ["LICENSE-APACHE", "LICENSE-MIT"] {
         copy(&workspace.path(name), &doc.join(name))?;
     }
-    copy(
-        &ort_folder.join("LICENSE"),
-        &doc.join("onnxruntime/LICENSE"),
-    )?;
-    copy(
-        &ort_folder.join("ThirdPartyNotices.txt"),
-        &doc.join("onnxruntime/ThirdPartyNotices.txt"),
-    )?;
+    for name in ["LICENSE", "ThirdPartyNotices.txt"] {
+        copy(&ort_folder.join(name), &doc.join("onnxruntime").join(name))?;
+    }
     std::fs::write(doc.join("THIRD-PARTY.txt"), licences::notice(workspace)?)?;
     Ok(())
 }
 
-fn native(workspace: &Workspace, host: Platform, out: &Path) -> Result<PathBuf> {
-    if !has_program("cmake") {
-        bail!(
-            "cmake is missing: it writes the find_package and pkg-config files (Debian: apt-get install cmake)"
-        );
-    }
-    let ort_folder = ort::fetch(workspace, host, ort::VERSION)?;
-    stages::build(workspace)?;
-    let name = format!("libupt-{}-{}", version(workspace)?, host.name());
-    let root = out.join(&name);
-    std::fs::remove_dir_all(&root).ok();
-    install(workspace, None, &workspace.release(), &root)?;
-    let library = if cfg!(windows) {
-        "onnxruntime.dll"
-    } else if cfg!(target_os = "macos") {
-        "libonnxruntime.dylib"
-    } else {
-        "libonnxruntime.so"
-    };
-    let folder = if cfg!(windows) { "bin" } else { "lib" };
-    copy(&ort_folder.join(library), &root.join(folder).join(library))?;
-    let program = format!("upt{}", std::env::consts::EXE_SUFFIX);
-    copy(&workspace.upt(), &root.join("bin").join(program))?;
-    #[cfg(unix)]
-    std::os::unix::fs::symlink(format!("../lib/{library}"), root.join("bin").join(library))?;
-    shared(workspace, &root, &ort_folder)?;
-    archive(workspace, out, &name)
-}
-
-/// The archive for another platform: built here where that is possible, else laid out without libupt.
-fn foreign(workspace: &Workspace, platform: Platform, out: &Path) -> Result<PathBuf> {
+/// The archive: of this platform, of one that is built for here, or of macOS laid out without libupt.
+fn native(workspace: &Workspace, platform: Platform, out: &Path) -> Result<PathBuf> {
+    ensure!(
+        has_program("cmake"),
+        "cmake is missing: it writes the find_package and pkg-config files (Debian: apt-get install cmake)"
+    );
     let ort_folder = ort::fetch(workspace, platform, ort::VERSION)?;
     let name = format!("libupt-{}-{}", version(workspace)?, platform.name());
     let root = out.join(&name);
     std::fs::remove_dir_all(&root).ok();
-    let (folder, library) = match platform {
-        Platform::WindowsX64 => ("bin", "onnxruntime.dll"),
-        Platform::MacosArm64 => ("lib", "libonnxruntime.dylib"),
-        Platform::LinuxX64 | Platform::LinuxArm64 => ("lib", "libonnxruntime.so"),
-    };
-    if platform == Platform::MacosArm64 {
+    let is_host = Platform::host()? == platform;
+    let (windows, onnx) = (platform == Platform::WindowsX64, platform.library());
+    if platform == Platform::MacosArm64 && !is_host {
         for header in ["include/upt.h", "include/upt.hpp"] {
             copy(&workspace.path(header), &root.join(header))?;
         }
@@ -183,141 +146,124 @@ fn foreign(workspace: &Workspace, platform: Platform, out: &Path) -> Result<Path
              The library has not been run on macOS by its authors.\n",
         )?;
     } else {
-        let built = cross::build(workspace, platform, &["upt", "upt-cli"])?;
-        install(workspace, Some(platform), &built, &root)?;
-        if platform == Platform::WindowsX64 {
-            copy(&built.join("upt.exe"), &root.join("bin/upt.exe"))?;
+        let built = match is_host {
+            true => workspace.build().map(|()| workspace.release.clone())?,
+            false => cross::build(workspace, platform, "-p upt -p upt-cli")?,
+        };
+        install(workspace, (!is_host).then_some(platform), &built, &root)?;
+        let program = if windows { "upt.exe" } else { "upt" };
+        copy(&built.join(program), &root.join("bin").join(program))?;
+        if windows && !is_host {
             cross::import_library(workspace, &built, &root.join("lib"))?;
-        } else {
-            copy(&built.join("upt"), &root.join("bin/upt"))?;
-            #[cfg(unix)]
-            std::os::unix::fs::symlink(
-                format!("../lib/{library}"),
-                root.join("bin").join(library),
-            )?;
+        }
+        #[cfg(unix)]
+        if !windows {
+            std::os::unix::fs::symlink(format!("../lib/{onnx}"), root.join("bin").join(onnx))?;
         }
     }
-    copy(&ort_folder.join(library), &root.join(folder).join(library))?;
+    let folder = if windows { "bin" } else { "lib" };
+    copy(&ort_folder.join(onnx), &root.join(folder).join(onnx))?;
     shared(workspace, &root, &ort_folder)?;
-    archive(workspace, out, &name)
+    let file = out.join(format!("{name}.tar.gz"));
+    archive::pack(out, &name, &file, archive::time(workspace))?;
+    Ok(file)
 }
 
 /// Library, headers, CMake and pkg-config files, by CMake.
 fn install(
     workspace: &Workspace,
-    platform: Option<Platform>,
+    other: Option<Platform>,
     built: &Path,
     root: &Path,
 ) -> Result<()> {
-    let build = workspace.path(&format!(
-        "target/package-cmake{}",
-        platform.map_or_else(String::new, |platform| format!("-{}", platform.name()))
-    ));
-    let log = workspace.logs().join("package.log");
-    let mut configure = Command::new("cmake");
+    let suffix = other.map_or_else(String::new, |platform| format!("-{}", platform.name()));
+    let build = format!("target/package-cmake{suffix}");
+    let words = format!("-S cmake -B {build} -DCMAKE_INSTALL_LIBDIR=lib");
+    let mut configure = workspace.command("cmake", &words);
     configure
-        .arg("-S")
-        .arg(workspace.path("cmake"))
-        .arg("-B")
-        .arg(&build)
         .arg(format!("-DUPT_LIB_DIR={}", built.display()))
-        .arg(format!("-DCMAKE_INSTALL_PREFIX={}", root.display()))
-        .arg("-DCMAKE_INSTALL_LIBDIR=lib");
-    if let Some(platform) = platform {
+        .arg(format!("-DCMAKE_INSTALL_PREFIX={}", root.display()));
+    if let Some(platform) = other {
         cross::configure(workspace, platform, &mut configure);
     }
-    run_checked("cmake", &mut configure, &log)?;
-    run_checked(
-        "cmake --install",
-        Command::new("cmake").arg("--install").arg(&build),
-        &log,
-    )?;
-    Ok(())
+    run_checked(workspace, "cmake", &mut configure)?;
+    let mut install = workspace.command("cmake", &format!("--install {build}"));
+    run_checked(workspace, "cmake --install", &mut install)
 }
 
-/// A .tar.gz: the same commit gives the same bytes.
-fn archive(workspace: &Workspace, out: &Path, name: &str) -> Result<PathBuf> {
-    let file = out.join(format!("{name}.tar.gz"));
-    archive::pack(out, name, &file, archive::time(&workspace.root))?;
-    Ok(file)
-}
-
-/// The Unity package with the native plugins: this platform's libupt, and ONNX Runtime of every platform
-/// whose libupt is there.
+/// The Unity package with the native plugins of this platform: libupt and ONNX Runtime.
 fn unity(workspace: &Workspace, out: &Path) -> Result<PathBuf> {
     let host = Platform::host()?;
     let ort_folder = ort::fetch(workspace, host, ort::VERSION)?;
-    stages::build(workspace)?;
-    let name = "package";
-    let staging = out.join("unity");
-    let root = staging.join(name);
-    std::fs::remove_dir_all(&staging).ok();
+    workspace.build()?;
+    let root = out.join("unity/package");
+    std::fs::remove_dir_all(out.join("unity")).ok();
     copy(&workspace.path("unity-plugin"), &root)?;
-    let (folder, libraries): (&str, &[&str]) = match host {
-        Platform::LinuxX64 => ("Linux/x86_64", &["libupt.so", "libonnxruntime.so"]),
-        Platform::LinuxArm64 => ("Linux/arm64", &["libupt.so", "libonnxruntime.so"]),
-        Platform::WindowsX64 => ("Windows/x86_64", &["upt.dll", "onnxruntime.dll"]),
-        Platform::MacosArm64 => ("macOS/arm64", &["libupt.dylib", "libonnxruntime.dylib"]),
-    };
-    let plugins = root.join("Runtime/Plugins").join(folder);
-    for library in libraries {
-        let from = if library.contains("onnxruntime") {
-            ort_folder.join(library)
-        } else {
-            workspace.release().join(library)
-        };
-        copy(&from, &plugins.join(library))?;
+    let plugins = root.join("Runtime/Plugins");
+    let own = plugins.join(match host {
+        Platform::LinuxX64 => "Linux/x86_64",
+        Platform::LinuxArm64 => "Linux/arm64",
+        Platform::WindowsX64 => "Windows/x86_64",
+        Platform::MacosArm64 => "macOS/arm64",
+    });
+    for (folder, name) in [
+        (&workspace.release, library(host)),
+        (&ort_folder, host.library()),
+    ] {
+        copy(&folder.join(name), &own.join(name))?;
     }
     // Unity leaves folders whose names end in ~ alone, so these need no .meta files.
-    for entry in std::fs::read_dir(workspace.path("onnx"))? {
-        let path = entry?.path();
-        if path.join("bundle.json").is_file()
-            && path.file_name().is_some_and(|name| name == "brain-reduced")
-        {
-            copy(&path, &root.join("Bundles~/brain-reduced"))?;
-        }
-    }
-    std::fs::write(
-        root.join("Documentation~/third-party-crates.txt"),
-        licences::notice(workspace)?,
+    copy(
+        &workspace.path("onnx/brain-reduced"),
+        &root.join("Bundles~/brain-reduced"),
     )?;
-    without_empty_plugins(&root)?;
+    let notice = licences::notice(workspace)?;
+    std::fs::write(root.join("Documentation~/third-party-crates.txt"), notice)?;
+    remove_orphans(&root, &plugins)?;
     let file = out.join(format!(
         "org.libupt.soft-tissue-{}.tgz",
         version(workspace)?
     ));
-    archive::pack(&staging, name, &file, archive::time(&workspace.root))?;
+    archive::pack(
+        &out.join("unity"),
+        "package",
+        &file,
+        archive::time(workspace),
+    )?;
     Ok(file)
 }
 
 /// Removes the settings of plugins that are not in the package, and folders that hold nothing else: Unity warns about
 /// them otherwise.
-fn without_empty_plugins(root: &Path) -> Result<()> {
-    remove_orphans(root, &root.join("Runtime/Plugins"))
-}
-
 fn remove_orphans(root: &Path, folder: &Path) -> Result<()> {
-    for entry in std::fs::read_dir(folder)? {
-        let path = entry?.path();
+    // What is inside of a folder first: an empty folder goes, and its settings with it.
+    for entry in WalkDir::new(folder).min_depth(1).contents_first(true) {
+        let path = entry?.into_path();
         if path.is_dir() {
-            remove_orphans(root, &path)?;
+            remove_settings(root, &path)?;
             if std::fs::read_dir(&path)?.next().is_none() {
                 std::fs::remove_dir(&path)?;
             }
         }
     }
+    remove_settings(root, folder)
+}
+
+/// Settings in one folder without what they are for.
+fn remove_settings(root: &Path, folder: &Path) -> Result<()> {
     for entry in std::fs::read_dir(folder)? {
         let path = entry?.path();
         let asset = path.with_extension("");
-        if path.extension().is_none_or(|extension| extension != "meta") || asset.exists() {
-            continue;
-        }
-        std::fs::remove_file(&path)?;
-        if asset.extension().is_some() {
-            println!(
-                "left out (not built on this platform): {}",
-                asset.strip_prefix(root).unwrap_or(&asset).display()
-            );
+        if path
+            .extension()
+            .is_some_and(|extension| extension == "meta")
+            && !asset.exists()
+        {
+            std::fs::remove_file(&path)?;
+            if asset.extension().is_some() {
+                let name = asset.strip_prefix(root).unwrap_or(&asset);
+                println!("left out (not built on this platform): {}", name.display());
+            }
         }
     }
     Ok(())
@@ -346,7 +292,7 @@ mod tests {
             std::fs::create_dir_all(path.parent().unwrap()).unwrap();
             std::fs::write(path, "").unwrap();
         }
-        without_empty_plugins(root).unwrap();
+        remove_orphans(root, &plugins).unwrap();
         for file in files {
             let stays = file.starts_with("Linux");
             assert_eq!(plugins.join(file).exists(), stays, "{file}");

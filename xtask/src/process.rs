@@ -1,12 +1,14 @@
-//! Running other programs: output goes to a log file, the terminal sees one line of progress.
+//! Running other programs: output goes to a log file in `target/xtask-logs/`, the terminal sees one line of progress.
 
 use std::fs::File;
-use std::io::{IsTerminal, Write};
-use std::path::{Path, PathBuf};
+use std::io::IsTerminal;
+use std::path::PathBuf;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
+
+use crate::workspace::Workspace;
 
 /// What a program left behind.
 pub struct Finished {
@@ -24,19 +26,18 @@ impl Finished {
     }
 }
 
-/// Runs `command` with its output in `log`, printing `label` and the time it takes.
+/// Runs `command` with its output in a log named after `label`.
 ///
-/// On a terminal the line is redrawn; elsewhere a line is printed once a minute, so that a
-/// log keeper sees that the job is alive.
-pub fn run_logged(label: &str, command: &mut Command, log: &Path) -> Result<Finished> {
-    if let Some(folder) = log.parent() {
-        std::fs::create_dir_all(folder)?;
-    }
-    let file = File::create(log).with_context(|| format!("cannot write {}", log.display()))?;
-    let started = Instant::now();
+/// On a terminal the line of progress is redrawn; elsewhere a line is printed once a minute, so that a log keeper sees
+/// that the job is alive.
+pub fn run_logged(workspace: &Workspace, label: &str, command: &mut Command) -> Result<Finished> {
+    let name = label.replace([' ', '/'], "-");
+    let log = workspace.path(&format!("target/xtask-logs/{name}.log"));
+    std::fs::create_dir_all(log.with_file_name(""))?;
+    let file = File::create(&log).with_context(|| format!("cannot write {}", log.display()))?;
+    command.stdin(Stdio::null()).stdout(file.try_clone()?);
+    let start = Instant::now();
     let mut child = command
-        .stdin(Stdio::null())
-        .stdout(file.try_clone()?)
         .stderr(file)
         .spawn()
         .with_context(|| format!("cannot start {:?}", command.get_program()))?;
@@ -47,47 +48,51 @@ pub fn run_logged(label: &str, command: &mut Command, log: &Path) -> Result<Fini
             break status;
         }
         std::thread::sleep(Duration::from_millis(40));
-        let pause = if terminal { 0.5 } else { 60.0 };
-        if shown.elapsed().as_secs_f64() > pause {
+        if shown.elapsed().as_secs_f64() > if terminal { 0.5 } else { 60.0 } {
             shown = Instant::now();
-            let seconds = started.elapsed().as_secs();
-            if terminal {
-                eprint!("\r\x1b[K  {label} ... {seconds} s");
-            } else {
-                eprintln!("  {label} ... {seconds} s");
+            let line = format!("  {label} ... {} s", start.elapsed().as_secs());
+            match terminal {
+                true => eprint!("\r\x1b[K{line}"),
+                false => eprintln!("{line}"),
             }
-            std::io::stderr().flush().ok();
         }
     };
     if terminal {
         eprint!("\r\x1b[K");
     }
-    let text = String::from_utf8_lossy(&std::fs::read(log)?).into_owned();
     Ok(Finished {
         success: status.success(),
-        text,
-        log: log.to_path_buf(),
+        text: String::from_utf8_lossy(&std::fs::read(&log)?).into_owned(),
+        log,
     })
 }
 
 /// As [`run_logged`], but a failure is an error that shows the end of the log.
-pub fn run_checked(label: &str, command: &mut Command, log: &Path) -> Result<Finished> {
-    let finished = run_logged(label, command, log)?;
+pub fn run_checked(workspace: &Workspace, label: &str, command: &mut Command) -> Result<()> {
+    let finished = run_logged(workspace, label, command)?;
     if !finished.success {
-        bail!(
-            "{label} failed; the end of {}:\n{}",
-            finished.log.display(),
-            finished.tail(40)
-        );
+        let (log, end) = (finished.log.display(), finished.tail(40));
+        bail!("{label} failed; the end of {log}:\n{end}");
     }
-    Ok(finished)
+    Ok(())
 }
 
-/// True when `name` is a program on the `PATH`.
-pub fn has_program(name: &str) -> bool {
-    let Some(path) = std::env::var_os("PATH") else {
-        return false;
-    };
-    std::env::split_paths(&path)
-        .any(|folder| folder.join(name).is_file() || folder.join(format!("{name}.exe")).is_file())
+/// What a program prints; a failure is an error with its messages.
+pub fn output(command: &mut Command) -> Result<String> {
+    let output = command
+        .output()
+        .with_context(|| format!("cannot start {:?}", command.get_program()))?;
+    if !output.status.success() {
+        let message = String::from_utf8_lossy(&output.stderr);
+        bail!("{:?}: {message}", command.get_program());
+    }
+    Ok(String::from_utf8(output.stdout)?)
+}
+
+/// Runs `command` in the terminal; false where it failed, which it has said itself.
+pub fn run_visibly(command: &mut Command) -> Result<bool> {
+    let status = command
+        .status()
+        .with_context(|| format!("cannot start {:?}", command.get_program()))?;
+    Ok(status.success())
 }

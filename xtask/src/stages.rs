@@ -1,264 +1,123 @@
 //! The stages of `cargo xtask test`: one a language or check, each with its own counted result.
 
-use std::path::Path;
-use std::process::Command;
-
 use anyhow::Result;
 
-use crate::counts::{self, Counts};
-use crate::process::{Finished, has_program, run_checked, run_logged};
-use crate::system::{self, Package};
+use crate::counts::{self, Outcome};
+use crate::process::{output, run_logged};
+use crate::system::{self, Needs};
 use crate::workspace::Workspace;
 use crate::{cross, ort, venv, wheel};
-
-/// What a stage reports.
-pub struct Outcome {
-    pub counts: Counts,
-    /// Why something failed or was skipped; empty where all passed.
-    pub note: String,
-    /// The end of the log where something failed.
-    pub log_tail: String,
-    /// The stage did not run at all.
-    pub left_out: bool,
-}
-
-impl Outcome {
-    fn counted(counts: Counts) -> Self {
-        Self {
-            counts,
-            note: String::new(),
-            log_tail: String::new(),
-            left_out: false,
-        }
-    }
-
-    pub fn failed(note: String) -> Self {
-        Self {
-            note,
-            ..Self::counted(Counts {
-                failed: 1,
-                ..Counts::default()
-            })
-        }
-    }
-
-    pub fn skipped(note: String) -> Self {
-        Self {
-            note,
-            left_out: true,
-            ..Self::counted(Counts {
-                skipped: 1,
-                ..Counts::default()
-            })
-        }
-    }
-
-    /// The counts of a program that ran; one that failed without a failed test counts as one failure.
-    pub fn of(finished: &Finished, counts: Counts) -> Self {
-        let mut outcome = Self::counted(counts);
-        if !finished.success && counts.failed == 0 {
-            outcome.counts.failed = 1;
-        }
-        if finished.success && counts == Counts::default() {
-            outcome.counts.failed = 1;
-            outcome.note = "ran no tests".into();
-        }
-        if outcome.counts.failed > 0 {
-            if outcome.note.is_empty() {
-                outcome.note = format!("see {}", finished.log.display());
-            }
-            outcome.log_tail = finished.tail(40);
-        }
-        outcome
-    }
-}
 
 pub struct Stage {
     pub name: &'static str,
     pub about: &'static str,
-    pub needs: &'static [&'static [Package]],
+    /// Packages without which it is skipped.
+    pub needs: Needs,
     /// Too long for every run: in the nightly one, and by name.
     pub nightly: bool,
-    pub run: fn(&Workspace) -> Result<Outcome>,
+    pub run: Run,
+}
+
+/// How a stage runs.
+pub enum Run {
+    Function(fn(&Workspace) -> Result<Outcome>),
+    /// A test script and its arguments; its last line reads `N passed, N failed, N skipped`.
+    Script(&'static str),
+}
+
+use Run::{Function, Script};
+
+const fn stage(name: &'static str, about: &'static str, needs: Needs, run: Run) -> Stage {
+    Stage {
+        name,
+        about,
+        needs,
+        nightly: false,
+        run,
+    }
+}
+
+const fn nightly(name: &'static str, about: &'static str, needs: Needs, run: Run) -> Stage {
+    Stage {
+        nightly: true,
+        ..stage(name, about, needs, run)
+    }
 }
 
 /// In this order: what is cheap and most often wrong comes first.
+#[rustfmt::skip]
 pub const STAGES: &[Stage] = &[
-    Stage {
-        name: "fmt",
-        about: "cargo fmt --check",
-        needs: &[],
-        nightly: false,
-        run: fmt,
-    },
-    Stage {
-        name: "clippy",
-        about: "cargo clippy, warnings are errors; also of builds with a single feature or none",
-        needs: &[],
-        nightly: false,
-        run: clippy,
-    },
-    Stage {
-        name: "style",
-        about: "ruff, clang-format, unused dependencies",
-        needs: &[],
-        nightly: false,
-        run: style,
-    },
-    Stage {
-        name: "rust",
-        about: "cargo test --release --workspace",
-        needs: &[],
-        nightly: false,
-        run: rust,
-    },
-    Stage {
-        name: "loom",
-        about: "every interleaving of what threads share without a lock",
-        needs: &[],
-        nightly: false,
-        run: loom,
-    },
-    Stage {
-        name: "python",
-        about: "pytest of training/",
-        needs: &[],
-        nightly: false,
-        run: python,
-    },
-    Stage {
-        name: "wheel",
-        about: "the Python package: wheel, types, pytest",
-        needs: &[],
-        nightly: false,
-        run: wheel::stage,
-    },
-    Stage {
-        name: "docs",
-        about: "the book: links, code blocks, commands, index",
-        needs: &[],
-        nightly: false,
-        run: docs,
-    },
-    Stage {
-        name: "c",
-        about: "C and C++ hosts, CMake package, simulator",
-        needs: &[system::NATIVE],
-        nightly: false,
-        run: c,
-    },
-    Stage {
-        name: "csharp",
-        about: "the Unity package's C# under Mono",
-        needs: &[system::CSHARP],
-        nightly: false,
-        run: csharp,
-    },
-    Stage {
-        name: "godot",
-        about: "the GDExtension in a real engine",
-        needs: &[system::NATIVE],
-        nightly: false,
-        run: godot,
-    },
-    Stage {
-        name: "package",
-        about: "the archive, unpacked elsewhere",
-        needs: &[system::NATIVE],
-        nightly: false,
-        run: package,
-    },
-    Stage {
-        name: "view",
-        about: "upt view in headless Chromium",
-        needs: &[system::BROWSER],
-        nightly: false,
-        run: view,
-    },
-    Stage {
-        name: "haptics",
-        about: "a day of simulated haptics, or what fits into 20 minutes",
-        needs: &[system::NATIVE],
-        nightly: true,
-        run: haptics,
-    },
-    Stage {
-        name: "races",
-        about: "what threads share: Miri, ThreadSanitizer",
-        needs: &[],
-        nightly: true,
-        run: races,
-    },
-    Stage {
-        name: "windows",
-        about: "built by MinGW, run by Wine",
-        needs: &[system::WINDOWS],
-        nightly: true,
-        run: cross::windows,
-    },
-    Stage {
-        name: "arm64",
-        about: "Linux arm64, run by qemu",
-        needs: &[system::ARM64],
-        nightly: true,
-        run: cross::arm64,
-    },
+    stage("fmt", "cargo fmt --check", "", Function(fmt)),
+    stage("clippy", "cargo clippy, warnings are errors; also of builds with a single feature or none", "", Function(clippy)),
+    stage("style", "ruff, clang-format, unused dependencies", "", Function(style)),
+    stage("rust", "cargo test --release --workspace", "", Function(rust)),
+    stage("loom", "every interleaving of what threads share without a lock", "", Script("tests/races/run.sh loom")),
+    stage("python", "pytest of training/", "", Function(python)),
+    stage("wheel", "the Python package: wheel, types, pytest", "", Function(wheel::stage)),
+    stage("docs", "the book: links, code blocks, commands, index", "", Function(docs)),
+    stage("c", "C and C++ hosts, CMake package, simulator", system::NATIVE, Script("tests/c/run.sh")),
+    stage("csharp", "the Unity package's C# under Mono", system::CSHARP, Script("tests/csharp/run.sh")),
+    stage("godot", "the GDExtension in a real engine", system::NATIVE, Script("examples/godot/run.sh")),
+    stage("package", "the archive, unpacked elsewhere", system::NATIVE, Function(package)),
+    stage("view", "upt view in headless Chromium", system::BROWSER, Script("tests/view/run.sh")),
+    nightly("haptics", "a day of simulated haptics, or what fits into 20 minutes", system::NATIVE, Function(haptics)),
+    nightly("races", "what threads share: Miri, ThreadSanitizer", "", Script("tests/races/run.sh nightly")),
+    nightly("windows", "built by MinGW, run by Wine", system::WINDOWS, Function(cross::windows)),
+    nightly("arm64", "Linux arm64, run by qemu", system::ARM64, Function(cross::arm64)),
 ];
 
-fn cargo(workspace: &Workspace) -> Command {
-    let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-    command.current_dir(&workspace.root);
-    command
+impl Stage {
+    /// Runs it where nothing that it needs is missing; an error is a failure.
+    pub fn outcome(&self, workspace: &Workspace) -> Outcome {
+        let missing = system::missing(self.needs);
+        if !missing.is_empty() {
+            return Outcome::skipped(&format!("needs {}", missing.join(", ")));
+        }
+        let outcome = match self.run {
+            Function(run) => run(workspace),
+            Script(path) => script(workspace, self.name, path, &[]),
+        };
+        outcome.unwrap_or_else(|error| Outcome::failed(format!("{error:#}")))
+    }
 }
 
-/// No leak, no force that is no number or that stays: 24 simulated hours, or as many as 20 minutes hold; the log says how many.
-fn haptics(workspace: &Workspace) -> Result<Outcome> {
-    let mut command = cargo(workspace);
-    command.args(["run", "--release", "--package", "upt-cli", "--", "haptics"]);
-    command.args([
-        "onnx/brain-coarse-reduced",
-        "--hours",
-        "24",
-        "--within",
-        "20",
-    ]);
-    check(workspace, "upt haptics", &mut command)
-}
-
-fn loom(workspace: &Workspace) -> Result<Outcome> {
-    script_with(workspace, "loom", "tests/races/run.sh", |command| {
-        command.arg("loom");
-    })
-}
-
-fn races(workspace: &Workspace) -> Result<Outcome> {
-    script_with(workspace, "races", "tests/races/run.sh", |command| {
-        command.arg("nightly");
-    })
+/// Runs a test script with what it finds its parts by.
+pub fn script(
+    workspace: &Workspace,
+    name: &str,
+    words: &str,
+    environment: &[(&str, &std::path::Path)],
+) -> Result<Outcome> {
+    let mut command = workspace.bash(words);
+    workspace.with_parts(&mut command)?;
+    command.envs(environment.iter().copied());
+    let finished = run_logged(workspace, name, &mut command)?;
+    let mut outcome = Outcome::of(&finished, counts::script(&finished.text));
+    if outcome.counts.skipped > 0 && outcome.note.is_empty() {
+        let lines = finished.text.lines();
+        let why: Vec<&str> = lines
+            .filter(|line| line.to_lowercase().contains("skipped:"))
+            .collect();
+        outcome.note = why.join("; ");
+    }
+    Ok(outcome)
 }
 
 /// A check that passes or fails as a whole.
-pub fn check(workspace: &Workspace, label: &str, command: &mut Command) -> Result<Outcome> {
-    let log = workspace
-        .logs()
-        .join(format!("{}.log", label.replace(' ', "-")));
-    let finished = run_logged(label, command, &log)?;
-    let passed = u64::from(finished.success);
-    Ok(Outcome::of(
-        &finished,
-        Counts {
-            passed,
-            failed: 1 - passed,
-            skipped: 0,
-        },
-    ))
+pub fn check(
+    workspace: &Workspace,
+    label: &str,
+    command: &mut std::process::Command,
+) -> Result<Outcome> {
+    let finished = run_logged(workspace, label, command)?;
+    Ok(Outcome::of(&finished, counts::whole(finished.success)))
 }
 
 fn fmt(workspace: &Workspace) -> Result<Outcome> {
     check(
         workspace,
         "cargo fmt",
-        cargo(workspace).args(["fmt", "--all", "--check"]),
+        &mut workspace.cargo("fmt --all --check"),
     )
 }
 
@@ -270,267 +129,91 @@ const PARTIAL: [(&str, &[&str]); 3] = [
 ];
 
 fn clippy(workspace: &Workspace) -> Result<Outcome> {
-    let run = |label: &str, arguments: &[&str]| {
-        let mut command = cargo(workspace);
-        command.args(["clippy", "--release", "--all-targets"]);
-        command.args(arguments).args(["--", "-D", "warnings"]);
-        check(workspace, label, &mut command)
+    let run = |label: &str, what: &str| {
+        let words = format!("clippy --release --all-targets {what} -- -D warnings");
+        check(workspace, label, &mut workspace.cargo(&words))
     };
-    let mut outcomes = vec![run("cargo clippy", &["--workspace"])?];
+    let mut outcome = run("cargo clippy", "--workspace")?;
     for (package, builds) in PARTIAL {
         for &features in builds {
             let label = match features {
                 "" => format!("cargo clippy, {package} without features"),
                 _ => format!("cargo clippy, {package} with {features} alone"),
             };
-            let alone = ["--no-default-features", "--features", features];
-            outcomes.push(run(
-                &label,
-                &[&["--package", package], &alone[..]].concat(),
-            )?);
+            let alone = format!("--package {package} --no-default-features --features={features}");
+            outcome = outcome.and(run(&label, &alone)?);
         }
     }
-    Ok(joined(outcomes))
+    Ok(outcome)
 }
 
 fn style(workspace: &Workspace) -> Result<Outcome> {
     venv::install_tools(workspace)?;
-    let ruff = workspace.venv_program("ruff");
-    let mut parts = vec![
-        check(
-            workspace,
-            "ruff check",
-            Command::new(&ruff)
-                .arg("check")
-                .current_dir(&workspace.root),
-        )?,
-        check(
+    let tool = |name: &str, words: &str| workspace.command(workspace.venv_program(name), words);
+    let listed = output(&mut workspace.command("git", "ls-files *.c *.h *.cpp *.hpp"))?;
+    // The generated header is compared with a fresh generation instead.
+    let files = listed.lines().filter(|name| *name != "include/upt.h");
+    let mut format = tool("clang-format", "--dry-run --Werror");
+    Ok(check(workspace, "ruff check", &mut tool("ruff", "check"))?
+        .and(check(
             workspace,
             "ruff format",
-            Command::new(&ruff)
-                .args(["format", "--check"])
-                .current_dir(&workspace.root),
-        )?,
-        check(
+            &mut tool("ruff", "format --check"),
+        )?)
+        .and(check(
             workspace,
             "unused dependencies",
-            Command::new(workspace.python()).arg(workspace.path("tests/style/dependencies.py")),
-        )?,
-    ];
-    let listed = Command::new("git")
-        .args(["ls-files", "-z", "*.c", "*.h", "*.cpp", "*.hpp"])
-        .current_dir(&workspace.root)
-        .output()?;
-    let listed = String::from_utf8_lossy(&listed.stdout).into_owned();
-    // The generated header is compared with a fresh generation instead.
-    let files: Vec<&str> = listed
-        .split('\0')
-        .filter(|name| !name.is_empty() && *name != "include/upt.h")
-        .collect();
-    if !files.is_empty() {
-        let mut command = Command::new(workspace.venv_program("clang-format"));
-        command
-            .args(["--dry-run", "--Werror"])
-            .args(&files)
-            .current_dir(&workspace.root);
-        parts.push(check(workspace, "clang-format", &mut command)?);
-    }
-    Ok(joined(parts))
-}
-
-pub fn joined(parts: Vec<Outcome>) -> Outcome {
-    let mut sum = Outcome::counted(Counts::default());
-    for part in parts {
-        sum.counts += part.counts;
-        for (all, one) in [
-            (&mut sum.note, part.note),
-            (&mut sum.log_tail, part.log_tail),
-        ] {
-            if !one.is_empty() {
-                if !all.is_empty() {
-                    all.push('\n');
-                }
-                all.push_str(&one);
-            }
-        }
-    }
-    sum
+            &mut workspace.python("tests/style/dependencies.py"),
+        )?)
+        .and(check(workspace, "clang-format", format.args(files))?))
 }
 
 fn rust(workspace: &Workspace) -> Result<Outcome> {
-    let library = ort::host_library(workspace)?;
-    let mut command = cargo(workspace);
-    command
-        .args(["test", "--release", "--workspace", "--no-fail-fast"])
-        .env("CARGO_TERM_COLOR", "never");
-    ort::set_environment(&mut command, &library);
+    let mut command = workspace.cargo("test --release --workspace --no-fail-fast");
+    ort::set_environment(workspace, &mut command)?;
     let finished = run_logged(
+        workspace,
         "cargo test",
-        &mut command,
-        &workspace.logs().join("cargo-test.log"),
+        command.env("CARGO_TERM_COLOR", "never"),
     )?;
     let mut outcome = Outcome::of(&finished, counts::cargo(&finished.text));
     if outcome.counts.failed > 0 {
-        let failed: Vec<&str> = finished
-            .text
-            .lines()
-            .filter(|line| {
-                line.ends_with("... FAILED")
-                    || line.starts_with("error")
-                    || line.contains("panicked at")
-            })
-            .collect();
+        let tells = |line: &&str| {
+            line.ends_with("... FAILED")
+                || line.starts_with("error")
+                || line.contains("panicked at")
+        };
+        let failed: Vec<&str> = finished.text.lines().filter(tells).collect();
         outcome.log_tail = format!("{}\n{}", failed.join("\n"), outcome.log_tail);
     }
     Ok(outcome)
 }
 
+/// Python tests compare with the Rust side through its commands.
 fn python(workspace: &Workspace) -> Result<Outcome> {
-    if !workspace.path("training/pyproject.toml").exists() {
-        return Ok(Outcome::skipped(
-            "training/pyproject.toml does not exist".into(),
-        ));
-    }
-    let library = ort::host_library(workspace)?;
     venv::install_training(workspace)?;
-    // Python tests compare with the Rust side through its commands.
-    build(workspace)?;
-    let mut command = Command::new(workspace.python());
-    command
-        .args(["-m", "pytest", "-q", "-p", "no:cacheprovider", "training"])
-        .current_dir(&workspace.root);
-    set_test_environment(workspace, &mut command, &library);
-    let finished = run_logged("pytest", &mut command, &workspace.logs().join("pytest.log"))?;
+    let mut command = workspace.python("-m pytest -q -p no:cacheprovider training");
+    workspace.with_parts(&mut command)?;
+    let finished = run_logged(workspace, "pytest", &mut command)?;
     Ok(Outcome::of(&finished, counts::pytest(&finished.text)))
 }
 
-/// `libupt.so`, the static library and the command `upt`, in the release profile that the tests use too.
-pub fn build(workspace: &Workspace) -> Result<()> {
-    let mut command = cargo(workspace);
-    command.args(["build", "--release", "-p", "upt", "-p", "upt-cli"]);
-    run_checked(
-        "cargo build",
-        &mut command,
-        &workspace.logs().join("cargo-build.log"),
-    )?;
-    Ok(())
-}
-
-/// The command `upt` for the demo. On a fresh clone it is built without what the demo does not use (files of other
-/// programs, sparse factorisation: half of a cold build); a whole `upt` that is there is brought up to date instead.
-pub fn build_for_demo(workspace: &Workspace) -> Result<()> {
-    let version = Command::new(workspace.upt()).arg("--version").output();
-    let whole = version.is_ok_and(|output| {
-        output.status.success() && !String::from_utf8_lossy(&output.stdout).contains("without")
-    });
-    if whole {
-        return build(workspace);
-    }
-    let mut command = cargo(workspace);
-    command.args([
-        "build",
-        "--release",
-        "-p",
-        "upt-cli",
-        "--no-default-features",
-    ]);
-    run_checked(
-        "cargo build, without what the demo does not use",
-        &mut command,
-        &workspace.logs().join("cargo-build.log"),
-    )?;
-    Ok(())
-}
-
-/// What the test scripts of the other languages find their parts by.
-pub fn set_test_environment(workspace: &Workspace, command: &mut Command, library: &Path) {
-    ort::set_environment(command, library);
-    command
-        .env("UPT_ROOT", &workspace.root)
-        .env("UPT_LIB_DIR", workspace.release())
-        .env("UPT_INCLUDE_DIR", workspace.path("include"))
-        .env("UPT_COMMAND", workspace.upt())
-        .env("UPT_PYTHON", workspace.python())
-        .env("UPT_BUNDLES", workspace.path("onnx"))
-        .env("UPT_BUILD_DIR", workspace.path("target"));
-}
-
-/// Runs a test script whose last line reads `N passed, N failed, N skipped`.
-fn script(workspace: &Workspace, name: &str, path: &str) -> Result<Outcome> {
-    script_with(workspace, name, path, |_| {})
-}
-
-/// As [`script`], with arguments and environment of its own.
-pub fn script_with(
-    workspace: &Workspace,
-    name: &str,
-    path: &str,
-    prepare: impl FnOnce(&mut Command),
-) -> Result<Outcome> {
-    let file = workspace.path(path);
-    if !file.exists() {
-        return Ok(Outcome::skipped(format!("{path} does not exist")));
-    }
-    let library = ort::host_library(workspace)?;
-    build(workspace)?;
-    let mut command = Command::new("bash");
-    command.arg(&file).current_dir(&workspace.root);
-    set_test_environment(workspace, &mut command, &library);
-    prepare(&mut command);
-    let finished = run_logged(
-        name,
-        &mut command,
-        &workspace.logs().join(format!("{name}.log")),
-    )?;
-    let counts = counts::script(&finished.text).unwrap_or_default();
-    let mut outcome = Outcome::of(&finished, counts);
-    if counts.skipped > 0 && outcome.note.is_empty() {
-        let why: Vec<&str> = finished
-            .text
-            .lines()
-            .filter(|line| line.to_lowercase().contains("skipped:"))
-            .collect();
-        outcome.note = why.join("; ");
-    }
-    Ok(outcome)
-}
-
 fn docs(workspace: &Workspace) -> Result<Outcome> {
-    let library = ort::host_library(workspace)?;
     venv::install_docs(workspace)?;
-    build(workspace)?;
-    let mut command = Command::new(workspace.python());
-    command
-        .arg("tests/docs/run.py")
-        .current_dir(&workspace.root);
-    set_test_environment(workspace, &mut command, &library);
-    let log = workspace.logs().join("docs.log");
-    let finished = run_logged("docs", &mut command, &log)?;
-    let counts = counts::script(&finished.text).unwrap_or_default();
-    Ok(Outcome::of(&finished, counts))
+    let mut command = workspace.python("tests/docs/run.py");
+    workspace.with_parts(&mut command)?;
+    let finished = run_logged(workspace, "docs", &mut command)?;
+    Ok(Outcome::of(&finished, counts::script(&finished.text)))
 }
 
-fn c(workspace: &Workspace) -> Result<Outcome> {
-    script(workspace, "c", "tests/c/run.sh")
-}
-
-fn csharp(workspace: &Workspace) -> Result<Outcome> {
-    script(workspace, "csharp", "tests/csharp/run.sh")
-}
-
-fn godot(workspace: &Workspace) -> Result<Outcome> {
-    script(workspace, "godot", "examples/godot/run.sh")
-}
-
-fn view(workspace: &Workspace) -> Result<Outcome> {
-    script(workspace, "view", "tests/view/run.sh")
-}
-
+/// It reads the pages of the archive.
 fn package(workspace: &Workspace) -> Result<Outcome> {
-    if !has_program("cmake") {
-        return Ok(Outcome::skipped("needs cmake".into()));
-    }
-    // It reads the pages of the archive.
     venv::install_docs(workspace)?;
-    script(workspace, "package", "tests/package/run.sh")
+    script(workspace, "package", "tests/package/run.sh", &[])
+}
+
+/// No leak, no force that is no number or that stays: 24 simulated hours, or as many as 20 minutes hold; the log says how many.
+fn haptics(workspace: &Workspace) -> Result<Outcome> {
+    const WORDS: &str = "run --release --package upt-cli -- haptics onnx/brain-coarse-reduced --hours 24 --within 20";
+    check(workspace, "upt haptics", &mut workspace.cargo(WORDS))
 }

@@ -8,267 +8,134 @@ use std::process::Command;
 
 use anyhow::Result;
 
-use crate::process::{has_program, run_logged};
+use crate::process::run_logged;
 use crate::workspace::Workspace;
 
-/// One prerequisite: how it is recognised and which Debian package brings it.
-pub struct Package {
-    /// Programs of which one must be on the `PATH`; empty where a file or a Python module tells.
-    programs: &'static [&'static str],
-    /// Files of which one must exist.
-    files: &'static [&'static str],
-    pub debian: &'static str,
-    pub purpose: &'static str,
-}
-
-const fn program(
-    names: &'static [&'static str],
-    debian: &'static str,
-    purpose: &'static str,
-) -> Package {
-    Package {
-        programs: names,
-        files: &[],
-        debian,
-        purpose,
-    }
-}
-
-const fn file(
-    paths: &'static [&'static str],
-    debian: &'static str,
-    purpose: &'static str,
-) -> Package {
-    Package {
-        programs: &[],
-        files: paths,
-        debian,
-        purpose,
-    }
-}
+/// Prerequisites, one a line: the Debian package, then programs on the `PATH` or files of which one must be there, or
+/// `import:` and modules that Python must have.
+pub type Needs = &'static str;
 
 /// What every command needs: a linker for cargo and Python for ONNX Runtime's wheel.
-pub const BASE: &[Package] = &[
-    program(
-        &["cc", "gcc", "clang"],
-        "build-essential",
-        "the C compiler and linker",
-    ),
-    program(&["python3"], "python3", "Python 3.11 or later"),
-    program(
-        &["python3-venv-module"],
-        "python3-venv",
-        "Python virtual environments",
-    ),
-];
+pub const BASE: Needs = "
+    build-essential  cc gcc clang
+    python3          python3
+    python3-venv     import:venv,ensurepip";
 
-/// What the C and C++ tests need.
-pub const NATIVE: &[Package] = &[
-    program(&["cmake"], "cmake", "the C and C++ tests"),
-    program(&["c++", "g++", "clang++"], "g++", "the C++ tests"),
-    program(&["pkg-config"], "pkg-config", "the packaging tests"),
-    program(&["Xvfb"], "xvfb", "the simulator's window without a screen"),
-    program(
-        &["xauth"],
-        "xauth",
-        "the simulator's window without a screen",
-    ),
-    program(&["valgrind"], "valgrind", "the memory check of the C host"),
-    file(
-        &["/usr/include/png.h"],
-        "libpng-dev",
-        "the C++ simulator's screenshots",
-    ),
-    file(
-        &["/usr/include/GLFW/glfw3.h"],
-        "libglfw3-dev",
-        "the C++ simulator",
-    ),
-    file(
-        &["/usr/include/GL/gl.h"],
-        "libgl1-mesa-dev",
-        "the C++ simulator",
-    ),
-    file(
-        &[
-            "/usr/lib/x86_64-linux-gnu/dri/swrast_dri.so",
-            "/usr/lib/aarch64-linux-gnu/dri/swrast_dri.so",
-            "/usr/lib/x86_64-linux-gnu/libgallium.so",
-            "/usr/lib/x86_64-linux-gnu/dri/libdril_dri.so",
-        ],
-        "libgl1-mesa-dri",
-        "the C++ simulator and Godot without a graphics card",
-    ),
-];
+/// What the C and C++ tests need, and those of Godot: also without a screen and without a graphics card.
+pub const NATIVE: Needs = "
+    cmake            cmake
+    g++              c++ g++ clang++
+    pkg-config       pkg-config
+    xvfb             Xvfb
+    xauth            xauth
+    valgrind         valgrind
+    libpng-dev       /usr/include/png.h
+    libglfw3-dev     /usr/include/GLFW/glfw3.h
+    libgl1-mesa-dev  /usr/include/GL/gl.h
+    libgl1-mesa-dri  /usr/lib/x86_64-linux-gnu/dri/swrast_dri.so /usr/lib/aarch64-linux-gnu/dri/swrast_dri.so \
+                     /usr/lib/x86_64-linux-gnu/libgallium.so /usr/lib/x86_64-linux-gnu/dri/libdril_dri.so";
 
 /// What the C# tests need.
-pub const CSHARP: &[Package] = &[
-    program(&["mcs"], "mono-mcs", "the C# tests"),
-    program(&["mono"], "mono-runtime", "the C# tests"),
-    program(&["nunit-console"], "nunit-console", "the C# tests"),
-    file(
-        &["/usr/lib/cli/nunit.framework-2.6.3/nunit.framework.dll"],
-        "libnunit-framework2.6.3-cil",
-        "the C# tests",
-    ),
-];
+pub const CSHARP: Needs = "
+    mono-mcs                     mcs
+    mono-runtime                 mono
+    nunit-console                nunit-console
+    libnunit-framework2.6.3-cil  /usr/lib/cli/nunit.framework-2.6.3/nunit.framework.dll";
 
 /// What the tests of `upt view` need.
-pub const BROWSER: &[Package] = &[
-    program(&["chromium", "google-chrome"], "chromium", "the page"),
-    program(&["chromedriver"], "chromium-driver", "the page"),
-    file(
-        &[
-            "/usr/lib/x86_64-linux-gnu/libEGL_mesa.so.0",
-            "/usr/lib/aarch64-linux-gnu/libEGL_mesa.so.0",
-        ],
-        "libegl-mesa0",
-        "drawing the page without a graphics card",
-    ),
-];
+pub const BROWSER: Needs = "
+    chromium         chromium google-chrome
+    chromium-driver  chromedriver
+    libegl-mesa0     /usr/lib/x86_64-linux-gnu/libEGL_mesa.so.0 /usr/lib/aarch64-linux-gnu/libEGL_mesa.so.0";
 
 /// What the tests for Windows need.
-pub const WINDOWS: &[Package] = &[
-    program(&["cmake"], "cmake", "the C and C++ tests"),
-    program(
-        &["x86_64-w64-mingw32-g++"],
-        "g++-mingw-w64-x86-64-posix",
-        "building for Windows",
-    ),
-    file(
-        &[
-            "/usr/lib/wine/wine64",
-            "/usr/bin/wine64",
-            "/usr/lib/wine-development/wine64",
-        ],
-        "wine64",
-        "running what is built for Windows",
-    ),
-    program(
-        &["lld-link", "lld-link-14", "lld-link-19"],
-        "lld",
-        "linking as Microsoft's toolchain does",
-    ),
-];
+pub const WINDOWS: Needs = "
+    cmake                       cmake
+    g++-mingw-w64-x86-64-posix  x86_64-w64-mingw32-g++
+    wine64                      /usr/lib/wine/wine64 /usr/bin/wine64 /usr/lib/wine-development/wine64
+    lld                         lld-link lld-link-14 lld-link-19";
 
 /// What the tests for Linux arm64 need.
-pub const ARM64: &[Package] = &[
-    program(&["cmake"], "cmake", "the C and C++ tests"),
-    program(
-        &["aarch64-linux-gnu-g++"],
-        "g++-aarch64-linux-gnu",
-        "building for arm64",
-    ),
-    program(
-        &["qemu-aarch64-static", "qemu-aarch64"],
-        "qemu-user-static",
-        "running what is built for arm64",
-    ),
-];
+pub const ARM64: Needs = "
+    cmake                  cmake
+    g++-aarch64-linux-gnu  aarch64-linux-gnu-g++
+    qemu-user-static       qemu-aarch64-static qemu-aarch64";
 
-impl Package {
-    pub fn present(&self) -> bool {
-        if self.programs == ["python3-venv-module"] {
-            return Command::new("python3")
-                .args(["-c", "import venv, ensurepip"])
-                .output()
-                .is_ok_and(|output| output.status.success());
-        }
-        self.programs.iter().any(|name| has_program(name))
-            || self.files.iter().any(|path| Path::new(path).exists())
+/// The Debian names of what is not there.
+pub fn missing(needs: Needs) -> Vec<&'static str> {
+    let lines = needs.lines().filter_map(|line| line.trim().split_once(' '));
+    let absent = lines.filter(|(_, signs)| !signs.split_whitespace().any(is_there));
+    absent.map(|(debian, _)| debian).collect()
+}
+
+fn is_there(sign: &str) -> bool {
+    match sign.strip_prefix("import:") {
+        Some(modules) => succeeds("python3", &["-c", &format!("import {modules}")]),
+        None if sign.starts_with('/') => Path::new(sign).exists(),
+        None => has_program(sign),
     }
 }
 
-/// The Debian names of what is missing, after trying to install it.
-///
-/// `install` is false under `--no-install`. Nothing is an error here: a stage that lacks something
-/// is reported as skipped, with these names.
-pub fn provide(
-    workspace: &Workspace,
-    packages: &[&[Package]],
-    install: bool,
-) -> Result<Vec<String>> {
-    let missing = |list: &[&[Package]]| -> Vec<(String, &'static str)> {
-        list.iter()
-            .flat_map(|group| group.iter())
-            .filter(|package| !package.present())
-            .map(|package| (package.debian.to_owned(), package.purpose))
-            .collect()
-    };
-    let absent = missing(packages);
-    if absent.is_empty() {
-        return Ok(Vec::new());
+/// True when `name` is a program on the `PATH`.
+pub fn has_program(name: &str) -> bool {
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let file = format!("{name}{}", std::env::consts::EXE_SUFFIX);
+    std::env::split_paths(&path).any(|folder| folder.join(&file).is_file())
+}
+
+fn succeeds(program: &str, arguments: &[&str]) -> bool {
+    let output = Command::new(program).args(arguments).output();
+    output.is_ok_and(|output| output.status.success())
+}
+
+/// Tries to install what is missing, unless `install` is false, and says what then is. Nothing is an error here: a stage
+/// that lacks something is reported as skipped.
+pub fn provide(workspace: &Workspace, needs: &[Needs], install: bool) -> Result<Vec<&'static str>> {
+    let all = || -> Vec<&'static str> { needs.iter().flat_map(|needs| missing(needs)).collect() };
+    let absent = all();
+    if !absent.is_empty() && install && has_program("apt-get") {
+        install_by_apt(workspace, &absent)?;
     }
-    let names: Vec<String> = absent.iter().map(|(name, _)| name.clone()).collect();
-    if install && has_program("apt-get") {
-        match privilege() {
-            Some(prefix) => install_by_apt(workspace, &prefix, &names)?,
-            None => {
-                eprintln!("not root and no passwordless sudo: nothing can be installed for you")
-            }
-        }
-    }
-    let left = missing(packages);
+    let left = all();
     if !left.is_empty() {
-        eprintln!("missing on this machine:");
-        for (name, purpose) in &left {
-            eprintln!("  {name:<24} {purpose}");
-        }
-        let left_names: Vec<&str> = left.iter().map(|(name, _)| name.as_str()).collect();
         eprintln!(
-            "on Debian or Ubuntu: apt-get install {}",
-            left_names.join(" ")
+            "missing on this machine; on Debian or Ubuntu: apt-get install {}",
+            left.join(" ")
         );
         eprintln!("elsewhere: install the programs of the same names, then run the command again");
     }
-    Ok(left.into_iter().map(|(name, _)| name).collect())
+    Ok(left)
 }
 
-/// The words before `apt-get`: none for root, `sudo -n` where it needs no password.
-fn privilege() -> Option<Vec<String>> {
-    let root = Command::new("id")
-        .arg("-u")
-        .output()
-        .is_ok_and(|output| output.stdout.trim_ascii() == b"0");
-    if root {
-        return Some(Vec::new());
-    }
-    let sudo = Command::new("sudo").args(["-n", "true"]).output();
-    sudo.is_ok_and(|output| output.status.success())
-        .then(|| vec!["sudo".into(), "-n".into()])
-}
-
-fn install_by_apt(workspace: &Workspace, prefix: &[String], names: &[String]) -> Result<()> {
-    eprintln!("installing {}", names.join(" "));
-    let apt = |arguments: &[&str]| {
-        let mut words: Vec<String> = prefix.to_vec();
-        words.extend([
-            "env".into(),
-            "DEBIAN_FRONTEND=noninteractive".into(),
-            "apt-get".into(),
-        ]);
-        words.extend(arguments.iter().map(|word| (*word).to_owned()));
-        let mut command = Command::new(&words[0]);
-        command.args(&words[1..]);
-        command
+fn install_by_apt(workspace: &Workspace, names: &[&str]) -> Result<()> {
+    let root = Command::new("id").arg("-u").output();
+    let before = if root.is_ok_and(|output| output.stdout.trim_ascii() == b"0") {
+        "env"
+    } else if succeeds("sudo", &["-n", "true"]) {
+        "sudo -n env"
+    } else {
+        eprintln!("not root and no passwordless sudo: nothing can be installed for you");
+        return Ok(());
     };
-    let log = workspace.logs().join("apt.log");
-    run_logged("apt-get update", &mut apt(&["update", "-q"]), &log)?;
-    let mut arguments = vec!["install", "-q", "-y", "--no-install-recommends"];
-    arguments.extend(names.iter().map(String::as_str));
-    let finished = run_logged("apt-get install", &mut apt(&arguments), &log)?;
-    if !finished.success {
+    eprintln!("installing {}", names.join(" "));
+    let apt = |label: &str, arguments: &str| {
+        let line = format!("{before} DEBIAN_FRONTEND=noninteractive apt-get {arguments}");
+        run_logged(workspace, label, workspace.bash("-c").arg(line))
+    };
+    apt("apt-get update", "update -q")?;
+    const INSTALL: &str = "install -q -y --no-install-recommends";
+    let all = apt("apt-get install", &format!("{INSTALL} {}", names.join(" ")))?;
+    if !all.success {
         eprintln!(
             "apt-get install failed; the end of {}:\n{}",
-            log.display(),
-            finished.tail(15)
+            all.log.display(),
+            all.tail(15)
         );
         // One package of a list may be unknown on this release: take the others one by one.
         for name in names {
-            run_logged(
-                name,
-                &mut apt(&["install", "-q", "-y", "--no-install-recommends", name]),
-                &log,
+            apt(
+                &format!("apt-get install {name}"),
+                &format!("{INSTALL} {name}"),
             )?;
         }
     }

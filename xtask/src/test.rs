@@ -1,10 +1,12 @@
 //! `cargo xtask test`: every test of every language, each stage counted, the sum on the last line.
 
+use std::time::Instant;
+
 use anyhow::{Result, bail};
 use clap::Args;
 
-use crate::counts::Counts;
-use crate::stages::{Outcome, STAGES, Stage};
+use crate::counts::{Counts, Outcome};
+use crate::stages::{STAGES, Stage};
 use crate::system;
 use crate::workspace::Workspace;
 
@@ -24,13 +26,6 @@ pub struct Options {
     strict: bool,
 }
 
-struct Row {
-    stage: &'static str,
-    counts: Counts,
-    seconds: f64,
-    note: String,
-}
-
 /// True when nothing failed.
 pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
     if options.list {
@@ -39,102 +34,65 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
         }
         return Ok(true);
     }
-    if let Some(unknown) = options
-        .only
-        .iter()
-        .find(|name| !STAGES.iter().any(|stage| stage.name == **name))
-    {
+    let is_stage = |name: &String| STAGES.iter().any(|stage| stage.name == name);
+    if let Some(unknown) = options.only.iter().find(|name| !is_stage(name)) {
         bail!("no stage is called {unknown}; `cargo xtask test --list` names them");
     }
-    let chosen: Vec<&Stage> = STAGES
-        .iter()
-        .filter(|stage| {
-            options.only.is_empty() || options.only.iter().any(|name| name == stage.name)
-        })
-        .collect();
-    let nightly = std::env::var("UPT_NIGHTLY").is_ok_and(|value| value == "1");
-    let (chosen, left_out): (Vec<&Stage>, Vec<&Stage>) = chosen
-        .into_iter()
-        .partition(|stage| !stage.nightly || nightly || !options.only.is_empty());
-    let strict = options.strict || std::env::var("UPT_STRICT").is_ok_and(|value| value == "1");
+    let is_set = |name: &str| std::env::var(name).is_ok_and(|value| value == "1");
+    let strict = options.strict || is_set("UPT_STRICT");
+    let nightly = is_set("UPT_NIGHTLY") || !options.only.is_empty();
+    let asked =
+        |stage: &&Stage| options.only.is_empty() || options.only.iter().any(|n| n == stage.name);
+    let (chosen, left_out): (Vec<&Stage>, Vec<&Stage>) =
+        (STAGES.iter().filter(asked)).partition(|stage| !stage.nightly || nightly);
 
-    let mut groups: Vec<&[system::Package]> = vec![system::BASE];
-    groups.extend(chosen.iter().flat_map(|stage| stage.needs.iter().copied()));
-    let missing = system::provide(workspace, &groups, !options.no_install)?;
+    let mut needs = vec![system::BASE];
+    needs.extend(chosen.iter().map(|stage| stage.needs));
+    system::provide(workspace, &needs, !options.no_install)?;
 
     let mut rows = Vec::new();
     for stage in chosen {
         eprintln!("== {}: {}", stage.name, stage.about);
-        let started = std::time::Instant::now();
-        let lacking: Vec<&str> = stage
-            .needs
-            .iter()
-            .flat_map(|group| group.iter())
-            .filter(|package| missing.iter().any(|name| name == package.debian))
-            .map(|package| package.debian)
-            .collect();
-        let outcome = if lacking.is_empty() {
-            (stage.run)(workspace).unwrap_or_else(|error| Outcome::failed(format!("{error:#}")))
-        } else {
-            Outcome::skipped(format!("needs {}", lacking.join(", ")))
-        };
-        let mut counts = outcome.counts;
+        let start = Instant::now();
+        let mut outcome = stage.outcome(workspace);
         if strict && outcome.left_out {
-            counts = Counts {
-                passed: counts.passed,
-                failed: counts.failed + counts.skipped,
-                skipped: 0,
-            };
+            outcome.counts.failed += std::mem::take(&mut outcome.counts.skipped);
         }
-        let seconds = started.elapsed().as_secs_f64();
+        let seconds = start.elapsed().as_secs_f64();
+        let colon = if outcome.note.is_empty() { "" } else { ": " };
         eprintln!(
-            "   {counts} ({seconds:.0} s){}{}",
-            if outcome.note.is_empty() { "" } else { ": " },
-            outcome.note
+            "   {} ({seconds:.0} s){colon}{}",
+            outcome.counts, outcome.note
         );
         if !outcome.log_tail.is_empty() {
             eprintln!("{}", outcome.log_tail);
         }
-        rows.push(Row {
-            stage: stage.name,
-            counts,
-            seconds,
-            note: outcome.note,
-        });
+        rows.push((stage.name, outcome, seconds));
     }
-    rows.extend(left_out.iter().map(|stage| Row {
-        stage: stage.name,
-        counts: Counts {
-            skipped: 1,
-            ..Counts::default()
-        },
-        seconds: 0.0,
-        note: "nightly, or --only it".into(),
-    }));
+    let skipped = || Outcome::skipped("nightly, or --only it");
+    rows.extend(left_out.iter().map(|stage| (stage.name, skipped(), 0.0)));
     Ok(summarise(&rows))
 }
 
-fn summarise(rows: &[Row]) -> bool {
-    println!();
+fn summarise(rows: &[(&str, Outcome, f64)]) -> bool {
     println!(
-        "{:<12} {:>7} {:>7} {:>8} {:>8}",
+        "\n{:<12} {:>7} {:>7} {:>8} {:>8}",
         "stage", "passed", "failed", "skipped", "seconds"
     );
     let mut total = Counts::default();
-    for row in rows {
-        let first = row.note.lines().next().unwrap_or("");
-        let note = if row.counts.failed + row.counts.skipped > 0 {
-            first
-        } else {
-            ""
+    for (stage, outcome, seconds) in rows {
+        let Counts {
+            passed,
+            failed,
+            skipped,
+        } = outcome.counts;
+        let note = match failed + skipped {
+            0 => "",
+            _ => outcome.note.lines().next().unwrap_or(""),
         };
-        println!(
-            "{:<12} {:>7} {:>7} {:>8} {:>8.0}  {note}",
-            row.stage, row.counts.passed, row.counts.failed, row.counts.skipped, row.seconds
-        );
-        total += row.counts;
+        println!("{stage:<12} {passed:>7} {failed:>7} {skipped:>8} {seconds:>8.0}  {note}");
+        total += outcome.counts;
     }
-    println!();
-    println!("{total}");
+    println!("\n{total}");
     total.failed == 0
 }

@@ -1,57 +1,42 @@
-//! `cargo xtask header`, `cargo xtask bundle` and `cargo xtask view`: one program, with its set-up.
+//! `cargo xtask header`, `bundle`, `view` and `readme`: one program or one page, with its set-up.
 
-use std::path::Path;
-use std::process::Command;
+use std::path::{Path, PathBuf};
 
-use anyhow::{Result, bail};
+use anyhow::{Context, Result};
 
-use crate::workspace::Workspace;
-use crate::{ort, stages, venv};
+use crate::process::run_visibly;
+use crate::workspace::{Workspace, write_between_markers};
+use crate::{ort, venv};
 
 /// Writes include/upt.h and the C# bindings from the library's source.
 pub fn header(workspace: &Workspace, check: bool) -> Result<bool> {
-    let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-    command.current_dir(&workspace.root).args([
-        "run",
-        "--quiet",
-        "--release",
-        "-p",
-        "upt-bindgen",
-        "--",
-    ]);
-    if check {
-        command.arg("--check");
-    }
-    Ok(command.status()?.success())
+    let check = if check { "--check" } else { "" };
+    run_visibly(&mut workspace.cargo(&format!("run --quiet --release -p upt-bindgen -- {check}")))
 }
 
 /// Runs the Python package's command line with the environment set up: `cargo xtask bundle -- export ...`.
 pub fn bundle(workspace: &Workspace, module: &str, arguments: &[String]) -> Result<bool> {
-    venv::create(workspace)?;
-    let library = ort::host_library(workspace)?;
     venv::install_training(workspace)?;
-    stages::build(workspace)?;
-    let mut command = Command::new(workspace.python());
-    command
-        .current_dir(&workspace.root)
-        .args(["-m", module])
-        .args(arguments)
-        .env("UPT_COMMAND", workspace.upt());
-    ort::set_environment(&mut command, &library);
-    let status = command.status()?;
-    if !status.success() {
-        bail!("python -m {module} {} failed", arguments.join(" "));
-    }
-    Ok(true)
+    let mut command = workspace.python("-m");
+    workspace.with_parts(&mut command)?;
+    run_visibly(command.arg(module).args(arguments))
 }
 
 /// Runs `upt view` until it is ended.
 pub fn view(workspace: &Workspace, bundle: &Path) -> Result<bool> {
-    venv::create(workspace)?;
-    let library = ort::host_library(workspace)?;
-    stages::build_for_demo(workspace)?;
-    let mut command = Command::new(workspace.upt());
-    command.current_dir(&workspace.root).arg("view").arg(bundle);
-    ort::set_environment(&mut command, &library);
-    Ok(command.status()?.success())
+    workspace.build_for_demo()?;
+    let mut command = workspace.command(workspace.upt(), "view");
+    ort::set_environment(workspace, &mut command)?;
+    run_visibly(command.arg(bundle))
+}
+
+/// The tables that `upt report` wrote for documents, one after another, between the markers of a page.
+pub fn readme(workspace: &Workspace, page: &Path, reports: &[PathBuf]) -> Result<bool> {
+    let read = |path: &PathBuf| {
+        let text = std::fs::read_to_string(path);
+        text.with_context(|| format!("cannot read {}", path.display()))
+    };
+    let tables = reports.iter().map(read).collect::<Result<String>>()?;
+    write_between_markers(&workspace.root.join(page), "readme", |_| Ok(tables))?;
+    Ok(true)
 }

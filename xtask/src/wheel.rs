@@ -2,129 +2,77 @@
 //! tests it there.
 
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
 use anyhow::{Context, Result};
 
-use crate::archive;
-use crate::counts;
-use crate::cross;
+use crate::counts::{self, Outcome};
 use crate::ort::Platform;
 use crate::process::{run_checked, run_logged};
-use crate::stages::{self, Outcome, check, joined};
-use crate::venv;
-use crate::workspace::Workspace;
+use crate::stages::check;
+use crate::venv::{self, PIP_INSTALL};
+use crate::workspace::{Workspace, program_in};
+use crate::{archive, cross, package};
 
-/// What the tests need, beside the wheel's own dependencies.
-const TEST_EXTRA: &str = "[test]";
-
-/// A wheel with this machine's libupt, in `out`.
-pub fn make(workspace: &Workspace, out: &Path) -> Result<PathBuf> {
-    stages::build(workspace)?;
-    let name = format!(
-        "{}upt{}",
-        std::env::consts::DLL_PREFIX,
-        std::env::consts::DLL_SUFFIX
-    );
-    with_library(workspace, out, &workspace.release().join(name), None)
-}
-
-/// A wheel with the libupt of another platform, built here.
-pub fn make_for(workspace: &Workspace, platform: Platform, out: &Path) -> Result<PathBuf> {
-    let built = cross::build(workspace, platform, &["upt"])?;
-    let name = if platform == Platform::WindowsX64 {
-        "upt.dll"
-    } else {
-        "libupt.so"
+/// A wheel with the libupt of this platform or of another one, built here, in `out`.
+pub fn make(workspace: &Workspace, platform: Platform, out: &Path) -> Result<PathBuf> {
+    let host = Platform::host()? == platform;
+    let built = match host {
+        true => workspace.build().map(|()| workspace.release.clone())?,
+        false => cross::build(workspace, platform, "-p upt")?,
     };
-    let tag = cross::wheel_tag(platform);
-    with_library(workspace, out, &built.join(name), tag)
-}
-
-/// A wheel with a library that is built already; `platform` is its tag where the library is another platform's.
-pub fn with_library(
-    workspace: &Workspace,
-    out: &Path,
-    library: &Path,
-    platform: Option<&str>,
-) -> Result<PathBuf> {
-    venv::create(workspace)?;
+    venv::create(workspace, "target/venv")?;
     let scratch = workspace.path("target/python/wheel");
     std::fs::remove_dir_all(&scratch).ok();
-    let mut command = venv::pip(workspace);
+    let mut command = workspace
+        .python("-m pip wheel --quiet --disable-pip-version-check --no-deps ./python --wheel-dir");
     command
-        .args([
-            "wheel",
-            "--quiet",
-            "--disable-pip-version-check",
-            "--no-deps",
-            "--wheel-dir",
-        ])
         .arg(&scratch)
-        .arg(workspace.path("python"))
-        .env("UPT_WHEEL_LIBRARY", library)
-        .env(
-            "SOURCE_DATE_EPOCH",
-            archive::time(&workspace.root).to_string(),
-        );
-    if let Some(platform) = platform {
-        command.env("UPT_WHEEL_PLATFORM", platform);
+        .env("UPT_WHEEL_LIBRARY", built.join(package::library(platform)))
+        .env("SOURCE_DATE_EPOCH", archive::time(workspace).to_string());
+    if let (false, Some(tag)) = (host, cross::wheel_tag(platform)) {
+        command.env("UPT_WHEEL_PLATFORM", tag);
     }
-    run_checked(
-        "pip wheel",
-        &mut command,
-        &workspace.logs().join("wheel.log"),
-    )?;
+    run_checked(workspace, "pip wheel", &mut command)?;
     let made = std::fs::read_dir(&scratch)?
         .filter_map(|entry| entry.ok().map(|entry| entry.path()))
         .find(|path| path.extension().is_some_and(|extension| extension == "whl"))
         .with_context(|| format!("pip left no wheel in {}", scratch.display()))?;
     let place = out.join(made.file_name().context("a wheel has a name")?);
-    std::fs::create_dir_all(out)?;
-    std::fs::copy(&made, &place)?;
+    package::copy(&made, &place)?;
     Ok(place)
 }
 
 /// `cargo xtask test --only wheel`.
 pub fn stage(workspace: &Workspace) -> Result<Outcome> {
-    let wheel = make(workspace, &workspace.path("target/package"))?;
+    let wheel = make(
+        workspace,
+        Platform::host()?,
+        &workspace.path("target/package"),
+    )?;
+    venv::create(workspace, "target/venv-upt")?;
     let environment = workspace.path("target/venv-upt");
-    venv::create_at(workspace, &environment)?;
-    let python = Workspace::program_in(&environment, "python");
-    let log = workspace.logs().join("pip-wheel.log");
+    let python = |words: &str| workspace.command(program_in(&environment, "python"), words);
     // The dependencies once, then the wheel as it is today.
-    let with_tests = format!("{}{TEST_EXTRA}", wheel.display());
-    for more in [&[][..], &["--force-reinstall", "--no-deps"]] {
-        let mut command = Command::new(&python);
-        command
-            .args([
-                "-m",
-                "pip",
-                "install",
-                "--quiet",
-                "--disable-pip-version-check",
-            ])
-            .args(more)
-            .arg(&with_tests);
-        run_checked("pip install (wheel)", &mut command, &log)?;
+    for more in ["", "--force-reinstall --no-deps"] {
+        let mut command = python(&format!("{PIP_INSTALL} {more}"));
+        command.arg(format!("{}[test]", wheel.display()));
+        run_checked(workspace, "pip install (wheel)", &mut command)?;
     }
+    let mut mypy = workspace.command(
+        program_in(&environment, "mypy"),
+        "--cache-dir ../target/mypy",
+    );
     let types = check(
         workspace,
         "mypy",
-        Command::new(Workspace::program_in(&environment, "mypy"))
-            .args(["--cache-dir", "../target/mypy"])
-            .current_dir(workspace.path("python")),
+        mypy.current_dir(workspace.path("python")),
     )?;
     // From outside of python/, so that the installed package is tested; its ONNX Runtime is the one of its own environment.
-    let mut command = Command::new(&python);
+    let mut command = python("-m pytest -q -p no:cacheprovider ../python");
     command
-        .args(["-m", "pytest", "-q", "-p", "no:cacheprovider"])
-        .arg(workspace.path("python"))
         .current_dir(workspace.path("target"))
         .env_remove("ORT_DYLIB_PATH")
         .env_remove("UPT_LIBRARY");
-    let log = workspace.logs().join("pytest-wheel.log");
-    let finished = run_logged("pytest of the wheel", &mut command, &log)?;
-    let tests = Outcome::of(&finished, counts::pytest(&finished.text));
-    Ok(joined(vec![types, tests]))
+    let finished = run_logged(workspace, "pytest of the wheel", &mut command)?;
+    Ok(types.and(Outcome::of(&finished, counts::pytest(&finished.text))))
 }

@@ -1,73 +1,142 @@
-//! Where things are: the repository root and the folders under `target/` that the commands fill.
+//! Where things are: the repository root, the folders under `target/` that the commands fill, and the programs in them.
 
 use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use anyhow::Result;
+
+use crate::ort;
+use crate::process::run_checked;
 
 /// The repository's folders. Everything that a command makes lies under `target/`.
 #[derive(Clone, Debug)]
 pub struct Workspace {
     /// The folder that holds the root `Cargo.toml`.
     pub root: PathBuf,
-    /// `CARGO_TARGET_DIR` where it is set, else `target/`: what cargo builds.
-    pub cargo_target: PathBuf,
+    /// Release builds, `libupt.so` and `upt`, in `CARGO_TARGET_DIR` where it is set, else in `target/`.
+    pub release: PathBuf,
 }
 
 impl Workspace {
     /// Found from the place where this crate was compiled, so the commands work from any folder.
     pub fn find() -> Self {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR"))
-            .parent()
-            .map(Path::to_path_buf)
-            .unwrap_or_else(|| PathBuf::from("."));
-        let cargo_target = match std::env::var_os("CARGO_TARGET_DIR") {
-            Some(dir) if Path::new(&dir).is_absolute() => PathBuf::from(dir),
-            Some(dir) => root.join(dir),
-            None => root.join("target"),
-        };
-        Self { root, cargo_target }
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).with_file_name("");
+        let target = std::env::var_os("CARGO_TARGET_DIR").unwrap_or_else(|| "target".into());
+        Self {
+            release: root.join(target).join("release"),
+            root,
+        }
     }
 
     pub fn path(&self, relative: &str) -> PathBuf {
         self.root.join(relative)
     }
 
-    /// Release builds: `libupt.so`, `upt`.
-    pub fn release(&self) -> PathBuf {
-        self.cargo_target.join("release")
-    }
-
-    pub fn ort(&self) -> PathBuf {
-        self.path("target/ort")
-    }
-
-    pub fn venv(&self) -> PathBuf {
-        self.path("target/venv")
-    }
-
-    pub fn logs(&self) -> PathBuf {
-        self.path("target/xtask-logs")
-    }
-
-    /// The virtual environment's interpreter.
-    pub fn python(&self) -> PathBuf {
-        self.venv_program("python")
-    }
-
+    /// A program of the virtual environment.
     pub fn venv_program(&self, name: &str) -> PathBuf {
-        Self::program_in(&self.venv(), name)
-    }
-
-    /// A program of the virtual environment in `folder`.
-    pub fn program_in(folder: &Path, name: &str) -> PathBuf {
-        if cfg!(windows) {
-            folder.join("Scripts").join(format!("{name}.exe"))
-        } else {
-            folder.join("bin").join(name)
-        }
+        program_in(&self.path("target/venv"), name)
     }
 
     /// The command `upt` as `cargo build --release` leaves it.
     pub fn upt(&self) -> PathBuf {
-        self.release()
-            .join(format!("upt{}", std::env::consts::EXE_SUFFIX))
+        let name = format!("upt{}", std::env::consts::EXE_SUFFIX);
+        self.release.join(name)
     }
+
+    /// `program` in the repository's root with these arguments, which spaces part.
+    pub fn command(&self, program: impl AsRef<std::ffi::OsStr>, arguments: &str) -> Command {
+        let mut command = Command::new(program);
+        command.current_dir(&self.root);
+        command.args(arguments.split_whitespace());
+        command
+    }
+
+    pub fn cargo(&self, arguments: &str) -> Command {
+        let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+        self.command(cargo, arguments)
+    }
+
+    /// The virtual environment's Python.
+    pub fn python(&self, arguments: &str) -> Command {
+        self.command(self.venv_program("python"), arguments)
+    }
+
+    pub fn bash(&self, script: &str) -> Command {
+        self.command("bash", script)
+    }
+
+    /// `libupt.so`, the static library and the command `upt`, in the release profile that the tests use too.
+    pub fn build(&self) -> Result<()> {
+        let mut command = self.cargo("build --release -p upt -p upt-cli");
+        run_checked(self, "cargo build", &mut command)
+    }
+
+    /// The command `upt` for the demo. On a fresh clone it is built without what the demo does not use (files of other
+    /// programs, sparse factorisation: half of a cold build); a whole `upt` that is there is brought up to date instead.
+    pub fn build_for_demo(&self) -> Result<()> {
+        let version = Command::new(self.upt()).arg("--version").output();
+        let whole = version.is_ok_and(|output| {
+            output.status.success() && !String::from_utf8_lossy(&output.stdout).contains("without")
+        });
+        if whole {
+            return self.build();
+        }
+        let mut command = self.cargo("build --release -p upt-cli --no-default-features");
+        run_checked(
+            self,
+            "cargo build, without what the demo does not use",
+            &mut command,
+        )
+    }
+
+    /// Builds, fetches ONNX Runtime, and sets what the test scripts of the other languages find their parts by.
+    pub fn with_parts(&self, command: &mut Command) -> Result<()> {
+        ort::set_environment(self, command)?;
+        self.build()?;
+        command
+            .env("UPT_ROOT", &self.root)
+            .env("UPT_LIB_DIR", &self.release)
+            .env("UPT_INCLUDE_DIR", self.path("include"))
+            .env("UPT_COMMAND", self.upt())
+            .env("UPT_PYTHON", self.venv_program("python"))
+            .env("UPT_BUNDLES", self.path("onnx"))
+            .env("UPT_BUILD_DIR", self.path("target"));
+        Ok(())
+    }
+}
+
+/// A program of the virtual environment in `folder`.
+pub fn program_in(folder: &Path, name: &str) -> PathBuf {
+    match cfg!(windows) {
+        true => folder.join("Scripts").join(format!("{name}.exe")),
+        false => folder.join("bin").join(name),
+    }
+}
+
+/// Replaces what stands between the markers `<!-- cargo xtask NAME: begin -->` and `... end -->` of a page.
+///
+/// # Errors
+/// Where the page or a marker is missing.
+pub fn write_between_markers(
+    page: &Path,
+    name: &str,
+    text: impl FnOnce(&str) -> Result<String>,
+) -> Result<()> {
+    use anyhow::Context;
+    let whole =
+        std::fs::read_to_string(page).with_context(|| format!("cannot read {}", page.display()))?;
+    let begin = format!("<!-- cargo xtask {name}: begin -->\n");
+    let end = format!("<!-- cargo xtask {name}: end -->");
+    let (start, stop) = (whole.find(&begin).zip(whole.find(&end))).with_context(|| {
+        format!(
+            "{}: the markers `{}` and `{end}` are missing",
+            page.display(),
+            begin.trim()
+        )
+    })?;
+    let start = start + begin.len();
+    let text = text(&whole[start..stop])?;
+    std::fs::write(page, format!("{}{text}{}", &whole[..start], &whole[stop..]))?;
+    println!("{} written", page.display());
+    Ok(())
 }

@@ -15,8 +15,8 @@ mod row;
 
 use crate::process::{run_checked, run_logged};
 use crate::workspace::Workspace;
-use crate::{ort, stages, venv};
-use row::Row;
+use crate::{ort, venv};
+use page::Measured;
 
 #[derive(Args)]
 pub struct Options {
@@ -46,218 +46,137 @@ struct Target {
 /// The part of the tables that is no Rust: `tests/csharp/overhead.sh`.
 const UNITY: &str = "unity-plugin";
 
-impl Target {
-    fn command(&self, workspace: &Workspace, library: &Path) -> Result<Command> {
-        if self.package == UNITY {
-            let mut command = Command::new("bash");
-            command.arg(workspace.path("tests/csharp/overhead.sh"));
-            stages::set_test_environment(workspace, &mut command, library);
-            return Ok(command);
-        }
-        let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-        command.current_dir(&workspace.root).args([
-            "bench",
-            "-p",
-            self.package,
-            "--bench",
-            &self.name,
-        ]);
-        ort::set_environment(&mut command, library);
-        Ok(command)
-    }
-}
-
 pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
-    venv::create(workspace)?;
-    let library = ort::host_library(workspace)?;
+    venv::create(workspace, "target/venv")?;
     let random = workspace.path("target/bench/bundles");
-    if let Err(error) = random_bundles(workspace, &library, &random) {
+    if let Err(error) = random_bundles(workspace, &random) {
         eprintln!("left out: the rows of `wide` and `paper`: {error:#}");
     }
     let mut chosen = targets(workspace)?;
     if let Some(part) = &options.only {
         chosen.retain(|target| target.name.contains(part.as_str()));
     }
-    build(workspace, &chosen)?;
-    let started = Instant::now();
-    let mut tables: Vec<(String, Vec<Row>)> = Vec::new();
-    let (mut failed, mut notes) = (Vec::new(), Vec::new());
-    for target in chosen {
-        let mut command = target.command(workspace, &library)?;
-        if options.quick {
-            command.env("UPT_BENCH_QUICK", "1");
-        }
-        command.env("UPT_BENCH_BUNDLES", &random);
-        if let Some(part) = options.part.as_ref().filter(|_| target.package != UNITY) {
-            command.args(["--", part]);
-        }
-        let log = workspace
-            .logs()
-            .join(format!("bench-{}-{}.log", target.package, target.name));
-        let finished = run_logged(
-            &format!("bench {}/{}", target.package, target.name),
-            &mut command,
-            &log,
-        )?;
+    // What the targets run is built first, so that a measurement's time is its own.
+    let mut commands = Vec::new();
+    for target in &chosen {
+        commands.push(target.command(workspace, &random, options)?);
+    }
+    let start = Instant::now();
+    let (mut measured, mut all, mut failed) = (Measured::default(), Vec::new(), false);
+    for (target, mut command) in chosen.iter().zip(commands) {
+        let name = format!("{}/{}", target.package, target.name);
+        let finished = run_logged(workspace, &format!("bench {name}"), &mut command)?;
+        let log = finished.log.display();
         if !finished.success {
-            eprintln!(
-                "{}/{} failed; the end of {}:\n{}",
-                target.package,
-                target.name,
-                log.display(),
-                finished.tail(15)
-            );
-            failed.push(format!("{}/{}", target.package, target.name));
+            eprintln!("{name} failed; the end of {log}:\n{}", finished.tail(15));
+            measured.notes.push(format!("{name} (failed)."));
+            failed = true;
             continue;
         }
         for line in row::left_out(&finished.text) {
-            eprintln!("{}/{}: {line}", target.package, target.name);
-            notes.push(line.to_owned());
+            eprintln!("{name}: {line}");
+            measured.notes.push(line.to_owned());
         }
         let rows = row::rows(&finished.text)?;
         if rows.is_empty() {
-            eprintln!(
-                "{}/{}: printed no rows (see {})",
-                target.package,
-                target.name,
-                log.display()
-            );
+            eprintln!("{name}: printed no rows (see {log})");
             continue;
         }
-        println!(
-            "\n{}/{}\n{}",
-            target.package,
-            target.name,
-            row::table(&rows)
-        );
-        tables.push((format!("{}: {}", target.package, target.name), rows));
+        let table = row::table(&rows);
+        println!("\n{name}\n{table}");
+        measured.tables.insert(name.replace('/', ": "), table);
+        all.extend(rows);
     }
-    eprintln!(
-        "measured in {:.0} s (builds not counted)",
-        started.elapsed().as_secs_f64()
-    );
+    let seconds = start.elapsed().as_secs_f64();
+    eprintln!("measured in {seconds:.0} s (builds not counted)");
     if let Some(path) = &options.json {
-        let all: Vec<&Row> = tables.iter().flat_map(|table| &table.1).collect();
         std::fs::write(path, serde_json::to_string_pretty(&all)? + "\n")
             .with_context(|| format!("cannot write {}", path.display()))?;
     }
     if !options.keep_docs {
-        let partly = options.part.is_some();
-        page::write(workspace, options.quick, partly, &tables, &failed, &notes)?;
+        page::write(workspace, options.quick, options.part.is_some(), &measured)?;
     }
-    Ok(failed.is_empty())
+    Ok(!failed)
 }
 
-/// Builds what the targets run, so that a measurement's time is its own.
-fn build(workspace: &Workspace, targets: &[Target]) -> Result<()> {
-    if targets.iter().any(|target| target.package == UNITY) {
-        stages::build(workspace)?;
-    }
-    for package in ["upt", "tissue"] {
-        let own: Vec<&Target> = targets
-            .iter()
-            .filter(|target| target.package == package)
-            .collect();
-        if own.is_empty() {
-            continue;
+impl Target {
+    /// What measures it, built already.
+    fn command(&self, workspace: &Workspace, random: &Path, options: &Options) -> Result<Command> {
+        let Self { package, name } = self;
+        let mut command = if *package == UNITY {
+            let mut command = workspace.bash("tests/csharp/overhead.sh");
+            workspace.with_parts(&mut command)?;
+            command
+        } else {
+            let words = format!("bench -p {package} --bench {name}");
+            let label = format!("build the bench {package}/{name}");
+            run_checked(workspace, &label, workspace.cargo(&words).arg("--no-run"))?;
+            let mut command = workspace.cargo(&words);
+            ort::set_environment(workspace, &mut command)?;
+            if let Some(part) = &options.part {
+                command.args(["--", part]);
+            }
+            command
+        };
+        if options.quick {
+            command.env("UPT_BENCH_QUICK", "1");
         }
-        let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-        command
-            .current_dir(&workspace.root)
-            .args(["bench", "--no-run", "-p", package]);
-        for target in own {
-            command.args(["--bench", &target.name]);
-        }
-        let log = workspace.logs().join(format!("bench-build-{package}.log"));
-        run_checked(
-            &format!("build the benches of {package}"),
-            &mut command,
-            &log,
-        )?;
+        command.env("UPT_BENCH_BUNDLES", random);
+        Ok(command)
     }
-    Ok(())
 }
 
 /// Bundles with random weights of the `wide` and the `paper` configuration on the brain, the second with the graphs of
 /// the paper's split beside it, and `paper-fine` on the mesh that `UPT_FINE_MESH` names; made again when a bundle's
 /// configuration or mesh is newer.
-fn random_bundles(workspace: &Workspace, library: &Path, folder: &Path) -> Result<()> {
+fn random_bundles(workspace: &Workspace, folder: &Path) -> Result<()> {
     let brain = workspace.path("onnx/meshes/brain.mesh.safetensors");
-    let fine = std::env::var_os("UPT_FINE_MESH").map(PathBuf::from);
-    let mut wanted = vec![("wide", "wide", &brain), ("paper", "paper", &brain)];
-    wanted.extend(fine.as_ref().map(|mesh| ("paper-fine", "paper", mesh)));
+    let mut wanted = vec![("wide", "wide", brain.clone()), ("paper", "paper", brain)];
+    let fine = std::env::var_os("UPT_FINE_MESH");
+    wanted.extend(fine.map(|mesh| ("paper-fine", "paper", mesh.into())));
     for (name, config, mesh) in wanted {
-        let out = folder.join(name);
         let config = workspace.path(&format!("training/configs/{config}.toml"));
-        let split = name != "wide";
-        let made = out.join(if split {
-            "reference.safetensors"
-        } else {
-            "bundle.json"
-        });
-        if is_newer(&made, &config) && is_newer(&made, mesh) {
+        let (split, last) = match name {
+            "wide" => ("", "bundle.json"),
+            _ => ("--paper-split", "reference.safetensors"),
+        };
+        let written = |path: &Path| path.metadata().and_then(|file| file.modified()).ok();
+        let made = written(&folder.join(name).join(last));
+        if made > written(&config) && made > written(&mesh) {
             continue;
         }
         venv::install_training(workspace)?;
         std::fs::create_dir_all(folder)?;
-        let mut command = Command::new(workspace.python());
-        command
-            .current_dir(&workspace.root)
-            .args(["-m", "upt_training.random_bundle", "--config"])
-            .arg(&config)
-            .arg("--mesh")
-            .arg(mesh)
-            .arg("--out")
-            .arg(&out)
-            .args(["--name", name]);
-        if split {
-            command.arg("--paper-split");
-        }
-        ort::set_environment(&mut command, library);
-        let log = workspace.logs().join(format!("bench-bundle-{name}.log"));
+        let words = format!("-m upt_training.random_bundle --name {name} {split} --config");
+        let mut command = workspace.python(&words);
+        ort::set_environment(workspace, &mut command)?;
+        command.arg(&config).arg("--mesh").arg(&mesh);
+        command.arg("--out").arg(folder.join(name));
         run_checked(
+            workspace,
             &format!("bundle {name}, random weights"),
             &mut command,
-            &log,
         )?;
     }
     Ok(())
 }
 
-/// Whether `made` exists and was written after `source`.
-fn is_newer(made: &Path, source: &Path) -> bool {
-    let written = |path: &Path| {
-        std::fs::metadata(path)
-            .and_then(|file| file.modified())
-            .ok()
-    };
-    written(made).is_some_and(|made| written(source).is_some_and(|source| made > source))
-}
-
 /// Bench targets of `benches/` and `crates/tissue/benches/` (files, and folders with a `main.rs`), and the C# side.
 fn targets(workspace: &Workspace) -> Result<Vec<Target>> {
-    let mut found = Vec::new();
+    let mut found = vec![(UNITY, "overhead".into())];
     for (package, folder) in [("upt", "benches"), ("tissue", "crates/tissue/benches")] {
-        let Ok(entries) = std::fs::read_dir(workspace.path(folder)) else {
-            continue;
-        };
-        for entry in entries {
+        for entry in std::fs::read_dir(workspace.path(folder))? {
             let path = entry?.path();
             let is_file = path.extension().is_some_and(|extension| extension == "rs");
             if is_file || path.join("main.rs").exists() {
-                let name = path
-                    .file_stem()
-                    .unwrap_or_default()
-                    .to_string_lossy()
-                    .into_owned();
-                found.push(Target { package, name });
+                let name = path.file_stem().unwrap_or_default();
+                found.push((package, name.to_string_lossy().into_owned()));
             }
         }
     }
-    found.push(Target {
-        package: UNITY,
-        name: "overhead".into(),
-    });
-    found.sort_by(|a, b| (a.package, &a.name).cmp(&(b.package, &b.name)));
-    Ok(found)
+    found.sort();
+    Ok(found
+        .into_iter()
+        .map(|(package, name)| Target { package, name })
+        .collect())
 }

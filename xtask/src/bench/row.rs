@@ -38,20 +38,14 @@ fn number(value: Option<f64>) -> String {
     let Some(value) = value else {
         return "-".into();
     };
-    let magnitude = value.abs();
-    if magnitude != 0.0 && !(1e-3..1e6).contains(&magnitude) {
-        return format!("{value:.1e}");
+    match value.abs() {
+        0.0 => format!("{value:.3}"),
+        size if !(1e-3..1e6).contains(&size) => format!("{value:.1e}"),
+        size if size < 1.0 => format!("{value:.3}"),
+        size if size < 10.0 => format!("{value:.2}"),
+        size if size < 100.0 => format!("{value:.1}"),
+        _ => format!("{value:.0}"),
     }
-    let digits = if magnitude >= 100.0 {
-        0
-    } else if magnitude >= 10.0 {
-        1
-    } else if magnitude >= 1.0 {
-        2
-    } else {
-        3
-    };
-    format!("{value:.digits$}")
 }
 
 /// Whether the bar is met, where the row has one. A bar on a ratio ("x") is a lower limit, all others are upper limits.
@@ -59,16 +53,9 @@ fn verdict(row: &Row) -> &'static str {
     let (Some(value), Some(bar)) = (row.value, row.bar) else {
         return "";
     };
-    let lower_limit = row
-        .unit
-        .as_deref()
-        .is_some_and(|unit| matches!(unit, "x" | "times"));
-    let within = |limit: f64| {
-        if lower_limit {
-            value >= limit
-        } else {
-            value <= limit
-        }
+    let within = |limit: f64| match row.unit.as_deref() {
+        Some("x" | "times") => value >= limit,
+        _ => value <= limit,
     };
     match (within(bar), row.goal.is_some_and(within)) {
         (_, true) => "goal",
@@ -82,21 +69,15 @@ pub fn table(rows: &[Row]) -> String {
         "| | value | against | times faster | error | bar | goal | reached |\n|---|---:|---|---:|---:|---:|---:|---|\n",
     );
     for row in rows {
-        let value = format!(
-            "{} {}",
-            number(row.value),
-            row.unit.as_deref().unwrap_or("")
-        );
+        let text = |text: &Option<String>| text.clone().unwrap_or_default();
+        let value = format!("{} {}", number(row.value), text(&row.unit));
+        let numbers = [row.ratio, row.error, row.bar, row.goal]
+            .map(number)
+            .join(" | ");
+        let (name, value, against) = (&row.name, value.trim(), text(&row.against));
         let _ = writeln!(
             out,
-            "| {} | {} | {} | {} | {} | {} | {} | {} |",
-            row.name,
-            value.trim(),
-            row.against.as_deref().unwrap_or(""),
-            number(row.ratio),
-            number(row.error),
-            number(row.bar),
-            number(row.goal),
+            "| {name} | {value} | {against} | {numbers} | {} |",
             verdict(row)
         );
     }

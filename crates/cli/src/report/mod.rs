@@ -19,7 +19,7 @@ pub mod prior_alone;
 mod row;
 mod same_body;
 pub mod setting;
-mod table;
+pub mod table;
 mod write;
 
 use std::path::PathBuf;
@@ -52,7 +52,7 @@ use setting::{Precision, Provider, Region};
   upt report --shown 90 --tools data/brain-frames --split all --bundle onnx/brain-reduced --out target/shown
   upt report --step-ms 10,20,25,50 --tools data/brain-frames --split all --bundle onnx/brain-reduced
 
-report.json and report.html are written to --out (with --tools: tools.json and tools.html); the table goes to the terminal.")]
+report.json, report.html and report.md (the table for a document of yours) are written to --out (with --tools: tools.json and tools.html); the table goes to the terminal.")]
 pub struct Options {
     /// Bundles; default: all below onnx/ that fit the cases' mesh and boundary condition.
     #[arg(long = "bundle", value_name = "FOLDER")]
@@ -91,7 +91,7 @@ pub struct Options {
     /// Cases of each scheme or programme at most.
     #[arg(long, default_value_t = 2)]
     cases: usize,
-    /// Folder for report.json, report.html and the finished rows.
+    /// Folder for report.json, report.html, report.md and the finished rows.
     #[arg(long, default_value = "target/report")]
     out: PathBuf,
     /// Threads of the library; default: 1, and all of this machine's.

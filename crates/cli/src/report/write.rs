@@ -1,4 +1,4 @@
-//! The report's files: report.json and report.html.
+//! The report's files: report.json, report.html, and report.md for a document.
 
 use anyhow::{Context, Result};
 use serde_json::json;
@@ -7,7 +7,7 @@ use tissue::trajectory::TrajectoryHeader;
 
 use super::cases::Cases;
 use super::row::{Measurement, Row};
-use super::{Options, html, pictures};
+use super::{Options, html, pictures, table};
 use crate::machine::Machine;
 
 /// What was measured on which cases: all that a report says.
@@ -41,7 +41,7 @@ impl Made {
 }
 
 impl Findings<'_> {
-    /// Writes report.json and report.html; returns the former.
+    /// Writes report.json, report.md and report.html; returns the first.
     pub fn write(self, options: &Options) -> Result<serde_json::Value> {
         std::fs::create_dir_all(&options.out)
             .with_context(|| format!("cannot make {}", options.out.display()))?;
@@ -51,6 +51,7 @@ impl Findings<'_> {
             options.out.join("report.json"),
             serde_json::to_string_pretty(&report)? + "\n",
         )?;
+        std::fs::write(options.out.join("report.md"), self.document(&made))?;
         let title = options.title.as_deref();
         let page = self.page(&made, title.unwrap_or("Error against run time"))?;
         std::fs::write(options.out.join("report.html"), page)?;
@@ -83,6 +84,26 @@ impl Findings<'_> {
             "left_out": self.notes,
             "rows": rows,
         })
+    }
+
+    /// A paragraph that says what was measured where, the table, and what was left out.
+    fn document(&self, made: &Made) -> String {
+        let rows: Vec<&Row> = self.measurements.iter().map(|one| &one.row).collect();
+        let left_out = self
+            .notes
+            .iter()
+            .map(|note| format!("\nLeft out: {note}\n"));
+        format!(
+            "{} held-out contacts of 8 s on {} nodes, boundary condition `{}`, replayed autoregressively; {}, {} cores, {}.\n\n{}{}\n",
+            self.cases.list.len(),
+            self.mesh.node_count(),
+            self.cases.boundary,
+            self.machine.cpu,
+            self.machine.cores,
+            made.date,
+            table::markdown(&rows),
+            left_out.collect::<String>()
+        )
     }
 
     /// The lines above the page's tables: machine, versions, mesh, cases, and the digest of each bundle.

@@ -2,6 +2,7 @@
 
 use super::row::{ALL, Row};
 use crate::report::plot::label;
+use crate::report::table::aligned;
 
 /// What a column shows of a row.
 type Cell = fn(&Row) -> String;
@@ -81,39 +82,25 @@ pub fn by_programme(rows: &[Row]) -> Vec<&Row> {
     programmes.into_iter().flat_map(own).collect()
 }
 
-/// Aligned columns, figures to the right.
+/// The columns that a terminal has room for; the page has all.
+const TERMINAL: [&str; 8] = [
+    "method",
+    "k",
+    "programme",
+    "MSE mean, mm²",
+    "largest error, mm",
+    "penetration, mm",
+    "force",
+    "ms",
+];
+
+/// The rows for the terminal, names to the left, figures to the right.
 pub fn text(rows: &[Row]) -> String {
-    let mut lines: Vec<Vec<String>> =
-        vec![COLUMNS.iter().map(|column| column.0.to_owned()).collect()];
-    lines.extend(
-        rows.iter()
-            .map(|row| COLUMNS.iter().map(|column| (column.1)(row)).collect()),
-    );
-    let widths: Vec<usize> = (0..COLUMNS.len())
-        .map(|column| {
-            let cells = lines.iter().map(|line| line[column].chars().count());
-            cells.max().unwrap_or(0)
-        })
-        .collect();
-    let mut out = String::new();
-    for line in lines {
-        let cells: Vec<String> = line
-            .iter()
-            .zip(&widths)
-            .enumerate()
-            .map(|(column, (cell, width))| {
-                let space = " ".repeat(width - cell.chars().count());
-                if column == 0 || column == 2 {
-                    format!("{cell}{space}")
-                } else {
-                    format!("{space}{cell}")
-                }
-            })
-            .collect();
-        out.push_str(cells.join("  ").trim_end());
-        out.push('\n');
-    }
-    out
+    let shown = COLUMNS.iter().filter(|column| TERMINAL.contains(&column.0));
+    let shown: Vec<&(&str, Cell)> = shown.collect();
+    let cells = |row: &Row| shown.iter().map(|column| (column.1)(row)).collect();
+    let head = shown.iter().map(|column| column.0.to_owned()).collect();
+    aligned(head, rows.iter().map(cells), &[0, 2])
 }
 
 /// The columns of a table that has to be narrow.
