@@ -11,7 +11,8 @@ use crate::corrections::{History, Input, Integrator, Lent};
 use crate::error::Result;
 use crate::stats::SceneStats;
 
-/// Tissue that tools let go swings by the elements while the last state is displaced by more than this, mm: they see what the tools did, where the
+/// Tissue that tools let go swings by the elements while the last state is displaced by more than this, beside where the model's own free motion
+/// ends (a network that rests farther out would never take over), mm: they see what the tools did, where the
 /// learned part goes on from a field that it did not predict.
 const SWUNG_MM: f32 = 0.1;
 
@@ -82,8 +83,9 @@ impl Core {
         let Some(corrected) = &self.corrected else {
             return true;
         };
-        let lifted =
-            corrected.most_substeps > 1 && self.driven && self.counters.max_displacement > SWUNG_MM;
+        let lifted = corrected.most_substeps > 1
+            && self.driven
+            && self.counters.max_displacement > SWUNG_MM + self.model.manifest.rest_displacement_mm;
         !(corrected.own_pace || lifted)
     }
 
