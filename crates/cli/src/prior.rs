@@ -186,7 +186,7 @@ pub fn write_columns(args: &Options) -> anyhow::Result<Written> {
             "{} free dofs, {} entries in the factor ({:.2} GiB), {factor_seconds:.1} s",
             stats.dofs,
             stats.factor_entries,
-            stats.factor_entries as f64 * 8.0 / (1u64 << 30) as f64
+            stats.factor_bytes as f64 / (1u64 << 30) as f64
         );
     }
 

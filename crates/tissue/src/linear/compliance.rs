@@ -74,7 +74,8 @@ pub fn remaining_columns(
         for (at, &dof) in dofs[first..last].iter().enumerate() {
             solution[at * n + dof] = 1.0;
         }
-        factor.solve(&mut solution);
+        // Columns are kept in float32.
+        factor.solve_to(&mut solution, 1e-6);
         field.clear();
         field.resize((last - first) * 3 * count, 0.0f32);
         for (at, column) in solution.chunks_exact(n).enumerate() {

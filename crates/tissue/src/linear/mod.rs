@@ -22,6 +22,7 @@ mod factor;
 mod material;
 mod natural_modes;
 mod ordering;
+mod refined;
 mod response;
 mod stiffness;
 

@@ -242,6 +242,36 @@ fn threads_do_not_change_the_answer_beyond_round_off() {
 }
 
 #[test]
+fn a_factor_in_float32_solves_as_one_in_float64() {
+    let (positions, tets) = block([7, 6, 5], 3.0);
+    let held = base(&positions);
+    let lame = Lame::from_young(3000.0, 0.495).unwrap();
+    let stiffness = Stiffness::assemble(&mesh(&positions, &tets), &held, lame).unwrap();
+    let n = stiffness.dofs();
+    // More than go through the factor together, of very different sizes, and one of zeros.
+    let mut random = crate::schemes::SplitMix(3);
+    let right: Vec<f64> = (0..21 * n)
+        .map(|at| 10f64.powi((at / n) as i32 - 12) * (random.unit() - 0.5))
+        .map(|value| if value.abs() < 1e-13 { 0.0 } else { value })
+        .collect();
+    let solve = |limit| {
+        let factor = Factor::within(&stiffness, &positions, 1, limit).unwrap();
+        let mut columns = right.clone();
+        columns[..n].fill(0.0);
+        factor.solve(&mut columns);
+        (factor.stats(&stiffness), columns)
+    };
+    let ((double, exact), (single, found)) = (solve(usize::MAX), solve(0));
+    assert_eq!(2 * single.factor_bytes, double.factor_bytes);
+    for (exact, found) in exact.chunks_exact(n).zip(found.chunks_exact(n)) {
+        let largest = exact.iter().fold(0.0f64, |most, x| most.max(x.abs()));
+        for (a, b) in exact.iter().zip(found) {
+            assert!((a - b).abs() <= 1e-7 * largest, "{a} and {b} of {largest}");
+        }
+    }
+}
+
+#[test]
 fn what_cannot_be_solved_is_named() {
     let (positions, mut tets) = block([2, 2, 2], 1.0);
     let lame = Lame::from_young(3000.0, 0.49).unwrap();
