@@ -11,6 +11,7 @@
 pub(crate) mod energy;
 mod path;
 mod quasi_newton;
+mod relax;
 
 use std::path::Path as FilePath;
 
@@ -26,6 +27,7 @@ use crate::solver::ContactNode;
 use crate::trajectory::{Trajectory, TrajectoryHeader};
 use energy::StrainEnergy;
 use path::{Equilibrium, Path};
+pub use relax::relax;
 
 /// Root mean square over the nodes of the last step to an equilibrium, mm.
 pub const TOLERANCE_MM: f64 = 5e-4;
