@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail};
-use tissue::mesh::{Mesh, face_area};
+use tissue::mesh::{Boundary, Mesh, face_area};
 use tissue::mesh_import::{
     ImportError, ImportOptions, Opened, Region, Resolution, faces_in, import, nodes_in, tets_in,
 };
@@ -48,7 +48,13 @@ pub fn make(options: &Options, stage: &mut Stage) -> Result<()> {
             suggestion(&mesh)
         );
     }
-    if mesh.fixed.len() == mesh.node_count() {
+    if options.boundary == Boundary::Supported && mesh.supported.is_empty() {
+        bail!(
+            "--boundary supported: {} holds no set `supported`; a mesh file (.mesh.safetensors) can, and --fixed replaces both sets",
+            options.input.display()
+        );
+    }
+    if mesh.held_nodes(options.boundary).len() == mesh.node_count() {
         bail!("--fixed holds every node; hold a part of the body only");
     }
     for (region, factor) in &options.stiffness {
@@ -195,7 +201,7 @@ fn choose_domain(
     stage: &mut Stage,
 ) -> Result<()> {
     let mut held = vec![false; mesh.node_count()];
-    mesh.fixed
+    mesh.held_nodes(options.boundary)
         .iter()
         .for_each(|&node| held[node as usize] = true);
     let free = |mesh: &Mesh, row: u32| {
@@ -245,9 +251,10 @@ fn choose_domain(
         * 2.3)
         .sqrt();
     let rim = RIM_EDGES * edge;
+    let all_held = mesh.held_nodes(options.boundary);
     let far = |node: u32| {
         let p = mesh.positions[node as usize];
-        mesh.fixed.iter().all(|&other| {
+        all_held.iter().all(|&other| {
             let q = mesh.positions[other as usize];
             (0..3).map(|k| f64::from(p[k] - q[k]).powi(2)).sum::<f64>() > rim * rim
         })

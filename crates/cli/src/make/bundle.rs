@@ -93,7 +93,7 @@ pub fn assemble(
         ("dt_s", json!(tissue::schemes::FRAME_S)),
         ("length_unit", json!("mm")),
         ("force_unit", json!("mN")),
-        ("boundary", json!("fixed")),
+        ("boundary", json!(options.boundary.as_str())),
         ("material", serde_json::to_value(material)?),
         (
             "mesh",

@@ -26,7 +26,7 @@ use std::time::Instant;
 use anyhow::{Context, Result, bail};
 use serde_json::json;
 use tissue::linear::ColumnsFile;
-use tissue::mesh::{Boundary, Mesh};
+use tissue::mesh::Mesh;
 
 use crate::check;
 use crate::corrections::{Workbench, principal};
@@ -35,8 +35,6 @@ use crate::{corrections, modes, preview, prior};
 use options::Sizes;
 use stages::{Work, key_of};
 
-/// The bundles of `upt make` hold the mesh's set `fixed`.
-const BOUNDARY: Boundary = Boundary::Fixed;
 /// Part of the time after which no round of equilibria starts.
 const REFINED: f64 = 0.4;
 /// Part of it after which no tool is simulated but by the check.
@@ -106,12 +104,13 @@ pub fn run(options: &Options) -> Result<ExitCode> {
             .collect::<Vec<u8>>(),
         material.young_pa.to_string().as_bytes(),
         material.poisson.to_string().as_bytes(),
+        options.boundary.as_str().as_bytes(),
     ]);
     let columns_file = work.file("columns.safetensors");
     work.stage("columns", &held_key, &["columns.safetensors"], |stage| {
         let found = prior::write_columns(&prior::Options {
             mesh: mesh_file.clone(),
-            boundary: BOUNDARY,
+            boundary: options.boundary,
             out: columns_file.clone(),
             young: material.young_pa,
             poisson: material.poisson,
@@ -135,8 +134,8 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     work.stage("modes", &modes_key, &["modes.safetensors"], |stage| {
         let hertz = modes::write(&modes::Options {
             mesh: mesh_file.clone(),
-            boundary: BOUNDARY,
-            count: vibration::count(&mesh, options.natural),
+            boundary: options.boundary,
+            count: vibration::count(&mesh, options),
             out: modes_file.clone(),
             young: material.young_pa,
             poisson: material.poisson,
@@ -162,7 +161,7 @@ pub fn run(options: &Options) -> Result<ExitCode> {
         let columns = ColumnsFile::open(
             &columns_file,
             &mesh,
-            BOUNDARY,
+            options.boundary,
             material.young_pa,
             material.poisson,
         )?;
@@ -185,7 +184,7 @@ pub fn run(options: &Options) -> Result<ExitCode> {
             bundle::assemble(options, &mesh, &sizes, &stage.folder, &draft)?;
             bundle::publish(&draft, &options.out)?;
             stage.decided("a bundle of the linear response and its free vibration is there");
-            let natural = vibration::count(&mesh, options.natural);
+            let natural = vibration::count(&mesh, options);
             let bench = Workbench::open(&draft, natural, options.threads, options.json)?;
             let found =
                 corrections::differences(&bench, options.patches, options.seed, options.json)?;

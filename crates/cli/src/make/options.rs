@@ -6,7 +6,7 @@ use anyhow::{Result, bail};
 use clap::Args;
 use elements::{Law, Material};
 use serde_json::{Value, json};
-use tissue::mesh::{Mesh, face_area};
+use tissue::mesh::{Boundary, Mesh, face_area};
 use tissue::mesh_import::Region;
 use tissue::programmes::{BodySize, REFERENCE_WIDTH_MM, ToolProgramme};
 
@@ -46,6 +46,9 @@ pub struct Options {
     /// input's unit), group:NAME (a group, material or #rrggbb colour of the input), not: and one of them. May be repeated. Left out: what the mesh file holds.
     #[arg(long, value_name = "REGION", allow_hyphen_values = true)]
     pub fixed: Vec<Region>,
+    /// Which node sets of a mesh file are held: `fixed`, or `supported` (both of its sets; not together with --fixed).
+    #[arg(long, default_value = "fixed")]
+    pub boundary: Boundary,
     /// Instruments may touch the surface here; may be repeated. Left out: what the mesh file names, or else all of the surface
     /// but for a rim around what is held.
     #[arg(long, value_name = "REGION", allow_hyphen_values = true)]
@@ -237,11 +240,12 @@ impl Options {
     /// What the body depends on beside the input's bytes.
     pub fn body_words(&self) -> Result<String> {
         let mut words = format!(
-            "{} {} {} {:?}",
+            "{} {} {} {:?} {}",
             self.scale()?,
             self.nodes,
             self.no_repair,
-            self.name
+            self.name,
+            self.boundary.as_str()
         );
         let stiffer = self.stiffness.iter().map(|(region, _)| region);
         words += &format!(" {:?}", self.stiffness);
@@ -267,7 +271,7 @@ impl Options {
             |regions: &[Region]| -> Vec<String> { regions.iter().map(Region::to_string).collect() };
         json!({
             "unit": self.unit, "stiffness": self.stiffness.iter().map(|(region, factor)| format!("{region}={factor}")).collect::<Vec<String>>(),
-            "fixed": list(&self.fixed), "domain": list(&self.domain), "nodes": self.nodes,
+            "boundary": self.boundary.as_str(), "fixed": list(&self.fixed), "domain": list(&self.domain), "nodes": self.nodes,
             "material": self.material, "corrections": self.corrections.map(|effort| effort.to_string()), "natural": self.natural, "patches": self.patches,
             "tolerance_mm": self.tolerance_mm, "minutes": self.minutes, "tools": self.tools, "tool_scale": self.sizes.tool_scale,
         })
@@ -291,6 +295,7 @@ pub struct Sizes {
     pub push_mm: f64,
     /// Area of a contact, mm².
     pub area_mm2: [f64; 2],
+    boundary: Boundary,
     chosen: bool,
 }
 
@@ -315,6 +320,7 @@ impl Sizes {
         Ok(Self {
             push_mm: PUSH_MM * scale,
             area_mm2,
+            boundary: options.boundary,
             chosen: options.push.is_some(),
         })
     }
@@ -355,7 +361,10 @@ impl Sizes {
             ("name".into(), mesh.name.clone()),
             ("nodes".into(), mesh.node_count().to_string()),
             ("tetrahedra".into(), mesh.tets.len().to_string()),
-            ("held nodes".into(), mesh.fixed.len().to_string()),
+            (
+                "held nodes".into(),
+                mesh.held_nodes(self.boundary).len().to_string(),
+            ),
             ("domain faces".into(), mesh.domain.len().to_string()),
             ("deepest push, mm".into(), format!("{:.1}", self.push_mm)),
         ]

@@ -7,12 +7,13 @@ use anyhow::{Context, Result};
 use tissue::mesh::{Mesh, tet_volume};
 use tissue::tensors::{Dtype, Tensor, f32_values, write_file};
 
+use super::options::Options;
 use super::tables::Projected;
 
 /// Number of modes: as asked, but at most a sixth of the free degrees of freedom.
-pub fn count(mesh: &Mesh, asked: usize) -> usize {
-    let free = 3 * (mesh.node_count() - mesh.fixed.len());
-    asked.min(free / 6).max(1)
+pub fn count(mesh: &Mesh, options: &Options) -> usize {
+    let free = 3 * (mesh.node_count() - mesh.held_nodes(options.boundary).len());
+    options.natural.min(free / 6).max(1)
 }
 
 /// What `upt modes` writes.

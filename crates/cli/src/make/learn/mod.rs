@@ -101,7 +101,7 @@ fn teach(
 ) -> Result<()> {
     let (folder, options) = (stage.folder.clone(), learning.options);
     let started = Instant::now();
-    let natural = vibration::count(learning.mesh, options.natural);
+    let natural = vibration::count(learning.mesh, options);
     let bench = Workbench::open(learning.refined, natural, options.threads, options.json)?;
     let errors = refine::best_errors(&folder)?;
     let sites = choose(&bench.pushes(), &errors, count, options.seed);

@@ -126,7 +126,7 @@ pub fn run(rounds: &Rounds<'_>, stage: &mut Stage) -> Result<()> {
                     Some(ref bench) => bench,
                     None => &*bench.insert(Workbench::open(
                         rounds.draft,
-                        vibration::count(rounds.mesh, options.natural),
+                        vibration::count(rounds.mesh, options),
                         options.threads,
                         options.json,
                     )?),
