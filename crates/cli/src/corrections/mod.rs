@@ -8,6 +8,7 @@ pub mod manifest;
 mod patches;
 mod pushes;
 mod space;
+mod trajectories;
 mod workbench;
 
 pub use constraint::Constraint;
@@ -49,6 +50,12 @@ pub struct Options {
     /// Use the bundle's own residual modes (kind `reduced`) in place of patches.
     #[arg(long)]
     pub residual: bool,
+    /// Modes from the training cases of a dataset (`upt dataset`, schemes or tools), beside the others; may be repeated.
+    #[arg(long)]
+    pub data: Vec<PathBuf>,
+    /// Number of modes from --data.
+    #[arg(long, default_value_t = 60)]
+    pub data_modes: usize,
     /// Corrections a step that the bundle recommends; COUNT@MM: at most COUNT, fewer where the estimated error is below MM;
     /// COUNT@MM/SUBSTEPS: that many substeps where a step that instruments drive would miss MM.
     #[arg(long, default_value_t = Effort::fixed(3))]
@@ -151,7 +158,7 @@ pub fn write(args: &Options) -> Result<usize> {
         bail!("--natural is 0; corrections need natural modes");
     }
     let bench = Workbench::open(&args.bundle, args.natural, args.threads, args.json)?;
-    let more = if args.residual {
+    let mut more = if args.residual {
         let width = bench.prior.width();
         if bench.prior.residual.is_empty() {
             bail!("--residual: this bundle has no residual modes; leave the option out");
@@ -164,6 +171,10 @@ pub fn write(args: &Options) -> Result<usize> {
     } else {
         Vec::new()
     };
+    if !args.data.is_empty() {
+        let found = trajectories::differences(&bench, &args.data, args.json)?;
+        more.extend(principal(&found, args.data_modes));
+    }
     bench.write_space(
         &args.bundle,
         more.into_iter(),
