@@ -48,7 +48,7 @@ pub struct Options {
     /// Store displacements as f16.
     #[arg(long)]
     half: bool,
-    /// Time between recorded frames of --tools, ms; a whole part of a step of 50 ms. Shorter frames are what `upt report --shown` measures by.
+    /// Time between recorded frames of --tools, ms; it must divide the step of 50 ms. `upt report --shown` needs shorter frames.
     #[arg(long, default_value_t = 1e3 * FRAME_S, requires = "tools", conflicts_with = "schemes")]
     frame_ms: f64,
     /// Inner step of the split `train`, ms; held-out cases keep `--inner-step-ms`. Needs `--train-mass-scaling-ms`.

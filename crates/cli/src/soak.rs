@@ -16,6 +16,7 @@ pub struct Options {
     /// Bundle folder.
     #[arg(long)]
     bundle: PathBuf,
+    /// Number of steps.
     #[arg(long, default_value_t = 1_000_000)]
     steps: u64,
     /// Steps between two lines of the log.

@@ -57,13 +57,13 @@ const SAME: f64 = 0.1;
 pub struct Options {
     /// Bundle folder with a certificate, as `upt make` leaves it.
     bundle: PathBuf,
-    /// Held-out cases; left out: those of the certificate.
+    /// Number of held-out cases. Default: that of the certificate.
     #[arg(long)]
     cases: Option<usize>,
-    /// Another seed: other sites than the certificate's.
+    /// A seed other than the certificate's, for other sites.
     #[arg(long)]
     seed: Option<u64>,
-    #[arg(long, help = loads::programmes_help() + ". Left out: those of the certificate")]
+    #[arg(long, help = loads::programmes_help() + ". Default: those of the certificate")]
     tools: Option<String>,
     #[command(flatten)]
     sizes: tool_scale::Arguments,

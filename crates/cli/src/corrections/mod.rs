@@ -40,7 +40,7 @@ pub struct Options {
     /// Natural modes.
     #[arg(long, default_value_t = 60)]
     pub natural: usize,
-    /// Modes of what patches add to the linear response; 0: none.
+    /// Number of modes of what patches add to the linear response; 0: none.
     #[arg(long, default_value_t = 60)]
     pub patch_modes: usize,
     /// Number of patches that these modes are made from.
@@ -49,15 +49,15 @@ pub struct Options {
     /// Use the bundle's own residual modes (kind `reduced`) in place of patches.
     #[arg(long)]
     pub residual: bool,
-    /// Corrections a step that the bundle recommends; COUNT@MM: at most COUNT, fewer where the estimated error is below MM;
-    /// COUNT@MM/SUBSTEPS: that many substeps where a step that instruments drive would miss MM.
+    /// Corrections per step that the bundle recommends. COUNT@MM: at most COUNT, fewer once the estimated error is below MM.
+    /// COUNT@MM/SUBSTEPS: also that many substeps, where one step that instruments drive would miss MM.
     #[arg(long, default_value_t = Effort::fixed(3))]
     pub recommended: Effort,
     /// Factor of the estimated error: `truth over estimate` of `training/scripts/corrections_table.py` on held-out cases.
-    /// Default: 1, with --keep the bundle's own.
+    /// Default: 1, or with --keep the bundle's own.
     #[arg(long)]
     pub calibration: Option<f32>,
-    /// Keep the bundle's file: only what the manifest says of it changes.
+    /// Keep the bundle's file and change only the manifest's entry.
     #[arg(long)]
     pub keep: bool,
     /// Seed of the patches.

@@ -24,7 +24,7 @@ use clap::Args;
 pub struct Options {
     /// The bundle's folder.
     bundle: PathBuf,
-    /// Port of 127.0.0.1; 0: any that is free.
+    /// Port on 127.0.0.1; 0: any free port.
     #[arg(long, default_value_t = 0)]
     port: u16,
     /// Threads of a step.
