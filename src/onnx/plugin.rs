@@ -88,7 +88,7 @@ fn register(runtime: &'static Runtime, candidates: &[PathBuf]) -> Result<(), Str
         return Ok(());
     }
     Err(format!(
-        "{} was loaded and offers no device: it needs an NVIDIA card of compute capability 7.5, 8.6, 8.9 or 12.x",
+        "{} was loaded but offers no device: it needs an NVIDIA card of compute capability 7.5, 8.6, 8.9 or 12.x",
         path.display()
     ))
 }
