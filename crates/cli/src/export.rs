@@ -60,7 +60,7 @@ pub fn run(options: &Options) -> anyhow::Result<ExitCode> {
         };
         if frame >= trajectory.frame_count() {
             bail!(
-                "frame {frame} is not there: the trajectory has frames 0 to {}",
+                "--frame {frame} does not exist; the trajectory has frames 0 to {}",
                 trajectory.frame_count() - 1
             );
         }

@@ -56,7 +56,7 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     let mesh = Mesh::read(&bundle.mesh_file)?;
     if trajectory.header.mesh_sha256 != bundle.mesh_sha256 {
         bail!(
-            "{}: simulated on another mesh ({}) than the bundle's",
+            "{}: simulated on a mesh ({}) other than the bundle's",
             options.trajectory.display(),
             trajectory.header.mesh_name
         );

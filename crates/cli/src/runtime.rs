@@ -43,7 +43,7 @@ fn fetch() -> Result<PathBuf> {
     };
     ort_wheel::fetch(&folder, platform, VERSION, &python, &mut run).with_context(|| {
         format!(
-            "ONNX Runtime {VERSION} cannot be fetched; or set {VARIABLE} to a library of your own"
+            "ONNX Runtime {VERSION} cannot be fetched; you can also set {VARIABLE} to a library of your own"
         )
     })
 }

@@ -94,7 +94,7 @@ pub fn run(options: &Options) -> Result<ExitCode> {
 
 fn resident_kib() -> Result<u64> {
     let status = std::fs::read_to_string("/proc/self/status")
-        .context("resident memory is read from /proc/self/status, which only Linux has")?;
+        .context("`upt soak` reads the resident memory from /proc/self/status, which exists only on Linux")?;
     status
         .lines()
         .find_map(|line| {

@@ -21,7 +21,7 @@ pub struct Arguments {
 fn factor(text: &str) -> Result<f64, String> {
     let factor = text
         .parse()
-        .map_err(|_| format!("`{text}` is no number; write a factor such as 0.5"))?;
+        .map_err(|_| format!("`{text}` is not a number; write a factor such as 0.5"))?;
     ToolScale::of_factor(factor).map(|scale| scale.factor)
 }
 

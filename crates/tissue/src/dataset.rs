@@ -97,10 +97,10 @@ pub enum DatasetError {
     #[error("the plan has no schemes or tools, or no cases")]
     EmptyPlan,
     #[error(
-        "scheme `{0}` needs the compliance columns of its mesh: make them with `upt prior`, give --columns"
+        "scheme `{0}` needs the compliance columns of its mesh; make them with `upt prior` and name the file with --columns"
     )]
     NoColumns(&'static str),
-    #[error("static schemes know the pressure of an element only, not the average nodal one")]
+    #[error("static schemes cannot use the average nodal pressure; leave --average-pressure out")]
     AveragePressure,
     #[cfg(feature = "linear")]
     #[error(transparent)]

@@ -76,7 +76,7 @@ pub fn run(args: &Options) -> Result<ExitCode> {
     if let Some(calibration) = args.calibration
         && !(calibration.is_finite() && calibration > 0.0)
     {
-        bail!("--calibration is {calibration}, must be positive");
+        bail!("--calibration is {calibration}; it must be positive");
     }
     if args.keep {
         recommend(&args.bundle, args.recommended, args.calibration)?;
@@ -111,7 +111,7 @@ pub fn recommend(bundle: &Path, recommended: Effort, calibration: Option<f32>) -
     let before: Option<Value> = Manifest::read(bundle)?.get("corrections")?;
     let Some(before) = before else {
         bail!(
-            "{}: has no corrections; leave --keep out, and they are made",
+            "{}: has no corrections to keep; leave --keep out to make them",
             bundle.display()
         );
     };

@@ -73,7 +73,7 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     let bundle: BundleFolder = fitting.remove(0);
     let corrections = match (options.corrections, bundle.corrections) {
         (_, None) => bail!(
-            "{}: has no corrections, and tools are judged by them; `upt corrections` gives it what they need",
+            "{}: has no corrections, which the limits of tools need; add them with `upt corrections`",
             bundle.name
         ),
         (Some(effort), _) | (None, Some(effort)) => effort,

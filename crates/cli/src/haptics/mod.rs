@@ -77,14 +77,14 @@ pub struct Options {
 /// Exit code 1 when a force was not a number, or stayed when the tools had gone.
 pub fn run(options: &Options) -> Result<ExitCode> {
     if options.plot.is_some() && options.reference <= 0.0 {
-        bail!("--plot shows the solver's force too: say for how many seconds with --reference");
+        bail!("--plot also shows the solver's force; say for how many seconds with --reference");
     }
     let minutes = options.hours.map_or(options.minutes, |hours| 60.0 * hours);
     if !(minutes > 0.0 && minutes <= 10_000.0) {
-        bail!("--minutes is {minutes}, must be above 0 and at most 10000");
+        bail!("--minutes is {minutes}; it must be above 0 and at most 10000");
     }
     if !(0.0..=40.0).contains(&options.latency_ms) {
-        bail!("--latency-ms is {}, must be 0 to 40", options.latency_ms);
+        bail!("--latency-ms is {}; it must be 0 to 40", options.latency_ms);
     }
     let bundle = BundleFolder::read(&options.bundle)?;
     let mesh = Mesh::read(&bundle.mesh_file)?;

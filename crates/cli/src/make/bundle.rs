@@ -29,7 +29,7 @@ pub fn check_target(out: &Path) -> Result<()> {
     };
     if entries.next().is_some() && ours() != Some(true) {
         bail!(
-            "{}: is there and is no bundle of `upt make`; choose another --out, or remove it",
+            "{}: exists, but `upt make` did not make it; choose another --out, or remove it",
             out.display()
         );
     }

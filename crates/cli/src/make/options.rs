@@ -141,7 +141,7 @@ fn stiffer(text: &str) -> Result<(Region, f32), String> {
         .ok_or_else(|| format!("`{text}` has no factor; write REGION=FACTOR"))?;
     match factor.trim().parse::<f32>() {
         Ok(factor) if factor.is_finite() && factor > 0.0 => Ok((region.parse()?, factor)),
-        _ => Err(format!("`{factor}` is no factor above 0")),
+        _ => Err(format!("`{factor}` is not a number above 0")),
     }
 }
 
@@ -161,16 +161,16 @@ impl Options {
     /// Refuses what no stage can use.
     pub fn check(&self) -> Result<()> {
         if !(self.minutes.is_finite() && self.minutes > 0.0) {
-            bail!("--minutes is {}, must be above 0", self.minutes);
+            bail!("--minutes is {}; it must be above 0", self.minutes);
         }
         if self.cases == Some(0) {
             bail!("--cases is 0; a certificate needs a held-out case, give 1 or more");
         }
         if self.nodes < 50 {
-            bail!("--nodes is {}, must be at least 50", self.nodes);
+            bail!("--nodes is {}; it must be at least 50", self.nodes);
         }
         if !(self.tolerance_mm.is_finite() && self.tolerance_mm > 0.0) {
-            bail!("--tolerance-mm is {}, must be positive", self.tolerance_mm);
+            bail!("--tolerance-mm is {}; it must be positive", self.tolerance_mm);
         }
         if self.natural == 0 {
             bail!("--natural is 0; the free motion needs natural modes");
@@ -196,7 +196,7 @@ impl Options {
             other => match other.parse::<f64>() {
                 Ok(scale) if scale.is_finite() && scale > 0.0 => scale,
                 _ => bail!(
-                    "--unit is `{other}`; use mm, cm, m, in, or millimetres a unit as a number"
+                    "--unit is `{other}`; use mm, cm, m, in, or a number of millimetres per unit"
                 ),
             },
         })
@@ -206,7 +206,7 @@ impl Options {
     pub fn material(&self) -> Result<Material> {
         let Some([young, density, damping]) = named(&self.material) else {
             bail!(
-                "--material is `{}`; use brain, liver, kidney, heart or fat, and --young, --density, --damping for another",
+                "--material is `{}`; use brain, liver, kidney, heart or fat; --young, --density and --damping describe any other material",
                 self.material
             );
         };
@@ -309,7 +309,7 @@ impl Sizes {
         let area_mm2 = AREA_MM2.map(|area| area * scale * scale);
         if domain < 1.3 * area_mm2[1] {
             bail!(
-                "the domain has {domain:.0} mm² and a contact up to {:.0}: widen --domain, or make it for smaller tools with --push {:.1}",
+                "the domain has {domain:.0} mm², and a contact may take up to {:.0} mm²: widen --domain, or make the bundle for smaller tools with --push {:.1}",
                 area_mm2[1],
                 0.9 * PUSH_MM * scale * (domain / (1.3 * area_mm2[1])).sqrt()
             );

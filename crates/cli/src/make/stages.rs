@@ -76,7 +76,7 @@ impl Work {
         match lock.try_lock() {
             Ok(()) => {}
             Err(std::fs::TryLockError::WouldBlock) => bail!(
-                "{}: another `upt make` works here; wait for it, or give --work another folder",
+                "{}: another `upt make` is working here; wait for it, or choose another folder with --work",
                 folder.display()
             ),
             // A file system without locks.

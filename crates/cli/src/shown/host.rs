@@ -35,11 +35,11 @@ impl Clock {
     /// A rate or a delay that no host has.
     pub fn new(hz: f64, arrival_ms: f64) -> Result<Self> {
         if !(hz.is_finite() && (1.0..=2000.0).contains(&hz)) {
-            bail!("--shown {hz}: frames a second, from 1 to 2000");
+            bail!("--shown is {hz}; it must be 1 to 2000 frames a second");
         }
         if !(0.0..1e3 * FRAME_S).contains(&arrival_ms) {
             bail!(
-                "--arrival-ms {arrival_ms}: from 0 to less than a step, {} ms",
+                "--arrival-ms is {arrival_ms}; it must be 0 or more and less than a step of {} ms",
                 1e3 * FRAME_S
             );
         }

@@ -114,7 +114,7 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     let bad = rows.iter().filter(|r| r.verdict == Verdict::Bad).count();
     let left = rows.iter().filter(|r| r.verdict == Verdict::Left).count();
     println!(
-        "{} cases: {} as they must be, {bad} not, {left} left out",
+        "{} cases: {} as they should be, {bad} not, {left} left out",
         rows.len(),
         rows.len() - bad - left
     );

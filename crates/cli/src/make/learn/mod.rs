@@ -83,7 +83,7 @@ pub fn run(learning: &Learning<'_>, stage: &mut Stage) -> Result<()> {
         stage.decided("no time for tool trajectories; a larger --minutes has it");
     } else if count < LEAST {
         stage.decided(&format!(
-            "no time for {LEAST} tool trajectories of {each:.1} s; a larger --minutes has it"
+            "no time for {LEAST} tool trajectories of {each:.1} s; give more --minutes"
         ));
     } else {
         teach(learning, stage, &recording, count)?;
