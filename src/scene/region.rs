@@ -57,7 +57,7 @@ impl Core {
         Ok(())
     }
 
-    /// Decodes the nodes of a plan in a published state into the spare frame, and what points have beside them.
+    /// Decodes the nodes of a plan in a published state into the spare frame, and what points have in addition to them.
     pub(super) fn decode_published(
         &mut self,
         published: &RwLock<Published>,

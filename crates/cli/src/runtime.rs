@@ -71,7 +71,7 @@ fn is_named() -> bool {
     std::env::var_os(VARIABLE).is_some_and(|path| !path.is_empty())
 }
 
-/// What `cargo xtask` fetched beside a `upt` out of `cargo build`.
+/// What `cargo xtask` fetched next to a `upt` out of `cargo build`.
 fn of_the_build() -> Option<PathBuf> {
     let exe = std::env::current_exe().ok()?;
     let target = exe.parent()?.parent()?;

@@ -3,7 +3,7 @@
 //! Case `i` follows from the plan and `i` alone, so any process may compute any
 //! case: shards share a folder, an interrupted run goes on where it stopped, and
 //! the trajectories have the same bytes either way. Each finished or failed case
-//! leaves a small record beside its trajectory; the manifest is put together from
+//! leaves a small record next to its trajectory; the manifest is put together from
 //! the records, so it is right whoever writes it last.
 
 pub use crate::loads::Load;
@@ -52,7 +52,7 @@ pub struct Case {
     pub split: String,
 }
 
-/// Outcome of a case, beside its trajectory as `case-….record.json`.
+/// Outcome of a case, next to its trajectory as `case-….record.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CaseRecord {
     #[serde(flatten)]

@@ -1,4 +1,4 @@
-//! `upt beside`: a bundle beside the reference solver on the same contacts: the error over random steps without a reset, what
+//! `upt beside`: a bundle against the reference solver on the same contacts: the error over random steps without a reset, what
 //! falling asleep after a release costs, and, on these and on cases from disk that the bundle was not trained on, false
 //! alarms, how well the warnings rank the error, and the error of the contact force and of attached points.
 

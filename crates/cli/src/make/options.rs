@@ -236,7 +236,7 @@ impl Options {
         })
     }
 
-    /// What the body depends on beside the input's bytes.
+    /// What the body depends on besides the input's bytes.
     pub fn body_words(&self) -> Result<String> {
         let mut words = format!(
             "{} {} {} {:?}",
@@ -351,7 +351,7 @@ impl Sizes {
         )
     }
 
-    /// What the preview says beside the mesh.
+    /// What the preview says besides the mesh.
     pub fn scene(&self, mesh: &Mesh) -> Vec<(String, String)> {
         vec![
             ("name".into(), mesh.name.clone()),

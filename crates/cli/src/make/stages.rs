@@ -28,7 +28,7 @@ pub fn key_of(parts: &[&[u8]]) -> String {
         .collect()
 }
 
-/// What a finished stage leaves beside its files.
+/// What a finished stage leaves in addition to its files.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Record {
     pub key: String,

@@ -1,4 +1,4 @@
-//! Everything that can be stepped through a contact: the library, and the plain methods beside it.
+//! Everything that can be stepped through a contact: the library and the plain methods.
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;

@@ -1,4 +1,4 @@
-//! `upt report`: error against run time, for the library and for the plain methods beside it.
+//! `upt report`: error against run time, for the library and for the plain methods.
 //!
 //! Every row replays the same held-out contacts autoregressively and is timed step by step around the
 //! C call. Finished rows are kept by content, so that an interrupted report goes on where it was.

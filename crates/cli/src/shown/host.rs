@@ -70,7 +70,7 @@ pub struct Drawn {
     pub penetration_mm: f64,
     /// What the arrival of a state changed at the very moment of it, mm; 0 in frames without one.
     pub jump_mm: f64,
-    /// How far a node went from the frame before beside how far it went in truth, mm.
+    /// How far a node went from the frame before, compared with how far it went in truth, mm.
     pub unlike_mm: f64,
 }
 
