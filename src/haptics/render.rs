@@ -92,7 +92,9 @@ impl Haptics {
             )));
         }
         if self.ends.scene_gone.load(Ordering::Acquire) {
-            return Err(Error::State("the scene was destroyed, so there is no force; destroy this object too".into()));
+            return Err(Error::State(
+                "the scene was destroyed, so there is no force; destroy this object too".into(),
+            ));
         }
         let put = self.body.motion(&from, &now) > PUT_MM;
         let from = if put { now } else { from };

@@ -46,7 +46,9 @@ impl Core {
             return Ok(());
         }
         if self.counters.step_count == 0 {
-            return Err(Error::State("there is no state to decode before the first step; step the scene first".into()));
+            return Err(Error::State(
+                "there is no state to decode before the first step; step the scene first".into(),
+            ));
         }
         let _flush = FlushToZero::enter();
         let plan = NodePlan::new(&[nodes], count, self.engine.planned_prior())?;

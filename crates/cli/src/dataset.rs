@@ -183,7 +183,8 @@ pub fn run(options: &Options) -> anyhow::Result<ExitCode> {
     });
     bar.finish_and_clear();
     if let Some(error) = failure.into_inner().ok().flatten() {
-        return Err(error).context("the dataset is incomplete; run the same command again to continue");
+        return Err(error)
+            .context("the dataset is incomplete; run the same command again to continue");
     }
     let manifest = dataset.write_manifest()?;
     let with = |status: &str| manifest.cases.iter().filter(|c| c.status == status).count();

@@ -93,8 +93,9 @@ pub fn run(options: &Options) -> Result<ExitCode> {
 }
 
 fn resident_kib() -> Result<u64> {
-    let status = std::fs::read_to_string("/proc/self/status")
-        .context("`upt soak` reads the resident memory from /proc/self/status, which exists only on Linux")?;
+    let status = std::fs::read_to_string("/proc/self/status").context(
+        "`upt soak` reads the resident memory from /proc/self/status, which exists only on Linux",
+    )?;
     status
         .lines()
         .find_map(|line| {

@@ -170,7 +170,10 @@ impl Options {
             bail!("--nodes is {}; it must be at least 50", self.nodes);
         }
         if !(self.tolerance_mm.is_finite() && self.tolerance_mm > 0.0) {
-            bail!("--tolerance-mm is {}; it must be positive", self.tolerance_mm);
+            bail!(
+                "--tolerance-mm is {}; it must be positive",
+                self.tolerance_mm
+            );
         }
         if self.natural == 0 {
             bail!("--natural is 0; the free motion needs natural modes");

@@ -188,7 +188,9 @@ pub fn methods(
             }
             "none" => {}
             other => {
-                bail!("--plain {other} is unknown; use zero, linear, prior, coarse, tled, paper or none")
+                bail!(
+                    "--plain {other} is unknown; use zero, linear, prior, coarse, tled, paper or none"
+                )
             }
         }
     }

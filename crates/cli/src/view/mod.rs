@@ -33,8 +33,12 @@ pub struct Options {
 }
 
 pub fn run(options: &Options) -> Result<ExitCode> {
-    let listener = TcpListener::bind(("127.0.0.1", options.port))
-        .with_context(|| format!("port {} on 127.0.0.1 cannot be opened; choose another with --port, or leave it out", options.port))?;
+    let listener = TcpListener::bind(("127.0.0.1", options.port)).with_context(|| {
+        format!(
+            "port {} on 127.0.0.1 cannot be opened; choose another with --port, or leave it out",
+            options.port
+        )
+    })?;
     let server = server::Server::new(&options.bundle, options.threads, &listener)?;
     println!("{}", server.address());
     println!("open this address in a browser; Ctrl-C stops the server");
