@@ -13,7 +13,7 @@ use crate::{
 fn unknown<T>(field: &str, value: i32) -> Result<T, Failure> {
     fail(
         UPT_ERR_ARGUMENT,
-        format!("{field} is {value}, which is no valid value; see upt.h"),
+        format!("{field} is {value}, which is not a valid value; see upt.h"),
     )
 }
 
