@@ -90,7 +90,7 @@
 #define UPT_ERR_VERSION -32
 
 /**
- * A snapshot is damaged or of another model.
+ * A snapshot is damaged or belongs to another model.
  */
 #define UPT_ERR_SNAPSHOT -33
 
@@ -165,7 +165,7 @@
 #define UPT_LOG_TRACE 5
 
 /**
- * 32-bit floats: the reference. Of a scene's options: what its model has.
+ * 32-bit floats: the reference. In a scene's options: the model's precision.
  */
 #define UPT_PRECISION_F32 0
 
@@ -185,7 +185,7 @@
 #define UPT_PRECISION_INT8 3
 
 /**
- * Of options only: 32-bit floats also in a scene of a model that was opened with another precision.
+ * In options only: 32-bit floats, even in a scene of a model that was opened with another precision.
  */
 #define UPT_PRECISION_FORCE_F32 4
 
@@ -210,7 +210,7 @@
 #define UPT_KERNEL_RESIDENT 3
 
 /**
- * Split on the CPU; on a device the faster of split and whole, timed while the scene is made.
+ * On the CPU: split. On a device: the faster of split and whole, timed while the scene is created.
  */
 #define UPT_STEP_AUTO 0
 
@@ -225,7 +225,7 @@
 #define UPT_STEP_WHOLE 2
 
 /**
- * Both are timed while the scene is made, and the faster one stays.
+ * The faster of split and whole, timed while the scene is created.
  */
 #define UPT_STEP_MEASURED 3
 
@@ -240,8 +240,8 @@
 #define UPT_CORRECTIONS_AUTO -2
 
 /**
- * Keep the last good state and return `UPT_ERR_GUARD`; without contact, where no later call could do otherwise, as
- * `UPT_GUARD_BLEND`.
+ * Keep the last good state and return `UPT_ERR_GUARD`. A step without contact, which the host cannot change, is treated as
+ * under `UPT_GUARD_BLEND`.
  */
 #define UPT_GUARD_HOLD 0
 
@@ -251,7 +251,7 @@
 #define UPT_GUARD_REPORT 1
 
 /**
- * Replace a refused state by the prior's or by rest and set flags.
+ * Replace a refused state by the prior's or by rest, and set flags.
  */
 #define UPT_GUARD_BLEND 2
 
@@ -311,7 +311,8 @@
 #define UPT_FLAG_REGULARISED 1024
 
 /**
- * The corrections ended inverted: under tools the tissue stays where it was, else the linear response takes their place.
+ * The corrections ended with inverted elements: under tools the tissue stays where it was, otherwise the linear response
+ * replaces them.
  */
 #define UPT_FLAG_FELL_BACK 2048
 
@@ -371,7 +372,7 @@
 #define UPT_SHAPE_SPATULA 2
 
 /**
- * An instrument's shape: a hull of `upt_hull_create`.
+ * An instrument's shape: a hull from `upt_hull_create`.
  */
 #define UPT_SHAPE_HULL 3
 
@@ -381,7 +382,8 @@
 #define UPT_MODE_SLIDE 0
 
 /**
- * An instrument holds what lies within 0.5 mm of it when the mode changes to this, until the mode changes back or the grasp tears off.
+ * An instrument grasps what lies within 0.5 mm of it when the mode changes to this, and holds it until the mode changes back
+ * or the grasp tears off.
  */
 #define UPT_MODE_GRASP 1
 
@@ -425,11 +427,11 @@ typedef struct upt_init_options {
    */
   uint32_t struct_size;
   /**
-   * Default number of threads of a model; 0: 1.
+   * Default number of threads of a model; 0 means 1.
    */
   uint32_t threads;
   /**
-   * ONNX Runtime's shared library, a path; NULL: the folder of libupt, then `ORT_DYLIB_PATH`, then the system.
+   * Path of ONNX Runtime's shared library; NULL searches the folder of libupt, then `ORT_DYLIB_PATH`, then the system.
    */
   const char *onnxruntime_path;
 } upt_init_options;
@@ -475,7 +477,7 @@ typedef struct upt_model_options {
    */
   uint64_t gpu_memory_limit;
   /**
-   * Folder for compiled engines; NULL: none is kept.
+   * Folder for compiled engines; NULL: they are not kept.
    */
   const char *cache_dir;
   /**
@@ -495,7 +497,7 @@ typedef struct upt_model_options {
    */
   uint8_t reserved;
   /**
-   * A `cudaStream_t` of `device_id` to run the graphs on, which outlives the model and its scenes; NULL: one of ONNX Runtime's own.
+   * A `cudaStream_t` of `device_id` that runs the graphs and must outlive the model and its scenes; NULL: ONNX Runtime makes its own.
    */
   void *user_stream;
 } upt_model_options;
@@ -579,7 +581,7 @@ typedef struct upt_scene_options {
    */
   int32_t kernel;
   /**
-   * `UPT_PRECISION_*` of the native decoder; 0: the model's, `UPT_PRECISION_FORCE_F32`: float32 whatever the model has.
+   * `UPT_PRECISION_*` of the native decoder; 0: the model's; `UPT_PRECISION_FORCE_F32`: float32, whatever the model's is.
    */
   int32_t precision;
   /**
@@ -603,7 +605,7 @@ typedef struct upt_scene_options {
    */
   uint8_t check_inversion;
   /**
-   * 1: a submit while a step is in flight replaces the waiting contact instead of `UPT_ERR_BUSY`.
+   * 1: a submit while a step is in flight replaces the waiting contact and does not return `UPT_ERR_BUSY`.
    */
   uint8_t latest_wins;
   /**
@@ -615,8 +617,8 @@ typedef struct upt_scene_options {
    */
   uint8_t interpolate_points;
   /**
-   * Substeps of a step that instruments drive, at most, where it alone would err by more than the corrections' target: 1 for none, up to
-   * 8, 0 as many as the bundle recommends. From 2 only with a target.
+   * The most substeps of a step that instruments drive, where one step would miss the corrections' target: 1 for none, up to 8; 0: as
+   * many as the bundle recommends. 2 or more need a target.
    */
   uint8_t substeps;
   /**
@@ -637,21 +639,21 @@ typedef struct upt_scene_options {
    */
   uint32_t corrections_budget_us;
   /**
-   * Enough where the estimated error is below this, mm; 0: no target. Only with a count or `UPT_CORRECTIONS_AUTO`.
+   * Corrections stop once the estimated error is below this, mm; 0: no target. Only with a count or `UPT_CORRECTIONS_AUTO`.
    */
   float corrections_target_mm;
   /**
-   * `UPT_FLAG_ERROR` rises where the estimated error is above this, mm; 0: never.
+   * `UPT_FLAG_ERROR` rises if the estimated error is above this, mm; 0: never.
    */
   float error_limit_mm;
   /**
-   * Length of a step, s: 0.01 to 0.05, or 0 for the bundle's. Another length than the bundle's needs corrections
-   * (`UPT_ERR_UNSUPPORTED` without); the learned part is left out then.
+   * Length of a step, s: 0.01 to 0.05, or 0 for the bundle's. A length other than the bundle's needs corrections
+   * (without them: `UPT_ERR_UNSUPPORTED`) and leaves the learned part out.
    */
   double step_s;
   /**
-   * Mass-proportional damping of the tissue, 1/s: 0.01 to 1000, or 0 for the bundle's. Another than the bundle's needs
-   * corrections (`UPT_ERR_UNSUPPORTED` without); the learned part is left out then.
+   * Mass-proportional damping of the tissue, 1/s: 0.01 to 1000, or 0 for the bundle's. A damping other than the bundle's
+   * needs corrections (without them: `UPT_ERR_UNSUPPORTED`) and leaves the learned part out.
    */
   double damping_per_s;
 } upt_scene_options;
@@ -685,11 +687,11 @@ typedef struct upt_instrument {
    */
   float radius;
   /**
-   * `upt_scene_contacts_from_instruments` alone: 1: touched nodes move with the instrument until it leaves; 0: they slide.
+   * Only for `upt_scene_contacts_from_instruments`. 1: touched nodes move with the instrument until it leaves; 0: they slide.
    */
   uint8_t sticking;
   /**
-   * `upt_scene_step_instruments` alone: `UPT_MODE_*`.
+   * Only for `upt_scene_step_instruments`: `UPT_MODE_*`.
    */
   uint8_t mode;
   /**
@@ -697,7 +699,7 @@ typedef struct upt_instrument {
    */
   uint8_t reserved[2];
   /**
-   * `upt_scene_step_instruments` alone: Coulomb's coefficient, 0 or more.
+   * Only for `upt_scene_step_instruments`: Coulomb's coefficient, 0 or more.
    */
   float friction;
   /**
@@ -731,7 +733,7 @@ typedef struct upt_instrument_reading {
    */
   float torque[3];
   /**
-   * How deep the deepest point of the surface lies inside the instrument, mm.
+   * Depth of the deepest point of the surface inside the instrument, mm.
    */
   float penetration_mm;
   /**
@@ -753,7 +755,7 @@ typedef struct upt_instrument_contact {
    */
   uint32_t instrument;
   /**
-   * Where the point is, mm.
+   * Position of the point, mm.
    */
   float position[3];
   /**
@@ -775,15 +777,15 @@ typedef struct upt_haptics_options {
    */
   uint32_t instrument;
   /**
-   * Its shape, mode and friction, as in that array; position and rotation say where it is first.
+   * Its shape, mode and friction, as in that array; position and rotation say where it starts.
    */
   const struct upt_instrument *tool;
   /**
-   * What a new step puts elsewhere is blended in over this time, ms; 0: 25.
+   * Time over which the change that a new step brings is blended in, ms; 0: 25.
    */
   float blend_ms;
   /**
-   * How old a step is when it arrives, ms: the time since the poses that it was given were taken; 0: as long as it took.
+   * Age of a step when it arrives, ms: the time since its poses were taken; 0: as long as the step took.
    */
   float step_latency_ms;
   /**
@@ -791,11 +793,11 @@ typedef struct upt_haptics_options {
    */
   float force_limit_n;
   /**
-   * What the passivity controller damps with at most, N s/m; 0: 5.
+   * The most that the passivity controller damps, N s/m; 0: 5.
    */
   float damping_limit_n_s_per_m;
   /**
-   * 1: without the passivity observer and controller.
+   * 1: no passivity observer and controller.
    */
   uint8_t no_passivity;
   /**
@@ -805,7 +807,7 @@ typedef struct upt_haptics_options {
 } upt_haptics_options;
 
 /**
- * Where a tool is at a moment; the input of `upt_haptics_render`.
+ * A tool's pose at a moment; the input of `upt_haptics_render`.
  */
 typedef struct upt_haptic_pose {
   /**
@@ -813,7 +815,7 @@ typedef struct upt_haptic_pose {
    */
   uint32_t struct_size;
   /**
-   * 1: the velocities are given; 0: they are those between the last two poses.
+   * 1: the velocities below are given; 0: they follow from the last two poses.
    */
   uint8_t has_velocity;
   /**
@@ -821,7 +823,7 @@ typedef struct upt_haptic_pose {
    */
   uint8_t reserved[3];
   /**
-   * The host's clock, s; never before that of the last call.
+   * The host's clock, s; never earlier than in the last call.
    */
   double time_s;
   /**
@@ -871,11 +873,11 @@ typedef struct upt_haptic_force {
    */
   uint64_t step_count;
   /**
-   * Watchdog: how old the last of them is, s.
+   * Watchdog: age of the last of these states, s.
    */
   double age_s;
   /**
-   * Energy that the hand was given beyond what came from it since the tool last touched, J; the controller takes it back.
+   * Energy that the hand received, less what it gave, since the tool last touched, J; the controller takes it back.
    */
   double excess_energy_j;
   /**
@@ -887,7 +889,7 @@ typedef struct upt_haptic_force {
    */
   float torque_n_m[3];
   /**
-   * `[3,3]`, row-major: how the force falls with the position, N/m. With the next two a symmetric 6x6 stiffness, of contact alone.
+   * `[3,3]`, row-major: how the force falls with the position, N/m. With the next two: a symmetric 6x6 stiffness of the contact alone.
    */
   float stiffness_n_per_m[9];
   /**
@@ -957,7 +959,7 @@ typedef struct upt_scene_stats {
    */
   uint64_t contact_count;
   /**
-   * Bytes that the scene has allocated in addition to the model; pages that it never touches are not resident.
+   * Bytes that the scene has allocated in addition to the model; pages that it has never touched are not resident.
    */
   uint64_t memory_bytes;
   /**
@@ -997,7 +999,7 @@ typedef struct upt_scene_stats {
    */
   uint8_t prior_forces;
   /**
-   * Substeps that the last step was made of; 0 where it is one.
+   * Substeps of the last step; 0 if it was not split.
    */
   uint8_t substeps;
   /**
@@ -1005,11 +1007,11 @@ typedef struct upt_scene_stats {
    */
   uint8_t reserved[4];
   /**
-   * Of the stages' times, copies to a device, ms; 0 on the CPU.
+   * Part of the stages' times: copies to a device, ms; 0 on the CPU.
    */
   double upload_ms;
   /**
-   * Of the stages' times, copies back from a device, ms; 0 on the CPU.
+   * Part of the stages' times: copies back from a device, ms; 0 on the CPU.
    */
   double download_ms;
   /**
@@ -1029,7 +1031,7 @@ typedef struct upt_scene_stats {
    */
   uint32_t evaluations;
   /**
-   * Residual force after the corrections over that before them; 0 without corrections.
+   * Residual force after the corrections divided by that before them; 0 without corrections.
    */
   float residual;
   /**
@@ -1037,11 +1039,11 @@ typedef struct upt_scene_stats {
    */
   float error_mm;
   /**
-   * Smallest det F of the corrected state; without corrections, of the elements at the contact; 0 where there is neither.
+   * Smallest det F of the corrected state; without corrections, of the elements at the contact; 0 if there are neither.
    */
   float min_det;
   /**
-   * Solves of the contact of instruments, ms; part of `corrections_ms`, without corrections of `check_ms`.
+   * Contact solves of instruments, ms; part of `corrections_ms`, or of `check_ms` without corrections.
    */
   double contact_ms;
 } upt_scene_stats;
@@ -1417,8 +1419,8 @@ upt_status upt_scene_sample_points(struct upt_scene *scene,
 /**
  * One step from the scene's own state, driven by rigid instruments. Their contact with the tissue is solved.
  *
- * Give the pose that each instrument has at the end of the step; it moves there on a straight line from its last pose.
- * An instrument that would move more than 40 mm in a step is placed there instead. Contact is unilateral, with Coulomb
+ * Give the pose of each instrument at the end of the step; the instrument moves there on a straight line from its last
+ * pose. An instrument that would move more than 40 mm in a step is placed there without a motion. Contact is unilateral, with Coulomb
  * friction, at points of the domain's surface at most 1.7 mm apart. A scene with corrections solves it inside each
  * correction, as a load; with `corrections = UPT_CORRECTIONS_NONE` it is solved once, on the linear response. The scene
  * remembers each place of the array: pass every instrument every time, in the same order.
@@ -1501,9 +1503,9 @@ upt_status upt_hull_destroy(struct upt_hull *hull);
  * The tissue at a moment between steps, with the instruments where they are at that moment: frames without lag.
  *
  * The velocities of the last published state continue as far as the instruments do, and contact is solved at the poses given here with
- * the compliance of that time. Use any frame rate, even an uneven one, and call it while a submitted step is in flight too. When a step
- * arrives, the frame goes on from where it would have been without it, and over to it within two fifths of a step, or at 25 mm/s where
- * that takes longer, within two steps in any case.
+ * the compliance of that time. Any frame rate works, even an uneven one, and a submitted step may be in flight. When a step arrives, the
+ * frames start from where they would have been without it. They blend into the new step within two fifths of a step, or at 25 mm/s where
+ * that takes longer, but always within two steps.
  *
  * - `seconds`: time since the last published step, 0 or more; velocities are followed for two steps at most.
  * - `instruments`: as `upt_scene_step_instruments`.
@@ -1544,8 +1546,8 @@ upt_status upt_scene_present_points(struct upt_scene *scene,
 /**
  * As `upt_scene_present`, with a collision field in place of instruments, for scenes that `upt_scene_step_contacts` drives.
  *
- * Nodes go where the list says, by the compliance of that time. Nodes of the last step that are no longer listed are released: they
- * lose the force that held them.
+ * The listed nodes go where the list says; the others follow by the compliance of that time. Nodes of the last step that are no longer
+ * listed are released: they lose the force that held them.
  *
  * - `seconds`: as `upt_scene_present`.
  * - `contact_nodes`: `[m]` node indices, each at most once, in any order.
@@ -1637,7 +1639,7 @@ upt_status upt_haptics_destroy(struct upt_haptics *haptics);
  * every instrument every time, in the same order. NULL with count 0 releases all.
  *
  * - `instruments`: at most 64, each with its `struct_size` set.
- * - `contact_nodes`: `[capacity]`, contact_vectors: `[capacity,3]`, mm; both may be NULL with capacity 0, which only
+ * - `contact_nodes`: `[capacity]`, `contact_vectors`: `[capacity,3]`, mm; both may be NULL with capacity 0, which only
  *   queries the count.
  * - `contact_count`: number of contacts found, always written.
  *
@@ -1657,7 +1659,7 @@ upt_status upt_scene_contacts_from_instruments(struct upt_scene *scene,
 /**
  * Copies the reaction of the tissue at the last step's contact nodes, in their order.
  *
- * A bundle with a linear response (`prior_forces` of the statistics is 1) gives that response's contact forces,
+ * A bundle with a linear response (`prior_forces` of the statistics is 1) gives the contact forces of that response,
  * `-A_CC^-1 c`: nodes that borrow a column of the compliance share its force, and held nodes and nodes far from the
  * domain get zero. Other bundles give the elastic force of the elements around each node at the last state. Both leave
  * out inertia and damping.

@@ -1,8 +1,8 @@
 // libupt for C++17: move-only handles over upt.h, header only.
 //
-// Errors: every call returns the `upt_status`. By default a negative status is thrown as
-// `upt::error`, so what a call returns is UPT_OK or UPT_PENDING. With UPT_NO_EXCEPTIONS defined
-// nothing is thrown and the status must be looked at; the message is `upt::last_error()`. The forms
+// Errors: every call returns a `upt_status`. By default a negative status is thrown as
+// `upt::error`, so a call returns only UPT_OK or UPT_PENDING. With UPT_NO_EXCEPTIONS defined
+// nothing is thrown: check the status, and read the message from `upt::last_error()`. The forms
 // that return a value (`Model::open(path)`, `model.info()`, ...) exist only with exceptions.
 //
 // Shapes, units and thread rules: upt.h. SPDX-License-Identifier: Apache-2.0 OR MIT
@@ -53,7 +53,7 @@ private:
 /// Message of the last failed call of this thread.
 inline const char *last_error() noexcept { return upt_last_error(); }
 
-/// Whether the library that runs speaks the ABI of this header.
+/// Whether the loaded library has the ABI of this header.
 inline bool abi_matches() noexcept { return upt_abi_version() == UPT_ABI_VERSION; }
 
 #ifndef UPT_NO_EXCEPTIONS
@@ -68,7 +68,7 @@ private:
 };
 #endif
 
-/// Throws on an error, or hands the status on when UPT_NO_EXCEPTIONS is defined.
+/// Throws on an error, or returns the status when UPT_NO_EXCEPTIONS is defined.
 inline upt_status check(upt_status status) {
 #ifndef UPT_NO_EXCEPTIONS
   if (status < 0) {
@@ -79,7 +79,7 @@ inline upt_status check(upt_status status) {
 }
 
 namespace detail {
-/// Spans that do not belong together are refused here; the C call could not see it.
+/// Refuses spans whose sizes do not match; the C call could not see it.
 inline upt_status mismatch() {
 #ifndef UPT_NO_EXCEPTIONS
   throw error(UPT_ERR_ARGUMENT, "a [n,3] span's size is not three times its count");
@@ -127,7 +127,7 @@ public:
   Model &operator=(const Model &) = delete;
   ~Model() { close(); }
 
-  /// Opens the bundle in the folder `path` (UTF-8); a model held before is closed.
+  /// Opens the bundle in the folder `path` (UTF-8). Closes a model that this object already held.
   upt_status reopen(const char *path, const upt_model_options *options = nullptr) {
     upt_model *handle = nullptr;
     const upt_status status = check(upt_model_open(path, options, &handle));
@@ -138,7 +138,7 @@ public:
     return status;
   }
 
-  /// Scenes made of the model live on.
+  /// Scenes made from the model stay usable.
   void close() noexcept {
     if (handle_ != nullptr) {
       upt_model_close(std::exchange(handle_, nullptr));
@@ -211,7 +211,7 @@ private:
 };
 
 /// The convex hull of a tool's points, for instruments of shape UPT_SHAPE_HULL. Immutable: any
-/// thread may use it. It must live while instruments that name it are handed to a scene.
+/// thread may use it. It must live while you pass instruments that name it to a scene.
 class Hull {
 public:
   Hull() noexcept = default;
@@ -227,7 +227,7 @@ public:
   Hull &operator=(const Hull &) = delete;
   ~Hull() { destroy(); }
 
-  /// points: [n,3], mm, in the tool's own frame; a hull held before is destroyed.
+  /// points: [n,3], mm, in the tool's own frame. Destroys a hull that this object already held.
   upt_status create(span<const float> points) {
     if (points.size() % 3 != 0) {
       return detail::mismatch();
@@ -245,7 +245,7 @@ public:
   explicit Hull(span<const float> points) { create(points); }
 #endif
 
-  /// Steps that were submitted with it go on.
+  /// Steps that were submitted with it still finish.
   void destroy() noexcept {
     if (handle_ != nullptr) {
       upt_hull_destroy(std::exchange(handle_, nullptr));
@@ -284,7 +284,7 @@ public:
   Scene &operator=(const Scene &) = delete;
   ~Scene() { destroy(); }
 
-  /// Makes a scene at rest; one held before is destroyed.
+  /// Creates a scene at rest. Destroys a scene that this object already held.
   upt_status create(const Model &model, const upt_scene_options *options = nullptr) {
     upt_scene *handle = nullptr;
     const upt_status status = check(upt_scene_create(model.get(), options, &handle));
@@ -314,7 +314,7 @@ public:
   upt_status reset() { return check(upt_scene_reset(handle_)); }
 
   /// displacement: [K,3] or empty (own state); collision: [K,3] or empty (no contact); out: [n,3]
-  /// or empty. K is the size of the scene's mesh: the spans' sizes must fit it.
+  /// or empty. K is the size of the scene's mesh; the spans must have these sizes.
   upt_status step(span<const float> displacement, span<const float> collision, span<float> out) {
     return check(
         upt_scene_step(handle_, displacement.data(), collision.data(), out.data(), out.size()));
@@ -367,7 +367,7 @@ public:
     return check(upt_scene_sample_points(handle_, alpha, out.data(), out.size()));
   }
 
-  /// A step that rigid instruments drive, their contact solved; out: [n,3] or empty.
+  /// A step that rigid instruments drive, with contact solved; out: [n,3] or empty.
   upt_status step_instruments(span<const upt_instrument> instruments, span<float> out = {}) {
     return check(upt_scene_step_instruments(handle_, instruments.data(), instruments.size(),
                                             out.data(), out.size()));
@@ -388,7 +388,7 @@ public:
     return check(upt_scene_present_points(handle_, seconds, instruments.data(), instruments.size(),
                                           out.data(), out.size()));
   }
-  /// The same with nodes where they are then, [m], [m,3], in place of instruments.
+  /// The same with nodes [m] and their vectors [m,3] at that moment, in place of instruments.
   upt_status present_contacts(double seconds, span<const std::uint32_t> nodes,
                               span<const float> vectors, span<float> out) {
     return check(upt_scene_present_contacts(handle_, seconds, nodes.data(), vectors.data(),
@@ -479,8 +479,8 @@ private:
   upt_scene *handle_ = nullptr;
 };
 
-/// A tool that a hand feels: the force on it at each millisecond, from a thread of its own. Its
-/// scene is stepped by another one, with the same tool among the instruments.
+/// A tool that a hand feels: the force on it at each millisecond, from a thread of its own. Another
+/// thread steps its scene, with the same tool among the instruments.
 class Haptics {
 public:
   Haptics() noexcept = default;
@@ -496,7 +496,7 @@ public:
   Haptics &operator=(const Haptics &) = delete;
   ~Haptics() { destroy(); }
 
-  /// No step of the scene may be in flight; an object held before is destroyed.
+  /// No step of the scene may be in flight. Destroys what this object already held.
   upt_status create(const Scene &scene, const upt_haptics_options &options) {
     upt_haptics *handle = nullptr;
     const upt_status status = check(upt_haptics_create(scene.get(), &options, &handle));
@@ -506,7 +506,7 @@ public:
     }
     return status;
   }
-  /// The tool at place `instrument` of the steps' instruments, everything else as it is by default.
+  /// The tool at place `instrument` of the steps' instruments, with defaults for everything else.
   upt_status create(const Scene &scene, std::uint32_t instrument, const upt_instrument &tool) {
     upt_haptics_options options = make<upt_haptics_options>();
     options.instrument = instrument;
@@ -530,7 +530,7 @@ public:
   explicit operator bool() const noexcept { return handle_ != nullptr; }
   upt_haptics *get() const noexcept { return handle_; }
 
-  /// Waits for nothing. Where it fails there is no force in out.
+  /// Never waits. If it fails, the force in out is zero.
   upt_status render(const upt_haptic_pose &pose, upt_haptic_force &out) {
     out = make<upt_haptic_force>();
     return check(upt_haptics_render(handle_, &pose, &out));

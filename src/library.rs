@@ -19,7 +19,7 @@ pub fn init(wanted: &InitOptions) -> Result<()> {
     let mut options = options();
     match &*options {
         Some(current) if current != wanted => Err(Error::State(
-            "the library is initialised with other options; call shutdown first".into(),
+            "the library was already started with other options; call upt_shutdown first".into(),
         )),
         _ => {
             *options = Some(wanted.clone());
@@ -39,7 +39,7 @@ pub fn shutdown() -> Result<()> {
             Ok(())
         }
         count => Err(Error::State(format!(
-            "{count} models are alive; close models and scenes first"
+            "{count} models are alive; close all models and scenes first"
         ))),
     }
 }

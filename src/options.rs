@@ -80,7 +80,7 @@ pub enum IndexSet {
 pub struct InitOptions {
     /// Default thread count of models; 0 means 1.
     pub threads: usize,
-    /// ONNX Runtime's shared library; `None` searches beside libupt, `ORT_DYLIB_PATH`, then the system.
+    /// ONNX Runtime's shared library; `None` searches next to libupt, `ORT_DYLIB_PATH`, then the system.
     pub onnxruntime_path: Option<PathBuf>,
 }
 

@@ -26,11 +26,11 @@ pub mod flag {
     pub const CLAMPED: u32 = 512;
     /// The contact block was near singular and was regularised.
     pub const REGULARISED: u32 = 1024;
-    /// The corrections ended inverted: under tools the tissue stays where it was, else the linear response takes their place.
+    /// The corrections ended with inverted elements: under tools the tissue stays where it was, otherwise the linear response replaces them.
     pub const FELL_BACK: u32 = 2048;
     /// The estimated error is above the host's limit.
     pub const ERROR: u32 = 4096;
-    /// Tissue lies more than 1 mm inside of an instrument.
+    /// Tissue lies more than 1 mm inside an instrument.
     pub const DEEP: u32 = 8192;
 
     /// What the flags say, as text.
@@ -49,7 +49,7 @@ pub mod flag {
             (REGULARISED, "the contact block was nearly singular"),
             (
                 FELL_BACK,
-                "the corrections ended inverted and were given up",
+                "the corrections ended with inverted elements and were given up",
             ),
             (ERROR, "the estimated error is above the limit"),
             (DEEP, "tissue lies more than 1 mm inside an instrument"),

@@ -81,7 +81,7 @@ pub fn read<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<(T, &'a [u8])> {
     MISSING.set(0);
     postcard::take_from_bytes(bytes).map_err(|error| match (MISSING.take(), error) {
         (0, postcard::Error::DeserializeUnexpectedEnd) => Error::Snapshot("is cut short".into()),
-        (0, error) => Error::Snapshot(format!("holds what no scene has: {error}")),
+        (0, error) => Error::Snapshot(format!("holds a value that no scene can have: {error}")),
         (missing, _) => memory::none(missing, WHAT),
     })
 }

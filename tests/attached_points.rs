@@ -167,7 +167,7 @@ fn points_attached_late_are_where_they_would_have_been() {
     }
 }
 
-/// A contact node is moved to `c`, whatever the network says, and a point beside it goes along.
+/// A contact node is moved to `c`, whatever the network says, and a point next to it goes along.
 #[test]
 fn points_near_a_contact_follow_what_is_imposed() {
     for name in BUNDLES {

@@ -31,7 +31,7 @@ fn run(command: &mut Command) -> Output {
     output
 }
 
-/// Cargo builds the package's examples beside its tests.
+/// Cargo builds the package's examples together with its tests.
 fn examples() -> PathBuf {
     let test = std::env::current_exe().unwrap();
     test.parent().unwrap().with_file_name("examples")

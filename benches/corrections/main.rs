@@ -1,4 +1,4 @@
-//! What corrections cost: whole steps under a tool, and their parts beside the floor of their bytes and FLOP.
+//! What corrections cost: whole steps under a tool, and their parts compared with the floor of their bytes and FLOP.
 //!
 //! `cargo bench --bench corrections` runs every bundle in `onnx/` that has corrections; `cargo bench --bench corrections -- brain-reduced`
 //! those with that name. The error of a step is the relative L2 difference of its field from that of 40 corrections from the same

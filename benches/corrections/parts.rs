@@ -1,4 +1,4 @@
-//! The parts of a correction, each alone, beside its floor: its bytes over the bandwidth of a copy, or its FLOP over the rate of a matrix
+//! The parts of a correction, each alone, compared with its floor: its bytes over the bandwidth of a copy, or its FLOP over the rate of a matrix
 //! product, whichever is longer. Tables that stay in cache may beat the bandwidth's floor.
 
 use upt::kernels::project::{project_field, row_dots};

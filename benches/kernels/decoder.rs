@@ -241,7 +241,7 @@ pub fn against_references() {
     }
 }
 
-/// The weights of each bundle of kind `upt`: the native kernel beside `decoder.onnx` in tiles, one thread each.
+/// The weights of each bundle of kind `upt`: the native kernel next to `decoder.onnx` in tiles, one thread each.
 pub fn against_onnx_runtime() -> upt::Result<()> {
     for path in bundles() {
         let model = Model::open(&path, &ModelOptions::default())?;

@@ -69,7 +69,7 @@ def providers() -> list[dict[str, Any]]:
 
 
 def shutdown() -> None:
-    """Ends the library. Call it after closing all models, before exit where a GPU provider was used."""
+    """Shuts the library down. Call it after closing all models, and before exit if you used a GPU provider."""
     check(lib.upt_shutdown())
 
 

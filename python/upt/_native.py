@@ -52,7 +52,7 @@ class Status(IntEnum):
     VERSION = -32
     """The version of a bundle or snapshot is not supported."""
     SNAPSHOT = -33
-    """A snapshot is damaged or of another model."""
+    """A snapshot is damaged or belongs to another model."""
     GUARD = -40
     """The guard refused the new state; the last good state stays."""
     PANIC = -90
@@ -102,7 +102,7 @@ class Precision(IntEnum):
     """`UPT_PRECISION_*`."""
 
     F32 = 0
-    """32-bit floats: the reference. Of a scene's options: what its model has."""
+    """32-bit floats: the reference. In a scene's options: the model's precision."""
     BF16 = 1
     """bfloat16 products where the CPU is faster with them, 32-bit floats elsewhere; the statistics say which."""
     F16 = 2
@@ -110,7 +110,7 @@ class Precision(IntEnum):
     INT8 = 3
     """8-bit integers: the bundle's `*.int8.onnx`."""
     FORCE_F32 = 4
-    """Of options only: 32-bit floats also in a scene of a model that was opened with another precision."""
+    """In options only: 32-bit floats, even in a scene of a model that was opened with another precision."""
 
 
 class Kernel(IntEnum):
@@ -130,13 +130,13 @@ class StepPath(IntEnum):
     """`UPT_STEP_*`."""
 
     AUTO = 0
-    """Split on the CPU; on a device the faster of split and whole, timed while the scene is made."""
+    """On the CPU: split. On a device: the faster of split and whole, timed while the scene is created."""
     SPLIT = 1
     """Native encoder and message mean, then `latent.onnx` and the decoder."""
     WHOLE = 2
     """The bundle's `step.onnx`, which decodes every node in every step."""
     MEASURED = 3
-    """Both are timed while the scene is made, and the faster one stays."""
+    """The faster of split and whole, timed while the scene is created."""
 
 
 class Corrections(IntEnum):
@@ -152,12 +152,12 @@ class GuardPolicy(IntEnum):
     """`UPT_GUARD_*`."""
 
     HOLD = 0
-    """Keep the last good state and return `UPT_ERR_GUARD`; without contact, where no later call could do otherwise, as
-    `UPT_GUARD_BLEND`."""
+    """Keep the last good state and return `UPT_ERR_GUARD`. A step without contact, which the host cannot change, is treated as
+    under `UPT_GUARD_BLEND`."""
     REPORT = 1
     """Publish finite states and set flags."""
     BLEND = 2
-    """Replace a refused state by the prior's or by rest and set flags."""
+    """Replace a refused state by the prior's or by rest, and set flags."""
 
 
 class Flag(IntFlag):
@@ -186,7 +186,8 @@ class Flag(IntFlag):
     REGULARISED = 1024
     """The contact block was nearly singular and was regularised."""
     FELL_BACK = 2048
-    """The corrections ended inverted: under tools the tissue stays where it was, else the linear response takes their place."""
+    """The corrections ended with inverted elements: under tools the tissue stays where it was, otherwise the linear response
+    replaces them."""
     ERROR = 4096
     """The estimated error is above the scene's `error_limit_mm`."""
     DEEP = 8192
@@ -220,7 +221,7 @@ class Shape(IntEnum):
     SPATULA = 2
     """An instrument's shape: a box with rounded corners."""
     HULL = 3
-    """An instrument's shape: a hull of `upt_hull_create`."""
+    """An instrument's shape: a hull from `upt_hull_create`."""
 
 
 class Mode(IntEnum):
@@ -229,7 +230,8 @@ class Mode(IntEnum):
     SLIDE = 0
     """An instrument pushes, with Coulomb friction."""
     GRASP = 1
-    """An instrument holds what lies within 0.5 mm of it when the mode changes to this, until the mode changes back or the grasp tears off."""
+    """An instrument grasps what lies within 0.5 mm of it when the mode changes to this, and holds it until the mode changes back
+    or the grasp tears off."""
 
 
 class InitOptions(Record):
@@ -238,9 +240,9 @@ class InitOptions(Record):
     struct_size: int
     """`sizeof(upt_init_options)`."""
     threads: int
-    """Default number of threads of a model; 0: 1."""
+    """Default number of threads of a model; 0 means 1."""
     onnxruntime_path: str | None = text("_onnxruntime_path")
-    """ONNX Runtime's shared library, a path; NULL: the folder of libupt, then `ORT_DYLIB_PATH`, then the system."""
+    """Path of ONNX Runtime's shared library; NULL searches the folder of libupt, then `ORT_DYLIB_PATH`, then the system."""
 
     _fields_ = [
         ("struct_size", ctypes.c_uint32),
@@ -253,9 +255,9 @@ class InitOptionsKeywords(TypedDict, total=False):
     """Fields of `InitOptions`."""
 
     threads: int
-    """Default number of threads of a model; 0: 1."""
+    """Default number of threads of a model; 0 means 1."""
     onnxruntime_path: str | os.PathLike[str] | None
-    """ONNX Runtime's shared library, a path; NULL: the folder of libupt, then `ORT_DYLIB_PATH`, then the system."""
+    """Path of ONNX Runtime's shared library; NULL searches the folder of libupt, then `ORT_DYLIB_PATH`, then the system."""
 
 
 class ModelOptions(Record):
@@ -276,7 +278,7 @@ class ModelOptions(Record):
     gpu_memory_limit: int
     """Bytes; 0: no limit. Needs a GPU provider in `providers`."""
     cache_dir: str | None = text("_cache_dir")
-    """Folder for compiled engines; NULL: none is kept."""
+    """Folder for compiled engines; NULL: they are not kept."""
     allow_tf32: bool = boolean("_allow_tf32")
     """1: TF32 products allowed (CUDA; errors near 1e-3)."""
     cuda_graph: bool = boolean("_cuda_graph")
@@ -286,7 +288,7 @@ class ModelOptions(Record):
     reserved: int
     """Zero."""
     user_stream: int | None
-    """A `cudaStream_t` of `device_id` to run the graphs on, which outlives the model and its scenes; NULL: one of ONNX Runtime's own."""
+    """A `cudaStream_t` of `device_id` that runs the graphs and must outlive the model and its scenes; NULL: ONNX Runtime makes its own."""
 
     _fields_ = [
         ("struct_size", ctypes.c_uint32),
@@ -319,7 +321,7 @@ class ModelOptionsKeywords(TypedDict, total=False):
     gpu_memory_limit: int
     """Bytes; 0: no limit. Needs a GPU provider in `providers`."""
     cache_dir: str | os.PathLike[str] | None
-    """Folder for compiled engines; NULL: none is kept."""
+    """Folder for compiled engines; NULL: they are not kept."""
     allow_tf32: bool
     """1: TF32 products allowed (CUDA; errors near 1e-3)."""
     cuda_graph: bool
@@ -327,7 +329,7 @@ class ModelOptionsKeywords(TypedDict, total=False):
     no_fallback: bool
     """1: fail with `UPT_ERR_PROVIDER` when the first provider cannot run the model."""
     user_stream: int | None
-    """A `cudaStream_t` of `device_id` to run the graphs on, which outlives the model and its scenes; NULL: one of ONNX Runtime's own."""
+    """A `cudaStream_t` of `device_id` that runs the graphs and must outlive the model and its scenes; NULL: ONNX Runtime makes its own."""
 
 
 class ModelInfo(Record):
@@ -390,7 +392,7 @@ class SceneOptions(Record):
     kernel: Kernel = choice("_kernel", Kernel)
     """`UPT_KERNEL_*`: who decodes."""
     precision: Precision = choice("_precision", Precision)
-    """`UPT_PRECISION_*` of the native decoder; 0: the model's, `UPT_PRECISION_FORCE_F32`: float32 whatever the model has."""
+    """`UPT_PRECISION_*` of the native decoder; 0: the model's; `UPT_PRECISION_FORCE_F32`: float32, whatever the model's is."""
     guard_policy: GuardPolicy = choice("_guard_policy", GuardPolicy)
     """`UPT_GUARD_*`."""
     mesh_path: str | None = text("_mesh_path")
@@ -402,14 +404,14 @@ class SceneOptions(Record):
     check_inversion: bool = boolean("_check_inversion")
     """1: the guard looks for inverted elements in each step."""
     latest_wins: bool = boolean("_latest_wins")
-    """1: a submit while a step is in flight replaces the waiting contact instead of `UPT_ERR_BUSY`."""
+    """1: a submit while a step is in flight replaces the waiting contact and does not return `UPT_ERR_BUSY`."""
     cubic_sampling: bool = boolean("_cubic_sampling")
     """1: sample with a cubic through the last states instead of a line."""
     interpolate_points: bool = boolean("_interpolate_points")
     """1: attached points are interpolated between nodes, not decoded (kind `upt`)."""
     substeps: int
-    """Substeps of a step that instruments drive, at most, where it alone would err by more than the corrections' target: 1 for none, up to
-    8, 0 as many as the bundle recommends. From 2 only with a target."""
+    """The most substeps of a step that instruments drive, where one step would miss the corrections' target: 1 for none, up to 8; 0: as
+    many as the bundle recommends. 2 or more need a target."""
     reserved: tuple[int, ...] = vector("_reserved")
     """Zero."""
     step_path: StepPath = choice("_step_path", StepPath)
@@ -420,15 +422,15 @@ class SceneOptions(Record):
     corrections_budget_us: int
     """No correction starts later than this in a step, µs; 0: no budget. Only with a count or `UPT_CORRECTIONS_AUTO`."""
     corrections_target_mm: float
-    """Enough where the estimated error is below this, mm; 0: no target. Only with a count or `UPT_CORRECTIONS_AUTO`."""
+    """Corrections stop once the estimated error is below this, mm; 0: no target. Only with a count or `UPT_CORRECTIONS_AUTO`."""
     error_limit_mm: float
-    """`UPT_FLAG_ERROR` rises where the estimated error is above this, mm; 0: never."""
+    """`UPT_FLAG_ERROR` rises if the estimated error is above this, mm; 0: never."""
     step_s: float
-    """Length of a step, s: 0.01 to 0.05, or 0 for the bundle's. Another length than the bundle's needs corrections
-    (`UPT_ERR_UNSUPPORTED` without); the learned part is left out then."""
+    """Length of a step, s: 0.01 to 0.05, or 0 for the bundle's. A length other than the bundle's needs corrections
+    (without them: `UPT_ERR_UNSUPPORTED`) and leaves the learned part out."""
     damping_per_s: float
-    """Mass-proportional damping of the tissue, 1/s: 0.01 to 1000, or 0 for the bundle's. Another than the bundle's needs
-    corrections (`UPT_ERR_UNSUPPORTED` without); the learned part is left out then."""
+    """Mass-proportional damping of the tissue, 1/s: 0.01 to 1000, or 0 for the bundle's. A damping other than the bundle's
+    needs corrections (without them: `UPT_ERR_UNSUPPORTED`) and leaves the learned part out."""
 
     _fields_ = [
         ("struct_size", ctypes.c_uint32),
@@ -463,7 +465,7 @@ class SceneOptionsKeywords(TypedDict, total=False):
     kernel: Kernel | str | int
     """`UPT_KERNEL_*`: who decodes."""
     precision: Precision | str | int
-    """`UPT_PRECISION_*` of the native decoder; 0: the model's, `UPT_PRECISION_FORCE_F32`: float32 whatever the model has."""
+    """`UPT_PRECISION_*` of the native decoder; 0: the model's; `UPT_PRECISION_FORCE_F32`: float32, whatever the model's is."""
     guard_policy: GuardPolicy | str | int
     """`UPT_GUARD_*`."""
     mesh_path: str | os.PathLike[str] | None
@@ -475,14 +477,14 @@ class SceneOptionsKeywords(TypedDict, total=False):
     check_inversion: bool
     """1: the guard looks for inverted elements in each step."""
     latest_wins: bool
-    """1: a submit while a step is in flight replaces the waiting contact instead of `UPT_ERR_BUSY`."""
+    """1: a submit while a step is in flight replaces the waiting contact and does not return `UPT_ERR_BUSY`."""
     cubic_sampling: bool
     """1: sample with a cubic through the last states instead of a line."""
     interpolate_points: bool
     """1: attached points are interpolated between nodes, not decoded (kind `upt`)."""
     substeps: int
-    """Substeps of a step that instruments drive, at most, where it alone would err by more than the corrections' target: 1 for none, up to
-    8, 0 as many as the bundle recommends. From 2 only with a target."""
+    """The most substeps of a step that instruments drive, where one step would miss the corrections' target: 1 for none, up to 8; 0: as
+    many as the bundle recommends. 2 or more need a target."""
     step_path: StepPath | str | int
     """`UPT_STEP_*`: who makes a step of a `UPT_KIND_UPT` bundle."""
     corrections: Corrections | str | int
@@ -491,15 +493,15 @@ class SceneOptionsKeywords(TypedDict, total=False):
     corrections_budget_us: int
     """No correction starts later than this in a step, µs; 0: no budget. Only with a count or `UPT_CORRECTIONS_AUTO`."""
     corrections_target_mm: float
-    """Enough where the estimated error is below this, mm; 0: no target. Only with a count or `UPT_CORRECTIONS_AUTO`."""
+    """Corrections stop once the estimated error is below this, mm; 0: no target. Only with a count or `UPT_CORRECTIONS_AUTO`."""
     error_limit_mm: float
-    """`UPT_FLAG_ERROR` rises where the estimated error is above this, mm; 0: never."""
+    """`UPT_FLAG_ERROR` rises if the estimated error is above this, mm; 0: never."""
     step_s: float
-    """Length of a step, s: 0.01 to 0.05, or 0 for the bundle's. Another length than the bundle's needs corrections
-    (`UPT_ERR_UNSUPPORTED` without); the learned part is left out then."""
+    """Length of a step, s: 0.01 to 0.05, or 0 for the bundle's. A length other than the bundle's needs corrections
+    (without them: `UPT_ERR_UNSUPPORTED`) and leaves the learned part out."""
     damping_per_s: float
-    """Mass-proportional damping of the tissue, 1/s: 0.01 to 1000, or 0 for the bundle's. Another than the bundle's needs
-    corrections (`UPT_ERR_UNSUPPORTED` without); the learned part is left out then."""
+    """Mass-proportional damping of the tissue, 1/s: 0.01 to 1000, or 0 for the bundle's. A damping other than the bundle's
+    needs corrections (without them: `UPT_ERR_UNSUPPORTED`) and leaves the learned part out."""
 
 
 class Instrument(Record):
@@ -518,13 +520,13 @@ class Instrument(Record):
     radius: float
     """A capsule's radius or a spatula's corner radius, mm."""
     sticking: bool = boolean("_sticking")
-    """`upt_scene_contacts_from_instruments` alone: 1: touched nodes move with the instrument until it leaves; 0: they slide."""
+    """Only for `upt_scene_contacts_from_instruments`. 1: touched nodes move with the instrument until it leaves; 0: they slide."""
     mode: Mode = choice("_mode", Mode)
-    """`upt_scene_step_instruments` alone: `UPT_MODE_*`."""
+    """Only for `upt_scene_step_instruments`: `UPT_MODE_*`."""
     reserved: tuple[int, ...] = vector("_reserved")
     """Zero."""
     friction: float
-    """`upt_scene_step_instruments` alone: Coulomb's coefficient, 0 or more."""
+    """Only for `upt_scene_step_instruments`: Coulomb's coefficient, 0 or more."""
     tear_off_mn: float
     """A grasp tears off when its points together pull harder than this, mN; 0: never."""
     hull: int | None
@@ -558,7 +560,7 @@ class InstrumentReading(Record):
     torque: tuple[float, ...] = vector("_torque")
     """On the instrument about its position, mN mm."""
     penetration_mm: float
-    """How deep the deepest point of the surface lies inside the instrument, mm."""
+    """Depth of the deepest point of the surface inside the instrument, mm."""
     torn: bool = boolean("_torn")
     """1: its grasp tore off in this step."""
     reserved: tuple[int, ...] = vector("_reserved")
@@ -581,7 +583,7 @@ class InstrumentContact(Record):
     instrument: int
     """Place of the instrument in the step's array."""
     position: tuple[float, ...] = vector("_position")
-    """Where the point is, mm."""
+    """Position of the point, mm."""
     force: tuple[float, ...] = vector("_force")
     """On the instrument, mN."""
 
@@ -600,17 +602,17 @@ class HapticsOptions(Record):
     instrument: int
     """The tool's place in the array of instruments that drives the steps."""
     tool: int | None
-    """Its shape, mode and friction, as in that array; position and rotation say where it is first."""
+    """Its shape, mode and friction, as in that array; position and rotation say where it starts."""
     blend_ms: float
-    """What a new step puts elsewhere is blended in over this time, ms; 0: 25."""
+    """Time over which the change that a new step brings is blended in, ms; 0: 25."""
     step_latency_ms: float
-    """How old a step is when it arrives, ms: the time since the poses that it was given were taken; 0: as long as it took."""
+    """Age of a step when it arrives, ms: the time since its poses were taken; 0: as long as the step took."""
     force_limit_n: float
     """Longest force, N; 0: no limit."""
     damping_limit_n_s_per_m: float
-    """What the passivity controller damps with at most, N s/m; 0: 5."""
+    """The most that the passivity controller damps, N s/m; 0: 5."""
     no_passivity: bool = boolean("_no_passivity")
-    """1: without the passivity observer and controller."""
+    """1: no passivity observer and controller."""
     reserved: tuple[int, ...] = vector("_reserved")
     """Zero."""
 
@@ -633,30 +635,30 @@ class HapticsOptionsKeywords(TypedDict, total=False):
     instrument: int
     """The tool's place in the array of instruments that drives the steps."""
     tool: int | None
-    """Its shape, mode and friction, as in that array; position and rotation say where it is first."""
+    """Its shape, mode and friction, as in that array; position and rotation say where it starts."""
     blend_ms: float
-    """What a new step puts elsewhere is blended in over this time, ms; 0: 25."""
+    """Time over which the change that a new step brings is blended in, ms; 0: 25."""
     step_latency_ms: float
-    """How old a step is when it arrives, ms: the time since the poses that it was given were taken; 0: as long as it took."""
+    """Age of a step when it arrives, ms: the time since its poses were taken; 0: as long as the step took."""
     force_limit_n: float
     """Longest force, N; 0: no limit."""
     damping_limit_n_s_per_m: float
-    """What the passivity controller damps with at most, N s/m; 0: 5."""
+    """The most that the passivity controller damps, N s/m; 0: 5."""
     no_passivity: bool
-    """1: without the passivity observer and controller."""
+    """1: no passivity observer and controller."""
 
 
 class HapticPose(Record):
-    """Where a tool is at a moment; the input of `upt_haptics_render`."""
+    """A tool's pose at a moment; the input of `upt_haptics_render`."""
 
     struct_size: int
     """`sizeof(upt_haptic_pose)`."""
     has_velocity: bool = boolean("_has_velocity")
-    """1: the velocities are given; 0: they are those between the last two poses."""
+    """1: the velocities below are given; 0: they follow from the last two poses."""
     reserved: tuple[int, ...] = vector("_reserved")
     """Zero."""
     time_s: float
-    """The host's clock, s; never before that of the last call."""
+    """The host's clock, s; never earlier than in the last call."""
     position_m: tuple[float, ...] = vector("_position_m")
     """In the mesh's frame, metres."""
     rotation: tuple[float, ...] = vector("_rotation")
@@ -694,15 +696,15 @@ class HapticForce(Record):
     step_count: int
     """States of the scene that this object has seen."""
     age_s: float
-    """Watchdog: how old the last of them is, s."""
+    """Watchdog: age of the last of these states, s."""
     excess_energy_j: float
-    """Energy that the hand was given beyond what came from it since the tool last touched, J; the controller takes it back."""
+    """Energy that the hand received, less what it gave, since the tool last touched, J; the controller takes it back."""
     force_n: tuple[float, ...] = vector("_force_n")
     """On the tool, N, in the mesh's frame."""
     torque_n_m: tuple[float, ...] = vector("_torque_n_m")
     """On the tool about its position, N m."""
     stiffness_n_per_m: tuple[float, ...] = vector("_stiffness_n_per_m")
-    """`[3,3]`, row-major: how the force falls with the position, N/m. With the next two a symmetric 6x6 stiffness, of contact alone."""
+    """`[3,3]`, row-major: how the force falls with the position, N/m. With the next two: a symmetric 6x6 stiffness of the contact alone."""
     coupling_n_per_rad: tuple[float, ...] = vector("_coupling_n_per_rad")
     """`[3,3]`, row-major: how the force falls with the rotation, N/rad; transposed, the torque with the position, N m/m."""
     angular_stiffness_n_m_per_rad: tuple[float, ...] = vector("_angular_stiffness_n_m_per_rad")
@@ -755,7 +757,7 @@ class SceneStats(Record):
     contact_count: int
     """Contact nodes of the last step."""
     memory_bytes: int
-    """Bytes that the scene has allocated in addition to the model; pages that it never touches are not resident."""
+    """Bytes that the scene has allocated in addition to the model; pages that it has never touched are not resident."""
     threads: int
     """Threads of a step."""
     kernel: Kernel = choice("_kernel", Kernel)
@@ -775,13 +777,13 @@ class SceneStats(Record):
     prior_forces: bool = boolean("_prior_forces")
     """1: `upt_scene_contact_force` gives the contact forces of the linear response; 0: the elements' elastic forces."""
     substeps: int
-    """Substeps that the last step was made of; 0 where it is one."""
+    """Substeps of the last step; 0 if it was not split."""
     reserved: tuple[int, ...] = vector("_reserved")
     """Zero."""
     upload_ms: float
-    """Of the stages' times, copies to a device, ms; 0 on the CPU."""
+    """Part of the stages' times: copies to a device, ms; 0 on the CPU."""
     download_ms: float
-    """Of the stages' times, copies back from a device, ms; 0 on the CPU."""
+    """Part of the stages' times: copies back from a device, ms; 0 on the CPU."""
     step_path: StepPath = choice("_step_path", StepPath)
     """`UPT_STEP_SPLIT` or `UPT_STEP_WHOLE`."""
     corrections: int
@@ -791,13 +793,13 @@ class SceneStats(Record):
     evaluations: int
     """Evaluations of the element forces in the last step."""
     residual: float
-    """Residual force after the corrections over that before them; 0 without corrections."""
+    """Residual force after the corrections divided by that before them; 0 without corrections."""
     error_mm: float
     """Estimated root mean square error of the corrected state over all nodes, mm; 0 without corrections."""
     min_det: float
-    """Smallest det F of the corrected state; without corrections, of the elements at the contact; 0 where there is neither."""
+    """Smallest det F of the corrected state; without corrections, of the elements at the contact; 0 if there are neither."""
     contact_ms: float
-    """Solves of the contact of instruments, ms; part of `corrections_ms`, without corrections of `check_ms`."""
+    """Contact solves of instruments, ms; part of `corrections_ms`, or of `check_ms` without corrections."""
 
     _fields_ = [
         ("struct_size", ctypes.c_uint32),

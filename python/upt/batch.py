@@ -36,7 +36,7 @@ def core_count() -> int:
 
 
 class BatchedScenes:
-    """`count` scenes of one model; each call steps all of them, a scene on one thread, scenes on all cores.
+    """`count` scenes of one model; each call steps all of them, each scene on one thread, over all cores.
 
     Args:
         model: what to step; its tables are shared.

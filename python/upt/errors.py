@@ -33,7 +33,7 @@ class UnsupportedError(Error):
 
 
 class OutOfMemoryError(Error, MemoryError):
-    """There is no memory for what the call needs."""
+    """There is not enough memory for the call."""
 
 
 class RuntimeLibraryError(Error):

@@ -94,5 +94,5 @@ class Haptics:
         return out
 
     def close(self) -> None:
-        """Ends it; the scene goes on. Also done when the object is collected."""
+        """Destroys the object; the scene stays usable. Also done when the object is collected."""
         self._destroy()

@@ -1,4 +1,4 @@
-"""Rigid instruments that drive a scene's steps, and the hull of a tool of one's own."""
+"""Rigid instruments that drive a scene's steps, and the hull of your own tool."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Hull:
         self._destroy = weakref.finalize(self, lib.upt_hull_destroy, handle.value)
 
     def close(self) -> None:
-        """Frees the hull; steps that were submitted with it go on. Also done when the object is collected."""
+        """Frees the hull; steps that were submitted with it still finish. Also done when the object is collected."""
         self._destroy()
 
 
@@ -57,13 +57,13 @@ class Instrument:
     radius: float = 0.0
     """A capsule's radius or a spatula's corner radius, mm."""
     friction: float = 0.0
-    """Coulomb's coefficient, 0 or more. `step_instruments` alone."""
+    """Coulomb's coefficient, 0 or more. Only for `step_instruments`."""
     grasp: bool = False
-    """Whether it holds what was within 0.5 mm of it when this became true. `step_instruments` alone."""
+    """Whether it holds what was within 0.5 mm of it when this became true. Only for `step_instruments`."""
     tear_off: float = 0.0
-    """A grasp lets go where the tissue pulls harder than this, mN; 0: never."""
+    """A grasp tears off when the tissue pulls harder than this, mN; 0: never."""
     sticking: bool = False
-    """`contacts` alone: touched nodes move with the instrument until it leaves."""
+    """Only for `contacts`: touched nodes move with the instrument until it leaves."""
     hull_of: Hull | None = None
     """The shape of an instrument of shape hull."""
 

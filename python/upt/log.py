@@ -27,7 +27,7 @@ _RECEIVER = ctypes.CFUNCTYPE(None, ctypes.c_int32, ctypes.c_char_p, ctypes.c_voi
 
 
 def set_log(level: LogLevel | str) -> None:
-    """Sends messages of this severity and above to the logger `upt`; `"off"` ends it."""
+    """Sends messages of this severity and above to the logger `upt`; `"off"` turns this off."""
     chosen = LogLevel[level.upper()] if isinstance(level, str) else LogLevel(level)
     callback = None if chosen is LogLevel.OFF else ctypes.cast(_RECEIVER, ctypes.c_void_p)
     check(lib.upt_set_log(callback, None, chosen))

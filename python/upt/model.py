@@ -68,7 +68,7 @@ class Model:
         return self.info.dt
 
     def describe(self) -> dict[str, Any]:
-        """Name, bundle hash, the provider of each stage and why others were not taken."""
+        """Name, bundle hash, the provider of each stage and why the others were not chosen."""
         described: dict[str, Any] = json.loads(read_text(lib.upt_model_describe, self._handle))
         return described
 
@@ -81,7 +81,7 @@ class Model:
         return out
 
     def indices(self, which: IndexSet | int) -> Indices:
-        """A static index set as `[n]` uint32: node indices, 3 a face, 4 a tetrahedron."""
+        """A static index set as `[n]` uint32: node indices, 3 per face, 4 per tetrahedron."""
         needed = ctypes.c_uint64()
         check(lib.upt_model_indices(self._handle, which, None, 0, ctypes.byref(needed)))
         out = np.empty(needed.value, np.uint32)
@@ -119,7 +119,7 @@ class Model:
         return self.indices(IndexSet.TETS).reshape(-1, 4)
 
     def close(self) -> None:
-        """Frees the model; its scenes live on. Also done when the object is collected."""
+        """Frees the model; its scenes stay usable. Also done when the object is collected."""
         self._close()
 
     def __enter__(self) -> Model:

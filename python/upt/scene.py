@@ -201,7 +201,7 @@ class Scene:
         return check(lib.upt_scene_poll(self._handle)) != Status.PENDING
 
     def wait(self, timeout: float | None = None) -> bool:
-        """Waits for the submitted step, at most `timeout` seconds; false when they are over; raises its error."""
+        """Waits for the submitted step, at most `timeout` seconds; False if the time is up; raises the step's error."""
         milliseconds = FOREVER_MS if timeout is None else min(max(int(timeout * 1000), 0), FOREVER_MS)
         return check(lib.upt_scene_wait(self._handle, milliseconds)) != Status.PENDING
 
@@ -214,7 +214,7 @@ class Scene:
     def present(self, seconds: float, instruments: Sequence[Instrument] = (), out: Floats | None = None) -> Floats:
         """The tissue at this moment, between steps, with the instruments where they are now: frames without lag.
 
-        Works beside a step in flight; the first call comes before the first submit. Another thread may step meanwhile.
+        Works while a step is in flight; make the first call before the first submit. Another thread may step meanwhile.
 
         Args:
             seconds: time since the last published step, 0 or more; velocities are followed for two steps at most.
@@ -302,7 +302,7 @@ class Scene:
 
     @property
     def stats(self) -> SceneStats:
-        """What the last step did and cost; works beside a step in flight."""
+        """What the last step did and cost; works while a step is in flight."""
         stats = SceneStats()
         check(lib.upt_scene_get_stats(self._handle, ctypes.byref(stats)))
         return stats
@@ -326,7 +326,7 @@ class Scene:
         self._instrument_count = 0
 
     def close(self) -> None:
-        """Frees the scene; a step in flight is waited for. Also done when the object is collected."""
+        """Frees the scene after waiting for a step in flight. Also done when the object is collected."""
         status = self._destroy()
         if status is not None:
             check(status)

@@ -89,7 +89,7 @@ impl Manifest {
                 check(
                     swings,
                     "prior.vibration",
-                    "kind `reduced` has it only without a learned map (field `reduced`)",
+                    "in kind `reduced` it is allowed only without a learned map (field `reduced`)",
                 )?;
             }
             if let Some(release) = &prior.release {
@@ -101,7 +101,7 @@ impl Manifest {
                 check(
                     swings,
                     "prior.release",
-                    "goes on from the free vibration of kind `reduced` (field `prior.vibration`)",
+                    "needs the free vibration of kind `reduced` (field `prior.vibration`)",
                 )?;
             }
         }
@@ -110,7 +110,7 @@ impl Manifest {
                 let upt = self
                     .upt
                     .as_ref()
-                    .ok_or_else(|| bad("upt", "is missing, kind `upt` needs it"))?;
+                    .ok_or_else(|| bad("upt", "is missing; kind `upt` needs it"))?;
                 upt.check()?;
                 for file in ["embed.onnx", "latent.onnx", "decoder.onnx"] {
                     self.listed(file, "files")?;
@@ -122,7 +122,7 @@ impl Manifest {
                 check(
                     !upt.needs_prior() || self.prior.is_some(),
                     "prior",
-                    "is missing, the features or the base need it",
+                    "is missing; the features or the base need it",
                 )
             }
             ManifestKind::Reduced => {
@@ -142,7 +142,7 @@ impl Manifest {
                 check(
                     self.prior.is_some(),
                     "prior",
-                    "is missing, kind `reduced` needs it",
+                    "is missing; kind `reduced` needs it",
                 )
             }
         }

@@ -33,7 +33,7 @@ impl BundleFiles {
         if length > LARGEST_MANIFEST {
             return Err(Error::bundle(
                 "bundle.json",
-                format!("has {length} bytes, at most {LARGEST_MANIFEST} are read"),
+                format!("has {length} bytes; at most {LARGEST_MANIFEST} are allowed"),
             ));
         }
         let bytes = read_regular(&path)?;

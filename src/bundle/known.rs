@@ -7,7 +7,7 @@ use super::faults::{FILE, bad};
 use crate::error::{Error, Result};
 
 /// What `requires` may name: each changes what a step gives, and a library without it must refuse the bundle. A new one is
-/// one line here, beside its keys in [`KEYS`].
+/// one line here, next to its keys in [`KEYS`].
 const REQUIREMENTS: &[&str] = &[
     "anchors",
     "corrections",

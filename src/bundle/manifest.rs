@@ -72,9 +72,9 @@ pub struct ToolEnvelope {
 pub struct PriorEntry {
     /// File of the bundle.
     pub file: String,
-    /// File with the free vibration that follows a release; not beside a learned map of kind `reduced`.
+    /// File with the free vibration that follows a release; not together with a learned map of kind `reduced`.
     pub vibration: Option<String>,
-    /// File with the learned map of a release, beside the free vibration of kind `reduced`.
+    /// File with the learned map of a release, in addition to the free vibration of kind `reduced`.
     pub release: Option<String>,
 }
 
@@ -315,7 +315,7 @@ pub struct Manifest {
     /// Precisions of the graphs.
     #[serde(default)]
     pub precisions: Vec<String>,
-    /// Where the network's own free motion ends beside rest: its largest `|u|` of a node, mm; 0 where it ends at rest.
+    /// How far from rest the network's own free motion ends: its largest `|u|` of a node, mm; 0 where it ends at rest.
     #[serde(default)]
     pub rest_displacement_mm: f32,
     /// Linear response.

@@ -27,7 +27,10 @@ pub(super) fn check(bytes: &[u8], manifest: &Value) -> Result<()> {
         .map(|(at, _)| at)
         .collect();
     let [at] = places[..] else {
-        return Err(bad(FIELD, "must stand in the file once, as it is"));
+        return Err(bad(
+            FIELD,
+            "must appear in the file exactly once, as plain text",
+        ));
     };
     let mut hash = Sha256::new();
     hash.update(&bytes[..at]);

@@ -73,7 +73,11 @@ impl Past {
     /// # Errors
     /// [`Error::Snapshot`].
     pub fn check(&self, samples: u32) -> Result<()> {
-        let bad = |what: &str| Err(Error::Snapshot(format!("holds {what} that no scene has")));
+        let bad = |what: &str| {
+            Err(Error::Snapshot(format!(
+                "holds {what} that no scene can have"
+            )))
+        };
         let Past { tools, forces } = self;
         if tools.len() > MAX_TOOLS {
             return bad("a number of instruments");

@@ -37,7 +37,7 @@ impl History {
         motion.check(len, contacts)?;
         if pairs.len() > PAIRS {
             return Err(Error::Snapshot(format!(
-                "holds {} pairs of corrections, more than any scene",
+                "holds {} pairs of corrections, more than any scene has",
                 pairs.len()
             )));
         }

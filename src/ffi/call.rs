@@ -51,7 +51,7 @@ fn misplaced() -> Option<&'static str> {
     let here = std::process::id();
     match PROCESS.compare_exchange(0, here, Ordering::Relaxed, Ordering::Relaxed) {
         Err(first) if first != here => Some(
-            "the process was forked after the library was used, and its threads stayed behind; use it in one of the two, or load it after the fork",
+            "the process was forked after the library was used, and the library's threads stayed in the parent; use it in one of the two processes, or load it after the fork",
         ),
         _ => None,
     }

@@ -13,7 +13,7 @@ use crate::{
 fn unknown<T>(field: &str, value: i32) -> Result<T, Failure> {
     fail(
         UPT_ERR_ARGUMENT,
-        format!("{field} is {value}, which has no meaning; see upt.h"),
+        format!("{field} is {value}, which is not a valid value; see upt.h"),
     )
 }
 
@@ -98,7 +98,7 @@ pub(super) fn shape(raw: &upt_instrument) -> Result<crate::instrument::Shape, Fa
         UPT_SHAPE_HULL => {
             return fail(
                 UPT_ERR_UNSUPPORTED,
-                "instruments[].shape: hulls are for upt_scene_step_instruments",
+                "instruments[].shape: this call takes no hulls; use upt_scene_step_instruments",
             );
         }
         value => return unknown("instruments[].shape", value),
@@ -200,7 +200,7 @@ pub(super) unsafe fn model_options(raw: &upt_model_options) -> Result<ModelOptio
         return fail(
             UPT_ERR_ARGUMENT,
             format!(
-                "provider_count is {}; a list of more than {MOST_PROVIDERS} has no meaning",
+                "provider_count is {}; the list may hold at most {MOST_PROVIDERS}",
                 raw.provider_count
             ),
         );

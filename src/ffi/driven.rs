@@ -26,8 +26,8 @@ const WITHOUT: &str = "this build has no feature \"contact\"";
 
 /// One step from the scene's own state, driven by rigid instruments. Their contact with the tissue is solved.
 ///
-/// Give the pose that each instrument has at the end of the step; it moves there on a straight line from its last pose.
-/// An instrument that would move more than 40 mm in a step is placed there instead. Contact is unilateral, with Coulomb
+/// Give the pose of each instrument at the end of the step; the instrument moves there on a straight line from its last
+/// pose. An instrument that would move more than 40 mm in a step is placed there without a motion. Contact is unilateral, with Coulomb
 /// friction, at points of the domain's surface at most 1.7 mm apart. A scene with corrections solves it inside each
 /// correction, as a load; with `corrections = UPT_CORRECTIONS_NONE` it is solved once, on the linear response. The scene
 /// remembers each place of the array: pass every instrument every time, in the same order.

@@ -21,7 +21,7 @@ use crate::instrument::{Instrument, MAX_INSTRUMENTS, Shape};
 /// every instrument every time, in the same order. NULL with count 0 releases all.
 ///
 /// - `instruments`: at most 64, each with its `struct_size` set.
-/// - `contact_nodes`: `[capacity]`, contact_vectors: `[capacity,3]`, mm; both may be NULL with capacity 0, which only
+/// - `contact_nodes`: `[capacity]`, `contact_vectors`: `[capacity,3]`, mm; both may be NULL with capacity 0, which only
 ///   queries the count.
 /// - `contact_count`: number of contacts found, always written.
 ///
@@ -122,7 +122,7 @@ unsafe fn read_instruments(
 
 /// Copies the reaction of the tissue at the last step's contact nodes, in their order.
 ///
-/// A bundle with a linear response (`prior_forces` of the statistics is 1) gives that response's contact forces,
+/// A bundle with a linear response (`prior_forces` of the statistics is 1) gives the contact forces of that response,
 /// `-A_CC^-1 c`: nodes that borrow a column of the compliance share its force, and held nodes and nodes far from the
 /// domain get zero. Other bundles give the elastic force of the elements around each node at the last state. Both leave
 /// out inertia and damping.

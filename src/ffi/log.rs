@@ -105,7 +105,7 @@ pub(super) fn set(callback: upt_log_fn, user: *mut c_void, level: i32) -> Answer
         if INSTALLED.load(Ordering::Acquire) == 0 {
             return fail(
                 UPT_ERR_STATE,
-                "the process has a tracing subscriber of its own; listen there",
+                "the process has its own tracing subscriber; receive the log there",
             );
         }
     }

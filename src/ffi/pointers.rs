@@ -61,7 +61,7 @@ pub(super) fn length<T>(count: u64, name: &str) -> Result<usize, Failure> {
         Ok(count) if count <= isize::MAX as usize / size_of::<T>().max(1) => Ok(count),
         _ => fail(
             UPT_ERR_ARGUMENT,
-            format!("{name}: a count of {count} is beyond any memory"),
+            format!("{name}: a count of {count} is larger than any memory"),
         ),
     }
 }
@@ -161,7 +161,7 @@ pub(super) unsafe fn struct_size<T: Sized32>(
     fail(
         UPT_ERR_STRUCT_SIZE,
         format!(
-            "{name}: struct_size is {size}; set it to sizeof({}), here {}",
+            "{name}: struct_size is {size}; set it to sizeof({}), which is {} here",
             T::NAME,
             size_of::<T>()
         ),

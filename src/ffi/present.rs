@@ -99,9 +99,9 @@ unsafe fn shown(scene: &Scene, contact: Contact<'_>, frame: Frame) -> Result<(),
 /// The tissue at a moment between steps, with the instruments where they are at that moment: frames without lag.
 ///
 /// The velocities of the last published state continue as far as the instruments do, and contact is solved at the poses given here with
-/// the compliance of that time. Use any frame rate, even an uneven one, and call it while a submitted step is in flight too. When a step
-/// arrives, the frame goes on from where it would have been without it, and over to it within two fifths of a step, or at 25 mm/s where
-/// that takes longer, within two steps in any case.
+/// the compliance of that time. Any frame rate works, even an uneven one, and a submitted step may be in flight. When a step arrives, the
+/// frames start from where they would have been without it. They blend into the new step within two fifths of a step, or at 25 mm/s where
+/// that takes longer, but always within two steps.
 ///
 /// - `seconds`: time since the last published step, 0 or more; velocities are followed for two steps at most.
 /// - `instruments`: as `upt_scene_step_instruments`.
@@ -164,8 +164,8 @@ pub unsafe extern "C" fn upt_scene_present_points(
 
 /// As `upt_scene_present`, with a collision field in place of instruments, for scenes that `upt_scene_step_contacts` drives.
 ///
-/// Nodes go where the list says, by the compliance of that time. Nodes of the last step that are no longer listed are released: they
-/// lose the force that held them.
+/// The listed nodes go where the list says; the others follow by the compliance of that time. Nodes of the last step that are no longer
+/// listed are released: they lose the force that held them.
 ///
 /// - `seconds`: as `upt_scene_present`.
 /// - `contact_nodes`: `[m]` node indices, each at most once, in any order.

@@ -35,7 +35,7 @@ pub const UPT_ERR_IO: i32 = -30;
 pub const UPT_ERR_BUNDLE: i32 = -31;
 /// The version of a bundle or snapshot is not supported.
 pub const UPT_ERR_VERSION: i32 = -32;
-/// A snapshot is damaged or of another model.
+/// A snapshot is damaged or belongs to another model.
 pub const UPT_ERR_SNAPSHOT: i32 = -33;
 /// The guard refused the new state; the last good state stays.
 pub const UPT_ERR_GUARD: i32 = -40;
@@ -69,7 +69,7 @@ pub const UPT_LOG_DEBUG: i32 = 4;
 /// Everything.
 pub const UPT_LOG_TRACE: i32 = 5;
 
-/// 32-bit floats: the reference. Of a scene's options: what its model has.
+/// 32-bit floats: the reference. In a scene's options: the model's precision.
 pub const UPT_PRECISION_F32: i32 = 0;
 /// bfloat16 products where the CPU is faster with them, 32-bit floats elsewhere; the statistics say which.
 pub const UPT_PRECISION_BF16: i32 = 1;
@@ -77,7 +77,7 @@ pub const UPT_PRECISION_BF16: i32 = 1;
 pub const UPT_PRECISION_F16: i32 = 2;
 /// 8-bit integers: the bundle's `*.int8.onnx`.
 pub const UPT_PRECISION_INT8: i32 = 3;
-/// Of options only: 32-bit floats also in a scene of a model that was opened with another precision.
+/// In options only: 32-bit floats, even in a scene of a model that was opened with another precision.
 pub const UPT_PRECISION_FORCE_F32: i32 = 4;
 
 /// The library chooses the decoder.
@@ -89,13 +89,13 @@ pub const UPT_KERNEL_ONNX: i32 = 2;
 /// ONNX Runtime, all nodes in one run with the query table resident on the device.
 pub const UPT_KERNEL_RESIDENT: i32 = 3;
 
-/// Split on the CPU; on a device the faster of split and whole, timed while the scene is made.
+/// On the CPU: split. On a device: the faster of split and whole, timed while the scene is created.
 pub const UPT_STEP_AUTO: i32 = 0;
 /// Native encoder and message mean, then `latent.onnx` and the decoder.
 pub const UPT_STEP_SPLIT: i32 = 1;
 /// The bundle's `step.onnx`, which decodes every node in every step.
 pub const UPT_STEP_WHOLE: i32 = 2;
-/// Both are timed while the scene is made, and the faster one stays.
+/// The faster of split and whole, timed while the scene is created.
 pub const UPT_STEP_MEASURED: i32 = 3;
 
 /// No corrections.
@@ -103,12 +103,12 @@ pub const UPT_CORRECTIONS_NONE: i32 = -1;
 /// As many corrections as the scene's target needs and its budget allows.
 pub const UPT_CORRECTIONS_AUTO: i32 = -2;
 
-/// Keep the last good state and return `UPT_ERR_GUARD`; without contact, where no later call could do otherwise, as
-/// `UPT_GUARD_BLEND`.
+/// Keep the last good state and return `UPT_ERR_GUARD`. A step without contact, which the host cannot change, is treated as
+/// under `UPT_GUARD_BLEND`.
 pub const UPT_GUARD_HOLD: i32 = 0;
 /// Publish finite states and set flags.
 pub const UPT_GUARD_REPORT: i32 = 1;
-/// Replace a refused state by the prior's or by rest and set flags.
+/// Replace a refused state by the prior's or by rest, and set flags.
 pub const UPT_GUARD_BLEND: i32 = 2;
 
 /// A push is longer than the model was trained on.
@@ -133,7 +133,8 @@ pub const UPT_FLAG_GROWTH: u32 = 256;
 pub const UPT_FLAG_CLAMPED: u32 = 512;
 /// The contact block was nearly singular and was regularised.
 pub const UPT_FLAG_REGULARISED: u32 = 1024;
-/// The corrections ended inverted: under tools the tissue stays where it was, else the linear response takes their place.
+/// The corrections ended with inverted elements: under tools the tissue stays where it was, otherwise the linear response
+/// replaces them.
 pub const UPT_FLAG_FELL_BACK: u32 = 2048;
 /// The estimated error is above the scene's `error_limit_mm`.
 pub const UPT_FLAG_ERROR: u32 = 4096;
@@ -159,12 +160,13 @@ pub const UPT_SHAPE_CAPSULE: i32 = 0;
 pub const UPT_SHAPE_BOX: i32 = 1;
 /// An instrument's shape: a box with rounded corners.
 pub const UPT_SHAPE_SPATULA: i32 = 2;
-/// An instrument's shape: a hull of `upt_hull_create`.
+/// An instrument's shape: a hull from `upt_hull_create`.
 pub const UPT_SHAPE_HULL: i32 = 3;
 
 /// An instrument pushes, with Coulomb friction.
 pub const UPT_MODE_SLIDE: u8 = 0;
-/// An instrument holds what lies within 0.5 mm of it when the mode changes to this, until the mode changes back or the grasp tears off.
+/// An instrument grasps what lies within 0.5 mm of it when the mode changes to this, and holds it until the mode changes back
+/// or the grasp tears off.
 pub const UPT_MODE_GRASP: u8 = 1;
 
 /// The library's own values are these; a difference does not compile.

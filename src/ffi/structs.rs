@@ -37,9 +37,9 @@ pub type upt_log_fn =
 pub struct upt_init_options {
     /// `sizeof(upt_init_options)`.
     pub struct_size: u32,
-    /// Default number of threads of a model; 0: 1.
+    /// Default number of threads of a model; 0 means 1.
     pub threads: u32,
-    /// ONNX Runtime's shared library, a path; NULL: the folder of libupt, then `ORT_DYLIB_PATH`, then the system.
+    /// Path of ONNX Runtime's shared library; NULL searches the folder of libupt, then `ORT_DYLIB_PATH`, then the system.
     pub onnxruntime_path: *const c_char,
 }
 
@@ -62,7 +62,7 @@ pub struct upt_model_options {
     pub precision: i32,
     /// Bytes; 0: no limit. Needs a GPU provider in `providers`.
     pub gpu_memory_limit: u64,
-    /// Folder for compiled engines; NULL: none is kept.
+    /// Folder for compiled engines; NULL: they are not kept.
     pub cache_dir: *const c_char,
     /// 1: TF32 products allowed (CUDA; errors near 1e-3).
     pub allow_tf32: u8,
@@ -72,7 +72,7 @@ pub struct upt_model_options {
     pub no_fallback: u8,
     /// Zero.
     pub reserved: u8,
-    /// A `cudaStream_t` of `device_id` to run the graphs on, which outlives the model and its scenes; NULL: one of ONNX Runtime's own.
+    /// A `cudaStream_t` of `device_id` that runs the graphs and must outlive the model and its scenes; NULL: ONNX Runtime makes its own.
     pub user_stream: *mut c_void,
 }
 
@@ -122,7 +122,7 @@ pub struct upt_scene_options {
     pub threads: u32,
     /// `UPT_KERNEL_*`: who decodes.
     pub kernel: i32,
-    /// `UPT_PRECISION_*` of the native decoder; 0: the model's, `UPT_PRECISION_FORCE_F32`: float32 whatever the model has.
+    /// `UPT_PRECISION_*` of the native decoder; 0: the model's; `UPT_PRECISION_FORCE_F32`: float32, whatever the model's is.
     pub precision: i32,
     /// `UPT_GUARD_*`.
     pub guard_policy: i32,
@@ -134,14 +134,14 @@ pub struct upt_scene_options {
     pub no_sleep: u8,
     /// 1: the guard looks for inverted elements in each step.
     pub check_inversion: u8,
-    /// 1: a submit while a step is in flight replaces the waiting contact instead of `UPT_ERR_BUSY`.
+    /// 1: a submit while a step is in flight replaces the waiting contact and does not return `UPT_ERR_BUSY`.
     pub latest_wins: u8,
     /// 1: sample with a cubic through the last states instead of a line.
     pub cubic_sampling: u8,
     /// 1: attached points are interpolated between nodes, not decoded (kind `upt`).
     pub interpolate_points: u8,
-    /// Substeps of a step that instruments drive, at most, where it alone would err by more than the corrections' target: 1 for none, up to
-    /// 8, 0 as many as the bundle recommends. From 2 only with a target.
+    /// The most substeps of a step that instruments drive, where one step would miss the corrections' target: 1 for none, up to 8; 0: as
+    /// many as the bundle recommends. 2 or more need a target.
     pub substeps: u8,
     /// Zero.
     pub reserved: [u8; 1],
@@ -152,15 +152,15 @@ pub struct upt_scene_options {
     pub corrections: i32,
     /// No correction starts later than this in a step, µs; 0: no budget. Only with a count or `UPT_CORRECTIONS_AUTO`.
     pub corrections_budget_us: u32,
-    /// Enough where the estimated error is below this, mm; 0: no target. Only with a count or `UPT_CORRECTIONS_AUTO`.
+    /// Corrections stop once the estimated error is below this, mm; 0: no target. Only with a count or `UPT_CORRECTIONS_AUTO`.
     pub corrections_target_mm: f32,
-    /// `UPT_FLAG_ERROR` rises where the estimated error is above this, mm; 0: never.
+    /// `UPT_FLAG_ERROR` rises if the estimated error is above this, mm; 0: never.
     pub error_limit_mm: f32,
-    /// Length of a step, s: 0.01 to 0.05, or 0 for the bundle's. Another length than the bundle's needs corrections
-    /// (`UPT_ERR_UNSUPPORTED` without); the learned part is left out then.
+    /// Length of a step, s: 0.01 to 0.05, or 0 for the bundle's. A length other than the bundle's needs corrections
+    /// (without them: `UPT_ERR_UNSUPPORTED`) and leaves the learned part out.
     pub step_s: f64,
-    /// Mass-proportional damping of the tissue, 1/s: 0.01 to 1000, or 0 for the bundle's. Another than the bundle's needs
-    /// corrections (`UPT_ERR_UNSUPPORTED` without); the learned part is left out then.
+    /// Mass-proportional damping of the tissue, 1/s: 0.01 to 1000, or 0 for the bundle's. A damping other than the bundle's
+    /// needs corrections (without them: `UPT_ERR_UNSUPPORTED`) and leaves the learned part out.
     pub damping_per_s: f64,
 }
 
@@ -181,13 +181,13 @@ pub struct upt_instrument {
     pub half_extents: [f32; 3],
     /// A capsule's radius or a spatula's corner radius, mm.
     pub radius: f32,
-    /// `upt_scene_contacts_from_instruments` alone: 1: touched nodes move with the instrument until it leaves; 0: they slide.
+    /// Only for `upt_scene_contacts_from_instruments`. 1: touched nodes move with the instrument until it leaves; 0: they slide.
     pub sticking: u8,
-    /// `upt_scene_step_instruments` alone: `UPT_MODE_*`.
+    /// Only for `upt_scene_step_instruments`: `UPT_MODE_*`.
     pub mode: u8,
     /// Zero.
     pub reserved: [u8; 2],
-    /// `upt_scene_step_instruments` alone: Coulomb's coefficient, 0 or more.
+    /// Only for `upt_scene_step_instruments`: Coulomb's coefficient, 0 or more.
     pub friction: f32,
     /// A grasp tears off when its points together pull harder than this, mN; 0: never.
     pub tear_off_mn: f32,
@@ -208,7 +208,7 @@ pub struct upt_instrument_reading {
     pub force: [f32; 3],
     /// On the instrument about its position, mN mm.
     pub torque: [f32; 3],
-    /// How deep the deepest point of the surface lies inside the instrument, mm.
+    /// Depth of the deepest point of the surface inside the instrument, mm.
     pub penetration_mm: f32,
     /// 1: its grasp tore off in this step.
     pub torn: u8,
@@ -223,7 +223,7 @@ pub struct upt_instrument_reading {
 pub struct upt_instrument_contact {
     /// Place of the instrument in the step's array.
     pub instrument: u32,
-    /// Where the point is, mm.
+    /// Position of the point, mm.
     pub position: [f32; 3],
     /// On the instrument, mN.
     pub force: [f32; 3],
@@ -238,34 +238,34 @@ pub struct upt_haptics_options {
     pub struct_size: u32,
     /// The tool's place in the array of instruments that drives the steps.
     pub instrument: u32,
-    /// Its shape, mode and friction, as in that array; position and rotation say where it is first.
+    /// Its shape, mode and friction, as in that array; position and rotation say where it starts.
     pub tool: *const upt_instrument,
-    /// What a new step puts elsewhere is blended in over this time, ms; 0: 25.
+    /// Time over which the change that a new step brings is blended in, ms; 0: 25.
     pub blend_ms: f32,
-    /// How old a step is when it arrives, ms: the time since the poses that it was given were taken; 0: as long as it took.
+    /// Age of a step when it arrives, ms: the time since its poses were taken; 0: as long as the step took.
     pub step_latency_ms: f32,
     /// Longest force, N; 0: no limit.
     pub force_limit_n: f32,
-    /// What the passivity controller damps with at most, N s/m; 0: 5.
+    /// The most that the passivity controller damps, N s/m; 0: 5.
     pub damping_limit_n_s_per_m: f32,
-    /// 1: without the passivity observer and controller.
+    /// 1: no passivity observer and controller.
     pub no_passivity: u8,
     /// Zero.
     pub reserved: [u8; 7],
 }
 
-/// Where a tool is at a moment; the input of `upt_haptics_render`.
+/// A tool's pose at a moment; the input of `upt_haptics_render`.
 #[derive_ReprC]
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct upt_haptic_pose {
     /// `sizeof(upt_haptic_pose)`.
     pub struct_size: u32,
-    /// 1: the velocities are given; 0: they are those between the last two poses.
+    /// 1: the velocities below are given; 0: they follow from the last two poses.
     pub has_velocity: u8,
     /// Zero.
     pub reserved: [u8; 3],
-    /// The host's clock, s; never before that of the last call.
+    /// The host's clock, s; never earlier than in the last call.
     pub time_s: f64,
     /// In the mesh's frame, metres.
     pub position_m: [f32; 3],
@@ -294,15 +294,15 @@ pub struct upt_haptic_force {
     pub reserved: [u8; 6],
     /// States of the scene that this object has seen.
     pub step_count: u64,
-    /// Watchdog: how old the last of them is, s.
+    /// Watchdog: age of the last of these states, s.
     pub age_s: f64,
-    /// Energy that the hand was given beyond what came from it since the tool last touched, J; the controller takes it back.
+    /// Energy that the hand received, less what it gave, since the tool last touched, J; the controller takes it back.
     pub excess_energy_j: f64,
     /// On the tool, N, in the mesh's frame.
     pub force_n: [f32; 3],
     /// On the tool about its position, N m.
     pub torque_n_m: [f32; 3],
-    /// `[3,3]`, row-major: how the force falls with the position, N/m. With the next two a symmetric 6x6 stiffness, of contact alone.
+    /// `[3,3]`, row-major: how the force falls with the position, N/m. With the next two: a symmetric 6x6 stiffness of the contact alone.
     pub stiffness_n_per_m: [f32; 9],
     /// `[3,3]`, row-major: how the force falls with the rotation, N/rad; transposed, the torque with the position, N m/m.
     pub coupling_n_per_rad: [f32; 9],
@@ -341,7 +341,7 @@ pub struct upt_scene_stats {
     pub decoded_node_count: u64,
     /// Contact nodes of the last step.
     pub contact_count: u64,
-    /// Bytes that the scene has allocated in addition to the model; pages that it never touches are not resident.
+    /// Bytes that the scene has allocated in addition to the model; pages that it has never touched are not resident.
     pub memory_bytes: u64,
     /// Threads of a step.
     pub threads: u32,
@@ -361,13 +361,13 @@ pub struct upt_scene_stats {
     pub poisoned: u8,
     /// 1: `upt_scene_contact_force` gives the contact forces of the linear response; 0: the elements' elastic forces.
     pub prior_forces: u8,
-    /// Substeps that the last step was made of; 0 where it is one.
+    /// Substeps of the last step; 0 if it was not split.
     pub substeps: u8,
     /// Zero.
     pub reserved: [u8; 4],
-    /// Of the stages' times, copies to a device, ms; 0 on the CPU.
+    /// Part of the stages' times: copies to a device, ms; 0 on the CPU.
     pub upload_ms: f64,
-    /// Of the stages' times, copies back from a device, ms; 0 on the CPU.
+    /// Part of the stages' times: copies back from a device, ms; 0 on the CPU.
     pub download_ms: f64,
     /// `UPT_STEP_SPLIT` or `UPT_STEP_WHOLE`.
     pub step_path: i32,
@@ -377,12 +377,12 @@ pub struct upt_scene_stats {
     pub corrections_ms: f64,
     /// Evaluations of the element forces in the last step.
     pub evaluations: u32,
-    /// Residual force after the corrections over that before them; 0 without corrections.
+    /// Residual force after the corrections divided by that before them; 0 without corrections.
     pub residual: f32,
     /// Estimated root mean square error of the corrected state over all nodes, mm; 0 without corrections.
     pub error_mm: f32,
-    /// Smallest det F of the corrected state; without corrections, of the elements at the contact; 0 where there is neither.
+    /// Smallest det F of the corrected state; without corrections, of the elements at the contact; 0 if there are neither.
     pub min_det: f32,
-    /// Solves of the contact of instruments, ms; part of `corrections_ms`, without corrections of `check_ms`.
+    /// Contact solves of instruments, ms; part of `corrections_ms`, or of `check_ms` without corrections.
     pub contact_ms: f64,
 }

@@ -148,7 +148,7 @@ fn check(options: &HapticOptions) -> Result<()> {
     let most = crate::contact::MAX_TOOLS as u32;
     if options.instrument >= most {
         return Err(Error::Argument(format!(
-            "instrument is {}, a place in a list of at most {most}",
+            "instrument is {}; it must be a place in a list of at most {most} instruments",
             options.instrument
         )));
     }

@@ -87,12 +87,14 @@ impl Haptics {
         let (last_s, from) = self.last.unwrap_or((at.time_s - FIRST_S, now));
         if at.time_s < last_s {
             return Err(Error::Argument(format!(
-                "time_s is {}, before the last call's {last_s}",
+                "time_s is {}, earlier than {last_s} of the last call; time must not go back",
                 at.time_s
             )));
         }
         if self.ends.scene_gone.load(Ordering::Acquire) {
-            return Err(Error::State("the scene was destroyed: no force".into()));
+            return Err(Error::State(
+                "the scene was destroyed, so there is no force; destroy this object too".into(),
+            ));
         }
         let put = self.body.motion(&from, &now) > PUT_MM;
         let from = if put { now } else { from };

@@ -145,7 +145,7 @@ impl InstrumentContacts {
         }
         if instruments.len() > MAX_INSTRUMENTS {
             return Err(Error::Argument(format!(
-                "{} instruments; at most {MAX_INSTRUMENTS} at once",
+                "{} instruments; at most {MAX_INSTRUMENTS} are allowed at once",
                 instruments.len()
             )));
         }

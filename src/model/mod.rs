@@ -120,7 +120,7 @@ impl Model {
         ] {
             if set && !on_device {
                 return Err(crate::Error::Argument(format!(
-                    "{name} is set and `providers` names no GPU provider"
+                    "{name} is set, but `providers` names no GPU provider"
                 )));
             }
         }

@@ -165,7 +165,7 @@ impl UptModel {
         Ok(queries)
     }
 
-    /// Bytes held beside the tables.
+    /// Bytes held in addition to the tables.
     pub fn memory_bytes(&self) -> usize {
         self.embed.len()
             + self.latent.len()

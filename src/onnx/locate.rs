@@ -1,4 +1,4 @@
-//! Where ONNX Runtime's shared library may be: beside libupt, `ORT_DYLIB_PATH`, then the system.
+//! Where ONNX Runtime's shared library may be: next to libupt, `ORT_DYLIB_PATH`, then the system.
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};

@@ -1,6 +1,6 @@
 //! TensorRT-RTX as a plugin provider: a shared library of its own that ONNX Runtime registers, then offers devices of.
 //!
-//! It is searched beside libupt, beside ONNX Runtime, then where `UPT_TENSORRT_RTX_PATH` says (the library or its
+//! It is searched next to libupt, next to ONNX Runtime, then where `UPT_TENSORRT_RTX_PATH` says (the library or its
 //! folder). Nothing is opened before a host asks for the provider.
 
 use std::path::{Path, PathBuf};
@@ -11,7 +11,7 @@ use super::runtime::Runtime;
 
 /// Name of the provider, of its registration, and prefix of its options.
 pub(super) const NAME: &str = "NvTensorRTRTXExecutionProvider";
-/// Library or folder, where it is neither beside libupt nor beside ONNX Runtime.
+/// Library or folder, where it is neither next to libupt nor next to ONNX Runtime.
 const VARIABLE: &str = "UPT_TENSORRT_RTX_PATH";
 /// What the plugin needs from its own folder, in the order in which they are opened: how the names begin.
 const COMPANIONS: [&str; 3] = if cfg!(windows) {
@@ -88,7 +88,7 @@ fn register(runtime: &'static Runtime, candidates: &[PathBuf]) -> Result<(), Str
         return Ok(());
     }
     Err(format!(
-        "{} was loaded and offers no device: it needs an NVIDIA card of compute capability 7.5, 8.6, 8.9 or 12.x",
+        "{} was loaded but offers no device: it needs an NVIDIA card of compute capability 7.5, 8.6, 8.9 or 12.x",
         path.display()
     ))
 }

@@ -131,7 +131,7 @@ impl ProviderPlan {
         let (memory, missing) = Memory::of(runtime, session, provider, self.options.device_id);
         match missing {
             Some(reason) if self.options.cuda_graph => Err(format!(
-                "cuda_graph needs tensors of fixed address on the card, which are not to be had: {reason}"
+                "cuda_graph needs tensors of fixed address on the card, which are not available: {reason}"
             )),
             _ => Ok(memory),
         }

@@ -44,12 +44,12 @@ impl Runtime {
         RUNTIME.get().is_some()
     }
 
-    /// The process's one environment, for sessions beside the library's own (measurements of rivals).
+    /// The process's one environment, for sessions other than the library's own (measurements of rivals).
     pub fn environment(&self) -> &Environment {
         &self.environment
     }
 
-    /// Lets the environment copy tensors between host and card: the CUDA provider's library, which lies beside ONNX
+    /// Lets the environment copy tensors between host and card: the CUDA provider's library, which lies next to ONNX
     /// Runtime, is registered once a process.
     pub(super) fn offer_cuda_copies(&self) -> std::result::Result<(), String> {
         static OUTCOME: OnceLock<std::result::Result<(), String>> = OnceLock::new();

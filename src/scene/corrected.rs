@@ -91,7 +91,7 @@ impl Corrected {
             }
             count if target_mm == 0.0 => {
                 return Err(Error::Argument(format!(
-                    "substeps is {count}: which steps need them is known by a target; give corrections a target in mm"
+                    "substeps is {count}: without a target no step needs them; give corrections a target in mm"
                 )));
             }
             count => count,
@@ -149,7 +149,7 @@ impl Corrected {
 fn none(own: OwnPace, substeps: u32) -> Result<Option<Corrected>> {
     if substeps > 1 {
         return Err(Error::Argument(format!(
-            "substeps is {substeps}: only corrections have them, and this scene has none; leave substeps at 0, or set `corrections`"
+            "substeps is {substeps}: only corrections have substeps, and this scene makes none; leave substeps at 0, or set `corrections`"
         )));
     }
     own.refuse()?;

@@ -77,7 +77,7 @@ impl Engine {
     }
 
     /// Decodes the nodes of a plan into a field `[K,3]`, boundary conditions not yet enforced. `detail [n,3]` is what the
-    /// attached points have beside the interpolation of the field.
+    /// attached points have in addition to the interpolation of the field.
     pub fn decode(
         &mut self,
         compute: Compute<'_>,

@@ -32,13 +32,13 @@ impl Core {
     ) -> Result<Haptics> {
         let (Some(prior), Some(_)) = (&self.model.prior, &self.corrected) else {
             return Err(Error::Unsupported(
-                "haptics: the bundle has no linear response, or the scene does not correct (`corrections`)".into(),
+                "haptics: the bundle has no linear response, or the scene makes no corrections; use a bundle with both, and leave `corrections` on".into(),
             ));
         };
         self.hands.retain(|hand| !hand.is_over());
         if self.hands.len() >= MOST_HANDS {
             return Err(Error::Argument(format!(
-                "the scene has {MOST_HANDS} hands already; destroy one first"
+                "the scene already has {MOST_HANDS} haptics objects; destroy one first"
             )));
         }
         memory::reserve(&mut self.hands, 1, "the haptics of a scene")?;

@@ -316,7 +316,7 @@ fn build(model: &Arc<Model>, options: &SceneOptions) -> Result<Core> {
         Some(path) => {
             if model.prior.is_some() {
                 return Err(Error::Unsupported(
-                    "mesh_path: this bundle has a prior, which holds for its own mesh only".into(),
+                    "mesh_path: this bundle has a prior, which is valid only for its own mesh; leave mesh_path out".into(),
                 ));
             }
             let bytes = crate::bundle::read_regular(path)?;

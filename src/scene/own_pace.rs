@@ -78,7 +78,7 @@ impl OwnPace {
             (None, None) => return Ok(()),
         };
         Err(Error::Unsupported(format!(
-            "{option} is {value}: only corrections by the elements can have another than the bundle's, and this scene has none; leave {option} at 0, set `corrections`, or run `upt corrections BUNDLE`"
+            "{option} is {value}: only corrections by the elements can use another value than the bundle's, and this scene makes none; leave {option} at 0, set `corrections`, or run `upt corrections BUNDLE`"
         )))
     }
 }

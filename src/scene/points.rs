@@ -26,7 +26,7 @@ pub fn check_point_count(count: u64) -> Result<()> {
         return Ok(());
     }
     Err(Error::Argument(format!(
-        "count is {count} points, at most {MOST_POINTS} can be attached"
+        "count is {count} points; at most {MOST_POINTS} can be attached"
     )))
 }
 

@@ -103,7 +103,7 @@ impl Core {
     fn begin_moments(&mut self, published: &RwLock<Published>) -> Result<()> {
         if self.corrected.is_none() {
             return Err(Error::Unsupported(
-                "present: the scene does not correct (`corrections`); show its steps by upt_scene_sample".into(),
+                "present: the scene makes no corrections (`corrections`); show its steps with upt_scene_sample".into(),
             ));
         }
         let mut shared = lock_write(published);

@@ -46,7 +46,9 @@ impl Core {
             return Ok(());
         }
         if self.counters.step_count == 0 {
-            return Err(Error::State("decode before the first step".into()));
+            return Err(Error::State(
+                "there is no state to decode before the first step; step the scene first".into(),
+            ));
         }
         let _flush = FlushToZero::enter();
         let plan = NodePlan::new(&[nodes], count, self.engine.planned_prior())?;
@@ -57,7 +59,7 @@ impl Core {
         Ok(())
     }
 
-    /// Decodes the nodes of a plan in a published state into the spare frame, and what points have beside them.
+    /// Decodes the nodes of a plan in a published state into the spare frame, and what points have in addition to them.
     pub(super) fn decode_published(
         &mut self,
         published: &RwLock<Published>,

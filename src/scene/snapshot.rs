@@ -80,7 +80,7 @@ impl Core {
         // Asked first: a count that was never set is not followed to the end of the host's memory.
         if bytes.len() > HEAD + self.most_bytes() + DIGEST {
             return Err(Error::Snapshot(format!(
-                "has {} bytes, more than any of this scene",
+                "has {} bytes, more than any snapshot of this scene",
                 bytes.len()
             )));
         }
@@ -120,10 +120,10 @@ impl Core {
     fn check_origin(&self, saved: &Origin) -> Result<()> {
         let own = self.origin(saved.driven);
         if saved.model != own.model {
-            return Err(Error::Snapshot("is of another model".into()));
+            return Err(Error::Snapshot("belongs to another model".into()));
         }
         if saved.mesh != own.mesh {
-            return Err(Error::Snapshot("is of another mesh".into()));
+            return Err(Error::Snapshot("belongs to another mesh".into()));
         }
         if saved.step_us != own.step_us {
             return Err(Error::Snapshot(format!(

@@ -2,7 +2,7 @@
 
 use std::collections::{HashMap, HashSet};
 
-/// Function name -> statuses beside `UPT_OK`.
+/// Function name -> statuses other than `UPT_OK`.
 pub type Documented = HashMap<String, HashSet<i32>>;
 
 /// All functions that the header declares.

@@ -21,9 +21,9 @@ namespace Upt.Editor
             "guard: growth",
             "correction bounded",
             "contact block regularised",
-            "corrections ended inverted and were given up",
+            "corrections ended with inverted elements and were given up",
             "estimated error above the limit",
-            "tissue more than 1 mm inside of an instrument",
+            "tissue more than 1 mm inside an instrument",
         };
 
         public override void OnInspectorGUI()

@@ -1,4 +1,4 @@
-//! `cargo xtask demo`: an organ pushed by libupt beside the reference solver, from a fresh clone.
+//! `cargo xtask demo`: an organ pushed by libupt next to the reference solver, from a fresh clone.
 //!
 //! Set-up; a tool that presses, slides and lifts, simulated by the reference solver (kept by content); every committed bundle of that organ driven by
 //! the tool's poses alone; a table and a page. With `--scheme` the paper's own measure instead: a collision field, replayed.

@@ -15,7 +15,7 @@ const ELSEWHERE: &[(&str, &str)] = &[
     ("onnx", "../../upt/bundles"),
 ];
 
-/// Pages beside docs/ that the package has too.
+/// Pages outside docs/ that the package has too.
 const PAGES: &[&str] = &[
     "README.md",
     "CHANGELOG.md",

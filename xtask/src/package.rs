@@ -3,7 +3,7 @@
 //! ```text
 //! libupt-VERSION-PLATFORM/
 //!   bin/upt                            the command
-//!   lib/libupt.so -> .so.0 -> .so.V    the library; libupt.a; libonnxruntime.so beside it
+//!   lib/libupt.so -> .so.0 -> .so.V    the library; libupt.a; libonnxruntime.so next to it
 //!   lib/cmake/upt/, lib/pkgconfig/     find_package(upt), pkg-config upt
 //!   include/upt.h, upt.hpp
 //!   share/upt/bundles/, examples/

@@ -132,7 +132,7 @@ fn seen(source: &Source, item: &Struct, field: &Named) -> Result<Seen> {
             of("bool", "bool", Some(format!("boolean(\"_{name}\")")))
         }
         Kind::Number(number) if number.starts_with('f') => of("float", "float", None),
-        // Microseconds may be spoken of beside an enum and are none of it.
+        // Microseconds may be mentioned next to an enum and are not part of it.
         Kind::Number(number) if number == "u32" && name.ends_with("_us") => of("int", "int", None),
         Kind::Number(number) => match named_enum(source, &field.doc) {
             Some(class) if matches!(number.as_str(), "u8" | "i32" | "u32") => of(

@@ -48,7 +48,7 @@ pub struct Options {
     /// Store displacements as f16.
     #[arg(long)]
     half: bool,
-    /// Time between recorded frames of --tools, ms; a whole part of a step of 50 ms. Shorter frames are what `upt report --shown` measures by.
+    /// Time between recorded frames of --tools, ms; it must divide the step of 50 ms. `upt report --shown` needs shorter frames.
     #[arg(long, default_value_t = 1e3 * FRAME_S, requires = "tools", conflicts_with = "schemes")]
     frame_ms: f64,
     /// Inner step of the split `train`, ms; held-out cases keep `--inner-step-ms`. Needs `--train-mass-scaling-ms`.
@@ -78,7 +78,7 @@ impl Options {
         let whole = count >= 1.0 && (count * self.frame_ms - step_ms).abs() < 1e-6 * step_ms;
         if !whole {
             bail!(
-                "--frame-ms {}: must be a whole part of a step of {step_ms} ms, such as 5",
+                "--frame-ms {}: it must divide a step of {step_ms} ms, such as 5",
                 self.frame_ms
             );
         }
@@ -100,7 +100,7 @@ fn parse_shard(text: &str) -> Result<(usize, usize), String> {
     text.split_once('/')
         .and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)))
         .filter(|(i, n)| i < n)
-        .ok_or_else(|| format!("shard `{text}`: write i/n with i from 0 to n - 1"))
+        .ok_or_else(|| format!("--shard `{text}`: write i/n with i from 0 to n - 1"))
 }
 
 pub fn run(options: &Options) -> anyhow::Result<ExitCode> {
@@ -183,7 +183,8 @@ pub fn run(options: &Options) -> anyhow::Result<ExitCode> {
     });
     bar.finish_and_clear();
     if let Some(error) = failure.into_inner().ok().flatten() {
-        return Err(error).context("the dataset is incomplete; run the same command to go on");
+        return Err(error)
+            .context("the dataset is incomplete; run the same command again to continue");
     }
     let manifest = dataset.write_manifest()?;
     let with = |status: &str| manifest.cases.iter().filter(|c| c.status == status).count();

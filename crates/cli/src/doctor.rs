@@ -16,7 +16,7 @@ use sha2::{Digest, Sha256};
     after_help = "Examples:\n  upt doctor\n  upt doctor --json\n  upt doctor onnx/brain-reduced"
 )]
 pub struct Options {
-    /// Bundles to check; default: the folders below onnx/ that hold a bundle.json.
+    /// Bundles to check. Default: the folders below onnx/ that hold a bundle.json.
     bundles: Vec<PathBuf>,
     /// Machine-readable output.
     #[arg(long)]

@@ -61,7 +61,7 @@ impl FromStr for Effort {
     fn from_str(text: &str) -> Result<Self, String> {
         let wrong = || {
             format!(
-                "`{text}` is not a number of corrections: give 0 to 64, or COUNT@MM for at most COUNT, fewer where the estimated error is below MM, with /SUBSTEPS (1 to 8) behind it for steps that miss MM"
+                "`{text}` is not a number of corrections: give 0 to 64, or COUNT@MM for at most COUNT and fewer once the estimated error is below MM; append /SUBSTEPS (1 to 8) for steps that miss MM"
             )
         };
         let (most, target, substeps) = match text.split_once('@') {

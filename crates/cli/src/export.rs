@@ -17,7 +17,7 @@ use tissue::trajectory::Trajectory;
 pub struct Options {
     /// Trajectory file (*.trajectory.safetensors).
     trajectory: PathBuf,
-    /// The mesh it was made on (*.mesh.safetensors).
+    /// Mesh of the trajectory (*.mesh.safetensors).
     #[arg(long)]
     mesh: PathBuf,
     /// Folder for `trajectory.pvd` and its frames.
@@ -26,7 +26,7 @@ pub struct Options {
     /// Write every n-th frame.
     #[arg(long, default_value_t = 1)]
     every: usize,
-    /// Triangles of the surface only, for smaller files.
+    /// Write only the triangles of the surface, for smaller files.
     #[arg(long)]
     skin: bool,
     /// Keep the rest positions as points (warp by `displacement` in ParaView).
@@ -60,7 +60,7 @@ pub fn run(options: &Options) -> anyhow::Result<ExitCode> {
         };
         if frame >= trajectory.frame_count() {
             bail!(
-                "frame {frame} is not there: the trajectory has frames 0 to {}",
+                "--frame {frame} does not exist; the trajectory has frames 0 to {}",
                 trajectory.frame_count() - 1
             );
         }

@@ -17,6 +17,6 @@ pub struct Options {
 pub fn run(feature: &str, options: &Options) -> anyhow::Result<ExitCode> {
     let _ = &options.rest;
     bail!(
-        "this `upt` was built without the feature `{feature}` (as `cargo xtask demo` does it); `cargo build --release -p upt-cli` makes the whole command"
+        "this `upt` was built without the feature `{feature}` (as `cargo xtask demo` does it); build the whole command with `cargo build --release -p upt-cli`"
     )
 }

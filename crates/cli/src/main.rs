@@ -129,13 +129,13 @@ enum Command {
     Report(report::Options),
     /// Find out which rigid tools a bundle is good for, and write them into its manifest.
     Envelope(envelope::Options),
-    /// Run stiff and extreme cases, and say whether each came out as it must.
+    /// Run stiff and extreme cases, and say whether each ended as it should.
     Stress(stress::Options),
     /// Run a bundle and the reference solver side by side: error over random steps, warnings, forces, release.
     Beside(beside::Options),
     /// Let a simulated hand feel a bundle at 1 kHz: energy, force steps, call times, forces against the reference solver.
     Haptics(haptics::Options),
-    /// Make very many steps on one scene and log the memory.
+    /// Make many steps on one scene and log the memory.
     Soak(soak::Options),
     /// Show a bundle in the browser: drag a tool, watch the tissue.
     View(view::Options),

@@ -53,7 +53,7 @@ struct Info {
     /// Density, kg/m³.
     #[arg(long, default_value_t = Material::default().density_kg_m3)]
     density: f64,
-    /// Selective mass scaling, ms: the critical step that it gives, and the mass that it adds.
+    /// Selective mass scaling, ms; prints the critical step that it gives and the mass that it adds.
     #[arg(long, default_value_t = 0.0)]
     mass_scaling_ms: f64,
     /// Print the result as JSON.

@@ -21,13 +21,13 @@ pub struct Import {
     input: PathBuf,
     /// Mesh file to write (*.mesh.safetensors).
     output: PathBuf,
-    /// Name in the mesh file; default: the input's.
+    /// Name in the mesh file. Default: the input's.
     #[arg(long)]
     name: Option<String>,
-    /// Millimetres a unit of the file: 1000 for metres.
+    /// Millimetres per unit of the file: 1000 for metres.
     #[arg(long, default_value_t = 1.0)]
     scale: f64,
-    /// Surfaces: wanted number of nodes.
+    /// Surfaces: number of nodes to aim for.
     #[arg(long, conflicts_with = "spacing")]
     nodes: Option<usize>,
     /// Surfaces: lattice spacing, mm.
@@ -57,7 +57,7 @@ pub struct Import {
 pub struct Stuff {
     /// Distance field (docs/reference/formats.md), positive inside.
     field: PathBuf,
-    /// Mesh file to write; no set is filled.
+    /// Mesh file to write; its sets are empty.
     output: PathBuf,
     /// Lattice spacing, mm.
     #[arg(long)]

@@ -210,7 +210,7 @@ pub fn write_columns(args: &Options) -> anyhow::Result<Written> {
     let done = partial.done;
     if done > 0 && !args.json {
         eprintln!(
-            "{}: {done} of {rows} columns are there",
+            "{}: {done} of {rows} columns are finished",
             temporary.display()
         );
     }

@@ -15,7 +15,7 @@ pub fn cache() -> Result<PathBuf> {
     let cache = variable("XDG_CACHE_HOME")
         .or_else(|| variable("LOCALAPPDATA"))
         .or_else(|| Some(variable("HOME")?.join(".cache")));
-    let cache = cache.context("there is no folder for what is fetched: set XDG_CACHE_HOME")?;
+    let cache = cache.context("there is no cache folder for downloads; set XDG_CACHE_HOME")?;
     Ok(cache.join("upt"))
 }
 
@@ -35,7 +35,7 @@ pub fn interpreter(tell: &mut dyn FnMut(&str)) -> Result<PathBuf> {
     };
     if !python.is_file() {
         tell(&format!(
-            "makes a Python environment in {}",
+            "making a Python environment in {}",
             folder.display()
         ));
         let start = if cfg!(windows) { "python" } else { "python3" };

@@ -22,6 +22,7 @@ use crate::report::setting::{Precision, Provider, Region};
   upt rollout onnx/brain-fast push.trajectory.safetensors --png push.png --vtu frames/
   upt rollout onnx/brain-fast push.trajectory.safetensors --json > errors.json")]
 pub struct Options {
+    /// Bundle folder.
     bundle: PathBuf,
     /// A trajectory on the bundle's mesh (`upt simulate` writes one).
     trajectory: PathBuf,
@@ -32,13 +33,13 @@ pub struct Options {
     precision: Precision,
     #[arg(long, default_value = "cpu")]
     provider: Provider,
-    /// Write a VTU file a frame, with prediction, truth and error, and a PVD file that lists them.
+    /// Write a VTU file per frame, with prediction, truth and error, and a PVD file that lists them.
     #[arg(long, value_name = "FOLDER")]
     vtu: Option<PathBuf>,
     /// Write a picture of the deepest push: truth, prediction, error side by side.
     #[arg(long, value_name = "FILE")]
     png: Option<PathBuf>,
-    /// Corrections a step, 0 to 64; left out: as many as the bundle recommends.
+    /// Corrections per step, 0 to 64. Default: as many as the bundle recommends.
     #[arg(long)]
     corrections: Option<Effort>,
     /// Leave out the Hausdorff distance (the slowest of the metrics).
@@ -55,7 +56,7 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     let mesh = Mesh::read(&bundle.mesh_file)?;
     if trajectory.header.mesh_sha256 != bundle.mesh_sha256 {
         bail!(
-            "{}: simulated on another mesh ({}) than the bundle's",
+            "{}: simulated on a mesh ({}) other than the bundle's",
             options.trajectory.display(),
             trajectory.header.mesh_name
         );

@@ -43,7 +43,7 @@ fn fetch() -> Result<PathBuf> {
     };
     ort_wheel::fetch(&folder, platform, VERSION, &python, &mut run).with_context(|| {
         format!(
-            "ONNX Runtime {VERSION} cannot be fetched; or set {VARIABLE} to a library of your own"
+            "ONNX Runtime {VERSION} cannot be fetched; you can also set {VARIABLE} to a library of your own"
         )
     })
 }
@@ -71,7 +71,7 @@ fn is_named() -> bool {
     std::env::var_os(VARIABLE).is_some_and(|path| !path.is_empty())
 }
 
-/// What `cargo xtask` fetched beside a `upt` out of `cargo build`.
+/// What `cargo xtask` fetched next to a `upt` out of `cargo build`.
 fn of_the_build() -> Option<PathBuf> {
     let exe = std::env::current_exe().ok()?;
     let target = exe.parent()?.parent()?;

@@ -24,7 +24,7 @@ pub struct Options {
     /// Programme of rigid tools.
     #[arg(long, value_parser = loads::programme(), conflicts_with = "scheme")]
     tool: Option<ToolProgramme>,
-    /// Convex hull of this STL, OBJ or PLY file (mm; y up the shaft, the lowest end touches) in place of the programme's tool.
+    /// STL, OBJ or PLY file whose convex hull replaces the programme's tool (mm; y up the shaft, the lowest end touches).
     #[cfg(feature = "files")]
     #[arg(long, requires = "tool")]
     tool_shape: Option<PathBuf>,
@@ -72,7 +72,7 @@ pub struct SolverArguments {
     /// Young's modulus, Pa.
     #[arg(long, default_value_t = 3000.0)]
     young: f64,
-    /// Law of the tissue: neo-hookean, or mooney-rivlin:SHARE with the share of C01 in C10 + C01 (left out: 0.526, brain).
+    /// Law of the tissue: neo-hookean, or mooney-rivlin:SHARE with the share of C01 in C10 + C01 (default: 0.526, brain).
     #[arg(long, default_value_t = elements::Law::default())]
     law: elements::Law,
     /// Poisson's ratio.
@@ -87,11 +87,10 @@ pub struct SolverArguments {
     /// Inner step, ms; shortened automatically if the mesh needs a shorter one.
     #[arg(long, default_value_t = 0.1)]
     inner_step_ms: f64,
-    /// Selective mass scaling: elements with a shorter critical step of their own get mass until it is this long,
-    /// ms; 0 for none.
+    /// Selective mass scaling, ms: elements whose own critical step is shorter than this get mass until it is this long; 0: none.
     #[arg(long, default_value_t = 0.0)]
     mass_scaling_ms: f64,
-    /// Average nodal pressure instead of one pressure an element (less locking, slower).
+    /// Average nodal pressure instead of one pressure per element (less locking, slower).
     #[arg(long)]
     average_pressure: bool,
 }

@@ -16,6 +16,7 @@ pub struct Options {
     /// Bundle folder.
     #[arg(long)]
     bundle: PathBuf,
+    /// Number of steps.
     #[arg(long, default_value_t = 1_000_000)]
     steps: u64,
     /// Steps between two lines of the log.
@@ -92,8 +93,9 @@ pub fn run(options: &Options) -> Result<ExitCode> {
 }
 
 fn resident_kib() -> Result<u64> {
-    let status = std::fs::read_to_string("/proc/self/status")
-        .context("resident memory is read from /proc/self/status, which only Linux has")?;
+    let status = std::fs::read_to_string("/proc/self/status").context(
+        "`upt soak` reads the resident memory from /proc/self/status, which exists only on Linux",
+    )?;
     status
         .lines()
         .find_map(|line| {

@@ -12,8 +12,8 @@ pub const PUSH_MM: f64 = 15.0;
 /// The option that commands with tools share.
 #[derive(Args, Clone, Copy, Debug, Default)]
 pub struct Arguments {
-    /// Sizes, depths, ways and speeds of tools over those of their programmes, which are made for a brain; 1: as they are. Left out: 1 on a
-    /// body as large as a brain, less on a smaller or thinner one.
+    /// Factor on the sizes, depths, ways and speeds of tools, whose programmes are made for a brain. Default: 1 on a body as large as a brain,
+    /// less on a smaller or thinner one.
     #[arg(long, value_name = "FACTOR", value_parser = factor)]
     pub tool_scale: Option<f64>,
 }
@@ -21,7 +21,7 @@ pub struct Arguments {
 fn factor(text: &str) -> Result<f64, String> {
     let factor = text
         .parse()
-        .map_err(|_| format!("`{text}` is no number; write a factor such as 0.5"))?;
+        .map_err(|_| format!("`{text}` is not a number; write a factor such as 0.5"))?;
     ToolScale::of_factor(factor).map(|scale| scale.factor)
 }
 

@@ -353,12 +353,12 @@ fn input_that_cannot_become_a_bundle_is_named_with_what_to_do() {
                 "plane:0,0,-1,-22",
             ],
         ),
-        &["held by --fixed"],
+        &["--fixed holds all"],
     );
     has(refused(&good, &["--fixed", "all"]), &["holds every node"]);
     has(
         refused(&good, &["--fixed", "ball:900,0,0,5"]),
-        &["no node lies in --fixed", "x -"],
+        &["no node lies in the region of --fixed", "x -"],
     );
     has(
         refused(&good, &["--fixed", "plane:0,0,0,1"]),
@@ -415,7 +415,7 @@ fn input_that_cannot_become_a_bundle_is_named_with_what_to_do() {
     std::fs::write(taken.join("thesis.txt"), "text").unwrap();
     let output = command(&good, &taken, &HELD).output().unwrap();
     assert_eq!(output.status.code(), Some(2));
-    has(text(&output), &["is no bundle of `upt make`"]);
+    has(text(&output), &["`upt make` did not make it"]);
     assert!(taken.join("thesis.txt").exists());
 }
 

@@ -43,7 +43,7 @@ impl Installed {
             .env_remove("UPT_PYTHON");
         loop {
             match command.output() {
-                // A test beside this one has just started a process, which holds the copy open for writing until it runs its program.
+                // A test that runs at the same time has just started a process, which holds the copy open for writing until it runs its program.
                 Err(error) if error.kind() == ErrorKind::ExecutableFileBusy => {
                     std::thread::yield_now();
                 }

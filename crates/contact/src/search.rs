@@ -9,7 +9,7 @@ use crate::body::Body;
 use crate::samples::Samples;
 use parry3d::math::{Pose, Vector};
 
-/// How far from a tool samples are looked at, beside its motion, mm.
+/// How far from a tool samples are looked at, in addition to its motion, mm.
 pub const SKIN_MM: f32 = 1.0;
 
 /// A tool where it is, and how far from it to look: [`SKIN_MM`] and its motion ([`Body::motion`]).

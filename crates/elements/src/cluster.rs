@@ -29,7 +29,7 @@ pub type Octahedra = Cluster<6, 4>;
 pub type Pairs = Cluster<5, 2>;
 pub type Singles = Cluster<4, 1>;
 
-/// Nodes of a cluster that tetrahedron `tet` has beside node 0.
+/// Nodes of a cluster that tetrahedron `tet` has in addition to node 0.
 #[inline(always)]
 pub const fn corners<const NODES: usize>(tet: usize) -> [usize; 3] {
     if NODES == 6 {

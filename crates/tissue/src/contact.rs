@@ -22,7 +22,7 @@ pub enum ContactError {
     #[error("seed {seed} is not a row of `domain` ({count} rows)")]
     SeedOutOfRange { seed: usize, count: usize },
     #[error(
-        "domain face {seed} grows to {reached_mm2:.1} mm² of {wanted_mm2:.1} mm²: its part of `domain` is too small for this load"
+        "domain face {seed} grows to only {reached_mm2:.1} of {wanted_mm2:.1} mm²: its part of `domain` is too small for this load"
     )]
     DomainTooSmall {
         seed: usize,

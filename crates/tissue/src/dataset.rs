@@ -3,7 +3,7 @@
 //! Case `i` follows from the plan and `i` alone, so any process may compute any
 //! case: shards share a folder, an interrupted run goes on where it stopped, and
 //! the trajectories have the same bytes either way. Each finished or failed case
-//! leaves a small record beside its trajectory; the manifest is put together from
+//! leaves a small record next to its trajectory; the manifest is put together from
 //! the records, so it is right whoever writes it last.
 
 pub use crate::loads::Load;
@@ -52,7 +52,7 @@ pub struct Case {
     pub split: String,
 }
 
-/// Outcome of a case, beside its trajectory as `case-….record.json`.
+/// Outcome of a case, next to its trajectory as `case-….record.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CaseRecord {
     #[serde(flatten)]
@@ -97,10 +97,10 @@ pub enum DatasetError {
     #[error("the plan has no schemes or tools, or no cases")]
     EmptyPlan,
     #[error(
-        "scheme `{0}` needs the compliance columns of its mesh: make them with `upt prior`, give --columns"
+        "scheme `{0}` needs the compliance columns of its mesh; make them with `upt prior` and name the file with --columns"
     )]
     NoColumns(&'static str),
-    #[error("static schemes know the pressure of an element only, not the average nodal one")]
+    #[error("static schemes cannot use the average nodal pressure; leave --average-pressure out")]
     AveragePressure,
     #[cfg(feature = "linear")]
     #[error(transparent)]

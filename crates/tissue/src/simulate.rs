@@ -22,7 +22,7 @@ pub enum SimulationError {
     Programme(#[from] ProgrammeError),
     #[error(transparent)]
     Solver(#[from] SolverError),
-    #[error("scheme `{0}` is a list of equilibria, not a motion: use `upt dataset` with --columns")]
+    #[error("scheme `{0}` is a list of equilibria, not a motion; use `upt dataset` with --columns")]
     Static(&'static str),
 }
 

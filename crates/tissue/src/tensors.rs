@@ -58,7 +58,7 @@ impl Tensor {
     }
 }
 
-/// Writes the tensors to `path` through a temporary file beside it.
+/// Writes the tensors to `path` through a temporary file next to it.
 pub fn write_file(
     path: &Path,
     metadata: &BTreeMap<String, String>,

@@ -192,7 +192,7 @@ fn what_is_wrong_with_a_file_is_named() {
         &inp[inp.find("\n32, 0").unwrap()..inp.find("\n*ELEMENT").unwrap()],
         "",
     );
-    refused("missing.inp", missing, &["names node 32", "not there"]);
+    refused("missing.inp", missing, &["names node 32", "does not exist"]);
     refused(
         "nodes.feb",
         before(&feb, "<node id=\"32\"", 9),
@@ -206,18 +206,18 @@ fn what_is_wrong_with_a_file_is_named() {
     refused(
         "between.feb",
         before(&feb, "</Elements>\n<NodeSet", 11),
-        &["inside of <Mesh>", "cut off"],
+        &["inside <Mesh>", "cut off"],
     );
     // Numbers that are none, lists of another length, the same number twice.
     refused(
         "word.inp",
         inp.replace("11, 0, 0e0", "11, 0, zero"),
-        &["line 5", "`zero` is no number"],
+        &["line 5", "`zero` is not a number"],
     );
     refused(
         "word.feb",
         feb.replace("id=\"14\">10", "id=\"14\">ten"),
-        &["`ten` is no number"],
+        &["`ten` is not a number"],
     );
     refused(
         "short.feb",
@@ -227,12 +227,12 @@ fn what_is_wrong_with_a_file_is_named() {
     refused(
         "twice.inp",
         inp.replace("\n14, ", "\n11, "),
-        &["node 11 is there twice"],
+        &["node 11 appears twice"],
     );
     refused(
         "twice.feb",
         feb.replace("<elem id=\"2\"", "<elem id=\"1\""),
-        &["element 1 is there twice"],
+        &["element 1 appears twice"],
     );
     refused(
         "set.inp",

@@ -138,7 +138,7 @@ impl Problem {
     pub fn enter(&mut self, tools: &[Tool], rest: &[f32], start: &[f32]) -> Result<()> {
         if tools.len() > MAX_TOOLS {
             return Err(Error::Argument(format!(
-                "{} instruments; at most {MAX_TOOLS} at once",
+                "{} instruments; at most {MAX_TOOLS} are allowed at once",
                 tools.len()
             )));
         }

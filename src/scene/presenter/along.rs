@@ -189,7 +189,7 @@ fn slowed(tau: f64, alpha: f64) -> f32 {
     }
 }
 
-/// How far a tool has `gone` beside where its speed would have taken it.
+/// How far a tool has `gone` from where its speed would have taken it.
 fn stretch(wanted: Vector, gone: Vector) -> f32 {
     if gone.length() > PUT_MM {
         return 1.0;

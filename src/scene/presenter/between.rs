@@ -55,7 +55,7 @@ impl Between {
         let model = &scene.model;
         let (true, Ok(corrections)) = (model.prior.is_some(), model.corrections()) else {
             return Err(Error::Unsupported(
-                "present: the bundle has no linear response or no corrections; show its steps by upt_scene_sample".into(),
+                "present: the bundle has no linear response or no corrections; show its steps with upt_scene_sample".into(),
             ));
         };
         let count = scene.node_count();

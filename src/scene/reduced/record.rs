@@ -26,7 +26,7 @@ pub struct ReducedRecord {
     /// The whole field in block coordinates `[Q]`.
     #[serde(skip)]
     pub q: Vec<f32>,
-    /// State of the free vibration, mm; empty beside a learned map.
+    /// State of the free vibration, mm; empty with a learned map.
     #[serde(with = "stored")]
     pub vibration: Vec<f32>,
     /// `|L|` over all nodes, mm.

@@ -114,7 +114,7 @@ impl Core {
             (None, None) => {}
             (Some(_), None) | (None, Some(_)) => {
                 return Err(Error::Snapshot(
-                    "was saved by a scene with other `corrections`; restore it in one that corrects where that one did".into(),
+                    "was saved by a scene that corrects where this one does not, or the reverse; restore it in a scene with the same `corrections`".into(),
                 ));
             }
         }

@@ -15,7 +15,7 @@ pub enum Records {
 }
 
 fn other_kind() -> Error {
-    Error::Snapshot("is of a model of another kind".into())
+    Error::Snapshot("belongs to a model of another kind".into())
 }
 
 impl Engine {

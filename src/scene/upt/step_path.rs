@@ -76,12 +76,12 @@ impl Parts<'_> {
                 tracing::info!(
                     step = provider(&whole).name(),
                     latent = provider(&split).name(),
-                    "step.onnx is not taken: another provider would run it"
+                    "step.onnx is not used: another provider would run it"
                 );
                 self.warm(split, on_cpu)
             }
             Err(error) => {
-                tracing::warn!(%error, "step.onnx is not taken");
+                tracing::warn!(%error, "step.onnx is not used");
                 self.warm(split, on_cpu)
             }
         }

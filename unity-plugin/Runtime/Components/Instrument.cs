@@ -25,7 +25,7 @@ namespace Upt
         [Tooltip("Radius of the capsule, or of the spatula's rounding, mm.")]
         public float radius = 1f;
 
-        [Tooltip("Shape Hull: the collider whose mesh is taken, on this object or one that is fixed to it. Its mesh needs Read/Write.")]
+        [Tooltip("Shape Hull: the collider whose mesh is used, on this object or on one that is fixed to it. Its mesh needs Read/Write.")]
         public MeshCollider hull;
 
         [Tooltip("Coulomb's coefficient of friction, 0 or more.")]
@@ -34,10 +34,10 @@ namespace Upt
         [Tooltip("Holds the tissue that is within 0.5 mm when this is turned on, until it is turned off or tears off.")]
         public bool grasp = false;
 
-        [Tooltip("A grasp lets go where the tissue pulls harder than this, mN. 0: never.")]
+        [Tooltip("A grasp tears off when the tissue pulls harder than this, mN. 0: never.")]
         public float tearOff = 0f;
 
-        [Tooltip("Models without a linear response alone: tissue in contact sticks to the instrument instead of sliding along it.")]
+        [Tooltip("Only for models without a linear response: tissue in contact sticks to the instrument instead of sliding along it.")]
         public bool sticking = false;
 
         private Hull made;

@@ -19,7 +19,7 @@ namespace Upt
         public UptModel model;
 
         [Tooltip("Mesh to deform, in this object's local space, lying in the bundle's volume. None: the MeshFilter's; " +
-                 "where it has none either, the bundle's surface.")]
+                 "if it has none either, the bundle's surface.")]
         public Mesh renderMesh;
 
         [Tooltip("Unity units per millimetre.")]
@@ -29,21 +29,21 @@ namespace Upt
         public List<Instrument> instruments = new List<Instrument>();
 
         [Range(-1, 64)]
-        [Tooltip("Corrections by the elements that a step in contact gets at most: 1 to 64; 0: what the bundle recommends, with its own " +
+        [Tooltip("The most corrections by the elements that a step in contact gets: 1 to 64; 0: what the bundle recommends, with its own " +
                  "target; -1: none, the fastest and least accurate. Read when the tissue starts.")]
         public int corrections;
 
         [Min(0f)]
-        [Tooltip("With corrections from 1: fewer where the estimated error is below this, mm; 0: always so many.")]
+        [Tooltip("With corrections from 1: fewer once the estimated error is below this, mm; 0: always that many.")]
         public float correctionsTarget;
 
         [Range(0, 8)]
-        [Tooltip("Shorter steps that a step under instruments is made of at most, where it alone would miss the target: 2 to 8; 1: none; " +
-                 "0: what the bundle recommends. From 2 only with a target.")]
+        [Tooltip("The most shorter steps that replace a step under instruments, where one step would miss the target: 2 to 8; 1: none; " +
+                 "0: what the bundle recommends. 2 or more need a target.")]
         public int substeps;
 
         [Min(0f)]
-        [Tooltip("Damping of the tissue, 1/s: 0.01 to 1000, less swings longer; 0: the bundle's. Needs corrections.")]
+        [Tooltip("Damping of the tissue, 1/s: 0.01 to 1000; with less it swings longer. 0: the bundle's. Needs corrections.")]
         public float damping;
 
         [Tooltip("Recompute normals each frame.")]

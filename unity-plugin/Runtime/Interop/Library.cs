@@ -63,7 +63,7 @@ namespace Upt.Interop
         }
 
         /// <summary>
-        /// Optional: sets the path of ONNX Runtime (null: search beside libupt, then ORT_DYLIB_PATH, then
+        /// Optional: sets the path of ONNX Runtime (null: search next to libupt, then ORT_DYLIB_PATH, then
         /// the system) and the threads of the native pool (0: one). Throws when the library was
         /// already initialised with other options.
         /// </summary>

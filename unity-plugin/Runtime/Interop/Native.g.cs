@@ -11,9 +11,9 @@ namespace Upt.Interop
     {
         /// <summary>`sizeof(upt_init_options)`.</summary>
         public uint struct_size;
-        /// <summary>Default number of threads of a model; 0: 1.</summary>
+        /// <summary>Default number of threads of a model; 0 means 1.</summary>
         public uint threads;
-        /// <summary>ONNX Runtime's shared library, a path; NULL: the folder of libupt, then `ORT_DYLIB_PATH`, then the system.</summary>
+        /// <summary>Path of ONNX Runtime's shared library; NULL searches the folder of libupt, then `ORT_DYLIB_PATH`, then the system.</summary>
         public byte* onnxruntime_path;
     }
 
@@ -35,7 +35,7 @@ namespace Upt.Interop
         public int precision;
         /// <summary>Bytes; 0: no limit. Needs a GPU provider in `providers`.</summary>
         public ulong gpu_memory_limit;
-        /// <summary>Folder for compiled engines; NULL: none is kept.</summary>
+        /// <summary>Folder for compiled engines; NULL: they are not kept.</summary>
         public byte* cache_dir;
         /// <summary>1: TF32 products allowed (CUDA; errors near 1e-3).</summary>
         public byte allow_tf32;
@@ -45,7 +45,7 @@ namespace Upt.Interop
         public byte no_fallback;
         /// <summary>Zero.</summary>
         public byte reserved;
-        /// <summary>A `cudaStream_t` of `device_id` to run the graphs on, which outlives the model and its scenes; NULL: one of ONNX Runtime's own.</summary>
+        /// <summary>A `cudaStream_t` of `device_id` that runs the graphs and must outlive the model and its scenes; NULL: ONNX Runtime makes its own.</summary>
         public IntPtr user_stream;
     }
 
@@ -93,7 +93,7 @@ namespace Upt.Interop
         public uint threads;
         /// <summary>`UPT_KERNEL_*`: who decodes.</summary>
         public int kernel;
-        /// <summary>`UPT_PRECISION_*` of the native decoder; 0: the model's, `UPT_PRECISION_FORCE_F32`: float32 whatever the model has.</summary>
+        /// <summary>`UPT_PRECISION_*` of the native decoder; 0: the model's; `UPT_PRECISION_FORCE_F32`: float32, whatever the model's is.</summary>
         public int precision;
         /// <summary>`UPT_GUARD_*`.</summary>
         public int guard_policy;
@@ -105,15 +105,15 @@ namespace Upt.Interop
         public byte no_sleep;
         /// <summary>1: the guard looks for inverted elements in each step.</summary>
         public byte check_inversion;
-        /// <summary>1: a submit while a step is in flight replaces the waiting contact instead of `UPT_ERR_BUSY`.</summary>
+        /// <summary>1: a submit while a step is in flight replaces the waiting contact and does not return `UPT_ERR_BUSY`.</summary>
         public byte latest_wins;
         /// <summary>1: sample with a cubic through the last states instead of a line.</summary>
         public byte cubic_sampling;
         /// <summary>1: attached points are interpolated between nodes, not decoded (kind `upt`).</summary>
         public byte interpolate_points;
         /// <summary>
-        /// Substeps of a step that instruments drive, at most, where it alone would err by more than the corrections' target: 1 for none, up to
-        /// 8, 0 as many as the bundle recommends. From 2 only with a target.
+        /// The most substeps of a step that instruments drive, where one step would miss the corrections' target: 1 for none, up to 8; 0: as
+        /// many as the bundle recommends. 2 or more need a target.
         /// </summary>
         public byte substeps;
         /// <summary>Zero.</summary>
@@ -127,18 +127,18 @@ namespace Upt.Interop
         public int corrections;
         /// <summary>No correction starts later than this in a step, µs; 0: no budget. Only with a count or `UPT_CORRECTIONS_AUTO`.</summary>
         public uint corrections_budget_us;
-        /// <summary>Enough where the estimated error is below this, mm; 0: no target. Only with a count or `UPT_CORRECTIONS_AUTO`.</summary>
+        /// <summary>Corrections stop once the estimated error is below this, mm; 0: no target. Only with a count or `UPT_CORRECTIONS_AUTO`.</summary>
         public float corrections_target_mm;
-        /// <summary>`UPT_FLAG_ERROR` rises where the estimated error is above this, mm; 0: never.</summary>
+        /// <summary>`UPT_FLAG_ERROR` rises if the estimated error is above this, mm; 0: never.</summary>
         public float error_limit_mm;
         /// <summary>
-        /// Length of a step, s: 0.01 to 0.05, or 0 for the bundle's. Another length than the bundle's needs corrections
-        /// (`UPT_ERR_UNSUPPORTED` without); the learned part is left out then.
+        /// Length of a step, s: 0.01 to 0.05, or 0 for the bundle's. A length other than the bundle's needs corrections
+        /// (without them: `UPT_ERR_UNSUPPORTED`) and leaves the learned part out.
         /// </summary>
         public double step_s;
         /// <summary>
-        /// Mass-proportional damping of the tissue, 1/s: 0.01 to 1000, or 0 for the bundle's. Another than the bundle's needs
-        /// corrections (`UPT_ERR_UNSUPPORTED` without); the learned part is left out then.
+        /// Mass-proportional damping of the tissue, 1/s: 0.01 to 1000, or 0 for the bundle's. A damping other than the bundle's
+        /// needs corrections (without them: `UPT_ERR_UNSUPPORTED`) and leaves the learned part out.
         /// </summary>
         public double damping_per_s;
     }
@@ -159,13 +159,13 @@ namespace Upt.Interop
         public fixed float half_extents[3];
         /// <summary>A capsule's radius or a spatula's corner radius, mm.</summary>
         public float radius;
-        /// <summary>`upt_scene_contacts_from_instruments` alone: 1: touched nodes move with the instrument until it leaves; 0: they slide.</summary>
+        /// <summary>Only for `upt_scene_contacts_from_instruments`. 1: touched nodes move with the instrument until it leaves; 0: they slide.</summary>
         public byte sticking;
-        /// <summary>`upt_scene_step_instruments` alone: `UPT_MODE_*`.</summary>
+        /// <summary>Only for `upt_scene_step_instruments`: `UPT_MODE_*`.</summary>
         public byte mode;
         /// <summary>Zero.</summary>
         public fixed byte reserved[2];
-        /// <summary>`upt_scene_step_instruments` alone: Coulomb's coefficient, 0 or more.</summary>
+        /// <summary>Only for `upt_scene_step_instruments`: Coulomb's coefficient, 0 or more.</summary>
         public float friction;
         /// <summary>A grasp tears off when its points together pull harder than this, mN; 0: never.</summary>
         public float tear_off_mn;
@@ -185,7 +185,7 @@ namespace Upt.Interop
         public fixed float force[3];
         /// <summary>On the instrument about its position, mN mm.</summary>
         public fixed float torque[3];
-        /// <summary>How deep the deepest point of the surface lies inside the instrument, mm.</summary>
+        /// <summary>Depth of the deepest point of the surface inside the instrument, mm.</summary>
         public float penetration_mm;
         /// <summary>1: its grasp tore off in this step.</summary>
         public byte torn;
@@ -199,7 +199,7 @@ namespace Upt.Interop
     {
         /// <summary>Place of the instrument in the step's array.</summary>
         public uint instrument;
-        /// <summary>Where the point is, mm.</summary>
+        /// <summary>Position of the point, mm.</summary>
         public fixed float position[3];
         /// <summary>On the instrument, mN.</summary>
         public fixed float force[3];
@@ -213,33 +213,33 @@ namespace Upt.Interop
         public uint struct_size;
         /// <summary>The tool's place in the array of instruments that drives the steps.</summary>
         public uint instrument;
-        /// <summary>Its shape, mode and friction, as in that array; position and rotation say where it is first.</summary>
+        /// <summary>Its shape, mode and friction, as in that array; position and rotation say where it starts.</summary>
         public upt_instrument* tool;
-        /// <summary>What a new step puts elsewhere is blended in over this time, ms; 0: 25.</summary>
+        /// <summary>Time over which the change that a new step brings is blended in, ms; 0: 25.</summary>
         public float blend_ms;
-        /// <summary>How old a step is when it arrives, ms: the time since the poses that it was given were taken; 0: as long as it took.</summary>
+        /// <summary>Age of a step when it arrives, ms: the time since its poses were taken; 0: as long as the step took.</summary>
         public float step_latency_ms;
         /// <summary>Longest force, N; 0: no limit.</summary>
         public float force_limit_n;
-        /// <summary>What the passivity controller damps with at most, N s/m; 0: 5.</summary>
+        /// <summary>The most that the passivity controller damps, N s/m; 0: 5.</summary>
         public float damping_limit_n_s_per_m;
-        /// <summary>1: without the passivity observer and controller.</summary>
+        /// <summary>1: no passivity observer and controller.</summary>
         public byte no_passivity;
         /// <summary>Zero.</summary>
         public fixed byte reserved[7];
     }
 
-    /// <summary>Where a tool is at a moment; the input of `upt_haptics_render`.</summary>
+    /// <summary>A tool's pose at a moment; the input of `upt_haptics_render`.</summary>
     [StructLayout(LayoutKind.Sequential)]
     public unsafe struct upt_haptic_pose
     {
         /// <summary>`sizeof(upt_haptic_pose)`.</summary>
         public uint struct_size;
-        /// <summary>1: the velocities are given; 0: they are those between the last two poses.</summary>
+        /// <summary>1: the velocities below are given; 0: they follow from the last two poses.</summary>
         public byte has_velocity;
         /// <summary>Zero.</summary>
         public fixed byte reserved[3];
-        /// <summary>The host's clock, s; never before that of the last call.</summary>
+        /// <summary>The host's clock, s; never earlier than in the last call.</summary>
         public double time_s;
         /// <summary>In the mesh's frame, metres.</summary>
         public fixed float position_m[3];
@@ -267,15 +267,15 @@ namespace Upt.Interop
         public fixed byte reserved[6];
         /// <summary>States of the scene that this object has seen.</summary>
         public ulong step_count;
-        /// <summary>Watchdog: how old the last of them is, s.</summary>
+        /// <summary>Watchdog: age of the last of these states, s.</summary>
         public double age_s;
-        /// <summary>Energy that the hand was given beyond what came from it since the tool last touched, J; the controller takes it back.</summary>
+        /// <summary>Energy that the hand received, less what it gave, since the tool last touched, J; the controller takes it back.</summary>
         public double excess_energy_j;
         /// <summary>On the tool, N, in the mesh's frame.</summary>
         public fixed float force_n[3];
         /// <summary>On the tool about its position, N m.</summary>
         public fixed float torque_n_m[3];
-        /// <summary>`[3,3]`, row-major: how the force falls with the position, N/m. With the next two a symmetric 6x6 stiffness, of contact alone.</summary>
+        /// <summary>`[3,3]`, row-major: how the force falls with the position, N/m. With the next two: a symmetric 6x6 stiffness of the contact alone.</summary>
         public fixed float stiffness_n_per_m[9];
         /// <summary>`[3,3]`, row-major: how the force falls with the rotation, N/rad; transposed, the torque with the position, N m/m.</summary>
         public fixed float coupling_n_per_rad[9];
@@ -313,7 +313,7 @@ namespace Upt.Interop
         public ulong decoded_node_count;
         /// <summary>Contact nodes of the last step.</summary>
         public ulong contact_count;
-        /// <summary>Bytes that the scene has allocated in addition to the model; pages that it never touches are not resident.</summary>
+        /// <summary>Bytes that the scene has allocated in addition to the model; pages that it has never touched are not resident.</summary>
         public ulong memory_bytes;
         /// <summary>Threads of a step.</summary>
         public uint threads;
@@ -333,13 +333,13 @@ namespace Upt.Interop
         public byte poisoned;
         /// <summary>1: `upt_scene_contact_force` gives the contact forces of the linear response; 0: the elements' elastic forces.</summary>
         public byte prior_forces;
-        /// <summary>Substeps that the last step was made of; 0 where it is one.</summary>
+        /// <summary>Substeps of the last step; 0 if it was not split.</summary>
         public byte substeps;
         /// <summary>Zero.</summary>
         public fixed byte reserved[4];
-        /// <summary>Of the stages' times, copies to a device, ms; 0 on the CPU.</summary>
+        /// <summary>Part of the stages' times: copies to a device, ms; 0 on the CPU.</summary>
         public double upload_ms;
-        /// <summary>Of the stages' times, copies back from a device, ms; 0 on the CPU.</summary>
+        /// <summary>Part of the stages' times: copies back from a device, ms; 0 on the CPU.</summary>
         public double download_ms;
         /// <summary>`UPT_STEP_SPLIT` or `UPT_STEP_WHOLE`.</summary>
         public int step_path;
@@ -349,13 +349,13 @@ namespace Upt.Interop
         public double corrections_ms;
         /// <summary>Evaluations of the element forces in the last step.</summary>
         public uint evaluations;
-        /// <summary>Residual force after the corrections over that before them; 0 without corrections.</summary>
+        /// <summary>Residual force after the corrections divided by that before them; 0 without corrections.</summary>
         public float residual;
         /// <summary>Estimated root mean square error of the corrected state over all nodes, mm; 0 without corrections.</summary>
         public float error_mm;
-        /// <summary>Smallest det F of the corrected state; without corrections, of the elements at the contact; 0 where there is neither.</summary>
+        /// <summary>Smallest det F of the corrected state; without corrections, of the elements at the contact; 0 if there are neither.</summary>
         public float min_det;
-        /// <summary>Solves of the contact of instruments, ms; part of `corrections_ms`, without corrections of `check_ms`.</summary>
+        /// <summary>Contact solves of instruments, ms; part of `corrections_ms`, or of `check_ms` without corrections.</summary>
         public double contact_ms;
     }
 
@@ -396,7 +396,7 @@ namespace Upt.Interop
         public const int UPT_ERR_BUNDLE = -31;
         /// <summary>The version of a bundle or snapshot is not supported.</summary>
         public const int UPT_ERR_VERSION = -32;
-        /// <summary>A snapshot is damaged or of another model.</summary>
+        /// <summary>A snapshot is damaged or belongs to another model.</summary>
         public const int UPT_ERR_SNAPSHOT = -33;
         /// <summary>The guard refused the new state; the last good state stays.</summary>
         public const int UPT_ERR_GUARD = -40;
@@ -426,7 +426,7 @@ namespace Upt.Interop
         public const int UPT_LOG_DEBUG = 4;
         /// <summary>Everything.</summary>
         public const int UPT_LOG_TRACE = 5;
-        /// <summary>32-bit floats: the reference. Of a scene's options: what its model has.</summary>
+        /// <summary>32-bit floats: the reference. In a scene's options: the model's precision.</summary>
         public const int UPT_PRECISION_F32 = 0;
         /// <summary>bfloat16 products where the CPU is faster with them, 32-bit floats elsewhere; the statistics say which.</summary>
         public const int UPT_PRECISION_BF16 = 1;
@@ -434,7 +434,7 @@ namespace Upt.Interop
         public const int UPT_PRECISION_F16 = 2;
         /// <summary>8-bit integers: the bundle's `*.int8.onnx`.</summary>
         public const int UPT_PRECISION_INT8 = 3;
-        /// <summary>Of options only: 32-bit floats also in a scene of a model that was opened with another precision.</summary>
+        /// <summary>In options only: 32-bit floats, even in a scene of a model that was opened with another precision.</summary>
         public const int UPT_PRECISION_FORCE_F32 = 4;
         /// <summary>The library chooses the decoder.</summary>
         public const int UPT_KERNEL_AUTO = 0;
@@ -444,26 +444,26 @@ namespace Upt.Interop
         public const int UPT_KERNEL_ONNX = 2;
         /// <summary>ONNX Runtime, all nodes in one run with the query table resident on the device.</summary>
         public const int UPT_KERNEL_RESIDENT = 3;
-        /// <summary>Split on the CPU; on a device the faster of split and whole, timed while the scene is made.</summary>
+        /// <summary>On the CPU: split. On a device: the faster of split and whole, timed while the scene is created.</summary>
         public const int UPT_STEP_AUTO = 0;
         /// <summary>Native encoder and message mean, then `latent.onnx` and the decoder.</summary>
         public const int UPT_STEP_SPLIT = 1;
         /// <summary>The bundle's `step.onnx`, which decodes every node in every step.</summary>
         public const int UPT_STEP_WHOLE = 2;
-        /// <summary>Both are timed while the scene is made, and the faster one stays.</summary>
+        /// <summary>The faster of split and whole, timed while the scene is created.</summary>
         public const int UPT_STEP_MEASURED = 3;
         /// <summary>No corrections.</summary>
         public const int UPT_CORRECTIONS_NONE = -1;
         /// <summary>As many corrections as the scene's target needs and its budget allows.</summary>
         public const int UPT_CORRECTIONS_AUTO = -2;
         /// <summary>
-        /// Keep the last good state and return `UPT_ERR_GUARD`; without contact, where no later call could do otherwise, as
-        /// `UPT_GUARD_BLEND`.
+        /// Keep the last good state and return `UPT_ERR_GUARD`. A step without contact, which the host cannot change, is treated as
+        /// under `UPT_GUARD_BLEND`.
         /// </summary>
         public const int UPT_GUARD_HOLD = 0;
         /// <summary>Publish finite states and set flags.</summary>
         public const int UPT_GUARD_REPORT = 1;
-        /// <summary>Replace a refused state by the prior's or by rest and set flags.</summary>
+        /// <summary>Replace a refused state by the prior's or by rest, and set flags.</summary>
         public const int UPT_GUARD_BLEND = 2;
         /// <summary>A push is longer than the model was trained on.</summary>
         public const uint UPT_FLAG_PUSH = 1;
@@ -487,7 +487,10 @@ namespace Upt.Interop
         public const uint UPT_FLAG_CLAMPED = 512;
         /// <summary>The contact block was nearly singular and was regularised.</summary>
         public const uint UPT_FLAG_REGULARISED = 1024;
-        /// <summary>The corrections ended inverted: under tools the tissue stays where it was, else the linear response takes their place.</summary>
+        /// <summary>
+        /// The corrections ended with inverted elements: under tools the tissue stays where it was, otherwise the linear response
+        /// replaces them.
+        /// </summary>
         public const uint UPT_FLAG_FELL_BACK = 2048;
         /// <summary>The estimated error is above the scene's `error_limit_mm`.</summary>
         public const uint UPT_FLAG_ERROR = 4096;
@@ -511,11 +514,14 @@ namespace Upt.Interop
         public const int UPT_SHAPE_BOX = 1;
         /// <summary>An instrument's shape: a box with rounded corners.</summary>
         public const int UPT_SHAPE_SPATULA = 2;
-        /// <summary>An instrument's shape: a hull of `upt_hull_create`.</summary>
+        /// <summary>An instrument's shape: a hull from `upt_hull_create`.</summary>
         public const int UPT_SHAPE_HULL = 3;
         /// <summary>An instrument pushes, with Coulomb friction.</summary>
         public const int UPT_MODE_SLIDE = 0;
-        /// <summary>An instrument holds what lies within 0.5 mm of it when the mode changes to this, until the mode changes back or the grasp tears off.</summary>
+        /// <summary>
+        /// An instrument grasps what lies within 0.5 mm of it when the mode changes to this, and holds it until the mode changes back
+        /// or the grasp tears off.
+        /// </summary>
         public const int UPT_MODE_GRASP = 1;
         /// <summary>Version of the C ABI that `upt_abi_version` returns. Bindings compare it at load.</summary>
         public const uint UPT_ABI_VERSION = 1;
@@ -867,8 +873,8 @@ namespace Upt.Interop
         /// <summary>
         /// One step from the scene's own state, driven by rigid instruments. Their contact with the tissue is solved.
         ///
-        /// Give the pose that each instrument has at the end of the step; it moves there on a straight line from its last pose.
-        /// An instrument that would move more than 40 mm in a step is placed there instead. Contact is unilateral, with Coulomb
+        /// Give the pose of each instrument at the end of the step; the instrument moves there on a straight line from its last
+        /// pose. An instrument that would move more than 40 mm in a step is placed there without a motion. Contact is unilateral, with Coulomb
         /// friction, at points of the domain's surface at most 1.7 mm apart. A scene with corrections solves it inside each
         /// correction, as a load; with `corrections = UPT_CORRECTIONS_NONE` it is solved once, on the linear response. The scene
         /// remembers each place of the array: pass every instrument every time, in the same order.
@@ -944,9 +950,9 @@ namespace Upt.Interop
         /// The tissue at a moment between steps, with the instruments where they are at that moment: frames without lag.
         ///
         /// The velocities of the last published state continue as far as the instruments do, and contact is solved at the poses given here with
-        /// the compliance of that time. Use any frame rate, even an uneven one, and call it while a submitted step is in flight too. When a step
-        /// arrives, the frame goes on from where it would have been without it, and over to it within two fifths of a step, or at 25 mm/s where
-        /// that takes longer, within two steps in any case.
+        /// the compliance of that time. Any frame rate works, even an uneven one, and a submitted step may be in flight. When a step arrives, the
+        /// frames start from where they would have been without it. They blend into the new step within two fifths of a step, or at 25 mm/s where
+        /// that takes longer, but always within two steps.
         ///
         /// - `seconds`: time since the last published step, 0 or more; velocities are followed for two steps at most.
         /// - `instruments`: as `upt_scene_step_instruments`.
@@ -979,8 +985,8 @@ namespace Upt.Interop
         /// <summary>
         /// As `upt_scene_present`, with a collision field in place of instruments, for scenes that `upt_scene_step_contacts` drives.
         ///
-        /// Nodes go where the list says, by the compliance of that time. Nodes of the last step that are no longer listed are released: they
-        /// lose the force that held them.
+        /// The listed nodes go where the list says; the others follow by the compliance of that time. Nodes of the last step that are no longer
+        /// listed are released: they lose the force that held them.
         ///
         /// - `seconds`: as `upt_scene_present`.
         /// - `contact_nodes`: `[m]` node indices, each at most once, in any order.
@@ -1061,7 +1067,7 @@ namespace Upt.Interop
         /// every instrument every time, in the same order. NULL with count 0 releases all.
         ///
         /// - `instruments`: at most 64, each with its `struct_size` set.
-        /// - `contact_nodes`: `[capacity]`, contact_vectors: `[capacity,3]`, mm; both may be NULL with capacity 0, which only
+        /// - `contact_nodes`: `[capacity]`, `contact_vectors`: `[capacity,3]`, mm; both may be NULL with capacity 0, which only
         /// queries the count.
         /// - `contact_count`: number of contacts found, always written.
         ///
@@ -1076,7 +1082,7 @@ namespace Upt.Interop
         /// <summary>
         /// Copies the reaction of the tissue at the last step's contact nodes, in their order.
         ///
-        /// A bundle with a linear response (`prior_forces` of the statistics is 1) gives that response's contact forces,
+        /// A bundle with a linear response (`prior_forces` of the statistics is 1) gives the contact forces of that response,
         /// `-A_CC^-1 c`: nodes that borrow a column of the compliance share its force, and held nodes and nodes far from the
         /// domain get zero. Other bundles give the elastic force of the elements around each node at the last state. Both leave
         /// out inertia and damping.

@@ -5,7 +5,7 @@ namespace Upt.Samples
 {
     /// <summary>
     /// A simulated haptic device on a <see cref="HapticTool"/>: a handle with a mass, held by a hand that presses it into the tissue and lifts it
-    /// again. Put it beside a HapticTool whose instrument is in a tissue's list, and press play. With a real device replace the
+    /// again. Put it next to a HapticTool whose instrument is in a tissue's list, and press play. With a real device replace the
     /// body of <see cref="ReadPose"/> and <see cref="WriteWrench"/>, or call <c>HapticTool.Tick</c> from its servo callback:
     ///
     ///     hdBeginFrame(device);

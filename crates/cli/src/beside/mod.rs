@@ -1,4 +1,4 @@
-//! `upt beside`: a bundle beside the reference solver on the same contacts: the error over random steps without a reset, what
+//! `upt beside`: a bundle against the reference solver on the same contacts: the error over random steps without a reset, what
 //! falling asleep after a release costs, and, on these and on cases from disk that the bundle was not trained on, false
 //! alarms, how well the warnings rank the error, and the error of the contact force and of attached points.
 
@@ -31,18 +31,18 @@ pub struct Options {
     /// Bundle folder.
     #[arg(long)]
     bundle: PathBuf,
-    /// Random steps beside the solver, schemes 1 to 5 in turn of 160 steps each, and then contacts outside of the
-    /// envelope and a release; minutes on a coarse mesh, an hour on a fine one; 0 leaves the solver out.
+    /// Random steps to compare with the solver: schemes 1 to 5 in turn, 160 steps each, then contacts outside the envelope and a release. This
+    /// takes minutes on a coarse mesh and an hour on a fine one. 0 leaves the solver out.
     #[arg(long, default_value_t = 1600)]
     steps: usize,
-    /// Programmes of rigid tools beside the solver, one after another without a reset; the bundle gets their poses alone.
+    /// Programmes of rigid tools to compare with the solver, one after another without a reset; the bundle gets only their poses.
     #[arg(long, default_value_t = 0, value_name = "COUNT")]
     tools: usize,
     /// Cases inside the envelope that the bundle was not trained on: a dataset folder (its test split) or a
-    /// trajectory; may be given many times.
+    /// trajectory; may be repeated.
     #[arg(long, value_name = "PATH", num_args = 1..)]
     held_out: Vec<PathBuf>,
-    /// The same outside the envelope.
+    /// Such cases outside the envelope.
     #[arg(long, value_name = "PATH", num_args = 1..)]
     outside: Vec<PathBuf>,
     /// Page whose part between the markers `upt beside NAME` is replaced, and that of --tools between `upt beside --tools NAME`.

@@ -54,7 +54,7 @@ fn replay(bench: &Bench, file: &Path) -> Result<(String, Vec<Moment>)> {
     let wanted = &bench.model.manifest.mesh.mesh_sha256;
     ensure!(
         trajectory.header.mesh_sha256 == *wanted,
-        "{}: simulated on another mesh ({}) than the bundle's",
+        "{}: simulated on a mesh ({}) other than the bundle's",
         file.display(),
         trajectory.header.mesh_name
     );

@@ -1,4 +1,4 @@
-//! Random tools beside the reference solver, one programme after another on one body without a reset: the library gets
+//! Random tools and the reference solver, one programme after another on one body without a reset: the library gets
 //! the poses alone, the solver the same poses.
 
 use std::fmt::Write;

@@ -1,4 +1,4 @@
-//! `upt check`: held-out contacts through a bundle beside the reference solver, and the certificate that comes of it.
+//! `upt check`: held-out contacts through a bundle and the reference solver, and the certificate that results.
 //!
 //! Nothing is stored on the way: the solver and the bundle's scenes step side by side. One scene makes the steps that the bundle
 //! recommends, another leaves its corrections out; for a bundle without a learned map the latter is linear elasticity, static in
@@ -57,13 +57,13 @@ const SAME: f64 = 0.1;
 pub struct Options {
     /// Bundle folder with a certificate, as `upt make` leaves it.
     bundle: PathBuf,
-    /// Held-out cases; left out: those of the certificate.
+    /// Number of held-out cases. Default: that of the certificate.
     #[arg(long)]
     cases: Option<usize>,
-    /// Another seed: other sites than the certificate's.
+    /// A seed other than the certificate's, for other sites.
     #[arg(long)]
     seed: Option<u64>,
-    #[arg(long, help = loads::programmes_help() + ". Left out: those of the certificate")]
+    #[arg(long, help = loads::programmes_help() + ". Default: those of the certificate")]
     tools: Option<String>,
     #[command(flatten)]
     sizes: tool_scale::Arguments,
@@ -106,7 +106,7 @@ pub struct Plan {
     pub cases: Option<usize>,
     pub seconds: f64,
     pub seed: u64,
-    /// Programmes of rigid tools beside the contacts.
+    /// Programmes of rigid tools in addition to the contacts.
     pub tools: Vec<ToolProgramme>,
     /// Their sizes.
     pub sizes: ToolSizes,

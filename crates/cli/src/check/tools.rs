@@ -1,4 +1,4 @@
-//! Programmes of rigid tools, driven by their poses alone, through a bundle beside the reference solver: the part `tools` of a certificate.
+//! Programmes of rigid tools, driven by their poses alone, through a bundle and the reference solver: the part `tools` of a certificate.
 
 use std::path::Path;
 

@@ -41,7 +41,7 @@ pub struct Options {
     /// Natural modes.
     #[arg(long, default_value_t = 60)]
     pub natural: usize,
-    /// Modes of what patches add to the linear response; 0: none.
+    /// Number of modes of what patches add to the linear response; 0: none.
     #[arg(long, default_value_t = 60)]
     pub patch_modes: usize,
     /// Number of patches that these modes are made from.
@@ -50,21 +50,21 @@ pub struct Options {
     /// Use the bundle's own residual modes (kind `reduced`) in place of patches.
     #[arg(long)]
     pub residual: bool,
-    /// Modes from the training cases of a dataset (`upt dataset`, schemes or tools), beside the others; may be repeated.
+    /// Modes from the training cases of a dataset (`upt dataset`, schemes or tools), added to the others. May be repeated.
     #[arg(long)]
     pub data: Vec<PathBuf>,
     /// Number of modes from --data.
     #[arg(long, default_value_t = 60)]
     pub data_modes: usize,
-    /// Corrections a step that the bundle recommends; COUNT@MM: at most COUNT, fewer where the estimated error is below MM;
-    /// COUNT@MM/SUBSTEPS: that many substeps where a step that instruments drive would miss MM.
+    /// Corrections per step that the bundle recommends. COUNT@MM: at most COUNT, fewer once the estimated error is below MM.
+    /// COUNT@MM/SUBSTEPS: also that many substeps, where one step that instruments drive would miss MM.
     #[arg(long, default_value_t = Effort::fixed(3))]
     pub recommended: Effort,
     /// Factor of the estimated error: `truth over estimate` of `training/scripts/corrections_table.py` on held-out cases.
-    /// Default: 1, with --keep the bundle's own.
+    /// Default: 1, or with --keep the bundle's own.
     #[arg(long)]
     pub calibration: Option<f32>,
-    /// Keep the bundle's file: only what the manifest says of it changes.
+    /// Keep the bundle's file and change only the manifest's entry.
     #[arg(long)]
     pub keep: bool,
     /// Seed of the patches.
@@ -83,7 +83,7 @@ pub fn run(args: &Options) -> Result<ExitCode> {
     if let Some(calibration) = args.calibration
         && !(calibration.is_finite() && calibration > 0.0)
     {
-        bail!("--calibration is {calibration}, must be positive");
+        bail!("--calibration is {calibration}; it must be positive");
     }
     if args.keep {
         recommend(&args.bundle, args.recommended, args.calibration)?;
@@ -118,7 +118,7 @@ pub fn recommend(bundle: &Path, recommended: Effort, calibration: Option<f32>) -
     let before: Option<Value> = Manifest::read(bundle)?.get("corrections")?;
     let Some(before) = before else {
         bail!(
-            "{}: has no corrections; leave --keep out, and they are made",
+            "{}: has no corrections to keep; leave --keep out to make them",
             bundle.display()
         );
     };

@@ -28,22 +28,22 @@ use limits::{Limits, Tried};
 pub struct Options {
     /// Bundle folder with corrections; `envelope.tools` of its manifest is written.
     bundle: PathBuf,
-    /// Datasets of `upt dataset --tools`, or trajectories; may be given many times.
+    /// Datasets of `upt dataset --tools`, or trajectories; may be repeated.
     #[arg(long, required = true)]
     tools: Vec<PathBuf>,
     /// Which cases of a dataset.
     #[arg(long, value_enum, default_value_t = Split::All)]
     split: Split,
-    /// Cases of each programme at most.
+    /// The most cases of each programme.
     #[arg(long, default_value_t = 100)]
     cases: usize,
-    /// Corrections a step; left out: as many as the bundle recommends.
+    /// Corrections per step. Default: as many as the bundle recommends.
     #[arg(long)]
     corrections: Option<Effort>,
-    /// Mean squared error of a case that is good, mm².
+    /// Largest mean squared error of a good case, mm².
     #[arg(long, default_value_t = 0.05)]
     limit_mm2: f64,
-    /// Share of the cases inside of the limits that may be worse.
+    /// Share of the cases inside the limits that may be worse.
     #[arg(long, default_value_t = 0.05)]
     share: f64,
     /// Threads of the library.
@@ -52,7 +52,7 @@ pub struct Options {
     /// Print what would be written, and write nothing.
     #[arg(long)]
     dry_run: bool,
-    /// Document whose tables between `begin: upt envelope BUNDLE` and its end are written; may be given many times.
+    /// Document whose tables between `begin: upt envelope BUNDLE` and its end are written; may be repeated.
     #[arg(long)]
     markdown: Vec<PathBuf>,
     /// Print the result as JSON.
@@ -73,7 +73,7 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     let bundle: BundleFolder = fitting.remove(0);
     let corrections = match (options.corrections, bundle.corrections) {
         (_, None) => bail!(
-            "{}: has no corrections, and tools are judged by them; `upt corrections` gives it what they need",
+            "{}: has no corrections, which the limits of tools need; add them with `upt corrections`",
             bundle.name
         ),
         (Some(effort), _) | (None, Some(effort)) => effort,

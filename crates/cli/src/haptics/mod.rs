@@ -45,22 +45,22 @@ pub struct Options {
     /// The same in hours.
     #[arg(long, conflicts_with = "minutes")]
     hours: Option<f64>,
-    /// End after so many minutes of wall time, with what was simulated by then.
+    /// Stop after this many minutes of wall time, and report what was simulated by then.
     #[arg(long, value_name = "MINUTES")]
     within: Option<f64>,
-    /// Threads that do nothing but keep the machine busy meanwhile.
+    /// Extra threads that only keep the machine busy.
     #[arg(long, default_value_t = 0)]
     load: usize,
-    /// Length of a step, ms, 10 to 50; by default the bundle's.
+    /// Length of a step, ms, 10 to 50. Default: the bundle's.
     #[arg(long, value_name = "MS")]
     step_ms: Option<f64>,
     /// Seconds of each gesture that the reference solver replays; 0: none.
     #[arg(long, default_value_t = 0.0)]
     reference: f64,
-    /// How old a step is when it arrives, ms.
+    /// Age of a step when it arrives, ms.
     #[arg(long, default_value_t = 12.0)]
     latency_ms: f64,
-    /// Corrections a step; by default as many as the bundle recommends.
+    /// Corrections per step. Default: as many as the bundle recommends.
     #[arg(long)]
     corrections: Option<u32>,
     /// Seed of the sites and of the clock's jitter.
@@ -77,14 +77,14 @@ pub struct Options {
 /// Exit code 1 when a force was not a number, or stayed when the tools had gone.
 pub fn run(options: &Options) -> Result<ExitCode> {
     if options.plot.is_some() && options.reference <= 0.0 {
-        bail!("--plot shows the solver's force too: say for how many seconds with --reference");
+        bail!("--plot also shows the solver's force; say for how many seconds with --reference");
     }
     let minutes = options.hours.map_or(options.minutes, |hours| 60.0 * hours);
     if !(minutes > 0.0 && minutes <= 10_000.0) {
-        bail!("--minutes is {minutes}, must be above 0 and at most 10000");
+        bail!("--minutes is {minutes}; it must be above 0 and at most 10000");
     }
     if !(0.0..=40.0).contains(&options.latency_ms) {
-        bail!("--latency-ms is {}, must be 0 to 40", options.latency_ms);
+        bail!("--latency-ms is {}; it must be 0 to 40", options.latency_ms);
     }
     let bundle = BundleFolder::read(&options.bundle)?;
     let mesh = Mesh::read(&bundle.mesh_file)?;

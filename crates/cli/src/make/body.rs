@@ -37,7 +37,7 @@ pub fn make(options: &Options, stage: &mut Stage) -> Result<()> {
         mesh.supported.clear();
         if mesh.fixed.is_empty() {
             bail!(
-                "no node lies in --fixed; the body spans {}",
+                "no node lies in the region of --fixed; the body spans {}",
                 span(&measure(&mesh))
             );
         }
@@ -50,17 +50,17 @@ pub fn make(options: &Options, stage: &mut Stage) -> Result<()> {
     }
     if options.boundary == Boundary::Supported && mesh.supported.is_empty() {
         bail!(
-            "--boundary supported: {} holds no set `supported`; a mesh file (.mesh.safetensors) can, and --fixed replaces both sets",
+            "--boundary supported: {} has no set `supported`; only a mesh file (.mesh.safetensors) can have one, and --fixed replaces both sets",
             options.input.display()
         );
     }
     if mesh.held_nodes(options.boundary).len() == mesh.node_count() {
-        bail!("--fixed holds every node; hold a part of the body only");
+        bail!("--fixed holds every node; hold only a part of the body");
     }
     for (region, factor) in &options.stiffness {
         let rows = tets_in(&mesh, &region.open(&input, scale)?);
         if rows.is_empty() {
-            bail!("no tetrahedron lies in --stiffness {region}={factor}");
+            bail!("no tetrahedron lies in the region of --stiffness {region}={factor}");
         }
         mesh.stiffness.resize(mesh.tets.len(), 1.0);
         rows.iter().for_each(|&row| mesh.stiffness[row] = *factor);
@@ -213,14 +213,14 @@ fn choose_domain(
         let count = chosen.len();
         if count == 0 {
             bail!(
-                "no face of the surface lies in --domain; the body spans {}",
+                "no face of the surface lies in the region of --domain; the body spans {}",
                 span(&measure(mesh))
             );
         }
         mesh.domain = chosen.into_iter().filter(|&row| free(mesh, row)).collect();
         if mesh.domain.is_empty() {
             bail!(
-                "all of the {count} faces in --domain are held by --fixed; touch another place, or hold less"
+                "--fixed holds all {count} faces of --domain; choose another place for one of them, or hold less"
             );
         }
         if mesh.domain.len() < count {
@@ -238,7 +238,7 @@ fn choose_domain(
                 .all(|&node| held[node as usize])
         });
         if mesh.domain.is_empty() {
-            bail!("the mesh file's domain is held altogether; give --domain");
+            bail!("the whole domain of the mesh file is held; give another with --domain");
         }
         return Ok(());
     }

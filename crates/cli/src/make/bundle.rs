@@ -1,4 +1,4 @@
-//! The bundle's folder: its manifest, put together beside the work, and published whole.
+//! The bundle's folder: its manifest, put together in the work folder, and published whole.
 
 use std::path::Path;
 
@@ -29,7 +29,7 @@ pub fn check_target(out: &Path) -> Result<()> {
     };
     if entries.next().is_some() && ours() != Some(true) {
         bail!(
-            "{}: is there and is no bundle of `upt make`; choose another --out, or remove it",
+            "{}: exists, but `upt make` did not make it; choose another --out, or remove it",
             out.display()
         );
     }
@@ -163,7 +163,7 @@ pub fn copy(from: &Path, to: &Path) -> Result<()> {
     })
 }
 
-/// Copies the folder beside `out` and lets it take that place.
+/// Copies the folder next to `out` and lets it take that place.
 pub fn publish(draft: &Path, out: &Path) -> Result<()> {
     let beside = |end: &str| {
         let mut name = out.file_name().unwrap_or_default().to_os_string();

@@ -39,81 +39,82 @@ pub struct Options {
     /// Folder of the bundle.
     #[arg(long)]
     pub out: PathBuf,
-    /// Unit of the input's coordinates: mm, cm, m, in, or millimetres a unit as a number. Regions are in mm.
+    /// Unit of the input's coordinates: mm, cm, m, in, or a number of millimetres per unit. Regions are in mm.
     #[arg(long, default_value = "mm")]
     pub unit: String,
-    /// Nodes are held here: ball:x,y,z,r, plane:a,b,c,d (where a x + b y + c z + d > 0), inside:FILE (a closed surface in the
-    /// input's unit), group:NAME (a group, material or #rrggbb colour of the input), not: and one of them. May be repeated. Left out: what the mesh file holds.
+    /// Region whose nodes are held: ball:x,y,z,r, plane:a,b,c,d (where a x + b y + c z + d > 0), inside:FILE (a closed surface in the input's
+    /// unit), group:NAME (a group, material or #rrggbb colour of the input), or not: before one of these. May be repeated. Default: what the
+    /// mesh file holds.
     #[arg(long, value_name = "REGION", allow_hyphen_values = true)]
     pub fixed: Vec<Region>,
-    /// Which node sets of a mesh file are held: `fixed`, or `supported` (both of its sets; not together with --fixed).
+    /// Node sets of a mesh file that are held: `fixed`, or `supported` (both sets; not together with --fixed).
     #[arg(long, default_value = "fixed")]
     pub boundary: Boundary,
-    /// Instruments may touch the surface here; may be repeated. Left out: what the mesh file names, or else all of the surface
-    /// but for a rim around what is held.
+    /// Region of the surface that instruments may touch. May be repeated. Default: what the mesh file names, otherwise all of the surface
+    /// except a rim around what is held.
     #[arg(long, value_name = "REGION", allow_hyphen_values = true)]
     pub domain: Vec<Region>,
-    /// Tissue of another stiffness: a region, `=` and a factor on Young's modulus, such as group:tumour=4 or inside:tumour.stl=4.
-    /// May be repeated; the later one counts.
+    /// Region of another stiffness: a region, `=` and a factor on Young's modulus, such as group:tumour=4 or inside:tumour.stl=4. May be
+    /// repeated; where regions overlap, the last one counts.
     #[arg(long, value_name = "REGION=FACTOR", allow_hyphen_values = true, value_parser = stiffer)]
     pub stiffness: Vec<(Region, f32)>,
-    /// Wanted number of nodes where a surface is filled.
+    /// Number of nodes to aim for when a surface is filled.
     #[arg(long, default_value_t = 5000)]
     pub nodes: usize,
     /// Time to spend, minutes. It sets how many held-out cases the check simulates.
     #[arg(long, default_value_t = 10.0)]
     pub minutes: f64,
-    /// Held-out cases of the check; left out: as many as there is time for, at most 8.
+    /// Held-out cases of the check. Default: as many as there is time for, at most 8.
     #[arg(long)]
     pub cases: Option<usize>,
     #[arg(long, help = loads::programmes_help() + ". Two cases of each are part of the certificate and of --target-error")]
     pub tools: Option<String>,
     #[command(flatten)]
     pub sizes: tool_scale::Arguments,
-    /// brain, liver, kidney, heart or fat: Young's modulus, density and damping; or left out for brain.
+    /// Material that sets Young's modulus, density and damping: brain, liver, kidney, heart or fat.
     #[arg(long, default_value = "brain")]
     pub material: String,
-    /// Young's modulus, Pa; over the material's.
+    /// Young's modulus, Pa; overrides the material's.
     #[arg(long)]
     pub young: Option<f64>,
-    /// Law of the tissue: neo-hookean, or mooney-rivlin:SHARE with the share of C01 in C10 + C01 (left out: 0.526, brain).
+    /// Law of the tissue: neo-hookean, or mooney-rivlin:SHARE with the share of C01 in C10 + C01 (default: 0.526, brain).
     #[arg(long, default_value_t = Law::default())]
     pub law: Law,
     /// Poisson's ratio, below 0.5.
     #[arg(long, default_value_t = 0.49)]
     pub poisson: f64,
-    /// Density, kg/m³; over the material's.
+    /// Density, kg/m³; overrides the material's.
     #[arg(long)]
     pub density: Option<f64>,
-    /// Damping, 1/s; over the material's.
+    /// Damping, 1/s; overrides the material's.
     #[arg(long)]
     pub damping: Option<f64>,
-    /// Deepest push that it is made for, mm; left out: 15 for a body of a brain's size, less for a smaller one.
+    /// Deepest push that the bundle is made for, mm. Default: 15 for a body of a brain's size, less for a smaller one.
     #[arg(long)]
     pub push: Option<f64>,
-    /// Fail where the mean squared error in contact, or that of a programme of --tools, is above this, mm².
+    /// Fail if the mean squared error in contact, or that of a programme of --tools, is above this, mm².
     #[arg(long, value_name = "MM2")]
     pub target_error: Option<f64>,
-    /// Corrections a step that the bundle recommends: COUNT, or COUNT@MM for at most COUNT, fewer where the estimated error is below MM.
-    /// Left out: 10@0.02/2 for pushes of 15 mm, with the target in proportion to the deepest push.
+    /// Corrections per step that the bundle recommends: COUNT, or COUNT@MM for at most COUNT and fewer once the estimated error is below MM.
+    /// Default: 10@0.02/2 for pushes of 15 mm, with the target in proportion to the deepest push.
     #[arg(long, value_name = "COUNT[@MM]")]
     pub corrections: Option<Effort>,
     /// Natural modes.
     #[arg(long, default_value_t = 60)]
     pub natural: usize,
-    /// Patches that the coarse space is made from.
+    /// Number of patches that the coarse space is made from.
     #[arg(long, default_value_t = 120)]
     pub patches: usize,
-    /// Error of the block-wise tables, mm in the mean square over typical pushes.
+    /// Error that the block-wise tables may have, mm (root mean square over typical pushes).
     #[arg(long, default_value_t = 5e-3)]
     pub tolerance_mm: f64,
-    /// Name in the bundle; left out: the input's.
+    /// Name of the bundle. Default: the input's.
     #[arg(long)]
     pub name: Option<String>,
-    /// Licence of the bundle, which is the anatomy's.
+    /// Licence of the bundle: that of the anatomy.
     #[arg(long, default_value = "as the input's")]
     pub license: String,
-    /// Folder for stages; left out: the bundle's with `.work` behind it.
+    /// Folder for the stages. Default: the bundle's folder with `.work` appended.
     #[arg(long)]
     pub work: Option<PathBuf>,
     /// Only import, and write the page that shows what is held and touched.
@@ -122,9 +123,10 @@ pub struct Options {
     /// Write job scripts for a cluster into a folder instead of running: `--emit slurm DIR` or `--emit ray DIR`.
     #[arg(long, num_args = 2, value_names = ["slurm|ray", "DIR"])]
     pub emit: Vec<String>,
-    /// Import faults as they are instead of repairing what can be repaired safely.
+    /// Refuse faults instead of repairing those that can be repaired safely.
     #[arg(long)]
     pub no_repair: bool,
+    /// Seed of the sites that are drawn.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
     /// Threads (0: all).
@@ -142,7 +144,7 @@ fn stiffer(text: &str) -> Result<(Region, f32), String> {
         .ok_or_else(|| format!("`{text}` has no factor; write REGION=FACTOR"))?;
     match factor.trim().parse::<f32>() {
         Ok(factor) if factor.is_finite() && factor > 0.0 => Ok((region.parse()?, factor)),
-        _ => Err(format!("`{factor}` is no factor above 0")),
+        _ => Err(format!("`{factor}` is not a number above 0")),
     }
 }
 
@@ -162,16 +164,19 @@ impl Options {
     /// Refuses what no stage can use.
     pub fn check(&self) -> Result<()> {
         if !(self.minutes.is_finite() && self.minutes > 0.0) {
-            bail!("--minutes is {}, must be above 0", self.minutes);
+            bail!("--minutes is {}; it must be above 0", self.minutes);
         }
         if self.cases == Some(0) {
             bail!("--cases is 0; a certificate needs a held-out case, give 1 or more");
         }
         if self.nodes < 50 {
-            bail!("--nodes is {}, must be at least 50", self.nodes);
+            bail!("--nodes is {}; it must be at least 50", self.nodes);
         }
         if !(self.tolerance_mm.is_finite() && self.tolerance_mm > 0.0) {
-            bail!("--tolerance-mm is {}, must be positive", self.tolerance_mm);
+            bail!(
+                "--tolerance-mm is {}; it must be positive",
+                self.tolerance_mm
+            );
         }
         if self.natural == 0 {
             bail!("--natural is 0; the free motion needs natural modes");
@@ -197,7 +202,7 @@ impl Options {
             other => match other.parse::<f64>() {
                 Ok(scale) if scale.is_finite() && scale > 0.0 => scale,
                 _ => bail!(
-                    "--unit is `{other}`; use mm, cm, m, in, or millimetres a unit as a number"
+                    "--unit is `{other}`; use mm, cm, m, in, or a number of millimetres per unit"
                 ),
             },
         })
@@ -207,7 +212,7 @@ impl Options {
     pub fn material(&self) -> Result<Material> {
         let Some([young, density, damping]) = named(&self.material) else {
             bail!(
-                "--material is `{}`; use brain, liver, kidney, heart or fat, and --young, --density, --damping for another",
+                "--material is `{}`; use brain, liver, kidney, heart or fat; --young, --density and --damping describe any other material",
                 self.material
             );
         };
@@ -237,7 +242,7 @@ impl Options {
         })
     }
 
-    /// What the body depends on beside the input's bytes.
+    /// What the body depends on besides the input's bytes.
     pub fn body_words(&self) -> Result<String> {
         let mut words = format!(
             "{} {} {} {:?} {}",
@@ -312,7 +317,7 @@ impl Sizes {
         let area_mm2 = AREA_MM2.map(|area| area * scale * scale);
         if domain < 1.3 * area_mm2[1] {
             bail!(
-                "the domain has {domain:.0} mm² and a contact up to {:.0}: widen --domain, or make it for smaller tools with --push {:.1}",
+                "the domain has {domain:.0} mm², and a contact may take up to {:.0} mm²: widen --domain, or make the bundle for smaller tools with --push {:.1}",
                 area_mm2[1],
                 0.9 * PUSH_MM * scale * (domain / (1.3 * area_mm2[1])).sqrt()
             );
@@ -355,7 +360,7 @@ impl Sizes {
         )
     }
 
-    /// What the preview says beside the mesh.
+    /// What the preview says besides the mesh.
     pub fn scene(&self, mesh: &Mesh) -> Vec<(String, String)> {
         vec![
             ("name".into(), mesh.name.clone()),

@@ -28,7 +28,7 @@ pub fn key_of(parts: &[&[u8]]) -> String {
         .collect()
 }
 
-/// What a finished stage leaves beside its files.
+/// What a finished stage leaves in addition to its files.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Record {
     pub key: String,
@@ -76,7 +76,7 @@ impl Work {
         match lock.try_lock() {
             Ok(()) => {}
             Err(std::fs::TryLockError::WouldBlock) => bail!(
-                "{}: another `upt make` works here; wait for it, or give --work another folder",
+                "{}: another `upt make` is working here; wait for it, or choose another folder with --work",
                 folder.display()
             ),
             // A file system without locks.

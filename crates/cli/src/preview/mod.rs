@@ -22,7 +22,7 @@ pub struct Content<'a> {
     pub mesh: &'a Mesh,
     /// Root mean square error of each node in a check, mm.
     pub node_errors: Option<&'a [f32]>,
-    /// Shown beside the picture.
+    /// Shown next to the picture.
     pub facts: &'a [(String, String)],
     /// What [`Film::json`] made, or null.
     pub film: &'a serde_json::Value,

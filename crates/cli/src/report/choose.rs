@@ -27,12 +27,12 @@ pub fn fitting_bundles(
         let bundle = BundleFolder::read(path)?;
         if bundle.mesh_sha256 != cases.mesh_sha256 {
             notes.push(format!(
-                "{}: made for another mesh than that of the cases",
+                "{}: made for a mesh other than that of the cases",
                 bundle.name
             ));
         } else if bundle.boundary != cases.boundary {
             notes.push(format!(
-                "{}: made for the boundary `{}`, the cases have `{}`",
+                "{}: made for the boundary `{}`, but the cases have `{}`",
                 bundle.name, bundle.boundary, cases.boundary
             ));
         } else {
@@ -188,7 +188,9 @@ pub fn methods(
             }
             "none" => {}
             other => {
-                bail!("--plain {other}: known are zero, linear, prior, coarse, tled, paper, none")
+                bail!(
+                    "--plain {other} is unknown; use zero, linear, prior, coarse, tled, paper or none"
+                )
             }
         }
     }

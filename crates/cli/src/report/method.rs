@@ -1,4 +1,4 @@
-//! Everything that can be stepped through a contact: the library, and the plain methods beside it.
+//! Everything that can be stepped through a contact: the library and the plain methods.
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -340,7 +340,7 @@ impl SurrogateStepper {
         let stats = scene.stats()?;
         if stats.precision != settings.precision {
             bail!(
-                "{}: precision {} is not available here (the library would run another)",
+                "{}: precision {} is not available on this machine; the library would run another",
                 bundle.name,
                 settings.precision
             );

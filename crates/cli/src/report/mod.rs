@@ -1,4 +1,4 @@
-//! `upt report`: error against run time, for the library and for the plain methods beside it.
+//! `upt report`: error against run time, for the library and for the plain methods.
 //!
 //! Every row replays the same held-out contacts autoregressively and is timed step by step around the
 //! C call. Finished rows are kept by content, so that an interrupted report goes on where it was.
@@ -52,9 +52,9 @@ use setting::{Precision, Provider, Region};
   upt report --shown 90 --tools data/brain-frames --split all --bundle onnx/brain-reduced --out target/shown
   upt report --step-ms 10,20,25,50 --tools data/brain-frames --split all --bundle onnx/brain-reduced
 
-report.json, report.html and report.md (the table for a document of yours) are written to --out (with --tools: tools.json and tools.html); the table goes to the terminal.")]
+The command writes report.json, report.html and report.md (the table for a document of yours) to --out (with --tools: tools.json and tools.html), and prints the table.")]
 pub struct Options {
-    /// Bundles; default: all below onnx/ that fit the cases' mesh and boundary condition.
+    /// Bundles. Default: all below onnx/ that fit the cases' mesh and boundary condition.
     #[arg(long = "bundle", value_name = "FOLDER")]
     bundles: Vec<PathBuf>,
     /// A trajectory to replay (repeat for several).
@@ -63,15 +63,14 @@ pub struct Options {
     /// A dataset folder whose test split is replayed (repeat for several).
     #[arg(long = "data", value_name = "FOLDER")]
     data: Vec<PathBuf>,
-    /// A dataset folder or a trajectory with rigid tools (`upt dataset --tools`, repeat for several): the library is driven by
-    /// their poses alone. Of the options below --split, --cases, --corrections, --threads (the largest), --out, --title,
-    /// --markdown and --json apply.
+    /// A dataset folder or a trajectory with rigid tools (`upt dataset --tools`, repeat for several): the tools' poses alone drive the library. Of the options below, only --split, --cases, --corrections, --threads (the largest), --out,
+    /// --title, --markdown and --json apply.
     #[arg(long = "tools", value_name = "PATH", conflicts_with_all = ["trajectories", "data"])]
     tools: Vec<PathBuf>,
     /// Cases of the datasets of --tools: held-out ones, those that bundles may learn from, or both.
     #[arg(long, default_value = "test", requires = "tools")]
     split: Split,
-    /// What a host shows between steps at this many frames a second; --tools names datasets with frames shorter than a step
+    /// Measure what a host shows between steps, at this many frames a second; --tools names datasets with frames shorter than a step
     /// (`upt dataset --tools all --frame-ms 5`). Writes shown.json and pictures; --markdown replaces the part between the markers
     /// `upt report --shown BUNDLE`.
     #[arg(long, value_name = "HZ", requires = "tools")]
@@ -79,32 +78,33 @@ pub struct Options {
     /// With --shown: time from a step's moment to the arrival of its state, ms.
     #[arg(long, default_value_t = 10.0, requires = "shown")]
     arrival_ms: f64,
-    /// Lengths of step, ms, 10 to 50. With --shown: frames between such steps are measured besides. Without: the error of the steps by their
-    /// length, against the same frames shorter than a step; --markdown replaces the part between the markers
+    /// Lengths of a step, ms, 10 to 50. With --shown: also measure frames between such steps. Without: measure the error of the steps by their
+    /// length, against frames shorter than a step; --markdown replaces the part between the markers
     /// `upt report --step-ms BUNDLE`.
     #[arg(long, value_name = "MS", value_delimiter = ',', requires = "tools")]
     step_ms: Vec<f64>,
-    /// Page whose part between the markers `upt report --tools MESH` is replaced by the tables of --tools, or by a narrow one
-    /// where the markers end in `summary` (repeat for several).
+    /// Page whose part between the markers `upt report --tools MESH` is replaced by the tables of --tools, or by a narrow table if the markers end in `summary` (repeat for several).
     #[arg(long, value_name = "FILE", requires = "tools")]
     markdown: Vec<PathBuf>,
-    /// Cases of each scheme or programme at most.
+    /// The most cases of each scheme or programme.
     #[arg(long, default_value_t = 2)]
     cases: usize,
     /// Folder for report.json, report.html, report.md and the finished rows.
     #[arg(long, default_value = "target/report")]
     out: PathBuf,
-    /// Threads of the library; default: 1, and all of this machine's.
+    /// Threads of the library. Default: 1, and all of this machine's.
     #[arg(long, value_delimiter = ',', default_values_t = default_threads(), hide_default_value = true)]
     threads: Vec<u32>,
+    /// Nodes that a step computes: all, those of the surface, or those of the domain.
     #[arg(long, value_delimiter = ',', default_value = "all,surface")]
     region: Vec<Region>,
-    /// Default: float32 and what else a bundle and this CPU have.
+    /// Default: float32, and whatever else the bundle and this CPU support.
     #[arg(long, value_delimiter = ',')]
     precision: Vec<Precision>,
     #[arg(long, value_delimiter = ',', default_value = "cpu")]
     provider: Vec<Provider>,
-    /// Corrections a step in contact: counts, or COUNT@MM for at most COUNT, fewer where the estimated error is below MM; default: none and as many as a bundle recommends, and 0, 1, 3, 5, 10 with all nodes and the most threads.
+    /// Corrections per step in contact: counts, or COUNT@MM for at most COUNT and fewer once the estimated error is below MM. Default: none and
+    /// as many as the bundle recommends; with all nodes and the most threads also 0, 1, 3, 5 and 10.
     #[arg(long, value_delimiter = ',')]
     corrections: Vec<Effort>,
     /// Plain methods to compare with: zero, linear, prior (the bundles' linear response alone), coarse, tled, paper; or none.
@@ -117,7 +117,7 @@ pub struct Options {
     /// The mesh of `coarse`.
     #[arg(long, default_value = "onnx/meshes/brain-coarse.mesh.safetensors")]
     coarse_mesh: PathBuf,
-    /// Frames of the first case that TLED itself is timed on.
+    /// Frames of the first case on which TLED itself is timed.
     #[arg(long, default_value_t = 40)]
     tled_frames: usize,
     /// Leave out the Hausdorff distance (the slowest of the metrics).

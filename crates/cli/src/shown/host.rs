@@ -35,11 +35,11 @@ impl Clock {
     /// A rate or a delay that no host has.
     pub fn new(hz: f64, arrival_ms: f64) -> Result<Self> {
         if !(hz.is_finite() && (1.0..=2000.0).contains(&hz)) {
-            bail!("--shown {hz}: frames a second, from 1 to 2000");
+            bail!("--shown is {hz}; it must be 1 to 2000 frames a second");
         }
         if !(0.0..1e3 * FRAME_S).contains(&arrival_ms) {
             bail!(
-                "--arrival-ms {arrival_ms}: from 0 to less than a step, {} ms",
+                "--arrival-ms is {arrival_ms}; it must be 0 or more and less than a step of {} ms",
                 1e3 * FRAME_S
             );
         }
@@ -70,7 +70,7 @@ pub struct Drawn {
     pub penetration_mm: f64,
     /// What the arrival of a state changed at the very moment of it, mm; 0 in frames without one.
     pub jump_mm: f64,
-    /// How far a node went from the frame before beside how far it went in truth, mm.
+    /// How far a node went from the frame before, compared with how far it went in truth, mm.
     pub unlike_mm: f64,
 }
 

@@ -77,7 +77,7 @@ pub fn report(plan: &Plan) -> Result<ExitCode> {
     for bundle in &bundles {
         if bundle.corrections.is_none() {
             notes.push(format!(
-                "{}: has no corrections, so nothing is presented; add them with `upt corrections`",
+                "{}: has no corrections, so it cannot present frames; add them with `upt corrections`",
                 bundle.name
             ));
             continue;

@@ -99,7 +99,7 @@ pub fn report(plan: &Plan) -> Result<ExitCode> {
     for bundle in &bundles {
         let Some(recommended) = bundle.corrections else {
             let name = &bundle.name;
-            notes.push(format!("{name}: has no corrections, so it has one length of step; add them with `upt corrections`"));
+            notes.push(format!("{name}: has no corrections, so it has only one length of step; add them with `upt corrections`"));
             continue;
         };
         let counts = match plan.corrections {

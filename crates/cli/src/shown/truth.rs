@@ -27,7 +27,7 @@ impl Truth {
         let parts = (FRAME_S / frame_s).round() as usize;
         if parts < 2 || (parts as f64 * frame_s - FRAME_S).abs() > 1e-9 {
             bail!(
-                "{}: field `dt_s` is {frame_s}; what is shown between steps is measured by shorter frames: `upt dataset --tools all --frame-ms 5`",
+                "{}: field `dt_s` is {frame_s}; measuring what is shown between steps needs shorter frames: `upt dataset --tools all --frame-ms 5`",
                 case.name
             );
         }

@@ -23,10 +23,10 @@ use serde::Serialize;
     after_help = "Examples:\n  upt stress --quick\n  upt stress --bundle onnx/brain-reduced --bundle onnx/brain-fast --markdown docs/results/stability.md"
 )]
 pub struct Options {
-    /// Bundle folders to stress; none: the reference solver only.
+    /// Bundle folders to stress. Default: only the reference solver.
     #[arg(long = "bundle")]
     bundles: Vec<PathBuf>,
-    /// Mesh of the reference cases; none: an ellipsoid phantom.
+    /// Mesh of the reference cases. Default: an ellipsoid phantom.
     #[arg(long)]
     mesh: Option<PathBuf>,
     /// Leave out the reference solver.
@@ -114,7 +114,7 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     let bad = rows.iter().filter(|r| r.verdict == Verdict::Bad).count();
     let left = rows.iter().filter(|r| r.verdict == Verdict::Left).count();
     println!(
-        "{} cases: {} as they must be, {bad} not, {left} left out",
+        "{} cases: {} as they should be, {bad} not, {left} left out",
         rows.len(),
         rows.len() - bad - left
     );

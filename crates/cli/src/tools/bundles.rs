@@ -24,12 +24,12 @@ pub fn fitting(
         let bundle = BundleFolder::read(path)?;
         let reason = if bundle.mesh_sha256 != cases.mesh_sha256 {
             format!(
-                "{}: made for another mesh than that of the cases ({mesh})",
+                "{}: made for a mesh other than that of the cases ({mesh})",
                 bundle.name
             )
         } else if bundle.boundary != cases.boundary {
             format!(
-                "{}: made for the boundary `{}`, the cases have `{}`",
+                "{}: made for the boundary `{}`, but the cases have `{}`",
                 bundle.name, bundle.boundary, cases.boundary
             )
         } else {

@@ -195,7 +195,7 @@ impl ToolCases {
             }
             if files.len() == before {
                 bail!(
-                    "{}: no finished case of the split `{}`; choose another with --split, or go on with `upt dataset`",
+                    "{}: no finished case of the split `{}`; choose another with --split, or finish the dataset with `upt dataset`",
                     path.display(),
                     splits.join("` or `")
                 );
@@ -259,7 +259,7 @@ impl ToolCases {
             let frame_s = case.trajectory.header.dt_s;
             if (frame_s - FRAME_S).abs() > 1e-9 {
                 bail!(
-                    "{}: field `dt_s` is {frame_s}, a step takes {FRAME_S} s; add --shown 90 to measure what is shown between steps",
+                    "{}: field `dt_s` is {frame_s}, but a step takes {FRAME_S} s; add --shown 90 to measure what is shown between steps",
                     case.name
                 );
             }
@@ -273,7 +273,7 @@ impl ToolCases {
             let nodes = case.trajectory.frame(0).len();
             if nodes != mesh.node_count() {
                 bail!(
-                    "{}: field `displacement` has {nodes} nodes, the mesh {}; simulate the case again",
+                    "{}: field `displacement` has {nodes} nodes, but the mesh has {}; simulate the case again",
                     case.name,
                     mesh.node_count()
                 );

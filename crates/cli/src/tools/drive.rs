@@ -207,7 +207,7 @@ fn hull(drive: Drive, shape: &Shape) -> Result<Option<host::Hull>> {
         }
         (_, Drive::Linear) => Ok(None),
         (Shape::Hull { .. } | Shape::Mesh { .. }, _) => anyhow::bail!(
-            "this shape cannot be driven by the library ({}): it takes spheres, capsules, boxes, spatulas and, where contact is solved, hulls without a margin",
+            "the library cannot drive this shape ({}): it takes spheres, capsules, boxes, spatulas and, where contact is solved, hulls without a margin",
             drive.name()
         ),
         _ => Ok(None),

@@ -1,4 +1,4 @@
-//! One case through the library, beside what the reference solver recorded of it.
+//! One case through the library, compared with what the reference solver recorded of it.
 
 use anyhow::{Context, Result};
 use tissue::mesh::{Boundary, Mesh};

@@ -24,7 +24,7 @@ use clap::Args;
 pub struct Options {
     /// The bundle's folder.
     bundle: PathBuf,
-    /// Port of 127.0.0.1; 0: any that is free.
+    /// Port on 127.0.0.1; 0: any free port.
     #[arg(long, default_value_t = 0)]
     port: u16,
     /// Threads of a step.
@@ -33,11 +33,15 @@ pub struct Options {
 }
 
 pub fn run(options: &Options) -> Result<ExitCode> {
-    let listener = TcpListener::bind(("127.0.0.1", options.port))
-        .with_context(|| format!("port {} of 127.0.0.1 cannot be opened", options.port))?;
+    let listener = TcpListener::bind(("127.0.0.1", options.port)).with_context(|| {
+        format!(
+            "port {} on 127.0.0.1 cannot be opened; choose another with --port, or leave it out",
+            options.port
+        )
+    })?;
     let server = server::Server::new(&options.bundle, options.threads, &listener)?;
     println!("{}", server.address());
-    println!("open this address in a browser; Ctrl-C ends it");
+    println!("open this address in a browser; Ctrl-C stops the server");
     server.serve(&listener);
     Ok(ExitCode::SUCCESS)
 }

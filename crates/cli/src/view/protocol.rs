@@ -88,7 +88,7 @@ impl Wish {
                 Ok(Wish::Tool(Some(tool), sequence))
             }
             (Some(wish), None) => Ok(wish),
-            _ => Err("a message has one of tool, reset, record, replay".into()),
+            _ => Err("a message must hold one of tool, reset, record, replay".into()),
         }
     }
 }
@@ -104,14 +104,14 @@ impl Tool {
         }
         let length = self.rotation.iter().map(|x| x * x).sum::<f32>().sqrt();
         if (length - 1.0).abs() > 1e-3 {
-            return Err(format!("tool.rotation has length {length}, must be 1"));
+            return Err(format!("tool.rotation has length {length}; it must be 1"));
         }
         if !(0.1..=50.0).contains(&self.radius) || !(0.0..=200.0).contains(&self.half_length) {
-            return Err("tool: radius is 0.1 to 50 mm, half_length 0 to 200 mm".into());
+            return Err("tool: radius must be 0.1 to 50 mm and half_length 0 to 200 mm".into());
         }
         if !(0.0..=STICKIEST).contains(&self.friction) {
             return Err(format!(
-                "tool.friction is {}, 0 to {STICKIEST}",
+                "tool.friction is {}; it must be 0 to {STICKIEST}",
                 self.friction
             ));
         }

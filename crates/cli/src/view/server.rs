@@ -221,7 +221,7 @@ impl Server {
                         let wish = Wish::parse(text.as_str()).map_err(anyhow::Error::msg)?;
                         session.take(wish)?;
                     }
-                    Ok(Message::Binary(_)) => anyhow::bail!("messages are JSON text"),
+                    Ok(Message::Binary(_)) => anyhow::bail!("messages must be JSON text"),
                     Ok(_) => {}
                     Err(Error::Io(error)) if error.kind() == ErrorKind::WouldBlock => break,
                     Err(Error::ConnectionClosed | Error::AlreadyClosed | Error::Io(_)) => {

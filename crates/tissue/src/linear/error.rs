@@ -6,7 +6,7 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 pub enum LinearError {
     /// A tetrahedron names a node that does not exist.
-    #[error("tetrahedron {tet} names node {node}, the mesh has {nodes} nodes")]
+    #[error("tetrahedron {tet} names node {node}, but the mesh has {nodes} nodes")]
     Node { tet: usize, node: u32, nodes: usize },
     /// A tetrahedron is inverted or flat.
     #[error(
@@ -35,18 +35,18 @@ pub enum LinearError {
     #[error("sparse factorisation: {0}")]
     Factor(String),
     /// A contact node is held or does not exist.
-    #[error("contact node {node} is held or outside of the mesh ({nodes} nodes)")]
+    #[error("contact node {node} is held or is not one of the mesh's {nodes} nodes")]
     Contact { node: u32, nodes: usize },
     /// Prescribed displacements and nodes differ in number.
     #[error("{nodes} contact nodes but {vectors} contact vectors")]
     Count { nodes: usize, vectors: usize },
     /// More natural modes than the mesh can have.
     #[error(
-        "{asked} natural modes asked of {dofs} free degrees of freedom: ask for fewer than half as many"
+        "{asked} natural modes of {dofs} free degrees of freedom are too many; ask for fewer than half as many modes as degrees of freedom"
     )]
     Modes { asked: usize, dofs: usize },
     /// The iteration for the natural modes ended early.
-    #[error("{found} of {asked} natural modes converged: ask for fewer")]
+    #[error("only {found} of {asked} natural modes converged; ask for fewer")]
     NotConverged { asked: usize, found: usize },
     /// A sink of columns failed.
     #[error("writing compliance columns: {0}")]

@@ -68,7 +68,7 @@ pub enum MeshError {
     )]
     Stiffness { tet: usize, value: f32 },
     #[error(
-        "`stiffness` has {found} numbers, but there are {expected} tetrahedra; give one a tetrahedron, or none"
+        "`stiffness` has {found} numbers, but there are {expected} tetrahedra; give one number per tetrahedron, or none"
     )]
     StiffnessCount { expected: usize, found: usize },
     #[error("the mesh has no {what}")]

@@ -36,13 +36,13 @@ pub(super) fn parse(text: &str) -> Result<NamedTets, Wrong> {
         while keyword.ends_with(',') {
             match lines.next() {
                 Some((_, more)) => keyword += more,
-                None => return wrong(format!("line {at}: the file ends inside of a keyword")),
+                None => return wrong(format!("line {at}: the file ends inside a keyword")),
             }
         }
         parts += usize::from(name_of(&keyword) == "PART");
         if parts > 1 {
             return wrong(format!(
-                "line {at}: a second *PART; a file must hold one part, exported by itself"
+                "line {at}: a second *PART; a file may hold only one part, so export each part by itself"
             ));
         }
         block = begin(&keyword, at)?;
@@ -193,7 +193,7 @@ fn members(
 fn whole(word: &str, at: usize) -> Result<u64, Wrong> {
     match word.parse() {
         Ok(number) => Ok(number),
-        Err(_) => wrong(format!("line {at}: `{word}` is no whole number")),
+        Err(_) => wrong(format!("line {at}: `{word}` is not a whole number")),
     }
 }
 
@@ -201,6 +201,6 @@ fn real(word: &str, at: usize) -> Result<f64, Wrong> {
     // Fortran writes exponents with D.
     match word.replace(['D', 'd'], "e").parse() {
         Ok(number) => Ok(number),
-        Err(_) => wrong(format!("line {at}: `{word}` is no number")),
+        Err(_) => wrong(format!("line {at}: `{word}` is not a number")),
     }
 }

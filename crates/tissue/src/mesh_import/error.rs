@@ -19,7 +19,7 @@ pub enum ImportError {
     #[error("{path}: {reason}")]
     Format { path: PathBuf, reason: String },
     #[error(
-        "{path}: element {element} is {kind}; only linear tetrahedra can be imported, re-mesh or export with first-order tetrahedra"
+        "{path}: element {element} is {kind}; only linear tetrahedra can be imported; mesh again or export first-order tetrahedra"
     )]
     ElementKind {
         path: PathBuf,
@@ -31,7 +31,7 @@ pub enum ImportError {
     )]
     NoResolution,
     #[error(
-        "scale {0} is not a positive number; give millimetres a unit of the file, such as 1000 for metres"
+        "scale {0} is not a positive number; give millimetres per unit of the file, such as 1000 for metres"
     )]
     Scale(f64),
     #[error("no lattice spacing gives about {wanted} nodes; give --spacing")]
@@ -56,7 +56,7 @@ pub enum ImportError {
         count: usize,
     },
     #[error(
-        "tet {tet} is degenerate (volume {volume_mm3:.3e} mm³), {count} in all; --repair drops it, re-meshing is better"
+        "tet {tet} is degenerate (volume {volume_mm3:.3e} mm³), {count} in all; --repair drops it, but meshing again is better"
     )]
     Degenerate {
         tet: usize,

@@ -99,7 +99,7 @@ pub(super) fn parse(text: &str) -> Result<NamedTets, Wrong> {
         }
     }
     if let Some(tag) = open.last() {
-        return wrong(format!("the file ends inside of <{tag}>: is it cut off?"));
+        return wrong(format!("the file ends inside <{tag}>; is it cut off?"));
     }
     if !seen {
         return wrong("the file has neither <Mesh> nor <Geometry>");
@@ -161,7 +161,7 @@ fn entry(
         (Place::Nodes(set), &[x, y, z]) => {
             let real = |word: &str| match word.parse::<f64>() {
                 Ok(value) => Ok(value),
-                Err(_) => wrong(format!("line {at}: `{word}` is no number")),
+                Err(_) => wrong(format!("line {at}: `{word}` is not a number")),
             };
             out.node(number, [real(x)?, real(y)?, real(z)?])?;
             if let Some(set) = set {
@@ -204,6 +204,6 @@ fn member(out: &mut NamedTets, place: &Place, words: &str, at: usize) -> Result<
 fn whole(word: &str, at: usize) -> Result<u64, Wrong> {
     match word.trim().parse() {
         Ok(number) => Ok(number),
-        Err(_) => wrong(format!("line {at}: `{word}` is no whole number")),
+        Err(_) => wrong(format!("line {at}: `{word}` is not a whole number")),
     }
 }

@@ -273,7 +273,7 @@ fn finish(parts: Parts) -> Result<RawTets, Fault> {
                 Some(&found) => *node = found,
                 None => {
                     return fault(format!(
-                        "tet {index} names node tag {tag}, which is not there"
+                        "tet {index} names node tag {tag}, which does not exist"
                     ));
                 }
             }

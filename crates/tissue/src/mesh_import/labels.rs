@@ -66,10 +66,10 @@ impl Labels {
         if ![&faces, &points, &tets].into_iter().flatten().any(|&x| x) {
             let names: Vec<&str> = self.names().into_iter().take(40).collect();
             return Err(format(if names.is_empty() {
-                format!("no part of the file is called `{name}`: it names none")
+                format!("no part of the file is called `{name}`; the file names no parts")
             } else {
                 format!(
-                    "no part of the file is called `{name}`; it names {}",
+                    "no part of the file is called `{name}`; the file names {}",
                     names.join(", ")
                 )
             }));

@@ -31,7 +31,7 @@ impl NamedTets {
         let place = self.positions.len() as u32;
         if self.place_of_node.insert(number, place).is_some() {
             return wrong(format!(
-                "node {number} is there twice; a file must hold one part, exported by itself"
+                "node {number} appears twice; a file may hold only one part, so export each part by itself"
             ));
         }
         self.positions.push(point);
@@ -41,7 +41,7 @@ impl NamedTets {
     pub fn tet(&mut self, number: u64, nodes: [u64; 4]) -> Result<(), Wrong> {
         if (self.place_of_tet.insert(number, self.tets.len())).is_some() {
             return wrong(format!(
-                "element {number} is there twice; a file must hold one part, exported by itself"
+                "element {number} appears twice; a file may hold only one part, so export each part by itself"
             ));
         }
         self.tets.push(nodes);
@@ -75,7 +75,7 @@ impl NamedTets {
                     Some(&place) => place,
                     None => {
                         return wrong(format!(
-                            "element {element} names node {node}, which is not there"
+                            "element {element} names node {node}, which does not exist"
                         ));
                     }
                 };

@@ -51,7 +51,7 @@ impl FromStr for Region {
             "group" if !rest.trim().is_empty() => Ok(Self::Group(rest.trim().into())),
             "not" => Ok(Self::Not(Box::new(rest.parse()?))),
             _ => Err(format!(
-                "`{text}` is no region; write ball:x,y,z,r, plane:a,b,c,d, inside:FILE, group:NAME, all, or not: and one of them"
+                "`{text}` is not a region; write ball:x,y,z,r, plane:a,b,c,d, inside:FILE, group:NAME, all, or not: before one of these"
             )),
         }
     }

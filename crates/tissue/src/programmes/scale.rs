@@ -56,7 +56,7 @@ impl ToolScale {
     pub fn of_factor(factor: f64) -> Result<Self, String> {
         if !(0.01..=100.0).contains(&factor) {
             return Err(format!(
-                "the scale of tools is {factor}, must lie between 0.01 and 100"
+                "the scale of tools is {factor}; it must be 0.01 to 100"
             ));
         }
         Ok(Self::from_factor(factor))

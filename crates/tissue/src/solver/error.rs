@@ -24,7 +24,9 @@ pub enum SolverError {
     },
     #[error("tools[{index}]: {reason}")]
     Tool { index: usize, reason: String },
-    #[error("{poses} poses for {tools} tools; give one each (`step_frame` alone moves no tools)")]
+    #[error(
+        "{poses} poses for {tools} tools; give each tool one pose (`step_frame` alone moves no tools)"
+    )]
     ToolCount { tools: usize, poses: usize },
     #[error("contact entry {index} (node {node}): {reason}")]
     Contact {

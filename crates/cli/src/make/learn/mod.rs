@@ -33,7 +33,7 @@ const REPLAYS: f64 = 4.0;
 const LEAST: usize = 6;
 const MOST: usize = 40;
 const SITES: usize = 5;
-/// Modes of the coarse space beside the natural ones, at most.
+/// Modes of the coarse space in addition to the natural ones, at most.
 const MOST_MODES: usize = 120;
 /// Something is kept where the error falls below this part of what it was.
 const BETTER: f64 = 0.97;
@@ -83,7 +83,7 @@ pub fn run(learning: &Learning<'_>, stage: &mut Stage) -> Result<()> {
         stage.decided("no time for tool trajectories; a larger --minutes has it");
     } else if count < LEAST {
         stage.decided(&format!(
-            "no time for {LEAST} tool trajectories of {each:.1} s; a larger --minutes has it"
+            "no time for {LEAST} tool trajectories of {each:.1} s; give more --minutes"
         ));
     } else {
         teach(learning, stage, &recording, count)?;

@@ -24,7 +24,7 @@ use crate::corrections::{Push, Pushes, Workbench, principal};
 const EQUILIBRIA: usize = 24;
 /// Sites of the validation; no equilibrium is computed for its pushes.
 const VALIDATED: usize = 32;
-/// Modes beside the natural ones, at most: each costs time in every step.
+/// Modes in addition to the natural ones, at most: each costs time in every step.
 const MOST_MODES: usize = 90;
 const MOST_ROUNDS: usize = 12;
 /// A round is taken where the error, or the worst region's, falls below this part of what it was.
@@ -54,7 +54,7 @@ pub struct Rounds<'a> {
     pub seconds: f64,
 }
 
-/// What a round found, kept beside its files.
+/// What a round found, kept next to its files.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct Round {
     key: String,

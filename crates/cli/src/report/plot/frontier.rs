@@ -11,7 +11,7 @@ use super::colour;
 pub struct Point {
     /// Groups rows by colour: the bundle or the plain method.
     pub family: String,
-    /// What distinguishes it within its family, beside its corrections.
+    /// What distinguishes it within its family, besides its corrections.
     pub label: String,
     /// Corrections a step in contact: points of one family and label with several of them are one curve.
     pub corrections: Effort,

@@ -38,7 +38,7 @@ pub fn stage_breakdown(rows: &[Stages]) -> String {
                     names.push(name.clone());
                     names.len() - 1
                 });
-            // Each bar is its own whole: shares, with the total beside it.
+            // Each bar is its own whole: shares, with the total next to it.
             let wide = value / totals[index].max(1e-12) * WIDTH;
             let _ = write!(
                 body,

@@ -81,7 +81,7 @@ fn bad(bench: &Bench, path: &Path) -> Result<Vec<Row>> {
         let mut after = vec![[0.0; 3]; before.len()];
         let poses = vec![pose; tools.len()];
         let refused = scene.step_raw(&tools, &poses, &mut after).err();
-        // One step more of the press, beside a scene that was never asked.
+        // One step more of the press, compared with a scene that was never asked.
         let mut other = driver(path, 1)?;
         let expected = press(&mut other, bench, &tool, 16)?;
         scene.step_raw(std::slice::from_ref(&tool), &[good], &mut after)?;
