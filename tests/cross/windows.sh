@@ -65,6 +65,9 @@ more() {
   text="$(run "$1/upt.exe" doctor onnx/brain-coarse-reduced 2>/dev/null | tr -d '\r')"
   check "upt doctor opens a bundle" grep -q '^ok  bundle .*brain-coarse-reduced' <<<"$text"
   lanes "$text"
+  # ONNX Runtime without Microsoft's C++ runtime, of which Wine has its own.
+  text="$(WINEDLLOVERRIDES="$WINEDLLOVERRIDES;msvcp140=" run "$1/upt.exe" doctor onnx/brain-coarse-reduced 2>/dev/null || true)"
+  check "upt doctor names the Visual C++ redistributable where it is missing" grep -q 'Visual C++ redistributable' <<<"$text"
   # A reader that goes away: the command ends without a panic.
   (run "$1/upt.exe" completions bash 2>"$build/pipe.log" || true) | head -c 1 >/dev/null || true
   check "a closed pipe ends the command quietly" bash -c '! grep -qi panicked "$1"' _ "$build/pipe.log"
