@@ -58,6 +58,11 @@ def test_contacts_are_the_same_bits_copied_or_not(model, scene, monkeypatch, sho
     apart = np.repeat(nodes, 2)[::2], np.repeat(vectors, 2, axis=1)[:, ::2]
     np.testing.assert_array_equal(scene.step_contacts(*apart), expected)
     np.testing.assert_array_equal(scene.step_contacts(nodes, vectors), other.step_contacts(*apart))
+    # The same arrays again, with other values in them.
+    vectors = vectors.copy()
+    for depth in (1.0, 1.5, 2.0, 2.5):
+        vectors[:, 2] = -depth
+        np.testing.assert_array_equal(scene.step_contacts(nodes, vectors), other.step_contacts(nodes, vectors.tolist()))
 
 
 @pytest.mark.parametrize("convert", [np.float64, list])

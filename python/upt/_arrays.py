@@ -18,6 +18,8 @@ Indices = NDArray[np.uint32]
 _F32, _U32 = np.dtype(np.float32), np.dtype(np.uint32)
 
 Place = tuple[Floats, c_void_p, c_uint64, int]
+#: Both arrays, what stands for them in a call, their length, and whether that holds when the same arrays come again.
+Lists = tuple[object, object, bytes | c_void_p | int, bytes | c_void_p | int, c_uint64 | int, bool]
 
 #: Contacts below which their lists are copied: sooner done than asking the arrays where they lie.
 SHORT = 256
@@ -81,17 +83,39 @@ def indices(values: ArrayLike, name: str) -> Indices:
     return np.ascontiguousarray(array, np.uint32)
 
 
-def contact_lists(nodes: ArrayLike, contact: ArrayLike) -> tuple[int | bytes, int | bytes, int, object]:
-    """Nodes `[n]` and vectors `[n, 3]` as a call takes them, n, and what the caller keeps over the call."""
+class Contacts:
+    """The lists of contacts that calls get: where they lie is remembered once the same two arrays have come again.
+
+    Two threads may share one, as `Outputs`.
+    """
+
+    __slots__ = ("_last",)
+
+    def __init__(self) -> None:
+        self._last: Lists = (self, self, 0, 0, 0, False)
+
+    def place(self, nodes: ArrayLike, contact: ArrayLike) -> Lists:
+        """Nodes `[n]` and vectors `[n, 3]` with what stands for them in a call, and n; to be kept over the call."""
+        last = self._last
+        again = nodes is last[0] and contact is last[1]
+        if again and last[5]:
+            return last
+        found = _contacts(nodes, contact, again)
+        self._last = found
+        return found
+
+
+def _contacts(nodes: ArrayLike, contact: ArrayLike, again: bool) -> Lists:
     if type(nodes) is ndarray and type(contact) is ndarray and nodes.dtype is _U32 and contact.dtype is _F32:
         count = len(nodes) if nodes.ndim == 1 else SHORT
-        if count < SHORT and contact.shape == (count, 3):
-            return nodes.tobytes(), contact.tobytes(), count, None
+        if count < SHORT and contact.shape == (count, 3) and not again:
+            return nodes, contact, nodes.tobytes(), contact.tobytes(), count, False
     n = indices(nodes, "nodes")
     if not n.size and not np.size(contact):
-        return b"", b"", 0, None
+        return nodes, contact, b"", b"", 0, False
     c = vectors(contact, "contact", len(n))
-    return address(n), address(c), len(n), (n, c)
+    lies = n is nodes and c is contact
+    return n, c, c_void_p(address(n)), c_void_p(address(c)), c_uint64(len(n)), lies
 
 
 def output(out: Floats | None, count: int, name: str = "out") -> Floats:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from upt._arrays import Floats, Indices, Outputs, address, contact_lists, indices, vectors
+from upt._arrays import Contacts, Floats, Indices, Outputs, address, indices, vectors
 from upt._library import check, lib
 from upt._native import InstrumentContact, InstrumentReading, SceneOptions, SceneStats, Status
 from upt.instrument import Instrument, records
@@ -37,9 +37,9 @@ class Scene:
     """One deforming body, made by `Model.scene`.
 
     Arrays are float32, `[n, 3]`, mm; node indices are uint32. An input that is C-contiguous and of this type is not
-    copied (short lists of contacts are: it is faster), and a result goes straight into `out` where one is given; the
-    scene remembers the last of these. The GIL is released during each call, so scenes step on several threads at once;
-    one scene is used by one thread at a time (another gets `upt.BusyError`).
+    copied (short lists of contacts are: it is faster), and a result goes straight into `out` where one is given; a
+    scene keeps the last arrays that it was given. The GIL is released during each call, so scenes step on several
+    threads at once; one scene is used by one thread at a time (another gets `upt.BusyError`).
     """
 
     def __init__(self, model: Model, **options: Unpack[SceneOptionsKeywords]) -> None:
@@ -49,6 +49,7 @@ class Scene:
         self._handle = handle.value
         self._destroy = weakref.finalize(self, lib.upt_scene_destroy, handle.value)
         self._steps, self._frames, self._others = Outputs(), Outputs(), Outputs()
+        self._contacts = Contacts()
         self._point_count = 0
         self._instrument_count = 0
         self._node_count = model.node_count if fields.mesh_path is None else _node_count_of(fields.mesh_path)
@@ -104,8 +105,9 @@ class Scene:
         Returns:
             `u(t + dt)`, `[n, 3]`, mm.
         """
-        n, c, count, _kept = contact_lists(nodes, contact)
+        lists = self._contacts.place(nodes, contact)
         result, place, length, _ = self._steps.place(out, self._out_count)
+        _, _, n, c, count, _ = lists
         if (status := _step_contacts(self._handle, n, c, count, place, length)) < 0:
             check(status)
         self._instrument_count = 0
@@ -198,8 +200,8 @@ class Scene:
 
     def submit(self, nodes: ArrayLike = (), contact: ArrayLike = ()) -> None:
         """Starts a step on the scene's worker and returns at once; arguments as in `step_contacts`, copied."""
-        n, c, count, _kept = contact_lists(nodes, contact)
-        check(lib.upt_scene_submit(self._handle, n, c, count))
+        lists = self._contacts.place(nodes, contact)
+        check(lib.upt_scene_submit(self._handle, *lists[2:5]))
         self._instrument_count = 0
 
     def poll(self) -> bool:
@@ -242,9 +244,9 @@ class Scene:
         self, seconds: float, nodes: ArrayLike = (), contact: ArrayLike = (), out: Floats | None = None
     ) -> Floats:
         """As `present`, with nodes `[m]` and where they are at that moment, `[m, 3]`, mm, in place of instruments."""
-        n, c, count, _kept = contact_lists(nodes, contact)
+        lists = self._contacts.place(nodes, contact)
         result, place, length, _ = self._frames.place(out, self._out_count)
-        check(lib.upt_scene_present_contacts(self._handle, seconds, n, c, count, place, length))
+        check(lib.upt_scene_present_contacts(self._handle, seconds, *lists[2:5], place, length))
         return result
 
     def present_points(
@@ -260,9 +262,9 @@ class Scene:
         self, seconds: float, nodes: ArrayLike = (), contact: ArrayLike = (), out: Floats | None = None
     ) -> Floats:
         """As `present_contacts`, at the attached points."""
-        n, c, count, _kept = contact_lists(nodes, contact)
+        lists = self._contacts.place(nodes, contact)
         result, place, length, _ = self._others.place(out, self._point_count)
-        check(lib.upt_scene_present_points_contacts(self._handle, seconds, n, c, count, place, length))
+        check(lib.upt_scene_present_points_contacts(self._handle, seconds, *lists[2:5], place, length))
         return result
 
     def set_region(self, nodes: ArrayLike | None) -> None:
