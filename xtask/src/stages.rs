@@ -61,9 +61,9 @@ pub const STAGES: &[Stage] = &[
     stage("package", "the archive, unpacked elsewhere", system::NATIVE, Function(package)),
     stage("view", "upt view in headless Chromium", system::BROWSER, Script("tests/view/run.sh")),
     stage("windows", "built by MinGW, run by Wine", system::WINDOWS, Function(cross::windows)),
-    stage("arm64", "Linux arm64, run by qemu", system::ARM64, Function(cross::arm64)),
     nightly("haptics", "a day of simulated haptics, or what fits into 20 minutes", system::NATIVE, Function(haptics)),
     nightly("races", "what threads share: Miri, ThreadSanitizer", "", Script("tests/races/run.sh nightly")),
+    nightly("arm64", "Linux arm64, run by qemu", system::ARM64, Function(cross::arm64)),
 ];
 
 impl Stage {
