@@ -1,79 +1,100 @@
-"""What Python adds to a step: the same loop in C and in Python, by turns.
+"""What Python adds to a step: one loop in C and in Python, by turns on one scene.
 
-    python python/benches/overhead.py --bundle onnx/brain-coarse-reduced --markdown docs/guide/python.md
+    python python/benches/overhead.py --markdown docs/guide/python.md
 
-A step by nodes in contact, and one by an instrument beside the tissue. Prints the median time of a call in each
-language over all turns, and the difference of turns side by side. `--markdown` writes it between the page's marks.
+A step by nodes in contact, and one by an instrument beside the tissue. A turn is a row of steps from rest in C and the
+same row in Python, each call timed by itself. A call's time is the median of all turns, what Python adds to it the
+difference of the two, so that a busy machine or a clock that changes falls out. Prints the mean over the row, and the
+least and the most of its calls. `--markdown` writes it between the page's marks. Needs a C compiler, `cc`.
 """
 
 from __future__ import annotations
 
 import argparse
-import os
-import statistics
+import ctypes
 import subprocess
 import tempfile
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import upt
+from numpy.typing import NDArray
 from page import machine, write
-from upt._library import lib, packaged_onnxruntime
+from upt._library import check, lib
 
 ROOT = Path(__file__).resolve().parents[2]
+Seconds = NDArray[np.float64]
 
 
-def in_python(bundle: str, calls: int, by_tool: bool) -> list[float]:
-    with upt.Model(bundle) as model, model.scene(no_sleep=True) as scene:
-        nodes, vectors = model.domain_nodes[:4], np.tile(np.float32([0, 0, -1]), (4, 1))
-        tool = upt.Instrument.capsule(3.0, position=(500, 0, 0))
-        out, seconds = np.empty((model.node_count, 3), np.float32), []
-        for _ in range(calls):
-            begin = time.perf_counter()
-            if by_tool:
-                scene.step_instruments([tool], out)
-            else:
-                scene.step_contacts(nodes, vectors, out)
-            seconds.append(time.perf_counter() - begin)
-    return seconds
+def c_loop(scratch: str) -> Any:
+    """`steps` of overhead.c, which calls the library that this process has loaded."""
+    made = str(Path(scratch) / "overhead.so")
+    source = str(Path(__file__).with_suffix(".c"))
+    command = ["cc", "-O2", "-shared", "-fPIC", "-I", str(ROOT / "include"), source, lib._name, "-o", made]
+    subprocess.run(command, check=True)
+    # By this name it looks for the library; the one that is loaded has it already.
+    steps = ctypes.CDLL(made).steps
+    pointer, whole = ctypes.c_void_p, ctypes.c_uint64
+    steps.argtypes = [pointer, pointer, pointer, pointer, whole, pointer, whole, ctypes.c_long, pointer]
+    return steps
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--bundle", default=str(ROOT / "onnx/brain-coarse-reduced"))
-    parser.add_argument("--calls", type=int, default=2000, help="calls a turn")
-    parser.add_argument("--turns", type=int, default=5)
+    parser.add_argument("--calls", type=int, default=10, help="steps of a row")
+    parser.add_argument("--turns", type=int, default=600)
     parser.add_argument("--markdown", type=Path)
     arguments = parser.parse_args()
 
-    library = Path(lib._name)
     about = machine()
-    runtime = os.environ.get("ORT_DYLIB_PATH") or str(packaged_onnxruntime())
-    with tempfile.TemporaryDirectory() as scratch:
-        program = str(Path(scratch) / "overhead")
-        source = str(Path(__file__).with_suffix(".c"))
-        subprocess.run(["cc", "-O2", "-I", str(ROOT / "include"), source, str(library), "-o", program], check=True)
-        (Path(scratch) / "libupt.so.0").symlink_to(library)
-        environment = os.environ | {"LD_LIBRARY_PATH": scratch}
-        lines = []
-        for kind in ("nodes", "tool"):
-            c, python = [], []
-            for _ in range(arguments.turns):
-                command = [program, arguments.bundle, str(arguments.calls), runtime, kind]
-                ran = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True, env=environment)
-                c.append(statistics.median(map(float, ran.stdout.split())))
-                python.append(statistics.median(in_python(arguments.bundle, arguments.calls, kind == "tool")))
-            added = [1e6 * (slow - fast) for slow, fast in zip(python, c, strict=True)]
+    lines = []
+    with tempfile.TemporaryDirectory() as scratch, upt.Model(arguments.bundle) as model:
+        steps = c_loop(scratch)
+        nodes, vectors = model.domain_nodes[:4], np.tile(np.float32([0, 0, -1]), (4, 1))
+        out = np.empty((model.node_count, 3), np.float32)
+        where = [array.ctypes.data for array in (nodes, vectors)]
+        tool = upt.Instrument.capsule(3.0, position=(500, 0, 0))
+        record = tool.record()
+
+        def by_nodes(scene: upt.Scene, seconds: Seconds) -> None:
+            for i in range(len(seconds)):
+                begin = time.perf_counter()
+                scene.step_contacts(nodes, vectors, out)
+                seconds[i] = time.perf_counter() - begin
+
+        def by_tool(scene: upt.Scene, seconds: Seconds) -> None:
+            for i in range(len(seconds)):
+                begin = time.perf_counter()
+                scene.step_instruments([tool], out)
+                seconds[i] = time.perf_counter() - begin
+
+        for name, in_python in (("step_contacts", by_nodes), ("step_instruments", by_tool)):
+            described = ctypes.addressof(record) if in_python is by_tool else None
+
+            def in_c(scene: upt.Scene, seconds: Seconds, described: int | None = described) -> None:
+                tail = (out.ctypes.data, out.size, len(seconds), seconds.ctypes.data)
+                check(steps(scene._handle, described, *where, len(nodes), *tail))
+
+            with model.scene(no_sleep=True) as scene:
+                found = {run: np.empty((arguments.turns, arguments.calls)) for run in (in_c, in_python)}
+                for turn in range(arguments.turns):
+                    for run in (in_c, in_python) if turn % 2 else (in_python, in_c):
+                        scene.reset()
+                        run(scene, found[run][turn])
+            c, python = (1e6 * np.median(found[run], axis=0) for run in (in_c, in_python))
+            added = python - c
             lines.append(
-                f"| {'`step_contacts`' if kind == 'nodes' else '`step_instruments`'} | "
-                f"{1e6 * statistics.median(c):.0f} | {1e6 * statistics.median(python):.0f} | "
-                f"{statistics.median(added):.1f} ({min(added):.1f} to {max(added):.1f}) |"
+                f"| `{name}` | {c.mean():.0f} | {python.mean():.0f} | "
+                f"{added.mean():.1f} ({added.min():.1f} to {added.max():.1f}) |"
             )
+    rows = f"{arguments.turns} turns of {arguments.calls} steps in each language"
     head = [
-        f"`{Path(arguments.bundle).name}`, {arguments.turns} turns of {arguments.calls} calls. {about}.",
+        f"`{Path(arguments.bundle).name}`, {rows}. {about}.",
         "",
-        "| call | in C, µs | in Python, µs | Python adds, µs: median (least to most of the turns) |",
+        "| call | in C, µs | in Python, µs | Python adds, µs (least to most of the row) |",
         "|---|---:|---:|---:|",
     ]
     write(arguments.markdown, "python/benches/overhead.py", "\n".join(head + lines))

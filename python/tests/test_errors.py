@@ -71,6 +71,26 @@ def test_a_read_only_output_is_refused(model, scene):
         scene.read(model.positions)
 
 
+def test_an_array_that_comes_again_is_still_checked(model, scene):
+    """Its address is remembered, not what it was."""
+    nodes, vectors = push(model, 2)
+    out = np.zeros((model.node_count, 3), np.float32)
+    for _ in range(2):
+        scene.step_contacts(nodes, vectors, out)
+    before = out.copy()
+    out.setflags(write=False)
+    with pytest.raises(ValueError, match="writeable"):
+        scene.step_contacts(nodes, vectors, out)
+    out.setflags(write=True)
+    scene.set_region(model.surface_nodes)
+    with pytest.raises(ValueError, match=r"shape \(\d+, 3\)"):
+        scene.step_contacts(nodes, vectors, out)
+    np.testing.assert_array_equal(out, before)
+    # What the scene writes to cannot be moved from under it.
+    with pytest.raises(ValueError, match="resize"):
+        out.resize((7, 3))
+
+
 def test_messages_go_to_logging(caplog):
     upt.set_log("info")
     try:

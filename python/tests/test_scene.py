@@ -48,6 +48,23 @@ def test_arrays_of_the_right_type_are_not_copied(model, scene):
     np.testing.assert_array_equal(out, expected)
 
 
+@pytest.mark.parametrize("short", [0, 1000])
+def test_contacts_are_the_same_bits_copied_or_not(model, scene, monkeypatch, short):
+    """Below `SHORT` lists are copied; in either way they need not lie in one piece."""
+    monkeypatch.setattr(_arrays, "SHORT", short)
+    nodes, vectors = push(model, 3)
+    other = model.scene(no_sleep=True)
+    expected = other.step_contacts(nodes.tolist(), vectors.tolist())
+    apart = np.repeat(nodes, 2)[::2], np.repeat(vectors, 2, axis=1)[:, ::2]
+    np.testing.assert_array_equal(scene.step_contacts(*apart), expected)
+    np.testing.assert_array_equal(scene.step_contacts(nodes, vectors), other.step_contacts(*apart))
+    # The same arrays again, with other values in them.
+    vectors = vectors.copy()
+    for depth in (1.0, 1.5, 2.0, 2.5):
+        vectors[:, 2] = -depth
+        np.testing.assert_array_equal(scene.step_contacts(nodes, vectors), other.step_contacts(nodes, vectors.tolist()))
+
+
 @pytest.mark.parametrize("convert", [np.float64, list])
 def test_other_types_are_converted(model, scene, convert):
     nodes, vectors = push(model, 1)

@@ -5,10 +5,11 @@ This runs in every step, with caches that the step has emptied: what fits is rec
 
 from __future__ import annotations
 
-from ctypes import addressof, c_char
+from ctypes import addressof, c_char, c_uint64, c_void_p
 from typing import Any
 
 import numpy as np
+from numpy import ndarray
 from numpy.typing import ArrayLike, NDArray
 
 Floats = NDArray[np.float32]
@@ -16,20 +17,50 @@ Indices = NDArray[np.uint32]
 
 _F32, _U32 = np.dtype(np.float32), np.dtype(np.uint32)
 
+Place = tuple[Floats, c_void_p, c_uint64, int]
+#: Both arrays, what stands for them in a call, their length, and whether that holds when the same arrays come again.
+Lists = tuple[object, object, bytes | c_void_p | int, bytes | c_void_p | int, c_uint64 | int, bool]
+
+#: Contacts below which their lists are copied: sooner done than asking the arrays where they lie.
+SHORT = 256
+
+
+class Outputs:
+    """Where calls write their results: an array's address is kept for as long as the same array comes again.
+
+    Two threads may share one: what it keeps is replaced as a whole.
+    """
+
+    __slots__ = ("_last",)
+
+    def __init__(self) -> None:
+        self._last: Place = (np.empty(0, np.float32), c_void_p(), c_uint64(), -1)
+
+    def place(self, out: Floats | None, count: int) -> Place:
+        """The array for `count` rows, as `output` makes or checks it, where it lies, its length in floats, `count`."""
+        last = self._last
+        if out is last[0] and count == last[3] and last[0].flags.carray:
+            return last
+        result = output(out, count)
+        found = (result, c_void_p(address(result)), c_uint64(result.size), count)
+        if out is not None:
+            self._last = found
+        return found
+
 
 def address(array: NDArray[Any]) -> int:
     """Where the data lie; the caller keeps the array alive over the call."""
-    flags = array.flags
-    if flags.writeable and flags.c_contiguous and array.size:
+    try:
         # A third of the time of the attribute below.
         return addressof(c_char.from_buffer(array))  # type: ignore[arg-type]
-    data: int = array.__array_interface__["data"][0]
-    return data
+    except (TypeError, ValueError):  # read-only, or empty
+        data: int = array.__array_interface__["data"][0]
+        return data
 
 
 def vectors(values: ArrayLike, name: str, count: int | None = None) -> Floats:
     """`[count, 3]` float32 in one piece; the array itself where it is that already."""
-    fits = type(values) is np.ndarray and values.dtype is _F32 and values.flags.c_contiguous
+    fits = type(values) is ndarray and values.dtype is _F32 and values.flags.c_contiguous
     array: Floats = values if fits else np.ascontiguousarray(values, np.float32)  # type: ignore[assignment]
     if array.ndim != 2 or array.shape[1] != 3 or (count is not None and len(array) != count):
         wanted = f"({'n' if count is None else count}, 3)"
@@ -39,7 +70,7 @@ def vectors(values: ArrayLike, name: str, count: int | None = None) -> Floats:
 
 def indices(values: ArrayLike, name: str) -> Indices:
     """`[n]` uint32 in one piece; the array itself where it is that already."""
-    if type(values) is np.ndarray and values.dtype is _U32 and values.ndim == 1 and values.flags.c_contiguous:
+    if type(values) is ndarray and values.dtype is _U32 and values.ndim == 1 and values.flags.c_contiguous:
         return values
     array = np.asarray(values)
     if array.ndim != 1:
@@ -52,10 +83,45 @@ def indices(values: ArrayLike, name: str) -> Indices:
     return np.ascontiguousarray(array, np.uint32)
 
 
+class Contacts:
+    """The lists of contacts that calls get: where they lie is remembered once the same two arrays have come again.
+
+    Two threads may share one, as `Outputs`.
+    """
+
+    __slots__ = ("_last",)
+
+    def __init__(self) -> None:
+        self._last: Lists = (self, self, 0, 0, 0, False)
+
+    def place(self, nodes: ArrayLike, contact: ArrayLike) -> Lists:
+        """Nodes `[n]` and vectors `[n, 3]` with what stands for them in a call, and n; to be kept over the call."""
+        last = self._last
+        again = nodes is last[0] and contact is last[1]
+        if again and last[5]:
+            return last
+        found = _contacts(nodes, contact, again)
+        self._last = found
+        return found
+
+
+def _contacts(nodes: ArrayLike, contact: ArrayLike, again: bool) -> Lists:
+    if type(nodes) is ndarray and type(contact) is ndarray and nodes.dtype is _U32 and contact.dtype is _F32:
+        count = len(nodes) if nodes.ndim == 1 else SHORT
+        if count < SHORT and contact.shape == (count, 3) and not again:
+            return nodes, contact, nodes.tobytes(), contact.tobytes(), count, False
+    n = indices(nodes, "nodes")
+    if not n.size and not np.size(contact):
+        return nodes, contact, b"", b"", 0, False
+    c = vectors(contact, "contact", len(n))
+    lies = n is nodes and c is contact
+    return n, c, c_void_p(address(n)), c_void_p(address(c)), c_uint64(len(n)), lies
+
+
 def output(out: Floats | None, count: int, name: str = "out") -> Floats:
     """Where a result goes: a new array, or the caller's own, which must fit without a copy."""
     if out is None:
         return np.empty((count, 3), np.float32)
-    if not isinstance(out, np.ndarray) or out.dtype != _F32 or out.shape != (count, 3) or not out.flags.carray:
+    if not isinstance(out, ndarray) or out.dtype != _F32 or out.shape != (count, 3) or not out.flags.carray:
         raise ValueError(f"{name} must be a writeable C-contiguous float32 array of shape ({count}, 3)")
     return out

@@ -135,25 +135,17 @@ class Instrument:
             hull_of=made,
         )
 
-    def _pack_into(self, array: ctypes.Array[_native.Instrument], place: int) -> None:
-        """As `record`, into an array. Any error means: let `record` say what is wrong."""
-        if not (len(self.position) == 3 and len(self.rotation) == 4 and len(self.half_extents) == 3):
-            raise ValueError
-        _LAYOUT.pack_into(
-            array,
-            place * _LAYOUT.size,
-            _LAYOUT.size,
-            self.shape,
-            *self.position,
-            *self.rotation,
-            *self.half_extents,
-            self.radius,
-            bool(self.sticking),
-            Mode.GRASP if self.grasp else Mode.SLIDE,
-            self.friction,
-            self.tear_off,
-            0 if self.hull_of is None else self.hull_of._handle,
-        )
+    def _packed(self) -> bytes:
+        """As `record`, in bytes. Any error means: let `record` say what is wrong."""
+        x, y, z = self.position
+        qx, qy, qz, qw = self.rotation
+        a, b, c = self.half_extents
+        mode = _GRASP if self.grasp else _SLIDE
+        hull = 0 if self.hull_of is None else self.hull_of._handle
+        return _pack(
+            _SIZE, self.shape, x, y, z, qx, qy, qz, qw, a, b, c,
+            self.radius, self.sticking, mode, self.friction, self.tear_off, hull,
+        )  # fmt: skip
 
     def record(self) -> _native.Instrument:
         """As the C ABI's struct. It does not keep the hull alive."""
@@ -172,19 +164,21 @@ class Instrument:
 
 
 #: `upt_instrument` as it lies in memory. `record` is the same by the fields' names: slower, with errors that name them.
-_LAYOUT = struct.Struct("@Ii3f4f3ffBB2xffP")
-assert _LAYOUT.size == ctypes.sizeof(_native.Instrument)
+_LAYOUT = struct.Struct("@Ii3f4f3ff?B2xffP")
+_SIZE = ctypes.sizeof(_native.Instrument)
+assert _LAYOUT.size == _SIZE
+_pack = _LAYOUT.pack
+_SLIDE, _GRASP = int(Mode.SLIDE), int(Mode.GRASP)
 
 
-def records(instruments: Sequence[Instrument]) -> tuple[ctypes.Array[_native.Instrument] | None, int]:
+def records(instruments: Sequence[Instrument]) -> tuple[bytes | ctypes.Array[_native.Instrument] | None, int]:
     """As an array for the C ABI (None where there are no instruments), and its length."""
     count = len(instruments)
     if not count:
         return None, 0
-    array = (_native.Instrument * count)()
     try:
-        for place, one in enumerate(instruments):
-            one._pack_into(array, place)
+        if count == 1:
+            return instruments[0]._packed(), 1
+        return b"".join([one._packed() for one in instruments]), count
     except (TypeError, ValueError, OverflowError, struct.error):
-        array = (_native.Instrument * count)(*[one.record() for one in instruments])
-    return array, count
+        return (_native.Instrument * count)(*[one.record() for one in instruments]), count

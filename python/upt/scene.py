@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from upt._arrays import Floats, Indices, address, indices, output, vectors
+from upt._arrays import Contacts, Floats, Indices, Outputs, address, indices, vectors
 from upt._library import check, lib
 from upt._native import InstrumentContact, InstrumentReading, SceneOptions, SceneStats, Status
 from upt.instrument import Instrument, records
@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from upt._native import SceneOptionsKeywords
     from upt.model import Model
 
+_step_contacts, _step_instruments = lib.upt_scene_step_contacts, lib.upt_scene_step_instruments
+
 #: How long `wait` waits when nothing is stated, milliseconds: 49 days.
 FOREVER_MS = 0xFFFFFFFF
 
@@ -35,8 +37,9 @@ class Scene:
     """One deforming body, made by `Model.scene`.
 
     Arrays are float32, `[n, 3]`, mm; node indices are uint32. An input that is C-contiguous and of this type is not
-    copied, and a result goes straight into `out` where one is given. The GIL is released during each call, so scenes
-    step on several threads at once; one scene is used by one thread at a time (another gets `upt.BusyError`).
+    copied (short lists of contacts are: it is faster), and a result goes straight into `out` where one is given; a
+    scene keeps the last arrays that it was given. The GIL is released during each call, so scenes step on several
+    threads at once; one scene is used by one thread at a time (another gets `upt.BusyError`).
     """
 
     def __init__(self, model: Model, **options: Unpack[SceneOptionsKeywords]) -> None:
@@ -45,10 +48,12 @@ class Scene:
         check(lib.upt_scene_create(model._handle, ctypes.byref(fields), ctypes.byref(handle)))
         self._handle = handle.value
         self._destroy = weakref.finalize(self, lib.upt_scene_destroy, handle.value)
+        self._steps, self._frames, self._others = Outputs(), Outputs(), Outputs()
+        self._contacts = Contacts()
         self._point_count = 0
         self._instrument_count = 0
-        self._region_count: int | None = None
         self._node_count = model.node_count if fields.mesh_path is None else _node_count_of(fields.mesh_path)
+        self._out_count = self._node_count
 
     @property
     def node_count(self) -> int:
@@ -58,7 +63,7 @@ class Scene:
     @property
     def out_count(self) -> int:
         """Rows that a step writes: the region's, or K."""
-        return self._node_count if self._region_count is None else self._region_count
+        return self._out_count
 
     def step(
         self, displacement: ArrayLike | None = None, collision: ArrayLike | None = None, out: Floats | None = None
@@ -76,7 +81,7 @@ class Scene:
         """
         u = None if displacement is None else vectors(displacement, "displacement", self._node_count)
         c = None if collision is None else vectors(collision, "collision", self._node_count)
-        result = output(out, self.out_count)
+        result, place, length, _ = self._steps.place(out, self._out_count)
         check(
             lib.upt_scene_step(
                 self._handle,
@@ -100,9 +105,11 @@ class Scene:
         Returns:
             `u(t + dt)`, `[n, 3]`, mm.
         """
-        n, c = _contacts(nodes, contact)
-        result = output(out, self.out_count)
-        check(lib.upt_scene_step_contacts(self._handle, address(n), address(c), len(n), address(result), result.size))
+        lists = self._contacts.place(nodes, contact)
+        result, place, length, _ = self._steps.place(out, self._out_count)
+        _, _, n, c, count, _ = lists
+        if (status := _step_contacts(self._handle, n, c, count, place, length)) < 0:
+            check(status)
         self._instrument_count = 0
         return result
 
@@ -125,8 +132,9 @@ class Scene:
                 `step_contacts`.
         """
         array, count = records(instruments)
-        result = output(out, self.out_count)
-        check(lib.upt_scene_step_instruments(self._handle, array, count, address(result), result.size))
+        result, place, length, _ = self._steps.place(out, self._out_count)
+        if (status := _step_instruments(self._handle, array, count, place, length)) < 0:
+            check(status)
         self._instrument_count = count
         return result
 
@@ -180,20 +188,20 @@ class Scene:
 
     def contact_force(self, out: Floats | None = None) -> Floats:
         """The reaction on the instrument at the last step's contact nodes, in their order: `[m, 3]`, mN."""
-        result = output(out, self.stats.contact_count)
-        check(lib.upt_scene_contact_force(self._handle, address(result), result.size))
+        result, place, length, _ = self._others.place(out, self.stats.contact_count)
+        check(lib.upt_scene_contact_force(self._handle, place, length))
         return result
 
     def read(self, out: Floats | None = None) -> Floats:
         """The last published state `[n, 3]`, mm, in the region's order."""
-        result = output(out, self.out_count)
-        check(lib.upt_scene_read(self._handle, address(result), result.size))
+        result, place, length, _ = self._others.place(out, self._out_count)
+        check(lib.upt_scene_read(self._handle, place, length))
         return result
 
     def submit(self, nodes: ArrayLike = (), contact: ArrayLike = ()) -> None:
         """Starts a step on the scene's worker and returns at once; arguments as in `step_contacts`, copied."""
-        n, c = _contacts(nodes, contact)
-        check(lib.upt_scene_submit(self._handle, address(n), address(c), len(n)))
+        lists = self._contacts.place(nodes, contact)
+        check(lib.upt_scene_submit(self._handle, *lists[2:5]))
         self._instrument_count = 0
 
     def poll(self) -> bool:
@@ -207,8 +215,8 @@ class Scene:
 
     def sample(self, alpha: float, out: Floats | None = None) -> Floats:
         """Between the last two states (`alpha` 0: the one before, 1: the last): `[n, 3]`, mm, in the region's order."""
-        result = output(out, self.out_count)
-        check(lib.upt_scene_sample(self._handle, alpha, address(result), result.size))
+        result, place, length, _ = self._others.place(out, self._out_count)
+        check(lib.upt_scene_sample(self._handle, alpha, place, length))
         return result
 
     def present(self, seconds: float, instruments: Sequence[Instrument] = (), out: Floats | None = None) -> Floats:
@@ -228,21 +236,17 @@ class Scene:
             upt.UnsupportedError: the scene has no linear response or does not correct; use `sample`.
         """
         array, count = records(instruments)
-        result = output(out, self.out_count)
-        check(lib.upt_scene_present(self._handle, seconds, array, count, address(result), result.size))
+        result, place, length, _ = self._frames.place(out, self._out_count)
+        check(lib.upt_scene_present(self._handle, seconds, array, count, place, length))
         return result
 
     def present_contacts(
         self, seconds: float, nodes: ArrayLike = (), contact: ArrayLike = (), out: Floats | None = None
     ) -> Floats:
         """As `present`, with nodes `[m]` and where they are at that moment, `[m, 3]`, mm, in place of instruments."""
-        n, c = _contacts(nodes, contact)
-        result = output(out, self.out_count)
-        check(
-            lib.upt_scene_present_contacts(
-                self._handle, seconds, address(n), address(c), len(n), address(result), result.size
-            )
-        )
+        lists = self._contacts.place(nodes, contact)
+        result, place, length, _ = self._frames.place(out, self._out_count)
+        check(lib.upt_scene_present_contacts(self._handle, seconds, *lists[2:5], place, length))
         return result
 
     def present_points(
@@ -250,21 +254,17 @@ class Scene:
     ) -> Floats:
         """As `present`, at the attached points."""
         array, count = records(instruments)
-        result = output(out, self._point_count)
-        check(lib.upt_scene_present_points(self._handle, seconds, array, count, address(result), result.size))
+        result, place, length, _ = self._others.place(out, self._point_count)
+        check(lib.upt_scene_present_points(self._handle, seconds, array, count, place, length))
         return result
 
     def present_points_contacts(
         self, seconds: float, nodes: ArrayLike = (), contact: ArrayLike = (), out: Floats | None = None
     ) -> Floats:
         """As `present_contacts`, at the attached points."""
-        n, c = _contacts(nodes, contact)
-        result = output(out, self._point_count)
-        check(
-            lib.upt_scene_present_points_contacts(
-                self._handle, seconds, address(n), address(c), len(n), address(result), result.size
-            )
-        )
+        lists = self._contacts.place(nodes, contact)
+        result, place, length, _ = self._others.place(out, self._point_count)
+        check(lib.upt_scene_present_points_contacts(self._handle, seconds, *lists[2:5], place, length))
         return result
 
     def set_region(self, nodes: ArrayLike | None) -> None:
@@ -273,13 +273,13 @@ class Scene:
         if nodes is not None and not len(chosen):
             raise ValueError("nodes is empty; None means all nodes")
         check(lib.upt_scene_set_region(self._handle, address(chosen) if len(chosen) else None, len(chosen)))
-        self._region_count = None if nodes is None else len(chosen)
+        self._out_count = self._node_count if nodes is None else len(chosen)
 
     def decode(self, nodes: ArrayLike, out: Floats | None = None) -> Floats:
         """Displacement of any nodes `[n]` in the last state, whatever the region is: `[n, 3]`, mm."""
         chosen = indices(nodes, "nodes")
-        result = output(out, len(chosen))
-        check(lib.upt_scene_decode(self._handle, address(chosen), len(chosen), address(result), result.size))
+        result, place, length, _ = self._others.place(out, len(chosen))
+        check(lib.upt_scene_decode(self._handle, address(chosen), len(chosen), place, length))
         return result
 
     def attach_points(self, points: ArrayLike | None) -> None:
@@ -290,14 +290,14 @@ class Scene:
 
     def read_points(self, out: Floats | None = None) -> Floats:
         """Displacement of the attached points in the last state: `[n, 3]`, mm."""
-        result = output(out, self._point_count)
-        check(lib.upt_scene_read_points(self._handle, address(result), result.size))
+        result, place, length, _ = self._others.place(out, self._point_count)
+        check(lib.upt_scene_read_points(self._handle, place, length))
         return result
 
     def sample_points(self, alpha: float, out: Floats | None = None) -> Floats:
         """As `sample`, at the attached points."""
-        result = output(out, self._point_count)
-        check(lib.upt_scene_sample_points(self._handle, alpha, address(result), result.size))
+        result, place, length, _ = self._others.place(out, self._point_count)
+        check(lib.upt_scene_sample_points(self._handle, alpha, place, length))
         return result
 
     @property
@@ -336,13 +336,6 @@ class Scene:
 
     def __exit__(self, *_: object) -> None:
         self.close()
-
-
-def _contacts(nodes: ArrayLike, contact: ArrayLike) -> tuple[Indices, Floats]:
-    n = indices(nodes, "nodes")
-    if not n.size and not np.size(contact):
-        return n, np.empty((0, 3), np.float32)
-    return n, vectors(contact, "contact", len(n))
 
 
 def _node_count_of(mesh: str) -> int:

@@ -1,7 +1,9 @@
 /* Steps a bundle through one push and its release, and writes each state: the same bytes wherever
  * it runs, or not.
  *
- *   rollout BUNDLE STEPS FILE        FILE: [STEPS,K,3] floats, mm
+ *   rollout BUNDLE STEPS FILE [CORRECTIONS]        FILE: [STEPS,K,3] floats, mm
+ *
+ * With CORRECTIONS each step makes so many of them, whatever their error; -1: none.
  */
 #include "expect.h"
 
@@ -19,8 +21,8 @@ int main(int argc, char **argv) {
   long step, steps;
   int i;
   FILE *file;
-  if (argc != 4) {
-    fprintf(stderr, "usage: %s BUNDLE STEPS FILE\n", argv[0]);
+  if (argc < 4 || argc > 5) {
+    fprintf(stderr, "usage: %s BUNDLE STEPS FILE [CORRECTIONS]\n", argv[0]);
     return 2;
   }
   steps = atol(argv[2]);
@@ -28,6 +30,7 @@ int main(int argc, char **argv) {
   options.struct_size = sizeof options;
   options.no_sleep = 1;
   options.guard_policy = UPT_GUARD_REPORT;
+  options.corrections = argc > 4 ? atoi(argv[4]) : 0;
   memset(&info, 0, sizeof info);
   info.struct_size = sizeof info;
   EXPECT(upt_model_open(argv[1], NULL, &model), UPT_OK);

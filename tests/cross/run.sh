@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
-# Builds libupt for another platform and runs its tests here, under Wine or qemu:
+# Builds libupt for another platform and tests it here, under Wine or qemu:
 #
 #   tests/cross/run.sh windows|arm64
 #
-# Reads what tests/c/run.sh reads, and UPT_CROSS_ORT: the folder with that platform's ONNX Runtime. UPT_NIGHTLY=1 runs all
-# of the crate's tests and longer rollouts. What is left out is named and counted as skipped; the last line is
-# `N passed, N failed, N skipped`.
+# Reads what tests/c/run.sh reads, UPT_CROSS_ORT: the folder with that platform's ONNX Runtime, and UPT_CROSS_HOST_ORT: this
+# machine's library. Every run has minutes; UPT_NIGHTLY=1 runs all of the crates' tests, longer rollouts of all bundles and
+# the Python package too. What is left out is named and counted as skipped; the last line is `N passed, N failed, N skipped`.
 set -euo pipefail
 root="${UPT_ROOT:-$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)}"
 name="$1"
@@ -23,30 +23,30 @@ cargo_cross() {
 }
 
 # The library and the command, without mesh files and sparse factorisation: half of the compiling.
-packages=(-p upt -p tissue -p elements -p contact -p exchange)
 echo "== build"
 cargo_cross build --release -q -p upt -p upt-cli --no-default-features
 out="$root/target/cross/build/$UPT_CROSS_TRIPLE/release"
 prepare "$out"
 
-echo "== unit tests"
-tests=(--lib --test same_bits --test reference_rollouts --test scene_states --test step_path --test snapshot_rollback)
-if [ "$nightly" = 1 ]; then
-  tests=(--lib --tests)
-else
-  leave_out "$(find tests -maxdepth 1 -name '*.rs' | wc -l | awk '{print $1 - 5}')" "integration tests of the crate, but for five: nightly"
-fi
 export ORT_DYLIB_PATH="$UPT_CROSS_ORT/$UPT_CROSS_ORT_NAME"
-UPT_FUZZ_SECONDS=0 cargo_cross test --release --no-fail-fast -q "${packages[@]}" --no-default-features --features upt/default "${tests[@]}" \
-  >"$build/unit.log" 2>&1 || true
-count_cargo "$build/unit.log"
 
-echo "== equilibria, by the sparse factorisation"
+# unit_tests PACKAGE... WHAT: cargo's tests there.
+unit_tests() {
+  UPT_FUZZ_SECONDS=0 cargo_cross test --release --no-fail-fast -q "$@" >"$build/unit.log" 2>&1 || true
+  count_cargo "$build/unit.log"
+}
+# Their number in these folders.
+tests_in() {
+  { grep -rh --include='*.rs' -E '^ *#\[test\]' "$@" || true; } | wc -l
+}
+
+echo "== unit tests"
 if [ "$nightly" = 1 ]; then
-  cargo_cross test --release --no-fail-fast -q -p tissue --lib >"$build/statics.log" 2>&1 || true
-  count_cargo "$build/statics.log"
+  unit_tests -p upt -p tissue -p elements -p contact -p exchange --no-default-features --features upt/default --lib --tests
+  echo "== equilibria, by the sparse factorisation"
+  unit_tests -p tissue --lib
 else
-  leave_out "$(grep -c '#\[test\]' crates/tissue/src/statics/tests.rs)" "unit tests of equilibria, whose factorisation takes minutes to build: nightly"
+  quick_tests
 fi
 
 echo "== C and C++"
@@ -67,19 +67,25 @@ leave_out 8 "of the C tests: a panicking library, AddressSanitizer, valgrind, sy
 
 echo "== one rollout a bundle, beside this machine's own"
 steps=12
+bundles=(tests/fixtures/tiny-upt tests/fixtures/tiny-upt-prior tests/fixtures/tiny-reduced onnx/brain-*)
 if [ "$nightly" = 1 ]; then
   steps=120
+else
+  quick_bundles
 fi
 cc -O2 -I include tests/c/rollout.c tests/c/expect.c "$native/libupt.so" -o "$build/rollout"
 ln -sf "$native/libupt.so" "$build/libupt.so.0"
-for bundle in tests/fixtures/tiny-upt tests/fixtures/tiny-upt-prior tests/fixtures/tiny-reduced onnx/brain-*; do
-  [ -e "$bundle/bundle.json" ] || continue
-  short="$(basename "$bundle")"
+
+# roll BUNDLE NAME [CORRECTIONS]: $build/NAME.here and $build/NAME.there
+roll() {
+  local bundle="$1" to="$build/$2"
+  shift 2
   LD_LIBRARY_PATH="$build" ORT_DYLIB_PATH="$UPT_CROSS_HOST_ORT" \
-    "$build/rollout" "$bundle" "$steps" "$build/$short.here" >"$build/$short.log" 2>&1 || cat "$build/$short.log"
-  run "$build/tests/$UPT_CROSS_ROLLOUT" "$bundle" "$steps" "$build/$short.there" \
-    >"$build/$short.log" 2>&1 || cat "$build/$short.log"
-  compare "$short" "$build/$short.here" "$build/$short.there"
+    "$build/rollout" "$bundle" "$steps" "$to.here" "$@" >"$to.log" 2>&1 || cat "$to.log"
+  run "$build/tests/$UPT_CROSS_ROLLOUT" "$bundle" "$steps" "$to.there" "$@" >"$to.log" 2>&1 || cat "$to.log"
+}
+for bundle in "${bundles[@]}"; do
+  if [ -e "$bundle/bundle.json" ]; then compare "$bundle" "$(basename "$bundle")"; fi
 done
 
 echo "== the command and the reference solver"

@@ -197,22 +197,22 @@ def a_replay_makes_the_steps_of_the_recording_again():
         at = 0
 
         def steps(count: int, tool) -> list[tuple]:
-            """What is new after each of the next steps."""
+            """What is new after each of the next steps, with the tool where it is to be after so many of them."""
             nonlocal at
             seen: dict[int, tuple] = {}
             while len(seen) < count + 1:
                 at += 1
-                now = frame(client, tool(at), at)
+                now = frame(client, tool(len(seen)), at)
                 seen[now.steps] = (now.largest, now.force)
             return list(seen.values())[1:]
 
         client.send(b'{"reset":true}')
         client.send(b'{"record":true}')
-        recorded = steps(30, lambda at: pressing(top, min(0.02 * at, 5.0)))
+        recorded = steps(30, lambda done: pressing(top, min(0.25 * done, 5.0)))
         client.send(b'{"record":false}')
         assert recorded[-1][0] > 1.0, recorded[-1]
         client.send(b'{"replay":true}')
-        replayed = steps(30, lambda at: None)
+        replayed = steps(30, lambda done: None)
         # Where a step was not seen because two came between frames, both lists still hold the same states in order.
         moving = [state for state in recorded if state[0] > 0.0]
         again = [state for state in replayed if state[0] > 0.0]

@@ -1,7 +1,7 @@
 # Sourced with a target triple in $1: a Rust toolchain that can build for it, in the environment.
 #
-# The user's own toolchain where it has the target's standard library. Else Debian's `rustc-web` with the standard
-# library of the same version, unpacked below target/cross/rust and never installed: Debian builds the library for
+# The user's own toolchain where it has the target's standard library, or where rustup can add it. Else Debian's `rustc-web`
+# with the standard library of the same version, unpacked below target/cross/rust and never installed: Debian builds the library for
 # arm64, and for Windows cargo builds it from `rust-web-src`.
 #
 # Sets RUSTC, LD_LIBRARY_PATH, RUSTC_BOOTSTRAP where they are needed, CARGO_TARGET_DIR, the linker, and the array
@@ -54,8 +54,14 @@ CONF
   echo "$version" >"$cross/rust/version"
 }
 
-own="$(rustc --print target-libdir --target "$triple")"
-if ! compgen -G "$own/libstd-*" >/dev/null; then
+has_own() {
+  compgen -G "$(rustc --print target-libdir --target "$triple")/libstd-*" >/dev/null
+}
+if ! has_own && [ ! -e "$cross/rust/version" ] && command -v rustup >/dev/null; then
+  mkdir -p "$cross"
+  timeout 300 rustup target add "$triple" >"$cross/rustup.log" 2>&1 || echo "rustup cannot add $triple: taking Debian's library" >&2
+fi
+if ! has_own; then
   if [ ! -e "$cross/rust/version" ]; then
     unpack_debian
   fi

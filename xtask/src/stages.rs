@@ -60,9 +60,9 @@ pub const STAGES: &[Stage] = &[
     stage("godot", "the GDExtension in a real engine", system::NATIVE, Script("examples/godot/run.sh")),
     stage("package", "the archive, unpacked elsewhere", system::NATIVE, Function(package)),
     stage("view", "upt view in headless Chromium", system::BROWSER, Script("tests/view/run.sh")),
+    stage("windows", "built by MinGW, run by Wine", system::WINDOWS, Function(cross::windows)),
     nightly("haptics", "a day of simulated haptics, or what fits into 20 minutes", system::NATIVE, Function(haptics)),
     nightly("races", "what threads share: Miri, ThreadSanitizer", "", Script("tests/races/run.sh nightly")),
-    nightly("windows", "built by MinGW, run by Wine", system::WINDOWS, Function(cross::windows)),
     nightly("arm64", "Linux arm64, run by qemu", system::ARM64, Function(cross::arm64)),
 ];
 

@@ -1,5 +1,6 @@
 // The page of `upt view`: shows the surface that the server streams, sends the tool that the mouse drags.
-// What the two say to each other: protocol.rs. Each picture asks for the frame of the next one.
+// What the two say to each other: protocol.rs. Each picture has one frame, asked for as late as it can be, so that it shows where the
+// mouse and the tissue are now.
 import * as three from "./three.js";
 import { finish, makeRenderer, software, steelMaterial, tissueMaterial, turnNormals } from "./drawing.js";
 import { gltf } from "./gltf.js";
@@ -9,6 +10,8 @@ const HALF_LENGTH = 25; // of the tool, mm
 const PRESS = 250; // ms until the tool is at its depth
 const READOUTS = 100; // ms between two of the readouts
 const AHEAD = 2; // frames that are asked for and have not come
+const LATE = 2; // ms by which the next frame is asked for sooner where one came too late for its picture
+const IN_TIME = 0.01; // ms by which it is asked for later where it did not
 const PALE = new three.Color(0xd8bfb0);
 const GREY = new three.Color(0x8f9399); // where the model was not trained to be touched
 const RED = new three.Color(0xc8402a);
@@ -33,14 +36,18 @@ let rest; // at rest and not shown: where the mouse finds its place
 let restPositions;
 let restColours;
 let tool; // the capsule that is shown
-let pointer; // {x, y, when} while the tool is held: where the mouse is
+let pointer; // {x, y, when, last} while the tool is held: where the mouse is, since when; `when` is 0 once a frame was asked for with it
 let pressed; // {point, normal, since} while the tool is held
 let sequence = 0;
 let latest; // the frame that has come and is not shown yet
 let told = 0; // when the readouts were written
+let lead = 1000 / 60; // ms before a picture at which its frame is asked for
+let interval = 1000 / 60; // ms from picture to picture
+let before = 0; // when the last picture was begun
+let timer; // asks for the next frame
 const sent = new Map(); // sequence: when the mouse was there, until it is seen
 const pictures = []; // when the last ones were shown
-const status = { shown: 0, largest: 0, force: 0, contacts: 0, latency: [], made: [], intervals: [], steps: 0, sequence: 0, software };
+const status = { shown: 0, largest: 0, force: 0, contacts: 0, latency: [], made: [], intervals: [], leads: [], steps: 0, sequence: 0, software };
 window.uptView = status; // for tests
 
 const socket = new WebSocket(`ws://${location.host}/socket${location.search}`);
@@ -177,8 +184,20 @@ function pose(now) {
   return { position, rotation, radius };
 }
 
+// The frame of the next picture is asked for `lead` before it: long enough that one in 200 comes too late.
+function askInTime(now, came) {
+  const passed = Math.min(now - before, 50);
+  before = now;
+  interval += (passed < interval ? 0.5 : 0.01) * (passed - interval);
+  lead = Math.min(Math.max(came ? lead - IN_TIME : lead + LATE, 2), interval);
+  clearTimeout(timer);
+  const wait = now + interval - lead - performance.now();
+  if (wait < 1) ask();
+  else timer = setTimeout(ask, wait);
+}
+
 // Asks for the next frame, with the tool where it is now.
-function ask(now) {
+function ask() {
   if (sequence - status.sequence >= AHEAD) return;
   sequence += 1;
   if (!pressed) {
@@ -191,7 +210,7 @@ function ask(now) {
     sent.set(sequence, pointer.when);
     pointer.when = 0;
   }
-  const { position, rotation, radius } = pose(now);
+  const { position, rotation, radius } = pose(performance.now());
   say({
     tool: {
       position: position.toArray(),
@@ -220,7 +239,7 @@ function place({ x: left, y: top }) {
 }
 
 const canvas = renderer.domElement;
-const where = (event) => ({ x: event.clientX, y: event.clientY, when: event.timeStamp });
+const where = ({ clientX: x, clientY: y, timeStamp: when }) => ({ x, y, when, last: when });
 canvas.addEventListener(
   "pointerdown",
   (event) => {
@@ -233,9 +252,12 @@ canvas.addEventListener(
   },
   { capture: true },
 );
-canvas.addEventListener("pointermove", (event) => {
-  if (pressed) pointer = where(event);
-});
+// The raw events come at once, the others wait for the next picture.
+for (const kind of ["pointerrawupdate", "pointermove"]) {
+  canvas.addEventListener(kind, (event) => {
+    if (pressed && event.timeStamp > pointer.last) pointer = where(event);
+  });
+}
 const lift = () => {
   pressed = null;
 };
@@ -284,7 +306,7 @@ renderer.setAnimationLoop((now) => {
   const data = latest;
   latest = undefined;
   if (data) take(data);
-  ask(now); // it is made while this picture is drawn
+  askInTime(now, data !== undefined); // it is made while this picture is drawn
   light.position.copy(camera.position);
   controls.update();
   renderer.render(scene, camera);
@@ -293,6 +315,7 @@ renderer.setAnimationLoop((now) => {
   const when = seen();
   if (when !== undefined) keep(status.latency, performance.now() - when);
   keep(status.made, status.frameMs);
+  keep(status.leads, lead);
   if (pictures.length > 0) keep(status.intervals, now - pictures[pictures.length - 1]);
   pictures.push(now);
   while (pictures[0] < now - 2000) pictures.shift();
