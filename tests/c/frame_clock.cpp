@@ -151,7 +151,11 @@ static float deepest_frame(const char *bundle, double step_s) {
         ball(rest[3 * middle], rest[3 * middle + 1], rest[3 * middle + 2] + 4.5F - press);
     EXPECT(clock.frame(scene, now, {&tool, 1}, u), UPT_OK);
     landed += clock.landed() ? 1 : 0;
-    if (frame < 101 || frame > 110) { // a tool that was put inside is pushed out over a few steps
+    // A tool that was put inside is pushed out over a few steps. Slow frames make steps themselves
+    // where the machine is quick enough, and are late where it is not.
+    const bool slow = step_s > 0 && frame % 50 > 40;
+    const bool after = step_s > 0 && frame > 50 && frame % 50 < 6;
+    if (!slow && !after && (frame < 101 || frame > 110)) {
       deepest = std::max(deepest, depth(rest, u, domain, tool));
     }
     for (const float value : u) {
@@ -160,10 +164,9 @@ static float deepest_frame(const char *bundle, double step_s) {
     }
     // The step in flight finishes now or some frames later, as it likes; a second is lost once, and
     // some frames come later than the next two short steps.
-    if (frame % 3 == 2) {
+    if (slow || frame % 3 == 2) {
       scene.wait(60000);
     }
-    const bool slow = step_s > 0 && frame % 50 > 40;
     now += frame == 100 ? 1.0 : slow ? 0.045 : 0.004 + 0.004 * (frame % 4);
   }
   EXPECT_TRUE(landed > 20);
