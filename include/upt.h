@@ -562,6 +562,11 @@ typedef struct upt_model_info {
    * Wall time of `upt_model_open`.
    */
   double load_seconds;
+  /**
+   * The `step_s` of `upt_scene_options` that the bundle recommends to a host that shows frames (`upt_scene_present`), seconds; `dt` where it
+   * recommends no other. For scenes with the corrections that the bundle recommends.
+   */
+  double frame_step_s;
 } upt_model_info;
 
 /**

@@ -552,15 +552,18 @@ private:
 ///
 /// Time is the host's own in seconds, from any origin, and does not go back. A step is made for
 /// every `dt` of it, with the poses that the instruments had at that moment (between those of the
-/// two frames around it), on the scene's worker. A host that hangs for more than two steps goes on
-/// from where it is: the time that is lost makes no steps. Used by one thread.
+/// two frames around it), on the scene's worker. Where frames come slower than steps, the earlier
+/// of the steps that are due are made in the frame's call: two at most, and only if the last one
+/// took less than half of `dt`. A host that hangs for more than 0.1 s or two steps goes on from
+/// where it is: the time that is lost makes no steps. Used by one thread.
 class FrameClock {
 public:
-  /// dt: the scene's step, s: `model.info().dt`, or `step_s` of its options.
+  /// dt: the scene's step, s: `step_s` of its options, for instance `model.info().frame_step_s`;
+  /// `model.info().dt` where that is 0.
   explicit FrameClock(double dt) : dt_(dt) {}
 
   /// One frame: takes a finished step, writes the tissue at `now` with the instruments where they
-  /// are now, and submits the next step when it is due. Never waits for a step.
+  /// are now, and submits the next step when it is due. Never waits for a step in flight.
   ///
   /// now: s. instruments: each in the same place in every frame. out: [n,3], mm, the region.
   /// A scene that cannot present shows its last two steps between each other, up to two steps late.
@@ -571,6 +574,9 @@ public:
     landed_now_ = false;
     upt_status result = collect(scene);
     look(scene);
+    if (result == UPT_OK) {
+      result = catch_up(scene, now);
+    }
     upt_status status = show(scene, now, instruments, out);
     if (status == UPT_OK && in_flight_ && look(scene)) {
       // A step that finished after it was asked for has changed the state under the frame.
@@ -589,6 +595,8 @@ public:
 
   /// Whether the last frame took a finished step: readings and statistics are new.
   bool landed() const noexcept { return landed_now_; }
+  /// Instruments of the step that was taken last: as many readings there are.
+  std::size_t landed_instruments() const noexcept { return landed_count_; }
   /// Whether a step was submitted that no frame has taken yet.
   bool in_flight() const noexcept { return in_flight_; }
   /// Back to rest, with the scene: waits for the step in flight, resets, and forgets the poses.
@@ -615,9 +623,11 @@ public:
   }
   /// Whether a step is to be submitted now.
   bool due(double now) const noexcept { return started_ && !in_flight_ && now + 1e-9 >= next_; }
+  /// Whether another step is due after that: frames come slower than steps.
+  bool behind(double now) const noexcept { return due(now) && now + 1e-9 >= next_ + dt_; }
   /// The instruments of the step that is submitted now, at its moment.
   const std::vector<upt_instrument> &start(double now) {
-    if (now - next_ > 2 * dt_) {
+    if (now - next_ > std::fmax(2 * dt_, LOST_S)) {
       next_ = now;
     }
     place(next_);
@@ -630,6 +640,7 @@ public:
   void finished() noexcept {
     in_flight_ = false;
     landed_now_ = true;
+    landed_count_ = poses_.size();
     published_ = step_;
   }
   /// The moment of the step that was submitted last, s.
@@ -641,6 +652,10 @@ public:
 
 private:
   static constexpr std::size_t MOST_POSES = 256;
+  // Of a frame's own steps.
+  static constexpr int MOST_MADE = 2;
+  // A host that was away for longer does not make up for it, s.
+  static constexpr double LOST_S = 0.1;
   // An instrument that moves farther from a frame to the next has been put there.
   static constexpr float PUT_MM = 40;
   struct Moment {
@@ -658,6 +673,25 @@ private:
     }
     finished();
     return status;
+  }
+
+  // The steps that are due before the last one, in a host whose frames come slower than steps.
+  upt_status catch_up(Scene &scene, double now) {
+    for (int made = 0; made < MOST_MADE && behind(now); made++) {
+      upt_scene_stats stats = make<upt_scene_stats>();
+      if (upt_scene_get_stats(scene.get(), &stats) != UPT_OK || stats.step_ms > 500 * dt_) {
+        break;
+      }
+      const std::vector<upt_instrument> &poses = start(now);
+      const upt_status status =
+          upt_scene_step_instruments(scene.get(), poses.data(), poses.size(), nullptr, 0);
+      finished();
+      look(scene);
+      if (status < 0) {
+        return status;
+      }
+    }
+    return UPT_OK;
   }
 
   // Whether a step has been published since the last look; poll() may not have told yet.
@@ -732,6 +766,7 @@ private:
   double dt_;
   double next_ = 0, step_ = 0, published_ = 0;
   std::uint64_t counted_ = 0;
+  std::size_t landed_count_ = 0;
   bool started_ = false, in_flight_ = false, landed_now_ = false, presents_ = true;
   std::vector<Moment> queue_;
   std::vector<upt_instrument> poses_;

@@ -63,8 +63,8 @@ pub use library::{init, shutdown};
 pub use model::{Kind, Model, ModelInfo};
 pub use onnx::providers_json;
 pub use options::{
-    Corrections, DecoderKernel, GuardPolicy, IndexSet, InitOptions, ModelOptions, Precision,
-    Provider, SceneOptions, StepPath, UserStream,
+    Corrections, DecoderKernel, GuardPolicy, IndexSet, InitOptions, LONGEST_STEP_S, ModelOptions,
+    Precision, Provider, SHORTEST_STEP_S, SceneOptions, StepPath, UserStream,
 };
 pub use scene::{Contact, Progress, Scene, StepInput};
 pub use stats::{SceneStats, flag};

@@ -136,6 +136,18 @@ fn manifest_errors_name_the_field() {
             "max_tools",
         ),
         (
+            "tiny-corrected",
+            "/corrections/frame_step_s",
+            serde_json::json!(0.005),
+            "corrections.frame_step_s",
+        ),
+        (
+            "tiny-corrected",
+            "/corrections/frame_step_s",
+            serde_json::json!(0.06),
+            "corrections.frame_step_s",
+        ),
+        (
             "tiny-upt",
             "/upt/coordinates/scale",
             serde_json::json!(0),
@@ -279,6 +291,15 @@ fn manifest_errors_name_the_field() {
             "{pointer}: {text}"
         );
     }
+    let uncorrected = with_manifest("tiny-corrected", |manifest| {
+        manifest["corrections"]["recommended"] = 0.into();
+        manifest["corrections"]["frame_step_s"] = 0.02.into();
+    });
+    assert!(
+        uncorrected
+            .to_string()
+            .contains("`corrections.frame_step_s`")
+    );
     let missing = with_manifest("tiny-reduced", |manifest| {
         manifest.as_object_mut().unwrap().remove("reduced");
     });

@@ -6,7 +6,7 @@ mod fixture;
 use contact::Shape;
 use fixture::{bits, model, plain, scene};
 use upt::contact::Tool;
-use upt::{Contact, Corrections, Error, Scene, SceneOptions, StepInput};
+use upt::{Contact, Corrections, Error, Model, ModelOptions, Scene, SceneOptions, StepInput};
 
 const DT: f64 = 0.05;
 
@@ -84,6 +84,28 @@ fn what_cannot_be_is_refused() {
         ..learned
     };
     assert!(Scene::new(model.clone(), &own).is_ok());
+}
+
+#[test]
+fn a_bundle_recommends_a_length_to_those_that_ask() {
+    fixture::find_runtime();
+    let folder = fixture::copy_of("tiny-corrected");
+    let mut manifest = fixture::manifest(folder.path());
+    manifest["corrections"]["frame_step_s"] = 0.02.into();
+    fixture::write_manifest(folder.path(), &mut manifest);
+    let told = Model::open(folder.path(), &ModelOptions::default()).unwrap();
+    assert_eq!(told.info().frame_step_s, 0.02);
+    assert_eq!(told.info().dt, 0.05);
+    // Who does not ask steps as the bundle does; who does gets that length.
+    assert!((scene(&told, &plain()).step_s() - DT).abs() < 1e-12);
+    let asked = SceneOptions {
+        step_s: told.info().frame_step_s,
+        ..SceneOptions::default()
+    };
+    assert!((scene(&told, &asked).step_s() - 0.02).abs() < 1e-12);
+    for name in ["tiny-corrected", "tiny-reduced", "tiny-upt"] {
+        assert_eq!(model(name).info().frame_step_s, DT, "{name}");
+    }
 }
 
 #[test]

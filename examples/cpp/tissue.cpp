@@ -9,9 +9,16 @@ static Vec3 at(const std::vector<float> &values, std::size_t index, std::size_t 
   return {values[stride * index], values[stride * index + 1], values[stride * index + 2]};
 }
 
-Tissue::Tissue(const std::string &bundle) : model_(upt::Model::open(bundle)), scene_(model_) {
-  info_ = model_.info();
-  clock_ = upt::FrameClock(info_.dt);
+// Frames lag less behind steps of the length that the bundle recommends for them.
+static upt::Scene make_scene(const upt::Model &model) {
+  auto options = upt::make<upt_scene_options>();
+  options.step_s = model.info().frame_step_s;
+  return upt::Scene(model, &options);
+}
+
+Tissue::Tissue(const std::string &bundle)
+    : model_(upt::Model::open(bundle)), scene_(make_scene(model_)), info_(model_.info()),
+      clock_(info_.frame_step_s) {
   surface_ = model_.indices(UPT_SET_SURFACE_NODES);
   domain_ = model_.indices(UPT_SET_DOMAIN_NODES);
   const std::vector<float> positions = model_.positions();
@@ -103,18 +110,17 @@ void Tissue::advance(double now, const Contacts &contacts) {
     in_flight_ = false;
     count_step(0);
   }
-  if (now - last_start_ + 1e-9 >= info_.dt) {
+  if (now - last_start_ + 1e-9 >= info_.frame_step_s) {
     scene_.submit(contacts.nodes, contacts.vectors);
     in_flight_ = true;
-    last_start_ = std::max(last_start_ + info_.dt, now - info_.dt);
+    last_start_ = std::max(last_start_ + info_.frame_step_s, now - info_.frame_step_s);
   }
 }
 
 void Tissue::frame(double now, upt::span<const upt_instrument> instruments) {
-  const std::size_t count = clock_.step_instruments().size();
   clock_.frame(scene_, now, instruments, displacement_);
   if (clock_.landed()) {
-    count_step(count);
+    count_step(clock_.landed_instruments());
   }
   fill(displacement_);
 }
@@ -156,7 +162,7 @@ void Tissue::sample(double now) {
     // While the step runs the last state stays; once it has published, it is approached from the
     // one before, even if poll() has not told yet.
     const bool running = in_flight_ && steps == counted_steps_;
-    const double alpha = running ? 1.0 : (now - last_start_) / info_.dt;
+    const double alpha = running ? 1.0 : (now - last_start_) / info_.frame_step_s;
     scene_.sample(std::clamp(alpha, 0.0, 1.0), displacement_);
   }
   fill(displacement_);

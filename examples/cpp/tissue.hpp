@@ -75,7 +75,8 @@ private:
 
   upt::Model model_;
   upt::Scene scene_;
-  upt_model_info info_{};
+  upt_model_info info_;
+  upt::FrameClock clock_;
   std::vector<Vec3> rest_;             // all nodes
   std::vector<std::uint32_t> surface_; // node of each surface vertex
   std::vector<std::uint32_t> domain_;  // nodes that instruments may touch
@@ -86,7 +87,6 @@ private:
   std::vector<double> step_ms_;
   Vec3 centre_;
   float radius_ = 0, max_displacement_ = 0;
-  upt::FrameClock clock_{0.05};
   bool in_flight_ = false, solves_contact_ = true;
   std::optional<upt_instrument_reading> reading_;
   std::uint64_t counted_steps_ = 0;

@@ -87,6 +87,7 @@ refused() { # name message options...
 }
 refused lone-target corrections_target_mm --bundle="$bundle" --target=0.1
 refused substeps substeps --bundle="$bundle" --corrections=3 --target=0.1 --substeps=300
+refused step step_s --bundle="$bundle" --step=0.5
 
 # A bundle that is not there: a message, exit code 1, no crash.
 refused missing "" --bundle="$build/no-such-bundle"

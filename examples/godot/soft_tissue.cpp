@@ -13,7 +13,8 @@
  * Properties, in the inspector too; `open` reads them: corrections (1 to 64: the most that a step
  * in contact gets, 0: what the bundle recommends, -1: none), corrections_target_mm (fewer where the
  * estimated error is below this, 0: always so many), substeps (1 to 8: the most of a step that
- * would err by more than the target, 0: what the bundle recommends). */
+ * would err by more than the target, 0: what the bundle recommends), step_s (length of a step, s,
+ * 0.01 to 0.05, 0: what the bundle recommends for frames). */
 #include "godot_api.h"
 #include "tissue.hpp"
 
@@ -248,6 +249,14 @@ static void get_substeps(void *instance, const GDExtensionConstTypePtr *,
   *static_cast<int64_t *>(result) = effort(instance).substeps;
 }
 
+static void set_step(void *instance, const GDExtensionConstTypePtr *arguments, GDExtensionTypePtr) {
+  effort(instance).step_s = real(arguments[0]);
+}
+
+static void get_step(void *instance, const GDExtensionConstTypePtr *, GDExtensionTypePtr result) {
+  *static_cast<double *>(result) = effort(instance).step_s;
+}
+
 static void message(void *instance, const GDExtensionConstTypePtr *, GDExtensionTypePtr result) {
   godot.ptr_destructor(GDEXTENSION_VARIANT_TYPE_STRING)(result);
   godot.string_new(result, static_cast<SoftTissue *>(instance)->message.c_str());
@@ -306,12 +315,15 @@ static const GodotMethod METHODS[] = {
     {"get_corrections_target_mm", get_target, T(FLOAT), 0, {}},
     {"set_substeps", set_substeps, T(NIL), 1, {{"most", T(INT)}}},
     {"get_substeps", get_substeps, T(INT), 0, {}},
+    {"set_step_s", set_step, T(NIL), 1, {{"seconds", T(FLOAT)}}},
+    {"get_step_s", get_step, T(FLOAT), 0, {}},
 };
 static const GodotProperty PROPERTIES[] = {
     {"corrections", T(INT), "-1,64,1", "set_corrections", "get_corrections"},
     {"corrections_target_mm", T(FLOAT), "0,1,0.001,or_greater", "set_corrections_target_mm",
      "get_corrections_target_mm"},
     {"substeps", T(INT), "0,8,1", "set_substeps", "get_substeps"},
+    {"step_s", T(FLOAT), "0,0.05,0.001", "set_step_s", "get_step_s"},
 };
 #undef T
 

@@ -5,7 +5,7 @@
 #include <stdexcept>
 
 // The library says what it can do with them; here they only have to fit into its fields.
-static upt::Scene make_scene(const upt::Model &model, const Effort &effort) {
+static upt::Scene make_scene(const upt::Model &model, const Effort &effort, double step_s) {
   if (effort.substeps < 0 || effort.substeps > std::numeric_limits<std::uint8_t>::max()) {
     throw std::runtime_error("substeps is " + std::to_string(effort.substeps));
   }
@@ -14,12 +14,22 @@ static upt::Scene make_scene(const upt::Model &model, const Effort &effort) {
   options.corrections = static_cast<std::int32_t>(std::clamp(effort.corrections, -most, most));
   options.corrections_target_mm = static_cast<float>(effort.target_mm);
   options.substeps = static_cast<std::uint8_t>(effort.substeps);
+  options.step_s = step_s;
   return upt::Scene(model, &options);
 }
 
+// What the host asks for; else what the bundle recommends for frames, which takes corrections.
+static double length_of_step(const upt::Model &model, const Effort &effort) {
+  const upt_model_info info = model.info();
+  if (effort.step_s != 0) {
+    return effort.step_s;
+  }
+  return effort.corrections < 0 ? static_cast<double>(info.dt) : info.frame_step_s;
+}
+
 Tissue::Tissue(const std::string &bundle, const Effort &effort)
-    : model_(upt::Model::open(bundle)), scene_(make_scene(model_, effort)),
-      clock_(model_.info().dt), dt_(model_.info().dt) {
+    : model_(upt::Model::open(bundle)), step_s_(length_of_step(model_, effort)),
+      scene_(make_scene(model_, effort, step_s_)), clock_(step_s_) {
   try {
     scene_.step_instruments({});
     scene_.reset();
@@ -55,9 +65,9 @@ void Tissue::frame(double now) {
     follow(now, tools);
     return;
   }
-  const std::size_t in_step = clock_.step_instruments().size();
   clock_.frame(scene_, now, tools, displacement_);
   if (clock_.landed()) {
+    const std::size_t in_step = clock_.landed_instruments();
     reading_ = in_step > 0 ? scene_.readings(in_step).front() : upt_instrument_reading{};
   }
 }
@@ -74,7 +84,7 @@ void Tissue::follow(double now, upt::span<const upt_instrument> tools) {
   // It may have landed since it was asked.
   const bool landed = clock_.in_flight() && stats().step_count != counted_steps_;
   const double since = landed ? std::max(0.0, now - clock_.step_time()) : clock_.since(now);
-  scene_.sample(std::min(1.0, since / dt_), displacement_);
+  scene_.sample(std::min(1.0, since / step_s_), displacement_);
   if (clock_.due(now)) {
     scene_.contacts_from_instruments(clock_.start(now), nodes_, vectors_, contact_count_);
     scene_.submit({nodes_.data(), contact_count_}, {vectors_.data(), 3 * contact_count_});

@@ -12,6 +12,7 @@ struct Effort {
   std::int64_t corrections = 0; // at most; UPT_CORRECTIONS_NONE: none
   double target_mm = 0;         // enough where the estimated error is below; with `corrections`
   std::int64_t substeps = 0;    // at most; from 2 with a target
+  double step_s = 0;            // length of a step; zero with corrections: recommended for frames
 };
 
 class Tissue {
@@ -38,9 +39,9 @@ private:
   void follow(double now, upt::span<const upt_instrument> tools);
 
   upt::Model model_;
+  double step_s_;
   upt::Scene scene_;
   upt::FrameClock clock_;
-  double dt_;
   std::vector<std::uint32_t> faces_;
   std::vector<float> rest_, displacement_;
   upt_instrument_reading reading_{};

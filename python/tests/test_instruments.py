@@ -135,7 +135,8 @@ def test_nodes_and_vectors_for_hosts_that_want_them(model, scene):
 
 def test_a_frame_shows_the_tool_where_it_is(corrected):
     """Between steps the tissue follows the tool; at the step's own moment it is the step."""
-    with corrected.scene(no_sleep=True) as scene:
+    assert corrected.frame_step_s == pytest.approx(corrected.dt), "this one recommends none of its own"
+    with corrected.scene(no_sleep=True, step_s=corrected.frame_step_s) as scene:
         ball = upt.Instrument.capsule(3.0, position=pressing(corrected, 0.3))
         scene.present(0.0)  # before the first step
         state = scene.step_instruments([ball])

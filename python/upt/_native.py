@@ -363,6 +363,9 @@ class ModelInfo(Record):
     """Host memory of the model."""
     load_seconds: float
     """Wall time of `upt_model_open`."""
+    frame_step_s: float
+    """The `step_s` of `upt_scene_options` that the bundle recommends to a host that shows frames (`upt_scene_present`), seconds; `dt` where it
+    recommends no other. For scenes with the corrections that the bundle recommends."""
 
     _fields_ = [
         ("struct_size", ctypes.c_uint32),
@@ -379,6 +382,7 @@ class ModelInfo(Record):
         ("_precision", ctypes.c_int32),
         ("memory_bytes", ctypes.c_uint64),
         ("load_seconds", ctypes.c_double),
+        ("frame_step_s", ctypes.c_double),
     ]
 
 

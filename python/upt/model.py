@@ -67,6 +67,11 @@ class Model:
         """Length of a step, seconds."""
         return self.info.dt
 
+    @property
+    def frame_step_s(self) -> float:
+        """`step_s` for a scene that shows frames (`Scene.present`), seconds; `dt` where the bundle says nothing."""
+        return self.info.frame_step_s
+
     def describe(self) -> dict[str, Any]:
         """Name, bundle hash, the provider of each stage and why the others were not chosen."""
         described: dict[str, Any] = json.loads(read_text(lib.upt_model_describe, self._handle))

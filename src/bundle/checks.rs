@@ -3,6 +3,7 @@
 use super::faults::{bad, check};
 use super::manifest::{Envelope, Manifest, ManifestKind, ReducedEntry, ToolEnvelope, UptEntry};
 use crate::error::Result;
+use crate::options::{LONGEST_STEP_S, SHORTEST_STEP_S};
 
 impl Manifest {
     pub(super) fn check(&self) -> Result<()> {
@@ -63,6 +64,18 @@ impl Manifest {
                 "corrections.calibration",
                 "must be positive",
             )?;
+            if let Some(step_s) = corrections.frame_step_s {
+                check(
+                    (SHORTEST_STEP_S..=LONGEST_STEP_S).contains(&step_s),
+                    "corrections.frame_step_s",
+                    "must be 0.01 to 0.05",
+                )?;
+                check(
+                    corrections.recommended > 0,
+                    "corrections.frame_step_s",
+                    "needs corrections that the bundle recommends (field `corrections.recommended`)",
+                )?;
+            }
             check(
                 self.prior.is_some(),
                 "corrections",

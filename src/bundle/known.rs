@@ -90,6 +90,7 @@ const KEYS: &[(&str, &[&str])] = &[
             "target_mm",
             "substeps",
             "calibration",
+            "frame_step_s",
         ],
     ),
     (

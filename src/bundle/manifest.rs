@@ -94,6 +94,8 @@ pub struct CorrectionsEntry {
     /// Estimated over measured error on held-out cases: what [`crate::SceneStats::error_mm`] is multiplied by.
     #[serde(default = "one")]
     pub calibration: f32,
+    /// Length of step that suits scenes whose frames are presented, s; none: the bundle's.
+    pub frame_step_s: Option<f64>,
 }
 
 fn one() -> f32 {
@@ -331,6 +333,21 @@ pub struct Manifest {
     pub errors: serde_json::Value,
     /// All files but `bundle.json`.
     pub files: BTreeMap<String, FileEntry>,
+}
+
+impl Manifest {
+    /// Length of step for a scene that presents and corrects as the bundle recommends, s: `dt_s` where a scene cannot present or has
+    /// no step of its own.
+    pub fn frame_step_s(&self) -> f64 {
+        let own = self
+            .corrections
+            .as_ref()
+            .and_then(|entry| entry.frame_step_s);
+        match own {
+            Some(step_s) if cfg!(feature = "contact") => step_s,
+            _ => self.dt_s,
+        }
+    }
 }
 
 impl ReducedEntry {

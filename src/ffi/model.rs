@@ -90,6 +90,7 @@ pub unsafe extern "C" fn upt_model_get_info(
                     precision: info.precision as i32,
                     memory_bytes: info.memory_bytes,
                     load_seconds: info.load_seconds,
+                    frame_step_s: info.frame_step_s,
                 })
             };
             // SAFETY: `out` points to a struct whose first field is its size, as the header asks.

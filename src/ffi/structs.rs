@@ -109,6 +109,9 @@ pub struct upt_model_info {
     pub memory_bytes: u64,
     /// Wall time of `upt_model_open`.
     pub load_seconds: f64,
+    /// The `step_s` of `upt_scene_options` that the bundle recommends to a host that shows frames (`upt_scene_present`), seconds; `dt` where it
+    /// recommends no other. For scenes with the corrections that the bundle recommends.
+    pub frame_step_s: f64,
 }
 
 /// Options of `upt_scene_create`.

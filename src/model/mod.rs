@@ -61,6 +61,9 @@ pub struct ModelInfo {
     pub memory_bytes: u64,
     /// Wall time of opening, s.
     pub load_seconds: f64,
+    /// [`crate::SceneOptions::step_s`] for a scene that presents and corrects as the bundle recommends, s; `dt` where the bundle recommends
+    /// no other.
+    pub frame_step_s: f64,
 }
 
 /// What differs between the kinds.
@@ -268,6 +271,7 @@ impl Model {
             },
             memory_bytes: (own + prior + self.mesh.memory_bytes()) as u64,
             load_seconds: self.load_seconds,
+            frame_step_s: self.manifest.frame_step_s(),
         }
     }
 

@@ -7,7 +7,7 @@ use super::counters::Source;
 use super::published::{Frame, Published};
 use crate::stats::SceneStats;
 
-/// A scene is asleep after this many steps without contact ...
+/// A scene is asleep after this many steps of the bundle's length, or as much time in its own, without contact ...
 pub const QUIET_STEPS: u32 = 4;
 /// ... in which no decoded node is displaced by more than this, mm, ...
 pub const QUIET_DISPLACEMENT: f32 = 0.02;
@@ -61,7 +61,9 @@ impl Core {
             && (self.counters.max_displacement <= QUIET_DISPLACEMENT || self.is_still(published))
             && self.engine.is_quiet(QUIET_DISPLACEMENT);
         self.counters.quiet = if quiet { self.counters.quiet + 1 } else { 0 };
-        self.counters.sleeping = !self.options.no_sleep && self.counters.quiet >= QUIET_STEPS;
+        let steps = f64::from(QUIET_STEPS) * self.model.manifest.dt_s / self.step_s();
+        self.counters.sleeping =
+            !self.options.no_sleep && f64::from(self.counters.quiet) >= steps - 1e-6;
         self.counters.rest_frames = 0;
         self.rotate(published);
     }

@@ -9,10 +9,11 @@ use anyhow::{Context, Result, ensure};
 use crate::process::{output, run_checked};
 use crate::workspace::{Workspace, write_between_markers};
 
-const FEATURES: [&str; 7] = [
+const FEATURES: [&str; 8] = [
     "",
     "contact",
     "forces",
+    "haptics",
     "cuda",
     "tensorrt",
     "tensorrt-rtx",

@@ -142,6 +142,12 @@ impl Model {
         &self.info
     }
 
+    /// The same; its scenes' steps have the length that the bundle recommends for frames.
+    pub fn for_frames(mut self) -> Self {
+        self.step_s = self.info.frame_step_s;
+        self
+    }
+
     /// `upt_model_indices` of a `UPT_SET_*`.
     pub fn indices(&self, set: i32) -> Result<Vec<u32>> {
         let mut needed = 0;

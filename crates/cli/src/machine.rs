@@ -31,6 +31,17 @@ impl Machine {
     }
 }
 
+/// What else the machine was doing: the mean number of running threads over the last minute; none where the system does not tell.
+pub fn load() -> Option<f64> {
+    let text = std::fs::read_to_string("/proc/loadavg").ok()?;
+    text.split_whitespace().next()?.parse().ok()
+}
+
+/// The same for a line of text: `, load 1.9`, or nothing.
+pub fn load_words() -> String {
+    load().map_or(String::new(), |load| format!(", load {load:.1}"))
+}
+
 /// The value of a `name: value` or `name=value` line of a system file.
 fn field_of(path: &str, name: &str) -> Option<String> {
     let text = std::fs::read_to_string(path).ok()?;

@@ -132,6 +132,49 @@ fn a_corrected_bundle_follows_the_solver_and_more_corrections_closer() {
 }
 
 #[test]
+fn what_a_bundle_recommends_changes_key_by_key() {
+    find_runtime();
+    let folder = tempfile::tempdir().unwrap();
+    for entry in std::fs::read_dir(root().join("tests/fixtures/tiny-corrected")).unwrap() {
+        let entry = entry.unwrap();
+        std::fs::copy(entry.path(), folder.path().join(entry.file_name())).unwrap();
+    }
+    let path = folder.path().to_str().unwrap();
+    let set = |more: &[&str]| upt(&[&["corrections", path, "--keep"], more].concat());
+    let entry = || {
+        let text = std::fs::read(folder.path().join("bundle.json")).unwrap();
+        let manifest: serde_json::Value = serde_json::from_slice(&text).unwrap();
+        manifest["corrections"].clone()
+    };
+    let (done, text) = set(&["--recommended", "10@0.02/4", "--calibration", "1.5"]);
+    assert!(done, "{text}");
+    let (done, text) = set(&["--frame-step-s", "0.02"]);
+    assert!(done, "{text}");
+    let wanted = serde_json::json!({
+        "file": "corrections.safetensors", "recommended": 10, "target_mm": 0.02, "substeps": 4, "calibration": 1.5, "frame_step_s": 0.02,
+    });
+    assert_eq!(entry(), wanted);
+    let model = Model::open(folder.path(), &ModelOptions::default()).unwrap();
+    assert_eq!(model.info().frame_step_s, 0.02);
+    let (done, text) = set(&["--recommended", "5"]);
+    assert!(done, "{text}");
+    let wanted = serde_json::json!({
+        "file": "corrections.safetensors", "recommended": 5, "calibration": 1.5, "frame_step_s": 0.02,
+    });
+    assert_eq!(entry(), wanted);
+    // Steps of their own length need corrections, and there are limits.
+    for (more, message) in [
+        (["--recommended", "0"], "--frame-step-s"),
+        (["--frame-step-s", "0.06"], "0.01 to 0.05"),
+        (["--frame-step-s", "nan"], "0.01 to 0.05"),
+    ] {
+        let (done, text) = set(&more);
+        assert!(!done && text.contains(message), "{text}");
+        assert_eq!(entry(), wanted);
+    }
+}
+
+#[test]
 fn a_bundle_without_a_linear_response_is_refused_untouched() {
     let folder = tempfile::tempdir().unwrap();
     for entry in std::fs::read_dir(root().join("tests/fixtures/tiny-upt")).unwrap() {

@@ -391,7 +391,7 @@ namespace Upt.Tests
             PushedBrain sample = Sample();
             SoftTissue tissue = sample.Tissue;
             if (!tissue.Presents) Assert.Ignore("the test bundle has no corrections");
-            foreach (int most in new[] { 1, 3, -1 })
+            foreach (int most in new[] { 2, 3, -1 })
             {
                 tissue.gameObject.SetActive(false);
                 tissue.corrections = most;

@@ -6,8 +6,8 @@ namespace Upt
     /// <summary>
     /// When a step is due, with which poses, and how long ago the last published one was: what a host that presents has to
     /// know. A step is made for every <c>dt</c> of the host's time with the poses of its own moment, between those of the two
-    /// frames around it. A host that hangs for more than two steps goes on from where it is. Allocates only where a
-    /// list grows.
+    /// frames around it. A host that hangs for more than 0.1 s or two steps goes on from where it is. Allocates only where
+    /// a list grows.
     /// </summary>
     internal sealed class FrameClock
     {
@@ -16,6 +16,9 @@ namespace Upt
 
         /// <summary>An instrument that moves farther from a frame to the next has been put there, mm.</summary>
         private const float Put = 40f;
+
+        /// <summary>A host that was away for longer does not make up for it, seconds.</summary>
+        private const double Lost = 0.1;
 
         private struct Frame
         {
@@ -34,13 +37,13 @@ namespace Upt
         private bool started;
         private bool inFlight;
 
-        /// <summary>At rest, for a model with a step of <paramref name="dt"/> seconds.</summary>
+        /// <summary>At rest, for a scene with a step of <paramref name="dt"/> seconds.</summary>
         public FrameClock(double dt)
         {
             this.dt = dt;
         }
 
-        /// <summary>The model's step, seconds.</summary>
+        /// <summary>The scene's step, seconds.</summary>
         public double Step
         {
             get { return dt; }
@@ -78,11 +81,17 @@ namespace Upt
             return started && !inFlight && now + 1e-9 >= next;
         }
 
+        /// <summary>True when another step is due after that: frames come slower than steps.</summary>
+        public bool IsBehind(double now)
+        {
+            return IsDue(now) && now + 1e-9 >= next + dt;
+        }
+
         /// <summary>A step is submitted: fills <paramref name="poses"/> with the instruments at its moment and gives
         /// their number.</summary>
         public int Start(double now, ref upt_instrument[] poses)
         {
-            if (now - next > 2.0 * dt) next = now;
+            if (now - next > Math.Max(2.0 * dt, Lost)) next = now;
             int count = Place(next, ref poses);
             step = next;
             next += dt;

@@ -7,10 +7,10 @@ using UnityEngine;
 namespace Upt
 {
     /// <summary>
-    /// Soft tissue on this object's mesh. Steps run on the scene's worker at the model's own rate (20 Hz);
-    /// each frame shows the tissue at its own moment, with the instruments where they are then. Models without
-    /// corrections cannot: there a frame lies between the last two states, one step (50 ms) and the time
-    /// that a step takes behind the instruments.
+    /// Soft tissue on this object's mesh. Steps run on the scene's worker, as many a second as the model recommends for
+    /// frames (<see cref="stepSeconds"/>); each frame shows the tissue at its own moment, with the instruments where they are
+    /// then. Models without corrections cannot: there a frame lies between the last two states, one step (50 ms) and the
+    /// time that a step takes behind the instruments.
     /// </summary>
     [RequireComponent(typeof(MeshFilter))]
     public sealed class SoftTissue : MonoBehaviour
@@ -46,8 +46,16 @@ namespace Upt
         [Tooltip("Damping of the tissue, 1/s: 0.01 to 1000; with less it swings longer. 0: the bundle's. Needs corrections.")]
         public float damping;
 
+        [Range(0f, 0.05f)]
+        [Tooltip("Length of a step, seconds: 0.01 to 0.05, shorter ones lag less and take more of the processor; 0: what the model " +
+                 "recommends for frames. Another than the model's own needs corrections.")]
+        public float stepSeconds;
+
         [Tooltip("Recompute normals each frame.")]
         public bool recalculateNormals = true;
+
+        /// <summary>Steps that a frame makes itself at most where frames come slower than steps.</summary>
+        private const int MostMade = 2;
 
         private static readonly ProfilerMarker FrameMarker = new ProfilerMarker("libupt.Frame");
         private static readonly ProfilerMarker ContactMarker = new ProfilerMarker("libupt.Contacts");
@@ -228,12 +236,16 @@ namespace Upt
             shownBefore = filter.sharedMesh;
             surface = new SurfaceMesh(native, renderMesh != null ? renderMesh : shownBefore, unitsPerMillimetre);
             // Render vertices between nodes are interpolated: decoding them costs a step more and is no more accurate.
+            // What the model recommends for frames takes its corrections.
+            double step = corrections < 0 ? native.Info.dt : native.Info.frame_step_s;
+            if (stepSeconds != 0f) step = stepSeconds;
             scene = new Scene(native, new upt_scene_options {
                 interpolate_points = 1,
                 corrections = corrections,
                 corrections_target_mm = correctionsTarget,
                 substeps = (byte)substeps,
                 damping_per_s = damping,
+                step_s = step,
             });
             solvesContact = Solves(scene);
             uint[] touchable = native.Indices(Native.UPT_SET_SURFACE_NODES);
@@ -243,8 +255,8 @@ namespace Upt
             contactNodes = new uint[touchable.Length];
             contactVectors = new float[3 * touchable.Length];
             geometry = new RestGeometry(native, unitsPerMillimetre);
-            playhead = new Playhead(native.Info.dt);
-            clock = new FrameClock(native.Info.dt);
+            playhead = new Playhead(step);
+            clock = new FrameClock(step);
             now = 0.0;
             presents = solvesContact && surface.TryPresent(scene);
             LastStats = scene.Stats();
@@ -305,6 +317,7 @@ namespace Upt
             int count = TakePoses();
             clock.Moved(now, poses, count);
             if (inFlight) Collect();
+            CatchUp();
             using (UploadMarker.Auto())
             {
                 surface.Present(scene, clock.Since(now), poses, count);
@@ -327,6 +340,31 @@ namespace Upt
             }
         }
 
+        /// <summary>Makes the steps that are due before the last one, where frames come slower than steps and steps are
+        /// quick.</summary>
+        private void CatchUp()
+        {
+            for (int made = 0; made < MostMade && !inFlight && clock.IsBehind(now); made++)
+            {
+                if (LastStats.step_ms > 500.0 * clock.Step) return;
+                using (ContactMarker.Auto())
+                {
+                    submittedCount = clock.Start(now, ref stepPoses);
+                    TakePlaces();
+                    try
+                    {
+                        scene.StepInstruments(stepPoses, submittedCount, null);
+                    }
+                    catch (UptException error)
+                    {
+                        if (!Refuse(error)) throw;
+                        continue;
+                    }
+                    Take();
+                }
+            }
+        }
+
         /// <summary>Takes the submitted step's result when it is there.</summary>
         private void Collect()
         {
@@ -336,12 +374,26 @@ namespace Upt
             }
             catch (UptException error)
             {
-                inFlight = false;
-                clock.Finished();
-                if (error.Status != Native.UPT_ERR_GUARD) throw;
-                Hold(error);
+                if (!Refuse(error)) throw;
                 return;
             }
+            Take();
+        }
+
+        /// <summary>The step failed. False where the tissue cannot go on: for any reason but that the guard refused its
+        /// state.</summary>
+        private bool Refuse(UptException error)
+        {
+            inFlight = false;
+            clock.Finished();
+            if (error.Status != Native.UPT_ERR_GUARD) return false;
+            Hold(error);
+            return true;
+        }
+
+        /// <summary>The step has been made.</summary>
+        private void Take()
+        {
             inFlight = false;
             refused = false;
             clock.Finished();

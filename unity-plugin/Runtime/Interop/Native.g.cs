@@ -81,6 +81,11 @@ namespace Upt.Interop
         public ulong memory_bytes;
         /// <summary>Wall time of `upt_model_open`.</summary>
         public double load_seconds;
+        /// <summary>
+        /// The `step_s` of `upt_scene_options` that the bundle recommends to a host that shows frames (`upt_scene_present`), seconds; `dt` where it
+        /// recommends no other. For scenes with the corrections that the bundle recommends.
+        /// </summary>
+        public double frame_step_s;
     }
 
     /// <summary>Options of `upt_scene_create`.</summary>

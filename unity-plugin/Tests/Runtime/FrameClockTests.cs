@@ -84,6 +84,32 @@ namespace Upt.Tests
         }
 
         [Test]
+        public void FramesSlowerThanStepsLoseNone()
+        {
+            const double Short = 0.02;
+            FrameClock clock = new FrameClock(Short);
+            upt_instrument[] poses = new upt_instrument[1], step = null;
+            int steps = 0;
+            for (int frame = 0; frame < 60; frame++)
+            {
+                double now = frame / 30.0;
+                poses[0] = At(now);
+                clock.Moved(now, poses, 1);
+                while (clock.IsDue(now))
+                {
+                    bool behind = clock.IsBehind(now);
+                    clock.Start(now, ref step);
+                    Assert.That(X(step[0]), Is.EqualTo(Short * steps).Within(1e-5));
+                    clock.Finished();
+                    Assert.That(clock.IsDue(now), Is.EqualTo(behind));
+                    steps++;
+                }
+                Assert.That(clock.Since(now), Is.LessThan(Short));
+            }
+            Assert.That(steps, Is.EqualTo(99), "59 / 30 s and the first");
+        }
+
+        [Test]
         public void AnInstrumentThatIsPutElsewhereIsNotBetween()
         {
             FrameClock clock = new FrameClock(Dt);

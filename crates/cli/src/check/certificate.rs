@@ -183,6 +183,13 @@ impl Certificate {
             .fold(self.mse_in_contact(), f64::max)
     }
 
+    /// Time of a step in contact on one thread, ms.
+    pub fn median_step_ms(&self) -> f64 {
+        self.value["speed"]["ms_median"]
+            .as_f64()
+            .unwrap_or(f64::INFINITY)
+    }
+
     /// What the estimated error should be multiplied by once more; none where nothing was corrected.
     pub fn calibration(&self) -> Option<f32> {
         let ratio = self.value["truth_over_estimate"].as_f64()?;

@@ -23,6 +23,7 @@ use std::time::Instant;
 use anyhow::{Result, bail};
 use clap::Args;
 use serde_json::{Value, json};
+use upt::{LONGEST_STEP_S, SHORTEST_STEP_S};
 
 use crate::effort::Effort;
 use crate::manifest::Manifest;
@@ -34,7 +35,8 @@ const FILE: &str = "corrections.safetensors";
 #[command(after_help = "Examples:
   upt corrections onnx/brain-reduced
   upt corrections my-bundle --natural 60 --patches 160 --recommended 3
-  upt corrections my-bundle --keep --recommended 10@0.02/4")]
+  upt corrections my-bundle --keep --recommended 10@0.02/4
+  upt corrections my-bundle --keep --frame-step-s 0.02")]
 pub struct Options {
     /// Bundle folder with a linear response; `corrections.safetensors` and the manifest's entry are written there.
     pub bundle: PathBuf,
@@ -57,13 +59,18 @@ pub struct Options {
     #[arg(long, default_value_t = 60)]
     pub data_modes: usize,
     /// Corrections per step that the bundle recommends. COUNT@MM: at most COUNT, fewer once the estimated error is below MM.
-    /// COUNT@MM/SUBSTEPS: also that many substeps, where one step that instruments drive would miss MM.
-    #[arg(long, default_value_t = Effort::fixed(3))]
-    pub recommended: Effort,
+    /// COUNT@MM/SUBSTEPS: also that many substeps, where one step that instruments drive would miss MM. Default: 3, with --keep the bundle's
+    /// own.
+    #[arg(long)]
+    pub recommended: Option<Effort>,
     /// Factor of the estimated error: `truth over estimate` of `training/scripts/corrections_table.py` on held-out cases.
     /// Default: 1, or with --keep the bundle's own.
     #[arg(long)]
     pub calibration: Option<f32>,
+    /// Length of step that the bundle recommends to hosts that show frames (`upt_scene_present`), s, 0.01 to 0.05. Default: none of its own,
+    /// with --keep the bundle's.
+    #[arg(long, value_name = "S", value_parser = frame_step)]
+    pub frame_step_s: Option<f64>,
     /// Keep the bundle's file and change only the manifest's entry.
     #[arg(long)]
     pub keep: bool,
@@ -78,6 +85,22 @@ pub struct Options {
     pub json: bool,
 }
 
+fn frame_step(text: &str) -> Result<f64, String> {
+    let allowed = SHORTEST_STEP_S..=LONGEST_STEP_S;
+    let step_s = text.parse().ok().filter(|step_s| allowed.contains(step_s));
+    step_s.ok_or_else(|| format!("`{text}` is not a length of step: give 0.01 to 0.05 s"))
+}
+
+/// What changes in the manifest's entry; none: as it was.
+#[derive(Default)]
+pub struct Change {
+    pub recommended: Option<Effort>,
+    /// What the estimated error is multiplied by.
+    pub calibration: Option<f32>,
+    /// Length of step for scenes that present, s.
+    pub frame_step_s: Option<f64>,
+}
+
 /// Runs the command.
 pub fn run(args: &Options) -> Result<ExitCode> {
     if let Some(calibration) = args.calibration
@@ -86,17 +109,29 @@ pub fn run(args: &Options) -> Result<ExitCode> {
         bail!("--calibration is {calibration}; it must be positive");
     }
     if args.keep {
-        recommend(&args.bundle, args.recommended, args.calibration)?;
+        let change = Change {
+            recommended: args.recommended,
+            calibration: args.calibration,
+            frame_step_s: args.frame_step_s,
+        };
+        let entry = recommend(&args.bundle, &change)?;
         let path = args.bundle.join("bundle.json");
         if args.json {
-            println!("{}", json!({"file": path, "recommended": args.recommended}));
+            println!("{}", json!({"file": path, "corrections": entry}));
         } else {
-            println!("{}: recommends {}", path.display(), args.recommended);
+            println!("{}: {entry}", path.display());
         }
         return Ok(ExitCode::SUCCESS);
     }
     let started = Instant::now();
     let count = write(args)?;
+    if args.frame_step_s.is_some() {
+        let change = Change {
+            frame_step_s: args.frame_step_s,
+            ..Change::default()
+        };
+        recommend(&args.bundle, &change)?;
+    }
     let seconds = started.elapsed().as_secs_f64();
     let path = args.bundle.join(FILE);
     if args.json {
@@ -113,35 +148,56 @@ pub fn run(args: &Options) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Changes how many corrections the bundle recommends and what their estimated error is multiplied by (none: as before).
-pub fn recommend(bundle: &Path, recommended: Effort, calibration: Option<f32>) -> Result<()> {
+/// Changes what the manifest says of the corrections; gives the new entry.
+pub fn recommend(bundle: &Path, change: &Change) -> Result<Value> {
     let before: Option<Value> = Manifest::read(bundle)?.get("corrections")?;
-    let Some(before) = before else {
+    let Some(mut entry) = before else {
         bail!(
             "{}: has no corrections to keep; leave --keep out to make them",
             bundle.display()
         );
     };
-    let calibration = calibration.map_or_else(
-        || before["calibration"].clone(),
-        |calibration| json!(calibration),
-    );
-    manifest::add(bundle, FILE, &entry(recommended, calibration))
+    if let Some(effort) = change.recommended {
+        set_effort(&mut entry, effort);
+    }
+    if let Some(calibration) = change.calibration {
+        entry["calibration"] = short(calibration);
+    }
+    if let Some(step_s) = change.frame_step_s {
+        entry["frame_step_s"] = json!(step_s);
+    }
+    if entry["frame_step_s"].is_number() && entry["recommended"] == 0 {
+        bail!(
+            "--frame-step-s: steps of a length of their own are made by corrections; recommend some with --recommended"
+        );
+    }
+    manifest::add(bundle, FILE, &entry)?;
+    Ok(entry)
 }
 
-/// The manifest's entry.
-fn entry(recommended: Effort, calibration: Value) -> Value {
-    let mut entry = json!({"file": FILE, "recommended": recommended.most});
-    if recommended.target_mm > 0.0 {
-        entry["target_mm"] = short(recommended.target_mm);
-    }
-    if recommended.substeps > 1 {
-        entry["substeps"] = json!(recommended.substeps);
-    }
-    if !calibration.is_null() {
-        entry["calibration"] = calibration;
-    }
+/// A new entry of the manifest.
+fn entry(recommended: Effort, calibration: f32) -> Value {
+    let mut entry = json!({"file": FILE});
+    set_effort(&mut entry, recommended);
+    entry["calibration"] = short(calibration);
     entry
+}
+
+/// The keys that an [`Effort`] stands for; those that it leaves at their defaults are absent.
+fn set_effort(entry: &mut Value, effort: Effort) {
+    let target = (effort.target_mm > 0.0).then(|| short(effort.target_mm));
+    let substeps = (effort.substeps > 1).then(|| json!(effort.substeps));
+    for (key, value) in [
+        ("recommended", Some(json!(effort.most))),
+        ("target_mm", target),
+        ("substeps", substeps),
+    ] {
+        match (value, entry.as_object_mut()) {
+            (Some(value), _) => entry[key] = value,
+            (None, Some(keys)) => drop(keys.remove(key)),
+            (None, None) => {}
+        }
+    }
 }
 
 /// A float32 with the digits that it was given.
@@ -178,7 +234,7 @@ pub fn write(args: &Options) -> Result<usize> {
     bench.write_space(
         &args.bundle,
         more.into_iter(),
-        args.recommended,
+        args.recommended.unwrap_or(Effort::fixed(3)),
         args.calibration.unwrap_or(1.0),
     )
 }

@@ -11,7 +11,7 @@ use upt::prior::PriorTable;
 
 use super::pushes::Pushes;
 use super::space::Space;
-use super::{FILE, entry, manifest, short};
+use super::{FILE, entry, manifest};
 use crate::effort::Effort;
 use crate::progress::spinner;
 
@@ -117,7 +117,7 @@ impl Workbench {
         let count = space
             .write(&path, &frequency)
             .with_context(|| format!("{}: cannot be written", path.display()))?;
-        manifest::add(bundle, FILE, &entry(recommended, short(calibration)))?;
+        manifest::add(bundle, FILE, &entry(recommended, calibration))?;
         Ok(count)
     }
 }

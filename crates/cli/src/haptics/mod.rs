@@ -25,7 +25,7 @@ use anyhow::{Context, Result, bail};
 use tissue::mesh::{Boundary, Mesh};
 use upt::{Corrections, Model, ModelOptions, SceneOptions};
 
-use crate::machine::Machine;
+use crate::machine::{Machine, load_words};
 use crate::report::method::BundleFolder;
 use crate::stress::{progress, replace_between};
 use gesture::{GESTURES, Site};
@@ -51,7 +51,7 @@ pub struct Options {
     /// Extra threads that only keep the machine busy.
     #[arg(long, default_value_t = 0)]
     load: usize,
-    /// Length of a step, ms, 10 to 50. Default: the bundle's.
+    /// Length of a step, ms, 10 to 50. Default: what the bundle recommends to hosts that show frames.
     #[arg(long, value_name = "MS")]
     step_ms: Option<f64>,
     /// Seconds of each gesture that the reference solver replays; 0: none.
@@ -97,10 +97,12 @@ pub fn run(options: &Options) -> Result<ExitCode> {
             Some(count) => Corrections::Fixed(count),
             None => Corrections::Recommended,
         },
-        step_s: options.step_ms.map_or(0.0, |ms| 1e-3 * ms),
+        step_s: options
+            .step_ms
+            .map_or(model.info().frame_step_s, |ms| 1e-3 * ms),
         ..SceneOptions::default()
     };
-    let step_ms = 1e3 * scene_step(&model, &scene);
+    let step_ms = 1e3 * scene.step_s;
     if options.latency_ms >= step_ms {
         bail!(
             "--latency-ms is {}: a step of {step_ms:.0} ms must arrive before the next one starts",
@@ -151,7 +153,6 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     let text = table::markdown(&rows, &account, options.reference > 0.0);
     println!("{text}");
     if let Some(page) = &options.markdown {
-        let step_ms = 1e3 * scene_step(&model, &scene);
         write(
             page,
             &bundle.name,
@@ -187,14 +188,6 @@ impl Drop for Load {
     }
 }
 
-/// The length of a step, s.
-fn scene_step(model: &Model, scene: &SceneOptions) -> f64 {
-    match scene.step_s {
-        0.0 => model.manifest.dt_s,
-        own => own,
-    }
-}
-
 fn write(
     page: &Path,
     name: &str,
@@ -204,8 +197,12 @@ fn write(
 ) -> Result<()> {
     let machine = Machine::this();
     let lead = format!(
-        "\n`{name}`, {nodes} nodes, steps of {step_ms:.0} ms that arrive {} ms late; {} ({} cores), {} threads of load.\n\n",
-        options.latency_ms, machine.cpu, machine.cores, options.load
+        "\n`{name}`, {nodes} nodes, steps of {step_ms:.0} ms that arrive {} ms late; {} ({} cores{}), {} of the load by --load.\n\n",
+        options.latency_ms,
+        machine.cpu,
+        machine.cores,
+        load_words(),
+        options.load
     );
     let own = match options.step_ms {
         Some(ms) => format!(" --step-ms {ms}"),

@@ -15,6 +15,8 @@ pub struct WayFigures {
     pub way: String,
     /// Over the frames without those of slip-offs.
     pub mse_mm2: f64,
+    /// Of the steps that are shown, at their own moments.
+    pub step_mse_mm2: f64,
     pub worst_frame_mm2: f64,
     pub penetration_mm: f64,
     pub jump_mm: f64,
@@ -27,11 +29,20 @@ pub struct WayFigures {
 pub struct CaseFigures {
     pub case: String,
     pub programme: String,
+    pub dataset: String,
     pub frames: usize,
-    pub step_mse_mm2: f64,
     pub true_penetration_mm: f64,
     /// In the order of the ways.
     pub ways: Vec<WayFigures>,
+}
+
+/// A dataset's row: what a host shows over what it showed before, medians over the cases.
+#[derive(Clone, Debug, Serialize)]
+pub struct DatasetRow {
+    pub dataset: String,
+    pub cases: usize,
+    pub over_late: f64,
+    pub over_step: f64,
 }
 
 /// A row of the table.
@@ -42,6 +53,7 @@ pub struct Row {
     pub cases: usize,
     /// Medians over the cases.
     pub mse_mm2: f64,
+    pub step_mse_mm2: f64,
     pub over_late: f64,
     pub over_step: f64,
     pub latency_ms: f64,
@@ -60,6 +72,8 @@ impl CaseFigures {
     pub fn of(case: &ToolCase, shown: &Shown) -> Self {
         let counted = || shown.frames.iter().filter(|frame| !frame.slips);
         let count = counted().count().max(1) as f64;
+        let steps = shown.step_mse_mm2.len().max(1) as f64;
+        let step_mse_mm2 = shown.step_mse_mm2.iter().sum::<f64>() / steps;
         let ways = (0..WAYS.len()).map(|way| {
             let largest = |value: fn(&super::host::Drawn) -> f64| {
                 counted().map(|f| value(&f.drawn[way])).fold(0.0, f64::max)
@@ -67,6 +81,7 @@ impl CaseFigures {
             WayFigures {
                 way: WAYS[way].into(),
                 mse_mm2: counted().map(|f| f.drawn[way].mse_mm2).sum::<f64>() / count,
+                step_mse_mm2,
                 worst_frame_mm2: largest(|d| d.mse_mm2),
                 penetration_mm: largest(|d| d.penetration_mm),
                 jump_mm: largest(|d| d.jump_mm),
@@ -74,21 +89,20 @@ impl CaseFigures {
                 latency_ms: shown.latency_ms[way],
             }
         });
-        let steps = shown.step_mse_mm2.len().max(1) as f64;
         Self {
             case: case.name.clone(),
             programme: case.programme.clone(),
+            dataset: case.dataset.clone(),
             frames: shown.frames.len(),
-            step_mse_mm2: shown.step_mse_mm2.iter().sum::<f64>() / steps,
             true_penetration_mm: counted().map(|f| f.true_penetration_mm).fold(0.0, f64::max),
             ways: ways.collect(),
         }
     }
 
     /// The presented frames of the same case by a scene with steps of another length.
-    pub fn add(&mut self, case: &ToolCase, shown: &Shown, step_s: f64) {
+    pub fn add(&mut self, case: &ToolCase, shown: &Shown, length: &str) {
         let mut own = Self::of(case, shown).ways.swap_remove(PRESENT);
-        own.way = format!("{}, steps of {:.0} ms", WAYS[PRESENT], 1e3 * step_s);
+        own.way = format!("{}, {length}", WAYS[PRESENT]);
         self.ways.push(own);
     }
 }
@@ -111,7 +125,8 @@ fn row(way: usize, programme: &str, cases: &[&CaseFigures]) -> Row {
         cases: cases.len(),
         mse_mm2: median(each(|w| w.mse_mm2)),
         over_late: over(&mse(LATE)),
-        over_step: over(&|case| case.step_mse_mm2),
+        step_mse_mm2: median(each(|w| w.step_mse_mm2)),
+        over_step: over(&|case| case.ways[way].step_mse_mm2),
         latency_ms: median(each(|w| w.latency_ms)),
         jump_median_mm: median(each(|w| w.jump_mm)),
         jump_mm: each(|w| w.jump_mm).fold(0.0, f64::max),
@@ -124,6 +139,27 @@ fn row(way: usize, programme: &str, cases: &[&CaseFigures]) -> Row {
             .map(|case| case.true_penetration_mm)
             .fold(0.0, f64::max),
     }
+}
+
+/// One way by dataset, where there are more than one.
+pub fn by_dataset(figures: &[CaseFigures], way: usize) -> Vec<DatasetRow> {
+    let mut names: Vec<&str> = figures.iter().map(|case| case.dataset.as_str()).collect();
+    names.sort_unstable();
+    names.dedup();
+    if names.len() < 2 {
+        return Vec::new();
+    }
+    let rows = names.into_iter().map(|name| {
+        let own: Vec<&CaseFigures> = figures.iter().filter(|case| case.dataset == name).collect();
+        let all = row(way, ALL, &own);
+        DatasetRow {
+            dataset: name.into(),
+            cases: all.cases,
+            over_late: all.over_late,
+            over_step: all.over_step,
+        }
+    });
+    rows.collect()
 }
 
 /// The ways over all cases, then over those of each programme.

@@ -27,7 +27,7 @@ use tissue::mesh::{Boundary, Mesh};
 
 use crate::effort::Effort;
 use crate::host::{Model, ModelSettings};
-use crate::machine::Machine;
+use crate::machine::{Machine, load_words};
 use crate::stress::{progress, replace_between};
 use crate::tools::bundles::fitting;
 use crate::tools::cases::{Split, ToolCases};
@@ -50,7 +50,7 @@ pub struct Plan<'a> {
     pub bundles: &'a [PathBuf],
     /// Corrections a step; none: as many as a bundle recommends.
     pub corrections: Option<Effort>,
-    /// Lengths of step whose frames are measured besides the bundle's, ms.
+    /// Lengths of step whose frames are measured besides the bundle's and the one that it recommends for frames, ms.
     pub step_ms: &'a [f64],
     pub threads: u32,
     pub out: PathBuf,
@@ -99,31 +99,58 @@ pub fn report(plan: &Plan) -> Result<ExitCode> {
             bar.inc(1);
         }
         bar.finish_and_clear();
-        for step_s in plan.step_ms.iter().map(|ms| 1e-3 * ms) {
+        let mut lengths = vec![(
+            model.info().frame_step_s,
+            format!(
+                "the bundle's frame step ({:.0} ms)",
+                1e3 * model.info().frame_step_s
+            ),
+        )];
+        lengths.extend(
+            plan.step_ms
+                .iter()
+                .map(|ms| (1e-3 * ms, format!("steps of {ms} ms"))),
+        );
+        let mut between = Vec::new();
+        for (step_s, length) in &lengths {
             let settings = ModelSettings {
-                step_s,
+                step_s: *step_s,
                 ..settings.clone()
             };
             let model = Model::open(&bundle.path, &settings)?;
             let mut driver = Driver::new(&model, Drive::Solved)?;
-            let clock = clock.stepping(step_s);
-            let bar = progress(cases.list.len(), &bundle.name);
+            let clock = clock.stepping(*step_s);
+            let bar = progress(cases.list.len(), &format!("{}, {length}", bundle.name));
             for ((case, truth), figures) in cases.list.iter().zip(&truths).zip(&mut figures) {
                 let shown = host::show(case, truth, &clock, &mut driver, &mut yard)
                     .with_context(|| case.name.clone())?;
-                figures.add(case, &shown, step_s);
+                figures.add(case, &shown, length);
+                if between.len() < cases.list.len() {
+                    between.push(shown);
+                }
                 bar.inc(1);
             }
             bar.finish_and_clear();
         }
-        let times = timing::measure(&mut driver, &mesh, &cases, &truths, &clock)?;
+        let settings = ModelSettings {
+            step_s: model.info().frame_step_s,
+            ..settings.clone()
+        };
+        let times = timing::measure(
+            &mut Driver::new(&Model::open(&bundle.path, &settings)?, Drive::Solved)?,
+            &mesh,
+            &cases,
+            &truths,
+            &clock.stepping(settings.step_s),
+        )?;
         let rows = figures::rows(&figures);
+        let datasets = figures::by_dataset(&figures, host::WAYS.len());
         let k = plan
             .corrections
             .or(bundle.corrections)
             .unwrap_or(Effort::NONE);
         let lead = format!(
-            "`{}`, k = {k}, {} cases on {} ({} nodes), frames at {} Hz, each state {} ms after its step's moment, {} thread. {} ({} cores), {date}.",
+            "`{}`, k = {k}, {} cases on {} ({} nodes), frames at {} Hz, each state {} ms after its step's moment, {} thread. {} ({} cores{}), {date}.",
             bundle.name,
             cases.list.len(),
             header.mesh_name,
@@ -133,19 +160,25 @@ pub fn report(plan: &Plan) -> Result<ExitCode> {
             plan.threads,
             machine.cpu,
             machine.cores,
+            load_words(),
         );
-        let text = page::markdown(&lead, &rows, &times);
+        let text = page::markdown(&lead, &rows, &datasets, &times);
         for path in plan.markdown {
             replace_between(path, &format!("upt report --shown {}", bundle.name), &text)?;
         }
         if !plan.json {
             println!("{text}");
         }
-        let pictures = page::pictures(&plan.out, &bundle.name, &mesh, &cases, &truths, &outcomes)?;
+        let pictures = page::pictures(
+            &plan.out,
+            &bundle.name,
+            (&mesh, &cases, &truths),
+            [&outcomes, &between],
+        )?;
         for path in pictures.iter().filter(|_| !plan.json) {
             println!("{}", path.display());
         }
-        reports.push(json!({"bundle": bundle.name, "corrections": k.to_string(), "rows": rows, "present": times, "cases": figures}));
+        reports.push(json!({"bundle": bundle.name, "corrections": k.to_string(), "rows": rows, "datasets": datasets, "present": times, "cases": figures}));
     }
     if reports.is_empty() {
         bail!("nothing could be measured: {}", notes.join("; "));

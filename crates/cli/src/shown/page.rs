@@ -7,7 +7,7 @@ use tissue::mesh::Mesh;
 use tissue::schemes::FRAME_S;
 
 use super::Rows;
-use super::figures::{ALL, Row};
+use super::figures::{ALL, DatasetRow, Row};
 use super::host::{LAST, LATE, PRESENT, Shown, WAYS};
 use super::timing::Time;
 use super::truth::Truth;
@@ -15,22 +15,26 @@ use crate::report::plot::{Axes, Scale, label};
 use crate::tools::cases::{ToolCase, ToolCases};
 use crate::tools::section;
 
-const COLOURS: [&str; 3] = ["#c2553f", "#b08a2e", "#2f6fab"];
+const COLOURS: [&str; 3] = ["#c2553f", "#b08a2e", "#8fb3d3"];
+/// Of frames with the bundle's frame step.
+const FRAMES: &str = "#1f5f9f";
 /// Programmes of the error over time and of the strip.
 const PLOTTED: &str = "probe";
 const PICTURED: &str = "stroke";
 
-/// The rows over all, the ratios by programme, and the times.
-pub fn markdown(lead: &str, rows: &Rows, times: &[Time]) -> String {
+/// The rows over all, the ratios by programme and by dataset with the bundle's frame step, and the times.
+pub fn markdown(lead: &str, rows: &Rows, datasets: &[DatasetRow], times: &[Time]) -> String {
     let mut out = format!("\n{lead}\n\n");
-    out += "| shown | MSE, mm² | over one step late | over the step's own | latency, ms | jump at an arrival, mm: median / worst | frame to frame beside the truth, mm: median / worst | tool inside, mm: median / worst |\n";
-    out += "|---|---:|---:|---:|---:|---:|---:|---:|\n";
-    for row in rows.iter().filter(|row| row.programme == ALL) {
+    out += "| shown | MSE, mm² | over one step late | the steps' own MSE, mm² | over the steps' own | latency, ms | jump at an arrival, mm: median / worst | frame to frame beside the truth, mm: median / worst | tool inside, mm: median / worst |\n";
+    out += "|---|---:|---:|---:|---:|---:|---:|---:|---:|\n";
+    let overall = || rows.iter().filter(|row| row.programme == ALL);
+    for row in overall() {
         out += &format!(
-            "| {} | {} | {} | {} | {:.0} | {} / {} | {} / {} | {} / {} |\n",
+            "| {} | {} | {} | {} | {} | {:.0} | {} / {} | {} / {} | {} / {} |\n",
             row.way,
             label(row.mse_mm2),
             ratio(row.over_late),
+            label(row.step_mse_mm2),
             ratio(row.over_step),
             row.latency_ms,
             millimetres(row.jump_median_mm),
@@ -41,15 +45,16 @@ pub fn markdown(lead: &str, rows: &Rows, times: &[Time]) -> String {
             label(row.penetration_mm),
         );
     }
+    let shown = overall().nth(WAYS.len()).map_or("", |row| row.way.as_str());
     if let Some(row) = rows.first() {
         out += &format!(
-            "\nDeepest point of the truth in a tool: {} mm. By programme, `upt_scene_present`:\n\n",
+            "\nDeepest point of the truth in a tool: {} mm. By programme, {shown}:\n\n",
             label(row.true_penetration_mm)
         );
     }
-    out += "| programme | cases | MSE, mm² | over one step late | over the step's own | latency, ms | frame to frame beside the truth, mm | tool inside, mm |\n";
+    out += "| programme | cases | MSE, mm² | over one step late | over the steps' own | latency, ms | frame to frame beside the truth, mm | tool inside, mm |\n";
     out += "|---|---:|---:|---:|---:|---:|---:|---:|\n";
-    let presented = |row: &&Row| row.programme != ALL && row.way == WAYS[PRESENT];
+    let presented = |row: &&Row| row.programme != ALL && row.way == shown;
     for row in rows.iter().filter(presented) {
         out += &format!(
             "| {} | {} | {} | {} | {} | {:.0} | {} | {} |\n",
@@ -62,6 +67,13 @@ pub fn markdown(lead: &str, rows: &Rows, times: &[Time]) -> String {
             millimetres(row.unlike_mm),
             label(row.penetration_mm),
         );
+    }
+    if !datasets.is_empty() {
+        out += "\n| dataset | cases | over one step late | over the steps' own |\n|---|---:|---:|---:|\n";
+    }
+    for row in datasets {
+        let (late, step) = (ratio(row.over_late), ratio(row.over_step));
+        out += &format!("| {} | {} | {late} | {step} |\n", row.dataset, row.cases);
     }
     out += "\n| present call in contact | nodes | calls | median, ms | 99 %, ms |\n|---|---:|---:|---:|---:|\n";
     for time in times {
@@ -93,14 +105,12 @@ fn ratio(value: f64) -> String {
     }
 }
 
-/// Error over time and a strip of frames of one case; their paths.
+/// Error over time and a strip of frames of one case, with the bundle's step and with its frame step; their paths.
 pub fn pictures(
     folder: &Path,
     bundle: &str,
-    mesh: &Mesh,
-    cases: &ToolCases,
-    truths: &[Truth],
-    shown: &[Shown],
+    (mesh, cases, truths): (&Mesh, &ToolCases, &[Truth]),
+    shown: [&[Shown]; 2],
 ) -> Result<Vec<PathBuf>> {
     let first = |name: &str| {
         let own = cases.list.iter().position(|c| c.programme == name);
@@ -109,10 +119,18 @@ pub fn pictures(
     let (plotted, drawn) = (first(PLOTTED), first(PICTURED));
     let mut paths = Vec::new();
     for (name, text) in [
-        ("error", error(&shown[plotted], &truths[plotted])),
+        (
+            "error",
+            error(shown.map(|all| &all[plotted]), &truths[plotted]),
+        ),
         (
             "strip",
-            strip(mesh, &cases.list[drawn], &truths[drawn], &shown[drawn]),
+            strip(
+                mesh,
+                &cases.list[drawn],
+                &truths[drawn],
+                shown.map(|all| &all[drawn]),
+            ),
         ),
     ] {
         let path = folder.join(format!("{bundle}-shown-{name}.svg"));
@@ -123,15 +141,25 @@ pub fn pictures(
 }
 
 /// Root of the mean squared error of each frame, over time.
-fn error(shown: &Shown, truth: &Truth) -> String {
-    let rms = |way: usize| -> Vec<(f64, f64)> {
+fn error([whole, short]: [&Shown; 2], truth: &Truth) -> String {
+    let rms = |shown: &Shown, way: usize| -> Vec<(f64, f64)> {
         let frames = shown.frames.iter();
         frames
             .map(|frame| (frame.seconds, frame.drawn[way].mse_mm2.sqrt()))
             .collect()
     };
-    let lines: Vec<_> = (0..WAYS.len()).map(rms).collect();
-    let top = lines.iter().flatten().map(|at| at.1).fold(0.0, f64::max);
+    let lines = [
+        ("one step late", rms(whole, LATE), COLOURS[LATE]),
+        ("last state", rms(whole, LAST), COLOURS[LAST]),
+        (
+            "present, the bundle's step",
+            rms(whole, PRESENT),
+            COLOURS[PRESENT],
+        ),
+        ("present, its frame step", rms(short, PRESENT), FRAMES),
+    ];
+    let points = lines.iter().flat_map(|(_, line, _)| line);
+    let top = points.map(|at| at.1).fold(0.0, f64::max);
     let mut axes = Axes::new(
         860.0,
         300.0,
@@ -140,37 +168,35 @@ fn error(shown: &Shown, truth: &Truth) -> String {
         "time, s",
         "RMS error of a frame, mm",
     );
-    for (line, colour) in lines.iter().zip(COLOURS) {
+    for (_, line, colour) in &lines {
         axes.line(line, colour, 1.8, false);
     }
-    axes.standalone(&[
-        ("one step late", COLOURS[LATE]),
-        ("last state", COLOURS[LAST]),
-        ("present", COLOURS[PRESENT]),
-    ])
+    axes.standalone(&lines.each_ref().map(|(name, _, colour)| (*name, *colour)))
 }
 
 /// Frames one under the other for each way: the tool where it is, the true surface, and what is shown.
-fn strip(mesh: &Mesh, case: &ToolCase, truth: &Truth, shown: &Shown) -> String {
-    let ways = [LATE, PRESENT];
+fn strip(mesh: &Mesh, case: &ToolCase, truth: &Truth, [whole, short]: [&Shown; 2]) -> String {
+    let ways = [
+        ("one step late", whole, LATE, COLOURS[LATE]),
+        ("present, frame step", short, PRESENT, FRAMES),
+    ];
     let (width, height, title) = (416.0, 272.0, 24.0);
     let mut body = String::new();
-    for (row, way) in ways.into_iter().enumerate() {
+    for (row, (name, shown, way, colour)) in ways.into_iter().enumerate() {
         for (column, (frame, fields)) in shown.pictured.iter().enumerate() {
             let seconds = *frame as f64 / truth.parts as f64 * FRAME_S;
             let (x, y) = (column as f64 * width, row as f64 * (height + title));
-            let name = WAYS[way].replace('`', "");
             body += &format!(
                 "<text x=\"{:.0}\" y=\"{:.0}\">{name}, {seconds:.2} s</text><g transform=\"translate({x:.0} {:.0})\"><svg width=\"{width}\" height=\"{height}\">{}</svg></g>",
                 x + 8.0,
                 y + 16.0,
                 y + title,
-                section::drawing(mesh, case, *frame, &fields[way], COLOURS[way])
+                section::drawing(mesh, case, *frame, &fields[way], colour)
             );
         }
     }
     let (w, h) = (
-        shown.pictured.len() as f64 * width,
+        whole.pictured.len() as f64 * width,
         ways.len() as f64 * (height + title),
     );
     format!(

@@ -64,11 +64,14 @@ pub fn measure(
                 }
                 while step < clock.arrived(seconds) {
                     step += 1;
-                    driver.step(&truth.poses(case, step as f64 * FRAME_S), &mut out)?;
+                    driver.step(&truth.poses(case, step as f64 * clock.step_s), &mut out)?;
                 }
-                let since = seconds - step as f64 * FRAME_S;
+                let moment = step as f64 * clock.step_s;
+                let since = seconds - moment;
                 let ms = driver.present(since, &truth.poses(case, seconds), &mut out)?;
-                if step > 0 && case.touches(step * truth.parts) {
+                if step > 0
+                    && case.touches((moment / FRAME_S * truth.parts as f64).round() as usize)
+                {
                     spent.push(ms);
                 }
             }

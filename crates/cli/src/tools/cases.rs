@@ -29,6 +29,8 @@ pub enum Split {
 /// One simulated case.
 pub struct ToolCase {
     pub name: String,
+    /// Name of the folder that it lies in.
+    pub dataset: String,
     /// `press`, `stroke` and so on.
     pub programme: String,
     pub tools: Vec<Tool>,
@@ -62,8 +64,10 @@ impl ToolCase {
                 .with_context(|| format!("{}: field `tools`, tool {index}", path.display()))
         });
         let programme = trajectory.header.scheme.trim_start_matches("tool-");
+        let dataset = path.parent().and_then(Path::file_name).unwrap_or_default();
         Ok(Self {
             name: name.to_owned(),
+            dataset: dataset.to_string_lossy().into_owned(),
             programme: programme.to_owned(),
             tools: tracks.tools.clone(),
             bodies: bodies.collect::<Result<_>>()?,

@@ -70,7 +70,7 @@ impl Server {
         };
         let name = bundle.file_name().unwrap_or(bundle.as_os_str());
         Ok(Self {
-            model: Model::open(bundle, &settings)?,
+            model: Model::open(bundle, &settings)?.for_frames(),
             bundle: name.to_string_lossy().into_owned(),
             port: listener.local_addr()?.port(),
             token: token()?,

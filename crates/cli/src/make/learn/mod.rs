@@ -199,7 +199,15 @@ fn calibrate(
     stage: &mut Stage,
 ) -> Result<()> {
     let few = effort.most.min(CALIBRATED_AFTER);
-    corrections::recommend(bundle, effort, Some(1.0))?;
+    let set = |factor: f32| {
+        let change = corrections::Change {
+            recommended: Some(effort),
+            calibration: Some(factor),
+            frame_step_s: None,
+        };
+        corrections::recommend(bundle, &change)
+    };
+    set(1.0)?;
     let factor = match few {
         0 => None,
         few => recording
@@ -207,7 +215,7 @@ fn calibrate(
             .calibration(),
     };
     if let Some(factor) = factor {
-        corrections::recommend(bundle, effort, Some(factor))?;
+        set(factor)?;
         stage.decided(&format!(
             "{effort} corrections a step; the true error is {factor:.2} times the estimated one after {few}"
         ));
