@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 
 use crate::ort;
 use crate::process::run_checked;
@@ -30,6 +30,16 @@ impl Workspace {
 
     pub fn path(&self, relative: &str) -> PathBuf {
         self.root.join(relative)
+    }
+
+    /// Folders of the committed bundles, by name.
+    pub fn bundles(&self) -> Result<Vec<PathBuf>> {
+        let entries = std::fs::read_dir(self.path("onnx"))?;
+        let folders = entries.filter_map(|entry| Some(entry.ok()?.path()));
+        let is_bundle = |folder: &PathBuf| folder.join("bundle.json").is_file();
+        let mut found: Vec<PathBuf> = folders.filter(is_bundle).collect();
+        found.sort();
+        Ok(found)
     }
 
     /// A program of the virtual environment.
@@ -81,12 +91,9 @@ impl Workspace {
         if whole {
             return self.build();
         }
+        let label = "cargo build, without what the demo does not use";
         let mut command = self.cargo("build --release -p upt-cli --no-default-features");
-        run_checked(
-            self,
-            "cargo build, without what the demo does not use",
-            &mut command,
-        )
+        run_checked(self, label, &mut command)
     }
 
     /// Builds, fetches ONNX Runtime, and sets what the test scripts of the other languages find their parts by.
@@ -122,21 +129,16 @@ pub fn write_between_markers(
     name: &str,
     text: impl FnOnce(&str) -> Result<String>,
 ) -> Result<()> {
-    use anyhow::Context;
-    let whole =
-        std::fs::read_to_string(page).with_context(|| format!("cannot read {}", page.display()))?;
+    let place = page.display();
+    let whole = std::fs::read_to_string(page).with_context(|| format!("cannot read {place}"))?;
     let begin = format!("<!-- cargo xtask {name}: begin -->\n");
     let end = format!("<!-- cargo xtask {name}: end -->");
-    let (start, stop) = (whole.find(&begin).zip(whole.find(&end))).with_context(|| {
-        format!(
-            "{}: the markers `{}` and `{end}` are missing",
-            page.display(),
-            begin.trim()
-        )
-    })?;
+    let found = whole.find(&begin).zip(whole.find(&end));
+    let (start, stop) =
+        found.with_context(|| format!("{place}: no markers `{}` and `{end}`", begin.trim()))?;
     let start = start + begin.len();
     let text = text(&whole[start..stop])?;
     std::fs::write(page, format!("{}{text}{}", &whole[..start], &whole[stop..]))?;
-    println!("{} written", page.display());
+    println!("{place} written");
     Ok(())
 }
