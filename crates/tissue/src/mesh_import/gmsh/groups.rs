@@ -1,6 +1,7 @@
 //! Physical groups of a Gmsh file: the sections `$PhysicalNames` and `$Entities` (4.1), and which elements are in which group.
 
-use super::gmsh::{Cursor, Fault, fault};
+use super::{Cursor, Fault, Parts, fault};
+use crate::mesh_import::labels::Labels;
 use std::collections::HashMap;
 
 /// Triangles and tetrahedra with the groups that they are in.
@@ -85,4 +86,34 @@ impl Groups {
         }
         Ok(())
     }
+}
+
+/// Names of the triangles and tetrahedra that are in groups.
+pub(super) fn labels(parts: Parts) -> Labels {
+    let mut labels = Labels {
+        positions: parts.positions,
+        ..Labels::default()
+    };
+    for (tags, dimension, groups) in &parts.groups.elements {
+        let names = groups
+            .iter()
+            .flat_map(|&group| parts.groups.words(*dimension, group))
+            .collect();
+        let nodes: Option<Vec<u32>> = tags
+            .iter()
+            .map(|tag| parts.node_of_tag.get(tag).copied())
+            .collect();
+        match nodes.as_deref() {
+            Some(&[a, b, c]) => {
+                labels.faces.push([a, b, c]);
+                labels.of_face.push(names);
+            }
+            Some(&[a, b, c, d]) => {
+                labels.tets.push([a, b, c, d]);
+                labels.of_tet.push(names);
+            }
+            _ => {}
+        }
+    }
+    labels
 }

@@ -4,7 +4,7 @@
 //! y, z), `*ELEMENT` of type C3D4 (number, four nodes), `*NSET` and `*ELSET` (numbers, names of sets, or ranges with `GENERATE`).
 //! Elements of other volumes are an error; shells, beams, springs and everything that is no mesh are skipped.
 
-use super::named_tets::{NamedTets, Wrong, wrong};
+use super::{NamedTets, Wrong, wrong};
 
 /// What the data lines below a keyword are.
 enum Block {

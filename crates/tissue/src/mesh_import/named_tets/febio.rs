@@ -4,7 +4,7 @@
 //! `<elem id="1">a,b,c,d</elem>`; `<NodeSet name="...">` and `<ElementSet name="...">` with their numbers as text or as `<n id="1"/>`.
 //! Solids of other types are an error; shells are skipped.
 
-use super::named_tets::{NamedTets, Wrong, wrong};
+use super::{NamedTets, Wrong, wrong};
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 

@@ -2,7 +2,7 @@
 //!
 //! `$NOD`: a count, then `tag x y z`. `$ELM`: a count, then `tag type physical elementary nodes node...`.
 
-use super::gmsh::{Cursor, Fault, Parts, TETRAHEDRON, fault, node_count};
+use super::{Cursor, Fault, Parts, TETRAHEDRON, fault, node_count};
 
 /// Whether the file begins as version 1 does.
 pub fn is_version_1(bytes: &[u8]) -> bool {
