@@ -179,7 +179,7 @@ fn the_same_question_has_the_same_contacts() {
         let (first, second) = (ask(), ask());
         assert_eq!(first, second, "step {t}");
         assert!(!first.0.is_empty());
-        scene.step(fixture::sparse(&first), None).unwrap();
+        scene.step(super::fixture::sparse(&first), None).unwrap();
     }
 }
 

@@ -8,7 +8,7 @@ mod fixture;
 use contact::{Shape, Vector};
 use fixture::{bits, model, plain, scene};
 use upt::contact::{Mode, Reading, Tool};
-use upt::{Contact, Corrections, Error, Scene, SceneOptions, StepInput, flag};
+use upt::{Contact, Corrections, Scene, SceneOptions, StepInput};
 
 /// A ball at a place.
 fn ball(radius: f32, at: [f32; 3]) -> Tool {

@@ -4,12 +4,10 @@
 mod fixture;
 mod worker;
 
-use std::time::Duration;
-
 use fixture::{BUNDLES, bits, largest_difference, model, plain, push, rollout, scene, sparse};
 use sha2::{Digest, Sha256};
 use upt::scene::{QUIET_DISPLACEMENT, QUIET_STEPS};
-use upt::{Contact, Corrections, Error, Progress, SceneOptions, StepInput};
+use upt::{Contact, Corrections, Error, SceneOptions, StepInput};
 
 const FREE: StepInput<'static> = StepInput {
     displacement: None,
