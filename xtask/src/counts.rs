@@ -1,8 +1,13 @@
 //! What a stage came to: how many tests passed, read out of what the test programs of each language print, and why not all.
 
 use std::ops::AddAssign;
+use std::path::Path;
+use std::process::Command;
 
-use crate::process::Finished;
+use anyhow::Result;
+
+use crate::process::{Finished, run_logged};
+use crate::workspace::Workspace;
 
 /// Passed, failed and skipped tests of a stage.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -131,6 +136,38 @@ pub fn summary(text: &str) -> Counts {
     let mut lines = text.lines().rev();
     let line = lines.find(|line| is_script(line) || is_pytest(line));
     line.map(counts_of).unwrap_or_default()
+}
+
+/// Runs a test script with what it finds its parts by.
+pub fn script(
+    workspace: &Workspace,
+    name: &str,
+    words: &str,
+    environment: &[(&str, &Path)],
+) -> Result<Outcome> {
+    let mut command = workspace.bash(words);
+    workspace.with_parts(&mut command)?;
+    command.envs(environment.iter().copied());
+    counted(workspace, name, &mut command, summary)
+}
+
+/// Runs tests and reads their counts out of what they print.
+pub fn counted(
+    workspace: &Workspace,
+    label: &str,
+    command: &mut Command,
+    read: fn(&str) -> Counts,
+) -> Result<Outcome> {
+    let finished = run_logged(workspace, label, command)?;
+    Ok(Outcome::of(&finished, read(&finished.text)))
+}
+
+/// A check that passes or fails as a whole.
+pub fn check(workspace: &Workspace, label: &str, command: &mut Command) -> Result<Outcome> {
+    let finished = run_logged(workspace, label, command)?;
+    let mut counts = Counts::default();
+    counts.passed += u64::from(finished.success);
+    Ok(Outcome::of(&finished, counts))
 }
 
 #[cfg(test)]

@@ -8,14 +8,15 @@ use anyhow::{Context, Result, ensure};
 use crate::process::{output, run_checked};
 use crate::workspace::{Workspace, write_between_markers};
 
-const FEATURES: [&str; 7] = [
-    "",
-    "contact",
-    "forces",
-    "cuda",
-    "tensorrt",
-    "tensorrt-rtx",
-    "default",
+/// Features and what the table calls them.
+const FEATURES: [(&str, &str); 7] = [
+    ("", "none"),
+    ("contact", "`contact`"),
+    ("forces", "`forces`"),
+    ("cuda", "`cuda`"),
+    ("tensorrt", "`tensorrt`"),
+    ("tensorrt-rtx", "`tensorrt-rtx`"),
+    ("default", "default"),
 ];
 
 /// A build's bytes, and the libraries that it names (`DT_NEEDED`), sorted.
@@ -29,7 +30,7 @@ pub fn run(workspace: &Workspace) -> Result<bool> {
         cfg!(target_os = "linux"),
         "the footprint is read from ELF files: run it on Linux"
     );
-    let builds = FEATURES.map(|features| build(workspace, features));
+    let builds = FEATURES.map(|(features, _)| build(workspace, features));
     let builds = builds.into_iter().collect::<Result<Vec<Build>>>()?;
     let page = workspace.path("docs/results/footprint.md");
     write_between_markers(&page, "footprint", |_| table(&builds))?;
@@ -64,12 +65,7 @@ fn table(builds: &[Build]) -> Result<String> {
         "\nAll builds need {usual} and nothing else from the system, unless the table says so.\n\n\
          | features | bytes, stripped | more than none | needs |\n|---|---|---|---|\n",
     );
-    for (features, build) in FEATURES.iter().zip(builds) {
-        let name = match *features {
-            "" => "none".into(),
-            "default" => "default".into(),
-            name => format!("`{name}`"),
-        };
+    for ((_, name), build) in FEATURES.iter().zip(builds) {
         let needs = match &build.needed {
             same if same == usual => "the same",
             other => other,

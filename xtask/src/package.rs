@@ -19,7 +19,7 @@ use walkdir::WalkDir;
 use crate::ort::{self, Platform};
 use crate::process::run_checked;
 use crate::system::has_program;
-use crate::workspace::Workspace;
+use crate::workspace::{Workspace, library};
 use crate::{archive, cross, venv, wheel};
 
 #[derive(Args)]
@@ -50,15 +50,6 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
     };
     println!("{}", made.display());
     Ok(true)
-}
-
-/// libupt's name on a platform.
-pub fn library(platform: Platform) -> &'static str {
-    match platform {
-        Platform::WindowsX64 => "upt.dll",
-        Platform::MacosArm64 => "libupt.dylib",
-        Platform::LinuxX64 | Platform::LinuxArm64 => "libupt.so",
-    }
 }
 
 /// The workspace's.

@@ -1,11 +1,8 @@
 //! The stages of `cargo xtask test`: one a language or check, each with its own counted result.
 
-use std::process::Command;
-
 use anyhow::Result;
 
-use crate::counts::{self, Counts, Outcome};
-use crate::process::run_logged;
+use crate::counts::{self, Outcome, check, counted, script};
 use crate::system::{self, Needs};
 use crate::workspace::Workspace;
 use crate::{cross, ort, venv, wheel};
@@ -83,38 +80,6 @@ impl Stage {
         };
         outcome.unwrap_or_else(|error| Outcome::failed(format!("{error:#}")))
     }
-}
-
-/// Runs a test script with what it finds its parts by.
-pub fn script(
-    workspace: &Workspace,
-    name: &str,
-    words: &str,
-    environment: &[(&str, &std::path::Path)],
-) -> Result<Outcome> {
-    let mut command = workspace.bash(words);
-    workspace.with_parts(&mut command)?;
-    command.envs(environment.iter().copied());
-    counted(workspace, name, &mut command, counts::summary)
-}
-
-/// Runs tests and reads their counts out of what they print.
-pub fn counted(
-    workspace: &Workspace,
-    label: &str,
-    command: &mut Command,
-    read: fn(&str) -> Counts,
-) -> Result<Outcome> {
-    let finished = run_logged(workspace, label, command)?;
-    Ok(Outcome::of(&finished, read(&finished.text)))
-}
-
-/// A check that passes or fails as a whole.
-pub fn check(workspace: &Workspace, label: &str, command: &mut Command) -> Result<Outcome> {
-    let finished = run_logged(workspace, label, command)?;
-    let mut counts = Counts::default();
-    counts.passed += u64::from(finished.success);
-    Ok(Outcome::of(&finished, counts))
 }
 
 fn style(workspace: &Workspace) -> Result<Outcome> {

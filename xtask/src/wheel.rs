@@ -5,13 +5,12 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 
-use crate::counts::{Outcome, summary};
+use crate::counts::{Outcome, check, counted, summary};
 use crate::ort::Platform;
 use crate::process::run_checked;
-use crate::stages::{check, counted};
 use crate::venv::{self, PIP_INSTALL};
-use crate::workspace::{Workspace, program_in};
-use crate::{archive, cross, package};
+use crate::workspace::{Workspace, library, program_in};
+use crate::{archive, cross};
 
 /// A wheel with the libupt of this platform or of another one, built here, in `out`.
 pub fn make(workspace: &Workspace, platform: Platform, out: &Path) -> Result<PathBuf> {
@@ -27,7 +26,7 @@ pub fn make(workspace: &Workspace, platform: Platform, out: &Path) -> Result<Pat
         .python("-m pip wheel --quiet --disable-pip-version-check --no-deps ./python --wheel-dir");
     command
         .arg(&scratch)
-        .env("UPT_WHEEL_LIBRARY", built.join(package::library(platform)))
+        .env("UPT_WHEEL_LIBRARY", built.join(library(platform)))
         .env("SOURCE_DATE_EPOCH", archive::time(workspace).to_string());
     if let (false, Some(tag)) = (host, cross::wheel_tag(platform)) {
         command.env("UPT_WHEEL_PLATFORM", tag);
@@ -36,7 +35,7 @@ pub fn make(workspace: &Workspace, platform: Platform, out: &Path) -> Result<Pat
     // The only file of the folder.
     let made = std::fs::read_dir(&scratch)?.next().context("no wheel")??;
     let place = out.join(made.file_name());
-    package::copy(&made.path(), &place)?;
+    std::fs::copy(made.path(), &place)?;
     Ok(place)
 }
 
