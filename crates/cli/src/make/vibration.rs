@@ -7,7 +7,7 @@ use anyhow::{Context, Result};
 use tissue::mesh::{Mesh, tet_volume};
 use tissue::tensors::{Dtype, Tensor, f32_values, write_file};
 
-use super::tables::Projected;
+use super::projected::Projected;
 
 /// Number of modes: as asked, but at most a sixth of the free degrees of freedom.
 pub fn count(mesh: &Mesh, asked: usize) -> usize {

@@ -1,4 +1,4 @@
-//! Cases on several threads, in an order that does not depend on them.
+//! Work on several threads, with results in an order that does not depend on them.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -34,11 +34,9 @@ pub fn in_parallel<T: Send>(
     };
     std::thread::scope(|scope| {
         let threads: Vec<_> = (0..workers.max(1)).map(|_| scope.spawn(run)).collect();
-        threads.into_iter().try_for_each(|thread| {
-            thread
-                .join()
-                .unwrap_or_else(|_| bail!("a thread of the check panicked"))
-        })
+        threads
+            .into_iter()
+            .try_for_each(|thread| thread.join().unwrap_or_else(|_| bail!("a thread panicked")))
     })?;
     let mut finished = finished
         .into_inner()

@@ -10,7 +10,7 @@ use tissue::mesh_import::{Ball, ImportOptions, RawTets, Resolution, from_tets, i
 use tissue::mesh_quality::measure;
 use tissue::stuffing::{GridField, HalfSpace, stuff};
 
-use crate::mesh::print_quality;
+use super::print_quality;
 
 #[derive(Debug, Args)]
 #[command(

@@ -5,8 +5,8 @@ use tissue::contact::ContactDomain;
 use tissue::mesh::{Boundary, Mesh};
 use tissue::solver::SolverOptions;
 
-use super::Row;
-use super::reference::{Body, Press, SUBJECT};
+use super::{Body, Press, SUBJECT};
+use crate::stress::Row;
 
 const JUMP: f32 = 1000.0;
 

@@ -1,4 +1,5 @@
-//! A bundle on the bench of `upt stress`: its scenes, contact patches, and runs of steps with what they came to.
+//! A bundle on the bench of `upt stress`, `upt beside` and `upt soak`: its scenes, contact patches, and runs of steps with what they
+//! came to.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -7,8 +8,6 @@ use anyhow::{Context, Result};
 use tissue::contact::{ContactDomain, Patch};
 use tissue::mesh::{Boundary, Mesh};
 use upt::{Contact, Error, Model, ModelOptions, Scene, SceneOptions, StepInput, flag};
-
-use super::Row;
 
 /// A bundle on the bench.
 pub(crate) struct Bench {
@@ -170,10 +169,6 @@ impl Bench {
         } else {
             full
         }
-    }
-
-    pub(crate) fn row(&self, case: &str, run: &Run, good: bool) -> Row {
-        Row::new(&self.subject, case, run.text(), good)
     }
 
     pub(crate) fn patch(&self, seed: usize, area: f64) -> Result<Patch> {
