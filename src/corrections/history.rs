@@ -2,10 +2,12 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::memory::PAIRS;
 use super::motion::Motion;
 use crate::error::{Error, Result};
 use crate::stored;
+
+/// L-BFGS pairs kept; 3 are six times worse than 8.
+pub const PAIRS: usize = 8;
 
 /// An L-BFGS pair, `[K,3]` each.
 #[derive(Debug, Serialize, Deserialize)]

@@ -14,13 +14,15 @@
 //! What moves the whole field stays in the block coordinates until the elements ask for it: the contact is solved where the tissue
 //! would be at the nodes of the domain, and an iteration decodes once and projects once.
 
+mod iteration;
+
 use std::time::Instant;
 
 use super::input::{Input, Lent, Report};
 use super::memory::Memory;
 use super::passes;
 use super::precondition::{Env, Preconditioner, mask_held};
-use super::stage::{MOST_PARTS, SHORTENINGS, SLOPE, SMALLEST_DET, Stage};
+use super::stage::{MOST_PARTS, SMALLEST_DET, Stage};
 use crate::contact::{Compliance, Problem, State};
 use crate::error::Result;
 
@@ -310,103 +312,6 @@ impl Stage {
         self.preconditioner
             .add_load(env, change.dofs, change.forces)
     }
-
-    /// `U^T F(u)` of the state that stands.
-    fn project_standing(&mut self, env: Env<'_>, g: &[f32]) -> Result<()> {
-        if !self.is_projected {
-            self.preconditioner.project(env, g)?;
-            self.projected
-                .copy_from_slice(&self.preconditioner.coordinates);
-            self.is_projected = true;
-        }
-        Ok(())
-    }
-
-    /// One iteration with the tools at part `way` of their way, from the residual in `q`.
-    fn improve_at(
-        &mut self,
-        lent: Lent<'_>,
-        input: &Input<'_>,
-        problem: &mut Problem,
-        at: &mut Iterate<'_>,
-        way: f32,
-        report: &mut Report,
-    ) -> Result<()> {
-        let env = lent.env();
-        let (mut d, mut q) = (std::mem::take(&mut self.d), std::mem::take(&mut self.q));
-        let mut g_new = std::mem::take(&mut self.g_new);
-        // The coordinates of the residual: those of F less those of the loads.
-        self.project_standing(env, at.g)?;
-        let pre = &mut self.preconditioner;
-        pre.coordinates.copy_from_slice(&self.projected);
-        each_free_load(problem, &env.body.held, |node, force| {
-            env.prior
-                .add_row(node, force.map(|f| -f), &mut pre.coordinates);
-        });
-        let starts = &pre.starts;
-        let recursion = self
-            .memory
-            .descend(env, starts, &mut q, &mut d, &mut pre.coordinates)?;
-        pre.coarse(env)?;
-        self.memory
-            .ascend(env, recursion, &pre.coordinates, &mut d)?;
-        pre.coordinates.iter_mut().for_each(|c| *c = -*c);
-        // Where the tissue would be is u + d and the coordinates' field, which takes on what the contact changes.
-        for &node in &pre.domain_nodes {
-            let range = 3 * node as usize..3 * node as usize + 3;
-            for ((q, u), d) in q[range.clone()]
-                .iter_mut()
-                .zip(&at.u[range.clone()])
-                .zip(&d[range])
-            {
-                *q = u + d;
-            }
-        }
-        self.press(lent, input, problem, way, &q)?;
-        self.preconditioner.decode(env, &mut q)?;
-        let [along, moved] = passes::advance(env, [at.u, at.g], &mut d, &mut q, &mut self.partial)?;
-        self.moved = moved;
-        let work = work(problem, &d);
-        let slope = along - work;
-        let mut t = 1.0f32;
-        for attempt in 0..=SHORTENINGS {
-            if attempt > 0 {
-                passes::shorten(env, at.u, &d, t, &mut q)?;
-            }
-            let (det, slope_new) = self.residual(lent, [input.last, &q, &d], &mut g_new, report)?;
-            let slope_new = slope_new - work;
-            if det > SMALLEST_DET && 0.5 * (slope + slope_new) <= SLOPE * slope {
-                std::mem::swap(at.u, &mut q);
-                passes::difference(env, &g_new, at.g, &mut q)?;
-                if self.memory.store(env, &d, t, &q)? {
-                    let starts = &self.preconditioner.starts;
-                    let change = self.memory.newest(env, starts)?;
-                    let own = self.projected.iter_mut();
-                    own.zip(change).for_each(|(own, change)| *own += change);
-                } else {
-                    self.is_projected = false;
-                }
-                std::mem::swap(at.g, &mut g_new);
-                at.det = det;
-                if t < 1.0 {
-                    problem.blend(t);
-                }
-                break;
-            }
-            if attempt == SHORTENINGS || slope >= 0.0 {
-                problem.undo();
-                self.memory.clear();
-                break;
-            }
-            t *= if det > SMALLEST_DET && slope_new.is_finite() {
-                (-slope / (slope_new - slope)).clamp(0.1, 0.5) as f32
-            } else {
-                0.5
-            };
-        }
-        (self.d, self.q, self.g_new) = (d, q, g_new);
-        Ok(())
-    }
 }
 
 /// Whether the elements can go on from a state.
@@ -429,16 +334,4 @@ fn each_free_load(problem: &Problem, held: &[bool], mut take: impl FnMut(u32, [f
             take(node, force.to_array().map(|f| 1e3 * f));
         }
     });
-}
-
-/// Work of the tools' loads over a field, nJ.
-fn work(problem: &Problem, d: &[f32]) -> f64 {
-    let mut sum = 0.0f64;
-    problem.each_load(|node, force| {
-        let at = 3 * node as usize;
-        for (d, f) in d[at..at + 3].iter().zip(force.to_array()) {
-            sum += 1e3 * f64::from(*d) * f64::from(f);
-        }
-    });
-    sum
 }

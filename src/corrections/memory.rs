@@ -7,14 +7,11 @@
 #[cfg(feature = "contact")]
 mod recursion;
 
-use super::history::Pair;
+use super::history::{PAIRS, Pair};
 use super::precondition::Env;
 use crate::error::Result;
 use crate::kernels::vectors::{PartialSums, add_scaled, dots};
 use crate::memory;
-
-/// Pairs kept; 3 are six times worse than 8.
-pub const PAIRS: usize = 8;
 
 /// Room for the pairs of the last published state and for those of the step being made: a step that is refused leaves no trace.
 const SLOTS: usize = 2 * PAIRS;

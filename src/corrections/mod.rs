@@ -17,6 +17,7 @@ mod integrate;
 mod loaded;
 mod memory;
 mod motion;
+mod oscillators;
 mod pace;
 mod passes;
 mod precondition;
@@ -38,9 +39,8 @@ use crate::prior::PriorTable;
 use pace::Diagonal;
 
 pub use body::Body;
-pub use history::History;
+pub use history::{History, PAIRS};
 pub use input::{Enough, Input, Lent, Report};
-pub use memory::PAIRS;
 pub use motion::Motion;
 pub use pace::{Integrator, Pace};
 pub use shorter::Shorter;

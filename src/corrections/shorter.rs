@@ -6,9 +6,9 @@
 use std::mem::swap;
 use std::sync::Arc;
 
-use super::free::Free;
 use super::input::{Enough, Input, Lent, Report};
 use super::motion::Motion;
+use super::oscillators::Oscillators;
 use super::pace::Pace;
 use super::precondition::Preconditioner;
 use super::stage::Stage;
@@ -23,7 +23,7 @@ pub struct Shorter {
     count: u32,
     pub(super) pace: Arc<Pace>,
     preconditioner: Preconditioner,
-    free: Free,
+    free: Oscillators,
     pub(super) motion: Motion,
     /// The states that one starts from, the last and the one before, and where it ends.
     pub(super) last: Vec<f32>,
@@ -47,7 +47,7 @@ impl Shorter {
             count,
             preconditioner: Preconditioner::new(short.env())?,
             pace,
-            free: Free::default(),
+            free: Oscillators::default(),
             motion: Motion::at_rest(len)?,
             last: field()?,
             before: field()?,

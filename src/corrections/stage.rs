@@ -2,11 +2,11 @@
 
 use std::time::Instant;
 
-use super::free::Free;
-use super::history::{History, Pair};
+use super::history::{History, PAIRS, Pair};
 use super::input::{Input, Lent, Report};
-use super::memory::{Memory, PAIRS};
+use super::memory::Memory;
 use super::motion::Motion;
+use super::oscillators::Oscillators;
 use super::passes;
 use super::precondition::{Env, Preconditioner, mask};
 use crate::error::{Error, Result};
@@ -54,7 +54,7 @@ pub struct Stage {
     /// `d . d` of the last iteration.
     #[cfg(feature = "contact")]
     pub(super) moved: f64,
-    pub(super) free: Free,
+    pub(super) free: Oscillators,
 }
 
 impl Stage {
@@ -94,7 +94,7 @@ impl Stage {
             is_projected: false,
             #[cfg(feature = "contact")]
             moved: 0.0,
-            free: Free::default(),
+            free: Oscillators::default(),
         })
     }
 

@@ -1,8 +1,13 @@
 //! What a stage came to: how many tests passed, read out of what the test programs of each language print, and why not all.
 
 use std::ops::AddAssign;
+use std::path::Path;
+use std::process::Command;
 
-use crate::process::Finished;
+use anyhow::Result;
+
+use crate::process::{Finished, run_logged};
+use crate::workspace::Workspace;
 
 /// Passed, failed and skipped tests of a stage.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -22,11 +27,8 @@ impl AddAssign for Counts {
 
 impl std::fmt::Display for Counts {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(
-            f,
-            "{} passed, {} failed, {} skipped",
-            self.passed, self.failed, self.skipped
-        )
+        let (passed, failed, skipped) = (self.passed, self.failed, self.skipped);
+        write!(f, "{passed} passed, {failed} failed, {skipped} skipped")
     }
 }
 
@@ -44,22 +46,24 @@ pub struct Outcome {
 
 impl Outcome {
     pub fn failed(note: String) -> Self {
-        Self {
-            note,
-            counts: whole(false),
-            ..Self::default()
-        }
+        let mut outcome = Self::default();
+        (outcome.counts.failed, outcome.note) = (1, note);
+        outcome
     }
 
     pub fn skipped(note: &str) -> Self {
-        let mut outcome = Self::failed(note.into());
-        (outcome.counts.failed, outcome.counts.skipped) = (0, 1);
+        let mut outcome = Self::default();
+        (outcome.counts.skipped, outcome.note) = (1, note.into());
         outcome.left_out = true;
         outcome
     }
 
     /// The counts of a program that ran; one that failed without a failed test counts as one failure.
     pub fn of(finished: &Finished, counts: Counts) -> Self {
+        if finished.success && counts == Counts::default() {
+            return Self::failed("ran no tests".into());
+        }
+        let lines = |tells: fn(&&str) -> bool| finished.text.lines().filter(tells).collect();
         let mut outcome = Self {
             counts,
             ..Self::default()
@@ -67,14 +71,15 @@ impl Outcome {
         if !finished.success && counts.failed == 0 {
             outcome.counts.failed = 1;
         }
-        if finished.success && counts == Counts::default() {
-            outcome = Self::failed("ran no tests".into());
-        }
         if outcome.counts.failed > 0 {
-            if outcome.note.is_empty() {
-                outcome.note = format!("see {}", finished.log.display());
-            }
-            outcome.log_tail = finished.tail(40);
+            let failed: Vec<&str> = lines(|line| {
+                line.contains("FAILED") || line.starts_with("error") || line.contains("panicked at")
+            });
+            outcome.note = format!("see {}", finished.log.display());
+            outcome.log_tail = format!("{}\n{}", failed.join("\n"), finished.tail(40));
+        } else if counts.skipped > 0 {
+            let why: Vec<&str> = lines(|line| line.to_lowercase().contains("skipped:"));
+            outcome.note = why.join("; ");
         }
         outcome
     }
@@ -86,23 +91,9 @@ impl Outcome {
             (&mut self.note, other.note),
             (&mut self.log_tail, other.log_tail),
         ] {
-            let between = if all.is_empty() || one.is_empty() {
-                ""
-            } else {
-                "\n"
-            };
-            *all = format!("{all}{between}{one}");
+            *all = format!("{all}\n{one}").trim().to_owned();
         }
         self
-    }
-}
-
-/// A check that passed or failed as a whole.
-pub fn whole(success: bool) -> Counts {
-    Counts {
-        passed: u64::from(success),
-        failed: u64::from(!success),
-        skipped: 0,
     }
 }
 
@@ -133,22 +124,50 @@ pub fn cargo(text: &str) -> Counts {
     counts
 }
 
-/// The last line of pytest's output, `12 passed, 1 skipped in 3.21s`.
-pub fn pytest(text: &str) -> Counts {
-    let sums = |line: &&str| line.contains(" in ") && counts_of(line) != Counts::default();
-    let line = text.lines().rev().find(sums);
-    line.map(counts_of).unwrap_or_default()
-}
-
-/// The line `N passed, N failed, N skipped` that the repository's own test scripts end with; nothing without one.
-pub fn script(text: &str) -> Counts {
-    let sums = |line: &&str| {
+/// The last summary: pytest's `12 passed, 1 skipped in 3.21s`, or the line `N passed, N failed, N skipped` that the
+/// repository's own test scripts end with; nothing without one.
+pub fn summary(text: &str) -> Counts {
+    let is_script = |line: &&str| {
         ["passed", "failed", "skipped"]
             .iter()
             .all(|word| line.contains(word))
     };
-    let line = text.lines().rev().find(sums);
+    let is_pytest = |line: &&str| line.contains(" in ") && counts_of(line) != Counts::default();
+    let mut lines = text.lines().rev();
+    let line = lines.find(|line| is_script(line) || is_pytest(line));
     line.map(counts_of).unwrap_or_default()
+}
+
+/// Runs a test script with what it finds its parts by.
+pub fn script(
+    workspace: &Workspace,
+    name: &str,
+    words: &str,
+    environment: &[(&str, &Path)],
+) -> Result<Outcome> {
+    let mut command = workspace.bash(words);
+    workspace.with_parts(&mut command)?;
+    command.envs(environment.iter().copied());
+    counted(workspace, name, &mut command, summary)
+}
+
+/// Runs tests and reads their counts out of what they print.
+pub fn counted(
+    workspace: &Workspace,
+    label: &str,
+    command: &mut Command,
+    read: fn(&str) -> Counts,
+) -> Result<Outcome> {
+    let finished = run_logged(workspace, label, command)?;
+    Ok(Outcome::of(&finished, read(&finished.text)))
+}
+
+/// A check that passes or fails as a whole.
+pub fn check(workspace: &Workspace, label: &str, command: &mut Command) -> Result<Outcome> {
+    let finished = run_logged(workspace, label, command)?;
+    let mut counts = Counts::default();
+    counts.passed += u64::from(finished.success);
+    Ok(Outcome::of(&finished, counts))
 }
 
 #[cfg(test)]
@@ -161,41 +180,18 @@ mod tests {
             test result: ok. 3 passed; 0 failed; 0 ignored; 0 measured; 0 filtered out; finished in 0.1s\n\
             noise: 7 passed\n\
             test result: FAILED. 4 passed; 2 failed; 1 ignored; 0 measured; 0 filtered out; finished in 1.2s\n";
-        assert_eq!(
-            cargo(text),
-            Counts {
-                passed: 7,
-                failed: 2,
-                skipped: 1
-            }
-        );
+        assert_eq!(cargo(text).to_string(), "7 passed, 2 failed, 1 skipped");
     }
 
     #[test]
-    fn pytest_summaries_count_errors_as_failures() {
-        let text = "....F\n== 1 failed, 12 passed, 3 skipped, 2 errors in 4.20s ==\n";
-        assert_eq!(
-            pytest(text),
-            Counts {
-                passed: 12,
-                failed: 3,
-                skipped: 3
-            }
-        );
-        assert_eq!(pytest("no tests ran in 0.01s"), Counts::default());
-    }
-
-    #[test]
-    fn a_script_without_a_summary_has_no_counts() {
-        assert_eq!(script("all good\n"), Counts::default());
-        let text = "1 passed, 0 failed, 0 skipped\nmore\n5 passed, 1 failed, 2 skipped\n";
-        assert_eq!(
-            script(text),
-            Counts {
-                passed: 5,
-                failed: 1,
-                skipped: 2
-            }
-        );
+    fn the_last_summary_counts() {
+        let pytest = "....F\n== 1 failed, 12 passed, 3 skipped, 2 errors in 4.20s ==\n";
+        let read = |text| summary(text).to_string();
+        assert_eq!(read(pytest), "12 passed, 3 failed, 3 skipped");
+        let script = "1 passed, 0 failed, 0 skipped\nmore\n5 passed, 1 failed, 2 skipped\n";
+        assert_eq!(read(script), "5 passed, 1 failed, 2 skipped");
+        for text in ["no tests ran in 0.01s", "all good\n"] {
+            assert_eq!(summary(text), Counts::default());
+        }
     }
 }

@@ -6,10 +6,9 @@ use std::process::Command;
 
 use anyhow::{Result, bail};
 
-use crate::counts::Outcome;
+use crate::counts::{self, Outcome};
 use crate::ort::{self, Platform};
 use crate::process::run_checked;
-use crate::stages;
 use crate::workspace::Workspace;
 
 /// What is particular to a platform that is built for from Linux x86-64.
@@ -93,5 +92,5 @@ fn stage(workspace: &Workspace, name: &str, platform: Platform) -> Result<Outcom
     let ours = ort::host_library(workspace)?;
     let environment = [("UPT_CROSS_ORT", &*theirs), ("UPT_CROSS_HOST_ORT", &*ours)];
     let words = format!("tests/cross/run.sh {name}");
-    stages::script(workspace, name, &words, &environment)
+    counts::script(workspace, name, &words, &environment)
 }

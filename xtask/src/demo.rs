@@ -3,11 +3,12 @@
 //! Set-up; a tool that presses, slides and lifts, simulated by the reference solver (kept by content); every committed bundle of that organ driven by
 //! the tool's poses alone; a table and a page. With `--scheme` the paper's own measure instead: a collision field, replayed.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
-use anyhow::{Context, Result, bail, ensure};
-use clap::{Args, ValueEnum};
+use anyhow::{Context, Result, ensure};
+use clap::Args;
+use serde::Deserialize;
 use sha2::{Digest, Sha256};
 use walkdir::WalkDir;
 
@@ -16,35 +17,35 @@ use crate::workspace::Workspace;
 use crate::{ort, system, venv};
 
 /// An organ with committed bundles.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Organ {
-    Brain,
-    Liver,
+struct Organ {
+    name: &'static str,
+    /// The mesh that is simulated, and a bundle on it: all others with the same mesh are shown too.
+    mesh: &'static str,
+    bundle: &'static str,
+    /// What the paper's measure compares with: there is no coarser mesh of the liver.
+    plain: &'static str,
 }
 
-impl Organ {
-    /// Its name, the mesh whose bundles are shown, and what they are compared with: there is no coarser mesh of the liver.
-    fn traits(self) -> [&'static str; 3] {
-        match self {
-            Self::Brain => [
-                "brain",
-                "onnx/meshes/brain.mesh.safetensors",
-                "zero,prior,coarse,tled",
-            ],
-            Self::Liver => [
-                "liver",
-                "onnx/liver-coarse/mesh.safetensors",
-                "zero,prior,tled",
-            ],
-        }
-    }
-}
+const ORGANS: [Organ; 2] = [
+    Organ {
+        name: "brain",
+        mesh: "onnx/meshes/brain.mesh.safetensors",
+        bundle: "onnx/brain-reduced",
+        plain: "zero,prior,coarse,tled",
+    },
+    Organ {
+        name: "liver",
+        mesh: "onnx/liver-coarse/mesh.safetensors",
+        bundle: "onnx/liver-coarse",
+        plain: "zero,prior,tled",
+    },
+];
 
 #[derive(Args)]
 pub struct Options {
     /// What is pushed; the liver's bundle was made by `upt make` without any training.
-    #[arg(long, default_value = "brain")]
-    organ: Organ,
+    #[arg(long, default_value = "brain", value_parser = ORGANS.map(|organ| organ.name))]
+    organ: String,
     /// Install no system packages.
     #[arg(long)]
     no_install: bool,
@@ -61,28 +62,32 @@ pub struct Options {
 }
 
 impl Options {
-    /// What drives the contact, as `upt simulate` takes it.
-    fn driver(&self) -> (&'static str, &str) {
-        match &self.scheme {
-            Some(scheme) => ("--scheme", scheme),
-            None => ("--tool", &self.tool),
-        }
+    fn organ(&self) -> &'static Organ {
+        let mut organs = ORGANS.iter();
+        let found = organs.find(|organ| organ.name == self.organ);
+        found.expect("clap takes these names only")
     }
 
-    /// The same in words.
-    fn words(&self) -> String {
-        match &self.scheme {
-            Some(scheme) => format!("scheme {scheme}, seed {}", self.seed),
-            None => format!("tool programme `{}`, seed {}", self.tool, self.seed),
-        }
+    /// What drives the contact, as `upt simulate` takes it, and in words.
+    fn driver(&self) -> (String, String) {
+        let (option, kind, name) = match &self.scheme {
+            Some(scheme) => ("--scheme", "scheme", scheme),
+            None => ("--tool", "tool programme", &self.tool),
+        };
+        let words = format!("{kind} `{name}`, seed {}", self.seed);
+        (format!("{option} {name} --seed {}", self.seed), words)
     }
 }
 
-/// A bundle that the demo shows.
+/// A bundle that the demo shows: its folder, and what its manifest says of the simulation.
+#[derive(Deserialize)]
 struct Bundle {
+    #[serde(skip)]
     path: PathBuf,
+    name: String,
     boundary: String,
     material: serde_json::Value,
+    mesh: serde_json::Value,
 }
 
 pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
@@ -92,78 +97,47 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
     venv::create(workspace, "target/venv")?;
     workspace.build_for_demo()?;
 
-    let [organ, mesh, _] = options.organ.traits();
-    let bundles = bundles_of(workspace, mesh)?;
-    let mut boundaries: Vec<&str> = bundles.iter().map(|one| one.boundary.as_str()).collect();
-    boundaries.sort_unstable();
-    boundaries.dedup();
-    let folder = match options.organ {
-        Organ::Brain => workspace.path("target/demo"),
-        Organ::Liver => workspace.path("target/demo").join(organ),
-    };
+    let mut by_boundary: BTreeMap<String, Vec<Bundle>> = BTreeMap::new();
+    for bundle in bundles_of(workspace, options.organ())? {
+        let boundary = bundle.boundary.clone();
+        by_boundary.entry(boundary).or_default().push(bundle);
+    }
+    let folder = workspace.path(match options.organ.as_str() {
+        "brain" => "target/demo",
+        _ => "target/demo/liver",
+    });
     std::fs::create_dir_all(&folder)?;
-    for boundary in &boundaries {
-        let own: Vec<&Bundle> = bundles
-            .iter()
-            .filter(|one| one.boundary == *boundary)
-            .collect();
-        let trajectory = simulate(workspace, options, own[0], &folder)?;
+    for (place, (boundary, bundles)) in by_boundary.iter().enumerate() {
+        let trajectory = simulate(workspace, options, &bundles[0], &folder)?;
         // The paper's boundary condition gets the plain names; another one its own folder.
-        let out = match *boundary == boundaries[0] {
-            true => folder.clone(),
-            false => folder.join(boundary),
+        let out = match place {
+            0 => folder.clone(),
+            _ => folder.join(boundary),
         };
-        report(workspace, options, &own, &trajectory, &out)?;
+        report(workspace, options, bundles, &trajectory, &out)?;
     }
     Ok(true)
 }
 
-/// The committed bundles of the mesh that the demo simulates.
-fn bundles_of(workspace: &Workspace, mesh: &str) -> Result<Vec<Bundle>> {
-    let (mut found, mut left_out) = (Vec::new(), Vec::new());
-    let nodes = mesh_nodes(&workspace.path(mesh))?;
-    for entry in std::fs::read_dir(workspace.path("onnx"))? {
-        let path = entry?.path();
-        let Ok(text) = std::fs::read_to_string(path.join("bundle.json")) else {
-            continue;
-        };
-        let manifest: serde_json::Value = serde_json::from_str(&text)
-            .with_context(|| format!("{}/bundle.json", path.display()))?;
-        if manifest["mesh"]["nodes"].as_u64() != Some(nodes) {
-            left_out.push(format!(
-                "{} (another mesh)",
-                manifest["name"].as_str().unwrap_or("?")
-            ));
-            continue;
-        }
-        found.push(Bundle {
-            path,
-            boundary: manifest["boundary"].as_str().unwrap_or("fixed").to_owned(),
-            material: manifest["material"].clone(),
-        });
-    }
-    found.sort_by(|a, b| a.path.cmp(&b.path));
-    if !left_out.is_empty() {
-        eprintln!("left out: {}", left_out.join(", "));
-    }
-    ensure!(!found.is_empty(), "no bundle below onnx/ fits {mesh}");
+/// The committed bundles of the mesh that the demo simulates, by name.
+fn bundles_of(workspace: &Workspace, organ: &Organ) -> Result<Vec<Bundle>> {
+    let own = read(&workspace.path(organ.bundle))?.mesh;
+    let folders = workspace.bundles()?.into_iter();
+    let all = folders
+        .map(|folder| read(&folder))
+        .collect::<Result<Vec<Bundle>>>()?;
+    let (found, others): (Vec<_>, Vec<_>) = all.into_iter().partition(|one| one.mesh == own);
+    let names: Vec<&str> = others.iter().map(|bundle| bundle.name.as_str()).collect();
+    eprintln!("left out, on another mesh: {}", names.join(", "));
     Ok(found)
 }
 
-/// Node count of a mesh, from the header of its file.
-fn mesh_nodes(path: &Path) -> Result<u64> {
-    let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
-    let header = bytes.split_first_chunk().and_then(|(length, rest)| {
-        let header = rest.get(..u64::from_le_bytes(*length) as usize)?;
-        serde_json::from_slice::<serde_json::Value>(header).ok()
-    });
-    let nodes = header.and_then(|header| header["positions"]["shape"][0].as_u64());
-    nodes.with_context(|| {
-        format!(
-            "{}: the file has no header with `positions`",
-            path.display()
-        )
-    })
+fn read(folder: &Path) -> Result<Bundle> {
+    let file = folder.join("bundle.json");
+    let parsed = || -> Result<Bundle> { Ok(serde_json::from_slice(&std::fs::read(&file)?)?) };
+    let mut bundle = parsed().with_context(|| format!("cannot read {}", file.display()))?;
+    bundle.path = folder.to_owned();
+    Ok(bundle)
 }
 
 /// The reference simulation, made once for each mesh, load, seed, boundary and version of the solver's source.
@@ -173,15 +147,10 @@ fn simulate(
     bundle: &Bundle,
     folder: &Path,
 ) -> Result<PathBuf> {
-    let Bundle {
-        boundary, material, ..
-    } = bundle;
-    let [_, mesh, _] = options.organ.traits();
-    let (option, name) = options.driver();
-    let load = format!(
-        "{option} {name} --seed {} --boundary {boundary}",
-        options.seed
-    );
+    let (boundary, material) = (&bundle.boundary, &bundle.material);
+    let mesh = options.organ().mesh;
+    let (driver, words) = options.driver();
+    let load = format!("{driver} --boundary {boundary}");
     let mut hash = Sha256::new();
     hash.update(format!("{load} {material}"));
     hash.update(std::fs::read(workspace.path(mesh))?);
@@ -197,31 +166,21 @@ fn simulate(
     let key = format!("{:x}", hash.finalize());
     let file = folder.join(format!("contact-{}.trajectory.safetensors", &key[..16]));
     if file.is_file() {
-        eprintln!(
-            "2/4 the reference simulation is there already: {}",
-            file.display()
-        );
+        let place = file.display();
+        eprintln!("2/4 the reference simulation is there already: {place}");
         return Ok(file);
     }
-    let words = options.words();
-    eprintln!(
-        "2/4 simulating {words}, boundary `{boundary}`, with the reference solver: frames of 50 ms"
-    );
+    eprintln!("2/4 simulating {words}, boundary `{boundary}`, with the reference solver");
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     let words = format!("simulate --mesh {mesh} {load} --threads {threads} --out");
     let mut command = workspace.command(workspace.upt(), &words);
     command.arg(&file);
-    for (option, key) in [
-        ("--young", "young_pa"),
-        ("--poisson", "poisson"),
-        ("--density", "density_kg_m3"),
-        ("--damping", "damping_per_s"),
-    ] {
-        if let Some(value) = material[key].as_f64() {
-            command.args([option, &value.to_string()]);
-        }
+    // `young_pa` of a manifest is the option `--young`.
+    for (key, value) in material.as_object().context("material is no object")? {
+        let option = key.split('_').next().unwrap_or_default();
+        command.args([format!("--{option}"), value.to_string()]);
     }
-    succeed(&mut command)?;
+    ensure!(run_visibly(&mut command)?, "`upt simulate` failed");
     Ok(file)
 }
 
@@ -230,33 +189,23 @@ fn simulate(
 fn report(
     workspace: &Workspace,
     options: &Options,
-    bundles: &[&Bundle],
+    bundles: &[Bundle],
     trajectory: &Path,
     out: &Path,
 ) -> Result<()> {
-    let [organ, _, plain] = options.organ.traits();
+    let (Organ { name, plain, .. }, (_, words)) = (options.organ(), options.driver());
     let mut command = workspace.command(workspace.upt(), "report --out");
     ort::set_environment(workspace, &mut command)?;
-    command.arg(out);
-    command.args([
-        "--title",
-        &format!("A {organ} pushed by libupt: {}", options.words()),
-    ]);
+    let title = format!("A {name} pushed by libupt: {words}");
+    command.arg(out).arg("--title").arg(title);
     for bundle in bundles {
         command.arg("--bundle").arg(&bundle.path);
     }
     let shows = match options.scheme {
         Some(_) => {
             eprintln!("3/4 replaying the contact through the bundles and the plain methods");
-            command.args([
-                "--region",
-                "all,surface",
-                "--tled-frames",
-                "20",
-                "--plain",
-                plain,
-            ]);
-            command.arg("--trajectory");
+            let words = "--region all,surface --tled-frames 20 --plain";
+            command.args(words.split(' ')).args([plain, "--trajectory"]);
             "pictures and curves: report.html"
         }
         None => {
@@ -265,14 +214,8 @@ fn report(
             "the dent in cross-section, forces over time: tools.html"
         }
     };
-    succeed(command.arg(trajectory))?;
+    let made = run_visibly(command.arg(trajectory))?;
+    ensure!(made, "`upt report` failed");
     println!("4/4 in {}: {shows}", out.display());
-    Ok(())
-}
-
-fn succeed(command: &mut Command) -> Result<()> {
-    if !run_visibly(command)? {
-        bail!("{:?} failed", command.get_program());
-    }
     Ok(())
 }

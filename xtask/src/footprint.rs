@@ -1,7 +1,6 @@
 //! `cargo xtask footprint`: what each cargo feature of libupt adds, into docs/results/footprint.md: the library is built
 //! once for each set of features, stripped, and read. What a process maps is `tests/mapped_libraries.rs`.
 
-use std::collections::BTreeSet;
 use std::fmt::Write;
 
 use anyhow::{Context, Result, ensure};
@@ -9,21 +8,22 @@ use anyhow::{Context, Result, ensure};
 use crate::process::{output, run_checked};
 use crate::workspace::{Workspace, write_between_markers};
 
-const FEATURES: [&str; 8] = [
-    "",
-    "contact",
-    "forces",
-    "haptics",
-    "cuda",
-    "tensorrt",
-    "tensorrt-rtx",
-    "default",
+/// Features and what the table calls them.
+const FEATURES: [(&str, &str); 8] = [
+    ("", "none"),
+    ("contact", "`contact`"),
+    ("forces", "`forces`"),
+    ("haptics", "`haptics`"),
+    ("cuda", "`cuda`"),
+    ("tensorrt", "`tensorrt`"),
+    ("tensorrt-rtx", "`tensorrt-rtx`"),
+    ("default", "default"),
 ];
 
-/// A build's bytes, and the libraries that it names (`DT_NEEDED`).
+/// A build's bytes, and the libraries that it names (`DT_NEEDED`), sorted.
 struct Build {
     bytes: u64,
-    needed: BTreeSet<String>,
+    needed: String,
 }
 
 pub fn run(workspace: &Workspace) -> Result<bool> {
@@ -31,7 +31,7 @@ pub fn run(workspace: &Workspace) -> Result<bool> {
         cfg!(target_os = "linux"),
         "the footprint is read from ELF files: run it on Linux"
     );
-    let builds = FEATURES.map(|features| build(workspace, features));
+    let builds = FEATURES.map(|(features, _)| build(workspace, features));
     let builds = builds.into_iter().collect::<Result<Vec<Build>>>()?;
     let page = workspace.path("docs/results/footprint.md");
     write_between_markers(&page, "footprint", |_| table(&builds))?;
@@ -42,49 +42,34 @@ fn build(workspace: &Workspace, features: &str) -> Result<Build> {
     let mut cargo = workspace.cargo(
         "rustc --release --package upt --lib --crate-type cdylib --no-default-features --features",
     );
-    run_checked(
-        workspace,
-        &format!("libupt with features \"{features}\""),
-        cargo.arg(features),
-    )?;
+    let label = format!("libupt with features \"{features}\"");
+    run_checked(workspace, &label, cargo.arg(features))?;
     let library = workspace.path("target/footprint.so");
     let mut strip = workspace.command("strip", "-o");
     output(strip.arg(&library).arg(workspace.release.join("libupt.so")))
         .context("`strip` and `readelf` are in binutils")?;
-    let dynamic = output(
-        workspace
-            .command("readelf", "--dynamic --wide")
-            .arg(&library),
-    )?;
-    let names = (dynamic.lines().filter(|line| line.contains("(NEEDED)")))
-        .filter_map(|line| Some(line.split_once('[')?.1.trim_end_matches(']')));
+    let mut readelf = workspace.command("readelf", "--dynamic --wide");
+    let dynamic = output(readelf.arg(&library))?;
+    let lines = dynamic.lines().filter(|line| line.contains("(NEEDED)"));
+    let names = lines.filter_map(|line| Some(line.split_once('[')?.1.trim_end_matches(']')));
+    let mut needed: Vec<String> = names.map(|name| format!("`{name}`")).collect();
+    needed.sort();
     Ok(Build {
         bytes: std::fs::metadata(&library)?.len(),
-        needed: names.map(|name| format!("`{name}`")).collect(),
+        needed: needed.join(", "),
     })
 }
 
 fn table(builds: &[Build]) -> Result<String> {
-    let names = |names: &BTreeSet<String>| names.iter().cloned().collect::<Vec<_>>().join(", ");
-    let all: BTreeSet<String> = builds
-        .iter()
-        .flat_map(|build| build.needed.clone())
-        .collect();
+    let usual = &builds[builds.len() - 1].needed;
     let mut text = format!(
-        "\nAll builds need {} and nothing else from the system, unless the table says so.\n\n\
+        "\nAll builds need {usual} and nothing else from the system, unless the table says so.\n\n\
          | features | bytes, stripped | more than none | needs |\n|---|---|---|---|\n",
-        names(&all)
     );
-    for (features, build) in FEATURES.iter().zip(builds) {
-        let name = match *features {
-            "" => "none".into(),
-            "default" => "default".into(),
-            name => format!("`{name}`"),
-        };
-        let needs = if build.needed == all {
-            "the same".into()
-        } else {
-            names(&build.needed)
+    for ((_, name), build) in FEATURES.iter().zip(builds) {
+        let needs = match &build.needed {
+            same if same == usual => "the same",
+            other => other,
         };
         let more = build.bytes as i64 - builds[0].bytes as i64;
         writeln!(text, "| {name} | {} | {more:+} | {needs} |", build.bytes)?;

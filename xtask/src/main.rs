@@ -6,11 +6,10 @@ mod bench;
 mod counts;
 mod cross;
 mod demo;
-mod documents;
 mod footprint;
-mod licences;
 mod ort;
 mod package;
+mod parts;
 mod process;
 mod stages;
 mod system;
@@ -19,6 +18,8 @@ mod upkeep;
 mod venv;
 mod wheel;
 mod workspace;
+
+use std::process::ExitCode;
 
 use anyhow::Result;
 use clap::{Parser, Subcommand};
@@ -110,16 +111,9 @@ enum Task {
     },
 }
 
-fn main() -> std::process::ExitCode {
-    let workspace = Workspace::find();
-    match run(&workspace, Arguments::parse().command) {
-        Ok(true) => std::process::ExitCode::SUCCESS,
-        Ok(false) => std::process::ExitCode::FAILURE,
-        Err(error) => {
-            eprintln!("error: {error:#}");
-            std::process::ExitCode::FAILURE
-        }
-    }
+fn main() -> Result<ExitCode> {
+    let passed = run(&Workspace::find(), Arguments::parse().command)?;
+    Ok(ExitCode::from(u8::from(!passed)))
 }
 
 /// False when the command ran and something failed that it has already reported.

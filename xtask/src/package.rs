@@ -19,8 +19,8 @@ use walkdir::WalkDir;
 use crate::ort::{self, Platform};
 use crate::process::run_checked;
 use crate::system::has_program;
-use crate::workspace::Workspace;
-use crate::{archive, cross, documents, licences, wheel};
+use crate::workspace::{Workspace, library};
+use crate::{archive, cross, venv, wheel};
 
 #[derive(Args)]
 pub struct Options {
@@ -41,6 +41,7 @@ pub struct Options {
 pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
     let out = workspace.root.join(&options.out);
     std::fs::create_dir_all(&out)?;
+    venv::create(workspace, "target/venv")?;
     let platform = options.platform.map_or_else(Platform::host, Ok)?;
     let made = match (options.wheel, options.unity) {
         (true, _) => wheel::make(workspace, platform, &out)?,
@@ -51,23 +52,8 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
     Ok(true)
 }
 
-/// libupt's name on a platform.
-pub fn library(platform: Platform) -> &'static str {
-    match platform {
-        Platform::WindowsX64 => "upt.dll",
-        Platform::MacosArm64 => "libupt.dylib",
-        Platform::LinuxX64 | Platform::LinuxArm64 => "libupt.so",
-    }
-}
-
-fn version(workspace: &Workspace) -> Result<String> {
-    let text = std::fs::read_to_string(workspace.path("Cargo.toml"))?;
-    let line = text
-        .lines()
-        .find_map(|line| line.strip_prefix("version = \""))
-        .context("Cargo.toml: no workspace version")?;
-    Ok(line.trim_end_matches('"').to_owned())
-}
+/// The workspace's.
+const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 /// Copies a file or a folder; links are followed.
 pub fn copy(from: &Path, to: &Path) -> Result<()> {
@@ -77,18 +63,11 @@ pub fn copy(from: &Path, to: &Path) -> Result<()> {
             0 => to.to_owned(),
             _ => to.join(entry.path().strip_prefix(from)?),
         };
-        let context = || {
-            format!(
-                "cannot copy {} to {}",
-                entry.path().display(),
-                place.display()
-            )
-        };
-        if entry.file_type().is_dir() {
-            std::fs::create_dir_all(&place).with_context(context)?;
-        } else {
-            std::fs::create_dir_all(place.parent().context("a file has a folder")?)?;
-            std::fs::copy(entry.path(), &place).with_context(context)?;
+        if !entry.file_type().is_dir() {
+            std::fs::create_dir_all(place.with_file_name(""))?;
+            let (from, to) = (entry.path().display(), place.display());
+            std::fs::copy(entry.path(), &place)
+                .with_context(|| format!("cannot copy {from} to {to}"))?;
         }
     }
     Ok(())
@@ -96,31 +75,30 @@ pub fn copy(from: &Path, to: &Path) -> Result<()> {
 
 /// What is the same on every platform: bundles, examples, licences.
 fn shared(workspace: &Workspace, root: &Path, ort_folder: &Path) -> Result<()> {
-    for entry in std::fs::read_dir(workspace.path("onnx"))? {
-        let entry = entry?;
-        if entry.path().join("bundle.json").is_file() {
-            copy(
-                &entry.path(),
-                &root.join("share/upt/bundles").join(entry.file_name()),
-            )?;
-        }
+    let share = root.join("share/upt");
+    for bundle in workspace.bundles()? {
+        let name = bundle.file_name().context("a bundle has a name")?;
+        copy(&bundle, &share.join("bundles").join(name))?;
     }
     for example in ["examples/c", "examples/cpp"] {
-        copy(
-            &workspace.path(example),
-            &root.join("share/upt").join(example),
-        )?;
+        copy(&workspace.path(example), &share.join(example))?;
     }
     let doc = root.join("share/doc/upt");
-    documents::copy(workspace, &doc)?;
+    script(workspace, "xtask/package/documents.py", &doc)?;
     for name in ["LICENSE-APACHE", "LICENSE-MIT"] {
         copy(&workspace.path(name), &doc.join(name))?;
     }
     for name in ["LICENSE", "ThirdPartyNotices.txt"] {
         copy(&ort_folder.join(name), &doc.join("onnxruntime").join(name))?;
     }
-    std::fs::write(doc.join("THIRD-PARTY.txt"), licences::notice(workspace)?)?;
-    Ok(())
+    script(workspace, LICENCES, &doc.join("THIRD-PARTY.txt"))
+}
+
+/// Writes the licences of all linked crates into a file; one that may not be linked stops the package.
+const LICENCES: &str = "tests/style/licences.py --write";
+
+fn script(workspace: &Workspace, words: &str, to: &Path) -> Result<()> {
+    run_checked(workspace, words, workspace.python(words).arg(to))
 }
 
 /// The archive: of this platform, of one that is built for here, or of macOS laid out without libupt.
@@ -130,7 +108,7 @@ fn native(workspace: &Workspace, platform: Platform, out: &Path) -> Result<PathB
         "cmake is missing: it writes the find_package and pkg-config files (Debian: apt-get install cmake)"
     );
     let ort_folder = ort::fetch(workspace, platform, ort::VERSION)?;
-    let name = format!("libupt-{}-{}", version(workspace)?, platform.name());
+    let name = format!("libupt-{VERSION}-{}", platform.name());
     let root = out.join(&name);
     std::fs::remove_dir_all(&root).ok();
     let is_host = Platform::host()? == platform;
@@ -176,8 +154,8 @@ fn install(
     built: &Path,
     root: &Path,
 ) -> Result<()> {
-    let suffix = other.map_or_else(String::new, |platform| format!("-{}", platform.name()));
-    let build = format!("target/package-cmake{suffix}");
+    let name = other.map_or("", Platform::name);
+    let build = format!("target/package-cmake/{name}");
     let words = format!("-S cmake -B {build} -DCMAKE_INSTALL_LIBDIR=lib");
     let mut configure = workspace.command("cmake", &words);
     configure
@@ -191,6 +169,14 @@ fn install(
     run_checked(workspace, "cmake --install", &mut install)
 }
 
+/// Folders of the plugins in the Unity package: platform, system, processor.
+const PLUGINS: [(Platform, &str, &str); 4] = [
+    (Platform::LinuxX64, "Linux", "x86_64"),
+    (Platform::LinuxArm64, "Linux", "arm64"),
+    (Platform::WindowsX64, "Windows", "x86_64"),
+    (Platform::MacosArm64, "macOS", "arm64"),
+];
+
 /// The Unity package with the native plugins of this platform: libupt and ONNX Runtime.
 fn unity(workspace: &Workspace, out: &Path) -> Result<PathBuf> {
     let host = Platform::host()?;
@@ -200,103 +186,31 @@ fn unity(workspace: &Workspace, out: &Path) -> Result<PathBuf> {
     std::fs::remove_dir_all(out.join("unity")).ok();
     copy(&workspace.path("unity-plugin"), &root)?;
     let plugins = root.join("Runtime/Plugins");
-    let own = plugins.join(match host {
-        Platform::LinuxX64 => "Linux/x86_64",
-        Platform::LinuxArm64 => "Linux/arm64",
-        Platform::WindowsX64 => "Windows/x86_64",
-        Platform::MacosArm64 => "macOS/arm64",
-    });
-    for (folder, name) in [
-        (&workspace.release, library(host)),
-        (&ort_folder, host.library()),
-    ] {
-        copy(&folder.join(name), &own.join(name))?;
+    let mut folders = PLUGINS;
+    folders.sort_by_key(|(platform, ..)| *platform != host); // its own first: then their common folder stays
+    for (platform, system, processor) in folders {
+        let (outer, inner) = (plugins.join(system), plugins.join(system).join(processor));
+        if platform == host {
+            let (ours, theirs) = (library(host), host.library());
+            copy(&workspace.release.join(ours), &inner.join(ours))?;
+            copy(&ort_folder.join(theirs), &inner.join(theirs))?;
+            continue;
+        }
+        // Unity warns about settings (.meta) of what is not there, so those of other platforms go.
+        println!("left out (not this platform): {}", platform.name());
+        std::fs::remove_dir_all(&inner).ok();
+        std::fs::remove_file(inner.with_extension("meta")).ok();
+        if std::fs::remove_dir(&outer).is_ok() {
+            std::fs::remove_file(outer.with_extension("meta"))?;
+        }
     }
     // Unity leaves folders whose names end in ~ alone, so these need no .meta files.
-    copy(
-        &workspace.path("onnx/brain-reduced"),
-        &root.join("Bundles~/brain-reduced"),
-    )?;
-    let notice = licences::notice(workspace)?;
-    std::fs::write(root.join("Documentation~/third-party-crates.txt"), notice)?;
-    remove_orphans(&root, &plugins)?;
-    let file = out.join(format!(
-        "org.libupt.soft-tissue-{}.tgz",
-        version(workspace)?
-    ));
-    archive::pack(
-        &out.join("unity"),
-        "package",
-        &file,
-        archive::time(workspace),
-    )?;
+    let bundle = workspace.path("onnx/brain-reduced");
+    copy(&bundle, &root.join("Bundles~/brain-reduced"))?;
+    let notice = root.join("Documentation~/third-party-crates.txt");
+    script(workspace, LICENCES, &notice)?;
+    let file = out.join(format!("org.libupt.soft-tissue-{VERSION}.tgz"));
+    let (parent, time) = (out.join("unity"), archive::time(workspace));
+    archive::pack(&parent, "package", &file, time)?;
     Ok(file)
-}
-
-/// Removes the settings of plugins that are not in the package, and folders that hold nothing else: Unity warns about
-/// them otherwise.
-fn remove_orphans(root: &Path, folder: &Path) -> Result<()> {
-    // What is inside of a folder first: an empty folder goes, and its settings with it.
-    for entry in WalkDir::new(folder).min_depth(1).contents_first(true) {
-        let path = entry?.into_path();
-        if path.is_dir() {
-            remove_settings(root, &path)?;
-            if std::fs::read_dir(&path)?.next().is_none() {
-                std::fs::remove_dir(&path)?;
-            }
-        }
-    }
-    remove_settings(root, folder)
-}
-
-/// Settings in one folder without what they are for.
-fn remove_settings(root: &Path, folder: &Path) -> Result<()> {
-    for entry in std::fs::read_dir(folder)? {
-        let path = entry?.path();
-        let asset = path.with_extension("");
-        if path
-            .extension()
-            .is_some_and(|extension| extension == "meta")
-            && !asset.exists()
-        {
-            std::fs::remove_file(&path)?;
-            if asset.extension().is_some() {
-                let name = asset.strip_prefix(root).unwrap_or(&asset);
-                println!("left out (not built on this platform): {}", name.display());
-            }
-        }
-    }
-    Ok(())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn settings_without_their_library_leave_with_their_folders() {
-        let folder = tempfile::tempdir().unwrap();
-        let root = folder.path();
-        let plugins = root.join("Runtime/Plugins");
-        let files = [
-            "Linux.meta",
-            "Linux/x86_64.meta",
-            "Linux/x86_64/libupt.so",
-            "Linux/x86_64/libupt.so.meta",
-            "Windows.meta",
-            "Windows/x86_64.meta",
-            "Windows/x86_64/upt.dll.meta",
-        ];
-        for file in files {
-            let path = plugins.join(file);
-            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
-            std::fs::write(path, "").unwrap();
-        }
-        remove_orphans(root, &plugins).unwrap();
-        for file in files {
-            let stays = file.starts_with("Linux");
-            assert_eq!(plugins.join(file).exists(), stays, "{file}");
-        }
-        assert!(!plugins.join("Windows").exists());
-    }
 }

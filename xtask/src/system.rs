@@ -98,10 +98,8 @@ pub fn provide(workspace: &Workspace, needs: &[Needs], install: bool) -> Result<
     }
     let left = all();
     if !left.is_empty() {
-        eprintln!(
-            "missing on this machine; on Debian or Ubuntu: apt-get install {}",
-            left.join(" ")
-        );
+        let names = left.join(" ");
+        eprintln!("missing on this machine; on Debian or Ubuntu: apt-get install {names}");
         eprintln!("elsewhere: install the programs of the same names, then run the command again");
     }
     Ok(left)
@@ -126,17 +124,12 @@ fn install_by_apt(workspace: &Workspace, names: &[&str]) -> Result<()> {
     const INSTALL: &str = "install -q -y --no-install-recommends";
     let all = apt("apt-get install", &format!("{INSTALL} {}", names.join(" ")))?;
     if !all.success {
-        eprintln!(
-            "apt-get install failed; the end of {}:\n{}",
-            all.log.display(),
-            all.tail(15)
-        );
+        let (log, end) = (all.log.display(), all.tail(15));
+        eprintln!("apt-get install failed; the end of {log}:\n{end}");
         // One package of a list may be unknown on this release: take the others one by one.
         for name in names {
-            apt(
-                &format!("apt-get install {name}"),
-                &format!("{INSTALL} {name}"),
-            )?;
+            let label = format!("apt-get install {name}");
+            apt(&label, &format!("{INSTALL} {name}"))?;
         }
     }
     Ok(())

@@ -6,7 +6,7 @@ use anyhow::{Result, bail};
 use clap::Args;
 
 use crate::counts::{Counts, Outcome};
-use crate::stages::{STAGES, Stage};
+use crate::stages::{NIGHTLY, STAGES, Stage};
 use crate::system;
 use crate::workspace::Workspace;
 
@@ -28,23 +28,25 @@ pub struct Options {
 
 /// True when nothing failed.
 pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
+    let all = || STAGES.iter().chain(NIGHTLY);
     if options.list {
-        for stage in STAGES {
+        for stage in all() {
             println!("{:<12} {}", stage.name, stage.about);
         }
         return Ok(true);
     }
-    let is_stage = |name: &String| STAGES.iter().any(|stage| stage.name == name);
+    let is_stage = |name: &String| all().any(|stage| stage.name == name);
     if let Some(unknown) = options.only.iter().find(|name| !is_stage(name)) {
         bail!("no stage is called {unknown}; `cargo xtask test --list` names them");
     }
     let is_set = |name: &str| std::env::var(name).is_ok_and(|value| value == "1");
     let strict = options.strict || is_set("UPT_STRICT");
-    let nightly = is_set("UPT_NIGHTLY") || !options.only.is_empty();
-    let asked =
-        |stage: &&Stage| options.only.is_empty() || options.only.iter().any(|n| n == stage.name);
-    let (chosen, left_out): (Vec<&Stage>, Vec<&Stage>) =
-        (STAGES.iter().filter(asked)).partition(|stage| !stage.nightly || nightly);
+    let asked = |stage: &&Stage| options.only.iter().any(|name| name == stage.name);
+    let (chosen, left_out): (Vec<&Stage>, &[Stage]) = match options.only.is_empty() {
+        false => (all().filter(asked).collect(), &[]),
+        true if is_set("UPT_NIGHTLY") => (all().collect(), &[]),
+        true => (STAGES.iter().collect(), NIGHTLY),
+    };
 
     let mut needs = vec![system::BASE];
     needs.extend(chosen.iter().map(|stage| stage.needs));
@@ -81,17 +83,14 @@ fn summarise(rows: &[(&str, Outcome, f64)]) -> bool {
     );
     let mut total = Counts::default();
     for (stage, outcome, seconds) in rows {
-        let Counts {
-            passed,
-            failed,
-            skipped,
-        } = outcome.counts;
+        let counts = outcome.counts;
+        let (passed, failed, skipped) = (counts.passed, counts.failed, counts.skipped);
         let note = match failed + skipped {
             0 => "",
             _ => outcome.note.lines().next().unwrap_or(""),
         };
         println!("{stage:<12} {passed:>7} {failed:>7} {skipped:>8} {seconds:>8.0}  {note}");
-        total += outcome.counts;
+        total += counts;
     }
     println!("\n{total}");
     total.failed == 0

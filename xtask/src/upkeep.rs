@@ -16,7 +16,7 @@ pub fn header(workspace: &Workspace, check: bool) -> Result<bool> {
 
 /// Runs the Python package's command line with the environment set up: `cargo xtask bundle -- export ...`.
 pub fn bundle(workspace: &Workspace, module: &str, arguments: &[String]) -> Result<bool> {
-    venv::install_training(workspace)?;
+    venv::install(workspace, venv::TRAINING)?;
     let mut command = workspace.python("-m");
     workspace.with_parts(&mut command)?;
     run_visibly(command.arg(module).args(arguments))

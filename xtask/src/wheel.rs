@@ -5,13 +5,12 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 
-use crate::counts::{self, Outcome};
+use crate::counts::{Outcome, check, counted, summary};
 use crate::ort::Platform;
-use crate::process::{run_checked, run_logged};
-use crate::stages::check;
+use crate::process::run_checked;
 use crate::venv::{self, PIP_INSTALL};
-use crate::workspace::{Workspace, program_in};
-use crate::{archive, cross, package};
+use crate::workspace::{Workspace, library, program_in};
+use crate::{archive, cross};
 
 /// A wheel with the libupt of this platform or of another one, built here, in `out`.
 pub fn make(workspace: &Workspace, platform: Platform, out: &Path) -> Result<PathBuf> {
@@ -27,28 +26,23 @@ pub fn make(workspace: &Workspace, platform: Platform, out: &Path) -> Result<Pat
         .python("-m pip wheel --quiet --disable-pip-version-check --no-deps ./python --wheel-dir");
     command
         .arg(&scratch)
-        .env("UPT_WHEEL_LIBRARY", built.join(package::library(platform)))
+        .env("UPT_WHEEL_LIBRARY", built.join(library(platform)))
         .env("SOURCE_DATE_EPOCH", archive::time(workspace).to_string());
     if let (false, Some(tag)) = (host, cross::wheel_tag(platform)) {
         command.env("UPT_WHEEL_PLATFORM", tag);
     }
     run_checked(workspace, "pip wheel", &mut command)?;
-    let made = std::fs::read_dir(&scratch)?
-        .filter_map(|entry| entry.ok().map(|entry| entry.path()))
-        .find(|path| path.extension().is_some_and(|extension| extension == "whl"))
-        .with_context(|| format!("pip left no wheel in {}", scratch.display()))?;
-    let place = out.join(made.file_name().context("a wheel has a name")?);
-    package::copy(&made, &place)?;
+    // The only file of the folder.
+    let made = std::fs::read_dir(&scratch)?.next().context("no wheel")??;
+    let place = out.join(made.file_name());
+    std::fs::copy(made.path(), &place)?;
     Ok(place)
 }
 
 /// `cargo xtask test --only wheel`.
 pub fn stage(workspace: &Workspace) -> Result<Outcome> {
-    let wheel = make(
-        workspace,
-        Platform::host()?,
-        &workspace.path("target/package"),
-    )?;
+    let out = workspace.path("target/package");
+    let wheel = make(workspace, Platform::host()?, &out)?;
     venv::create(workspace, "target/venv-upt")?;
     let environment = workspace.path("target/venv-upt");
     let python = |words: &str| workspace.command(program_in(&environment, "python"), words);
@@ -58,21 +52,16 @@ pub fn stage(workspace: &Workspace) -> Result<Outcome> {
         command.arg(format!("{}[test]", wheel.display()));
         run_checked(workspace, "pip install (wheel)", &mut command)?;
     }
-    let mut mypy = workspace.command(
-        program_in(&environment, "mypy"),
-        "--cache-dir ../target/mypy",
-    );
-    let types = check(
-        workspace,
-        "mypy",
-        mypy.current_dir(workspace.path("python")),
-    )?;
+    let program = program_in(&environment, "mypy");
+    let mut mypy = workspace.command(program, "--cache-dir ../target/mypy");
+    mypy.current_dir(workspace.path("python"));
+    let types = check(workspace, "mypy", &mut mypy)?;
     // From outside of python/, so that the installed package is tested; its ONNX Runtime is the one of its own environment.
     let mut command = python("-m pytest -q -p no:cacheprovider ../python");
     command
         .current_dir(workspace.path("target"))
         .env_remove("ORT_DYLIB_PATH")
         .env_remove("UPT_LIBRARY");
-    let finished = run_logged(workspace, "pytest of the wheel", &mut command)?;
-    Ok(types.and(Outcome::of(&finished, counts::pytest(&finished.text))))
+    let tests = counted(workspace, "pytest of the wheel", &mut command, summary)?;
+    Ok(types.and(tests))
 }

@@ -3,10 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use anyhow::Result;
-
-use crate::ort;
-use crate::process::run_checked;
+use anyhow::{Context, Result};
+use ort_wheel::Platform;
 
 /// The repository's folders. Everything that a command makes lies under `target/`.
 #[derive(Clone, Debug)]
@@ -30,6 +28,16 @@ impl Workspace {
 
     pub fn path(&self, relative: &str) -> PathBuf {
         self.root.join(relative)
+    }
+
+    /// Folders of the committed bundles, by name.
+    pub fn bundles(&self) -> Result<Vec<PathBuf>> {
+        let entries = std::fs::read_dir(self.path("onnx"))?;
+        let folders = entries.filter_map(|entry| Some(entry.ok()?.path()));
+        let is_bundle = |folder: &PathBuf| folder.join("bundle.json").is_file();
+        let mut found: Vec<PathBuf> = folders.filter(is_bundle).collect();
+        found.sort();
+        Ok(found)
     }
 
     /// A program of the virtual environment.
@@ -64,44 +72,14 @@ impl Workspace {
     pub fn bash(&self, script: &str) -> Command {
         self.command("bash", script)
     }
+}
 
-    /// `libupt.so`, the static library and the command `upt`, in the release profile that the tests use too.
-    pub fn build(&self) -> Result<()> {
-        let mut command = self.cargo("build --release -p upt -p upt-cli");
-        run_checked(self, "cargo build", &mut command)
-    }
-
-    /// The command `upt` for the demo. On a fresh clone it is built without what the demo does not use (files of other
-    /// programs, sparse factorisation: half of a cold build); a whole `upt` that is there is brought up to date instead.
-    pub fn build_for_demo(&self) -> Result<()> {
-        let version = Command::new(self.upt()).arg("--version").output();
-        let whole = version.is_ok_and(|output| {
-            output.status.success() && !String::from_utf8_lossy(&output.stdout).contains("without")
-        });
-        if whole {
-            return self.build();
-        }
-        let mut command = self.cargo("build --release -p upt-cli --no-default-features");
-        run_checked(
-            self,
-            "cargo build, without what the demo does not use",
-            &mut command,
-        )
-    }
-
-    /// Builds, fetches ONNX Runtime, and sets what the test scripts of the other languages find their parts by.
-    pub fn with_parts(&self, command: &mut Command) -> Result<()> {
-        ort::set_environment(self, command)?;
-        self.build()?;
-        command
-            .env("UPT_ROOT", &self.root)
-            .env("UPT_LIB_DIR", &self.release)
-            .env("UPT_INCLUDE_DIR", self.path("include"))
-            .env("UPT_COMMAND", self.upt())
-            .env("UPT_PYTHON", self.venv_program("python"))
-            .env("UPT_BUNDLES", self.path("onnx"))
-            .env("UPT_BUILD_DIR", self.path("target"));
-        Ok(())
+/// libupt's name on a platform.
+pub fn library(platform: Platform) -> &'static str {
+    match platform {
+        Platform::WindowsX64 => "upt.dll",
+        Platform::MacosArm64 => "libupt.dylib",
+        Platform::LinuxX64 | Platform::LinuxArm64 => "libupt.so",
     }
 }
 
@@ -122,21 +100,16 @@ pub fn write_between_markers(
     name: &str,
     text: impl FnOnce(&str) -> Result<String>,
 ) -> Result<()> {
-    use anyhow::Context;
-    let whole =
-        std::fs::read_to_string(page).with_context(|| format!("cannot read {}", page.display()))?;
+    let place = page.display();
+    let whole = std::fs::read_to_string(page).with_context(|| format!("cannot read {place}"))?;
     let begin = format!("<!-- cargo xtask {name}: begin -->\n");
     let end = format!("<!-- cargo xtask {name}: end -->");
-    let (start, stop) = (whole.find(&begin).zip(whole.find(&end))).with_context(|| {
-        format!(
-            "{}: the markers `{}` and `{end}` are missing",
-            page.display(),
-            begin.trim()
-        )
-    })?;
+    let found = whole.find(&begin).zip(whole.find(&end));
+    let (start, stop) =
+        found.with_context(|| format!("{place}: no markers `{}` and `{end}`", begin.trim()))?;
     let start = start + begin.len();
     let text = text(&whole[start..stop])?;
     std::fs::write(page, format!("{}{text}{}", &whole[..start], &whole[stop..]))?;
-    println!("{} written", page.display());
+    println!("{place} written");
     Ok(())
 }

@@ -4,6 +4,7 @@
 //! Exit codes: 0 done; 1 the command ran and its finding is bad (`doctor`, `stress`); 2 wrong usage or
 //! input, with a message on stderr that says what to do. A closed pipe ends the program quietly.
 
+mod bench;
 mod beside;
 #[cfg(feature = "linear")]
 mod check;
@@ -26,10 +27,10 @@ mod machine;
 mod make;
 mod manifest;
 mod mesh;
-#[cfg(feature = "files")]
-mod mesh_files;
 #[cfg(feature = "linear")]
 mod modes;
+#[cfg(feature = "linear")]
+mod parallel;
 mod preview;
 #[cfg(feature = "linear")]
 mod prior;

@@ -1,7 +1,8 @@
-//! `upt mesh`: what a mesh is (`info`); `import` and `stuff` are in [`crate::mesh_files`].
+//! `upt mesh`: what a mesh is (`info`); `import` and `stuff` are in [`files`].
 
 #[cfg(feature = "files")]
-use crate::mesh_files::{Import, Stuff, run_import, run_stuff};
+mod files;
+
 use clap::{Args, Subcommand};
 use serde_json::json;
 use std::path::PathBuf;
@@ -10,6 +11,9 @@ use tissue::material::Material;
 use tissue::mesh::{Boundary, Mesh};
 use tissue::mesh_quality::{Quality, measure};
 use tissue::solver::{Solver, SolverOptions};
+
+#[cfg(feature = "files")]
+use files::{Import, Stuff, run_import, run_stuff};
 
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  upt mesh info onnx/meshes/brain.mesh.safetensors --json")]
@@ -133,7 +137,7 @@ fn run_info(args: &Info) -> anyhow::Result<ExitCode> {
 }
 
 /// The lines of `upt mesh info` that are about shape.
-pub fn print_quality(q: &Quality) {
+fn print_quality(q: &Quality) {
     let row = |label: &str, text: String| println!("{label:24}{text}");
     row("nodes", q.nodes.to_string());
     row("tetrahedra", q.tets.to_string());

@@ -8,7 +8,8 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 use tissue::schemes::{Programme, Scheme};
 
-use crate::stress::bench::Bench;
+use crate::bench::Bench;
+use crate::report::memory::resident_bytes;
 
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  upt soak --bundle onnx/brain-coarse-reduced --log soak.csv")]
@@ -93,17 +94,6 @@ pub fn run(options: &Options) -> Result<ExitCode> {
 }
 
 fn resident_kib() -> Result<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").context(
-        "`upt soak` reads the resident memory from /proc/self/status, which exists only on Linux",
-    )?;
-    status
-        .lines()
-        .find_map(|line| {
-            line.strip_prefix("VmRSS:")?
-                .split_whitespace()
-                .next()?
-                .parse()
-                .ok()
-        })
-        .context("/proc/self/status has no line VmRSS")
+    let bytes = resident_bytes().context("resident memory is not known here: only Linux tells")?;
+    Ok(bytes / 1024)
 }

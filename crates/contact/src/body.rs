@@ -4,7 +4,8 @@
 //! less the radius. Boxes and segments are closed forms that stay exact on the surface itself, where the direction to a
 //! projected point is rounding.
 
-use crate::shape::{Shape, ShapeError};
+use crate::error::ShapeError;
+use crate::shape::Shape;
 use crate::triangles::Triangles;
 use parry3d::math::{Pose, Vector};
 use std::sync::Arc;

@@ -13,6 +13,7 @@
 //! the solver brings lumped masses, the runtime a dense compliance.
 
 pub mod body;
+mod error;
 pub mod friction;
 pub mod grasp;
 pub mod pose;
@@ -23,9 +24,10 @@ pub mod sweeps;
 mod triangles;
 
 pub use body::{Body, Nearest};
+pub use error::ShapeError;
 pub use grasp::Grasp;
 pub use parry3d::math::{Matrix, Pose, Rotation, Vector};
 pub use samples::{SPACING_MM, Sample, Samples};
 pub use search::{Candidate, Placed, SKIN_MM, Search};
-pub use shape::{Shape, ShapeError};
+pub use shape::Shape;
 pub use sweeps::{Contact, Law, Limits, Outcome, Sweeps};

@@ -1,6 +1,6 @@
 //! Signed distance to a closed surface of triangles, convex or not: the nearest one by parry3d's bounding-volume tree.
 
-use crate::shape::ShapeError;
+use crate::error::ShapeError;
 use parry3d::math::Vector;
 use parry3d::query::PointQueryWithLocation;
 use parry3d::shape::{TriMesh, TriMeshFlags};

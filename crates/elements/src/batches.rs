@@ -3,10 +3,12 @@
 use crate::cluster::{Cluster, Group, corners};
 use crate::lanes::WIDTH;
 use crate::material::Material;
-use crate::partition::PADDING;
 use crate::tetrahedra::Tetrahedra;
 use crate::vector::{cross, dot};
 use std::ops::Range;
+
+/// Stands for a node or an element where there is none: in lanes and slots that only fill a batch or a cache line.
+pub const PADDING: u32 = u32::MAX;
 
 /// Batches of one kind of cluster.
 #[derive(Default)]

@@ -4,9 +4,10 @@
 //! collects for its nodes what their elements in other chunks added, in ascending slot order. So the sum has the same
 //! bits for any number of threads.
 
+use crate::batches::PADDING;
 use crate::dispatch::{Kernels, Simd};
 use crate::material::Material;
-use crate::partition::{Chunk, PADDING, Partition};
+use crate::partition::{Chunk, Partition};
 use crate::slots::PADDED;
 use crate::tetrahedra::Tetrahedra;
 use std::collections::TryReserveError;

@@ -25,14 +25,14 @@ mod tetrahedra;
 mod tetrahedron;
 pub mod vector;
 
-pub use batches::{Element, Kind, shape_gradients};
+pub use batches::{Element, Kind, PADDING, shape_gradients};
 pub use dispatch::{Kernels, Simd};
 pub use internal_forces::{ElementForces, ParallelFor, Scratch};
 pub use kernel::flops;
 pub use lanes::WIDTH;
 pub use laws::{Invariants, Isochoric, Law, MooneyRivlin, NeoHookean};
 pub use material::{Material, MaterialError, Moduli};
-pub use partition::{Chunk, PADDING, Partition};
+pub use partition::{Chunk, Partition};
 pub use slots::{FLOPS_PER_NODE, PADDED};
 pub use tetrahedra::Tetrahedra;
 pub use tetrahedron::{Deformation, Tetrahedron, energy_density, inverse_cube_root, stress};

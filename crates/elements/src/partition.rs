@@ -7,7 +7,7 @@
 //! added to the owner in ascending slot order. The split depends on the mesh
 //! alone: a result has the same bits for any number of threads.
 
-use crate::batches::{Element, Kind, Source};
+use crate::batches::{Element, Kind, PADDING, Source};
 use crate::cluster::{Groups, Octahedra, Pairs, Singles};
 use crate::material::{Material, Moduli};
 use crate::tetrahedra::Tetrahedra;
@@ -15,9 +15,6 @@ use std::ops::Range;
 
 /// Target number of elements in a chunk.
 const CHUNK_ELEMENTS: usize = 2048;
-
-/// Marks a slot that only pads a chunk to a cache line.
-pub const PADDING: u32 = u32::MAX;
 
 /// A chunk's nodes and elements.
 pub struct Chunk {

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use tissue::mesh::Mesh;
 use tissue::mesh_import::{
-    ImportOptions, Labels, Region, Resolution, faces_in, import, nodes_in, tets_in,
+    ImportOptions, Region, Resolution, faces_in, import, nodes_in, read_labels, tets_in,
 };
 
 /// Corners of a cube of 10 mm and its triangles, outward; the first two are its floor.
@@ -96,7 +96,7 @@ fn an_obj_names_its_groups_and_materials_without_a_material_file() {
     let mesh = filled(&path);
     is_the_floor(&mesh, &path, "group:floor");
     is_the_floor(&mesh, &path, "group:ligament");
-    let names = Labels::read(&path).unwrap();
+    let names = read_labels(&path).unwrap();
     let error = names.group("tumour", &path, 1.0).err().unwrap().to_string();
     for word in ["tumour", "capsule", "floor", "ligament", "rest"] {
         assert!(error.contains(word), "{error}");

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use tissue::mesh::Mesh;
-use tissue::mesh_import::{ImportOptions, Labels, Region, import, nodes_in, tets_in};
+use tissue::mesh_import::{ImportOptions, Region, import, nodes_in, read_labels, tets_in};
 
 /// Corners of a cube of 10 mm; the first four are its floor.
 const CORNERS: [[f64; 3]; 8] = [
@@ -106,7 +106,7 @@ fn both_become_the_same_cube_and_keep_their_sets() {
         );
     }
     let named = |name: &str| -> Vec<String> {
-        let labels = Labels::read(&folder.path().join(name)).unwrap();
+        let labels = read_labels(&folder.path().join(name)).unwrap();
         labels.names().into_iter().map(str::to_owned).collect()
     };
     assert_eq!(

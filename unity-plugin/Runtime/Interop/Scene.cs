@@ -7,7 +7,7 @@ namespace Upt.Interop
     /// <c>UPT_ERR_BUSY</c>). No call allocates managed memory unless it says so. Lengths are in
     /// floats; vectors are <c>[n,3]</c>, row-major, mm.
     /// </summary>
-    public sealed unsafe class Scene : IDisposable
+    public sealed unsafe partial class Scene : IDisposable
     {
         private readonly SceneHandle handle;
 
@@ -195,189 +195,6 @@ namespace Upt.Interop
             finally { Leave(); }
         }
 
-        /// <summary>Attaches points of the rest volume (a render mesh's vertices; <c>[n,3]</c> mm), or
-        /// detaches them with null.</summary>
-        public void AttachPoints(float[] points)
-        {
-            if (points != null && points.Length % 3 != 0)
-                throw new ArgumentException("points hold " + points.Length + " floats, which is not a multiple of 3",
-                                            "points");
-            IntPtr scene = Enter();
-            try
-            {
-                fixed (float* p = points)
-                    Status.Check(
-                        Native.upt_scene_attach_points(scene, p, points == null ? 0 : (ulong)points.Length / 3));
-            }
-            finally { Leave(); }
-            PointCount = points == null ? 0 : points.Length / 3;
-        }
-
-        /// <summary>Displacement of the attached points at the last state.</summary>
-        public void ReadPoints(float* output, int floats)
-        {
-            IntPtr scene = Enter();
-            try { Status.Check(Native.upt_scene_read_points(scene, output, checked((ulong)floats))); }
-            finally { Leave(); }
-        }
-
-        /// <summary>Displacement of the attached points between the last two states. The pointer may be a
-        /// <c>NativeArray</c>'s.</summary>
-        public void SamplePoints(double alpha, float* output, int floats)
-        {
-            IntPtr scene = Enter();
-            try { Status.Check(Native.upt_scene_sample_points(scene, alpha, output, checked((ulong)floats))); }
-            finally { Leave(); }
-        }
-
-        /// <summary>Displacement of the attached points <paramref name="seconds"/> after the last published step, with the first
-        /// <paramref name="count"/> instruments where they are then. Throws <c>UPT_ERR_UNSUPPORTED</c> where the scene does not
-        /// correct. The pointer may be a <c>NativeArray</c>'s.</summary>
-        public void PresentPoints(double seconds, upt_instrument[] instruments, int count, float* output, int floats)
-        {
-            RequireInstruments(instruments, count);
-            IntPtr scene = Enter();
-            try
-            {
-                fixed (upt_instrument* i = instruments)
-                    Status.Check(Native.upt_scene_present_points(scene, seconds, i, (ulong)count, output,
-                                                                 checked((ulong)floats)));
-            }
-            finally { Leave(); }
-        }
-
-        /// <summary>The same in the region's order.</summary>
-        public void Present(double seconds, upt_instrument[] instruments, int count, float[] output)
-        {
-            RequireInstruments(instruments, count);
-            IntPtr scene = Enter();
-            try
-            {
-                fixed (upt_instrument* i = instruments)
-                fixed (float* o = output)
-                    Status.Check(Native.upt_scene_present(scene, seconds, i, (ulong)count, o, Length(output)));
-            }
-            finally { Leave(); }
-        }
-
-        /// <summary>As <see cref="Present"/>, with the first <paramref name="count"/> entries of a contact list, where the nodes are
-        /// then, in place of instruments.</summary>
-        public void PresentContacts(double seconds, uint[] nodes, float[] vectors, int count, float[] output)
-        {
-            RequireContacts(nodes, vectors, count);
-            IntPtr scene = Enter();
-            try
-            {
-                fixed (uint* n = nodes)
-                fixed (float* v = vectors)
-                fixed (float* o = output)
-                    Status.Check(Native.upt_scene_present_contacts(scene, seconds, n, v, (ulong)count, o, Length(output)));
-            }
-            finally { Leave(); }
-        }
-
-        /// <summary>The same at the attached points. The pointer may be a <c>NativeArray</c>'s.</summary>
-        public void PresentPointsContacts(double seconds, uint[] nodes, float[] vectors, int count, float* output, int floats)
-        {
-            RequireContacts(nodes, vectors, count);
-            IntPtr scene = Enter();
-            try
-            {
-                fixed (uint* n = nodes)
-                fixed (float* v = vectors)
-                    Status.Check(Native.upt_scene_present_points_contacts(scene, seconds, n, v, (ulong)count, output,
-                                                                          checked((ulong)floats)));
-            }
-            finally { Leave(); }
-        }
-
-        /// <summary>One step from the scene's own state that the first <paramref name="count"/> instruments drive: their
-        /// contact is solved. Throws <c>UPT_ERR_UNSUPPORTED</c> for a bundle without a linear response.</summary>
-        public void StepInstruments(upt_instrument[] instruments, int count, float[] output)
-        {
-            RequireInstruments(instruments, count);
-            IntPtr scene = Enter();
-            try
-            {
-                fixed (upt_instrument* i = instruments)
-                fixed (float* o = output)
-                    Status.Check(Native.upt_scene_step_instruments(scene, i, (ulong)count, o, Length(output)));
-            }
-            finally { Leave(); }
-        }
-
-        /// <summary>Hands such a step to the scene's worker and returns at once; the instruments are copied.</summary>
-        public void SubmitInstruments(upt_instrument[] instruments, int count)
-        {
-            RequireInstruments(instruments, count);
-            IntPtr scene = Enter();
-            try
-            {
-                fixed (upt_instrument* i = instruments)
-                    Status.Check(Native.upt_scene_submit_instruments(scene, i, (ulong)count));
-            }
-            finally { Leave(); }
-        }
-
-        /// <summary>What the tissue did to each instrument of the last step; <paramref name="count"/> is their
-        /// number.</summary>
-        public void Readings(upt_instrument_reading[] output, int count)
-        {
-            if (count < 0 || count > (output == null ? 0 : output.Length)) throw new ArgumentOutOfRangeException("count");
-            for (int i = 0; i < count; i++) output[i].struct_size = (uint)sizeof(upt_instrument_reading);
-            IntPtr scene = Enter();
-            try
-            {
-                fixed (upt_instrument_reading* o = output)
-                    Status.Check(Native.upt_scene_instrument_readings(scene, o, (ulong)count));
-            }
-            finally { Leave(); }
-        }
-
-        /// <summary>The points of the surface that pushed or held instruments at the end of the last step; returns their
-        /// number. An array that is too short is replaced by a longer one.</summary>
-        public int InstrumentContacts(ref upt_instrument_contact[] output)
-        {
-            IntPtr scene = Enter();
-            try
-            {
-                ulong needed = 0;
-                Status.Check(Native.upt_scene_instrument_contacts(scene, null, 0, &needed));
-                if (output == null || (ulong)output.Length < needed) output = new upt_instrument_contact[2 * needed];
-                if (needed == 0) return 0;
-                fixed (upt_instrument_contact* o = output)
-                    Status.Check(Native.upt_scene_instrument_contacts(scene, o, (ulong)output.Length, &needed));
-                return checked((int)needed);
-            }
-            finally { Leave(); }
-        }
-
-        /// <summary>Contacts of instrument poses with the tissue as it is now; returns their number. The
-        /// arrays must hold it (at most one entry a surface node).</summary>
-        public int ContactsFrom(upt_instrument[] instruments, int instrumentCount, uint[] nodes, float[] vectors)
-        {
-            if (instruments == null) throw new ArgumentNullException("instruments");
-            if (nodes == null) throw new ArgumentNullException("nodes");
-            if (vectors == null) throw new ArgumentNullException("vectors");
-            if (instrumentCount < 0 || instrumentCount > instruments.Length)
-                throw new ArgumentOutOfRangeException("instrumentCount");
-            IntPtr scene = Enter();
-            try
-            {
-                ulong found = 0;
-                ulong capacity = (ulong)Math.Min(nodes.Length, vectors.Length / 3);
-                fixed (upt_instrument* i = instruments)
-                fixed (uint* n = nodes)
-                fixed (float* v = vectors)
-                {
-                    Status.Check(Native.upt_scene_contacts_from_instruments(scene, i, (ulong)instrumentCount, n, v,
-                                                                            capacity, &found));
-                }
-                return checked((int)found);
-            }
-            finally { Leave(); }
-        }
-
         /// <summary>Times per stage, flags, sleep state of the last step.</summary>
         public upt_scene_stats Stats()
         {
@@ -418,24 +235,6 @@ namespace Upt.Interop
             finally { Leave(); }
         }
 
-        /// <summary>Makes a tool felt: <paramref name="tool"/> at place <paramref name="instrument"/> of the steps'
-        /// instruments, where it is now. No step may be in flight. Throws <c>UPT_ERR_UNSUPPORTED</c> where the scene does not
-        /// correct.</summary>
-        public Haptics MakeHaptics(int instrument, upt_instrument tool, upt_haptics_options options)
-        {
-            options.struct_size = (uint)sizeof(upt_haptics_options);
-            options.instrument = checked((uint)instrument);
-            options.tool = &tool;
-            IntPtr scene = Enter();
-            try
-            {
-                IntPtr created = IntPtr.Zero;
-                Status.Check(Native.upt_haptics_create(scene, &options, &created));
-                return new Haptics(created);
-            }
-            finally { Leave(); }
-        }
-
         /// <summary>Ends the scene. Waits for a step in flight. May be called again.</summary>
         public void Dispose()
         {
@@ -466,14 +265,6 @@ namespace Upt.Interop
                     parameter + " holds " + field.Length + " floats, the mesh has " + NodeCount + " nodes (" +
                         3 * NodeCount + " floats)",
                     parameter);
-        }
-
-        private static void RequireInstruments(upt_instrument[] instruments, int count)
-        {
-            int room = instruments == null ? 0 : instruments.Length;
-            if (count < 0 || count > room)
-                throw new ArgumentOutOfRangeException(
-                    "count", "count is " + count + ", the array holds " + room + " instruments");
         }
 
         private static void RequireContacts(uint[] nodes, float[] vectors, int count)

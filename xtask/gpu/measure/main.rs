@@ -7,6 +7,8 @@
 
 #[path = "../../../benches/step/cost.rs"]
 mod cost;
+#[path = "../../../benches/step/pushes.rs"]
+mod pushes;
 #[path = "../../../benches/step/split.rs"]
 mod split;
 
@@ -18,15 +20,15 @@ use serde_json::{Value, json};
 use upt::model::KindModel;
 use upt::onnx::ProviderPlan;
 use upt::{
-    Contact, Corrections, GuardPolicy, IndexSet, Model, ModelOptions, Precision, Provider, Scene,
-    SceneOptions, StepInput, StepPath,
+    Corrections, Error, GuardPolicy, IndexSet, Model, ModelOptions, Precision, Provider, Result,
+    Scene, SceneOptions, StepPath,
 };
 
 const WARM_UP: usize = 10;
 /// Steps of the rollout that is compared with the CPU's.
 const ROLLOUT: usize = 40;
 
-fn main() -> Result<(), Box<dyn std::error::Error>> {
+fn main() -> std::result::Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [provider, steps, scenes, bundles @ ..] = arguments.as_slice() else {
         return Err("usage: gpu-measure PROVIDER STEPS SCENES BUNDLE...".into());
@@ -36,47 +38,21 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         .into_iter()
         .find(|known| known.name() == provider)
         .ok_or("PROVIDER must be cpu, cuda, tensorrt or tensorrt-rtx")?;
-    let scenes: Vec<usize> = scenes
-        .split(',')
-        .map(str::parse)
-        .collect::<Result<_, _>>()?;
     let steps = steps.parse()?;
+    let scenes: std::result::Result<Vec<usize>, _> = scenes.split(',').map(str::parse).collect();
+    let scenes = scenes?;
     for bundle in bundles {
-        let reference = Model::open(bundle.as_ref(), &ModelOptions::default())?;
-        let plain = rollout(&reference, StepPath::Split)?;
-        for (name, options, path) in variants(provider) {
-            let rows = Model::open(bundle.as_ref(), &options).and_then(|model| {
-                let deviation = deviation(&plain, &rollout(&model, path)?);
-                for surface in [false, true] {
-                    for &count in &scenes {
-                        let mut row = timed(&model, path, surface, count, steps)?;
-                        if count == 1 {
-                            let scene = Scene::new(Arc::clone(&model), &scene_options(path))?;
-                            push(
-                                &scene,
-                                &patch(&model),
-                                0,
-                                &mut vec![0.0; 3 * scene.node_count()],
-                            )?;
-                            let cost = cost::Cost::of(bundle.as_ref(), &model)?;
-                            row["flops_and_bytes"] = json!(cost.of_step(&scene, None));
-                        }
-                        row["deviation_from_cpu_f32"] = json!(deviation);
-                        row["nodes"] = json!(if surface { "surface" } else { "all" });
-                        print(row, &reference, name, provider, count);
-                    }
-                }
-                Ok(())
-            });
-            explain(rows, &reference, name, provider);
+        let path = Path::new(bundle);
+        let reference = Way::open(path, &ModelOptions::default(), StepPath::Split)?;
+        let plain = reference.rollout()?;
+        for (name, options, step_path) in variants(provider) {
+            let way = Way::open(path, &options, step_path);
+            let rows = way.and_then(|way| way.rows(&plain, &scenes, steps));
+            print(&reference.model, name, provider, rows);
         }
+        let rows = papers(path, &reference, provider, steps);
         let name = "ONNX Runtime, the paper's split";
-        let rows = papers(bundle.as_ref(), &reference, provider, steps);
-        let rows = rows.map(|row| {
-            row.into_iter()
-                .for_each(|row| print(row, &reference, name, provider, 1));
-        });
-        explain(rows, &reference, name, provider);
+        print(&reference.model, name, provider, rows);
     }
     Ok(())
 }
@@ -107,153 +83,147 @@ fn variants(provider: Provider) -> Vec<(&'static str, ModelOptions, StepPath)> {
     all
 }
 
-fn print(mut row: Value, model: &Model, variant: &str, provider: Provider, scenes: usize) {
-    row["bundle"] = json!(model.manifest.name);
-    row["node_count"] = json!(model.info().node_count);
-    row["variant"] = json!(variant);
-    row["provider"] = json!(provider.name());
-    row["scenes"] = json!(scenes);
-    println!("{row}");
-}
-
-fn explain(outcome: upt::Result<()>, model: &Model, variant: &str, provider: Provider) {
-    if let Err(error) = outcome {
-        let what = format!("{}, {variant}, {}", model.manifest.name, provider.name());
-        println!(
-            "{}",
-            json!({"not_measured": what, "why": error.to_string()})
-        );
-    }
-}
-
-fn scene_options(path: StepPath) -> SceneOptions {
-    SceneOptions {
-        step_path: path,
-        corrections: Corrections::None,
-        guard_policy: GuardPolicy::Report,
-        no_sleep: true,
-        ..SceneOptions::default()
-    }
-}
-
-/// Nodes of the domain within 8 mm of its middle one.
-fn patch(model: &Model) -> Vec<u32> {
-    let domain = model.indices(IndexSet::DomainNodes);
-    let position = |node: u32| &model.positions()[3 * node as usize..3 * node as usize + 3];
-    let centre = position(domain[domain.len() / 2]);
-    let near = |&node: &u32| {
-        let apart = position(node)
-            .iter()
-            .zip(centre)
-            .map(|(a, b)| (a - b).powi(2));
-        apart.sum::<f32>() < 64.0
-    };
-    domain.iter().copied().filter(near).collect()
-}
-
-fn pushed(nodes: &[u32], t: usize) -> Vec<f32> {
-    [0.0, 0.0, -5.0 + 0.1 * (t % 7) as f32].repeat(nodes.len())
-}
-
-fn push(scene: &Scene, nodes: &[u32], t: usize, out: &mut [f32]) -> upt::Result<()> {
-    let vectors = &pushed(nodes, t);
-    let (displacement, contact) = (None, Contact::Sparse { nodes, vectors });
-    let input = StepInput {
-        displacement,
-        contact,
-    };
-    scene.step(input, Some(out))
-}
-
-fn rollout(model: &Arc<Model>, path: StepPath) -> upt::Result<Vec<f32>> {
-    let scene = Scene::new(Arc::clone(model), &scene_options(path))?;
-    let (nodes, mut frames) = (patch(model), Vec::new());
-    let mut out = vec![0.0; 3 * scene.node_count()];
-    for t in 0..ROLLOUT {
-        push(&scene, &nodes, t, &mut out)?;
-        frames.extend_from_slice(&out);
-    }
-    Ok(frames)
-}
-
-/// Largest difference over the largest displacement of a rollout.
-fn deviation(plain: &[f32], found: &[f32]) -> f32 {
-    let largest = plain.iter().fold(1e-6f32, |a, x| a.max(x.abs()));
-    let differences = plain.iter().zip(found).map(|(a, b)| (a - b).abs());
-    differences.fold(0.0, f32::max) / largest
-}
-
-/// Steps of `count` scenes at once, a thread each; percentiles over all of them, means of a step's parts.
-fn timed(
-    model: &Arc<Model>,
-    path: StepPath,
-    surface: bool,
-    count: usize,
-    steps: usize,
-) -> upt::Result<Value> {
-    let (nodes, start_line) = (&patch(model), &Barrier::new(count));
-    let scene = || {
-        let scene = Scene::new(Arc::clone(model), &scene_options(path))?;
-        scene.set_region(surface.then(|| model.indices(IndexSet::SurfaceNodes)))?;
-        Ok(scene)
-    };
-    let made = (0..count)
-        .map(|_| scene())
-        .collect::<upt::Result<Vec<Scene>>>()?;
-    let run = |scene: &Scene| -> upt::Result<Vec<[f64; 4]>> {
-        let mut out = vec![0.0; 3 * scene.region_count()];
-        (0..WARM_UP).try_for_each(|t| push(scene, nodes, t, &mut out))?;
-        start_line.wait();
-        let mut times = Vec::with_capacity(steps);
-        for t in 0..steps {
-            let start = Instant::now();
-            push(scene, nodes, t, &mut out)?;
-            let ms = start.elapsed().as_secs_f64() * 1e3;
-            let s = scene.stats();
-            let compute = s.latent_ms + s.decode_ms - s.upload_ms - s.download_ms;
-            times.push([ms, s.upload_ms, compute, s.download_ms]);
+/// A line for each row, or for why there is none.
+fn print(model: &Model, variant: &str, provider: Provider, rows: Result<Vec<Value>>) {
+    let (bundle, card) = (&model.manifest.name, provider.name());
+    match rows {
+        Ok(rows) => rows.into_iter().for_each(|mut row| {
+            row["bundle"] = json!(bundle);
+            row["node_count"] = json!(model.info().node_count);
+            row["variant"] = json!(variant);
+            row["provider"] = json!(card);
+            println!("{row}");
+        }),
+        Err(error) => {
+            let what = format!("{bundle}, {variant}, {card}");
+            let line = json!({"not_measured": what, "why": error.to_string()});
+            println!("{line}");
         }
-        Ok(times)
-    };
-    let times: upt::Result<Vec<_>> = std::thread::scope(|scope| {
-        let threads: Vec<_> = made
-            .iter()
-            .map(|scene| scope.spawn(|| run(scene)))
-            .collect();
-        let panicked = |_| Err(upt::Error::State("a scene's thread panicked".into()));
-        threads
-            .into_iter()
-            .map(|thread| thread.join().unwrap_or_else(panicked))
-            .collect()
-    });
-    let times = times?.concat();
-    let mean = |part: usize| times.iter().map(|t| t[part]).sum::<f64>() / times.len() as f64;
-    let mut row = percentiles(times.iter().map(|t| t[0]).collect());
-    row["upload_ms"] = json!(mean(1));
-    row["compute_ms"] = json!(mean(2));
-    row["download_ms"] = json!(mean(3));
-    let taken = made[0].stats();
-    row["step_path"] = json!(format!("{:?}", taken.step_path).to_lowercase());
-    row["kernel"] = json!(format!("{:?}", taken.kernel).to_lowercase());
-    row["precision"] = json!(format!("{:?}", taken.precision).to_lowercase());
-    row["ran_on"] = json!(taken.provider.name());
-    Ok(row)
+    }
+}
+
+/// A way to run a bundle.
+struct Way {
+    model: Arc<Model>,
+    cost: cost::Cost,
+    step_path: StepPath,
+}
+
+impl Way {
+    fn open(path: &Path, options: &ModelOptions, step_path: StepPath) -> Result<Way> {
+        let model = Model::open(path, options)?;
+        let cost = cost::Cost::of(path, &model)?;
+        Ok(Way {
+            model,
+            cost,
+            step_path,
+        })
+    }
+
+    fn scene(&self) -> Result<Scene> {
+        let options = SceneOptions {
+            step_path: self.step_path,
+            corrections: Corrections::None,
+            guard_policy: GuardPolicy::Report,
+            no_sleep: true,
+            ..SceneOptions::default()
+        };
+        Scene::new(Arc::clone(&self.model), &options)
+    }
+
+    /// Nodes in the middle of the domain.
+    fn patch(&self) -> Vec<u32> {
+        let mesh = &self.model.mesh;
+        pushes::patch(mesh, mesh.domain_nodes.len() / 2)
+    }
+
+    fn rollout(&self) -> Result<Vec<f32>> {
+        let (scene, nodes) = (self.scene()?, self.patch());
+        let (mut frames, mut out) = (Vec::new(), vec![0.0; 3 * scene.node_count()]);
+        for t in 0..ROLLOUT {
+            pushes::push(&scene, &nodes, t, Some(&mut out))?;
+            frames.extend_from_slice(&out);
+        }
+        Ok(frames)
+    }
+
+    /// All nodes and the surface, and each number of scenes.
+    fn rows(&self, plain: &[f32], scenes: &[usize], steps: usize) -> Result<Vec<Value>> {
+        let found = self.rollout()?;
+        let largest = plain.iter().fold(1e-6f32, |a, x| a.max(x.abs()));
+        let differences = plain.iter().zip(&found).map(|(a, b)| (a - b).abs());
+        let deviation = differences.fold(0.0, f32::max) / largest;
+        let mut rows = Vec::new();
+        for surface in [false, true] {
+            for &count in scenes {
+                let mut row = self.timed(surface, count, steps)?;
+                row["deviation_from_cpu_f32"] = json!(deviation);
+                row["nodes"] = json!(if surface { "surface" } else { "all" });
+                row["scenes"] = json!(count);
+                rows.push(row);
+            }
+        }
+        Ok(rows)
+    }
+
+    /// Steps of `count` scenes at once, a thread each; percentiles over all of them, means of a step's parts.
+    fn timed(&self, surface: bool, count: usize, steps: usize) -> Result<Value> {
+        let (nodes, start_line) = (&self.patch(), &Barrier::new(count));
+        let region = surface.then(|| self.model.indices(IndexSet::SurfaceNodes));
+        let made = (0..count).map(|_| {
+            let scene = self.scene()?;
+            scene.set_region(region)?;
+            Ok(scene)
+        });
+        let made = made.collect::<Result<Vec<Scene>>>()?;
+        let run = |scene: &Scene| -> Result<Vec<[f64; 4]>> {
+            let mut out = vec![0.0; 3 * scene.region_count()];
+            (0..WARM_UP).try_for_each(|t| pushes::push(scene, nodes, t, Some(&mut out)))?;
+            start_line.wait();
+            let timed = (0..steps).map(|t| {
+                let start = Instant::now();
+                pushes::push(scene, nodes, t, Some(&mut out))?;
+                let ms = start.elapsed().as_secs_f64() * 1e3;
+                let s = scene.stats();
+                let compute = s.latent_ms + s.decode_ms - s.upload_ms - s.download_ms;
+                Ok([ms, s.upload_ms, compute, s.download_ms])
+            });
+            timed.collect()
+        };
+        let times: Vec<[f64; 4]> = std::thread::scope(|scope| {
+            let start = |scene| scope.spawn(move || run(scene));
+            let threads: Vec<_> = made.iter().map(start).collect();
+            let panicked = |_| Err(Error::State("a scene's thread panicked".into()));
+            let ends = threads.into_iter();
+            let times = ends.map(|thread| thread.join().unwrap_or_else(panicked));
+            times.collect::<Result<Vec<_>>>().map(|all| all.concat())
+        })?;
+        let mean = |part: usize| times.iter().map(|t| t[part]).sum::<f64>() / times.len() as f64;
+        let mut row = percentiles(times.iter().map(|t| t[0]).collect());
+        row["upload_ms"] = json!(mean(1));
+        row["compute_ms"] = json!(mean(2));
+        row["download_ms"] = json!(mean(3));
+        let taken = made[0].stats();
+        row["step_path"] = json!(format!("{:?}", taken.step_path).to_lowercase());
+        row["kernel"] = json!(format!("{:?}", taken.kernel).to_lowercase());
+        row["precision"] = json!(format!("{:?}", taken.precision).to_lowercase());
+        row["ran_on"] = json!(taken.provider.name());
+        if count == 1 {
+            row["flops_and_bytes"] = json!(self.cost.of_step(&made[0], region));
+        }
+        Ok(row)
+    }
 }
 
 /// The paper's two graphs in ONNX Runtime alone; none for another kind of bundle.
-fn papers(
-    bundle: &Path,
-    reference: &Arc<Model>,
-    provider: Provider,
-    steps: usize,
-) -> upt::Result<Option<Value>> {
-    let KindModel::Upt(kind) = &reference.kind else {
-        return Ok(None);
+fn papers(bundle: &Path, reference: &Way, provider: Provider, steps: usize) -> Result<Vec<Value>> {
+    let KindModel::Upt(kind) = &reference.model.kind else {
+        return Ok(Vec::new());
     };
     let plan = ProviderPlan::new(&variants(provider)[0].1);
-    let mut split = split::Split::new(bundle, reference, kind, 1, plan)?;
-    let nodes = patch(reference);
-    split.set_contact(kind, &nodes, &pushed(&nodes, 0));
+    let mut split = split::Split::new(bundle, &reference.model, kind, 1, plan)?;
+    let nodes = reference.patch();
+    split.set_contact(kind, &nodes, &pushes::pushed(&nodes, 0));
     let mut times = Vec::new();
     for _ in 0..steps + WARM_UP {
         let start = Instant::now();
@@ -261,9 +231,11 @@ fn papers(
         times.push(start.elapsed().as_secs_f64() * 1e3);
     }
     if split.displacement().iter().any(|u| !u.is_finite()) {
-        return Err(upt::Error::State("the paper's split gave NaN".into()));
+        return Err(Error::State("the paper's split gave NaN".into()));
     }
-    Ok(Some(percentiles(times.split_off(WARM_UP))))
+    let mut row = percentiles(times.split_off(WARM_UP));
+    row["scenes"] = json!(1);
+    Ok(vec![row])
 }
 
 fn percentiles(mut times: Vec<f64>) -> Value {

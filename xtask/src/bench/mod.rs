@@ -38,33 +38,29 @@ pub struct Options {
 }
 
 /// A bench target: package and name.
-struct Target {
-    package: &'static str,
-    name: String,
-}
+type Target = (&'static str, String);
 
 /// The part of the tables that is no Rust: `tests/csharp/overhead.sh`.
 const UNITY: &str = "unity-plugin";
 
 pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
-    venv::create(workspace, "target/venv")?;
     let random = workspace.path("target/bench/bundles");
     if let Err(error) = random_bundles(workspace, &random) {
         eprintln!("left out: the rows of `wide` and `paper`: {error:#}");
     }
     let mut chosen = targets(workspace)?;
     if let Some(part) = &options.only {
-        chosen.retain(|target| target.name.contains(part.as_str()));
+        chosen.retain(|(_, name)| name.contains(part.as_str()));
     }
     // What the targets run is built first, so that a measurement's time is its own.
     let mut commands = Vec::new();
     for target in &chosen {
-        commands.push(target.command(workspace, &random, options)?);
+        commands.push(command(workspace, target, &random, options)?);
     }
     let start = Instant::now();
     let (mut measured, mut all, mut failed) = (Measured::default(), Vec::new(), false);
-    for (target, mut command) in chosen.iter().zip(commands) {
-        let name = format!("{}/{}", target.package, target.name);
+    for ((package, name), mut command) in chosen.iter().zip(commands) {
+        let name = format!("{package}/{name}");
         let finished = run_logged(workspace, &format!("bench {name}"), &mut command)?;
         let log = finished.log.display();
         if !finished.success {
@@ -99,66 +95,42 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
     Ok(!failed)
 }
 
-impl Target {
-    /// What measures it, built already.
-    fn command(&self, workspace: &Workspace, random: &Path, options: &Options) -> Result<Command> {
-        let Self { package, name } = self;
-        let mut command = if *package == UNITY {
-            let mut command = workspace.bash("tests/csharp/overhead.sh");
-            workspace.with_parts(&mut command)?;
-            command
-        } else {
-            let words = format!("bench -p {package} --bench {name}");
-            let label = format!("build the bench {package}/{name}");
-            run_checked(workspace, &label, workspace.cargo(&words).arg("--no-run"))?;
-            let mut command = workspace.cargo(&words);
-            ort::set_environment(workspace, &mut command)?;
-            if let Some(part) = &options.part {
-                command.args(["--", part]);
-            }
-            command
-        };
-        if options.quick {
-            command.env("UPT_BENCH_QUICK", "1");
+/// What measures a target, built already.
+fn command(
+    workspace: &Workspace,
+    (package, name): &Target,
+    random: &Path,
+    options: &Options,
+) -> Result<Command> {
+    let mut command = if *package == UNITY {
+        let mut command = workspace.bash("tests/csharp/overhead.sh");
+        workspace.with_parts(&mut command)?;
+        command
+    } else {
+        let words = format!("bench -p {package} --bench {name}");
+        let label = format!("build the bench {package}/{name}");
+        run_checked(workspace, &label, workspace.cargo(&words).arg("--no-run"))?;
+        let mut command = workspace.cargo(&words);
+        ort::set_environment(workspace, &mut command)?;
+        if let Some(part) = &options.part {
+            command.args(["--", part]);
         }
-        command.env("UPT_BENCH_BUNDLES", random);
-        Ok(command)
+        command
+    };
+    if options.quick {
+        command.env("UPT_BENCH_QUICK", "1");
     }
+    command.env("UPT_BENCH_BUNDLES", random);
+    Ok(command)
 }
 
-/// Bundles with random weights of the `wide` and the `paper` configuration on the brain, the second with the graphs of
-/// the paper's split beside it, and `paper-fine` on the mesh that `UPT_FINE_MESH` names; made again when a bundle's
-/// configuration or mesh is newer.
+/// What `benches/random_bundles.sh` makes in this folder, where it is older than what it is made of.
 fn random_bundles(workspace: &Workspace, folder: &Path) -> Result<()> {
-    let brain = workspace.path("onnx/meshes/brain.mesh.safetensors");
-    let mut wanted = vec![("wide", "wide", brain.clone()), ("paper", "paper", brain)];
-    let fine = std::env::var_os("UPT_FINE_MESH");
-    wanted.extend(fine.map(|mesh| ("paper-fine", "paper", mesh.into())));
-    for (name, config, mesh) in wanted {
-        let config = workspace.path(&format!("training/configs/{config}.toml"));
-        let (split, last) = match name {
-            "wide" => ("", "bundle.json"),
-            _ => ("--paper-split", "reference.safetensors"),
-        };
-        let written = |path: &Path| path.metadata().and_then(|file| file.modified()).ok();
-        let made = written(&folder.join(name).join(last));
-        if made > written(&config) && made > written(&mesh) {
-            continue;
-        }
-        venv::install_training(workspace)?;
-        std::fs::create_dir_all(folder)?;
-        let words = format!("-m upt_training.random_bundle --name {name} {split} --config");
-        let mut command = workspace.python(&words);
-        ort::set_environment(workspace, &mut command)?;
-        command.arg(&config).arg("--mesh").arg(&mesh);
-        command.arg("--out").arg(folder.join(name));
-        run_checked(
-            workspace,
-            &format!("bundle {name}, random weights"),
-            &mut command,
-        )?;
-    }
-    Ok(())
+    venv::install(workspace, venv::TRAINING)?;
+    let mut command = workspace.bash("benches/random_bundles.sh");
+    ort::set_environment(workspace, &mut command)?;
+    command.env("UPT_PYTHON", workspace.venv_program("python"));
+    run_checked(workspace, "random bundles", command.arg(folder))
 }
 
 /// Bench targets of `benches/` and `crates/tissue/benches/` (files, and folders with a `main.rs`), and the C# side.
@@ -175,8 +147,5 @@ fn targets(workspace: &Workspace) -> Result<Vec<Target>> {
         }
     }
     found.sort();
-    Ok(found
-        .into_iter()
-        .map(|(package, name)| Target { package, name })
-        .collect())
+    Ok(found)
 }

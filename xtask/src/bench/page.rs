@@ -22,10 +22,9 @@ pub struct Measured {
 /// Replaces the sections of the tables that were measured; the others stay, with the machine that they name, and so
 /// does what is written by hand around the markers. `partly`: rows that were not measured stay too.
 pub fn write(workspace: &Workspace, quick: bool, partly: bool, measured: &Measured) -> Result<()> {
-    let short = if quick {
-        ", short runs (`--quick`)"
-    } else {
-        ""
+    let short = match quick {
+        true => ", short runs (`--quick`)",
+        false => "",
     };
     let how = format!("Measured on {}{short}.", machine());
     let page = workspace.path("docs/results/performance.md");

@@ -17,7 +17,7 @@ use std::process::ExitCode;
 use anyhow::{Context, Result, ensure};
 use tissue::schemes::{Programme, Scheme};
 
-use crate::stress::bench::{Bench, push, ramp};
+use crate::bench::{Bench, push, ramp};
 use crate::stress::{progress, replace_between};
 use observer::Moment;
 use pair::Pair;

@@ -4,7 +4,7 @@ use anyhow::{Result, ensure};
 use upt::forces::ReactionForces;
 use upt::{Contact, Error, Scene, StepInput, flag};
 
-use crate::stress::bench::Bench;
+use crate::bench::Bench;
 
 /// Attached points of each sort that are watched, at most.
 const POINTS: usize = 2000;

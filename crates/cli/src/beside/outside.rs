@@ -5,7 +5,7 @@ use tissue::contact::Patch;
 
 use super::observer::Moment;
 use super::pair::{Pair, contact};
-use crate::stress::bench::{Bench, Touch, push, ramp};
+use crate::bench::{Bench, Touch, push, ramp};
 
 const STEPS: usize = 30;
 

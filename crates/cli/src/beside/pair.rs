@@ -4,7 +4,7 @@ use anyhow::Result;
 use tissue::solver::{ContactNode, Solver, SolverOptions};
 
 use super::observer::{Moment, Observer, Truth};
-use crate::stress::bench::{Bench, Touch};
+use crate::bench::{Bench, Touch};
 
 const FRAME_S: f64 = 0.05;
 

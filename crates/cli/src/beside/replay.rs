@@ -6,8 +6,8 @@ use anyhow::{Result, ensure};
 use tissue::trajectory::Trajectory;
 
 use super::observer::{Moment, Observer, Truth};
+use crate::bench::Bench;
 use crate::report::cases::finished;
-use crate::stress::bench::Bench;
 use crate::stress::progress;
 
 /// The cases of a scheme or regime.

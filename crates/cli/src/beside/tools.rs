@@ -10,9 +10,9 @@ use tissue::programmes::{ToolCase, ToolProgramme};
 use tissue::schemes::FRAME_S;
 use tissue::solver::Solver;
 
+use crate::bench::{Bench, names};
 use crate::host;
 use crate::report::plot::label;
-use crate::stress::bench::{Bench, names};
 use crate::stress::progress;
 use crate::tools::drive::{Drive, Driver};
 use crate::tools::yard::Yard;

@@ -9,7 +9,7 @@ use tissue::schemes::{FRAME_S, FRAMES, Programme, Scheme};
 use tissue::solver::{Solver, SolverOptions};
 use upt::{Contact, Corrections, Error, Model, Scene, SceneOptions, StepInput};
 
-use super::score::{Regions, Score, Step};
+use super::score::{Regions, Score, Step, Touch};
 use crate::preview::Film;
 
 /// Push of the programmes as they are written, mm.
@@ -23,9 +23,6 @@ pub struct Case {
     pub scheme: Scheme,
     pub seed: u64,
 }
-
-/// Nodes and vectors of one step's contact.
-pub type Touch = (Vec<u32>, Vec<f32>);
 
 /// What is simulated and replayed.
 #[derive(Clone, Copy)]

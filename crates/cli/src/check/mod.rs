@@ -7,7 +7,6 @@
 mod case;
 mod certificate;
 mod page;
-mod parallel;
 mod recording;
 mod score;
 mod tools;
@@ -29,10 +28,10 @@ use tissue::programmes::ToolProgramme;
 use tissue::schemes::{FRAMES, Scheme};
 use upt::{Corrections, Model, ModelOptions};
 
+use crate::parallel::{in_parallel, workers};
 use crate::tool_scale::{self, Chosen};
 use crate::{loads, progress};
 use case::{Body, Case, Replay};
-use parallel::{in_parallel, workers};
 use score::{Regions, Score};
 
 /// Programmes in the order in which they are run: `probe` has five sites, the others are the paper's.

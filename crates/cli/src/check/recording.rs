@@ -5,9 +5,10 @@ use std::path::Path;
 use anyhow::Result;
 use upt::Corrections;
 
-use super::case::{Case, Frame, Replay, Touch};
-use super::parallel::{in_parallel, workers};
+use super::case::{Case, Frame, Replay};
+use super::score::Touch;
 use super::{Bundle, Certificate, held_out};
+use crate::parallel::{in_parallel, workers};
 use crate::progress;
 
 /// A frame that was kept: 12 bytes a node.

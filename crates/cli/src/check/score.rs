@@ -4,8 +4,10 @@ use tissue::mesh::{Mesh, face_centroid};
 use tissue::metrics;
 use upt::SceneStats;
 
-use super::case::Touch;
 use crate::preview::Film;
+
+/// Nodes and vectors of one step's contact.
+pub type Touch = (Vec<u32>, Vec<f32>);
 
 /// Regions of the domain.
 const REGIONS: usize = 6;

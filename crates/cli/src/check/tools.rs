@@ -9,8 +9,8 @@ use tissue::simulate::{ToolOrder, simulate_tools};
 use tissue::solver::SolverOptions;
 
 use super::certificate::short;
-use super::parallel::{in_parallel, workers};
 use super::{Bundle, Plan};
+use crate::parallel::{in_parallel, workers};
 use crate::progress;
 use crate::report::method::BundleFolder;
 use crate::tools::cases::{ToolCase, ToolCases};

@@ -12,6 +12,7 @@ mod foreign;
 mod learn;
 mod options;
 mod patches;
+mod projected;
 mod refine;
 mod stages;
 mod tables;

@@ -15,6 +15,7 @@ use tissue::tensors::{Dtype, Tensor, write_file};
 
 use super::options::{Options, Sizes};
 use super::patches::{self, Forces};
+use super::projected::Projected;
 use super::stages::Stage;
 use super::vibration::{self, Modes};
 use crate::progress;
@@ -27,55 +28,6 @@ const MOST: usize = 256;
 const MEMORY: usize = 1 << 30;
 /// Neighbours within so many radii of the largest contact have exact compliance, the others' comes from the response.
 const NEAR: f64 = 1.0;
-
-/// Rows of block coordinates, gathered block by block.
-pub struct Projected {
-    /// For each block, `[count, rank]`.
-    blocks: Vec<Vec<f32>>,
-    count: usize,
-    /// `Q`.
-    pub width: usize,
-}
-
-impl Projected {
-    fn new(count: usize) -> Self {
-        Self {
-            blocks: Vec::new(),
-            count,
-            width: 0,
-        }
-    }
-
-    /// Adds the next block: `fields [count, dofs]` times `basis [dofs, rank]`.
-    fn push(&mut self, fields: impl Iterator<Item = Vec<f32>>, basis: &[f32], rank: usize) {
-        let mut block = Vec::with_capacity(self.count * rank);
-        for field in fields {
-            let start = block.len();
-            block.resize(start + rank, 0.0f32);
-            for (&u, row) in field.iter().zip(basis.chunks_exact(rank)) {
-                if u != 0.0 {
-                    for (q, phi) in block[start..].iter_mut().zip(row) {
-                        *q += u * phi;
-                    }
-                }
-            }
-        }
-        self.width += rank;
-        self.blocks.push(block);
-    }
-
-    /// `[count, Q]`.
-    pub fn rows(&self) -> Vec<f32> {
-        let mut rows = Vec::with_capacity(self.count * self.width);
-        for row in 0..self.count {
-            for block in &self.blocks {
-                let rank = block.len() / self.count;
-                rows.extend_from_slice(&block[row * rank..(row + 1) * rank]);
-            }
-        }
-        rows
-    }
-}
 
 /// Writes `prior.safetensors` and `vibration.safetensors` into the stage's folder.
 pub fn make(

@@ -8,7 +8,7 @@ use tissue::mesh::{Mesh, tet_volume};
 use tissue::tensors::{Dtype, Tensor, f32_values, write_file};
 
 use super::options::Options;
-use super::tables::Projected;
+use super::projected::Projected;
 
 /// Number of modes: as asked, but at most a sixth of the free degrees of freedom.
 pub fn count(mesh: &Mesh, options: &Options) -> usize {

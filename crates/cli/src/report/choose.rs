@@ -6,7 +6,8 @@ use anyhow::{Result, bail};
 use tissue::mesh::Mesh;
 
 use super::cases::Cases;
-use super::method::{BundleFolder, Method};
+use super::method::BundleFolder;
+use super::method::Method;
 use super::prior_alone::PriorAlone;
 use super::{Options, Region, paper_split, same_body};
 use crate::effort::Effort;

@@ -11,8 +11,7 @@ impl Resident {
         unsafe {
             libc::malloc_trim(0);
         }
-        let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-        Resident(resident_bytes(&status))
+        Resident(resident_bytes())
     }
 
     /// MB more than then; 0 where it is not known.
@@ -24,8 +23,13 @@ impl Resident {
     }
 }
 
+/// Resident memory of this process, bytes; `None` where the system does not tell: only Linux does.
+pub fn resident_bytes() -> Option<u64> {
+    stated(&std::fs::read_to_string("/proc/self/status").ok()?)
+}
+
 /// The line `VmRSS:  123 kB` of /proc/self/status.
-fn resident_bytes(status: &str) -> Option<u64> {
+fn stated(status: &str) -> Option<u64> {
     let line = status.lines().find(|line| line.starts_with("VmRSS:"))?;
     let kilobytes: u64 = line.split_whitespace().nth(1)?.parse().ok()?;
     Some(1024 * kilobytes)
@@ -38,8 +42,8 @@ mod tests {
     #[test]
     fn the_line_is_found() {
         let status = "Name:\tupt\nVmHWM:\t  900 kB\nVmRSS:\t  812 kB\nThreads:\t1\n";
-        assert_eq!(resident_bytes(status), Some(812 * 1024));
-        assert_eq!(resident_bytes("Name:\tupt\n"), None);
+        assert_eq!(stated(status), Some(812 * 1024));
+        assert_eq!(stated("Name:\tupt\n"), None);
     }
 
     /// The test that measures runs in a process of its own: what other tests of this program allocate would be counted too.

@@ -1,9 +1,9 @@
 //! Everything that can be stepped through a contact: the library and the plain methods.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, bail};
 use tissue::baselines::CoarseTled;
 use tissue::mesh::{Boundary, Mesh};
 use tissue::solver::{ContactNode, Solver, SolverOptions};
@@ -11,26 +11,11 @@ use tissue::trajectory::TrajectoryHeader;
 #[cfg(feature = "linear")]
 use tissue::{baselines::LinearQuasiStatic, linear::Lame};
 use upt::ffi;
-use upt::kernels::decoder::DecoderPrecision;
 
+pub use super::bundle_folder::BundleFolder;
 use super::setting::{Precision, Provider, Region};
 use crate::effort::Effort;
 use crate::host;
-
-/// A bundle on disk, as its manifest describes it.
-#[derive(Clone, Debug)]
-pub struct BundleFolder {
-    pub path: PathBuf,
-    pub name: String,
-    pub boundary: String,
-    pub mesh_sha256: String,
-    pub mesh_file: PathBuf,
-    pub sha256: String,
-    /// Float32, the variants of the graphs that the manifest lists, and bfloat16 where kind and CPU have it.
-    pub precisions: Vec<Precision>,
-    /// Corrections a step that the manifest recommends; none where the bundle has no tables for them.
-    pub corrections: Option<Effort>,
-}
 
 /// A method in one configuration.
 #[derive(Clone, Debug)]
@@ -92,56 +77,6 @@ pub struct SurrogateStepper {
     region: Vec<u32>,
     others: Vec<u32>,
     returned: Vec<[f32; 3]>,
-}
-
-impl BundleFolder {
-    pub fn read(path: &Path) -> Result<Self> {
-        let file = path.join("bundle.json");
-        let bytes = std::fs::read(&file).with_context(|| {
-            format!(
-                "{}: cannot be read; a bundle is a folder with a bundle.json",
-                file.display()
-            )
-        })?;
-        let fields: serde_json::Value = serde_json::from_slice(&bytes)
-            .with_context(|| format!("{}: is not JSON", file.display()))?;
-        let text = |value: &serde_json::Value, name: &str| {
-            value
-                .as_str()
-                .map(str::to_owned)
-                .with_context(|| format!("{}: field `{name}` is missing", file.display()))
-        };
-        let listed = |name: &str| {
-            let list = fields["precisions"].as_array();
-            list.is_some_and(|list| list.iter().any(|one| one == name))
-        };
-        let mut precisions = vec![Precision::F32];
-        if fields["kind"] == "upt" && DecoderPrecision::fastest_bf16() != DecoderPrecision::F32 {
-            precisions.push(Precision::Bf16);
-        }
-        for narrow in [Precision::F16, Precision::Int8] {
-            if listed(narrow.name()) {
-                precisions.push(narrow);
-            }
-        }
-        use sha2::Digest;
-        Ok(Self {
-            precisions,
-            corrections: fields["corrections"]["recommended"]
-                .as_u64()
-                .map(|count| Effort {
-                    most: count as u32,
-                    target_mm: fields["corrections"]["target_mm"].as_f64().unwrap_or(0.0) as f32,
-                    substeps: 0,
-                }),
-            path: path.to_path_buf(),
-            name: text(&fields["name"], "name")?,
-            boundary: text(&fields["boundary"], "boundary")?,
-            mesh_sha256: text(&fields["mesh"]["mesh_sha256"], "mesh.mesh_sha256")?,
-            mesh_file: path.join(text(&fields["mesh"]["file"], "mesh.file")?),
-            sha256: format!("{:x}", sha2::Sha256::digest(&bytes)),
-        })
-    }
 }
 
 impl Stepper {

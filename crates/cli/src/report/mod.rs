@@ -3,6 +3,7 @@
 //! Every row replays the same held-out contacts autoregressively and is timed step by step around the
 //! C call. Finished rows are kept by content, so that an interrupted report goes on where it was.
 
+mod bundle_folder;
 mod cache;
 pub mod cases;
 mod choose;

@@ -7,7 +7,7 @@ use upt::kernels::rows::{RowPlan, decode_rows};
 use upt::kernels::{Isa, Pool};
 use upt::prior::{ContactResponse, PriorTable};
 
-use super::method::BundleFolder;
+use super::bundle_folder::BundleFolder;
 
 pub struct PriorAlone {
     table: PriorTable,

@@ -6,7 +6,7 @@ use anyhow::Result;
 use upt::{Contact, Error, Model, ModelOptions, Precision, Scene, SceneOptions, StepInput};
 
 use super::Row;
-use super::bench::{Bench, names, push, ramp};
+use crate::bench::{Bench, names, push, ramp};
 
 const CASE: &str = "float16 overflow";
 /// Above the largest float16, 65,504, and below the largest input, mm.

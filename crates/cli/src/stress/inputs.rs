@@ -6,7 +6,7 @@ use anyhow::Result;
 use upt::{Contact, Error, Scene, SceneOptions, StepInput};
 
 use super::Row;
-use super::bench::{Bench, Run, largest, push, ramp};
+use crate::bench::{Bench, Run, largest, push, ramp};
 
 pub(super) fn bad_inputs(bench: &Bench) -> Result<Vec<Row>> {
     let mut rows = Vec::new();

@@ -1,10 +1,8 @@
 //! `upt stress`: a fixed suite of stiff and extreme cases for the reference solver and for bundles, as a table: what was
 //! done, what happened, and whether that is what must happen. Exit code 1 when a verdict is bad.
 
-pub(crate) mod bench;
 mod half;
 mod inputs;
-mod jump;
 mod outside;
 mod reference;
 mod storm;
@@ -17,6 +15,8 @@ use std::process::ExitCode;
 use anyhow::{Context, Result};
 use indicatif::ProgressBar;
 use serde::Serialize;
+
+use crate::bench::{Bench, Run};
 
 #[derive(clap::Args)]
 #[command(
@@ -79,6 +79,12 @@ impl Row {
             verdict: Verdict::Left,
             ..Self::new(subject, case, why.into(), true)
         }
+    }
+}
+
+impl Bench {
+    pub(crate) fn row(&self, case: &str, run: &Run, good: bool) -> Row {
+        Row::new(&self.subject, case, run.text(), good)
     }
 }
 

@@ -5,7 +5,7 @@ use tissue::contact::Patch;
 use upt::flag;
 
 use super::Row;
-use super::bench::{Bench, Touch, push, ramp};
+use crate::bench::{Bench, Touch, push, ramp};
 
 pub(super) fn rows(bench: &Bench) -> Result<Vec<Row>> {
     let mut rows = Vec::new();

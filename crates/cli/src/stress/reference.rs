@@ -1,6 +1,8 @@
 //! Stiff and extreme cases for the reference solver. Expected of each: a finite answer (by substeps where the asked
 //! step is too long), or a typed error; never NaN in the caller's hands.
 
+mod jump;
+
 use std::path::Path;
 
 use anyhow::Result;
@@ -9,7 +11,7 @@ use tissue::material::Material;
 use tissue::mesh::{Boundary, Mesh, ellipsoid_phantom};
 use tissue::solver::{ContactNode, Solver, SolverError, SolverOptions, Substep};
 
-use super::{Row, jump, progress};
+use super::{Row, progress};
 
 pub(super) const SUBJECT: &str = "reference solver";
 const FRAME_S: f64 = 0.05;

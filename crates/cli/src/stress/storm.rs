@@ -10,7 +10,7 @@ use tissue::schemes::SplitMix;
 use upt::{Contact, Corrections, Error, Scene, SceneOptions, StepInput, flag};
 
 use super::Row;
-use super::bench::{Bench, Touch, largest, names, push};
+use crate::bench::{Bench, Touch, largest, names, push};
 use crate::tools::yard::Yard;
 
 /// Corrections a step.

@@ -6,8 +6,8 @@ use std::path::Path;
 use anyhow::Result;
 use tissue::schemes::{Group, Programme, Scheme};
 
-use super::bench::{Bench, Run, Touch, largest, push, ramp};
 use super::{Row, half, inputs, outside, progress, storm, tools};
+use crate::bench::{Bench, Run, Touch, largest, push, ramp};
 
 /// All cases of the bundle at `path`.
 pub fn rows(path: &Path, quick: bool) -> Result<Vec<Row>> {

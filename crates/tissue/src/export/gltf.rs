@@ -3,7 +3,7 @@
 //! glTF is in metres with y up and z towards the viewer: (x, y, z) RAS mm becomes
 //! (x, z, -y) / 1000, so the brain stands upright and looks away from the viewer.
 
-use super::surface::Skin;
+use super::skin::Skin;
 use crate::tensors::write_whole;
 use base64::Engine;
 use serde_json::json;

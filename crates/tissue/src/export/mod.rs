@@ -2,6 +2,7 @@
 
 #[cfg(feature = "files")]
 mod gltf;
+mod skin;
 #[cfg(feature = "files")]
 mod surface;
 mod vtu;

@@ -11,9 +11,6 @@ use serde::Serialize;
 use crate::programmes::{self, ToolProgramme};
 use crate::schemes::{self, FRAME_S, FRAMES, Group, Scheme};
 
-/// Lowest and highest value of a draw.
-pub type Range = [f64; 2];
-
 /// Both tables, one row a line, as `training/upt_training/loads.json` and `upt loads --json` have them. Units are in the
 /// names of the fields.
 ///

@@ -2,8 +2,8 @@
 
 use std::fmt::Write;
 
-use super::Range;
 use crate::programmes::{self, BLADE_MM, FOOT_MM, Tip};
+use crate::schemes::Range;
 use crate::schemes::{self, Group};
 
 /// `2 to 6`, or `2` where there is nothing to draw. Two digits after the point are enough for every row.

@@ -1,10 +1,14 @@
-//! Tetrahedra of a Gmsh mesh, MSH 2.2 and 4.1, text and binary (either byte order); version 1 is in `gmsh_1`.
+//! Tetrahedra of a Gmsh mesh, MSH 2.2 and 4.1, text and binary (either byte order); version 1 is in `version_1`.
 //!
 //! A strict reader of the sections that matter, `$Nodes` and `$Elements`, written from the format's
 //! description in the Gmsh manual; node tags may be sparse. Points, lines and faces are skipped.
 
-use super::gmsh_groups::Groups;
-use super::{ImportError, RawTets, gmsh_1};
+mod groups;
+mod version_1;
+
+use super::labels::Labels;
+use super::{ImportError, RawTets};
+use groups::Groups;
 use std::collections::HashMap;
 use std::path::Path;
 
@@ -14,8 +18,8 @@ pub fn read(path: &Path) -> Result<RawTets, ImportError> {
 }
 
 /// Reads the triangles and tetrahedra with their physical groups; coordinates as the file has them.
-pub(super) fn read_groups(path: &Path) -> Result<Parts, ImportError> {
-    named(path, parse)
+pub(super) fn read_labels(path: &Path) -> Result<Labels, ImportError> {
+    named(path, parse).map(groups::labels)
 }
 
 fn named<T>(path: &Path, read: impl FnOnce(&[u8]) -> Result<T, Fault>) -> Result<T, ImportError> {
@@ -36,19 +40,19 @@ fn named<T>(path: &Path, read: impl FnOnce(&[u8]) -> Result<T, Fault>) -> Result
     })
 }
 
-pub(super) enum Fault {
+enum Fault {
     Text(String),
     Kind { element: usize, kind: i64 },
 }
 
-pub(super) fn fault<T>(reason: impl Into<String>) -> Result<T, Fault> {
+fn fault<T>(reason: impl Into<String>) -> Result<T, Fault> {
     Err(Fault::Text(reason.into()))
 }
 
 /// Gmsh element types that are skipped (points, lines, faces of any order), by number of nodes;
 /// and the linear tetrahedron.
-pub(super) const TETRAHEDRON: i64 = 4;
-pub(super) fn node_count(kind: i64, element: usize) -> Result<usize, Fault> {
+const TETRAHEDRON: i64 = 4;
+fn node_count(kind: i64, element: usize) -> Result<usize, Fault> {
     match kind {
         15 => Ok(1),
         1 => Ok(2),
@@ -59,7 +63,7 @@ pub(super) fn node_count(kind: i64, element: usize) -> Result<usize, Fault> {
 }
 
 /// Walks the bytes of a file, text or binary.
-pub(super) struct Cursor<'a> {
+struct Cursor<'a> {
     bytes: &'a [u8],
     at: usize,
     binary: bool,
@@ -74,7 +78,7 @@ impl<'a> Cursor<'a> {
     }
 
     /// The next word of text.
-    pub(super) fn word(&mut self) -> Result<&'a str, Fault> {
+    fn word(&mut self) -> Result<&'a str, Fault> {
         self.skip_space();
         let start = self.at;
         while self
@@ -92,7 +96,7 @@ impl<'a> Cursor<'a> {
     }
 
     /// To the first byte of a binary block.
-    pub(super) fn begin_block(&mut self) {
+    fn begin_block(&mut self) {
         if self.binary {
             self.end_line();
         }
@@ -119,7 +123,7 @@ impl<'a> Cursor<'a> {
         Ok(out)
     }
 
-    pub(super) fn parsed<T: std::str::FromStr>(&mut self) -> Result<T, Fault> {
+    fn parsed<T: std::str::FromStr>(&mut self) -> Result<T, Fault> {
         let word = self.word()?;
         word.parse().or_else(|_| {
             fault(format!(
@@ -130,7 +134,7 @@ impl<'a> Cursor<'a> {
     }
 
     /// A 4-byte integer where binary.
-    pub(super) fn int(&mut self) -> Result<i64, Fault> {
+    fn int(&mut self) -> Result<i64, Fault> {
         if self.binary {
             Ok(i64::from(i32::from_le_bytes(self.raw()?)))
         } else {
@@ -139,7 +143,7 @@ impl<'a> Cursor<'a> {
     }
 
     /// An 8-byte size where binary.
-    pub(super) fn size(&mut self) -> Result<u64, Fault> {
+    fn size(&mut self) -> Result<u64, Fault> {
         if self.binary {
             Ok(u64::from_le_bytes(self.raw()?))
         } else {
@@ -147,7 +151,7 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    pub(super) fn real(&mut self) -> Result<f64, Fault> {
+    fn real(&mut self) -> Result<f64, Fault> {
         if self.binary {
             Ok(f64::from_le_bytes(self.raw()?))
         } else {
@@ -155,7 +159,7 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    pub(super) fn expect(&mut self, wanted: &str) -> Result<(), Fault> {
+    fn expect(&mut self, wanted: &str) -> Result<(), Fault> {
         match self.word()? {
             word if word == wanted => Ok(()),
             word => fault(format!("`{word}` where `{wanted}` is due")),
@@ -180,15 +184,15 @@ impl<'a> Cursor<'a> {
 
 /// What the sections give: coordinates by order of appearance, and their tags.
 #[derive(Default)]
-pub(super) struct Parts {
-    pub(super) positions: Vec<[f64; 3]>,
-    pub(super) node_of_tag: HashMap<u64, u32>,
-    pub(super) tets: Vec<[u64; 4]>,
-    pub(super) groups: Groups,
+struct Parts {
+    positions: Vec<[f64; 3]>,
+    node_of_tag: HashMap<u64, u32>,
+    tets: Vec<[u64; 4]>,
+    groups: Groups,
 }
 
 impl Parts {
-    pub(super) fn node(&mut self, tag: u64, point: [f64; 3]) -> Result<(), Fault> {
+    fn node(&mut self, tag: u64, point: [f64; 3]) -> Result<(), Fault> {
         let node = self.positions.len() as u32;
         if self.node_of_tag.insert(tag, node).is_some() {
             return fault(format!("node tag {tag} appears twice"));
@@ -205,8 +209,8 @@ fn parse(bytes: &[u8]) -> Result<Parts, Fault> {
         binary: false,
         swapped: false,
     };
-    if gmsh_1::is_version_1(bytes) {
-        return gmsh_1::parse(&mut cursor);
+    if version_1::is_version_1(bytes) {
+        return version_1::parse(&mut cursor);
     }
     cursor.expect("$MeshFormat")?;
     let version = cursor.word()?;

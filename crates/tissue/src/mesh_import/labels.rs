@@ -4,7 +4,7 @@
 //! Names belong to places, not to node numbers, so they survive repair and filling: a point on the surface has the name of the
 //! file's nearest triangle, or of that triangle's nearest corner; a tetrahedron has that of its centroid.
 
-use super::{ImportError, gmsh, named_tets, surface_files, vtk_labels};
+use super::ImportError;
 use parry3d_f64::math::Vector;
 use parry3d_f64::query::PointQueryWithLocation;
 use parry3d_f64::shape::{TriMesh, TrianglePointLocation};
@@ -24,25 +24,6 @@ pub struct Labels {
 }
 
 impl Labels {
-    /// Reads the names of a file; formats without any have none.
-    ///
-    /// # Errors
-    /// [`ImportError`] of the file.
-    pub fn read(path: &Path) -> Result<Self, ImportError> {
-        let extension = path
-            .extension()
-            .map(|e| e.to_string_lossy().to_lowercase())
-            .unwrap_or_default();
-        match extension.as_str() {
-            "obj" => surface_files::obj_labels(path),
-            "ply" => surface_files::ply_labels(path),
-            "msh" => Ok(of_gmsh(gmsh::read_groups(path)?)),
-            "vtk" | "vtu" | "vtp" => vtk_labels::read(path),
-            "inp" | "feb" => named_tets::read_labels(path),
-            _ => Ok(Self::default()),
-        }
-    }
-
     /// All names, ascending.
     pub fn names(&self) -> BTreeSet<&str> {
         let lists = [&self.of_face, &self.of_point, &self.of_tet];
@@ -158,33 +139,4 @@ impl Group {
             (-1..=1).any(|j| (-1..=1).any(|k| self.cells.contains(&[x + i, y + j, z + k])))
         })
     }
-}
-
-fn of_gmsh(parts: gmsh::Parts) -> Labels {
-    let mut labels = Labels {
-        positions: parts.positions,
-        ..Labels::default()
-    };
-    for (tags, dimension, groups) in &parts.groups.elements {
-        let names = groups
-            .iter()
-            .flat_map(|&group| parts.groups.words(*dimension, group))
-            .collect();
-        let nodes: Option<Vec<u32>> = tags
-            .iter()
-            .map(|tag| parts.node_of_tag.get(tag).copied())
-            .collect();
-        match nodes.as_deref() {
-            Some(&[a, b, c]) => {
-                labels.faces.push([a, b, c]);
-                labels.of_face.push(names);
-            }
-            Some(&[a, b, c, d]) => {
-                labels.tets.push([a, b, c, d]);
-                labels.of_tet.push(names);
-            }
-            _ => {}
-        }
-    }
-    labels
 }

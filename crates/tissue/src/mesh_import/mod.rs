@@ -12,14 +12,10 @@
 //! an [`ImportError`] that names the element; with [`ImportOptions::repair`] the fault is removed
 //! where that is safe and listed in [`Imported::repairs`].
 
-mod abaqus;
 mod closed_surface;
 mod distance;
 mod error;
-mod febio;
 mod gmsh;
-mod gmsh_1;
-mod gmsh_groups;
 mod labels;
 mod named_tets;
 mod region;
@@ -119,10 +115,7 @@ pub fn import(path: &Path, options: &ImportOptions) -> Result<Imported, ImportEr
     if !(options.scale.is_finite() && options.scale > 0.0) {
         return Err(ImportError::Scale(options.scale));
     }
-    let extension = path
-        .extension()
-        .map(|e| e.to_string_lossy().to_lowercase())
-        .unwrap_or_default();
+    let extension = extension_of(path);
     let mut repairs = Vec::new();
     let body = match extension.as_str() {
         "vtk" | "vtu" | "vtp" => vtk::read(path)?,
@@ -157,6 +150,27 @@ pub fn import(path: &Path, options: &ImportOptions) -> Result<Imported, ImportEr
     sets::select(&mut mesh, &options.fixed, &options.domain, &options.window)?;
     mesh.validate()?;
     Ok(Imported { mesh, repairs })
+}
+
+/// Reads the names that a file gives to parts of itself; formats without any have none.
+///
+/// # Errors
+/// [`ImportError`] of the file.
+pub fn read_labels(path: &Path) -> Result<Labels, ImportError> {
+    match extension_of(path).as_str() {
+        "obj" => surface_files::obj_labels(path),
+        "ply" => surface_files::ply_labels(path),
+        "msh" => gmsh::read_labels(path),
+        "vtk" | "vtu" | "vtp" => vtk_labels::read(path),
+        "inp" | "feb" => named_tets::read_labels(path),
+        _ => Ok(Labels::default()),
+    }
+}
+
+/// In lower case; empty without one.
+fn extension_of(path: &Path) -> String {
+    let extension = path.extension().unwrap_or_default();
+    extension.to_string_lossy().to_lowercase()
 }
 
 /// Checks tetrahedra and makes them a mesh without named sets.

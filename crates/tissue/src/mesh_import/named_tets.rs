@@ -1,23 +1,26 @@
 //! Tetrahedra whose file names sets of nodes and elements: Abaqus, CalculiX (`abaqus`) and FEBio (`febio`).
 
+mod abaqus;
+mod febio;
+
 use super::labels::Labels;
-use super::{ImportError, RawTets, abaqus, febio};
+use super::{ImportError, RawTets};
 use std::collections::HashMap;
 use std::path::Path;
 
 /// What is wrong with the text of a file.
-pub(super) enum Wrong {
+enum Wrong {
     Text(String),
     Kind { element: usize, kind: String },
 }
 
-pub(super) fn wrong<T>(reason: impl Into<String>) -> Result<T, Wrong> {
+fn wrong<T>(reason: impl Into<String>) -> Result<T, Wrong> {
     Err(Wrong::Text(reason.into()))
 }
 
 /// Nodes, tetrahedra and sets, by the numbers that the file gives them.
 #[derive(Default)]
-pub(super) struct NamedTets {
+struct NamedTets {
     positions: Vec<[f64; 3]>,
     place_of_node: HashMap<u64, u32>,
     tets: Vec<[u64; 4]>,

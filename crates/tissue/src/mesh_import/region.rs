@@ -1,7 +1,7 @@
 //! A part of a body by which nodes, faces and tetrahedra are chosen: a ball, a half-space, the inside of another closed surface,
 //! a part that the mesh's file names.
 
-use super::labels::{Group, Labels};
+use super::labels::Group;
 use super::{Ball, ImportError, SurfaceDistance, closed_surface, surface_files};
 use crate::mesh::{Mesh, face_centroid};
 use crate::stuffing::Field;
@@ -16,7 +16,7 @@ pub enum Region {
     Plane([f64; 4]),
     /// Inside of a closed surface (`.stl`, `.obj`, `.ply`) in the units of the mesh's file.
     Inside(PathBuf),
-    /// What the mesh's own file calls so ([`Labels`]).
+    /// What the mesh's own file calls so ([`super::Labels`]).
     Group(String),
     All,
     Not(Box<Region>),
@@ -95,12 +95,11 @@ impl Region {
             Self::All => Opened::All,
             Self::Not(region) => Opened::Not(Box::new(region.open(input, scale)?)),
             Self::Group(name) => {
-                let group = Labels::read(input)?.group(name, input, scale)?;
+                let group = super::read_labels(input)?.group(name, input, scale)?;
                 Opened::Group(Box::new(group))
             }
             Self::Inside(path) => {
-                let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
-                let extension = extension.unwrap_or_default();
+                let extension = super::extension_of(path);
                 if !["stl", "obj", "ply"].contains(&extension.as_str()) {
                     return Err(ImportError::Format {
                         path: path.into(),

@@ -13,8 +13,7 @@ pub fn tool_shape(path: &Path, scale: f64) -> Result<Shape, ImportError> {
     if !(scale.is_finite() && scale > 0.0) {
         return Err(ImportError::Scale(scale));
     }
-    let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
-    let extension = extension.unwrap_or_default();
+    let extension = super::extension_of(path);
     if !["stl", "obj", "ply"].contains(&extension.as_str()) {
         return Err(ImportError::Format {
             path: path.into(),

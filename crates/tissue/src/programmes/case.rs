@@ -1,7 +1,7 @@
 //! One case of a programme: its tools and their poses at each frame, drawn from a seed and checked.
 
 use super::approach::Surface;
-use super::legs::{Legs, draw};
+use super::legs::Legs;
 use super::scale::{Thickness, ToolScale};
 use super::site::{Site, Sites};
 use super::{Specification, Tip, ToolProgramme};
@@ -179,7 +179,7 @@ fn hands(
     random: &mut SplitMix,
 ) -> Option<Vec<Hand>> {
     // All numbers are drawn before anything can fail, so that tries do not hang together.
-    let radius = draw(specification.radius_mm, random) as f32;
+    let radius = random.within(specification.radius_mm) as f32;
     let unit = random.unit();
     let (turn, distance) = (random.unit(), random.unit());
     let sites = &place.sites;
@@ -214,8 +214,8 @@ fn hand(
     random: &mut SplitMix,
     site: impl Fn(f32) -> Option<Site>,
 ) -> Option<Hand> {
-    let friction = draw(specification.friction, random) as f32;
-    let tear_off = draw(specification.tear_off_mn, random);
+    let friction = random.within(specification.friction) as f32;
+    let tear_off = random.within(specification.tear_off_mn);
     let tears = random.unit() < 0.5;
     let (lean, round, spin) = (random.unit(), random.unit(), random.unit());
     let wait = random.unit();

@@ -1,7 +1,6 @@
 //! A motion as legs: where the tool is relative to its start, and how long it takes to get there.
 
 use super::Specification;
-use crate::loads::Range;
 use crate::schemes::SplitMix;
 use contact::{Pose, Rotation, Vector};
 
@@ -32,25 +31,16 @@ pub(super) struct Legs {
     slide: f64,
 }
 
-pub(super) fn draw(range: Range, random: &mut SplitMix) -> f64 {
-    range[0] + (range[1] - range[0]) * random.unit()
-}
-
-/// Speeds span decades: even in the logarithm.
-pub(super) fn draw_speed(range: Range, random: &mut SplitMix) -> f64 {
-    range[0] * (range[1] / range[0]).powf(random.unit())
-}
-
 impl Legs {
     /// Draws them; none goes in farther than `deepest`, mm.
     pub fn new(specification: &Specification, deepest: f64, random: &mut SplitMix) -> Self {
-        let depth = draw(specification.depth_mm, random).min(deepest);
-        let press = draw_speed(specification.press_mm_s, random);
-        let slide = draw(specification.slide_mm, random);
-        let slide_speed = draw_speed(specification.slide_mm_s, random);
-        let pull = draw(specification.pull_mm, random);
-        let hold = draw(specification.hold_s, random);
-        let lift = draw_speed(specification.lift_mm_s, random);
+        let depth = random.within(specification.depth_mm).min(deepest);
+        let press = random.speed(specification.press_mm_s);
+        let slide = random.within(specification.slide_mm);
+        let slide_speed = random.speed(specification.slide_mm_s);
+        let pull = random.within(specification.pull_mm);
+        let hold = random.within(specification.hold_s);
+        let lift = random.speed(specification.lift_mm_s);
         let mut legs = Self {
             slide,
             ..Self::default()

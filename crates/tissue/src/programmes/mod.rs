@@ -17,7 +17,7 @@ pub use scale::{BodySize, DEEPEST_SHARE, REFERENCE_THICKNESS_MM, REFERENCE_WIDTH
 
 use serde::Serialize;
 
-use crate::loads::Range;
+use crate::schemes::Range;
 
 /// What touches the tissue.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]

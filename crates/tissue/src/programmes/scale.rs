@@ -2,8 +2,8 @@
 
 use super::Specification;
 use super::site::Sites;
-use crate::loads::Range;
 use crate::mesh::Mesh;
+use crate::schemes::Range;
 use contact::Vector;
 
 /// A body has the table's tools if it is so wide across its second longest axis, mm.

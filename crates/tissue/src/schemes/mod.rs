@@ -16,7 +16,7 @@ mod table;
 
 pub use load::{Draw, PROBE_S, Pose};
 pub use programme::Programme;
-pub use random::SplitMix;
+pub use random::{Range, SplitMix};
 pub use table::{Group, PAPER_SECTION, Specification, TABLE};
 
 /// Length of every simulation, s.

@@ -1,5 +1,8 @@
 //! Random numbers that a case is drawn from.
 
+/// Lowest and highest value of a draw.
+pub type Range = [f64; 2];
+
 /// SplitMix64 (Steele et al. 2014): the same numbers on every platform and in every version.
 pub struct SplitMix(pub u64);
 
@@ -18,8 +21,13 @@ impl SplitMix {
     }
 
     /// Uniform in [low, high).
-    pub fn within(&mut self, [low, high]: [f64; 2]) -> f64 {
+    pub fn within(&mut self, [low, high]: Range) -> f64 {
         low + (high - low) * self.unit()
+    }
+
+    /// A speed in [low, high), even in the logarithm: speeds span decades.
+    pub fn speed(&mut self, [low, high]: Range) -> f64 {
+        low * (high / low).powf(self.unit())
     }
 
     /// One of `count` things.

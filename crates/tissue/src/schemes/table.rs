@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 use serde::Serialize;
 
 use super::Scheme;
-use crate::loads::Range;
+use super::random::Range;
 
 /// What a scheme is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]

@@ -9,6 +9,7 @@
 mod barrier;
 mod diagnosis;
 mod error;
+mod fields;
 mod frame;
 mod march;
 mod mass;
@@ -26,7 +27,8 @@ pub use touch::{SampleForce, Tool, ToolPose, ToolReport};
 
 use crate::mesh::{Boundary, Mesh};
 use elements::{Kernels, Partition};
-use march::{Fields, Node, Path};
+use fields::{Fields, Node};
+use march::Path;
 use mass::LumpedMass;
 use options::check_positive;
 use touch::Touch;

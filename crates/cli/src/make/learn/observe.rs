@@ -1,10 +1,7 @@
 //! Reference simulations at chosen sites, as what is learned from: what the tissue does beyond the linear response in contact, and how it
 //! moves after each release, both in block coordinates.
 
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
-
-use anyhow::{Result, bail};
+use anyhow::Result;
 use tissue::contact::ContactDomain;
 use tissue::mesh::Mesh;
 use tissue::schemes::{FRAME_S, FRAMES, Programme, Scheme};
@@ -13,6 +10,7 @@ use upt::kernels::{Isa, Pool};
 use upt::prior::ContactResponse;
 
 use crate::corrections::Workbench;
+use crate::parallel::{in_parallel, workers};
 use crate::progress;
 
 /// Push of the programmes as they are written, mm.
@@ -43,38 +41,14 @@ pub fn observe(
     quiet: bool,
 ) -> Result<Observed> {
     let bar = progress::bar(quiet, (sites.len() * FRAMES) as u64, "tool trajectories");
-    let next = AtomicUsize::new(0);
-    let found: Mutex<Vec<(usize, Observed)>> = Mutex::default();
-    let work = || -> Result<()> {
-        loop {
-            let at = next.fetch_add(1, Ordering::Relaxed);
-            let Some(faces) = sites.get(at) else {
-                return Ok(());
-            };
-            let case = simulate(bench, push_mm, faces, seed.wrapping_add(at as u64), &|| {
-                bar.inc(1);
-            })?;
-            found
-                .lock()
-                .unwrap_or_else(PoisonError::into_inner)
-                .push((at, case));
-        }
+    let work = |at: usize| {
+        let seed = seed.wrapping_add(at as u64);
+        simulate(bench, push_mm, &sites[at], seed, &|| bar.inc(1))
     };
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    let workers = if threads == 0 { cores } else { threads };
-    std::thread::scope(|scope| {
-        let threads: Vec<_> = (0..workers).map(|_| scope.spawn(work)).collect();
-        threads.into_iter().try_for_each(|thread| {
-            thread
-                .join()
-                .unwrap_or_else(|_| bail!("a thread of the trajectories panicked"))
-        })
-    })?;
+    let found = in_parallel(workers(threads), &|at| at < sites.len(), &work)?;
     bar.finish_and_clear();
-    let mut found = found.into_inner().unwrap_or_else(PoisonError::into_inner);
-    found.sort_by_key(|(at, _)| *at);
     let mut all = Observed::default();
-    for (_, case) in found {
+    for case in found {
         all.contact.extend(case.contact);
         all.releases.extend(case.releases);
         all.ended += case.ended;

@@ -1,16 +1,15 @@
 //! What nonlinear elasticity adds to the linear response at rest under pushes: exact equilibria, by the reference's statics.
 
 use std::path::Path;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
 
-use anyhow::{Result, bail};
+use anyhow::Result;
 use tissue::solver::ContactNode;
 use tissue::statics::StaticSolver;
 use upt::kernels::{Isa, Pool};
 use upt::prior::ContactResponse;
 
 use crate::corrections::{Push, Workbench};
+use crate::parallel::{in_parallel, workers};
 use crate::progress;
 
 /// Pushes that share each solve.
@@ -27,43 +26,21 @@ pub fn differences(
     let solver = StaticSolver::new(&bench.mesh, bench.boundary, bench.material, columns)?;
     let bar = progress::bar(quiet, pushes.len() as u64, "equilibria");
     let groups: Vec<&[Push]> = pushes.chunks(TOGETHER).collect();
-    let next = AtomicUsize::new(0);
-    let found: Mutex<Vec<(usize, Vec<Vec<f32>>)>> = Mutex::default();
-    let work = || -> Result<()> {
-        loop {
-            let at = next.fetch_add(1, Ordering::Relaxed);
-            let Some(group) = groups.get(at) else {
-                return Ok(());
-            };
-            let contacts: Vec<Vec<ContactNode>> = group.iter().map(contact).collect();
-            let fields = solver.at_rest(&contacts)?;
-            let mut differences = Vec::new();
-            for (push, field) in group.iter().zip(fields) {
-                if let Some(field) = field {
-                    differences.push(difference(bench, push, &field)?);
-                }
+    let work = |at: usize| {
+        let contacts: Vec<Vec<ContactNode>> = groups[at].iter().map(contact).collect();
+        let fields = solver.at_rest(&contacts)?;
+        let mut differences = Vec::new();
+        for (push, field) in groups[at].iter().zip(fields) {
+            if let Some(field) = field {
+                differences.push(difference(bench, push, &field)?);
             }
-            found
-                .lock()
-                .unwrap_or_else(PoisonError::into_inner)
-                .push((at, differences));
-            bar.inc(group.len() as u64);
         }
+        bar.inc(groups[at].len() as u64);
+        Ok(differences)
     };
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    let workers = if threads == 0 { cores } else { threads };
-    std::thread::scope(|scope| {
-        let threads: Vec<_> = (0..workers).map(|_| scope.spawn(work)).collect();
-        threads.into_iter().try_for_each(|thread| {
-            thread
-                .join()
-                .unwrap_or_else(|_| bail!("a thread of the equilibria panicked"))
-        })
-    })?;
+    let found = in_parallel(workers(threads), &|at| at < groups.len(), &work)?;
     bar.finish_and_clear();
-    let mut found = found.into_inner().unwrap_or_else(PoisonError::into_inner);
-    found.sort_by_key(|(at, _)| *at);
-    Ok(found.into_iter().flat_map(|(_, list)| list).collect())
+    Ok(found.into_iter().flatten().collect())
 }
 
 fn contact(push: &Push) -> Vec<ContactNode> {

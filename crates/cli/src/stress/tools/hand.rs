@@ -5,7 +5,7 @@ use contact::{Body, Pose, Rotation, Shape, Vector};
 use tissue::schemes::SplitMix;
 use tissue::solver::{Tool, ToolPose};
 
-use crate::stress::bench::Bench;
+use crate::bench::Bench;
 
 /// Half the length of a shaft, mm.
 const SHAFT_MM: f32 = 20.0;

@@ -8,8 +8,8 @@ use tissue::solver::{Tool, ToolPose};
 
 use super::Row;
 use super::hand::{at, central, rod};
+use crate::bench::Bench;
 use crate::host;
-use crate::stress::bench::Bench;
 use crate::tools::drive::{Drive, Driver};
 
 /// More instruments than a scene takes at once.

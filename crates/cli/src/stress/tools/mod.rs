@@ -13,8 +13,8 @@ use tissue::schemes::SplitMix;
 use tissue::solver::{Tool, ToolPose};
 use upt::flag;
 
-use super::bench::{Bench, names};
 use super::{Row, progress};
+use crate::bench::{Bench, names};
 use crate::host;
 use crate::tools::drive::{Drive, Driver};
 use crate::tools::yard::Yard;

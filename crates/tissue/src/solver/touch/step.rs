@@ -7,7 +7,7 @@
 
 use super::rows::{Row, SEARCH_STEPS};
 use super::{SWEEPS, TEAR_S, Touch};
-use crate::solver::march::Node;
+use crate::solver::fields::Node;
 use contact::grasp::tension;
 use contact::{Pose, Vector, pose};
 

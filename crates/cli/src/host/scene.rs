@@ -1,0 +1,262 @@
+//! A scene, by the functions `upt_scene_*`.
+
+use anyhow::Result;
+use upt::ffi;
+
+use super::{Model, check, size, zeroed};
+use crate::effort::Effort;
+
+/// A scene; destroyed when dropped. Used by the thread that made it.
+pub struct Scene {
+    handle: *mut ffi::upt_scene,
+}
+
+impl Scene {
+    /// `upt_scene_create`; the guard reports instead of refusing, so that errors can be measured.
+    pub fn create(model: &Model, kernel: i32) -> Result<Self> {
+        // SAFETY: the options live across the call; `handle` is a place to write to.
+        unsafe {
+            let mut options: ffi::upt_scene_options = zeroed();
+            options.struct_size = size::<ffi::upt_scene_options>();
+            options.kernel = kernel;
+            options.precision = model.info.precision;
+            options.guard_policy = ffi::UPT_GUARD_REPORT;
+            options.corrections = match model.corrections {
+                None => 0,
+                Some(Effort { most: 0, .. }) => ffi::UPT_CORRECTIONS_NONE,
+                Some(effort) => effort.most as i32,
+            };
+            options.corrections_target_mm =
+                model.corrections.map_or(0.0, |effort| effort.target_mm);
+            options.substeps = model.corrections.map_or(0, |effort| effort.substeps) as u8;
+            options.step_s = model.step_s;
+            options.damping_per_s = model.damping_per_s;
+            let mut handle = std::ptr::null_mut();
+            check(ffi::upt_scene_create(model.handle, &options, &mut handle))?;
+            Ok(Self { handle })
+        }
+    }
+
+    /// `upt_scene_reset`.
+    pub fn reset(&mut self) -> Result<()> {
+        // SAFETY: the handle is live.
+        check(unsafe { ffi::upt_scene_reset(self.handle) })
+    }
+
+    /// `upt_scene_set_region`; an empty list means all nodes.
+    pub fn set_region(&mut self, nodes: &[u32]) -> Result<()> {
+        let pointer = if nodes.is_empty() {
+            std::ptr::null()
+        } else {
+            nodes.as_ptr()
+        };
+        // SAFETY: pointer and count describe `nodes`.
+        check(unsafe { ffi::upt_scene_set_region(self.handle, pointer, nodes.len() as u64) })
+    }
+
+    /// `upt_scene_step_contacts`: one step from the scene's own state.
+    pub fn step(
+        &mut self,
+        nodes: &[u32],
+        vectors: &[[f32; 3]],
+        out: &mut [[f32; 3]],
+    ) -> Result<()> {
+        // SAFETY: the pointers and counts describe the slices, which live across the call.
+        let status = unsafe {
+            ffi::upt_scene_step_contacts(
+                self.handle,
+                nodes.as_ptr(),
+                vectors.as_ptr().cast(),
+                nodes.len() as u64,
+                out.as_mut_ptr().cast(),
+                3 * out.len() as u64,
+            )
+        };
+        check(status)
+    }
+
+    /// `upt_scene_decode`: displacement of any nodes in the last state.
+    pub fn decode(&mut self, nodes: &[u32], out: &mut [[f32; 3]]) -> Result<()> {
+        // SAFETY: the pointers and counts describe the slices.
+        let status = unsafe {
+            ffi::upt_scene_decode(
+                self.handle,
+                nodes.as_ptr(),
+                nodes.len() as u64,
+                out.as_mut_ptr().cast(),
+                3 * out.len() as u64,
+            )
+        };
+        check(status)
+    }
+
+    /// `upt_scene_step_instruments`: one step that instruments drive.
+    pub fn step_instruments(
+        &mut self,
+        instruments: &[ffi::upt_instrument],
+        out: &mut [[f32; 3]],
+    ) -> Result<()> {
+        // SAFETY: the pointers and counts describe the slices, which live across the call.
+        check(unsafe {
+            ffi::upt_scene_step_instruments(
+                self.handle,
+                instruments.as_ptr(),
+                instruments.len() as u64,
+                out.as_mut_ptr().cast(),
+                3 * out.len() as u64,
+            )
+        })
+    }
+
+    /// `upt_scene_submit_instruments`: as [`Scene::step_instruments`], on the scene's worker.
+    pub fn submit_instruments(&mut self, instruments: &[ffi::upt_instrument]) -> Result<()> {
+        // SAFETY: the pointer and count describe the list, which the call copies.
+        check(unsafe {
+            ffi::upt_scene_submit_instruments(
+                self.handle,
+                instruments.as_ptr(),
+                instruments.len() as u64,
+            )
+        })
+    }
+
+    /// `upt_scene_poll`: whether the submitted step has finished.
+    pub fn poll(&mut self) -> Result<bool> {
+        // SAFETY: the handle is live.
+        let status = unsafe { ffi::upt_scene_poll(self.handle) };
+        check(status)?;
+        Ok(status != ffi::UPT_PENDING)
+    }
+
+    /// `upt_scene_wait`: until no step is in flight; what became of it does not matter here.
+    pub fn settle(&mut self) {
+        // SAFETY: the handle is live.
+        unsafe { ffi::upt_scene_wait(self.handle, u32::MAX) };
+    }
+
+    /// `upt_scene_instrument_readings` of the last step's `count` instruments.
+    pub fn readings(&self, count: usize) -> Result<Vec<ffi::upt_instrument_reading>> {
+        // SAFETY: zeros are valid numbers.
+        let mut blank: ffi::upt_instrument_reading = unsafe { std::mem::zeroed() };
+        blank.struct_size = size_of::<ffi::upt_instrument_reading>() as u32;
+        let mut readings = vec![blank; count];
+        // SAFETY: the pointer and count describe the list.
+        check(unsafe {
+            ffi::upt_scene_instrument_readings(self.handle, readings.as_mut_ptr(), count as u64)
+        })?;
+        Ok(readings)
+    }
+
+    /// `upt_scene_contacts_from_instruments`; the lists are as long as the contact afterwards.
+    pub fn contacts(
+        &mut self,
+        instruments: &[ffi::upt_instrument],
+        nodes: &mut Vec<u32>,
+        vectors: &mut Vec<[f32; 3]>,
+    ) -> Result<()> {
+        /// Nodes that there is room for at first: more than a few tools touch.
+        const ROOM: usize = 4096;
+        let mut count = ROOM as u64;
+        loop {
+            let room = count;
+            nodes.resize(room as usize, 0);
+            vectors.resize(room as usize, [0.0; 3]);
+            // SAFETY: the pointers and counts describe the slices.
+            let status = unsafe {
+                ffi::upt_scene_contacts_from_instruments(
+                    self.handle,
+                    instruments.as_ptr(),
+                    instruments.len() as u64,
+                    nodes.as_mut_ptr(),
+                    vectors.as_mut_ptr().cast(),
+                    room,
+                    &mut count,
+                )
+            };
+            if count <= room {
+                check(status)?;
+                nodes.truncate(count as usize);
+                vectors.truncate(count as usize);
+                return Ok(());
+            }
+        }
+    }
+
+    /// `upt_scene_instrument_contacts` of the last step.
+    pub fn instrument_contacts(&self) -> Result<Vec<ffi::upt_instrument_contact>> {
+        let mut needed = 0;
+        // SAFETY: a NULL buffer of capacity 0 asks for the count; the second call has that capacity.
+        unsafe {
+            ffi::upt_scene_instrument_contacts(self.handle, std::ptr::null_mut(), 0, &mut needed);
+            let mut out = vec![zeroed(); needed as usize];
+            check(ffi::upt_scene_instrument_contacts(
+                self.handle,
+                out.as_mut_ptr(),
+                needed,
+                &mut needed,
+            ))?;
+            Ok(out)
+        }
+    }
+
+    /// `upt_scene_contact_force` at the `count` contact nodes of the last step, mN.
+    pub fn contact_force(&mut self, count: usize) -> Result<Vec<[f32; 3]>> {
+        let mut out = vec![[0.0; 3]; count];
+        // SAFETY: pointer and count describe `out`.
+        check(unsafe {
+            ffi::upt_scene_contact_force(self.handle, out.as_mut_ptr().cast(), 3 * count as u64)
+        })?;
+        Ok(out)
+    }
+
+    /// `upt_scene_sample`: between the last two states.
+    pub fn sample(&mut self, alpha: f64, out: &mut [[f32; 3]]) -> Result<()> {
+        // SAFETY: pointer and count describe `out`.
+        check(unsafe {
+            ffi::upt_scene_sample(
+                self.handle,
+                alpha,
+                out.as_mut_ptr().cast(),
+                3 * out.len() as u64,
+            )
+        })
+    }
+
+    /// `upt_scene_present`: `seconds` after the last step, with instruments where they are then.
+    pub fn present(
+        &mut self,
+        seconds: f64,
+        instruments: &[ffi::upt_instrument],
+        out: &mut [[f32; 3]],
+    ) -> Result<()> {
+        // SAFETY: the pointers and counts describe the slices.
+        check(unsafe {
+            ffi::upt_scene_present(
+                self.handle,
+                seconds,
+                instruments.as_ptr(),
+                instruments.len() as u64,
+                out.as_mut_ptr().cast(),
+                3 * out.len() as u64,
+            )
+        })
+    }
+
+    /// `upt_scene_get_stats`.
+    pub fn stats(&self) -> Result<ffi::upt_scene_stats> {
+        // SAFETY: the struct is a place to write to and states its size.
+        unsafe {
+            let mut stats: ffi::upt_scene_stats = zeroed();
+            stats.struct_size = size::<ffi::upt_scene_stats>();
+            check(ffi::upt_scene_get_stats(self.handle, &mut stats))?;
+            Ok(stats)
+        }
+    }
+}
+
+impl Drop for Scene {
+    fn drop(&mut self) {
+        // SAFETY: the handle came from upt_scene_create and is destroyed once.
+        unsafe { ffi::upt_scene_destroy(self.handle) };
+    }
+}

@@ -1,0 +1,165 @@
+//! `upt mesh import` (a mesh from another program) and `upt mesh stuff` (a mesh from a distance field).
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::bail;
+use clap::Args;
+use serde_json::json;
+use tissue::mesh_import::{Ball, ImportOptions, RawTets, Resolution, from_tets, import};
+use tissue::mesh_quality::measure;
+use tissue::stuffing::{GridField, HalfSpace, stuff};
+
+use super::print_quality;
+
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  upt mesh import liver.msh liver.mesh.safetensors --fixed-sphere 0,0,0,20 --domain-sphere 60,0,30,25\n  upt mesh import kidney.stl kidney.mesh.safetensors --nodes 5000 --scale 1000"
+)]
+pub struct Import {
+    /// File to read: .vtk, .vtu, .vtp, .msh (1, 2.2 or 4.1), .inp, .feb, .stl, .obj or .ply.
+    input: PathBuf,
+    /// Mesh file to write (*.mesh.safetensors).
+    output: PathBuf,
+    /// Name in the mesh file. Default: the input's.
+    #[arg(long)]
+    name: Option<String>,
+    /// Millimetres per unit of the file: 1000 for metres.
+    #[arg(long, default_value_t = 1.0)]
+    scale: f64,
+    /// Surfaces: number of nodes to aim for.
+    #[arg(long, conflicts_with = "spacing")]
+    nodes: Option<usize>,
+    /// Surfaces: lattice spacing, mm.
+    #[arg(long)]
+    spacing: Option<f64>,
+    /// Remove faults that can be removed safely, and report them.
+    #[arg(long)]
+    repair: bool,
+    /// Hold the nodes in this ball (x,y,z,r in mm); may be repeated.
+    #[arg(long, value_name = "X,Y,Z,R", allow_hyphen_values = true)]
+    fixed_sphere: Vec<Ball>,
+    /// Instruments may touch the surface in this ball; may be repeated.
+    #[arg(long, value_name = "X,Y,Z,R", allow_hyphen_values = true)]
+    domain_sphere: Vec<Ball>,
+    /// Under the `supported` boundary condition hold the surface outside this ball; may be repeated.
+    #[arg(long, value_name = "X,Y,Z,R", allow_hyphen_values = true)]
+    window_sphere: Vec<Ball>,
+    /// Print the result as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Example:\n  upt mesh stuff head.grid.safetensors head.mesh.safetensors --spacing 3.2 --half-space 1,0,0,0"
+)]
+pub struct Stuff {
+    /// Distance field (docs/reference/formats.md), positive inside.
+    field: PathBuf,
+    /// Mesh file to write; its sets are empty.
+    output: PathBuf,
+    /// Lattice spacing, mm.
+    #[arg(long)]
+    spacing: f64,
+    /// Keep the side of a plane where a x + b y + c z + d > 0.
+    #[arg(long, value_name = "A,B,C,D", allow_hyphen_values = true, value_parser = plane)]
+    half_space: Option<[f64; 4]>,
+}
+
+fn plane(text: &str) -> Result<[f64; 4], String> {
+    let numbers: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse()).collect();
+    let plane: [f64; 4] = numbers
+        .ok()
+        .and_then(|numbers| numbers.try_into().ok())
+        .ok_or("write a,b,c,d")?;
+    let length = plane[..3].iter().map(|x| x * x).sum::<f64>().sqrt();
+    if length.is_finite() && length > 0.0 && plane[3].is_finite() {
+        Ok(plane.map(|x| x / length))
+    } else {
+        Err("the normal a,b,c must not be zero".into())
+    }
+}
+
+/// A mesh from another program.
+pub fn run_import(args: &Import) -> anyhow::Result<ExitCode> {
+    let resolution = match (args.nodes, args.spacing) {
+        (Some(nodes), _) => Some(Resolution::Nodes(nodes)),
+        (_, Some(spacing)) => Some(Resolution::Spacing(spacing)),
+        _ => None,
+    };
+    let imported = import(
+        &args.input,
+        &ImportOptions {
+            name: args.name.clone(),
+            scale: args.scale,
+            resolution,
+            repair: args.repair,
+            fixed: args.fixed_sphere.clone(),
+            domain: args.domain_sphere.clone(),
+            window: args.window_sphere.clone(),
+        },
+    )
+    .map_err(|error| match error.names_file() {
+        true => anyhow::Error::new(error),
+        false => anyhow::Error::new(error).context(args.input.display().to_string()),
+    })?;
+    imported.mesh.write(&args.output)?;
+    let quality = measure(&imported.mesh);
+    if args.json {
+        let mut value = serde_json::to_value(&quality)?;
+        value["repairs"] = serde_json::to_value(&imported.repairs)?;
+        value["sha256"] = json!(imported.mesh.hash());
+        println!("{value:#}");
+        return Ok(ExitCode::SUCCESS);
+    }
+    for repair in &imported.repairs {
+        println!("{:24}{repair}", "repaired");
+    }
+    print_quality(&quality);
+    if imported.mesh.fixed.is_empty() {
+        println!("no node is held; name some with --fixed-sphere before simulating");
+    }
+    println!("{:24}{}", "written", args.output.display());
+    Ok(ExitCode::SUCCESS)
+}
+
+/// A mesh from a distance field.
+pub fn run_stuff(args: &Stuff) -> anyhow::Result<ExitCode> {
+    let field = GridField::read(&args.field)?;
+    let made = match args.half_space {
+        Some([a, b, c, offset]) => stuff(
+            &HalfSpace {
+                inner: field,
+                normal: [a, b, c],
+                offset,
+            },
+            args.spacing,
+        ),
+        None => stuff(&field, args.spacing),
+    }?;
+    let raw = RawTets {
+        positions: made.positions,
+        tets: made.tets,
+    };
+    let mut repairs = Vec::new();
+    let mut mesh = from_tets(raw, false, &mut repairs)?;
+    if !repairs.is_empty() {
+        bail!(
+            "{}: {} repairs in a stuffed mesh",
+            args.field.display(),
+            repairs.len()
+        );
+    }
+    mesh.name = "stuffed".into();
+    mesh.source = format!("distance field stuffed at a spacing of {} mm", args.spacing);
+    mesh.license = "as the distance field's".into();
+    mesh.write(&args.output)?;
+    println!(
+        "{} nodes, {} tetrahedra, {} dropped for a manifold boundary",
+        mesh.node_count(),
+        mesh.tets.len(),
+        made.dropped
+    );
+    Ok(ExitCode::SUCCESS)
+}

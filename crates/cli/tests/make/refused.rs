@@ -1,0 +1,146 @@
+//! Input that cannot become a bundle: named, with what to do.
+
+use std::path::Path;
+
+use super::{HELD, command, organ, plain, text};
+
+/// The message of a run that must fail and leave no bundle.
+fn refused(surface: &Path, more: &[&str]) -> String {
+    let out = surface.with_extension("bundle");
+    let output = command(surface, &out, more).output().unwrap();
+    assert_eq!(output.status.code(), Some(2), "{}", text(&output));
+    assert!(!out.exists());
+    text(&output)
+}
+
+#[test]
+fn input_that_cannot_become_a_bundle_is_named_with_what_to_do() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str| folder.path().join(name);
+    let has = |message: String, words: &[&str]| {
+        for word in words {
+            assert!(message.contains(word), "`{word}` is not in: {message}");
+        }
+    };
+
+    let good = file("good.obj");
+    plain(&good);
+    has(
+        refused(&good, &[]),
+        &["nothing is held", "--fixed plane:0,0,-1,", "preview.html"],
+    );
+    has(
+        refused(
+            &good,
+            &[
+                "--fixed",
+                "plane:0,0,-1,-20",
+                "--domain",
+                "plane:0,0,-1,-22",
+            ],
+        ),
+        &["--fixed holds all"],
+    );
+    has(refused(&good, &["--fixed", "all"]), &["holds every node"]);
+    has(
+        refused(&good, &["--fixed", "ball:900,0,0,5"]),
+        &["no node lies in the region of --fixed", "x -"],
+    );
+    has(
+        refused(&good, &["--fixed", "plane:0,0,0,1"]),
+        &["must not be zero"],
+    );
+    has(
+        refused(&good, &["--fixed", "plane:0,0,-1,-20", "--minutes", "0"]),
+        &["--minutes is 0"],
+    );
+    has(
+        refused(&good, &["--fixed", "plane:0,0,-1,-20", "--unit", "m"]),
+        &["with --unit m,", "--unit mm it would be 98 mm"],
+    );
+    has(
+        refused(&good, &["--fixed", "plane:0,0,-1,-20", "--unit", "0.001"]),
+        &["0.098 mm long", "--unit mm"],
+    );
+    has(
+        refused(&good, &["--fixed", "plane:0,0,-1,-20", "--poisson", "0.5"]),
+        &["poisson"],
+    );
+
+    has(
+        refused(&good, &[HELD[0], HELD[1], "--tools", "press,saw"]),
+        &["--tools: ", "`saw` is unknown", "stroke"],
+    );
+
+    let open = file("open.obj");
+    plain(&open);
+    let lines = std::fs::read_to_string(&open).unwrap();
+    std::fs::write(&open, lines.rsplit_once("f ").unwrap().0).unwrap();
+    has(refused(&open, &HELD), &["open", "edge"]);
+
+    let crossed = file("crossed.obj");
+    let through = |[x, y, z]: [f64; 3]| {
+        if z > 29.0 {
+            [x + 3.0, y + 2.0, -60.0]
+        } else {
+            [x, y, z]
+        }
+    };
+    organ(&crossed, through, false);
+    has(refused(&crossed, &HELD), &["passes through itself"]);
+
+    let inside_out = file("inside-out.obj");
+    organ(&inside_out, |p| p, true);
+    has(
+        refused(&inside_out, &["--fixed", "plane:0,0,-1,-20", "--no-repair"]),
+        &["inside out"],
+    );
+
+    let taken = file("taken");
+    std::fs::create_dir(&taken).unwrap();
+    std::fs::write(taken.join("thesis.txt"), "text").unwrap();
+    let output = command(&good, &taken, &HELD).output().unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    has(text(&output), &["`upt make` did not make it"]);
+    assert!(taken.join("thesis.txt").exists());
+}
+
+#[test]
+fn two_pieces_become_the_larger_one_and_are_refused_as_they_are() {
+    let folder = tempfile::tempdir().unwrap();
+    let surface = folder.path().join("two.obj");
+    plain(&surface);
+    let body = std::fs::read_to_string(&surface).unwrap();
+    let count = body.lines().filter(|line| line.starts_with("v ")).count();
+    let mut text = body.clone();
+    for line in body.lines() {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        let moved: Vec<String> = match words[0] {
+            "v" => words[1..]
+                .iter()
+                .map(|x| (0.3 * x.parse::<f64>().unwrap() + 90.0).to_string())
+                .collect(),
+            _ => words[1..]
+                .iter()
+                .map(|n| (n.parse::<usize>().unwrap() + count).to_string())
+                .collect(),
+        };
+        text += &format!("{} {}\n", words[0], moved.join(" "));
+    }
+    std::fs::write(&surface, text).unwrap();
+    let out = surface.with_extension("bundle");
+    let output = command(&surface, &out, &[HELD[0], HELD[1], "--preview"])
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", crate::text(&output));
+    let said = crate::text(&output);
+    assert!(
+        said.contains("repaired: ") && said.contains("part"),
+        "{said}"
+    );
+    let message = refused(&surface, &[HELD[0], HELD[1], "--no-repair"]);
+    assert!(
+        message.contains("part") || message.contains("piece"),
+        "{message}"
+    );
+}

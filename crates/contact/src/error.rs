@@ -1,0 +1,26 @@
+//! Why a shape is refused.
+
+/// A shape that no tool can have.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ShapeError {
+    #[error("{field} is {value} mm; it must be a length {wanted}")]
+    Length {
+        field: &'static str,
+        value: f32,
+        wanted: &'static str,
+    },
+    #[error(
+        "corner radius {radius} mm exceeds the smallest half extent {smallest} mm; make the box thicker or the radius smaller"
+    )]
+    Corner { radius: f32, smallest: f32 },
+    #[error("point {index} is not finite or farther than 10 m from the origin")]
+    Point { index: usize },
+    #[error("face {index} names a node beyond the {count} points")]
+    Face { index: usize, count: usize },
+    #[error(
+        "the surface is not closed: the edge from point {a} to {b} does not belong to one face on each side; give a watertight surface, or take its hull"
+    )]
+    Open { a: u32, b: u32 },
+    #[error("the {count} points of the tool have no volume ({reason}); give a solid tool")]
+    Flat { count: usize, reason: String },
+}

@@ -1,0 +1,133 @@
+//! The second loop of a batch: how strongly springs and pressure pull, by the law and the change of volume.
+
+use super::shape::{Shape, load, store};
+use crate::cluster::Cluster;
+use crate::lanes::Lanes;
+use crate::laws::Isochoric;
+
+/// `x^(-1/3)` for positive `x`, relative error about 1e-7.
+#[inline(always)]
+unsafe fn inverse_cube_root<L: Lanes>(x: L) -> L {
+    unsafe {
+        let y = x.inverse_cube_root_guess();
+        // y (1 - e)^(-1/3) with e = 1 - x y^3: a Chebyshev fit over -0.121..0.091, the guess's whole range.
+        let e = y.mul(y).neg_mul_add(y.mul(x), L::splat(1.0));
+        let series = e
+            .mul_add(L::splat(0.117_032_66), L::splat(0.145_538_02))
+            .mul_add(e, L::splat(0.172_930_58))
+            .mul_add(e, L::splat(0.222_216_78))
+            .mul_add(e, L::splat(0.333_333_13))
+            .mul_add(e, L::splat(1.0));
+        y.mul(series)
+    }
+}
+
+/// Where row `j`, column `k` of a symmetric matrix is in the order of [`Cluster::springs`].
+const ENTRY: [[usize; 3]; 3] = [[0, 1, 2], [1, 3, 4], [2, 4, 5]];
+
+/// Turns determinant, invariant and products into the factors of springs and pressure; returns det F.
+#[inline(always)]
+pub(super) unsafe fn moduli<
+    L: Lanes,
+    M: Isochoric,
+    const NODES: usize,
+    const TETS: usize,
+    const AVERAGED: bool,
+>(
+    (law, bulk_over_shear): (M, f32),
+    cluster: &Cluster<NODES, TETS>,
+    tet: usize,
+    first: usize,
+    shape: &mut Shape,
+) -> L {
+    unsafe {
+        let determinant = load::<L>(&shape.determinant[tet], first);
+        let inverse = load::<L>(&cluster.inverse[tet], first);
+        let ratio = determinant.mul(inverse);
+        let root = inverse_cube_root(ratio.max(L::splat(1e-3)));
+        let loss = if AVERAGED {
+            load::<L>(&shape.dilatation[tet], first).mul(L::splat(-0.25))
+        } else {
+            determinant.neg_mul_add(inverse, L::splat(1.0))
+        };
+        let bulk = load::<L>(&cluster.bulk[tet], first);
+        let pressure = bulk.mul(loss);
+        let invariant = load::<L>(&shape.invariant[tet], first);
+        let factor = if M::SECOND {
+            // -1 / (mu V), 1/nJ, by way of the square so that padding lanes give zero.
+            let scale = bulk
+                .mul(inverse)
+                .mul(L::splat(-bulk_over_shear))
+                .div(bulk.mul(bulk).max(L::splat(f32::MIN_POSITIVE)));
+            let volume = springs::<L, M, NODES, TETS>(
+                law,
+                [invariant.mul(scale), scale, root],
+                cluster,
+                tet,
+                first,
+                shape,
+            );
+            let sum = bulk.mul(L::splat(-1.0 / bulk_over_shear)).mul(volume[1]);
+            volume[0].neg_mul_add(sum, pressure)
+        } else {
+            let slopes = law.lane_slopes(inverse.mul(invariant), inverse, root);
+            store(slopes.first, &mut shape.determinant[tet], first);
+            slopes.volume[0].neg_mul_add(slopes.volume[1], pressure)
+        };
+        store(factor, &mut shape.invariant[tet], first);
+        ratio
+    }
+}
+
+/// Of a law with `I2`: puts the springs in place of the edges' products; returns the two factors of `-dw/dJ`.
+#[inline(always)]
+unsafe fn springs<L: Lanes, M: Isochoric, const NODES: usize, const TETS: usize>(
+    law: M,
+    [invariant, scale, root]: [L; 3],
+    cluster: &Cluster<NODES, TETS>,
+    tet: usize,
+    first: usize,
+    shape: &mut Shape,
+) -> [L; 2] {
+    unsafe {
+        let zero = L::splat(0.0);
+        let (mut e, mut g) = ([zero; 6], [zero; 6]);
+        for k in 0..6 {
+            e[k] = load(&shape.products[tet][k], first);
+            g[k] = load(&cluster.springs[tet][k], first);
+        }
+        // E G and the trace of its square, both with the factor -mu V of G.
+        let mut product = [[zero; 3]; 3];
+        for j in 0..3 {
+            for k in 0..3 {
+                let sum = e[ENTRY[j][0]].mul(g[ENTRY[0][k]]);
+                let sum = e[ENTRY[j][1]].mul_add(g[ENTRY[1][k]], sum);
+                product[j][k] = e[ENTRY[j][2]].mul_add(g[ENTRY[2][k]], sum);
+            }
+        }
+        let mixed = product[0][1].mul(product[1][0]);
+        let mixed = product[0][2].mul_add(product[2][0], mixed);
+        let mixed = product[1][2].mul_add(product[2][1], mixed);
+        let mut trace = mixed.add(mixed);
+        for j in 0..3 {
+            trace = product[j][j].mul_add(product[j][j], trace);
+        }
+        let squares = scale
+            .mul(scale)
+            .neg_mul_add(trace, invariant.mul(invariant));
+        let slopes = law.lane_slopes(invariant, squares.mul(L::splat(0.5)), root);
+        let own = slopes.second.mul_add(invariant, slopes.first);
+        let less = slopes.second.mul(scale);
+        for j in 0..3 {
+            for k in j..3 {
+                // G E G, with the square of the factor.
+                let sum = g[ENTRY[j][0]].mul(product[0][k]);
+                let sum = g[ENTRY[j][1]].mul_add(product[1][k], sum);
+                let sum = g[ENTRY[j][2]].mul_add(product[2][k], sum);
+                let spring = less.neg_mul_add(sum, own.mul(g[ENTRY[j][k]]));
+                store(spring, &mut shape.products[tet][ENTRY[j][k]], first);
+            }
+        }
+        slopes.volume
+    }
+}

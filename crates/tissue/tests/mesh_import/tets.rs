@@ -1,0 +1,160 @@
+//! Faults of tetrahedra: named, and repaired where that was asked for.
+
+use tissue::mesh::Mesh;
+use tissue::mesh_import::{ImportError, RawTets, Repair, from_tets};
+
+/// Two tetrahedra on one face.
+fn pair() -> RawTets {
+    RawTets {
+        positions: vec![
+            [0.0, 0.0, 0.0],
+            [3.0, 0.0, 0.0],
+            [0.0, 3.0, 0.0],
+            [0.0, 0.0, 3.0],
+            [3.0, 3.0, 3.0],
+        ],
+        tets: vec![[0, 1, 2, 3], [1, 2, 3, 4]],
+    }
+}
+
+/// The error without repair, and the repairs and the mesh with it.
+fn both(raw: RawTets) -> (ImportError, Vec<Repair>, Mesh) {
+    let error = from_tets(raw.clone(), false, &mut Vec::new()).unwrap_err();
+    let mut repairs = Vec::new();
+    let mesh = from_tets(raw, true, &mut repairs).unwrap();
+    (error, repairs, mesh)
+}
+
+#[test]
+fn a_sound_pair_passes_untouched() {
+    let mesh = from_tets(pair(), false, &mut Vec::new()).unwrap();
+    assert_eq!((mesh.tets.len(), mesh.surface.len()), (2, 6));
+}
+
+#[test]
+fn inverted_tets_are_named_and_turned() {
+    let mut raw = pair();
+    raw.tets[1].swap(0, 1);
+    let (error, repairs, mesh) = both(raw);
+    assert!(
+        matches!(
+            error,
+            ImportError::Inverted {
+                tet: 1,
+                count: 1,
+                ..
+            }
+        ),
+        "{error}"
+    );
+    assert_eq!((repairs.len(), repairs[0].first), (1, 1));
+    assert_eq!(mesh.tets.len(), 2);
+}
+
+#[test]
+fn degenerate_tets_are_named_and_dropped() {
+    let mut raw = pair();
+    raw.positions.push([1.0, 1.0, 0.0]);
+    raw.tets.insert(1, [0, 1, 2, 5]);
+    let (error, repairs, mesh) = both(raw);
+    assert!(
+        matches!(error, ImportError::Degenerate { tet: 1, .. }),
+        "{error}"
+    );
+    // The node of the dropped tetrahedron goes with it.
+    assert_eq!(repairs.len(), 2);
+    assert_eq!((mesh.node_count(), mesh.tets.len()), (5, 2));
+}
+
+#[test]
+fn repeated_tets_are_named_and_dropped() {
+    let mut raw = pair();
+    raw.tets.push([1, 0, 3, 2]);
+    let (error, repairs, mesh) = both(raw);
+    assert!(
+        matches!(
+            error,
+            ImportError::Duplicate {
+                first: 0,
+                second: 2
+            }
+        ),
+        "{error}"
+    );
+    assert_eq!(repairs[0].first, 2);
+    assert_eq!(mesh.tets.len(), 2);
+}
+
+#[test]
+fn unreferenced_nodes_are_named_and_dropped() {
+    let mut raw = pair();
+    raw.positions.insert(0, [50.0; 3]);
+    raw.tets.iter_mut().flatten().for_each(|node| *node += 1);
+    let (error, repairs, mesh) = both(raw);
+    assert!(
+        matches!(error, ImportError::Unreferenced { node: 0, count: 1 }),
+        "{error}"
+    );
+    assert_eq!(repairs.len(), 1);
+    assert_eq!(mesh.positions[0], [0.0; 3]);
+}
+
+#[test]
+fn parts_are_named_and_the_largest_kept() {
+    let mut raw = pair();
+    for p in [
+        [9.0, 0.0, 0.0],
+        [10.0, 0.0, 0.0],
+        [9.0, 1.0, 0.0],
+        [9.0, 0.0, 1.0],
+    ] {
+        raw.positions.push(p);
+    }
+    raw.tets.insert(0, [5, 6, 7, 8]);
+    let (error, repairs, mesh) = both(raw);
+    assert!(
+        matches!(
+            error,
+            ImportError::Components {
+                count: 2,
+                tet: 1,
+                ..
+            }
+        ),
+        "{error}"
+    );
+    assert_eq!(repairs[0].count, 1);
+    assert_eq!((mesh.node_count(), mesh.tets.len()), (5, 2));
+}
+
+#[test]
+fn non_finite_nodes_are_named_and_dropped_with_their_tets() {
+    let mut raw = pair();
+    raw.positions[4][1] = f64::NAN;
+    let (error, repairs, mesh) = both(raw);
+    assert!(
+        matches!(error, ImportError::NonFinite { node: 4 }),
+        "{error}"
+    );
+    assert_eq!(repairs.len(), 2);
+    assert_eq!((mesh.node_count(), mesh.tets.len()), (4, 1));
+}
+
+#[test]
+fn a_node_out_of_range_is_never_repaired() {
+    let mut raw = pair();
+    raw.tets[1][3] = 7;
+    let error = from_tets(raw, true, &mut Vec::new()).unwrap_err();
+    assert!(
+        matches!(
+            error,
+            ImportError::NodeOutOfRange {
+                index: 1,
+                node: 7,
+                count: 5,
+                ..
+            }
+        ),
+        "{error}"
+    );
+}

@@ -1,0 +1,200 @@
+//! Tools that a host had better not have: deep inside, wild, as large as the organ, or impossible and refused.
+
+use contact::{Shape, Vector};
+use upt::contact::{Mode, Tool};
+use upt::{Contact, Error, SceneOptions, StepInput, flag};
+
+use super::fixture::{model, plain, scene};
+use super::{ball, pressing, readings, site, step, with};
+
+#[test]
+fn a_tool_that_starts_deep_inside_is_told_of_and_comes_out_on_its_own_side() {
+    let scene = scene(&model("tiny-corrected"), &with(5));
+    let (_, normal) = site(&scene);
+    let mut deepest = Vec::new();
+    for t in 0..12 {
+        step(&scene, &[pressing(&scene, 5.5, Vector::ZERO)]);
+        let reading = readings(&scene)[0];
+        if t == 0 {
+            assert!(scene.stats().flags & flag::DEEP != 0, "{reading:?}");
+        }
+        assert!(
+            Vector::from(reading.force).dot(normal) >= 0.0,
+            "{reading:?}"
+        );
+        deepest.push(reading.penetration_mm);
+    }
+    assert!(deepest[11] < 0.1 && deepest[11] < deepest[0], "{deepest:?}");
+    let stats = scene.stats();
+    assert!(stats.min_det > 0.0 && stats.flags & flag::DEEP == 0);
+}
+
+#[test]
+fn wild_tools_stay_finite_and_the_tissue_comes_back() {
+    for corrections in [0, 1, 3] {
+        let options = SceneOptions {
+            guard_policy: upt::GuardPolicy::Blend,
+            ..with(corrections)
+        };
+        let scene = scene(&model("tiny-corrected"), &options);
+        let (at, _) = site(&scene);
+        let mut seed = 9u64;
+        let mut random = |scale: f32| {
+            seed = seed
+                .wrapping_mul(6364136223846793005)
+                .wrapping_add(1442695040888963407);
+            scale * ((seed >> 40) as f32 / (1u64 << 23) as f32 - 1.0)
+        };
+        for _ in 0..200 {
+            let tools: Vec<Tool> = (0..2)
+                .map(|_| {
+                    let centre = [0, 1, 2].map(|axis| at[axis] + random(6.0));
+                    let mut tool = ball(2.5 + random(1.5), centre);
+                    tool.friction = random(0.5).abs();
+                    if random(1.0) > 0.7 {
+                        tool.mode = Mode::Grasp;
+                    }
+                    tool
+                })
+                .collect();
+            let u = step(&scene, &tools);
+            assert!(u.iter().all(|x| x.is_finite()));
+            for reading in readings(&scene) {
+                assert!(
+                    reading
+                        .force
+                        .iter()
+                        .chain(&reading.torque)
+                        .all(|x| x.is_finite())
+                );
+            }
+        }
+        for _ in 0..100 {
+            step(&scene, &[]);
+        }
+        assert!(
+            scene.stats().max_displacement_mm < 0.05,
+            "k = {corrections}: {}",
+            scene.stats().max_displacement_mm
+        );
+    }
+}
+
+#[test]
+fn a_tool_as_large_as_the_organ_is_borne() {
+    for corrections in [0, 3] {
+        let options = SceneOptions {
+            guard_policy: upt::GuardPolicy::Blend,
+            ..with(corrections)
+        };
+        let scene = scene(&model("tiny-corrected"), &options);
+        let (at, normal) = site(&scene);
+        for t in 0..6 {
+            let centre = Vector::from(at) + normal * (500.0 - 0.3 * t as f32);
+            let u = step(&scene, &[ball(500.0, centre.to_array())]);
+            assert!(u.iter().all(|x| x.is_finite()));
+        }
+        assert!(readings(&scene)[0].contacts > 3);
+    }
+}
+
+#[test]
+fn what_cannot_be_is_refused_and_changes_nothing() {
+    let model = model("tiny-corrected");
+    let scene = scene(&model, &with(3));
+    for t in 1..4 {
+        step(&scene, &[pressing(&scene, 0.3 * t as f32, Vector::ZERO)]);
+    }
+    let before = scene.save().unwrap();
+    let tool = pressing(&scene, 1.2, Vector::ZERO);
+    let tried = |tools: &[Tool]| {
+        let input = StepInput {
+            displacement: None,
+            contact: Contact::Tools(tools),
+        };
+        scene.step(input, None).unwrap_err()
+    };
+    let friction = Tool {
+        friction: -0.1,
+        ..tool.clone()
+    };
+    let error = tried(&[tool.clone(), friction]);
+    assert!(matches!(error, Error::Argument(_)));
+    assert!(
+        error
+            .to_string()
+            .contains("instruments[1]: friction is -0.1"),
+        "{error}"
+    );
+    let tear = Tool {
+        tear_off_mn: f32::NAN,
+        ..tool.clone()
+    };
+    assert!(matches!(tried(&[tear]), Error::Argument(_)));
+    assert!(matches!(tried(&vec![tool; 65]), Error::Argument(_)));
+    let turn = [0.0, 0.0, 0.0, 1.0];
+    let made = |at: [f32; 3], turn| Tool::new(3, &Shape::Sphere { radius: 1.0 }, at, turn);
+    assert!(matches!(
+        made([f32::NAN; 3], turn),
+        Err(Error::NonFinite(_))
+    ));
+    assert!(matches!(made([0.0; 3], [0.0; 4]), Err(Error::Argument(_))));
+    assert!(matches!(
+        made([2e6, 0.0, 0.0], turn),
+        Err(Error::Argument(_))
+    ));
+    let flat = Shape::Sphere { radius: 0.0 };
+    assert!(matches!(
+        Tool::new(0, &flat, [0.0; 3], turn),
+        Err(Error::Argument(_))
+    ));
+    assert!(scene.save().unwrap() == before);
+}
+
+#[test]
+fn the_same_question_has_the_same_contacts() {
+    use upt::instrument::{Instrument, Shape};
+    let scene = scene(&model("tiny-reduced"), &plain());
+    let tool = |depth: f32| {
+        let at = pressing(&scene, depth, Vector::ZERO).pose.translation;
+        let shape = Shape::Capsule {
+            half_length: 2.0,
+            radius: 3.0,
+        };
+        [Instrument {
+            shape,
+            position: at.to_array(),
+            rotation: [0.0, 0.0, 0.0, 1.0],
+            sticking: true,
+        }]
+    };
+    for t in 1..8 {
+        let tool = tool(0.4 * t as f32);
+        let ask = || {
+            let found = scene.contacts_from_instruments(&tool, |nodes, vectors| {
+                Ok((nodes.to_vec(), vectors.to_vec()))
+            });
+            found.unwrap()
+        };
+        let (first, second) = (ask(), ask());
+        assert_eq!(first, second, "step {t}");
+        assert!(!first.0.is_empty());
+        scene.step(super::fixture::sparse(&first), None).unwrap();
+    }
+}
+
+#[test]
+fn a_bundle_without_a_linear_response_says_what_to_use_instead() {
+    let scene = scene(&model("tiny-upt"), &plain());
+    let input = StepInput {
+        displacement: None,
+        contact: Contact::Tools(&[ball(1.0, [0.0; 3])]),
+    };
+    let error = scene.step(input, None).unwrap_err();
+    assert!(matches!(error, Error::Unsupported(_)), "{error}");
+    assert!(
+        error
+            .to_string()
+            .contains("upt_scene_contacts_from_instruments")
+    );
+}

@@ -1,0 +1,23 @@
+#!/usr/bin/env bash
+# cargo clippy of the workspace, and of builds with a single feature or none, each of which must compile, tests included.
+# Warnings are errors. The last line: N passed, N failed, N skipped.
+set -uo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/../.." || exit 1
+source tests/cross/count.sh
+
+lint() { check "clippy $*" cargo clippy --release --all-targets "$@" -- -D warnings; }
+
+# alone PACKAGE FEATURE...: one build for each; "" is none.
+alone() {
+  local package="$1" feature
+  shift
+  for feature in "$@"; do lint --package "$package" --no-default-features --features="$feature"; done
+}
+
+lint --workspace
+alone upt "" contact forces haptics ndarray
+alone tissue "" files linear
+alone upt-cli "" files # the first is the demo's
+
+echo "$passed passed, $failed failed, $skipped skipped"
+[ "$failed" -eq 0 ]
