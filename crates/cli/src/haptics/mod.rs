@@ -197,7 +197,7 @@ fn write(
 ) -> Result<()> {
     let machine = Machine::this();
     let lead = format!(
-        "\n`{name}`, {nodes} nodes, steps of {step_ms:.0} ms that arrive {} ms late; {} ({} cores{}), {} of the load by --load.\n\n",
+        "\n`{name}`, {nodes} nodes, steps of {step_ms:.0} ms that arrive {} ms late; {} ({} cores{}), --load {}.\n\n",
         options.latency_ms,
         machine.cpu,
         machine.cores,
