@@ -6,6 +6,7 @@ mod refused;
 use std::path::Path;
 use std::process::{Command, Output};
 
+use refused::refused;
 use upt::{Contact, Model, ModelOptions, Scene, SceneOptions, StepInput};
 
 /// An ellipsoid with half axes 50, 40 and 30 mm as an OBJ, with `bend` applied to each point.

@@ -5,7 +5,7 @@ use std::path::Path;
 use super::{HELD, command, organ, plain, text};
 
 /// The message of a run that must fail and leave no bundle.
-fn refused(surface: &Path, more: &[&str]) -> String {
+pub fn refused(surface: &Path, more: &[&str]) -> String {
     let out = surface.with_extension("bundle");
     let output = command(surface, &out, more).output().unwrap();
     assert_eq!(output.status.code(), Some(2), "{}", text(&output));
