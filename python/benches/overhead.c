@@ -9,7 +9,8 @@ static double now(void) {
   return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-/* Steps by the instrument, or by nodes where there is none; the status that was not success, or 0. */
+/* Steps by the instrument, or by nodes where there is none; the status that was not success, or 0.
+ */
 upt_status steps(upt_scene *scene, const upt_instrument *tool, const uint32_t *nodes,
                  const float *vectors, uint64_t count, float *out, uint64_t length, long calls,
                  double *seconds) {
