@@ -2,6 +2,7 @@
 
 #[cfg(feature = "files")]
 mod gltf;
+#[cfg(feature = "files")]
 mod skin;
 #[cfg(feature = "files")]
 mod surface;
