@@ -35,6 +35,7 @@ pub fn make(workspace: &Workspace, platform: Platform, out: &Path) -> Result<Pat
     // The only file of the folder.
     let made = std::fs::read_dir(&scratch)?.next().context("no wheel")??;
     let place = out.join(made.file_name());
+    std::fs::create_dir_all(out)?;
     std::fs::copy(made.path(), &place)?;
     Ok(place)
 }

@@ -123,7 +123,7 @@ fn cases_that_cannot_be_measured_are_refused_by_name() {
     let press = simulate(folder.path(), MESH, ["--tool", "press"]);
     refused(
         &["--tools", &press, "--bundle", "onnx/brain-coarse-reduced"],
-        &["another mesh", "brain-coarse-reduced"],
+        &["a mesh other than", "brain-coarse-reduced"],
     );
     refused(
         &[
