@@ -3,7 +3,7 @@
 //! Writes `frequency [m]` (rad/s) and `modes [m,3K]` (mass-normalised, kg^-1/2) as one safetensors file, from which
 //! `python -m upt_training.vibration --natural FILE` makes a bundle's free vibration.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
@@ -11,8 +11,9 @@ use anyhow::Context;
 use clap::Args;
 use indicatif::ProgressBar;
 use serde_json::json;
-use tissue::linear::{Factor, Lame, Stiffness, natural_modes};
+use tissue::linear::{Factor, Lame, NaturalModes, Stiffness, natural_modes};
 use tissue::mesh::{Boundary, Mesh};
+use tissue::tensors::f32_values;
 
 use crate::prior::{floats, header};
 
@@ -55,6 +56,24 @@ pub struct Options {
 pub fn run(args: &Options) -> anyhow::Result<ExitCode> {
     write(args)?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Reads a file of modes, as float32 kept them.
+pub fn read(path: &Path) -> anyhow::Result<NaturalModes> {
+    let bytes =
+        std::fs::read(path).with_context(|| format!("{}: cannot be read", path.display()))?;
+    let file = safetensors::SafeTensors::deserialize(&bytes)
+        .with_context(|| format!("{}: not a file of modes", path.display()))?;
+    let values = |name: &str| -> anyhow::Result<Vec<f64>> {
+        let tensor = file
+            .tensor(name)
+            .with_context(|| format!("{}: not a file of modes", path.display()))?;
+        Ok(f32_values(tensor.data()).map(f64::from).collect())
+    };
+    Ok(NaturalModes {
+        frequency: values("frequency")?,
+        modes: values("modes")?,
+    })
 }
 
 /// Writes the file; returns the lowest and the highest frequency, Hz.

@@ -3,6 +3,7 @@
 //! Sources, none of which is a trajectory: natural modes, the bundle's own residual modes where it has them, and patches
 //! (what a few quasi-Newton steps add to the linear response of pushes all over the domain).
 
+mod beyond;
 mod constraint;
 pub mod manifest;
 mod patches;
@@ -11,10 +12,11 @@ mod space;
 mod trajectories;
 mod workbench;
 
+pub use beyond::Beyond;
 pub use constraint::Constraint;
 pub use patches::differences;
 pub use pushes::{Push, Pushes};
-pub use workbench::Workbench;
+pub use workbench::{Natural, Workbench};
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -213,7 +215,12 @@ pub fn write(args: &Options) -> Result<usize> {
     if args.natural == 0 {
         bail!("--natural is 0; corrections need natural modes");
     }
-    let bench = Workbench::open(&args.bundle, args.natural, args.threads, args.json)?;
+    let bench = Workbench::open(
+        &args.bundle,
+        &Natural::Found(args.natural),
+        args.threads,
+        args.json,
+    )?;
     let mut more = if args.residual {
         let width = bench.prior.width();
         if bench.prior.residual.is_empty() {

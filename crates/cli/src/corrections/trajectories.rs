@@ -5,9 +5,8 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail};
 use tissue::trajectory::Trajectory;
-use upt::kernels::{Isa, Pool};
-use upt::prior::ContactResponse;
 
+use super::beyond::Beyond;
 use super::workbench::Workbench;
 use crate::progress;
 use crate::report::cases::finished;
@@ -56,8 +55,7 @@ pub fn differences(source: &Workbench, folders: &[PathBuf], quiet: bool) -> Resu
     }
     let every = all.div_ceil(MOST_STATES);
 
-    let (isa, pool) = (Isa::detect(), Pool::new(1)?);
-    let mut response = ContactResponse::new(&source.prior)?;
+    let mut beyond = Beyond::new(source)?;
     let bar = progress::bar(quiet, trajectories.len() as u64, "trajectories");
     let (mut rows, mut seen) = (Vec::with_capacity(all / every + 1), 0);
     for (found, path) in trajectories.iter().zip(&files) {
@@ -67,26 +65,14 @@ pub fn differences(source: &Workbench, folders: &[PathBuf], quiet: bool) -> Resu
                 continue;
             }
             let (nodes, vectors) = found.contact(frame);
-            let mut linear = vec![0.0; source.prior.width()];
-            response
-                .solve(
-                    isa,
-                    &source.prior,
-                    &source.held_flags,
-                    nodes,
-                    vectors.as_flattened(),
-                )
-                .with_context(|| format!("{}: frame {frame}", path.display()))?;
-            response.field(isa, &pool, &source.prior, &mut linear)?;
-            let mut beyond = vec![0.0; source.prior.width()];
+            let mut q = vec![0.0; source.prior.width()];
             source
                 .prior
-                .project(found.frame(frame).as_flattened(), &mut beyond);
-            beyond
-                .iter_mut()
-                .zip(&linear)
-                .for_each(|(q, linear)| *q -= linear);
-            rows.push(beyond);
+                .project(found.frame(frame).as_flattened(), &mut q);
+            let q = beyond
+                .linear(nodes, vectors, q)
+                .with_context(|| format!("{}: frame {frame}", path.display()))?;
+            rows.push(q);
         }
         bar.inc(1);
     }

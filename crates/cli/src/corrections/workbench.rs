@@ -13,7 +13,16 @@ use super::pushes::Pushes;
 use super::space::Space;
 use super::{FILE, entry, manifest};
 use crate::effort::Effort;
+use crate::modes;
 use crate::progress::spinner;
+
+/// Where the natural modes come from.
+pub enum Natural<'a> {
+    /// So many, found with the factor.
+    Found(usize),
+    /// A file that `upt modes` wrote for the same body.
+    Kept(&'a Path),
+}
 
 pub struct Workbench {
     pub mesh: Mesh,
@@ -30,8 +39,8 @@ pub struct Workbench {
 }
 
 impl Workbench {
-    /// Reads the bundle, factorises its stiffness and finds `natural` modes.
-    pub fn open(bundle: &Path, natural: usize, threads: usize, quiet: bool) -> Result<Self> {
+    /// Reads the bundle, factorises its stiffness and takes the natural modes.
+    pub fn open(bundle: &Path, natural: &Natural<'_>, threads: usize, quiet: bool) -> Result<Self> {
         let files = BundleFiles::open(bundle)?;
         let stated = &files.manifest;
         let Some(entry) = &stated.prior else {
@@ -56,16 +65,17 @@ impl Workbench {
         let stiffness = Stiffness::assemble(&mesh, &held, lame)?;
         let factor = Factor::new(&stiffness, &mesh.positions, threads)?;
         bar.finish_and_clear();
-        let bar = spinner(quiet, "natural modes: solves with the factor");
-        let natural = natural_modes(
-            &mesh,
-            &stiffness,
-            &factor,
-            material.density_kg_m3,
-            natural,
-            &|| bar.inc(1),
-        )?;
-        bar.finish_and_clear();
+        let natural = match *natural {
+            Natural::Kept(path) => modes::read(path)?,
+            Natural::Found(count) => {
+                let bar = spinner(quiet, "natural modes: solves with the factor");
+                let density = material.density_kg_m3;
+                let done = || bar.inc(1);
+                let found = natural_modes(&mesh, &stiffness, &factor, density, count, &done)?;
+                bar.finish_and_clear();
+                found
+            }
+        };
         let mut held_flags = vec![false; mesh.node_count()];
         held.iter()
             .for_each(|&node| held_flags[node as usize] = true);

@@ -30,7 +30,7 @@ use tissue::linear::ColumnsFile;
 use tissue::mesh::Mesh;
 
 use crate::check;
-use crate::corrections::{Workbench, principal};
+use crate::corrections::{Natural, Workbench, principal};
 use crate::effort::Effort;
 use crate::{corrections, modes, preview, prior};
 use options::Sizes;
@@ -187,8 +187,8 @@ pub fn run(options: &Options) -> Result<ExitCode> {
             bundle::assemble(options, &mesh, &sizes, &stage.folder, &draft)?;
             bundle::publish(&draft, &options.out)?;
             stage.decided("a bundle of the linear response and its free vibration is there");
-            let natural = vibration::count(&mesh, options);
-            let bench = Workbench::open(&draft, natural, options.threads, options.json)?;
+            let natural = Natural::Kept(&modes_file);
+            let bench = Workbench::open(&draft, &natural, options.threads, options.json)?;
             let found =
                 corrections::differences(&bench, options.patches, options.seed, options.json)?;
             refine::write_differences(&stage.folder.join(refine::PATCHES), &found)?;
@@ -217,9 +217,9 @@ pub fn run(options: &Options) -> Result<ExitCode> {
         |stage| {
             let rounds = refine::Rounds {
                 options,
-                mesh: &mesh,
                 draft: &draft,
                 columns: &columns_file,
+                modes: &modes_file,
                 key: coarse_key.clone(),
                 seconds,
             };
@@ -232,10 +232,10 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     let made = work.stage("learn", &learn_key, &["learned/bundle.json"], |stage| {
         let learning = learn::Learning {
             options,
-            mesh: &mesh,
             sizes: &sizes,
             effort,
             refined: &work_refined,
+            modes: &modes_file,
             seconds,
         };
         learn::run(&learning, stage)

@@ -5,10 +5,11 @@ use std::path::Path;
 
 use anyhow::{Context, Result};
 use tissue::mesh::{Mesh, tet_volume};
-use tissue::tensors::{Dtype, Tensor, f32_values, write_file};
+use tissue::tensors::{Dtype, Tensor, write_file};
 
 use super::options::Options;
 use super::projected::Projected;
+use crate::modes;
 
 /// Number of modes: as asked, but at most a sixth of the free degrees of freedom.
 pub fn count(mesh: &Mesh, options: &Options) -> usize {
@@ -27,15 +28,10 @@ pub struct Modes {
 impl Modes {
     /// Reads the file.
     pub fn read(path: &Path) -> Result<Self> {
-        let bytes =
-            std::fs::read(path).with_context(|| format!("{}: cannot be read", path.display()))?;
-        let file = safetensors::SafeTensors::deserialize(&bytes)
-            .with_context(|| format!("{}: not a file of modes", path.display()))?;
+        let found = modes::read(path)?;
         Ok(Self {
-            frequency: f32_values(file.tensor("frequency")?.data())
-                .map(f64::from)
-                .collect(),
-            fields: f32_values(file.tensor("modes")?.data()).collect(),
+            frequency: found.frequency,
+            fields: found.modes.iter().map(|&value| value as f32).collect(),
         })
     }
 

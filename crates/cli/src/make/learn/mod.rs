@@ -10,15 +10,14 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 use serde_json::json;
-use tissue::mesh::Mesh;
 use tissue::schemes::{FRAMES, SplitMix};
 use upt::Corrections;
 
 use super::options::{Options, Sizes};
 use super::stages::Stage;
-use super::{bundle, refine, vibration};
+use super::{bundle, refine};
 use crate::check::{Certificate, Recording};
-use crate::corrections::{self, Pushes, Workbench, manifest, principal};
+use crate::corrections::{self, Natural, Pushes, Workbench, manifest, principal};
 use crate::effort::Effort;
 
 /// Simulated contacts that decide.
@@ -48,10 +47,10 @@ const CANDIDATE: &str = "candidate";
 /// What there is to learn from.
 pub struct Learning<'a> {
     pub options: &'a Options,
-    pub mesh: &'a Mesh,
     pub sizes: &'a Sizes,
     /// The best bundle without simulations.
     pub refined: &'a Path,
+    pub modes: &'a Path,
     /// What the bundle will recommend.
     pub effort: Effort,
     /// Time for it, seconds.
@@ -101,8 +100,8 @@ fn teach(
 ) -> Result<()> {
     let (folder, options) = (stage.folder.clone(), learning.options);
     let started = Instant::now();
-    let natural = vibration::count(learning.mesh, options);
-    let bench = Workbench::open(learning.refined, natural, options.threads, options.json)?;
+    let natural = Natural::Kept(learning.modes);
+    let bench = Workbench::open(learning.refined, &natural, options.threads, options.json)?;
     let errors = refine::best_errors(&folder)?;
     let sites = choose(&bench.pushes(), &errors, count, options.seed);
     let observed = observe::observe(

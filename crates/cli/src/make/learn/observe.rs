@@ -6,10 +6,8 @@ use tissue::contact::ContactDomain;
 use tissue::mesh::Mesh;
 use tissue::schemes::{FRAME_S, FRAMES, Programme, Scheme};
 use tissue::solver::{ContactNode, Solver, SolverOptions};
-use upt::kernels::{Isa, Pool};
-use upt::prior::ContactResponse;
 
-use crate::corrections::Workbench;
+use crate::corrections::{Beyond, Workbench};
 use crate::parallel::{in_parallel, workers};
 use crate::progress;
 
@@ -80,8 +78,7 @@ fn simulate(
             ..SolverOptions::default()
         },
     )?;
-    let (isa, pool) = (Isa::detect(), Pool::new(1)?);
-    let mut response = ContactResponse::new(&bench.prior)?;
+    let mut beyond = Beyond::new(bench)?;
     let mut truth = vec![[0.0f32; 3]; mesh.node_count()];
     let mut frames: Vec<(bool, Vec<f32>)> = Vec::with_capacity(FRAMES);
     let mut observed = Observed::default();
@@ -104,15 +101,10 @@ fn simulate(
         bench.prior.project(truth.as_flattened(), &mut q);
         if !contact.is_empty() && frame % EVERY == 0 {
             let nodes: Vec<u32> = contact.iter().map(|entry| entry.node).collect();
-            let vectors: Vec<f32> = contact
-                .iter()
-                .flat_map(|entry| entry.displacement)
-                .collect();
-            let mut linear = vec![0.0; q.len()];
-            response.solve(isa, &bench.prior, &bench.held_flags, &nodes, &vectors)?;
-            response.field(isa, &pool, &bench.prior, &mut linear)?;
-            let beyond = q.iter().zip(&linear).map(|(a, b)| a - b).collect();
-            observed.contact.push(beyond);
+            let vectors: Vec<[f32; 3]> = contact.iter().map(|entry| entry.displacement).collect();
+            observed
+                .contact
+                .push(beyond.linear(&nodes, &vectors, q.clone())?);
         }
         frames.push((!contact.is_empty(), q));
         done();

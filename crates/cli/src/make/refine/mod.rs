@@ -10,15 +10,14 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 use serde::{Deserialize, Serialize};
-use tissue::mesh::Mesh;
 use tissue::schemes::SplitMix;
 use tissue::tensors::{Dtype, Tensor, f32_values, write_file, write_whole};
 
+use super::bundle;
 use super::options::Options;
 use super::stages::{Stage, key_of};
-use super::{bundle, vibration};
 use crate::check;
-use crate::corrections::{Push, Pushes, Workbench, principal};
+use crate::corrections::{Natural, Push, Pushes, Workbench, principal};
 
 /// Equilibria of a round.
 const EQUILIBRIA: usize = 24;
@@ -44,10 +43,10 @@ const PARTS: [&str; 2] = ["bundle.json", "corrections.safetensors"];
 /// What there is to refine.
 pub struct Rounds<'a> {
     pub options: &'a Options,
-    pub mesh: &'a Mesh,
     /// The bundle that the coarse stage left; it stays as it is.
     pub draft: &'a Path,
     pub columns: &'a Path,
+    pub modes: &'a Path,
     /// Key of all that the draft was made from.
     pub key: String,
     /// Time for the rounds, seconds.
@@ -126,7 +125,7 @@ pub fn run(rounds: &Rounds<'_>, stage: &mut Stage) -> Result<()> {
                     Some(ref bench) => bench,
                     None => &*bench.insert(Workbench::open(
                         rounds.draft,
-                        vibration::count(rounds.mesh, options),
+                        &Natural::Kept(rounds.modes),
                         options.threads,
                         options.json,
                     )?),
