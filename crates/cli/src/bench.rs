@@ -1,4 +1,4 @@
-//! A bundle on the bench of `upt stress`, `upt beside` and `upt soak`: its scenes, contact patches, and runs of steps with what they
+//! A bundle on the bench of `upt stress`, `upt compare` and `upt soak`: its scenes, contact patches, and runs of steps with what they
 //! came to.
 
 use std::path::Path;

@@ -5,7 +5,7 @@
 //! input, with a message on stderr that says what to do. A closed pipe ends the program quietly.
 
 mod bench;
-mod beside;
+mod compare;
 #[cfg(feature = "linear")]
 mod check;
 mod completions;
@@ -133,7 +133,7 @@ enum Command {
     /// Run stiff and extreme cases, and say whether each ended as it should.
     Stress(stress::Options),
     /// Run a bundle and the reference solver side by side: error over random steps, warnings, forces, release.
-    Beside(beside::Options),
+    Compare(compare::Options),
     /// Let a simulated hand feel a bundle at 1 kHz: energy, force steps, call times, forces against the reference solver.
     Haptics(haptics::Options),
     /// Make many steps on one scene and log the memory.
@@ -186,7 +186,7 @@ fn main() -> ExitCode {
         Command::Report(options) => report::run(&options),
         Command::Envelope(options) => envelope::run(&options),
         Command::Stress(options) => stress::run(&options),
-        Command::Beside(options) => beside::run(&options),
+        Command::Compare(options) => compare::run(&options),
         Command::Haptics(options) => haptics::run(&options),
         Command::Soak(options) => soak::run(&options),
         Command::View(options) => view::run(&options),

@@ -151,14 +151,14 @@ fn cases_that_cannot_be_measured_are_refused_by_name() {
 }
 
 #[test]
-fn random_tools_run_beside_the_solver() {
+fn random_tools_are_compared_with_the_solver() {
     let folder = tempfile::tempdir().unwrap();
     let page = folder.path().join("page.md");
-    let name = format!("upt beside --tools {NAME}");
+    let name = format!("upt compare --tools {NAME}");
     let marked = format!("<!-- begin: {name} -->\n<!-- end: {name} -->\n");
     std::fs::write(&page, marked).unwrap();
     let output = upt(&[
-        "beside",
+        "compare",
         "--bundle",
         BUNDLE,
         "--steps",

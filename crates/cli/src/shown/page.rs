@@ -25,7 +25,7 @@ const PICTURED: &str = "stroke";
 /// The rows over all, the ratios by programme and by dataset with the bundle's frame step, and the times.
 pub fn markdown(lead: &str, rows: &Rows, datasets: &[DatasetRow], times: &[Time]) -> String {
     let mut out = format!("\n{lead}\n\n");
-    out += "| shown | MSE, mm² | over one step late | the steps' own MSE, mm² | over the steps' own | latency, ms | jump at an arrival, mm: median / worst | frame to frame beside the truth, mm: median / worst | tool inside, mm: median / worst |\n";
+    out += "| shown | MSE, mm² | over one step late | the steps' own MSE, mm² | over the steps' own | latency, ms | jump at an arrival, mm: median / worst | frame to frame against the truth, mm: median / worst | tool inside, mm: median / worst |\n";
     out += "|---|---:|---:|---:|---:|---:|---:|---:|---:|\n";
     let overall = || rows.iter().filter(|row| row.programme == ALL);
     for row in overall() {
@@ -52,7 +52,7 @@ pub fn markdown(lead: &str, rows: &Rows, datasets: &[DatasetRow], times: &[Time]
             label(row.true_penetration_mm)
         );
     }
-    out += "| programme | cases | MSE, mm² | over one step late | over the steps' own | latency, ms | frame to frame beside the truth, mm | tool inside, mm |\n";
+    out += "| programme | cases | MSE, mm² | over one step late | over the steps' own | latency, ms | frame to frame against the truth, mm | tool inside, mm |\n";
     out += "|---|---:|---:|---:|---:|---:|---:|---:|\n";
     let presented = |row: &&Row| row.programme != ALL && row.way == shown;
     for row in rows.iter().filter(presented) {

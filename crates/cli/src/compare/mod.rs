@@ -1,4 +1,4 @@
-//! `upt beside`: a bundle against the reference solver on the same contacts: the error over random steps without a reset, what
+//! `upt compare`: a bundle against the reference solver on the same contacts: the error over random steps without a reset, what
 //! falling asleep after a release costs, and, on these and on cases from disk that the bundle was not trained on, false
 //! alarms, how well the warnings rank the error, and the error of the contact force and of attached points.
 
@@ -24,9 +24,9 @@ use pair::Pair;
 
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  upt beside --bundle onnx/brain-coarse-reduced --markdown docs/results/stability.md --images docs/results/images
-  upt beside --bundle onnx/brain-coarse-reduced --steps 0 --tools 20
-  upt beside --bundle onnx/brain-fast --steps 0 --held-out DATASET --held-out DATASET-S5/case-00000.trajectory.safetensors --outside DATASET-HARD/case-00000.trajectory.safetensors")]
+  upt compare --bundle onnx/brain-coarse-reduced --markdown docs/results/stability.md --images docs/results/images
+  upt compare --bundle onnx/brain-coarse-reduced --steps 0 --tools 20
+  upt compare --bundle onnx/brain-fast --steps 0 --held-out DATASET --held-out DATASET-S5/case-00000.trajectory.safetensors --outside DATASET-HARD/case-00000.trajectory.safetensors")]
 pub struct Options {
     /// Bundle folder.
     #[arg(long)]
@@ -45,7 +45,7 @@ pub struct Options {
     /// Such cases outside the envelope.
     #[arg(long, value_name = "PATH", num_args = 1..)]
     outside: Vec<PathBuf>,
-    /// Page whose part between the markers `upt beside NAME` is replaced, and that of --tools between `upt beside --tools NAME`.
+    /// Page whose part between the markers `upt compare NAME` is replaced, and that of --tools between `upt compare --tools NAME`.
     #[arg(long)]
     markdown: Option<PathBuf>,
     /// Folder for the plots.
@@ -89,7 +89,7 @@ pub fn run(options: &Options) -> Result<ExitCode> {
         tables::release(&mut text, &release);
         if let Some(folder) = &options.images {
             let name = &bench.subject;
-            picture::run(&folder.join(format!("{name}-beside.svg")), &random)?;
+            picture::run(&folder.join(format!("{name}-compared.svg")), &random)?;
             picture::release(
                 &folder.join(format!("{name}-release.svg")),
                 &release.moments,
@@ -120,7 +120,7 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     }
     print!("{text}{of_tools}");
     if let Some(page) = &options.markdown {
-        for (what, text) in [("upt beside", &text), ("upt beside --tools", &of_tools)] {
+        for (what, text) in [("upt compare", &text), ("upt compare --tools", &of_tools)] {
             if !text.is_empty() {
                 let name = format!("{what} {}", bench.subject);
                 replace_between(page, &name, &format!("\n{text}"))?;

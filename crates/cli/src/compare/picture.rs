@@ -1,4 +1,4 @@
-//! The plots of `upt beside`, SVG files that stand alone.
+//! The plots of `upt compare`, SVG files that stand alone.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! What `upt beside` writes, as Markdown.
+//! What `upt compare` writes, as Markdown.
 
 use std::fmt::Write;
 
