@@ -96,7 +96,7 @@ pub fn against_split(
         )
         .against(rival, theirs / ours)
         .error(relative_error(&out, &exact.displacement))
-        .limits(Some(1.6), Some(3.0))
+        .limits(Some(2.0), Some(3.0))
         .print();
         let found = [
             (
