@@ -1,4 +1,4 @@
-"""What the page of `upt view` reaches in headless Chromium: pictures a second, mouse to picture, the step beside it.
+"""What the page of `upt view` reaches in headless Chromium: pictures a second, mouse to picture, the step meanwhile.
 
     python3 tests/view/measure.py --bundle onnx/brain-reduced --markdown docs/guide/view.md
 
@@ -92,14 +92,16 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=20.0)
     parser.add_argument("--width", type=int, default=1000)
     parser.add_argument("--height", type=int, default=700)
+    parser.add_argument("--step-ms", type=float, help="of upt view; default: what the bundle recommends for frames")
     parser.add_argument("--markdown", type=Path)
     arguments = parser.parse_args()
     browser = Browser(arguments.width, arguments.height)
     try:
-        with server(arguments.bundle) as (port, token):
+        more = () if arguments.step_ms is None else ("--step-ms", str(arguments.step_ms))
+        with server(arguments.bundle, *more) as (port, token):
             browser.open(f"http://127.0.0.1:{port}/?token={token}")
             browser.wait("window.uptView && uptView.shown > 10")
-            nodes = browser.run("return uptView.nodes()")
+            nodes, step_ms = browser.run("return [uptView.nodes(), uptView.dt()]")
             stroke(browser, 2.0)  # until everything is compiled
             found = stroke(browser, arguments.seconds)
     finally:
@@ -108,7 +110,7 @@ def main() -> None:
     middle = statistics.median
     size = f"{arguments.width} x {arguments.height} pixels"
     drag = (
-        f"{found['ms'] / 1000:.0f} s of strokes ({found['steps']} steps, median force {middle(found['force']):.0f} mN)"
+        f"{found['ms'] / 1000:.0f} s of strokes ({found['steps']} steps of {step_ms:.0f} ms, median force {middle(found['force']):.0f} mN)"
     )
 
     def row(what: str, values: list[float], digits: int = 1) -> str:
@@ -123,7 +125,7 @@ def main() -> None:
         row("from picture to picture, ms", found["intervals"]),
         row(f"mouse to picture, ms ({len(found['latency'])} moves)", found["latency"]),
         row("making the tissue of a picture's moment, ms", found["made"], 2),
-        row("step beside it, ms", found["step"]),
+        row("step meanwhile, ms", found["step"]),
         "",
         "Processor time a picture: drawing {:.1f} ms, page {:.1f} ms, library {:.1f} ms.".format(*found["processor"]),
     ]

@@ -35,9 +35,9 @@ TOOL = {"position": [0, 0, 0], "rotation": [0, 0, 0, 1], "radius": 5, "half_leng
 
 
 @contextmanager
-def server(bundle: Path):
+def server(bundle: Path, *more: str):
     """Port and token of a running `upt view`."""
-    command = [COMMAND, "view", str(bundle)]
+    command = [COMMAND, "view", str(bundle), *more]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     try:
         address = process.stdout.readline().strip()

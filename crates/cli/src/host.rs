@@ -139,6 +139,14 @@ impl Model {
         }
     }
 
+    /// Length of its scenes' steps, s.
+    pub fn step_s(&self) -> f64 {
+        match self.step_s {
+            0.0 => self.info.dt.into(),
+            own => own,
+        }
+    }
+
     pub fn info(&self) -> &ffi::upt_model_info {
         &self.info
     }

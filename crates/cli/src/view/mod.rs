@@ -14,7 +14,7 @@ use std::net::TcpListener;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use clap::Args;
 
 #[derive(Args)]
@@ -30,16 +30,25 @@ pub struct Options {
     /// Threads of a step.
     #[arg(long, default_value_t = 1)]
     threads: u32,
+    /// Length of a step, ms, 10 to 50. Default: what the bundle recommends to hosts that show frames. A longer one leaves more of the
+    /// processor to the picture.
+    #[arg(long, value_name = "MS")]
+    step_ms: Option<f64>,
 }
 
 pub fn run(options: &Options) -> Result<ExitCode> {
+    if let Some(ms) = options.step_ms
+        && !(1e3 * upt::SHORTEST_STEP_S..=1e3 * upt::LONGEST_STEP_S).contains(&ms)
+    {
+        bail!("--step-ms is {ms}; a step takes 10 to 50 ms");
+    }
     let listener = TcpListener::bind(("127.0.0.1", options.port)).with_context(|| {
         format!(
             "port {} on 127.0.0.1 cannot be opened; choose another with --port, or leave it out",
             options.port
         )
     })?;
-    let server = server::Server::new(&options.bundle, options.threads, &listener)?;
+    let server = server::Server::new(&options.bundle, options.threads, options.step_ms, &listener)?;
     println!("{}", server.address());
     println!("open this address in a browser; Ctrl-C stops the server");
     server.serve(&listener);

@@ -63,14 +63,24 @@ pub struct Server {
 }
 
 impl Server {
-    pub fn new(bundle: &Path, threads: u32, listener: &TcpListener) -> Result<Self> {
+    pub fn new(
+        bundle: &Path,
+        threads: u32,
+        step_ms: Option<f64>,
+        listener: &TcpListener,
+    ) -> Result<Self> {
         let settings = ModelSettings {
             threads,
+            step_s: step_ms.map_or(0.0, |ms| 1e-3 * ms),
             ..ModelSettings::default()
         };
+        let model = Model::open(bundle, &settings)?;
         let name = bundle.file_name().unwrap_or(bundle.as_os_str());
         Ok(Self {
-            model: Model::open(bundle, &settings)?.for_frames(),
+            model: match step_ms {
+                Some(_) => model,
+                None => model.for_frames(),
+            },
             bundle: name.to_string_lossy().into_owned(),
             port: listener.local_addr()?.port(),
             token: token()?,

@@ -74,7 +74,7 @@ impl Session {
         let solves = scene.step_instruments(&[], &mut displacement).is_ok();
         scene.reset()?;
         let presents = solves && scene.present(0.0, &[], &mut displacement).is_ok();
-        let dt = model.info().frame_step_s;
+        let dt = model.step_s();
         Ok(Self {
             faces: faces.iter().map(|node| place[node]).collect(),
             rest: nodes.iter().map(|node| positions[*node as usize]).collect(),
@@ -110,7 +110,7 @@ impl Session {
             node_count: info.node_count as usize,
             surface_node_count: self.nodes.len(),
             surface_face_count: self.faces.len() / 3,
-            dt: info.frame_step_s as f32,
+            dt: self.dt as f32,
             max_push_mm: info.max_push_mm,
             presents: self.presents,
             flags: vec![

@@ -275,6 +275,7 @@ at("reset").addEventListener("click", () => say({ reset: true }));
 at("record").addEventListener("click", () => say({ record: !status.recording }));
 at("replay").addEventListener("click", () => say({ replay: true }));
 status.nodes = () => hello.node_count;
+status.dt = () => 1000 * hello.dt;
 status.gltf = () => gltf(surface.geometry, hello.bundle);
 at("save").addEventListener("click", () => {
   const link = document.createElement("a");
