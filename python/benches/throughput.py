@@ -1,6 +1,7 @@
 """Steps a second of `BatchedScenes` against one scene times the number of cores, by turns.
 
-By the clock it is true only where nothing else runs; processor time says what the batch itself costs more.
+By the clock it is true only where nothing else runs; processor time says what the batch itself costs more. As many threads as cores that step
+their scenes without waiting for one another say what the machine gives: cores share caches, memory and the clock's power.
 
     python python/benches/throughput.py --bundle onnx/brain-reduced --scenes 8 --markdown docs/guide/python.md
 """
@@ -11,6 +12,7 @@ import argparse
 import statistics
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -53,17 +55,29 @@ def main() -> None:
         for _ in range(arguments.steps):
             batch.step_contacts(contacts, out)
 
-    one_by_one()
-    together()
-    turns = [(timed(one_by_one), timed(together)) for _ in range(arguments.turns)]
     cores = core_count()
+
+    def row(first: int) -> None:
+        mine = list(zip(batch.scenes, contacts, out, strict=True))[first::cores]
+        for _ in range(arguments.steps):
+            for scene, (nodes, vectors), place in mine:
+                scene.step_contacts(nodes, vectors, place)
+
+    threads = ThreadPoolExecutor(cores)
+
+    def apart() -> None:
+        list(threads.map(row, range(cores)))
+
+    for warm_up in (one_by_one, together, apart):
+        warm_up()
+    turns = [(timed(one_by_one), timed(together), timed(apart)) for _ in range(arguments.turns)]
     single, both = (statistics.median(turn[i][0] for turn in turns) for i in range(2))
-    wall = statistics.median(b[0] / (cores * s[0]) for s, b in turns)
-    processor = statistics.median(b[1] / s[1] for s, b in turns)
+    wall, free = (statistics.median(turn[i][0] / (cores * turn[0][0]) for turn in turns) for i in (1, 2))
+    processor = statistics.median(b[1] / s[1] for s, b, _ in turns)
     text = (
         f"One scene of `{Path(arguments.bundle).name}` {single:.0f} steps/s, {arguments.scenes} scenes on {cores} "
         f"cores {both:.0f} steps/s: {wall:.2f} times cores times one scene by the clock, {processor:.2f} by processor "
-        f"time (medians of {arguments.turns} turns). {about}."
+        f"time. {cores} threads that never wait for one another: {free:.2f} (medians of {arguments.turns} turns). {about}."
     )
     write(arguments.markdown, "python/benches/throughput.py", text)
 
