@@ -10,7 +10,7 @@ that bundles learn from and of the hard ones, and their ratio (times the bundle'
 `hard-ring` is left out of that: its tissue has another damping than the bundle says. With corrections `upt rollout`
 takes the damping of the trajectory; without them the bundle's is all that there is.
 
-With `--rows` the table stays as it is but for the rows of the data's schemes. Times, forces and estimates, which are of
+With `--rows` the table stays as it is but for the rows of the data's schemes and their largest errors. Times, forces and estimates, which are of
 all schemes together, stay too.
 """
 
@@ -30,6 +30,8 @@ BEGIN = "<!-- corrections_table.py: begin {} -->"
 END = "<!-- corrections_table.py: end {} -->"
 
 GROUPS = ("learned regimes", "hard regimes")
+PUSHES = ("1", "2", "3", "4")
+LARGEST = "largest error of a case, mm, mean over schemes 1-4"
 
 
 def scheme_of(path: pathlib.Path) -> str:
@@ -71,6 +73,7 @@ def rows(upt: str, bundle: str, cases: list[pathlib.Path], counts: list[str], th
     lines, times = [], {k: [] for k in counts}
     pairs = {group: {k: [] for k in counts} for group in GROUPS}
     forces = {k: [0.0, 0.0] for k in counts}
+    worst = {k: [] for k in counts}
     for scheme, members in sorted(by_scheme.items()):
         cells = []
         for count in counts:
@@ -79,6 +82,8 @@ def rows(upt: str, bundle: str, cases: list[pathlib.Path], counts: list[str], th
                 result = replay(upt, bundle, case, count, threads)
                 errors.append(result["overall"]["mse_mm2"])
                 largest.append(result["overall"]["max_mm"])
+                if scheme in PUSHES:
+                    worst[count].append(largest[-1])
                 for step, estimate, ms in zip(result["steps"], result["estimated_mm"], result["ms"], strict=True):
                     if estimate is not None:
                         if scheme not in OTHER_DAMPING:
@@ -93,6 +98,8 @@ def rows(upt: str, bundle: str, cases: list[pathlib.Path], counts: list[str], th
                     forces[count][1] += sum(wanted**2 for wanted in force["wanted"])
             cells.append(f"{statistics.fmean(errors):.2g} ({max(largest):.2g})")
         lines.append(f"| {scheme} ({len(members)}) | " + " | ".join(cells) + " |")
+    if all(worst.values()):
+        lines.append(f"| {LARGEST} | " + " | ".join(f"{statistics.fmean(worst[k]):.2g}" for k in counts) + " |")
     correlations = {group: [spearman(pairs[group][k]) for k in counts] for group in GROUPS}
     inside = pairs[GROUPS[0]]
     ratios = [[true / estimate for estimate, true in inside[k] if estimate > 0] for k in counts]
@@ -146,7 +153,7 @@ def main() -> None:
             raise SystemExit(f"{options.page}: the marker {begin} is missing")
         before, rest = page.split(begin, 1)
         if options.rows:
-            schemes = [line for line in table[2:] if line[2:].split(" (", 1)[0] in SCHEMES]
+            schemes = [line for line in table[2:] if line[2:].split(" (", 1)[0] in SCHEMES or LARGEST in line]
             text = with_rows(rest.split(end, 1)[0], schemes)
         options.page.write_text(f"{before}{begin}\n{text}\n{end}{rest.split(end, 1)[1]}")
 
