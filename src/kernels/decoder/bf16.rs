@@ -4,6 +4,7 @@
 //! Inputs are stored as pairs of successive features, `[in/2][nodes][2]`: a 32-bit lane holds what one `vdpbf16ps` consumes, and
 //! sixteen rows of sixteen lanes are a matrix tile. Behind the last feature are zeros up to a whole tile.
 
+#[cfg(target_arch = "x86_64")]
 use super::amx::NODES;
 #[cfg(target_arch = "x86_64")]
 use super::tile::MAX_NODES;
