@@ -179,8 +179,9 @@ pub fn run(rounds: &Rounds<'_>, stage: &mut Stage) -> Result<()> {
 
 fn words(number: usize, round: &Round) -> String {
     let found = format!(
-        "{:.2e} mm² of estimated error at {VALIDATED} sites, worst region {:.1} times the mean",
+        "{:.2e} mm² of estimated error at {} sites, worst region {:.1} times the mean",
         round.error,
+        round.errors.iter().filter(|&&error| error > 0.0).count(),
         round.worst / round.error
     );
     match (number, round.taken) {
@@ -262,7 +263,8 @@ fn make(
         &validation,
         options.json,
     )?;
-    let error = errors.iter().sum::<f64>() / errors.len() as f64;
+    let carried = errors.iter().filter(|&&error| error > 0.0).count();
+    let error = errors.iter().sum::<f64>() / carried.max(1) as f64;
     let worst = worst_region(bench, &sites, &errors);
     let taken = best.is_none_or(|(_, best)| {
         error < BETTER * best.error || (worst < BETTER * best.worst && error <= best.error)
@@ -368,7 +370,8 @@ fn choose(
 fn worst_region(bench: &Workbench, sites: &[u32], errors: &[f64]) -> f64 {
     let regions = check::regions(&bench.mesh);
     let mut sums = vec![(0.0, 0.0); regions.len()];
-    for (&site, error) in sites.iter().zip(errors) {
+    let carried = sites.iter().zip(errors).filter(|(_, error)| **error > 0.0);
+    for (&site, error) in carried {
         let place = bench.mesh.positions[site as usize].map(f64::from);
         if let Some(region) = check::nearest(&regions, place) {
             sums[region].0 += error;

