@@ -70,6 +70,20 @@ def only_the_token_opens_the_page():
         assert status_of(port, f"/../Cargo.toml?token={token}") == 404
 
 
+def the_length_of_a_step_is_asked_for():
+    phantom = ROOT / "tests/fixtures/tiny-reduced"
+    for wrong in ("5", "nan", "60"):
+        refused = subprocess.run([COMMAND, "view", str(phantom), "--step-ms", wrong], capture_output=True, text=True)
+        assert refused.returncode != 0 and "10 to 50 ms" in refused.stderr, (wrong, refused)
+    # Without corrections there are only the bundle's own steps.
+    refused = subprocess.run([COMMAND, "view", str(phantom), "--step-ms", "20"], capture_output=True, text=True)
+    assert refused.returncode != 0 and "step_s is 0.02" in refused.stderr, refused
+    with server(phantom, "--step-ms", "50") as (port, token):
+        client = RawClient(port, f"/socket?token={token}")
+        hello = json.loads(client.read()[1])
+        assert abs(hello["dt"] - 0.05) < 1e-6, hello["dt"]
+
+
 def a_socket_of_another_origin_is_refused():
     with server(ROOT / "tests/fixtures/tiny-reduced") as (port, token):
         target = f"/socket?token={token}"
@@ -343,6 +357,7 @@ def main() -> int:
     PICTURES.mkdir(parents=True, exist_ok=True)
     tests = [
         only_the_token_opens_the_page,
+        the_length_of_a_step_is_asked_for,
         a_socket_of_another_origin_is_refused,
         a_second_client_is_refused_and_the_first_goes_on,
         a_bad_message_closes_its_client_alone,

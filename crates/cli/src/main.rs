@@ -5,9 +5,9 @@
 //! input, with a message on stderr that says what to do. A closed pipe ends the program quietly.
 
 mod bench;
-mod compare;
 #[cfg(feature = "linear")]
 mod check;
+mod compare;
 mod completions;
 #[cfg(feature = "linear")]
 mod corrections;

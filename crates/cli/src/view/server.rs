@@ -76,11 +76,14 @@ impl Server {
         };
         let model = Model::open(bundle, &settings)?;
         let name = bundle.file_name().unwrap_or(bundle.as_os_str());
+        let model = match step_ms {
+            Some(_) => model,
+            None => model.for_frames(),
+        };
+        // What no client could have is refused here.
+        Session::new(&model)?;
         Ok(Self {
-            model: match step_ms {
-                Some(_) => model,
-                None => model.for_frames(),
-            },
+            model,
             bundle: name.to_string_lossy().into_owned(),
             port: listener.local_addr()?.port(),
             token: token()?,
