@@ -1,7 +1,8 @@
 """Steps a second of `BatchedScenes` against one scene times the number of cores, by turns.
 
-By the clock it is true only where nothing else runs; processor time says what the batch itself costs more. As many threads as cores that step
-their scenes without waiting for one another say what the machine gives: cores share caches, memory and the clock's power.
+By the clock it is true only where nothing else runs; processor time says what the batch itself costs more. As many
+threads as cores that step their scenes without waiting for one another say what the machine gives: cores share caches,
+memory and the clock's power.
 
     python python/benches/throughput.py --bundle onnx/brain-reduced --scenes 8 --markdown docs/guide/python.md
 """
@@ -77,7 +78,8 @@ def main() -> None:
     text = (
         f"One scene of `{Path(arguments.bundle).name}` {single:.0f} steps/s, {arguments.scenes} scenes on {cores} "
         f"cores {both:.0f} steps/s: {wall:.2f} times cores times one scene by the clock, {processor:.2f} by processor "
-        f"time. {cores} threads that never wait for one another: {free:.2f} (medians of {arguments.turns} turns). {about}."
+        f"time. {cores} threads that never wait for one another: {free:.2f} (medians of {arguments.turns} turns). "
+        f"{about}."
     )
     write(arguments.markdown, "python/benches/throughput.py", text)
 

@@ -109,9 +109,8 @@ def main() -> None:
     rate = 1000 * found["pictures"] / found["ms"]
     middle = statistics.median
     size = f"{arguments.width} x {arguments.height} pixels"
-    drag = (
-        f"{found['ms'] / 1000:.0f} s of strokes ({found['steps']} steps of {step_ms:.0f} ms, median force {middle(found['force']):.0f} mN)"
-    )
+    steps = f"{found['steps']} steps of {step_ms:.0f} ms"
+    drag = f"{found['ms'] / 1000:.0f} s of strokes ({steps}, median force {middle(found['force']):.0f} mN)"
 
     def row(what: str, values: list[float], digits: int = 1) -> str:
         return f"| {what} | {middle(values):.{digits}f} | {percentile(values, 0.99):.{digits}f} |"

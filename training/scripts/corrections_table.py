@@ -10,8 +10,8 @@ that bundles learn from and of the hard ones, and their ratio (times the bundle'
 `hard-ring` is left out of that: its tissue has another damping than the bundle says. With corrections `upt rollout`
 takes the damping of the trajectory; without them the bundle's is all that there is.
 
-With `--rows` the table stays as it is but for the rows of the data's schemes and their largest errors. Times, forces and estimates, which are of
-all schemes together, stay too.
+With `--rows` the table stays as it is but for the rows of the data's schemes and their largest errors. Times, forces
+and estimates, which are of all schemes together, stay too.
 """
 
 import argparse

@@ -8,7 +8,7 @@
 //! threads, and a region has the bits of the full decode. [`weights`] packs once a model and once a
 //! step, [`gemm`] is the micro-kernel, [`tile`] the layers, [`scalar`] the readable reference.
 
-// Elsewhere only the sizes of its tiles are read.
+// On other processors nothing computes in bf16; only sizes are read.
 #[cfg_attr(not(target_arch = "x86_64"), allow(dead_code))]
 mod amx;
 mod bf16;
@@ -16,6 +16,7 @@ mod gemm;
 pub mod probe;
 mod scalar;
 mod tile;
+#[cfg_attr(not(target_arch = "x86_64"), allow(dead_code))]
 mod weights;
 
 pub use weights::{DecoderTokens, DecoderWeights, PackedDecoder};

@@ -52,7 +52,6 @@ pub(super) struct Linear {
 }
 
 /// A matrix in bf16, in both layouts.
-#[cfg(target_arch = "x86_64")]
 #[derive(Clone, Copy)]
 pub(super) struct Narrow<'a> {
     pub outputs: usize,
@@ -62,7 +61,6 @@ pub(super) struct Narrow<'a> {
 
 impl Linear {
     /// The weights in bf16.
-    #[cfg(target_arch = "x86_64")]
     pub(super) fn narrow(&self) -> Narrow<'_> {
         Narrow {
             outputs: self.bias.len(),
@@ -364,7 +362,6 @@ impl DecoderTokens {
     }
 
     /// A head's keys in bf16, `[L, h/heads]`.
-    #[cfg(target_arch = "x86_64")]
     pub(super) fn keys_of(&self, head: usize) -> Narrow<'_> {
         let (tokens, width) = (self.tokens, self.hidden / self.heads);
         let (pairs, blocks) = (pair_count(tokens, width), block_count(tokens, width));
@@ -376,7 +373,6 @@ impl DecoderTokens {
     }
 
     /// A head's values in bf16, `[h/heads, L]`.
-    #[cfg(target_arch = "x86_64")]
     pub(super) fn values_of(&self, head: usize) -> Narrow<'_> {
         let (tokens, width) = (self.tokens, self.hidden / self.heads);
         let (pairs, blocks) = (pair_count(width, tokens), block_count(width, tokens));
