@@ -77,6 +77,10 @@ def organs(work: Path, sofa: Path) -> dict[str, list[str]]:
         "box-inclusion": [
             *[str(work / "box.mesh.safetensors"), "--license", "Apache-2.0 OR MIT", "--minutes", "3"],
         ],
+        "brain-supported": [
+            *[str(ROOT / "onnx/meshes/brain.mesh.safetensors"), "--license", "Apache-2.0 OR MIT", "--minutes", "11"],
+            *["--boundary", "supported", "--tolerance-mm", "0.03", "--name", "brain-supported"],
+        ],
     }
 
 
