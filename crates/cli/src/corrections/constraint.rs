@@ -17,17 +17,15 @@ pub struct Constraint {
 impl Constraint {
     pub fn new(source: &Workbench, nodes: &[u32]) -> Result<Self> {
         let free = &source.stiffness.free;
-        let dofs: Vec<usize> = nodes
-            .iter()
+        let (held, n) = (&source.held_flags, source.stiffness.dofs());
+        let nodes: Vec<u32> = (nodes.iter().copied())
+            .filter(|&node| !held[node as usize])
+            .collect();
+        let dofs: Vec<usize> = (nodes.iter())
             .filter_map(|&node| free.get(node))
             .flat_map(|at| [3 * at, 3 * at + 1, 3 * at + 2])
             .collect();
-        let n = source.stiffness.dofs();
-        let mut columns = vec![0.0; dofs.len() * n];
-        for (column, &dof) in columns.chunks_exact_mut(n).zip(&dofs) {
-            column[dof] = 1.0;
-        }
-        source.factor.solve(&mut columns);
+        let columns = source.responses(&nodes)?;
         let mut factor = ContactFactor::with_capacity(dofs.len());
         let names: Vec<u32> = dofs.iter().map(|&dof| dof as u32).collect();
         factor.factor(Isa::detect(), &names, |upper| {

@@ -16,7 +16,7 @@ pub use beyond::Beyond;
 pub use constraint::Constraint;
 pub use patches::differences;
 pub use pushes::{Push, Pushes};
-pub use workbench::{Natural, Workbench};
+pub use workbench::{Known, Workbench};
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -217,7 +217,8 @@ pub fn write(args: &Options) -> Result<usize> {
     }
     let bench = Workbench::open(
         &args.bundle,
-        &Natural::Found(args.natural),
+        args.natural,
+        &Known::default(),
         args.threads,
         args.json,
     )?;

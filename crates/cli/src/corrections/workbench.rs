@@ -4,7 +4,7 @@ use std::path::Path;
 
 use anyhow::{Context, Result, bail};
 use elements::{ElementForces, Material, Simd};
-use tissue::linear::{Factor, Lame, NaturalModes, Stiffness, natural_modes};
+use tissue::linear::{ColumnsFile, Factor, Lame, NaturalModes, Stiffness, natural_modes};
 use tissue::mesh::{Boundary, Mesh};
 use upt::bundle::BundleFiles;
 use upt::prior::PriorTable;
@@ -16,12 +16,13 @@ use crate::effort::Effort;
 use crate::modes;
 use crate::progress::spinner;
 
-/// Where the natural modes come from.
-pub enum Natural<'a> {
-    /// So many, found with the factor.
-    Found(usize),
-    /// A file that `upt modes` wrote for the same body.
-    Kept(&'a Path),
+/// What files already hold of the same body.
+#[derive(Default)]
+pub struct Known<'a> {
+    /// What `upt modes` wrote; without it the modes are found with the factor.
+    pub modes: Option<&'a Path>,
+    /// What `upt prior` wrote; without it a contact's columns are solved for.
+    pub columns: Option<&'a Path>,
 }
 
 pub struct Workbench {
@@ -32,6 +33,7 @@ pub struct Workbench {
     pub stiffness: Stiffness,
     pub factor: Factor,
     natural: NaturalModes,
+    columns: Option<ColumnsFile>,
     pub held: Vec<u32>,
     pub held_flags: Vec<bool>,
     push_mm: f64,
@@ -39,8 +41,14 @@ pub struct Workbench {
 }
 
 impl Workbench {
-    /// Reads the bundle, factorises its stiffness and takes the natural modes.
-    pub fn open(bundle: &Path, natural: &Natural<'_>, threads: usize, quiet: bool) -> Result<Self> {
+    /// Reads the bundle, factorises its stiffness and takes `natural` modes, or those that are known.
+    pub fn open(
+        bundle: &Path,
+        natural: usize,
+        known: &Known<'_>,
+        threads: usize,
+        quiet: bool,
+    ) -> Result<Self> {
         let files = BundleFiles::open(bundle)?;
         let stated = &files.manifest;
         let Some(entry) = &stated.prior else {
@@ -65,17 +73,20 @@ impl Workbench {
         let stiffness = Stiffness::assemble(&mesh, &held, lame)?;
         let factor = Factor::new(&stiffness, &mesh.positions, threads)?;
         bar.finish_and_clear();
-        let natural = match *natural {
-            Natural::Kept(path) => modes::read(path)?,
-            Natural::Found(count) => {
+        let natural = match known.modes {
+            Some(path) => modes::read(path)?,
+            None => {
                 let bar = spinner(quiet, "natural modes: solves with the factor");
                 let density = material.density_kg_m3;
                 let done = || bar.inc(1);
-                let found = natural_modes(&mesh, &stiffness, &factor, density, count, &done)?;
+                let found = natural_modes(&mesh, &stiffness, &factor, density, natural, &done)?;
                 bar.finish_and_clear();
                 found
             }
         };
+        let (young, poisson) = (material.young_pa, material.poisson);
+        let open = |path| ColumnsFile::open(path, &mesh, boundary, young, poisson);
+        let columns = known.columns.map(open).transpose()?;
         let mut held_flags = vec![false; mesh.node_count()];
         held.iter()
             .for_each(|&node| held_flags[node as usize] = true);
@@ -86,12 +97,43 @@ impl Workbench {
             stiffness,
             factor,
             natural,
+            columns,
             held,
             held_flags,
             push_mm: f64::from(stated.envelope.max_push_mm),
             area_mm2: stated.envelope.contact_area_mm2.map(f64::from),
             mesh,
         })
+    }
+
+    /// Displacement of all free degrees of freedom `[3m][n]` by a unit force at each of the nodes', mm/mN: read where a file has
+    /// them, solved for otherwise.
+    pub fn responses(&self, nodes: &[u32]) -> Result<Vec<f64>> {
+        let (free, n) = (&self.stiffness.free, self.stiffness.dofs());
+        if let Some(file) = &self.columns {
+            let row = |node: &u32| file.compliance.nodes.binary_search(node).ok();
+            if let Some(rows) = nodes.iter().map(row).collect::<Option<Vec<usize>>>() {
+                let all = file.columns(&rows)?;
+                let mut found = Vec::with_capacity(3 * nodes.len() * n);
+                for column in all.chunks_exact(3 * self.mesh.node_count()) {
+                    for &node in &free.nodes {
+                        let at = 3 * node as usize;
+                        found.extend(column[at..at + 3].iter().map(|&value| f64::from(value)));
+                    }
+                }
+                return Ok(found);
+            }
+        }
+        let dofs = nodes.iter().filter_map(|&node| free.get(node));
+        let dofs: Vec<usize> = dofs
+            .flat_map(|at| [3 * at, 3 * at + 1, 3 * at + 2])
+            .collect();
+        let mut found = vec![0.0; dofs.len() * n];
+        for (column, &dof) in found.chunks_exact_mut(n).zip(&dofs) {
+            column[dof] = 1.0;
+        }
+        self.factor.solve(&mut found);
+        Ok(found)
     }
 
     /// Pushes of the bundle's envelope.

@@ -30,7 +30,7 @@ use tissue::linear::ColumnsFile;
 use tissue::mesh::Mesh;
 
 use crate::check;
-use crate::corrections::{Natural, Workbench, principal};
+use crate::corrections::{Known, Workbench, principal};
 use crate::effort::Effort;
 use crate::{corrections, modes, preview, prior};
 use options::Sizes;
@@ -173,6 +173,11 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     })?;
 
     // From here on there is a bundle that works.
+    let natural = vibration::count(&mesh, options);
+    let known = Known {
+        modes: Some(&modes_file),
+        columns: Some(&columns_file),
+    };
     let coarse_key = key_of(&[
         tables_key.as_bytes(),
         format!("{:?} {} {}", material, options.natural, options.patches).as_bytes(),
@@ -187,8 +192,8 @@ pub fn run(options: &Options) -> Result<ExitCode> {
             bundle::assemble(options, &mesh, &sizes, &stage.folder, &draft)?;
             bundle::publish(&draft, &options.out)?;
             stage.decided("a bundle of the linear response and its free vibration is there");
-            let natural = Natural::Kept(&modes_file);
-            let bench = Workbench::open(&draft, &natural, options.threads, options.json)?;
+            let bench =
+                Workbench::open(&draft, natural, &known, options.threads, options.json)?;
             let found =
                 corrections::differences(&bench, options.patches, options.seed, options.json)?;
             refine::write_differences(&stage.folder.join(refine::PATCHES), &found)?;
@@ -219,7 +224,8 @@ pub fn run(options: &Options) -> Result<ExitCode> {
                 options,
                 draft: &draft,
                 columns: &columns_file,
-                modes: &modes_file,
+                natural,
+                known: &known,
                 key: coarse_key.clone(),
                 seconds,
             };
@@ -235,7 +241,8 @@ pub fn run(options: &Options) -> Result<ExitCode> {
             sizes: &sizes,
             effort,
             refined: &work_refined,
-            modes: &modes_file,
+            natural,
+            known: &known,
             seconds,
         };
         learn::run(&learning, stage)

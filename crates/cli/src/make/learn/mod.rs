@@ -17,7 +17,7 @@ use super::options::{Options, Sizes};
 use super::stages::Stage;
 use super::{bundle, refine};
 use crate::check::{Certificate, Recording};
-use crate::corrections::{self, Natural, Pushes, Workbench, manifest, principal};
+use crate::corrections::{self, Known, Pushes, Workbench, manifest, principal};
 use crate::effort::Effort;
 
 /// Simulated contacts that decide.
@@ -50,7 +50,8 @@ pub struct Learning<'a> {
     pub sizes: &'a Sizes,
     /// The best bundle without simulations.
     pub refined: &'a Path,
-    pub modes: &'a Path,
+    pub natural: usize,
+    pub known: &'a Known<'a>,
     /// What the bundle will recommend.
     pub effort: Effort,
     /// Time for it, seconds.
@@ -100,8 +101,13 @@ fn teach(
 ) -> Result<()> {
     let (folder, options) = (stage.folder.clone(), learning.options);
     let started = Instant::now();
-    let natural = Natural::Kept(learning.modes);
-    let bench = Workbench::open(learning.refined, &natural, options.threads, options.json)?;
+    let bench = Workbench::open(
+        learning.refined,
+        learning.natural,
+        learning.known,
+        options.threads,
+        options.json,
+    )?;
     let errors = refine::best_errors(&folder)?;
     let sites = choose(&bench.pushes(), &errors, count, options.seed);
     let observed = observe::observe(

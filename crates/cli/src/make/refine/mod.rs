@@ -17,7 +17,7 @@ use super::bundle;
 use super::options::Options;
 use super::stages::{Stage, key_of};
 use crate::check;
-use crate::corrections::{Natural, Push, Pushes, Workbench, principal};
+use crate::corrections::{Known, Push, Pushes, Workbench, principal};
 
 /// Equilibria of a round.
 const EQUILIBRIA: usize = 24;
@@ -46,7 +46,8 @@ pub struct Rounds<'a> {
     /// The bundle that the coarse stage left; it stays as it is.
     pub draft: &'a Path,
     pub columns: &'a Path,
-    pub modes: &'a Path,
+    pub natural: usize,
+    pub known: &'a Known<'a>,
     /// Key of all that the draft was made from.
     pub key: String,
     /// Time for the rounds, seconds.
@@ -125,7 +126,8 @@ pub fn run(rounds: &Rounds<'_>, stage: &mut Stage) -> Result<()> {
                     Some(ref bench) => bench,
                     None => &*bench.insert(Workbench::open(
                         rounds.draft,
-                        &Natural::Kept(rounds.modes),
+                        rounds.natural,
+                        rounds.known,
                         options.threads,
                         options.json,
                     )?),
