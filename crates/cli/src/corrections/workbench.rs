@@ -62,9 +62,6 @@ impl Workbench {
             upt::bundle::Boundary::Supported => Boundary::Supported,
         };
         let mesh = Mesh::read(&bundle.join(&stated.mesh.file))?;
-        let runtime_mesh =
-            upt::bundle::Mesh::parse(&files.tensors(&stated.mesh.file)?, stated.boundary)?;
-        let prior = PriorTable::open(&files, entry, &runtime_mesh)?;
         let held = mesh.held_nodes(boundary);
         let material = stated.material;
         let lame = Lame::from_young(material.young_pa, material.poisson)?;
@@ -84,6 +81,10 @@ impl Workbench {
                 found
             }
         };
+        // After the factorisation, which needs the most memory.
+        let runtime_mesh =
+            upt::bundle::Mesh::parse(&files.tensors(&stated.mesh.file)?, stated.boundary)?;
+        let prior = PriorTable::open(&files, entry, &runtime_mesh)?;
         let (young, poisson) = (material.young_pa, material.poisson);
         let open = |path| ColumnsFile::open(path, &mesh, boundary, young, poisson);
         let columns = known.columns.map(open).transpose()?;
