@@ -16,6 +16,9 @@ use crate::effort::Effort;
 use crate::modes;
 use crate::progress::spinner;
 
+/// Columns that are solved for together: each takes several times its length.
+const SOLVED: usize = 96;
+
 /// What files already hold of the same body.
 #[derive(Default)]
 pub struct Known<'a> {
@@ -107,33 +110,35 @@ impl Workbench {
         })
     }
 
-    /// Displacement of all free degrees of freedom `[3m][n]` by a unit force at each of the nodes', mm/mN: read where a file has
+    /// Displacement of all nodes by a unit force at each degree of freedom of free `nodes`, `[3m,3K]`, mm/mN: read where a file has
     /// them, solved for otherwise.
-    pub fn responses(&self, nodes: &[u32]) -> Result<Vec<f64>> {
-        let (free, n) = (&self.stiffness.free, self.stiffness.dofs());
+    pub fn responses(&self, nodes: &[u32]) -> Result<Vec<f32>> {
         if let Some(file) = &self.columns {
             let row = |node: &u32| file.compliance.nodes.binary_search(node).ok();
             if let Some(rows) = nodes.iter().map(row).collect::<Option<Vec<usize>>>() {
-                let all = file.columns(&rows)?;
-                let mut found = Vec::with_capacity(3 * nodes.len() * n);
-                for column in all.chunks_exact(3 * self.mesh.node_count()) {
-                    for &node in &free.nodes {
-                        let at = 3 * node as usize;
-                        found.extend(column[at..at + 3].iter().map(|&value| f64::from(value)));
-                    }
-                }
-                return Ok(found);
+                return Ok(file.columns(&rows)?);
             }
         }
+        let (free, n) = (&self.stiffness.free, self.stiffness.dofs());
         let dofs = nodes.iter().filter_map(|&node| free.get(node));
         let dofs: Vec<usize> = dofs
             .flat_map(|at| [3 * at, 3 * at + 1, 3 * at + 2])
             .collect();
-        let mut found = vec![0.0; dofs.len() * n];
-        for (column, &dof) in found.chunks_exact_mut(n).zip(&dofs) {
-            column[dof] = 1.0;
+        let mut found = vec![0.0; 3 * self.mesh.node_count() * dofs.len()];
+        let mut rows = found.chunks_exact_mut(3 * self.mesh.node_count());
+        for some in dofs.chunks(SOLVED) {
+            let mut columns = vec![0.0; some.len() * n];
+            for (column, &dof) in columns.chunks_exact_mut(n).zip(some) {
+                column[dof] = 1.0;
+            }
+            self.factor.solve(&mut columns);
+            for (row, column) in rows.by_ref().zip(columns.chunks_exact(n)) {
+                for (&node, column) in free.nodes.iter().zip(column.as_chunks::<3>().0) {
+                    let at = 3 * node as usize;
+                    row[at..at + 3].copy_from_slice(&column.map(|value| value as f32));
+                }
+            }
         }
-        self.factor.solve(&mut found);
         Ok(found)
     }
 
