@@ -269,13 +269,17 @@ fn pushes_that_invert_the_solvers_elements_are_told_and_what_came_before_counts(
     let folder = tempfile::tempdir().unwrap();
     let (surface, out) = (folder.path().join("organ.obj"), folder.path().join("organ"));
     plain(&surface);
-    let deep = ["--push", "26", "--minutes", "0.7", "--cases", "2"];
-    let output = command(&surface, &out, &[&HELD[..], &deep].concat())
-        .output()
-        .unwrap();
-    let said = text(&output);
-    assert!(output.status.success(), "{said}");
-    assert!(said.contains("of them ended early at a load"), "{said}");
+    let deep = ["--push", "26", "--cases", "2"];
+    // A busy machine has no time for tools in the first: the later ones go on from there.
+    let mut runs = ["0.7", "3", "12"].into_iter().map(|minutes| {
+        let all = [&HELD[..], &deep, &["--minutes", minutes]].concat();
+        let output = command(&surface, &out, &all).output().unwrap();
+        let said = text(&output);
+        assert!(output.status.success(), "{said}");
+        said
+    });
+    let told = runs.any(|said| said.contains("of them ended early at a load"));
+    assert!(told, "not even with 12 minutes");
     works(&out);
 }
 
