@@ -5,10 +5,8 @@ use std::path::Path;
 use anyhow::Result;
 use tissue::solver::ContactNode;
 use tissue::statics::StaticSolver;
-use upt::kernels::{Isa, Pool};
-use upt::prior::ContactResponse;
 
-use crate::corrections::{Push, Workbench};
+use crate::corrections::{Beyond, Push, Workbench};
 use crate::parallel::{in_parallel, workers};
 use crate::progress;
 
@@ -52,14 +50,8 @@ fn contact(push: &Push) -> Vec<ContactNode> {
 }
 
 fn difference(bench: &Workbench, push: &Push, field: &[f64]) -> Result<Vec<f32>> {
-    let (isa, pool) = (Isa::detect(), Pool::new(1)?);
-    let prior = &bench.prior;
-    let mut response = ContactResponse::new(prior)?;
-    let mut linear = vec![0.0; prior.width()];
-    response.solve(isa, prior, &bench.held_flags, &push.nodes, &push.vectors)?;
-    response.field(isa, &pool, prior, &mut linear)?;
     let single: Vec<f32> = field.iter().map(|&value| value as f32).collect();
-    let mut q = vec![0.0; prior.width()];
-    prior.project(&single, &mut q);
-    Ok(q.iter().zip(&linear).map(|(a, b)| a - b).collect())
+    let mut q = vec![0.0; bench.prior.width()];
+    bench.prior.project(&single, &mut q);
+    Beyond::new(bench)?.linear(&push.nodes, push.vectors.as_chunks::<3>().0, q)
 }
