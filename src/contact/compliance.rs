@@ -10,7 +10,7 @@ use crate::error::Result;
 use crate::memory;
 use crate::prior::PriorTable;
 
-const WHAT: &str = "the compliance of a contact";
+pub(super) const WHAT: &str = "the compliance of a contact";
 
 /// The tables of a solve.
 #[derive(Clone, Copy)]
@@ -67,8 +67,6 @@ pub struct Delassus {
     /// Samples of the call before, ascending, and their rows there.
     known: Vec<(u32, u32)>,
     entries: Vec<Entries>,
-    /// `W` less what inertia holds back in [`Delassus::between`], which keeps `modes` at the samples.
-    varied: Vec<f32>,
 }
 
 const NONE: u32 = u32::MAX;
@@ -94,63 +92,18 @@ impl Delassus {
         Ok(&self.w)
     }
 
-    /// As [`Delassus::of`] where the inertia changes from call to call: the static part and the modes at the samples are kept.
+    /// The same, and whether it is other than that of the last call.
     ///
     /// # Errors
     /// [`crate::Error::OutOfMemory`].
-    pub fn between(
+    pub fn fixed(
         &mut self,
         compliance: Compliance<'_>,
         all: &[Sample],
         rows: &[u32],
-    ) -> Result<&[f32]> {
-        let Some((space, held_back)) = compliance.inertia else {
-            return self.of(compliance, all, rows);
-        };
-        let alone = Compliance {
-            inertia: None,
-            ..compliance
-        };
-        let order = 3 * rows.len();
-        if self.read(alone, all, rows)? || self.modes.len() != held_back.len() * order {
-            self.modes.clear();
-            let made = memory::reserve(&mut self.varied, order * order, WHAT)
-                .and_then(|()| memory::reserve(&mut self.modes, held_back.len() * order, WHAT));
-            if let Err(error) = made {
-                self.forget();
-                return Err(error);
-            }
-            self.modes.resize(held_back.len() * order, 0.0);
-            for (at, &row) in rows.iter().enumerate() {
-                for (column, weight) in compliance.entries(all[row as usize]) {
-                    for axis in 0..3 {
-                        let own = space.at_contact(3 * column as usize + axis);
-                        let to = self.modes.chunks_exact_mut(order.max(1));
-                        for (to, own) in to.zip(own) {
-                            to[3 * at + axis] += weight * own;
-                        }
-                    }
-                }
-            }
-        }
-        self.varied.clear();
-        self.varied.extend_from_slice(&self.w);
-        // A row of blocks at a time stays in the cache; the upper triangle is enough to compute.
-        for at in 0..order {
-            let row = &mut self.varied[at * order + at..(at + 1) * order];
-            for (mode, lost) in self.modes.chunks_exact(order).zip(held_back) {
-                let factor = lost * mode[at];
-                for (w, value) in row.iter_mut().zip(&mode[at..]) {
-                    *w -= factor * value;
-                }
-            }
-        }
-        for at in 0..order {
-            for other in 0..at {
-                self.varied[at * order + other] = self.varied[other * order + at];
-            }
-        }
-        Ok(&self.varied)
+    ) -> Result<(&[f32], bool)> {
+        let is_new = self.read(compliance, all, rows)?;
+        Ok((&self.w, is_new))
     }
 
     /// Makes `w` that of the samples; tells whether it was another's.
@@ -365,7 +318,6 @@ impl Delassus {
             + self.a_before.capacity()
             + self.w.capacity()
             + self.w_before.capacity()
-            + self.varied.capacity()
             + self.of.capacity()
             + self.of_before.capacity()
             + 2 * self.known.capacity())

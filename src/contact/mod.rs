@@ -6,12 +6,14 @@
 //! | [`tool`] | what a host gives: shape, pose, how it holds; and what it gets back |
 //! | [`past`] | what is remembered from step to step: poses, forces, grasps |
 //! | [`compliance`] | how samples move under forces on samples: the Delassus matrix `W = B A B^T` |
+//! | [`held_back`] | the same at any time after a step |
 //! | [`rows`] | gaps and slips of samples near the tools, at a state of the tissue |
 //! | [`problem`] | the samples near the tools, one solve for the forces on them, what the forces change, and what tools are told |
 //!
 //! Shapes, samples and sweeps are those of the reference solver (crate `contact`). Lengths mm, forces mN.
 
 pub mod compliance;
+mod held_back;
 pub mod past;
 pub mod problem;
 pub mod rows;

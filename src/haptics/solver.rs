@@ -191,8 +191,12 @@ impl Solver {
             }
         }
         debug_assert_eq!(self.w.len(), 9 * n * n);
-        self.sweeps
-            .solve(&self.w, &self.contacts, &mut self.solved, LIMITS);
+        self.sweeps.solve(
+            &mut self.w.as_slice(),
+            &self.contacts,
+            &mut self.solved,
+            LIMITS,
+        );
         for row in 0..self.rows.len() {
             let ((_, at), force) = (self.rows[row], self.solved[row]);
             let change = force - self.forces[at];

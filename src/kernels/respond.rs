@@ -74,7 +74,8 @@ fn columns_scalar<T: Number>(
 }
 
 by_isa! {
-    fn columns_f32(table: &[f32], width: usize, rows: &[u32], factors: &[f32], add: bool, q: &mut [f32])
+    /// [`accumulate_rows`] of a table in f32 `[n,Q]`, on this thread; `width` is `Q`.
+    pub(crate) fn columns_f32(table: &[f32], width: usize, rows: &[u32], factors: &[f32], add: bool, q: &mut [f32])
         = columns_body, columns_scalar;
 }
 by_isa! {

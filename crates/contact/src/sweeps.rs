@@ -2,8 +2,8 @@
 //!
 //! Gaps and slips are given at the forces that come in, so that a solve goes on from the last one (a *warm start*): a
 //! change of force `df` moves the samples by `W df`. Contacts are visited in their order, each with its own 3x3 block
-//! ([`crate::friction`]); the first to be asked is the first to be solved, so the same input gives the same bits. A sweep
-//! costs nothing for contacts whose force does not change.
+//! ([`crate::friction`]); the first to be asked is the first to be solved, so the same input gives the same bits. A contact
+//! that is open and has no force costs a distance a sweep, and its rows of `W` are never asked for.
 
 use crate::friction::{coulomb, frame};
 use parry3d::math::{Matrix, Vector};
@@ -61,6 +61,28 @@ pub struct Outcome {
     pub converged: bool,
 }
 
+/// A Delassus matrix `[3n,3n]`, symmetric, in millimetres a unit of force, of which a solve reads the rows of those contacts alone whose
+/// force changes.
+pub trait Rows {
+    /// `n`.
+    fn contacts(&self) -> usize;
+
+    /// Three rows of a contact, `[3,3n]`.
+    fn rows(&mut self, contact: usize) -> &[f32];
+}
+
+/// All of it, row-major.
+impl Rows for &[f32] {
+    fn contacts(&self) -> usize {
+        (self.len() / 9).isqrt()
+    }
+
+    fn rows(&mut self, contact: usize) -> &[f32] {
+        let size = 9 * self.contacts();
+        &self[contact * size..][..size]
+    }
+}
+
 /// A contact's own block in its own frame.
 #[derive(Clone, Copy, Debug)]
 struct Block {
@@ -74,7 +96,8 @@ struct Block {
 /// The solver's buffers. One thread at a time.
 #[derive(Clone, Debug, Default)]
 pub struct Sweeps {
-    blocks: Vec<Block>,
+    /// Those that have been asked for.
+    blocks: Vec<Option<Block>>,
     /// `W df`, three numbers a contact, mm.
     shift: Vec<f32>,
 }
@@ -89,25 +112,22 @@ impl Sweeps {
     }
 
     /// Solves for `forces`, one a contact, on the tissue; they come in as the guess that gaps and slips belong to.
-    /// `delassus` is `[3n,3n]`, row-major, symmetric, in millimetres a unit of force.
     ///
     /// Panics when the lengths do not agree.
     pub fn solve(
         &mut self,
-        delassus: &[f32],
+        delassus: &mut (impl Rows + ?Sized),
         contacts: &[Contact],
         forces: &mut [Vector],
         limits: Limits,
     ) -> Outcome {
         let n = contacts.len();
         assert_eq!(forces.len(), n, "one force a contact");
-        assert_eq!(delassus.len(), 9 * n * n, "`delassus` is [3n,3n]");
+        assert_eq!(delassus.contacts(), n, "`delassus` is [3n,3n]");
         self.shift.clear();
         self.shift.resize(3 * n, 0.0);
         self.blocks.clear();
-        for (i, contact) in contacts.iter().enumerate() {
-            self.blocks.push(Block::new(delassus, n, i, contact));
-        }
+        self.blocks.resize(n, None);
         // A guess that the law forbids is put right first: a contact that became another's may pull.
         let mut outcome = Outcome {
             sweeps: 0,
@@ -130,18 +150,28 @@ impl Sweeps {
         Vector::from_slice(&self.shift[3 * contact..])
     }
 
-    fn sweep(&mut self, delassus: &[f32], contacts: &[Contact], forces: &mut [Vector]) -> f32 {
-        let n = contacts.len();
+    fn sweep(
+        &mut self,
+        delassus: &mut (impl Rows + ?Sized),
+        contacts: &[Contact],
+        forces: &mut [Vector],
+    ) -> f32 {
         let mut largest = 0.0f32;
         for (i, contact) in contacts.iter().enumerate() {
-            let block = &self.blocks[i];
+            let gap = contact.gap + contact.normal.dot(self.shift(i));
+            let touch = matches!(contact.law, Law::Touch { .. });
+            if touch && gap >= 0.0 && forces[i] == Vector::ZERO {
+                continue;
+            }
+            let made = &mut self.blocks[i];
+            let block = made.get_or_insert_with(|| Block::new(delassus.rows(i), i, contact));
             let now = contact.slip + Vector::from_slice(&self.shift[3 * i..]);
             let local = block.frame.transpose() * forces[i];
             let wanted = match contact.law {
                 _ if block.rigid => Vector::ZERO,
                 Law::Touch { friction } => {
                     let mut r = block.frame.transpose() * now;
-                    r.x = contact.gap + contact.normal.dot(self.shift(i));
+                    r.x = gap;
                     let b = r - block.w * local;
                     coulomb(&block.w, &block.inverse, b, friction, local)
                 }
@@ -154,8 +184,8 @@ impl Sweeps {
             largest = largest.max((block.w * change).abs().max_element());
             let change = block.frame * change;
             forces[i] = block.frame * wanted;
-            for (k, df) in change.to_array().into_iter().enumerate() {
-                let row = &delassus[(3 * i + k) * 3 * n..][..3 * n];
+            let rows = delassus.rows(i).chunks_exact(self.shift.len());
+            for (row, df) in rows.zip(change.to_array()) {
                 for (shift, w) in self.shift.iter_mut().zip(row) {
                     *shift += w * df;
                 }
@@ -166,8 +196,9 @@ impl Sweeps {
 }
 
 impl Block {
-    fn new(delassus: &[f32], n: usize, i: usize, contact: &Contact) -> Self {
-        let row = |k: usize| Vector::from_slice(&delassus[(3 * i + k) * 3 * n + 3 * i..]);
+    /// From the rows `[3,3n]` of contact `i`.
+    fn new(rows: &[f32], i: usize, contact: &Contact) -> Self {
+        let row = |k: usize| Vector::from_slice(&rows[k * (rows.len() / 3) + 3 * i..]);
         // Symmetric: rows serve as columns.
         let w = Matrix::from_cols(row(0), row(1), row(2));
         let frame = frame(contact.normal);

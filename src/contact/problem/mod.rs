@@ -17,6 +17,7 @@ use ::contact::{Contact, Pose, Sample, Samples, Search, Sweeps, Vector};
 pub use solve::Change;
 
 use super::compliance::Delassus;
+use super::held_back::HeldBack;
 use super::past::{Force, Held, Past};
 use super::rows::{Row, State};
 use super::tool::{MAX_TOOLS, Mode, Reading, Tool};
@@ -43,6 +44,7 @@ pub struct Problem {
     search: Search,
     sweeps: Sweeps,
     delassus: Delassus,
+    held_back: HeldBack,
     rows: Vec<Row>,
     contacts: Vec<Contact>,
     forces: Vec<Vector>,
@@ -75,6 +77,7 @@ impl Problem {
             search: Search::default(),
             sweeps: Sweeps::with_capacity(256),
             delassus: Delassus::default(),
+            held_back: HeldBack::default(),
             rows: memory::room(room, WHAT)?,
             contacts: memory::room(room, WHAT)?,
             forces: memory::room(room, WHAT)?,
@@ -240,6 +243,11 @@ impl Problem {
         self.next.forces.clear();
     }
 
+    /// Nodes of the surface that tools may touch, all that a solve asks of a state of the tissue.
+    pub fn nodes(&self) -> &[u32] {
+        self.samples.nodes()
+    }
+
     /// The sample of a force.
     pub fn sample(&self, row: u32) -> Sample {
         self.samples.rows()[row as usize]
@@ -261,5 +269,6 @@ impl Problem {
             + self.past.memory_bytes()
             + self.next.memory_bytes()
             + self.delassus.memory_bytes()
+            + self.held_back.memory_bytes()
     }
 }

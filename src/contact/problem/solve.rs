@@ -2,16 +2,25 @@
 
 use std::time::Instant;
 
-use ::contact::{Limits, Sample, Vector};
+use ::contact::{Limits, Rows, Vector};
 
 use super::Problem;
-use crate::contact::compliance::{Compliance, Delassus};
+use crate::contact::Compliance;
 use crate::contact::past::Force;
 use crate::contact::rows::{Moving, State, vector};
 use crate::error::Result;
 
 /// Linearisations of the gap.
 const LINEARISATIONS: usize = 2;
+
+/// Which compliance a solve takes.
+#[derive(Clone, Copy)]
+enum Time {
+    /// Of a step's length: the same in each.
+    StepEnd,
+    /// Of a moment between steps, another in each call.
+    Any,
+}
 
 /// What one solve changed: forces on the degrees of freedom of the prior's columns.
 #[derive(Clone, Copy, Debug)]
@@ -32,7 +41,7 @@ impl Problem {
         compliance: Compliance<'_>,
         state: State<'_>,
     ) -> Result<Change<'_>> {
-        self.solve_by(compliance, state, 1.0, Delassus::between)
+        self.solve_at(compliance, state, 1.0, Time::Any)
     }
 
     /// Solves for the forces at `state`, which is the tissue under the forces so far, with the tools at part `part` in `(0, 1]` of
@@ -46,15 +55,15 @@ impl Problem {
         state: State<'_>,
         part: f32,
     ) -> Result<Change<'_>> {
-        self.solve_by(compliance, state, part, Delassus::of)
+        self.solve_at(compliance, state, part, Time::StepEnd)
     }
 
-    fn solve_by(
+    fn solve_at(
         &mut self,
         compliance: Compliance<'_>,
         state: State<'_>,
         part: f32,
-        read: impl for<'d> Fn(&'d mut Delassus, Compliance<'_>, &[Sample], &[u32]) -> Result<&'d [f32]>,
+        time: Time,
     ) -> Result<Change<'_>> {
         let start = Instant::now();
         self.kept.clear();
@@ -65,12 +74,18 @@ impl Problem {
         let samples = &self.samples;
         self.columns.clear();
         self.columns.extend(self.rows.iter().map(|row| row.sample));
-        let w = read(
-            &mut self.delassus,
-            compliance,
-            samples.rows(),
-            &self.columns,
-        )?;
+        let (own, all, rows) = (&mut self.delassus, samples.rows(), &self.columns);
+        let (mut whole, mut at);
+        let w: &mut dyn Rows = match time {
+            Time::StepEnd => {
+                whole = own.of(compliance, all, rows)?;
+                &mut whole
+            }
+            Time::Any => {
+                at = self.held_back.at(own, compliance, all, rows)?;
+                &mut at
+            }
+        };
         let moving = Moving {
             tools: &self.tools,
             before: &self.before,

@@ -131,18 +131,8 @@ impl Along {
         (&self.driven, self.free)
     }
 
-    /// `out = last + along velocity`.
-    pub(super) fn follow(&self, rest: &[f32], last: &[f32], velocity: &[f32], out: &mut [f32]) {
-        let at = self.each();
-        let [rest, last, velocity] = [rest, last, velocity].map(|field| field.as_chunks::<3>().0);
-        let nodes = out.as_chunks_mut::<3>().0.iter_mut().zip(rest);
-        for ((out, rest), (last, velocity)) in nodes.zip(last.iter().zip(velocity)) {
-            *out = at(rest, last, velocity);
-        }
-    }
-
-    /// The same at some nodes alone.
-    pub(super) fn follow_at(
+    /// `out = last + along velocity` at some nodes.
+    pub(super) fn follow(
         &self,
         nodes: &[u32],
         (rest, last, velocity): (&[f32], &[f32], &[f32]),
@@ -242,7 +232,7 @@ mod tests {
         };
         let rest = [0.0, 0.0, 0.0, 100.0, 0.0, 0.0, 50.0, 0.0, 0.0];
         let mut out = [0.0; 9];
-        along.follow(&rest, &[0.0; 9], &[1.0; 9], &mut out);
+        along.follow(&[0, 1, 2], (&rest, &[0.0; 9], &[1.0; 9]), &mut out);
         assert!(
             out[0] < 1e-3 && out[3] > 0.9 && out[6] > 0.7 && out[6] < 0.9,
             "{out:?}"

@@ -122,8 +122,8 @@ impl Between {
         };
         let tau = tau.min(MOST_STEPS * scene.step_s());
         let alpha = scene.integrator().damping_per_s;
-        let rest = &scene.mesh.positions;
-        let (last, velocity) = (&self.last, &self.velocity);
+        let rest = scene.mesh.positions.as_slice();
+        let (last, velocity) = (self.last.as_slice(), self.velocity.as_slice());
         match driven {
             Contact::Tools(tools) => {
                 self.along
@@ -145,11 +145,15 @@ impl Between {
             },
         };
         let known = solves.find(&question);
-        match known {
-            Some(_) => self
-                .along
-                .follow_at(view.region, (rest, last, velocity), &mut self.free),
-            None => self.along.follow(rest, last, velocity, &mut self.free),
+        // What is shown, and where contact is looked at.
+        let touched = match (known, question.drive) {
+            (Some(_), _) => &[][..],
+            (None, Drive::Tools(_)) => self.problem.nodes(),
+            (None, Drive::Nodes(now)) => &now.nodes,
+        };
+        for nodes in [touched, view.region] {
+            let fields = (rest, last, velocity);
+            self.along.follow(nodes, fields, &mut self.free);
         }
         let make = |q: &mut [f32]| -> Result<bool> {
             let kappa = scene.integrator().over(tau.max(AT_ONCE_S)).kappa();
