@@ -87,7 +87,12 @@ fn a_second_search_and_solve_allocate_nothing() {
     let mut round = || {
         search.find(&samples, &tools, position);
         forces.fill(Vector::ZERO);
-        sweeps.solve(&delassus, &contacts, &mut forces, Limits::default());
+        sweeps.solve(
+            &mut delassus.as_slice(),
+            &contacts,
+            &mut forces,
+            Limits::default(),
+        );
     };
     round();
     assert_eq!(allocations(&mut round), 0);
