@@ -8,9 +8,6 @@ use parry3d::math::{Matrix, Vector};
 /// Rounds of the slip iteration; the sweeps around it go on from where it stops.
 const ROUNDS: usize = 12;
 
-/// It ends earlier where a round changes the force by less than this part of the normal force.
-const STILL: f32 = 1e-5;
-
 /// Unit tangents that complete a unit normal to a right-handed frame, the columns of a matrix: normal, tangent, tangent.
 pub fn frame(normal: Vector) -> Matrix {
     // The axis that the normal is least along keeps the product long.
@@ -61,13 +58,9 @@ pub fn coulomb(w: &Matrix, inverse: &Matrix, b: Vector, friction: f32, guess: Ve
         let coupling = w.y_axis.x * force.y + w.z_axis.x * force.z;
         force.x = (-(b.x + coupling) / w.x_axis.x).max(0.0);
         let slip = b + *w * force;
-        let before = force;
         force.y -= rate * slip.y;
         force.z -= rate * slip.z;
         force = clamp_tangential(force, friction);
-        if (force - before).abs().max_element() <= STILL * force.x {
-            break;
-        }
     }
     force
 }
