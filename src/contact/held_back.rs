@@ -127,3 +127,54 @@ impl Rows for At<'_> {
         &own.rows[place]
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::{Model, ModelOptions};
+
+    /// Rows at a time are those of the whole matrix that a step of that length would have, also after samples and times have changed.
+    #[test]
+    fn rows_are_those_of_the_whole_matrix() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/tiny-corrected");
+        let model = Model::open(&path, &ModelOptions::default()).unwrap();
+        let (prior, space) = (
+            model.prior.as_ref().unwrap(),
+            &model.corrections().unwrap().space,
+        );
+        let mut held = vec![false; model.mesh.positions.len() / 3];
+        for &node in &model.mesh.held_nodes {
+            held[node as usize] = true;
+        }
+        let samples = model.samples().unwrap();
+        let count = samples.rows().len() as u32;
+        let mut own = HeldBack::default();
+        let mut between = Delassus::default();
+        for (step, seconds) in [(1, 0.01f64), (1, 0.04), (3, 0.04)] {
+            let rows: Vec<u32> = (0..count).step_by(step).take(20).collect();
+            let lost: Vec<f32> = space.holds_back(2.25 / (seconds * seconds)).collect();
+            assert!(lost.iter().any(|lost| *lost > 0.0));
+            let compliance = Compliance {
+                prior,
+                held: &held,
+                inertia: Some((space, &lost)),
+            };
+            let mut whole = Delassus::default();
+            let wanted = whole.of(compliance, samples.rows(), &rows).unwrap();
+            let mut at = own
+                .at(&mut between, compliance, samples.rows(), &rows)
+                .unwrap();
+            assert_eq!(at.contacts(), rows.len());
+            let size = 9 * rows.len();
+            let largest = wanted.iter().fold(0.0f32, |most, w| most.max(w.abs()));
+            for contact in [7, 0, 19, 7] {
+                let wanted = &wanted[contact * size..][..size];
+                for (a, b) in at.rows(contact).iter().zip(wanted) {
+                    assert!((a - b).abs() < 1e-5 * largest, "{contact}: {a} {b}");
+                }
+            }
+        }
+    }
+}

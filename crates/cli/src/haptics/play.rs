@@ -25,7 +25,7 @@ pub struct Track {
     pub ticks: Vec<Tick>,
     /// Wall time of each call, µs.
     pub calls_us: Vec<f64>,
-    /// Energy that tissue gave to hands over the touches in which it gave any, J.
+    /// Energy that tissue gave to the hands, over the touches in which it gave any to all of them together, J.
     pub given_j: f64,
     pub damped: usize,
     pub touching: usize,
@@ -90,8 +90,8 @@ impl Player {
         let mut random = Random::new(seed);
         let mut track = Track::default();
         let mut forces = vec![Vector::ZERO; count];
-        // Energy of the present touch.
-        let mut given = vec![0.0f64; count];
+        // Energy since tissue was last touched, to all hands: what one of them puts in may come out at another.
+        let mut given = 0.0f64;
         let mut told = vec![Vector::ZERO; count];
         let (mut time, mut due) = (0.0, 0.0);
         let mut waiting: Option<f64> = None;
@@ -123,23 +123,22 @@ impl Player {
             for (index, hand) in hands.iter_mut().enumerate() {
                 let position = devices[index].read();
                 let force = self.call(hand, index, time, position, &mut track)?;
-                if force == Vector::ZERO {
-                    track.given_j += given[index].max(0.0);
-                    given[index] = 0.0;
-                }
                 forces[index] = force;
                 tick.tools.push((position, force, told[index]));
+            }
+            if forces.iter().all(|force| *force == Vector::ZERO) {
+                track.given_j += std::mem::take(&mut given).max(0.0);
             }
             track.ticks.push(tick);
             let passed = random.tick();
             for (index, device) in devices.iter_mut().enumerate() {
                 let wanted = |part: f64| site.wanted(gesture, index, time + part * passed);
-                given[index] += device.advance(passed, forces[index], wanted);
+                given += device.advance(passed, forces[index], wanted);
             }
             time += passed;
         }
         track.stuck = forces.iter().any(|force| *force != Vector::ZERO);
-        track.given_j += given.iter().map(|given| given.max(0.0)).sum::<f64>();
+        track.given_j += given.max(0.0);
         Ok(track)
     }
 
