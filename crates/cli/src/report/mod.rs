@@ -84,7 +84,7 @@ pub struct Options {
     /// `upt report --step-ms BUNDLE`.
     #[arg(long, value_name = "MS", value_delimiter = ',', requires = "tools")]
     step_ms: Vec<f64>,
-    /// Page whose part between the markers `upt report --tools MESH` is replaced by the tables of --tools, or by a narrow table if the markers end in `summary` (repeat for several).
+    /// Page whose part between the markers `upt report --tools MESH` (with `--boundary NAME` behind where it is not `fixed`) is replaced by the tables of --tools, or by a narrow table if the markers end in `summary` (repeat for several).
     #[arg(long, value_name = "FILE", requires = "tools")]
     markdown: Vec<PathBuf>,
     /// The most cases of each scheme or programme.

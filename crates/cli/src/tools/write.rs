@@ -145,15 +145,19 @@ pub(super) fn write(plan: &Plan, made: &Made) -> Result<serde_json::Value> {
         machine.cpu, machine.cores, plan.threads
     );
     for path in plan.markdown {
-        document(path, &header.mesh_name, &made, rows)?;
+        let cases = match header.boundary.as_str() {
+            "fixed" => header.mesh_name.clone(),
+            other => format!("{} --boundary {other}", header.mesh_name),
+        };
+        document(path, &cases, &made, rows)?;
     }
     Ok(report)
 }
 
-/// Writes the tables of a document: all columns between the markers `upt report --tools MESH`, or few between those with
-/// `summary` behind.
-fn document(path: &Path, mesh: &str, made: &str, rows: &[Row]) -> Result<()> {
-    let name = format!("upt report --tools {mesh}");
+/// Writes the tables of a document: all columns between the markers `upt report --tools MESH [--boundary NAME]`, or few between those
+/// with `summary` behind.
+fn document(path: &Path, cases: &str, made: &str, rows: &[Row]) -> Result<()> {
+    let name = format!("upt report --tools {cases}");
     let summary = format!("{name} summary");
     let over_all: Vec<&Row> = rows.iter().filter(|row| row.programme == ALL).collect();
     let page = std::fs::read_to_string(path).with_context(|| format!("{}", path.display()))?;
