@@ -1,6 +1,6 @@
 //! The samples between two steps: where they are, and the forces of a tool at a pose on them.
 
-use ::contact::{Body, Contact, Law, Limits, Pose, Sweeps, Vector};
+use ::contact::{Body, Contact, Law, Limits, Pose, Sweeps, Vector, Whole};
 
 use super::modes::Modes;
 use super::slow::{MOST_SAMPLES, Slow};
@@ -190,9 +190,8 @@ impl Solver {
                 }
             }
         }
-        debug_assert_eq!(self.w.len(), 9 * n * n);
         self.sweeps.solve(
-            &mut self.w.as_slice(),
+            &mut Whole::new(&self.w, n),
             &self.contacts,
             &mut self.solved,
             LIMITS,

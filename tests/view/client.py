@@ -155,12 +155,12 @@ class Browser:
             actions.append({"type": "pointerUp", "button": 0})
         self._act(actions)
 
-    def move(self, points: list[tuple[int, int]]) -> None:
-        """On through more points with the button as it is, 100 ms each."""
-        self._act(self._moves(points))
+    def move(self, points: list[tuple[int, int]], each_ms: int = 100) -> None:
+        """On through more points with the button as it is, so many milliseconds each."""
+        self._act(self._moves(points, each_ms))
 
-    def _moves(self, points: list[tuple[int, int]]) -> list[dict]:
-        return [{"type": "pointerMove", "duration": 100, "x": x, "y": y, "origin": "viewport"} for x, y in points]
+    def _moves(self, points: list[tuple[int, int]], each_ms: int = 100) -> list[dict]:
+        return [{"type": "pointerMove", "duration": each_ms, "x": x, "y": y, "origin": "viewport"} for x, y in points]
 
     def _act(self, actions: list[dict]) -> None:
         mouse = {"type": "pointer", "id": "mouse", "parameters": {"pointerType": "mouse"}, "actions": actions}

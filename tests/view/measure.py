@@ -13,6 +13,7 @@ import argparse
 import datetime
 import os
 import statistics
+from itertools import pairwise
 from pathlib import Path
 
 from client import Browser
@@ -20,6 +21,8 @@ from run import server
 
 ROOT = Path(__file__).resolve().parents[2]
 MARK = "tests/view/measure.py"
+# Moves of the mouse from one corner of the stroke to the next.
+SLICES = 6
 
 
 def machine() -> str:
@@ -62,9 +65,15 @@ def stroke(browser: Browser, seconds: float) -> dict:
     browser.run("uptView.begun = performance.now(); uptView.before = uptView.shown; uptView.steps0 = uptView.steps")
     steps, forces = [], []
     own = [processor_seconds(browser.driver.pid), processor_seconds(os.getpid())]
-    way = [(x + dx, y + dy) for dx, dy in [(25, 10), (40, 0), (15, -10), (-15, 0), (4, 0)]]
+    # As a hand moves a mouse: about 250 pixels a second, an event every 16 ms.
+    corners = [(4, 0), (25, 10), (40, 0), (15, -10), (-15, 0), (4, 0)]
+    way = [
+        (round(x + (1 - part) * ax + part * bx), round(y + (1 - part) * ay + part * by))
+        for (ax, ay), (bx, by) in pairwise(corners)
+        for part in [step / SLICES for step in range(1, SLICES + 1)]
+    ]
     while browser.run("return performance.now() - uptView.begun") < 1000 * seconds:
-        browser.move(way)
+        browser.move(way, 16)
         now = browser.run("return [uptView.stepMs, uptView.force]")
         steps.append(now[0])
         forces.append(now[1])

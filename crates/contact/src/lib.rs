@@ -30,4 +30,4 @@ pub use parry3d::math::{Matrix, Pose, Rotation, Vector};
 pub use samples::{SPACING_MM, Sample, Samples};
 pub use search::{Candidate, Placed, SKIN_MM, Search};
 pub use shape::Shape;
-pub use sweeps::{Contact, Law, Limits, Outcome, Rows, Sweeps};
+pub use sweeps::{Contact, Law, Limits, Outcome, Rows, Sweeps, Whole};

@@ -72,14 +72,30 @@ pub trait Rows {
 }
 
 /// All of it, row-major.
-impl Rows for &[f32] {
+#[derive(Clone, Copy, Debug)]
+pub struct Whole<'a> {
+    w: &'a [f32],
+    contacts: usize,
+}
+
+impl<'a> Whole<'a> {
+    /// Of `[3n,3n]` numbers.
+    ///
+    /// Panics when there are others.
+    pub fn new(w: &'a [f32], contacts: usize) -> Self {
+        assert_eq!(w.len(), 9 * contacts * contacts, "`delassus` is [3n,3n]");
+        Self { w, contacts }
+    }
+}
+
+impl Rows for Whole<'_> {
     fn contacts(&self) -> usize {
-        (self.len() / 9).isqrt()
+        self.contacts
     }
 
     fn rows(&mut self, contact: usize) -> &[f32] {
-        let size = 9 * self.contacts();
-        &self[contact * size..][..size]
+        let size = 9 * self.contacts;
+        &self.w[contact * size..][..size]
     }
 }
 

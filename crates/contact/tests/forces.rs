@@ -1,6 +1,6 @@
 //! The contact solver against closed forms, and its conditions over random problems.
 
-use contact::{Contact, Law, Limits, Sweeps, Vector};
+use contact::{Contact, Law, Limits, Sweeps, Vector, Whole};
 use proptest::prelude::*;
 
 /// `W = 1/k I` for every contact: springs that do not know each other.
@@ -27,7 +27,7 @@ fn a_sphere_on_a_spring_pushes_with_stiffness_times_depth() {
         let mut forces = [Vector::ZERO];
         let contact = touch(normal, -depth, Vector::ZERO, 0.0);
         let outcome = sweeps.solve(
-            &mut springs(1, 25.0).as_slice(),
+            &mut Whole::new(&springs(1, 25.0), 1),
             &[contact],
             &mut forces,
             Limits::default(),
@@ -40,7 +40,7 @@ fn a_sphere_on_a_spring_pushes_with_stiffness_times_depth() {
     let mut forces = [normal * 10.0];
     let contact = touch(normal, 1.0, Vector::ZERO, 0.3);
     sweeps.solve(
-        &mut springs(1, 25.0).as_slice(),
+        &mut Whole::new(&springs(1, 25.0), 1),
         &[contact],
         &mut forces,
         Limits::default(),
@@ -56,7 +56,7 @@ fn it_sticks_below_mu_times_the_normal_force_and_slips_at_it() {
         let mut forces = [Vector::ZERO];
         let contact = touch(normal, -1.0, along * slip, 0.3);
         sweeps.solve(
-            &mut springs(1, 10.0).as_slice(),
+            &mut Whole::new(&springs(1, 10.0), 1),
             &[contact],
             &mut forces,
             Limits::default(),
@@ -85,7 +85,7 @@ fn a_bound_sample_follows_its_place_in_every_direction() {
     };
     let mut forces = [Vector::ZERO];
     sweeps.solve(
-        &mut springs(1, 4.0).as_slice(),
+        &mut Whole::new(&springs(1, 4.0), 1),
         &[contact],
         &mut forces,
         Limits::default(),
@@ -102,8 +102,12 @@ fn what_nothing_moves_takes_no_force() {
     for k in 0..3 {
         w[k * 7] = 0.0;
     }
-    let outcome =
-        Sweeps::default().solve(&mut w.as_slice(), &contacts, &mut forces, Limits::default());
+    let outcome = Sweeps::default().solve(
+        &mut Whole::new(&w, contacts.len()),
+        &contacts,
+        &mut forces,
+        Limits::default(),
+    );
     assert_eq!(forces[0], Vector::ZERO);
     assert!(
         outcome.converged && (forces[1].z - 2.0).abs() < 1e-5,
@@ -188,7 +192,7 @@ proptest! {
     fn the_conditions_of_contact_hold((w, contacts) in problem()) {
         let mut forces = vec![Vector::ZERO; contacts.len()];
         let limits = Limits { tolerance_mm: 1e-6, most_sweeps: 5000, ..Limits::default() };
-        let outcome = Sweeps::default().solve(&mut w.as_slice(), &contacts, &mut forces, limits);
+        let outcome = Sweeps::default().solve(&mut Whole::new(&w, contacts.len()), &contacts, &mut forces, limits);
         prop_assert!(outcome.sweeps >= 15);
         let worst = violation(&w, &contacts, &forces);
         prop_assert!(worst < 2e-3, "{worst} after {outcome:?}");
@@ -199,10 +203,10 @@ proptest! {
         let limits = Limits { tolerance_mm: 1e-6, most_sweeps: 5000, ..Limits::default() };
         let mut sweeps = Sweeps::with_capacity(contacts.len());
         let mut forces = vec![Vector::ZERO; contacts.len()];
-        sweeps.solve(&mut w.as_slice(), &contacts, &mut forces, limits);
+        sweeps.solve(&mut Whole::new(&w, contacts.len()), &contacts, &mut forces, limits);
         let mut again = vec![Vector::ZERO; contacts.len()];
         let shifts: Vec<Vector> = (0..contacts.len()).map(|i| sweeps.shift(i)).collect();
-        Sweeps::default().solve(&mut w.as_slice(), &contacts, &mut again, limits);
+        Sweeps::default().solve(&mut Whole::new(&w, contacts.len()), &contacts, &mut again, limits);
         prop_assert_eq!(&forces, &again);
         // Gaps and slips now belong to the forces found.
         let moved: Vec<Contact> = contacts
@@ -210,7 +214,7 @@ proptest! {
             .zip(&shifts)
             .map(|(c, s)| Contact { gap: c.gap + s.dot(c.normal), slip: c.slip + *s, ..*c })
             .collect();
-        sweeps.solve(&mut w.as_slice(), &moved, &mut again, Limits::default());
+        sweeps.solve(&mut Whole::new(&w, moved.len()), &moved, &mut again, Limits::default());
         for (a, b) in forces.iter().zip(&again) {
             prop_assert!((*a - *b).length() < 5e-3 * (1.0 + a.length()), "{a} {b}");
         }

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use ::contact::{Limits, Rows, Vector};
+use ::contact::{Limits, Rows, Vector, Whole};
 
 use super::Problem;
 use crate::contact::Compliance;
@@ -78,7 +78,7 @@ impl Problem {
         let (mut whole, mut at);
         let w: &mut dyn Rows = match time {
             Time::StepEnd => {
-                whole = own.of(compliance, all, rows)?;
+                whole = Whole::new(own.of(compliance, all, rows)?, rows.len());
                 &mut whole
             }
             Time::Any => {

@@ -30,8 +30,8 @@ pub struct Options {
     /// Threads of a step.
     #[arg(long, default_value_t = 1)]
     threads: u32,
-    /// Length of a step, ms, 10 to 50. Default: what the bundle recommends to hosts that show frames, or its own on two cores or fewer. A
-    /// longer one leaves more of the processor to the picture.
+    /// Length of a step, ms, 10 to 50. Default: what the bundle recommends to hosts that show frames. A longer one leaves more of the
+    /// processor to the picture.
     #[arg(long, value_name = "MS")]
     step_ms: Option<f64>,
 }

@@ -22,8 +22,6 @@ const SOONEST: Duration = Duration::from_micros(4_166);
 const MOST_MESSAGES: usize = 64;
 /// Connections that are served at once; more are closed.
 const MOST_CONNECTIONS: usize = 16;
-/// On this many cores or fewer, shorter steps than the bundle's own would take what the picture needs.
-const DRAWING_CORES: usize = 2;
 
 /// What the page is made of.
 const FILES: [(&str, &str, &[u8]); 5] = [
@@ -78,10 +76,9 @@ impl Server {
         };
         let model = Model::open(bundle, &settings)?;
         let name = bundle.file_name().unwrap_or(bundle.as_os_str());
-        let cores = std::thread::available_parallelism().map_or(1, usize::from);
         let model = match step_ms {
-            None if cores > DRAWING_CORES => model.for_frames(),
-            _ => model,
+            Some(_) => model,
+            None => model.for_frames(),
         };
         // What no client could have is refused here.
         Session::new(&model)?;
