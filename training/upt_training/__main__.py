@@ -28,7 +28,7 @@ def parser() -> argparse.ArgumentParser:
     train.add_argument("--vibration", type=Path, help="vibration.safetensors, for configurations with `vibration`")
     train.add_argument("--out", type=Path, default=Path("runs/last"), help="run folder")
     train.add_argument("--resume", action="store_true", help="continue the run in --out, exactly")
-    train.add_argument("--init", type=Path, help="checkpoint whose weights to start from")
+    train.add_argument("--init", type=Path, help="checkpoint or bundle whose weights to start from")
     train.add_argument("--device", default="auto", help="auto, cpu, cuda, cuda:N")
     train.add_argument("--threads", type=int, default=1)
     train.add_argument("--max-minutes", type=float, default=0.0, help="stop with a checkpoint after this time")

@@ -17,6 +17,7 @@ import numpy as np
 import torch
 import torch.distributed as distributed
 
+from upt_training.bundle_weights import bundle_state
 from upt_training.config import Settings
 from upt_training.errors import InputError
 from upt_training.field_cache import FieldCache
@@ -248,9 +249,12 @@ class Trainer:
         self.generator.bit_generator.state = state["random"]["numpy"]
 
     def start_from(self, path: Path) -> None:
-        """Take the weights (and the normalisation) of another run, for transfer to another mesh or recipe."""
-        state = load_checkpoint(path)
-        weights = state["ema"] or state["model"]
+        """Take the weights (and the normalisation) of another run or bundle, for transfer to another mesh or recipe."""
+        if Path(path).is_dir():
+            weights = bundle_state(path, self.model)
+        else:
+            state = load_checkpoint(path)
+            weights = state["ema"] or state["model"]
         load_state(self.model, weights, str(path))
         if self.ema is not None:
             load_state(self.ema, weights, str(path))
