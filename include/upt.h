@@ -640,7 +640,7 @@ typedef struct upt_scene_options {
    */
   int32_t corrections;
   /**
-   * No correction starts later than this in a step, µs; 0: no budget. Only with a count or `UPT_CORRECTIONS_AUTO`.
+   * No correction starts later than this in a step, µs, but the first; 0: no budget. Not with `UPT_CORRECTIONS_NONE`.
    */
   uint32_t corrections_budget_us;
   /**

@@ -205,6 +205,11 @@ pub enum Corrections {
     /// As many as the bundle recommends; none where it has no tables for them.
     #[default]
     Recommended,
+    /// As many as the bundle recommends, and none of them started after so many µs of a step: 0 for no budget.
+    RecommendedWithin {
+        /// The budget, µs.
+        budget_us: u32,
+    },
     /// None: they cost nothing then.
     None,
     /// This many, 1 to 64.

@@ -98,6 +98,12 @@ fn a_target_stops_early_and_a_budget_leaves_one() {
         budget_us: 1,
     });
     assert_eq!(hurried, [1; 6]);
+    // The bundle's own count and target, in that time.
+    let recommended = made(Corrections::RecommendedWithin { budget_us: 1 });
+    assert_eq!(recommended, [1; 6]);
+    let unhurried = made(Corrections::RecommendedWithin { budget_us: 0 });
+    assert_eq!(unhurried, made(Corrections::Recommended));
+    assert!(unhurried.iter().sum::<u32>() > 6, "{unhurried:?}");
 }
 
 #[test]

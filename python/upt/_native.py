@@ -424,7 +424,7 @@ class SceneOptions(Record):
     """Corrections by the elements while there is contact: 1 to 64 a step, 0 as many as the bundle recommends,
     `UPT_CORRECTIONS_NONE`, or `UPT_CORRECTIONS_AUTO` for up to 64. A count with a budget or a target is the most that a step gets."""
     corrections_budget_us: int
-    """No correction starts later than this in a step, µs; 0: no budget. Only with a count or `UPT_CORRECTIONS_AUTO`."""
+    """No correction starts later than this in a step, µs, but the first; 0: no budget. Not with `UPT_CORRECTIONS_NONE`."""
     corrections_target_mm: float
     """Corrections stop once the estimated error is below this, mm; 0: no target. Only with a count or `UPT_CORRECTIONS_AUTO`."""
     error_limit_mm: float
@@ -495,7 +495,7 @@ class SceneOptionsKeywords(TypedDict, total=False):
     """Corrections by the elements while there is contact: 1 to 64 a step, 0 as many as the bundle recommends,
     `UPT_CORRECTIONS_NONE`, or `UPT_CORRECTIONS_AUTO` for up to 64. A count with a budget or a target is the most that a step gets."""
     corrections_budget_us: int
-    """No correction starts later than this in a step, µs; 0: no budget. Only with a count or `UPT_CORRECTIONS_AUTO`."""
+    """No correction starts later than this in a step, µs, but the first; 0: no budget. Not with `UPT_CORRECTIONS_NONE`."""
     corrections_target_mm: float
     """Corrections stop once the estimated error is below this, mm; 0: no target. Only with a count or `UPT_CORRECTIONS_AUTO`."""
     error_limit_mm: float

@@ -228,7 +228,8 @@ pub(super) unsafe fn model_options(raw: &upt_model_options) -> Result<ModelOptio
 }
 
 fn corrections(raw: &upt_scene_options) -> Result<Corrections, Failure> {
-    let limited = raw.corrections_budget_us != 0 || raw.corrections_target_mm != 0.0;
+    let target = raw.corrections_target_mm != 0.0;
+    let limited = raw.corrections_budget_us != 0 || target;
     let until = |most| Corrections::Auto {
         most,
         target_mm: raw.corrections_target_mm,
@@ -237,9 +238,16 @@ fn corrections(raw: &upt_scene_options) -> Result<Corrections, Failure> {
     match raw.corrections {
         UPT_CORRECTIONS_AUTO => Ok(until(LIMIT)),
         count @ 1.. if limited => Ok(until(count as u32)),
-        _ if limited => fail(
+        0 if limited && !target => Ok(Corrections::RecommendedWithin {
+            budget_us: raw.corrections_budget_us,
+        }),
+        0 if limited => fail(
             UPT_ERR_ARGUMENT,
-            "corrections_budget_us and corrections_target_mm are for UPT_CORRECTIONS_AUTO and for counts from 1",
+            "corrections_target_mm is for UPT_CORRECTIONS_AUTO and for counts from 1; with corrections 0 the bundle's own target counts",
+        ),
+        UPT_CORRECTIONS_NONE if limited => fail(
+            UPT_ERR_ARGUMENT,
+            "corrections_budget_us and corrections_target_mm limit corrections, and UPT_CORRECTIONS_NONE makes none",
         ),
         0 => Ok(Corrections::Recommended),
         UPT_CORRECTIONS_NONE => Ok(Corrections::None),

@@ -153,7 +153,7 @@ pub struct upt_scene_options {
     /// Corrections by the elements while there is contact: 1 to 64 a step, 0 as many as the bundle recommends,
     /// `UPT_CORRECTIONS_NONE`, or `UPT_CORRECTIONS_AUTO` for up to 64. A count with a budget or a target is the most that a step gets.
     pub corrections: i32,
-    /// No correction starts later than this in a step, µs; 0: no budget. Only with a count or `UPT_CORRECTIONS_AUTO`.
+    /// No correction starts later than this in a step, µs, but the first; 0: no budget. Not with `UPT_CORRECTIONS_NONE`.
     pub corrections_budget_us: u32,
     /// Corrections stop once the estimated error is below this, mm; 0: no target. Only with a count or `UPT_CORRECTIONS_AUTO`.
     pub corrections_target_mm: f32,

@@ -49,9 +49,13 @@ impl Corrected {
         let own = OwnPace::new(model, options)?;
         let (most, target_mm, budget_us) = match options.corrections {
             Corrections::None => return none(own, options.substeps),
-            Corrections::Recommended => match entry {
+            Corrections::Recommended | Corrections::RecommendedWithin { .. } => match entry {
                 Some(entry) if entry.recommended > 0 && !options.free_boundary => {
-                    (entry.recommended, entry.target_mm, 0)
+                    let budget_us = match options.corrections {
+                        Corrections::RecommendedWithin { budget_us } => budget_us,
+                        _ => 0,
+                    };
+                    (entry.recommended, entry.target_mm, budget_us)
                 }
                 _ => return none(own, options.substeps),
             },

@@ -33,7 +33,19 @@ void walk_scene_create(const char *reduced_bundle) {
   options.substeps = 4;
   EXPECT(upt_scene_create(model, &options, &scene), UPT_ERR_ARGUMENT);
   options.substeps = 0;
-  /* So does a damping of the scene's own, which has bounds. */
+  /* A budget limits corrections: the bundle's own, which are none here. A target of one's own needs a count. */
+  options.corrections_budget_us = 100;
+  options.corrections = UPT_CORRECTIONS_NONE;
+  EXPECT(upt_scene_create(model, &options, &scene), UPT_ERR_ARGUMENT);
+  options.corrections = 0;
+  options.corrections_target_mm = 0.1f;
+  EXPECT(upt_scene_create(model, &options, &scene), UPT_ERR_ARGUMENT);
+  options.corrections_target_mm = 0.0f;
+  EXPECT(upt_scene_create(model, &options, &scene), UPT_OK);
+  EXPECT(upt_scene_destroy(scene), UPT_OK);
+  scene = NULL;
+  options.corrections_budget_us = 0;
+  /* A damping of the scene's own needs corrections too, and has bounds. */
   options.damping_per_s = 2.0;
   EXPECT(upt_scene_create(model, &options, &scene), UPT_ERR_UNSUPPORTED);
   options.damping_per_s = -2.0;

@@ -130,7 +130,7 @@ namespace Upt.Interop
         /// `UPT_CORRECTIONS_NONE`, or `UPT_CORRECTIONS_AUTO` for up to 64. A count with a budget or a target is the most that a step gets.
         /// </summary>
         public int corrections;
-        /// <summary>No correction starts later than this in a step, µs; 0: no budget. Only with a count or `UPT_CORRECTIONS_AUTO`.</summary>
+        /// <summary>No correction starts later than this in a step, µs, but the first; 0: no budget. Not with `UPT_CORRECTIONS_NONE`.</summary>
         public uint corrections_budget_us;
         /// <summary>Corrections stop once the estimated error is below this, mm; 0: no target. Only with a count or `UPT_CORRECTIONS_AUTO`.</summary>
         public float corrections_target_mm;
