@@ -6,6 +6,7 @@ import base64
 import glob
 import json
 import os
+import select
 import shutil
 import socket
 import struct
@@ -98,6 +99,29 @@ def drawing() -> list[str]:
     return ["--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 
 
+class Mouse:
+    """The mouse by Chromium's own protocol, as real ones are: events come when they come, whether or not the page has
+    had the last one. (WebDriver sends the next one only then, which ties the mouse to the page's pictures.)"""
+
+    def __init__(self, port: int, target: str) -> None:
+        self.client = RawClient(port, target, origin=None)
+        self.client.socket.settimeout(None)
+        self.sent = 0
+
+    def event(self, kind: str, x: float, y: float, held: bool = True) -> None:
+        """`mousePressed`, `mouseMoved` or `mouseReleased` at a place of the page, in pixels."""
+        self.sent += 1
+        button = {"button": "left", "buttons": int(held), "clickCount": int(kind != "mouseMoved")}
+        event = {"type": kind, "x": x, "y": y} | button
+        call = {"id": self.sent, "method": "Input.dispatchMouseEvent", "params": event}
+        self.client.send(json.dumps(call).encode())
+        while select.select([self.client.socket], [], [], 0.0)[0]:
+            self.client.read()
+
+    def close(self) -> None:
+        self.client.close()
+
+
 class Browser:
     """Headless Chromium by chromedriver."""
 
@@ -117,12 +141,14 @@ class Browser:
         wanted = {"capabilities": {"alwaysMatch": {"goog:chromeOptions": options}}}
         for _ in range(100):
             try:
-                self.session = self._call("POST", "/session", wanted)["sessionId"]
+                made = self._call("POST", "/session", wanted)
                 break
             except (urllib.error.URLError, ConnectionError):
                 time.sleep(0.1)
         else:
             raise RuntimeError("chromedriver does not answer")
+        self.session = made["sessionId"]
+        self.debugger = made["capabilities"]["goog:chromeOptions"]["debuggerAddress"]
 
     def _call(self, method: str, path: str, body: object = None) -> object:
         data = None if body is None else json.dumps(body).encode()
@@ -175,6 +201,14 @@ class Browser:
     def screenshot(self, path: str) -> None:
         with open(path, "wb") as file:
             file.write(base64.b64decode(self._call("GET", f"/session/{self.session}/screenshot")))
+
+    def mouse(self) -> Mouse:
+        """A mouse that waits for nothing, on the page that is open."""
+        with urllib.request.urlopen(f"http://{self.debugger}/json/list", timeout=30) as answer:
+            page = next(target for target in json.load(answer) if target["type"] == "page")
+        address = page["webSocketDebuggerUrl"].removeprefix("ws://")
+        place, path = address.split("/", 1)
+        return Mouse(int(place.rsplit(":", 1)[1]), "/" + path)
 
     def close(self) -> None:
         try:

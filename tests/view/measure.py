@@ -2,17 +2,20 @@
 
     python3 tests/view/measure.py --bundle onnx/brain-reduced --markdown docs/guide/view.md
 
-The mouse presses the middle of the page and strokes to and fro, by chromedriver. A picture counts when its last pixel
-is drawn (`readPixels` waits for it); the mouse's time is the event's own. Without a graphics card Chromium draws by the
-processor, so that page, library and drawing share the same cores. `--markdown` writes the table between the marks.
+The mouse presses the middle of the page and strokes to and fro, with an event every 8 ms as most mice send them; each
+counts. A picture is there when its last pixel is drawn (`whenDrawn` of drawing.js); the event's own time counts.
+Without a graphics card Chromium draws by the processor, so that page, library and drawing share the same cores.
+`--markdown` writes the table between the marks.
 """
 
 from __future__ import annotations
 
 import argparse
 import datetime
+import math
 import os
 import statistics
+import time
 from itertools import pairwise
 from pathlib import Path
 
@@ -21,8 +24,12 @@ from run import server
 
 ROOT = Path(__file__).resolve().parents[2]
 MARK = "tests/view/measure.py"
-# Moves of the mouse from one corner of the stroke to the next.
-SLICES = 6
+EVENT_S = 0.008  # from one event of the mouse to the next
+SPEED = 250.0  # of the mouse, pixels a second
+# What the page counts, a number a picture or event.
+LISTS = ["latency", "intervals", "made", "stepTimes", "forces"]
+# Where the stroke turns, from the middle of the page.
+CORNERS = [(4, 0), (25, 10), (40, 0), (15, -10), (-15, 0)]
 
 
 def machine() -> str:
@@ -55,40 +62,46 @@ def processor_seconds(root: int) -> dict[str, float]:
     return found
 
 
+def way(seconds: float) -> tuple[float, float]:
+    """Where the mouse is after so many seconds, from the middle of the page."""
+    corners = [*CORNERS, CORNERS[0]]
+    lengths = [math.dist(a, b) for a, b in pairwise(corners)]
+    left = (SPEED * seconds) % sum(lengths)
+    for (a, b), length in zip(pairwise(corners), lengths, strict=True):
+        if left <= length:
+            return tuple(p + left / length * (q - p) for p, q in zip(a, b, strict=True))
+        left -= length
+    return corners[0]
+
+
 def stroke(browser: Browser, seconds: float) -> dict:
     """Drags for so long and returns what the page counted meanwhile."""
     width, height = browser.run("return [innerWidth, innerHeight]")
     x, y = width // 2, height // 2
-    browser.drag([(x, y), (x + 4, y)], release=False)
+    mouse = browser.mouse()
+    mouse.event("mousePressed", x + CORNERS[0][0], y + CORNERS[0][1])
     browser.wait("uptView.contacts > 0")
-    browser.run("uptView.finish = true; for (const list of ['latency', 'intervals', 'made']) uptView[list].length = 0")
+    browser.run(f"uptView.finish = true; for (const list of {LISTS}) uptView[list].length = 0")
     browser.run("uptView.begun = performance.now(); uptView.before = uptView.shown; uptView.steps0 = uptView.steps")
-    steps, forces = [], []
     own = [processor_seconds(browser.driver.pid), processor_seconds(os.getpid())]
-    # As a hand moves a mouse: about 250 pixels a second, an event every 16 ms.
-    corners = [(4, 0), (25, 10), (40, 0), (15, -10), (-15, 0), (4, 0)]
-    way = [
-        (round(x + (1 - part) * ax + part * bx), round(y + (1 - part) * ay + part * by))
-        for (ax, ay), (bx, by) in pairwise(corners)
-        for part in [step / SLICES for step in range(1, SLICES + 1)]
-    ]
-    while browser.run("return performance.now() - uptView.begun") < 1000 * seconds:
-        browser.move(way, 16)
-        now = browser.run("return [uptView.stepMs, uptView.force]")
-        steps.append(now[0])
-        forces.append(now[1])
+    begun = time.monotonic()
+    for count in range(1, int(seconds / EVENT_S) + 1):
+        time.sleep(max(begun + count * EVENT_S - time.monotonic(), 0.0))
+        px, py = way(time.monotonic() - begun)
+        mouse.event("mouseMoved", x + px, y + py)
+    lists = ", ".join(f"{name}: uptView.{name}" for name in LISTS)
     found = browser.run(
         "return {pictures: uptView.shown - uptView.before, ms: performance.now() - uptView.begun, "
-        "latency: uptView.latency, intervals: uptView.intervals, made: uptView.made, "
-        "steps: uptView.steps - uptView.steps0}"
+        f"steps: uptView.steps - uptView.steps0, {lists}}}"
     )
     used = [processor_seconds(browser.driver.pid), processor_seconds(os.getpid())]
-    browser.release()
+    mouse.event("mouseReleased", x + px, y + py, held=False)
+    mouse.close()
     drawing = used[0]["drawing"] - own[0]["drawing"]
     page = used[0]["rest"] - own[0]["rest"]
     server = used[1]["rest"] - own[1]["rest"] - page  # and this program, which is little
     each = [1000 * seconds / found["pictures"] for seconds in (drawing, page, server)]
-    return found | {"step": steps, "force": forces, "processor": each}
+    return found | {"processor": each}
 
 
 def percentile(values: list[float], part: float) -> float:
@@ -110,16 +123,16 @@ def main() -> None:
         with server(arguments.bundle, *more) as (port, token):
             browser.open(f"http://127.0.0.1:{port}/?token={token}")
             browser.wait("window.uptView && uptView.shown > 10")
-            nodes, step_ms = browser.run("return [uptView.nodes(), uptView.dt()]")
+            nodes, step_ms, *size = browser.run("return [uptView.nodes(), uptView.dt(), innerWidth, innerHeight]")
             stroke(browser, 2.0)  # until everything is compiled
             found = stroke(browser, arguments.seconds)
     finally:
         browser.close()
     rate = 1000 * found["pictures"] / found["ms"]
     middle = statistics.median
-    size = f"{arguments.width} x {arguments.height} pixels"
+    size = "a page of {} x {} pixels".format(*size)
     steps = f"{found['steps']} steps of {step_ms:.0f} ms"
-    drag = f"{found['ms'] / 1000:.0f} s of strokes ({steps}, median force {middle(found['force']):.0f} mN)"
+    drag = f"{found['ms'] / 1000:.0f} s of strokes ({steps}, median force {middle(found['forces']):.0f} mN)"
 
     def row(what: str, values: list[float], digits: int = 1) -> str:
         return f"| {what} | {middle(values):.{digits}f} | {percentile(values, 0.99):.{digits}f} |"
@@ -131,9 +144,9 @@ def main() -> None:
         "|---|---:|---:|",
         f"| pictures a second (mean) | {rate:.1f} | |",
         row("from picture to picture, ms", found["intervals"]),
-        row(f"mouse to picture, ms ({len(found['latency'])} moves)", found["latency"]),
+        row(f"mouse to picture, ms ({len(found['latency'])} events)", found["latency"]),
         row("making the tissue of a picture's moment, ms", found["made"], 2),
-        row("step meanwhile, ms", found["step"]),
+        row("step meanwhile, ms", found["stepTimes"]),
         "",
         "Processor time a picture: drawing {:.1f} ms, page {:.1f} ms, library {:.1f} ms.".format(*found["processor"]),
     ]

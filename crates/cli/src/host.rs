@@ -28,6 +28,8 @@ pub struct ModelSettings {
     pub exact: bool,
     /// Corrections a step; none: as many as the bundle recommends.
     pub corrections: Option<Effort>,
+    /// No correction of a step starts later than this, µs; 0: no budget.
+    pub correction_budget_us: u32,
     /// Length of its scenes' steps, s; 0: the bundle's.
     pub step_s: f64,
     /// Damping of its scenes' tissue, 1/s; 0: the bundle's.
@@ -42,6 +44,7 @@ impl Default for ModelSettings {
             precision: ffi::UPT_PRECISION_F32,
             exact: false,
             corrections: None,
+            correction_budget_us: 0,
             step_s: 0.0,
             damping_per_s: 0.0,
         }
@@ -51,6 +54,7 @@ impl Default for ModelSettings {
 /// An open model; closed when dropped.
 pub struct Model {
     corrections: Option<Effort>,
+    correction_budget_us: u32,
     step_s: f64,
     damping_per_s: f64,
     handle: *mut ffi::upt_model,
@@ -129,6 +133,7 @@ impl Model {
             info.struct_size = size::<ffi::upt_model_info>();
             let mut model = Self {
                 corrections: settings.corrections,
+                correction_budget_us: settings.correction_budget_us,
                 step_s: settings.step_s,
                 damping_per_s: settings.damping_per_s,
                 handle,
@@ -154,6 +159,12 @@ impl Model {
     /// The same; its scenes' steps have the length that the bundle recommends for frames.
     pub fn for_frames(mut self) -> Self {
         self.step_s = self.info.frame_step_s;
+        self
+    }
+
+    /// The same; no correction of a step starts later than after this part of the step's length, so that steps keep up with the clock.
+    pub fn in_real_time(mut self, part: f64) -> Self {
+        self.correction_budget_us = (1e6 * part * self.step_s()) as u32;
         self
     }
 

@@ -26,6 +26,7 @@ impl Scene {
                 Some(Effort { most: 0, .. }) => ffi::UPT_CORRECTIONS_NONE,
                 Some(effort) => effort.most as i32,
             };
+            options.corrections_budget_us = model.correction_budget_us;
             options.corrections_target_mm =
                 model.corrections.map_or(0.0, |effort| effort.target_mm);
             options.substeps = model.corrections.map_or(0, |effort| effort.substeps) as u8;
@@ -132,6 +133,14 @@ impl Scene {
     pub fn settle(&mut self) {
         // SAFETY: the handle is live.
         unsafe { ffi::upt_scene_wait(self.handle, u32::MAX) };
+    }
+
+    /// `upt_scene_wait`, for at most so many milliseconds: whether no step is in flight.
+    pub fn wait(&mut self, timeout_ms: u32) -> Result<bool> {
+        // SAFETY: the handle is live.
+        let status = unsafe { ffi::upt_scene_wait(self.handle, timeout_ms) };
+        check(status)?;
+        Ok(status != ffi::UPT_PENDING)
     }
 
     /// `upt_scene_instrument_readings` of the last step's `count` instruments.

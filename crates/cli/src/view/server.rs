@@ -23,6 +23,9 @@ const MOST_MESSAGES: usize = 64;
 /// Connections that are served at once; more are closed.
 const MOST_CONNECTIONS: usize = 16;
 
+/// Part of a step's length after which no correction of it starts; the rest is for the last one and for the picture.
+const SPENT: f64 = 0.45;
+
 /// What the page is made of.
 const FILES: [(&str, &str, &[u8]); 5] = [
     (
@@ -80,6 +83,7 @@ impl Server {
             Some(_) => model,
             None => model.for_frames(),
         };
+        let model = model.in_real_time(SPENT);
         // What no client could have is refused here.
         Session::new(&model)?;
         Ok(Self {
@@ -223,10 +227,11 @@ impl Server {
         // A page that is hidden asks for no frames, and may do so for ever.
         socket.get_ref().set_read_timeout(None)?;
         let mut sent = Instant::now();
+        let mut steps = false;
         loop {
             // One message is waited for, the others that are there already are taken with it.
             let mut left = MOST_MESSAGES;
-            let mut waits = !session.asked();
+            let mut waits = !session.asked() && !steps;
             while left > 0 {
                 socket.get_ref().set_nonblocking(!waits)?;
                 match socket.read() {
@@ -247,6 +252,7 @@ impl Server {
             }
             socket.get_ref().set_nonblocking(false)?;
             if !session.asked() {
+                steps = session.go_on()?;
                 continue;
             }
             let early = SOONEST.saturating_sub(sent.elapsed());
@@ -258,6 +264,7 @@ impl Server {
             }
             sent = Instant::now();
             let frame = session.frame()?.to_vec();
+            steps = true;
             match socket.send(Message::binary(frame)) {
                 Ok(()) => {}
                 Err(Error::ConnectionClosed | Error::AlreadyClosed | Error::Io(_)) => return Ok(()),

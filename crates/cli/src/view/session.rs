@@ -17,8 +17,6 @@ use crate::host::{Model, Scene, instrument};
 const STICKS: f32 = 0.5;
 /// A recording ends after so many steps: a quarter of an hour of 20 ms.
 const LONGEST_RECORDING: usize = 45_000;
-/// Steps that a frame makes itself at most, where frames come slower than steps.
-const MOST_MADE: usize = 2;
 
 pub struct Session {
     scene: Scene,
@@ -31,6 +29,8 @@ pub struct Session {
     domain: Vec<u32>,
     dt: f64,
     begun: Instant,
+    /// When the last frame was made, s since `begun`.
+    framed: f64,
     clock: Clock,
     /// As the page has it, and as the frame shows it.
     tool: Option<Tool>,
@@ -84,6 +84,7 @@ impl Session {
             scene,
             dt,
             begun: Instant::now(),
+            framed: 0.0,
             clock: Clock::new(dt),
             tool: None,
             shown: None,
@@ -182,10 +183,8 @@ impl Session {
     pub fn frame(&mut self) -> Result<&[u8]> {
         let asked = Instant::now();
         let now = self.begun.elapsed().as_secs_f64();
-        if self.clock.in_flight() && self.scene.poll()? {
-            self.clock.finished();
-            self.read()?;
-        }
+        self.framed = now;
+        self.finish()?;
         self.shown = match self.replayed {
             None => self.tool,
             Some(next) => {
@@ -194,7 +193,6 @@ impl Session {
             }
         };
         self.clock.moved(now, self.shown);
-        self.catch_up(now)?;
         let since = self.clock.since(now);
         if self.presents {
             let instruments: Vec<ffi::upt_instrument> = self.shown.iter().map(capsule).collect();
@@ -212,16 +210,22 @@ impl Session {
         self.encode()
     }
 
-    /// The steps that are due before the last one, where frames come slower than steps and steps are quick.
-    fn catch_up(&mut self, now: f64) -> Result<()> {
-        for _ in 0..MOST_MADE {
-            let quick = self.scene.stats()?.step_ms <= 500.0 * self.dt;
-            if !(self.solves && quick && self.clock.behind(now)) {
-                break;
-            }
-            let instruments = self.begin(now);
-            self.scene
-                .step_instruments(&instruments, &mut self.displacement)?;
+    /// Goes on with the steps that the tool's poses so far allow; waits at most 1 ms for the one in flight. False: there is none to go on
+    /// with before the next frame is asked for.
+    pub fn go_on(&mut self) -> Result<bool> {
+        if self.clock.in_flight() && self.scene.wait(1)? {
+            self.clock.finished();
+            self.read()?;
+        }
+        if self.solves && self.clock.due(self.framed) {
+            self.step(self.framed)?;
+        }
+        Ok(self.clock.in_flight())
+    }
+
+    /// Takes the step that has finished, if one has.
+    fn finish(&mut self) -> Result<()> {
+        if self.clock.in_flight() && self.scene.poll()? {
             self.clock.finished();
             self.read()?;
         }

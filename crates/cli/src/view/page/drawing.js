@@ -1,5 +1,6 @@
 // How the page of `upt view` draws: the renderer, its materials, the normals of a surface that moves.
-// Where no graphics card draws, the processor does, beside the library: then light is computed at the corners and edges are not smoothed.
+// Where no graphics card draws, the processor does, beside the library: then light is computed at the corners, edges are not smoothed and pixels
+// are a third larger.
 import * as three from "./three.js";
 
 // Names by which browsers call drawing by software.
@@ -13,10 +14,15 @@ function drawsBySoftware() {
   return SOFTWARE.test(found);
 }
 
+// Drawn pixels in a row for each of the page's, where the processor draws.
+const COARSE = 0.75;
+
 export const software = drawsBySoftware();
 
 export function makeRenderer(canvas) {
-  return new three.WebGLRenderer({ canvas, antialias: !software });
+  const renderer = new three.WebGLRenderer({ canvas, antialias: !software });
+  renderer.setPixelRatio(software ? COARSE : Math.min(window.devicePixelRatio, 2));
+  return renderer;
 }
 
 // Light from the eye at each corner; the colours are linear, the picture's are not.
@@ -93,9 +99,18 @@ export function turnNormals(geometry) {
   normal.needsUpdate = true;
 }
 
-// A picture is there when its last pixel is: waits for it. For measurements alone.
-const pixel = new Uint8Array(4);
-export function finish(renderer) {
+// Calls `then` when the picture is there, to the last pixel. For measurements alone; nothing waits meanwhile.
+export function whenDrawn(renderer, then) {
   const gl = renderer.getContext();
-  gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
+  const fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+  gl.flush();
+  const look = () => {
+    if (gl.getSyncParameter(fence, gl.SYNC_STATUS) !== gl.SIGNALED) {
+      scheduler.postTask(look, { delay: 1 });
+      return;
+    }
+    gl.deleteSync(fence);
+    then(performance.now());
+  };
+  look();
 }

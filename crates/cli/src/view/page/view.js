@@ -2,16 +2,19 @@
 // What the two say to each other: protocol.rs. Each picture has one frame, asked for as late as it can be, so that it shows where the
 // mouse and the tissue are now.
 import * as three from "./three.js";
-import { finish, makeRenderer, software, steelMaterial, tissueMaterial, turnNormals } from "./drawing.js";
+import { makeRenderer, software, steelMaterial, tissueMaterial, turnNormals, whenDrawn } from "./drawing.js";
 import { gltf } from "./gltf.js";
 
 const HEADER = 24;
 const HALF_LENGTH = 25; // of the tool, mm
 const PRESS = 250; // ms until the tool is at its depth
-const READOUTS = 100; // ms between two of the readouts
+const SPEED = 0.1; // at which the tip follows the mouse at most, mm/ms: the bundles know tools of about this speed
+const TURN = 0.004; // at which the tool turns at most, rad/ms
+const READOUTS = 250; // ms between two of the readouts
 const AHEAD = 2; // frames that are asked for and have not come
-const LATE = 2; // ms by which the next frame is asked for sooner where one came too late for its picture
-const IN_TIME = 0.01; // ms by which it is asked for later where it did not
+const OFTEN = 0.995; // of the frames come in time for their picture
+const LATEST = 0.85; // of a picture: its frame is asked for once the last picture is on its way, with all that the mouse has done until then
+const KEPT = 240; // frames by which that is judged
 const PALE = new three.Color(0xd8bfb0);
 const GREY = new three.Color(0x8f9399); // where the model was not trained to be touched
 const RED = new three.Color(0xc8402a);
@@ -36,18 +39,21 @@ let rest; // at rest and not shown: where the mouse finds its place
 let restPositions;
 let restColours;
 let tool; // the capsule that is shown
-let pointer; // {x, y, when, last} while the tool is held: where the mouse is, since when; `when` is 0 once a frame was asked for with it
-let pressed; // {point, normal, since} while the tool is held
+let pointer; // {x, y, last} while the tool is held: where the mouse is, since when
+let moves = []; // when it moved since a frame was asked for
+let pressed; // {point, normal, since, held} while the tool is held: where the mouse points, since when, where the hand is
 let sequence = 0;
 let latest; // the frame that has come and is not shown yet
 let told = 0; // when the readouts were written
-let lead = 1000 / 60; // ms before a picture at which its frame is asked for
+let lead = 12; // ms before a picture at which its frame is asked for
+let due = 0; // when the last one was to be asked for
+const needs = []; // ms from there until it had come, of the last frames
 let interval = 1000 / 60; // ms from picture to picture
 let before = 0; // when the last picture was begun
 let timer; // asks for the next frame
-const sent = new Map(); // sequence: when the mouse was there, until it is seen
+let sent = []; // {sequence, moves} until they are seen
 const pictures = []; // when the last ones were shown
-const status = { shown: 0, largest: 0, force: 0, contacts: 0, latency: [], made: [], intervals: [], leads: [], steps: 0, sequence: 0, software };
+const status = { shown: 0, largest: 0, force: 0, contacts: 0, latency: [], made: [], intervals: [], stepTimes: [], forces: [], steps: 0, sequence: 0, software };
 window.uptView = status; // for tests
 
 const socket = new WebSocket(`ws://${location.host}/socket${location.search}`);
@@ -64,6 +70,8 @@ socket.onmessage = ({ data }) => {
     build(data);
   } else {
     latest = data;
+    needs.push(performance.now() - due);
+    if (needs.length > KEPT) needs.shift();
   }
 };
 socket.onclose = ({ reason }) => show("message", reason || "The connection is closed: run upt view again, or close its other page.");
@@ -169,29 +177,46 @@ function readOut() {
   show("flags", raised.join(", "));
   if (status.rate) show("rate", `${status.rate.toFixed(0)} /s`);
   if (status.latency.length > 0) {
-    const sorted = [...status.latency].sort((a, b) => a - b);
+    const sorted = status.latency.slice(-200).sort((a, b) => a - b);
     show("latency", `${sorted[sorted.length >> 1].toFixed(0)} ms`);
   }
 }
 
-// The tool: its tip `depth` below the place at rest that the mouse points at, its axis along the normal there.
+// The hand: goes where the mouse points, as fast as a hand does. Behind a fissure the mouse is elsewhere at once.
+function follow(now) {
+  const { held } = pressed;
+  const passed = now - held.when;
+  held.when = now;
+  const way = pressed.point.clone().sub(held.point);
+  held.point.add(way.clampLength(0, SPEED * passed));
+  const angle = held.normal.angleTo(pressed.normal);
+  if (angle > 0) held.normal.lerp(pressed.normal, Math.min((TURN * passed) / angle, 1)).normalize();
+}
+
+// The tool: its tip `depth` below the place at rest where the hand is, its axis along the normal there.
 function pose(now) {
+  follow(now);
+  const { point, normal } = pressed.held;
   const ramp = Math.min((now - pressed.since) / PRESS, 1);
   const radius = Number(at("radius").value);
   const up = HALF_LENGTH + radius - ramp * Number(at("depth").value);
-  const position = pressed.point.clone().addScaledVector(pressed.normal, up);
-  const rotation = new three.Quaternion().setFromUnitVectors(new three.Vector3(0, 1, 0), pressed.normal);
+  const position = point.clone().addScaledVector(normal, up);
+  const rotation = new three.Quaternion().setFromUnitVectors(new three.Vector3(0, 1, 0), normal);
   return { position, rotation, radius };
 }
 
-// The frame of the next picture is asked for `lead` before it: long enough that one in 200 comes too late.
-function askInTime(now, came) {
+// The frame of the next picture is asked for as late as most of the last ones could have been.
+function askInTime(now) {
   const passed = Math.min(now - before, 50);
   before = now;
   interval += (passed < interval ? 0.5 : 0.01) * (passed - interval);
-  lead = Math.min(Math.max(came ? lead - IN_TIME : lead + LATE, 2), interval);
+  if (needs.length >= KEPT / 4) {
+    const sorted = [...needs].sort((a, b) => a - b);
+    lead = Math.min(Math.max(sorted[Math.floor(OFTEN * sorted.length)] + 0.5, 2), LATEST * interval);
+  }
   clearTimeout(timer);
-  const wait = now + interval - lead - performance.now();
+  due = now + interval - lead;
+  const wait = due - performance.now();
   if (wait < 1) ask();
   else timer = setTimeout(ask, wait);
 }
@@ -204,11 +229,11 @@ function ask() {
     say({ tool: null, sequence });
     return;
   }
-  if (pointer.when) {
+  if (moves.length > 0) {
     const found = place(pointer);
     if (found) Object.assign(pressed, found);
-    sent.set(sequence, pointer.when);
-    pointer.when = 0;
+    sent.push({ sequence, moves });
+    moves = [];
   }
   const { position, rotation, radius } = pose(performance.now());
   say({
@@ -239,7 +264,7 @@ function place({ x: left, y: top }) {
 }
 
 const canvas = renderer.domElement;
-const where = ({ clientX: x, clientY: y, timeStamp: when }) => ({ x, y, when, last: when });
+const where = ({ clientX: x, clientY: y, timeStamp: last }) => ({ x, y, last });
 canvas.addEventListener(
   "pointerdown",
   (event) => {
@@ -248,14 +273,18 @@ canvas.addEventListener(
     event.stopImmediatePropagation(); // the camera stays
     canvas.setPointerCapture(event.pointerId);
     pointer = where(event);
-    pressed = { ...found, since: performance.now() };
+    moves = [event.timeStamp];
+    const now = performance.now();
+    pressed = { ...found, since: now, held: { point: found.point.clone(), normal: found.normal.clone(), when: now } };
   },
   { capture: true },
 );
 // The raw events come at once, the others wait for the next picture.
 for (const kind of ["pointerrawupdate", "pointermove"]) {
   canvas.addEventListener(kind, (event) => {
-    if (pressed && event.timeStamp > pointer.last) pointer = where(event);
+    if (!pressed || event.timeStamp <= pointer.last) return;
+    for (const { timeStamp: when } of event.getCoalescedEvents()) if (when > pointer.last) moves.push(when);
+    pointer = where(event);
   });
 }
 const lift = () => {
@@ -286,19 +315,20 @@ at("save").addEventListener("click", () => {
 
 const keep = (list, value) => {
   list.push(value);
-  if (list.length > 2000) list.shift();
+  if (list.length > 10000) list.shift();
 };
 
-// Since when the mouse had been where this picture shows it, ms; undefined where it has not moved.
+// When the mouse moved that this picture is the first to show.
 function seen() {
-  const when = sent.get(status.sequence) ?? [...sent].findLast(([old]) => old <= status.sequence)?.[1];
-  for (const old of sent.keys()) if (old <= status.sequence) sent.delete(old);
-  return when;
+  const times = sent.filter((old) => old.sequence <= status.sequence).flatMap((old) => old.moves);
+  sent = sent.filter((old) => old.sequence > status.sequence);
+  return times;
 }
 
 renderer.setAnimationLoop((now) => {
   const { clientWidth: width, clientHeight: height } = canvas;
-  if (canvas.width !== width || canvas.height !== height) {
+  const size = renderer.getSize(new three.Vector2());
+  if (size.x !== width || size.y !== height) {
     renderer.setSize(width, height, false);
     camera.aspect = width / height;
     camera.updateProjectionMatrix();
@@ -307,16 +337,18 @@ renderer.setAnimationLoop((now) => {
   const data = latest;
   latest = undefined;
   if (data) take(data);
-  askInTime(now, data !== undefined); // it is made while this picture is drawn
+  askInTime(now);
   light.position.copy(camera.position);
   controls.update();
   renderer.render(scene, camera);
   if (!data) return;
-  if (status.finish) finish(renderer);
-  const when = seen();
-  if (when !== undefined) keep(status.latency, performance.now() - when);
+  const times = seen();
+  const drawn = (then) => times.forEach((when) => keep(status.latency, then - when));
+  if (status.finish) whenDrawn(renderer, drawn);
+  else drawn(performance.now());
   keep(status.made, status.frameMs);
-  keep(status.leads, lead);
+  keep(status.stepTimes, status.stepMs);
+  keep(status.forces, status.force);
   if (pictures.length > 0) keep(status.intervals, now - pictures[pictures.length - 1]);
   pictures.push(now);
   while (pictures[0] < now - 2000) pictures.shift();
