@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 from upt_training.errors import InputError
+from upt_training.memory import keep_freed_memory
 
 
 def parser() -> argparse.ArgumentParser:
@@ -144,6 +145,8 @@ def parser() -> argparse.ArgumentParser:
 
 def main(arguments: list[str] | None = None) -> int:
     options = parser().parse_args(arguments)
+    if options.command in ("train", "scaling", "ablate"):
+        keep_freed_memory()
     try:
         if options.command == "train":
             from upt_training.run import train_command
