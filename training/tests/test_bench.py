@@ -25,7 +25,8 @@ def test_bench_writes_a_row_for_each_lever_of_the_configuration(data, mesh_path,
     command = ["bench", "--config", str(config), *paths(data, mesh_path), "--steps", "2", "--rounds", "1"]
     assert main([*command, "--draws", "2", "--page", str(page)]) == 0
     rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in page.read_text().splitlines()[3:-1]]
-    assert [row[0].split()[0] for row in rows] == ["plain", "messages", "predictions", "20", "16", "2", "fused", "freed"]
+    first = [row[0].split()[0] for row in rows]
+    assert first == ["plain", "messages", "predictions", "20", "16", "2", "fused", "freed"]
     assert all(row[1] == "4" for row in rows)  # 2 windows of 3 predictions, the first is not scored
     assert all(float(row[5]) < 1e-5 for row in rows[1:3]) and rows[1][6] == "-" and rows[3][6] != "-"
     assert main([*command, "--draws", "0"]) == 2 and "--draws" in capsys.readouterr().err
