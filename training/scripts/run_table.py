@@ -21,7 +21,7 @@ from upt_training.page import write_table  # noqa: E402
 from upt_training.scaling_report import Reference, read_reference  # noqa: E402
 from upt_training.trainer import load_checkpoint  # noqa: E402
 
-BARS = {"paper": (0.4, 0.09), "paper-prior": (0.013, 0.006)}
+BARS = {"paper": (0.4, 0.09), "paper-prior": (0.013, 0.006), "paper-prior-fine": (0.025, 0.01)}
 HEAD = (
     "| configuration | parameters | steps done | of | samples | core-hours | held-out MSE, mm² (cases) | "
     "max error, mm | {bundle}, same cases | bar | goal |"
@@ -73,7 +73,8 @@ def row(named: str, bundle: Reference) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("run", nargs="+", help="run folders, each with `=JSON` of `evaluate` of its bundle")
-    parser.add_argument("--page", type=Path, help="page to write into, between the marks `paper runs`")
+    parser.add_argument("--page", type=Path, help="page to write into, between the marks")
+    parser.add_argument("--marks", default="paper runs", help="of the table in the page (paper runs)")
     parser.add_argument("--evaluation", type=Path, required=True, help="JSON of `evaluate` of a bundle")
     options = parser.parse_args()
     bundle = read_reference(options.evaluation)
@@ -81,7 +82,7 @@ def main() -> None:
     lines = [head, "|---" * 11 + "|", *(row(run, bundle) for run in options.run)]
     print("\n".join(lines))
     if options.page:
-        write_table(options.page, "paper runs", lines)
+        write_table(options.page, options.marks, lines)
 
 
 if __name__ == "__main__":
