@@ -33,7 +33,7 @@ void walk_scene_create(const char *reduced_bundle) {
   options.substeps = 4;
   EXPECT(upt_scene_create(model, &options, &scene), UPT_ERR_ARGUMENT);
   options.substeps = 0;
-  /* A budget limits corrections: the bundle's own, which are none here. A target of one's own needs a count. */
+  /* A budget limits the bundle's own corrections, none here; a target needs a count. */
   options.corrections_budget_us = 100;
   options.corrections = UPT_CORRECTIONS_NONE;
   EXPECT(upt_scene_create(model, &options, &scene), UPT_ERR_ARGUMENT);
