@@ -205,7 +205,7 @@ def a_flood_of_messages_gets_one_answer_for_many():
 
 def a_replay_makes_the_steps_of_the_recording_again():
     """To the bit: the largest displacement and the force after each step."""
-    with server(ROOT / "tests/fixtures/tiny-corrected") as (port, token):
+    with server(ROOT / "tests/fixtures/tiny-corrected", "--exact") as (port, token):
         client = RawClient(port, f"/socket?token={token}")
         top = tip_of_the_phantom(client)
         at = 0

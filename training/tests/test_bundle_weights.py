@@ -30,7 +30,9 @@ def model_like(bundle: Path, **changes) -> Upt:
 
 def test_the_weights_compute_what_the_bundle_does():
     model = model_like(BUNDLE)
+    draws = torch.get_rng_state()
     load_state(model, bundle_state(BUNDLE, model), str(BUNDLE))
+    assert torch.equal(torch.get_rng_state(), draws)
     mesh = load_mesh(BUNDLE / "mesh.safetensors")
     graph = build_graph(mesh, model.settings.graph)
     features = np.random.default_rng(1).normal(size=(mesh.node_count, model.settings.feature_count)).astype(np.float32)
@@ -56,5 +58,5 @@ def test_another_architecture_and_a_bundle_without_one_are_refused(tmp_path):
     del manifest["provenance"]["architecture"]
     manifest.pop("manifest_sha256", None)
     (copy / "bundle.json").write_text(json.dumps(manifest))
-    with pytest.raises(InputError):
+    with pytest.raises(InputError, match="no provenance.architecture"):
         bundle_state(copy, model_like(BUNDLE))

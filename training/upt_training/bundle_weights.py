@@ -40,9 +40,9 @@ def bundle_state(folder: Path, like: Upt) -> dict[str, torch.Tensor]:
     if manifest["kind"] != "upt":
         raise InputError(f"{folder}: kind is {manifest['kind']!r}; only `upt` bundles hold weights to start from")
     _check_architecture(folder, manifest, like)
-    torch.manual_seed(0)
-    model = Upt(like.settings)
-    with torch.no_grad():
+    with torch.random.fork_rng(devices=[]), torch.no_grad():  # the run's own draws stay as they are
+        torch.manual_seed(0)
+        model = Upt(like.settings)
         for parameter in model.parameters():
             parameter.normal_()
     found, constants = _constants(folder, model)
@@ -95,7 +95,7 @@ def _constants(folder: Path, model: Upt) -> tuple[dict[str, np.ndarray], list[np
                 continue
             name, part, turned = weight
             if name not in found:
-                found[name] = dict(model.state_dict())[name].numpy().copy()
+                found[name] = model.state_dict()[name].numpy().copy()
             found[name][part] = values.T if turned else values
     return found, others
 

@@ -28,8 +28,6 @@ pub struct ModelSettings {
     pub exact: bool,
     /// Corrections a step; none: as many as the bundle recommends.
     pub corrections: Option<Effort>,
-    /// No correction of a step starts later than this, µs; 0: no budget.
-    pub correction_budget_us: u32,
     /// Length of its scenes' steps, s; 0: the bundle's.
     pub step_s: f64,
     /// Damping of its scenes' tissue, 1/s; 0: the bundle's.
@@ -44,7 +42,6 @@ impl Default for ModelSettings {
             precision: ffi::UPT_PRECISION_F32,
             exact: false,
             corrections: None,
-            correction_budget_us: 0,
             step_s: 0.0,
             damping_per_s: 0.0,
         }
@@ -54,6 +51,7 @@ impl Default for ModelSettings {
 /// An open model; closed when dropped.
 pub struct Model {
     corrections: Option<Effort>,
+    /// No correction of a step starts later than this, µs; 0: no budget.
     correction_budget_us: u32,
     step_s: f64,
     damping_per_s: f64,
@@ -133,7 +131,7 @@ impl Model {
             info.struct_size = size::<ffi::upt_model_info>();
             let mut model = Self {
                 corrections: settings.corrections,
-                correction_budget_us: settings.correction_budget_us,
+                correction_budget_us: 0,
                 step_s: settings.step_s,
                 damping_per_s: settings.damping_per_s,
                 handle,

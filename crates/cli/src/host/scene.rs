@@ -121,14 +121,6 @@ impl Scene {
         })
     }
 
-    /// `upt_scene_poll`: whether the submitted step has finished.
-    pub fn poll(&mut self) -> Result<bool> {
-        // SAFETY: the handle is live.
-        let status = unsafe { ffi::upt_scene_poll(self.handle) };
-        check(status)?;
-        Ok(status != ffi::UPT_PENDING)
-    }
-
     /// `upt_scene_wait`: until no step is in flight; what became of it does not matter here.
     pub fn settle(&mut self) {
         // SAFETY: the handle is live.

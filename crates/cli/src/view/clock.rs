@@ -1,7 +1,7 @@
 //! When to step: the host's part between frames (docs/guide/frames-and-haptics.md), for one tool.
 //!
 //! The tool's poses of the last frames are kept with their times. A step is submitted with the pose of its own moment, which lies between
-//! two frames; the next one is due a step later, or now where more than three steps were lost.
+//! two frames; the next one is due a step later, or now where more than 0.1 s or two steps were lost.
 
 use std::collections::VecDeque;
 
@@ -11,8 +11,8 @@ use super::protocol::Tool;
 const MOST_POSES: usize = 256;
 /// A tool that moves farther from a frame to the next has been put there, mm.
 const PUT_MM: f32 = 40.0;
-/// More than so many steps behind, what was lost is not made up for.
-const LOST_STEPS: f64 = 3.0;
+/// What was lost for longer is not made up for, s.
+const LOST_S: f64 = 0.1;
 
 /// Times in seconds, from any beginning.
 pub struct Clock {
@@ -58,7 +58,7 @@ impl Clock {
 
     /// A step begins: the tool at its moment.
     pub fn begin(&mut self, now: f64) -> Option<Tool> {
-        if now - self.next > LOST_STEPS * self.dt {
+        if now - self.next > (2.0 * self.dt).max(LOST_S) {
             self.next = now;
         }
         self.step = self.next;

@@ -34,6 +34,9 @@ pub struct Options {
     /// processor to the picture.
     #[arg(long, value_name = "MS")]
     step_ms: Option<f64>,
+    /// Make all corrections of a step, even where steps then fall behind the clock. A replay is then exact to the bit.
+    #[arg(long)]
+    exact: bool,
 }
 
 pub fn run(options: &Options) -> Result<ExitCode> {
@@ -48,7 +51,13 @@ pub fn run(options: &Options) -> Result<ExitCode> {
             options.port
         )
     })?;
-    let server = server::Server::new(&options.bundle, options.threads, options.step_ms, &listener)?;
+    let model = server::open(
+        &options.bundle,
+        options.threads,
+        options.step_ms,
+        options.exact,
+    )?;
+    let server = server::Server::new(&options.bundle, model, &listener)?;
     println!("{}", server.address());
     println!("open this address in a browser; Ctrl-C stops the server");
     server.serve(&listener);

@@ -65,25 +65,27 @@ pub struct Server {
     connections: AtomicUsize,
 }
 
+/// The bundle, with steps for frames that keep up with the clock; `exact`: that make all their corrections.
+pub fn open(bundle: &Path, threads: u32, step_ms: Option<f64>, exact: bool) -> Result<Model> {
+    let settings = ModelSettings {
+        threads,
+        step_s: step_ms.map_or(0.0, |ms| 1e-3 * ms),
+        ..ModelSettings::default()
+    };
+    let model = Model::open(bundle, &settings)?;
+    let model = match step_ms {
+        Some(_) => model,
+        None => model.for_frames(),
+    };
+    Ok(match exact {
+        true => model,
+        false => model.in_real_time(SPENT),
+    })
+}
+
 impl Server {
-    pub fn new(
-        bundle: &Path,
-        threads: u32,
-        step_ms: Option<f64>,
-        listener: &TcpListener,
-    ) -> Result<Self> {
-        let settings = ModelSettings {
-            threads,
-            step_s: step_ms.map_or(0.0, |ms| 1e-3 * ms),
-            ..ModelSettings::default()
-        };
-        let model = Model::open(bundle, &settings)?;
+    pub fn new(bundle: &Path, model: Model, listener: &TcpListener) -> Result<Self> {
         let name = bundle.file_name().unwrap_or(bundle.as_os_str());
-        let model = match step_ms {
-            Some(_) => model,
-            None => model.for_frames(),
-        };
-        let model = model.in_real_time(SPENT);
         // What no client could have is refused here.
         Session::new(&model)?;
         Ok(Self {

@@ -184,7 +184,7 @@ impl Session {
         let asked = Instant::now();
         let now = self.begun.elapsed().as_secs_f64();
         self.framed = now;
-        self.finish()?;
+        self.finish(0)?;
         self.shown = match self.replayed {
             None => self.tool,
             Some(next) => {
@@ -213,19 +213,16 @@ impl Session {
     /// Goes on with the steps that the tool's poses so far allow; waits at most 1 ms for the one in flight. False: there is none to go on
     /// with before the next frame is asked for.
     pub fn go_on(&mut self) -> Result<bool> {
-        if self.clock.in_flight() && self.scene.wait(1)? {
-            self.clock.finished();
-            self.read()?;
-        }
+        self.finish(1)?;
         if self.solves && self.clock.due(self.framed) {
             self.step(self.framed)?;
         }
         Ok(self.clock.in_flight())
     }
 
-    /// Takes the step that has finished, if one has.
-    fn finish(&mut self) -> Result<()> {
-        if self.clock.in_flight() && self.scene.poll()? {
+    /// Takes the step in flight if it finishes within so many milliseconds.
+    fn finish(&mut self, within_ms: u32) -> Result<()> {
+        if self.clock.in_flight() && self.scene.wait(within_ms)? {
             self.clock.finished();
             self.read()?;
         }
@@ -246,7 +243,7 @@ impl Session {
     fn begin(&mut self, now: f64) -> Vec<ffi::upt_instrument> {
         let mut tool = self.clock.begin(now);
         if let Some(next) = &mut self.replayed {
-            // The very poses of the recording: its steps again, to the bit.
+            // The very poses of the recording: its steps again, to the bit where all corrections are made.
             tool = self.recorded.get(*next).copied().flatten();
             *next += 1;
             if *next > self.recorded.len() {

@@ -46,12 +46,12 @@ let sequence = 0;
 let latest; // the frame that has come and is not shown yet
 let told = 0; // when the readouts were written
 let lead = 12; // ms before a picture at which its frame is asked for
-let due = 0; // when the last one was to be asked for
+let due = 0; // when it is to be asked for
 const needs = []; // ms from there until it had come, of the last frames
 let interval = 1000 / 60; // ms from picture to picture
 let before = 0; // when the last picture was begun
 let timer; // asks for the next frame
-let sent = []; // {sequence, moves} until they are seen
+let sent = []; // {sequence, due, moves} of the frames that are asked for, until they are seen
 const pictures = []; // when the last ones were shown
 const status = { shown: 0, largest: 0, force: 0, contacts: 0, latency: [], made: [], intervals: [], stepTimes: [], forces: [], steps: 0, sequence: 0, software };
 window.uptView = status; // for tests
@@ -70,7 +70,9 @@ socket.onmessage = ({ data }) => {
     build(data);
   } else {
     latest = data;
-    needs.push(performance.now() - due);
+    const [came] = new Uint32Array(data, 0, 1);
+    const asked = sent.find((one) => one.sequence === came);
+    if (asked) needs.push(performance.now() - asked.due);
     if (needs.length > KEPT) needs.shift();
   }
 };
@@ -225,15 +227,16 @@ function askInTime(now) {
 function ask() {
   if (sequence - status.sequence >= AHEAD) return;
   sequence += 1;
+  const moved = pressed ? moves : [];
+  moves = [];
+  sent.push({ sequence, due, moves: moved });
   if (!pressed) {
     say({ tool: null, sequence });
     return;
   }
-  if (moves.length > 0) {
+  if (moved.length > 0) {
     const found = place(pointer);
     if (found) Object.assign(pressed, found);
-    sent.push({ sequence, moves });
-    moves = [];
   }
   const { position, rotation, radius } = pose(performance.now());
   say({
@@ -283,7 +286,8 @@ canvas.addEventListener(
 for (const kind of ["pointerrawupdate", "pointermove"]) {
   canvas.addEventListener(kind, (event) => {
     if (!pressed || event.timeStamp <= pointer.last) return;
-    for (const { timeStamp: when } of event.getCoalescedEvents()) if (when > pointer.last) moves.push(when);
+    const times = (event.getCoalescedEvents?.() ?? []).map((one) => one.timeStamp).filter((when) => when > pointer.last);
+    moves.push(...(times.length > 0 ? times : [event.timeStamp]));
     pointer = where(event);
   });
 }
