@@ -55,12 +55,16 @@ pub fn coulomb(w: &Matrix, inverse: &Matrix, b: Vector, friction: f32, guess: Ve
     let rate = 1.0 / (w.y_axis.y + w.z_axis.z);
     let mut force = clamp_tangential(guess, friction);
     for _ in 0..ROUNDS {
+        let before = force;
         let coupling = w.y_axis.x * force.y + w.z_axis.x * force.z;
         force.x = (-(b.x + coupling) / w.x_axis.x).max(0.0);
         let slip = b + *w * force;
         force.y -= rate * slip.y;
         force.z -= rate * slip.z;
         force = clamp_tangential(force, friction);
+        if force == before {
+            break; // so would all further rounds leave it
+        }
     }
     force
 }
