@@ -13,13 +13,29 @@ use crate::error::Result;
 /// Linearisations of the gap.
 const LINEARISATIONS: usize = 2;
 
-/// Which compliance a solve takes.
+/// Of a solve that a picture shows: a thousandth of a millimetre is not seen, and a frame has little time.
+const SHOWN: Limits = Limits {
+    tolerance_mm: 1e-3,
+    least_sweeps: 8,
+    most_sweeps: 60,
+};
+
+/// Which compliance a solve takes, and how long it goes on.
 #[derive(Clone, Copy)]
 enum Time {
     /// Of a step's length: the same in each.
     StepEnd,
     /// Of a moment between steps, another in each call.
     Any,
+}
+
+impl Time {
+    fn limits(self) -> Limits {
+        match self {
+            Self::StepEnd => Limits::default(),
+            Self::Any => SHOWN,
+        }
+    }
 }
 
 /// What one solve changed: forces on the degrees of freedom of the prior's columns.
@@ -104,7 +120,7 @@ impl Problem {
                 self.contacts.push(moving.measure(row));
             }
             self.sweeps
-                .solve(w, &self.contacts, &mut self.forces, Limits::default());
+                .solve(w, &self.contacts, &mut self.forces, time.limits());
         }
         self.next.forces.clear();
         self.columns.clear();
