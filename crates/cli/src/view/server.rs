@@ -24,7 +24,7 @@ const MOST_MESSAGES: usize = 64;
 const MOST_CONNECTIONS: usize = 16;
 
 /// Part of a step's length after which no correction of it starts; the rest is for the last one and for the picture.
-const SPENT: f64 = 0.45;
+const SPENT: f64 = 0.3;
 
 /// What the page is made of.
 const FILES: [(&str, &str, &[u8]); 5] = [

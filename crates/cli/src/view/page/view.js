@@ -12,9 +12,10 @@ const SPEED = 0.1; // at which the tip follows the mouse at most, mm/ms: the bun
 const TURN = 0.004; // at which the tool turns at most, rad/ms
 const READOUTS = 250; // ms between two of the readouts
 const AHEAD = 2; // frames that are asked for and have not come
-const OFTEN = 0.995; // of the frames come in time for their picture
+const OFTEN = 0.998; // of the frames come in time for their picture
 const LATEST = 0.85; // of a picture: its frame is asked for once the last picture is on its way, with all that the mouse has done until then
-const KEPT = 240; // frames by which that is judged
+const KEPT = 600; // frames by which that is judged
+const FEWEST = 60; // by which it can be
 const PALE = new three.Color(0xd8bfb0);
 const GREY = new three.Color(0x8f9399); // where the model was not trained to be touched
 const RED = new three.Color(0xc8402a);
@@ -53,7 +54,7 @@ let before = 0; // when the last picture was begun
 let timer; // asks for the next frame
 let sent = []; // {sequence, due, moves} of the frames that are asked for, until they are seen
 const pictures = []; // when the last ones were shown
-const status = { shown: 0, largest: 0, force: 0, contacts: 0, latency: [], made: [], intervals: [], stepTimes: [], forces: [], steps: 0, sequence: 0, software };
+const status = { drawn: 0, shown: 0, largest: 0, force: 0, contacts: 0, latency: [], made: [], intervals: [], stepTimes: [], forces: [], steps: 0, sequence: 0, software };
 window.uptView = status; // for tests
 
 const socket = new WebSocket(`ws://${location.host}/socket${location.search}`);
@@ -212,7 +213,7 @@ function askInTime(now) {
   const passed = Math.min(now - before, 50);
   before = now;
   interval += (passed < interval ? 0.5 : 0.01) * (passed - interval);
-  if (needs.length >= KEPT / 4) {
+  if (needs.length >= FEWEST) {
     const sorted = [...needs].sort((a, b) => a - b);
     lead = Math.min(Math.max(sorted[Math.floor(OFTEN * sorted.length)] + 0.5, 2), LATEST * interval);
   }
@@ -338,6 +339,7 @@ renderer.setAnimationLoop((now) => {
     camera.updateProjectionMatrix();
   }
   if (!surface) return;
+  status.drawn += 1;
   const data = latest;
   latest = undefined;
   if (data) take(data);
