@@ -51,20 +51,58 @@ pub fn coulomb(w: &Matrix, inverse: &Matrix, b: Vector, friction: f32, guess: Ve
     if stick.x >= 0.0 && across(stick) <= friction * stick.x {
         return stick;
     }
-    // A step of one over the trace of the tangential block never overshoots.
-    let rate = 1.0 / (w.y_axis.y + w.z_axis.z);
     let mut force = clamp_tangential(guess, friction);
     for _ in 0..ROUNDS {
-        let before = force;
-        let coupling = w.y_axis.x * force.y + w.z_axis.x * force.z;
-        force.x = (-(b.x + coupling) / w.x_axis.x).max(0.0);
-        let slip = b + *w * force;
-        force.y -= rate * slip.y;
-        force.z -= rate * slip.z;
-        force = clamp_tangential(force, friction);
-        if force == before {
+        let next = slide(w, b, friction, force);
+        if next == force {
             break; // so would all further rounds leave it
         }
+        force = next;
     }
     force
+}
+
+/// A round of the slip iteration: the normal force that closes the gap, then a step against the slip, cut to the cone.
+fn slide(w: &Matrix, b: Vector, friction: f32, mut force: Vector) -> Vector {
+    let coupling = w.y_axis.x * force.y + w.z_axis.x * force.z;
+    force.x = (-(b.x + coupling) / w.x_axis.x).max(0.0);
+    let slip = b + *w * force;
+    // A step of one over the trace of the tangential block never overshoots.
+    let rate = 1.0 / (w.y_axis.y + w.z_axis.z);
+    force.y -= rate * slip.y;
+    force.z -= rate * slip.z;
+    clamp_tangential(force, friction)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A round that moves nothing is the last one that could: the force is that of all rounds.
+    #[test]
+    fn rounds_that_are_left_out_would_have_moved_nothing() {
+        let w = Matrix::from_cols(
+            Vector::new(0.9, 0.1, -0.2),
+            Vector::new(0.1, 0.7, 0.05),
+            Vector::new(-0.2, 0.05, 0.8),
+        );
+        let inverse = w.inverse();
+        let mut ended_early = 0;
+        for at in 0..400 {
+            let turn = 0.1 * at as f32;
+            let b = Vector::new(-0.3, 0.5 * turn.cos(), 0.4 * (1.7 * turn).sin());
+            let friction = 0.05 + 0.001 * at as f32;
+            let first = clamp_tangential(Vector::new(0.4, 0.1, -0.1), friction);
+            let mut rounds = vec![first];
+            for _ in 0..ROUNDS {
+                rounds.push(slide(&w, b, friction, rounds[rounds.len() - 1]));
+            }
+            let stick = -(inverse * b);
+            let sticks = stick.x >= 0.0 && across(stick) <= friction * stick.x;
+            let wanted = if sticks { stick } else { rounds[ROUNDS] };
+            assert_eq!(coulomb(&w, &inverse, b, friction, first), wanted, "{at}");
+            ended_early += u32::from(!sticks && rounds[ROUNDS - 1] == rounds[ROUNDS]);
+        }
+        assert!(ended_early > 0, "no iteration came to rest");
+    }
 }
