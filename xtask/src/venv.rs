@@ -1,11 +1,12 @@
-//! The Python virtual environment `target/venv`, and what pip installs into it.
+//! The Python virtual environment `target/venv`, and what uv or pip installs into it.
 
+use std::path::Path;
 use std::process::Command;
 
 use anyhow::{Context, Result};
 use sha2::{Digest, Sha256};
 
-use crate::process::run_checked;
+use crate::process::{output, run_checked};
 use crate::workspace::{Workspace, program_in};
 
 /// What pip installs at once: a name, packages, and the file that asks for it anew when it changes.
@@ -58,9 +59,56 @@ pub fn install(workspace: &Workspace, (name, packages, file): Set) -> Result<()>
     if std::fs::read_to_string(&stamp).is_ok_and(|found| found == wanted) {
         return Ok(());
     }
-    let mut command = workspace.python(&format!("{PIP_INSTALL} {packages}"));
-    run_checked(workspace, &format!("pip install ({name})"), &mut command)
-        .context("pip needs a package index: set PIP_INDEX_URL if yours is not the default")?;
+    // uv knows nothing of pip's configuration files: what it cannot install, pip may.
+    if with_uv(workspace, name, packages).is_err() {
+        let mut command = workspace.python(&format!("{PIP_INSTALL} {packages}"));
+        run_checked(workspace, &format!("pip install ({name})"), &mut command).context(
+            "pip needs room on the disk (6 GB, and as much for its downloads) \
+             and a package index: set PIP_INDEX_URL if yours is not the default",
+        )?;
+    }
     std::fs::write(&stamp, wanted)?;
     Ok(())
+}
+
+/// uv unpacks while it downloads, and links from its cache: torch's 4 GB are on the disk once, where pip needs three times as much.
+fn with_uv(workspace: &Workspace, name: &str, packages: &str) -> Result<()> {
+    let uv = workspace.venv_program("uv");
+    if !uv.exists() {
+        let mut command = workspace.python(&format!("{PIP_INSTALL} uv==0.13.9"));
+        run_checked(workspace, "pip install (uv)", &mut command)?;
+    }
+    let words = "pip install --quiet --excludes training/excludes.txt --python";
+    let mut command = workspace.command(&uv, words);
+    command
+        .arg(workspace.venv_program("python"))
+        .args(packages.split(' '));
+    let known = [
+        ("PIP_INDEX_URL", "UV_DEFAULT_INDEX"),
+        ("PIP_EXTRA_INDEX_URL", "UV_INDEX"),
+        ("PIP_CERT", "SSL_CERT_FILE"),
+    ];
+    for (pip, uv) in known {
+        if let (Some(value), None) = (std::env::var_os(pip), std::env::var_os(uv)) {
+            command.env(uv, value);
+        }
+    }
+    let cache = output(Command::new(&uv).args(["cache", "dir"]))?;
+    if !can_link(Path::new(cache.trim()), &workspace.path("target")) {
+        command.env("UV_CACHE_DIR", workspace.path("target/uv"));
+    }
+    run_checked(workspace, &format!("uv pip install ({name})"), &mut command)
+}
+
+/// Are both on one file system? The first need not exist yet.
+#[cfg(unix)]
+fn can_link(cache: &Path, target: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let device = |path: &Path| path.metadata().ok().map(|found| found.dev());
+    cache.ancestors().find_map(device) == device(target)
+}
+
+#[cfg(not(unix))]
+fn can_link(_: &Path, _: &Path) -> bool {
+    true
 }
