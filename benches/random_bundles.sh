@@ -19,4 +19,9 @@ bundle() {
 
 bundle wide wide "$brain" bundle.json
 bundle paper paper "$brain" reference.safetensors --paper-split
+# The trained network of that size, split in the same way.
+split=$out/brain-paper.split/paper_decoder.onnx
+if [ ! "$split" -nt onnx/brain-paper/decoder.onnx ]; then
+  "${UPT_PYTHON:-python3}" -m upt_training.paper_split onnx/brain-paper --out "$out/brain-paper.split"
+fi
 if [ -n "${UPT_FINE_MESH:-}" ]; then bundle paper-fine paper "$UPT_FINE_MESH" reference.safetensors --paper-split; fi

@@ -2,8 +2,9 @@
 //!
 //! `cargo bench --bench step` runs every bundle in `onnx/` and in the folder that `UPT_BENCH_BUNDLES` names. A bundle that
 //! carries `paper_encoder.onnx` and `paper_decoder.onnx` is also run through ONNX Runtime as the paper splits it, with
-//! the same weights and threads; `cargo bench --bench step -- reduced` runs the bundles with that name only. `UPT_FINE_MESH=FILE` adds steps on that mesh for bundles without a prior;
-//! those with one have bundles of their own there (`training/scripts/large_mesh.sh WORK ...`, then `UPT_LARGE_BUNDLES=WORK`).
+//! the same weights and threads; so is one whose two graphs are in the folder `NAME.split` next to the random bundles.
+//! `cargo bench --bench step -- reduced` runs the bundles with that name only. `UPT_FINE_MESH=FILE` adds steps on that mesh
+//! for bundles without a prior; those with one have bundles of their own there (`training/scripts/large_mesh.sh WORK ...`, then `UPT_LARGE_BUNDLES=WORK`).
 
 mod bare;
 mod cost;
@@ -19,6 +20,7 @@ mod sleeping;
 mod split;
 mod steady;
 mod tail;
+mod trained;
 mod windows;
 
 use std::path::Path;
@@ -87,6 +89,8 @@ fn run(path: &Path, machine: &floor::Machine) -> upt::Result<()> {
     if let KindModel::Upt(kind) = &model.kind {
         if path.join("paper_encoder.onnx").exists() {
             paper::against_split(path, &model, kind, &name)?;
+        } else if let Some(graphs) = trained::graphs(&name) {
+            trained::against_split(&graphs, &model, kind, &name)?;
         }
         fine::against_bundle_mesh(&model, &name)?;
     }
@@ -96,9 +100,12 @@ fn run(path: &Path, machine: &floor::Machine) -> upt::Result<()> {
 /// Nodes from which a mesh counts as the large one (150,140 nodes, `training/scripts/large_mesh.sh`).
 const LARGE: u64 = 100_000;
 
-/// Whether a bundle is one of `onnx/`: trained, and of a mesh that is not the large one.
+/// Whether a bundle is one of `onnx/` for real time: trained, of a mesh that is not the large one, and not of the
+/// paper's size, which is measured against the paper's split.
 fn ships(model: &Model) -> bool {
-    model.manifest.name.starts_with("brain-") && model.info().node_count < LARGE
+    let paper_size =
+        matches!(&model.kind, KindModel::Upt(kind) if kind.entry.dims.latent_tokens >= 256);
+    model.manifest.name.starts_with("brain-") && model.info().node_count < LARGE && !paper_size
 }
 
 /// Bar and goal of a step, ms, for trained weights. Random ones have neither.

@@ -50,7 +50,7 @@ pub fn against_split(
     let exact = Reference::read(path, model.mesh.node_count())?;
     for threads in [1, 2] {
         let mut split = Split::new(path, model, kind, threads, ProviderPlan::cpu())?;
-        split.set_contact(kind, &exact.nodes, &exact.vectors);
+        split.set_contact(kind, &exact.nodes, &exact.vectors, &[]);
         let scene = Scene::new(
             Arc::clone(model),
             &SceneOptions {

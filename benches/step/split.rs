@@ -79,8 +79,8 @@ impl Split {
         })
     }
 
-    /// Features of rest with a contact.
-    pub fn set_contact(&mut self, kind: &UptModel, nodes: &[u32], vectors: &[f32]) {
+    /// Features of rest with a contact, and what linear elasticity answers to it (`[K,3]`, empty where no feature asks).
+    pub fn set_contact(&mut self, kind: &UptModel, nodes: &[u32], vectors: &[f32], linear: &[f32]) {
         let (f, norm) = (kind.entry.feature_width(), &kind.entry.normalisation);
         let features = self.encoder.input(0);
         let mut column = 0;
@@ -95,6 +95,11 @@ impl Split {
             };
             for row in features.chunks_exact_mut(f) {
                 (0..width).for_each(|axis| row[column + axis] = scaled(0.0, axis));
+            }
+            if *feature == Feature::Prior {
+                for (row, p) in features.chunks_exact_mut(f).zip(linear.chunks_exact(3)) {
+                    (0..3).for_each(|axis| row[column + axis] = scaled(p[axis], axis));
+                }
             }
             for (&node, c) in nodes.iter().zip(vectors.chunks_exact(3)) {
                 let row = &mut features[node as usize * f + column..][..width];

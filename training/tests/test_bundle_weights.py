@@ -1,4 +1,4 @@
-"""`train --init BUNDLE`: a model that computes what the bundle does, and refusals of what cannot be started from."""
+"""`train --init BUNDLE` and `paper_split`: a model that computes what the bundle does, and what has no such model."""
 
 import json
 import shutil
@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 import torch
 
-from upt_training.bundle import BundleSession
+from upt_training.bundle import BundleSession, run_paper_split
 from upt_training.bundle_weights import bundle_state
 from upt_training.config import settings_from_dict
 from upt_training.errors import InputError
 from upt_training.graph import build_graph
 from upt_training.mesh_file import load_mesh
 from upt_training.model import Upt, load_state
+from upt_training.paper_split import main as paper_split
 
 BUNDLE = Path(__file__).parents[2] / "tests/fixtures/tiny-upt-prior"
 
@@ -45,6 +46,19 @@ def test_the_weights_compute_what_the_bundle_does():
     assert np.abs(expected).max() > 0.05
     assert np.abs(found - expected).max() < 1e-5 * np.abs(expected).max()
     assert torch.equal(model.output_scale, torch.tensor([0.1, 0.2, 0.3]))
+
+
+def test_the_split_of_a_bundle_computes_what_the_bundle_does(tmp_path, capsys):
+    assert paper_split([str(BUNDLE), "--out", str(tmp_path / "split")]) == 0
+    mesh, like = load_mesh(BUNDLE / "mesh.safetensors"), model_like(BUNDLE)
+    graph = build_graph(mesh, like.settings.graph)
+    features = np.random.default_rng(2).normal(size=(mesh.node_count, like.settings.feature_count)).astype(np.float32)
+    expected = BundleSession(BUNDLE, mesh, graph)(features)
+    found = run_paper_split(tmp_path / "split", mesh, graph, features)
+    assert np.abs(expected).max() > 0.05
+    assert np.abs(found - expected).max() < 1e-5 * np.abs(expected).max()
+    assert paper_split([str(BUNDLE.parent / "tiny-reduced"), "--out", str(tmp_path / "none")]) == 2
+    assert "tiny-reduced: not of kind `upt`" in capsys.readouterr().err
 
 
 def test_another_architecture_and_a_bundle_without_one_are_refused(tmp_path):
