@@ -63,15 +63,16 @@ pub fn install(workspace: &Workspace, (name, packages, file): Set) -> Result<()>
     if with_uv(workspace, name, packages).is_err() {
         let mut command = workspace.python(&format!("{PIP_INSTALL} {packages}"));
         run_checked(workspace, &format!("pip install ({name})"), &mut command).context(
-            "pip needs room on the disk (6 GB, and as much for its downloads) \
-             and a package index: set PIP_INDEX_URL if yours is not the default",
+            "pip needs room on the disk (10 GB for training) and a package index: \
+             set PIP_INDEX_URL if yours is not the default",
         )?;
     }
     std::fs::write(&stamp, wanted)?;
     Ok(())
 }
 
-/// uv unpacks while it downloads, and links from its cache: torch's 4 GB are on the disk once, where pip needs three times as much.
+/// uv unpacks while it downloads, and links from its cache: the 5 GB of torch's environment are on the disk once. pip keeps the
+/// archives next to them, twice while it installs.
 fn with_uv(workspace: &Workspace, name: &str, packages: &str) -> Result<()> {
     let uv = workspace.venv_program("uv");
     if !uv.exists() {
