@@ -45,6 +45,7 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     {
         bail!("--step-ms is {ms}; a step takes 10 to 50 ms");
     }
+    give_way();
     let listener = TcpListener::bind(("127.0.0.1", options.port)).with_context(|| {
         format!(
             "port {} on 127.0.0.1 cannot be opened; choose another with --port, or leave it out",
@@ -63,3 +64,13 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     server.serve(&listener);
     Ok(ExitCode::SUCCESS)
 }
+
+/// A page that draws on the same cores comes first: the threads that are started from here on inherit the lower priority.
+#[cfg(unix)]
+fn give_way() {
+    // SAFETY: it takes numbers; where it fails, the priority stays.
+    unsafe { libc::setpriority(libc::PRIO_PROCESS, 0, 10) };
+}
+
+#[cfg(not(unix))]
+fn give_way() {}
