@@ -223,7 +223,7 @@ fn papers(bundle: &Path, reference: &Way, provider: Provider, steps: usize) -> R
     let plan = ProviderPlan::new(&variants(provider)[0].1);
     let mut split = split::Split::new(bundle, &reference.model, kind, 1, plan)?;
     let nodes = reference.patch();
-    split.set_contact(kind, &nodes, &pushes::pushed(&nodes, 0));
+    split.set_contact(kind, &nodes, &pushes::pushed(&nodes, 0), &[]);
     let mut times = Vec::new();
     for _ in 0..steps + WARM_UP {
         let start = Instant::now();
