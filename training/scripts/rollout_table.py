@@ -1,0 +1,108 @@
+"""Whole rollouts through the library, by scheme and number of corrections, and the second after an abrupt release.
+
+    python training/scripts/rollout_table.py --upt target/release/upt --bundle onnx/brain-paper --data DIR \
+        --counts 0,3 --keep FOLDER --page docs/results/training.md --marks "brain-paper rollouts"
+
+Each case of the data is replayed through `upt rollout --json`; `--keep` holds these results, so an interrupted run
+goes on. The second after a release is the mean over cases of the MSE of the frames within a second after a push of
+2 mm or more has ended abruptly (`upt_training.reduced.evaluate.released`). Bundles are of the data's mesh.
+"""
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from statistics import fmean, median
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from corrections_table import replay  # noqa: E402
+from tqdm import tqdm  # noqa: E402
+
+from upt_training.page import write_table  # noqa: E402
+from upt_training.reduced.evaluate import released  # noqa: E402
+from upt_training.reduced.trajectories import Case, open_dataset  # noqa: E402
+
+HEAD = (
+    "| bundle | K | scheme (cases) | k | MSE, mm² (median) | max error, mm | the second after a release, mm² (cases) |"
+)
+
+
+def kept(folder: Path | None, upt: str, bundle: Path, case: Case, count: str) -> dict:
+    """One rollout, from the folder where it was made before with this bundle."""
+    if folder is None:
+        return replay(upt, str(bundle), case.path, count, 1)
+    seal = json.loads((bundle / "bundle.json").read_text())["manifest_sha256"][:12]
+    path = folder / f"{seal}-{case.path.parent.name}-{case.path.name.split('.')[0]}-{count}.json"
+    if not path.exists():
+        folder.mkdir(parents=True, exist_ok=True)
+        partial = path.with_suffix(".partial")
+        partial.write_text(json.dumps(replay(upt, str(bundle), case.path, count, 1)))
+        partial.rename(path)
+    return json.loads(path.read_text())
+
+
+def row(name: str, scheme: str, count: str, cases: list[Case], results: list[dict]) -> str:
+    errors, largest, after = [], [], []
+    for case, result in zip(cases, results, strict=True):
+        steps = [step["mse_mm2"] for step in result["steps"]]
+        mask = released(case)[-len(steps) :]
+        errors.append(result["overall"]["mse_mm2"])
+        largest.append(result["overall"]["max_mm"])
+        if mask.any():
+            after.append(fmean(mse for mse, wanted in zip(steps, mask, strict=True) if wanted))
+    nodes = cases[0].displacement.shape[1]
+    second = f"{fmean(after):.4f} ({len(after)})" if after else ""
+    return (
+        f"| `{name}` | {nodes:,} | {scheme} ({len(cases)}) | {count} | {fmean(errors):.4f} ({median(errors):.4f}) "
+        f"| {fmean(largest):.2f} | {second} |"
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--upt", default="target/release/upt")
+    parser.add_argument("--bundle", action="append", required=True, type=Path)
+    parser.add_argument("--data", action="append", required=True, type=Path)
+    parser.add_argument("--counts", default="0,3", help="COUNT, or COUNT@MM")
+    parser.add_argument("--keep", type=Path, help="folder of the rollouts' results")
+    parser.add_argument("--page", type=Path)
+    parser.add_argument("--marks", help="name of the table in the page")
+    parser.add_argument("--add", action="store_true", help="keep the rows that the page's table has")
+    options = parser.parse_args()
+    if (options.page is None) != (options.marks is None):
+        parser.error("--page and --marks go together")
+    by_scheme: dict[str, list[Case]] = {}
+    for folder in options.data:
+        mesh = json.loads((folder / "manifest.json").read_text())["mesh_sha256"]
+        for case in open_dataset(folder, mesh):
+            by_scheme.setdefault(case.scheme, []).append(case)
+    lines = [HEAD, "|---" * 7 + "|"]
+    every = [
+        (bundle, scheme, count)
+        for scheme in sorted(by_scheme)
+        for count in options.counts.split(",")
+        for bundle in options.bundle
+    ]
+    total = sum(len(by_scheme[scheme]) for _, scheme, _ in every)
+    with tqdm(total=total, unit="rollout", disable=None) as progress:
+        for bundle, scheme, count in every:
+            results = []
+            for case in by_scheme[scheme]:
+                results.append(kept(options.keep, options.upt, bundle, case, count))
+                progress.update()
+            lines.append(row(bundle.resolve().name, scheme, count, by_scheme[scheme], results))
+    if options.page:
+        old = table_of(options.page, options.marks) if options.add else []
+        write_table(options.page, options.marks, [*lines[:2], *old, *lines[2:]])
+    print("\n".join(lines))
+
+
+def table_of(page: Path, marks: str) -> list[str]:
+    """The rows that stand between the marks."""
+    text = page.read_text().split(f"<!-- {marks}: begin -->")[1].split(f"<!-- {marks}: end -->")[0]
+    return [line for line in text.strip().splitlines()[2:] if line.startswith("|")]
+
+
+if __name__ == "__main__":
+    main()
