@@ -5,11 +5,12 @@
 #
 # Each call trains for at most SLICE_MINUTES (default 9) and leaves OUT/last.pt; call it again until it says "finished".
 # Carry to the machine: the repository, DATA (or make it there: `upt dataset`), MESH, PRIOR, VIBRATION. Bring back: OUT/.
-# GPUS=N starts N processes by torchrun. DEVICE=cpu rehearses every line without a GPU. PYTHON names the interpreter.
+# INIT=CHECKPOINT_OR_BUNDLE starts from those weights. GPUS=N starts N processes by torchrun. DEVICE=cpu rehearses every
+# line without a GPU. PYTHON names the interpreter.
 set -euo pipefail
 
 if [ $# -lt 4 ]; then
-  sed -n '2,9p' "$0" >&2
+  sed -n '2,10p' "$0" >&2
   exit 2
 fi
 config=$1 data=$2 mesh=$3 out=$4 prior=${5:-} vibration=${6:-}
@@ -23,7 +24,11 @@ arguments=(train --config "$config" --data "$data" --mesh "$mesh" --out "$out" -
   --max-minutes "${SLICE_MINUTES:-9}")
 [ -n "$prior" ] && arguments+=(--prior "$prior")
 [ -n "$vibration" ] && arguments+=(--vibration "$vibration")
-[ -f "$out/last.pt" ] && arguments+=(--resume)
+if [ -f "$out/last.pt" ]; then
+  arguments+=(--resume)
+elif [ -n "${INIT:-}" ]; then
+  arguments+=(--init "$INIT")
+fi
 
 mkdir -p "$out"
 if [ "$gpus" -gt 1 ]; then

@@ -6,7 +6,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 from conftest import CONFIGS
+
+from upt_training.config import load_settings
+from upt_training.dataset import map_safetensors
+from upt_training.trainer import load_checkpoint
 
 SCRIPT = Path(__file__).parents[1] / "scripts" / "train_on_gpu.sh"
 
@@ -35,3 +40,9 @@ def test_a_slice_of_two_processes_ends_together_and_the_next_slice_finishes_and_
     manifest = json.loads((out / "bundle" / "bundle.json").read_text())
     assert manifest["provenance"]["steps"] > 0 and (out / "bundle" / "step.onnx").exists()
     assert len(json.loads((out / "evaluation.json").read_text())["cases"]) == 2
+    refined = tmp_path / "refined"
+    call(config, data, mesh_path, refined, SLICE_MINUTES="0.0001", INIT=str(out / "bundle"))
+    # One step away from the bundle; a fresh start would be forty away.
+    found = load_checkpoint(refined / "last.pt")["model"]["decoder.mlp.fc1.weight"]
+    apart = found.numpy() - map_safetensors(out / "bundle/weights.safetensors")[0]["decoder.mlp1.weight"]
+    assert np.abs(apart).max() < 2 * load_settings(config).train.learning_rate
