@@ -5,7 +5,6 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Instant;
 
 use upt::kernels::rows::{RowPlan, decode_rows};
 use upt::kernels::{Isa, Pool};
@@ -14,9 +13,10 @@ use upt::onnx::ProviderPlan;
 use upt::prior::ContactResponse;
 use upt::{Model, Scene, SceneOptions};
 
-use super::measure::{Row, budget, median, quick, relative_l2};
+use super::measure::{Row, relative_l2};
 use super::options;
-use super::pushes::{patch, push, pushed};
+use super::paper::in_turns;
+use super::pushes::{patch, pushed};
 use super::split::Split;
 
 /// The folder with the two graphs of this bundle: `NAME.split` where the bundles with random weights are.
@@ -44,21 +44,7 @@ pub fn against_split(
         };
         let scene = Scene::new(Arc::clone(model), &free)?;
         let mut out = vec![0.0; 3 * scene.node_count()];
-        let (mut theirs, mut ours) = (Vec::new(), Vec::new());
-        let started = Instant::now();
-        for turn in 0..if quick() { 5 } else { 41 } {
-            if turn >= 5 && started.elapsed() > 4 * budget() {
-                break;
-            }
-            let start = Instant::now();
-            split.run()?;
-            theirs.push(start.elapsed().as_secs_f64() * 1e3);
-            scene.reset()?;
-            let start = Instant::now();
-            push(&scene, &nodes, 0, Some(&mut out))?;
-            ours.push(start.elapsed().as_secs_f64() * 1e3);
-        }
-        let (ours, theirs) = (median(&mut ours), median(&mut theirs));
+        let (ours, theirs) = in_turns(&mut split, &scene, &nodes, &vectors, &mut out)?;
         println!(
             "{name}, {threads} threads: {ours:.1} ms, its network split as in the paper {theirs:.1} ms"
         );

@@ -60,7 +60,8 @@ pub fn install(workspace: &Workspace, (name, packages, file): Set) -> Result<()>
         return Ok(());
     }
     // uv knows nothing of pip's configuration files: what it cannot install, pip may.
-    if with_uv(workspace, name, packages).is_err() {
+    if let Err(error) = with_uv(workspace, name, packages) {
+        eprintln!("uv could not install ({name}), pip tries: {error:#}");
         let mut command = workspace.python(&format!("{PIP_INSTALL} {packages}"));
         run_checked(workspace, &format!("pip install ({name})"), &mut command).context(
             "pip needs room on the disk (10 GB for training) and a package index: \
