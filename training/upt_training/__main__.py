@@ -19,7 +19,9 @@ def parser() -> argparse.ArgumentParser:
 
     train = commands.add_parser("train", help="train a configuration on a dataset")
     train.add_argument("--config", type=Path, required=True, help="configs/NAME.toml")
-    train.add_argument("--data", type=Path, required=True, help="dataset folder")
+    train.add_argument(
+        "--data", type=Path, required=True, action="append", help="dataset folder, of schemes or tools; may be repeated"
+    )
     train.add_argument("--mesh", type=Path, help="mesh file; default: found by the dataset's mesh hash")
     train.add_argument(
         "--prior",

@@ -104,10 +104,10 @@ def run_variant(settings: Settings, base: Settings, options, mesh, folder: Path)
     result = cache_rollout(stepper, cache, cases, np.searchsorted(nodes, scored))
     return {
         **autoregressive_scores(result),
-        "mse_per_step": result["mse"].mean(axis=0).tolist(),
-        "mse_min": result["mse"].min(axis=0).tolist(),
-        "mse_max": result["mse"].max(axis=0).tolist(),
-        "largest_displacement_mm": float(result["moved"].max()),
+        "mse_per_step": np.nanmean(result["mse"], axis=0).tolist(),
+        "mse_min": np.nanmin(result["mse"], axis=0).tolist(),
+        "mse_max": np.nanmax(result["mse"], axis=0).tolist(),
+        "largest_displacement_mm": float(np.nanmax(result["moved"])),
         "steps": trainer.step_count,
         "cpu_seconds": round(seconds, 1),
         "cases": len(cases),
@@ -116,15 +116,15 @@ def run_variant(settings: Settings, base: Settings, options, mesh, folder: Path)
 
 def reference_scores(trainer_cache, cases: np.ndarray) -> dict[str, float]:
     """MSE of predicting zero, of the response and of copying the true last frame, on the cache's nodes."""
-    u = np.stack([trainer_cache.displacement[c] for c in cases]).astype(np.float32)
-    out = {
-        "predict zero": float((u[:, 2:] ** 2).sum(-1).mean()),
-        "copy the true last frame": float(((u[:, 2:] - u[:, 1:-1]) ** 2).sum(-1).mean()),
-    }
-    if trainer_cache.prior is not None:
-        prior = np.stack([trainer_cache.prior[c] for c in cases]).astype(np.float32)
-        out["linear response, quasi-static"] = float(((u - prior)[:, 2:] ** 2).sum(-1).mean())
-    return out
+    scores: dict[str, list[float]] = {}
+    for case in cases:
+        u = trainer_cache.displacement[case].astype(np.float32)
+        errors = {"predict zero": u[2:], "copy the true last frame": u[2:] - u[1:-1]}
+        if trainer_cache.prior is not None:
+            errors["linear response, quasi-static"] = u[2:] - trainer_cache.prior[case][2:].astype(np.float32)
+        for name, error in errors.items():
+            scores.setdefault(name, []).append(float((error**2).sum(-1).mean()))
+    return {name: float(np.mean(values)) for name, values in scores.items()}
 
 
 def ablate_command(options) -> int:

@@ -25,7 +25,7 @@ TORCH = {np.dtype(np.float16): torch.float16, np.dtype(np.uint8): torch.uint8}
 
 @dataclass
 class FieldCache:
-    """A list of cases; each `displacement [F, n, 3]` and `prior [F, n, 3]` f16 mm, `contact [F, n]` u8.
+    """A list of cases; each `displacement [F, n, 3]` and `prior [F, n, 3]` f16 mm, `contact [F, n]` u8, with its own F.
 
     `nodes`: ascending mesh indices of the `n` nodes.
     """
@@ -34,15 +34,17 @@ class FieldCache:
     displacement: list[np.ndarray]
     contact: list[np.ndarray]
     prior: list[np.ndarray] | None
-    resident: dict[str, torch.Tensor] = field(default_factory=dict)  # all cases in a row, `[cases * F, n, ...]`
+    resident: dict[str, torch.Tensor] = field(default_factory=dict)  # all cases in a row, `[sum of F, n, ...]`
+    frames: np.ndarray = field(init=False)  # F of each case
+    starts: np.ndarray = field(init=False)  # of each case, in such a row
+
+    def __post_init__(self) -> None:
+        self.frames = np.array([len(case) for case in self.displacement])
+        self.starts = np.cumsum(self.frames) - self.frames
 
     @property
     def case_count(self) -> int:
         return len(self.displacement)
-
-    @property
-    def frame_count(self) -> int:
-        return len(self.displacement[0])
 
     def hold(self, limit_gb: float, device: torch.device) -> bool:
         """Keep the cases in the device's memory if they take no more than `limit_gb`, to be read by one gather."""
@@ -51,16 +53,19 @@ class FieldCache:
         if sum(a.nbytes for arrays in parts.values() for a in arrays) > limit_gb * 1e9:
             return False
         for name, arrays in parts.items():
-            rows = torch.empty((self.case_count * self.frame_count, *arrays[0].shape[1:]), dtype=TORCH[arrays[0].dtype])
-            for case, array in enumerate(arrays):
-                rows[case * self.frame_count : (case + 1) * self.frame_count] = torch.from_numpy(np.array(array))
+            rows = torch.empty((self.frames.sum(), *arrays[0].shape[1:]), dtype=TORCH[arrays[0].dtype])
+            for start, array in zip(self.starts, arrays, strict=True):
+                rows[start : start + len(array)] = torch.from_numpy(np.array(array))
             self.resident[name] = rows.to(device)
         return True
 
     def fields(self, case: np.ndarray, frame: np.ndarray) -> dict[str, torch.Tensor]:
-        """Truth at `frame` (`[B]`, -1 is rest): `u`, `c`, `prior` `[B, n, 3]` mm, `contact` `[B, n, 1]`."""
-        frame = np.maximum(frame, 0)
-        index = torch.from_numpy(case * self.frame_count + frame)
+        """Truth at `frame` (`[B]`, -1 is rest): `u`, `c`, `prior` `[B, n, 3]` mm, `contact` `[B, n, 1]`.
+
+        After its end a case stays at its last frame.
+        """
+        frame = np.clip(frame, 0, self.frames[case] - 1)
+        index = torch.from_numpy(self.starts[case] + frame)
 
         def read(name: str, arrays: list[np.ndarray]) -> torch.Tensor:
             if name in self.resident:
@@ -101,6 +106,14 @@ def build_cache(folder: Path, mesh: Mesh, cases: list[Case], nodes: np.ndarray, 
         if prior is not None:
             response.append(np.load(stem.with_suffix(".prior.npy"), mmap_mode="r"))
     return FieldCache(nodes, displacement, contact, response if prior is not None else None)
+
+
+def join_caches(parts: list[FieldCache]) -> FieldCache:
+    """The cases of several datasets behind one another; all have the same nodes."""
+    prior = None if parts[0].prior is None else [case for part in parts for case in part.prior or []]
+    displacement = [case for part in parts for case in part.displacement]
+    contact = [case for part in parts for case in part.contact]
+    return FieldCache(parts[0].nodes, displacement, contact, prior)
 
 
 def _write_case(stem: Path, mesh: Mesh, case: Case, nodes: np.ndarray, prior: PriorTable | None) -> None:

@@ -26,7 +26,7 @@ class ReplayPool:
         n = len(cache.nodes)
         self.cache, self.generator = cache, generator
         self.case = generator.integers(cache.case_count, size=slots)
-        self.frame = generator.integers(0, cache.frame_count - 1, size=slots)
+        self.frame = generator.integers(0, cache.frames[self.case] - 1)
         start = truth_state(cache, self.case, self.frame, "cpu")
         self.u, self.previous = start.u.clone(), start.previous.clone()
         self.next = 0
@@ -37,9 +37,9 @@ class ReplayPool:
         slots = (self.next + np.arange(batch)) % len(self.case)
         self.next = int((self.next + batch) % len(self.case))
         lost = ~torch.isfinite(self.u[slots]).flatten(1).all(dim=1).numpy()
-        for s in slots[lost | (self.frame[slots] + window >= self.cache.frame_count)]:
+        for s in slots[lost | (self.frame[slots] + window >= self.cache.frames[self.case[slots]])]:
             case = int(self.generator.integers(self.cache.case_count))
-            late = int(self.generator.integers(0, self.cache.frame_count - window - 1))
+            late = int(self.generator.integers(0, self.cache.frames[case] - window - 1))
             frame = 0 if self.generator.random() < 0.7 else late
             state = truth_state(self.cache, np.array([case]), np.array([frame]), "cpu")
             self.case[s], self.frame[s] = case, frame

@@ -14,7 +14,7 @@ import torch.distributed as distributed
 from upt_training.config import ModelSettings, Settings, load_settings
 from upt_training.dataset import open_dataset
 from upt_training.errors import InputError
-from upt_training.field_cache import build_cache
+from upt_training.field_cache import FieldCache, build_cache, join_caches
 from upt_training.graph import build_graph
 from upt_training.mesh_file import Mesh, load_mesh
 from upt_training.prior_table import PriorTable
@@ -71,22 +71,33 @@ def open_prior(model: ModelSettings, mesh: Mesh, prior: Path | None, vibration: 
 
 
 def make_trainer(
-    settings: Settings, data: Path, mesh: Mesh, table: PriorTable | None, out: Path, device: str
+    settings: Settings, data: Path | list[Path], mesh: Mesh, table: PriorTable | None, out: Path, device: str
 ) -> Trainer:
-    """`table`: what `open_prior` gave for the configuration."""
-    dataset = open_dataset(data, mesh)
-    boundary = dataset.manifest.get("boundary", "fixed")
+    """`data`: one dataset, or several that are trained on together. `table`: what `open_prior` gave."""
+    folders = [Path(data)] if isinstance(data, str | Path) else [Path(folder) for folder in data]
+    datasets = [open_dataset(folder, mesh) for folder in folders]
+    boundary = datasets[0].manifest.get("boundary", "fixed")
+    for dataset in datasets[1:]:
+        other = dataset.manifest.get("boundary", "fixed")
+        if other != boundary:
+            raise InputError(f"{dataset.folder}: boundary {other!r}, but {folders[0]} has {boundary!r}; train on one")
     graph = build_graph(mesh, settings.model.graph)
     t = settings.train
     nodes = training_nodes(mesh, graph, t.loss_nodes)
-    train_cases = dataset.select("train", t.schemes, t.train_cases)
-    test_cases = dataset.select("test", t.schemes)
-    if not train_cases or not test_cases:
-        raise InputError(f"{data}: {len(train_cases)} training and {len(test_cases)} test cases; both are needed")
-    cache = Path(data) / ".cache" if os.access(data, os.W_OK) else Path(out) / "cache"
-    train = build_cache(cache, mesh, train_cases, nodes, table)
-    test = build_cache(cache, mesh, test_cases, nodes, table)
-    return Trainer(settings, out, mesh, graph, train, test, boundary, device)
+
+    def joined(split: str, count: int = 0) -> FieldCache:
+        chosen = [(d.folder, d.select(split, t.schemes, count)) for d in datasets]
+        if not any(cases for _, cases in chosen):
+            raise InputError(f"{', '.join(map(str, folders))}: no {split} case; training needs both splits")
+        parts = [build_cache(cache_of(folder, out), mesh, cases, nodes, table) for folder, cases in chosen if cases]
+        return join_caches(parts)
+
+    return Trainer(settings, out, mesh, graph, joined("train", t.train_cases), joined("test"), boundary, device)
+
+
+def cache_of(folder: Path, out: Path) -> Path:
+    """Where the arrays of a dataset's cases are kept: beside them where that can be written."""
+    return folder / ".cache" if os.access(folder, os.W_OK) else Path(out) / "cache" / folder.name
 
 
 def train_command(options) -> int:
@@ -104,7 +115,7 @@ def train_command(options) -> int:
         distributed.init_process_group("nccl" if device.startswith("cuda") else "gloo")
         if device == "cuda":
             device = f"cuda:{os.environ.get('LOCAL_RANK', '0')}"
-    mesh = find_mesh(options.mesh, options.data)
+    mesh = find_mesh(options.mesh, options.data[0])
     if ranks > 1 and distributed.get_rank() > 0:
         distributed.barrier()  # rank 0 makes the cache
     table = open_prior(settings.model, mesh, options.prior, options.vibration)

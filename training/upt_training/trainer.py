@@ -71,7 +71,7 @@ class Trainer:
         self.step_count, self.best, self.stale = 0, float("inf"), 0
         self.core_seconds = 0.0  # CPU time of this process in training steps, over all resumed parts
         self.loss_scale = 1.0 / float((self.model.output_scale**2).sum())
-        windows = train.case_count * (train.frame_count - 1) // max(1, t.window)
+        windows = int((train.frames - 1).sum()) // max(1, t.window)
         self.steps_per_epoch = t.steps_per_epoch or max(1, windows // (t.micro_batch * t.accumulate * self.world))
         self.total_steps = self.steps_per_epoch * (t.epochs + t.autoregressive_epochs)
 
@@ -264,10 +264,9 @@ class Trainer:
 def normalisation(cache: FieldCache, model) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
     """Per-axis mean and std of `u`, std of what the network adds to its base, and the mixing scale."""
     cases = np.unique(np.linspace(0, cache.case_count - 1, min(40, cache.case_count)).astype(int))
-    frames = np.arange(0, cache.frame_count, 2)
 
     def read(arrays: list[np.ndarray], case: int) -> np.ndarray:
-        return arrays[case][frames].astype(np.float64)
+        return arrays[case][::2].astype(np.float64)
 
     mean, std = spread(read(cache.displacement, c) for c in cases)
     if model.base == "displacement":

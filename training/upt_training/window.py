@@ -63,7 +63,7 @@ class Windows:
         else:
             window = 2 if t.strategy == "teacher" else t.window
             case = self.generator.integers(self.cache.case_count, size=t.micro_batch)
-            frame = self.generator.integers(0, self.cache.frame_count - window, size=t.micro_batch)
+            frame = self.generator.integers(0, self.cache.frames[case] - window)
             first = 2
             if p >= 1.0:  # the first prediction would be thrown away: start at the second's true input
                 frame, first, window = frame + 1, 1, window - 1
