@@ -53,8 +53,11 @@ def write_columns(mesh: Mesh, path: Path) -> Columns:
     return load_columns(path)
 
 
-def write_dataset(mesh: Mesh, columns: Columns, folder: Path, count: int) -> None:
-    """Trajectories with a made-up law: the residual is quadratic in `L` and decays after release."""
+def write_dataset(mesh: Mesh, columns: Columns, folder: Path, count: int, frames: int = FRAMES, tool: str = "") -> None:
+    """Trajectories with a made-up law: the residual is quadratic in `L` and decays after release.
+
+    `frames`, at least 23, cuts them off in their free motion; `tool` is the scheme in place of 1 to 4.
+    """
     folder.mkdir()
     rng = np.random.default_rng(0)
     points = mesh.positions[columns.contact_nodes]
@@ -81,8 +84,8 @@ def write_dataset(mesh: Mesh, columns: Columns, folder: Path, count: int) -> Non
             u[t] = linear[t] + residual
         counts = np.where(np.arange(FRAMES) == 0, 0, np.where(np.arange(FRAMES) < 22, 4, 0))
         tensors = {
-            "displacement": u.reshape(FRAMES, -1, 3).astype(np.float32),
-            "contact_offsets": np.concatenate([[0], np.cumsum(counts)]).astype(np.int32),
+            "displacement": u.reshape(FRAMES, -1, 3)[:frames].astype(np.float32),
+            "contact_offsets": np.concatenate([[0], np.cumsum(counts[:frames])]).astype(np.int32),
             "contact_nodes": np.tile(columns.contact_nodes[rows], 21).astype(np.int32),
             "contact_vectors": push[1:22].reshape(-1, 3),
         }
@@ -90,7 +93,8 @@ def write_dataset(mesh: Mesh, columns: Columns, folder: Path, count: int) -> Non
         metadata = {"mesh_sha256": mesh.sha256, "site": "[0,0,0]"}
         save_file(tensors, str(folder / name), metadata=metadata)
         split = "test" if (index // 4) % 5 == 4 else "train"
-        cases.append({"index": index, "file": name, "scheme": str(index % 4 + 1), "split": split, "status": "done"})
+        scheme = tool or str(index % 4 + 1)
+        cases.append({"index": index, "file": name, "scheme": scheme, "split": split, "status": "done"})
     (folder / "manifest.json").write_text(json.dumps({"cases": cases}))
 
 

@@ -19,7 +19,7 @@ from upt_training.reduced.blocks import partition
 from upt_training.reduced.build import Options, build, split_states, trainable, training_states
 from upt_training.reduced.columns import Columns
 from upt_training.reduced.compare import compare
-from upt_training.reduced.domain import beside_domain, patches_of_domain
+from upt_training.reduced.domain import beside_domain, patches_of_domain, worst_of_domain
 from upt_training.reduced.evaluate import evaluate
 from upt_training.reduced.make_prior import make_prior, prior_error
 from upt_training.reduced.modes import Modes
@@ -347,6 +347,23 @@ def test_the_domain_beside_the_domain_shares_no_node_with_it(phantom):
     assert 0 < len(patches.domain) < len(mesh.domain) and np.isin(patches.domain, mesh.domain).all()
     with pytest.raises(InputError, match="raise --beside"):
         beside_domain(mesh, 0.0)
+
+
+def test_the_domain_around_the_worst_sites_is_where_the_error_is_largest(phantom, tmp_path):
+    mesh = phantom[0]
+    points = mesh.positions[mesh.domain_nodes].astype(float)
+    bad, good = points[points[:, 0].argmin()], points[points[:, 0].argmax()]
+    cases = [{"site": list(site), "bundle": {"mse_mm2": mse}} for site, mse in ((good, 0.01), (bad, 0.4), (good, 0.02))]
+    evaluation = tmp_path / "evaluation.json"
+    evaluation.write_text(json.dumps({"cases": [*cases, {"site": None, "bundle": {"mse_mm2": 9.0}}]}))
+    found = worst_of_domain(mesh, evaluation, 0.3, 20.0)
+    assert found.sha256 == mesh.sha256 and 0 < len(found.domain) < len(mesh.domain)
+    centres = mesh.positions[mesh.surface[found.domain]].mean(axis=1)
+    assert np.linalg.norm(centres - bad, axis=1).max() <= 20.0
+    for text, share in (("{}", 0.3), ('{"cases": []}', 0.3), (evaluation.read_text(), 0.0)):
+        evaluation.write_text(text)
+        with pytest.raises(InputError, match="evaluation.json: "):
+            worst_of_domain(mesh, evaluation, share)
 
 
 def test_a_domain_with_columns_of_a_part_lends_to_the_nearest(phantom, bundle):

@@ -59,7 +59,8 @@ def evaluate_bundle(
         metrics = evaluate_case(runner, trajectory, baselines, with_hausdorff)
         seconds = time.monotonic() - began
         scores = {name: m.scores() for name, m in metrics.items()}
-        rows.append({"index": case.index, "file": case.path.name, "scheme": case.scheme, **scores})
+        site = json.loads(trajectory.metadata.get("site", "null"))
+        rows.append({"index": case.index, "file": case.path.name, "scheme": case.scheme, "site": site, **scores})
         rows[-1]["mse_per_step_mm2"] = metrics["bundle"].mse
         schemes.setdefault(case.scheme, []).append(scores)
         if report:

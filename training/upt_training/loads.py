@@ -20,6 +20,7 @@ def named(**fields) -> tuple[str, ...]:
 TRAINED = named(group="trained")
 (WITHHELD,) = named(group="withheld")
 STATIC = named(group="static")
-TWO_INSTRUMENTS = named(instruments=2)
+TOOL = "tool-"  # what the scheme of a programme of tools begins with
+TWO_INSTRUMENTS = (*named(instruments=2), TOOL + "two")
 # Their tissue has another damping than the one that bundles are made for.
 OTHER_DAMPING = tuple(name for name, row in SCHEMES.items() if row["damping"] != 1.0)

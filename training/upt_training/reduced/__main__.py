@@ -16,7 +16,7 @@ from upt_training.mesh_file import load_mesh
 from upt_training.reduced.build import Options, Progress, build
 from upt_training.reduced.columns import load_columns
 from upt_training.reduced.compare import compare
-from upt_training.reduced.domain import beside_domain, patches_of_domain
+from upt_training.reduced.domain import beside_domain, patches_of_domain, worst_of_domain
 from upt_training.reduced.evaluate import evaluate, insert_table, table
 from upt_training.reduced.export import near_of
 from upt_training.reduced.make_prior import check_columns, make_prior, prior_error
@@ -82,6 +82,9 @@ def arguments() -> argparse.ArgumentParser:
     whole = commands.add_parser("build", help="a reduced bundle: modes, training, tables, evaluation; resumes")
     add_build_arguments(whole)
     whole.add_argument("--modes", type=int, default=120)
+    whole.add_argument(
+        "--keep", type=Path, metavar="BUNDLE", help="take modes and tables from this bundle: only latent.onnx is new"
+    )
 
     counts = commands.add_parser("modes", help="one bundle for each number of modes, and their errors as a table")
     add_build_arguments(counts)
@@ -112,6 +115,11 @@ def arguments() -> argparse.ArgumentParser:
     where = domain.add_mutually_exclusive_group(required=True)
     where.add_argument("--beside", type=float, metavar="MM", help="the free surface around the domain, up to there")
     where.add_argument("--patches", type=int, metavar="N", help="N patches of the domain")
+    where.add_argument(
+        "--worst", type=Path, metavar="JSON", help="around the sites of largest error of `upt_training evaluate --out`"
+    )
+    domain.add_argument("--share", type=float, default=0.25, help="share of the evaluated cases that --worst takes")
+    domain.add_argument("--radius", type=float, default=15.0, help="distance from those sites, mm")
 
     exact = commands.add_parser("response-error", help="L(c) of a bundle against exact columns of its mesh")
     exact.add_argument("--bundle", type=Path, required=True)
@@ -151,7 +159,7 @@ def run_build(args: argparse.Namespace) -> None:
     options = Options(
         modes=0 if sweeping else args.modes,
         tolerance_mm=args.tolerance,
-        **{name: getattr(args, name) for name in names},
+        **{name: getattr(args, name) for name in names if hasattr(args, name)},
     )
     settings = Settings(
         hidden=args.hidden,
@@ -191,7 +199,10 @@ def run_compare(args: argparse.Namespace) -> None:
 
 def run_domain(args: argparse.Namespace) -> None:
     mesh = load_mesh(args.mesh)
-    other = beside_domain(mesh, args.beside) if args.beside else patches_of_domain(mesh, args.patches)
+    if args.worst:
+        other = worst_of_domain(mesh, args.worst, args.share, args.radius)
+    else:
+        other = beside_domain(mesh, args.beside) if args.beside else patches_of_domain(mesh, args.patches)
     other.save(args.out)
     print(f"{args.out}: {len(other.domain)} faces, {len(other.domain_nodes)} nodes in the domain")
 

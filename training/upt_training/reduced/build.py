@@ -24,6 +24,7 @@ from upt_training.mesh_file import Mesh, load_mesh
 from upt_training.reduced.columns import Columns, load_columns
 from upt_training.reduced.evaluate import evaluate, table
 from upt_training.reduced.export import Description, tables_of, write_reduced_bundle
+from upt_training.reduced.kept import kept_tables, write_retrained
 from upt_training.reduced.make_prior import check_columns
 from upt_training.reduced.modes import Modes, learn_modes
 from upt_training.reduced.network import Correction
@@ -54,6 +55,7 @@ class Options:
     tolerance_mm: float = 3e-3
     tables: str = "f16"
     near_mm: float | None = None
+    keep: Path | None = None
     seeds: int = 1
     refit: bool = False
 
@@ -310,9 +312,12 @@ def prepare(options: Options) -> Prepared:
     cases = trainable([case for _, source in sources for case in source.cases])
     if not cases:
         raise InputError("no finished case of the split 'train': make the dataset with `upt dataset`")
-    modes = learned_modes(options, sources)
+    if options.keep is not None:
+        modes, prior, info = kept_tables(options.keep, mesh, columns)
+    else:
+        modes = learned_modes(options, sources)
+        prior, info = tables(options, mesh, columns, modes)
     states, statics = projected(options, sources, modes), projected_statics(options, sources, modes)
-    prior, info = tables(options, mesh, columns, modes)
     return Prepared(mesh, columns, [name for name, _ in sources], own, cases, states, statics, prior, info)
 
 
@@ -335,10 +340,13 @@ def finish(options: Options, settings: Settings, description: str, made: Prepare
         "command": "python -m upt_training.reduced build",
     }
     about = Description(options.name, description, envelope(options, made), provenance)
-    dtype = np.float16 if options.tables == "f16" else np.float32
-    manifest = write_reduced_bundle(
-        options.out, made.mesh, made.columns, made.prior, model, limits, about, dtype, options.near_mm
-    )
+    if options.keep is not None:
+        manifest = write_retrained(options.keep, options.out, made.mesh, made.columns, model, limits, about)
+    else:
+        dtype = np.float16 if options.tables == "f16" else np.float32
+        manifest = write_reduced_bundle(
+            options.out, made.mesh, made.columns, made.prior, model, limits, about, dtype, options.near_mm
+        )
     tested = [case for case in made.own if case.split == "test" or case.scheme == WITHHELD]
     result = evaluate(options.out, tested, Progress("evaluation")) if tested else {"reduced": {}}
     manifest["errors"] = {group: _published(e) for group, e in result["reduced"].items()}

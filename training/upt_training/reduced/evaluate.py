@@ -14,7 +14,7 @@ from typing import Protocol
 import numpy as np
 
 from upt_training.errors import InputError
-from upt_training.loads import TRAINED, WITHHELD
+from upt_training.loads import TOOL, TRAINED, WITHHELD
 from upt_training.reduced.runner import ReducedRunner
 from upt_training.reduced.trajectories import Case
 
@@ -84,9 +84,11 @@ def zero_error(case: Case) -> CaseError:
 
 
 def group_of(scheme: str) -> str:
-    """`schemes_1_4`, `scheme_5`, or `hard`."""
+    """`schemes_1_4`, `scheme_5`, `tools`, or `hard`."""
     if scheme in TRAINED:
         return "schemes_1_4"
+    if scheme.startswith(TOOL):
+        return "tools"
     return "scheme_5" if scheme == WITHHELD else "hard"
 
 
@@ -94,7 +96,7 @@ def summarise(errors: list[CaseError]) -> dict[str, dict]:
     """Mean and standard deviation over the cases of each group, and of each hard regime by itself."""
     out = {}
     regimes = sorted({e.scheme for e in errors if group_of(e.scheme) == "hard"})
-    for group in ("schemes_1_4", "scheme_5", "hard", *regimes):
+    for group in ("schemes_1_4", "scheme_5", "tools", "hard", *regimes):
         of = [e for e in errors if group in (group_of(e.scheme), e.scheme)]
         if not of:
             continue

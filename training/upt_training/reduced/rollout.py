@@ -112,4 +112,4 @@ def release_frames(states: States, seconds: float = 1.0, dt_s: float = 0.05, lea
     for case, t in np.argwhere(states.contact[:, :-1] & ~states.contact[:, 1:]):
         if states.push[case, t] >= least_push_mm:
             out[case, t + 1 : t + 1 + round(seconds / dt_s)] = True
-    return out & ~states.contact
+    return out & ~states.contact & states.valid

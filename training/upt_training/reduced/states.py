@@ -18,7 +18,7 @@ from upt_training.reduced.transfer import Source
 
 @dataclass
 class States:
-    """Arrays over `[cases, frames]`; lengths in mm."""
+    """Arrays over `[cases, frames]`; lengths in mm. After its last frame a case is zero (`length [cases]`)."""
 
     b: np.ndarray
     z: np.ndarray
@@ -33,7 +33,13 @@ class States:
     scheme: np.ndarray
     split: np.ndarray
     source: np.ndarray
+    length: np.ndarray
     nodes: np.ndarray
+
+    @property
+    def valid(self) -> np.ndarray:
+        """Which frames a case has, `[cases, frames]`."""
+        return np.arange(self.frames) < self.length[:, None]
 
     @property
     def cases(self) -> int:
@@ -58,6 +64,7 @@ class States:
 
 
 _PER_CASE = tuple(f.name for f in fields(States) if f.name != "nodes")
+_PER_FRAME = tuple(name for name in _PER_CASE if name not in ("scheme", "split", "source", "length"))
 
 
 def load_states(path: Path) -> States:
@@ -66,9 +73,22 @@ def load_states(path: Path) -> States:
 
 
 def join_states(parts: list[States]) -> States:
-    """Datasets of the same mesh and modes behind one another (shorter ones are refused by numpy)."""
-    joined = {name: np.concatenate([getattr(part, name) for part in parts]) for name in _PER_CASE}
+    """Datasets of the same mesh and modes behind one another."""
+    frames = max(part.frames for part in parts)
+
+    def values(part: States, name: str) -> np.ndarray:
+        array = getattr(part, name)
+        return lengthened(array, frames, axis=1) if name in _PER_FRAME else array
+
+    joined = {name: np.concatenate([values(part, name) for part in parts]) for name in _PER_CASE}
     return States(**joined, nodes=parts[0].nodes)
+
+
+def lengthened(array: np.ndarray, length: int, axis: int) -> np.ndarray:
+    """`array` with zeros behind it, up to `length` entries along `axis`."""
+    padding = [(0, 0)] * array.ndim
+    padding[axis] = (0, length - array.shape[axis])
+    return np.pad(array, padding)
 
 
 def project_cases(
@@ -79,11 +99,10 @@ def project_cases(
     """Every frame of a source's cases in reduced coordinates, computed on the cases' own mesh."""
     cases = source.cases
     residual_modes, response_modes = source.adjoint(modes.residual), source.adjoint(modes.response)
-    frames = cases[0].frames
     collected: dict[str, list] = {name: [] for name in _PER_CASE}
     for index, case in enumerate(cases):
         linear, field = source.own_fields(case)
-        jump = np.zeros(frames, np.float32)
+        jump = np.zeros(case.frames, np.float32)
         jump[1:] = np.sqrt(source.squares(np.diff(linear, axis=0)))
         collected["field_square"].append(source.squares(field))
         residual = field - linear
@@ -99,6 +118,10 @@ def project_cases(
         collected["scheme"].append(case.scheme)
         collected["split"].append(case.split)
         collected["source"].append(case.path.name)
+        collected["length"].append(case.frames)
         progress(index + 1, len(cases))
+    frames = max(collected["length"])
+    for name in _PER_FRAME:
+        collected[name] = [lengthened(np.asarray(values), frames, axis=0) for values in collected[name]]
     arrays = {name: np.array(values) for name, values in collected.items()}
     return States(**arrays, nodes=np.array(modes.residual.shape[1] // 3))

@@ -44,7 +44,7 @@ def floor(states: States, modes: int, group: str) -> float:
     unseen = (states.split == "test") | ((states.scheme == WITHHELD) & (states.split == "train"))
     part = states.pick(unseen & (schemes == group))
     outside = part.residual_square - (part.b[:, :, :modes].astype(np.float64) ** 2).sum(2)
-    return float(np.maximum(outside, 0.0)[:, 2:].mean() / part.nodes) if part.cases else float("nan")
+    return float(np.maximum(outside, 0.0)[:, 2:][part.valid[:, 2:]].mean() / part.nodes) if part.cases else float("nan")
 
 
 def sweep(

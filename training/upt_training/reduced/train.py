@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from upt_training.loads import TRAINED, WITHHELD
+from upt_training.loads import TOOL, TRAINED, WITHHELD
 from upt_training.reduced.base import Equilibria, fit_base
 from upt_training.reduced.network import Correction
 from upt_training.reduced.rollout import (
@@ -59,7 +59,8 @@ def state_pairs(states: States) -> tuple[np.ndarray, np.ndarray]:
     inputs = np.concatenate(
         [b[:, :-1], before, z[:, 1:], z[:, :-1], p[:, 1:], p[:, :-1], flags[:, 1:], flags[:, :-1]], axis=2
     )
-    return inputs.reshape(-1, inputs.shape[2]), b[:, 1:].reshape(-1, b.shape[2])
+    valid = states.valid[:, 1:]
+    return inputs[valid], b[:, 1:][valid]
 
 
 def prepare(states: States, settings: Settings, statics: Statics | None = None) -> Correction:
@@ -70,7 +71,8 @@ def prepare(states: States, settings: Settings, statics: Statics | None = None) 
         states.modes, states.z.shape[2], settings.hidden, settings.depth, settings.quadratic_modes, static_hidden
     )
     inputs, targets = state_pairs(states)
-    rms = {name: math.sqrt(float((getattr(states, name) ** 2).sum(2).mean())) + 1e-9 for name in ("b", "z", "p")}
+    frames = states.length.sum()
+    rms = {name: math.sqrt(float((getattr(states, name) ** 2).sum() / frames)) + 1e-9 for name in ("b", "z", "p")}
     r, rz = states.modes, states.z.shape[2]
     groups = [(2 * r, rms["b"]), (2 * rz, rms["z"]), (2 * r, rms["p"])]
     spread = math.sqrt(32.0)
@@ -110,13 +112,18 @@ def holds(statics: Statics, rows: np.ndarray, steps: int, limits: Limits) -> tup
 
 
 def summary(states: States, b: np.ndarray) -> dict[str, float]:
-    """Mean squared errors of full rollouts, mm²: all cases, schemes 1-4, scheme 5, after abrupt release."""
+    """Mean squared errors of full rollouts, mm²: all cases, schemes 1-4, scheme 5, tools, after abrupt release."""
     mse = field_mse(states, b)
-    out = {"mse": float(mse[:, 2:].mean())}
-    trained = np.isin(states.scheme, TRAINED)
-    for name, mask in (("schemes_1_4", trained), ("scheme_5", states.scheme == WITHHELD)):
+    by_case = np.where(states.valid, mse, 0.0)[:, 2:].sum(1) / (states.length - 2)
+    out = {"mse": float(by_case.mean())}
+    masks = {
+        "schemes_1_4": np.isin(states.scheme, TRAINED),
+        "scheme_5": states.scheme == WITHHELD,
+        "tools": np.char.startswith(states.scheme.astype(str), TOOL),
+    }
+    for name, mask in masks.items():
         if mask.any():
-            out[name] = float(mse[mask][:, 2:].mean())
+            out[name] = float(by_case[mask].mean())
     released = release_frames(states)
     if released.any():
         out["after_release"] = float(mse[released].mean())
@@ -146,7 +153,7 @@ def train(
     rng = np.random.default_rng(settings.seed)
     drive, true_b = drive_of(states), torch.from_numpy(states.b)
     limit = torch.from_numpy(true_limits(states, limits))
-    deviation = torch.from_numpy(states.b.reshape(-1, states.modes).std(0))
+    deviation = torch.from_numpy(states.b[states.valid].std(0))
     optimiser = torch.optim.AdamW(model.mlp.parameters(), lr=settings.learning_rate, weight_decay=settings.weight_decay)
     done, started, history, running = 0, time.monotonic(), [], []
     first = 0
@@ -168,8 +175,9 @@ def train(
             rate = settings.learning_rate * min(1.0, done / 100) * cosine
             for group in optimiser.param_groups:
                 group["lr"] = rate
-            cases = torch.from_numpy(rng.integers(states.cases, size=batch))
-            starts = torch.from_numpy(rng.integers(states.frames - steps, size=batch))
+            drawn = rng.choice(np.flatnonzero(states.length > steps), batch)
+            cases = torch.from_numpy(drawn)
+            starts = torch.from_numpy(rng.integers(states.length[drawn] - steps))
             pieces = Drive(**{k: windows(v, cases, starts, steps + 1) for k, v in vars(drive).items()})
             target = windows(true_b, cases, starts, steps + 1)
             b, bounds = target[:, 0], limit[cases, starts]
