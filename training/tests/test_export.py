@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import shutil
 
 import numpy as np
 import onnxruntime
@@ -13,6 +14,7 @@ from safetensors.numpy import load_file
 from upt_training import onnx_graph
 from upt_training.__main__ import main
 from upt_training.bundle import TOLERANCE
+from upt_training.bundle_folder import read_manifest, seal, write_manifest
 from upt_training.bundle_rollout import BundleRunner
 from upt_training.config import load_settings
 from upt_training.dataset import open_dataset, open_trajectory
@@ -109,6 +111,34 @@ def test_evaluate_reports_the_papers_metrics(bundle, data, tmp_path):
     assert table["bundle"]["mse_mm2"]["min"] <= table["bundle"]["mse_mm2"]["mean"] <= table["bundle"]["mse_mm2"]["max"]
     f32, int8 = (results[p]["all"]["bundle"]["mse_mm2"]["mean"] for p in ("f32", "int8"))
     assert abs(f32 - int8) < 0.1 * f32
+
+
+def test_a_network_trained_again_keeps_what_belongs_to_the_mesh(bundle, committed, data, mesh_path, tmp_path, capsys):
+    kept, out = tmp_path / "kept", tmp_path / "again"
+    shutil.copytree(bundle, kept)
+    (kept / "corrections.safetensors").write_bytes(b"modes")
+    (kept / "anchors.safetensors").write_bytes(b"anchors")
+    manifest = read_manifest(kept)
+    manifest["corrections"] = {"file": "corrections.safetensors", "recommended": 3, "calibration": 3.5}
+    manifest["upt"]["anchors"] = "anchors.safetensors"
+    manifest["envelope"]["tools"] = {"corrections": 3, "depth_mm": 9.0}
+    manifest["description"] = "as before"
+    write_manifest(kept, manifest)
+    command = ["export", str(committed), "--out", str(out), "--mesh", str(mesh_path), "--data", str(data)]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("upt_training.export.write_rest", lambda folder: None)  # these anchors cannot be read
+        assert main([*command, "--data", str(data), "--keep", str(kept)]) == 0
+    after = read_manifest(out)
+    for name in ("corrections.safetensors", "anchors.safetensors", "mesh.safetensors"):
+        assert (out / name).read_bytes() == (kept / name).read_bytes()
+        assert after["files"][name] == read_manifest(kept)["files"][name]
+    assert after["corrections"] == manifest["corrections"] and after["upt"]["anchors"] == "anchors.safetensors"
+    assert after["envelope"]["tools"] == manifest["envelope"]["tools"] and after["description"] == "as before"
+    assert after["requires"] == ["anchors", "corrections"]
+    assert after["provenance"]["data"]["cases"] == 2 * read_manifest(bundle)["provenance"]["data"]["cases"]
+    seal(kept, {"boundary": "supported"})
+    assert main([*command, "--keep", str(kept)]) == 2
+    assert "kept/bundle.json: boundary is supported" in capsys.readouterr().err
 
 
 def test_evaluate_without_a_case_is_an_error(bundle, data, tmp_path, capsys):

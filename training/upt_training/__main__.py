@@ -57,7 +57,15 @@ def parser() -> argparse.ArgumentParser:
     export.add_argument("run", type=Path, help="run folder or checkpoint")
     export.add_argument("--out", type=Path, required=True, help="bundle folder")
     export.add_argument("--mesh", type=Path, required=True)
-    export.add_argument("--data", type=Path, help="dataset: envelope, material and real inputs for the self-check")
+    export.add_argument(
+        "--data",
+        type=Path,
+        action="append",
+        help="dataset: envelope, material, inputs of the self-check; may be repeated",
+    )
+    export.add_argument(
+        "--keep", type=Path, metavar="BUNDLE", help="take corrections, anchors and limits of tools from it"
+    )
     export.add_argument("--prior", type=Path)
     export.add_argument("--vibration", type=Path)
     export.add_argument("--name")

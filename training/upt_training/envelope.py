@@ -5,11 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from upt_training.dataset import Case, open_trajectory
+from upt_training.loads import TWO_INSTRUMENTS
 from upt_training.mesh_file import Mesh
 
 
 def measure_envelope(mesh: Mesh, cases: list[Case]) -> dict:
-    """Largest push and push rate (mm), range of contact areas (mm²), largest displacement times two as the bound."""
+    """Largest push and push rate (mm), range of contact areas (mm²), largest displacement times two as the bound.
+
+    An area is that of one instrument: cases of two, which may adjoin, do not count for it.
+    """
     areas = mesh.node_areas()
     push, rate, smallest, widest, largest = 0.0, 0.0, np.inf, 0.0, 0.0
     for case in cases:
@@ -19,8 +23,9 @@ def measure_envelope(mesh: Mesh, cases: list[Case]) -> dict:
             nodes, vectors = trajectory.contact(t)
             if len(nodes):
                 push = max(push, float(np.linalg.norm(vectors, axis=1).max()))
-                area = float(areas[nodes].sum())
-                smallest, widest = min(smallest, area), max(widest, area)
+                if case.scheme not in TWO_INSTRUMENTS:
+                    area = float(areas[nodes].sum())
+                    smallest, widest = min(smallest, area), max(widest, area)
                 if before:
                     moves = [np.linalg.norm(v - before[n]) for n, v in zip(nodes, vectors, strict=True) if n in before]
                     rate = max([rate, *map(float, moves)])
@@ -34,6 +39,6 @@ def measure_envelope(mesh: Mesh, cases: list[Case]) -> dict:
         "max_push_mm": round(push, 3),
         "max_push_rate_mm": round(1.05 * rate, 3),
         "contact_area_mm2": [round(0.75 * smallest, 1), round(1.25 * widest, 1)],
-        "max_sites": 1,
+        "max_sites": 2 if any(case.scheme in TWO_INSTRUMENTS for case in cases) else 1,
         "displacement_bound_mm": round(max(2.0 * largest, 30.0), 1),
     }

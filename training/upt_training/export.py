@@ -9,9 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from upt_training.bundle import MATERIAL, write_bundle
+from upt_training.bundle_folder import read_manifest
 from upt_training.config import settings_from_dict
 from upt_training.dataset import Dataset, open_dataset, open_trajectory
 from upt_training.envelope import measure_envelope
+from upt_training.kept import keep_parts
 from upt_training.loads import TRAINED
 from upt_training.mesh_file import Mesh, load_mesh
 from upt_training.model import Upt, load_state
@@ -85,7 +87,8 @@ def export_command(options) -> int:
     mesh = load_mesh(options.mesh)
     model, checkpoint = load_model(options.run)
     settings = checkpoint["settings"]
-    dataset = open_dataset(options.data, mesh) if options.data else None
+    datasets = [open_dataset(folder, mesh) for folder in options.data or []]
+    dataset = datasets[0] if datasets else None
     prior = open_prior(model.settings, mesh, options.prior, options.vibration)
     for name in ("radius_mm", "max_degree", "supernodes"):
         if getattr(options, name) is not None:
@@ -100,8 +103,12 @@ def export_command(options) -> int:
         "date": datetime.now(UTC).date().isoformat(),
     }
     if dataset is not None:
-        provenance["data"] = {"seed": dataset.manifest.get("seed"), "cases": len(dataset.cases)}
-    envelope = measure_envelope(mesh, dataset.select("train")) if dataset else None
+        seeds = [d.manifest.get("seed") for d in datasets]
+        provenance["data"] = {
+            "seed": seeds[0] if len(seeds) == 1 else seeds,
+            "cases": sum(len(d.cases) for d in datasets),
+        }
+    envelope = measure_envelope(mesh, [case for d in datasets for case in d.select("train")]) if datasets else None
     if options.envelope:
         other = json.loads((Path(options.envelope) / "bundle.json").read_text())
         measured, envelope = envelope, other["envelope"]
@@ -113,7 +120,7 @@ def export_command(options) -> int:
         mesh,
         options.out,
         name=options.name or Path(options.out).name,
-        description=options.description or settings["description"],
+        description=options.description or (read_manifest(options.keep) if options.keep else settings)["description"],
         boundary=checkpoint.get("boundary", "fixed"),
         material=dataset.manifest.get("material", MATERIAL) if dataset else None,
         envelope=envelope,
@@ -127,6 +134,8 @@ def export_command(options) -> int:
         check_features=real_features(model, mesh, dataset, prior) if dataset else None,
         half_weights=options.half_weights,
     )
+    if options.keep:
+        keep_parts(options.keep, Path(options.out), mesh)
     write_rest(Path(options.out))
     check = {k: f"{v:.1e}" for k, v in manifest["provenance"]["export_check"].items()}
     size = sum(f["bytes"] for f in manifest["files"].values())
