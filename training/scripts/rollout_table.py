@@ -19,6 +19,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from corrections_table import replay  # noqa: E402
 from tqdm import tqdm  # noqa: E402
 
+from upt_training.loads import WITHHELD  # noqa: E402
 from upt_training.page import write_table  # noqa: E402
 from upt_training.reduced.evaluate import group_of, released  # noqa: E402
 from upt_training.reduced.trajectories import Case, open_dataset  # noqa: E402
@@ -65,7 +66,7 @@ def main() -> None:
     parser.add_argument("--upt", default="target/release/upt")
     parser.add_argument("--bundle", action="append", required=True, type=Path)
     parser.add_argument("--data", action="append", required=True, type=Path)
-    parser.add_argument("--split", choices=("train", "test"), help="only this split; default: both")
+    parser.add_argument("--unseen", action="store_true", help="only the split `test` and scheme 5")
     parser.add_argument("--groups", action="store_true", help="a row for schemes 1 to 4 and one for all tools")
     parser.add_argument("--counts", default="0,3", help="COUNT, or COUNT@MM")
     parser.add_argument("--keep", type=Path, help="folder of the rollouts' results")
@@ -78,7 +79,9 @@ def main() -> None:
     by_scheme: dict[str, list[Case]] = {}
     for folder in options.data:
         mesh = json.loads((folder / "manifest.json").read_text())["mesh_sha256"]
-        for case in open_dataset(folder, mesh, options.split):
+        for case in open_dataset(folder, mesh):
+            if options.unseen and case.split != "test" and case.scheme != WITHHELD:
+                continue
             name = GROUPS.get(group_of(case.scheme), case.scheme) if options.groups else case.scheme
             by_scheme.setdefault(name, []).append(case)
     lines = [HEAD, "|---" * 7 + "|"]
