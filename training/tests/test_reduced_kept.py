@@ -1,5 +1,7 @@
 """A finished bundle trained again: on schemes and shorter cases of tools, with its modes and tables kept."""
 
+import shutil
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -7,17 +9,25 @@ import pytest
 from reduced_phantom import FRAMES, write_columns, write_dataset
 
 from upt_training.box_mesh import box_mesh
-from upt_training.bundle_folder import read_manifest
+from upt_training.bundle_folder import read_manifest, write_manifest
 from upt_training.errors import InputError
+from upt_training.reduced.__main__ import main as command
 from upt_training.reduced.build import Options, build, prepare, split_states
 from upt_training.reduced.evaluate import evaluate
 from upt_training.reduced.kept import kept_tables
 from upt_training.reduced.modes import Modes
+from upt_training.reduced.runner import ReducedRunner
 from upt_training.reduced.states import load_states
 from upt_training.reduced.train import Settings, state_pairs, summary
 from upt_training.reduced.trajectories import open_dataset
 
 SHORT = 27
+
+
+def main_of(*arguments: str) -> int:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "argv", ["upt_training.reduced", *arguments])
+        return command()
 
 
 @pytest.fixture(scope="module")
@@ -103,6 +113,33 @@ def test_tools_are_scored_beside_the_schemes(made):
     errors = evaluate(again.out, cases)
     assert set(errors["reduced"]) == {"tools"}
     assert errors["reduced"]["tools"]["mse_mm2"] < errors["prior"]["tools"]["mse_mm2"]
+
+
+def test_the_average_of_two_trainings_gives_the_mean_of_their_corrections(made, tmp_path):
+    _, _, first, again = made
+    out = tmp_path / "mean"
+    assert main_of("average", str(first.out), str(again.out), "--out", str(out)) == 0
+    state = np.random.default_rng(3).normal(size=(1, ReducedRunner(first.out).session.get_inputs()[0].shape[1]))
+    results = [
+        ReducedRunner(folder).session.run(None, {"state": state.astype(np.float32)})[0]
+        for folder in (first.out, again.out, out)
+    ]
+    assert np.abs(results[0] - results[1]).max() > 1e-3
+    assert np.allclose(results[2], (results[0] + results[1]) / 2, rtol=1e-5, atol=1e-6)
+    before, manifest = read_manifest(again.out), read_manifest(out)
+    assert manifest["reduced"]["bound"]["relative"] >= before["reduced"]["bound"]["relative"]
+    assert [part["data"] for part in manifest["provenance"]["mean_of"]] == [["schemes"], ["schemes", "tools"]]
+    assert (out / "prior.safetensors").read_bytes() == (first.out / "prior.safetensors").read_bytes()
+
+
+def test_trainings_of_other_tables_are_not_averaged(made, tmp_path, capsys):
+    _, _, first, again = made
+    other = tmp_path / "other"
+    shutil.copytree(again.out, other)
+    (other / "prior.safetensors").write_bytes(b"another")
+    write_manifest(other, read_manifest(other))
+    assert main_of("average", str(first.out), str(other), "--out", str(tmp_path / "mean")) == 2
+    assert "other/bundle.json: has other tables" in capsys.readouterr().err and not (tmp_path / "mean").exists()
 
 
 def test_a_bundle_of_another_mesh_is_refused(made):

@@ -13,6 +13,7 @@ import numpy as np
 from upt_training.errors import InputError
 from upt_training.loads import WITHHELD
 from upt_training.mesh_file import load_mesh
+from upt_training.reduced.average import average
 from upt_training.reduced.build import Options, Progress, build
 from upt_training.reduced.columns import load_columns
 from upt_training.reduced.compare import compare
@@ -109,6 +110,10 @@ def arguments() -> argparse.ArgumentParser:
     regimes.add_argument("--into", type=Path, help="also write the table into this page, at the markers of --label")
     regimes.add_argument("--label", default="compare")
 
+    mean = commands.add_parser("average", help="the mean of trainings of one bundle (`build --keep`) as a bundle")
+    mean.add_argument("bundles", type=Path, nargs="+", help="bundle folders; the first gives everything but the mean")
+    mean.add_argument("--out", type=Path, required=True, help="bundle folder")
+
     domain = commands.add_parser("domain", help="a copy of a mesh with another domain; its hash stays")
     domain.add_argument("--mesh", type=Path, required=True)
     domain.add_argument("--out", type=Path, required=True)
@@ -197,6 +202,11 @@ def run_compare(args: argparse.Namespace) -> None:
     print(text)
 
 
+def run_average(args: argparse.Namespace) -> None:
+    manifest = average(args.bundles, args.out)
+    print(f"{args.out}: {manifest['name']}, the mean of {len(args.bundles)} trainings")
+
+
 def run_domain(args: argparse.Namespace) -> None:
     mesh = load_mesh(args.mesh)
     if args.worst:
@@ -219,6 +229,7 @@ COMMANDS = {
     "modes": run_build,
     "evaluate": run_evaluate,
     "compare": run_compare,
+    "average": run_average,
     "domain": run_domain,
     "response-error": run_response_error,
 }
