@@ -21,6 +21,6 @@ TRAINED = named(group="trained")
 (WITHHELD,) = named(group="withheld")
 STATIC = named(group="static")
 TOOL = "tool-"  # what the scheme of a programme of tools begins with
-TWO_INSTRUMENTS = (*named(instruments=2), TOOL + "two")
+TWO_INSTRUMENTS = named(instruments=2)
 # Their tissue has another damping than the one that bundles are made for.
 OTHER_DAMPING = tuple(name for name, row in SCHEMES.items() if row["damping"] != 1.0)

@@ -19,7 +19,7 @@ import torch
 
 from upt_training.bundle_folder import write_manifest
 from upt_training.errors import InputError
-from upt_training.loads import TWO_INSTRUMENTS, WITHHELD
+from upt_training.loads import TOOL, TWO_INSTRUMENTS, WITHHELD
 from upt_training.mesh_file import Mesh, load_mesh
 from upt_training.reduced.columns import Columns, load_columns
 from upt_training.reduced.evaluate import evaluate, table
@@ -237,8 +237,9 @@ def tables(options: Options, mesh: Mesh, columns: Columns, modes: Modes) -> tupl
 def envelope_of(cases: list[Case], mesh: Mesh) -> dict:
     """What the training cases cover: pushes, their rate, and areas of a patch, those of one instrument.
 
-    Two instruments that adjoin make a patch larger than any that was pushed as a whole.
+    Two instruments that adjoin make a patch larger than any that was pushed as a whole. Tools have limits of their own.
     """
+    cases = [case for case in cases if not case.scheme.startswith(TOOL)] or cases
     areas = mesh.node_areas()
     push, rate, area = 0.0, 0.0, []
     for case in cases:
