@@ -142,6 +142,15 @@ def test_trainings_of_other_tables_are_not_averaged(made, tmp_path, capsys):
     assert "other/bundle.json: has other tables" in capsys.readouterr().err and not (tmp_path / "mean").exists()
 
 
+def test_states_in_the_modes_of_another_bundle_are_refused(made):
+    _, _, first, again = made
+    with pytest.raises(InputError, match="work-1: its states are in the modes of another bundle"):
+        prepare(replace(again, work=first.work))
+    with pytest.raises(InputError, match="work-2: its states"):
+        prepare(replace(first, work=again.work))
+    assert prepare(again).states.cases == 40
+
+
 def test_a_bundle_of_another_mesh_is_refused(made):
     _, columns, first, _ = made
     other = box_mesh(cells=(5, 5, 4), spacing_mm=9.0)

@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from upt_training.dataset import Case, open_trajectory
+from upt_training.errors import InputError
 from upt_training.loads import TOOL, TWO_INSTRUMENTS
 from upt_training.mesh_file import Mesh
 
 
-def prescribed(cases: list[Case]) -> list[Case]:
+def prescribed(cases: list) -> list:
     """Without the cases of tools, unless there are no others."""
     return [case for case in cases if not case.scheme.startswith(TOOL)] or cases
 
@@ -41,6 +42,8 @@ def measure_envelope(mesh: Mesh, cases: list[Case]) -> dict:
             largest,
             float(np.abs(trajectory.displacement[:: max(1, trajectory.frame_count // 8)]).max()),
         )
+    if not np.isfinite(smallest):
+        raise InputError("every training case has two instruments: the area of one patch is not known; add others")
     # Sites and frames that were not drawn differ a little from those that were: 5 % on the rate, a quarter on the area.
     return {
         "max_push_mm": round(push, 3),

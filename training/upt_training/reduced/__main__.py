@@ -91,6 +91,7 @@ def arguments() -> argparse.ArgumentParser:
     add_build_arguments(counts)
     counts.add_argument("--counts", default="60,120,240", help="numbers of modes; bundles are OUT-60, ...")
     counts.add_argument("--into", type=Path, help="also write the table into this page, at the markers NAME-modes")
+    counts.set_defaults(keep=None)
 
     check = commands.add_parser("evaluate", help="errors of a bundle over full rollouts")
     check.add_argument("--bundle", type=Path, required=True)
@@ -164,7 +165,7 @@ def run_build(args: argparse.Namespace) -> None:
     options = Options(
         modes=0 if sweeping else args.modes,
         tolerance_mm=args.tolerance,
-        **{name: getattr(args, name) for name in names if hasattr(args, name)},
+        **{name: getattr(args, name) for name in names},
     )
     settings = Settings(
         hidden=args.hidden,

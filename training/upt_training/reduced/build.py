@@ -17,9 +17,10 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from upt_training.bundle_folder import write_manifest
+from upt_training.bundle_folder import read_manifest, write_manifest
+from upt_training.envelope import prescribed
 from upt_training.errors import InputError
-from upt_training.loads import TOOL, TWO_INSTRUMENTS, WITHHELD
+from upt_training.loads import TWO_INSTRUMENTS, WITHHELD
 from upt_training.mesh_file import Mesh, load_mesh
 from upt_training.reduced.columns import Columns, load_columns
 from upt_training.reduced.evaluate import evaluate, table
@@ -239,7 +240,7 @@ def envelope_of(cases: list[Case], mesh: Mesh) -> dict:
 
     Two instruments that adjoin make a patch larger than any that was pushed as a whole. Tools have limits of their own.
     """
-    cases = [case for case in cases if not case.scheme.startswith(TOOL)] or cases
+    cases = prescribed(cases)
     areas = mesh.node_areas()
     push, rate, area = 0.0, 0.0, []
     for case in cases:
@@ -302,6 +303,18 @@ class Prepared:
     block_basis: dict
 
 
+def check_work(options: Options) -> None:
+    """Refuses a work folder whose states are in other modes: those of a build of its own, or of another kept bundle."""
+    marker = options.work / "modes-of.txt"
+    wanted = "this build"
+    if options.keep is not None:
+        wanted = read_manifest(options.keep)["files"]["prior.safetensors"]["sha256"]
+    found = marker.read_text() if marker.exists() else "this build"
+    if any(options.work.glob("stat*-*.npz")) and found != wanted:
+        raise InputError(f"{options.work}: its states are in the modes of another bundle; give --keep its own --work")
+    marker.write_text(wanted)
+
+
 def prepare(options: Options) -> Prepared:
     """Everything before the training; what the work folder holds is not made again."""
     torch.set_num_threads(1)
@@ -313,6 +326,7 @@ def prepare(options: Options) -> Prepared:
     cases = trainable([case for _, source in sources for case in source.cases])
     if not cases:
         raise InputError("no finished case of the split 'train': make the dataset with `upt dataset`")
+    check_work(options)
     if options.keep is not None:
         modes, prior, info = kept_tables(options.keep, mesh, columns)
     else:
