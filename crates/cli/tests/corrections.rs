@@ -132,6 +132,22 @@ fn a_corrected_bundle_follows_the_solver_and_more_corrections_closer() {
 }
 
 #[test]
+fn pushes_may_have_more_nodes_than_columns_that_are_solved_for_at_once() {
+    let folder = bundle();
+    let path = folder.path().join("bundle.json");
+    let mut manifest: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
+    // All 42 contact nodes, 126 columns: a batch is of 96.
+    manifest["envelope"]["contact_area_mm2"] = serde_json::json!([9000.0, 9500.0]);
+    manifest.as_object_mut().unwrap().remove("manifest_sha256");
+    std::fs::write(&path, manifest.to_string()).unwrap();
+    let folder = folder.path().to_str().unwrap();
+    let arguments = ["--natural", "12", "--patches", "4", "--patch-modes", "4"];
+    let (done, text) = upt(&[&["corrections", folder], &arguments[..]].concat());
+    assert!(done && text.contains("16 modes"), "{text}");
+}
+
+#[test]
 fn what_a_bundle_recommends_changes_key_by_key() {
     find_runtime();
     let folder = tempfile::tempdir().unwrap();

@@ -4,7 +4,9 @@ use std::path::Path;
 
 use anyhow::{Context, Result, bail};
 use elements::{ElementForces, Material, Simd};
-use tissue::linear::{ColumnsFile, Factor, Lame, NaturalModes, Stiffness, natural_modes};
+use tissue::linear::{
+    ColumnsFile, Factor, Lame, NaturalModes, Stiffness, compliance_columns, natural_modes,
+};
 use tissue::mesh::{Boundary, Mesh};
 use upt::bundle::BundleFiles;
 use upt::prior::PriorTable;
@@ -119,26 +121,13 @@ impl Workbench {
                 return Ok(file.columns(&rows)?);
             }
         }
-        let (free, n) = (&self.stiffness.free, self.stiffness.dofs());
-        let dofs = nodes.iter().filter_map(|&node| free.get(node));
-        let dofs: Vec<usize> = dofs
-            .flat_map(|at| [3 * at, 3 * at + 1, 3 * at + 2])
-            .collect();
-        let mut found = vec![0.0; 3 * self.mesh.node_count() * dofs.len()];
-        let mut rows = found.chunks_exact_mut(3 * self.mesh.node_count());
-        for some in dofs.chunks(SOLVED) {
-            let mut columns = vec![0.0; some.len() * n];
-            for (column, &dof) in columns.chunks_exact_mut(n).zip(some) {
-                column[dof] = 1.0;
-            }
-            self.factor.solve(&mut columns);
-            for (row, column) in rows.by_ref().zip(columns.chunks_exact(n)) {
-                for (&node, column) in free.nodes.iter().zip(column.as_chunks::<3>().0) {
-                    let at = 3 * node as usize;
-                    row[at..at + 3].copy_from_slice(&column.map(|value| value as f32));
-                }
-            }
-        }
+        let is_free = |&&node: &&u32| self.stiffness.free.get(node).is_some();
+        let nodes: Vec<u32> = nodes.iter().filter(is_free).copied().collect();
+        let mut found = Vec::with_capacity(9 * self.mesh.node_count() * nodes.len());
+        compliance_columns(&self.stiffness, &self.factor, &nodes, SOLVED, |_, rows| {
+            found.extend_from_slice(rows);
+            Ok(())
+        })?;
         Ok(found)
     }
 
