@@ -21,14 +21,23 @@ fn find_runtime() {
     upt::init(&options).unwrap();
 }
 
-/// A copy of the fixture without corrections.
-fn bundle() -> tempfile::TempDir {
+/// A copy of a fixture.
+fn copy_of(name: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
-    for entry in std::fs::read_dir(root().join("tests/fixtures/tiny-reduced")).unwrap() {
+    for entry in std::fs::read_dir(root().join("tests/fixtures").join(name)).unwrap() {
         let entry = entry.unwrap();
         std::fs::copy(entry.path(), folder.path().join(entry.file_name())).unwrap();
     }
     folder
+}
+
+/// A copy of the fixture without corrections.
+fn bundle() -> tempfile::TempDir {
+    copy_of("tiny-reduced")
+}
+
+fn corrected() -> tempfile::TempDir {
+    copy_of("tiny-corrected")
 }
 
 fn upt(arguments: &[&str]) -> (bool, String) {
@@ -148,13 +157,64 @@ fn pushes_may_have_more_nodes_than_columns_that_are_solved_for_at_once() {
 }
 
 #[test]
+fn a_coarse_space_is_extended_by_what_data_has_outside_of_it() {
+    let folder = corrected();
+    let (path, data) = (folder.path(), tempfile::tempdir().unwrap());
+    let names = [path, data.path()].map(|path| path.to_str().unwrap());
+    let modes = || {
+        let bytes = std::fs::read(path.join("corrections.safetensors")).unwrap();
+        let tensors = safetensors::SafeTensors::deserialize(&bytes).unwrap();
+        let modes = tensors.tensor("modes").unwrap();
+        (modes.shape()[0], modes.data().to_vec())
+    };
+    let before = modes();
+    let entry = |text: &[u8]| -> serde_json::Value {
+        serde_json::from_slice::<serde_json::Value>(text).unwrap()["corrections"].clone()
+    };
+    let manifest = std::fs::read(path.join("bundle.json")).unwrap();
+
+    let (done, text) = upt(&["corrections", names[0], "--extend"]);
+    assert!(!done && text.contains("--data"), "{text}");
+    let (done, text) = upt(&["corrections", names[0], "--extend", "--data", names[1]]);
+    assert!(!done && text.contains("upt dataset"), "{text}");
+    assert_eq!(before, modes());
+
+    let mesh = path.join("mesh.safetensors");
+    let (done, text) = upt(&[
+        "dataset",
+        "--mesh",
+        mesh.to_str().unwrap(),
+        "--schemes",
+        "probe",
+        "--count",
+        "1",
+        "--seed",
+        "5",
+        "--out",
+        names[1],
+    ]);
+    assert!(done, "{text}");
+    let (done, text) = upt(&[
+        "corrections",
+        names[0],
+        "--extend",
+        "--data",
+        names[1],
+        "--data-modes",
+        "3",
+    ]);
+    assert!(done, "{text}");
+    let after = modes();
+    assert_eq!(after.0, before.0 + 3, "{text}");
+    let changed = std::fs::read(path.join("bundle.json")).unwrap();
+    assert_eq!(entry(&manifest), entry(&changed));
+    Model::open(path, &ModelOptions::default()).unwrap();
+}
+
+#[test]
 fn what_a_bundle_recommends_changes_key_by_key() {
     find_runtime();
-    let folder = tempfile::tempdir().unwrap();
-    for entry in std::fs::read_dir(root().join("tests/fixtures/tiny-corrected")).unwrap() {
-        let entry = entry.unwrap();
-        std::fs::copy(entry.path(), folder.path().join(entry.file_name())).unwrap();
-    }
+    let folder = corrected();
     let path = folder.path().to_str().unwrap();
     let set = |more: &[&str]| upt(&[&["corrections", path, "--keep"], more].concat());
     let entry = || {
@@ -192,11 +252,7 @@ fn what_a_bundle_recommends_changes_key_by_key() {
 
 #[test]
 fn a_bundle_without_a_linear_response_is_refused_untouched() {
-    let folder = tempfile::tempdir().unwrap();
-    for entry in std::fs::read_dir(root().join("tests/fixtures/tiny-upt")).unwrap() {
-        let entry = entry.unwrap();
-        std::fs::copy(entry.path(), folder.path().join(entry.file_name())).unwrap();
-    }
+    let folder = copy_of("tiny-upt");
     let (done, text) = upt(&["corrections", folder.path().to_str().unwrap()]);
     assert!(!done && text.contains("linear response"), "{text}");
     assert!(!folder.path().join("corrections.safetensors").exists());

@@ -5,6 +5,7 @@
 
 mod beyond;
 mod constraint;
+mod extend;
 pub mod manifest;
 mod patches;
 mod pushes;
@@ -37,6 +38,7 @@ const FILE: &str = "corrections.safetensors";
 #[command(after_help = "Examples:
   upt corrections onnx/brain-reduced
   upt corrections my-bundle --natural 60 --patches 160 --recommended 3
+  upt corrections my-bundle --extend --data data/tools
   upt corrections my-bundle --keep --recommended 10@0.02/4
   upt corrections my-bundle --keep --frame-step-s 0.02")]
 pub struct Options {
@@ -73,6 +75,9 @@ pub struct Options {
     /// with --keep the bundle's.
     #[arg(long, value_name = "S", value_parser = frame_step)]
     pub frame_step_s: Option<f64>,
+    /// Keep the modes of the bundle's file and add those of --data. Recommended corrections and calibration stay where none are given.
+    #[arg(long, requires = "data", conflicts_with_all = ["keep", "natural", "patch_modes", "patches", "residual"])]
+    pub extend: bool,
     /// Keep the bundle's file and change only the manifest's entry.
     #[arg(long)]
     pub keep: bool,
@@ -126,7 +131,7 @@ pub fn run(args: &Options) -> Result<ExitCode> {
         return Ok(ExitCode::SUCCESS);
     }
     let started = Instant::now();
-    let count = write(args)?;
+    let (count, natural) = write(args)?;
     if args.frame_step_s.is_some() {
         let change = Change {
             frame_step_s: args.frame_step_s,
@@ -137,14 +142,12 @@ pub fn run(args: &Options) -> Result<ExitCode> {
     let seconds = started.elapsed().as_secs_f64();
     let path = args.bundle.join(FILE);
     if args.json {
-        let value =
-            json!({"file": path, "modes": count, "natural": args.natural, "seconds": seconds});
+        let value = json!({"file": path, "modes": count, "natural": natural, "seconds": seconds});
         println!("{value}");
     } else {
         println!(
-            "{}: {count} modes, {} of them natural ({seconds:.0} s)",
-            path.display(),
-            args.natural
+            "{}: {count} modes, {natural} of them natural ({seconds:.0} s)",
+            path.display()
         );
     }
     Ok(ExitCode::SUCCESS)
@@ -210,18 +213,37 @@ fn short(value: f32) -> Value {
         .map_or(Value::Null, Value::from)
 }
 
-/// Writes the file and the manifest's entry; returns the number of modes.
-pub fn write(args: &Options) -> Result<usize> {
+/// Writes the file and the manifest's entry; returns the number of modes, and of natural ones.
+pub fn write(args: &Options) -> Result<(usize, usize)> {
     if args.natural == 0 {
         bail!("--natural is 0; corrections need natural modes");
     }
+    let existing = match args.extend {
+        true => Some(extend::Existing::read(&args.bundle)?),
+        false => None,
+    };
+    let natural = existing.as_ref().map_or(args.natural, |old| old.natural);
     let bench = Workbench::open(
         &args.bundle,
-        args.natural,
+        natural,
         &Known::default(),
         args.threads,
         args.json,
     )?;
+    if let Some(existing) = existing {
+        let entry = existing.entry.clone();
+        let found = trajectories::differences(&bench, &args.data, args.json)?;
+        let more = existing.extended(&found, args.data_modes);
+        let count = bench.write_space(&args.bundle, more.into_iter(), Effort::fixed(3), 1.0)?;
+        manifest::add(&args.bundle, FILE, &entry)?;
+        let change = Change {
+            recommended: args.recommended,
+            calibration: args.calibration,
+            frame_step_s: None,
+        };
+        recommend(&args.bundle, &change)?;
+        return Ok((count, natural));
+    }
     let mut more = if args.residual {
         let width = bench.prior.width();
         if bench.prior.residual.is_empty() {
@@ -239,12 +261,13 @@ pub fn write(args: &Options) -> Result<usize> {
         let found = trajectories::differences(&bench, &args.data, args.json)?;
         more.extend(principal(&found, args.data_modes));
     }
-    bench.write_space(
+    let count = bench.write_space(
         &args.bundle,
         more.into_iter(),
         args.recommended.unwrap_or(Effort::fixed(3)),
         args.calibration.unwrap_or(1.0),
-    )
+    )?;
+    Ok((count, natural))
 }
 
 /// The leading principal directions of some vectors, by their Gram matrix.
