@@ -3,6 +3,7 @@
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::{Mutex, PoisonError};
 
 use anyhow::Result;
 pub use ort_wheel::{Platform, VERSION};
@@ -14,6 +15,8 @@ use crate::workspace::Workspace;
 /// The folder `target/ort/<platform>` with the library, `LICENSE` and `ThirdPartyNotices.txt`;
 /// downloads nothing when it is there already.
 pub fn fetch(workspace: &Workspace, platform: Platform, version: &str) -> Result<PathBuf> {
+    static FETCHING: Mutex<()> = Mutex::new(());
+    let _one = FETCHING.lock().unwrap_or_else(PoisonError::into_inner);
     let folder = workspace.path("target/ort").join(platform.name());
     if !ort_wheel::is_there(&folder, platform, version) {
         venv::create(workspace, "target/venv")?;

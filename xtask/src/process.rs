@@ -4,6 +4,7 @@ use std::fs::File;
 use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
@@ -26,6 +27,38 @@ impl Finished {
     }
 }
 
+/// What runs now, in the order of its starts, for the line of progress.
+static RUNNING: Mutex<Vec<(String, Instant)>> = Mutex::new(Vec::new());
+
+fn running() -> MutexGuard<'static, Vec<(String, Instant)>> {
+    RUNNING.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// On the list of what runs, until it is dropped.
+struct Running(Instant);
+
+impl Running {
+    fn new(label: &str) -> Self {
+        let start = Instant::now();
+        running().push((label.to_owned(), start));
+        Self(start)
+    }
+
+    fn line() -> String {
+        let all = running();
+        let each = all
+            .iter()
+            .map(|(label, start)| format!("{label} ... {} s", start.elapsed().as_secs()));
+        each.collect::<Vec<_>>().join(", ")
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        running().retain(|(_, start)| *start != self.0);
+    }
+}
+
 /// Runs `command` with its output in a log named after `label`.
 ///
 /// On a terminal the line of progress is redrawn; elsewhere a line is printed once a minute, so that a log keeper sees
@@ -36,11 +69,11 @@ pub fn run_logged(workspace: &Workspace, label: &str, command: &mut Command) -> 
     std::fs::create_dir_all(log.with_file_name(""))?;
     let file = File::create(&log).with_context(|| format!("cannot write {}", log.display()))?;
     command.stdin(Stdio::null()).stdout(file.try_clone()?);
-    let start = Instant::now();
     let mut child = command
         .stderr(file)
         .spawn()
         .with_context(|| format!("cannot start {:?}", command.get_program()))?;
+    let _running = Running::new(label);
     let terminal = std::io::stderr().is_terminal();
     let mut shown = Instant::now();
     let status = loop {
@@ -50,10 +83,10 @@ pub fn run_logged(workspace: &Workspace, label: &str, command: &mut Command) -> 
         std::thread::sleep(Duration::from_millis(40));
         if shown.elapsed().as_secs_f64() > if terminal { 0.5 } else { 60.0 } {
             shown = Instant::now();
-            let line = format!("  {label} ... {} s", start.elapsed().as_secs());
+            let line = Running::line();
             match terminal {
-                true => eprint!("\r\x1b[K{line}"),
-                false => eprintln!("{line}"),
+                true => eprint!("\r\x1b[K  {line}"),
+                false => eprintln!("  {line}"),
             }
         }
     };

@@ -39,32 +39,41 @@ const fn stage(name: &'static str, about: &'static str, needs: Needs, run: Run) 
 const HAPTICS: &str =
     "run --release --package upt-cli -- haptics onnx/brain-coarse-reduced --hours 24 --within 20";
 
-/// In this order: what is cheap and most often wrong comes first.
+/// In this order: what is cheap and most often wrong comes first. Groups run one after another, the lanes of a group at the same
+/// time, the stages of a lane one after another. No stage runs beside `rust`, whose build replaces the programs that others use.
 #[rustfmt::skip]
-pub const STAGES: &[Stage] = &[
-    stage("fmt", "cargo fmt --check", "", Cargo("fmt --all --check")),
-    stage("clippy", "cargo clippy, warnings are errors; also of builds with a single feature or none", "", Function(clippy)),
-    stage("style", "ruff, clang-format, dependencies, licences, circles and sizes of files", "", Function(style)),
-    stage("rust", "cargo test --release --workspace", "", Function(rust)),
-    stage("loom", "every interleaving of what threads share without a lock", "", Script("tests/races/run.sh loom")),
-    stage("python", "pytest of training/", "", Function(python)),
-    stage("wheel", "the Python package: wheel, types, pytest", "", Function(wheel::stage)),
-    stage("docs", "the book: links, code blocks, commands, index", "", Function(docs)),
-    stage("c", "C and C++ hosts, CMake package, simulator", system::NATIVE, Script("tests/c/run.sh")),
-    stage("csharp", "the Unity package's C# under Mono", system::CSHARP, Script("tests/csharp/run.sh")),
-    stage("godot", "the GDExtension in a real engine", system::NATIVE, Script("examples/godot/run.sh")),
-    stage("package", "the archive, unpacked elsewhere", system::NATIVE, Function(package)),
-    stage("view", "upt view in headless Chromium", system::BROWSER, Script("tests/view/run.sh")),
-    stage("windows", "built by MinGW, run by Wine", system::WINDOWS, Function(cross::windows)),
+pub const STAGES: &[&[&[Stage]]] = &[
+    &[&[
+        stage("fmt", "cargo fmt --check", "", Cargo("fmt --all --check")),
+        stage("clippy", "cargo clippy, warnings are errors; also of builds with a single feature or none", "", Function(clippy)),
+        stage("style", "ruff, clang-format, dependencies, licences, circles and sizes of files", "", Function(style)),
+        stage("rust", "cargo test --release --workspace", "", Function(rust)),
+    ]],
+    &[
+        &[
+            stage("loom", "every interleaving of what threads share without a lock", "", Script("tests/races/run.sh loom")),
+            stage("wheel", "the Python package: wheel, types, pytest", "", Function(wheel::stage)),
+            stage("docs", "the book: links, code blocks, commands, index", "", Function(docs)),
+            stage("c", "C and C++ hosts, CMake package, simulator", system::NATIVE, Script("tests/c/run.sh")),
+            stage("csharp", "the Unity package's C# under Mono", system::CSHARP, Script("tests/csharp/run.sh")),
+            stage("godot", "the GDExtension in a real engine", system::NATIVE, Script("examples/godot/run.sh")),
+            stage("package", "the archive, unpacked elsewhere", system::NATIVE, Function(package)),
+            stage("view", "upt view in headless Chromium", system::BROWSER, Script("tests/view/run.sh")),
+        ],
+        &[
+            stage("python", "pytest of training/", "", Function(python)),
+            stage("windows", "built by MinGW, run by Wine", system::WINDOWS, Function(cross::windows)),
+        ],
+    ],
 ];
 
 /// Too long for every run: these are in the nightly one, and run by name.
 #[rustfmt::skip]
-pub const NIGHTLY: &[Stage] = &[
+pub const NIGHTLY: &[&[&[Stage]]] = &[&[&[
     stage("haptics", "a day of simulated haptics, or what fits into 20 minutes", system::NATIVE, Cargo(HAPTICS)),
     stage("races", "what threads share: Miri, ThreadSanitizer", "", Script("tests/races/run.sh nightly")),
     stage("arm64", "Linux arm64, run by qemu", system::ARM64, Function(cross::arm64)),
-];
+]]];
 
 impl Stage {
     /// Runs it where nothing that it needs is missing; an error is a failure.

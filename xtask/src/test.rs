@@ -26,57 +26,92 @@ pub struct Options {
     strict: bool,
 }
 
+/// A stage, what it came to, and its time.
+type Row = (&'static str, Outcome, f64);
+
+/// Stages of groups, as [`STAGES`] has them.
+fn all(groups: &'static [&[&[Stage]]]) -> impl Iterator<Item = &'static Stage> {
+    groups.iter().copied().flatten().copied().flatten()
+}
+
 /// True when nothing failed.
 pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
-    let all = || STAGES.iter().chain(NIGHTLY);
+    let every = || all(STAGES).chain(all(NIGHTLY));
     if options.list {
-        for stage in all() {
+        for stage in every() {
             println!("{:<12} {}", stage.name, stage.about);
         }
         return Ok(true);
     }
-    let is_stage = |name: &String| all().any(|stage| stage.name == name);
+    let is_stage = |name: &String| every().any(|stage| stage.name == name);
     if let Some(unknown) = options.only.iter().find(|name| !is_stage(name)) {
         bail!("no stage is called {unknown}; `cargo xtask test --list` names them");
     }
     let is_set = |name: &str| std::env::var(name).is_ok_and(|value| value == "1");
     let strict = options.strict || is_set("UPT_STRICT");
-    let asked = |stage: &&Stage| options.only.iter().any(|name| name == stage.name);
-    let (chosen, left_out): (Vec<&Stage>, &[Stage]) = match options.only.is_empty() {
-        false => (all().filter(asked).collect(), &[]),
-        true if is_set("UPT_NIGHTLY") => (all().collect(), &[]),
-        true => (STAGES.iter().collect(), NIGHTLY),
+    let (only, nightly) = (&options.only, is_set("UPT_NIGHTLY"));
+    let asked = |stage: &&Stage| match only.is_empty() {
+        true => nightly || !all(NIGHTLY).any(|left_out| left_out.name == stage.name),
+        false => only.iter().any(|name| name == stage.name),
     };
 
     let mut needs = vec![system::BASE];
-    needs.extend(chosen.iter().map(|stage| stage.needs));
+    needs.extend(every().filter(asked).map(|stage| stage.needs));
     system::provide(workspace, &needs, !options.no_install)?;
 
     let mut rows = Vec::new();
-    for stage in chosen {
-        eprintln!("== {}: {}", stage.name, stage.about);
-        let start = Instant::now();
-        let mut outcome = stage.outcome(workspace);
-        if strict && outcome.left_out {
-            outcome.counts.failed += std::mem::take(&mut outcome.counts.skipped);
-        }
-        let seconds = start.elapsed().as_secs_f64();
-        let colon = if outcome.note.is_empty() { "" } else { ": " };
-        eprintln!(
-            "   {} ({seconds:.0} s){colon}{}",
-            outcome.counts, outcome.note
-        );
-        if !outcome.log_tail.is_empty() {
-            eprintln!("{}", outcome.log_tail);
-        }
-        rows.push((stage.name, outcome, seconds));
+    for lanes in STAGES.iter().chain(NIGHTLY) {
+        let chosen = |lane: &&'static [Stage]| lane.iter().filter(asked).collect();
+        let lanes: Vec<Vec<&Stage>> = lanes.iter().map(chosen).collect();
+        rows.extend(side_by_side(workspace, strict, &lanes));
     }
-    let skipped = || Outcome::skipped("nightly, or --only it");
-    rows.extend(left_out.iter().map(|stage| (stage.name, skipped(), 0.0)));
+    if only.is_empty() {
+        let left_out = all(NIGHTLY).filter(|stage| !asked(stage));
+        let skipped = || Outcome::skipped("nightly, or --only it");
+        rows.extend(left_out.map(|stage| (stage.name, skipped(), 0.0)));
+    }
     Ok(summarise(&rows))
 }
 
-fn summarise(rows: &[(&str, Outcome, f64)]) -> bool {
+/// Lanes at the same time, the stages of each one after another.
+fn side_by_side(workspace: &Workspace, strict: bool, lanes: &[Vec<&'static Stage>]) -> Vec<Row> {
+    let run = |lane: &Vec<&'static Stage>| -> Vec<Row> {
+        let rows = lane.iter().map(|stage| run_stage(workspace, strict, stage));
+        rows.collect()
+    };
+    std::thread::scope(|scope| {
+        let running: Vec<_> = lanes
+            .iter()
+            .map(|lane| scope.spawn(move || run(lane)))
+            .collect();
+        let joined = running.into_iter().map(std::thread::ScopedJoinHandle::join);
+        joined
+            .flat_map(|rows| rows.unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
+            .collect()
+    })
+}
+
+fn run_stage(workspace: &Workspace, strict: bool, stage: &'static Stage) -> Row {
+    let name = stage.name;
+    eprintln!("== {name}: {}", stage.about);
+    let start = Instant::now();
+    let mut outcome = stage.outcome(workspace);
+    if strict && outcome.left_out {
+        outcome.counts.failed += std::mem::take(&mut outcome.counts.skipped);
+    }
+    let seconds = start.elapsed().as_secs_f64();
+    let colon = if outcome.note.is_empty() { "" } else { ": " };
+    eprintln!(
+        "   {name}: {} ({seconds:.0} s){colon}{}",
+        outcome.counts, outcome.note
+    );
+    if !outcome.log_tail.is_empty() {
+        eprintln!("{}", outcome.log_tail);
+    }
+    (name, outcome, seconds)
+}
+
+fn summarise(rows: &[Row]) -> bool {
     println!(
         "\n{:<12} {:>7} {:>7} {:>8} {:>8}",
         "stage", "passed", "failed", "skipped", "seconds"

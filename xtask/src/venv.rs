@@ -2,6 +2,7 @@
 
 use std::path::Path;
 use std::process::Command;
+use std::sync::{Mutex, PoisonError};
 
 use anyhow::{Context, Result};
 use sha2::{Digest, Sha256};
@@ -35,8 +36,16 @@ const SYSTEM_PYTHON: &str = if cfg!(windows) { "python" } else { "python3" };
 /// Arguments of Python that install quietly.
 pub const PIP_INSTALL: &str = "-m pip install --quiet --disable-pip-version-check";
 
+/// One at a time: stages that run at the same time share an environment.
+static INSTALLING: Mutex<()> = Mutex::new(());
+
 /// Makes an environment in this folder where it is absent. Only pip is in it then.
 pub fn create(workspace: &Workspace, folder: &str) -> Result<()> {
+    let _one = INSTALLING.lock().unwrap_or_else(PoisonError::into_inner);
+    create_alone(workspace, folder)
+}
+
+fn create_alone(workspace: &Workspace, folder: &str) -> Result<()> {
     let python = program_in(&workspace.path(folder), "python");
     let has_pip = Command::new(python).args(["-c", "import pip"]).output();
     if has_pip.is_ok_and(|output| output.status.success()) {
@@ -49,7 +58,8 @@ pub fn create(workspace: &Workspace, folder: &str) -> Result<()> {
 
 /// Runs pip once for each state of a set; a stamp in the environment remembers it.
 pub fn install(workspace: &Workspace, (name, packages, file): Set) -> Result<()> {
-    create(workspace, "target/venv")?;
+    let _one = INSTALLING.lock().unwrap_or_else(PoisonError::into_inner);
+    create_alone(workspace, "target/venv")?;
     let stamp = workspace.path(&format!("target/venv/upt-{name}.stamp"));
     let key = match file {
         Some(file) => std::fs::read(workspace.path(file)).context(file)?,
