@@ -50,6 +50,10 @@ mod tool_scale;
 mod tools;
 mod view;
 
+// For their features alone: see Cargo.toml.
+use bitflags as _;
+use either as _;
+
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
