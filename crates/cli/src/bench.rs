@@ -7,7 +7,7 @@ use std::sync::Arc;
 use anyhow::{Context, Result};
 use tissue::contact::{ContactDomain, Patch};
 use tissue::mesh::{Boundary, Mesh};
-use upt::{Contact, Error, Model, ModelOptions, Scene, SceneOptions, StepInput, flag};
+use upt::{Contact, Corrections, Error, Model, ModelOptions, Scene, SceneOptions, StepInput, flag};
 
 /// A bundle on the bench.
 pub(crate) struct Bench {
@@ -22,6 +22,8 @@ pub(crate) struct Bench {
     /// Patches at once that the bundle was trained on.
     pub(crate) max_sites: usize,
     pub(crate) quick: bool,
+    /// Of the scenes.
+    pub(crate) corrections: Corrections,
 }
 
 /// Nodes and vectors of a step's contact.
@@ -141,6 +143,7 @@ impl Bench {
             mesh,
             boundary,
             quick,
+            corrections: Corrections::Recommended,
         };
         // The envelope counts the area around the nodes, which on a coarse mesh is well above that of the faces.
         while bench.area_of(&bench.central()?) > 0.9 * high && bench.area > 0.1 * low {
@@ -157,10 +160,11 @@ impl Bench {
     }
 
     pub(crate) fn scene(&self) -> Result<Scene> {
-        Ok(Scene::new(
-            Arc::clone(&self.model),
-            &SceneOptions::default(),
-        )?)
+        let options = SceneOptions {
+            corrections: self.corrections,
+            ..SceneOptions::default()
+        };
+        Ok(Scene::new(Arc::clone(&self.model), &options)?)
     }
 
     pub(crate) fn steps(&self, full: usize) -> usize {

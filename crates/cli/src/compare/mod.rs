@@ -16,6 +16,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result, ensure};
 use tissue::schemes::{Programme, Scheme};
+use upt::Corrections;
 
 use crate::bench::{Bench, push, ramp};
 use crate::stress::{progress, replace_between};
@@ -25,6 +26,7 @@ use pair::Pair;
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   upt compare --bundle onnx/brain-coarse-reduced --markdown docs/results/stability.md --images docs/results/images
+  upt compare --bundle onnx/brain-coarse-reduced --uncorrected
   upt compare --bundle onnx/brain-coarse-reduced --steps 0 --tools 20
   upt compare --bundle onnx/brain-fast --steps 0 --held-out DATASET --held-out DATASET-S5/case-00000.trajectory.safetensors --outside DATASET-HARD/case-00000.trajectory.safetensors")]
 pub struct Options {
@@ -45,6 +47,9 @@ pub struct Options {
     /// Such cases outside the envelope.
     #[arg(long, value_name = "PATH", num_args = 1..)]
     outside: Vec<PathBuf>,
+    /// Make no corrections, though the bundle recommends some: the learned part alone. Not for --tools.
+    #[arg(long, conflicts_with = "tools")]
+    uncorrected: bool,
     /// Page whose part between the markers `upt compare NAME` is replaced, and that of --tools between `upt compare --tools NAME`.
     #[arg(long)]
     markdown: Option<PathBuf>,
@@ -75,8 +80,11 @@ pub fn run(options: &Options) -> Result<ExitCode> {
         options.steps > 0 || options.tools > 0 || !options.held_out.is_empty(),
         "--steps 0 without --tools and --held-out leaves nothing to do"
     );
-    let bench = Bench::open(&options.bundle, false)
+    let mut bench = Bench::open(&options.bundle, false)
         .with_context(|| format!("{}", options.bundle.display()))?;
+    if options.uncorrected {
+        bench.corrections = Corrections::None;
+    }
     let (mut text, mut of_tools) = (String::new(), String::new());
     let (mut inside, mut outside) = (Vec::new(), Vec::new());
     let mut complaints = Vec::new();
