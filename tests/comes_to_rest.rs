@@ -3,17 +3,22 @@
 mod fixture;
 
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use upt::kernels::Isa;
 use upt::{Contact, IndexSet, Model, ModelOptions, Scene, SceneOptions, StepInput};
 
+/// Bytes of the network.
+fn network(bundle: &Path) -> u64 {
+    std::fs::metadata(bundle.join("latent.onnx")).map_or(0, |file| file.len())
+}
+
 /// Pushes of each bundle. There are fewer where a step takes ten times as long or more: without vector instructions, and through a network
-/// of more than two megabytes.
+/// of more than three megabytes.
 fn pushes(bundle: &Path) -> u64 {
-    let latent = std::fs::metadata(bundle.join("latent.onnx")).map_or(0, |file| file.len());
     match Isa::detect() {
         Isa::Scalar => 10,
-        _ if latent > 2_000_000 => 15,
+        _ if network(bundle) > 3_000_000 => 10,
         _ => 100,
     }
 }
@@ -21,6 +26,7 @@ fn pushes(bundle: &Path) -> u64 {
 /// Steps without contact in which a scene must have fallen asleep: 20 s of tissue.
 const PATIENCE: usize = 400;
 
+/// The slowest first, so that none of them is left alone at the end.
 fn shipped() -> Vec<PathBuf> {
     let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("onnx");
     let mut found: Vec<PathBuf> = std::fs::read_dir(folder)
@@ -28,7 +34,7 @@ fn shipped() -> Vec<PathBuf> {
         .map(|entry| entry.unwrap().path())
         .filter(|path| path.join("bundle.json").is_file())
         .collect();
-    found.sort();
+    found.sort_by_key(|path| (std::cmp::Reverse(network(path)), path.clone()));
     found
 }
 
@@ -68,46 +74,63 @@ fn push(model: &Model, seed: u64) -> (Vec<u32>, [f32; 3]) {
 #[test]
 fn shipped_bundles_fall_asleep_after_random_pushes() {
     fixture::find_runtime();
-    for path in shipped() {
-        let model = Model::open(&path, &ModelOptions::default()).unwrap();
-        let scene = Scene::new(model.clone(), &SceneOptions::default()).unwrap();
-        let mut longest = 0;
-        for seed in 0..pushes(&path) {
-            scene.reset().unwrap();
-            let (nodes, end) = push(&model, seed);
-            let steps = 1 + seed as usize % 6;
-            for t in 1..=steps {
-                let now = end.map(|x| x * t as f32 / steps as f32);
-                let vectors = now.repeat(nodes.len());
-                let contact = Contact::Sparse {
-                    nodes: &nodes,
-                    vectors: &vectors,
-                };
-                let input = StepInput {
-                    displacement: None,
-                    contact,
-                };
-                // The guard may refuse a push; the tissue comes back from what there was.
-                let _ = scene.step(input, None);
-            }
-            let free = StepInput {
-                displacement: None,
-                contact: Contact::None,
-            };
-            let asleep = (1..=PATIENCE).find(|_| {
-                scene.step(free, None).unwrap();
-                scene.stats().sleeping
-            });
-            let stats = scene.stats();
-            let asleep = asleep.unwrap_or_else(|| {
-                panic!(
-                    "{}: push {seed} is {} mm from rest and awake",
-                    path.display(),
-                    stats.max_displacement_mm
-                )
-            });
-            longest = longest.max(asleep);
+    let (bundles, next) = (shipped(), AtomicUsize::new(0));
+    let work = || {
+        while let Some(path) = bundles.get(next.fetch_add(1, Ordering::Relaxed)) {
+            falls_asleep(path);
         }
-        println!("{}: asleep after at most {longest} steps", path.display());
+    };
+    let workers = std::thread::available_parallelism().map_or(1, usize::from);
+    std::thread::scope(|scope| {
+        for _ in 0..workers.min(bundles.len()) {
+            scope.spawn(work);
+        }
+    });
+}
+
+fn falls_asleep(path: &Path) {
+    let options = ModelOptions {
+        threads: 1,
+        ..ModelOptions::default()
+    };
+    let model = Model::open(path, &options).unwrap();
+    let scene = Scene::new(model.clone(), &SceneOptions::default()).unwrap();
+    let mut longest = 0;
+    for seed in 0..pushes(path) {
+        scene.reset().unwrap();
+        let (nodes, end) = push(&model, seed);
+        let steps = 1 + seed as usize % 6;
+        for t in 1..=steps {
+            let now = end.map(|x| x * t as f32 / steps as f32);
+            let vectors = now.repeat(nodes.len());
+            let contact = Contact::Sparse {
+                nodes: &nodes,
+                vectors: &vectors,
+            };
+            let input = StepInput {
+                displacement: None,
+                contact,
+            };
+            // The guard may refuse a push; the tissue comes back from what there was.
+            let _ = scene.step(input, None);
+        }
+        let free = StepInput {
+            displacement: None,
+            contact: Contact::None,
+        };
+        let asleep = (1..=PATIENCE).find(|_| {
+            scene.step(free, None).unwrap();
+            scene.stats().sleeping
+        });
+        let stats = scene.stats();
+        let asleep = asleep.unwrap_or_else(|| {
+            panic!(
+                "{}: push {seed} is {} mm from rest and awake",
+                path.display(),
+                stats.max_displacement_mm
+            )
+        });
+        longest = longest.max(asleep);
     }
+    println!("{}: asleep after at most {longest} steps", path.display());
 }
