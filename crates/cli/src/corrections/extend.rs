@@ -27,9 +27,9 @@ impl Existing {
         };
         let file = BundleFiles::open(bundle)?.tensors(FILE)?;
         let natural = file.f32("frequency", &[None])?.len();
-        let values = file.f16("modes", &[None, None])?;
-        let width = values.len() / file.f32("mass", &[None, None])?.len().isqrt().max(1);
-        let modes = values.chunks_exact(width.max(1));
+        let width = file.shape("modes")?.last().map_or(1, |&width| width.max(1));
+        let values = file.f16("modes", &[None, Some(width)])?;
+        let modes = values.chunks_exact(width);
         Ok(Self {
             natural,
             entry,

@@ -30,6 +30,7 @@ use upt::{LONGEST_STEP_S, SHORTEST_STEP_S};
 
 use crate::effort::Effort;
 use crate::manifest::Manifest;
+use extend::Existing;
 
 const FILE: &str = "corrections.safetensors";
 
@@ -63,19 +64,19 @@ pub struct Options {
     #[arg(long, default_value_t = 60)]
     pub data_modes: usize,
     /// Corrections per step that the bundle recommends. COUNT@MM: at most COUNT, fewer once the estimated error is below MM.
-    /// COUNT@MM/SUBSTEPS: also that many substeps, where one step that instruments drive would miss MM. Default: 3, with --keep the bundle's
+    /// COUNT@MM/SUBSTEPS: also that many substeps, where one step that instruments drive would miss MM. Default: 3, with --keep or --extend the bundle's
     /// own.
     #[arg(long)]
     pub recommended: Option<Effort>,
     /// Factor of the estimated error: `truth over estimate` of `training/scripts/corrections_table.py` on held-out cases.
-    /// Default: 1, or with --keep the bundle's own.
+    /// Default: 1, or with --keep or --extend the bundle's own.
     #[arg(long)]
     pub calibration: Option<f32>,
     /// Length of step that the bundle recommends to hosts that show frames (`upt_scene_present`), s, 0.01 to 0.05. Default: none of its own,
-    /// with --keep the bundle's.
+    /// with --keep or --extend the bundle's.
     #[arg(long, value_name = "S", value_parser = frame_step)]
     pub frame_step_s: Option<f64>,
-    /// Keep the modes of the bundle's file and add those of --data. Recommended corrections and calibration stay where none are given.
+    /// Keep the modes of the bundle's file, and add what --data has outside of them.
     #[arg(long, requires = "data", conflicts_with_all = ["keep", "natural", "patch_modes", "patches", "residual"])]
     pub extend: bool,
     /// Keep the bundle's file and change only the manifest's entry.
@@ -108,6 +109,16 @@ pub struct Change {
     pub frame_step_s: Option<f64>,
 }
 
+impl Options {
+    fn change(&self) -> Change {
+        Change {
+            recommended: self.recommended,
+            calibration: self.calibration,
+            frame_step_s: self.frame_step_s,
+        }
+    }
+}
+
 /// Runs the command.
 pub fn run(args: &Options) -> Result<ExitCode> {
     if let Some(calibration) = args.calibration
@@ -116,12 +127,7 @@ pub fn run(args: &Options) -> Result<ExitCode> {
         bail!("--calibration is {calibration}; it must be positive");
     }
     if args.keep {
-        let change = Change {
-            recommended: args.recommended,
-            calibration: args.calibration,
-            frame_step_s: args.frame_step_s,
-        };
-        let entry = recommend(&args.bundle, &change)?;
+        let entry = recommend(&args.bundle, &args.change())?;
         let path = args.bundle.join("bundle.json");
         if args.json {
             println!("{}", json!({"file": path, "corrections": entry}));
@@ -132,13 +138,6 @@ pub fn run(args: &Options) -> Result<ExitCode> {
     }
     let started = Instant::now();
     let (count, natural) = write(args)?;
-    if args.frame_step_s.is_some() {
-        let change = Change {
-            frame_step_s: args.frame_step_s,
-            ..Change::default()
-        };
-        recommend(&args.bundle, &change)?;
-    }
     let seconds = started.elapsed().as_secs_f64();
     let path = args.bundle.join(FILE);
     if args.json {
@@ -162,8 +161,14 @@ pub fn recommend(bundle: &Path, change: &Change) -> Result<Value> {
             bundle.display()
         );
     };
+    apply(&mut entry, change)?;
+    manifest::add(bundle, FILE, &entry)?;
+    Ok(entry)
+}
+
+fn apply(entry: &mut Value, change: &Change) -> Result<()> {
     if let Some(effort) = change.recommended {
-        set_effort(&mut entry, effort);
+        set_effort(entry, effort);
     }
     if let Some(calibration) = change.calibration {
         entry["calibration"] = short(calibration);
@@ -176,12 +181,11 @@ pub fn recommend(bundle: &Path, change: &Change) -> Result<Value> {
             "--frame-step-s: steps of a length of their own are made by corrections; recommend some with --recommended"
         );
     }
-    manifest::add(bundle, FILE, &entry)?;
-    Ok(entry)
+    Ok(())
 }
 
 /// A new entry of the manifest.
-fn entry(recommended: Effort, calibration: f32) -> Value {
+pub fn entry(recommended: Effort, calibration: f32) -> Value {
     let mut entry = json!({"file": FILE});
     set_effort(&mut entry, recommended);
     entry["calibration"] = short(calibration);
@@ -214,15 +218,19 @@ fn short(value: f32) -> Value {
 }
 
 /// Writes the file and the manifest's entry; returns the number of modes, and of natural ones.
-pub fn write(args: &Options) -> Result<(usize, usize)> {
+fn write(args: &Options) -> Result<(usize, usize)> {
     if args.natural == 0 {
         bail!("--natural is 0; corrections need natural modes");
     }
-    let existing = match args.extend {
-        true => Some(extend::Existing::read(&args.bundle)?),
+    let mut existing = match args.extend {
+        true => Some(Existing::read(&args.bundle)?),
         false => None,
     };
-    let natural = existing.as_ref().map_or(args.natural, |old| old.natural);
+    let (natural, mut entry) = match &mut existing {
+        Some(old) => (old.natural, old.entry.take()),
+        None => (args.natural, entry(Effort::fixed(3), 1.0)),
+    };
+    apply(&mut entry, &args.change())?;
     let bench = Workbench::open(
         &args.bundle,
         natural,
@@ -230,43 +238,27 @@ pub fn write(args: &Options) -> Result<(usize, usize)> {
         args.threads,
         args.json,
     )?;
-    if let Some(existing) = existing {
-        let entry = existing.entry.clone();
-        let found = trajectories::differences(&bench, &args.data, args.json)?;
-        let more = existing.extended(&found, args.data_modes);
-        let count = bench.write_space(&args.bundle, more.into_iter(), Effort::fixed(3), 1.0)?;
-        manifest::add(&args.bundle, FILE, &entry)?;
-        let change = Change {
-            recommended: args.recommended,
-            calibration: args.calibration,
-            frame_step_s: None,
-        };
-        recommend(&args.bundle, &change)?;
-        return Ok((count, natural));
-    }
-    let mut more = if args.residual {
+    let mut more = if existing.is_some() || args.patch_modes == 0 && !args.residual {
+        Vec::new()
+    } else if args.residual {
         let width = bench.prior.width();
         if bench.prior.residual.is_empty() {
             bail!("--residual: this bundle has no residual modes; leave the option out");
         }
         let modes = bench.prior.residual.chunks_exact(width);
         modes.map(<[f32]>::to_vec).collect()
-    } else if args.patch_modes > 0 {
+    } else {
         let found = patches::differences(&bench, args.patches, args.seed, args.json)?;
         principal(&found, args.patch_modes)
-    } else {
-        Vec::new()
     };
     if !args.data.is_empty() {
         let found = trajectories::differences(&bench, &args.data, args.json)?;
-        more.extend(principal(&found, args.data_modes));
+        more.extend(match existing {
+            Some(old) => old.extended(&found, args.data_modes),
+            None => principal(&found, args.data_modes),
+        });
     }
-    let count = bench.write_space(
-        &args.bundle,
-        more.into_iter(),
-        args.recommended.unwrap_or(Effort::fixed(3)),
-        args.calibration.unwrap_or(1.0),
-    )?;
+    let count = bench.write_space(&args.bundle, more.into_iter(), &entry)?;
     Ok((count, natural))
 }
 

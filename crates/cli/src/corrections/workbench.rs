@@ -4,6 +4,7 @@ use std::path::Path;
 
 use anyhow::{Context, Result, bail};
 use elements::{ElementForces, Material, Simd};
+use serde_json::Value;
 use tissue::linear::{
     ColumnsFile, Factor, Lame, NaturalModes, Stiffness, compliance_columns, natural_modes,
 };
@@ -13,8 +14,7 @@ use upt::prior::PriorTable;
 
 use super::pushes::Pushes;
 use super::space::Space;
-use super::{FILE, entry, manifest};
-use crate::effort::Effort;
+use super::{FILE, manifest};
 use crate::modes;
 use crate::progress::spinner;
 
@@ -147,14 +147,12 @@ impl Workbench {
     }
 
     /// Writes the natural modes and `more` (in block coordinates) as the coarse space of a copy of the bundle, with the manifest's
-    /// entry;
-    /// returns the number of modes.
+    /// entry; returns the number of modes.
     pub fn write_space(
         &self,
         bundle: &Path,
         more: impl Iterator<Item = Vec<f32>>,
-        recommended: Effort,
-        calibration: f32,
+        entry: &Value,
     ) -> Result<usize> {
         let density = self.material.density_kg_m3;
         let mut space = Space::new(&self.prior, &self.stiffness, &self.mesh, density);
@@ -164,7 +162,7 @@ impl Workbench {
         let count = space
             .write(&path, &frequency)
             .with_context(|| format!("{}: cannot be written", path.display()))?;
-        manifest::add(bundle, FILE, &entry(recommended, calibration))?;
+        manifest::add(bundle, FILE, entry)?;
         Ok(count)
     }
 }

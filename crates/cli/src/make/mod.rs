@@ -200,8 +200,7 @@ pub fn run(options: &Options) -> Result<ExitCode> {
             let count = bench.write_space(
                 &draft,
                 principal(&found, options.patches.div_ceil(3).min(60)).into_iter(),
-                options.draft(),
-                1.0,
+                &corrections::entry(options.draft(), 1.0),
             )?;
             bundle::publish(&draft, &options.out)?;
             stage.decided(&format!(

@@ -143,8 +143,7 @@ fn teach(
     let modes = bench.write_space(
         &candidate,
         principal(&rows, MOST_MODES).into_iter(),
-        options.draft(),
-        1.0,
+        &corrections::entry(options.draft(), 1.0),
     )?;
     // Both with the same number of corrections: a target would hide what the space is worth.
     let [before, after] =

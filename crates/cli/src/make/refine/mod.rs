@@ -17,7 +17,7 @@ use super::bundle;
 use super::options::Options;
 use super::stages::{Stage, key_of};
 use crate::check;
-use crate::corrections::{Known, Push, Pushes, Workbench, principal};
+use crate::corrections::{self, Known, Push, Pushes, Workbench, principal};
 
 /// Equilibria of a round.
 const EQUILIBRIA: usize = 24;
@@ -248,7 +248,7 @@ fn make(
         let count = (all.len() / 2).min(MOST_MODES);
         bundle::copy(rounds.draft, &candidate)?;
         let space = principal(&all, count).into_iter();
-        modes = bench.write_space(&candidate, space, options.draft(), 1.0)?;
+        modes = bench.write_space(&candidate, space, &corrections::entry(options.draft(), 1.0))?;
         for part in PARTS {
             let to = file(folder, number, part);
             std::fs::copy(candidate.join(part), &to)
