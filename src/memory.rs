@@ -14,6 +14,19 @@ pub fn reserve<T>(list: &mut Vec<T>, count: usize, what: &str) -> Result<()> {
         .map_err(|_| none(count.saturating_mul(size_of::<T>()), what))
 }
 
+/// Room for `count` elements in all.
+pub fn fit<T>(list: &mut Vec<T>, count: usize, what: &str) -> Result<()> {
+    reserve(list, count.saturating_sub(list.len()), what)
+}
+
+/// The result of what asks for memory itself.
+pub fn tried<T>(
+    result: std::result::Result<T, std::collections::TryReserveError>,
+    what: &str,
+) -> Result<T> {
+    result.map_err(|_| Error::OutOfMemory(format!("no memory for {what}")))
+}
+
 /// An empty list with room for `count` elements.
 pub fn room<T>(count: usize, what: &str) -> Result<Vec<T>> {
     let mut list = Vec::new();

@@ -60,7 +60,7 @@ fn measured(model: &Model, isa: Isa, pool: &Pool) -> upt::Result<Vec<Part>> {
     let (space, forces) = (&corrections.space, &corrections.body.forces);
     let mut scratch = (forces.scratch(pool.threads()))
         .map_err(|_| Error::OutOfMemory("no memory for the element forces".into()))?;
-    let (basis, starts) = (prior.basis(), prior.basis_starts());
+    let (basis, starts) = (prior.basis(), prior.basis_starts().unwrap());
     let plan = RowPlan::full(&basis);
     let (width, count) = (prior.width(), space.count());
     let (mut q, mut on_modes) = (vec![0.5f32; width], vec![0.5f32; count]);

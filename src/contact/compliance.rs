@@ -76,6 +76,7 @@ impl Delassus {
     fn forget(&mut self) {
         self.columns.clear();
         self.of.clear();
+        self.w.clear();
     }
 
     /// `W` of samples, `[3n,3n]`, row-major; read again only where they are others than those of the last call.
@@ -108,25 +109,30 @@ impl Delassus {
 
     /// Makes `w` that of the samples; tells whether it was another's.
     fn read(&mut self, compliance: Compliance<'_>, all: &[Sample], rows: &[u32]) -> Result<bool> {
+        self.wanted.clear();
+        memory::fit(&mut self.wanted, 3 * rows.len(), WHAT)?;
         let samples = rows.iter().map(|row| all[*row as usize]);
         self.gather(compliance, samples.clone())?;
         if self.of == rows {
             return Ok(false);
         }
+        let count = rows.len();
         std::mem::swap(&mut self.w, &mut self.w_before);
         std::mem::swap(&mut self.of, &mut self.of_before);
+        self.of.clear();
+        self.w.clear();
         self.known.clear();
+        self.entries.clear();
+        memory::fit(&mut self.known, self.of_before.len(), WHAT)?;
+        memory::fit(&mut self.entries, count, WHAT)?;
+        memory::fit(&mut self.of, count, WHAT)?;
+        memory::fit(&mut self.w, 9 * count * count, WHAT)?;
         let before = self.of_before.iter().enumerate();
         self.known
             .extend(before.map(|(at, &sample)| (sample, at as u32)));
         self.known.sort_unstable();
-        self.of.clear();
-        self.w.clear();
-        let count = rows.len();
-        memory::reserve(&mut self.w, 9 * count * count, WHAT)?;
         self.w.resize(9 * count * count, 0.0);
         self.of.extend_from_slice(rows);
-        self.entries.clear();
         for sample in samples {
             let mut entries = Entries::default();
             for (column, weight) in compliance.entries(sample) {
@@ -194,13 +200,12 @@ impl Delassus {
         }
     }
 
-    /// Reads the columns that samples need, unless they are there.
+    /// Reads the columns that samples need, unless they are there; `wanted` has room for three a sample.
     fn gather(
         &mut self,
         compliance: Compliance<'_>,
         samples: impl Iterator<Item = Sample>,
     ) -> Result<()> {
-        self.wanted.clear();
         for sample in samples {
             self.wanted
                 .extend(compliance.entries(sample).map(|entry| entry.0));
@@ -225,8 +230,16 @@ impl Delassus {
         let order = 3 * self.columns.len();
         self.upper.clear();
         self.a.clear();
-        let made = memory::reserve(&mut self.upper, order * order, WHAT)
-            .and_then(|()| memory::reserve(&mut self.a, order * order, WHAT));
+        let modes = compliance
+            .inertia
+            .map_or(0, |(_, held_back)| held_back.len());
+        let made = memory::fit(&mut self.upper, order * order, WHAT)
+            .and_then(|()| memory::fit(&mut self.a, order * order, WHAT))
+            .and_then(|()| memory::fit(&mut self.modes, modes * order, WHAT))
+            .and_then(|()| {
+                let widened = 6 * compliance.prior.widest_block();
+                memory::fit(&mut self.widened, widened, WHAT)
+            });
         if let Err(error) = made {
             self.forget();
             return Err(error);

@@ -52,6 +52,8 @@ impl HeldBack {
             self.read(compliance, all, rows)?;
         }
         self.made.clear();
+        memory::fit(&mut self.made, rows.len(), WHAT)?;
+        memory::fit(&mut self.factors, lost.len(), WHAT)?;
         self.made.resize(rows.len(), false);
         Ok(At {
             own: self,
@@ -67,10 +69,11 @@ impl HeldBack {
             return Ok(());
         };
         let (count, order) = (lost.len(), 3 * rows.len());
-        memory::reserve(&mut self.modes, count * order, WHAT)?;
-        let grown = (order * order).saturating_sub(self.rows.len());
-        memory::reserve(&mut self.rows, grown, WHAT)?;
-        self.rows.resize(self.rows.len() + grown, 0.0);
+        memory::fit(&mut self.rows, order * order, WHAT)?;
+        memory::fit(&mut self.all, count, WHAT)?;
+        memory::fit(&mut self.modes, count * order, WHAT)?;
+        let most = self.rows.len().max(order * order);
+        self.rows.resize(most, 0.0);
         self.modes.resize(count * order, 0.0);
         self.all.clear();
         self.all.extend(0..count as u32);

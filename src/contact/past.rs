@@ -32,7 +32,7 @@ impl Force {
 }
 
 /// A tool's own part.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[derive(Debug, Default, Serialize, Deserialize)]
 pub struct Held {
     /// Where it was at the end of the step.
     #[serde(with = "stored::pose")]
@@ -48,7 +48,7 @@ pub struct Held {
 }
 
 /// The state of contact at the end of a step.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[derive(Debug, Default, Serialize, Deserialize)]
 pub struct Past {
     /// One a tool, in the host's order.
     pub tools: Vec<Held>,
@@ -114,18 +114,30 @@ impl Past {
     }
 
     /// Takes another one's values; the room stays.
-    pub fn take(&mut self, other: &Past) {
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`]: some values are the other one's.
+    pub fn take(&mut self, other: &Past) -> Result<()> {
         self.tools.truncate(other.tools.len());
-        let count = self.tools.len();
+        memory::fit(&mut self.tools, other.tools.len(), WHAT)?;
+        self.tools.resize_with(other.tools.len(), Held::default);
         for (own, other) in self.tools.iter_mut().zip(&other.tools) {
             own.pose = other.pose;
             own.closed = other.closed;
             own.reading = other.reading;
-            own.grasp.clone_from(&other.grasp);
+            memory::tried(own.grasp.take(&other.grasp), WHAT)?;
         }
-        self.tools.extend_from_slice(&other.tools[count..]);
-        self.forces.clear();
-        self.forces.extend_from_slice(&other.forces);
+        memory::replace(&mut self.forces, &other.forces, WHAT)
+    }
+
+    /// A copy.
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
+    pub fn copy(&self) -> Result<Past> {
+        let mut copy = Past::default();
+        copy.take(self)?;
+        Ok(copy)
     }
 
     /// No tool.

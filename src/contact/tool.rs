@@ -3,6 +3,7 @@
 use ::contact::{Body, Pose, Shape, pose};
 
 use crate::error::{Error, Result};
+use crate::memory;
 use crate::scene::INPUT_LIMIT;
 
 /// Tools at once.
@@ -146,6 +147,16 @@ pub struct Told {
 }
 
 impl Told {
+    /// Room for what so many tools and samples are told.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`].
+    pub fn fit(&mut self, tools: usize, pushes: usize) -> Result<()> {
+        const WHAT: &str = "the readings of instruments";
+        memory::fit(&mut self.readings, tools, WHAT)?;
+        memory::fit(&mut self.pushes, pushes, WHAT)
+    }
+
     /// No tools.
     pub fn clear(&mut self) {
         self.readings.clear();

@@ -55,11 +55,11 @@ impl Memory {
             coordinates: vectors(width)?,
             #[cfg(feature = "contact")]
             projected: [false; SLOTS],
-            order: Vec::with_capacity(SLOTS),
-            published: Vec::with_capacity(SLOTS),
+            order: memory::room(SLOTS, "L-BFGS pairs")?,
+            published: memory::room(SLOTS, "L-BFGS pairs")?,
             products: memory::filled(SLOTS, [0.0; SLOTS], "L-BFGS pairs")?,
             masked: memory::filled(SLOTS, [0.0; SLOTS], "L-BFGS pairs")?,
-            partial: PartialSums::with_capacity(len, PAIRS),
+            partial: PartialSums::with_room(len, PAIRS)?,
         })
     }
 

@@ -77,7 +77,11 @@ impl Motion {
     }
 
     /// Takes another one's values; the room stays.
-    pub(super) fn take(&mut self, other: &Motion) {
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`]: nothing has changed.
+    pub(super) fn take(&mut self, other: &Motion) -> Result<()> {
+        memory::fit(&mut self.reaction, other.reaction.len(), "contact forces")?;
         self.velocity.copy_from_slice(&other.velocity);
         self.velocity_before.copy_from_slice(&other.velocity_before);
         self.inertia.copy_from_slice(&other.inertia);
@@ -86,6 +90,7 @@ impl Motion {
         self.error_mm = other.error_mm;
         self.reaction.clear();
         self.reaction.extend_from_slice(&other.reaction);
+        Ok(())
     }
 
     pub(super) fn clear(&mut self) {

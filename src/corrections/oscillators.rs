@@ -47,7 +47,7 @@ impl Oscillators {
             return Ok(());
         }
         const WHAT: &str = "the free motion of a scene";
-        let natural = lent.corrections.space.natural();
+        let natural = lent.corrections.space.natural()?;
         let integrator = lent.pace.integrator;
         let turned = |omega: f32| f64::from(omega) * integrator.step_s;
         let resolved = natural.iter().take_while(|mode| turned(mode.0) <= RESOLVED);
@@ -61,9 +61,11 @@ impl Oscillators {
                 ..Oscillator::default()
             }
         });
-        self.values = memory::zeros(count, WHAT)?;
-        self.faster = memory::zeros(3 * lent.corrections.body.mass.len(), WHAT)?;
-        self.modes = memory::collected(count, oscillators, WHAT)?;
+        *self = Oscillators {
+            values: memory::zeros(count, WHAT)?,
+            faster: memory::zeros(3 * lent.corrections.body.mass.len(), WHAT)?,
+            modes: memory::collected(count, oscillators, WHAT)?,
+        };
         Ok(())
     }
 

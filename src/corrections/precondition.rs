@@ -99,10 +99,10 @@ impl Preconditioner {
             memory::collected(nodes.len(), inside, WHAT)?
         };
         Ok(Preconditioner {
-            held_back: env.space.held_back(kappa),
+            held_back: env.space.held_back(kappa)?,
             #[cfg(feature = "contact")]
-            moved_freely: env.space.moved_freely(kappa),
-            starts: env.prior.basis_starts(),
+            moved_freely: env.space.moved_freely(kappa)?,
+            starts: env.prior.basis_starts()?,
             plan: RowPlan::try_region(&env.prior.basis(), &nodes, false)?,
             #[cfg(feature = "contact")]
             domain: RowPlan::try_region(&env.prior.basis(), &domain_nodes, false)?,

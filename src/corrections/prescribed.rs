@@ -4,6 +4,7 @@ use super::input::{Input, Lent, Report};
 use super::precondition::mask_held;
 use super::stage::{MOST_PARTS, SMALLEST_DET, Stage};
 use crate::error::Result;
+use crate::memory;
 use crate::scene::ContactSet;
 
 impl Stage {
@@ -17,6 +18,8 @@ impl Stage {
         let env = lent.env();
         let _awake = lent.pool.keep_awake();
         let held = &env.body.held;
+        let forces = 3 * input.contact.len();
+        memory::fit(&mut self.next.reaction, forces, "contact forces")?;
         self.nodes.clear();
         let nodes = input.contact.nodes.iter();
         self.nodes

@@ -70,14 +70,17 @@ impl Shorter {
     }
 
     /// The state a shorter step before `input.last`, and the velocity there: the cubic through two states `step_s` apart.
-    pub(super) fn start(&mut self, whole: &Motion, input: &Input<'_>, step_s: f32) {
-        self.motion.take(whole);
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
+    pub(super) fn start(&mut self, whole: &Motion, input: &Input<'_>, step_s: f32) -> Result<()> {
+        self.motion.take(whole)?;
         self.last.copy_from_slice(input.last);
         if input.still {
             self.motion.velocity.fill(0.0);
             self.motion.velocity_before.fill(0.0);
             self.before.copy_from_slice(input.last);
-            return;
+            return Ok(());
         }
         let s = 1.0 - 1.0 / self.count as f32;
         let (s2, s3) = (s * s, s * s * s);
@@ -107,6 +110,7 @@ impl Shorter {
             *before = at(&place);
             self.motion.velocity_before[i] = at(&speed);
         }
+        Ok(())
     }
 
     /// The end of a step becomes the start of the next.
@@ -164,7 +168,7 @@ impl Stage {
         let Some(shorter) = shorter else {
             return self.swing_once(lent, input, next);
         };
-        shorter.start(&self.motion, input, lent.pace.integrator.step_s as f32);
+        shorter.start(&self.motion, input, lent.pace.integrator.step_s as f32)?;
         self.exchange(shorter);
         self.memory.clear();
         let result = self.swing_each(lent, input, shorter);

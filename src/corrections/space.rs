@@ -13,6 +13,7 @@ use crate::kernels::rows::Stored;
 use crate::memory;
 use crate::prior::PriorTable;
 
+const WHAT: &str = "the modes of the corrections";
 /// Most modes that a file may hold.
 const LIMIT: usize = 1024;
 
@@ -56,11 +57,8 @@ impl CoarseSpace {
             return Err(file.bad("frequency", format!("element {at} is not positive")));
         }
         let mut space = CoarseSpace {
-            at_contact: memory::zeros(
-                3 * prior.contact_nodes.len() * count,
-                "modes at the contact",
-            )?,
-            rows: (0..count as u32).collect(),
+            at_contact: memory::zeros(3 * prior.contact_nodes.len() * count, WHAT)?,
+            rows: memory::collected(count, 0..count as u32, WHAT)?,
             modes,
             stiffness,
             mass,
@@ -110,16 +108,22 @@ impl CoarseSpace {
     }
 
     /// Frequency (rad/s) and mass (g) of each natural mode.
-    pub fn natural(&self) -> Vec<(f32, f32)> {
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
+    pub fn natural(&self) -> Result<Vec<(f32, f32)>> {
         let count = self.count();
         let frequencies = self.frequency.iter().enumerate();
         let masses = frequencies.map(|(i, &omega)| (omega, self.mass[i * (count + 1)]));
-        masses.collect()
+        memory::collected(self.natural_count(), masses, WHAT)
     }
 
     /// For each natural mode `kappa / (m w² (w² + kappa))`: what inertia takes off its part of the compliance, mm/mN.
-    pub fn held_back(&self, kappa: f64) -> Vec<f32> {
-        self.holds_back(kappa).collect()
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
+    pub fn held_back(&self, kappa: f64) -> Result<Vec<f32>> {
+        memory::collected(self.natural_count(), self.holds_back(kappa), WHAT)
     }
 
     /// The same, mode by mode.
@@ -134,16 +138,18 @@ impl CoarseSpace {
     }
 
     /// For each natural mode `1 / (m (w² + kappa))`: what a force on it moves, mm/µN.
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
     #[cfg(feature = "contact")]
-    pub fn moved_freely(&self, kappa: f64) -> Vec<f32> {
+    pub fn moved_freely(&self, kappa: f64) -> Result<Vec<f32>> {
         let count = self.count();
         let frequencies = self.frequency.iter().enumerate();
-        frequencies
-            .map(|(i, &omega)| {
-                let mass = f64::from(self.mass[i * (count + 1)]);
-                (1.0 / (mass * (f64::from(omega).powi(2) + kappa))) as f32
-            })
-            .collect()
+        let moved = frequencies.map(|(i, &omega)| {
+            let mass = f64::from(self.mass[i * (count + 1)]);
+            (1.0 / (mass * (f64::from(omega).powi(2) + kappa))) as f32
+        });
+        memory::collected(self.natural_count(), moved, WHAT)
     }
 
     /// `Phi^T (K + kappa M) Phi [r,r]`, µN/mm.

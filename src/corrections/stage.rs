@@ -85,7 +85,7 @@ impl Stage {
             q: field()?,
             u: field()?,
             drift: field()?,
-            partial: PartialSums::with_capacity(len, PAIRS),
+            partial: PartialSums::with_room(len, PAIRS)?,
             #[cfg(feature = "contact")]
             touched: field()?,
             #[cfg(feature = "contact")]
@@ -141,7 +141,7 @@ impl Stage {
     /// A panic on another thread of the pool.
     pub fn restore(&mut self, lent: Lent<'_>, history: &History) -> Result<()> {
         let History { motion, pairs } = history;
-        self.motion.take(motion);
+        self.motion.take(motion)?;
         self.memory.clear();
         self.memory.commit();
         for Pair { step, change } in pairs {
@@ -266,30 +266,51 @@ impl Stage {
         det: f32,
         report: &mut Report,
     ) -> Result<f32> {
+        self.with_fields(|stage, fields| stage.improve_in(lent, (last, u, g), det, fields, report))
+    }
+
+    /// Calls with `d`, `q` and the new residual, which come back whatever the call gives.
+    pub(super) fn with_fields<T>(
+        &mut self,
+        call: impl FnOnce(&mut Stage, [&mut Vec<f32>; 3]) -> Result<T>,
+    ) -> Result<T> {
+        let [mut d, mut q, mut g_new] =
+            [&mut self.d, &mut self.q, &mut self.g_new].map(std::mem::take);
+        let made = call(self, [&mut d, &mut q, &mut g_new]);
+        (self.d, self.q, self.g_new) = (d, q, g_new);
+        made
+    }
+
+    fn improve_in(
+        &mut self,
+        lent: Lent<'_>,
+        (last, u, g): (&[f32], &mut [f32], &mut [f32]),
+        det: f32,
+        [d, q, g_new]: [&mut Vec<f32>; 3],
+        report: &mut Report,
+    ) -> Result<f32> {
         let env = lent.env();
-        let (mut d, mut q) = (std::mem::take(&mut self.d), std::mem::take(&mut self.q));
-        let mut g_new = std::mem::take(&mut self.g_new);
         let preconditioner = &mut self.preconditioner;
         let nodes = &self.nodes;
-        self.memory.direction(env, g, &mut q, &mut d, |q, z| {
+        self.memory.direction(env, g, q, d, |q, z| {
             mask(nodes, q);
             preconditioner.apply(env, q, z)
         })?;
-        mask(&self.nodes, &mut d);
+        mask(&self.nodes, d);
         let mut slope = [0.0];
-        dots(env.isa, env.pool, &[g], &d, &mut self.partial, &mut slope)?;
+        dots(env.isa, env.pool, &[g], d, &mut self.partial, &mut slope)?;
         let [slope] = slope;
         let mut t = 1.0f32;
         let mut accepted = det;
         for attempt in 0..=SHORTENINGS {
-            passes::shorten(env, u, &d, t, &mut q)?;
-            let (det_new, slope_new) = self.residual(lent, [last, &q, &d], &mut g_new, report)?;
+            passes::shorten(env, u, d, t, q)?;
+            let (det_new, slope_new) = self.residual(lent, [last, q, d], g_new, report)?;
             if det_new > SMALLEST_DET && 0.5 * (slope + slope_new) <= SLOPE * slope {
                 self.stand();
-                u.copy_from_slice(&q);
-                passes::difference(env, &g_new, g, &mut q)?;
-                self.memory.store(env, &d, t, &q)?;
-                g.copy_from_slice(&g_new);
+                u.copy_from_slice(q);
+                passes::difference(env, g_new, g, q)?;
+                self.memory.store(env, d, t, q)?;
+                g.copy_from_slice(g_new);
                 accepted = det_new;
                 break;
             }
@@ -303,7 +324,6 @@ impl Stage {
                 0.5
             };
         }
-        (self.d, self.q, self.g_new) = (d, q, g_new);
         Ok(accepted)
     }
 }

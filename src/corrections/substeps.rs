@@ -93,8 +93,8 @@ impl Stage {
         (substeps, shorter): (&mut Substeps, &mut Shorter),
         next: &mut [f32],
     ) -> Result<Report> {
-        shorter.start(&self.motion, input, lent.pace.integrator.step_s as f32);
-        substeps.past.take(&problem.past);
+        shorter.start(&self.motion, input, lent.pace.integrator.step_s as f32)?;
+        substeps.past.take(&problem.past)?;
         substeps.tools.clear();
         substeps.tools.extend_from_slice(problem.tools());
         substeps.from.clear();
@@ -106,7 +106,7 @@ impl Stage {
         problem.exchange(&mut substeps.responses);
         // The pairs are those of shorter steps.
         self.memory.begin();
-        problem.past.take(&substeps.past);
+        std::mem::swap(&mut problem.past, &mut substeps.past);
         let report = result?;
         self.arrive(lent, input, shorter, next)?;
         Ok(report)

@@ -86,7 +86,7 @@ pub fn join(
 ) -> Result<(Link, Haptics)> {
     check(options)?;
     let tool = &options.tool;
-    let natural = corrections.space.natural();
+    let natural = corrections.space.natural()?;
     let slow = Slow::new(natural.len())?;
     // Three of them, and what both ends keep.
     let slow_bytes = slow.memory_bytes();
@@ -107,13 +107,13 @@ pub fn join(
         pose,
         slow_bytes,
         ends: Arc::clone(&ends),
-        samples,
-        search: Search::default(),
+        samples: Arc::clone(&samples),
+        search: memory::tried(Search::with_room(&samples), WHAT)?,
         delassus: Delassus::default(),
-        held_back: corrections.space.held_back(kappa),
+        held_back: corrections.space.held_back(kappa)?,
         found: memory::room(4 * MOST_SAMPLES, WHAT)?,
         sampled: memory::room(MOST_SAMPLES, WHAT)?,
-        starts: prior.basis_starts(),
+        starts: prior.basis_starts()?,
         coordinates: memory::zeros(prior.width(), WHAT)?,
         field: memory::zeros(3 * nodes, WHAT)?,
         masses: memory::collected(count, natural.iter().map(|mode| mode.1), WHAT)?,
@@ -184,7 +184,7 @@ impl Link {
     /// # Errors
     /// [`Error::OutOfMemory`]; [`Error::Panic`] of a worker. The problem before stays.
     pub fn publish(&mut self, step: &Stepped<'_>) -> Result<()> {
-        self.find(step);
+        self.find(step)?;
         let held = &step.corrections.body.held;
         let compliance = Compliance {
             prior: step.prior,
@@ -289,11 +289,15 @@ impl Link {
     }
 
     /// The samples that are pushed or held by the tool, and the nearest to where the hand is now.
-    fn find(&mut self, step: &Stepped<'_>) {
+    fn find(&mut self, step: &Stepped<'_>) -> Result<()> {
         let pose = *self.pose.read();
         self.found.clear();
         let index = self.instrument as usize;
         if let Some(problem) = step.problem {
+            let past = &problem.past;
+            let anchors = past.tools.get(index).map(|tool| tool.grasp.anchors().len());
+            let more = past.forces.len() + anchors.unwrap_or(0);
+            memory::reserve(&mut self.found, more, WHAT)?;
             let own = problem.past.forces.iter();
             let own = own.filter(|force| force.tool == self.instrument);
             self.found.extend(own.map(|force| (f32::MIN, force.sample)));
@@ -312,6 +316,7 @@ impl Link {
         };
         let position = |node| vector(step.rest, node) + vector(step.u, node);
         let near = self.search.find(&self.samples, &[placed], position);
+        memory::reserve(&mut self.found, near.len(), WHAT)?;
         self.found
             .extend(near.iter().map(|near| (near.distance, near.sample)));
         // Of equals the pushed one comes first, and stays.
@@ -322,11 +327,13 @@ impl Link {
             .sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         self.found.truncate(MOST_SAMPLES);
         self.found.sort_unstable_by_key(|found| found.1);
+        Ok(())
     }
 
     /// Bytes held, of both ends.
     pub fn memory_bytes(&self) -> usize {
         3 * self.slow_bytes
+            + self.search.memory_bytes()
             + self.delassus.memory_bytes()
             + 4 * (self.coordinates.len() + self.field.len() + 2 * self.starts.len())
             + 8 * self.found.capacity()

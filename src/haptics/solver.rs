@@ -49,6 +49,8 @@ impl Solver {
     /// [`crate::Error::OutOfMemory`].
     pub fn new(modes: Modes) -> Result<Solver> {
         let vectors = |count| memory::filled(count, Vector::ZERO, WHAT);
+        let mut sweeps = Sweeps::default();
+        memory::tried(sweeps.reserve(MOST_ROWS), WHAT)?;
         Ok(Solver {
             modes,
             forces: vectors(MOST_SAMPLES)?,
@@ -59,8 +61,8 @@ impl Solver {
             contacts: memory::room(MOST_ROWS, WHAT)?,
             solved: memory::room(MOST_ROWS, WHAT)?,
             w: memory::room(9 * MOST_ROWS * MOST_ROWS, WHAT)?,
-            sweeps: Sweeps::with_capacity(MOST_ROWS),
-            stiffness: Stiffness::new(),
+            sweeps,
+            stiffness: Stiffness::new()?,
             nearest: f32::MAX,
         })
     }

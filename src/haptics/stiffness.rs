@@ -3,6 +3,9 @@
 
 use ::contact::Vector;
 
+use crate::error::Result;
+use crate::memory;
+
 /// Directions at most; the strongest are kept.
 pub const MOST: usize = 48;
 
@@ -25,11 +28,15 @@ pub struct Stiffness {
 
 impl Stiffness {
     /// Room for [`MOST`] directions.
-    pub fn new() -> Stiffness {
-        Stiffness {
-            factor: vec![0.0; MOST * MOST],
-            directions: Vec::with_capacity(MOST),
-        }
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
+    pub fn new() -> Result<Stiffness> {
+        const WHAT: &str = "the stiffness of haptics";
+        Ok(Stiffness {
+            factor: memory::filled(MOST * MOST, 0.0, WHAT)?,
+            directions: memory::room(MOST, WHAT)?,
+        })
     }
 
     /// Adds a direction while there is room.
@@ -102,7 +109,7 @@ mod tests {
 
     #[test]
     fn two_springs_side_by_side_have_their_sum_and_turn_about_their_middle() {
-        let mut stiffness = Stiffness::new();
+        let mut stiffness = Stiffness::new().unwrap();
         for (sample, x) in [(0, -2.0), (1, 2.0)] {
             stiffness.add(Direction {
                 sample,

@@ -7,6 +7,7 @@ use super::isa::{Isa, by_isa};
 use super::lanes::Lanes;
 use super::parts::Parts;
 use super::pool::{Pool, PoolError};
+use crate::memory;
 
 /// Floats a piece.
 const PIECE: usize = 4096;
@@ -17,9 +18,13 @@ pub struct PartialSums(Vec<f32>);
 
 impl PartialSums {
     /// Room for `count` products of vectors of `len`.
-    pub fn with_capacity(len: usize, count: usize) -> Self {
-        // Another cut of the vectors may have a piece more.
-        Self(Vec::with_capacity((len.div_ceil(PIECE) + 1) * count))
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
+    pub fn with_room(len: usize, count: usize) -> crate::Result<Self> {
+        // Other passes cut the vectors a little shorter.
+        let pieces = len.div_ceil(PIECE / 4 * 3) + 1;
+        memory::room(pieces * count, "sums over long vectors").map(Self)
     }
 
     /// Makes room for `count` sums, all zero.

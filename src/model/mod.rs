@@ -18,6 +18,7 @@ use crate::bundle::{BundleFiles, Manifest, ManifestKind, Mesh};
 use crate::corrections::Corrections;
 use crate::error::Result;
 use crate::library::{self, Alive};
+use crate::memory;
 use crate::onnx::{ProviderChoice, ProviderPlan, Runtime};
 use crate::options::{IndexSet, ModelOptions, Precision, Provider};
 use crate::prior::PriorTable;
@@ -228,19 +229,14 @@ impl Model {
             return Ok(Arc::clone(made));
         }
         let mesh = &self.mesh;
-        // Made of many lists: what they take together is asked for first.
-        let bytes = 512 * mesh.domain_faces.len() + mesh.positions.len();
-        crate::memory::probe(bytes, "the samples of the surface")?;
-        let faces = mesh.domain_faces.as_chunks::<3>().0.iter().copied();
-        let made = || {
-            Arc::new(::contact::Samples::new(
-                mesh.positions.as_chunks().0,
-                faces,
-                &mesh.held_nodes,
-                ::contact::SPACING_MM,
-            ))
-        };
-        Ok(Arc::clone(self.samples.get_or_init(made)))
+        let made = ::contact::Samples::try_new(
+            mesh.positions.as_chunks().0,
+            mesh.domain_faces.as_chunks().0,
+            &mesh.held_nodes,
+            ::contact::SPACING_MM,
+        );
+        let made = Arc::new(memory::tried(made, "the samples of the surface")?);
+        Ok(Arc::clone(self.samples.get_or_init(|| made)))
     }
 
     /// What the model is.

@@ -5,7 +5,9 @@ mod read;
 use super::compliance::{Bases, Compliance};
 use super::numbers::Numbers;
 use super::vibration::FreeVibration;
+use crate::error::Result;
 use crate::kernels::rows::BlockBasis;
+use crate::memory;
 
 /// A node without a column near it.
 pub const NO_COLUMN: u32 = u32::MAX;
@@ -84,8 +86,12 @@ impl PriorTable {
     }
 
     /// Where each block's rows start in the basis `[B+1]`.
-    pub fn basis_starts(&self) -> Vec<usize> {
-        let mut starts = vec![0];
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
+    pub fn basis_starts(&self) -> Result<Vec<usize>> {
+        let mut starts = memory::room(self.rank_offsets.len(), "the linear response")?;
+        starts.push(0);
         let blocks = self
             .block_offsets
             .windows(2)
@@ -94,7 +100,7 @@ impl PriorTable {
             let size = 3 * (nodes[1] - nodes[0]) as usize * (ranks[1] - ranks[0]) as usize;
             starts.push(starts[starts.len() - 1] + size);
         }
-        starts
+        Ok(starts)
     }
 
     /// The block-wise basis as the kernels take it.

@@ -82,11 +82,13 @@ impl ContactSet {
     }
 
     /// Copies another set.
-    pub fn copy_from(&mut self, other: &ContactSet) {
-        self.clear();
-        self.nodes.extend_from_slice(&other.nodes);
-        self.vectors.extend_from_slice(&other.vectors);
-        self.order.extend_from_slice(&other.order);
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`].
+    pub fn copy_from(&mut self, other: &ContactSet) -> Result<()> {
+        memory::replace(&mut self.nodes, &other.nodes, CONTACTS)?;
+        memory::replace(&mut self.vectors, &other.vectors, CONTACTS)?;
+        memory::replace(&mut self.order, &other.order, CONTACTS)
     }
 
     /// Takes nodes, ascending, each where `field [K,3]` has it.

@@ -202,6 +202,8 @@ impl Core {
         let near = self.meet_tools(published, &input)?;
 
         if self.counters.sleeping && given.is_none() && self.incoming.is_empty() && !near {
+            #[cfg(feature = "contact")]
+            self.fit_published(published)?;
             self.publish_rest(published);
         } else {
             if !self.drive(published, near, start, &mut stats)? {
@@ -218,6 +220,8 @@ impl Core {
             if replaced {
                 self.give_up_tools(published, &mut stats);
             }
+            #[cfg(feature = "contact")]
+            self.fit_published(published)?;
             self.publish(published, given.is_some(), replaced, &stats);
         }
         #[cfg(feature = "haptics")]

@@ -142,7 +142,7 @@ impl Corrected {
             budget_us,
             error_limit_mm: options.error_limit_mm,
             calibration: entry.map_or(1.0, |entry| entry.calibration),
-            basis_starts: prior.basis_starts(),
+            basis_starts: prior.basis_starts()?,
             own_pace: own.is_some(),
             pace,
         }))

@@ -45,13 +45,12 @@ impl Core {
         let shared = lock_read(published);
         let (rest, start) = (&self.mesh.positions, &shared.last.field);
         let begun = problem.begin(tools, rest, start);
-        let near = begun.map(|()| {
-            problem.is_near(State {
-                rest,
-                u: start,
-                start,
-            })
-        });
+        let state = State {
+            rest,
+            u: start,
+            start,
+        };
+        let near = begun.and_then(|()| problem.is_near(state));
         self.problem = Some(problem);
         near
     }

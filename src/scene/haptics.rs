@@ -44,11 +44,30 @@ impl Core {
         memory::reserve(&mut self.hands, 1, "the haptics of a scene")?;
         let samples = self.model.samples()?;
         let corrections = self.model.corrections()?;
-        let (link, haptics) = join(options, prior, corrections, self.integrator(), samples)?;
-        self.hands.push(link);
+        let (mut link, haptics) = join(options, prior, corrections, self.integrator(), samples)?;
         self.took_s = 0.0;
-        self.tell_hands(published);
+        let shared = lock_read(published);
+        if let Some(step) = self.stepped(&shared) {
+            link.publish(&step)?;
+        }
+        drop(shared);
+        self.hands.push(link);
         Ok(haptics)
+    }
+
+    /// The last state, as hands are told of it.
+    fn stepped<'a>(&'a self, shared: &'a Published) -> Option<Stepped<'a>> {
+        Some(Stepped {
+            isa: self.machine.isa,
+            pool: &self.machine.pool,
+            prior: self.model.prior.as_ref()?,
+            corrections: self.model.corrections().ok()?,
+            motion: &self.corrected.as_ref()?.stage.motion,
+            problem: self.problem.as_deref(),
+            rest: &self.mesh.positions,
+            u: &shared.last.field,
+            took_s: self.took_s,
+        })
     }
 
     /// Publishes the last state for each hand.
@@ -57,28 +76,19 @@ impl Core {
             return;
         }
         self.hands.retain(|hand| !hand.is_over());
-        let (Some(prior), Some(corrected), Ok(corrections)) =
-            (&self.model.prior, &self.corrected, self.model.corrections())
-        else {
-            return;
-        };
+        let mut hands = std::mem::take(&mut self.hands);
         let shared = lock_read(published);
-        let step = Stepped {
-            isa: self.machine.isa,
-            pool: &self.machine.pool,
-            prior,
-            corrections,
-            motion: &corrected.stage.motion,
-            problem: self.problem.as_deref(),
-            rest: &self.mesh.positions,
-            u: &shared.last.field,
-            took_s: self.took_s,
-        };
-        for hand in &mut self.hands {
-            if let Err(error) = hand.publish(&step) {
-                tracing::error!("haptics: the step was not published: {error}");
+        if let Some(step) = self.stepped(&shared) {
+            for hand in &mut hands {
+                // The step is made and cannot fail any more: what lacked memory is tried once more, and then the hand goes on from the
+                // step before.
+                if let Err(error) = hand.publish(&step).or_else(|_| hand.publish(&step)) {
+                    tracing::error!("haptics: the step was not published: {error}");
+                }
             }
         }
+        drop(shared);
+        self.hands = hands;
     }
 
     /// Bytes of the hands.

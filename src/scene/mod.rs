@@ -201,7 +201,7 @@ impl Scene {
     /// Back to rest; region and points stay.
     pub fn reset(&self) -> Result<()> {
         self.with(|core, published| {
-            core.reset(published);
+            core.reset(published)?;
             self.tools.reset();
             Ok(())
         })

@@ -1,17 +1,39 @@
 //! What a published step leaves for frames after it.
 
 use crate::contact::Past;
+use crate::error::Result;
+use crate::memory;
 
 /// Velocities, tools and forces of a published step.
 #[derive(Debug, Default)]
 pub struct Moment {
     /// `[K,3]`, mm/s.
     pub velocity: Vec<f32>,
-    /// Where the tools were, and their forces.
+    /// Where the tools were, and their forces; of the step that is being made until it is published.
     pub past: Past,
+    pub next: Past,
     /// Nodes in contact, ascending, and the forces on them, mN `[m,3]`; none where tools push.
     pub nodes: Vec<u32>,
     pub forces: Vec<f32>,
     /// Steps made, by which a new one is known.
     pub step: u64,
+}
+
+impl Moment {
+    /// Takes what contact remembers of a step that is about to be published, and makes room for forces at `nodes` nodes.
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`]; what is published stays.
+    pub fn prepare(&mut self, past: Option<&Past>, nodes: usize) -> Result<()> {
+        const WHAT: &str = "the present state of a scene";
+        memory::fit(&mut self.nodes, nodes, WHAT)?;
+        memory::fit(&mut self.forces, 3 * nodes, WHAT)?;
+        match past {
+            Some(past) => self.next.take(past),
+            None => {
+                self.next.clear();
+                Ok(())
+            }
+        }
+    }
 }

@@ -109,16 +109,41 @@ impl Core {
         let mut shared = lock_write(published);
         if shared.moment.is_none() {
             let len = shared.last.field.len();
-            shared.moment = Some(Moment {
+            let mut moment = Moment {
                 velocity: memory::zeros(len, WHAT)?,
                 past: Past::with_room(1024)?,
+                next: Past::with_room(1024)?,
                 nodes: memory::room(1024, WHAT)?,
                 forces: memory::room(3 * 1024, WHAT)?,
                 step: 0,
-            });
+            };
+            let past = self.problem.as_ref().map(|problem| &problem.past);
+            moment.prepare(past, self.contact.len())?;
+            shared.moment = Some(moment);
         }
         self.leave_moment(&mut shared);
         Ok(())
+    }
+
+    /// Asks for all room that publishing the step being made takes: from there on nothing fails.
+    pub(super) fn fit_published(&self, published: &RwLock<Published>) -> Result<()> {
+        let mut shared = lock_write(published);
+        let next = self.problem.as_ref().map(|problem| &problem.next);
+        let counts = next.map_or((0, 0), |next| (next.tools.len(), next.forces.len()));
+        shared.tools.fit(counts.0, counts.1)?;
+        match &mut shared.moment {
+            Some(moment) => moment.prepare(next, self.incoming.len()),
+            None => Ok(()),
+        }
+    }
+
+    /// The same for a state that is about to be published without a step.
+    pub(super) fn fit_state(&self, published: &RwLock<Published>) -> Result<()> {
+        let past = self.problem.as_ref().map(|problem| &problem.past);
+        match &mut lock_write(published).moment {
+            Some(moment) => moment.prepare(past, self.contact.len()),
+            None => Ok(()),
+        }
     }
 
     /// Leaves the moment of the state that has just been published, where frames are made of it.
@@ -129,10 +154,7 @@ impl Core {
         moment
             .velocity
             .copy_from_slice(&corrected.stage.motion.velocity);
-        match &self.problem {
-            Some(problem) => moment.past.take(&problem.past),
-            None => moment.past.clear(),
-        }
+        std::mem::swap(&mut moment.past, &mut moment.next);
         moment.nodes.clear();
         moment.forces.clear();
         let reaction = &corrected.stage.motion.reaction;

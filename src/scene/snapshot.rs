@@ -65,9 +65,13 @@ impl Core {
         // What is computed from it may still fail: the old state is kept until then.
         let _flush = FlushToZero::enter();
         let old = self.state(published)?;
-        let taken = self.put(published, state);
-        if let Err(error) = taken.and_then(|()| self.recompute(published)) {
-            // Fails only where a worker panics, which has been reported by then.
+        let taken = self
+            .put(published, state)
+            .and_then(|()| self.recompute(published));
+        #[cfg(feature = "contact")]
+        let taken = taken.and_then(|()| self.fit_state(published));
+        if let Err(error) = taken {
+            // Fails only where a worker panics, which has been reported by then: the old state's lists had their room.
             let _ = self.put(published, old);
             return Err(error);
         }

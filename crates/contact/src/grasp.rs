@@ -3,6 +3,7 @@
 use crate::body::Body;
 use crate::samples::Samples;
 use parry3d::math::{Pose, Vector};
+use std::collections::TryReserveError;
 
 /// A grasper holds samples within this distance of its surface, mm.
 pub const REACH_MM: f32 = 0.5;
@@ -31,6 +32,9 @@ pub struct Grasp {
 impl Grasp {
     /// Binds all samples within `reach_mm` of the tool's surface where they are now; what was held before is let go.
     /// Ascending by sample.
+    ///
+    /// # Errors
+    /// No memory: some of the samples are bound.
     pub fn close(
         &mut self,
         samples: &Samples,
@@ -38,7 +42,7 @@ impl Grasp {
         pose: &Pose,
         reach_mm: f32,
         position: impl Fn(u32) -> Vector,
-    ) {
+    ) -> Result<(), TryReserveError> {
         self.anchors.clear();
         let (low, high) = body.bounds(pose, reach_mm);
         for (row, sample) in samples.rows().iter().enumerate() {
@@ -48,12 +52,26 @@ impl Grasp {
             }
             let place = pose.inverse_transform_point(point);
             if body.nearest(place).distance <= reach_mm {
+                self.anchors.try_reserve(1)?;
                 self.anchors.push(Anchor {
                     sample: row as u32,
                     place,
                 });
             }
         }
+        Ok(())
+    }
+
+    /// Takes what another holds; the room stays.
+    ///
+    /// # Errors
+    /// No memory: nothing has changed.
+    pub fn take(&mut self, other: &Grasp) -> Result<(), TryReserveError> {
+        let more = other.anchors.len().saturating_sub(self.anchors.len());
+        self.anchors.try_reserve_exact(more)?;
+        self.anchors.clear();
+        self.anchors.extend_from_slice(&other.anchors);
+        Ok(())
     }
 
     /// Takes what was held, ascending by sample.

@@ -6,7 +6,7 @@
 //! the reference solver and the runtime see the same ones.
 
 use parry3d::math::Vector;
-use std::collections::HashSet;
+use std::collections::{HashSet, TryReserveError};
 
 /// Largest distance between neighbouring samples, mm: with 2.8 mm errors are seven times larger, with nodes alone 500
 /// times.
@@ -51,7 +51,7 @@ impl Samples {
     /// Samples `faces` (mesh nodes) of a mesh with rest positions `[K,3]`, at most `spacing_mm` apart. Samples with no node
     /// but `held` ones cannot move and are left out.
     ///
-    /// Panics when a face names a node that `positions` does not have.
+    /// Panics when a face names a node that `positions` does not have, and where there is no memory: see [`Samples::try_new`].
     pub fn new(
         positions: &[[f32; 3]],
         faces: impl IntoIterator<Item = [u32; 3]>,
@@ -59,31 +59,56 @@ impl Samples {
         spacing_mm: f32,
     ) -> Self {
         let faces: Vec<[u32; 3]> = faces.into_iter().collect();
-        let mut nodes: Vec<u32> = faces.iter().flatten().copied().collect();
+        match Self::try_new(positions, &faces, held, spacing_mm) {
+            Ok(samples) => samples,
+            Err(error) => panic!("the samples of the surface: {error}"),
+        }
+    }
+
+    /// As [`Samples::new`].
+    ///
+    /// Panics when a face names a node that `positions` does not have.
+    ///
+    /// # Errors
+    /// No memory.
+    pub fn try_new(
+        positions: &[[f32; 3]],
+        faces: &[[u32; 3]],
+        held: &[u32],
+        spacing_mm: f32,
+    ) -> Result<Self, TryReserveError> {
+        let (mut nodes, mut corners, mut offsets) = (Vec::new(), Vec::new(), Vec::new());
+        nodes.try_reserve_exact(3 * faces.len())?;
+        corners.try_reserve_exact(faces.len())?;
+        offsets.try_reserve_exact(faces.len() + 1)?;
+        nodes.extend_from_slice(faces.as_flattened());
         nodes.sort_unstable();
         nodes.dedup();
         let place = |node: u32| nodes.partition_point(|n| *n < node) as u32;
-        let corners = faces.iter().map(|face| face.map(place)).collect();
-        let held: HashSet<u32> = held.iter().copied().collect();
+        corners.extend(faces.iter().map(|face| face.map(place)));
         let mut builder = Builder {
             positions,
             spacing: f64::from(spacing_mm),
-            held,
+            held: HashSet::new(),
             seen_nodes: HashSet::new(),
             seen_edges: HashSet::new(),
             rows: Vec::new(),
         };
-        let mut offsets = vec![0];
-        for face in &faces {
-            builder.face(*face);
+        builder.held.try_reserve(held.len())?;
+        builder.held.extend(held);
+        builder.seen_nodes.try_reserve(nodes.len())?;
+        builder.seen_edges.try_reserve(3 * faces.len())?;
+        offsets.push(0);
+        for face in faces {
+            builder.face(*face)?;
             offsets.push(builder.rows.len() as u32);
         }
-        Self {
+        Ok(Self {
             rows: builder.rows,
             nodes,
             corners,
             offsets,
-        }
+        })
     }
 
     /// The same of rows `domain` of a mesh's boundary triangles `surface`.
@@ -151,10 +176,10 @@ struct Builder<'a> {
 }
 
 impl Builder<'_> {
-    fn face(&mut self, face: [u32; 3]) {
+    fn face(&mut self, face: [u32; 3]) -> Result<(), TryReserveError> {
         for node in face {
             if self.seen_nodes.insert(node) {
-                self.push([node; 3], [1.0, 0.0, 0.0]);
+                self.push([node; 3], [1.0, 0.0, 0.0])?;
             }
         }
         let mut longest = 0.0f64;
@@ -168,7 +193,7 @@ impl Builder<'_> {
                 let parts = self.parts(length);
                 for i in 1..parts {
                     let t = i as f32 / parts as f32;
-                    self.push([a, b, a], [1.0 - t, t, 0.0]);
+                    self.push([a, b, a], [1.0 - t, t, 0.0])?;
                 }
             }
         }
@@ -176,16 +201,19 @@ impl Builder<'_> {
         let part = |i: usize| i as f32 / parts as f32;
         for i in 1..parts {
             for j in 1..parts - i {
-                self.push(face, [part(parts - i - j), part(i), part(j)]);
+                self.push(face, [part(parts - i - j), part(i), part(j)])?;
             }
         }
+        Ok(())
     }
 
-    fn push(&mut self, nodes: [u32; 3], weights: [f32; 3]) {
+    fn push(&mut self, nodes: [u32; 3], weights: [f32; 3]) -> Result<(), TryReserveError> {
         let sample = Sample { nodes, weights };
         if sample.entries().any(|(node, _)| !self.held.contains(&node)) {
+            self.rows.try_reserve(1)?;
             self.rows.push(sample);
         }
+        Ok(())
     }
 
     fn length(&self, a: u32, b: u32) -> f64 {

@@ -8,6 +8,7 @@
 use crate::body::Body;
 use crate::samples::Samples;
 use parry3d::math::{Pose, Vector};
+use std::collections::TryReserveError;
 
 /// How far from a tool samples are looked at, in addition to its motion, mm.
 pub const SKIN_MM: f32 = 1.0;
@@ -44,6 +45,22 @@ pub struct Search {
 }
 
 impl Search {
+    /// Room for what one tool finds at most, so that no search of it allocates.
+    ///
+    /// # Errors
+    /// No memory.
+    pub fn with_room(samples: &Samples) -> Result<Self, TryReserveError> {
+        let mut search = Self::default();
+        search.beyond.try_reserve_exact(samples.nodes().len())?;
+        search.found.try_reserve_exact(samples.len())?;
+        Ok(search)
+    }
+
+    /// Bytes held.
+    pub fn memory_bytes(&self) -> usize {
+        self.beyond.capacity() + size_of::<Candidate>() * self.found.capacity()
+    }
+
     /// Samples within each tool's skin; `position` gives a mesh node's present position, mm.
     pub fn find(
         &mut self,

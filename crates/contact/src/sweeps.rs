@@ -7,6 +7,7 @@
 
 use crate::friction::{coulomb, frame};
 use parry3d::math::{Matrix, Vector};
+use std::collections::TryReserveError;
 
 /// How a contact may push.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -119,12 +120,21 @@ pub struct Sweeps {
 }
 
 impl Sweeps {
-    /// Room for `contacts` contacts without an allocation later.
-    pub fn with_capacity(contacts: usize) -> Self {
-        Self {
-            blocks: Vec::with_capacity(contacts),
-            shift: Vec::with_capacity(3 * contacts),
-        }
+    /// Room for `contacts` contacts, which then allocate nothing.
+    ///
+    /// # Errors
+    /// No memory.
+    pub fn reserve(&mut self, contacts: usize) -> Result<(), TryReserveError> {
+        let more = |have: usize, wanted: usize| wanted.saturating_sub(have);
+        self.blocks
+            .try_reserve_exact(more(self.blocks.len(), contacts))?;
+        self.shift
+            .try_reserve_exact(more(self.shift.len(), 3 * contacts))
+    }
+
+    /// Bytes held.
+    pub fn memory_bytes(&self) -> usize {
+        size_of::<Option<Block>>() * self.blocks.capacity() + 4 * self.shift.capacity()
     }
 
     /// Solves for `forces`, one a contact, on the tissue; they come in as the guess that gaps and slips belong to.

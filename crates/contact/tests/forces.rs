@@ -201,7 +201,8 @@ proptest! {
     #[test]
     fn a_warm_start_stays_at_the_answer_and_bits_repeat((w, contacts) in problem()) {
         let limits = Limits { tolerance_mm: 1e-6, most_sweeps: 5000, ..Limits::default() };
-        let mut sweeps = Sweeps::with_capacity(contacts.len());
+        let mut sweeps = Sweeps::default();
+        sweeps.reserve(contacts.len()).unwrap();
         let mut forces = vec![Vector::ZERO; contacts.len()];
         sweeps.solve(&mut Whole::new(&w, contacts.len()), &contacts, &mut forces, limits);
         let mut again = vec![Vector::ZERO; contacts.len()];

@@ -149,7 +149,7 @@ fn a_grasp_holds_what_is_in_reach_until_it_is_pulled_too_hard() {
     let pose = Pose::from_parts(Vector::new(12.0, 12.0, 1.8), contact::Rotation::IDENTITY);
     let position = |n: u32| point(&positions, n);
     let mut grasp = Grasp::default();
-    grasp.close(&samples, &body, &pose, 0.3, position);
+    grasp.close(&samples, &body, &pose, 0.3, position).unwrap();
     assert!(grasp.anchors().len() > 3);
     for anchor in grasp.anchors() {
         let p = samples.rows()[anchor.sample as usize].gather(position);

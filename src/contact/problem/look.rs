@@ -2,18 +2,23 @@
 
 use ::contact::{Placed, SKIN_MM, Vector, pose};
 
-use super::Problem;
+use super::{Problem, WHAT};
 use crate::contact::past::Force;
 use crate::contact::rows::{Moving, Row, State, outward};
 use crate::contact::tool::MAX_TOOLS;
+use crate::error::Result;
+use crate::memory;
 
 /// Samples that one solve may have: what a tool as large as the organ touches beyond these is left to the next solve.
-const MOST_ROWS: usize = 256;
+pub(super) const MOST_ROWS: usize = 256;
 
 impl Problem {
     /// Fills `rows`: samples near the tools at part `part` of their way, those that are pushed, and those that are held. `wide`
     /// looks as far as the tools move.
-    pub(super) fn look(&mut self, state: State<'_>, part: f32, wide: bool) {
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
+    pub(super) fn look(&mut self, state: State<'_>, part: f32, wide: bool) -> Result<()> {
         let mut placed: [Option<Placed>; MAX_TOOLS] = [const { None }; MAX_TOOLS];
         for (place, (tool, from)) in placed.iter_mut().zip(self.tools.iter().zip(&self.before)) {
             let motion = match wide {
@@ -40,14 +45,14 @@ impl Problem {
                 .find(&self.samples, std::slice::from_ref(placed), |node| {
                     state.position(node)
                 });
-            let found = found
-                .iter()
-                .map(|c| row(index as u32, c.sample, Vector::ZERO));
-            self.rows.extend(found);
-            let anchors = self.next.tools[index].grasp.anchors().iter();
+            let anchors = self.next.tools[index].grasp.anchors();
+            memory::reserve(&mut self.rows, found.len() + anchors.len(), WHAT)?;
+            let samples = found.iter().map(|c| c.sample);
+            let samples = samples.chain(anchors.iter().map(|anchor| anchor.sample));
             self.rows
-                .extend(anchors.map(|anchor| row(index as u32, anchor.sample, Vector::ZERO)));
+                .extend(samples.map(|sample| row(index as u32, sample, Vector::ZERO)));
         }
+        memory::reserve(&mut self.rows, self.next.forces.len(), WHAT)?;
         let pushed = self.next.forces.iter();
         self.rows
             .extend(pushed.map(|force| row(force.tool, force.sample, force.force)));
@@ -63,6 +68,7 @@ impl Problem {
         if self.rows.len() > MOST_ROWS {
             self.keep_nearest(part);
         }
+        Ok(())
     }
 
     /// Keeps [`MOST_ROWS`] rows: those with a force first, then those deepest inside of their tool.

@@ -23,9 +23,11 @@ use super::rows::{Row, State};
 use super::tool::{MAX_TOOLS, Mode, Reading, Tool};
 use crate::error::{Error, Result};
 use crate::memory;
+use look::MOST_ROWS;
 
 /// A tool that moves farther in a step was put there, not moved, mm.
 const PUT_MM: f32 = 40.0;
+const WHAT: &str = "the contact of instruments";
 /// Parts of a step's way at most.
 const MOST_PARTS: f32 = 16.0;
 
@@ -64,18 +66,18 @@ impl Problem {
     /// # Errors
     /// [`Error::OutOfMemory`].
     pub fn new(samples: Arc<Samples>) -> Result<Problem> {
-        const WHAT: &str = "the contact of instruments";
-        // A tool as large as the organ finds all samples at once.
-        memory::probe(128 * samples.len(), WHAT)?;
-        let room = samples.len().min(1024);
+        let mut sweeps = Sweeps::default();
+        memory::tried(sweeps.reserve(MOST_ROWS), WHAT)?;
+        // Those of a solve and of the one before it, each with the nodes of its sample and their three axes.
+        let (room, nodes, dofs) = (2 * MOST_ROWS, 6 * MOST_ROWS, 18 * MOST_ROWS);
         Ok(Problem {
             tools: memory::room(MAX_TOOLS, WHAT)?,
             before: memory::room(MAX_TOOLS, WHAT)?,
             put: memory::room(MAX_TOOLS, WHAT)?,
             past: Past::with_room(room)?,
             next: Past::with_room(room)?,
-            search: Search::default(),
-            sweeps: Sweeps::with_capacity(256),
+            search: memory::tried(Search::with_room(&samples), WHAT)?,
+            sweeps,
             delassus: Delassus::default(),
             held_back: HeldBack::default(),
             rows: memory::room(room, WHAT)?,
@@ -83,10 +85,10 @@ impl Problem {
             forces: memory::room(room, WHAT)?,
             kept: memory::room(room, WHAT)?,
             spent: Duration::ZERO,
-            columns: memory::room(room, WHAT)?,
-            change: memory::room(room, WHAT)?,
-            nodes: memory::room(room, WHAT)?,
-            vectors: memory::room(room, WHAT)?,
+            columns: memory::room(dofs, WHAT)?,
+            change: memory::room(dofs, WHAT)?,
+            nodes: memory::room(nodes, WHAT)?,
+            vectors: memory::room(3 * nodes, WHAT)?,
             samples,
         })
     }
@@ -128,7 +130,7 @@ impl Problem {
     /// Takes the tools of a step that begins at `start`. A tool's place in the list is its identity from step to step.
     ///
     /// # Errors
-    /// [`Error::Argument`] for friction, tear-off force or number; the past stays.
+    /// [`Error::Argument`] for friction, tear-off force or number, [`Error::OutOfMemory`]; the past stays.
     pub fn begin(&mut self, tools: &[Tool], rest: &[f32], start: &[f32]) -> Result<()> {
         self.spent = Duration::ZERO;
         self.enter(tools, rest, start)
@@ -150,8 +152,9 @@ impl Problem {
         }
         self.tools.clear();
         self.tools.extend_from_slice(tools);
-        self.next.take(&self.past);
+        self.next.take(&self.past)?;
         self.next.tools.truncate(tools.len());
+        memory::fit(&mut self.next.tools, tools.len(), WHAT)?;
         let state = State {
             rest,
             u: start,
@@ -174,8 +177,9 @@ impl Problem {
             let closes = tool.mode == Mode::Grasp;
             if closes && !held.closed {
                 let position = |node| state.position(node);
-                held.grasp
-                    .close(&self.samples, &tool.body, &from, REACH_MM, position);
+                let closed =
+                    (held.grasp).close(&self.samples, &tool.body, &from, REACH_MM, position);
+                memory::tried(closed, WHAT)?;
             } else if !closes {
                 held.grasp.open();
             }
@@ -185,12 +189,15 @@ impl Problem {
     }
 
     /// Whether a tool is near enough to touch the tissue in this step, or pushed it in the last.
-    pub fn is_near(&mut self, state: State<'_>) -> bool {
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`].
+    pub fn is_near(&mut self, state: State<'_>) -> Result<bool> {
         if !self.next.forces.is_empty() || self.holds() {
-            return true;
+            return Ok(true);
         }
-        self.look(state, 1.0, true);
-        !self.rows.is_empty()
+        self.look(state, 1.0, true)?;
+        Ok(!self.rows.is_empty())
     }
 
     /// Whether forces were at work at the end of the last step.
@@ -268,6 +275,8 @@ impl Problem {
             + 4 * (self.nodes.capacity() + self.vectors.capacity())
             + self.past.memory_bytes()
             + self.next.memory_bytes()
+            + self.search.memory_bytes()
+            + self.sweeps.memory_bytes()
             + self.delassus.memory_bytes()
             + self.held_back.memory_bytes()
     }

@@ -4,11 +4,12 @@ use std::time::Instant;
 
 use ::contact::{Limits, Rows, Vector, Whole};
 
-use super::Problem;
+use super::{Problem, WHAT};
 use crate::contact::Compliance;
 use crate::contact::past::Force;
 use crate::contact::rows::{Moving, State, vector};
 use crate::error::Result;
+use crate::memory;
 
 /// Linearisations of the gap.
 const LINEARISATIONS: usize = 2;
@@ -82,9 +83,9 @@ impl Problem {
         time: Time,
     ) -> Result<Change<'_>> {
         let start = Instant::now();
-        self.kept.clear();
-        self.kept.extend_from_slice(&self.next.forces);
-        self.look(state, part, false);
+        memory::replace(&mut self.kept, &self.next.forces, WHAT)?;
+        self.look(state, part, false)?;
+        self.fit()?;
         self.forces.clear();
         self.forces.extend(self.rows.iter().map(|row| row.force));
         let samples = &self.samples;
@@ -169,6 +170,21 @@ impl Problem {
             dofs: &self.columns,
             forces: &self.change,
         })
+    }
+
+    /// Room for what a solve of `rows` leaves: it cannot stop half way.
+    fn fit(&mut self) -> Result<()> {
+        let rows = self.rows.len();
+        memory::tried(self.sweeps.reserve(rows), WHAT)?;
+        memory::fit(&mut self.forces, rows, WHAT)?;
+        memory::fit(&mut self.contacts, rows, WHAT)?;
+        // Three nodes a sample and three axes a node; `blend` gives forces of before their part back.
+        memory::fit(&mut self.columns, 9 * rows, WHAT)?;
+        memory::fit(&mut self.change, 9 * rows, WHAT)?;
+        let forces = rows + self.kept.len();
+        memory::fit(&mut self.next.forces, forces, WHAT)?;
+        memory::fit(&mut self.nodes, 3 * forces, WHAT)?;
+        memory::fit(&mut self.vectors, 9 * forces, WHAT)
     }
 
     /// The contact solved once on the static response, as a collision field: nodes, ascending, and where they go, `[m,3]`, mm.

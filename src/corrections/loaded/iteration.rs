@@ -30,9 +30,21 @@ impl Stage {
         way: f32,
         report: &mut Report,
     ) -> Result<()> {
+        self.with_fields(|stage, fields| {
+            stage.improve_at_in(lent, input, (problem, at), way, fields, report)
+        })
+    }
+
+    fn improve_at_in(
+        &mut self,
+        lent: Lent<'_>,
+        input: &Input<'_>,
+        (problem, at): (&mut Problem, &mut Iterate<'_>),
+        way: f32,
+        [d, q, g_new]: [&mut Vec<f32>; 3],
+        report: &mut Report,
+    ) -> Result<()> {
         let env = lent.env();
-        let (mut d, mut q) = (std::mem::take(&mut self.d), std::mem::take(&mut self.q));
-        let mut g_new = std::mem::take(&mut self.g_new);
         // The coordinates of the residual: those of F less those of the loads.
         self.project_standing(env, at.g)?;
         let pre = &mut self.preconditioner;
@@ -44,10 +56,9 @@ impl Stage {
         let starts = &pre.starts;
         let recursion = self
             .memory
-            .descend(env, starts, &mut q, &mut d, &mut pre.coordinates)?;
+            .descend(env, starts, q, d, &mut pre.coordinates)?;
         pre.coarse(env)?;
-        self.memory
-            .ascend(env, recursion, &pre.coordinates, &mut d)?;
+        self.memory.ascend(env, recursion, &pre.coordinates, d)?;
         pre.coordinates.iter_mut().for_each(|c| *c = -*c);
         // Where the tissue would be is u + d and the coordinates' field, which takes on what the contact changes.
         for &node in &pre.domain_nodes {
@@ -60,23 +71,23 @@ impl Stage {
                 *q = u + d;
             }
         }
-        self.press(lent, input, problem, way, &q)?;
-        self.preconditioner.decode(env, &mut q)?;
-        let [along, moved] = passes::advance(env, [at.u, at.g], &mut d, &mut q, &mut self.partial)?;
+        self.press(lent, input, problem, way, q)?;
+        self.preconditioner.decode(env, q)?;
+        let [along, moved] = passes::advance(env, [at.u, at.g], d, q, &mut self.partial)?;
         self.moved = moved;
-        let work = work(problem, &d);
+        let work = work(problem, d);
         let slope = along - work;
         let mut t = 1.0f32;
         for attempt in 0..=SHORTENINGS {
             if attempt > 0 {
-                passes::shorten(env, at.u, &d, t, &mut q)?;
+                passes::shorten(env, at.u, d, t, q)?;
             }
-            let (det, slope_new) = self.residual(lent, [input.last, &q, &d], &mut g_new, report)?;
+            let (det, slope_new) = self.residual(lent, [input.last, q, d], g_new, report)?;
             let slope_new = slope_new - work;
             if det > SMALLEST_DET && 0.5 * (slope + slope_new) <= SLOPE * slope {
-                std::mem::swap(at.u, &mut q);
-                passes::difference(env, &g_new, at.g, &mut q)?;
-                if self.memory.store(env, &d, t, &q)? {
+                std::mem::swap(at.u, q);
+                passes::difference(env, g_new, at.g, q)?;
+                if self.memory.store(env, d, t, q)? {
                     let starts = &self.preconditioner.starts;
                     let change = self.memory.newest(env, starts)?;
                     let own = self.projected.iter_mut();
@@ -84,7 +95,7 @@ impl Stage {
                 } else {
                     self.is_projected = false;
                 }
-                std::mem::swap(at.g, &mut g_new);
+                std::mem::swap(at.g, g_new);
                 at.det = det;
                 if t < 1.0 {
                     problem.blend(t);
@@ -102,7 +113,6 @@ impl Stage {
                 0.5
             };
         }
-        (self.d, self.q, self.g_new) = (d, q, g_new);
         Ok(())
     }
 }

@@ -11,6 +11,7 @@ use crate::contact::{MAX_TOOLS, Problem, Tool};
 use crate::error::Result;
 use crate::memory;
 
+const WHAT: &str = "the present state of a scene";
 /// What the time is stretched by. A tool that goes faster than it did pushes by itself; following it (up to 1.5) or taking tissue back (down
 /// to -1) was no better.
 const STRETCH: [f32; 2] = [0.0, 1.0];
@@ -21,12 +22,44 @@ const NEAR_MM: f32 = 24.0;
 /// A tool that goes farther in a step than this has been put there, mm.
 const PUT_MM: f32 = 40.0;
 
-/// The tools' ways of the last step, and the tissue that each drives.
+/// The tools' ways to the last step.
 #[derive(Default)]
-pub(super) struct Along {
+pub(super) struct Ways {
     /// Poses at the step before the last and at the one before it, and how far apart they are, s.
     before: [Vec<Pose>; 2],
     before_s: [f64; 2],
+}
+
+impl Ways {
+    /// Becomes the ways to a step `seconds` after that of `problem`, to which `known` led.
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
+    pub(super) fn follow(&mut self, known: &Ways, problem: &Problem, seconds: f64) -> Result<()> {
+        let tools = &problem.past.tools;
+        let [last, before] = &mut self.before;
+        memory::replace(before, &known.before[0], WHAT)?;
+        last.clear();
+        memory::fit(last, tools.len(), WHAT)?;
+        last.extend(tools.iter().map(|held| held.pose));
+        self.before_s = [seconds, known.before_s[0]];
+        Ok(())
+    }
+
+    /// Nothing is known of the tools' ways.
+    pub(super) fn forget(&mut self) {
+        self.before.iter_mut().for_each(Vec::clear);
+    }
+
+    fn memory_bytes(&self) -> usize {
+        size_of::<Pose>() * (self.before[0].capacity() + self.before[1].capacity())
+    }
+}
+
+/// The tools' ways of the last step, and the tissue that each drives.
+#[derive(Default)]
+pub(super) struct Along {
+    pub(super) ways: Ways,
     /// Where tools push, and how far velocities are followed there, s.
     driven: Vec<(Vector, f32)>,
     /// Where none does.
@@ -35,29 +68,10 @@ pub(super) struct Along {
 
 impl Along {
     pub(super) fn new() -> Result<Along> {
-        const WHAT: &str = "the present state of a scene";
         Ok(Along {
-            before: [
-                memory::room(MAX_TOOLS, WHAT)?,
-                memory::room(MAX_TOOLS, WHAT)?,
-            ],
             driven: memory::room(MAX_TOOLS, WHAT)?,
             ..Along::default()
         })
-    }
-
-    /// Keeps the tools' poses of the state that is last, before that of `seconds` later is taken.
-    pub(super) fn keep(&mut self, problem: &Problem, seconds: f64) {
-        self.before.swap(0, 1);
-        self.before[0].clear();
-        let tools = problem.past.tools.iter();
-        self.before[0].extend(tools.map(|held| held.pose));
-        self.before_s = [seconds, self.before_s[0]];
-    }
-
-    /// Nothing is known of the tools' ways.
-    pub(super) fn forget(&mut self) {
-        self.before.iter_mut().for_each(Vec::clear);
     }
 
     /// Looks at the tools `tau` after the last state `u`.
@@ -103,16 +117,17 @@ impl Along {
     /// The speed of a tool at a place of its own, which is at `now`, at the end of the last step, mm/s: by BDF2, as the tissue's.
     fn speed(&self, index: usize, place: Vector, now: Vector) -> Option<Vector> {
         let at = |poses: &[Pose]| poses.get(index).map(|pose| pose.transform_point(place));
-        let [seconds, earlier_s] = self.before_s;
-        let before = at(&self.before[0]).filter(|_| seconds > 0.0)?;
+        let Ways { before, before_s } = &self.ways;
+        let [seconds, earlier_s] = *before_s;
+        let last = at(&before[0]).filter(|_| seconds > 0.0)?;
         let far = |a: Vector, b: Vector| a.distance(b) > PUT_MM;
-        if far(now, before) {
+        if far(now, last) {
             return None;
         }
         let even = (seconds - earlier_s).abs() < 1e-6;
-        let speed = match at(&self.before[1]).filter(|earlier| even && !far(before, *earlier)) {
-            Some(earlier) => (now * 3.0 - before * 4.0 + earlier) * 0.5,
-            None => now - before,
+        let speed = match at(&before[1]).filter(|earlier| even && !far(last, *earlier)) {
+            Some(earlier) => (now * 3.0 - last * 4.0 + earlier) * 0.5,
+            None => now - last,
         };
         Some(speed / seconds as f32)
     }
@@ -166,8 +181,7 @@ impl Along {
     }
 
     pub(super) fn memory_bytes(&self) -> usize {
-        size_of::<Pose>() * (self.before[0].capacity() + self.before[1].capacity())
-            + size_of::<(Vector, f32)>() * self.driven.capacity()
+        self.ways.memory_bytes() + size_of::<(Vector, f32)>() * self.driven.capacity()
     }
 }
 
@@ -211,14 +225,16 @@ mod tests {
         let at = |z: f32| vec![Pose::from_translation(Vector::new(0.0, 0.0, z))];
         // 4 mm, then 2 mm: at the end 1 mm a step.
         let mut along = Along {
-            before: [at(4.0), at(0.0)],
-            before_s: [0.05; 2],
+            ways: Ways {
+                before: [at(4.0), at(0.0)],
+                before_s: [0.05; 2],
+            },
             ..Along::default()
         };
         let now = Vector::new(0.0, 0.0, 6.0);
         let speed = along.speed(0, Vector::ZERO, now).unwrap();
         assert!((speed.z - 20.0).abs() < 1e-3, "{speed}");
-        along.before_s[1] = 0.1;
+        along.ways.before_s[1] = 0.1;
         assert!((along.speed(0, Vector::ZERO, now).unwrap().z - 40.0).abs() < 1e-3);
         assert!(along.speed(1, Vector::ZERO, now).is_none());
     }

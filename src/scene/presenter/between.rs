@@ -3,12 +3,14 @@
 //! The last velocities go on, as far as the tools do ([`super::along`]), and contact is solved at the instruments' poses with the compliance of
 //! that time, `kappa = 9/(4 tau²) + 3 alpha/(2 tau)`.
 
-use super::along::Along;
+use std::mem::swap;
+
+use super::along::{Along, Ways};
 use super::nodes::{Means, Nodes};
 use super::solves::{Drive, Question, Solves};
 use super::{AT_ONCE_S, WHAT};
 use crate::contact::problem::Change;
-use crate::contact::{Compliance, Problem, State};
+use crate::contact::{Compliance, Past, Problem, State};
 use crate::error::{Error, Result};
 use crate::kernels::respond::accumulate_rows;
 use crate::kernels::rows::{RowPlan, decode_rows};
@@ -29,9 +31,24 @@ pub(super) struct View<'a> {
     pub moved: &'a mut [f32],
 }
 
+/// A step: its state and velocity `[K,3]`, where tools were and pushed, nodes in contact and their forces, the tools' ways.
+#[derive(Default)]
+struct Known {
+    /// Which step that is.
+    step: Option<u64>,
+    last: Vec<f32>,
+    velocity: Vec<f32>,
+    past: Past,
+    then: Vec<u32>,
+    forces: Vec<f32>,
+    ways: Ways,
+}
+
 /// A step, and what its tissue does after it.
 pub(super) struct Between {
     problem: Problem,
+    /// The step before the known one, or what the next is read into.
+    other: Known,
     pool: Pool,
     isa: Isa,
     held: Vec<bool>,
@@ -64,12 +81,14 @@ impl Between {
         for &node in &scene.mesh.held_nodes {
             held[node as usize] = true;
         }
-        let natural = corrections
-            .space
-            .held_back(scene.integrator().kappa())
-            .len();
+        let natural = corrections.space.natural_count();
         Ok(Between {
             problem: Problem::new(model.samples()?)?,
+            other: Known {
+                last: field()?,
+                velocity: field()?,
+                ..Known::default()
+            },
             pool: Pool::new(1).map_err(|error| Error::Argument(error.to_string()))?,
             isa: Isa::detect(),
             held,
@@ -87,19 +106,48 @@ impl Between {
     }
 
     /// Takes a step's state `[K,3]` and moment, which are `later_s` after those of the step before; none where nothing was known before.
-    pub(super) fn take(&mut self, state: &[f32], moment: &Moment, later_s: Option<f64>) {
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`]: nothing has changed.
+    pub(super) fn take(
+        &mut self,
+        state: &[f32],
+        moment: &Moment,
+        later_s: Option<f64>,
+    ) -> Result<()> {
+        let other = &mut self.other;
         match later_s {
-            Some(seconds) => self.along.keep(&self.problem, seconds),
-            None => self.along.forget(),
+            Some(seconds) => (other.ways).follow(&self.along.ways, &self.problem, seconds)?,
+            None => other.ways.forget(),
         }
-        self.last.copy_from_slice(state);
-        self.velocity.copy_from_slice(&moment.velocity);
-        self.problem.past.take(&moment.past);
-        self.nodes.then.clear();
-        self.nodes.then.extend_from_slice(&moment.nodes);
-        self.nodes.forces.clear();
-        self.nodes.forces.extend_from_slice(&moment.forces);
-        self.step = Some(moment.step);
+        other.last.copy_from_slice(state);
+        other.velocity.copy_from_slice(&moment.velocity);
+        other.past.take(&moment.past)?;
+        memory::replace(&mut other.then, &moment.nodes, WHAT)?;
+        memory::replace(&mut other.forces, &moment.forces, WHAT)?;
+        other.step = Some(moment.step);
+        self.give_back();
+        Ok(())
+    }
+
+    /// Exchanges the known step and the other: takes the last [`Between::take`] back.
+    pub(super) fn give_back(&mut self) {
+        let Known {
+            step,
+            last,
+            velocity,
+            past,
+            then,
+            forces,
+            ways,
+        } = &mut self.other;
+        swap(&mut self.step, step);
+        swap(&mut self.last, last);
+        swap(&mut self.velocity, velocity);
+        swap(&mut self.problem.past, past);
+        swap(&mut self.nodes.then, then);
+        swap(&mut self.nodes.forces, forces);
+        swap(&mut self.along.ways, ways);
     }
 
     /// The displacements of a view's nodes `tau` after the step, into `out [n,3]`.
@@ -157,6 +205,7 @@ impl Between {
         }
         let make = |q: &mut [f32]| -> Result<bool> {
             let kappa = scene.integrator().over(tau.max(AT_ONCE_S)).kappa();
+            // As many as before.
             self.held_back.clear();
             self.held_back.extend(corrections.space.holds_back(kappa));
             let change = match question.drive {
@@ -167,7 +216,7 @@ impl Between {
                         u: &self.free,
                         start: last,
                     };
-                    if tau <= AT_ONCE_S || !self.problem.is_near(state) {
+                    if tau <= AT_ONCE_S || !self.problem.is_near(state)? {
                         return Ok(false);
                     }
                     let compliance = Compliance {
@@ -240,7 +289,9 @@ impl Between {
     /// Bytes held.
     pub(super) fn memory_bytes(&self) -> usize {
         // The published moment holds velocities too.
-        4 * (self.last.len() + 2 * self.velocity.len() + self.free.len())
+        4 * (2 * self.last.len() + 3 * self.velocity.len() + self.free.len())
+            + 4 * (self.other.then.capacity() + self.other.forces.capacity())
+            + self.other.past.memory_bytes()
             + self.along.memory_bytes()
             + self.nodes.memory_bytes()
             + self.now.memory_bytes()

@@ -151,11 +151,13 @@ impl Presenter {
             (Values::Region, Some(region)) => memory::copied(region, WHAT)?,
             (Values::Region, None) => memory::collected(count, 0..count as u32, WHAT)?,
         };
-        self.plan = RowPlan::try_region(&prior.basis(), &region, true)?;
-        for list in [&mut self.moved, &mut self.shown, &mut self.nodal] {
-            *list = memory::zeros(3 * region.len(), WHAT)?;
-        }
+        // All of it is there before any of it changes.
+        let plan = RowPlan::try_region(&prior.basis(), &region, true)?;
+        let field = || memory::zeros(3 * region.len(), WHAT);
+        let (moved, shown, nodal) = (field()?, field()?, field()?);
         self.over = Over::of(region.len())?;
+        (self.moved, self.shown, self.nodal) = (moved, shown, nodal);
+        self.plan = plan;
         self.region = region;
         if self.values == Values::Points {
             self.attached = Arc::clone(&shared.attached);
@@ -251,10 +253,14 @@ impl Presenter {
             if let Some(moment) = &shared.moment {
                 let steps = known.map(|known| moment.step.saturating_sub(known));
                 let later_s = steps.map(|steps| steps as f64 * step_s);
-                self.between.take(&shared.last.field, moment, later_s);
+                self.between.take(&shared.last.field, moment, later_s)?;
             }
         }
-        self.show(scene, tau, driven, solves, out)?;
+        if let Err(error) = self.show(scene, tau, driven, solves, out) {
+            // The step arrives anew at the next frame.
+            self.between.give_back();
+            return Err(error);
+        }
         let seen_s = tau - since_s;
         match known {
             Some(_) if tau > AT_ONCE_S => self.over.begin(seen_s, &self.shown, out),

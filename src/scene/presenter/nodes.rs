@@ -75,7 +75,18 @@ impl Nodes {
             Some((column, true)) => Some(column as u32),
             _ => None,
         };
+        let most = now.len() + self.then.len();
         self.columns.clear();
+        memory::fit(&mut self.columns, most, WHAT)?;
+        for list in [&mut self.only, &mut self.dofs, &mut self.held] {
+            list.clear();
+            memory::fit(list, 3 * most, WHAT)?;
+        }
+        for list in [&mut self.change, &mut self.wanted, &mut self.solved] {
+            list.clear();
+            memory::fit(list, 3 * most, WHAT)?;
+        }
+        memory::fit(&mut self.widened, 6 * means.prior.widest_block(), WHAT)?;
         let there = now.nodes.iter().filter_map(|&node| own(node));
         self.columns.extend(there.map(|column| (column, true)));
         for &node in &self.then {
@@ -86,16 +97,13 @@ impl Nodes {
             }
         }
         self.columns.sort_unstable();
-        self.only.clear();
         self.only.extend(self.columns.iter().map(|column| column.0));
         let order = 3 * self.only.len();
-        let grown = (order * order).saturating_sub(self.upper.len());
-        memory::reserve(&mut self.upper, grown, WHAT)?;
+        memory::fit(&mut self.upper, order * order, WHAT)?;
         self.upper.clear();
         self.upper.resize(order * order, 0.0);
         let prior = means.prior;
         prior.gather_compliance(&self.only, &mut self.upper, &mut self.widened);
-        self.dofs.clear();
         for column in &self.only {
             self.dofs.extend([0, 1, 2].map(|axis| 3 * column + axis));
         }
@@ -109,7 +117,6 @@ impl Nodes {
             }
         }
         // What the released nodes were pushed with is taken back, ...
-        self.change.clear();
         self.change.resize(order, 0.0);
         for (at, &(column, stays)) in self.columns.iter().enumerate() {
             let node = prior.contact_nodes[column as usize];
@@ -121,13 +128,11 @@ impl Nodes {
             }
         }
         // ... and the others are pushed to their places.
-        self.held.clear();
         let stays = |at: &usize| self.columns[at / 3].1;
         self.held
             .extend((0..order).filter(stays).map(|at| at as u32));
         let upper = &self.upper;
         let between = |i: usize, j: usize| upper[i.min(j) * order + i.max(j)];
-        self.wanted.clear();
         for &at in &self.held {
             let at = at as usize;
             let node = prior.contact_nodes[self.only[at / 3] as usize];
@@ -154,7 +159,6 @@ impl Nodes {
                 }
             })
             .map_err(|error| Error::bundle("prior.safetensors", error.to_string()))?;
-        self.solved.clear();
         self.solved.resize(count, 0.0);
         self.factor.solve(means.isa, &self.wanted, &mut self.solved);
         for (&at, &force) in self.held.iter().zip(&self.solved) {

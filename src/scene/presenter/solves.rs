@@ -11,6 +11,8 @@ use crate::error::Result;
 use crate::memory;
 use crate::scene::ContactSet;
 
+const WHAT: &str = "the present state of a scene";
+
 /// What drives a frame.
 #[derive(Clone, Copy)]
 pub(super) enum Drive<'a> {
@@ -77,19 +79,22 @@ impl Solve {
             }
     }
 
-    fn take(&mut self, question: &Question<'_>) {
+    fn take(&mut self, question: &Question<'_>) -> Result<()> {
         let (driven, free) = question.along.times();
         self.tau = question.tau;
         self.free = free;
-        self.driven.clear();
-        self.driven.extend_from_slice(driven);
+        memory::replace(&mut self.driven, driven, WHAT)?;
         self.tools.clear();
         self.nodes.clear();
         match question.drive {
-            Drive::Tools(tools) => self.tools.extend_from_slice(tools),
-            Drive::Nodes(nodes) => self.nodes.copy_from(nodes),
+            Drive::Tools(tools) => {
+                memory::fit(&mut self.tools, tools.len(), WHAT)?;
+                self.tools.extend_from_slice(tools);
+            }
+            Drive::Nodes(nodes) => self.nodes.copy_from(nodes)?,
         }
         self.by_tools = matches!(question.drive, Drive::Tools(_));
+        Ok(())
     }
 
     fn memory_bytes(&self) -> usize {
@@ -126,9 +131,9 @@ impl Solves {
         let solve = &mut self.kept[place];
         solve.step = None;
         if solve.coordinates.len() != width {
-            solve.coordinates = memory::zeros(width, "the present state of a scene")?;
+            solve.coordinates = memory::zeros(width, WHAT)?;
         }
-        solve.take(question);
+        solve.take(question)?;
         solve.pushed = make(&mut solve.coordinates)?;
         solve.step = Some(question.step);
         self.next = 1 - place;

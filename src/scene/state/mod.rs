@@ -76,7 +76,7 @@ impl Core {
             history: corrected
                 .map(|corrected| corrected.stage.history(self.contact.len()))
                 .transpose()?,
-            tools: self.tools(),
+            tools: self.tools()?,
         })
     }
 
@@ -153,8 +153,9 @@ impl Core {
             tools,
         } = state;
         self.counters = counters;
-        self.contact.copy_from(&contact);
-        self.contact_before.copy_from(&contact_before);
+        // There is room for all nodes.
+        self.contact.copy_from(&contact)?;
+        self.contact_before.copy_from(&contact_before)?;
         if let Some([Field(last), Field(before)]) = fields {
             let mut shared = lock_write(published);
             (shared.last.field, shared.before.field) = (last, before);
@@ -182,7 +183,7 @@ impl Core {
     }
 
     /// Back to rest.
-    pub(super) fn reset(&mut self, published: &RwLock<Published>) {
+    pub(super) fn reset(&mut self, published: &RwLock<Published>) -> Result<()> {
         self.counters = Counters::REST;
         self.contact.clear();
         self.contact_before.clear();
@@ -206,7 +207,11 @@ impl Core {
             }
         }
         self.told = 0;
+        // Of empty lists, for which there is room.
+        #[cfg(feature = "contact")]
+        self.fit_state(published)?;
         self.tell_state(published);
+        Ok(())
     }
 
     /// Publishes a state that no step led to: without statistics and readings.

@@ -10,8 +10,8 @@ use crate::scene::core::Core;
 pub enum Tools {}
 
 impl Core {
-    pub(super) fn tools(&self) -> Option<Tools> {
-        None
+    pub(super) fn tools(&self) -> Result<Option<Tools>> {
+        Ok(None)
     }
 
     pub(super) fn admit_tools(&self, tools: &mut Tools) -> Result<()> {

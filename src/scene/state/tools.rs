@@ -8,9 +8,11 @@ pub type Tools = Past;
 
 impl Core {
     /// A copy of what contact of instruments remembers.
-    pub(super) fn tools(&self) -> Option<Tools> {
-        let past = &self.problem.as_ref()?.past;
-        (!past.tools.is_empty()).then(|| past.clone())
+    pub(super) fn tools(&self) -> Result<Option<Tools>> {
+        match &self.problem {
+            Some(problem) if !problem.past.tools.is_empty() => problem.past.copy().map(Some),
+            _ => Ok(None),
+        }
     }
 
     pub(super) fn admit_tools(&self, tools: &mut Tools) -> Result<()> {
@@ -19,11 +21,11 @@ impl Core {
 
     pub(super) fn put_tools(&mut self, tools: Option<Tools>) -> Result<()> {
         match (&mut self.problem, tools) {
-            (Some(problem), Some(past)) => problem.past.take(&past),
+            (Some(problem), Some(past)) => problem.past = past,
             (Some(problem), None) => problem.past.clear(),
             (none @ None, Some(past)) => {
                 let mut problem = Problem::new(self.model.samples()?)?;
-                problem.past.take(&past);
+                problem.past = past;
                 *none = Some(Box::new(problem));
             }
             (None, None) => {}

@@ -72,8 +72,8 @@ impl Touch {
         for (index, tool) in self.tools.iter_mut().enumerate() {
             if step == 1 && tool.closed && !tool.torn && tool.grasp.anchors().is_empty() {
                 let (body, at) = (placed[index].body, &placed[index].pose);
-                tool.grasp
-                    .close(&scene.samples, body, at, REACH_MM, &position);
+                let closed = (tool.grasp).close(&scene.samples, body, at, REACH_MM, &position);
+                closed.unwrap_or_else(|error| panic!("a grasp: {error}"));
             }
         }
         std::mem::swap(&mut self.rows, &mut self.before);
