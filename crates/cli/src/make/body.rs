@@ -131,6 +131,7 @@ fn read(options: &Options, stage: &mut Stage) -> Result<(Mesh, PathBuf)> {
     for repair in &imported.repairs {
         stage.decided(&format!("repaired: {repair}"));
     }
+    imported.notes.iter().for_each(|note| stage.decided(note));
     Ok((imported.mesh, input))
 }
 
@@ -138,7 +139,7 @@ fn read(options: &Options, stage: &mut Stage) -> Result<(Mesh, PathBuf)> {
 fn hint(error: &ImportError) -> Option<&'static str> {
     match error {
         ImportError::Open { .. } => Some("only a closed surface can be filled"),
-        ImportError::Stuffing(_) | ImportError::NodeCount { .. } => {
+        ImportError::Stuffing(_) => {
             Some("the surface could not be filled; look at --unit and --nodes")
         }
         _ => None,

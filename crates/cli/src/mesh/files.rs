@@ -109,12 +109,16 @@ pub fn run_import(args: &Import) -> anyhow::Result<ExitCode> {
     if args.json {
         let mut value = serde_json::to_value(&quality)?;
         value["repairs"] = serde_json::to_value(&imported.repairs)?;
+        value["notes"] = serde_json::to_value(&imported.notes)?;
         value["sha256"] = json!(imported.mesh.hash());
         println!("{value:#}");
         return Ok(ExitCode::SUCCESS);
     }
     for repair in &imported.repairs {
         println!("{:24}{repair}", "repaired");
+    }
+    for note in &imported.notes {
+        println!("{:24}{note}", "note");
     }
     print_quality(&quality);
     if imported.mesh.fixed.is_empty() {

@@ -4,7 +4,7 @@
 use super::{ImportError, RawSurface};
 use crate::stuffing::Field;
 use parry3d_f64::math::Vector;
-use parry3d_f64::query::PointQuery;
+use parry3d_f64::query::{PointQuery, Ray, RayCast};
 use parry3d_f64::shape::{TriMesh, TriMeshFlags};
 
 /// Distance to a surface, mm, positive inside.
@@ -37,6 +37,29 @@ impl SurfaceDistance {
             },
         )?;
         Ok(Self { surface, low, high })
+    }
+}
+
+/// A way through the body that is shorter than this part of its box is the face that it starts on.
+const SKIN: f64 = 1e-9;
+
+impl SurfaceDistance {
+    /// The nearest point of the surface.
+    pub(super) fn nearest(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
+        let point = self
+            .surface
+            .project_local_point(Vector::new(x, y, z), false)
+            .point;
+        [point.x, point.y, point.z]
+    }
+
+    /// From a point of the surface along a direction of length 1 to where it comes out, mm.
+    pub(super) fn along(&self, from: [f64; 3], way: [f64; 3]) -> Option<f64> {
+        let size = (0..3).map(|k| self.high[k] - self.low[k]).sum::<f64>();
+        let start = [0, 1, 2].map(|k| from[k] + SKIN * size * way[k]);
+        let [origin, way] = [start, way].map(|[x, y, z]| Vector::new(x, y, z));
+        self.surface
+            .cast_local_ray(&Ray::new(origin, way), 2.0 * size, false)
     }
 }
 

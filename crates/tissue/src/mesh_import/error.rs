@@ -34,8 +34,23 @@ pub enum ImportError {
         "scale {0} is not a positive number; give millimetres per unit of the file, such as 1000 for metres"
     )]
     Scale(f64),
-    #[error("no lattice spacing gives about {wanted} nodes; give --spacing")]
-    NodeCount { wanted: usize },
+    #[error(
+        "the tetrahedra would {} the {volume_ml:.1} ml that the surface bounds: its thinnest place, {thickness_mm:.2} mm near {at:.1?} mm, \
+         is thinner than they are; give about --nodes {nodes}, or a thicker surface",
+        match share {
+            Some(share) if *share < 97.0 => format!("hold {share:.0} % of"),
+            Some(_) => "leave holes in the walls of".to_owned(),
+            None => "hold only a part of".to_owned(),
+        }
+    )]
+    Thin {
+        volume_ml: f64,
+        /// Of the volume, %; none where it was not worth trying.
+        share: Option<f64>,
+        thickness_mm: f64,
+        at: [f64; 3],
+        nodes: u64,
+    },
     #[error(
         "node {node} has a non-finite coordinate; repair the file, or drop its elements with --repair"
     )]

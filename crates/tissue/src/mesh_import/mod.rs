@@ -15,6 +15,7 @@
 mod closed_surface;
 mod distance;
 mod error;
+mod fill;
 mod gmsh;
 mod labels;
 mod named_tets;
@@ -23,10 +24,12 @@ mod repair;
 mod self_crossing;
 mod sets;
 mod surface_files;
+mod thickness;
 mod tool_file;
 mod vtk;
 mod vtk_labels;
 mod vtk_raw;
+mod walls;
 
 pub use distance::SurfaceDistance;
 pub use error::{ImportError, Repair};
@@ -36,7 +39,6 @@ pub use sets::Ball;
 pub use tool_file::tool_shape;
 
 use crate::mesh::Mesh;
-use crate::stuffing;
 use std::path::Path;
 
 /// How large the elements of a filled surface are.
@@ -44,7 +46,7 @@ use std::path::Path;
 pub enum Resolution {
     /// Lattice spacing, mm.
     Spacing(f64),
-    /// Wanted number of nodes, met within 2 % where the shape allows.
+    /// Wanted number of nodes, met within 15 %; where thin places do not allow it, a note says so.
     Nodes(usize),
 }
 
@@ -87,6 +89,8 @@ impl Default for ImportOptions {
 pub struct Imported {
     pub mesh: Mesh,
     pub repairs: Vec<Repair>,
+    /// What else there is to know, in words: where a filled surface is finer, how far a count was missed.
+    pub notes: Vec<String>,
 }
 
 /// Tetrahedra as a file holds them, unchecked.
@@ -116,7 +120,7 @@ pub fn import(path: &Path, options: &ImportOptions) -> Result<Imported, ImportEr
         return Err(ImportError::Scale(options.scale));
     }
     let extension = extension_of(path);
-    let mut repairs = Vec::new();
+    let (mut repairs, mut notes) = (Vec::new(), Vec::new());
     let body = match extension.as_str() {
         "vtk" | "vtu" | "vtp" => vtk::read(path)?,
         "msh" => vtk::Body::Tets(gmsh::read(path)?),
@@ -134,7 +138,9 @@ pub fn import(path: &Path, options: &ImportOptions) -> Result<Imported, ImportEr
             scale(&mut surface.positions, options.scale);
             closed_surface::check(&mut surface, options.repair, &mut repairs)?;
             self_crossing::check(&surface, options.repair, &mut repairs)?;
-            fill(surface, resolution)?
+            let filled = fill::fill(surface, resolution)?;
+            notes = filled.notes;
+            filled.raw
         }
     };
     let mut mesh = from_tets(raw, options.repair, &mut repairs)?;
@@ -149,7 +155,11 @@ pub fn import(path: &Path, options: &ImportOptions) -> Result<Imported, ImportEr
     });
     sets::select(&mut mesh, &options.fixed, &options.domain, &options.window)?;
     mesh.validate()?;
-    Ok(Imported { mesh, repairs })
+    Ok(Imported {
+        mesh,
+        repairs,
+        notes,
+    })
 }
 
 /// Reads the names that a file gives to parts of itself; formats without any have none.
@@ -196,48 +206,4 @@ fn scale(positions: &mut [[f64; 3]], factor: f64) {
     if factor != 1.0 {
         positions.iter_mut().flatten().for_each(|x| *x *= factor);
     }
-}
-
-/// Fills a checked closed surface with tetrahedra.
-fn fill(surface: RawSurface, resolution: Resolution) -> Result<RawTets, ImportError> {
-    let volume = closed_surface::volume(&surface);
-    let field = SurfaceDistance::new(surface)?;
-    let made = match resolution {
-        Resolution::Spacing(spacing) => stuffing::stuff(&field, spacing)?,
-        Resolution::Nodes(wanted) => stuff_to_count(&field, volume, wanted)?,
-    };
-    Ok(RawTets {
-        positions: made.positions,
-        tets: made.tets,
-    })
-}
-
-/// Node counts within this part of the wanted one are accepted.
-const COUNT_TOLERANCE: f64 = 0.02;
-
-fn stuff_to_count(
-    field: &SurfaceDistance,
-    volume: f64,
-    wanted: usize,
-) -> Result<stuffing::Stuffed, ImportError> {
-    // A BCC lattice has two nodes a cube; a body has some more on its surface.
-    let mut spacing = (2.0 * volume / wanted.max(8) as f64).cbrt();
-    let mut best: Option<(f64, stuffing::Stuffed)> = None;
-    for _ in 0..6 {
-        let Ok(made) = stuffing::stuff(field, spacing) else {
-            spacing *= 0.7;
-            continue;
-        };
-        let ratio = made.positions.len() as f64 / wanted as f64;
-        let miss = (ratio - 1.0).abs();
-        if best.as_ref().is_none_or(|(least, _)| miss < *least) {
-            best = Some((miss, made));
-        }
-        if miss <= COUNT_TOLERANCE {
-            break;
-        }
-        spacing *= ratio.cbrt();
-    }
-    best.map(|(_, made)| made)
-        .ok_or(ImportError::NodeCount { wanted })
 }

@@ -50,6 +50,23 @@ impl Field for GridField {
     }
 }
 
+/// `inner` with its surface moved outward by `by`.
+pub struct Offset<'a, F> {
+    pub inner: &'a F,
+    pub by: f64,
+}
+
+impl<F: Field> Field for Offset<'_, F> {
+    fn value(&self, point: [f64; 3]) -> f64 {
+        self.inner.value(point) + self.by
+    }
+
+    fn bounds(&self) -> ([f64; 3], [f64; 3]) {
+        let (low, high) = self.inner.bounds();
+        (low.map(|x| x - self.by), high.map(|x| x + self.by))
+    }
+}
+
 /// The part of `inner` where `normal . p + offset > 0`; `normal` has length 1.
 #[derive(Clone, Debug)]
 pub struct HalfSpace<F> {

@@ -1,74 +1,56 @@
 //! The BCC lattice: two interleaved cubic grids, its 14 edges a node, and the warp of nodes that
 //! lie too close to the surface (Labelle and Shewchuk, section 3).
+//!
+//! Where a body is thin the lattice's tetrahedra may have been bisected (`bisection`); its nodes are
+//! therefore listed one by one.
 
 use super::{Field, StuffError};
 
-/// Safe warp distances as fractions of an edge's length, for edges that join nodes of one cubic
-/// grid (long) and of both (short).
+/// Safe warp distances as fractions of an edge's length, for edges along an axis (they join nodes of
+/// one cubic grid: long) and for all others (short).
 const ALPHA_LONG: f64 = 0.24999;
 const ALPHA_SHORT: f64 = 0.41189;
+
+/// Nodes of a lattice, at most: about a gigabyte.
+const MOST_NODES: f64 = 16e6;
 
 /// Bisection steps of a cut point; below the rounding of an f32 position.
 const BISECTIONS: usize = 40;
 
-/// Nodes are numbered corner grid first, then the cube centres, z fastest.
+/// Coordinates of nodes are whole multiples of half a cube over this, so that every node that
+/// bisection can make has some.
+pub const UNITS: i64 = 64;
+
+/// A lattice over a field. Nodes: corner grid first, then the cube centres, z fastest, then
+/// midpoints of bisected edges in the order in which they were made.
 pub struct Lattice {
-    /// First cube, in cubes.
-    low: [i64; 3],
-    /// Cubes along each axis; corner and centre grids have this shape each.
-    shape: [usize; 3],
     spacing: f64,
+    /// Where each node was before the warp, in units of `spacing / 2 / UNITS`.
+    pub coordinates: Vec<[i64; 3]>,
     /// Field at each node; 0 for nodes moved onto the surface.
     pub values: Vec<f64>,
     /// Position of each node, after the warp.
     pub positions: Vec<[f64; 3]>,
+    pub tets: Vec<[u32; 4]>,
 }
 
-impl Lattice {
-    /// Samples the field at every lattice node of its bounds, with a margin of a cube.
-    pub fn sample(field: &impl Field, spacing: f64) -> Result<Self, StuffError> {
-        let (lower, upper) = field.bounds();
-        let low = lower.map(|x| (x / spacing).floor() as i64 - 1);
-        let high = upper.map(|x| (x / spacing).ceil() as i64 + 2);
-        let shape = [0, 1, 2].map(|axis| (high[axis] - low[axis]) as usize);
-        let count = shape.iter().fold(2.0, |n, &s| n * s as f64);
-        if count >= f64::from(u32::MAX / 16) {
-            return Err(StuffError::TooLarge(count as u64, spacing));
-        }
-        let mut lattice = Self {
-            low,
-            shape,
-            spacing,
-            values: Vec::new(),
-            positions: Vec::new(),
-        };
-        for node in 0..2 * shape.iter().product::<usize>() {
-            let [x, y, z] = lattice
-                .half_coordinates(node)
-                .map(|h| h as f64 * (spacing / 2.0));
-            let value = field.value([x, y, z]);
-            if !value.is_finite() {
-                return Err(StuffError::NotFinite { value, x, y, z });
-            }
-            lattice.values.push(value);
-            lattice.positions.push([x, y, z]);
-        }
-        Ok(lattice)
-    }
+/// A uniform lattice's cubes.
+struct Cubes {
+    /// First cube, in cubes.
+    low: [i64; 3],
+    /// Cubes along each axis; corner and centre grids have this shape each.
+    shape: [usize; 3],
+}
 
-    fn cubes(&self) -> usize {
+impl Cubes {
+    fn count(&self) -> usize {
         self.shape.iter().product()
     }
 
-    /// Whether a node is a cube centre; an edge is long where both ends agree.
-    pub fn is_centre(&self, node: usize) -> bool {
-        node >= self.cubes()
-    }
-
     /// Coordinates of a node in half cubes: even for corners, odd for centres.
-    pub fn half_coordinates(&self, node: usize) -> [i64; 3] {
-        let centre = i64::from(self.is_centre(node));
-        let cell = node % self.cubes();
+    fn half_coordinates(&self, node: usize) -> [i64; 3] {
+        let centre = i64::from(node >= self.count());
+        let cell = node % self.count();
         let z = cell % self.shape[2];
         let y = cell / self.shape[2] % self.shape[1];
         let x = cell / (self.shape[2] * self.shape[1]);
@@ -89,13 +71,13 @@ impl Lattice {
             }
             cell = cell * shape + at as usize;
         }
-        Some(cell + if half[0] % 2 == 0 { 0 } else { self.cubes() })
+        Some(cell + if half[0] % 2 == 0 { 0 } else { self.count() })
     }
 
     /// Every tetrahedron of the lattice: two neighbouring cube centres and an edge of the face
     /// that their cubes share.
-    pub fn for_each_tet(&self, mut visit: impl FnMut([usize; 4])) {
-        for first in self.cubes()..2 * self.cubes() {
+    fn for_each_tet(&self, mut visit: impl FnMut([usize; 4])) {
+        for first in self.count()..2 * self.count() {
             let at = self.half_coordinates(first);
             for axis in 0..3 {
                 let mut next = at;
@@ -118,6 +100,63 @@ impl Lattice {
                 }
             }
         }
+    }
+}
+
+impl Lattice {
+    /// Samples the field at every lattice node of its bounds, with a margin of a cube, and keeps the
+    /// tetrahedra for which `keep` is true of their nodes' values.
+    pub fn sample(
+        field: &impl Field,
+        spacing: f64,
+        keep: impl Fn([f64; 4]) -> bool,
+    ) -> Result<Self, StuffError> {
+        let (lower, upper) = field.bounds();
+        let low = lower.map(|x| (x / spacing).floor() as i64 - 1);
+        let high = upper.map(|x| (x / spacing).ceil() as i64 + 2);
+        let shape = [0, 1, 2].map(|axis| (high[axis] - low[axis]) as usize);
+        let count = shape.iter().fold(2.0, |n, &s| n * s as f64);
+        if count >= MOST_NODES {
+            return Err(StuffError::TooLarge(count as u64, spacing));
+        }
+        let cubes = Cubes { low, shape };
+        let mut lattice = Self {
+            spacing,
+            coordinates: Vec::new(),
+            values: Vec::new(),
+            positions: Vec::new(),
+            tets: Vec::new(),
+        };
+        for node in 0..2 * cubes.count() {
+            lattice.add(field, cubes.half_coordinates(node).map(|h| UNITS * h))?;
+        }
+        let values = &lattice.values;
+        cubes.for_each_tet(|tet| {
+            if keep(tet.map(|node| values[node])) {
+                lattice.tets.push(tet.map(|node| node as u32));
+            }
+        });
+        Ok(lattice)
+    }
+
+    /// Adds a node.
+    pub fn add(&mut self, field: &impl Field, coordinates: [i64; 3]) -> Result<u32, StuffError> {
+        let unit = self.spacing / (2 * UNITS) as f64;
+        let [x, y, z] = coordinates.map(|h| h as f64 * unit);
+        let value = field.value([x, y, z]);
+        if !value.is_finite() {
+            return Err(StuffError::NotFinite { value, x, y, z });
+        }
+        self.coordinates.push(coordinates);
+        self.values.push(value);
+        self.positions.push([x, y, z]);
+        Ok(self.values.len() as u32 - 1)
+    }
+
+    /// Squared length of an edge before the warp, in units.
+    pub fn length2(&self, one: usize, other: usize) -> i64 {
+        let (a, b) = (self.coordinates[one], self.coordinates[other]);
+        (0..3).map(|axis| (a[axis] - b[axis]).pow(2)).sum()
     }
 
     /// Where the field changes sign on the edge between two nodes that have not moved.
@@ -149,47 +188,50 @@ impl Lattice {
         at(0.5 * (low + high))
     }
 
-    /// Moves every node that has a cut point within alpha of an edge onto the nearest such point.
-    /// A moved node has value 0, so the cut points of its edges are gone for the nodes after it.
-    pub fn warp(&mut self, field: &impl Field) {
-        const SHORT: [i64; 2] = [-1, 1];
-        let mut offsets = Vec::with_capacity(14);
-        for axis in 0..3 {
-            for step in [-2, 2] {
-                let mut offset = [0; 3];
-                offset[axis] = step;
-                offsets.push((offset, ALPHA_LONG * self.spacing));
-            }
-        }
-        for x in SHORT {
-            for y in SHORT {
-                for z in SHORT {
-                    let reach = ALPHA_SHORT * self.spacing * 0.75f64.sqrt();
-                    offsets.push(([x, y, z], reach));
+    /// Edges on which the field changes sign, from both of their ends, ordered by the first end.
+    fn cut_edges(&self) -> Vec<(u32, u32)> {
+        let mut edges = Vec::new();
+        for tet in &self.tets {
+            for &a in tet {
+                for &b in tet {
+                    if self.values[a as usize] * self.values[b as usize] < 0.0 {
+                        edges.push((a, b));
+                    }
                 }
             }
         }
-        for node in 0..self.values.len() {
+        // Along an axis first.
+        let order = |&(a, b): &(u32, u32)| {
+            let (from, to) = (self.coordinates[a as usize], self.coordinates[b as usize]);
+            let way = [0, 1, 2].map(|axis| to[axis] - from[axis]);
+            let short = way.iter().filter(|&&x| x != 0).count() > 1;
+            let axis = way.iter().position(|&x| x != 0);
+            (a, short, if short { None } else { axis }, way)
+        };
+        edges.sort_unstable_by_key(order);
+        edges.dedup();
+        edges
+    }
+
+    /// Moves every node that has a cut point within alpha of an edge onto the nearest such point.
+    /// A moved node has value 0, so the cut points of its edges are gone for the nodes after it.
+    pub fn warp(&mut self, field: &impl Field) {
+        let edges = self.cut_edges();
+        for own in edges.chunk_by(|one, other| one.0 == other.0) {
+            let node = own[0].0 as usize;
             let value = self.values[node];
             if value == 0.0 {
                 continue;
             }
-            let here = self.half_coordinates(node);
             let origin = self.positions[node];
             let mut nearest = f64::INFINITY;
             let mut target = origin;
-            for &(offset, reach) in &offsets {
-                let at = [
-                    here[0] + offset[0],
-                    here[1] + offset[1],
-                    here[2] + offset[2],
-                ];
-                let Some(neighbour) = self.node_at(at) else {
-                    continue;
-                };
+            for &(_, neighbour) in own {
+                let neighbour = neighbour as usize;
                 if value * self.values[neighbour] >= 0.0 {
                     continue;
                 }
+                let reach = self.reach(node, neighbour);
                 let cut = self.cut(field, node, neighbour);
                 let distance = (0..3)
                     .map(|axis| (cut[axis] - origin[axis]).powi(2))
@@ -205,5 +247,14 @@ impl Lattice {
                 self.values[node] = 0.0;
             }
         }
+    }
+
+    /// How far a node may move along an edge, mm.
+    fn reach(&self, node: usize, neighbour: usize) -> f64 {
+        let (from, to) = (self.coordinates[node], self.coordinates[neighbour]);
+        let axes = (0..3).filter(|&axis| from[axis] != to[axis]).count();
+        let length = (self.length2(node, neighbour) as f64).sqrt() / (2 * UNITS) as f64;
+        let alpha = if axes == 1 { ALPHA_LONG } else { ALPHA_SHORT };
+        alpha * (self.spacing * length)
     }
 }

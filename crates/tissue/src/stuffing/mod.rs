@@ -9,13 +9,14 @@
 //!
 //! A field is positive inside, negative outside, in the unit of length of the positions (mm here).
 
+mod bisection;
 mod field;
 mod grid_file;
 mod lattice;
 mod manifold;
 mod stencils;
 
-pub use field::{Field, GridField, HalfSpace};
+pub use field::{Field, GridField, HalfSpace, Offset};
 
 use lattice::Lattice;
 
@@ -61,12 +62,46 @@ pub fn stuff(field: &impl Field, spacing: f64) -> Result<Stuffed, StuffError> {
     if !(spacing.is_finite() && spacing > 0.0) {
         return Err(StuffError::Spacing(spacing));
     }
-    let mut lattice = Lattice::sample(field, spacing)?;
+    let lattice = Lattice::sample(field, spacing, |values| values.iter().any(|&x| x > 0.0))?;
+    fill(lattice, field, spacing, false)
+}
+
+/// [`stuff`] with a lattice that is finer where the body is thin: tetrahedra are bisected until
+/// `too_large` (of their corners and their longest edge's length, mm) holds of none, down to a
+/// sixteenth of `spacing`. Angles are bounded less well where sizes change. Tetrahedra between two
+/// sheets of the surface, all of whose nodes were moved onto it, are kept too: walls as thin as the
+/// spacing then have no holes.
+///
+/// `field` must be a distance: a tetrahedron farther from the surface than its size is outside.
+///
+/// # Errors
+/// [`StuffError`]; nothing is returned then.
+pub fn stuff_graded(
+    field: &impl Field,
+    spacing: f64,
+    too_large: impl Fn([[f64; 3]; 4], f64) -> bool,
+) -> Result<Stuffed, StuffError> {
+    if !(spacing.is_finite() && spacing > 0.0) {
+        return Err(StuffError::Spacing(spacing));
+    }
+    let mut lattice = Lattice::sample(field, spacing, |values| {
+        values.iter().any(|&x| x > -spacing)
+    })?;
+    bisection::refine(&mut lattice, field, spacing, too_large)?;
+    fill(lattice, field, spacing, true)
+}
+
+fn fill(
+    mut lattice: Lattice,
+    field: &impl Field,
+    spacing: f64,
+    thin: bool,
+) -> Result<Stuffed, StuffError> {
     if !lattice.values.iter().any(|&value| value > 0.0) {
         return Err(StuffError::Empty(spacing));
     }
     lattice.warp(field);
-    let mut mesh = stencils::fill(&lattice, field);
+    let mut mesh = stencils::fill(&lattice, field, thin);
     manifold::repair(&mut mesh);
     Ok(mesh)
 }

@@ -6,6 +6,7 @@
 
 use super::lattice::Lattice;
 use super::{Field, Stuffed, volume6};
+use crate::mesh_quality::dihedral_angles;
 use std::collections::HashMap;
 
 /// Output nodes: lattice nodes and cut points that some tetrahedron uses, in order of first use.
@@ -65,31 +66,60 @@ impl<F: Field> Nodes<'_, F> {
                 return;
             }
         }
-        unreachable!("a prism's three diagonals never run in a circle: see diagonal_from_first");
+        // Where a lattice was bisected the diagonals may run in a circle: then from a node within.
+        let corners = [top, bottom].concat();
+        let mut centre = [0.0; 3];
+        for &node in &corners {
+            let at = self.out.positions[node as usize];
+            (0..3).for_each(|axis| centre[axis] += at[axis] / 6.0);
+        }
+        self.out.positions.push(centre);
+        let apex = self.out.positions.len() as u32 - 1;
+        self.tet([apex, top[0], top[1], top[2]]);
+        self.tet([apex, bottom[0], bottom[1], bottom[2]]);
+        for i in 0..3 {
+            let j = (i + 1) % 3;
+            self.pyramid(apex, [top[i], top[j], bottom[j], bottom[i]], falls[i]);
+        }
     }
 }
 
 /// The diagonal of the quadrilateral on the lattice face `(first, second, outside)` whose first
 /// two nodes are inside: true for the one from `first` to the cut point of `second`.
 ///
-/// Where one cut edge is long, the diagonal ends at the other edge's cut point. Where both are
-/// short, the parity rule: it leaves the node that has an even number of coordinates greater than
-/// `outside`.
+/// Where one cut edge is longer, the diagonal ends at the other edge's cut point. Where both are
+/// as long, the parity rule: it leaves the node that has an even number of coordinates greater than
+/// `outside`. Where that does not tell, which a uniform lattice never needs, it leaves the first made.
 fn diagonal_from_first(lattice: &Lattice, first: usize, second: usize, outside: usize) -> bool {
-    let centre = lattice.is_centre(outside);
-    if lattice.is_centre(first) == centre {
-        return true;
+    let longer = lattice.length2(first, outside) - lattice.length2(second, outside);
+    if longer != 0 {
+        return longer > 0;
     }
-    if lattice.is_centre(second) == centre {
-        return false;
+    let there = lattice.coordinates[outside];
+    let even = |node: usize| {
+        let here = lattice.coordinates[node];
+        (0..3).filter(|&axis| here[axis] > there[axis]).count() % 2 == 0
+    };
+    if even(first) == even(second) {
+        return first < second;
     }
-    let here = lattice.half_coordinates(first);
-    let there = lattice.half_coordinates(outside);
-    (0..3).filter(|&axis| here[axis] > there[axis]).count() % 2 == 0
+    even(first)
 }
 
-/// The tetrahedra of the inside.
-pub fn fill(lattice: &Lattice, field: &impl Field) -> Stuffed {
+/// Whether a tetrahedron whose nodes all lie on the surface is a piece of a wall: within, and no sliver.
+fn between_sheets(lattice: &Lattice, field: &impl Field, tet: [u32; 4]) -> bool {
+    let corners = tet.map(|node| lattice.positions[node as usize]);
+    let centre = [0, 1, 2].map(|axis| corners.iter().map(|p| p[axis]).sum::<f64>() / 4.0);
+    let [a, b, c, d] = corners;
+    let shape = |angle: &f64| (10.0..160.0).contains(angle);
+    tet.iter().all(|&node| lattice.values[node as usize] == 0.0)
+        && field.value(centre) > 0.0
+        && volume6(a, b, c, d) != 0.0
+        && dihedral_angles(corners).iter().all(shape)
+}
+
+/// The tetrahedra of the inside; with `thin`, also those between two sheets of the surface.
+pub fn fill(lattice: &Lattice, field: &impl Field, thin: bool) -> Stuffed {
     let mut nodes = Nodes {
         lattice,
         field,
@@ -97,20 +127,25 @@ pub fn fill(lattice: &Lattice, field: &impl Field) -> Stuffed {
         of_edge: HashMap::new(),
         out: Stuffed::default(),
     };
-    lattice.for_each_tet(|tet| {
+    for tet in &lattice.tets {
         let pick = |keep: fn(f64) -> bool| -> Vec<usize> {
-            tet.into_iter()
+            tet.iter()
+                .map(|&node| node as usize)
                 .filter(|&node| keep(lattice.values[node]))
                 .collect()
         };
         let inside = pick(|value| value > 0.0);
         if inside.is_empty() {
-            return;
+            if thin && between_sheets(lattice, field, *tet) {
+                let kept = tet.map(|node| nodes.node(node as usize));
+                nodes.tet(kept);
+            }
+            continue;
         }
         let zero = pick(|value| value == 0.0);
         let outside = pick(|value| value < 0.0);
         replace(&mut nodes, &inside, &zero, &outside);
-    });
+    }
     nodes.out
 }
 

@@ -3,6 +3,7 @@
 
 mod surfaces;
 mod tets;
+mod thin;
 
 use contact::Shape;
 use std::path::{Path, PathBuf};
@@ -276,7 +277,7 @@ fn vtk_polydata_is_a_closed_surface() {
 #[test]
 fn a_surface_that_passes_through_itself_is_named_unless_it_hardly_does() {
     let options = |repair| ImportOptions {
-        resolution: Some(Resolution::Nodes(300)),
+        resolution: Some(Resolution::Nodes(3000)),
         repair,
         ..ImportOptions::default()
     };
