@@ -30,6 +30,7 @@ pub mod mesh_import;
 pub mod mesh_quality;
 pub mod metrics;
 pub mod programmes;
+pub mod regular_file;
 pub mod schemes;
 pub mod simulate;
 pub mod solver;

@@ -9,7 +9,7 @@ use std::path::Path;
 impl Mesh {
     /// Reads and validates a mesh file.
     pub fn read(path: &Path) -> Result<Self, MeshError> {
-        let bytes = std::fs::read(path).map_err(|source| MeshError::Io {
+        let bytes = crate::regular_file::read(path).map_err(|source| MeshError::Io {
             path: path.into(),
             source,
         })?;

@@ -1,10 +1,11 @@
 //! Whether triangles bound a body: closed, each edge with two faces, one direction, one part.
 
-use super::{ImportError, RawSurface, Repair};
+use super::{ImportError, RawSurface, Repair, surface_repair};
 use std::collections::BTreeMap;
 
-/// Checks a surface; with `repair`, drops degenerate faces, keeps the largest part and turns an
-/// inside-out surface. Holes and edges of more than two faces are always errors.
+/// Checks a surface. Corners that differ in their last digits are welded where that closes it. With `repair`, drops degenerate and
+/// repeated faces, turns faces that are turned against their neighbours, keeps the largest part and turns an inside-out surface.
+/// Holes and edges of more than two faces are always errors.
 pub fn check(
     surface: &mut RawSurface,
     repair: bool,
@@ -25,8 +26,16 @@ pub fn check(
     if let Some(node) = surface.positions.iter().position(|p| !finite(p)) {
         return Err(ImportError::NonFinite { node });
     }
+    surface_repair::weld(surface, repairs);
     degenerate(surface, repair, repairs)?;
-    edges(surface)?;
+    if repair {
+        surface_repair::drop_repeated(surface, repairs);
+    }
+    closed(surface)?;
+    if repair {
+        surface_repair::turn(surface, repairs);
+    }
+    oriented(surface)?;
     parts(surface, repair, repairs)?;
     let volume_mm3 = volume(surface);
     if volume_mm3 < 0.0 {
@@ -95,38 +104,42 @@ fn faces_of_edges(surface: &RawSurface) -> BTreeMap<[u32; 2], Vec<(usize, bool)>
     edges
 }
 
-fn edges(surface: &RawSurface) -> Result<(), ImportError> {
+/// Whether each edge has two faces.
+fn closed(surface: &RawSurface) -> Result<(), ImportError> {
     let all = faces_of_edges(surface);
     let open = all.values().filter(|faces| faces.len() == 1).count();
-    for (&edge, faces) in &all {
-        let at = surface.positions[edge[0] as usize];
-        let face = faces[0].0;
-        match faces[..] {
-            [_] => {
-                return Err(ImportError::Open {
-                    edge,
-                    face,
-                    at,
-                    count: open,
-                });
-            }
-            [one, other] => {
-                if one.1 == other.1 {
-                    return Err(ImportError::Orientation {
-                        first: one.0,
-                        second: other.0,
-                        edge,
-                    });
-                }
-            }
-            _ => {
-                return Err(ImportError::SurfaceEdge {
-                    edge,
-                    face,
-                    at,
-                    faces: faces.len(),
-                });
-            }
+    let odd = all.into_iter().find(|(_, faces)| faces.len() != 2);
+    let Some((edge, faces)) = odd else {
+        return Ok(());
+    };
+    let (face, at) = (faces[0].0, surface.positions[edge[0] as usize]);
+    Err(match faces.len() {
+        1 => ImportError::Open {
+            edge,
+            face,
+            at,
+            count: open,
+        },
+        faces => ImportError::SurfaceEdge {
+            edge,
+            face,
+            at,
+            faces,
+        },
+    })
+}
+
+/// Whether neighbours are turned alike.
+fn oriented(surface: &RawSurface) -> Result<(), ImportError> {
+    for (edge, faces) in faces_of_edges(surface) {
+        if let [one, other] = faces[..]
+            && one.1 == other.1
+        {
+            return Err(ImportError::Orientation {
+                first: one.0,
+                second: other.0,
+                edge,
+            });
         }
     }
     Ok(())
@@ -168,17 +181,13 @@ fn parts(
             face: second,
         });
     }
-    let size = |wanted: usize| {
-        let faces = surface.faces.iter().zip(&part);
-        let chosen = faces.filter(|&(_, &p)| p == wanted).map(|(&face, _)| face);
-        volume(&RawSurface {
-            positions: surface.positions.clone(),
-            faces: chosen.collect(),
-        })
-        .abs()
-    };
+    let mut size = vec![0.0; count];
+    for (&face, &part) in surface.faces.iter().zip(&part) {
+        let [a, b, c] = face.map(|node| surface.positions[node as usize]);
+        size[part] += crate::stuffing::volume6([0.0; 3], a, b, c);
+    }
     let largest = (0..count)
-        .max_by(|&a, &b| size(a).total_cmp(&size(b)).then(b.cmp(&a)))
+        .max_by(|&a, &b| size[a].abs().total_cmp(&size[b].abs()).then(b.cmp(&a)))
         .unwrap_or(0);
     let before = surface.faces.len();
     let first = part.iter().position(|&p| p != largest).unwrap_or(0);

@@ -13,13 +13,13 @@ pub enum ImportError {
         source: std::io::Error,
     },
     #[error(
-        "{path}: unknown extension; use .vtk, .vtu, .msh, .inp, .feb (tetrahedra), .stl, .obj, .ply or .vtp (closed surface)"
+        "{path}: unknown extension; use .vtk, .vtu, .msh, .inp, .feb, .mesh, .node or .ele (tetrahedra), .stl, .obj, .ply, .off or .vtp (closed surface)"
     )]
     Extension { path: PathBuf },
     #[error("{path}: {reason}")]
     Format { path: PathBuf, reason: String },
     #[error(
-        "{path}: element {element} is {kind}; only linear tetrahedra can be imported; mesh again or export first-order tetrahedra"
+        "{path}: element {element} is {kind}; only tetrahedra can be imported; mesh the volume again with tetrahedra"
     )]
     ElementKind {
         path: PathBuf,
@@ -100,7 +100,7 @@ pub enum ImportError {
         count: usize,
     },
     #[error(
-        "edge {edge:?} of face {face} (at {at:?} mm) has {faces} faces; a closed surface has two at each edge"
+        "edge {edge:?} of face {face} (at {at:?} mm) has {faces} faces; a closed surface has two at each edge (--repair drops repeated faces)"
     )]
     SurfaceEdge {
         edge: [u32; 2],
@@ -109,7 +109,7 @@ pub enum ImportError {
         faces: usize,
     },
     #[error(
-        "faces {first} and {second} run along edge {edge:?} in the same direction: one is turned inside out; orient the surface in a mesh editor"
+        "faces {first} and {second} run along edge {edge:?} in the same direction: one is turned inside out; --repair turns it"
     )]
     Orientation {
         first: usize,
@@ -150,6 +150,44 @@ pub enum ImportError {
     Mesh(#[from] MeshError),
     #[error(transparent)]
     Stuffing(#[from] StuffError),
+}
+
+/// What is wrong with the content of a file, which it does not name.
+#[derive(Debug)]
+pub(super) enum Fault {
+    Text(String),
+    /// A volume that is no tetrahedron.
+    Kind {
+        element: usize,
+        kind: String,
+    },
+}
+
+pub(super) fn fault<T>(reason: impl Into<String>) -> Result<T, Fault> {
+    Err(Fault::Text(reason.into()))
+}
+
+impl From<String> for Fault {
+    fn from(reason: String) -> Self {
+        Self::Text(reason)
+    }
+}
+
+impl Fault {
+    /// With the name of its file.
+    pub(super) fn of(self, path: &std::path::Path) -> ImportError {
+        match self {
+            Self::Text(reason) => ImportError::Format {
+                path: path.into(),
+                reason,
+            },
+            Self::Kind { element, kind } => ImportError::ElementKind {
+                path: path.into(),
+                element,
+                kind,
+            },
+        }
+    }
 }
 
 impl ImportError {

@@ -1,185 +1,78 @@
-//! Tetrahedra of a Gmsh mesh, MSH 2.2 and 4.1, text and binary (either byte order); version 1 is in `version_1`.
+//! Tetrahedra of a Gmsh mesh, MSH 2 (2.0 to 2.2) and 4.1, text and binary (either byte order); version 1 is in `version_1`.
 //!
 //! A strict reader of the sections that matter, `$Nodes` and `$Elements`, written from the format's
-//! description in the Gmsh manual; node tags may be sparse. Points, lines and faces are skipped.
+//! description in the Gmsh manual; node tags may be sparse. Points, lines and faces are skipped, tetrahedra of higher order read by
+//! their corners.
 
+mod cursor;
 mod groups;
 mod version_1;
 
+use super::ImportError;
+use super::body::{Read, TetList};
+use super::error::{Fault, fault};
 use super::labels::Labels;
-use super::{ImportError, RawTets};
+use super::words::{bytes_of, short};
+use cursor::Cursor;
 use groups::Groups;
 use std::collections::HashMap;
 use std::path::Path;
 
-/// Reads the linear tetrahedra of a file.
-pub fn read(path: &Path) -> Result<RawTets, ImportError> {
+/// Reads the tetrahedra of a file.
+pub fn read(path: &Path) -> Result<Read, ImportError> {
     named(path, |bytes| parse(bytes).and_then(finish))
 }
 
 /// Reads the triangles and tetrahedra with their physical groups; coordinates as the file has them.
 pub(super) fn read_labels(path: &Path) -> Result<Labels, ImportError> {
-    named(path, parse).map(groups::labels)
-}
-
-fn named<T>(path: &Path, read: impl FnOnce(&[u8]) -> Result<T, Fault>) -> Result<T, ImportError> {
-    let bytes = std::fs::read(path).map_err(|source| ImportError::Io {
-        path: path.into(),
-        source,
-    })?;
-    read(&bytes).map_err(|fault| match fault {
-        Fault::Text(reason) => ImportError::Format {
-            path: path.into(),
-            reason,
-        },
-        Fault::Kind { element, kind } => ImportError::ElementKind {
-            path: path.into(),
-            element,
-            kind: format!("Gmsh element type {kind}"),
-        },
+    named(path, |bytes| {
+        parse(bytes).and_then(|parts| groups::labels(parts, bytes.len()))
     })
 }
 
-enum Fault {
-    Text(String),
-    Kind { element: usize, kind: i64 },
+fn named<T>(path: &Path, read: impl FnOnce(&[u8]) -> Result<T, Fault>) -> Result<T, ImportError> {
+    let bytes = bytes_of(path)?;
+    read(&bytes).map_err(|fault| fault.of(path))
 }
 
-fn fault<T>(reason: impl Into<String>) -> Result<T, Fault> {
-    Err(Fault::Text(reason.into()))
+/// What an element is, by its type in Gmsh.
+#[derive(Clone, Copy, PartialEq)]
+enum Shape {
+    /// A point or a line, or a face of more than three corners.
+    Other,
+    Triangle,
+    Tetrahedron,
 }
 
-/// Gmsh element types that are skipped (points, lines, faces of any order), by number of nodes;
-/// and the linear tetrahedron.
-const TETRAHEDRON: i64 = 4;
-fn node_count(kind: i64, element: usize) -> Result<usize, Fault> {
-    match kind {
-        15 => Ok(1),
-        1 => Ok(2),
-        2 | 8 => Ok(3),
-        3 | 4 => Ok(4),
-        _ => Err(Fault::Kind { element, kind }),
-    }
-}
-
-/// Walks the bytes of a file, text or binary.
-struct Cursor<'a> {
-    bytes: &'a [u8],
-    at: usize,
-    binary: bool,
-    swapped: bool,
-}
-
-impl<'a> Cursor<'a> {
-    fn skip_space(&mut self) {
-        while self.bytes.get(self.at).is_some_and(u8::is_ascii_whitespace) {
-            self.at += 1;
+/// The shape and the number of nodes of a type.
+fn shape(kind: i64, element: usize) -> Result<(Shape, usize), Fault> {
+    Ok(match kind {
+        2 => (Shape::Triangle, 3),
+        9 => (Shape::Triangle, 6),
+        20 => (Shape::Triangle, 9),
+        21 => (Shape::Triangle, 10),
+        22 => (Shape::Triangle, 12),
+        23 | 24 => (Shape::Triangle, 15),
+        25 => (Shape::Triangle, 21),
+        4 => (Shape::Tetrahedron, 4),
+        11 => (Shape::Tetrahedron, 10),
+        29 => (Shape::Tetrahedron, 20),
+        30 => (Shape::Tetrahedron, 35),
+        31 => (Shape::Tetrahedron, 56),
+        15 => (Shape::Other, 1),
+        1 => (Shape::Other, 2),
+        8 => (Shape::Other, 3),
+        26 => (Shape::Other, 4),
+        27 => (Shape::Other, 5),
+        28 => (Shape::Other, 6),
+        3 => (Shape::Other, 4),
+        10 => (Shape::Other, 9),
+        16 => (Shape::Other, 8),
+        _ => {
+            let kind = format!("Gmsh element type {kind}");
+            return Err(Fault::Kind { element, kind });
         }
-    }
-
-    /// The next word of text.
-    fn word(&mut self) -> Result<&'a str, Fault> {
-        self.skip_space();
-        let start = self.at;
-        while self
-            .bytes
-            .get(self.at)
-            .is_some_and(|b| !b.is_ascii_whitespace())
-        {
-            self.at += 1;
-        }
-        if start == self.at {
-            return fault("the file ends too early");
-        }
-        std::str::from_utf8(&self.bytes[start..self.at])
-            .or_else(|_| fault(format!("byte {start}: not text where text is due")))
-    }
-
-    /// To the first byte of a binary block.
-    fn begin_block(&mut self) {
-        if self.binary {
-            self.end_line();
-        }
-    }
-
-    /// Past the end of the line, which opens a binary block.
-    fn end_line(&mut self) {
-        while self.at < self.bytes.len() && self.bytes[self.at] != b'\n' {
-            self.at += 1;
-        }
-        self.at = (self.at + 1).min(self.bytes.len());
-    }
-
-    fn raw<const N: usize>(&mut self) -> Result<[u8; N], Fault> {
-        let Some(chunk) = self.bytes.get(self.at..self.at + N) else {
-            return fault("the file ends inside a binary block");
-        };
-        self.at += N;
-        let mut out = [0; N];
-        out.copy_from_slice(chunk);
-        if self.swapped {
-            out.reverse();
-        }
-        Ok(out)
-    }
-
-    fn parsed<T: std::str::FromStr>(&mut self) -> Result<T, Fault> {
-        let word = self.word()?;
-        word.parse().or_else(|_| {
-            fault(format!(
-                "`{word}` (before byte {}) is not a number",
-                self.at
-            ))
-        })
-    }
-
-    /// A 4-byte integer where binary.
-    fn int(&mut self) -> Result<i64, Fault> {
-        if self.binary {
-            Ok(i64::from(i32::from_le_bytes(self.raw()?)))
-        } else {
-            self.parsed()
-        }
-    }
-
-    /// An 8-byte size where binary.
-    fn size(&mut self) -> Result<u64, Fault> {
-        if self.binary {
-            Ok(u64::from_le_bytes(self.raw()?))
-        } else {
-            self.parsed()
-        }
-    }
-
-    fn real(&mut self) -> Result<f64, Fault> {
-        if self.binary {
-            Ok(f64::from_le_bytes(self.raw()?))
-        } else {
-            self.parsed()
-        }
-    }
-
-    fn expect(&mut self, wanted: &str) -> Result<(), Fault> {
-        match self.word()? {
-            word if word == wanted => Ok(()),
-            word => fault(format!("`{word}` where `{wanted}` is due")),
-        }
-    }
-
-    /// Past the line `$End<section>`.
-    fn skip_section(&mut self, section: &str) -> Result<(), Fault> {
-        let end = format!("$End{section}");
-        match self.bytes[self.at..]
-            .windows(end.len())
-            .position(|window| window == end.as_bytes())
-        {
-            Some(offset) => {
-                self.at += offset + end.len();
-                Ok(())
-            }
-            None => fault(format!("section ${section} has no {end}")),
-        }
-    }
+    })
 }
 
 /// What the sections give: coordinates by order of appearance, and their tags.
@@ -187,7 +80,8 @@ impl<'a> Cursor<'a> {
 struct Parts {
     positions: Vec<[f64; 3]>,
     node_of_tag: HashMap<u64, u32>,
-    tets: Vec<[u64; 4]>,
+    /// Node tags of each tetrahedron.
+    tets: Vec<Vec<u64>>,
     groups: Groups,
 }
 
@@ -199,6 +93,18 @@ impl Parts {
         }
         self.positions.push(point);
         Ok(())
+    }
+
+    /// An element by its node tags; `physical` is a list of [`Groups`].
+    fn element(&mut self, shape: Shape, nodes: Vec<u64>, physical: usize) {
+        match shape {
+            Shape::Other => {}
+            Shape::Triangle => self.groups.add(&nodes[..3], physical),
+            Shape::Tetrahedron => {
+                self.groups.add(&nodes[..4], physical);
+                self.tets.push(nodes);
+            }
+        }
     }
 }
 
@@ -215,11 +121,12 @@ fn parse(bytes: &[u8]) -> Result<Parts, Fault> {
     cursor.expect("$MeshFormat")?;
     let version = cursor.word()?;
     let four = match version {
-        "2.2" => false,
+        "2" | "2.0" | "2.1" | "2.2" => false,
         "4.1" => true,
         other => {
             return fault(format!(
-                "MSH version {other}; save as 4.1 or 2.2 (gmsh -format msh41)"
+                "MSH version {}; save as 4.1 or 2.2 (gmsh -format msh41)",
+                short(other)
             ));
         }
     };
@@ -244,7 +151,7 @@ fn parse(bytes: &[u8]) -> Result<Parts, Fault> {
         }
         let word = cursor.word()?;
         let Some(section) = word.strip_prefix('$') else {
-            return fault(format!("`{word}` where a $Section is due"));
+            return fault(format!("`{}` where a $Section is due", short(word)));
         };
         if !matches!(section, "Nodes" | "Elements" | "PhysicalNames" | "Entities") {
             cursor.skip_section(section)?;
@@ -265,16 +172,13 @@ fn parse(bytes: &[u8]) -> Result<Parts, Fault> {
     Ok(parts)
 }
 
-fn finish(parts: Parts) -> Result<RawTets, Fault> {
-    if parts.tets.is_empty() {
-        return fault("the file holds no tetrahedra; mesh the volume (gmsh -3)");
-    }
-    let mut tets = Vec::with_capacity(parts.tets.len());
+fn finish(parts: Parts) -> Result<Read, Fault> {
+    let mut tets = TetList::default();
     for (index, tet) in parts.tets.iter().enumerate() {
-        let mut nodes = [0; 4];
-        for (node, tag) in nodes.iter_mut().zip(tet) {
+        let mut nodes = Vec::with_capacity(tet.len());
+        for tag in tet {
             match parts.node_of_tag.get(tag) {
-                Some(&found) => *node = found,
+                Some(&node) => nodes.push(node),
                 None => {
                     return fault(format!(
                         "tet {index} names node tag {tag}, which does not exist"
@@ -282,12 +186,10 @@ fn finish(parts: Parts) -> Result<RawTets, Fault> {
                 }
             }
         }
-        tets.push(nodes);
+        tets.add(&nodes);
     }
-    Ok(RawTets {
-        positions: parts.positions,
-        tets,
-    })
+    let none = "the file holds no tetrahedra; mesh the volume (gmsh -3)";
+    tets.finish(parts.positions, none)
 }
 
 fn nodes_2(cursor: &mut Cursor, parts: &mut Parts) -> Result<(), Fault> {
@@ -313,7 +215,7 @@ fn elements_2(cursor: &mut Cursor, parts: &mut Parts) -> Result<(), Fault> {
             let _tag = cursor.int()?;
             (cursor.int()?, 1, cursor.int()?)
         };
-        let nodes = node_count(kind, element)?;
+        let (shape, nodes) = shape(kind, element)?;
         if block < 1 {
             return fault("an element block holds no element");
         }
@@ -329,14 +231,10 @@ fn elements_2(cursor: &mut Cursor, parts: &mut Parts) -> Result<(), Fault> {
                     physical = tag;
                 }
             }
-            let mut list = [0u64; 4];
-            for node in list.iter_mut().take(nodes) {
-                *node = cursor.int()? as u64;
-            }
-            parts.groups.add(kind, &list[..nodes], &[physical]);
-            if kind == TETRAHEDRON {
-                parts.tets.push(list);
-            }
+            let list = (0..nodes).map(|_| Ok(cursor.int()? as u64));
+            let list = list.collect::<Result<_, Fault>>()?;
+            let physical = parts.groups.list_of(physical);
+            parts.element(shape, list, physical);
             element += 1;
         }
     }
@@ -376,18 +274,13 @@ fn elements_4(cursor: &mut Cursor, parts: &mut Parts) -> Result<(), Fault> {
     let mut element = 0;
     for _ in 0..blocks {
         let [dimension, entity, kind] = [cursor.int()?, cursor.int()?, cursor.int()?];
-        let nodes = node_count(kind, element)?;
+        let (shape, nodes) = shape(kind, element)?;
         let physical = parts.groups.of_entity(dimension, entity);
         for _ in 0..cursor.size()? {
             let _tag = cursor.size()?;
-            let mut list = [0u64; 4];
-            for node in list.iter_mut().take(nodes) {
-                *node = cursor.size()?;
-            }
-            parts.groups.add(kind, &list[..nodes], &physical);
-            if kind == TETRAHEDRON {
-                parts.tets.push(list);
-            }
+            let list = (0..nodes).map(|_| cursor.size());
+            let list = list.collect::<Result<_, Fault>>()?;
+            parts.element(shape, list, physical);
             element += 1;
         }
     }

@@ -8,7 +8,7 @@ use super::ImportError;
 use parry3d_f64::math::Vector;
 use parry3d_f64::query::PointQueryWithLocation;
 use parry3d_f64::shape::{TriMesh, TrianglePointLocation};
-use std::collections::{BTreeSet, HashSet};
+use std::collections::{BTreeSet, HashMap, HashSet};
 use std::path::Path;
 
 /// Names of a file's parts; several a part.
@@ -18,17 +18,80 @@ pub struct Labels {
     pub positions: Vec<[f64; 3]>,
     pub faces: Vec<[u32; 3]>,
     pub tets: Vec<[u32; 4]>,
-    pub of_face: Vec<Vec<String>>,
-    pub of_point: Vec<Vec<String>>,
-    pub of_tet: Vec<Vec<String>>,
+    named: Vec<Named>,
+    place_of_name: HashMap<String, usize>,
+    /// Members of all names together, and how many there may be.
+    members: usize,
+    most_members: usize,
+}
+
+/// What has a name, by index.
+#[derive(Default)]
+struct Named {
+    name: String,
+    faces: Vec<u32>,
+    points: Vec<u32>,
+    tets: Vec<u32>,
+}
+
+/// What a name is given to, by index.
+#[derive(Clone, Copy)]
+pub(super) enum Part {
+    Face(usize),
+    Point(usize),
+    Tet(usize),
 }
 
 impl Labels {
-    /// All names, ascending.
+    /// Without names; a file of this many bytes can give so many parts a name that memory still holds them.
+    pub(super) fn of_file(bytes: usize) -> Self {
+        Self {
+            most_members: bytes.saturating_mul(16).saturating_add(1 << 20),
+            ..Self::default()
+        }
+    }
+
+    /// The number of a name, for [`Self::add`].
+    pub(super) fn name(&mut self, name: &str) -> usize {
+        if let Some(&place) = self.place_of_name.get(name) {
+            return place;
+        }
+        self.named.push(Named {
+            name: name.to_owned(),
+            ..Named::default()
+        });
+        let place = self.named.len() - 1;
+        self.place_of_name.insert(name.to_owned(), place);
+        place
+    }
+
+    /// Gives a part of the file a name, by its number.
+    ///
+    /// # Errors
+    /// The names have more members than a file of this size needs.
+    pub(super) fn add(&mut self, name: usize, part: Part) -> Result<(), String> {
+        self.members += 1;
+        if self.members > self.most_members {
+            return Err(format!(
+                "its groups and sets name more than {} members in all; leave out those that are not needed",
+                self.most_members
+            ));
+        }
+        let named = &mut self.named[name];
+        match part {
+            Part::Face(index) => named.faces.push(index as u32),
+            Part::Point(index) => named.points.push(index as u32),
+            Part::Tet(index) => named.tets.push(index as u32),
+        }
+        Ok(())
+    }
+
+    /// All names that parts have, ascending.
     pub fn names(&self) -> BTreeSet<&str> {
-        let lists = [&self.of_face, &self.of_point, &self.of_tet];
-        let names = lists.into_iter().flatten().flatten();
-        names.map(String::as_str).collect()
+        let used = self.named.iter().filter(|named| {
+            !(named.faces.is_empty() && named.points.is_empty() && named.tets.is_empty())
+        });
+        used.map(|named| named.name.as_str()).collect()
     }
 
     /// The part of this name, with lengths multiplied by `scale`.
@@ -36,15 +99,31 @@ impl Labels {
     /// # Errors
     /// No part has the name; the message lists those that are there.
     pub fn group(&self, name: &str, path: &Path, scale: f64) -> Result<Group, ImportError> {
-        let has = |list: &Vec<String>| list.iter().any(|n| n.eq_ignore_ascii_case(name));
-        let faces: Vec<bool> = self.of_face.iter().map(has).collect();
-        let points: Vec<bool> = self.of_point.iter().map(has).collect();
-        let tets: Vec<bool> = self.of_tet.iter().map(has).collect();
+        let mut faces = vec![false; self.faces.len()];
+        let mut points = vec![false; self.positions.len()];
+        let mut tets = vec![false; self.tets.len()];
+        let mut found = false;
+        for named in &self.named {
+            if !named.name.eq_ignore_ascii_case(name) {
+                continue;
+            }
+            let flags = [&mut faces, &mut points, &mut tets];
+            for (flags, members) in
+                flags
+                    .into_iter()
+                    .zip([&named.faces, &named.points, &named.tets])
+            {
+                for &member in members {
+                    flags[member as usize] = true;
+                    found = true;
+                }
+            }
+        }
         let format = |reason: String| ImportError::Format {
             path: path.into(),
             reason,
         };
-        if ![&faces, &points, &tets].into_iter().flatten().any(|&x| x) {
+        if !found {
             let names: Vec<&str> = self.names().into_iter().take(40).collect();
             return Err(format(if names.is_empty() {
                 format!("no part of the file is called `{name}`; the file names no parts")
@@ -54,6 +133,23 @@ impl Labels {
                     names.join(", ")
                 )
             }));
+        }
+        let count = self.positions.len();
+        let corners = self
+            .faces
+            .iter()
+            .flatten()
+            .chain(self.tets.iter().flatten());
+        if let Some(node) = corners.copied().find(|&node| node as usize >= count) {
+            return Err(format(format!(
+                "an element names node {node}, but there are {count} nodes"
+            )));
+        }
+        let broken = |p: &[f64; 3]| p.iter().any(|x| !x.is_finite());
+        if let Some(node) = self.positions.iter().position(broken) {
+            return Err(format(format!(
+                "node {node} has a coordinate that is no number, so that its names have no place"
+            )));
         }
         let scaled: Vec<[f64; 3]> = self
             .positions
@@ -136,7 +232,29 @@ impl Group {
         let [x, y, z] = key(centroid);
         // The neighbours too: rounding may go the other way.
         (-1..=1).any(|i| {
-            (-1..=1).any(|j| (-1..=1).any(|k| self.cells.contains(&[x + i, y + j, z + k])))
+            (-1..=1).any(|j| {
+                (-1..=1).any(|k| {
+                    let near = [(x, i), (y, j), (z, k)].map(|(at, by)| at.saturating_add(by));
+                    self.cells.contains(&near)
+                })
+            })
         })
     }
+}
+
+/// Faces of one tetrahedron alone, outward: where the names of points are looked up in a file without triangles.
+pub(super) fn boundary(tets: &[[u32; 4]]) -> Vec<[u32; 3]> {
+    let faces = |&[a, b, c, d]: &[u32; 4]| [[a, c, b], [a, b, d], [a, d, c], [b, c, d]];
+    let mut uses: HashMap<[u32; 3], u32> = HashMap::new();
+    for face in tets.iter().flat_map(faces) {
+        *uses.entry(sorted(face)).or_default() += 1;
+    }
+    let alone = |face: &[u32; 3]| uses[&sorted(*face)] == 1;
+    tets.iter().flat_map(faces).filter(alone).collect()
+}
+
+/// A triangle's nodes, ascending: the same for both of its sides.
+pub(super) fn sorted(mut face: [u32; 3]) -> [u32; 3] {
+    face.sort_unstable();
+    face
 }

@@ -2,34 +2,44 @@
 //!
 //! | extension | read as |
 //! |---|---|
-//! | `.vtk`, `.vtu` | linear tetrahedra of a VTK legacy or XML unstructured grid |
-//! | `.msh` | linear tetrahedra of a Gmsh file, version 2.2 or 4.1, text or binary, or version 1 |
-//! | `.inp` | linear tetrahedra (C3D4) of an Abaqus or CalculiX input file |
-//! | `.feb` | linear tetrahedra (tet4) of a FEBio model |
-//! | `.stl`, `.obj`, `.ply`, VTK polydata (`.vtk`, `.vtp`) | a closed surface, filled with tetrahedra of a chosen spacing |
+//! | `.vtk`, `.vtu` | tetrahedra of a VTK legacy or XML unstructured grid |
+//! | `.msh` | tetrahedra of a Gmsh file, version 2.0 to 2.2 or 4.1, text or binary, or version 1 |
+//! | `.inp` | tetrahedra (C3D4, C3D10) of an Abaqus or CalculiX input file |
+//! | `.feb` | tetrahedra (tet4, tet10) of a FEBio model |
+//! | `.mesh` | tetrahedra, or a closed surface, of a Medit file |
+//! | `.node`, `.ele` | tetrahedra of TetGen |
+//! | `.stl`, `.obj`, `.ply`, `.off`, VTK polydata (`.vtk`, `.vtp`) | a closed surface, filled with tetrahedra of a chosen spacing |
+//!
+//! Of tetrahedra of higher order the corners are read, which [`Imported::repairs`] says. Only regular files are opened, and no file
+//! makes a reader take far more memory than it has bytes: counts are held against what is left of the file.
 //!
 //! Coordinates are taken as millimetres times [`ImportOptions::scale`]. What is wrong with a file is
 //! an [`ImportError`] that names the element; with [`ImportOptions::repair`] the fault is removed
 //! where that is safe and listed in [`Imported::repairs`].
 
+mod body;
 mod closed_surface;
 mod distance;
 mod error;
+mod far;
 mod fill;
 mod gmsh;
 mod labels;
+mod medit;
 mod named_tets;
+mod polygons;
 mod region;
 mod repair;
 mod self_crossing;
 mod sets;
 mod surface_files;
+mod surface_repair;
+mod tetgen;
 mod thickness;
 mod tool_file;
 mod vtk;
-mod vtk_labels;
-mod vtk_raw;
 mod walls;
+mod words;
 
 pub use distance::SurfaceDistance;
 pub use error::{ImportError, Repair};
@@ -37,6 +47,8 @@ pub use labels::{Group, Labels};
 pub use region::{Opened, Region, faces_in, nodes_in, tets_in};
 pub use sets::Ball;
 pub use tool_file::tool_shape;
+
+use body::{Body, Read};
 
 use crate::mesh::Mesh;
 use std::path::Path;
@@ -119,21 +131,17 @@ pub fn import(path: &Path, options: &ImportOptions) -> Result<Imported, ImportEr
     if !(options.scale.is_finite() && options.scale > 0.0) {
         return Err(ImportError::Scale(options.scale));
     }
-    let extension = extension_of(path);
-    let (mut repairs, mut notes) = (Vec::new(), Vec::new());
-    let body = match extension.as_str() {
-        "vtk" | "vtu" | "vtp" => vtk::read(path)?,
-        "msh" => vtk::Body::Tets(gmsh::read(path)?),
-        "inp" | "feb" => vtk::Body::Tets(named_tets::read(path)?),
-        "stl" | "obj" | "ply" => vtk::Body::Surface(surface_files::read(path, &extension)?),
-        _ => return Err(ImportError::Extension { path: path.into() }),
-    };
+    let Read {
+        body,
+        notes: mut repairs,
+    } = read_file(path)?;
+    let mut notes = Vec::new();
     let raw = match body {
-        vtk::Body::Tets(mut raw) => {
+        Body::Tets(mut raw) => {
             scale(&mut raw.positions, options.scale);
             raw
         }
-        vtk::Body::Surface(mut surface) => {
+        Body::Surface(mut surface) => {
             let resolution = options.resolution.ok_or(ImportError::NoResolution)?;
             scale(&mut surface.positions, options.scale);
             closed_surface::check(&mut surface, options.repair, &mut repairs)?;
@@ -162,17 +170,34 @@ pub fn import(path: &Path, options: &ImportOptions) -> Result<Imported, ImportEr
     })
 }
 
+/// What a file holds, by its extension.
+fn read_file(path: &Path) -> Result<Read, ImportError> {
+    let extension = extension_of(path);
+    Ok(match extension.as_str() {
+        "vtk" | "vtu" | "vtp" => vtk::read(path)?,
+        "msh" => gmsh::read(path)?,
+        "inp" | "feb" => named_tets::read(path)?,
+        "mesh" => medit::read(path)?,
+        "node" | "ele" => tetgen::read(path)?,
+        surface if surface_files::EXTENSIONS.contains(&surface) => {
+            surface_files::read(path, surface)?.into()
+        }
+        _ => return Err(ImportError::Extension { path: path.into() }),
+    })
+}
+
 /// Reads the names that a file gives to parts of itself; formats without any have none.
 ///
 /// # Errors
 /// [`ImportError`] of the file.
 pub fn read_labels(path: &Path) -> Result<Labels, ImportError> {
     match extension_of(path).as_str() {
-        "obj" => surface_files::obj_labels(path),
-        "ply" => surface_files::ply_labels(path),
+        extension @ ("obj" | "ply") => surface_files::read_labels(path, extension),
         "msh" => gmsh::read_labels(path),
-        "vtk" | "vtu" | "vtp" => vtk_labels::read(path),
+        "vtk" | "vtu" | "vtp" => vtk::read_labels(path),
         "inp" | "feb" => named_tets::read_labels(path),
+        "mesh" => medit::read_labels(path),
+        "node" | "ele" => tetgen::read_labels(path),
         _ => Ok(Labels::default()),
     }
 }

@@ -100,10 +100,11 @@ impl Region {
             }
             Self::Inside(path) => {
                 let extension = super::extension_of(path);
-                if !["stl", "obj", "ply"].contains(&extension.as_str()) {
+                if !surface_files::EXTENSIONS.contains(&extension.as_str()) {
                     return Err(ImportError::Format {
                         path: path.into(),
-                        reason: "the surface of inside: is read from .stl, .obj or .ply".into(),
+                        reason: "the surface of inside: is read from .stl, .obj, .ply or .off"
+                            .into(),
                     });
                 }
                 let mut surface = surface_files::read(path, &extension)?;

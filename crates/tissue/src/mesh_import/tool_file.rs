@@ -14,10 +14,10 @@ pub fn tool_shape(path: &Path, scale: f64) -> Result<Shape, ImportError> {
         return Err(ImportError::Scale(scale));
     }
     let extension = super::extension_of(path);
-    if !["stl", "obj", "ply"].contains(&extension.as_str()) {
+    if !surface_files::EXTENSIONS.contains(&extension.as_str()) {
         return Err(ImportError::Format {
             path: path.into(),
-            reason: "a tool is read from .stl, .obj or .ply".into(),
+            reason: "a tool is read from .stl, .obj, .ply or .off".into(),
         });
     }
     let surface = surface_files::read(path, &extension)?;

@@ -10,7 +10,7 @@ impl GridField {
     /// Reads `distance` `[nx, ny, nz]` f32 with the metadata `origin` (JSON `[x, y, z]`, mm) and
     /// `voxel` (mm).
     pub fn read(path: &Path) -> Result<Self, MeshError> {
-        let bytes = std::fs::read(path).map_err(|source| MeshError::Io {
+        let bytes = crate::regular_file::read(path).map_err(|source| MeshError::Io {
             path: path.into(),
             source,
         })?;

@@ -1,7 +1,7 @@
 //! Physical groups of a Gmsh file: the sections `$PhysicalNames` and `$Entities` (4.1), and which elements are in which group.
 
-use super::{Cursor, Fault, Parts, fault};
-use crate::mesh_import::labels::Labels;
+use super::{Cursor, Fault, Parts};
+use crate::mesh_import::labels::{Labels, Part};
 use std::collections::HashMap;
 
 /// Triangles and tetrahedra with the groups that they are in.
@@ -9,29 +9,43 @@ use std::collections::HashMap;
 pub(super) struct Groups {
     /// Names by dimension and number.
     names: HashMap<(i64, i64), String>,
-    /// Physical groups of an entity, by dimension and tag (4.1).
-    entities: HashMap<(i64, i64), Vec<i64>>,
-    /// Node tags of each triangle and tetrahedron, its dimension and the numbers of its groups.
-    pub elements: Vec<(Vec<u64>, i64, Vec<i64>)>,
+    /// Lists of physical groups. Elements share them, since an entity may have many of both.
+    lists: Vec<Vec<i64>>,
+    /// The list of an entity, by dimension and tag (4.1).
+    entities: HashMap<(i64, i64), usize>,
+    /// The list of one group alone.
+    singles: HashMap<i64, usize>,
+    /// Node tags of the corners of each triangle and tetrahedron, and its list.
+    elements: Vec<(Vec<u64>, usize)>,
 }
 
 impl Groups {
-    /// Adds an element; `list` holds its nodes, as many as its kind has.
-    pub fn add(&mut self, kind: i64, list: &[u64], groups: &[i64]) {
-        let dimension = match kind {
-            2 => 2,
-            4 => 3,
-            _ => return,
-        };
-        let groups = groups.iter().copied().filter(|&group| group > 0);
-        self.elements
-            .push((list.to_vec(), dimension, groups.collect()));
+    /// Adds an element by its corners.
+    pub fn add(&mut self, corners: &[u64], list: usize) {
+        self.elements.push((corners.to_vec(), list));
     }
 
-    /// The groups of an entity of version 4.1.
-    pub fn of_entity(&self, dimension: i64, tag: i64) -> Vec<i64> {
-        let found = self.entities.get(&(dimension, tag));
-        found.cloned().unwrap_or_default()
+    fn new_list(&mut self, groups: Vec<i64>) -> usize {
+        self.lists.push(groups);
+        self.lists.len() - 1
+    }
+
+    /// The list of an entity of version 4.1.
+    pub fn of_entity(&mut self, dimension: i64, tag: i64) -> usize {
+        match self.entities.get(&(dimension, tag)) {
+            Some(&list) => list,
+            None => self.list_of(0),
+        }
+    }
+
+    /// The list of one group; 0 is none.
+    pub fn list_of(&mut self, group: i64) -> usize {
+        if let Some(&list) = self.singles.get(&group) {
+            return list;
+        }
+        let list = self.new_list(if group > 0 { vec![group] } else { Vec::new() });
+        self.singles.insert(group, list);
+        list
     }
 
     /// What a group is called: its number, and its name where it has one.
@@ -45,14 +59,8 @@ impl Groups {
         let count: usize = cursor.parsed()?;
         for _ in 0..count {
             let key = (cursor.parsed()?, cursor.parsed()?);
-            let mut name = cursor.word()?.to_owned();
-            while name.len() < 2 || !name.ends_with('"') {
-                if !name.starts_with('"') {
-                    return fault(format!("physical name {name} has no quotes"));
-                }
-                name = format!("{name} {}", cursor.word()?);
-            }
-            self.names.insert(key, name.trim_matches('"').to_owned());
+            let name = cursor.quoted()?;
+            self.names.insert(key, name);
         }
         Ok(())
     }
@@ -81,7 +89,11 @@ impl Groups {
                         cursor.int()?;
                     }
                 }
-                self.entities.insert((dimension as i64, tag), groups);
+                groups.retain(|&group| group > 0);
+                groups.sort_unstable();
+                groups.dedup();
+                let list = self.new_list(groups);
+                self.entities.insert((dimension as i64, tag), list);
             }
         }
         Ok(())
@@ -89,31 +101,31 @@ impl Groups {
 }
 
 /// Names of the triangles and tetrahedra that are in groups.
-pub(super) fn labels(parts: Parts) -> Labels {
-    let mut labels = Labels {
-        positions: parts.positions,
-        ..Labels::default()
-    };
-    for (tags, dimension, groups) in &parts.groups.elements {
-        let names = groups
-            .iter()
-            .flat_map(|&group| parts.groups.words(*dimension, group))
-            .collect();
+pub(super) fn labels(parts: Parts, bytes: usize) -> Result<Labels, Fault> {
+    let mut labels = Labels::of_file(bytes);
+    labels.positions = parts.positions;
+    for (tags, list) in &parts.groups.elements {
         let nodes: Option<Vec<u32>> = tags
             .iter()
             .map(|tag| parts.node_of_tag.get(tag).copied())
             .collect();
-        match nodes.as_deref() {
+        let (part, dimension) = match nodes.as_deref() {
             Some(&[a, b, c]) => {
                 labels.faces.push([a, b, c]);
-                labels.of_face.push(names);
+                (Part::Face(labels.faces.len() - 1), 2)
             }
             Some(&[a, b, c, d]) => {
                 labels.tets.push([a, b, c, d]);
-                labels.of_tet.push(names);
+                (Part::Tet(labels.tets.len() - 1), 3)
             }
-            _ => {}
+            _ => continue,
+        };
+        for &group in &parts.groups.lists[*list] {
+            for word in parts.groups.words(dimension, group) {
+                let name = labels.name(&word);
+                labels.add(name, part)?;
+            }
         }
     }
-    labels
+    Ok(labels)
 }

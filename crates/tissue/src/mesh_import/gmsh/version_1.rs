@@ -2,7 +2,7 @@
 //!
 //! `$NOD`: a count, then `tag x y z`. `$ELM`: a count, then `tag type physical elementary nodes node...`.
 
-use super::{Cursor, Fault, Parts, TETRAHEDRON, fault, node_count};
+use super::{Cursor, Fault, Parts, fault, shape};
 
 /// Whether the file begins as version 1 does.
 pub fn is_version_1(bytes: &[u8]) -> bool {
@@ -28,20 +28,16 @@ pub fn parse(cursor: &mut Cursor<'_>) -> Result<Parts, Fault> {
         let kind: i64 = cursor.parsed()?;
         let [physical, _elementary]: [i64; 2] = [cursor.parsed()?, cursor.parsed()?];
         let stated: usize = cursor.parsed()?;
-        let nodes = node_count(kind, element)?;
+        let (shape, nodes) = shape(kind, element)?;
         if stated != nodes {
             return fault(format!(
                 "element {element} of type {kind} has {stated} nodes, must have {nodes}"
             ));
         }
-        let mut list = [0u64; 4];
-        for node in list.iter_mut().take(nodes) {
-            *node = cursor.parsed()?;
-        }
-        parts.groups.add(kind, &list[..nodes], &[physical]);
-        if kind == TETRAHEDRON {
-            parts.tets.push(list);
-        }
+        let list = (0..nodes).map(|_| cursor.parsed());
+        let list = list.collect::<Result<_, Fault>>()?;
+        let physical = parts.groups.list_of(physical);
+        parts.element(shape, list, physical);
     }
     cursor.expect("$ENDELM")?;
     Ok(parts)

@@ -1,206 +1,381 @@
 //! Tetrahedra of an Abaqus or CalculiX input file (`.inp`), with its sets.
 //!
-//! Keywords begin with `*`, comments with `**`; a keyword line that ends with a comma goes on in the next. Read are `*NODE` (number, x,
-//! y, z), `*ELEMENT` of type C3D4 (number, four nodes), `*NSET` and `*ELSET` (numbers, names of sets, or ranges with `GENERATE`).
-//! Elements of other volumes are an error; shells, beams, springs and everything that is no mesh are skipped.
+//! Keywords begin with `*`, comments with `**`; a keyword line that ends with a comma goes on in the next, and so does an element's.
+//! Read are `*NODE` (number, x, y, z; a normal may follow), `*ELEMENT` of tetrahedra (C3D4, C3D10) and of triangles, `*NSET`, `*ELSET`
+//! and `*SURFACE` of all kinds, parts and instances with their places. Other volumes are an error; everything else is skipped.
 
-use super::{NamedTets, Wrong, wrong};
+use super::super::error::{Fault, fault};
+use super::super::words::{real, short, whole};
+use super::keywords::{name_of, parameter, shape_of};
+use super::model::{Entry, Face, Instance, Model, Placement, Scope, Shape};
+use std::collections::HashMap;
 
 /// What the data lines below a keyword are.
 enum Block {
-    Nodes { set: Option<String> },
-    Tets { set: Option<String> },
-    NodeSet { name: String, ranges: bool },
-    ElementSet { name: String, ranges: bool },
+    Nodes {
+        set: Option<String>,
+    },
+    Elements {
+        shape: Shape,
+        count: usize,
+        set: Option<String>,
+    },
+    NodeSet {
+        name: String,
+        options: SetOptions,
+    },
+    ElementSet {
+        name: String,
+        options: SetOptions,
+    },
+    /// Elements and their sides, or nodes.
+    Surface {
+        name: String,
+        is_of_nodes: bool,
+    },
+    /// The lines of an instance that have been read.
+    Instance(usize),
     Skipped,
 }
 
+#[derive(Clone)]
+struct SetOptions {
+    ranges: bool,
+    instance: Option<String>,
+}
+
+struct Parser {
+    model: Model,
+    /// The scope that is open.
+    scope: usize,
+    scope_of_part: HashMap<String, usize>,
+    block: Block,
+    /// Words of an element that goes on in the next line.
+    pending: Vec<String>,
+}
+
 /// Reads the file.
-pub(super) fn parse(text: &str) -> Result<NamedTets, Wrong> {
-    let mut out = NamedTets::default();
-    let mut block = Block::Skipped;
-    let mut parts = 0;
-    let mut lines = text
-        .lines()
-        .enumerate()
-        .map(|(at, line)| (at + 1, line.trim()));
+pub(super) fn parse(text: &str) -> Result<Model, Fault> {
+    let mut parser = Parser {
+        model: Model::default(),
+        scope: 0,
+        scope_of_part: HashMap::new(),
+        block: Block::Skipped,
+        pending: Vec::new(),
+    };
+    let mut lines = text.lines().zip(1..).map(|(line, at)| (at, line.trim()));
     while let Some((at, line)) = lines.next() {
         if line.is_empty() || line.starts_with("**") {
             continue;
         }
         if !line.starts_with('*') {
-            data(&mut out, &block, at, line)?;
+            parser.data(at, line)?;
             continue;
         }
+        parser.end_block(at)?;
         let mut keyword = line.to_owned();
         while keyword.ends_with(',') {
             match lines.next() {
                 Some((_, more)) => keyword += more,
-                None => return wrong(format!("line {at}: the file ends inside a keyword")),
+                None => return fault(format!("line {at}: the file ends inside a keyword")),
             }
         }
-        parts += usize::from(name_of(&keyword) == "PART");
-        if parts > 1 {
-            return wrong(format!(
-                "line {at}: a second *PART; a file may hold only one part, so export each part by itself"
+        parser.begin(&keyword, at)?;
+    }
+    parser.end_block(text.lines().count())?;
+    Ok(parser.model)
+}
+
+impl Parser {
+    fn open(&mut self) -> &mut Scope {
+        &mut self.model.scopes[self.scope]
+    }
+
+    fn begin(&mut self, keyword: &str, at: usize) -> Result<(), Fault> {
+        let named = |wanted: &str, name: &str| match parameter(keyword, wanted) {
+            Some(found) => Ok(found),
+            None => fault(format!("line {at}: {name} has no name")),
+        };
+        let options = SetOptions {
+            ranges: parameter(keyword, "GENERATE").is_some(),
+            instance: parameter(keyword, "INSTANCE"),
+        };
+        let keyword_name = name_of(keyword);
+        if ["NODE", "ELEMENT", "NSET", "ELSET"].contains(&keyword_name.as_str())
+            && parameter(keyword, "INPUT").is_some()
+        {
+            return fault(format!(
+                "line {at}: INPUT= is not followed; put nodes and elements into one file"
             ));
         }
-        block = begin(&keyword, at)?;
-    }
-    Ok(out)
-}
-
-fn name_of(keyword: &str) -> String {
-    let name = keyword.split(',').next().unwrap_or_default();
-    name.trim_start_matches('*').trim().to_uppercase()
-}
-
-/// The value of a parameter; empty for one without a value.
-fn parameter(keyword: &str, wanted: &str) -> Option<String> {
-    keyword.split(',').skip(1).find_map(|part| {
-        let (name, value) = part.split_once('=').unwrap_or((part, ""));
-        let value = value.trim().trim_matches('"');
-        name.trim()
-            .eq_ignore_ascii_case(wanted)
-            .then(|| value.to_owned())
-    })
-}
-
-fn begin(keyword: &str, at: usize) -> Result<Block, Wrong> {
-    let ranges = parameter(keyword, "GENERATE").is_some();
-    let named = |parameter: Option<String>, name: &str| match parameter {
-        Some(found) => Ok(found),
-        None => wrong(format!("line {at}: {name} has no name")),
-    };
-    Ok(match name_of(keyword).as_str() {
-        "NODE" => Block::Nodes {
-            set: parameter(keyword, "NSET"),
-        },
-        "ELEMENT" => {
-            let Some(kind) = parameter(keyword, "TYPE") else {
-                return wrong(format!("line {at}: *ELEMENT has no TYPE"));
-            };
-            let upper = kind.to_uppercase();
-            if let Some(more) = upper.strip_prefix("C3D4")
-                && !more.starts_with(|c: char| c.is_ascii_digit())
-            {
-                Block::Tets {
-                    set: parameter(keyword, "ELSET"),
-                }
-            } else if ["C3D", "CC3D", "DC3D", "AC3D", "CSS", "SC"]
-                .iter()
-                .any(|volume| upper.starts_with(volume))
-            {
-                return Err(Wrong::Kind {
-                    element: at,
-                    kind: format!("{kind} (line {at})"),
+        self.block = match keyword_name.as_str() {
+            "PART" => {
+                let name = parameter(keyword, "NAME").unwrap_or_default();
+                self.model.scopes.push(Scope {
+                    name: name.clone(),
+                    ..Scope::default()
                 });
-            } else {
+                self.scope = self.model.scopes.len() - 1;
+                if self
+                    .scope_of_part
+                    .insert(name.to_uppercase(), self.scope)
+                    .is_some()
+                {
+                    return fault(format!("line {at}: a second *PART is called `{name}`"));
+                }
                 Block::Skipped
             }
+            "END PART" | "END INSTANCE" | "ASSEMBLY" | "END ASSEMBLY" => {
+                self.scope = 0;
+                Block::Skipped
+            }
+            "INSTANCE" => {
+                let part = parameter(keyword, "PART").unwrap_or_default();
+                let scope = match self.scope_of_part.get(&part.to_uppercase()) {
+                    Some(&scope) => scope,
+                    None => {
+                        // It may hold its own mesh.
+                        self.model.scopes.push(Scope::default());
+                        self.model.scopes.len() - 1
+                    }
+                };
+                self.model.instances.push(Instance {
+                    name: named("NAME", "*INSTANCE")?,
+                    scope,
+                    placement: Placement::IDENTITY,
+                    first_node: 0,
+                });
+                if part.is_empty() {
+                    self.scope = scope;
+                }
+                Block::Instance(0)
+            }
+            "NODE" => {
+                let system = parameter(keyword, "SYSTEM").unwrap_or_default();
+                if !(system.is_empty() || system.eq_ignore_ascii_case("R")) {
+                    return fault(format!(
+                        "line {at}: coordinates in SYSTEM={} are not read; give x, y and z",
+                        short(&system)
+                    ));
+                }
+                Block::Nodes {
+                    set: parameter(keyword, "NSET"),
+                }
+            }
+            "SYSTEM" => {
+                return fault(format!(
+                    "line {at}: *SYSTEM is not followed; give nodes in the global system"
+                ));
+            }
+            "ELEMENT" => {
+                let Some(kind) = parameter(keyword, "TYPE") else {
+                    return fault(format!("line {at}: *ELEMENT has no TYPE"));
+                };
+                let upper = kind.to_uppercase();
+                let is_volume = ["C3D", "CC3D", "DC3D", "AC3D", "CSS", "SC"]
+                    .iter()
+                    .any(|volume| upper.starts_with(volume));
+                match shape_of(&kind) {
+                    Some((shape, count)) => Block::Elements {
+                        shape,
+                        count,
+                        set: parameter(keyword, "ELSET"),
+                    },
+                    None if is_volume => {
+                        return Err(Fault::Kind {
+                            element: at,
+                            kind: format!("{} (line {at})", short(&kind)),
+                        });
+                    }
+                    None => Block::Skipped,
+                }
+            }
+            "NSET" => {
+                let name = named("NSET", "*NSET")?;
+                if let Some(elements) = parameter(keyword, "ELSET") {
+                    let entry = within(Entry::NodesOfElements(elements), &options.instance);
+                    self.open().node_sets.named(&name).push(entry);
+                }
+                Block::NodeSet { name, options }
+            }
+            "ELSET" => Block::ElementSet {
+                name: named("ELSET", "*ELSET")?,
+                options,
+            },
+            "SURFACE" => {
+                let kind = parameter(keyword, "TYPE").unwrap_or_default();
+                let kind = kind.to_uppercase();
+                match kind.as_str() {
+                    "" | "ELEMENT" | "NODE" => Block::Surface {
+                        name: named("NAME", "*SURFACE")?,
+                        is_of_nodes: kind == "NODE",
+                    },
+                    _ => Block::Skipped,
+                }
+            }
+            "INCLUDE" => {
+                return fault(format!(
+                    "line {at}: *INCLUDE is not followed; put nodes and elements into one file"
+                ));
+            }
+            _ => Block::Skipped,
+        };
+        Ok(())
+    }
+
+    fn end_block(&mut self, at: usize) -> Result<(), Fault> {
+        if self.pending.is_empty() {
+            return Ok(());
         }
-        "NSET" => Block::NodeSet {
-            name: named(parameter(keyword, "NSET"), "*NSET")?,
-            ranges,
-        },
-        "ELSET" => Block::ElementSet {
-            name: named(parameter(keyword, "ELSET"), "*ELSET")?,
-            ranges,
-        },
-        "INCLUDE" => {
-            return wrong(format!(
-                "line {at}: *INCLUDE is not followed; put nodes and elements into one file"
-            ));
+        fault(format!(
+            "line {at}: element {} has {} nodes, too few: is the file cut off?",
+            short(&self.pending[0]),
+            self.pending.len() - 1
+        ))
+    }
+
+    fn data(&mut self, at: usize, line: &str) -> Result<(), Fault> {
+        let words = || line.split(',').map(str::trim);
+        let filled = || words().filter(|word| !word.is_empty());
+        match &mut self.block {
+            Block::Nodes { set } => {
+                // A coordinate that is left out is 0.
+                let words: Vec<&str> = words().take(8).collect();
+                let [number, x, y, z, ..] = words[..] else {
+                    return fault(format!(
+                        "line {at}: a node is a number and three coordinates, not `{}`: is the file cut off?",
+                        short(line)
+                    ));
+                };
+                let number = whole(number, at)?;
+                let coordinate = |word: &str| match word {
+                    "" => Ok(0.0),
+                    word => real(word, at),
+                };
+                let point = [coordinate(x)?, coordinate(y)?, coordinate(z)?];
+                let scope = &mut self.model.scopes[self.scope];
+                scope.node(number, point)?;
+                if let Some(set) = set {
+                    scope.node_sets.named(set).push(Entry::Number(number));
+                }
+            }
+            Block::Elements { shape, count, set } => {
+                self.pending.extend(filled().map(str::to_owned));
+                if self.pending.len() <= *count {
+                    // Only a comma at its end says that a line goes on.
+                    return match line.ends_with(',') {
+                        true => Ok(()),
+                        false => fault(format!(
+                            "line {at}: an element of this type is a number and {count} nodes, not `{}`: is the file cut off?",
+                            short(line)
+                        )),
+                    };
+                }
+                if self.pending.len() > *count + 1 {
+                    return fault(format!(
+                        "line {at}: an element of this type has {count} nodes, not {}",
+                        self.pending.len() - 1
+                    ));
+                }
+                let numbers = self.pending.drain(..).map(|word| whole(&word, at));
+                let numbers: Vec<u64> = numbers.collect::<Result<_, _>>()?;
+                let [number, nodes @ ..] = numbers.as_slice() else {
+                    return Ok(());
+                };
+                let scope = &mut self.model.scopes[self.scope];
+                scope.element(*number, *shape, nodes[..*count].to_vec())?;
+                if let Some(set) = set {
+                    scope.element_sets.named(set).push(Entry::Number(*number));
+                }
+            }
+            Block::NodeSet { name, options } => {
+                let found = members(filled(), options, at)?;
+                let scope = &mut self.model.scopes[self.scope];
+                scope.node_sets.named(name).extend(found);
+            }
+            Block::ElementSet { name, options } => {
+                let found = members(filled(), options, at)?;
+                let scope = &mut self.model.scopes[self.scope];
+                scope.element_sets.named(name).extend(found);
+            }
+            Block::Surface { name, is_of_nodes } => {
+                let scope = &mut self.model.scopes[self.scope];
+                let mut words = filled();
+                let Some(first) = words.next() else {
+                    return Ok(());
+                };
+                let entry = member(first, &None);
+                if *is_of_nodes {
+                    scope.node_sets.named(name).push(entry);
+                } else {
+                    // S1 to S4 are sides; SPOS and SNEG are those of a shell.
+                    let side = words.next().unwrap_or_default();
+                    let side = side.trim_start_matches(['s', 'S']).parse().ok();
+                    scope.surfaces.named(name).push(Face::Side(entry, side));
+                }
+            }
+            Block::Instance(lines) => {
+                let numbers = filled().map(|word| real(word, at));
+                let numbers: Vec<f64> = numbers.collect::<Result<_, _>>()?;
+                *lines += 1;
+                let (lines, instance) = (*lines, self.model.instances.last_mut());
+                if let Some(instance) = instance {
+                    match (lines, numbers.as_slice()) {
+                        (1, &[x, y, z]) => instance.placement.shift = [x, y, z],
+                        (2, &[a, b, c, d, e, f, degrees]) => {
+                            instance.placement.turn([a, b, c], [d, e, f], degrees);
+                        }
+                        _ => {
+                            return fault(format!(
+                                "line {at}: an instance has a shift of three numbers, then a rotation of seven"
+                            ));
+                        }
+                    }
+                }
+            }
+            Block::Skipped => {}
         }
-        _ => Block::Skipped,
-    })
+        Ok(())
+    }
 }
 
-fn data(out: &mut NamedTets, block: &Block, at: usize, line: &str) -> Result<(), Wrong> {
-    let words: Vec<&str> = (line.split(',').map(str::trim))
-        .filter(|word| !word.is_empty())
-        .collect();
-    match block {
-        Block::Nodes { set } => {
-            let [number, x, y, z] = words[..] else {
-                return wrong(format!(
-                    "line {at}: a node is a number and three coordinates, not `{line}`: is the file cut off?"
-                ));
-            };
-            let number = whole(number, at)?;
-            out.node(number, [real(x, at)?, real(y, at)?, real(z, at)?])?;
-            if let Some(set) = set {
-                out.nodes(set, vec![number]);
-            }
-        }
-        Block::Tets { set } => {
-            let [number, a, b, c, d] = words[..] else {
-                return wrong(format!(
-                    "line {at}: a C3D4 is a number and four nodes, not `{line}`: is the file cut off?"
-                ));
-            };
-            let number = whole(number, at)?;
-            let nodes = [whole(a, at)?, whole(b, at)?, whole(c, at)?, whole(d, at)?];
-            out.tet(number, nodes)?;
-            if let Some(set) = set {
-                out.elements(set, vec![number]);
-            }
-        }
-        Block::NodeSet { name, ranges } => {
-            let found = members(&words, *ranges, at, &|set| out.nodes_of(set))?;
-            out.nodes(name, found);
-        }
-        Block::ElementSet { name, ranges } => {
-            let found = members(&words, *ranges, at, &|set| out.elements_of(set))?;
-            out.elements(name, found);
-        }
-        Block::Skipped => {}
+/// An entry of the instance that a set names.
+fn within(entry: Entry, instance: &Option<String>) -> Entry {
+    match instance {
+        Some(instance) => Entry::Of(instance.clone(), Box::new(entry)),
+        None => entry,
     }
-    Ok(())
+}
+
+/// A number, a set, or either of an instance: `Liver-1.12`.
+fn member(word: &str, instance: &Option<String>) -> Entry {
+    let word = word.trim_matches('"');
+    if let Ok(number) = word.parse() {
+        return within(Entry::Number(number), instance);
+    }
+    match word.rsplit_once('.') {
+        Some((of, inner)) if !of.is_empty() => within(member(inner, &None), &Some(of.to_owned())),
+        _ => within(Entry::Set(word.to_owned()), instance),
+    }
 }
 
 /// Members of a data line of a set.
-fn members(
-    words: &[&str],
-    ranges: bool,
+fn members<'a>(
+    words: impl Iterator<Item = &'a str>,
+    options: &SetOptions,
     at: usize,
-    of_set: &dyn Fn(&str) -> Option<Vec<u64>>,
-) -> Result<Vec<u64>, Wrong> {
-    if ranges {
-        let (first, last, step) = match *words {
-            [first, last] => (first, last, "1"),
-            [first, last, step] => (first, last, step),
-            _ => return wrong(format!("line {at}: a range is first, last and step")),
-        };
-        let step = whole(step, at)?.max(1);
-        return Ok((whole(first, at)?..=whole(last, at)?)
-            .step_by(step as usize)
-            .collect());
+) -> Result<Vec<Entry>, Fault> {
+    if !options.ranges {
+        return Ok(words.map(|word| member(word, &options.instance)).collect());
     }
-    let mut found = Vec::with_capacity(words.len());
-    for word in words {
-        match (word.parse(), of_set(word.trim_matches('"'))) {
-            (Ok(number), _) => found.push(number),
-            (Err(_), Some(numbers)) => found.extend(numbers),
-            (Err(_), None) => {
-                return wrong(format!("line {at}: there is no set `{word}` above it"));
-            }
+    let numbers = words.map(|word| whole(word, at));
+    let numbers: Vec<u64> = numbers.collect::<Result<_, _>>()?;
+    let entry = match *numbers.as_slice() {
+        [first, last] => Entry::Range(first, last, 1),
+        [first, last, step] => Entry::Range(first, last, step),
+        _ => {
+            return fault(format!("line {at}: a range is first, last and step"));
         }
-    }
-    Ok(found)
-}
-
-fn whole(word: &str, at: usize) -> Result<u64, Wrong> {
-    match word.parse() {
-        Ok(number) => Ok(number),
-        Err(_) => wrong(format!("line {at}: `{word}` is not a whole number")),
-    }
-}
-
-fn real(word: &str, at: usize) -> Result<f64, Wrong> {
-    // Fortran writes exponents with D.
-    match word.replace(['D', 'd'], "e").parse() {
-        Ok(number) => Ok(number),
-        Err(_) => wrong(format!("line {at}: `{word}` is not a number")),
-    }
+    };
+    Ok(vec![within(entry, &options.instance)])
 }

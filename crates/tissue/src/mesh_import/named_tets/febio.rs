@@ -1,209 +1,386 @@
-//! Tetrahedra of a FEBio model (`.feb`, XML, versions 2 to 4), with its parts and sets.
+//! Tetrahedra of a FEBio model (`.feb`, XML, versions 1.2 to 4), with its parts, sets and surfaces.
 //!
-//! Below `<Mesh>` (`<Geometry>` in version 2): `<Nodes>` with `<node id="1">x,y,z</node>`; `<Elements type="tet4" name="...">` with
-//! `<elem id="1">a,b,c,d</elem>`; `<NodeSet name="...">` and `<ElementSet name="...">` with their numbers as text or as `<n id="1"/>`.
-//! Solids of other types are an error; shells are skipped.
+//! Below `<Mesh>` (`<Geometry>` up to version 2.5): `<Nodes>` with `<node id="1">x,y,z</node>`; `<Elements type="tet4" name="...">`
+//! with `<elem id="1">a,b,c,d</elem>`, in version 1.2 `<tet4 id="1" mat="1">a,b,c,d</tet4>`; `<NodeSet>` and `<ElementSet>` with
+//! numbers, ranges (`1:9:2`), other sets (`@surface:bed`, `<NodeSet node_set="low"/>`) or entries with an `id`; `<Surface>` with
+//! `<tri3>`. Other solids are an error; shells of four corners, springs and beams are skipped.
 
-use super::{NamedTets, Wrong, wrong};
+use super::super::error::{Fault, fault};
+use super::super::words::{real, short, whole};
+use super::model::{Entry, Face, Model, Scope, Shape};
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 
-/// Element types without a volume.
-const THIN: [&str; 11] = [
-    "tri3", "tri6", "tri7", "quad4", "quad8", "quad9", "line2", "line3", "truss2", "spring",
-    "beam3",
-];
+/// What a type of element is: its shape and number of nodes, or none for what has neither volume nor three corners.
+fn kind_of(name: &str) -> Option<Option<(Shape, usize)>> {
+    Some(match name.to_lowercase().as_str() {
+        "tet4" => Some((Shape::Tetrahedron, 4)),
+        "tet5" => Some((Shape::Tetrahedron, 5)),
+        "tet10" => Some((Shape::Tetrahedron, 10)),
+        "tet15" => Some((Shape::Tetrahedron, 15)),
+        "tet20" => Some((Shape::Tetrahedron, 20)),
+        "tri3" => Some((Shape::Triangle, 3)),
+        "tri6" => Some((Shape::Triangle, 6)),
+        "tri7" => Some((Shape::Triangle, 7)),
+        "quad4" | "quad8" | "quad9" | "line2" | "line3" | "truss2" | "spring" | "beam2"
+        | "beam3" => None,
+        _ => return None,
+    })
+}
 
 /// What numbers belong to.
 enum Place {
     Nodes(Option<String>),
-    Tets(String),
-    Thin,
+    /// Elements of a kind; without one each entry says its own (version 1.2).
+    Elements {
+        kind: Option<Option<(Shape, usize)>>,
+        name: String,
+    },
     NodeSet(String),
     ElementSet(String),
+    Surface(String),
+}
+
+struct Parser {
+    scope: Scope,
+    place: Option<Place>,
+    /// Tags that are open inside the place.
+    inner: Vec<String>,
+    /// Number and text of the open entry.
+    number: Option<String>,
+    words: String,
+    parts: usize,
+    is_inside: bool,
 }
 
 /// Reads the file.
-pub(super) fn parse(text: &str) -> Result<NamedTets, Wrong> {
+pub(super) fn parse(text: &str) -> Result<Model, Fault> {
     let mut reader = Reader::from_str(text);
-    let mut out = NamedTets::default();
-    // Names of the open tags, the section that is open, and the number and text of the open entry.
+    let mut parser = Parser {
+        scope: Scope::default(),
+        place: None,
+        inner: Vec::new(),
+        number: None,
+        words: String::new(),
+        parts: 0,
+        is_inside: false,
+    };
+    let mut lines = Lines {
+        text,
+        at: 0,
+        line: 1,
+    };
     let mut open: Vec<String> = Vec::new();
-    let mut place: Option<Place> = None;
-    let (mut number, mut words) = (None, String::new());
-    let mut parts = 0;
     let mut seen = false;
     loop {
-        let line = |reader: &Reader<&[u8]>| {
-            let at = (reader.buffer_position() as usize).min(text.len());
-            1 + text.as_bytes()[..at]
-                .iter()
-                .filter(|b| **b == b'\n')
-                .count()
-        };
-        let event = match reader.read_event() {
-            Ok(event) => event,
-            Err(error) => {
-                return wrong(format!(
-                    "line {}: {error}: is the file cut off?",
-                    line(&reader)
-                ));
-            }
-        };
+        let event = reader.read_event();
+        let at = lines.of(reader.buffer_position() as usize);
         match event {
-            Event::Eof => break,
-            Event::Start(tag) => {
+            Err(error) => return fault(format!("line {at}: {error}: is the file cut off?")),
+            Ok(Event::Eof) => break,
+            Ok(Event::Start(tag)) => {
                 let name = String::from_utf8_lossy(tag.name().as_ref()).into_owned();
-                seen |= name == "Mesh" || name == "Geometry";
-                let inside = open.iter().any(|tag| tag == "Mesh" || tag == "Geometry");
-                if inside && place.is_none() {
-                    place = section(&name, &tag, &mut parts)?;
-                } else {
-                    number = attribute(&tag, "id")?;
+                if is_mesh(&name) {
+                    seen = true;
+                    parser.is_inside = true;
+                    elsewhere(&tag, at)?;
                 }
-                words.clear();
+                parser.start(&name, &tag, at)?;
                 open.push(name);
             }
-            Event::Empty(tag) => {
-                if let (Some(place), Some(id)) = (&place, attribute(&tag, "id")?) {
-                    member(&mut out, place, &id, line(&reader))?;
+            Ok(Event::Empty(tag)) => {
+                let name = String::from_utf8_lossy(tag.name().as_ref()).into_owned();
+                if is_mesh(&name) {
+                    seen = true;
+                    elsewhere(&tag, at)?;
                 }
+                parser.empty(&name, &tag, at)?;
             }
-            Event::Text(more) => match more.unescape() {
-                Ok(more) => words += &more,
-                Err(error) => return wrong(format!("line {}: {error}", line(&reader))),
+            Ok(Event::Text(more)) => match more.unescape() {
+                Ok(more) => parser.words += &more,
+                Err(error) => return fault(format!("line {at}: {error}")),
             },
-            Event::End(tag) => {
+            Ok(Event::End(_)) => {
                 let name = open.pop().unwrap_or_default();
-                let at = line(&reader);
-                match (&place, tag.name().as_ref()) {
-                    (Some(place), b"node" | b"elem") => {
-                        entry(&mut out, place, number.take(), &words, at)?;
-                    }
-                    (Some(_), b"Nodes" | b"Elements") => place = None,
-                    (Some(set), b"NodeSet" | b"ElementSet") => {
-                        member(&mut out, set, &words, at)?;
-                        place = None;
-                    }
-                    (Some(place), _) => {
-                        if let Some(id) = number.take() {
-                            member(&mut out, place, &id, at)?;
-                        }
-                    }
-                    _ => {}
+                parser.end(&name, at)?;
+                if is_mesh(&name) {
+                    parser.is_inside = false;
                 }
-                words.clear();
-                drop(name);
             }
-            _ => {}
+            Ok(_) => {}
         }
     }
     if let Some(tag) = open.last() {
-        return wrong(format!("the file ends inside <{tag}>; is it cut off?"));
+        return fault(format!(
+            "the file ends inside <{}>; is it cut off?",
+            short(tag)
+        ));
     }
     if !seen {
-        return wrong("the file has neither <Mesh> nor <Geometry>");
+        return fault("the file has neither <Mesh> nor <Geometry>");
     }
-    Ok(out)
-}
-
-fn attribute(tag: &BytesStart<'_>, wanted: &str) -> Result<Option<String>, Wrong> {
-    match tag.try_get_attribute(wanted) {
-        Ok(found) => Ok(found.map(|found| String::from_utf8_lossy(&found.value).into_owned())),
-        Err(error) => wrong(error.to_string()),
-    }
-}
-
-fn section(name: &str, tag: &BytesStart<'_>, parts: &mut usize) -> Result<Option<Place>, Wrong> {
-    let called = attribute(tag, "name")?;
-    Ok(match name {
-        "Nodes" => Some(Place::Nodes(called)),
-        "Elements" => {
-            *parts += 1;
-            let kind = attribute(tag, "type")?.unwrap_or_default().to_lowercase();
-            match kind.as_str() {
-                "tet4" => {
-                    let called = called.or(attribute(tag, "mat")?);
-                    Some(Place::Tets(called.unwrap_or_else(|| parts.to_string())))
-                }
-                thin if THIN.contains(&thin) => Some(Place::Thin),
-                _ => {
-                    return Err(Wrong::Kind {
-                        element: *parts,
-                        kind: format!("`{kind}` (part {})", called.unwrap_or_default()),
-                    });
-                }
-            }
-        }
-        "NodeSet" => called.map(Place::NodeSet),
-        "ElementSet" => called.map(Place::ElementSet),
-        _ => None,
+    Ok(Model {
+        scopes: vec![parser.scope],
+        instances: Vec::new(),
     })
 }
 
-/// A node or an element.
-fn entry(
-    out: &mut NamedTets,
-    place: &Place,
-    number: Option<String>,
-    words: &str,
+fn is_mesh(name: &str) -> bool {
+    name == "Mesh" || name == "Geometry"
+}
+
+/// Refuses a mesh that lies in another file.
+fn elsewhere(tag: &BytesStart<'_>, at: usize) -> Result<(), Fault> {
+    match attribute(tag, "from", at)? {
+        Some(file) => fault(format!(
+            "line {at}: the mesh is in {}; import that file",
+            short(&file)
+        )),
+        None => Ok(()),
+    }
+}
+
+/// Numbers of lines by positions that only grow.
+struct Lines<'a> {
+    text: &'a str,
     at: usize,
-) -> Result<(), Wrong> {
-    if matches!(place, Place::Thin) {
-        return Ok(());
+    line: usize,
+}
+
+impl Lines<'_> {
+    fn of(&mut self, position: usize) -> usize {
+        let end = position.clamp(self.at, self.text.len().max(self.at));
+        let passed = self.text.as_bytes().get(self.at..end).unwrap_or_default();
+        self.line += passed.iter().filter(|byte| **byte == b'\n').count();
+        self.at = end;
+        self.line
     }
-    let Some(number) = number else {
-        return wrong(format!("line {at}: an entry has no id"));
-    };
-    let number = whole(&number, at)?;
-    let list: Vec<&str> = words.split(',').map(str::trim).collect();
-    match (place, list.as_slice()) {
-        (Place::Nodes(set), &[x, y, z]) => {
-            let real = |word: &str| match word.parse::<f64>() {
-                Ok(value) => Ok(value),
-                Err(_) => wrong(format!("line {at}: `{word}` is not a number")),
-            };
-            out.node(number, [real(x)?, real(y)?, real(z)?])?;
-            if let Some(set) = set {
-                out.nodes(set, vec![number]);
+}
+
+fn attribute(tag: &BytesStart<'_>, wanted: &str, at: usize) -> Result<Option<String>, Fault> {
+    // Looking for attributes that come twice would take the square of their number.
+    for attribute in tag.attributes().with_checks(false) {
+        match attribute {
+            Ok(found) if found.key.as_ref() == wanted.as_bytes() => {
+                let value = String::from_utf8_lossy(&found.value).into_owned();
+                return Ok(Some(value));
             }
-            Ok(())
+            Ok(_) => {}
+            Err(error) => return fault(format!("line {at}: {error}")),
         }
-        (Place::Tets(part), &[a, b, c, d]) => {
-            let nodes = [whole(a, at)?, whole(b, at)?, whole(c, at)?, whole(d, at)?];
-            out.tet(number, nodes)?;
-            out.elements(part, vec![number]);
-            Ok(())
+    }
+    Ok(None)
+}
+
+impl Parser {
+    fn start(&mut self, name: &str, tag: &BytesStart<'_>, at: usize) -> Result<(), Fault> {
+        self.words.clear();
+        if self.place.is_some() {
+            self.number = attribute(tag, "id", at)?;
+            self.inner.push(name.to_owned());
+        } else if self.is_inside {
+            self.place = self.section(name, tag, at)?;
         }
-        (Place::Nodes(_), _) => wrong(format!(
-            "line {at}: node {number} has {} coordinates, must have three",
-            list.len()
-        )),
-        _ => wrong(format!(
-            "line {at}: element {number} of a tet4 part has {} nodes, must have four",
-            list.len()
-        )),
+        Ok(())
+    }
+
+    /// What a tag below the mesh opens.
+    fn section(
+        &mut self,
+        name: &str,
+        tag: &BytesStart<'_>,
+        at: usize,
+    ) -> Result<Option<Place>, Fault> {
+        let called = attribute(tag, "name", at)?;
+        Ok(match name {
+            "Nodes" => Some(Place::Nodes(called)),
+            "Elements" => {
+                self.parts += 1;
+                let kind = match attribute(tag, "type", at)? {
+                    None => None,
+                    Some(kind) => match kind_of(&kind) {
+                        Some(kind) => Some(kind),
+                        None => {
+                            return Err(Fault::Kind {
+                                element: self.parts,
+                                kind: format!(
+                                    "`{}` (part {}, line {at})",
+                                    short(&kind),
+                                    called.unwrap_or_default()
+                                ),
+                            });
+                        }
+                    },
+                };
+                let called = called.or(attribute(tag, "mat", at)?);
+                Some(Place::Elements {
+                    kind,
+                    name: called.unwrap_or_else(|| self.parts.to_string()),
+                })
+            }
+            "NodeSet" => called.map(Place::NodeSet),
+            "ElementSet" => called.map(Place::ElementSet),
+            "Surface" => called.map(Place::Surface),
+            _ => None,
+        })
+    }
+
+    /// `<n id="1"/>`, or a set inside a set.
+    fn empty(&mut self, name: &str, tag: &BytesStart<'_>, at: usize) -> Result<(), Fault> {
+        let id = attribute(tag, "id", at)?;
+        match (&self.place, name) {
+            (Some(Place::NodeSet(set)), "NodeSet" | "node_set") => {
+                let (set, inner) = (set.clone(), attribute(tag, "node_set", at)?);
+                if let Some(inner) = inner {
+                    self.scope.node_sets.named(&set).push(Entry::Set(inner));
+                }
+                Ok(())
+            }
+            (Some(Place::ElementSet(set)), "ElementSet" | "elem_set") => {
+                let (set, inner) = (set.clone(), attribute(tag, "elem_set", at)?);
+                if let Some(inner) = inner {
+                    self.scope.element_sets.named(&set).push(Entry::Set(inner));
+                }
+                Ok(())
+            }
+            (Some(_), _) => match id {
+                Some(id) => self.members(&id, at),
+                None => Ok(()),
+            },
+            (None, _) => Ok(()),
+        }
+    }
+
+    fn end(&mut self, name: &str, at: usize) -> Result<(), Fault> {
+        let words = std::mem::take(&mut self.words);
+        if self.place.is_none() {
+            return Ok(());
+        }
+        if self.inner.pop().is_none() {
+            // The section itself.
+            self.members(&words, at)?;
+            self.place = None;
+            return Ok(());
+        }
+        let number = self.number.take();
+        match self.place {
+            Some(Place::Nodes(_) | Place::Elements { .. } | Place::Surface(_)) => {
+                self.entry(name, number, &words, at)
+            }
+            _ => self.members(&number.unwrap_or_default(), at),
+        }
+    }
+
+    /// A node, an element or a face.
+    fn entry(
+        &mut self,
+        tag: &str,
+        number: Option<String>,
+        words: &str,
+        at: usize,
+    ) -> Result<(), Fault> {
+        let list: Vec<&str> = words.split(',').map(str::trim).collect();
+        let number = || match &number {
+            Some(number) => whole(number, at),
+            None => fault(format!("line {at}: an entry has no id")),
+        };
+        match &self.place {
+            Some(Place::Nodes(set)) => {
+                let number = number()?;
+                let &[x, y, z] = list.as_slice() else {
+                    return fault(format!(
+                        "line {at}: node {number} has {} coordinates, must have three",
+                        list.len()
+                    ));
+                };
+                self.scope
+                    .node(number, [real(x, at)?, real(y, at)?, real(z, at)?])?;
+                if let Some(set) = set {
+                    self.scope.node_sets.named(set).push(Entry::Number(number));
+                }
+            }
+            Some(Place::Elements { kind, name }) => {
+                let Some(kind) = kind.or_else(|| kind_of(tag)) else {
+                    return Err(Fault::Kind {
+                        element: self.scope.elements.len(),
+                        kind: format!("`{}` (line {at})", short(tag)),
+                    });
+                };
+                let Some((shape, count)) = kind else {
+                    return Ok(());
+                };
+                let number = number()?;
+                let nodes = list.iter().map(|word| whole(word, at));
+                let nodes: Vec<u64> = nodes.collect::<Result<_, _>>()?;
+                if nodes.len() != count {
+                    return fault(format!(
+                        "line {at}: element {number} has {} nodes, must have {count}",
+                        nodes.len()
+                    ));
+                }
+                self.scope.element(number, shape, nodes)?;
+                self.scope
+                    .element_sets
+                    .named(name)
+                    .push(Entry::Number(number));
+            }
+            Some(Place::Surface(name)) => {
+                if let Some(Some((Shape::Triangle, count))) = kind_of(tag) {
+                    let nodes = list.iter().map(|word| whole(word, at));
+                    let nodes: Vec<u64> = nodes.collect::<Result<_, _>>()?;
+                    if nodes.len() != count {
+                        return fault(format!(
+                            "line {at}: a face of surface {} has {} nodes, must have {count}",
+                            short(name),
+                            nodes.len()
+                        ));
+                    }
+                    self.scope.surfaces.named(name).push(Face::Nodes(nodes));
+                }
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// Members of a set, with commas or blanks between them.
+    fn members(&mut self, words: &str, at: usize) -> Result<(), Fault> {
+        let (sets, name) = match &self.place {
+            Some(Place::NodeSet(name)) => (&mut self.scope.node_sets, name),
+            Some(Place::ElementSet(name)) => (&mut self.scope.element_sets, name),
+            _ => return Ok(()),
+        };
+        let set = sets.named(name);
+        for word in words.split([',', ' ', '\n', '\t', '\r']) {
+            if !word.is_empty() {
+                set.push(member(word, at)?);
+            }
+        }
+        Ok(())
     }
 }
 
-/// Numbers of a set, with commas or spaces between them.
-fn member(out: &mut NamedTets, place: &Place, words: &str, at: usize) -> Result<(), Wrong> {
-    let words = words.split([',', ' ', '\n', '\t', '\r']);
-    let numbers: Vec<u64> = words
-        .filter(|word| !word.is_empty())
-        .map(|word| whole(word, at))
-        .collect::<Result<_, _>>()?;
-    match place {
-        Place::NodeSet(name) => out.nodes(name, numbers),
-        Place::ElementSet(name) => out.elements(name, numbers),
-        _ => {}
+/// A number, a range or another set.
+fn member(word: &str, at: usize) -> Result<Entry, Fault> {
+    if let Some(other) = word.strip_prefix('@') {
+        let (kind, name) = other.split_once(':').unwrap_or(("", other));
+        return Ok(match kind {
+            "surface" => Entry::NodesOfSurface(name.to_owned()),
+            "elem_set" | "part" => Entry::NodesOfElements(name.to_owned()),
+            _ => Entry::Set(name.to_owned()),
+        });
     }
-    Ok(())
-}
-
-fn whole(word: &str, at: usize) -> Result<u64, Wrong> {
-    match word.trim().parse() {
-        Ok(number) => Ok(number),
-        Err(_) => wrong(format!("line {at}: `{word}` is not a whole number")),
+    if !word.contains(':') {
+        return Ok(Entry::Number(whole(word, at)?));
+    }
+    let numbers = word.split(':').map(|part| whole(part, at));
+    let numbers: Vec<u64> = numbers.collect::<Result<_, _>>()?;
+    match *numbers.as_slice() {
+        [first, last] => Ok(Entry::Range(first, last, 1)),
+        [first, last, step] => Ok(Entry::Range(first, last, step)),
+        _ => fault(format!(
+            "line {at}: `{}` is no range of first, last and step",
+            short(word)
+        )),
     }
 }
