@@ -56,7 +56,7 @@ impl Linear {
         };
         self.problem.begin(tools, &self.rest, start)?;
         let (mut nodes, mut vectors) = (Vec::new(), Vec::new());
-        if self.problem.is_near(state) {
+        if self.problem.is_near(state)? {
             let compliance = Compliance {
                 prior: self.prior.table(),
                 held: self.prior.held(),
