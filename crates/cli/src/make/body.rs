@@ -103,9 +103,12 @@ fn read(options: &Options, stage: &mut Stage) -> Result<(Mesh, PathBuf)> {
         if options.scale()? != 1.0 {
             bail!("{name}: a mesh file is in mm; leave --unit out");
         }
+        if !options.label.is_empty() || options.part.is_some() {
+            bail!("{name}: a mesh file holds one body; leave --label and --part out");
+        }
         return Ok((Mesh::read(&options.input)?, options.input.clone()));
     }
-    let input = foreign::convert(&options.input, stage)?;
+    let input = foreign::convert(&options.input, &options.label, stage)?;
     let stem = name.split('.').next().unwrap_or_default().to_owned();
     let imported = import(
         &input,
@@ -114,6 +117,7 @@ fn read(options: &Options, stage: &mut Stage) -> Result<(Mesh, PathBuf)> {
             scale: options.scale()?,
             resolution: Some(Resolution::Nodes(options.nodes)),
             repair: !options.no_repair,
+            part: options.part.clone(),
             ..ImportOptions::default()
         },
     )
@@ -313,6 +317,7 @@ pub fn preview_of_failure(options: &Options) {
             scale,
             resolution: Some(Resolution::Nodes(options.nodes.min(3000))),
             repair: true,
+            part: options.part.clone(),
             ..ImportOptions::default()
         };
         import(&options.input, &import_options)

@@ -1,4 +1,4 @@
-"""Converts a file for `upt make`: KIND INPUT OUTPUT. What it prints is told to the user."""
+"""Converts a file for `upt make`: KIND INPUT OUTPUT [LABEL ...]. What it prints is told to the user."""
 
 import sys
 from pathlib import Path
@@ -53,10 +53,10 @@ def isosurface(field):
     return (1 - share) * ends[0] + share * ends[1], faces.reshape(-1, 3)
 
 
-def nifti(path, out):
-    """The surface of all labels together as a .ply in mm, and one of each label beside it."""
+def nifti(path, out, wanted=()):
+    """The surface of the wanted labels (or all) together as a .ply in mm, and one of each label beside it."""
     import nibabel
-    from scipy.ndimage import gaussian_filter, label
+    from scipy.ndimage import gaussian_filter
 
     try:
         image = nibabel.load(path)
@@ -68,10 +68,11 @@ def nifti(path, out):
     names = [int(name) for name in np.unique(labels) if name != 0]
     if not names:
         sys.exit("the volume holds no label but 0")
+    if missing := [name for name in wanted if name not in names]:
+        sys.exit(f"--label: no voxel has label {missing[0]}; the volume has {', '.join(map(str, names[:40]))}")
+    voxel = abs(np.linalg.det(image.affine[:3, :3]))
 
     def surface(inside, file):
-        parts, _ = label(inside)
-        inside = parts == 1 + np.argmax(np.bincount(parts.ravel())[1:])
         field = gaussian_filter(np.pad(inside, 3).astype(float), 0.8) - 0.5
         if not np.any(field > 0):
             return False
@@ -87,17 +88,20 @@ def nifti(path, out):
         file.write_text(head + "\n".join(lines) + "\n")
         return True
 
-    if not surface(labels != 0, Path(out)):
+    if not surface(np.isin(labels, wanted) if wanted else labels != 0, Path(out)):
         sys.exit("what the volume labels is thinner than two voxels")
     if len(names) > 1:
         for name in names:
             file = Path(out).with_name(f"label-{name}.ply")
-            if surface(labels == name, file):
-                print(f"label {name}: {np.sum(labels == name)} voxels; --stiffness inside:{file}=FACTOR")
+            found = labels == name
+            place = image.affine[:3, :3] @ np.argwhere(found).mean(0) + image.affine[:3, 3]
+            size = f"{np.sum(found) * voxel / 1000:.1f} ml at ({', '.join(f'{x:.0f}' for x in place)}) mm"
+            if surface(found, file):
+                print(f"label {name}: {size}; alone with --label {name}, stiffer with --stiffness inside:{file}=FACTOR")
             else:
-                print(f"label {name}: {np.sum(labels == name)} voxels, too few for a surface")
+                print(f"label {name}: {size}, too small for a surface")
 
 
 if __name__ == "__main__":
-    kind, path, out = sys.argv[1:]
-    {"nifti": nifti}[kind](path, out)
+    kind, path, out, *wanted = sys.argv[1:]
+    {"nifti": nifti}[kind](path, out, [int(name) for name in wanted])

@@ -26,9 +26,15 @@ fn kind(input: &Path) -> Option<(&'static str, &'static str, &'static [&'static 
     }
 }
 
-/// The file itself, or what it was converted to.
-pub fn convert(input: &Path, stage: &mut Stage) -> Result<PathBuf> {
+/// The file itself, or what its labels (all, where none is given) were converted to.
+pub fn convert(input: &Path, labels: &[i64], stage: &mut Stage) -> Result<PathBuf> {
     let Some((kind, name, packages)) = kind(input) else {
+        if !labels.is_empty() {
+            bail!(
+                "{}: has no labels; --label is for label volumes",
+                input.display()
+            );
+        }
         return Ok(input.to_owned());
     };
     if !input.is_file() {
@@ -40,6 +46,7 @@ pub fn convert(input: &Path, stage: &mut Stage) -> Result<PathBuf> {
         .args(["-c", SCRIPT, kind])
         .arg(input)
         .arg(&out)
+        .args(labels.iter().map(i64::to_string))
         .output()
         .with_context(|| format!("{}: cannot be started", python.display()))?;
     let said = String::from_utf8_lossy(&ran.stderr);

@@ -42,6 +42,12 @@ pub struct Options {
     /// Unit of the input's coordinates: mm, cm, m, in, or a number of millimetres per unit. Regions are in mm.
     #[arg(long, default_value = "mm")]
     pub unit: String,
+    /// Labels of a label volume that are the body: one or several (`--label 1,3`). Default: all but 0.
+    #[arg(long, value_name = "LABELS", value_delimiter = ',')]
+    pub label: Vec<i64>,
+    /// Which body, where the file holds several: its number or its name in the list that the command then prints.
+    #[arg(long, value_name = "NUMBER|NAME")]
+    pub part: Option<String>,
     /// Region whose nodes are held: ball:x,y,z,r, plane:a,b,c,d (where a x + b y + c z + d > 0), inside:FILE (a closed surface in the input's
     /// unit), group:NAME (a group, material or #rrggbb colour of the input), or not: before one of these. May be repeated. Default: what the
     /// mesh file holds.
@@ -245,11 +251,13 @@ impl Options {
     /// What the body depends on besides the input's bytes.
     pub fn body_words(&self) -> Result<String> {
         let mut words = format!(
-            "{} {} {} {:?} {}",
+            "{} {} {} {:?} {:?} {:?} {}",
             self.scale()?,
             self.nodes,
             self.no_repair,
             self.name,
+            self.part,
+            self.label,
             self.boundary.as_str()
         );
         let stiffer = self.stiffness.iter().map(|(region, _)| region);
@@ -277,6 +285,7 @@ impl Options {
         json!({
             "unit": self.unit, "stiffness": self.stiffness.iter().map(|(region, factor)| format!("{region}={factor}")).collect::<Vec<String>>(),
             "boundary": self.boundary.as_str(), "fixed": list(&self.fixed), "domain": list(&self.domain), "nodes": self.nodes,
+            "part": self.part, "label": self.label,
             "material": self.material, "corrections": self.corrections.map(|effort| effort.to_string()), "natural": self.natural, "patches": self.patches,
             "tolerance_mm": self.tolerance_mm, "minutes": self.minutes, "tools": self.tools, "tool_scale": self.sizes.tool_scale,
         })

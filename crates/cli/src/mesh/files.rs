@@ -36,6 +36,9 @@ pub struct Import {
     /// Remove faults that can be removed safely, and report them.
     #[arg(long)]
     repair: bool,
+    /// Which body, where the file holds several: its number or its name in the list that the command then prints.
+    #[arg(long, value_name = "NUMBER|NAME")]
+    part: Option<String>,
     /// Hold the nodes in this ball (x,y,z,r in mm); may be repeated.
     #[arg(long, value_name = "X,Y,Z,R", allow_hyphen_values = true)]
     fixed_sphere: Vec<Ball>,
@@ -95,6 +98,7 @@ pub fn run_import(args: &Import) -> anyhow::Result<ExitCode> {
             scale: args.scale,
             resolution,
             repair: args.repair,
+            part: args.part.clone(),
             fixed: args.fixed_sphere.clone(),
             domain: args.domain_sphere.clone(),
             window: args.window_sphere.clone(),

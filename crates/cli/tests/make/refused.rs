@@ -106,41 +106,51 @@ fn input_that_cannot_become_a_bundle_is_named_with_what_to_do() {
 }
 
 #[test]
-fn two_pieces_become_the_larger_one_and_are_refused_as_they_are() {
+fn of_two_pieces_one_is_chosen_and_a_speck_is_left_out_by_name() {
     let folder = tempfile::tempdir().unwrap();
     let surface = folder.path().join("two.obj");
     plain(&surface);
     let body = std::fs::read_to_string(&surface).unwrap();
     let count = body.lines().filter(|line| line.starts_with("v ")).count();
-    let mut text = body.clone();
-    for line in body.lines() {
-        let words: Vec<&str> = line.split_whitespace().collect();
-        let moved: Vec<String> = match words[0] {
-            "v" => words[1..]
-                .iter()
-                .map(|x| (0.3 * x.parse::<f64>().unwrap() + 90.0).to_string())
-                .collect(),
-            _ => words[1..]
-                .iter()
-                .map(|n| (n.parse::<usize>().unwrap() + count).to_string())
-                .collect(),
-        };
-        text += &format!("{} {}\n", words[0], moved.join(" "));
-    }
-    std::fs::write(&surface, text).unwrap();
+    let with_another = |scale: f64| {
+        let mut text = body.clone();
+        for line in body.lines() {
+            let words: Vec<&str> = line.split_whitespace().collect();
+            let moved: Vec<String> = match words[0] {
+                "v" => words[1..]
+                    .iter()
+                    .map(|x| (scale * x.parse::<f64>().unwrap() + 90.0).to_string())
+                    .collect(),
+                _ => words[1..]
+                    .iter()
+                    .map(|n| (n.parse::<usize>().unwrap() + count).to_string())
+                    .collect(),
+            };
+            text += &format!("{} {}\n", words[0], moved.join(" "));
+        }
+        std::fs::write(&surface, text).unwrap();
+    };
     let out = surface.with_extension("bundle");
-    let output = command(&surface, &out, &[HELD[0], HELD[1], "--preview"])
-        .output()
-        .unwrap();
-    assert!(output.status.success(), "{}", crate::text(&output));
-    let said = crate::text(&output);
-    assert!(
-        said.contains("repaired: ") && said.contains("part"),
-        "{said}"
-    );
+    let previewed = |more: &[&str]| {
+        let all = [&HELD[..], &["--preview"], more].concat();
+        let output = command(&surface, &out, &all).output().unwrap();
+        assert!(output.status.success(), "{}", crate::text(&output));
+        crate::text(&output)
+    };
+    with_another(0.1);
+    let said = previewed(&[]);
+    assert!(said.contains("a speck was left out: "), "{said}");
     let message = refused(&surface, &[HELD[0], HELD[1], "--no-repair"]);
+    assert!(message.contains("2 bodies"), "{message}");
+
+    with_another(0.3);
+    let message = refused(&surface, &HELD);
     assert!(
-        message.contains("part") || message.contains("piece"),
+        message.contains("choose one with --part") && message.contains("(90.0, 90.0, 90.0)"),
         "{message}"
     );
+    let said = previewed(&["--part", "1"]);
+    assert!(said.contains("x -5"), "{said}");
+    let message = refused(&surface, &[HELD[0], HELD[1], "--label", "1"]);
+    assert!(message.contains("has no labels"), "{message}");
 }

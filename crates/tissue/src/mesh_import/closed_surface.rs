@@ -1,10 +1,10 @@
-//! Whether triangles bound a body: closed, each edge with two faces, one direction, one part.
+//! Whether triangles bound bodies: closed, each edge with two faces, one direction.
 
-use super::{ImportError, RawSurface, Repair, surface_repair};
+use super::{ImportError, RawSurface, Repair, bodies, surface_repair};
 use std::collections::BTreeMap;
 
 /// Checks a surface. Corners that differ in their last digits are welded where that closes it. With `repair`, drops degenerate and
-/// repeated faces, turns faces that are turned against their neighbours, keeps the largest part and turns an inside-out surface.
+/// repeated faces, turns faces that are turned against their neighbours, and turns inside-out bodies.
 /// Holes and edges of more than two faces are always errors.
 pub fn check(
     surface: &mut RawSurface,
@@ -36,20 +36,7 @@ pub fn check(
         surface_repair::turn(surface, repairs);
     }
     oriented(surface)?;
-    parts(surface, repair, repairs)?;
-    let volume_mm3 = volume(surface);
-    if volume_mm3 < 0.0 {
-        if !repair {
-            return Err(ImportError::InsideOut { volume_mm3 });
-        }
-        surface.faces.iter_mut().for_each(|face| face.swap(1, 2));
-        repairs.push(Repair {
-            what: "faces of an inside-out surface turned",
-            count: surface.faces.len(),
-            first: 0,
-        });
-    }
-    Ok(())
+    bodies::orient(surface, repair, repairs)
 }
 
 /// Enclosed volume, mm³; negative when the faces look inward.
@@ -142,64 +129,5 @@ fn oriented(surface: &RawSurface) -> Result<(), ImportError> {
             });
         }
     }
-    Ok(())
-}
-
-fn parts(
-    surface: &mut RawSurface,
-    repair: bool,
-    repairs: &mut Vec<Repair>,
-) -> Result<(), ImportError> {
-    let mut neighbours = vec![Vec::new(); surface.faces.len()];
-    for faces in faces_of_edges(surface).values() {
-        for &(one, _) in faces {
-            neighbours[one].extend(faces.iter().map(|&(other, _)| other));
-        }
-    }
-    let mut part = vec![usize::MAX; surface.faces.len()];
-    let mut count = 0;
-    for start in 0..part.len() {
-        if part[start] != usize::MAX {
-            continue;
-        }
-        let mut stack = vec![start];
-        while let Some(face) = stack.pop() {
-            if part[face] == usize::MAX {
-                part[face] = count;
-                stack.extend(&neighbours[face]);
-            }
-        }
-        count += 1;
-    }
-    if count < 2 {
-        return Ok(());
-    }
-    let second = part.iter().position(|&p| p == 1).unwrap_or(0);
-    if !repair {
-        return Err(ImportError::SurfaceParts {
-            count,
-            face: second,
-        });
-    }
-    let mut size = vec![0.0; count];
-    for (&face, &part) in surface.faces.iter().zip(&part) {
-        let [a, b, c] = face.map(|node| surface.positions[node as usize]);
-        size[part] += crate::stuffing::volume6([0.0; 3], a, b, c);
-    }
-    let largest = (0..count)
-        .max_by(|&a, &b| size[a].abs().total_cmp(&size[b].abs()).then(b.cmp(&a)))
-        .unwrap_or(0);
-    let before = surface.faces.len();
-    let first = part.iter().position(|&p| p != largest).unwrap_or(0);
-    let mut index = 0;
-    surface.faces.retain(|_| {
-        index += 1;
-        part[index - 1] == largest
-    });
-    repairs.push(Repair {
-        what: "faces of smaller parts dropped",
-        count: before - surface.faces.len(),
-        first,
-    });
     Ok(())
 }

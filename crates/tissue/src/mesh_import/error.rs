@@ -1,5 +1,6 @@
 //! What can be wrong with a file to import, and what a repair did about it.
 
+use super::found_body::FoundBody;
 use crate::mesh::MeshError;
 use crate::stuffing::StuffError;
 use std::path::PathBuf;
@@ -81,13 +82,12 @@ pub enum ImportError {
     #[error("node {node} belongs to no tetrahedron, {count} in all; --repair drops them")]
     Unreferenced { node: usize, count: usize },
     #[error(
-        "the mesh has {count} parts that share no node; tet {tet} (at {at:?} mm) starts the second; --repair keeps the largest"
+        "the file holds {} bodies, of which one can be simulated: {why}. A closed surface inside another bounds a void only if it faces \
+         inward{}",
+        bodies.len(),
+        super::found_body::list(bodies)
     )]
-    Components {
-        count: usize,
-        tet: usize,
-        at: [f64; 3],
-    },
+    Bodies { why: String, bodies: Vec<FoundBody> },
     #[error("tets {first} and {second} have the same four nodes; --repair drops the second")]
     Duplicate { first: usize, second: usize },
     #[error(
@@ -122,10 +122,6 @@ pub enum ImportError {
         "face {face} is degenerate: it names the same point twice, {count} in all; --repair drops it"
     )]
     DegenerateFace { face: usize, count: usize },
-    #[error(
-        "the surface has {count} parts; face {face} starts the second; --repair keeps the largest by volume"
-    )]
-    SurfaceParts { count: usize, face: usize },
     #[error(
         "the surface passes through itself: an edge of face {first} goes {depth_mm:.2} mm through face {second} (at {at:?} mm), {count} \
          such places; re-mesh it or remove the overlap in a mesh editor (--repair accepts shallow places)"

@@ -17,12 +17,15 @@
 //! an [`ImportError`] that names the element; with [`ImportOptions::repair`] the fault is removed
 //! where that is safe and listed in [`Imported::repairs`].
 
+mod bodies;
 mod body;
+mod choice;
 mod closed_surface;
 mod distance;
 mod error;
 mod far;
 mod fill;
+mod found_body;
 mod gmsh;
 mod labels;
 mod medit;
@@ -43,12 +46,14 @@ mod words;
 
 pub use distance::SurfaceDistance;
 pub use error::{ImportError, Repair};
+pub use found_body::FoundBody;
 pub use labels::{Group, Labels};
 pub use region::{Opened, Region, faces_in, nodes_in, tets_in};
 pub use sets::Ball;
 pub use tool_file::tool_shape;
 
 use body::{Body, Read};
+use choice::Names;
 
 use crate::mesh::Mesh;
 use std::path::Path;
@@ -73,6 +78,8 @@ pub struct ImportOptions {
     pub resolution: Option<Resolution>,
     /// Remove faults that can be removed safely, instead of failing. Default false.
     pub repair: bool,
+    /// Which of several bodies is wanted: its number in the file's order, from 1, or its name.
+    pub part: Option<String>,
     /// Nodes in any of these balls are held: the set `fixed`.
     pub fixed: Vec<Ball>,
     /// Surface faces with their centroid in any of these balls may be touched: the set `domain`.
@@ -89,6 +96,7 @@ impl Default for ImportOptions {
             scale: 1.0,
             resolution: None,
             repair: false,
+            part: None,
             fixed: Vec::new(),
             domain: Vec::new(),
             window: Vec::new(),
@@ -136,6 +144,8 @@ pub fn import(path: &Path, options: &ImportOptions) -> Result<Imported, ImportEr
         notes: mut repairs,
     } = read_file(path)?;
     let mut notes = Vec::new();
+    let names = || Names::of(path, options.scale);
+    let mut own = options.clone();
     let raw = match body {
         Body::Tets(mut raw) => {
             scale(&mut raw.positions, options.scale);
@@ -145,13 +155,16 @@ pub fn import(path: &Path, options: &ImportOptions) -> Result<Imported, ImportEr
             let resolution = options.resolution.ok_or(ImportError::NoResolution)?;
             scale(&mut surface.positions, options.scale);
             closed_surface::check(&mut surface, options.repair, &mut repairs)?;
+            bodies::keep_one(&mut surface, options, names, &mut repairs, &mut notes)?;
             self_crossing::check(&surface, options.repair, &mut repairs)?;
             let filled = fill::fill(surface, resolution)?;
-            notes = filled.notes;
+            notes.extend(filled.notes);
+            // The body is chosen.
+            own.part = None;
             filled.raw
         }
     };
-    let mut mesh = from_tets(raw, options.repair, &mut repairs)?;
+    let mut mesh = checked(raw, &own, names, &mut repairs, &mut notes)?;
     let file = path.file_name().unwrap_or_default().to_string_lossy();
     mesh.source = format!("imported from {file}");
     mesh.license = "as the source file's".into();
@@ -212,11 +225,25 @@ fn extension_of(path: &Path) -> String {
 ///
 /// With `repair`, faults are removed and listed in `repairs`; without, the first is an error.
 pub fn from_tets(
-    mut raw: RawTets,
+    raw: RawTets,
     repair: bool,
     repairs: &mut Vec<Repair>,
 ) -> Result<Mesh, ImportError> {
-    repair::tets(&mut raw, repair, repairs)?;
+    let options = ImportOptions {
+        repair,
+        ..ImportOptions::default()
+    };
+    checked(raw, &options, Names::default, repairs, &mut Vec::new())
+}
+
+fn checked(
+    mut raw: RawTets,
+    options: &ImportOptions,
+    names: impl FnOnce() -> Names,
+    repairs: &mut Vec<Repair>,
+    notes: &mut Vec<String>,
+) -> Result<Mesh, ImportError> {
+    repair::tets(&mut raw, options, names, repairs, notes)?;
     let mesh = Mesh {
         surface: crate::mesh::boundary_faces(&raw.tets)?,
         positions: raw.positions.iter().map(|p| p.map(|x| x as f32)).collect(),

@@ -1,25 +1,92 @@
 //! The checks of imported tetrahedra, in the order in which their repairs make sense.
 
-use super::{ImportError, RawTets, Repair};
-use std::collections::HashMap;
+use super::bodies;
+use super::choice::Names;
+use super::{ImportError, ImportOptions, RawTets, Repair};
+use std::collections::{HashMap, HashSet};
 
 /// A tetrahedron is degenerate below this part of the cube of its longest edge (as in
 /// `Mesh::validate`, with a margin for the rounding of positions to f32).
 const DEGENERATE: f64 = 2e-6;
 
-/// Checks `raw`; with `repair`, removes what is wrong and lists it.
-pub fn tets(raw: &mut RawTets, repair: bool, repairs: &mut Vec<Repair>) -> Result<(), ImportError> {
+/// Checks `raw`; with `repair`, removes what is wrong and lists it. Of several bodies the chosen one is kept.
+pub fn tets(
+    raw: &mut RawTets,
+    options: &ImportOptions,
+    names: impl FnOnce() -> Names,
+    repairs: &mut Vec<Repair>,
+    notes: &mut Vec<String>,
+) -> Result<(), ImportError> {
+    let repair = options.repair;
     // The mesh stores f32; what is degenerate there must be found here.
     for x in raw.positions.iter_mut().flatten() {
         *x = f64::from(*x as f32);
     }
     node_range(raw)?;
+    weld(raw, repairs);
     non_finite(raw, repair, repairs)?;
     duplicates(raw, repair, repairs)?;
     degenerate(raw, repair, repairs)?;
     inverted(raw, repair, repairs)?;
-    components(raw, repair, repairs)?;
-    unreferenced(raw, repair, repairs)
+    let chosen = repairs.len();
+    bodies::keep_one_of_tets(raw, options, names, repairs, notes)?;
+    // The nodes of a body that was not chosen are no fault.
+    unreferenced(raw, repair || repairs.len() > chosen, repairs)
+}
+
+/// Makes nodes at exactly the same place one: exporters of several parts write the nodes between them once for each.
+fn weld(raw: &mut RawTets, repairs: &mut Vec<Repair>) {
+    let mut first_at: HashMap<[u64; 3], u32> = HashMap::with_capacity(raw.positions.len());
+    let place: Vec<u32> = (raw.positions.iter().zip(0..))
+        // Adding zero makes -0 and 0 the same key.
+        .map(|(point, node)| {
+            *first_at
+                .entry(point.map(|x| (x + 0.0).to_bits()))
+                .or_insert(node)
+        })
+        .collect();
+    let mut used = vec![false; place.len()];
+    raw.tets
+        .iter()
+        .flatten()
+        .for_each(|&node| used[node as usize] = true);
+    let bad: Vec<usize> = (0..place.len())
+        .filter(|&node| used[node] && used[place[node] as usize] && place[node] as usize != node)
+        .collect();
+    if bad.is_empty() {
+        return;
+    }
+    let moved: HashSet<usize> = bad.iter().copied().collect();
+    for node in raw.tets.iter_mut().flatten() {
+        if moved.contains(&(*node as usize)) {
+            *node = place[*node as usize];
+        }
+    }
+    // They go now, so that they are not called nodes without a tetrahedron.
+    drop_nodes(raw, |node| !moved.contains(&node));
+    note(
+        repairs,
+        "nodes at the place of another made one with it",
+        &bad,
+    );
+}
+
+/// Drops nodes and numbers the others anew.
+fn drop_nodes(raw: &mut RawTets, keep: impl Fn(usize) -> bool) {
+    let mut renumbered = vec![0u32; raw.positions.len()];
+    let mut next = 0;
+    for (node, number) in renumbered.iter_mut().enumerate() {
+        *number = next;
+        next += u32::from(keep(node));
+    }
+    let mut node = 0;
+    raw.positions.retain(|_| {
+        node += 1;
+        keep(node - 1)
+    });
+    for corner in raw.tets.iter_mut().flatten() {
+        *corner = renumbered[*corner as usize];
+    }
 }
 
 fn note(repairs: &mut Vec<Repair>, what: &'static str, bad: &[usize]) {
@@ -170,45 +237,6 @@ fn inverted(raw: &mut RawTets, repair: bool, repairs: &mut Vec<Repair>) -> Resul
     Ok(())
 }
 
-fn components(
-    raw: &mut RawTets,
-    repair: bool,
-    repairs: &mut Vec<Repair>,
-) -> Result<(), ImportError> {
-    let (label, _) = crate::mesh::components(raw.positions.len(), &raw.tets);
-    let mut volumes: HashMap<u32, f64> = HashMap::new();
-    for tet in &raw.tets {
-        *volumes.entry(label[tet[0] as usize]).or_default() += measure(raw, *tet).0;
-    }
-    if volumes.len() < 2 {
-        return Ok(());
-    }
-    let part = |tet: [u32; 4]| label[tet[0] as usize];
-    if !repair {
-        let first = part(raw.tets[0]);
-        let tet = raw
-            .tets
-            .iter()
-            .position(|&tet| part(tet) != first)
-            .unwrap_or(0);
-        return Err(ImportError::Components {
-            count: volumes.len(),
-            tet,
-            at: raw.positions[raw.tets[tet][0] as usize],
-        });
-    }
-    let largest = volumes
-        .iter()
-        .max_by(|a, b| a.1.total_cmp(b.1).then(b.0.cmp(a.0)))
-        .map(|(&label, _)| label);
-    let bad: Vec<usize> = (0..raw.tets.len())
-        .filter(|&tet| Some(part(raw.tets[tet])) != largest)
-        .collect();
-    drop_tets(raw, &bad);
-    note(repairs, "tets of smaller parts dropped", &bad);
-    Ok(())
-}
-
 fn unreferenced(
     raw: &mut RawTets,
     repair: bool,
@@ -228,20 +256,7 @@ fn unreferenced(
             count: bad.len(),
         });
     }
-    let mut renumbered = vec![0u32; used.len()];
-    let mut next = 0;
-    for (node, &keep) in used.iter().enumerate() {
-        renumbered[node] = next;
-        next += u32::from(keep);
-    }
-    let mut node = 0;
-    raw.positions.retain(|_| {
-        node += 1;
-        used[node - 1]
-    });
-    for corner in raw.tets.iter_mut().flatten() {
-        *corner = renumbered[*corner as usize];
-    }
+    drop_nodes(raw, |node| used[node]);
     note(repairs, "nodes of no tet dropped", &bad);
     Ok(())
 }

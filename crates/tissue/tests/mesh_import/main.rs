@@ -1,6 +1,7 @@
 //! Import: files of Gmsh and VTK (fixtures/import/make.py), and each fault by hand.
 #![cfg(feature = "files")]
 
+mod bodies;
 mod surfaces;
 mod tets;
 mod thin;

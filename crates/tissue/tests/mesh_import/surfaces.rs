@@ -109,17 +109,3 @@ fn an_inside_out_surface_is_turned_on_request() {
     assert_eq!(imported.repairs[0].count, 4);
     assert!(measure(&imported.mesh).volume_mm3 > 90.0);
 }
-
-#[test]
-fn smaller_parts_of_a_surface_are_dropped_on_request() {
-    let second = "v 20 0 0\nv 22 0 0\nv 20 2 0\nv 20 0 2\n";
-    let faces = "f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\nf 5 7 6\nf 5 6 8\nf 5 8 7\nf 6 7 8\n";
-    let both = format!("{second}{faces}");
-    let error = obj(&both, false).unwrap_err();
-    assert!(
-        matches!(error, ImportError::SurfaceParts { count: 2, face: 4 }),
-        "{error}"
-    );
-    let imported = obj(&both, true).unwrap();
-    assert!(measure(&imported.mesh).high_mm[0] < 10.0);
-}

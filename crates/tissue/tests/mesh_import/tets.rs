@@ -99,32 +99,61 @@ fn unreferenced_nodes_are_named_and_dropped() {
     assert_eq!(mesh.positions[0], [0.0; 3]);
 }
 
-#[test]
-fn parts_are_named_and_the_largest_kept() {
-    let mut raw = pair();
-    for p in [
-        [9.0, 0.0, 0.0],
-        [10.0, 0.0, 0.0],
-        [9.0, 1.0, 0.0],
-        [9.0, 0.0, 1.0],
+/// A second body whose corner has this edge.
+fn with_another(mut raw: RawTets, edge: f64) -> RawTets {
+    let first = raw.positions.len() as u32;
+    for step in [
+        [0.0; 3],
+        [edge, 0.0, 0.0],
+        [0.0, edge, 0.0],
+        [0.0, 0.0, edge],
     ] {
-        raw.positions.push(p);
+        raw.positions.push([9.0 + step[0], step[1], step[2]]);
     }
-    raw.tets.insert(0, [5, 6, 7, 8]);
+    raw.tets.insert(0, [0, 1, 2, 3].map(|node| first + node));
+    raw
+}
+
+#[test]
+fn bodies_are_listed_and_only_a_speck_is_dropped() {
+    let raw = with_another(pair(), 0.5);
     let (error, repairs, mesh) = both(raw);
-    assert!(
-        matches!(
-            error,
-            ImportError::Components {
-                count: 2,
-                tet: 1,
-                ..
-            }
-        ),
-        "{error}"
-    );
+    let ImportError::Bodies { bodies, .. } = error else {
+        panic!("{error}");
+    };
+    let volumes: Vec<f64> = bodies.iter().map(|body| body.volume_mm3).collect();
+    assert!((volumes[0] - 0.125 / 6.0).abs() < 1e-6 && (volumes[1] - 13.5).abs() < 1e-6);
+    assert!((bodies[0].centre[0] - 9.125).abs() < 1e-6, "{bodies:?}");
     assert_eq!(repairs[0].count, 1);
     assert_eq!((mesh.node_count(), mesh.tets.len()), (5, 2));
+    // What is no speck is a choice.
+    let raw = with_another(pair(), 1.0);
+    let error = from_tets(raw, true, &mut Vec::new())
+        .unwrap_err()
+        .to_string();
+    assert!(
+        error.contains("2 bodies") && error.contains("--part"),
+        "{error}"
+    );
+    assert!(
+        error.contains("1: 0.000 ml at (9.2, 0.2, 0.2) mm"),
+        "{error}"
+    );
+}
+
+#[test]
+fn nodes_at_one_place_are_one() {
+    let mut raw = pair();
+    raw.positions
+        .extend([[3.0, 0.0, 0.0], [-0.0, 3.0, 0.0], [0.0, 0.0, 3.0]]);
+    raw.tets[1] = [5, 6, 7, 4];
+    let mut repairs = Vec::new();
+    let mesh = from_tets(raw, false, &mut repairs).unwrap();
+    assert_eq!(
+        (mesh.node_count(), mesh.tets.len(), mesh.surface.len()),
+        (5, 2, 6)
+    );
+    assert_eq!((repairs[0].count, repairs[0].first), (3, 5));
 }
 
 #[test]
