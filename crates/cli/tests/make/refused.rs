@@ -150,7 +150,7 @@ fn of_two_pieces_one_is_chosen_and_a_speck_is_left_out_by_name() {
         "{message}"
     );
     let said = previewed(&["--part", "1"]);
-    assert!(said.contains("x -5"), "{said}");
+    assert!(said.contains("x -49"), "{said}");
     let message = refused(&surface, &[HELD[0], HELD[1], "--label", "1"]);
     assert!(message.contains("has no labels"), "{message}");
 }
