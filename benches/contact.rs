@@ -3,9 +3,11 @@
 
 mod measure;
 
+use contact::Shape;
 use measure::{Row, medians};
+use upt::contact::Tool;
 use upt::forces::ReactionForces;
-use upt::instrument::{Instrument, InstrumentContacts, Shape};
+use upt::instrument::{Instrument, InstrumentContacts};
 
 /// A slab of `n x n x layers` cells of 4 mm: positions, tetrahedra (six a cell), top and bottom faces.
 fn slab(n: u32, layers: u32) -> (Vec<f32>, Vec<u32>, Vec<u32>) {
@@ -44,7 +46,7 @@ fn main() {
 }
 
 fn instruments(positions: &[f32], faces: &[u32], displacement: &[f32]) {
-    let mut contacts = InstrumentContacts::new(positions, faces, &[]);
+    let mut contacts = InstrumentContacts::new(positions, faces, &[]).expect("memory for contacts");
     let half_extents = [16.0, 14.0, 3.0];
     let shapes = [
         (
@@ -64,16 +66,15 @@ fn instruments(positions: &[f32], faces: &[u32], displacement: &[f32]) {
         ),
     ];
     for (name, shape) in shapes {
-        let instrument = Instrument {
-            shape,
-            position: [170.0, 170.0, 14.0],
-            rotation: [0.0, 0.0, 0.0, 1.0],
+        let (at, turn) = ([170.0, 170.0, 14.0], [0.0, 0.0, 0.0, 1.0]);
+        let instrument = [Instrument {
+            tool: Tool::new(0, &shape, at, turn).expect("a tool"),
             sticking: false,
-        };
+        }];
         let mut touched = 0;
         let seconds = medians(&mut [Box::new(|| {
             contacts.reset();
-            let found = contacts.find(&[instrument], displacement);
+            let found = contacts.find(&instrument, displacement);
             touched = found.expect("finite values").0.len();
         })]);
         let name = format!("{name} on 16,200 surface nodes, {touched} touched");
@@ -89,7 +90,8 @@ fn forces(positions: &[f32], tets: &[u32], displacement: &[f32]) {
             .map(|i| 40 + i % side + 90 * (40 + i / side) + 3 * 90 * 90)
             .collect();
         let moduli = elements::Material::default().moduli();
-        let mut forces = ReactionForces::new(positions, tets, &[], &nodes, moduli);
+        let mut forces = ReactionForces::new(positions, tets, &[], &nodes, moduli)
+            .expect("memory for the elements");
         let mut out = vec![0.0; 3 * nodes.len()];
         let seconds = medians(&mut [Box::new(|| {
             forces

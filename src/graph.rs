@@ -3,7 +3,11 @@
 //! Unlike the paper's code, a capped ball keeps the *nearest* `max_degree` nodes and never loses its own self edge.
 
 use crate::bundle::{Graph, Mesh};
+use crate::error::Result;
 use crate::grid::PointGrid;
+use crate::memory;
+
+const WHAT: &str = "the graph of the supernodes";
 
 /// Supernodes and, for each, a CSR row of neighbours.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -30,12 +34,21 @@ pub fn node_key(seed: u64, node: u64) -> u64 {
 
 impl SupernodeGraph {
     /// Builds the graph of a mesh. `O(K log K)`.
-    pub fn new(positions: &[f32], domain_nodes: &[u32], settings: &Graph) -> SupernodeGraph {
-        let supernodes = select(positions.len() / 3, domain_nodes, settings);
-        let grid = PointGrid::new(positions.to_vec());
-        let mut offsets = vec![0];
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
+    pub fn new(
+        positions: &[f32],
+        domain_nodes: &[u32],
+        settings: &Graph,
+    ) -> Result<SupernodeGraph> {
+        let supernodes = select(positions.len() / 3, domain_nodes, settings)?;
+        let grid = PointGrid::try_new(memory::copied(positions, WHAT)?)?;
+        let mut offsets = memory::room(supernodes.len() + 1, WHAT)?;
+        offsets.push(0);
         let mut neighbours = Vec::new();
-        let mut row: Vec<(f64, u32)> = Vec::new();
+        // A ball may hold all nodes.
+        let mut row: Vec<(f64, u32)> = memory::room(positions.len() / 3 + 1, WHAT)?;
         for &supernode in &supernodes {
             let i = 3 * supernode as usize;
             row.clear();
@@ -51,56 +64,60 @@ impl SupernodeGraph {
                 row.push((0.0, supernode));
             }
             let start = neighbours.len();
+            memory::tried(neighbours.try_reserve(row.len()), WHAT)?;
             neighbours.extend(row.iter().map(|&(_, node)| node));
             neighbours[start..].sort_unstable();
             offsets.push(neighbours.len() as u32);
         }
-        SupernodeGraph {
+        Ok(SupernodeGraph {
             supernodes,
             offsets,
             neighbours,
-        }
+        })
     }
 
     /// The graph of a checked mesh.
-    pub fn of_mesh(mesh: &Mesh, settings: &Graph) -> SupernodeGraph {
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
+    pub fn of_mesh(mesh: &Mesh, settings: &Graph) -> Result<SupernodeGraph> {
         SupernodeGraph::new(&mesh.positions, &mesh.domain_nodes, settings)
     }
 
     /// Supernodes and all their neighbours, ascending: the nodes whose state the recurrence needs.
-    pub fn needed_nodes(&self) -> Vec<u32> {
-        let mut nodes: Vec<u32> = self
-            .neighbours
-            .iter()
-            .chain(&self.supernodes)
-            .copied()
-            .collect();
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
+    pub fn needed_nodes(&self) -> Result<Vec<u32>> {
+        let count = self.neighbours.len() + self.supernodes.len();
+        let both = self.neighbours.iter().chain(&self.supernodes);
+        let mut nodes = memory::collected(count, both.copied(), WHAT)?;
         nodes.sort_unstable();
         nodes.dedup();
-        nodes
+        Ok(nodes)
     }
 }
 
-fn select(count: usize, domain_nodes: &[u32], settings: &Graph) -> Vec<u32> {
+fn select(count: usize, domain_nodes: &[u32], settings: &Graph) -> Result<Vec<u32>> {
     let wanted = settings.supernodes.min(count);
     let key = |node: &u32| (node_key(settings.seed, *node as u64), *node);
-    let mut from_domain = domain_nodes.to_vec();
+    let mut from_domain = memory::copied(domain_nodes, WHAT)?;
     from_domain.sort_unstable_by_key(key);
     let quota = round_half_even(settings.domain_fraction * settings.supernodes as f64);
     from_domain.truncate(quota.min(wanted));
-    let mut taken = vec![false; count];
+    let mut taken = memory::filled(count, false, WHAT)?;
     for &node in &from_domain {
         taken[node as usize] = true;
     }
-    let mut rest: Vec<u32> = (0..count as u32)
-        .filter(|&node| !taken[node as usize])
-        .collect();
+    let rest = (0..count as u32).filter(|&node| !taken[node as usize]);
+    let mut rest = memory::collected(count, rest, WHAT)?;
     rest.sort_unstable_by_key(key);
     rest.truncate(wanted - from_domain.len());
     let mut supernodes = from_domain;
+    memory::reserve(&mut supernodes, rest.len(), WHAT)?;
     supernodes.extend(rest);
     supernodes.sort_unstable();
-    supernodes
+    Ok(supernodes)
 }
 
 /// Ties to even, as Python's `round`.

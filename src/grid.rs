@@ -21,11 +21,6 @@ pub fn squared_distance(a: [f32; 3], b: [f32; 3]) -> f64 {
 
 impl PointGrid {
     /// A grid of about two points a cell over `points [n,3]`, n > 0.
-    pub fn new(points: Vec<f32>) -> PointGrid {
-        Self::try_new(points).expect("memory for a grid of points")
-    }
-
-    /// As [`PointGrid::new`].
     ///
     /// # Errors
     /// [`crate::Error::OutOfMemory`].
@@ -157,7 +152,7 @@ mod tests {
     #[test]
     fn queries_find_what_a_full_search_finds() {
         let points = cloud(700);
-        let grid = PointGrid::new(points.clone());
+        let grid = PointGrid::try_new(points.clone()).unwrap();
         for p in cloud(60).chunks_exact(3) {
             let p = [p[0] * 1.4 - 20.0, p[1], p[2]];
             let mut found = Vec::new();
@@ -182,9 +177,11 @@ mod tests {
             .chunks_exact(3)
             .flat_map(|p| [p[0], p[1], 0.0])
             .collect();
-        assert!(PointGrid::new(flat).nearest([50.0, 50.0, 3.0]) < 50);
+        assert!(PointGrid::try_new(flat).unwrap().nearest([50.0, 50.0, 3.0]) < 50);
         assert_eq!(
-            PointGrid::new(vec![1.0, 2.0, 3.0]).nearest([1e6, 0.0, 0.0]),
+            PointGrid::try_new(vec![1.0, 2.0, 3.0])
+                .unwrap()
+                .nearest([1e6, 0.0, 0.0]),
             0
         );
     }

@@ -64,6 +64,16 @@ pub fn collected<T>(
     Ok(list)
 }
 
+/// A value on the heap.
+pub fn boxed<T>(value: T, what: &str) -> Result<Box<T>> {
+    const { assert!(size_of::<T>() > 0) };
+    let mut list = room(1, what)?;
+    list.push(value);
+    let one: Box<[T]> = list.into_boxed_slice();
+    // SAFETY: a slice of one element lies where the element does, and has its layout.
+    Ok(unsafe { Box::from_raw(Box::into_raw(one).cast::<T>()) })
+}
+
 /// Whether `bytes` are to be had now: for parts that are made of many lists at their first use.
 pub fn probe(bytes: usize, what: &str) -> Result<()> {
     room::<u8>(bytes, what).map(drop)
@@ -102,5 +112,6 @@ mod tests {
         assert!(error.to_string().contains("a test"), "{error}");
         assert_eq!(filled(3, 7u8, "three").unwrap(), [7, 7, 7]);
         assert_eq!(collected(2, 0..9, "two").unwrap(), [0, 1]);
+        assert_eq!(*boxed([1, 2, 3], "one").unwrap(), [1, 2, 3]);
     }
 }

@@ -228,7 +228,8 @@ fn without_a_prior_it_is_the_elements_force_at_the_last_state() {
         &mesh.stiffness,
         &contact.0,
         material.moduli(),
-    );
+    )
+    .unwrap();
     let mut want = vec![0.0; contact.1.len()];
     forces.reaction(&field, &contact.0, &mut want).unwrap();
     assert!(want.iter().any(|f| f.abs() > 0.1));

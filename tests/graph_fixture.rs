@@ -25,7 +25,7 @@ fn graphs_equal_pythons() {
     let cases: Vec<Graph> = serde_json::from_str(&file.text()["cases"]).unwrap();
     assert!(cases.len() >= 3);
     for (i, settings) in cases.iter().enumerate() {
-        let graph = SupernodeGraph::new(&positions, &domain, settings);
+        let graph = SupernodeGraph::new(&positions, &domain, settings).unwrap();
         let name = |part: &str| format!("case{i}.{part}");
         assert_eq!(
             graph.supernodes,

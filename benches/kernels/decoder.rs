@@ -51,17 +51,20 @@ impl Decoder {
 
     fn packed(&self) -> PackedDecoder {
         let (h, m) = (self.hidden, self.mlp);
-        PackedDecoder::new(&DecoderWeights {
-            hidden: h,
-            heads: self.heads,
-            mlp: m,
-            attention_out: (&self.matrices[0], &self.bias[..h]),
-            norm2: (&self.scale, &self.bias[..h]),
-            mlp1: (&self.matrices[1], &self.bias[..m]),
-            mlp2: (&self.matrices[2], &self.bias[..h]),
-            norm3: (&self.scale, &self.bias[..h]),
-            head: (&self.matrices[3], &self.bias[..3]),
-        })
+        PackedDecoder::new(
+            "weights.safetensors",
+            &DecoderWeights {
+                hidden: h,
+                heads: self.heads,
+                mlp: m,
+                attention_out: (&self.matrices[0], &self.bias[..h]),
+                norm2: (&self.scale, &self.bias[..h]),
+                mlp1: (&self.matrices[1], &self.bias[..m]),
+                mlp2: (&self.matrices[2], &self.bias[..h]),
+                norm3: (&self.scale, &self.bias[..h]),
+                head: (&self.matrices[3], &self.bias[..3]),
+            },
+        )
         .expect("shapes")
     }
 

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
 
+use super::maker;
 use super::manifest::Manifest;
 use super::tensors::TensorFile;
 use crate::error::{Error, Result};
@@ -21,6 +22,8 @@ pub struct BundleFiles {
     folder: PathBuf,
     /// The manifest, checked.
     pub manifest: Manifest,
+    /// The command that made the bundle, where the manifest tells.
+    made_with: Option<String>,
     /// SHA-256 of `bundle.json`, which holds the hashes of all other files: the identity of the bundle.
     pub hash: [u8; 32],
 }
@@ -37,7 +40,12 @@ impl BundleFiles {
             ));
         }
         let bytes = read_regular(&path)?;
-        let manifest = Manifest::parse(&bytes)?;
+        let manifest = Manifest::parse(&bytes).map_err(|error| {
+            // What of the manifest can be read may still tell.
+            let fields = serde_json::from_slice(&bytes).unwrap_or_default();
+            maker::tell(error, maker::of(&fields).as_deref())
+        })?;
+        let made_with = maker::of(&serde_json::from_slice(&bytes).unwrap_or_default());
         for (name, entry) in &manifest.files {
             let path = folder.join(name);
             let found = fs::metadata(&path).map_err(|error| Error::io(&path, error))?;
@@ -45,21 +53,26 @@ impl BundleFiles {
                 return Err(not_regular(&path));
             }
             if found.len() != entry.bytes {
-                return Err(Error::bundle(
-                    name,
-                    format!(
-                        "has {} bytes, bundle.json field `files.{name}.bytes` says {}; fetch or export the bundle again",
-                        found.len(),
-                        entry.bytes
-                    ),
-                ));
+                let problem = format!(
+                    "has {} bytes, bundle.json field `files.{name}.bytes` says {}; fetch or make the bundle again",
+                    found.len(),
+                    entry.bytes
+                );
+                let error = Error::bundle(name, problem);
+                return Err(maker::tell(error, made_with.as_deref()));
             }
         }
         Ok(BundleFiles {
             folder: folder.to_owned(),
             manifest,
+            made_with,
             hash: Sha256::digest(&bytes).into(),
         })
+    }
+
+    /// An error about one of the files, with the tool that made them.
+    pub fn tell(&self, error: Error) -> Error {
+        maker::tell(error, self.made_with.as_deref())
     }
 
     /// Whether the manifest lists `name`.
@@ -82,7 +95,7 @@ impl BundleFiles {
             return Err(Error::bundle(
                 name,
                 format!(
-                    "SHA-256 is {digest}, bundle.json field `files.{name}.sha256` says {}; fetch or export the bundle again",
+                    "SHA-256 is {digest}, bundle.json field `files.{name}.sha256` says {}; fetch or make the bundle again",
                     entry.sha256
                 ),
             ));

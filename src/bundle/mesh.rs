@@ -6,7 +6,10 @@ use super::files::hex;
 use super::manifest::Boundary;
 use super::tensors::TensorFile;
 use crate::error::{Error, Result};
+use crate::memory;
 use safetensors::Dtype;
+
+const WHAT: &str = "a mesh";
 
 /// A checked mesh; lengths in mm.
 #[derive(Debug)]
@@ -77,14 +80,12 @@ impl Mesh {
         } else {
             Vec::new()
         };
-        let domain_faces: Vec<u32> = domain
-            .iter()
-            .flat_map(|&face| {
-                surface_faces[3 * face as usize..3 * face as usize + 3]
-                    .iter()
-                    .copied()
-            })
-            .collect();
+        let corners = domain.iter().flat_map(|&face| {
+            surface_faces[3 * face as usize..3 * face as usize + 3]
+                .iter()
+                .copied()
+        });
+        let domain_faces = memory::collected(3 * domain.len(), corners, WHAT)?;
         let set = |name: &str| {
             if file.has(name) {
                 file.ascending(name, count)
@@ -107,12 +108,13 @@ impl Mesh {
         }
         let mut held_nodes = fixed;
         if boundary == Boundary::Supported {
+            memory::reserve(&mut held_nodes, supported.len(), WHAT)?;
             held_nodes.extend(supported);
         }
         Ok(Mesh {
-            node_area: node_area(&positions, &surface_faces),
-            surface_nodes: unique(surface_faces.clone()),
-            domain_nodes: unique(domain_faces.clone()),
+            node_area: node_area(&positions, &surface_faces)?,
+            surface_nodes: unique(memory::copied(&surface_faces, WHAT)?),
+            domain_nodes: unique(memory::copied(&domain_faces, WHAT)?),
             held_nodes: unique(held_nodes),
             positions,
             tets,
@@ -187,8 +189,9 @@ pub(crate) fn volume(positions: &[f32], tet: &[u32]) -> f64 {
     n[0] * c[0] + n[1] * c[1] + n[2] * c[2]
 }
 
-fn node_area(positions: &[f32], faces: &[u32]) -> Vec<f32> {
-    let mut area = vec![0.0f64; positions.len() / 3];
+fn node_area(positions: &[f32], faces: &[u32]) -> Result<Vec<f32>> {
+    let count = positions.len() / 3;
+    let mut area = memory::filled(count, 0.0f64, WHAT)?;
     for face in faces.chunks_exact(3) {
         let origin = at(positions, face[0]);
         let n = cross(
@@ -200,5 +203,5 @@ fn node_area(positions: &[f32], faces: &[u32]) -> Vec<f32> {
             area[node as usize] += third;
         }
     }
-    area.into_iter().map(|a| a as f32).collect()
+    memory::collected(count, area.into_iter().map(|a| a as f32), WHAT)
 }

@@ -4,6 +4,7 @@ mod checks;
 mod faults;
 mod files;
 mod known;
+mod maker;
 mod manifest;
 mod mesh;
 mod parse;

@@ -19,13 +19,7 @@ fn parse<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<T> {
     let mut deserializer = serde_json::Deserializer::from_slice(bytes);
     serde_path_to_error::deserialize(&mut deserializer).map_err(|error| {
         let path = error.path().to_string();
-        bad(
-            &path,
-            format!(
-                "{}; export with `python -m upt_training export`",
-                error.inner()
-            ),
-        )
+        bad(&path, error.inner())
     })
 }
 

@@ -12,13 +12,13 @@ const DIGITS: usize = 64;
 
 /// Compares a manifest's digest with its bytes. One without a digest, as they were made before there was one, is taken.
 pub(super) fn check(bytes: &[u8], manifest: &Value) -> Result<()> {
-    let stated = match &manifest[FIELD] {
-        Value::Null => {
+    let stated = match manifest.get(FIELD) {
+        None => {
             tracing::warn!("{FILE}: no `{FIELD}`; `python -m upt_training seal BUNDLE` adds it");
             return Ok(());
         }
-        Value::String(text) if text.len() == DIGITS => text,
-        _ => return Err(bad(FIELD, "must be 64 hex digits")),
+        Some(Value::String(text)) if text.len() == DIGITS => text,
+        Some(_) => return Err(bad(FIELD, "must be 64 hex digits")),
     };
     let places: Vec<usize> = bytes
         .windows(DIGITS)
@@ -43,7 +43,7 @@ pub(super) fn check(bytes: &[u8], manifest: &Value) -> Result<()> {
     Err(Error::bundle(
         FILE,
         format!(
-            "field `{FIELD}` says {stated}, the file has {found}: it was damaged or changed; fetch or export the bundle again, or, \
+            "field `{FIELD}` says {stated}, the file has {found}: it was damaged or changed; fetch or make the bundle again, or, \
              after a change of your own, run `python -m upt_training seal BUNDLE`"
         ),
     ))

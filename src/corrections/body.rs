@@ -4,7 +4,11 @@ use elements::{ElementForces, Material, Simd, Tetrahedra};
 
 use super::pace::Diagonal;
 use crate::bundle::Mesh;
+use crate::error::Result;
 use crate::kernels::Isa;
+use crate::memory;
+
+const WHAT: &str = "the elements of the corrections";
 
 /// Made once a model.
 pub struct Body {
@@ -22,27 +26,31 @@ pub struct Body {
 
 impl Body {
     /// Prepares the mesh of a bundle.
-    pub fn new(mesh: &Mesh, material: &Material, diagonal: &Diagonal, isa: Isa) -> Body {
-        let positions: Vec<[f32; 3]> = mesh.positions.as_chunks().0.to_vec();
-        let tets: Vec<[u32; 4]> = mesh.tets.as_chunks().0.to_vec();
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
+    pub fn new(mesh: &Mesh, material: &Material, diagonal: &Diagonal, isa: Isa) -> Result<Body> {
         let body = Tetrahedra {
-            positions: &positions,
-            tets: &tets,
+            positions: mesh.positions.as_chunks().0,
+            tets: mesh.tets.as_chunks().0,
             stiffness: &mesh.stiffness,
         };
-        let mut held = vec![false; positions.len()];
+        let count = mesh.node_count();
+        let mut held = memory::filled(count, false, WHAT)?;
         for &node in &mesh.held_nodes {
             held[node as usize] = true;
         }
-        let mass: Vec<f32> = diagonal.mass.iter().map(|mass| *mass as f32).collect();
-        let ascending = (0..mass.len() as u32).filter(|node| held[*node as usize]);
-        Body {
-            held_nodes: ascending.collect(),
-            mass_of_dof: mass.iter().flat_map(|&mass| [mass; 3]).collect(),
-            forces: ElementForces::new(body, material, simd(isa)),
+        let mass = diagonal.mass.iter().map(|mass| *mass as f32);
+        let mass = memory::collected(count, mass, WHAT)?;
+        let ascending = (0..count as u32).filter(|node| held[*node as usize]);
+        let of_dof = mass.iter().flat_map(|&mass| [mass; 3]);
+        Ok(Body {
+            held_nodes: memory::collected(mesh.held_nodes.len(), ascending, WHAT)?,
+            mass_of_dof: memory::collected(3 * count, of_dof, WHAT)?,
+            forces: memory::tried(ElementForces::new(body, material, simd(isa)), WHAT)?,
             mass,
             held,
-        }
+        })
     }
 
     /// Bytes held.

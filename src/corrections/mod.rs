@@ -75,9 +75,6 @@ impl Corrections {
         let manifest = &files.manifest;
         let (entry, prior) = needed(manifest, prior)?;
         let material = &manifest.material;
-        // Made of many lists: what they take together is asked for first.
-        let bytes = 160 * mesh.tets.len() / 4 + 228 * mesh.node_count();
-        crate::memory::probe(bytes, "the elements of the corrections")?;
         let integrator = Integrator {
             step_s: manifest.dt_s,
             damping_per_s: material.damping_per_s,
@@ -85,7 +82,7 @@ impl Corrections {
         let diagonal = Diagonal::of(mesh, material)?;
         Ok(Corrections {
             space: CoarseSpace::parse(&files.tensors(&entry.file)?, prior)?,
-            body: Body::new(mesh, material, &diagonal, Isa::detect()),
+            body: Body::new(mesh, material, &diagonal, Isa::detect())?,
             pace: Arc::new(Pace::new(&diagonal, integrator)?),
         })
     }

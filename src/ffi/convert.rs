@@ -80,32 +80,7 @@ pub(super) fn index_set(value: i32) -> Result<IndexSet, Failure> {
     })
 }
 
-/// The shape of an instrument; sizes are checked where it is placed.
-#[cfg(feature = "contact")]
-pub(super) fn shape(raw: &upt_instrument) -> Result<crate::instrument::Shape, Failure> {
-    use crate::instrument::Shape;
-    let half_extents = raw.half_extents;
-    Ok(match raw.shape {
-        UPT_SHAPE_CAPSULE => Shape::Capsule {
-            half_length: half_extents[1],
-            radius: raw.radius,
-        },
-        UPT_SHAPE_BOX => Shape::Box { half_extents },
-        UPT_SHAPE_SPATULA => Shape::Spatula {
-            half_extents,
-            radius: raw.radius,
-        },
-        UPT_SHAPE_HULL => {
-            return fail(
-                UPT_ERR_UNSUPPORTED,
-                "instruments[].shape: this call takes no hulls; use upt_scene_step_instruments",
-            );
-        }
-        value => return unknown("instruments[].shape", value),
-    })
-}
-
-/// An instrument whose contact is solved.
+/// An instrument, for each call that takes one.
 #[cfg(feature = "contact")]
 pub(super) fn tool(index: usize, raw: &upt_instrument) -> Result<crate::contact::Tool, Failure> {
     use crate::contact::{Mode, Tool};

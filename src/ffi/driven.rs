@@ -167,15 +167,13 @@ pub unsafe extern "C" fn upt_scene_instrument_contacts(
         #[cfg(feature = "contact")]
         {
             _scene.with_told(|told| {
-                let contacts: Vec<upt_instrument_contact> = told
-                    .pushes
-                    .iter()
-                    .map(|push| upt_instrument_contact {
-                        instrument: push.tool,
-                        position: push.point,
-                        force: push.force,
-                    })
-                    .collect();
+                let contacts = told.pushes.iter().map(|push| upt_instrument_contact {
+                    instrument: push.tool,
+                    position: push.point,
+                    force: push.force,
+                });
+                let count = told.pushes.len();
+                let contacts = crate::memory::collected(count, contacts, "the contacts")?;
                 // SAFETY: `out` has room for `capacity` elements and `needed` is NULL or writable, as the header asks.
                 unsafe { copy_out(&contacts, out, capacity, needed) }
             })
@@ -277,6 +275,7 @@ pub(super) unsafe fn read_tools(
         .into());
     }
     tools.clear();
+    crate::memory::fit(tools, count as usize, "the instruments")?;
     let read = |index: usize, raw: upt_instrument| {
         tools.push(convert::tool(index, &raw)?);
         Ok(())

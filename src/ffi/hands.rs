@@ -8,6 +8,7 @@ use super::failure::{Failure, fail};
 use super::registry::{next_hand, refuse_hand};
 use super::status::*;
 use crate::haptics::Haptics;
+use crate::memory;
 
 /// Haptics objects of a process.
 const MOST: usize = 64;
@@ -99,7 +100,7 @@ fn take(handle: usize) -> Result<(Taken, bool), Failure> {
 /// Gives an object a place and a number.
 pub(super) fn add(hand: Haptics) -> Result<usize, Failure> {
     let handle = next_hand();
-    let hand = Box::new(hand);
+    let hand = memory::boxed(hand, "the haptics of a scene")?;
     for place in &PLACES {
         let exchange =
             place

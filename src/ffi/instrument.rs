@@ -11,16 +11,16 @@ use super::registry::call_scene;
 use super::status::*;
 use super::structs::*;
 #[cfg(feature = "contact")]
-use crate::error::Error;
-#[cfg(feature = "contact")]
-use crate::instrument::{Instrument, MAX_INSTRUMENTS, Shape};
+use {
+    crate::contact::MAX_TOOLS, crate::error::Error, crate::instrument::Instrument, crate::memory,
+};
 
 /// Finds the nodes that rigid instruments touch, and the displacement that they impose there: the input of a step.
 ///
 /// The scene remembers what each place of the array touches until the array's length changes or `upt_scene_reset`: pass
 /// every instrument every time, in the same order. NULL with count 0 releases all.
 ///
-/// - `instruments`: at most 64, each with its `struct_size` set.
+/// - `instruments`: at most 64, all with the same `struct_size`, of every shape that `upt_scene_step_instruments` takes.
 /// - `contact_nodes`: `[capacity]`, `contact_vectors`: `[capacity,3]`, mm; both may be NULL with capacity 0, which only
 ///   queries the count.
 /// - `contact_count`: number of contacts found, always written.
@@ -50,10 +50,10 @@ pub unsafe extern "C" fn upt_scene_contacts_from_instruments(
             unsafe { output(contact_vectors, capacity_floats, "contact_vectors") }?;
         #[cfg(feature = "contact")]
         {
+            let mut list = _scene.instrument_list()?;
             // SAFETY: the host passes that many instruments, as the header asks.
-            let list = unsafe { read_instruments(instruments, instrument_count) }?;
-            let list = &list.0[..list.1];
-            _scene.contacts_from_instruments(list, |nodes, vectors| {
+            unsafe { read_instruments(instruments, instrument_count, &mut list) }?;
+            _scene.contacts_from_instruments(&list, |nodes, vectors| {
                 count_out.set(nodes.len() as u64);
                 if capacity == 0 {
                     return Ok(());
@@ -84,40 +84,30 @@ pub unsafe extern "C" fn upt_scene_contacts_from_instruments(
     })
 }
 
-/// The host's instruments, and how many there are.
+/// The host's instruments.
 #[cfg(feature = "contact")]
 unsafe fn read_instruments(
     instruments: *const upt_instrument,
     count: u64,
-) -> Result<([Instrument; MAX_INSTRUMENTS], usize), Failure> {
-    if count > MAX_INSTRUMENTS as u64 {
+    list: &mut Vec<Instrument>,
+) -> Result<(), Failure> {
+    if count > MAX_TOOLS as u64 {
         return Err(Error::Argument(format!(
-            "instrument_count is {count}, must be at most {MAX_INSTRUMENTS}"
+            "instrument_count is {count}, must be at most {MAX_TOOLS}"
         ))
         .into());
     }
-    let blank = Instrument {
-        shape: Shape::Box {
-            half_extents: [1.0; 3],
-        },
-        position: [0.0; 3],
-        rotation: [0.0, 0.0, 0.0, 1.0],
-        sticking: false,
-    };
-    let mut list = [blank; MAX_INSTRUMENTS];
+    list.clear();
+    memory::fit(list, count as usize, "the instruments")?;
     let read = |index: usize, raw: upt_instrument| {
-        convert::reserved(&raw.reserved)?;
-        list[index] = Instrument {
-            shape: convert::shape(&raw)?,
-            position: raw.position,
-            rotation: raw.rotation,
+        list.push(Instrument {
             sticking: convert::flag("sticking", raw.sticking)?,
-        };
+            tool: convert::tool(index, &raw)?,
+        });
         Ok(())
     };
     // SAFETY: the host passes that many instruments, as the header asks.
-    unsafe { each(instruments, count, "instruments[]", read) }?;
-    Ok((list, count as usize))
+    unsafe { each(instruments, count, "instruments[]", read) }
 }
 
 /// Copies the reaction of the tissue at the last step's contact nodes, in their order.

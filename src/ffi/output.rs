@@ -95,6 +95,14 @@ pub(super) unsafe fn copy_out<T: Copy>(
     if out.is_null() && capacity == 0 {
         return Ok(UPT_OK);
     }
+    if out.is_null() {
+        return fail(
+            UPT_ERR_NULL,
+            format!(
+                "out is NULL and capacity is {capacity}; to ask for the size alone, give capacity 0"
+            ),
+        );
+    }
     if capacity < values.len() as u64 {
         return fail(
             UPT_ERR_ARGUMENT,

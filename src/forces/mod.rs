@@ -8,6 +8,7 @@
 mod tests;
 
 use crate::error::{Error, Result};
+use crate::memory;
 use elements::Tetrahedron;
 
 pub use elements::Moduli;
@@ -41,32 +42,37 @@ fn row_of(values: &[f32], node: u32) -> [f64; 3] {
     [0, 1, 2].map(|axis| f64::from(values[3 * node as usize + axis]))
 }
 
+const WHAT: &str = "the elements' forces";
+
 impl ReactionForces {
     /// Adjacency and gradients of the elements that touch `nodes` (the surface's, say).
     ///
     /// `positions [K,3]` mm, `tets [T,4]` of positive volume, `stiffness [T]` their Young's moduli over the
     /// material's or empty for a uniform body, `nodes` below `K`.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`].
     pub fn new(
         positions: &[f32],
         tets: &[u32],
         stiffness: &[f32],
         nodes: &[u32],
         moduli: Moduli,
-    ) -> Self {
+    ) -> Result<Self> {
         let node_count = positions.len() / 3;
-        let mut wanted = vec![false; node_count];
+        let mut wanted = memory::filled(node_count, false, WHAT)?;
         nodes.iter().for_each(|&node| wanted[node as usize] = true);
-        let elements: Vec<Tetrahedron> = tets
-            .chunks_exact(4)
-            .enumerate()
-            .filter(|(_, tet)| tet.iter().any(|&node| wanted[node as usize]))
-            .map(|(index, tet)| {
-                let corners = [tet[0], tet[1], tet[2], tet[3]];
-                let factor = stiffness.get(index).map_or(1.0, |&f| f64::from(f));
-                Tetrahedron::new(corners, corners.map(|node| row_of(positions, node)), factor)
-            })
-            .collect();
-        let mut offsets = vec![0u32; node_count + 1];
+        let touched = || {
+            let all = tets.chunks_exact(4).enumerate();
+            all.filter(|(_, tet)| tet.iter().any(|&node| wanted[node as usize]))
+        };
+        let elements = touched().map(|(index, tet)| {
+            let corners = [tet[0], tet[1], tet[2], tet[3]];
+            let factor = stiffness.get(index).map_or(1.0, |&f| f64::from(f));
+            Tetrahedron::new(corners, corners.map(|node| row_of(positions, node)), factor)
+        });
+        let elements = memory::collected(touched().count(), elements, WHAT)?;
+        let mut offsets = memory::filled(node_count + 1, 0u32, WHAT)?;
         let touches = || {
             elements.iter().enumerate().flat_map(|(e, element)| {
                 let nodes = element.corners.into_iter().map(|node| node as usize);
@@ -77,29 +83,33 @@ impl ReactionForces {
         for node in 0..node_count {
             offsets[node + 1] += offsets[node];
         }
-        let mut around = vec![0; offsets[node_count] as usize];
-        let mut next = offsets.clone();
+        let mut around = memory::filled(offsets[node_count] as usize, 0, WHAT)?;
+        let mut next = memory::copied(&offsets, WHAT)?;
         for (element, node) in touches() {
             around[next[node] as usize] = element;
             next[node] += 1;
         }
-        Self {
+        Ok(Self {
             moduli,
-            visited: vec![0; elements.len()],
+            visited: memory::filled(elements.len(), 0, WHAT)?,
             elements,
             offsets,
             around,
-            entry_of_node: vec![0; node_count],
+            entry_of_node: memory::filled(node_count, 0, WHAT)?,
             call: 0,
-        }
+        })
     }
 
     /// Appends the nodes of the elements around `nodes` (whose displacement [`Self::reaction`] reads) to
     /// `out`, ascending, each once. A node that is out of range is skipped.
-    pub fn neighbourhood(&self, nodes: &[u32], out: &mut Vec<u32>) {
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`].
+    pub fn neighbourhood(&self, nodes: &[u32], out: &mut Vec<u32>) -> Result<()> {
         for &node in nodes {
             if let Some(row) = self.offsets.get(node as usize..node as usize + 2) {
                 let around = &self.around[row[0] as usize..row[1] as usize];
+                memory::tried(out.try_reserve(4 * around.len()), WHAT)?;
                 out.extend(
                     around
                         .iter()
@@ -109,6 +119,7 @@ impl ReactionForces {
         }
         out.sort_unstable();
         out.dedup();
+        Ok(())
     }
 
     /// Force of the tissue on the instrument at each of `nodes`, mN, to `out [m,3]`.

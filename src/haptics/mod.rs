@@ -33,8 +33,8 @@ use crate::contact::Tool;
 #[cfg(test)]
 pub(crate) fn test_hand(options: &HapticOptions) -> Haptics {
     let modes = modes::Modes::new(&[], 0.0).unwrap();
-    let (_, slow) = exchange::exchange(&slow::Slow::new(0).unwrap());
-    let (pose, _) = exchange::exchange(&options.tool.pose);
+    let (_, slow) = exchange::exchange([0; 3].map(|modes| slow::Slow::new(modes).unwrap()));
+    let (pose, _) = exchange::exchange([options.tool.pose; 3]);
     Haptics::new(options, modes, slow, pose, Default::default()).unwrap()
 }
 

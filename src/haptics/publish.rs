@@ -87,12 +87,11 @@ pub fn join(
     check(options)?;
     let tool = &options.tool;
     let natural = corrections.space.natural()?;
-    let slow = Slow::new(natural.len())?;
-    // Three of them, and what both ends keep.
-    let slow_bytes = slow.memory_bytes();
-    memory::probe(4 * slow_bytes, WHAT)?;
-    let (out, slow) = exchange(&slow);
-    let (at, pose) = exchange(&tool.pose);
+    let slow = || Slow::new(natural.len());
+    let buffers = [slow()?, slow()?, slow()?];
+    let slow_bytes = buffers[0].memory_bytes();
+    let (out, slow) = exchange(buffers);
+    let (at, pose) = exchange([tool.pose; 3]);
     let ends = Arc::new(Ends::default());
     let modes = Modes::new(&natural, integrator.damping_per_s)?;
     let kappa = integrator.over(AT_ONCE_S).kappa();

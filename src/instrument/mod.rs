@@ -16,13 +16,10 @@
 //! Every surface node is looked at, from where it is now, so large displacements need no care:
 //! a bounding-box test a node, and the exact query for the few that pass. Lengths in mm.
 
-mod shape;
-
-pub use shape::{Instrument, Shape};
-
+use crate::contact::{MAX_TOOLS, Tool};
 use crate::error::{Error, Result};
+use crate::memory;
 use parry3d::math::{Pose, Vec3A, Vec4, Vector};
-use shape::Placed;
 
 /// How far outside an instrument that does not move a node that was touched still follows it, mm.
 pub const SKIN_MM: f32 = 0.5;
@@ -32,8 +29,58 @@ pub const HYSTERESIS_MM: f32 = 0.1;
 const FLANK: f32 = 3.0;
 /// The longest way along the inward normal that is still taken as a contact, mm.
 pub const SHELL_MM: f32 = 10.0;
-/// Instruments at once.
-pub const MAX_INSTRUMENTS: usize = 64;
+const WHAT: &str = "the instruments' contacts";
+
+/// A tool whose contact is told from where it is alone.
+#[derive(Debug, Clone)]
+pub struct Instrument {
+    /// Shape and pose; the rest is for tools whose contact is solved.
+    pub tool: Tool,
+    /// Touched nodes move with the instrument until it leaves; otherwise they slide without friction.
+    pub sticking: bool,
+}
+
+/// The nearest point of an instrument's surface.
+struct Nearest {
+    /// Negative inside, mm.
+    distance: f32,
+    point: Vector,
+    /// Out of the instrument, unit length.
+    normal: Vector,
+}
+
+impl Instrument {
+    /// Whether another one is the same at the same place.
+    pub(crate) fn is_same(&self, other: &Instrument) -> bool {
+        self.sticking == other.sticking && self.tool.is_same(&other.tool)
+    }
+
+    fn bounds(&self) -> (Vector, Vector) {
+        self.tool.body.bounds(&self.tool.pose, 0.0)
+    }
+
+    fn nearest(&self, point: Vector) -> Nearest {
+        let found = self.tool.body.nearest_at(&self.tool.pose, point);
+        Nearest {
+            distance: found.distance,
+            point: point - found.normal * found.distance,
+            normal: found.normal,
+        }
+    }
+
+    fn way_out(&self, from: Vector, direction: Vector, limit: f32) -> Option<f32> {
+        let Tool { body, pose, .. } = &self.tool;
+        body.way_out(pose, from, direction, limit)
+    }
+
+    fn to_local(&self, point: Vector) -> Vector {
+        self.tool.pose.inverse_transform_point(point)
+    }
+
+    fn to_world(&self, local: Vector) -> Vector {
+        self.tool.pose.transform_point(local)
+    }
+}
 
 /// Contact search on one mesh, with the memory of what is touched. One thread at a time.
 #[derive(Debug)]
@@ -64,15 +111,20 @@ pub struct InstrumentContacts {
 impl InstrumentContacts {
     /// Prepares a mesh: `positions [K,3]`, boundary triangles `[F,3]` (outward), and the nodes that
     /// the boundary condition holds, which are never in contact.
-    pub fn new(positions: &[f32], surface_faces: &[u32], held: &[u32]) -> Self {
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`].
+    pub fn new(positions: &[f32], surface_faces: &[u32], held: &[u32]) -> Result<Self> {
         let node_count = positions.len() / 3;
-        let mut row = vec![0u32; node_count];
+        let mut row = memory::filled(node_count, 0u32, WHAT)?;
         surface_faces
             .iter()
             .for_each(|&node| row[node as usize] += 1);
         held.iter().for_each(|&node| row[node as usize] = 0);
-        let mut surface = Vec::new();
-        let mut face_offsets = vec![0];
+        let count = row.iter().filter(|&&faces| faces > 0).count();
+        let mut surface = memory::room(count, WHAT)?;
+        let mut face_offsets = memory::room(count + 1, WHAT)?;
+        face_offsets.push(0);
         for (node, count) in row.iter_mut().enumerate() {
             let faces = std::mem::replace(count, u32::MAX);
             if faces > 0 {
@@ -81,8 +133,8 @@ impl InstrumentContacts {
                 face_offsets.push(face_offsets[face_offsets.len() - 1] + faces);
             }
         }
-        let mut faces = vec![[0; 3]; face_offsets[surface.len()] as usize];
-        let mut next = face_offsets.clone();
+        let mut faces = memory::filled(face_offsets[count] as usize, [0; 3], WHAT)?;
+        let mut next = memory::copied(&face_offsets, WHAT)?;
         for face in surface_faces.chunks_exact(3) {
             for &node in face {
                 let row = row[node as usize];
@@ -92,26 +144,22 @@ impl InstrumentContacts {
                 }
             }
         }
-        let rest = surface
-            .iter()
-            .map(|&node| triple(positions, node).into())
-            .collect();
-        let count = surface.len();
-        Self {
+        let rest = surface.iter().map(|&node| triple(positions, node).into());
+        Ok(Self {
             node_count,
-            rest,
+            rest: memory::collected(count, rest, WHAT)?,
             face_offsets,
             faces,
-            positions: positions.to_vec(),
-            touched_by: vec![0; count],
-            left: vec![0; count],
-            anchor: vec![[0.0; 3]; count],
-            poses: Vec::with_capacity(MAX_INSTRUMENTS),
-            near: Vec::with_capacity(count),
-            nodes: Vec::with_capacity(count),
-            vectors: Vec::with_capacity(3 * count),
+            positions: memory::copied(positions, WHAT)?,
+            touched_by: memory::filled(count, 0, WHAT)?,
+            left: memory::filled(count, 0, WHAT)?,
+            anchor: memory::filled(count, [0.0; 3], WHAT)?,
+            poses: memory::room(MAX_TOOLS, WHAT)?,
+            near: memory::room(count, WHAT)?,
+            nodes: memory::room(count, WHAT)?,
+            vectors: memory::room(3 * count, WHAT)?,
             surface,
-        }
+        })
     }
 
     /// Forgets what is touched; the next call sees the instruments for the first time.
@@ -129,8 +177,7 @@ impl InstrumentContacts {
     /// collision field. No allocation on a mesh and instruments seen before.
     ///
     /// # Errors
-    /// [`Error::Argument`] for a wrong length, size or rotation, [`Error::NonFinite`] for a pose
-    /// that is not finite; the memory is then as before.
+    /// [`Error::Argument`] for a wrong length; the memory is then as before.
     pub fn find(
         &mut self,
         instruments: &[Instrument],
@@ -143,17 +190,13 @@ impl InstrumentContacts {
                 3 * self.node_count
             )));
         }
-        if instruments.len() > MAX_INSTRUMENTS {
+        if instruments.len() > MAX_TOOLS {
             return Err(Error::Argument(format!(
-                "{} instruments; at most {MAX_INSTRUMENTS} are allowed at once",
+                "{} instruments; at most {MAX_TOOLS} are allowed at once",
                 instruments.len()
             )));
         }
-        let mut placed: [Option<Placed>; MAX_INSTRUMENTS] = [const { None }; MAX_INSTRUMENTS];
-        for (index, instrument) in instruments.iter().enumerate() {
-            placed[index] = Some(Placed::new(instrument, index)?);
-        }
-        let placed = &placed[..instruments.len()];
+        let placed = instruments;
         if self.poses.len() != instruments.len() {
             self.reset();
         }
@@ -161,8 +204,8 @@ impl InstrumentContacts {
         self.vectors.clear();
         let mut low = Vector::splat(f32::INFINITY);
         let mut high = Vector::splat(f32::NEG_INFINITY);
-        for instrument in placed.iter().flatten() {
-            let (a, b) = instrument.bounds(0.0);
+        for instrument in placed {
+            let (a, b) = instrument.bounds();
             (low, high) = (low.min(a), high.max(b));
         }
         self.sift(displacement, low.into(), high.into());
@@ -172,7 +215,7 @@ impl InstrumentContacts {
             let node = self.surface[i];
             let before = std::mem::replace(&mut self.touched_by[i], 0);
             let point = Vector::from(p);
-            let target = match self.holder(i, point, before, placed) {
+            let target = match self.holder(point, before, placed) {
                 Some((by, instrument)) => {
                     let kept = self.keep(i, by, point, instrument);
                     if kept.is_none() {
@@ -191,7 +234,8 @@ impl InstrumentContacts {
             }
         }
         self.poses.clear();
-        self.poses.extend(placed.iter().flatten().map(Placed::pose));
+        let poses = placed.iter().map(|instrument| instrument.tool.pose);
+        self.poses.extend(poses);
         Ok((&self.nodes, &self.vectors))
     }
 
@@ -227,31 +271,29 @@ impl InstrumentContacts {
     /// sliding one, because the tissue has not followed yet: that is a touch like the first.
     fn holder<'a>(
         &self,
-        i: usize,
         point: Vector,
         before: u8,
-        placed: &'a [Option<Placed>],
-    ) -> Option<(usize, &'a Placed)> {
+        placed: &'a [Instrument],
+    ) -> Option<(usize, &'a Instrument)> {
         let by = usize::from(before.checked_sub(1)?);
-        let instrument = placed.get(by)?.as_ref()?;
-        let hint = point - Vector::from(self.rest[i]);
-        let follows = instrument.sticking || instrument.nearest(point, hint).distance > -1e-3;
+        let instrument = placed.get(by)?;
+        let follows = instrument.sticking || instrument.nearest(point).distance > -1e-3;
         follows.then_some((by, instrument))
     }
 
     /// How instrument `by` has moved since the last call at a point that it is at now, mm; none at its first.
-    fn motion(&self, by: usize, point: Vector, instrument: &Placed) -> Option<Vector> {
+    fn motion(&self, by: usize, point: Vector, instrument: &Instrument) -> Option<Vector> {
         let from = self.poses.get(by)?;
         Some(point - from.transform_point(instrument.to_local(point)))
     }
 
     /// Where a node goes that was touched before, or `None` where the instrument has left it.
-    fn keep(&self, i: usize, by: usize, point: Vector, instrument: &Placed) -> Option<Vector> {
+    fn keep(&self, i: usize, by: usize, point: Vector, instrument: &Instrument) -> Option<Vector> {
         let rest = Vector::from(self.rest[i]);
         let target = match instrument.sticking {
             true => instrument.to_world(Vector::from(self.anchor[i])),
             false => {
-                let nearest = instrument.nearest(point, point - rest);
+                let nearest = instrument.nearest(point);
                 let moved = self.motion(by, point, instrument).unwrap_or_default();
                 if nearest.distance > SKIN_MM + moved.length() {
                     return None;
@@ -271,22 +313,19 @@ impl InstrumentContacts {
         i: usize,
         point: Vector,
         displacement: &[f32],
-        placed: &[Option<Placed>],
+        placed: &[Instrument],
         before: u8,
     ) -> Option<(usize, Vector)> {
         let mut normal = None;
         let mut deepest: Option<(f32, usize, Vector)> = None;
         for (by, instrument) in placed.iter().enumerate() {
-            let Some(instrument) = instrument else {
-                continue;
-            };
-            let (low, high) = instrument.bounds(0.0);
+            let (low, high) = instrument.bounds();
             if point.cmplt(low).any() || point.cmpgt(high).any() {
                 continue;
             }
             let moved = |node| Vector::from(triple(displacement, node));
             let outward = *normal.get_or_insert_with(|| self.outward(i, moved));
-            let nearest = instrument.nearest(point, -outward);
+            let nearest = instrument.nearest(point);
             // One that was let go must come some way in before it is touched again.
             let shallow = match usize::from(self.left[i]) == by + 1 {
                 true => -HYSTERESIS_MM,
@@ -319,9 +358,7 @@ impl InstrumentContacts {
             deepest = Some((nearest.distance, by, target));
         }
         let (_, by, target) = deepest?;
-        if let Some(instrument) = &placed[by] {
-            self.anchor[i] = instrument.to_local(target).to_array();
-        }
+        self.anchor[i] = placed[by].to_local(target).to_array();
         Some((by, target))
     }
 

@@ -7,6 +7,7 @@ use super::isa::{Isa, by_isa};
 use super::lanes::{Lanes, load_some, store_some};
 use super::parts::Parts;
 use super::pool::{Pool, PoolError};
+use crate::memory;
 
 /// A table `[n,width]` and its update's weight, transposed: `[rank,width]`.
 #[derive(Debug, Clone, Copy)]
@@ -78,15 +79,18 @@ impl<'a> LowRank<'a> {
 }
 
 /// `[width,rank]` as stored in a bundle to `[rank,width]` as the kernels read it.
-pub fn transpose_weight(weight: &[f32], width: usize, rank: usize) -> Vec<f32> {
+///
+/// # Errors
+/// [`crate::Error::OutOfMemory`].
+pub fn transpose_weight(weight: &[f32], width: usize, rank: usize) -> crate::Result<Vec<f32>> {
     assert_eq!(weight.len(), width * rank, "weight must be [width, rank]");
-    let mut out = vec![0.0; weight.len()];
+    let mut out = memory::zeros(weight.len(), "the encoder's weights")?;
     for i in 0..width {
         for k in 0..rank {
             out[k * width + i] = weight[i * rank + k];
         }
     }
-    out
+    Ok(out)
 }
 
 const ROWS: usize = 64;
@@ -162,7 +166,7 @@ mod tests {
         for (width, rank) in [(3, 2), (16, 6), (96, 6), (100, 16)] {
             let table = random.normal(90 * width, 1.0);
             let features = random.normal(90 * rank, 1.0);
-            let weight = transpose_weight(&random.normal(width * rank, 1.0), width, rank);
+            let weight = transpose_weight(&random.normal(width * rank, 1.0), width, rank).unwrap();
             let rows: Vec<u32> = (0..130).map(|_| random.below(90) as u32).collect();
             let run = |isa, threads| {
                 let mut out = vec![f32::NAN; rows.len() * width];

@@ -91,7 +91,7 @@ pub struct Model {
     #[cfg(feature = "contact")]
     samples: OnceLock<Arc<::contact::Samples>>,
     opening: Mutex<()>,
-    files: BundleFiles,
+    files: Arc<BundleFiles>,
     /// ONNX Runtime; none where the bundle has no graph.
     runtime: Option<&'static Runtime>,
     pub(crate) plan: ProviderPlan,
@@ -129,8 +129,16 @@ impl Model {
             }
         }
         let _span = tracing::info_span!("open", path = %path.display()).entered();
+        let files = Arc::new(BundleFiles::open(path)?);
+        Model::of_files(Arc::clone(&files), options, start).map_err(|error| files.tell(error))
+    }
+
+    fn of_files(
+        files: Arc<BundleFiles>,
+        options: &ModelOptions,
+        start: Instant,
+    ) -> Result<Arc<Model>> {
         let process = library::current();
-        let files = BundleFiles::open(path)?;
         let manifest = files.manifest.clone();
         let mesh_file = files.tensors(&manifest.mesh.file)?;
         let mesh = Mesh::parse(&mesh_file, manifest.boundary)?;
@@ -215,7 +223,8 @@ impl Model {
         if let Some(made) = self.corrections.get() {
             return Ok(made);
         }
-        let made = Corrections::open(&self.files, &self.mesh, self.prior.as_deref())?;
+        let made = Corrections::open(&self.files, &self.mesh, self.prior.as_deref())
+            .map_err(|error| self.files.tell(error))?;
         Ok(self.corrections.get_or_init(|| made))
     }
 

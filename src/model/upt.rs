@@ -105,8 +105,8 @@ impl UptModel {
         let (d, f) = (entry.dims.encoder, entry.feature_width());
         let matrix = |name: &str| weights.f32(name, &[Some(d), Some(f)]);
         let embed = files.read("embed.onnx")?;
-        let source_weight = transpose_weight(&matrix("encoder.source")?, d, f);
-        let target_weight = transpose_weight(&matrix("encoder.target")?, d, f);
+        let source_weight = transpose_weight(&matrix("encoder.source")?, d, f)?;
+        let target_weight = transpose_weight(&matrix("encoder.target")?, d, f)?;
         let mut tables = make_tables(&entry, &embed, mesh, runtime, threads)?;
         if let Some(file) = &entry.anchors {
             tables.anchors = Some(Anchors::parse(&files.tensors(file)?, mesh.node_count())?);
@@ -189,7 +189,7 @@ fn pack_decoder(file: &TensorFile, entry: &UptEntry) -> Result<PackedDecoder> {
     let mlp2 = tensors("mlp2", &[Some(h), Some(m)])?;
     let norm3 = tensors("norm3", &[Some(h)])?;
     let head = tensors("head", &[Some(3), Some(h)])?;
-    PackedDecoder::new(&DecoderWeights {
+    let weights = DecoderWeights {
         hidden: h,
         heads: entry.dims.decoder_heads,
         mlp: m,
@@ -199,8 +199,8 @@ fn pack_decoder(file: &TensorFile, entry: &UptEntry) -> Result<PackedDecoder> {
         mlp2: (&mlp2.0, &mlp2.1),
         norm3: (&norm3.0, &norm3.1),
         head: (&head.0, &head.1),
-    })
-    .map_err(|message| Error::bundle(file.name(), message))
+    };
+    PackedDecoder::new(file.name(), &weights)
 }
 
 fn make_tables(
@@ -211,17 +211,15 @@ fn make_tables(
     threads: usize,
 ) -> Result<UptTables> {
     let _span = tracing::debug_span!("tables", nodes = mesh.node_count()).entered();
-    let graph = SupernodeGraph::of_mesh(mesh, &entry.graph);
-    let encode_nodes = graph.needed_nodes();
+    let graph = SupernodeGraph::of_mesh(mesh, &entry.graph)?;
+    let encode_nodes = graph.needed_nodes()?;
     let mut row = memory::filled(mesh.node_count(), u32::MAX, TABLES)?;
     for (at, &node) in encode_nodes.iter().enumerate() {
         row[node as usize] = at as u32;
     }
     let rows = |nodes: &[u32]| {
-        nodes
-            .iter()
-            .map(|&node| row[node as usize])
-            .collect::<Vec<u32>>()
+        let rows = nodes.iter().map(|&node| row[node as usize]);
+        memory::collected(nodes.len(), rows, TABLES)
     };
     let d = entry.dims.encoder;
     let mut source_table = memory::room(encode_nodes.len() * d, TABLES)?;
@@ -246,8 +244,8 @@ fn make_tables(
         },
     )?;
     Ok(UptTables {
-        supernode_rows: rows(&graph.supernodes),
-        neighbour_rows: rows(&graph.neighbours),
+        supernode_rows: rows(&graph.supernodes)?,
+        neighbour_rows: rows(&graph.neighbours)?,
         source_table,
         target_table,
         query_table,

@@ -2,6 +2,7 @@
 
 use super::upt::{UptModel, UptTables};
 use crate::error::{Error, Result};
+use crate::memory;
 use crate::onnx::{ProviderPlan, Runtime, Stage, StageOptions, Tensors};
 
 /// Nodes a run of `decoder.onnx`: activations stay in cache.
@@ -119,11 +120,12 @@ impl UptModel {
                 self.precision
             )));
         };
+        const STEP: &str = "the inputs of step.onnx";
         let (dims, graph) = (&self.entry.dims, &tables.graph);
         let (d, q, rows) = (dims.encoder, dims.query, tables.encode_nodes.len());
         let (supernodes, degree) = (graph.supernodes.len(), self.entry.graph.max_degree);
-        let mut neighbours = vec![0i64; supernodes * degree];
-        let mut mask = vec![0.0f32; supernodes * degree];
+        let mut neighbours = memory::filled(supernodes * degree, 0i64, STEP)?;
+        let mut mask = memory::zeros(supernodes * degree, STEP)?;
         for row in 0..supernodes {
             let edges = graph.offsets[row] as usize..graph.offsets[row + 1] as usize;
             let at = row * degree;
@@ -132,13 +134,10 @@ impl UptModel {
                 mask[at + i] = 1.0;
             }
         }
-        let receivers: Vec<i64> = tables
-            .supernode_rows
-            .iter()
-            .map(|&row| row.into())
-            .collect();
+        let receivers = tables.supernode_rows.iter().map(|&row| i64::from(row));
+        let receivers = memory::collected(supernodes, receivers, STEP)?;
         // The graph takes a target row for each row of the features, and reads the receivers'.
-        let mut targets = vec![0.0f32; rows * d];
+        let mut targets = memory::zeros(rows * d, STEP)?;
         for (row, target) in tables
             .supernode_rows
             .iter()

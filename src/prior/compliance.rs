@@ -110,13 +110,15 @@ impl Compliance {
                 ));
             }
         }
-        let places: Vec<_> = (0..count).map(place).collect();
+        const WHAT: &str = "near_compliance";
+        let narrow = offsets.iter().map(|&value| value as u32);
+        let ranks = (0..count).map(&place).map(|place| (place.1, place.2));
         Ok(Compliance::Near(Near {
-            offsets: offsets.into_iter().map(|value| value as u32).collect(),
+            offsets: memory::collected(offsets.len(), narrow, WHAT)?,
             nodes,
             blocks,
-            rows: places.iter().map(|place| place.0).collect(),
-            ranks: places.iter().map(|place| (place.1, place.2)).collect(),
+            rows: memory::collected(count, (0..count).map(|at| place(at).0), WHAT)?,
+            ranks: memory::collected(count, ranks, WHAT)?,
         }))
     }
 

@@ -3,6 +3,7 @@
 
 use crate::bundle::TensorFile;
 use crate::error::Result;
+use crate::memory;
 
 /// Most modes that a file may hold.
 const LIMIT: usize = 128;
@@ -28,7 +29,7 @@ impl Release {
             return Err(file.bad("modes", format!("must hold 1 to {LIMIT} modes")));
         }
         let step = file.f32("step", &[Some(2 * count), Some(count)])?;
-        if !dies_away(&step, count) {
+        if !dies_away(&step, count)? {
             let steps = 1 << SQUARINGS;
             return Err(file.bad("step", format!("must have died away after {steps} steps")));
         }
@@ -54,9 +55,11 @@ impl Release {
 }
 
 /// Whether the power `2^SQUARINGS` of `[b, b_before] -> [b', b]` is smaller than 1 in the Frobenius norm.
-fn dies_away(step: &[f32], count: usize) -> bool {
+fn dies_away(step: &[f32], count: usize) -> Result<bool> {
+    const WHAT: &str = "the map of a release";
     let size = 2 * count;
-    let mut power = vec![0.0f64; size * size];
+    let mut power = memory::filled(size * size, 0.0f64, WHAT)?;
+    let mut squared = memory::filled(size * size, 0.0f64, WHAT)?;
     for (i, (row, weights)) in power
         .chunks_exact_mut(size)
         .zip(step.chunks_exact(count))
@@ -70,7 +73,7 @@ fn dies_away(step: &[f32], count: usize) -> bool {
         }
     }
     for _ in 0..SQUARINGS {
-        let mut squared = vec![0.0; size * size];
+        squared.fill(0.0);
         for (to, row) in squared.chunks_exact_mut(size).zip(power.chunks_exact(size)) {
             for (value, from) in row.iter().zip(power.chunks_exact(size)) {
                 to.iter_mut()
@@ -78,9 +81,9 @@ fn dies_away(step: &[f32], count: usize) -> bool {
                     .for_each(|(to, from)| *to += value * from);
             }
         }
-        power = squared;
+        std::mem::swap(&mut power, &mut squared);
     }
-    power.iter().map(|x| x * x).sum::<f64>() < 1.0
+    Ok(power.iter().map(|x| x * x).sum::<f64>() < 1.0)
 }
 
 #[cfg(test)]
@@ -104,12 +107,12 @@ mod tests {
 
     #[test]
     fn only_a_map_that_dies_away_is_taken() {
-        assert!(dies_away(&[0.9, 0.0], 1));
-        assert!(!dies_away(&[1.0, 0.0], 1));
+        assert!(dies_away(&[0.9, 0.0], 1).unwrap());
+        assert!(!dies_away(&[1.0, 0.0], 1).unwrap());
         // b' = 1.2 b - 0.5 b_before turns and shrinks; with -1.1 it grows.
-        assert!(dies_away(&[1.2, -0.5], 1));
-        assert!(!dies_away(&[1.2, -1.1], 1));
-        assert!(!dies_away(&[f32::MAX, f32::MAX], 1));
-        assert!(!dies_away(&[f32::NAN, 0.0], 1));
+        assert!(dies_away(&[1.2, -0.5], 1).unwrap());
+        assert!(!dies_away(&[1.2, -1.1], 1).unwrap());
+        assert!(!dies_away(&[f32::MAX, f32::MAX], 1).unwrap());
+        assert!(!dies_away(&[f32::NAN, 0.0], 1).unwrap());
     }
 }

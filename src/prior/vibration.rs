@@ -13,6 +13,7 @@ use crate::kernels::project::row_dots;
 use crate::kernels::respond::accumulate_rows;
 use crate::kernels::rows::Stored;
 use crate::kernels::{Isa, Pool};
+use crate::memory;
 
 /// Most modes that a file may hold.
 const LIMIT: usize = 4096;
@@ -34,6 +35,8 @@ pub struct FreeVibration {
     /// For each mode `A, B, C, D` of `z' = A z + B w`, `w' = C z + D w`.
     propagator: Vec<[f32; 4]>,
 }
+
+const WHAT: &str = "the free vibration";
 
 impl FreeVibration {
     /// Reads and checks the tables for a response of shape `[3D,Q]`; `damping` in 1/s, `dt` in s. `projected`: the
@@ -61,20 +64,22 @@ impl FreeVibration {
             } else {
                 Vec::new()
             },
-            rows: (0..count as u32).collect(),
+            rows: memory::collected(count, 0..count as u32, WHAT)?,
             count,
             release: Release::default(),
-            propagator: frequency
-                .iter()
-                .map(|&omega| propagator(f64::from(omega), damping, dt))
-                .collect(),
+            propagator: {
+                let frequency = frequency.iter().map(|&omega| f64::from(omega));
+                let over = frequency.map(|omega| propagator(omega, damping, dt));
+                memory::collected(count, over, WHAT)?
+            },
         })
     }
 
     /// Reads the learned map that carries on what the modes leave out; `width`: that of the prior, `Q`.
     pub fn learn(&mut self, file: &TensorFile, width: usize) -> Result<()> {
         self.release = Release::parse(file, width)?;
-        self.rows = (0..self.count.max(self.release.count) as u32).collect();
+        let count = self.count.max(self.release.count);
+        self.rows = memory::collected(count, 0..count as u32, WHAT)?;
         Ok(())
     }
 

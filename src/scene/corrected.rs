@@ -9,9 +9,12 @@ use crate::corrections::Substeps;
 use crate::corrections::{Enough, LIMIT, Lent, MOST_SUBSTEPS, Pace, Report, Shorter, Stage};
 use crate::error::{Error, Result};
 use crate::kernels::{Isa, Pool};
+use crate::memory;
 use crate::model::Model;
 use crate::options::{Corrections, SceneOptions};
 use crate::stats::{SceneStats, flag};
+
+const WHAT: &str = "the corrections of a scene";
 
 /// The stage of a scene that corrects, and how far it goes.
 pub struct Corrected {
@@ -131,7 +134,7 @@ impl Corrected {
             pace: &pace,
         };
         Ok(Some(Corrected {
-            stage: Box::new(Stage::new(lent)?),
+            stage: memory::boxed(Stage::new(lent)?, WHAT)?,
             #[cfg(feature = "contact")]
             substeps: None,
             most_substeps,
@@ -185,7 +188,7 @@ impl Corrected {
         }
         self.be_shorter(lent, model)?;
         let limit_mm = self.target_mm / self.calibration;
-        self.substeps = Some(Box::new(Substeps::new(limit_mm)?));
+        self.substeps = Some(memory::boxed(Substeps::new(limit_mm)?, WHAT)?);
         Ok(())
     }
 
@@ -199,7 +202,7 @@ impl Corrected {
         let integrator = whole.over(whole.step_s / f64::from(count));
         let pace = (lent.corrections).pace(&model.mesh, &model.manifest.material, integrator)?;
         let shorter = Shorter::new(lent, Arc::new(pace), count)?;
-        self.shorter = Some(Box::new(shorter));
+        self.shorter = Some(memory::boxed(shorter, WHAT)?);
         Ok(())
     }
 

@@ -12,8 +12,10 @@ use super::{Contact, StepInput};
 use crate::contact::{Compliance, Problem, State};
 use crate::corrections::{Input, Lent};
 use crate::error::{Error, Result};
+use crate::memory;
 use crate::stats::{SceneStats, flag};
 
+const WHAT: &str = "the contact of instruments";
 /// Free tissue may come this deep into a tool before the step is made with contact, mm.
 const INTRUSION_MM: f32 = 0.02;
 /// Tissue this deep inside of a tool raises [`flag::DEEP`], mm.
@@ -40,7 +42,7 @@ impl Core {
         }
         let mut problem = match self.problem.take() {
             Some(problem) => problem,
-            None => Box::new(Problem::new(self.model.samples()?)?),
+            None => memory::boxed(Problem::new(self.model.samples()?)?, WHAT)?,
         };
         let shared = lock_read(published);
         let (rest, start) = (&self.mesh.positions, &shared.last.field);

@@ -335,7 +335,8 @@ fn build(model: &Arc<Model>, options: &SceneOptions) -> Result<Core> {
                 .prior
                 .as_ref()
                 .ok_or_else(|| Error::bundle("bundle.json", "field `prior` is missing"))?;
-            Engine::Reduced(Box::new(reduced::ReducedEngine::new(model, kind, table)?))
+            let engine = reduced::ReducedEngine::new(model, kind, table)?;
+            Engine::Reduced(memory::boxed(engine, core::SCENE)?)
         }
         KindModel::Upt(kind) => {
             let (tables, nodes) = match &own_mesh {
@@ -353,7 +354,7 @@ fn build(model: &Arc<Model>, options: &SceneOptions) -> Result<Core> {
                 node_count: nodes,
             };
             let engine = parts.engine(options)?;
-            Engine::Upt(Box::new(engine))
+            Engine::Upt(memory::boxed(engine, core::SCENE)?)
         }
     };
     let corrected = Corrected::new(model, options, Isa::detect(), &pool)?;

@@ -21,10 +21,13 @@ use crate::memory;
 use crate::model::Model;
 use crate::output::Output;
 
+const WHAT: &str = "the elements' forces";
+
 /// The elements' forces of a scene without a prior.
 pub struct Haptics {
     forces: ReactionForces,
-    /// Nodes around the contact nodes, and the field they are decoded into.
+    /// The contact nodes, nodes around them, and the field they are decoded into.
+    nodes: Vec<u32>,
     around: Vec<u32>,
     decoded: Vec<f32>,
     field: Vec<f32>,
@@ -71,12 +74,10 @@ impl Scene {
             return Ok(());
         }
         let mut haptics = lock(&self.tools.forces)?;
-        if haptics.is_none() {
-            // Made of many lists: what they take together is asked for first.
-            let bytes = 160 * self.mesh.tets.len() / 4 + 8 * self.mesh.positions.len();
-            memory::probe(bytes, "the elements' forces")?;
-        }
-        let haptics = haptics.get_or_insert_with(|| Haptics::new(&self.mesh, &self.model));
+        let haptics = match &mut *haptics {
+            Some(made) => made,
+            none => none.insert(Haptics::new(&self.mesh, &self.model)?),
+        };
         haptics.reaction(core, published, out)
     }
 }
@@ -101,20 +102,21 @@ impl Core {
 }
 
 impl Haptics {
-    fn new(mesh: &Mesh, model: &Model) -> Haptics {
+    fn new(mesh: &Mesh, model: &Model) -> Result<Haptics> {
         let material = &model.manifest.material;
-        Haptics {
+        Ok(Haptics {
             forces: ReactionForces::new(
                 &mesh.positions,
                 &mesh.tets,
                 &mesh.stiffness,
                 &mesh.surface_nodes,
                 material.moduli(),
-            ),
+            )?,
+            nodes: Vec::new(),
             around: Vec::new(),
             decoded: Vec::new(),
-            field: vec![0.0; mesh.positions.len()],
-        }
+            field: memory::zeros(mesh.positions.len(), WHAT)?,
+        })
     }
 
     fn reaction(
@@ -128,17 +130,20 @@ impl Haptics {
             let (field, nodes) = (&shared.last.field, &shared.contact_nodes);
             return self.forces.reaction(field, nodes, out).map(|_| ());
         }
-        let nodes = shared.contact_nodes.clone();
+        memory::replace(&mut self.nodes, &shared.contact_nodes, WHAT)?;
         drop(shared);
         self.around.clear();
-        self.forces.neighbourhood(&nodes, &mut self.around);
-        self.decoded.resize(3 * self.around.len(), 0.0);
+        (self.forces).neighbourhood(&self.nodes, &mut self.around)?;
+        let floats = 3 * self.around.len();
+        memory::fit(&mut self.decoded, floats, WHAT)?;
+        self.decoded.resize(floats, 0.0);
         if !self.around.is_empty() {
             core.decode(published, &self.around, self.decoded.as_mut_slice().into())?;
         }
         for (&node, u) in self.around.iter().zip(self.decoded.chunks_exact(3)) {
             self.field[3 * node as usize..][..3].copy_from_slice(u);
         }
-        self.forces.reaction(&self.field, &nodes, out).map(|_| ())
+        let forces = self.forces.reaction(&self.field, &self.nodes, out);
+        forces.map(|_| ())
     }
 }

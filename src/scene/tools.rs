@@ -9,11 +9,13 @@ use super::reaction::Haptics;
 #[cfg(feature = "contact")]
 use super::shared::lock;
 #[cfg(feature = "contact")]
-use crate::contact::{Told, Tool};
+use crate::contact::{MAX_TOOLS, Told, Tool};
 #[cfg(feature = "contact")]
 use crate::error::Result;
 #[cfg(feature = "contact")]
 use crate::instrument::{Instrument, InstrumentContacts};
+#[cfg(feature = "contact")]
+use crate::memory;
 #[cfg(any(feature = "contact", feature = "forces"))]
 use std::sync::Mutex;
 #[cfg(feature = "contact")]
@@ -40,6 +42,9 @@ pub struct Tools {
     /// The same of a frame between steps.
     #[cfg(feature = "contact")]
     frame_list: Mutex<Vec<Tool>>,
+    /// The same of contacts that a host asks for.
+    #[cfg(feature = "contact")]
+    asked_list: Mutex<Vec<Instrument>>,
     #[cfg(feature = "forces")]
     pub(super) forces: Mutex<Option<Haptics>>,
     /// The contact forces of the last call that asked for them.
@@ -78,6 +83,14 @@ impl Scene {
         lock(&self.tools.frame_list)
     }
 
+    /// A list for instruments whose contacts are asked for.
+    ///
+    /// # Errors
+    /// [`Error::Busy`].
+    pub fn instrument_list(&self) -> Result<MutexGuard<'_, Vec<Instrument>>> {
+        lock(&self.tools.asked_list)
+    }
+
     /// Starts a step that tools drive on the scene's worker.
     ///
     /// # Errors
@@ -100,7 +113,8 @@ impl Scene {
     /// With a region, surface nodes outside of it are taken where they last were.
     ///
     /// # Errors
-    /// [`Error::Argument`], [`Error::NonFinite`] for an instrument, [`Error::Busy`], and what `take` gives.
+    /// [`Error::Argument`] for more than [`MAX_TOOLS`](crate::contact::MAX_TOOLS), [`Error::Busy`], [`Error::OutOfMemory`], and what `take`
+    /// gives.
     #[cfg(feature = "contact")]
     pub fn contacts_from_instruments<T>(
         &self,
@@ -109,26 +123,23 @@ impl Scene {
     ) -> Result<T> {
         let mut contacts = lock(&self.tools.contacts)?;
         let mesh = &self.mesh;
-        if contacts.is_none() {
-            // Made of many lists: what they take together is asked for first.
-            let bytes = 64 * mesh.surface_nodes.len() + 24 * mesh.surface_faces.len();
-            crate::memory::probe(
-                bytes + 4 * mesh.positions.len(),
-                "the instruments' contacts",
-            )?;
-        }
-        let asked = contacts.get_or_insert_with(|| Asked {
-            contacts: InstrumentContacts::new(
-                &mesh.positions,
-                &mesh.surface_faces,
-                &mesh.held_nodes,
-            ),
-            instruments: Vec::new(),
-            step: None,
-        });
+        let asked = match &mut *contacts {
+            Some(asked) => asked,
+            none => none.insert(Asked {
+                contacts: InstrumentContacts::new(
+                    &mesh.positions,
+                    &mesh.surface_faces,
+                    &mesh.held_nodes,
+                )?,
+                instruments: memory::room(MAX_TOOLS, "the instruments' contacts")?,
+                step: None,
+            }),
+        };
         let published = lock_read(&self.shared.published);
         let step = Some(published.stats.step_count);
-        if asked.step != step || asked.instruments != instruments {
+        let mut pairs = asked.instruments.iter().zip(instruments);
+        let same = asked.instruments.len() == instruments.len() && pairs.all(|(a, b)| a.is_same(b));
+        if asked.step != step || !same {
             asked.step = None;
             asked.contacts.find(instruments, &published.last.field)?;
             asked.instruments.clear();

@@ -1,6 +1,7 @@
 //! Fields of a manifest that are wrong, each by its name.
 
-use super::with_manifest;
+use super::fixture::{copy_of, find_runtime};
+use super::{open, with_manifest};
 
 #[test]
 fn manifest_errors_name_the_field() {
@@ -277,4 +278,47 @@ fn manifest_errors_name_the_field() {
         with_manifest("tiny-upt", set("/version", serde_json::json!(2))).status(),
         -32
     );
+}
+
+#[test]
+fn an_error_names_the_tool_that_made_the_bundle() {
+    for (bundle, command) in [
+        ("tiny-upt", None),
+        ("tiny-reduced", None),
+        ("tiny-reduced", Some("upt make")),
+    ] {
+        let wanted = command.unwrap_or(match bundle {
+            "tiny-upt" => "python -m upt_training export",
+            _ => "python -m upt_training.reduced",
+        });
+        // In the manifest, and in a file that it lists.
+        for (field, value) in [("dt_s", serde_json::json!("a word")), ("", true.into())] {
+            let error = with_manifest(bundle, |manifest| {
+                if let Some(command) = command {
+                    manifest["provenance"]["command"] = command.into();
+                }
+                match field {
+                    "" => manifest["mesh"]["mesh_sha256"] = "0".repeat(64).into(),
+                    field => manifest[field] = value.clone(),
+                }
+            });
+            let text = error.to_string();
+            assert!(text.contains(&format!("made with `{wanted}`")), "{text}");
+        }
+    }
+}
+
+#[test]
+fn a_digest_that_is_null_is_refused_and_a_missing_one_is_not() {
+    find_runtime();
+    let folder = copy_of("tiny-upt");
+    let path = folder.path().join("bundle.json");
+    let mut manifest = crate::fixture::manifest(folder.path());
+    manifest["manifest_sha256"] = serde_json::Value::Null;
+    std::fs::write(&path, manifest.to_string()).unwrap();
+    let text = open(folder.path()).unwrap_err().to_string();
+    assert!(text.contains("`manifest_sha256`"), "{text}");
+    manifest.as_object_mut().unwrap().remove("manifest_sha256");
+    std::fs::write(&path, manifest.to_string()).unwrap();
+    open(folder.path()).unwrap();
 }

@@ -153,7 +153,7 @@ fn what_cannot_be_is_refused_and_changes_nothing() {
 
 #[test]
 fn the_same_question_has_the_same_contacts() {
-    use upt::instrument::{Instrument, Shape};
+    use upt::instrument::Instrument;
     let scene = scene(&model("tiny-reduced"), &plain());
     let tool = |depth: f32| {
         let at = pressing(&scene, depth, Vector::ZERO).pose.translation;
@@ -161,10 +161,9 @@ fn the_same_question_has_the_same_contacts() {
             half_length: 2.0,
             radius: 3.0,
         };
+        let turn = [0.0, 0.0, 0.0, 1.0];
         [Instrument {
-            shape,
-            position: at.to_array(),
-            rotation: [0.0, 0.0, 0.0, 1.0],
+            tool: Tool::new(0, &shape, at.to_array(), turn).unwrap(),
             sticking: true,
         }]
     };

@@ -30,7 +30,8 @@ fn reaction_equals_the_reference_solvers() {
         &mesh.stiffness,
         &nodes,
         material.moduli(),
-    );
+    )
+    .unwrap();
     let mut displacement = vec![[0.0; 3]; mesh.node_count()];
     let mut reaction = vec![0.0; 3 * nodes.len()];
     for frame in 1..=6 {

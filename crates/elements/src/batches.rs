@@ -3,8 +3,10 @@
 use crate::cluster::{Cluster, Group, corners};
 use crate::lanes::WIDTH;
 use crate::material::Material;
+use crate::room::{collected, room};
 use crate::tetrahedra::Tetrahedra;
 use crate::vector::{cross, dot};
+use std::collections::{HashSet, TryReserveError};
 use std::ops::Range;
 
 /// Stands for a node or an element where there is none: in lanes and slots that only fill a batch or a cache line.
@@ -39,14 +41,22 @@ pub struct Source<'a> {
 
 impl<const NODES: usize, const TETS: usize> Kind<NODES, TETS> {
     /// Packs groups into batches; `local` maps a mesh node to its chunk-local slot. Returns where they lie.
+    ///
+    /// # Errors
+    /// No memory.
     pub fn push(
         &mut self,
         groups: &[Group<NODES, TETS>],
         source: Source,
         local: impl Fn(u32) -> u16,
-    ) -> Range<usize> {
+    ) -> Result<Range<usize>, TryReserveError> {
         let start = self.batches.len();
-        for groups in disjoint_batches(groups) {
+        let (groups, ends) = disjoint_batches(groups)?;
+        self.batches.try_reserve(ends.len())?;
+        self.elements.try_reserve(ends.len())?;
+        let starts = std::iter::once(0).chain(ends.iter().copied());
+        for (first, end) in starts.zip(&ends) {
+            let groups = &groups[first..*end];
             let mut batch = Cluster {
                 springs: [[[0.0; WIDTH]; 6]; TETS],
                 inverse: [[0.0; WIDTH]; TETS],
@@ -85,7 +95,7 @@ impl<const NODES: usize, const TETS: usize> Kind<NODES, TETS> {
             self.batches.push(batch);
             self.elements.push(elements);
         }
-        start..self.batches.len()
+        Ok(start..self.batches.len())
     }
 
     /// The elements of some batches.
@@ -123,31 +133,36 @@ impl<const NODES: usize, const TETS: usize> Kind<NODES, TETS> {
     }
 }
 
-/// Groups of 16 that, while it lasts, share no node among them: their force
-/// additions then do not wait for each other.
+/// The groups in batches of 16 that, while it lasts, share no node among them: their force additions then do not wait for each
+/// other. Gives all, batch after batch, and where each ends.
 fn disjoint_batches<const NODES: usize, const TETS: usize>(
     groups: &[Group<NODES, TETS>],
-) -> Vec<Vec<Group<NODES, TETS>>> {
-    let mut remaining = groups.to_vec();
-    let mut batches = Vec::with_capacity(groups.len() / WIDTH + 1);
-    let mut used = std::collections::HashSet::with_capacity(NODES * WIDTH);
+) -> Result<Batches<NODES, TETS>, TryReserveError> {
+    let mut remaining = collected(groups.iter().copied())?;
+    let mut all = room(groups.len())?;
+    let mut ends = room(groups.len().div_ceil(WIDTH))?;
+    let mut used = HashSet::new();
+    used.try_reserve(NODES * WIDTH)?;
     while !remaining.is_empty() {
-        let mut batch = Vec::with_capacity(WIDTH);
+        let most = all.len() + WIDTH;
         used.clear();
         remaining.retain(|group| {
-            if batch.len() == WIDTH || group.nodes.iter().any(|n| used.contains(n)) {
+            if all.len() == most || group.nodes.iter().any(|n| used.contains(n)) {
                 return true;
             }
             used.extend(group.nodes);
-            batch.push(*group);
+            all.push(*group);
             false
         });
-        let missing = (WIDTH - batch.len()).min(remaining.len());
-        batch.extend(remaining.drain(..missing));
-        batches.push(batch);
+        // Every batch but the last is full.
+        let missing = (most - all.len()).min(remaining.len());
+        all.extend(remaining.drain(..missing));
+        ends.push(all.len());
     }
-    batches
+    Ok((all, ends))
 }
+
+type Batches<const NODES: usize, const TETS: usize> = (Vec<Group<NODES, TETS>>, Vec<usize>);
 
 /// Entries of a symmetric matrix, in the order of [`Cluster::springs`].
 const PAIRS: [[usize; 2]; 6] = [[0, 0], [0, 1], [0, 2], [1, 1], [1, 2], [2, 2]];

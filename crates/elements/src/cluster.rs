@@ -5,7 +5,8 @@
 //! *pair* shares a face (five instead of eight), and what is left is single.
 
 use crate::lanes::WIDTH;
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use crate::room::{collected, filled, push, room};
+use std::collections::{HashMap, TryReserveError};
 
 /// Sixteen clusters of one kind, structure of arrays. All tetrahedra of a cluster share the edge of its nodes 0 and 1.
 #[repr(C, align(64))]
@@ -57,29 +58,43 @@ pub struct Groups {
 impl Groups {
     /// Groups `elements`: octahedra around the longest edges first, then pairs, elements with the fewest
     /// free neighbours first. Depends on the mesh alone.
-    pub fn new(elements: &[u32], tets: &[[u32; 4]], positions: &[[f32; 3]]) -> Self {
+    ///
+    /// # Errors
+    /// No memory.
+    pub fn new(
+        elements: &[u32],
+        tets: &[[u32; 4]],
+        positions: &[[f32; 3]],
+    ) -> Result<Self, TryReserveError> {
         let mut groups = Self::default();
-        let mut free: BTreeSet<u32> = elements.iter().copied().collect();
-        for (edge, ring) in closed_edges(elements, tets, positions) {
-            if ring.tets.iter().all(|e| free.contains(e)) {
-                for element in ring.tets {
-                    free.remove(&element);
+        let mut left = collected(elements.iter().copied())?;
+        left.sort_unstable();
+        let mut taken = filled(left.len(), false)?;
+        for (edge, ring) in closed_edges(elements, tets, positions)? {
+            let places = ring.tets.map(|e| left.partition_point(|other| *other < e));
+            if places.iter().all(|at| !taken[*at]) {
+                for at in places {
+                    taken[at] = true;
                 }
                 let [a, b] = edge;
                 let [p, q, r, s] = ring.nodes;
-                groups.octahedra.push(Group {
+                let group = Group {
                     nodes: [a, b, p, q, r, s],
                     tets: ring.tets,
-                });
+                };
+                push(&mut groups.octahedra, group)?;
             }
         }
-        groups.pair_up(free.into_iter().collect(), tets);
-        groups
+        let mut taken = taken.into_iter();
+        left.retain(|_| taken.next() == Some(false));
+        groups.pair_up(&left, tets)?;
+        Ok(groups)
     }
 
-    fn pair_up(&mut self, elements: Vec<u32>, tets: &[[u32; 4]]) {
+    fn pair_up(&mut self, elements: &[u32], tets: &[[u32; 4]]) -> Result<(), TryReserveError> {
         let mut of_face: HashMap<[u32; 3], usize> = HashMap::new();
-        let mut neighbours: Vec<Vec<usize>> = vec![Vec::new(); elements.len()];
+        of_face.try_reserve(4 * elements.len())?;
+        let mut neighbours = filled(elements.len(), Neighbours::default())?;
         for (index, element) in elements.iter().enumerate() {
             for skip in 0..4 {
                 let face = face_without(tets[*element as usize], skip);
@@ -89,26 +104,29 @@ impl Groups {
                 }
             }
         }
-        let mut order: Vec<usize> = (0..elements.len()).collect();
-        order.sort_by_key(|index| neighbours[*index].len());
-        let mut taken = vec![false; elements.len()];
+        let mut order = collected(0..elements.len())?;
+        order.sort_unstable_by_key(|index| (neighbours[*index].count, *index));
+        let mut taken = filled(elements.len(), false)?;
         for index in order {
             if taken[index] {
                 continue;
             }
             taken[index] = true;
-            let free = |i: &usize| neighbours[*i].iter().filter(|n| !taken[**n]).count();
-            let partner = neighbours[index]
-                .iter()
+            let around = |i: usize| neighbours[i].all().iter();
+            let free = |i: &usize| around(*i).filter(|n| !taken[**n]).count();
+            let partner = around(index)
                 .copied()
                 .filter(|n| !taken[*n])
                 .min_by_key(|n| (free(n), *n));
             let first = tets[elements[index] as usize];
             match partner {
-                None => self.singles.push(Group {
-                    nodes: first,
-                    tets: [elements[index]],
-                }),
+                None => {
+                    let group = Group {
+                        nodes: first,
+                        tets: [elements[index]],
+                    };
+                    push(&mut self.singles, group)?;
+                }
                 Some(partner) => {
                     taken[partner] = true;
                     let second = tets[elements[partner] as usize];
@@ -117,13 +135,33 @@ impl Groups {
                         apex.unwrap_or_default()
                     });
                     let [p, q, r] = face_without(first, a);
-                    self.pairs.push(Group {
+                    let group = Group {
                         nodes: [p, q, r, first[a], second[b]],
                         tets: [elements[index], elements[partner]],
-                    });
+                    };
+                    push(&mut self.pairs, group)?;
                 }
             }
         }
+        Ok(())
+    }
+}
+
+/// Elements across the faces of one: two a face at most, the one before it that has the face and the one after it.
+#[derive(Clone, Copy, Default)]
+struct Neighbours {
+    list: [usize; 8],
+    count: usize,
+}
+
+impl Neighbours {
+    fn push(&mut self, index: usize) {
+        self.list[self.count] = index;
+        self.count += 1;
+    }
+
+    fn all(&self) -> &[usize] {
+        &self.list[..self.count]
     }
 }
 
@@ -138,34 +176,41 @@ fn closed_edges(
     elements: &[u32],
     tets: &[[u32; 4]],
     positions: &[[f32; 3]],
-) -> Vec<([u32; 2], Ring)> {
-    let mut around: BTreeMap<[u32; 2], Vec<u32>> = BTreeMap::new();
-    for element in elements {
+) -> Result<Vec<([u32; 2], Ring)>, TryReserveError> {
+    // Each element's edges, and its place among the elements.
+    let mut around = room(6 * elements.len())?;
+    for (place, element) in elements.iter().enumerate() {
         let mut nodes = tets[*element as usize];
         nodes.sort_unstable();
         for a in 0..3 {
-            for b in a + 1..4 {
-                let list = around.entry([nodes[a], nodes[b]]).or_default();
-                list.push(*element);
-            }
+            around.extend((a + 1..4).map(|b| ([nodes[a], nodes[b]], place as u32)));
         }
     }
+    around.sort_unstable();
     let length = |[a, b]: [u32; 2]| -> f32 {
         let (a, b) = (positions[a as usize], positions[b as usize]);
         (0..3).map(|k| (a[k] - b[k]).powi(2)).sum()
     };
-    let mut edges: Vec<([u32; 2], Ring)> = around
-        .into_iter()
-        .filter_map(|(edge, elements)| Some((edge, close(edge, &elements, tets)?)))
-        .collect();
-    // Stable: ties stay in ascending order of the edge's nodes.
-    edges.sort_by(|(a, _), (b, _)| length(*b).total_cmp(&length(*a)));
-    edges
+    let mut edges = Vec::new();
+    for same in around.chunk_by(|a, b| a.0 == b.0) {
+        let edge = same[0].0;
+        if let &[(_, a), (_, b), (_, c), (_, d)] = same
+            && let Some(ring) = close(
+                edge,
+                [a, b, c, d].map(|place| elements[place as usize]),
+                tets,
+            )
+        {
+            push(&mut edges, (edge, ring))?;
+        }
+    }
+    // Ties in ascending order of the edge's nodes.
+    edges.sort_unstable_by(|(a, _), (b, _)| length(*b).total_cmp(&length(*a)).then(a.cmp(b)));
+    Ok(edges)
 }
 
 /// Walks around the edge; `None` unless four elements close a ring of four nodes.
-fn close(edge: [u32; 2], elements: &[u32], tets: &[[u32; 4]]) -> Option<Ring> {
-    let elements: [u32; 4] = elements.try_into().ok()?;
+fn close(edge: [u32; 2], elements: [u32; 4], tets: &[[u32; 4]]) -> Option<Ring> {
     let sides = elements.map(|element| {
         let mut others = tets[element as usize]
             .into_iter()
@@ -175,11 +220,12 @@ fn close(edge: [u32; 2], elements: &[u32], tets: &[[u32; 4]]) -> Option<Ring> {
     let start = sides[0][0];
     let (mut nodes, mut ring) = ([start; 4], [elements[0]; 4]);
     let mut at = sides[0][1];
-    let mut left = vec![1, 2, 3];
+    let mut left = [true; 4];
+    left[0] = false;
     for k in 1..4 {
         nodes[k] = at;
-        let next = left.iter().position(|i| sides[*i].contains(&at))?;
-        let index = left.remove(next);
+        let index = (1..4).find(|i| left[*i] && sides[*i].contains(&at))?;
+        left[index] = false;
         ring[k] = elements[index];
         let [p, q] = sides[index];
         at = if p == at { q } else { p };
@@ -237,7 +283,7 @@ mod tests {
     fn every_element_is_in_one_cluster_with_its_own_nodes() {
         let mesh = box_phantom([30.0, 40.0, 50.0], [5, 6, 7]).unwrap();
         let elements: Vec<u32> = (0..mesh.tets.len() as u32).collect();
-        let groups = Groups::new(&elements, &mesh.tets, &mesh.positions);
+        let groups = Groups::new(&elements, &mesh.tets, &mesh.positions).unwrap();
         let mut seen = vec![false; mesh.tets.len()];
         check(&groups.octahedra, &mesh, &mut seen);
         check(&groups.pairs, &mesh, &mut seen);
@@ -264,7 +310,7 @@ mod tests {
             [0, 5, 1, 2],
             [1, 2, 3, 6],
         ];
-        let groups = Groups::new(&[0, 1, 2, 3, 4], &tets, &positions);
+        let groups = Groups::new(&[0, 1, 2, 3, 4], &tets, &positions).unwrap();
         assert_eq!(
             (
                 groups.octahedra.len(),
@@ -289,7 +335,7 @@ mod tests {
     fn two_tets_with_a_common_face_are_a_pair() {
         let tets = [[0, 1, 2, 3], [1, 2, 3, 4]];
         let positions = [[0.0; 3]; 5];
-        let groups = Groups::new(&[0, 1], &tets, &positions);
+        let groups = Groups::new(&[0, 1], &tets, &positions).unwrap();
         assert_eq!(
             groups.pairs,
             [Group {

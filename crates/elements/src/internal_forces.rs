@@ -8,6 +8,7 @@ use crate::batches::PADDING;
 use crate::dispatch::{Kernels, Simd};
 use crate::material::Material;
 use crate::partition::{Chunk, Partition};
+use crate::room::filled;
 use crate::slots::PADDED;
 use crate::tetrahedra::Tetrahedra;
 use std::collections::TryReserveError;
@@ -46,13 +47,6 @@ impl Scratch {
     }
 }
 
-fn filled<T: Clone>(count: usize, value: T) -> Result<Vec<T>, TryReserveError> {
-    let mut list = Vec::new();
-    list.try_reserve_exact(count)?;
-    list.resize(count, value);
-    Ok(list)
-}
-
 /// A pointer that the tasks of one evaluation share.
 struct Shared<T>(*mut T);
 // SAFETY: the tasks touch disjoint parts (see `evaluate`).
@@ -69,15 +63,22 @@ impl<T> Shared<T> {
 impl ElementForces {
     /// Prepares a body. `O(T log T)`.
     ///
+    /// # Errors
+    /// Where there is no memory for it.
+    ///
     /// # Panics
     /// If this processor lacks the instruction set.
-    pub fn new(body: Tetrahedra<'_>, material: &Material, simd: Simd) -> Self {
+    pub fn new(
+        body: Tetrahedra<'_>,
+        material: &Material,
+        simd: Simd,
+    ) -> Result<Self, TryReserveError> {
         let kernels = Kernels::of(simd);
-        Self {
+        Ok(Self {
             kernels: kernels.unwrap_or_else(|| panic!("{simd:?} is not available here")),
-            partition: Partition::new(body, material),
+            partition: Partition::new(body, material)?,
             node_count: body.positions.len(),
-        }
+        })
     }
 
     /// Nodes of the body, `K`.

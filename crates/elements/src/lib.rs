@@ -20,6 +20,7 @@ mod lanes;
 mod laws;
 mod material;
 mod partition;
+mod room;
 mod slots;
 mod tetrahedra;
 mod tetrahedron;

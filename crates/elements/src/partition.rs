@@ -10,7 +10,9 @@
 use crate::batches::{Element, Kind, PADDING, Source};
 use crate::cluster::{Groups, Octahedra, Pairs, Singles};
 use crate::material::{Material, Moduli};
+use crate::room::{collected, filled, room};
 use crate::tetrahedra::Tetrahedra;
+use std::collections::TryReserveError;
 use std::ops::Range;
 
 /// Target number of elements in a chunk.
@@ -60,21 +62,29 @@ pub struct Partition {
 
 impl Partition {
     /// Splits a validated mesh of a material. `O(T log T)`.
-    pub fn new(mesh: Tetrahedra<'_>, material: &Material) -> Self {
+    ///
+    /// # Errors
+    /// No memory.
+    pub fn new(mesh: Tetrahedra<'_>, material: &Material) -> Result<Self, TryReserveError> {
         let (positions, tets) = (mesh.positions, mesh.tets);
-        let centroids: Vec<[f32; 3]> = tets
-            .iter()
-            .map(|tet| {
-                [0, 1, 2].map(|k| tet.iter().map(|n| positions[*n as usize][k]).sum::<f32>())
-            })
-            .collect();
-        let mut order: Vec<u32> = (0..tets.len() as u32).collect();
-        let mut leaves = Vec::new();
+        let centroids = collected(tets.iter().map(|tet| {
+            [0, 1, 2].map(|k| tet.iter().map(|n| positions[*n as usize][k]).sum::<f32>())
+        }))?;
+        let mut order = collected(0..tets.len() as u32)?;
         let count = tets.len().div_ceil(CHUNK_ELEMENTS);
-        bisect(&mut order, &centroids, count, &mut leaves);
+        let mut sizes = room(count.max(1))?;
+        bisect(&mut order, &centroids, count, &mut sizes);
+        let leaves = || {
+            let mut rest = order.as_slice();
+            sizes.iter().map(move |size| {
+                let (leaf, after) = rest.split_at(*size);
+                rest = after;
+                leaf
+            })
+        };
 
-        let mut owner = vec![PADDING; positions.len()];
-        for (chunk, leaf) in leaves.iter().enumerate() {
+        let mut owner = filled(positions.len(), PADDING)?;
+        for (chunk, leaf) in leaves().enumerate() {
             for node in leaf.iter().flat_map(|e| tets[*e as usize]) {
                 if owner[node as usize] == PADDING {
                     owner[node as usize] = chunk as u32;
@@ -82,20 +92,20 @@ impl Partition {
             }
         }
         let mut partition = Self {
-            chunks: Vec::new(),
+            chunks: room(sizes.len())?,
             octahedra: Kind::default(),
             pairs: Kind::default(),
             singles: Kind::default(),
             node_of_slot: Vec::new(),
-            slot_of_node: vec![PADDING; positions.len()],
+            slot_of_node: filled(positions.len(), PADDING)?,
             rest: Vec::new(),
             moduli: material.moduli(),
         };
-        for (chunk, leaf) in leaves.iter().enumerate() {
-            partition.push_chunk(chunk as u32, leaf, &owner, mesh, material);
+        for (chunk, leaf) in leaves().enumerate() {
+            partition.push_chunk(chunk as u32, leaf, &owner, mesh, material)?;
         }
-        partition.connect();
-        partition
+        partition.connect()?;
+        Ok(partition)
     }
 
     fn push_chunk(
@@ -105,15 +115,21 @@ impl Partition {
         owner: &[u32],
         mesh: Tetrahedra<'_>,
         material: &Material,
-    ) {
+    ) -> Result<(), TryReserveError> {
         let tets = mesh.tets;
         let first = self.node_of_slot.len();
-        let mut nodes: Vec<u32> = leaf.iter().flat_map(|e| tets[*e as usize]).collect();
+        let mut nodes = room(4 * leaf.len())?;
+        nodes.extend(leaf.iter().flat_map(|e| tets[*e as usize]));
         nodes.sort_unstable();
         nodes.dedup();
-        let (own, ghost): (Vec<u32>, Vec<u32>) = nodes
-            .into_iter()
-            .partition(|node| owner[*node as usize] == chunk);
+        let owned = |node: &&u32| owner[**node as usize] == chunk;
+        let count = nodes.iter().filter(owned).count();
+        let (mut own, mut ghost) = (room(count)?, room(nodes.len() - count)?);
+        own.extend(nodes.iter().filter(owned));
+        ghost.extend(nodes.iter().filter(|node| !owned(node)));
+        let padded = (first + nodes.len()).next_multiple_of(4);
+        self.node_of_slot.try_reserve(padded - first)?;
+        self.rest.try_reserve(padded - first)?;
         for (offset, node) in own.iter().enumerate() {
             self.slot_of_node[*node as usize] = (first + offset) as u32;
         }
@@ -125,8 +141,9 @@ impl Partition {
             }
         };
         let here = self.node_of_slot[first..].iter();
-        let rest = from_centre(here.map(|node| mesh.positions[*node as usize]).collect());
-        let groups = Groups::new(leaf, tets, mesh.positions);
+        let here = collected(here.map(|node| mesh.positions[*node as usize]))?;
+        let rest = from_centre(&here)?;
+        let groups = Groups::new(leaf, tets, mesh.positions)?;
         let source = Source {
             rest: &rest,
             mesh,
@@ -135,16 +152,16 @@ impl Partition {
         self.chunks.push(Chunk {
             first,
             owned: own.len(),
-            octahedra: self.octahedra.push(&groups.octahedra, source, local),
-            pairs: self.pairs.push(&groups.pairs, source, local),
-            singles: self.singles.push(&groups.singles, source, local),
+            octahedra: self.octahedra.push(&groups.octahedra, source, local)?,
+            pairs: self.pairs.push(&groups.pairs, source, local)?,
+            singles: self.singles.push(&groups.singles, source, local)?,
             ghosts: ghost,
             contributions: Vec::new(),
         });
-        let padded = self.node_of_slot.len().next_multiple_of(4);
         self.node_of_slot.resize(padded, PADDING);
         self.rest.extend(rest);
         self.rest.resize(padded, [0.0; 4]);
+        Ok(())
     }
 
     /// The batches of a chunk.
@@ -166,27 +183,36 @@ impl Partition {
     }
 
     /// Turns ghost node numbers into owner slots and lists the forces that each owner collects.
-    fn connect(&mut self) {
-        let mut incoming = vec![Vec::new(); self.chunks.len()];
-        let starts: Vec<usize> = self.chunks.iter().map(|c| c.first).collect();
+    fn connect(&mut self) -> Result<(), TryReserveError> {
+        let starts = collected(self.chunks.iter().map(|c| c.first))?;
+        let owner = |slot: u32| starts.partition_point(|s| *s <= slot as usize) - 1;
+        let mut counts = filled(self.chunks.len(), 0)?;
         for chunk in &mut self.chunks {
-            for (offset, ghost) in chunk.ghosts.iter_mut().enumerate() {
-                let slot = self.slot_of_node[*ghost as usize];
-                let here = (chunk.first + chunk.owned + offset) as u32;
-                *ghost = slot;
-                let owner = starts.partition_point(|s| *s <= slot as usize) - 1;
-                incoming[owner].push((slot, here));
+            for ghost in &mut chunk.ghosts {
+                *ghost = self.slot_of_node[*ghost as usize];
+                counts[owner(*ghost)] += 1;
             }
         }
-        for (chunk, mut contributions) in self.chunks.iter_mut().zip(incoming) {
-            contributions.sort_unstable();
-            chunk.contributions = contributions;
+        for (chunk, count) in self.chunks.iter_mut().zip(counts) {
+            chunk.contributions = room(count)?;
         }
+        for at in 0..self.chunks.len() {
+            for offset in 0..self.chunks[at].ghosts.len() {
+                let chunk = &self.chunks[at];
+                let (slot, here) = (chunk.ghosts[offset], chunk.first + chunk.owned + offset);
+                let contributions = &mut self.chunks[owner(slot)].contributions;
+                contributions.push((slot, here as u32));
+            }
+        }
+        for chunk in &mut self.chunks {
+            chunk.contributions.sort_unstable();
+        }
+        Ok(())
     }
 }
 
 /// Positions from the middle of their box.
-fn from_centre(positions: Vec<[f32; 3]>) -> Vec<[f32; 4]> {
+fn from_centre(positions: &[[f32; 3]]) -> Result<Vec<[f32; 4]>, TryReserveError> {
     let centre = [0, 1, 2].map(|k| {
         let values = positions.iter().map(|p| p[k]);
         let (low, high) = (
@@ -199,13 +225,13 @@ fn from_centre(positions: Vec<[f32; 3]>) -> Vec<[f32; 4]> {
         let [x, y, z] = [0, 1, 2].map(|k| (f64::from(p[k]) - centre[k]) as f32);
         [x, y, z, 0.0]
     };
-    positions.iter().map(local).collect()
+    collected(positions.iter().map(local))
 }
 
-/// Splits `order` into `count` spatially compact leaves of nearly equal size.
-fn bisect(order: &mut [u32], centroids: &[[f32; 3]], count: usize, leaves: &mut Vec<Vec<u32>>) {
+/// Splits `order` into `count` spatially compact leaves of nearly equal size, one after another; `sizes` has room for theirs.
+fn bisect(order: &mut [u32], centroids: &[[f32; 3]], count: usize, sizes: &mut Vec<usize>) {
     if count <= 1 {
-        leaves.push(order.to_vec());
+        sizes.push(order.len());
         return;
     }
     let extent = |axis: usize| {
@@ -223,6 +249,6 @@ fn bisect(order: &mut [u32], centroids: &[[f32; 3]], count: usize, leaves: &mut 
     });
     let half = count / 2;
     let (left, right) = order.split_at_mut(order.len() * half / count);
-    bisect(left, centroids, half, leaves);
-    bisect(right, centroids, count - half, leaves);
+    bisect(left, centroids, half, sizes);
+    bisect(right, centroids, count - half, sizes);
 }

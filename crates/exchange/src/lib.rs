@@ -77,11 +77,10 @@ pub struct Reader<T> {
     shows: PhantomData<T>,
 }
 
-/// Both ends, each buffer a copy of `value`. Nothing is published yet.
-pub fn exchange<T: Clone>(value: &T) -> (Writer<T>, Reader<T>) {
-    let slot = || Apart(UnsafeCell::new(value.clone()));
+/// Both ends of three buffers. Nothing is published yet.
+pub fn exchange<T>(buffers: [T; 3]) -> (Writer<T>, Reader<T>) {
     let shared = Arc::new(Shared {
-        slots: [slot(), slot(), slot()],
+        slots: buffers.map(|buffer| Apart(UnsafeCell::new(buffer))),
         between: Apart(AtomicU8::new(1)),
     });
     let writer = Writer {

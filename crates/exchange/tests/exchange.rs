@@ -25,7 +25,7 @@ const COUNT: u32 = if cfg!(loom) {
 #[test]
 fn nothing_is_seen_before_it_is_published() {
     model(|| {
-        let (mut writer, mut reader) = exchange(&7);
+        let (mut writer, mut reader) = exchange([7; 3]);
         assert!(!reader.update());
         assert_eq!(*reader.buffer(), 7);
         writer.write(8);
@@ -39,7 +39,7 @@ fn nothing_is_seen_before_it_is_published() {
 #[test]
 fn what_is_seen_is_whole_and_never_goes_back() {
     model(|| {
-        let (mut writer, mut reader) = exchange(&[0_u32; 2]);
+        let (mut writer, mut reader) = exchange([[0_u32; 2]; 3]);
         let writing = thread::spawn(move || {
             for number in 1..=COUNT {
                 let buffer = writer.buffer();
@@ -64,7 +64,7 @@ fn what_is_seen_is_whole_and_never_goes_back() {
 #[test]
 fn either_end_may_go_first() {
     model(|| {
-        let (mut writer, mut reader) = exchange(&Box::new(0));
+        let (mut writer, mut reader) = exchange([0, 0, 0].map(Box::new));
         let reading = thread::spawn(move || **reader.read());
         writer.write(Box::new(1));
         drop(writer);
@@ -76,8 +76,8 @@ fn either_end_may_go_first() {
 fn two_exchanges_between_the_same_threads() {
     model(|| {
         // As a hand and its scene: poses one way, steps the other.
-        let (mut pose, mut seen) = exchange(&0_u32);
-        let (mut step, mut felt) = exchange(&0_u32);
+        let (mut pose, mut seen) = exchange([0_u32; 3]);
+        let (mut step, mut felt) = exchange([0_u32; 3]);
         let scene = thread::spawn(move || {
             for _ in 0..COUNT.min(2) {
                 let at = *seen.read();

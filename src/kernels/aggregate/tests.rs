@@ -72,7 +72,7 @@ fn fused_equals_encode_then_aggregate() {
             .collect();
         let packed: Vec<_> = weights
             .iter()
-            .map(|w| crate::kernels::encode::transpose_weight(w, width, rank))
+            .map(|w| crate::kernels::encode::transpose_weight(w, width, rank).unwrap())
             .collect();
         let source_update = LowRank::new(&source_table, &packed[0], width, rank);
         let target_update = LowRank::new(&target_table, &packed[1], width, rank);

@@ -45,8 +45,9 @@ pub(super) fn tile(
 mod x86 {
     use super::super::amx::{DEPTH, OUTPUTS, Sums, Tiles};
     use super::super::gemm::{Finish, store};
+    use super::super::pack::GROUP;
     use super::super::tile::{Layout, exponentials, gather, head, normalise};
-    use super::super::weights::{GROUP, Narrow};
+    use super::super::weights::Narrow;
     use super::{DecoderTokens, MAX_NODES, NODES, PackedDecoder};
     use crate::kernels::lanes::Avx512;
     use core::arch::x86_64::*;

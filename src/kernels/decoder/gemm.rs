@@ -5,7 +5,7 @@
 //! [`BLOCK`] multiply-adds in the order of the depth, whatever `R` and `C` are: rounding grows with the
 //! length of a chain.
 
-use super::weights::GROUP;
+use super::pack::GROUP;
 use crate::kernels::lanes::Lanes;
 use crate::kernels::math::gelu_lanes;
 

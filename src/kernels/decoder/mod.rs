@@ -13,6 +13,8 @@
 mod amx;
 mod bf16;
 mod gemm;
+#[cfg_attr(not(target_arch = "x86_64"), allow(dead_code))]
+mod pack;
 pub mod probe;
 mod scalar;
 mod tile;

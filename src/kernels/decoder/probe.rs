@@ -3,7 +3,7 @@
 
 use super::CacheLine;
 use super::gemm::{Finish, multiply};
-use super::weights::panel_floats;
+use super::pack::panel_floats;
 use crate::kernels::isa::{Isa, by_isa};
 use crate::kernels::lanes::Lanes;
 

@@ -21,17 +21,20 @@ fn case(h: usize, heads: usize, tokens: usize, mlp: usize, nodes: usize) -> Case
         t
     };
     let (n2, n3) = (norm(matrix(h, 1)), norm(matrix(h, 1)));
-    let decoder = PackedDecoder::new(&DecoderWeights {
-        hidden: h,
-        heads,
-        mlp,
-        attention_out: (&o.0, &o.1),
-        norm2: (&n2.0, &n2.1),
-        mlp1: (&m1.0, &m1.1),
-        mlp2: (&m2.0, &m2.1),
-        norm3: (&n3.0, &n3.1),
-        head: (&head.0, &head.1),
-    })
+    let decoder = PackedDecoder::new(
+        "weights.safetensors",
+        &DecoderWeights {
+            hidden: h,
+            heads,
+            mlp,
+            attention_out: (&o.0, &o.1),
+            norm2: (&n2.0, &n2.1),
+            mlp1: (&m1.0, &m1.1),
+            mlp2: (&m2.0, &m2.1),
+            norm3: (&n3.0, &n3.1),
+            head: (&head.0, &head.1),
+        },
+    )
     .unwrap();
     let mut packed = DecoderTokens::new(&decoder, tokens);
     let (keys, values) = (
@@ -268,17 +271,20 @@ fn nonsense_in_a_query_stays_in_its_node() {
 #[test]
 fn a_wrong_shape_is_named() {
     let (square, wide, h) = (vec![0.0; 64], vec![0.0; 24], vec![0.0; 8]);
-    let result = PackedDecoder::new(&DecoderWeights {
-        hidden: 8,
-        heads: 2,
-        mlp: 4,
-        attention_out: (&square, &h),
-        norm2: (&h, &h),
-        mlp1: (&wide, &h[..4]),
-        mlp2: (&square[..32], &h),
-        norm3: (&h, &h),
-        head: (&wide, &h[..3]),
-    });
-    let message = result.err().unwrap();
+    let result = PackedDecoder::new(
+        "weights.safetensors",
+        &DecoderWeights {
+            hidden: 8,
+            heads: 2,
+            mlp: 4,
+            attention_out: (&square, &h),
+            norm2: (&h, &h),
+            mlp1: (&wide, &h[..4]),
+            mlp2: (&square[..32], &h),
+            norm3: (&h, &h),
+            head: (&wide, &h[..3]),
+        },
+    );
+    let message = result.err().unwrap().to_string();
     assert!(message.contains("decoder.mlp1 has 24 weights"), "{message}");
 }

@@ -1,8 +1,9 @@
 //! The layers of the decoder for one tile of nodes: features in rows, nodes in lanes.
 
 use super::gemm::{BLOCK, Finish, multiply};
+use super::pack::{GROUP, panel_floats};
 use super::scalar;
-use super::weights::{DecoderTokens, GROUP, PackedDecoder, panel_floats};
+use super::weights::{DecoderTokens, PackedDecoder};
 use crate::kernels::isa::{Isa, by_isa};
 use crate::kernels::lanes::Lanes;
 use crate::kernels::math::exp2_lanes;

@@ -5,12 +5,11 @@
 //! output. The affine parts of LN_2 and LN_3 are folded into `W_1` and `W_3`; the attention's
 //! `1/sqrt(h/heads)` and the `log2 e` of its exponential are folded into the keys.
 
-use super::{DecoderPrecision, amx};
+use super::DecoderPrecision;
+use super::pack::{GROUP, block_count, pack, pack_blocks, pack_pairs, pair_count, panel_floats};
+use crate::error::Error;
 use crate::memory;
 use half::bf16;
-
-/// Outputs a group.
-pub(super) const GROUP: usize = 8;
 
 /// The decoder's tensors as stored in `weights.safetensors`; matrices `[out,in]` row-major.
 #[derive(Debug, Clone, Copy)]
@@ -69,34 +68,45 @@ impl Linear {
         }
     }
 
-    fn new(outputs: usize, depth: usize, weight: Vec<f32>, bias: Vec<f32>) -> Self {
+    fn new(
+        outputs: usize,
+        depth: usize,
+        weight: Vec<f32>,
+        mut bias: Vec<f32>,
+    ) -> crate::Result<Self> {
+        let rows = outputs.next_multiple_of(GROUP);
+        memory::fit(&mut bias, rows, WHAT)?;
+        bias.resize(rows, 0.0);
         let mut linear = Self {
             depth,
             bias,
+            panels: memory::zeros(panel_floats(outputs, depth), WHAT)?,
+            pairs: memory::filled(pair_count(outputs, depth), bf16::ZERO, WHAT)?,
+            blocks: memory::filled(block_count(outputs, depth), bf16::ZERO, WHAT)?,
             ..Self::default()
         };
-        linear.bias.resize(outputs.next_multiple_of(GROUP), 0.0);
-        linear.panels.resize(panel_floats(outputs, depth), 0.0);
-        linear.pairs.resize(pair_count(outputs, depth), bf16::ZERO);
         pack(&mut linear.panels, outputs, depth, |o, k| {
             weight[o * depth + k]
         });
         pack_pairs(&mut linear.pairs, outputs, depth, |o, k| {
             weight[o * depth + k]
         });
-        linear
-            .blocks
-            .resize(block_count(outputs, depth), bf16::ZERO);
         pack_blocks(&mut linear.blocks, outputs, depth, |o, k| {
             weight[o * depth + k]
         });
         linear.plain = weight;
-        linear
+        Ok(linear)
     }
 
     /// `W LN(y) + b` where `LN` has a scale and a shift, as a layer on the plain normalised `y`.
-    fn after_norm(outputs: usize, depth: usize, layer: Tensors<'_>, norm: Tensors<'_>) -> Self {
-        let (mut weight, mut bias) = (layer.0.to_vec(), layer.1.to_vec());
+    fn after_norm(
+        outputs: usize,
+        depth: usize,
+        layer: Tensors<'_>,
+        norm: Tensors<'_>,
+    ) -> crate::Result<Self> {
+        let mut weight = memory::copied(layer.0, WHAT)?;
+        let mut bias = memory::copied(layer.1, WHAT)?;
         for o in 0..outputs {
             let row = &mut weight[o * depth..][..depth];
             let shift: f64 = row
@@ -111,73 +121,9 @@ impl Linear {
     }
 }
 
+const WHAT: &str = "the decoder's weights";
+
 type Tensors<'a> = (&'a [f32], &'a [f32]);
-
-pub(super) fn panel_floats(outputs: usize, depth: usize) -> usize {
-    outputs.next_multiple_of(GROUP) * depth
-}
-
-pub(super) fn pair_count(outputs: usize, depth: usize) -> usize {
-    outputs.next_multiple_of(GROUP) * depth.next_multiple_of(2)
-}
-
-/// Numbers of a matrix as blocks; none where the machine has no matrix tiles.
-fn block_count(outputs: usize, depth: usize) -> usize {
-    if !amx::is_built_in() {
-        return 0;
-    }
-    outputs.next_multiple_of(amx::OUTPUTS) * depth.next_multiple_of(amx::DEPTH)
-}
-
-fn pack_blocks(
-    blocks: &mut [bf16],
-    outputs: usize,
-    depth: usize,
-    weight: impl Fn(usize, usize) -> f32,
-) {
-    let (rows, columns, steps) = (amx::OUTPUTS, amx::DEPTH, depth.div_ceil(amx::DEPTH));
-    for (index, block) in blocks.chunks_exact_mut(rows * columns).enumerate() {
-        let (first, start) = (index / steps * rows, index % steps * columns);
-        for (i, x) in block.iter_mut().enumerate() {
-            let (o, k) = (first + i / columns, start + i % columns);
-            if o < outputs && k < depth {
-                *x = bf16::from_f32(weight(o, k));
-            }
-        }
-    }
-}
-
-fn pack(panels: &mut [f32], outputs: usize, depth: usize, weight: impl Fn(usize, usize) -> f32) {
-    for (group, panel) in panels.chunks_exact_mut(GROUP * depth).enumerate() {
-        for (k, eight) in panel.chunks_exact_mut(GROUP).enumerate() {
-            for (r, x) in eight.iter_mut().enumerate() {
-                let o = group * GROUP + r;
-                *x = if o < outputs { weight(o, k) } else { 0.0 };
-            }
-        }
-    }
-}
-
-fn pack_pairs(
-    pairs: &mut [bf16],
-    outputs: usize,
-    depth: usize,
-    weight: impl Fn(usize, usize) -> f32,
-) {
-    let even = depth.next_multiple_of(2);
-    for (group, panel) in pairs.chunks_exact_mut(GROUP * even).enumerate() {
-        for (k2, sixteen) in panel.chunks_exact_mut(2 * GROUP).enumerate() {
-            for (i, x) in sixteen.iter_mut().enumerate() {
-                let (o, k) = (group * GROUP + i / 2, 2 * k2 + i % 2);
-                *x = if o < outputs && k < depth {
-                    bf16::from_f32(weight(o, k))
-                } else {
-                    bf16::ZERO
-                };
-            }
-        }
-    }
-}
 
 /// The decoder of a model, packed. Immutable; shared by scenes and threads.
 #[derive(Debug)]
@@ -195,14 +141,12 @@ impl PackedDecoder {
     /// Packs a model's decoder.
     ///
     /// # Errors
-    /// A sentence naming the tensor whose length does not fit, for the bundle's loader.
-    pub fn new(w: &DecoderWeights<'_>) -> Result<Self, String> {
+    /// [`Error::Bundle`] of `file`, naming the tensor whose length does not fit; [`Error::OutOfMemory`].
+    pub fn new(file: &str, w: &DecoderWeights<'_>) -> crate::Result<Self> {
         let (h, m) = (w.hidden, w.mlp);
         if h == 0 || w.heads == 0 || !h.is_multiple_of(w.heads) {
-            return Err(format!(
-                "decoder width {h} is not a multiple of {} heads",
-                w.heads
-            ));
+            let problem = format!("decoder width {h} is not a multiple of {} heads", w.heads);
+            return Err(Error::bundle(file, problem));
         }
         for (name, tensors, outputs, depth) in [
             ("attention_out", w.attention_out, h, h),
@@ -213,23 +157,27 @@ impl PackedDecoder {
             ("head", w.head, 3, h),
         ] {
             if tensors.0.len() != outputs * depth || tensors.1.len() != outputs {
-                return Err(format!(
+                let problem = format!(
                     "decoder.{name} has {} weights and {} biases, not {} and {outputs}",
                     tensors.0.len(),
                     tensors.1.len(),
                     outputs * depth
-                ));
+                );
+                return Err(Error::bundle(file, problem));
             }
         }
-        let plain = |t: Tensors<'_>, o, d| Linear::new(o, d, t.0.to_vec(), t.1.to_vec());
+        let plain = |t: Tensors<'_>, o, d| {
+            let (weight, bias) = (memory::copied(t.0, WHAT)?, memory::copied(t.1, WHAT)?);
+            Linear::new(o, d, weight, bias)
+        };
         Ok(Self {
             hidden: h,
             heads: w.heads,
             mlp: m,
-            attention_out: plain(w.attention_out, h, h),
-            mlp1: Linear::after_norm(m, h, w.mlp1, w.norm2),
-            mlp2: plain(w.mlp2, h, m),
-            head: Linear::after_norm(3, h, w.head, w.norm3),
+            attention_out: plain(w.attention_out, h, h)?,
+            mlp1: Linear::after_norm(m, h, w.mlp1, w.norm2)?,
+            mlp2: plain(w.mlp2, h, m)?,
+            head: Linear::after_norm(3, h, w.head, w.norm3)?,
         })
     }
 

@@ -4,10 +4,12 @@ use super::{NO_COLUMN, PriorTable};
 use crate::bundle::{BundleFiles, Manifest, ManifestKind, Mesh, PriorEntry, TensorFile};
 use crate::error::Result;
 use crate::grid::{PointGrid, squared_distance};
+use crate::memory;
 use crate::prior::compliance::Compliance;
 use crate::prior::numbers::Numbers;
 use crate::prior::vibration::FreeVibration;
 
+const WHAT: &str = "the linear response";
 /// How far outside the domain a contact node borrows a column, in typical edges of the domain.
 const REACH: f64 = 4.0;
 
@@ -43,7 +45,7 @@ impl PriorTable {
         }
         let dofs = 3 * contact_nodes.len();
         let block_nodes = file.indices("block_nodes", &[Some(count)], count)?;
-        let mut seen = vec![false; count];
+        let mut seen = memory::filled(count, false, WHAT)?;
         for (at, &node) in block_nodes.iter().enumerate() {
             if std::mem::replace(&mut seen[node as usize], true) {
                 return Err(file.bad(
@@ -82,7 +84,7 @@ impl PriorTable {
             .zip(rank_offsets.windows(2))
             .map(|(nodes, ranks)| 3 * (nodes[1] - nodes[0]) * (ranks[1] - ranks[0]))
             .sum();
-        let places = basis_places(&block_nodes, &block_offsets, &rank_offsets);
+        let places = basis_places(&block_nodes, &block_offsets, &rank_offsets)?;
         let compliance = Compliance::read(file, contact_nodes.len(), |i| {
             places[contact_nodes[i] as usize]
         })?;
@@ -97,19 +99,22 @@ impl PriorTable {
             .reduced
             .as_ref()
             .map_or((0, 0), |reduced| (reduced.modes, reduced.response_modes));
-        let mut in_domain = vec![false; count];
+        let mut in_domain = memory::filled(count, false, WHAT)?;
         for &node in &mesh.domain_nodes {
             in_domain[node as usize] = true;
         }
-        let narrow = |values: Vec<usize>| values.into_iter().map(|value| value as u32).collect();
+        let narrow = |values: Vec<usize>| {
+            let narrow = values.iter().map(|&value| value as u32);
+            memory::collected(values.len(), narrow, WHAT)
+        };
         Ok(PriorTable {
             nearest_column: nearest_columns(mesh, &contact_nodes)?,
             in_domain,
             contact_nodes,
             compliance,
             block_nodes,
-            block_offsets: narrow(block_offsets),
-            rank_offsets: narrow(rank_offsets),
+            block_offsets: narrow(block_offsets)?,
+            rank_offsets: narrow(rank_offsets)?,
             basis: Numbers::read(file, "basis", &[Some(size)])?,
             response: Numbers::read(file, "response", &[Some(dofs), Some(width)])?,
             residual: if modes > 0 {
@@ -130,8 +135,8 @@ fn basis_places(
     block_nodes: &[u32],
     block_offsets: &[usize],
     rank_offsets: &[usize],
-) -> Vec<(u32, u32, u32)> {
-    let mut places = vec![(0, 0, 0); block_nodes.len()];
+) -> Result<Vec<(u32, u32, u32)>> {
+    let mut places = memory::filled(block_nodes.len(), (0, 0, 0), WHAT)?;
     let mut start = 0;
     for (nodes, ranks) in block_offsets.windows(2).zip(rank_offsets.windows(2)) {
         let rank = ranks[1] - ranks[0];
@@ -140,32 +145,28 @@ fn basis_places(
             start += 3 * rank;
         }
     }
-    places
+    Ok(places)
 }
 
 /// For each node the nearest of `contact_nodes` (ties: the smallest index), by a cell grid.
 fn nearest_columns(mesh: &Mesh, contact_nodes: &[u32]) -> Result<Vec<u32>> {
-    let grid = PointGrid::try_new(
-        contact_nodes
-            .iter()
-            .flat_map(|&node| mesh.position(node))
-            .collect(),
-    )?;
+    let points = contact_nodes.iter().flat_map(|&node| mesh.position(node));
+    let points = memory::collected(3 * contact_nodes.len(), points, WHAT)?;
+    let grid = PointGrid::try_new(points)?;
     let area: f64 = contact_nodes
         .iter()
         .map(|&node| mesh.node_area[node as usize] as f64)
         .sum();
     let edge = (area / contact_nodes.len() as f64).sqrt();
-    Ok((0..mesh.node_count() as u32)
-        .map(|node| {
-            let p = mesh.position(node);
-            let column = grid.nearest(p);
-            let d2 = squared_distance(p, mesh.position(contact_nodes[column as usize]));
-            if d2.sqrt() <= REACH * edge {
-                column
-            } else {
-                NO_COLUMN
-            }
-        })
-        .collect())
+    let columns = (0..mesh.node_count() as u32).map(|node| {
+        let p = mesh.position(node);
+        let column = grid.nearest(p);
+        let d2 = squared_distance(p, mesh.position(contact_nodes[column as usize]));
+        if d2.sqrt() <= REACH * edge {
+            column
+        } else {
+            NO_COLUMN
+        }
+    });
+    memory::collected(mesh.node_count(), columns, WHAT)
 }

@@ -100,7 +100,7 @@ impl Between {
             held_back: memory::zeros(natural, WHAT)?,
             rows: memory::collected(natural, 0..natural as u32, WHAT)?,
             along: Along::new()?,
-            nodes: Box::default(),
+            nodes: memory::boxed(Nodes::default(), WHAT)?,
             now: ContactSet::default(),
         })
     }

@@ -72,7 +72,7 @@ impl Presenters {
             Values::Points => &mut self.points,
         };
         if place.is_none() {
-            let made = Box::new(Presenter::new(scene, values)?);
+            let made = memory::boxed(Presenter::new(scene, values)?, WHAT)?;
             begin()?;
             *place = Some(made);
         }

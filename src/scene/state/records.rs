@@ -3,9 +3,12 @@
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
+use crate::memory;
 use crate::scene::engine::Engine;
 use crate::scene::reduced::ReducedRecord;
 use crate::scene::upt::UptRecord;
+
+const WHAT: &str = "a copy of a scene's state";
 
 /// The last latent state and the one before.
 #[derive(Debug, Serialize, Deserialize)]
@@ -23,10 +26,12 @@ impl Engine {
     pub(super) fn records(&self) -> Result<Records> {
         Ok(match self {
             Engine::Upt(engine) => {
-                Records::Upt(Box::new([engine.last.copy()?, engine.before.copy()?]))
+                let records = [engine.last.copy()?, engine.before.copy()?];
+                Records::Upt(memory::boxed(records, WHAT)?)
             }
             Engine::Reduced(engine) => {
-                Records::Reduced(Box::new([engine.last.copy()?, engine.before.copy()?]))
+                let records = [engine.last.copy()?, engine.before.copy()?];
+                Records::Reduced(memory::boxed(records, WHAT)?)
             }
         })
     }

@@ -2,6 +2,7 @@
 
 use crate::contact::{MAX_TOOLS, Past, Problem};
 use crate::error::Result;
+use crate::memory;
 use crate::scene::core::Core;
 
 pub type Tools = Past;
@@ -26,7 +27,7 @@ impl Core {
             (none @ None, Some(past)) => {
                 let mut problem = Problem::new(self.model.samples()?)?;
                 problem.past = past;
-                *none = Some(Box::new(problem));
+                *none = Some(memory::boxed(problem, "the contact of instruments")?);
             }
             (None, None) => {}
         }

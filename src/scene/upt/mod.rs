@@ -77,6 +77,8 @@ pub struct UptEngine {
     pub before: UptRecord,
 }
 
+const STATES: &str = "a scene's latent states";
+
 impl UptEngine {
     /// Makes sessions and buffers.
     pub fn new(
@@ -92,7 +94,7 @@ impl UptEngine {
         let table = model.prior.as_ref().filter(|_| uses_prior);
         let kv = dims.latent_tokens * dims.decoder;
         let vibration = table.and_then(|table| table.vibration.as_ref());
-        let zeros = |count| memory::zeros(count, "a scene's latent states");
+        let zeros = |count| memory::zeros(count, STATES);
         let record = || {
             Ok::<_, Error>(UptRecord {
                 keys: zeros(kv)?,
@@ -104,11 +106,15 @@ impl UptEngine {
         };
         let (runtime, plan, threads) = (model.runtime()?, &model.plan, pool.threads());
         let path = if choice.whole {
-            Path::Whole(Box::new(kind.step_stage(runtime, plan, threads, tables)?))
+            let stage = kind.step_stage(runtime, plan, threads, tables)?;
+            Path::Whole(memory::boxed(stage, STATES)?)
         } else {
             let supernodes = tables.graph.supernodes.len();
             Path::Split {
-                latent: Box::new(kind.latent_stage(runtime, plan, threads, supernodes)?),
+                latent: {
+                    let stage = kind.latent_stage(runtime, plan, threads, supernodes)?;
+                    memory::boxed(stage, STATES)?
+                },
                 features: zeros(tables.encode_nodes.len() * kind.entry.feature_width())?,
                 scratch: zeros(threads * dims.encoder)?,
             }

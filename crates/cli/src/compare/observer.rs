@@ -142,7 +142,7 @@ impl Observer {
                 &mesh.stiffness,
                 &free,
                 material.moduli(),
-            ),
+            )?,
             internal: vec![0.0; 3 * free.len()],
             at_points: vec![0.0; points.len()],
             free,

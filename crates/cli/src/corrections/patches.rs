@@ -23,7 +23,7 @@ pub fn differences(
     quiet: bool,
 ) -> Result<Vec<Vec<f32>>> {
     let mut random = SplitMix(seed);
-    let forces = source.element_forces();
+    let forces = source.element_forces()?;
     let mut response = ContactResponse::new(&source.prior)?;
     let pool = Pool::new(1)?;
     let bar = progress::bar(quiet, count as u64, "patches");

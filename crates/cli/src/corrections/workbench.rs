@@ -142,8 +142,9 @@ impl Workbench {
         }
     }
 
-    pub fn element_forces(&self) -> ElementForces {
-        ElementForces::new(self.mesh.tetrahedra(), &self.material, Simd::detect())
+    pub fn element_forces(&self) -> Result<ElementForces> {
+        let made = ElementForces::new(self.mesh.tetrahedra(), &self.material, Simd::detect());
+        Ok(made?)
     }
 
     /// Writes the natural modes and `more` (in block coordinates) as the coarse space of a copy of the bundle, with the manifest's

@@ -90,7 +90,7 @@ impl PaperSplit {
             .collect();
         domain.sort_unstable();
         domain.dedup();
-        let graph = SupernodeGraph::new(mesh.positions.as_flattened(), &domain, &settings);
+        let graph = SupernodeGraph::new(mesh.positions.as_flattened(), &domain, &settings)?;
         let mut edge_target = Vec::with_capacity(graph.neighbours.len());
         for (row, supernode) in graph.supernodes.iter().enumerate() {
             let degree = graph.offsets[row + 1] - graph.offsets[row];

@@ -109,7 +109,7 @@ fn laws(mesh: &Mesh) -> Outcome<String> {
                 law,
                 ..Material::default()
             };
-            ElementForces::new(mesh.tetrahedra(), &material, simd)
+            ElementForces::new(mesh.tetrahedra(), &material, simd).expect("memory for a body")
         });
         let mut scratch = bodies[0].scratch(1)?;
         let mut out = vec![0.0; u.len()];

@@ -10,6 +10,8 @@ pub enum SolverError {
     Material(#[from] MaterialError),
     #[error(transparent)]
     Mesh(#[from] MeshError),
+    #[error("no memory for the elements of the mesh: {0}")]
+    Memory(#[from] std::collections::TryReserveError),
     #[error(
         "instruction set {0:?} is not available on this processor; leave `simd` unset to detect"
     )]

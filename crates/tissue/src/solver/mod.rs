@@ -127,7 +127,7 @@ impl Solver {
                     })?,
             ),
         };
-        let partition = Partition::new(mesh.tetrahedra(), &options.material);
+        let partition = Partition::new(mesh.tetrahedra(), &options.material)?;
         let slots = partition.node_of_slot.len();
         let lumped = LumpedMass::new(mesh, &options.material, options.mass_scaling_s);
         let mut mass = vec![0.0; slots];

@@ -44,7 +44,7 @@ fn body() -> Mesh {
 #[test]
 fn forces_are_the_derivative_of_the_energy() {
     let mesh = body();
-    let partition = Partition::new(mesh.tetrahedra(), &Material::default());
+    let partition = Partition::new(mesh.tetrahedra(), &Material::default()).unwrap();
     assert!(partition.chunks.len() > 1);
     assert!(partition.octahedra.count() > 0 && partition.pairs.count() > 0);
     // Up to 0.6 mm a node in elements of some 5 mm, and 10 mm of the whole.

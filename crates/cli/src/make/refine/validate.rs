@@ -32,7 +32,7 @@ pub fn errors(
         ..Default::default()
     };
     let model = Model::open(bundle, &options)?;
-    let forces = bench.element_forces();
+    let forces = bench.element_forces()?;
     let mut mass = vec![0.0f32; bench.mesh.node_count()];
     for tet in &bench.mesh.tets {
         let volume = tet_volume(&bench.mesh.positions, *tet);

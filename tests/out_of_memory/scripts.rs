@@ -1,0 +1,82 @@
+//! Which calls a host makes, one after another.
+
+use upt::ffi::UPT_MODE_GRASP;
+
+use crate::calls::{Call, Rig};
+
+const OPEN: Call = ("upt_model_open", Rig::open);
+const CREATE: Call = ("upt_scene_create", Rig::create);
+
+/// All of them, of a scene that corrects.
+pub const CORRECTED: &[Call] = &[
+    OPEN,
+    CREATE,
+    ("a first step with two tools", |rig| rig.drive(0.5)),
+    ("readings", Rig::readings),
+    ("a first frame", |rig| rig.present(0.01)),
+    ("a second step", |rig| rig.drive(1.5)),
+    ("a frame in which a step arrives", |rig| rig.present(0.005)),
+    ("upt_scene_attach_points", Rig::attach),
+    ("a frame of points", Rig::present_points),
+    ("upt_haptics_create", Rig::feel),
+    ("a step that a hand feels", |rig| rig.drive(2.5)),
+    ("upt_haptics_render", Rig::render),
+    ("a frame of another step", |rig| rig.present(0.005)),
+    ("upt_scene_set_region", Rig::region),
+    ("a frame of a region", |rig| rig.present(0.01)),
+    ("upt_scene_decode", Rig::decode),
+    ("a grasp", |rig| {
+        rig.tools[1].mode = UPT_MODE_GRASP;
+        rig.drive(2.5)
+    }),
+    ("a submitted step", |rig| rig.submit(2.0)),
+    ("upt_scene_save", Rig::save),
+    ("a step after a snapshot", |rig| rig.drive(1.0)),
+    ("upt_scene_restore", Rig::restore),
+    ("a frame after a restored state", |rig| rig.present(0.01)),
+    ("a step after a restored state", |rig| rig.drive(1.0)),
+    ("upt_scene_contact_force", Rig::contact_force),
+    ("a free step", Rig::free),
+    ("upt_scene_reset", Rig::reset),
+    ("upt_scene_contacts_from_instruments", |rig| {
+        rig.contacts(2.0)
+    }),
+    ("a step of nodes", |rig| rig.push(-0.5)),
+    ("a frame of nodes", Rig::present_contacts),
+    ("the forces of nodes", Rig::contact_force),
+    ("a submitted step of nodes", Rig::submit_nodes),
+    ("a last free step", Rig::free),
+];
+
+/// Those of a scene that does not.
+pub const PLAIN: &[Call] = &[
+    OPEN,
+    CREATE,
+    ("a first step of nodes", |rig| rig.push(-0.5)),
+    ("upt_scene_contact_force", Rig::contact_force),
+    ("upt_scene_attach_points", Rig::attach),
+    ("upt_scene_set_region", Rig::region),
+    ("a step of a region", |rig| rig.push(-1.0)),
+    ("upt_scene_decode", Rig::decode),
+    ("the forces in a region", Rig::contact_force),
+    ("upt_scene_save", Rig::save),
+    ("a free step", Rig::free),
+    ("upt_scene_restore", Rig::restore),
+    ("upt_scene_contacts_from_instruments", |rig| {
+        rig.contacts(2.0)
+    }),
+    ("a submitted step of nodes", Rig::submit_nodes),
+];
+
+/// More of a scene whose bundle has a linear response.
+pub const DRIVEN: &[Call] = &[
+    OPEN,
+    CREATE,
+    ("a first step with two tools", |rig| rig.drive(0.5)),
+    ("readings", Rig::readings),
+    ("a second step", |rig| rig.drive(1.5)),
+    ("upt_scene_save", Rig::save),
+    ("a step after a snapshot", |rig| rig.drive(1.0)),
+    ("upt_scene_restore", Rig::restore),
+    ("a step after a restored state", |rig| rig.drive(1.0)),
+];
