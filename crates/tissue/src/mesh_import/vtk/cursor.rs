@@ -40,10 +40,19 @@ impl<'a> Cursor<'a> {
         String::from_utf8_lossy(line)
     }
 
-    /// Past the metadata of an array, which end with an empty line.
-    pub fn skip_metadata(&mut self) {
+    /// Past the metadata of an array of this width, which end with an empty line; names of components may be empty too.
+    pub fn skip_metadata(&mut self, width: usize) {
         self.line();
-        while !self.line().trim().is_empty() {}
+        loop {
+            let line = self.line();
+            if line.trim() == "COMPONENT_NAMES" {
+                for _ in 0..width.min(self.bytes.len() - self.at) {
+                    self.line();
+                }
+            } else if line.trim().is_empty() {
+                return;
+            }
+        }
     }
 
     /// The next word, or none at the end.

@@ -34,8 +34,9 @@ fn file(cursor: &mut Cursor<'_>, with_arrays: bool) -> Result<DataSet, Fault> {
         pieces: vec![Piece::default()],
     };
     let piece = &mut data.pieces[0];
-    // The rows of the arrays that follow, and whether they are cells.
+    // The rows of the arrays that follow, and whether they are cells; numbers a row of the last one.
     let mut rows = (0, false);
+    let mut width = 1;
     while let Some(word) = cursor.keyword() {
         let word = word.to_ascii_uppercase();
         match word.as_str() {
@@ -49,11 +50,12 @@ fn file(cursor: &mut Cursor<'_>, with_arrays: bool) -> Result<DataSet, Fault> {
                     ));
                 }
             },
-            "METADATA" => cursor.skip_metadata(),
+            "METADATA" => cursor.skip_metadata(width),
             "POINTS" => {
                 let count = cursor.count()?;
                 let kind = cursor.kind()?;
                 cursor.is_binary = is_binary;
+                width = 3;
                 let numbers = cursor.reals(kind, times(count, 3)?)?;
                 piece.points.extend_from_slice(numbers.as_chunks::<3>().0);
             }
@@ -81,7 +83,7 @@ fn file(cursor: &mut Cursor<'_>, with_arrays: bool) -> Result<DataSet, Fault> {
             _ => {
                 let mut found = Vec::new();
                 let (count, is_cells) = rows;
-                array(cursor, &word, count, is_binary, &mut found)?;
+                width = array(cursor, &word, count, is_binary, &mut found)?;
                 // Field data of the data set itself come before any arrays of points and cells.
                 if with_arrays && count > 0 {
                     let arrays = match is_cells {
@@ -135,23 +137,24 @@ fn lists(cursor: &mut Cursor<'_>, is_binary: bool) -> Result<Lists, Fault> {
     Ok(Lists { nodes, ends })
 }
 
-/// An array, or several of a field. Those of one number a row go into `found`.
+/// An array, or several of a field; the numbers a row of the last one. Arrays of one number go into `found`.
 fn array(
     cursor: &mut Cursor<'_>,
     word: &str,
     rows: usize,
     is_binary: bool,
     found: &mut Vec<Array>,
-) -> Result<(), Fault> {
+) -> Result<usize, Fault> {
     if word == "FIELD" {
         cursor.word()?;
         let arrays = cursor.count()?;
+        let mut last = 1;
         for _ in 0..arrays {
             cursor.is_binary = false;
             let mut name = cursor.word()?;
             // An array may be followed by its metadata.
             while name == "METADATA" {
-                cursor.skip_metadata();
+                cursor.skip_metadata(last);
                 name = cursor.word()?;
             }
             if name == "NULL_ARRAY" {
@@ -159,6 +162,7 @@ fn array(
             }
             let name = decoded(name);
             let (width, rows) = (cursor.count()?, cursor.count()?);
+            last = width;
             let kind = cursor.word()?.to_owned();
             cursor.line();
             let count = times(width, rows)?;
@@ -179,7 +183,7 @@ fn array(
                 found.push(Array { name, values });
             }
         }
-        return Ok(());
+        return Ok(last);
     }
     if word == "LOOKUP_TABLE" {
         cursor.word()?;
@@ -188,7 +192,7 @@ fn array(
         cursor.is_binary = is_binary;
         let kind = if is_binary { Kind::U8 } else { Kind::F32 };
         cursor.reals(kind, times(colours, 4)?)?;
-        return Ok(());
+        return Ok(4);
     }
     let fixed = match word {
         "SCALARS" | "COLOR_SCALARS" | "TEXTURE_COORDINATES" => None,
@@ -215,7 +219,8 @@ fn array(
     });
     if word == "PEDIGREE_IDS" && kind.is_some_and(|kind| kind.contains("string")) {
         cursor.is_binary = is_binary;
-        return cursor.skip_texts(rows);
+        cursor.skip_texts(rows)?;
+        return Ok(1);
     }
     let (kind, width) = match (word, fixed) {
         // Bytes, or fractions of 1 where the file is text.
@@ -244,7 +249,7 @@ fn array(
             values,
         });
     }
-    Ok(())
+    Ok(width)
 }
 
 /// VTK writes spaces and other signs in names as `%20`.
