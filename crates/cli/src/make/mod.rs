@@ -58,7 +58,7 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     bundle::check_target(&options.out)?;
     let mut work = Work::open(&options.work_folder(), options.json)?;
 
-    let input = std::fs::read(&options.input)
+    let input = tissue::regular_file::read(&options.input)
         .with_context(|| format!("{}: cannot be read", options.input.display()))?;
     let body_key = key_of(&[&input, options.body_words()?.as_bytes()]);
     let made = work.stage("body", &body_key, &["mesh.safetensors"], |stage| {

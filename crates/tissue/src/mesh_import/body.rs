@@ -1,7 +1,7 @@
 //! What a file holds: tetrahedra or a surface, and what its reader did to get there.
 
 use super::error::{Fault, fault};
-use super::{RawSurface, RawTets, Repair};
+use super::{RawSurface, RawTets, Repair, far};
 
 /// Tetrahedra or a surface.
 pub enum Body {
@@ -60,6 +60,7 @@ impl TetList {
         if raw.tets.is_empty() {
             return fault(none);
         }
+        far::check(&raw.positions, raw.tets.iter().flatten().copied())?;
         let mut notes = Vec::new();
         if self.higher > 0 {
             notes.push(Repair {

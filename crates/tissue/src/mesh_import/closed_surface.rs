@@ -61,7 +61,7 @@ fn degenerate(
     let Some(&face) = bad.first() else {
         return Ok(());
     };
-    if !repair {
+    if !repair || bad.len() == surface.faces.len() {
         return Err(ImportError::DegenerateFace {
             face,
             count: bad.len(),

@@ -8,10 +8,10 @@ use std::path::PathBuf;
 /// A file that cannot become a mesh.
 #[derive(Debug, thiserror::Error)]
 pub enum ImportError {
-    #[error("{path}: {source}")]
+    #[error("{path}: {error}")]
     Io {
         path: PathBuf,
-        source: std::io::Error,
+        error: std::io::Error,
     },
     #[error(
         "{path}: unknown extension; use .vtk, .vtu, .msh, .inp, .feb, .mesh, .node or .ele (tetrahedra), .stl, .obj, .ply, .off or .vtp (closed surface)"
@@ -173,20 +173,31 @@ impl Fault {
     /// With the name of its file.
     pub(super) fn of(self, path: &std::path::Path) -> ImportError {
         match self {
-            Self::Text(reason) => ImportError::Format {
-                path: path.into(),
-                reason,
-            },
+            Self::Text(reason) => ImportError::format(path, &reason),
             Self::Kind { element, kind } => ImportError::ElementKind {
                 path: path.into(),
                 element,
-                kind,
+                kind: plain(&kind),
             },
         }
     }
 }
 
+/// One line without signs that a terminal acts on, whatever words of a file are in it.
+fn plain(reason: &str) -> String {
+    let shown = |c: char| if c.is_control() { '?' } else { c };
+    reason.chars().take(1000).map(shown).collect()
+}
+
 impl ImportError {
+    /// What is wrong with a file, in words.
+    pub(super) fn format(path: &std::path::Path, reason: &str) -> Self {
+        Self::Format {
+            path: path.into(),
+            reason: plain(reason),
+        }
+    }
+
     /// Whether the message names the file; the other faults are found after reading.
     pub fn names_file(&self) -> bool {
         matches!(

@@ -119,10 +119,7 @@ impl Labels {
                 }
             }
         }
-        let format = |reason: String| ImportError::Format {
-            path: path.into(),
-            reason,
-        };
+        let format = |reason: String| ImportError::format(path, &reason);
         if !found {
             let names: Vec<&str> = self.names().into_iter().take(40).collect();
             return Err(format(if names.is_empty() {

@@ -152,11 +152,11 @@ pub fn import(path: &Path, options: &ImportOptions) -> Result<Imported, ImportEr
             raw
         }
         Body::Surface(mut surface) => {
-            let resolution = options.resolution.ok_or(ImportError::NoResolution)?;
             scale(&mut surface.positions, options.scale);
             closed_surface::check(&mut surface, options.repair, &mut repairs)?;
             bodies::keep_one(&mut surface, options, names, &mut repairs, &mut notes)?;
             self_crossing::check(&surface, options.repair, &mut repairs)?;
+            let resolution = options.resolution.ok_or(ImportError::NoResolution)?;
             let filled = fill::fill(surface, resolution)?;
             notes.extend(filled.notes);
             // The body is chosen.

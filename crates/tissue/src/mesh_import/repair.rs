@@ -204,7 +204,7 @@ fn degenerate(
     let Some(&tet) = bad.first() else {
         return Ok(());
     };
-    if !repair {
+    if !repair || bad.len() == raw.tets.len() {
         return Err(ImportError::Degenerate {
             tet,
             volume_mm3: measure(raw, raw.tets[tet]).0,

@@ -50,7 +50,9 @@ pub(super) fn whole(surface: RawSurface) -> Result<RawSurface, Fault> {
             surface.faces[face]
         ));
     }
-    far::check(&surface.positions, surface.faces.iter().flatten().copied())?;
+    let used = || surface.faces.iter().flatten().copied();
+    far::check_finite(&surface.positions, used())?;
+    far::check(&surface.positions, used())?;
     Ok(merge_points(surface))
 }
 

@@ -7,9 +7,9 @@ use std::path::Path;
 
 /// The bytes of a regular file.
 pub fn bytes_of(path: &Path) -> Result<Vec<u8>, ImportError> {
-    crate::regular_file::read(path).map_err(|source| ImportError::Io {
+    crate::regular_file::read(path).map_err(|error| ImportError::Io {
         path: path.into(),
-        source,
+        error,
     })
 }
 

@@ -147,6 +147,19 @@ impl Packing {
     /// Unpacks a block of a known size.
     fn block(&self, packed: &[u8], size: usize, out: &mut Vec<u8>) -> Result<(), String> {
         let start = out.len();
+        // What a byte can unpack to at most.
+        let most = match self.compressor {
+            None => 1,
+            Some(Compressor::Zlib) => 1100,
+            Some(Compressor::Lz4) => 256,
+            Some(Compressor::Lzma) => 16384,
+        };
+        if size > packed.len().saturating_mul(most) {
+            return Err(format!(
+                "announces {size} bytes, which {} packed ones cannot hold",
+                packed.len()
+            ));
+        }
         let limit = size as u64;
         match self.compressor {
             None => out.extend_from_slice(packed),
