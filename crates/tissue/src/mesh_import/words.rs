@@ -18,9 +18,14 @@ pub fn without_mark(bytes: &[u8]) -> &[u8] {
     bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes)
 }
 
-/// The text of a file. Names and comments may be in any encoding, so that what is not UTF-8 becomes a replacement character.
+/// The text of a file. Names and comments may be in any encoding, so that what is not UTF-8 becomes a replacement character; a
+/// line may end as on old Macintoshes.
 pub fn text(bytes: &[u8]) -> Cow<'_, str> {
-    String::from_utf8_lossy(without_mark(bytes))
+    let text = String::from_utf8_lossy(without_mark(bytes));
+    if text.contains('\r') && !text.contains('\n') {
+        return text.replace('\r', "\n").into();
+    }
+    text
 }
 
 /// A number, also with the exponent that Fortran writes (`1.5D3`).

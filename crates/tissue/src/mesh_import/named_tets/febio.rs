@@ -46,8 +46,9 @@ struct Parser {
     place: Option<Place>,
     /// Tags that are open inside the place.
     inner: Vec<String>,
-    /// Number and text of the open entry.
+    /// Number, material and text of the open entry.
     number: Option<String>,
+    material: Option<String>,
     words: String,
     parts: usize,
     is_inside: bool,
@@ -61,6 +62,7 @@ pub(super) fn parse(text: &str) -> Result<Model, Fault> {
         place: None,
         inner: Vec::new(),
         number: None,
+        material: None,
         words: String::new(),
         parts: 0,
         is_inside: false,
@@ -177,6 +179,7 @@ impl Parser {
         self.words.clear();
         if self.place.is_some() {
             self.number = attribute(tag, "id", at)?;
+            self.material = attribute(tag, "mat", at)?;
             self.inner.push(name.to_owned());
         } else if self.is_inside {
             self.place = self.section(name, tag, at)?;
@@ -319,6 +322,8 @@ impl Parser {
                     ));
                 }
                 self.scope.element(number, shape, nodes)?;
+                // Only version 1.2 has a material for each element.
+                let name = self.material.as_ref().unwrap_or(name);
                 self.scope
                     .element_sets
                     .named(name)

@@ -80,8 +80,11 @@ pub fn parse(bytes: &[u8]) -> Result<Obj, Fault> {
     Ok(out)
 }
 
+/// A `#` inside a word is a part of a name.
 fn without_comment(line: &str) -> &str {
-    line.split('#').next().unwrap_or_default().trim()
+    let is_start = |&(at, _): &(usize, &str)| at == 0 || line[..at].ends_with([' ', '\t']);
+    let end = line.match_indices('#').find(is_start);
+    line[..end.map_or(line.len(), |(at, _)| at)].trim()
 }
 
 fn vertex(rest: &str, at: usize) -> Result<[f64; 3], Fault> {
