@@ -27,7 +27,7 @@ enum Command {
     /// Print counts, quality, manifoldness and the critical time step of a mesh.
     Info(Info),
     #[cfg(feature = "files")]
-    /// Import tetrahedra (VTK, VTU, MSH) or fill a closed surface (STL, OBJ, PLY).
+    /// Import tetrahedra (VTK, Gmsh, Abaqus, FEBio, Medit, TetGen) or fill a closed surface (STL, OBJ, PLY, OFF, VTK).
     Import(Import),
     #[cfg(feature = "files")]
     /// Fill a signed distance grid with tetrahedra; `python -m upt_training.anatomy` calls this.

@@ -17,7 +17,7 @@ use super::print_quality;
     after_help = "Examples:\n  upt mesh import liver.msh liver.mesh.safetensors --fixed-sphere 0,0,0,20 --domain-sphere 60,0,30,25\n  upt mesh import kidney.stl kidney.mesh.safetensors --nodes 5000 --scale 1000"
 )]
 pub struct Import {
-    /// File to read: .vtk, .vtu, .vtp, .msh (1, 2.2 or 4.1), .inp, .feb, .stl, .obj or .ply.
+    /// File to read: .vtk, .vtu, .vtp, .msh (1, 2 or 4.1), .inp, .feb, .mesh, .node, .ele, .stl, .obj, .ply or .off.
     input: PathBuf,
     /// Mesh file to write (*.mesh.safetensors).
     output: PathBuf,

@@ -14,7 +14,7 @@ pub enum ImportError {
         error: std::io::Error,
     },
     #[error(
-        "{path}: unknown extension; use .vtk, .vtu, .msh, .inp, .feb, .mesh, .node or .ele (tetrahedra), .stl, .obj, .ply, .off or .vtp (closed surface)"
+        "{path}: unknown extension; use .vtk, .vtu, .msh, .inp, .feb, .mesh, .node or .ele (tetrahedra), .stl, .obj, .ply, .off or .vtp (closed surface); label volumes are read by `upt make`"
     )]
     Extension { path: PathBuf },
     #[error("{path}: {reason}")]
