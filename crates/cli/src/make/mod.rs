@@ -58,8 +58,13 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     bundle::check_target(&options.out)?;
     let mut work = Work::open(&options.work_folder(), options.json)?;
 
-    let input = tissue::regular_file::read(&options.input)
-        .with_context(|| format!("{}: cannot be read", options.input.display()))?;
+    let mut input = Vec::new();
+    for file in tissue::mesh_import::files_of(&options.input) {
+        input.extend(
+            tissue::regular_file::read(&file)
+                .with_context(|| format!("{}: cannot be read", file.display()))?,
+        );
+    }
     let body_key = key_of(&[&input, options.body_words()?.as_bytes()]);
     let made = work.stage("body", &body_key, &["mesh.safetensors"], |stage| {
         body::make(options, stage)

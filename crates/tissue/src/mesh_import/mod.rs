@@ -56,7 +56,7 @@ use body::{Body, Read};
 use choice::Names;
 
 use crate::mesh::Mesh;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// How large the elements of a filled surface are.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -212,6 +212,14 @@ pub fn read_labels(path: &Path) -> Result<Labels, ImportError> {
         "mesh" => medit::read_labels(path),
         "node" | "ele" => tetgen::read_labels(path),
         _ => Ok(Labels::default()),
+    }
+}
+
+/// The files that [`import`] reads for `path`: TetGen's come in pairs.
+pub fn files_of(path: &Path) -> Vec<PathBuf> {
+    match extension_of(path).as_str() {
+        "node" | "ele" => vec![path.with_extension("node"), path.with_extension("ele")],
+        _ => vec![path.into()],
     }
 }
 
