@@ -4,6 +4,34 @@
 //! `Scene::step` takes the displacement field `u` (or the scene's own state) and the collision field `c`
 //! of the instruments, and gives the next displacement, `u[t+dt] = M(u[t], c[t])`.
 //! Lengths are mm, forces mN, fields row-major `[K,3]` float32.
+//!
+//! ```
+//! use std::path::Path;
+//! use upt::{Contact, IndexSet, Model, ModelOptions, Scene, SceneOptions, Shape, StepInput, Tool};
+//!
+//! # fn main() -> upt::Result<()> {
+//! // A bundle's folder; this one has no network, so that it needs no ONNX Runtime.
+//! let model = Model::open(Path::new("onnx/liver-coarse"), &ModelOptions::default())?;
+//! let scene = Scene::new(model.clone(), &SceneOptions::default())?;
+//! let mut u = vec![0.0; 3 * scene.node_count()]; // [K,3], mm
+//!
+//! // A ball of 6 mm comes down on a node that tools may touch, a millimetre a step.
+//! let node = 3 * model.indices(IndexSet::DomainNodes)[0] as usize;
+//! let [x, y, z] = [0, 1, 2].map(|axis| model.positions()[node + axis]);
+//! let ball = Shape::Sphere { radius: 6.0 };
+//! for step in 0..5 {
+//!     let position = [x, y, z + 6.0 - step as f32];
+//!     let tool = Tool::new(0, &ball, position, [0.0, 0.0, 0.0, 1.0])?;
+//!     let input = StepInput { displacement: None, contact: Contact::Tools(&[tool]) };
+//!     scene.step(input, Some(&mut u))?;
+//! }
+//! let [_, _, lift] = scene.with_told(|told| told.readings[0].force); // on the tool, mN
+//! assert!(u.iter().all(|x| x.is_finite()) && lift.is_finite());
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! The guide is `docs/guide/rust.md` of the repository; the C ABI, with all of the rules, is `docs/reference/abi.md`.
 
 #[cfg(feature = "ndarray")]
 mod arrays;
@@ -56,6 +84,8 @@ pub mod scene;
 #[doc(hidden)]
 pub mod stats;
 
+#[cfg(feature = "contact")]
+pub use ::contact::{Shape, ShapeError};
 #[cfg(feature = "contact")]
 pub use contact::{MAX_TOOLS, Mode, Push, Reading, Told, Tool};
 pub use error::{Error, Result};

@@ -62,7 +62,7 @@ def test_bad_contacts(model, scene, nodes, vectors, message):
 )
 def test_an_output_that_would_need_a_copy_is_refused(model, scene, spoil):
     out = np.zeros((model.node_count, 3), np.float32)
-    with pytest.raises(ValueError, match="out must be"):
+    with pytest.raises((ValueError, TypeError), match="out must be"):
         scene.step(out=spoil(out))
 
 
@@ -125,3 +125,38 @@ def test_a_process_may_end_with_scenes_alive():
     code = f"import upt; s = upt.Model({str(FIXTURES / 'tiny-reduced')!r}).scene(); s.step(); s.submit()"
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert run.returncode == 0 and not run.stderr, run.stderr
+
+
+@pytest.mark.parametrize(
+    ("call", "argument"),
+    [
+        (lambda m, s: upt.Model(5), "path"),
+        (lambda m, s: m.scene(threads="two"), "threads"),
+        (lambda m, s: m.scene(kernel=[1]), "kernel"),
+        (lambda m, s: m.scene(mesh_path=7), "mesh_path"),
+        (lambda m, s: m.indices("tets"), "which"),
+        (lambda m, s: s.step("field"), "displacement"),
+        (lambda m, s: s.step(None, {}), "collision"),
+        (lambda m, s: s.step(out=[1.0]), "out"),
+        (lambda m, s: s.step_contacts("ab", [[0, 0, 0]]), "nodes"),
+        (lambda m, s: s.step_contacts([0], "there"), "contact"),
+        (lambda m, s: s.step_instruments(5), "instruments"),
+        (lambda m, s: s.step_instruments(upt.Instrument.capsule(1.0)), "instruments"),
+        (lambda m, s: s.step_instruments([1]), r"instruments\[0\]"),
+        (lambda m, s: s.step_instruments([upt.Instrument.capsule("six")]), r"instruments\[0\].radius"),
+        (lambda m, s: s.step_instruments([upt.Instrument.capsule(6, position=3)]), r"instruments\[0\].position"),
+        (lambda m, s: s.step_instruments([upt.Instrument.capsule(6, position="abc")]), r"instruments\[0\].position"),
+        (lambda m, s: s.sample("half"), "alpha"),
+        (lambda m, s: s.present("now"), "seconds"),
+        (lambda m, s: s.wait("long"), "timeout"),
+        (lambda m, s: s.restore("bytes"), "snapshot"),
+        (lambda m, s: s.attach_points("here"), "points"),
+        (lambda m, s: s.set_region("all"), "nodes"),
+        (lambda m, s: upt.Haptics(s, 5), "tool"),
+        (lambda m, s: upt.BatchedScenes(m, "3"), "count"),
+        (lambda m, s: upt.Hull("cube"), "points"),
+    ],
+)
+def test_a_wrong_type_is_a_type_error_that_names_the_argument(model, scene, call, argument):
+    with pytest.raises(TypeError, match=rf"^{argument}"):
+        call(model, scene)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import json
 import sys
 import threading
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import upt
-from conftest import FIXTURES, push, tensors
-from upt import _arrays, _library
+from conftest import FIXTURES, ROOT, push, tensors
+from upt import _arrays, _library, bundles
 
 
 def test_a_scene_follows_the_stored_rollout(name, scene):
@@ -173,3 +175,13 @@ def test_a_mesh_of_the_hosts_own():
     assert scene.step().shape == (model.node_count, 3)
     with pytest.raises(upt.UnsupportedError, match="mesh_path"):
         upt.Model(FIXTURES / "tiny-reduced").scene(mesh_path=FIXTURES / "tiny-reduced" / "mesh.safetensors")
+
+
+def test_a_bundle_that_ships_is_found_from_any_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    # What pip keeps of `pip install ./python`; a wheel came from no clone.
+    kept = json.dumps({"url": (ROOT / "python").as_uri(), "dir_info": {}})
+    monkeypatch.setattr(bundles, "distribution", lambda name: SimpleNamespace(read_text=lambda file: kept))
+    assert (upt.bundle("brain-coarse-reduced") / "bundle.json").is_file()
+    with pytest.raises(FileNotFoundError, match="brain-coarse-reduced"):
+        upt.bundle("no-such-brain")

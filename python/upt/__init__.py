@@ -2,7 +2,7 @@
 
     import upt
 
-    model = upt.Model("onnx/brain-reduced")
+    model = upt.Model(upt.bundle("brain-reduced"))
     scene = model.scene()
     u = scene.step_contacts([17, 18], [[0, 0, -4], [0, 0, -4]])  # [K, 3], mm, 50 ms later
 
@@ -39,6 +39,7 @@ from upt._native import (
     StepPath,
 )
 from upt.batch import BatchedScenes
+from upt.bundles import bundle
 from upt.errors import (
     ArgumentError,
     BundleError,
@@ -110,6 +111,7 @@ __all__ = [
     "Status",
     "StepPath",
     "UnsupportedError",
+    "bundle",
     "init",
     "providers",
     "set_log",

@@ -6,6 +6,7 @@ This runs in every step, with caches that the step has emptied: what fits is rec
 from __future__ import annotations
 
 from ctypes import addressof, c_char, c_uint64, c_void_p
+from reprlib import repr as short
 from typing import Any
 
 import numpy as np
@@ -58,10 +59,36 @@ def address(array: NDArray[Any]) -> int:
         return data
 
 
+def number(value: float, name: str) -> float:
+    """A number that an argument is; an error that names it where it is none."""
+    if type(value) is float:
+        return value
+    try:
+        # A word is none, whatever it spells.
+        return float(value + 0)
+    except (TypeError, ValueError):
+        raise TypeError(f"{name} is {short(value)}, expected a number") from None
+
+
+def floats(values: ArrayLike, name: str) -> Floats:
+    """An array of float32 in one piece."""
+    try:
+        return np.ascontiguousarray(values, np.float32)
+    except (TypeError, ValueError) as error:
+        raise _named(values, name, "numbers", error) from None
+
+
+def _named(values: ArrayLike, name: str, wanted: str, error: Exception) -> Exception:
+    """An error of NumPy's with the argument's name: uneven rows are wrong values, all else wrong types."""
+    if "inhomogeneous" in str(error):
+        return ValueError(f"{name}: {error}")
+    return TypeError(f"{name} is {short(values)}, expected {wanted}: {error}")
+
+
 def vectors(values: ArrayLike, name: str, count: int | None = None) -> Floats:
     """`[count, 3]` float32 in one piece; the array itself where it is that already."""
     fits = type(values) is ndarray and values.dtype is _F32 and values.flags.c_contiguous
-    array: Floats = values if fits else np.ascontiguousarray(values, np.float32)  # type: ignore[assignment]
+    array: Floats = values if fits else floats(values, name)  # type: ignore[assignment]
     if array.ndim != 2 or array.shape[1] != 3 or (count is not None and len(array) != count):
         wanted = f"({'n' if count is None else count}, 3)"
         raise ValueError(f"{name} has shape {array.shape}, expected {wanted}")
@@ -72,12 +99,15 @@ def indices(values: ArrayLike, name: str) -> Indices:
     """`[n]` uint32 in one piece; the array itself where it is that already."""
     if type(values) is ndarray and values.dtype is _U32 and values.ndim == 1 and values.flags.c_contiguous:
         return values
-    array = np.asarray(values)
+    try:
+        array = np.asarray(values)
+    except (TypeError, ValueError) as error:
+        raise _named(values, name, "node indices", error) from None
+    if array.dtype.kind not in "iuf" or (array.size and array.dtype.kind == "f"):
+        raise TypeError(f"{name} has dtype {array.dtype}, expected node indices")
     if array.ndim != 1:
         raise ValueError(f"{name} has shape {array.shape}, expected (n,)")
     if array.dtype != np.uint32:
-        if array.size and array.dtype.kind not in "iu":
-            raise TypeError(f"{name} has dtype {array.dtype}, expected node indices")
         if array.size and (array.min() < 0 or array.max() > 0xFFFFFFFF):
             raise ValueError(f"{name}: an index is negative or passes 32 bits")
     return np.ascontiguousarray(array, np.uint32)
@@ -122,6 +152,10 @@ def output(out: Floats | None, count: int, name: str = "out") -> Floats:
     """Where a result goes: a new array, or the caller's own, which must fit without a copy."""
     if out is None:
         return np.empty((count, 3), np.float32)
-    if not isinstance(out, ndarray) or out.dtype != _F32 or out.shape != (count, 3) or not out.flags.carray:
+    if not isinstance(out, ndarray):
+        raise TypeError(
+            f"{name} must be a writeable C-contiguous float32 array of shape ({count}, 3), not {short(out)}"
+        )
+    if out.dtype != _F32 or out.shape != (count, 3) or not out.flags.carray:
         raise ValueError(f"{name} must be a writeable C-contiguous float32 array of shape ({count}, 3)")
     return out

@@ -6,8 +6,10 @@
 from __future__ import annotations
 
 import ctypes
+import operator
 import os
 from enum import IntEnum, IntFlag
+from reprlib import repr as short
 from typing import Any
 
 
@@ -21,6 +23,16 @@ class Record(ctypes.Structure):
                 raise TypeError(f"{type(self).__name__} has no field {name!r}; it has {', '.join(names)}")
         super().__init__(**values)
         self.struct_size = ctypes.sizeof(self)
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        """As usual; a value of the wrong type is an error that names the field."""
+        try:
+            super().__setattr__(name, value)
+        except TypeError as error:
+            field = name.removeprefix("_")
+            if str(error).startswith(f"{field} "):
+                raise
+            raise TypeError(f"{field} is {short(value)}: {error}") from None
 
     @classmethod
     def field_names(cls) -> list[str]:
@@ -44,7 +56,7 @@ def _as_enum(kind: type[Any], value: Any, field: str) -> int:
         except KeyError:
             known = ", ".join(member.name.lower() for member in kind)
             raise ValueError(f"{field}: {value!r} is not one of {known}") from None
-    return int(value)
+    return operator.index(value)
 
 
 def choice(raw: str, kind: type[IntEnum] | type[IntFlag]) -> Any:
@@ -84,7 +96,7 @@ def text(raw: str) -> Any:
         return None if value is None else value.decode()
 
     def write(record: Any, value: str | os.PathLike[str] | None) -> None:
-        setattr(record, raw, None if value is None else os.fspath(value).encode())
+        setattr(record, raw, None if value is None else os.fsencode(value))
 
     return property(read, write)
 

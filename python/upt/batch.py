@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from upt._arrays import Floats
+from upt._arrays import Floats, floats
 from upt.instrument import Instrument
 from upt.model import Model
 from upt.scene import Scene
@@ -48,6 +48,8 @@ class BatchedScenes:
     def __init__(
         self, model: Model, count: int, *, workers: int | None = None, **options: Unpack[SceneOptionsKeywords]
     ) -> None:
+        if not isinstance(count, int):
+            raise TypeError(f"count is {count!r}, expected a number of scenes")
         if count < 1:
             raise ValueError(f"count is {count}, must be at least 1")
         options.setdefault("threads", 1)
@@ -158,7 +160,7 @@ class BatchedScenes:
     def _each(self, fields: ArrayLike | None, name: str) -> NDArray[np.float32] | None:
         if fields is None:
             return None
-        array = np.ascontiguousarray(fields, np.float32)
+        array = floats(fields, name)
         expected = (len(self.scenes), self.scenes[0].node_count, 3)
         if array.shape != expected:
             raise ValueError(f"{name} has shape {array.shape}, expected {expected}")

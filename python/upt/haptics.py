@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from upt import _native
+from upt._arrays import number
 from upt._library import check, lib
 from upt._native import HapticForce
 
@@ -48,6 +49,8 @@ class Haptics:
         damping_limit: float = 0.0,
         passivity: bool = True,
     ) -> None:
+        if not hasattr(tool, "record"):
+            raise TypeError(f"tool is {tool!r}, expected an upt.Instrument")
         described = tool.record()
         options = _native.HapticsOptions(
             instrument=instrument,
@@ -83,7 +86,7 @@ class Haptics:
             upt.StateError: the scene was closed.
         """
         pose = _native.HapticPose(
-            time_s=time,
+            time_s=number(time, "time"),
             position_m=position,
             rotation=rotation,
             has_velocity=velocity is not None,

@@ -7,6 +7,7 @@ import struct
 import weakref
 from collections.abc import Sequence
 from dataclasses import dataclass
+from reprlib import repr as short
 
 from numpy.typing import ArrayLike
 
@@ -41,7 +42,7 @@ class Hull:
 
 @dataclass
 class Instrument:
-    """A rigid instrument: the input of `Scene.step_instruments` and, but for hulls, of `Scene.contacts`.
+    """A rigid instrument: the input of `Scene.step_instruments` and `Scene.contacts`.
 
     Made by `capsule`, `box`, `spatula` or `hull`; move it by assigning `position` and `rotation`.
     """
@@ -173,12 +174,25 @@ _SLIDE, _GRASP = int(Mode.SLIDE), int(Mode.GRASP)
 
 def records(instruments: Sequence[Instrument]) -> tuple[bytes | ctypes.Array[_native.Instrument] | None, int]:
     """As an array for the C ABI (None where there are no instruments), and its length."""
-    count = len(instruments)
+    try:
+        count = len(instruments)
+    except TypeError:
+        raise TypeError(f"instruments is {short(instruments)}, expected a list of upt.Instrument") from None
     if not count:
         return None, 0
     try:
         if count == 1:
             return instruments[0]._packed(), 1
         return b"".join([one._packed() for one in instruments]), count
-    except (TypeError, ValueError, OverflowError, struct.error):
-        return (_native.Instrument * count)(*[one.record() for one in instruments]), count
+    except (AttributeError, TypeError, ValueError, OverflowError, struct.error):
+        return (_native.Instrument * count)(*[_recorded(at, one) for at, one in enumerate(instruments)]), count
+
+
+def _recorded(at: int, one: Instrument) -> _native.Instrument:
+    """An instrument's struct, or an error that names its place in the list."""
+    if not isinstance(one, Instrument):
+        raise TypeError(f"instruments[{at}] is {short(one)}, expected an upt.Instrument")
+    try:
+        return one.record()
+    except (TypeError, ValueError) as error:
+        raise type(error)(f"instruments[{at}].{error}") from None

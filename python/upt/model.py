@@ -40,9 +40,11 @@ class Model:
 
     def __init__(self, path: str | os.PathLike[str], **options: Unpack[ModelOptionsKeywords]) -> None:
         ensure_started()
+        if not isinstance(path, str | os.PathLike):
+            raise TypeError(f"path is {path!r}, expected the folder of a bundle: a str or a path")
         handle = ctypes.c_void_p()
         fields = ModelOptions(**options)
-        check(lib.upt_model_open(os.fspath(path).encode(), ctypes.byref(fields), ctypes.byref(handle)))
+        check(lib.upt_model_open(os.fsencode(path), ctypes.byref(fields), ctypes.byref(handle)))
         self._handle = handle.value
         self._close = weakref.finalize(self, lib.upt_model_close, handle.value)
 
@@ -87,6 +89,8 @@ class Model:
 
     def indices(self, which: IndexSet | int) -> Indices:
         """A static index set as `[n]` uint32: node indices, 3 per face, 4 per tetrahedron."""
+        if not isinstance(which, int):
+            raise TypeError(f"which is {which!r}, expected an upt.IndexSet")
         needed = ctypes.c_uint64()
         check(lib.upt_model_indices(self._handle, which, None, 0, ctypes.byref(needed)))
         out = np.empty(needed.value, np.uint32)

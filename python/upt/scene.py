@@ -8,12 +8,13 @@ import struct
 import sys
 import weakref
 from collections.abc import Sequence
+from reprlib import repr as short
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from upt._arrays import Contacts, Floats, Indices, Outputs, address, indices, vectors
+from upt._arrays import Contacts, Floats, Indices, Outputs, address, indices, number, vectors
 from upt._library import check, lib
 from upt._native import InstrumentContact, InstrumentReading, SceneOptions, SceneStats, Status
 from upt.instrument import Instrument, records
@@ -210,13 +211,14 @@ class Scene:
 
     def wait(self, timeout: float | None = None) -> bool:
         """Waits for the submitted step, at most `timeout` seconds; False if the time is up; raises the step's error."""
-        milliseconds = FOREVER_MS if timeout is None else min(max(int(timeout * 1000), 0), FOREVER_MS)
+        seconds = None if timeout is None else number(timeout, "timeout")
+        milliseconds = FOREVER_MS if seconds is None else int(min(max(seconds * 1000, 0), FOREVER_MS))
         return check(lib.upt_scene_wait(self._handle, milliseconds)) != Status.PENDING
 
     def sample(self, alpha: float, out: Floats | None = None) -> Floats:
         """Between the last two states (`alpha` 0: the one before, 1: the last): `[n, 3]`, mm, in the region's order."""
         result, place, length, _ = self._others.place(out, self._out_count)
-        check(lib.upt_scene_sample(self._handle, alpha, place, length))
+        check(lib.upt_scene_sample(self._handle, number(alpha, "alpha"), place, length))
         return result
 
     def present(self, seconds: float, instruments: Sequence[Instrument] = (), out: Floats | None = None) -> Floats:
@@ -237,7 +239,7 @@ class Scene:
         """
         array, count = records(instruments)
         result, place, length, _ = self._frames.place(out, self._out_count)
-        check(lib.upt_scene_present(self._handle, seconds, array, count, place, length))
+        check(lib.upt_scene_present(self._handle, number(seconds, "seconds"), array, count, place, length))
         return result
 
     def present_contacts(
@@ -246,7 +248,8 @@ class Scene:
         """As `present`, with nodes `[m]` and where they are at that moment, `[m, 3]`, mm, in place of instruments."""
         lists = self._contacts.place(nodes, contact)
         result, place, length, _ = self._frames.place(out, self._out_count)
-        check(lib.upt_scene_present_contacts(self._handle, seconds, *lists[2:5], place, length))
+        when = number(seconds, "seconds")
+        check(lib.upt_scene_present_contacts(self._handle, when, *lists[2:5], place, length))
         return result
 
     def present_points(
@@ -255,7 +258,7 @@ class Scene:
         """As `present`, at the attached points."""
         array, count = records(instruments)
         result, place, length, _ = self._others.place(out, self._point_count)
-        check(lib.upt_scene_present_points(self._handle, seconds, array, count, place, length))
+        check(lib.upt_scene_present_points(self._handle, number(seconds, "seconds"), array, count, place, length))
         return result
 
     def present_points_contacts(
@@ -264,7 +267,8 @@ class Scene:
         """As `present_contacts`, at the attached points."""
         lists = self._contacts.place(nodes, contact)
         result, place, length, _ = self._others.place(out, self._point_count)
-        check(lib.upt_scene_present_points_contacts(self._handle, seconds, *lists[2:5], place, length))
+        when = number(seconds, "seconds")
+        check(lib.upt_scene_present_points_contacts(self._handle, when, *lists[2:5], place, length))
         return result
 
     def set_region(self, nodes: ArrayLike | None) -> None:
@@ -297,7 +301,7 @@ class Scene:
     def sample_points(self, alpha: float, out: Floats | None = None) -> Floats:
         """As `sample`, at the attached points."""
         result, place, length, _ = self._others.place(out, self._point_count)
-        check(lib.upt_scene_sample_points(self._handle, alpha, place, length))
+        check(lib.upt_scene_sample_points(self._handle, number(alpha, "alpha"), place, length))
         return result
 
     @property
@@ -317,6 +321,8 @@ class Scene:
 
     def restore(self, snapshot: bytes) -> None:
         """Back to a snapshot of the same model."""
+        if not isinstance(snapshot, bytes):
+            raise TypeError(f"snapshot is {short(snapshot)}, expected the bytes of `save`")
         check(lib.upt_scene_restore(self._handle, snapshot, len(snapshot)))
         self._instrument_count = 0
 

@@ -4,6 +4,9 @@
 mod extremes;
 #[path = "../fixture/mod.rs"]
 mod fixture;
+#[path = "../host/mod.rs"]
+mod host;
+mod through_the_abi;
 
 use contact::{Shape, Vector};
 use fixture::{bits, model, plain, scene};

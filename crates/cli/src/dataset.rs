@@ -1,5 +1,6 @@
 //! `upt dataset`: many cases in a folder, resumable and shardable (docs/guide/datasets.md).
 
+use crate::counted::counted;
 use crate::simulate::SolverArguments;
 use crate::{loads, tool_scale};
 use anyhow::{Context, bail};
@@ -189,12 +190,12 @@ pub fn run(options: &Options) -> anyhow::Result<ExitCode> {
     let manifest = dataset.write_manifest()?;
     let with = |status: &str| manifest.cases.iter().filter(|c| c.status == status).count();
     println!(
-        "{}: {} done, {} failed, {} pending of {} cases",
+        "{}: {} done, {} failed, {} pending of {}",
         options.out.display(),
         with("done"),
         with("failed"),
         with("pending"),
-        manifest.cases.len()
+        counted(manifest.cases.len(), "case")
     );
     Ok(ExitCode::SUCCESS)
 }

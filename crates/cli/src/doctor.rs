@@ -1,7 +1,8 @@
 //! `upt doctor`: what a scene would find on this machine.
 //!
 //! Reports ONNX Runtime (path, version), the providers that load and why others do not, the CPU's
-//! vector features, and the bundles with their hashes. Exit code 0: a bundle can run; 1: it cannot.
+//! vector features, and the bundles with their hashes. Exit code 0: every bundle that was looked at can run; 1: one cannot. Bundles without
+//! a network (those of `upt make`) need no ONNX Runtime.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -16,7 +17,8 @@ use sha2::{Digest, Sha256};
     after_help = "Examples:\n  upt doctor\n  upt doctor --json\n  upt doctor onnx/brain-reduced"
 )]
 pub struct Options {
-    /// Bundles to check. Default: the folders below onnx/ that hold a bundle.json.
+    /// Bundles to check. Default: those below onnx/ here or in the clone that this program was built in, or those of the archive that it
+    /// came in.
     bundles: Vec<PathBuf>,
     /// Machine-readable output.
     #[arg(long)]
@@ -79,13 +81,12 @@ pub fn run(options: &Options) -> Result<ExitCode> {
 
 fn look(options: &Options) -> Findings {
     let (onnxruntime, providers) = runtime();
-    let paths = if options.bundles.is_empty() {
-        bundles_below(Path::new("onnx"))
-    } else {
-        options.bundles.clone()
+    let paths = match options.bundles.is_empty() {
+        true => usual_bundles(),
+        false => options.bundles.clone(),
     };
     let bundles: Vec<Bundle> = paths.iter().map(|path| open(path)).collect();
-    let healthy = onnxruntime.loaded && bundles.iter().all(|bundle| bundle.problem.is_none());
+    let healthy = bundles.iter().all(|bundle| bundle.problem.is_none());
     Findings {
         upt: env!("CARGO_PKG_VERSION").into(),
         abi: upt::ffi::upt_abi_version(),
@@ -95,6 +96,26 @@ fn look(options: &Options) -> Findings {
         bundles,
         healthy,
     }
+}
+
+/// The bundles of where this is: of the folder at hand, of the clone that this program was built in, of the archive that it came in.
+fn usual_bundles() -> Vec<PathBuf> {
+    let exe = std::env::current_exe().ok();
+    let below = |up: usize, place: &str| Some(exe.as_ref()?.ancestors().nth(up)?.join(place));
+    // target/release/upt of a clone, bin/upt of an archive.
+    let places = [
+        Some(PathBuf::from("onnx")),
+        below(3, "onnx"),
+        below(2, "share/upt/bundles"),
+    ];
+    let found = places
+        .into_iter()
+        .flatten()
+        .map(|place| bundles_below(&place));
+    found
+        .into_iter()
+        .find(|found| !found.is_empty())
+        .unwrap_or_default()
 }
 
 /// Folders directly below `folder` that hold a bundle, by name.
@@ -130,7 +151,10 @@ fn runtime() -> (Runtime, serde_json::Value) {
                 loaded: false,
                 path: None,
                 version: None,
-                problem: Some(error.to_string()),
+                // A host puts a library beside its own; who asks this command has another way.
+                problem: Some(format!(
+                    "{error}. `upt runtime` fetches it for this command; bundles without a network, as `upt make` makes them, need none"
+                )),
             };
             (runtime, serde_json::Value::Null)
         }
@@ -174,7 +198,8 @@ fn print(findings: &Findings) {
         (Some(path), Some(version), _) => println!("{} ONNX Runtime {version}: {path}", mark(true)),
         (_, _, problem) => println!(
             "{} ONNX Runtime: {}",
-            mark(false),
+            // Missing is no fault where nothing asks for it.
+            if findings.healthy { "-  " } else { mark(false) },
             problem.as_deref().unwrap_or("not found")
         ),
     }
@@ -199,7 +224,7 @@ fn print(findings: &Findings) {
         cpu.features.join(" ")
     );
     if findings.bundles.is_empty() {
-        println!("-   no bundles below onnx/; name one: upt doctor BUNDLE");
+        println!("-   no bundles here; name one: upt doctor BUNDLE, or make one: upt make SURFACE");
     }
     for bundle in &findings.bundles {
         let short: String = bundle

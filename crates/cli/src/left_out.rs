@@ -17,6 +17,6 @@ pub struct Options {
 pub fn run(feature: &str, options: &Options) -> anyhow::Result<ExitCode> {
     let _ = &options.rest;
     bail!(
-        "this `upt` was built without the feature `{feature}` (as `cargo xtask demo` does it); build the whole command with `cargo build --release -p upt-cli`"
+        "this is the small `upt` of `cargo xtask demo`, built without the feature `{feature}`: in the clone, `cargo build --release -p upt-cli` builds the whole command, target/release/upt"
     )
 }

@@ -11,6 +11,7 @@ mod compare;
 mod completions;
 #[cfg(feature = "linear")]
 mod corrections;
+mod counted;
 mod dataset;
 mod doctor;
 mod effort;
@@ -65,12 +66,28 @@ const VERSION: &str = match (cfg!(feature = "files"), cfg!(feature = "linear")) 
     (false, _) => concat!(env!("CARGO_PKG_VERSION"), " (without files, linear)"),
 };
 
+macro_rules! explained {
+    () => {
+        "Each command explains itself: `upt report --help`. Most take --json for machine-readable output."
+    };
+}
+
+/// Says first what a build is that leaves something out.
+const AFTER: &str = match cfg!(all(feature = "files", feature = "linear")) {
+    true => explained!(),
+    false => concat!(
+        "This is the small `upt` that `cargo xtask demo` builds: it shows and measures bundles, and makes none. The whole command: \
+         `cargo build --release -p upt-cli` in the clone, then target/release/upt.\n\n",
+        explained!()
+    ),
+};
+
 #[derive(Parser)]
 #[command(
     name = "upt",
     version = VERSION,
     about = "Soft tissue in real time: surrogates of nonlinear FEM, and the solver that they are measured against",
-    after_help = "Each command explains itself: `upt report --help`. Most take --json for machine-readable output.",
+    after_help = AFTER,
     arg_required_else_help = true
 )]
 struct Arguments {
@@ -83,13 +100,13 @@ enum Command {
     /// Make a bundle from an organ's surface or mesh, with a certificate.
     #[cfg(feature = "linear")]
     Make(Box<make::Options>),
-    /// Left out of this build.
+    /// Left out of this small `upt`; `cargo build --release -p upt-cli` builds the whole.
     #[cfg(not(feature = "linear"))]
     Make(left_out::Options),
     /// Check a bundle on held-out contacts against the reference solver.
     #[cfg(feature = "linear")]
     Check(check::Options),
-    /// Left out of this build.
+    /// Left out of this small `upt`; `cargo build --release -p upt-cli` builds the whole.
     #[cfg(not(feature = "linear"))]
     Check(left_out::Options),
     /// Show what is on this machine: ONNX Runtime, providers, CPU features, bundles.
@@ -101,25 +118,25 @@ enum Command {
     /// Write a trajectory for ParaView, or one frame's surface as PLY or glTF.
     #[cfg(feature = "files")]
     Export(export::Options),
-    /// Left out of this build.
+    /// Left out of this small `upt`; `cargo build --release -p upt-cli` builds the whole.
     #[cfg(not(feature = "files"))]
     Export(left_out::Options),
     /// Compute the linear-elastic compliance columns of a mesh, from which priors and reduced bundles are made.
     #[cfg(feature = "linear")]
     Prior(prior::Options),
-    /// Left out of this build.
+    /// Left out of this small `upt`; `cargo build --release -p upt-cli` builds the whole.
     #[cfg(not(feature = "linear"))]
     Prior(left_out::Options),
     /// Give a bundle the coarse space that its corrections need.
     #[cfg(feature = "linear")]
     Corrections(corrections::Options),
-    /// Left out of this build.
+    /// Left out of this small `upt`; `cargo build --release -p upt-cli` builds the whole.
     #[cfg(not(feature = "linear"))]
     Corrections(left_out::Options),
     /// Compute the natural modes of a held mesh: how it swings after a release.
     #[cfg(feature = "linear")]
     Modes(modes::Options),
-    /// Left out of this build.
+    /// Left out of this small `upt`; `cargo build --release -p upt-cli` builds the whole.
     #[cfg(not(feature = "linear"))]
     Modes(left_out::Options),
     /// List the schemes and the programmes of tools, with the ranges that their cases are drawn from.

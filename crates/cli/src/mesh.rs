@@ -32,10 +32,10 @@ enum Command {
     #[cfg(feature = "files")]
     /// Fill a signed distance grid with tetrahedra; `python -m upt_training.anatomy` calls this.
     Stuff(Stuff),
-    /// Left out of this build.
+    /// Left out of this small `upt`; `cargo build --release -p upt-cli` builds the whole.
     #[cfg(not(feature = "files"))]
     Import(crate::left_out::Options),
-    /// Left out of this build.
+    /// Left out of this small `upt`; `cargo build --release -p upt-cli` builds the whole.
     #[cfg(not(feature = "files"))]
     Stuff(crate::left_out::Options),
 }

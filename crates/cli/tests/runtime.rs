@@ -34,9 +34,13 @@ impl Installed {
     }
 
     fn run(&self, arguments: &[&str], library: &str) -> Output {
+        self.run_in(&root(), arguments, library)
+    }
+
+    fn run_in(&self, folder: &Path, arguments: &[&str], library: &str) -> Output {
         let mut command = Command::new(self.folder.path().join("bin").join("upt"));
         command
-            .current_dir(root())
+            .current_dir(folder)
             .args(arguments)
             .env("ORT_DYLIB_PATH", library)
             .env("XDG_CACHE_HOME", self.folder.path().join("cache"))
@@ -139,4 +143,44 @@ fn a_library_that_the_user_named_and_that_is_missing_is_told_by_its_name() {
     assert_eq!(ran.status.code(), Some(2), "{said}");
     assert!(said.contains("/nowhere/libonnxruntime.so"), "{said}");
     assert!(!said.contains("upt runtime"), "{said}");
+}
+
+/// Who has only bundles of `upt make` needs no ONNX Runtime, and is told so; for a bundle with a network the way to it is named.
+#[test]
+fn doctor_asks_for_a_library_only_where_a_bundle_needs_it() {
+    let upt = Installed::new();
+    let ran = upt.run(&["doctor", "onnx/liver-coarse"], "");
+    let said = String::from_utf8(ran.stdout).unwrap();
+    assert_eq!(ran.status.code(), Some(0), "{said}");
+    assert!(said.contains("ok  bundle onnx/liver-coarse"), "{said}");
+    if said.contains("ok  ONNX Runtime") {
+        println!("this machine has an ONNX Runtime in the system's search path");
+        return;
+    }
+    assert!(said.contains("`upt runtime` fetches"), "{said}");
+    assert!(!said.contains("BAD"), "{said}");
+    let ran = upt.run(&["doctor", "tests/fixtures/tiny-upt"], "");
+    let said = String::from_utf8(ran.stdout).unwrap();
+    assert_eq!(ran.status.code(), Some(1), "{said}");
+    assert!(
+        said.contains("BAD ONNX Runtime") && said.contains("`upt runtime`"),
+        "{said}"
+    );
+}
+
+/// In an archive (bin/upt, share/upt/bundles) its own bundles are looked at, from any folder.
+#[test]
+fn doctor_finds_the_bundles_of_its_archive() {
+    let upt = Installed::new();
+    let bundles = upt.folder.path().join("share/upt/bundles/liver");
+    std::fs::create_dir_all(&bundles).unwrap();
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../onnx/liver-coarse");
+    for entry in std::fs::read_dir(source).unwrap().flatten() {
+        std::fs::copy(entry.path(), bundles.join(entry.file_name())).unwrap();
+    }
+    let elsewhere = tempfile::tempdir().unwrap();
+    let ran = upt.run_in(elsewhere.path(), &["doctor"], "");
+    let said = String::from_utf8(ran.stdout).unwrap();
+    assert_eq!(ran.status.code(), Some(0), "{said}");
+    assert!(said.contains("share/upt/bundles/liver"), "{said}");
 }

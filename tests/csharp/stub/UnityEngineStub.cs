@@ -64,6 +64,7 @@ namespace UnityEngine
 
     public struct Matrix4x4
     {
+        public float determinant;
         public static Matrix4x4 TRS(Vector3 position, Quaternion rotation, Vector3 scale) { return default(Matrix4x4); }
     }
 
@@ -129,7 +130,10 @@ namespace UnityEngine
         public Quaternion rotation = Quaternion.identity;
         public Vector3 localScale;
         public void SetParent(Transform parent, bool worldPositionStays) { }
-        public Matrix4x4 localToWorldMatrix { get { return default(Matrix4x4); } }
+        public Matrix4x4 localToWorldMatrix
+        {
+            get { return new Matrix4x4 { determinant = localScale.x * localScale.y * localScale.z }; }
+        }
         public Vector3 InverseTransformPoint(Vector3 world) { return Quaternion.Inverse(rotation) * (world - position); }
         public Vector3 TransformPoint(Vector3 local) { return position + rotation * local; }
     }
@@ -206,7 +210,7 @@ namespace UnityEngine
     {
         public static bool GetMouseButton(int button) { return false; }
     }
-    public enum PrimitiveType { Cube }
+    public enum PrimitiveType { Cube, Sphere }
 
     public static class Time { public static float deltaTime = 1f / 60f; }
     public static class Application

@@ -262,6 +262,23 @@ namespace Upt.Tests
         }
 
         [Test]
+        public void AMirroredTissueIsSaidOnce()
+        {
+            foreach (float scale in new[] { 1f, -1f })
+            {
+                SoftTissue tissue = Tissue();
+                tissue.transform.localScale = new Vector3(scale, 1f, 1f);
+                Debug.Warnings.Clear();
+                tissue.gameObject.SetActive(true);
+                tissue.gameObject.Send("Update");
+                tissue.gameObject.SetActive(false);
+                Assert.That(Debug.Errors, Is.Empty);
+                Assert.That(Debug.Warnings.Count, Is.EqualTo(scale < 0f ? 1 : 0));
+                if (scale < 0f) Assert.That(Debug.Warnings[0], Is.StringContaining("mirrored"));
+            }
+        }
+
+        [Test]
         public void ComponentDestroyedInFlight()
         {
             for (int i = 0; i < 10; i++)

@@ -113,6 +113,36 @@ namespace Upt.Tests
         }
 
         [Test]
+        public void TheSampleBuildsItsSceneAndTheHandFeelsTheBrain()
+        {
+            GameObject item = new GameObject("felt brain");
+            item.SetActive(false);
+            FeltBrain sample = item.AddComponent<FeltBrain>();
+            sample.model = ScriptableObject.CreateInstance<UptModel>();
+            sample.model.bundlePath = Path.GetFullPath(Bundle.Path);
+            sample.model.threads = 1;
+            Debug.Errors.Clear();
+            item.SetActive(true);
+            Assert.That(Debug.Errors, Is.Empty);
+            if (!sample.Tissue.Presents) Assert.Ignore("the test bundle has no corrections");
+            sample.Probe.period = 0.4f;
+            float largest = 0f;
+            for (int frame = 0; frame < 1000 && largest < 0.01f; frame++)
+            {
+                sample.Probe.gameObject.Send("Update");
+                sample.Tissue.gameObject.Send("Update");
+                largest = Math.Max(largest, sample.Probe.Force.magnitude);
+                Thread.Sleep(5);
+            }
+            Assert.That(Debug.Errors, Is.Empty);
+            Assert.That(largest, Is.GreaterThanOrEqualTo(0.01f), "N");
+            HapticProbe probe = sample.Probe;
+            item.SetActive(false);
+            Assert.That(probe.GetComponent<HapticTool>().IsRunning, Is.False);
+            Assert.That(Debug.Errors, Is.Empty);
+        }
+
+        [Test]
         public void AFaultInTheDevicesCodeStopsTheForceAndIsReported()
         {
             PushedBrain sample = Brain();

@@ -230,6 +230,11 @@ namespace Upt
         {
             if (model == null)
                 throw new InvalidOperationException("assign a UptModel asset to the field 'Model'");
+            if (transform.localToWorldMatrix.determinant < 0f)
+                Debug.LogWarning("libupt: soft tissue '" + name + "' is mirrored: the scale of its transform, or of one above it, is negative. " +
+                                     "Left and right of the organ are exchanged, and poses and forces do not follow a mirror; " +
+                                     "make the scale positive",
+                                 this);
             Model native = model.Acquire();
             acquired = true;
             MeshFilter filter = GetComponent<MeshFilter>();

@@ -1,6 +1,7 @@
 //! What was measured, as a document's table: the limits, and errors by size, depth, speed and number of the tools.
 
 use super::limits::{Limits, Tried};
+use crate::counted::counted;
 use crate::effort::Effort;
 use crate::report::{plot::label, quantile};
 
@@ -40,7 +41,7 @@ pub fn markdown(
     let mut out = format!(
         "`{bundle}` with k = {corrections} is good for {} of half the smallest extent (the radius of a rod) {low:.1} to {high:.1} mm that \
          push the tissue up to {:.1} mm and move at up to {:.0} mm/s: {} of {inside} such cases stay below {} mm² without an inverted element \
-         ({} cases measured).\n\n| cases | number | MSE median, mm² | worst | force, median | good |\n|---|---:|---:|---:|---:|---:|\n",
+         ({} measured).\n\n| cases | number | MSE median, mm² | worst | force, median | good |\n|---|---:|---:|---:|---:|---:|\n",
         match limits.count {
             1 => "one tool".to_owned(),
             count => format!("up to {count} tools"),
@@ -49,7 +50,7 @@ pub fn markdown(
         limits.speed_mm_s,
         inside - bad,
         label(limit_mm2),
-        cases.len()
+        counted(cases.len(), "case")
     );
     let mut add = |name: &str, own: Vec<&Tried>| {
         if own.is_empty() {

@@ -73,12 +73,37 @@ ul{margin:8px 0 0;padding-left:20px;color:#44505c;font-size:14px}
 pub const VIEWER_STYLE: &str =
     "iframe{display:block;width:100%;height:560px;border:0;border-radius:6px}";
 
+/// In the browser's tab.
+const ICON: &str = "data:image/svg+xml,%3Csvg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 16 16'%3E%3Ccircle cx='8' cy='8' r='7' fill='%23b5533c'/%3E%3C/svg%3E";
+
+/// Text with `code` in it.
+pub fn inline(text: &str) -> String {
+    let mut out = String::new();
+    let mut parts = text.split('`').peekable();
+    let mut inside = false;
+    while let Some(part) = parts.next() {
+        // A last one that nothing closes is itself.
+        match (inside, parts.peek().is_some()) {
+            (false, _) => out.push_str(&escape(part)),
+            (true, true) => {
+                let _ = write!(out, "<code>{}</code>", escape(part));
+            }
+            (true, false) => {
+                let _ = write!(out, "`{}", escape(part));
+            }
+        }
+        inside = !inside;
+    }
+    out
+}
+
 /// The page up to its first section; `style` is added to that of all pages.
 pub fn opening(title: &str, lead: &str, style: &str) -> String {
     format!(
-        "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width\"><title>{0}</title><style>{STYLE}{style}</style></head><body><main><h1>{0}</h1><p>{1}</p>",
-        escape(title),
-        escape(lead)
+        "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width\"><title>{}</title><link rel=\"icon\" href=\"{ICON}\"><style>{STYLE}{style}</style></head><body><main><h1>{}</h1><p>{}</p>",
+        escape(&title.replace('`', "")),
+        inline(title),
+        inline(lead)
     )
 }
 
@@ -200,12 +225,12 @@ pub fn section(out: &mut String, title: &str, explanation: &str, body: &str) {
     let explanation = if explanation.is_empty() {
         String::new()
     } else {
-        format!("<p>{}</p>", escape(explanation))
+        format!("<p>{}</p>", inline(explanation))
     };
     let _ = write!(
         out,
         "<section><h2>{}</h2>{explanation}{body}</section>",
-        escape(title)
+        inline(title)
     );
 }
 
@@ -276,7 +301,7 @@ fn table(page: &Page<'_>, points: &[Point]) -> String {
     let notes: String = page
         .notes
         .iter()
-        .map(|note| format!("<li>{}</li>", escape(note)))
+        .map(|note| format!("<li>{}</li>", inline(note)))
         .collect();
     let notes = if notes.is_empty() {
         notes
@@ -305,4 +330,20 @@ fn gallery_section(gallery: &Gallery) -> String {
         escape(&gallery.title),
         gallery.legend
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn code_is_set_as_code_and_not_in_the_tab() {
+        let page = opening("`upt tools` of a < b", "With `k = 3`, and a ` alone.", "");
+        assert!(
+            page.contains("<title>upt tools of a &lt; b</title>"),
+            "{page}"
+        );
+        assert!(page.contains("<h1><code>upt tools</code> of a &lt; b</h1>"));
+        assert!(page.contains("<code>k = 3</code>, and a ` alone.</p>"));
+    }
 }

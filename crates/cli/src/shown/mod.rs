@@ -25,6 +25,7 @@ use anyhow::{Context, Result, bail};
 use serde_json::json;
 use tissue::mesh::{Boundary, Mesh};
 
+use crate::counted::counted;
 use crate::effort::Effort;
 use crate::host::{Model, ModelSettings};
 use crate::machine::{Machine, load_words};
@@ -150,16 +151,16 @@ pub fn report(plan: &Plan) -> Result<ExitCode> {
             .or(bundle.corrections)
             .unwrap_or(Effort::NONE);
         let lead = format!(
-            "`{}`, k = {k}, {} cases on {} ({} nodes), frames at {} Hz, each state {} ms after its step's moment, {} thread. {} ({} cores{}), {date}.",
+            "`{}`, k = {k}, {} on {} ({} nodes), frames at {} Hz, each state {} ms after its step's moment, {}. {} ({}{}), {date}.",
             bundle.name,
-            cases.list.len(),
+            counted(cases.list.len(), "case"),
             header.mesh_name,
             mesh.node_count(),
             plan.hz,
             plan.arrival_ms,
-            plan.threads,
+            counted(plan.threads as usize, "thread"),
             machine.cpu,
-            machine.cores,
+            counted(machine.cores, "core"),
             load_words(),
         );
         let text = page::markdown(&lead, &rows, &datasets, &times);

@@ -12,6 +12,7 @@ use tissue::metrics;
 use tissue::schemes::FRAME_S;
 
 use super::truth::{Truth, places};
+use crate::counted::counted;
 use crate::effort::Effort;
 use crate::host::{Model, ModelSettings};
 use crate::machine::Machine;
@@ -129,14 +130,14 @@ pub fn report(plan: &Plan) -> Result<ExitCode> {
             }
         }
         let text = format!(
-            "\n`{}`, {} cases of rigid tools on {} ({} nodes), {} thread. {} ({} cores), {date}.\n\n{}\n",
+            "\n`{}`, {} of rigid tools on {} ({} nodes), {}. {} ({}), {date}.\n\n{}\n",
             bundle.name,
-            cases.list.len(),
+            counted(cases.list.len(), "case"),
             header.mesh_name,
             mesh.node_count(),
-            plan.threads,
+            counted(plan.threads as usize, "thread"),
             machine.cpu,
-            machine.cores,
+            counted(machine.cores, "core"),
             table(&rows)
         );
         for path in plan.markdown {

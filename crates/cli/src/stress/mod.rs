@@ -17,6 +17,7 @@ use indicatif::ProgressBar;
 use serde::Serialize;
 
 use crate::bench::{Bench, Run};
+use crate::counted::counted;
 
 #[derive(clap::Args)]
 #[command(
@@ -120,8 +121,8 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     let bad = rows.iter().filter(|r| r.verdict == Verdict::Bad).count();
     let left = rows.iter().filter(|r| r.verdict == Verdict::Left).count();
     println!(
-        "{} cases: {} as they should be, {bad} not, {left} left out",
-        rows.len(),
+        "{}: {} as it should be, {bad} not, {left} left out",
+        counted(rows.len(), "case"),
         rows.len() - bad - left
     );
     Ok(ExitCode::from(u8::from(bad > 0)))

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use crate::report::html::{Facts, VIEWER_STYLE, closing, opening, playing, section};
+use crate::report::html::{Facts, VIEWER_STYLE, closing, inline, opening, playing, section};
 use crate::report::plot::{escape, legend};
 
 use super::row::{ALL, Row};
@@ -57,7 +57,7 @@ pub fn page(page: &Page<'_>) -> String {
     let notes: String = page
         .notes
         .iter()
-        .map(|note| format!("<li>{}</li>", escape(note)))
+        .map(|note| format!("<li>{}</li>", inline(note)))
         .collect();
     let notes = match notes.is_empty() {
         true => notes,

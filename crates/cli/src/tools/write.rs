@@ -11,6 +11,7 @@ use super::drive::Drive;
 use super::measure::{Outcome, Truth};
 use super::row::{ALL, Row};
 use super::{Measured, Plan, force, page, section, table};
+use crate::counted::counted;
 use crate::machine::Machine;
 use crate::report::plot::colour;
 use crate::stress::replace_between;
@@ -95,8 +96,8 @@ pub(super) fn write(plan: &Plan, made: &Made) -> Result<serde_json::Value> {
         serde_json::to_string_pretty(&report)? + "\n",
     )?;
     let lead = format!(
-        "{} cases of rigid tools on {} ({} nodes), every method driven by the tools' poses alone.",
-        cases.list.len(),
+        "{} of rigid tools on {} ({} nodes), every method driven by the tools' poses alone.",
+        counted(cases.list.len(), "case"),
         header.mesh_name,
         mesh.node_count()
     );

@@ -2,11 +2,11 @@
 
 use std::io::{Read, Write};
 use std::net::TcpStream;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// A request's head may be so long, bytes.
 const LONGEST_HEAD: usize = 8192;
-/// And take so long to arrive.
+/// And take so long to arrive, the whole of it.
 const PATIENCE: Duration = Duration::from_secs(5);
 
 /// A request's head.
@@ -21,11 +21,18 @@ pub struct Request {
 impl Request {
     /// Reads a head; `None` where it is none, too long or too late.
     pub fn read(stream: &mut TcpStream) -> Option<Self> {
-        stream.set_read_timeout(Some(PATIENCE)).ok()?;
+        Self::read_within(stream, PATIENCE)
+    }
+
+    fn read_within(stream: &mut TcpStream, patience: Duration) -> Option<Self> {
+        let late = Instant::now() + patience;
         let mut head = Vec::new();
         let mut byte = [0];
         // Byte by byte, so that what follows the head (a WebSocket's first frame) stays in the stream.
         while !head.ends_with(b"\r\n\r\n") {
+            let left = late.saturating_duration_since(Instant::now());
+            // No time at all is no timeout that a socket takes: an error too.
+            stream.set_read_timeout(Some(left)).ok()?;
             if head.len() == LONGEST_HEAD || stream.read(&mut byte).ok()? == 0 {
                 return None;
             }
@@ -91,6 +98,24 @@ mod tests {
         assert_eq!(request.token.as_deref(), Some("abc"));
         assert_eq!(request.header("host"), Some("127.0.0.1:1"));
         assert_eq!(request.header("origin"), None);
+    }
+
+    #[test]
+    fn a_head_that_trickles_in_is_given_up_as_a_whole() {
+        let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+        let address = listener.local_addr().unwrap();
+        let sender = std::thread::spawn(move || {
+            let mut stream = TcpStream::connect(address).unwrap();
+            // A byte now and then keeps every single read in time; it ends once nobody reads any more.
+            while stream.write_all(b"G").is_ok() {
+                std::thread::sleep(Duration::from_millis(5));
+            }
+        });
+        let (mut stream, _) = listener.accept().unwrap();
+        let patience = Duration::from_millis(50);
+        assert!(Request::read_within(&mut stream, patience).is_none());
+        drop(stream);
+        sender.join().unwrap();
     }
 
     #[test]

@@ -1,9 +1,11 @@
 //! Accepts connections on 127.0.0.1: the page's files, and one WebSocket at a time.
 
+use std::collections::VecDeque;
 use std::io::ErrorKind;
-use std::net::{TcpListener, TcpStream};
+use std::net::{Shutdown, TcpListener, TcpStream};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result};
@@ -20,18 +22,27 @@ use crate::host::{Model, ModelSettings};
 const SOONEST: Duration = Duration::from_micros(4_166);
 /// Messages that are read before a frame is made; a page has one or two waiting.
 const MOST_MESSAGES: usize = 64;
-/// Connections that are served at once; more are closed.
+/// Connections that are served at once. One more takes the place of the oldest that has not said yet what it wants; where all have, it is
+/// closed.
 const MOST_CONNECTIONS: usize = 16;
+
+/// Longest time that an answer waits for its reader.
+const UNREAD: Duration = Duration::from_secs(5);
 
 /// Part of a step's length after which no correction of it starts; the rest is for the last one and for the picture.
 const SPENT: f64 = 0.3;
 
 /// What the page is made of.
-const FILES: [(&str, &str, &[u8]); 5] = [
+const FILES: [(&str, &str, &[u8]); 6] = [
     (
         "/",
         "text/html; charset=utf-8",
         include_bytes!("page/index.html"),
+    ),
+    (
+        "/icon.svg",
+        "image/svg+xml",
+        include_bytes!("page/icon.svg"),
     ),
     (
         "/view.js",
@@ -63,6 +74,8 @@ pub struct Server {
     /// A client steps.
     taken: AtomicBool,
     connections: AtomicUsize,
+    /// Those whose request has not come, oldest first.
+    silent: Mutex<VecDeque<(usize, TcpStream)>>,
 }
 
 /// The bundle, with steps for frames that keep up with the clock; `exact`: that make all their corrections.
@@ -95,6 +108,7 @@ impl Server {
             token: token()?,
             taken: AtomicBool::new(false),
             connections: AtomicUsize::new(0),
+            silent: Mutex::default(),
         })
     }
 
@@ -106,21 +120,40 @@ impl Server {
     /// Never returns but when the listener fails.
     pub fn serve(&self, listener: &TcpListener) {
         std::thread::scope(|scope| {
-            for stream in listener.incoming().map_while(std::result::Result::ok) {
-                if self.connections.fetch_add(1, Ordering::AcqRel) >= MOST_CONNECTIONS {
+            let incoming = listener.incoming().map_while(std::result::Result::ok);
+            for (number, stream) in incoming.enumerate() {
+                let many = self.connections.fetch_add(1, Ordering::AcqRel) >= MOST_CONNECTIONS;
+                if many && !self.give_up_silent() {
                     self.connections.fetch_sub(1, Ordering::AcqRel);
                     continue;
                 }
+                if let Ok(other) = stream.try_clone() {
+                    self.lock_silent().push_back((number, other));
+                }
                 scope.spawn(move || {
-                    self.connection(stream);
+                    self.connection(number, stream);
                     self.connections.fetch_sub(1, Ordering::AcqRel);
                 });
             }
         });
     }
 
-    fn connection(&self, mut stream: TcpStream) {
-        let Some(request) = Request::read(&mut stream) else {
+    fn lock_silent(&self) -> MutexGuard<'_, VecDeque<(usize, TcpStream)>> {
+        self.silent.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Ends the oldest connection whose request has not come; false where there is none.
+    fn give_up_silent(&self) -> bool {
+        let oldest = self.lock_silent().pop_front();
+        oldest.is_some_and(|(_, stream)| stream.shutdown(Shutdown::Both).is_ok())
+    }
+
+    fn connection(&self, number: usize, mut stream: TcpStream) {
+        let request = Request::read(&mut stream);
+        self.lock_silent().retain(|(other, _)| *other != number);
+        // Who reads nothing for so long is gone.
+        let _ = stream.set_write_timeout(Some(UNREAD));
+        let Some(request) = request else {
             return answer(
                 &mut stream,
                 "400 Bad Request",
@@ -218,10 +251,6 @@ impl Server {
     /// Steps and streams until the client goes away; an error is what it did wrong.
     fn converse(&self, socket: &mut WebSocket<TcpStream>) -> Result<()> {
         socket.get_ref().set_nodelay(true)?;
-        // A client that reads nothing for so long is gone.
-        socket
-            .get_ref()
-            .set_write_timeout(Some(Duration::from_secs(5)))?;
         let mut session = Session::new(&self.model)?;
         let hello = serde_json::to_string(&session.hello(&self.bundle, &self.model))?;
         socket.send(Message::text(hello))?;

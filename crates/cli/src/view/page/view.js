@@ -330,13 +330,23 @@ function seen() {
   return times;
 }
 
+// The organ in the middle of what the panel leaves free; where that is next to nothing, the panel lies on top.
+function lookBesidePanel(width, height) {
+  const taken = at("panel").getBoundingClientRect().right;
+  const free = width - taken > 0.4 * width ? width - taken : width;
+  camera.aspect = width / height;
+  // As much is seen of the free part's width as of its height at most: a narrow part looks from farther away.
+  camera.zoom = Math.min(1, free / height);
+  camera.setViewOffset(width, height, (free - width) / 2, 0, width, height);
+  camera.updateProjectionMatrix();
+}
+
 renderer.setAnimationLoop((now) => {
   const { clientWidth: width, clientHeight: height } = canvas;
   const size = renderer.getSize(new three.Vector2());
   if (size.x !== width || size.y !== height) {
     renderer.setSize(width, height, false);
-    camera.aspect = width / height;
-    camera.updateProjectionMatrix();
+    lookBesidePanel(width, height);
   }
   if (!surface) return;
   status.drawn += 1;

@@ -1,0 +1,105 @@
+//! What instruments mean to the C ABI: one reader for all calls that take them, and counts that no array has.
+#![allow(
+    clippy::undocumented_unsafe_blocks,
+    reason = "a host in a test: every call keeps to the header, or breaks it on purpose"
+)]
+
+use std::ptr::null_mut;
+
+use upt::ffi::*;
+
+use crate::host::{Host, indices, message};
+
+/// An instrument on the middle of the domain, this deep in it, mm.
+fn pressing(host: &Host, depth: f32) -> upt_instrument {
+    let mut positions = vec![0.0f32; 3 * host.nodes];
+    let floats = positions.len() as u64;
+    let read = unsafe { upt_model_positions(host.model, positions.as_mut_ptr(), floats) };
+    assert_eq!(read, UPT_OK);
+    let domain = indices(host.model, UPT_SET_DOMAIN_NODES);
+    let at = 3 * domain[domain.len() / 2] as usize;
+    // SAFETY: zeros are a value of this struct.
+    let mut tool: upt_instrument = unsafe { std::mem::zeroed() };
+    tool.struct_size = size_of::<upt_instrument>() as u32;
+    tool.radius = 3.0;
+    tool.rotation[3] = 1.0;
+    tool.position = [
+        positions[at],
+        positions[at + 1],
+        positions[at + 2] + 3.0 - depth,
+    ];
+    tool
+}
+
+fn contacts(host: &Host, tool: &upt_instrument) -> (i32, u64) {
+    let mut count = 0;
+    let none = null_mut::<u32>();
+    let status = unsafe {
+        upt_scene_contacts_from_instruments(host.scene, tool, 1, none, null_mut(), 0, &mut count)
+    };
+    (status, count)
+}
+
+/// A ball is a capsule without length, in steps and where contacts are asked for; so is a hull a shape.
+#[test]
+fn what_a_step_takes_gives_contacts_too() {
+    let host = Host::new("tiny-reduced", |_| ());
+    let mut ball = pressing(&host, 1.0);
+    let step = |tool: &upt_instrument| unsafe {
+        upt_scene_step_instruments(host.scene, tool, 1, null_mut(), 0)
+    };
+    let (status, count) = contacts(&host, &ball);
+    assert_eq!(status, UPT_OK, "{}", message());
+    assert!(count > 0);
+    assert_eq!(step(&ball), UPT_OK, "{}", message());
+    let corners: Vec<f32> = (0..8)
+        .flat_map(|i| [0, 1, 2].map(|k| if i >> k & 1 == 1 { 3.0 } else { -3.0 }))
+        .collect();
+    let mut hull = null_mut();
+    assert_eq!(
+        unsafe { upt_hull_create(corners.as_ptr(), 8, &mut hull) },
+        UPT_OK
+    );
+    (ball.shape, ball.radius, ball.hull) = (UPT_SHAPE_HULL, 0.0, hull.cast_const().cast());
+    let (status, count) = contacts(&host, &ball);
+    assert_eq!(status, UPT_OK, "{}", message());
+    assert!(count > 0);
+    // Both refuse the same.
+    (ball.shape, ball.hull, ball.friction) = (UPT_SHAPE_CAPSULE, null_mut(), -1.0);
+    ball.radius = 3.0;
+    let refused = (contacts(&host, &ball).0, message());
+    assert_eq!(refused.0, UPT_ERR_ARGUMENT);
+    assert_eq!(step(&ball), UPT_ERR_ARGUMENT);
+    assert!(
+        refused.1.contains("instruments[0]: friction"),
+        "{}",
+        refused.1
+    );
+    assert_eq!(unsafe { upt_hull_destroy(hull) }, UPT_OK);
+}
+
+/// A place for so many elements that is nowhere is an error, also where there is nothing to write.
+#[test]
+fn no_place_with_a_capacity_is_an_error() {
+    let host = Host::new("tiny-reduced", |_| ());
+    let find = |capacity: u64| {
+        let mut needed = 7;
+        let scene = host.scene;
+        let status =
+            unsafe { upt_scene_instrument_contacts(scene, null_mut(), capacity, &mut needed) };
+        (status, needed)
+    };
+    for round in 0..2 {
+        assert_eq!(find(0).0, UPT_OK);
+        for capacity in [1, u64::MAX] {
+            assert_eq!(find(capacity).0, UPT_ERR_NULL, "round {round}: {capacity}");
+            assert!(message().contains("out is NULL"), "{}", message());
+        }
+        let tool = pressing(&host, 1.0);
+        let status = unsafe { upt_scene_step_instruments(host.scene, &tool, 1, null_mut(), 0) };
+        assert_eq!(status, UPT_OK, "{}", message());
+    }
+    let mut needed = 0;
+    let status = unsafe { upt_scene_save(host.scene, null_mut(), u64::MAX, &mut needed) };
+    assert_eq!(status, UPT_ERR_NULL);
+}
