@@ -106,6 +106,11 @@ fn read(options: &Options, stage: &mut Stage) -> Result<(Mesh, PathBuf)> {
         if !options.label.is_empty() || options.part.is_some() {
             bail!("{name}: a mesh file holds one body; leave --label and --part out");
         }
+        if options.refill {
+            bail!(
+                "{name}: --refill is for files of other programs; make the mesh file anew with `upt mesh import --refill`"
+            );
+        }
         return Ok((Mesh::read(&options.input)?, options.input.clone()));
     }
     let input = foreign::convert(&options.input, &options.label, stage)?;
@@ -118,6 +123,7 @@ fn read(options: &Options, stage: &mut Stage) -> Result<(Mesh, PathBuf)> {
             resolution: Some(Resolution::Nodes(options.nodes)),
             repair: !options.no_repair,
             part: options.part.clone(),
+            refill: options.refill,
             ..ImportOptions::default()
         },
     )
@@ -283,8 +289,8 @@ pub fn gate(mesh: &Mesh, options: &Options) -> Result<()> {
     let quality = measure(mesh);
     if quality.min_dihedral_deg < SMALLEST_ANGLE_DEG {
         bail!(
-            "tetrahedra with an angle of {:.2} degrees (at least {SMALLEST_ANGLE_DEG} are needed): re-mesh, or give the surface \
-             instead, which is filled without slivers; upt mesh info tells more",
+            "tetrahedra with an angle of {:.2} degrees (at least {SMALLEST_ANGLE_DEG} are needed): re-mesh, or give --refill, which fills \
+             the mesh's own boundary anew with about --nodes nodes; upt mesh info tells more",
             quality.min_dihedral_deg
         );
     }

@@ -63,6 +63,10 @@ def nifti(path, out, wanted=()):
         labels = np.asarray(image.dataobj)
     except Exception as error:  # the library has no base class for what may be wrong with a file
         sys.exit(f"{error}".splitlines()[0] + ": is the file a NIfTI volume, and whole?")
+    # What is nothing in other programs: NaN, and numbers below 0.
+    if labels.dtype.kind in "if" and not np.all(labels >= 0):
+        print(f"{np.sum(~(labels >= 0))} voxels of negative labels or NaN are background")
+        labels = np.where(labels >= 0, labels, 0)
     if labels.ndim != 3 or labels.dtype.kind not in "iuf" or not np.all(labels == np.round(labels)):
         sys.exit("a label volume has three axes and whole numbers")
     names = [int(name) for name in np.unique(labels) if name != 0]

@@ -36,6 +36,9 @@ pub struct Import {
     /// Remove faults that can be removed safely, and report them.
     #[arg(long)]
     repair: bool,
+    /// Of tetrahedra take only the boundary and fill it anew with about --nodes nodes: cures slivers.
+    #[arg(long)]
+    refill: bool,
     /// Which body, where the file holds several: its number or its name in the list that the command then prints.
     #[arg(long, value_name = "NUMBER|NAME")]
     part: Option<String>,
@@ -99,6 +102,7 @@ pub fn run_import(args: &Import) -> anyhow::Result<ExitCode> {
             resolution,
             repair: args.repair,
             part: args.part.clone(),
+            refill: args.refill,
             fixed: args.fixed_sphere.clone(),
             domain: args.domain_sphere.clone(),
             window: args.window_sphere.clone(),

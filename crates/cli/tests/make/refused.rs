@@ -154,3 +154,52 @@ fn of_two_pieces_one_is_chosen_and_a_speck_is_left_out_by_name() {
     let message = refused(&surface, &[HELD[0], HELD[1], "--label", "1"]);
     assert!(message.contains("has no labels"), "{message}");
 }
+
+/// A box of 40 mm of 8 cubes, with its inner node hardly off one side: slivers.
+fn slivers(path: &Path) {
+    let node = |i: usize, j: usize, k: usize| (i * 3 + j) * 3 + k;
+    let (mut points, mut tets) = (String::new(), Vec::new());
+    for (i, j, k) in (0..27).map(|n| (n / 9, n / 3 % 3, n % 3)) {
+        let x = if (i, j, k) == (1, 1, 1) {
+            0.001
+        } else {
+            i as f64
+        };
+        points += &format!("{} {} {}\n", 20.0 * x, 20 * j, 20 * k);
+        if i < 2 && j < 2 && k < 2 {
+            let corner = |bits: usize| node(i + (bits >> 2), j + (bits >> 1 & 1), k + (bits & 1));
+            for [b, c] in [[4, 6], [6, 2], [2, 3], [3, 1], [1, 5], [5, 4]] {
+                let [a, b, c, d] = [0, b, c, 7].map(corner);
+                tets.push(format!("4 {a} {b} {c} {d}\n"));
+            }
+        }
+    }
+    let head = "# vtk DataFile Version 3.0\nbox\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 27 float";
+    let count = tets.len();
+    let text = format!(
+        "{head}\n{points}CELLS {count} {}\n{}CELL_TYPES {count}\n{}",
+        5 * count,
+        tets.concat(),
+        "10\n".repeat(count)
+    );
+    std::fs::write(path, text).unwrap();
+}
+
+#[test]
+fn a_preview_refuses_what_the_run_would_and_a_refill_cures_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let mesh = folder.path().join("box.vtk");
+    slivers(&mesh);
+    let held = ["--fixed", "plane:0,0,-1,10", "--preview"];
+    let message = refused(&mesh, &held);
+    assert!(
+        message.contains("the run itself would refuse") && message.contains("--refill"),
+        "{message}"
+    );
+    assert!(folder.path().join("box.preview.html").is_file());
+    let out = mesh.with_extension("bundle");
+    let output = command(&mesh, &out, &[&held[..], &["--refill"]].concat())
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", text(&output));
+}

@@ -5,6 +5,9 @@ use crate::mesh::MeshError;
 use crate::stuffing::StuffError;
 use std::path::PathBuf;
 
+/// Nodes that are suggested at most.
+const MOST_NODES: u64 = 500_000;
+
 /// A file that cannot become a mesh.
 #[derive(Debug, thiserror::Error)]
 pub enum ImportError {
@@ -37,11 +40,15 @@ pub enum ImportError {
     Scale(f64),
     #[error(
         "the tetrahedra would {} the {volume_ml:.1} ml that the surface bounds: its thinnest place, {thickness_mm:.2} mm near {at:.1?} mm, \
-         is thinner than they are; give about --nodes {nodes}, or a thicker surface",
+         is thinner than they are; {}",
         match share {
             Some(share) if *share < 97.0 => format!("hold {share:.0} % of"),
             Some(_) => "leave holes in the walls of".to_owned(),
             None => "hold only a part of".to_owned(),
+        },
+        match nodes {
+            0..=MOST_NODES => format!("give about --nodes {nodes}, or a thicker surface"),
+            _ => "give a thicker surface, no number of nodes that can be simulated resolves it".to_owned(),
         }
     )]
     Thin {
@@ -72,7 +79,7 @@ pub enum ImportError {
         count: usize,
     },
     #[error(
-        "tet {tet} is degenerate (volume {volume_mm3:.3e} mm³), {count} in all; --repair drops it, but meshing again is better"
+        "tet {tet} is degenerate (volume {volume_mm3:.3e} mm³), {count} in all; --repair drops it, but meshing again (or --refill) is better"
     )]
     Degenerate {
         tet: usize,

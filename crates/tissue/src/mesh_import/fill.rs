@@ -258,9 +258,12 @@ impl Solid {
     }
 
     fn at_spacing(&self, spacing: f64, notes: &mut Vec<String>) -> Result<Attempt, ImportError> {
-        let uniform = self.rounded(self.attempt(spacing, false)?, spacing, notes);
+        let uniform = match self.attempt(spacing, false) {
+            Err(StuffError::Empty(_)) => None,
+            found => Some(self.rounded(found?, spacing, notes)),
+        };
         let graded = || self.attempt(spacing, true).map(|found| (found, spacing));
-        self.better(Some((uniform, spacing)), None, notes, graded)
+        self.better(uniform.map(|found| (found, spacing)), None, notes, graded)
     }
 
     fn to_count(&self, wanted: usize, notes: &mut Vec<String>) -> Result<Attempt, ImportError> {

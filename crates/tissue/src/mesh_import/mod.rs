@@ -74,10 +74,12 @@ pub struct ImportOptions {
     pub name: Option<String>,
     /// Millimetres a unit of the file. Default 1.
     pub scale: f64,
-    /// For surfaces only, and needed there.
+    /// For surfaces (and `refill`) only, and needed there.
     pub resolution: Option<Resolution>,
     /// Remove faults that can be removed safely, instead of failing. Default false.
     pub repair: bool,
+    /// Of tetrahedra take only the boundary, and fill it anew; needs `resolution`. Default false.
+    pub refill: bool,
     /// Which of several bodies is wanted: its number in the file's order, from 1, or its name.
     pub part: Option<String>,
     /// Nodes in any of these balls are held: the set `fixed`.
@@ -96,6 +98,7 @@ impl Default for ImportOptions {
             scale: 1.0,
             resolution: None,
             repair: false,
+            refill: false,
             part: None,
             fixed: Vec::new(),
             domain: Vec::new(),
@@ -147,15 +150,20 @@ pub fn import(path: &Path, options: &ImportOptions) -> Result<Imported, ImportEr
     let names = || Names::of(path, options.scale);
     let mut own = options.clone();
     let raw = match body {
-        Body::Tets(mut raw) => {
+        Body::Tets(mut raw) if !options.refill => {
             scale(&mut raw.positions, options.scale);
             raw
         }
-        Body::Surface(mut surface) => {
+        body => {
+            let mut surface = match body {
+                Body::Surface(surface) => surface,
+                Body::Tets(raw) => repair::boundary(raw, &mut repairs)?,
+            };
             scale(&mut surface.positions, options.scale);
-            closed_surface::check(&mut surface, options.repair, &mut repairs)?;
+            let repair = options.repair || options.refill;
+            closed_surface::check(&mut surface, repair, &mut repairs)?;
             bodies::keep_one(&mut surface, options, names, &mut repairs, &mut notes)?;
-            self_crossing::check(&surface, options.repair, &mut repairs)?;
+            self_crossing::check(&surface, repair, &mut repairs)?;
             let resolution = options.resolution.ok_or(ImportError::NoResolution)?;
             let filled = fill::fill(surface, resolution)?;
             notes.extend(filled.notes);

@@ -2,7 +2,7 @@
 
 use super::bodies;
 use super::choice::Names;
-use super::{ImportError, ImportOptions, RawTets, Repair};
+use super::{ImportError, ImportOptions, RawSurface, RawTets, Repair};
 use std::collections::{HashMap, HashSet};
 
 /// A tetrahedron is degenerate below this part of the cube of its longest edge (as in
@@ -32,6 +32,28 @@ pub fn tets(
     bodies::keep_one_of_tets(raw, options, names, repairs, notes)?;
     // The nodes of a body that was not chosen are no fault.
     unreferenced(raw, repair || repairs.len() > chosen, repairs)
+}
+
+/// The boundary of tetrahedra however bad they are: faces that belong to one of them alone. Nodes at one place are one, and a
+/// tetrahedron that is there twice counts once.
+pub fn boundary(mut raw: RawTets, repairs: &mut Vec<Repair>) -> Result<RawSurface, ImportError> {
+    node_range(&raw)?;
+    weld(&mut raw, repairs);
+    let mut seen = HashSet::with_capacity(raw.tets.len());
+    raw.tets.retain(|tet| {
+        let mut key = *tet;
+        key.sort_unstable();
+        key.windows(2).all(|pair| pair[0] != pair[1]) && seen.insert(key)
+    });
+    // Faces outward, as far as a tetrahedron without volume has an outside.
+    let turned: Vec<usize> = (0..raw.tets.len())
+        .filter(|&tet| measure(&raw, raw.tets[tet]).0 < 0.0)
+        .collect();
+    turned.iter().for_each(|&tet| raw.tets[tet].swap(2, 3));
+    Ok(RawSurface {
+        faces: crate::mesh::boundary_faces(&raw.tets)?,
+        positions: raw.positions,
+    })
 }
 
 /// Makes nodes at exactly the same place one: exporters of several parts write the nodes between them once for each.

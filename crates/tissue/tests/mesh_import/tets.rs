@@ -1,7 +1,10 @@
 //! Faults of tetrahedra: named, and repaired where that was asked for.
 
 use tissue::mesh::Mesh;
-use tissue::mesh_import::{ImportError, RawTets, Repair, from_tets};
+use tissue::mesh_import::{ImportError, ImportOptions, RawTets, Repair, Resolution, from_tets};
+use tissue::mesh_quality::measure;
+
+use super::read_text;
 
 /// Two tetrahedra on one face.
 fn pair() -> RawTets {
@@ -186,4 +189,71 @@ fn a_node_out_of_range_is_never_repaired() {
         ),
         "{error}"
     );
+}
+
+/// A box of 2 x 2 x 2 cubes of 10 mm as a VTK file, with its inner node at a place.
+fn box_with_inner_node(at: [f64; 3]) -> String {
+    let node = |i: usize, j: usize, k: usize| (i * 3 + j) * 3 + k;
+    let mut points = Vec::new();
+    let mut tets = Vec::new();
+    for (i, j, k) in (0..27).map(|n| (n / 9, n / 3 % 3, n % 3)) {
+        points.push(match (i, j, k) {
+            (1, 1, 1) => at,
+            _ => [i, j, k].map(|x| 10.0 * x as f64),
+        });
+        if i < 2 && j < 2 && k < 2 {
+            let corner = |bits: usize| node(i + (bits >> 2), j + (bits >> 1 & 1), k + (bits & 1));
+            for [b, c] in [[4, 6], [6, 2], [2, 3], [3, 1], [1, 5], [5, 4]] {
+                tets.push([0, b, c, 7].map(corner));
+            }
+        }
+    }
+    let mut text = format!(
+        "# vtk DataFile Version 3.0\nbox\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS {} float\n",
+        points.len()
+    );
+    for [x, y, z] in points {
+        text += &format!("{x} {y} {z}\n");
+    }
+    text += &format!("CELLS {} {}\n", tets.len(), 5 * tets.len());
+    for [a, b, c, d] in &tets {
+        text += &format!("4 {a} {b} {c} {d}\n");
+    }
+    text + &format!("CELL_TYPES {}\n{}", tets.len(), "10\n".repeat(tets.len()))
+}
+
+#[test]
+fn slivers_and_inverted_tets_are_cured_by_filling_the_boundary_anew() {
+    let options = ImportOptions {
+        refill: true,
+        resolution: Some(Resolution::Nodes(400)),
+        ..ImportOptions::default()
+    };
+    // Flat beside a side, and pulled through one.
+    for at in [[0.01, 10.0, 10.0], [23.0, 10.0, 10.0]] {
+        let text = box_with_inner_node(at);
+        let kept = read_text(&text, "vtk", &ImportOptions::default());
+        let bad = kept.map_or(0.0, |made| measure(&made.mesh).min_dihedral_deg);
+        assert!(bad < 1.0, "{bad}");
+        let quality = measure(&read_text(&text, "vtk", &options).unwrap().mesh);
+        assert!(
+            quality.min_dihedral_deg > 8.0,
+            "{}",
+            quality.min_dihedral_deg
+        );
+        assert!(
+            (quality.volume_mm3 - 8000.0).abs() < 240.0,
+            "{}",
+            quality.volume_mm3
+        );
+    }
+    let unsized_one = ImportOptions {
+        resolution: None,
+        ..options
+    };
+    let text = box_with_inner_node([10.0; 3]);
+    assert!(matches!(
+        read_text(&text, "vtk", &unsized_one),
+        Err(ImportError::NoResolution)
+    ));
 }
