@@ -1,6 +1,7 @@
 //! One held-out case: the reference solver and two scenes of the bundle, frame by frame.
 
 use std::sync::Arc;
+use std::time::Instant;
 
 use anyhow::Result;
 use tissue::contact::ContactDomain;
@@ -14,8 +15,15 @@ use crate::preview::Film;
 
 /// Push of the programmes as they are written, mm.
 const PROGRAMME_PUSH_MM: f64 = 15.0;
+/// Frames of a case that are simulated whatever the time.
+const LEAST_FRAMES: usize = 24;
 /// Steps whose time is measured.
 const TIMED: usize = 400;
+
+/// Why a case ended, where it had time for so many frames, the body at rest among them.
+pub fn no_time(frames: usize) -> String {
+    format!("no time after {frames} of {FRAMES} frames")
+}
 
 /// A programme and the seed of its sites.
 #[derive(Clone, Copy)]
@@ -41,12 +49,14 @@ pub struct Frame<'a> {
 }
 
 impl Case {
-    /// Simulates the first frames, or those before a load that the mesh cannot carry; then it says which. Programmes are written for a brain: lengths are multiplied by the bundle's deepest push over theirs.
+    /// Simulates the first frames, or those before a load that the mesh cannot carry or before the time is up, but always
+    /// [`LEAST_FRAMES`]; then it says why. Programmes are written for a brain: lengths are multiplied by the bundle's deepest push over theirs.
     pub fn simulate(
         &self,
         model: &Model,
         body: &Body<'_>,
         frames: usize,
+        until: Option<Instant>,
         each: &mut dyn FnMut(&Frame<'_>) -> Result<()>,
     ) -> Result<Option<String>> {
         let scale = f64::from(model.manifest.envelope.max_push_mm) / PROGRAMME_PUSH_MM;
@@ -66,6 +76,9 @@ impl Case {
         )?;
         let mut truth = vec![[0.0f32; 3]; body.mesh.node_count()];
         for frame in 1..frames.min(FRAMES) {
+            if frame > LEAST_FRAMES && until.is_some_and(|until| Instant::now() > until) {
+                return Ok(Some(no_time(frame)));
+            }
             let mut contact = programme.contact(frame);
             for entry in &mut contact {
                 entry.displacement = entry.displacement.map(|x| (f64::from(x) * scale) as f32);

@@ -9,8 +9,9 @@ use tissue::mesh::Mesh;
 use tissue::tensors::{f32_values, write_whole};
 use upt::Model;
 
-use super::page;
+use super::case::no_time;
 use super::score::{Part, Score};
+use super::{page, verdict};
 use crate::machine::Machine;
 use crate::preview::Film;
 use crate::tool_scale::Chosen;
@@ -97,6 +98,7 @@ impl Certificate {
                 "seed": seed, "cases": scores.len(), "against": tissue::simulate::SOLVER_NAME,
                 "programmes": scores.iter().map(|score| json!({
                     "scheme": score.scheme, "seed": score.seed, "refused_steps": score.refused, "ended": score.ended,
+                    "frames_in_time": score.ended.as_ref().filter(|why| **why == no_time(score.touches.len() + 1)).map(|_| score.touches.len()),
                     "contact": part(&score.contact), "free": part(&score.free),
                 })).collect::<Vec<Value>>(),
                 "corrections": stated.corrections.as_ref().map_or(0, |entry| entry.recommended),
@@ -242,14 +244,9 @@ impl Certificate {
         )
     }
 
-    /// What to do about errors that corrections hardly lessen.
-    fn advice(&self) -> &'static str {
-        let share = self.value["contact"]["share_of_linear"].as_f64();
-        if share.is_some_and(|share| share > 0.5) {
-            "\ncorrections help little here: the pushes may be too deep for what is held beneath them; lower --push, narrow --domain, or hold less"
-        } else {
-            ""
-        }
+    /// Adds whether it is good enough.
+    pub fn judge(&mut self) {
+        self.value["verdict"] = verdict::of(&self.value);
     }
 
     /// A few lines.
@@ -296,7 +293,8 @@ impl Certificate {
             })
             .collect();
         format!(
-            "{}\n{}\n{}{sizes}{tools}{ended}\nworst region over the mean {}, force error {}, {} ms a step (median, 1 thread), p99 {}{}",
+            "{}\n{}\n{}\n{}{sizes}{tools}{ended}\nworst region over the mean {}, force error {}, {} ms a step (median, 1 thread), p99 {}",
+            v["verdict"]["text"].as_str().unwrap_or_default(),
             self.words(),
             row("in contact", &v["contact"]),
             row("after release", &v["free"]),
@@ -304,7 +302,6 @@ impl Certificate {
             v["force_error"],
             v["speed"]["ms_median"],
             v["speed"]["ms_p99"],
-            self.advice(),
         )
     }
 }

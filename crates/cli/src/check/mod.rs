@@ -10,6 +10,7 @@ mod page;
 mod recording;
 mod score;
 mod tools;
+mod verdict;
 
 pub use certificate::Certificate;
 pub use recording::Recording;
@@ -18,7 +19,7 @@ pub use score::{nearest, regions};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
@@ -101,8 +102,10 @@ impl ToolSizes {
 /// What to measure.
 pub struct Plan {
     pub bundle: PathBuf,
-    /// Cases; none: as many as fit into `seconds`, at most [`ORDER`]'s.
+    /// Cases; none: as many as fit into `seconds`, at most [`ORDER`]'s, the last ones perhaps not to their ends.
     pub cases: Option<usize>,
+    /// Frames of each case, where a certificate that is repeated had no time for all.
+    pub frames: Vec<Option<usize>>,
     pub seconds: f64,
     pub seed: u64,
     /// Programmes of rigid tools in addition to the contacts.
@@ -143,7 +146,16 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     let sizes = (before.as_ref())
         .filter(|_| options.sizes.tool_scale.is_none())
         .and_then(Chosen::stated);
+    let same_plan = before.is_some()
+        && Some(seed) == stated("seed")
+        && cases == stated("cases").map(|n| n as usize);
+    let programmes = (before.iter()).flat_map(|text| text["tested"]["programmes"].as_array());
+    let frames = programmes.flatten().map(|case| {
+        let count = case["frames_in_time"].as_u64().filter(|_| same_plan);
+        count.map(|count| count as usize)
+    });
     let plan = Plan {
+        frames: frames.collect(),
         sizes: sizes.map_or(ToolSizes::Asked(options.sizes), ToolSizes::Stated),
         tools,
         bundle: options.bundle.clone(),
@@ -170,9 +182,6 @@ pub fn run(options: &Options) -> Result<ExitCode> {
         let mesh = Mesh::read(&options.bundle.join("mesh.safetensors"))?;
         found.write(&options.bundle, &mesh, &[])?;
     }
-    let same_plan = before.is_some()
-        && Some(seed) == stated("seed")
-        && cases == stated("cases").map(|n| n as usize);
     let stated = before.and_then(|text| text["contact"]["mse_mm2"].as_f64());
     if let (true, Some(stated)) = (same_plan, stated) {
         let now = found.mse_in_contact();
@@ -192,6 +201,8 @@ pub fn run(options: &Options) -> Result<ExitCode> {
 /// Simulates and replays; the certificate lacks the bundle's identity until it is finished.
 pub fn measure(plan: &Plan) -> Result<Certificate> {
     let started = Instant::now();
+    let until = (plan.cases.is_none() && plan.seconds.is_finite())
+        .then(|| started + Duration::from_secs_f64(plan.seconds.max(0.0)));
     let bundle = Bundle::open(&plan.bundle)?;
     let most = plan.cases.unwrap_or(ORDER.len());
     let workers = workers(plan.threads).min(most);
@@ -209,11 +220,19 @@ pub fn measure(plan: &Plan) -> Result<Certificate> {
         if at == 0 {
             replay = replay.filmed();
         }
-        let ended = case.simulate(&bundle.model, &body, FRAMES, &mut |frame| {
+        // The first frame is the body at rest.
+        let frames = plan
+            .frames
+            .get(at)
+            .copied()
+            .flatten()
+            .map(|count| count + 1);
+        let most = frames.unwrap_or(FRAMES);
+        let ended = case.simulate(&bundle.model, &body, most, until, &mut |frame| {
             bar.inc(1);
             replay.step(frame)
         })?;
-        Ok(replay.finish(ended))
+        Ok(replay.finish(ended.or(frames.map(case::no_time))))
     })?;
     bar.finish_and_clear();
     let mut certificate = bundle.certificate(plan.seed, scores)?;
@@ -221,6 +240,7 @@ pub fn measure(plan: &Plan) -> Result<Certificate> {
         let sizes = plan.sizes.choose(&bundle);
         certificate.add_tools(tools::measure(plan, &bundle, sizes.scale)?, &sizes);
     }
+    certificate.judge();
     Ok(certificate)
 }
 

@@ -22,7 +22,9 @@ pub fn write(
         Some(x) => format!("{x:.3}"),
         None => "-".to_owned(),
     };
-    let mut rows: Vec<(String, String)> = facts.to_vec();
+    let verdict = certificate["verdict"]["text"].as_str().unwrap_or_default();
+    let mut rows = vec![("verdict".to_owned(), verdict.to_owned())];
+    rows.extend_from_slice(facts);
     let mut add = |name: &str, value: String| rows.push((name.to_owned(), value));
     for (name, part) in [
         ("in contact", &certificate["contact"]),

@@ -1,6 +1,7 @@
 //! Held-out contacts that are simulated once and replayed through several bundles of the same body, to choose between them.
 
 use std::path::Path;
+use std::time::Instant;
 
 use anyhow::Result;
 use upt::Corrections;
@@ -26,11 +27,12 @@ pub struct Recording {
 }
 
 impl Recording {
-    /// Simulates the first frames of `count` cases of a seed, within the bundle's envelope.
+    /// Simulates the first frames of `count` cases of a seed, within the bundle's envelope and as long as there is time.
     pub fn make(
         folder: &Path,
         count: usize,
         frames: usize,
+        until: Instant,
         seed: u64,
         threads: usize,
         quiet: bool,
@@ -40,7 +42,8 @@ impl Recording {
         let cases = in_parallel(workers(threads).min(count), &|at| at < count, &|at| {
             let case = held_out(seed, at);
             let mut kept = Vec::with_capacity(frames);
-            case.simulate(&bundle.model, &bundle.body(), frames, &mut |frame| {
+            let body = bundle.body();
+            case.simulate(&bundle.model, &body, frames, Some(until), &mut |frame| {
                 bar.inc(1);
                 kept.push(Kept {
                     touch: frame.touch.clone(),

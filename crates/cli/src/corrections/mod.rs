@@ -248,7 +248,7 @@ fn write(args: &Options) -> Result<(usize, usize)> {
         let modes = bench.prior.residual.chunks_exact(width);
         modes.map(<[f32]>::to_vec).collect()
     } else {
-        let found = patches::differences(&bench, args.patches, args.seed, args.json)?;
+        let found = patches::differences(&bench, args.patches, None, args.seed, args.json)?;
         principal(&found, args.patch_modes)
     };
     if !args.data.is_empty() {

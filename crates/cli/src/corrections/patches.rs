@@ -1,6 +1,8 @@
 //! What nonlinear elasticity adds to the linear response, without a simulation: pushes all over the domain, each taken a few
 //! quasi-Newton steps towards equilibrium with the factor of the stiffness at rest.
 
+use std::time::Instant;
+
 use anyhow::Result;
 use elements::ElementForces;
 use tissue::schemes::SplitMix;
@@ -15,10 +17,14 @@ use crate::progress;
 /// Steps towards the equilibrium of each push.
 const STEPS: usize = 5;
 
-/// What each of `count` pushes adds, in block coordinates.
+/// Pushes that are made whatever the time.
+const LEAST: usize = 12;
+
+/// What each of `count` pushes adds, in block coordinates; of fewer where there is no time.
 pub fn differences(
     source: &Workbench,
     count: usize,
+    until: Option<Instant>,
     seed: u64,
     quiet: bool,
 ) -> Result<Vec<Vec<f32>>> {
@@ -29,7 +35,14 @@ pub fn differences(
     let bar = progress::bar(quiet, count as u64, "patches");
     let mut found = Vec::with_capacity(count);
     let pushes = source.pushes();
-    for site in pushes.spread(count, &[], &mut random) {
+    for (made, site) in pushes
+        .spread(count, &[], &mut random)
+        .into_iter()
+        .enumerate()
+    {
+        if made >= LEAST && until.is_some_and(|until| Instant::now() > until) {
+            break;
+        }
         let push = pushes.at(site, &mut random);
         if let Some(difference) = relax(source, &forces, &mut response, &pool, &push)? {
             found.push(difference);

@@ -22,7 +22,7 @@ pub use options::Options;
 
 use std::path::Path;
 use std::process::ExitCode;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 use serde_json::json;
@@ -36,10 +36,16 @@ use crate::{corrections, modes, preview, prior};
 use options::Sizes;
 use stages::{Work, key_of};
 
-/// Part of the time after which no round of equilibria starts.
+/// Part of the time after which the coarse space is made from the patches that are there.
+const PATCHED: f64 = 0.3;
+/// Part of the time after which no equilibrium is computed.
 const REFINED: f64 = 0.4;
 /// Part of it after which no tool is simulated but by the check.
 const LEARNED: f64 = 0.75;
+/// Part of it that the check has whatever came before.
+const LEAST_CHECKED: f64 = 0.1;
+/// Part of what is left that simulates the check's cases.
+const SIMULATED: f64 = 0.8;
 /// Where `--target-error` is missed, so many corrections are added and a target is halved, at most up to so many corrections.
 const MORE_CORRECTIONS: u32 = 3;
 const MOST_CORRECTIONS: u32 = 16;
@@ -96,10 +102,13 @@ pub fn run(options: &Options) -> Result<ExitCode> {
         "{}: open it in a browser to see what is held and touched",
         page.display()
     ));
+    let fit = body::gate(&mesh, options);
     if options.preview {
-        return Ok(ExitCode::SUCCESS);
+        return fit
+            .context("the run itself would refuse this body")
+            .map(|()| ExitCode::SUCCESS);
     }
-    body::gate(&mesh, options)?;
+    fit?;
 
     let material = options.material()?;
     let held_key = key_of(&[
@@ -189,6 +198,9 @@ pub fn run(options: &Options) -> Result<ExitCode> {
         options.draft().to_string().as_bytes(),
     ]);
     let draft = work.file("bundle");
+    let budget = 60.0 * options.minutes;
+    let until =
+        Instant::now() + Duration::from_secs_f64((PATCHED * budget - work.spent()).max(0.0));
     work.stage(
         "coarse",
         &coarse_key,
@@ -200,7 +212,7 @@ pub fn run(options: &Options) -> Result<ExitCode> {
             let bench =
                 Workbench::open(&draft, natural, &known, options.threads, options.json)?;
             let found =
-                corrections::differences(&bench, options.patches, options.seed, options.json)?;
+                corrections::differences(&bench, options.patches, Some(until), options.seed, options.json)?;
             refine::write_differences(&stage.folder.join(refine::PATCHES), &found)?;
             let count = bench.write_space(
                 &draft,
@@ -216,7 +228,13 @@ pub fn run(options: &Options) -> Result<ExitCode> {
         },
     )?;
 
-    let budget = 60.0 * options.minutes;
+    if work.spent() > budget {
+        work.tell(&format!(
+            "what every bundle needs took {:.1} minutes, more than --minutes {}: the check is short, and nothing is refined",
+            work.spent() / 60.0,
+            options.minutes
+        ));
+    }
     let refine_key = key_of(&[coarse_key.as_bytes(), budget.to_string().as_bytes()]);
     let seconds = REFINED * budget - work.spent();
     let made = work.stage(
@@ -333,7 +351,7 @@ fn certify(
         )
         .as_bytes(),
     ]);
-    let left = (budget - work.spent()).max(20.0);
+    let left = (budget - work.spent()).max(LEAST_CHECKED * budget);
     let copy = work.file(&name);
     bundle::copy(draft, &copy)?;
     let change = corrections::Change {
@@ -351,7 +369,8 @@ fn certify(
             let found = check::measure(&check::Plan {
                 bundle: copy,
                 cases: options.cases,
-                seconds: 0.7 * left,
+                frames: Vec::new(),
+                seconds: SIMULATED * left,
                 seed: options.seed ^ 0xCE27,
                 tools: options.programmes()?,
                 sizes: check::ToolSizes::Asked(options.sizes),

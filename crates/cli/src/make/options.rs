@@ -8,7 +8,7 @@ use elements::{Law, Material};
 use serde_json::{Value, json};
 use tissue::mesh::{Boundary, Mesh, face_area};
 use tissue::mesh_import::Region;
-use tissue::programmes::{BodySize, REFERENCE_WIDTH_MM, ToolProgramme};
+use tissue::programmes::{BodySize, ToolProgramme, ToolScale};
 
 use crate::effort::Effort;
 use crate::loads;
@@ -45,6 +45,9 @@ pub struct Options {
     /// Labels of a label volume that are the body: one or several (`--label 1,3`). Default: all but 0.
     #[arg(long, value_name = "LABELS", value_delimiter = ',')]
     pub label: Vec<i64>,
+    /// Of tetrahedra take only the boundary and fill it anew with about --nodes nodes: cures slivers.
+    #[arg(long)]
+    pub refill: bool,
     /// Which body, where the file holds several: its number or its name in the list that the command then prints.
     #[arg(long, value_name = "NUMBER|NAME")]
     pub part: Option<String>,
@@ -95,7 +98,8 @@ pub struct Options {
     /// Damping, 1/s; overrides the material's.
     #[arg(long)]
     pub damping: Option<f64>,
-    /// Deepest push that the bundle is made for, mm. Default: 15 for a body of a brain's size, less for a smaller one.
+    /// Deepest push that the bundle is made for, mm. Default: 15 for a body as wide as a brain and at least 40 mm thick beneath its domain, less
+    /// for a smaller or thinner one.
     #[arg(long)]
     pub push: Option<f64>,
     /// Fail if the mean squared error in contact, or that of a programme of --tools, is above this, mm².
@@ -251,13 +255,14 @@ impl Options {
     /// What the body depends on besides the input's bytes.
     pub fn body_words(&self) -> Result<String> {
         let mut words = format!(
-            "{} {} {} {:?} {:?} {:?} {}",
+            "{} {} {} {:?} {:?} {:?} {} {}",
             self.scale()?,
             self.nodes,
             self.no_repair,
             self.name,
             self.part,
             self.label,
+            self.refill,
             self.boundary.as_str()
         );
         let stiffer = self.stiffness.iter().map(|(region, _)| region);
@@ -285,7 +290,7 @@ impl Options {
         json!({
             "unit": self.unit, "stiffness": self.stiffness.iter().map(|(region, factor)| format!("{region}={factor}")).collect::<Vec<String>>(),
             "boundary": self.boundary.as_str(), "fixed": list(&self.fixed), "domain": list(&self.domain), "nodes": self.nodes,
-            "part": self.part, "label": self.label,
+            "part": self.part, "label": self.label, "refill": self.refill,
             "material": self.material, "corrections": self.corrections.map(|effort| effort.to_string()), "natural": self.natural, "patches": self.patches,
             "tolerance_mm": self.tolerance_mm, "minutes": self.minutes, "tools": self.tools, "tool_scale": self.sizes.tool_scale,
         })
@@ -314,10 +319,12 @@ pub struct Sizes {
 }
 
 impl Sizes {
-    /// From the option, or from the body's width; a contact has room in the domain, and at least about three nodes.
+    /// From the option, or from the body's width and its thickness beneath the domain; a contact has room in the domain.
     pub fn of(options: &Options, mesh: &Mesh) -> Result<Self> {
-        let by_width = (BodySize::width(mesh) / REFERENCE_WIDTH_MM).min(1.0);
-        let scale = options.push.map_or(by_width, |push| push / PUSH_MM);
+        let scale = match options.push {
+            Some(push) => push / PUSH_MM,
+            None => ToolScale::of_body(BodySize::of(mesh)).factor,
+        };
         let domain: f64 = mesh
             .domain
             .iter()
@@ -364,7 +371,7 @@ impl Sizes {
             if self.chosen {
                 "--push"
             } else {
-                "from the body's width; --push changes it"
+                "from the body's width and its thickness there; --push changes it"
             }
         )
     }

@@ -6,7 +6,7 @@ mod observe;
 mod release;
 
 use std::path::Path;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result};
 use serde_json::json;
@@ -20,6 +20,8 @@ use crate::check::{Certificate, Recording};
 use crate::corrections::{self, Known, Pushes, Workbench, manifest, principal};
 use crate::effort::Effort;
 
+/// Part of `--minutes` that the calibration has whatever came before.
+const LEAST_CALIBRATED: f64 = 0.05;
 /// Simulated contacts that decide.
 const VALIDATED: usize = 4;
 /// Where there is no time for them: cases and frames that only calibrate.
@@ -68,10 +70,16 @@ pub fn run(learning: &Learning<'_>, stage: &mut Stage) -> Result<()> {
         true => (VALIDATED, FRAMES),
         false => CALIBRATED,
     };
+    // The calibration has a little time in any case.
+    let seconds = learning
+        .seconds
+        .max(LEAST_CALIBRATED * 60.0 * options.minutes);
+    let until = started + Duration::from_secs_f64(seconds);
     let recording = Recording::make(
         learning.refined,
         cases,
         frames,
+        until,
         options.seed ^ 0x5EEC,
         options.threads,
         options.json,
@@ -86,7 +94,8 @@ pub fn run(learning: &Learning<'_>, stage: &mut Stage) -> Result<()> {
             "no time for {LEAST} tool trajectories of {each:.1} s; give more --minutes"
         ));
     } else {
-        teach(learning, stage, &recording, count)?;
+        let until = started + Duration::from_secs_f64((learning.seconds - REPLAYS * each).max(0.0));
+        teach(learning, stage, &recording, count, until)?;
     }
     calibrate(learning.effort, &recording, &learned, stage)?;
     bundle::publish(&learned, &options.out)
@@ -98,6 +107,7 @@ fn teach(
     stage: &mut Stage,
     recording: &Recording,
     count: usize,
+    until: Instant,
 ) -> Result<()> {
     let (folder, options) = (stage.folder.clone(), learning.options);
     let started = Instant::now();
@@ -115,6 +125,7 @@ fn teach(
         learning.sizes.push_mm,
         &sites,
         options.seed ^ 0x7001,
+        until,
         options.threads,
         options.json,
     )?;

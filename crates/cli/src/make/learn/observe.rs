@@ -1,6 +1,8 @@
 //! Reference simulations at chosen sites, as what is learned from: what the tissue does beyond the linear response in contact, and how it
 //! moves after each release, both in block coordinates.
 
+use std::time::Instant;
+
 use anyhow::Result;
 use tissue::contact::ContactDomain;
 use tissue::mesh::Mesh;
@@ -29,21 +31,23 @@ pub struct Observed {
     pub ended: usize,
 }
 
-/// Simulates a `probe` programme for each list of sites (rows of the domain).
+/// Simulates a `probe` programme for each list of sites (rows of the domain), as long as there is time.
 pub fn observe(
     bench: &Workbench,
     push_mm: f64,
     sites: &[Vec<usize>],
     seed: u64,
+    until: Instant,
     threads: usize,
     quiet: bool,
 ) -> Result<Observed> {
     let bar = progress::bar(quiet, (sites.len() * FRAMES) as u64, "tool trajectories");
     let work = |at: usize| {
         let seed = seed.wrapping_add(at as u64);
-        simulate(bench, push_mm, &sites[at], seed, &|| bar.inc(1))
+        simulate(bench, push_mm, &sites[at], seed, until, &|| bar.inc(1))
     };
-    let found = in_parallel(workers(threads), &|at| at < sites.len(), &work)?;
+    let more = |at: usize| at < sites.len() && Instant::now() < until;
+    let found = in_parallel(workers(threads), &more, &work)?;
     bar.finish_and_clear();
     let mut all = Observed::default();
     for case in found {
@@ -59,6 +63,7 @@ fn simulate(
     push_mm: f64,
     faces: &[usize],
     seed: u64,
+    until: Instant,
     done: &dyn Fn(),
 ) -> Result<Observed> {
     let mesh: &Mesh = &bench.mesh;
@@ -83,6 +88,9 @@ fn simulate(
     let mut frames: Vec<(bool, Vec<f32>)> = Vec::with_capacity(FRAMES);
     let mut observed = Observed::default();
     for frame in 1..FRAMES {
+        if Instant::now() > until {
+            break;
+        }
         let mut contact: Vec<ContactNode> = programme.contact(frame);
         for entry in &mut contact {
             entry.displacement = entry.displacement.map(|x| (f64::from(x) * scale) as f32);

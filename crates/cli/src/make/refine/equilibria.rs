@@ -1,6 +1,7 @@
 //! What nonlinear elasticity adds to the linear response at rest under pushes: exact equilibria, by the reference's statics.
 
 use std::path::Path;
+use std::time::Instant;
 
 use anyhow::Result;
 use tissue::solver::ContactNode;
@@ -13,11 +14,12 @@ use crate::progress;
 /// Pushes that share each solve.
 const TOGETHER: usize = 4;
 
-/// The differences of the pushes whose equilibrium was found, in block coordinates.
+/// The differences of the pushes whose equilibrium was found in time, in block coordinates.
 pub fn differences(
     bench: &Workbench,
     columns: &Path,
     pushes: &[Push],
+    until: Instant,
     threads: usize,
     quiet: bool,
 ) -> Result<Vec<Vec<f32>>> {
@@ -36,7 +38,8 @@ pub fn differences(
         bar.inc(groups[at].len() as u64);
         Ok(differences)
     };
-    let found = in_parallel(workers(threads), &|at| at < groups.len(), &work)?;
+    let more = |at: usize| at < groups.len() && Instant::now() < until;
+    let found = in_parallel(workers(threads), &more, &work)?;
     bar.finish_and_clear();
     Ok(found.into_iter().flatten().collect())
 }

@@ -6,7 +6,7 @@ mod validate;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result};
 use serde::{Deserialize, Serialize};
@@ -106,6 +106,7 @@ fn read_differences(path: &Path) -> Result<Vec<Vec<f32>>> {
 pub fn run(rounds: &Rounds<'_>, stage: &mut Stage) -> Result<()> {
     let folder = stage.folder.clone();
     let options = rounds.options;
+    let until = Instant::now() + Duration::from_secs_f64(rounds.seconds.max(0.0));
     let mut bench: Option<Workbench> = None;
     let mut best: Option<(usize, Round)> = None;
     let mut key = rounds.key.clone();
@@ -116,9 +117,7 @@ pub fn run(rounds: &Rounds<'_>, stage: &mut Stage) -> Result<()> {
             Some(round) => round,
             None => {
                 if spent + last > rounds.seconds {
-                    stage.decided(
-                        "no time for another round of equilibria; a larger --minutes has it",
-                    );
+                    stage.decided("no time for another round; a larger --minutes has it");
                     break;
                 }
                 let started = Instant::now();
@@ -132,7 +131,11 @@ pub fn run(rounds: &Rounds<'_>, stage: &mut Stage) -> Result<()> {
                         options.json,
                     )?),
                 };
-                let mut round = make(rounds, bench, &folder, number, best.as_ref())?;
+                let best = best.as_ref();
+                let Some(mut round) = make(rounds, bench, &folder, number, best, until)? else {
+                    stage.decided("no time to end this round; a larger --minutes has it");
+                    break;
+                };
                 round.key.clone_from(&key);
                 round.seconds = started.elapsed().as_secs_f64();
                 let text = serde_json::to_vec_pretty(&round)?;
@@ -215,7 +218,8 @@ fn make(
     folder: &Path,
     number: usize,
     best: Option<&(usize, Round)>,
-) -> Result<Round> {
+    until: Instant,
+) -> Result<Option<Round>> {
     let options = rounds.options;
     let pushes = bench.pushes();
     let (sites, mut random) = validated(&pushes, options.seed);
@@ -237,9 +241,13 @@ fn make(
             bench,
             rounds.columns,
             &chosen,
+            until,
             options.threads,
             options.json,
         )?;
+        if Instant::now() > until {
+            return Ok(None);
+        }
         write_differences(&file(folder, number, "safetensors"), &found)?;
         let mut all = read_differences(&folder.join(PATCHES))?;
         for earlier in 1..=number {
@@ -263,15 +271,19 @@ fn make(
         bundle,
         options.draft().most,
         &validation,
+        until,
         options.json,
     )?;
+    let Some(errors) = errors else {
+        return Ok(None);
+    };
     let carried = errors.iter().filter(|&&error| error > 0.0).count();
     let error = errors.iter().sum::<f64>() / carried.max(1) as f64;
     let worst = worst_region(bench, &sites, &errors);
     let taken = best.is_none_or(|(_, best)| {
         error < BETTER * best.error || (worst < BETTER * best.worst && error <= best.error)
     });
-    Ok(Round {
+    Ok(Some(Round {
         key: String::new(),
         error,
         worst,
@@ -279,7 +291,7 @@ fn make(
         modes,
         taken,
         seconds: 0.0,
-    })
+    }))
 }
 
 /// Errors of the validation's sites with the best bundle; empty where there was no time for them.

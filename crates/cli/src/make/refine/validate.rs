@@ -6,6 +6,7 @@
 
 use std::path::Path;
 use std::sync::Arc;
+use std::time::Instant;
 
 use anyhow::Result;
 use elements::ElementForces;
@@ -20,13 +21,15 @@ const STEPS: usize = 10;
 const MEASURED: usize = 3;
 
 /// Mean squared error of each push's last steps, mm²; 0 where the elements carry none of them, so that there is nothing to make better.
+/// None where there is no time for all.
 pub fn errors(
     bench: &Workbench,
     bundle: &Path,
     corrections: u32,
     pushes: &[Push],
+    until: Instant,
     quiet: bool,
-) -> Result<Vec<f64>> {
+) -> Result<Option<Vec<f64>>> {
     let options = ModelOptions {
         threads: 1,
         ..Default::default()
@@ -42,11 +45,14 @@ pub fn errors(
     let bar = progress::bar(quiet, pushes.len() as u64, "validation");
     let mut found = Vec::with_capacity(pushes.len());
     for push in pushes {
+        if Instant::now() > until {
+            return Ok(None);
+        }
         found.push(error(bench, &model, corrections, &forces, &mass, push)?);
         bar.inc(1);
     }
     bar.finish_and_clear();
-    Ok(found)
+    Ok(Some(found))
 }
 
 fn error(
