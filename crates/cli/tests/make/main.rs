@@ -138,12 +138,11 @@ fn a_small_organ_end_to_end_and_checked_again() {
     let share = certificate["contact"]["share_of_linear"].as_f64().unwrap();
     assert!(share < 0.2, "{certificate:#}");
     assert_eq!(certificate["verdict"]["good"], share <= 0.05);
-    let first = String::from_utf8_lossy(&output.stdout)
-        .lines()
-        .next()
-        .unwrap()
-        .to_owned();
-    assert_eq!(certificate["verdict"]["text"], first);
+    let verdict = certificate["verdict"]["text"].as_str().unwrap();
+    assert!(
+        text(&output).lines().any(|line| line == verdict),
+        "{verdict}"
+    );
     // What simulated tools taught about releases is in the bundle, and better than linear elasticity.
     let share = certificate["free"]["share_of_linear"].as_f64().unwrap();
     assert!(share < 0.5, "{certificate:#}");

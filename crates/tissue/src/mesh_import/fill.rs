@@ -4,27 +4,27 @@
 //! until their edges are shorter than the body is thick ([`thickness`]). What then still loses more than
 //! [`LEAST_SHARE`] allows is refused, with the thinnest place and the nodes that it needs.
 
-use super::thickness::{Sample, samples};
+use super::solid::{FINE, Solid, characteristic};
 use super::walls::Walls;
-use super::{ImportError, RawSurface, RawTets, Resolution, SurfaceDistance, closed_surface};
+use super::{ImportError, RawSurface, RawTets, Resolution};
+use crate::mesh_quality::dihedral_angles;
 use crate::stuffing::{Offset, StuffError, Stuffed, stuff_graded, volume6};
 
 /// The part of the solid's volume that the tetrahedra hold at least.
 const LEAST_SHARE: f64 = 0.97;
-/// A wall is resolved by edges of its thickness over this.
-const FINE: f64 = 1.05;
+/// Walls are resolved by edges of their thickness over the first of these, necks by the second or third.
+const FINER: [f64; 3] = [FINE, 2.0, 3.0];
+/// Dihedral angles, degrees, from which on a mesh is fit for simulation.
+const SOUND_DEG: f64 = 5.0;
 /// Bisection goes down to this part of the spacing.
 const FINEST: f64 = 1.0 / 16.0;
 /// Node counts within this part of the wanted one are accepted; within the second without a word.
 const COUNT_TOLERANCE: f64 = 0.02;
 const SAID_BEYOND: f64 = 0.15;
+/// Part of the thinnest wall that its edges take, so that the rest of it is no thinner.
+const SNUG: f64 = 0.97;
 /// Meshes that are made in search of a count.
 const TRIES: usize = 5;
-/// A lattice has two nodes a cube, and so many more a square of the surface.
-const NODES_A_SQUARE: f64 = 1.35;
-/// The part of the surface that may be thinner than what is called the thinnest place: sharp rims are
-/// infinitely thin.
-const RIM: f64 = 3e-3;
 
 /// A surface's tetrahedra and what there is to say about them.
 pub struct Filled {
@@ -32,29 +32,21 @@ pub struct Filled {
     pub notes: Vec<String>,
 }
 
-struct Solid {
-    field: SurfaceDistance,
-    samples: Vec<Sample>,
-    volume: f64,
-    area: f64,
-    /// V - E + F of the surface.
-    euler: i64,
-    /// What is thinner than this, mm, holds a hundredth of the volume.
-    rim: f64,
-}
-
 /// Tetrahedra of one lattice.
 struct Attempt {
     made: Stuffed,
     /// Of the solid's volume.
     share: f64,
+    /// As many tunnels and gaps as the surface.
     whole: bool,
+    /// No slivers.
+    sound: bool,
 }
 
 impl Attempt {
     /// Whether no tissue is lost.
     fn holds(&self) -> bool {
-        self.whole && self.share >= LEAST_SHARE
+        self.whole && self.sound && self.share >= LEAST_SHARE
     }
 
     fn count_within(&self, wanted: usize) -> bool {
@@ -67,19 +59,7 @@ impl Attempt {
 /// # Errors
 /// [`ImportError::Thin`] where tissue would be lost.
 pub fn fill(surface: RawSurface, resolution: Resolution) -> Result<Filled, ImportError> {
-    let volume = closed_surface::volume(&surface);
-    let euler = characteristic(&surface.faces);
-    let field = SurfaceDistance::new(surface.clone())?;
-    let samples = samples(&surface, &field);
-    let area = samples.iter().map(|sample| sample.area).sum();
-    let solid = Solid {
-        rim: rim(&samples, volume),
-        field,
-        samples,
-        volume,
-        area,
-        euler,
-    };
+    let solid = Solid::of(surface)?;
     let mut notes = Vec::new();
     let attempt = match resolution {
         Resolution::Spacing(spacing) => solid.at_spacing(spacing, &mut notes)?,
@@ -102,108 +82,15 @@ pub fn fill(surface: RawSurface, resolution: Resolution) -> Result<Filled, Impor
     })
 }
 
-/// The thickness beneath which a hundredth of the volume lies.
-fn rim(samples: &[Sample], volume: f64) -> f64 {
-    let mut thin: Vec<(f64, f64)> = (samples.iter().filter(|s| s.thickness.is_finite()))
-        .map(|s| (s.thickness, 0.5 * s.area * s.thickness))
-        .collect();
-    thin.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut left = 0.01 * volume;
-    thin.into_iter()
-        .find(|&(_, own)| {
-            left -= own;
-            left < 0.0
-        })
-        .map_or(f64::INFINITY, |(thickness, _)| thickness)
-}
-
 fn boundary(made: &Stuffed) -> Vec<[u32; 3]> {
     crate::mesh::boundary_faces(&made.tets).unwrap_or_default()
 }
 
-/// V - E + F of triangles with two at each edge.
-fn characteristic(faces: &[[u32; 3]]) -> i64 {
-    let mut nodes: Vec<u32> = faces.iter().flatten().copied().collect();
-    nodes.sort_unstable();
-    nodes.dedup();
-    nodes.len() as i64 - faces.len() as i64 / 2
-}
-
 impl Solid {
-    /// Volume that lies in walls thinner than this, by the surface on both sides.
-    fn thinner_than(&self, thickness: f64) -> f64 {
-        let thin = self.samples.iter().filter(|s| s.thickness < thickness);
-        thin.map(|s| 0.5 * s.area * s.thickness).sum()
-    }
-
-    /// Nodes that a lattice of a spacing has, about; graded, finer where the body is thin, but for sharp rims.
-    fn nodes_at(&self, spacing: f64, graded: bool) -> f64 {
-        let density = |h: f64| 2.0 / (h * h * h);
-        let mut nodes =
-            self.volume * density(spacing) + NODES_A_SQUARE * self.area / spacing.powi(2);
-        for sample in self.samples.iter().filter(|_| graded) {
-            let fine = sample.thickness.max(self.rim) / FINE;
-            if fine < spacing {
-                nodes += 0.5 * sample.area * sample.thickness * (density(fine) - density(spacing));
-                nodes += NODES_A_SQUARE * sample.area * (fine.powi(-2) - spacing.powi(-2));
-            }
-        }
-        nodes
-    }
-
-    /// The spacing of about so many nodes.
-    fn spacing_of(&self, nodes: f64, graded: bool) -> f64 {
-        let (mut low, mut high) = (0.0, self.volume.cbrt());
-        for _ in 0..40 {
-            let middle = 0.5 * (low + high);
-            if self.nodes_at(middle, graded) > nodes {
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
-        high
-    }
-
-    /// The coarsest spacing at which flat faces still hold a round body's volume.
-    fn coarsest(&self) -> f64 {
-        0.15 * self.volume.cbrt()
-    }
-
-    /// The thinnest place that is no rim.
-    fn thinnest(&self) -> Option<&Sample> {
-        let mut by_thickness: Vec<&Sample> = self.samples.iter().collect();
-        by_thickness.sort_by(|a, b| a.thickness.total_cmp(&b.thickness));
-        let mut left = RIM * self.area;
-        by_thickness.into_iter().find(|sample| {
-            left -= sample.area;
-            left < 0.0 && sample.thickness.is_finite()
-        })
-    }
-
-    /// Why a lattice is refused.
-    fn too_thin(&self, share: Option<f64>) -> ImportError {
-        let needed = match self.thinnest() {
-            Some(place) if place.thickness < FINE * self.coarsest() => {
-                let uniform = self.nodes_at(place.thickness / FINE, false);
-                uniform.min(self.nodes_at(self.coarsest(), true))
-            }
-            _ => self.nodes_at(self.coarsest(), false),
-        };
-        // Two digits, rounded up.
-        let unit = 10f64.powf(needed.max(10.0).log10().floor() - 1.0);
-        ImportError::Thin {
-            volume_ml: 1e-3 * self.volume,
-            share: share.map(|share| 100.0 * share),
-            thickness_mm: self.thinnest().map_or(f64::NAN, |s| s.thickness),
-            at: self.thinnest().map_or([f64::NAN; 3], Sample::middle),
-            nodes: ((1.05 * needed / unit).ceil() * unit) as u64,
-        }
-    }
-
-    fn attempt(&self, spacing: f64, graded: bool) -> Result<Attempt, StuffError> {
-        if graded {
-            let walls = Walls::of(&self.samples, FINE, spacing);
+    /// A lattice that is finer where the body is thinner than `fine` times its edges, or a uniform one.
+    fn attempt(&self, spacing: f64, fine: Option<f64>) -> Result<Attempt, StuffError> {
+        if let Some(fine) = fine {
+            let walls = Walls::of(&self.samples, fine, spacing);
             self.judged(stuff_graded(&self.field, spacing, |corners, longest| {
                 longest > FINEST * spacing && walls.finer_than(&corners, longest)
             })?)
@@ -213,15 +100,19 @@ impl Solid {
     }
 
     fn judged(&self, made: Stuffed) -> Result<Attempt, StuffError> {
+        let corners = |tet: &[u32; 4]| tet.map(|node| made.positions[node as usize]);
         let volume6 = |tet: &[u32; 4]| {
-            let [a, b, c, d] = tet.map(|node| made.positions[node as usize]);
+            let [a, b, c, d] = corners(tet);
             volume6(a, b, c, d)
         };
         let volume = made.tets.iter().map(volume6).sum::<f64>() / 6.0;
+        let sound = |angle: &f64| (SOUND_DEG..180.0 - SOUND_DEG).contains(angle);
+        let sound = |tet: &[u32; 4]| dihedral_angles(corners(tet)).iter().all(sound);
         let whole = characteristic(&boundary(&made)) == self.euler;
         Ok(Attempt {
             share: volume / self.volume,
             whole,
+            sound: made.tets.iter().all(sound),
             made,
         })
     }
@@ -258,11 +149,14 @@ impl Solid {
     }
 
     fn at_spacing(&self, spacing: f64, notes: &mut Vec<String>) -> Result<Attempt, ImportError> {
-        let uniform = match self.attempt(spacing, false) {
+        let uniform = match self.attempt(spacing, None) {
             Err(StuffError::Empty(_)) => None,
             found => Some(self.rounded(found?, spacing, notes)),
         };
-        let graded = || self.attempt(spacing, true).map(|found| (found, spacing));
+        let graded = |fine| {
+            self.attempt(spacing, Some(fine))
+                .map(|found| (found, spacing))
+        };
         self.better(uniform.map(|found| (found, spacing)), None, notes, graded)
     }
 
@@ -270,10 +164,10 @@ impl Solid {
         let spacing = self.spacing_of(wanted as f64, false);
         // Else most of it falls through the lattice.
         let hopeful = self.thinner_than(0.85 * spacing) < 0.2 * self.volume;
-        let uniform = hopeful.then(|| self.search(wanted, false).ok()).flatten();
+        let uniform = hopeful.then(|| self.search(wanted, None).ok()).flatten();
         let uniform = uniform.map(|(found, at)| (self.rounded(found, at, notes), at));
-        let attempt = self.better(uniform, Some(wanted), notes, || {
-            self.graded_to_count(wanted)
+        let attempt = self.better(uniform, Some(wanted), notes, |fine| {
+            self.graded_to_count(wanted, fine)
         })?;
         if !attempt.count_within(wanted) {
             notes.push(format!(
@@ -290,14 +184,24 @@ impl Solid {
         uniform: Option<(Attempt, f64)>,
         wanted: Option<usize>,
         notes: &mut Vec<String>,
-        graded: impl FnOnce() -> Result<(Attempt, f64), StuffError>,
+        graded: impl Fn(f64) -> Result<(Attempt, f64), StuffError>,
     ) -> Result<Attempt, ImportError> {
         let fits = |found: &Attempt| wanted.is_none_or(|wanted| found.count_within(wanted));
         let uniform = match uniform {
             Some((found, _)) if found.holds() && fits(&found) => return Ok(found),
             other => other,
         };
-        let found = graded().ok();
+        let mut found = None;
+        for fine in FINER {
+            found = graded(fine).ok();
+            // A neck may need more; a wall has holes for another reason, or too many nodes already.
+            let is_neck = |(found, at): &(Attempt, f64)| {
+                !found.holds() && self.thinner_than(*at) < 0.1 * self.volume
+            };
+            if !found.as_ref().is_some_and(is_neck) {
+                break;
+            }
+        }
         let share = (uniform.iter().chain(&found)).map(|(found, _)| found.share);
         let share = share.reduce(f64::max);
         if let Some((found, spacing)) = found
@@ -313,21 +217,23 @@ impl Solid {
         }
         match uniform {
             Some((found, spacing)) if found.holds() || self.passable(&found, spacing) => Ok(found),
-            _ => Err(self.too_thin(share)),
+            _ => Err(self.too_thin(share, wanted)),
         }
     }
 
     /// Whether a mesh holds the solid but for bridges or gaps that are small beside it. Holes in a wall are not.
     fn passable(&self, attempt: &Attempt, spacing: f64) -> bool {
-        attempt.share >= LEAST_SHARE && self.thinner_than(1.3 * spacing) < 0.2 * self.volume
+        attempt.share >= LEAST_SHARE
+            && attempt.sound
+            && self.thinner_than(1.3 * spacing) < 0.2 * self.volume
     }
 
-    fn graded_to_count(&self, wanted: usize) -> Result<(Attempt, f64), StuffError> {
+    fn graded_to_count(&self, wanted: usize, fine: f64) -> Result<(Attempt, f64), StuffError> {
         let coarse = self.coarsest();
         if self.nodes_at(coarse, true) > 1.5 * wanted as f64 {
             return Err(StuffError::Empty(coarse));
         }
-        let (found, spacing) = self.search(wanted, true)?;
+        let (found, spacing) = self.search(wanted, Some(fine))?;
         if found.made.positions.len() as f64 > 1.5 * wanted as f64 {
             return Err(StuffError::Empty(spacing));
         }
@@ -335,13 +241,18 @@ impl Solid {
     }
 
     /// The spacing whose mesh has about so many nodes.
-    fn search(&self, wanted: usize, graded: bool) -> Result<(Attempt, f64), StuffError> {
+    fn search(&self, wanted: usize, fine: Option<f64>) -> Result<(Attempt, f64), StuffError> {
         let wanted = wanted as f64;
-        let mut spacing = self.spacing_of(wanted, graded);
+        let mut spacing = self.spacing_of(wanted, fine.is_some());
+        if let Some((fine, wall)) = fine.zip(self.thinnest()) {
+            // Halves of it, as bisection makes them, fit the wall.
+            let fit = SNUG * wall.thickness / fine;
+            spacing = fit * 2f64.powf((spacing / fit).log2().round().max(0.0));
+        }
         let mut best: Option<(f64, Attempt, f64)> = None;
         let mut failed = StuffError::Empty(spacing);
         for _ in 0..TRIES {
-            let found = match self.attempt(spacing, graded) {
+            let found = match self.attempt(spacing, fine) {
                 Ok(found) => found,
                 Err(error) => {
                     failed = error;

@@ -35,6 +35,7 @@ mod region;
 mod repair;
 mod self_crossing;
 mod sets;
+mod solid;
 mod surface_files;
 mod surface_repair;
 mod tetgen;

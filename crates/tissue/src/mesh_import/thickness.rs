@@ -9,6 +9,8 @@ const SAMPLES: f64 = 16_000.0;
 /// A ball that touches at two places less than this apart, seen from its centre, lies in an edge of
 /// the body, not in a wall: the cosine of 120 degrees.
 const OPPOSITE: f64 = -0.5;
+/// And beyond 160 degrees it lies in a wall whose sides are nearly parallel.
+const ACROSS: f64 = -0.94;
 /// Steps in which a ball shrinks.
 const STEPS: usize = 12;
 /// The part of its radius by which a ball may reach through the surface: the first one, from the
@@ -23,6 +25,8 @@ pub struct Sample {
     pub inward: [f64; 3],
     /// Diameter of the ball, mm; infinite in the body's edges.
     pub thickness: f64,
+    /// Whether the ball touches on opposite sides, as in walls and necks; in a rim that tapers off it does not.
+    pub is_wall: bool,
     /// The part of the surface that the sample stands for, mm².
     pub area: f64,
 }
@@ -46,7 +50,10 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
 pub fn samples(surface: &RawSurface, field: &SurfaceDistance) -> Vec<Sample> {
     let mut places = places(surface);
     places.par_iter_mut().for_each(|sample| {
-        sample.thickness = ball(field, sample.at, sample.inward).unwrap_or(f64::INFINITY);
+        if let Some((thickness, cosine)) = ball(field, sample.at, sample.inward) {
+            sample.thickness = thickness;
+            sample.is_wall = cosine <= ACROSS;
+        }
     });
     places
 }
@@ -81,6 +88,7 @@ fn places(surface: &RawSurface) -> Vec<Sample> {
                 at,
                 inward,
                 thickness: f64::INFINITY,
+                is_wall: false,
                 area: own,
             });
         };
@@ -100,8 +108,9 @@ fn places(surface: &RawSurface) -> Vec<Sample> {
     places
 }
 
-/// Diameter of the largest ball inside that touches the surface at `at`; none in an edge of the body.
-fn ball(field: &SurfaceDistance, at: [f64; 3], inward: [f64; 3]) -> Option<f64> {
+/// Diameter of the largest ball inside that touches the surface at `at`, and the cosine of the angle between the places where it
+/// touches, from its centre; none in an edge of the body.
+fn ball(field: &SurfaceDistance, at: [f64; 3], inward: [f64; 3]) -> Option<(f64, f64)> {
     let through = field.along(at, inward)?;
     let mut radius = 0.5 * through;
     // Where it touches besides `at`.
@@ -124,5 +133,5 @@ fn ball(field: &SurfaceDistance, at: [f64; 3], inward: [f64; 3]) -> Option<f64> 
         (radius, touched) = (smaller, nearest);
     }
     let cosine = -dot(minus(touched, centre(radius)), inward) / radius;
-    (cosine <= OPPOSITE).then_some(radius + clear)
+    (cosine <= OPPOSITE).then_some((radius + clear, cosine))
 }

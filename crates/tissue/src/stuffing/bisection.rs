@@ -5,7 +5,7 @@
 //! between two sizes is of two more shapes, so angles stay bounded (Maubach 1995 for the bisection;
 //! Labelle and Shewchuk, section 5, reach the same shapes through an octree).
 
-use super::lattice::{Lattice, UNITS};
+use super::lattice::{Lattice, MOST_NODES, UNITS};
 use super::{Field, StuffError};
 use std::collections::HashMap;
 
@@ -59,6 +59,9 @@ pub fn refine(
         let tet = lattice.tets[next];
         let (length2, edge) = longest(lattice, tet);
         let corners = tet.map(|node| lattice.positions[node as usize]);
+        if lattice.values.len() as f64 > MOST_NODES {
+            return Err(StuffError::TooLarge(lattice.values.len() as u64, spacing));
+        }
         if length2 >= SHORTEST.pow(2) && too_large(corners, (length2 as f64).sqrt() * unit) {
             bisect(lattice, &mut edges, field, edge)?;
         } else {

@@ -1,7 +1,7 @@
 //! Fields that can be stuffed: signed distances on a voxel grid, and half spaces to cut them by.
 
 /// A continuous scalar field, positive inside the body.
-pub trait Field {
+pub trait Field: Sync {
     /// Value at `point`, in the unit of length of the positions.
     fn value(&self, point: [f64; 3]) -> f64;
     /// A box `(low, high)` that holds every point where the field is positive.

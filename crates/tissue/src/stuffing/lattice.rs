@@ -5,6 +5,8 @@
 //! therefore listed one by one.
 
 use super::{Field, StuffError};
+use rayon::prelude::*;
+use std::collections::HashMap;
 
 /// Safe warp distances as fractions of an edge's length, for edges along an axis (they join nodes of
 /// one cubic grid: long) and for all others (short).
@@ -12,7 +14,7 @@ const ALPHA_LONG: f64 = 0.24999;
 const ALPHA_SHORT: f64 = 0.41189;
 
 /// Nodes of a lattice, at most: about a gigabyte.
-const MOST_NODES: f64 = 16e6;
+pub const MOST_NODES: f64 = 16e6;
 
 /// Bisection steps of a cut point; below the rounding of an f32 position.
 const BISECTIONS: usize = 40;
@@ -32,6 +34,10 @@ pub struct Lattice {
     /// Position of each node, after the warp.
     pub positions: Vec<[f64; 3]>,
     pub tets: Vec<[u32; 4]>,
+    /// Where the field is 0 on edges between nodes that have not moved; made by the warp.
+    cuts: HashMap<[u32; 2], [f64; 3]>,
+    /// For a distance, whose zeros a few steps along an edge find.
+    pub is_distance: bool,
 }
 
 /// A uniform lattice's cubes.
@@ -103,6 +109,10 @@ impl Cubes {
     }
 }
 
+fn not_finite(value: f64, [x, y, z]: [f64; 3]) -> StuffError {
+    StuffError::NotFinite { value, x, y, z }
+}
+
 impl Lattice {
     /// Samples the field at every lattice node of its bounds, with a margin of a cube, and keeps the
     /// tetrahedra for which `keep` is true of their nodes' values.
@@ -126,9 +136,20 @@ impl Lattice {
             values: Vec::new(),
             positions: Vec::new(),
             tets: Vec::new(),
+            cuts: HashMap::new(),
+            is_distance: false,
         };
-        for node in 0..2 * cubes.count() {
-            lattice.add(field, cubes.half_coordinates(node).map(|h| UNITS * h))?;
+        let nodes = (0..2 * cubes.count()).into_par_iter();
+        let coordinates = nodes.map(|node| cubes.half_coordinates(node).map(|h| UNITS * h));
+        lattice.coordinates = coordinates.collect();
+        lattice.positions = (lattice.coordinates.iter())
+            .map(|&at| lattice.position(at))
+            .collect();
+        lattice.values = (lattice.positions.par_iter())
+            .map(|&at| field.value(at))
+            .collect();
+        if let Some(bad) = lattice.values.iter().position(|value| !value.is_finite()) {
+            return Err(not_finite(lattice.values[bad], lattice.positions[bad]));
         }
         let values = &lattice.values;
         cubes.for_each_tet(|tet| {
@@ -141,16 +162,20 @@ impl Lattice {
 
     /// Adds a node.
     pub fn add(&mut self, field: &impl Field, coordinates: [i64; 3]) -> Result<u32, StuffError> {
-        let unit = self.spacing / (2 * UNITS) as f64;
-        let [x, y, z] = coordinates.map(|h| h as f64 * unit);
-        let value = field.value([x, y, z]);
+        let position = self.position(coordinates);
+        let value = field.value(position);
         if !value.is_finite() {
-            return Err(StuffError::NotFinite { value, x, y, z });
+            return Err(not_finite(value, position));
         }
         self.coordinates.push(coordinates);
         self.values.push(value);
-        self.positions.push([x, y, z]);
+        self.positions.push(position);
         Ok(self.values.len() as u32 - 1)
+    }
+
+    fn position(&self, coordinates: [i64; 3]) -> [f64; 3] {
+        let unit = self.spacing / (2 * UNITS) as f64;
+        coordinates.map(|h| h as f64 * unit)
     }
 
     /// Squared length of an edge before the warp, in units.
@@ -160,9 +185,12 @@ impl Lattice {
     }
 
     /// Where the field changes sign on the edge between two nodes that have not moved.
-    /// Independent of the order of the ends.
-    pub fn cut(&self, field: &impl Field, one: usize, other: usize) -> [f64; 3] {
-        let (a, b) = (one.min(other), one.max(other));
+    pub fn cut(&self, one: usize, other: usize) -> [f64; 3] {
+        let edge = [one.min(other), one.max(other)];
+        self.cuts[&edge.map(|node| node as u32)]
+    }
+
+    fn find_cut(&self, field: &impl Field, [a, b]: [usize; 2]) -> [f64; 3] {
         let (from, to) = (self.positions[a], self.positions[b]);
         let at = |t: f64| {
             [
@@ -171,6 +199,11 @@ impl Lattice {
                 from[2] + t * (to[2] - from[2]),
             ]
         };
+        if self.is_distance {
+            return at(false_position(self.values[a], self.values[b], |t| {
+                field.value(at(t))
+            }));
+        }
         let rising = self.values[a] < 0.0;
         let (mut low, mut high) = (0.0, 1.0);
         for _ in 0..BISECTIONS {
@@ -217,6 +250,11 @@ impl Lattice {
     /// A moved node has value 0, so the cut points of its edges are gone for the nodes after it.
     pub fn warp(&mut self, field: &impl Field) {
         let edges = self.cut_edges();
+        let once = edges.par_iter().filter(|(a, b)| a < b);
+        self.cuts = once
+            .map(|&(a, b)| ([a, b], self.find_cut(field, [a as usize, b as usize])))
+            .collect();
+        let shortest = self.shortest_edges();
         for own in edges.chunk_by(|one, other| one.0 == other.0) {
             let node = own[0].0 as usize;
             let value = self.values[node];
@@ -231,8 +269,9 @@ impl Lattice {
                 if value * self.values[neighbour] >= 0.0 {
                     continue;
                 }
-                let reach = self.reach(node, neighbour);
-                let cut = self.cut(field, node, neighbour);
+                let most = ALPHA_SHORT * self.spacing * shortest[node];
+                let reach = self.reach(node, neighbour).min(most);
+                let cut = self.cut(node, neighbour);
                 let distance = (0..3)
                     .map(|axis| (cut[axis] - origin[axis]).powi(2))
                     .sum::<f64>()
@@ -249,6 +288,23 @@ impl Lattice {
         }
     }
 
+    /// Length of the shortest edge of each node before the warp, over the spacing. It matters where sizes change.
+    fn shortest_edges(&self) -> Vec<f64> {
+        let mut shortest = vec![i64::MAX; self.values.len()];
+        for tet in &self.tets {
+            for &a in tet {
+                for &b in tet {
+                    if a != b {
+                        let length2 = self.length2(a as usize, b as usize);
+                        shortest[a as usize] = shortest[a as usize].min(length2);
+                    }
+                }
+            }
+        }
+        let length = |length2: i64| (length2 as f64).sqrt() / (2 * UNITS) as f64;
+        shortest.into_iter().map(length).collect()
+    }
+
     /// How far a node may move along an edge, mm.
     fn reach(&self, node: usize, neighbour: usize) -> f64 {
         let (from, to) = (self.coordinates[node], self.coordinates[neighbour]);
@@ -257,4 +313,25 @@ impl Lattice {
         let alpha = if axes == 1 { ALPHA_LONG } else { ALPHA_SHORT };
         alpha * (self.spacing * length)
     }
+}
+
+/// Where a function of [0, 1] with these ends is 0, by false position with halved weights (the Illinois rule).
+fn false_position(start: f64, end: f64, value: impl Fn(f64) -> f64) -> f64 {
+    let (mut low, mut high) = ((0.0, start), (1.0, end));
+    let small = 1e-9 * (start - end).abs();
+    for _ in 0..BISECTIONS {
+        let t = (low.0 * high.1 - high.0 * low.1) / (high.1 - low.1);
+        let found = value(t);
+        if found.abs() <= small || high.0 - low.0 < 1e-10 {
+            return t;
+        }
+        if (found < 0.0) == (low.1 < 0.0) {
+            low = (t, found);
+            high.1 *= 0.5;
+        } else {
+            high = (t, found);
+            low.1 *= 0.5;
+        }
+    }
+    0.5 * (low.0 + high.0)
 }

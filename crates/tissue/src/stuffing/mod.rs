@@ -87,6 +87,7 @@ pub fn stuff_graded(
     let mut lattice = Lattice::sample(field, spacing, |values| {
         values.iter().any(|&x| x > -spacing)
     })?;
+    lattice.is_distance = true;
     bisection::refine(&mut lattice, field, spacing, too_large)?;
     fill(lattice, field, spacing, true)
 }

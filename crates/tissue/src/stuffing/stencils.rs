@@ -10,15 +10,14 @@ use crate::mesh_quality::dihedral_angles;
 use std::collections::HashMap;
 
 /// Output nodes: lattice nodes and cut points that some tetrahedron uses, in order of first use.
-struct Nodes<'a, F> {
+struct Nodes<'a> {
     lattice: &'a Lattice,
-    field: &'a F,
     of_node: HashMap<usize, u32>,
     of_edge: HashMap<(usize, usize), u32>,
     out: Stuffed,
 }
 
-impl<F: Field> Nodes<'_, F> {
+impl Nodes<'_> {
     fn node(&mut self, node: usize) -> u32 {
         *self.of_node.entry(node).or_insert_with(|| {
             self.out.positions.push(self.lattice.positions[node]);
@@ -29,7 +28,7 @@ impl<F: Field> Nodes<'_, F> {
     fn cut(&mut self, inside: usize, outside: usize) -> u32 {
         let edge = (inside.min(outside), inside.max(outside));
         *self.of_edge.entry(edge).or_insert_with(|| {
-            let point = self.lattice.cut(self.field, inside, outside);
+            let point = self.lattice.cut(inside, outside);
             self.out.positions.push(point);
             self.out.positions.len() as u32 - 1
         })
@@ -122,7 +121,6 @@ fn between_sheets(lattice: &Lattice, field: &impl Field, tet: [u32; 4]) -> bool 
 pub fn fill(lattice: &Lattice, field: &impl Field, thin: bool) -> Stuffed {
     let mut nodes = Nodes {
         lattice,
-        field,
         of_node: HashMap::new(),
         of_edge: HashMap::new(),
         out: Stuffed::default(),
@@ -149,7 +147,7 @@ pub fn fill(lattice: &Lattice, field: &impl Field, thin: bool) -> Stuffed {
     nodes.out
 }
 
-fn replace<F: Field>(nodes: &mut Nodes<F>, inside: &[usize], zero: &[usize], outside: &[usize]) {
+fn replace(nodes: &mut Nodes<'_>, inside: &[usize], zero: &[usize], outside: &[usize]) {
     let lattice = nodes.lattice;
     match (inside, outside) {
         (_, []) => {
