@@ -5,7 +5,9 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use tissue::mesh::Mesh;
-use tissue::mesh_import::{ImportOptions, Region, import, nodes_in, read_labels, tets_in};
+use tissue::mesh_import::{
+    ImportOptions, Region, faces_in, import, nodes_in, read_labels, tets_in,
+};
 
 /// Corners of a cube of 10 mm; the first four are its floor.
 const CORNERS: [[f64; 3]; 8] = [
@@ -120,6 +122,15 @@ fn both_become_the_same_cube_and_keep_their_sets() {
     let path = folder.path().join("cube.inp");
     let mesh = read(&path);
     assert_eq!(tets_in(&mesh, &open("group:both halves", &path)).len(), 6);
+    // A set of tetrahedra has their nodes and the faces of the surface that are theirs.
+    let half = TETS[..3].iter().flatten();
+    let mut nodes: Vec<u32> = half.map(|&node| node as u32).collect();
+    nodes.sort_unstable();
+    nodes.dedup();
+    assert_eq!(nodes_in(&mesh, &[open("group:lower", &path)]), nodes);
+    let lower = faces_in(&mesh, &[open("group:lower", &path)]);
+    let upper = faces_in(&mesh, &[open("not:group:lower", &path)]);
+    assert_eq!((lower.len(), upper.len()), (6, 6));
     let path = folder.path().join("cube.feb");
     assert_eq!(tets_in(&mesh, &open("group:some", &path)), [1, 4]);
 }

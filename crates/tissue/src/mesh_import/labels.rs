@@ -224,6 +224,11 @@ impl Group {
         self.points.get(node as usize).copied().unwrap_or(false)
     }
 
+    /// Whether it has tetrahedra.
+    pub fn has_tets(&self) -> bool {
+        !self.cells.is_empty()
+    }
+
     /// Whether a tetrahedron with this centroid, mm, belongs to it.
     pub fn holds_tet(&self, centroid: [f64; 3]) -> bool {
         let [x, y, z] = key(centroid);

@@ -1,10 +1,11 @@
 //! A part of a body by which nodes, faces and tetrahedra are chosen: a ball, a half-space, the inside of another closed surface,
 //! a part that the mesh's file names.
 
-use super::labels::Group;
+use super::labels::{Group, sorted};
 use super::{Ball, ImportError, SurfaceDistance, closed_surface, surface_files};
 use crate::mesh::{Mesh, face_centroid};
 use crate::stuffing::Field;
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
@@ -141,13 +142,44 @@ impl Opened {
         }
     }
 
-    /// Whether each node belongs to it. A group has the nodes of its faces, and those whose own corner in the file it names.
+    /// Whether each face of the surface belongs to it, by its centroid. A group has the faces of its tetrahedra too.
+    fn faces(&self, mesh: &Mesh) -> Vec<bool> {
+        let by_centroid = |region: &Self| -> Vec<bool> {
+            let centroid = |&face: &[u32; 3]| face_centroid(&mesh.positions, face);
+            let holds = |face: &[u32; 3]| region.holds(centroid(face), Kind::Face);
+            mesh.surface.iter().map(holds).collect()
+        };
+        match self {
+            Self::Not(region) => region.faces(mesh).iter().map(|held| !held).collect(),
+            Self::Group(group) if group.has_tets() => {
+                let own: HashSet<[u32; 3]> = (tets_in(mesh, self).into_iter())
+                    .flat_map(|row| {
+                        let [a, b, c, d] = mesh.tets[row];
+                        [[a, b, c], [a, b, d], [a, c, d], [b, c, d]].map(sorted)
+                    })
+                    .collect();
+                let flags = by_centroid(self).into_iter().zip(&mesh.surface);
+                flags
+                    .map(|(held, &face)| held || own.contains(&sorted(face)))
+                    .collect()
+            }
+            region => by_centroid(region),
+        }
+    }
+
+    /// Whether each node belongs to it. A group has the nodes of its faces and tetrahedra, and those whose own corner in the file it
+    /// names.
     fn nodes(&self, mesh: &Mesh) -> Vec<bool> {
         let positions = || mesh.positions.iter().map(|p| p.map(f64::from));
         match self {
             Self::Not(region) => region.nodes(mesh).iter().map(|held| !held).collect(),
             Self::Group(group) => {
                 let mut flags = vec![false; mesh.node_count()];
+                if group.has_tets() {
+                    let tets = tets_in(mesh, self).into_iter();
+                    tets.flat_map(|row| mesh.tets[row])
+                        .for_each(|node| flags[node as usize] = true);
+                }
                 for &face in &mesh.surface {
                     let whole = group.holds_by_face(face_centroid(&mesh.positions, face));
                     for node in face.map(|node| node as usize) {
@@ -170,13 +202,12 @@ pub fn nodes_in(mesh: &Mesh, regions: &[Opened]) -> Vec<u32> {
         .collect()
 }
 
-/// Rows of `surface` with their centroid in any of the regions, ascending.
+/// Rows of `surface` in any of the regions, ascending.
 pub fn faces_in(mesh: &Mesh, regions: &[Opened]) -> Vec<u32> {
-    let holds = |&row: &u32| {
-        let point = face_centroid(&mesh.positions, mesh.surface[row as usize]);
-        regions.iter().any(|region| region.holds(point, Kind::Face))
-    };
-    (0..mesh.surface.len() as u32).filter(holds).collect()
+    let flags: Vec<Vec<bool>> = regions.iter().map(|region| region.faces(mesh)).collect();
+    (0..mesh.surface.len() as u32)
+        .filter(|&row| flags.iter().any(|flags| flags[row as usize]))
+        .collect()
 }
 
 /// Rows of `tets` with their centroid in the region, ascending.
