@@ -111,6 +111,15 @@ impl Error {
         }
     }
 
+    /// What ONNX Runtime said, as `or`, or as lack of memory where it said so.
+    pub(crate) fn of_onnx(text: String, or: impl FnOnce(String) -> Self) -> Self {
+        let memory = ["std::bad_alloc", "Failed to allocate memory"];
+        match memory.iter().any(|said| text.contains(said)) {
+            true => Error::OutOfMemory(format!("ONNX Runtime: {text}")),
+            false => or(text),
+        }
+    }
+
     pub(crate) fn bundle(file: impl Into<String>, message: impl Into<String>) -> Self {
         Error::Bundle {
             file: file.into(),
@@ -123,5 +132,18 @@ impl Error {
             path: path.into(),
             cause: cause.to_string(),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lack_of_memory_that_onnx_runtime_tells_is_lack_of_memory() {
+        let told = |text: &str| Error::of_onnx(text.into(), Error::Provider).status();
+        let cpu = "cpu: Exception during initialization: std::bad_alloc";
+        assert_eq!(told(cpu), crate::ffi::UPT_ERR_OUT_OF_MEMORY);
+        assert_eq!(told("cpu: no such operator"), crate::ffi::UPT_ERR_PROVIDER);
     }
 }

@@ -33,6 +33,11 @@
 //!
 //! The guide is `docs/guide/rust.md` of the repository; the C ABI, with all of the rules, is `docs/reference/abi.md`.
 
+/// The guide's program is compiled with the tests.
+#[cfg(all(doctest, feature = "contact"))]
+#[doc = include_str!("../docs/guide/rust.md")]
+struct Guide;
+
 #[cfg(feature = "ndarray")]
 mod arrays;
 #[cfg(feature = "haptics")]

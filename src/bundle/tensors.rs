@@ -19,6 +19,12 @@ pub struct TensorFile {
 impl TensorFile {
     /// Parses the header; `name` is for messages.
     pub fn parse(name: &str, bytes: Vec<u8>) -> Result<TensorFile> {
+        // The library's lists of the header's entries cannot fail softly: what they take at most is asked for first.
+        let stated = bytes
+            .first_chunk()
+            .map_or(0, |length| u64::from_le_bytes(*length));
+        let header = usize::try_from(stated).map_or(bytes.len(), |stated| stated.min(bytes.len()));
+        memory::probe(8 * header, "the header of a file")?;
         let (header, metadata) = SafeTensors::read_metadata(&bytes)
             .map_err(|error| Error::bundle(name, format!("not a safetensors file: {error}")))?;
         let start = header + 8;

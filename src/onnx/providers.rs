@@ -92,7 +92,10 @@ impl ProviderPlan {
         } else {
             ""
         };
-        Err(Error::Provider(format!("{}{note}", list.join("; "))))
+        Err(Error::of_onnx(
+            format!("{}{note}", list.join("; ")),
+            Error::Provider,
+        ))
     }
 
     /// What a bundle without any graph runs on: the CPU, if the list allows it.

@@ -10,6 +10,7 @@ use ort::logging::LogLevel;
 use super::locate;
 use super::version::version_of;
 use crate::error::{Error, Result};
+use crate::memory;
 
 /// The loaded library.
 pub struct Runtime {
@@ -81,7 +82,12 @@ impl Runtime {
     }
 }
 
+/// What the library takes while it makes its environment. Where that fails half way it cannot be made again in this process, so the room is
+/// asked for first.
+const ROOM: usize = 16 << 20;
+
 fn load(explicit: Option<&Path>) -> Result<Runtime> {
+    memory::probe(ROOM, "ONNX Runtime")?;
     let mut tried = Vec::new();
     for (path, why) in locate::candidates(explicit) {
         if path.is_absolute() && !path.exists() {
@@ -98,13 +104,14 @@ fn load(explicit: Option<&Path>) -> Result<Runtime> {
             )),
         }
     }
-    Err(Error::Runtime(format!(
+    let problem = format!(
         "no usable library (version 1.{} or newer); tried {}. Put {} into the folder of libupt, set ORT_DYLIB_PATH, \
          or fetch it with `cargo xtask ort`",
         ort::MINOR_VERSION,
         tried.join("; "),
         locate::plain_name()
-    )))
+    );
+    Err(Error::of_onnx(problem, Error::Runtime))
 }
 
 /// Microsoft's builds of ONNX Runtime from 1.29 on write a device identifier and upload a process event while the

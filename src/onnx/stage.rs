@@ -54,6 +54,11 @@ pub struct Stage {
     file: String,
 }
 
+/// What a graph's run or its copies failed with.
+fn failed(file: &str, cause: &dyn std::fmt::Display) -> Error {
+    Error::of_onnx(format!("{file}: {cause}"), Error::Runtime)
+}
+
 impl Stage {
     /// Input `index`, to be written before a run.
     pub fn input(&mut self, index: usize) -> &mut [f32] {
@@ -106,7 +111,7 @@ impl Stage {
     }
 
     fn failed(&self, cause: impl std::fmt::Display) -> Error {
-        Error::Runtime(format!("{}: {cause}", self.file))
+        failed(&self.file, &cause)
     }
 
     fn upload(&mut self) -> Result<()> {
@@ -116,7 +121,7 @@ impl Stage {
                 for input in &self.inputs {
                     self.binding
                         .bind_input(input.name.as_str(), &input.host)
-                        .map_err(|error| Error::Runtime(format!("{}: {error}", self.file)))?;
+                        .map_err(|error| failed(&self.file, &error))?;
                 }
                 self.binding
                     .synchronize_inputs()
@@ -126,7 +131,7 @@ impl Stage {
                 for input in &mut self.inputs {
                     if let Some(device) = &mut input.device {
                         copy(self.runtime, &input.host, device)
-                            .map_err(|error| Error::Runtime(format!("{}: {error}", self.file)))?;
+                            .map_err(|error| failed(&self.file, &error))?;
                     }
                 }
                 Ok(())
@@ -153,7 +158,7 @@ impl Stage {
         for output in &mut self.outputs {
             if let Some(device) = &output.device {
                 copy(self.runtime, device, &mut output.host)
-                    .map_err(|error| Error::Runtime(format!("{}: {error}", self.file)))?;
+                    .map_err(|error| failed(&self.file, &error))?;
             }
         }
         Ok(())

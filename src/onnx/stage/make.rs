@@ -98,7 +98,7 @@ impl Stage {
         choice: ProviderChoice,
     ) -> Result<Stage> {
         tensors.check(file, &session)?;
-        let failed = |error: &dyn std::fmt::Display| Error::Runtime(format!("{file}: {error}"));
+        let failed = |error: &dyn std::fmt::Display| super::failed(file, error);
         let buffers = |list: &[(&str, &[usize])]| {
             list.iter()
                 .map(|(name, shape)| {
