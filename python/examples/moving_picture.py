@@ -1,5 +1,6 @@
 """The moving picture of the README: a tool presses a brain, slides, and lets go.
 
+    pip install "./python[examples]"
     python python/examples/moving_picture.py --bundle onnx/brain-reduced --out docs/images/pressed-brain.gif
 
 A frame is a step of the model (50 ms), so the picture runs in real time. NumPy and Pillow draw it: faces are sorted by

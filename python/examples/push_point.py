@@ -1,5 +1,6 @@
 """A Gymnasium environment: move a point inside the tissue to a place with a ball that presses on the surface.
 
+    pip install "./python[examples]"
     python python/examples/push_point.py --bundle onnx/brain-coarse-reduced
 
 plays the environment with a random policy and with a linear one that it learns by the cross-entropy method

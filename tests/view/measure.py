@@ -2,7 +2,7 @@
 
     python3 tests/view/measure.py --bundle onnx/brain-reduced --markdown docs/guide/view.md
 
-The mouse presses the middle of the page and strokes to and fro, with an event every 8 ms as most mice send them; each
+The mouse presses the middle of the organ and strokes to and fro, with an event every 8 ms as most mice send them; each
 counts. A picture is there when its last pixel is drawn (`whenDrawn` of drawing.js); the event's own time counts.
 Without a graphics card Chromium draws by the processor, so that page, library and drawing share the same cores.
 `--markdown` writes the table between the marks.
@@ -29,7 +29,7 @@ SPEED = 250.0  # of the mouse, pixels a second
 # What the page counts: pictures, those with a new frame, steps; and a number a picture or event.
 COUNTS = ["drawn", "shown", "steps"]
 LISTS = ["latency", "intervals", "made", "stepTimes", "forces"]
-# Where the stroke turns, from the middle of the page.
+# Where the stroke turns, from the middle of the organ.
 CORNERS = [(4, 0), (25, 10), (40, 0), (15, -10), (-15, 0)]
 
 
@@ -64,7 +64,7 @@ def processor_seconds(root: int) -> dict[str, float]:
 
 
 def way(seconds: float) -> tuple[float, float]:
-    """Where the mouse is after so many seconds, from the middle of the page."""
+    """Where the mouse is after so many seconds, from the middle of the organ."""
     corners = [*CORNERS, CORNERS[0]]
     lengths = [math.dist(a, b) for a, b in pairwise(corners)]
     left = (SPEED * seconds) % sum(lengths)
@@ -77,8 +77,7 @@ def way(seconds: float) -> tuple[float, float]:
 
 def stroke(browser: Browser, seconds: float) -> dict:
     """Drags for so long and returns what the page counted meanwhile."""
-    width, height = browser.run("return [innerWidth, innerHeight]")
-    x, y = width // 2, height // 2
+    x, y = browser.run("return uptView.middle")
     mouse = browser.mouse()
     mouse.event("mousePressed", x + CORNERS[0][0], y + CORNERS[0][1])
     browser.wait("uptView.contacts > 0")

@@ -251,8 +251,7 @@ def a_drag_moves_the_surface(browser: Browser, bundle: str):
         browser.open(f"http://127.0.0.1:{port}/?token={token}")
         browser.wait("window.uptView && uptView.shown > 10")
         browser.screenshot(str(PICTURES / f"{bundle}-rest.png"))
-        width, height = browser.run("return [innerWidth, innerHeight]")
-        x, y = width // 2, height // 2
+        x, y = browser.run("return uptView.middle")
         browser.click("#record")
         browser.wait("uptView.recording")
         browser.drag([(x, y), (x + 10, y), (x + 30, y + 10)], release=False)

@@ -142,8 +142,10 @@ pub(super) fn write(plan: &Plan, made: &Made) -> Result<serde_json::Value> {
     };
     std::fs::write(plan.out.join("tools.html"), page::page(&page))?;
     let made = format!(
-        "{lead} {} ({} cores, {} thread), {date}.",
-        machine.cpu, machine.cores, plan.threads
+        "{lead} {} ({}, {}), {date}.",
+        machine.cpu,
+        counted(machine.cores, "core"),
+        counted(plan.threads as usize, "thread")
     );
     for path in plan.markdown {
         let cases = match header.boundary.as_str() {

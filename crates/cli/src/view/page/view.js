@@ -335,8 +335,9 @@ function lookBesidePanel(width, height) {
   const taken = at("panel").getBoundingClientRect().right;
   const free = width - taken > 0.4 * width ? width - taken : width;
   camera.aspect = width / height;
-  // As much is seen of the free part's width as of its height at most: a narrow part looks from farther away.
-  camera.zoom = Math.min(1, free / height);
+  // A narrow part shows the organ smaller: at the start it is about as wide as the page is high.
+  camera.zoom = Math.min(1, free / (1.05 * height));
+  status.middle = [Math.round(width - free / 2), Math.round(height / 2)];
   camera.setViewOffset(width, height, (free - width) / 2, 0, width, height);
   camera.updateProjectionMatrix();
 }
