@@ -165,3 +165,18 @@ fn other_data_sets_and_cells_are_named() {
         assert!(error.contains(wanted) && error.contains(name), "{error}");
     }
 }
+
+#[test]
+fn quadratic_tetrahedra_are_read_by_their_corners() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("quadratic.vtk");
+    let text = "# vtk DataFile Version 3.0\nx\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 10 float\n0 0 0 8 0 0 0 8 0 0 0 8 4 0 0 4 4 0 0 4 0 \
+                0 0 4 4 0 4 0 4 4\nCELLS 1 11\n10 0 1 2 3 4 5 6 7 8 9\nCELL_TYPES 1\n24\n";
+    std::fs::write(&path, text).unwrap();
+    let imported = import(&path, &ImportOptions::default()).unwrap();
+    assert_eq!(
+        (imported.mesh.node_count(), imported.mesh.tets.len()),
+        (4, 1)
+    );
+    assert!(imported.repairs[0].what.contains("higher order"));
+}
