@@ -18,7 +18,6 @@ use crate::bundle::{BundleFiles, Manifest, ManifestKind, Mesh};
 use crate::corrections::Corrections;
 use crate::error::Result;
 use crate::library::{self, Alive};
-use crate::memory;
 use crate::onnx::{ProviderChoice, ProviderPlan, Runtime};
 use crate::options::{IndexSet, ModelOptions, Precision, Provider};
 use crate::prior::PriorTable;
@@ -244,7 +243,7 @@ impl Model {
             &mesh.held_nodes,
             ::contact::SPACING_MM,
         );
-        let made = Arc::new(memory::tried(made, "the samples of the surface")?);
+        let made = Arc::new(crate::memory::tried(made, "the samples of the surface")?);
         Ok(Arc::clone(self.samples.get_or_init(|| made)))
     }
 
