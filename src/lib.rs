@@ -5,7 +5,8 @@
 //! of the instruments, and gives the next displacement, `u[t+dt] = M(u[t], c[t])`.
 //! Lengths are mm, forces mN, fields row-major `[K,3]` float32.
 //!
-//! ```
+#![cfg_attr(feature = "contact", doc = "```")]
+#![cfg_attr(not(feature = "contact"), doc = "```ignore")]
 //! use std::path::Path;
 //! use upt::{Contact, IndexSet, Model, ModelOptions, Scene, SceneOptions, Shape, StepInput, Tool};
 //!
