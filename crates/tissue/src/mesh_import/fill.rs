@@ -16,6 +16,8 @@ const LEAST_SHARE: f64 = 0.97;
 const FINER: [f64; 3] = [FINE, 2.0, 3.0];
 /// Dihedral angles, degrees, from which on a mesh is fit for simulation.
 const SOUND_DEG: f64 = 5.0;
+/// Tunnels that a mesh may have and its surface not, where the body is not thin: two places that nearly touch.
+const FEW_HOLES: i64 = 2;
 /// Bisection goes down to this part of the spacing.
 const FINEST: f64 = 1.0 / 16.0;
 /// Node counts within this part of the wanted one are accepted; within the second without a word.
@@ -39,6 +41,8 @@ struct Attempt {
     share: f64,
     /// As many tunnels and gaps as the surface.
     whole: bool,
+    /// Tunnels that the surface does not have.
+    holes: i64,
     /// No slivers.
     sound: bool,
 }
@@ -91,8 +95,8 @@ impl Solid {
     fn attempt(&self, spacing: f64, fine: Option<f64>) -> Result<Attempt, StuffError> {
         if let Some(fine) = fine {
             let walls = Walls::of(&self.samples, fine, spacing);
-            self.judged(stuff_graded(&self.field, spacing, |corners, longest| {
-                longest > FINEST * spacing && walls.finer_than(&corners, longest)
+            self.judged(stuff_graded(&self.field, spacing, |corners, size| {
+                size > FINEST * spacing && walls.finer_than(&corners, size)
             })?)
         } else {
             self.judged(stuff_graded(&self.field, spacing, |_, _| false)?)
@@ -108,10 +112,11 @@ impl Solid {
         let volume = made.tets.iter().map(volume6).sum::<f64>() / 6.0;
         let sound = |angle: &f64| (SOUND_DEG..180.0 - SOUND_DEG).contains(angle);
         let sound = |tet: &[u32; 4]| dihedral_angles(corners(tet)).iter().all(sound);
-        let whole = characteristic(&boundary(&made)) == self.euler;
+        let less = self.euler - characteristic(&boundary(&made));
         Ok(Attempt {
             share: volume / self.volume,
-            whole,
+            whole: less == 0,
+            holes: less / 2,
             sound: made.tets.iter().all(sound),
             made,
         })
@@ -225,6 +230,7 @@ impl Solid {
     fn passable(&self, attempt: &Attempt, spacing: f64) -> bool {
         attempt.share >= LEAST_SHARE
             && attempt.sound
+            && attempt.holes <= FEW_HOLES
             && self.thinner_than(1.3 * spacing) < 0.2 * self.volume
     }
 
@@ -245,9 +251,10 @@ impl Solid {
         let wanted = wanted as f64;
         let mut spacing = self.spacing_of(wanted, fine.is_some());
         if let Some((fine, wall)) = fine.zip(self.thinnest()) {
-            // Halves of it, as bisection makes them, fit the wall.
+            // Bisected some times, which each time makes it a third of an octave smaller, it fits the wall.
             let fit = SNUG * wall.thickness / fine;
-            spacing = fit * 2f64.powf((spacing / fit).log2().round().max(0.0));
+            let steps = (3.0 * (spacing / fit).log2()).round().max(0.0);
+            spacing = fit * 2f64.powf(steps / 3.0);
         }
         let mut best: Option<(f64, Attempt, f64)> = None;
         let mut failed = StuffError::Empty(spacing);

@@ -7,6 +7,8 @@ use super::{ImportError, RawSurface, SurfaceDistance, closed_surface};
 pub const FINE: f64 = 1.05;
 /// A lattice has two nodes a cube, and so many more a square of the surface.
 const NODES_A_SQUARE: f64 = 1.35;
+/// Where a lattice is finer it has so many times the nodes of a uniform one: what is finer reaches beyond the wall.
+const BISECTED: f64 = 2.0;
 /// The part of the surface that may be thinner than what is called the thinnest place: strays in walls,
 /// and sharp rims, which are infinitely thin.
 const STRAY: f64 = 3e-4;
@@ -55,8 +57,10 @@ impl Solid {
         for sample in self.samples.iter().filter(|_| graded) {
             let fine = sample.thickness.max(self.rim) / FINE;
             if fine < spacing {
-                nodes += 0.5 * sample.area * sample.thickness * (density(fine) - density(spacing));
-                nodes += NODES_A_SQUARE * sample.area * (fine.powi(-2) - spacing.powi(-2));
+                let within = 0.5 * sample.area * sample.thickness;
+                nodes += BISECTED * within * (density(fine) - density(spacing));
+                let squares = fine.powi(-2) - spacing.powi(-2);
+                nodes += BISECTED * NODES_A_SQUARE * sample.area * squares;
             }
         }
         nodes
@@ -78,7 +82,7 @@ impl Solid {
 
     /// The coarsest spacing at which flat faces still hold a round body's volume.
     pub fn coarsest(&self) -> f64 {
-        0.15 * self.volume.cbrt()
+        0.13 * self.volume.cbrt()
     }
 
     /// The thinnest wall or neck, or where there is none the thinnest place that is no rim.

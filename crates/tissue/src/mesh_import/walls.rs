@@ -3,14 +3,14 @@
 use super::thickness::Sample;
 use std::collections::HashMap;
 
-/// Places in thin walls, with the edges that they need, by cubes of the lattice.
+/// Places in thin walls, with the spacing that they need, by cubes of the lattice.
 pub struct Walls {
     size: f64,
     by_cube: HashMap<[i64; 3], Vec<([f64; 3], f64)>>,
 }
 
 impl Walls {
-    /// `samples` of which edges shorter than the thickness over `fine` resolve the wall; `spacing` is the longest edge.
+    /// `samples` where a spacing of the thickness over `fine` resolves the wall; `spacing` is that of the lattice.
     pub fn of(samples: &[Sample], fine: f64, spacing: f64) -> Self {
         let mut walls = Self {
             size: spacing,
@@ -29,9 +29,9 @@ impl Walls {
         walls
     }
 
-    /// Whether a place in or beside a tetrahedron needs edges shorter than `longest`.
-    pub fn finer_than(&self, corners: &[[f64; 3]; 4], longest: f64) -> bool {
-        let margin = 0.1 * longest;
+    /// Whether a place in or beside a tetrahedron needs a spacing smaller than `size`.
+    pub fn finer_than(&self, corners: &[[f64; 3]; 4], size: f64) -> bool {
+        let margin = 0.1 * size;
         let low =
             [0, 1, 2].map(|k| corners.iter().map(|p| p[k]).fold(f64::INFINITY, f64::min) - margin);
         let high = [0, 1, 2].map(|k| {
@@ -47,7 +47,7 @@ impl Walls {
                 for z in from[2]..=to[2] {
                     let places = self.by_cube.get(&[x, y, z]).map_or(&[][..], Vec::as_slice);
                     let within = |&(place, fine): &([f64; 3], f64)| {
-                        fine < longest && (0..3).all(|k| (low[k]..=high[k]).contains(&place[k]))
+                        fine < size && (0..3).all(|k| (low[k]..=high[k]).contains(&place[k]))
                     };
                     if places.iter().any(within) {
                         return true;

@@ -1,12 +1,11 @@
 //! Local refinement of a lattice: tetrahedra are bisected at their longest edges, and with them all
 //! others around such an edge, so that no node ends in the middle of a face.
 //!
-//! Three bisections of a BCC tetrahedron give BCC tetrahedra of half the size again, and what is
-//! between two sizes is of two more shapes, so angles stay bounded (Maubach 1995 for the bisection;
-//! Labelle and Shewchuk, section 5, reach the same shapes through an octree).
+//! Two bisections of a BCC tetrahedron give a sixth of a cube (Kuhn's), and from then on every third one gives
+//! the same shapes at half the size, so angles stay bounded (Maubach 1995).
 
-use super::lattice::{Lattice, MOST_NODES, UNITS};
-use super::{Field, StuffError};
+use super::lattice::{Lattice, MOST_NODES};
+use super::{Field, StuffError, volume6};
 use std::collections::HashMap;
 
 /// Shortest edge that is bisected, in the lattice's units: its midpoint must have whole coordinates.
@@ -43,15 +42,14 @@ impl Edges {
     }
 }
 
-/// Bisects tetrahedra for which `too_large` (of their corners and their longest edge's length, mm)
-/// holds, until it holds of none.
+/// Bisects tetrahedra for which `too_large` holds, until it holds of none: of their corners, and of the spacing at which a uniform
+/// lattice has tetrahedra of their volume, mm.
 pub fn refine(
     lattice: &mut Lattice,
     field: &impl Field,
     spacing: f64,
     too_large: impl Fn([[f64; 3]; 4], f64) -> bool,
 ) -> Result<(), StuffError> {
-    let unit = spacing / (2 * UNITS) as f64;
     let mut edges = Edges::of(&lattice.tets);
     let mut next = 0;
     // Halves are appended, and looked at in their turn; a bisected tetrahedron becomes one of its halves.
@@ -62,7 +60,9 @@ pub fn refine(
         if lattice.values.len() as f64 > MOST_NODES {
             return Err(StuffError::TooLarge(lattice.values.len() as u64, spacing));
         }
-        if length2 >= SHORTEST.pow(2) && too_large(corners, (length2 as f64).sqrt() * unit) {
+        let [a, b, c, d] = corners;
+        let size = (2.0 * volume6(a, b, c, d).abs()).cbrt();
+        if length2 >= SHORTEST.pow(2) && too_large(corners, size) {
             bisect(lattice, &mut edges, field, edge)?;
         } else {
             next += 1;

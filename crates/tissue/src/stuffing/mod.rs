@@ -67,7 +67,7 @@ pub fn stuff(field: &impl Field, spacing: f64) -> Result<Stuffed, StuffError> {
 }
 
 /// [`stuff`] with a lattice that is finer where the body is thin: tetrahedra are bisected until
-/// `too_large` (of their corners and their longest edge's length, mm) holds of none, down to a
+/// `too_large` (of their corners, and of the spacing of tetrahedra of their volume, mm) holds of none, down to a
 /// sixteenth of `spacing`. Angles are bounded less well where sizes change. Tetrahedra between two
 /// sheets of the surface, all of whose nodes were moved onto it, are kept too: walls as thin as the
 /// spacing then have no holes.
