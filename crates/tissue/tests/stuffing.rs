@@ -4,7 +4,7 @@
 use tissue::mesh::Mesh;
 use tissue::mesh_import::{RawTets, from_tets};
 use tissue::mesh_quality::measure;
-use tissue::stuffing::{Field, GridField, HalfSpace, StuffError, Stuffed, stuff};
+use tissue::stuffing::{Field, GridField, HalfSpace, StuffError, Stuffed, stuff, stuff_graded};
 
 struct Ball {
     centre: [f64; 3],
@@ -187,4 +187,30 @@ fn unusable_input_is_refused() {
         stuff(&broken, 3.0),
         Err(StuffError::NotFinite { .. })
     ));
+}
+
+#[test]
+fn a_lattice_that_is_finer_in_a_corner_leaves_no_gap_and_no_sliver() {
+    for step in 0..6 {
+        let spacing = 5.0 + 0.3 * f64::from(step);
+        // Four times finer where x is above 10 mm.
+        let fine = |corners: [[f64; 3]; 4], size: f64| {
+            size > 0.25 * spacing && corners.iter().any(|p| p[0] > 10.0)
+        };
+        let made = stuff_graded(&BALL, spacing, fine).unwrap();
+        let uniform = stuff_graded(&BALL, spacing, |_, _| false).unwrap();
+        assert!(made.positions.len() > 2 * uniform.positions.len());
+        let quality = measure(&mesh(made));
+        assert!(
+            quality.min_dihedral_deg > 4.0,
+            "{spacing}: {}",
+            quality.min_dihedral_deg
+        );
+        assert_eq!(quality.components, 1);
+        // A gap would be a second sheet of the boundary.
+        assert_eq!(quality.euler_characteristic, 2, "{spacing}");
+        assert!(quality.non_manifold_edges.is_empty(), "{spacing}");
+        let exact = 4.0 / 3.0 * std::f64::consts::PI * BALL.radius.powi(3);
+        assert!((quality.volume_mm3 / exact - 1.0).abs() < 0.04, "{spacing}");
+    }
 }
