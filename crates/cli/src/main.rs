@@ -18,6 +18,8 @@ mod effort;
 mod envelope;
 #[cfg(feature = "files")]
 mod export;
+#[cfg(feature = "files")]
+mod foreign;
 mod haptics;
 mod host;
 #[cfg(not(feature = "linear"))]
@@ -35,7 +37,7 @@ mod parallel;
 mod preview;
 #[cfg(feature = "linear")]
 mod prior;
-#[cfg(feature = "linear")]
+#[cfg(feature = "files")]
 mod progress;
 mod python;
 mod reference;

@@ -48,7 +48,7 @@ pub fn interpreter(tell: &mut dyn FnMut(&str)) -> Result<PathBuf> {
 }
 
 /// The interpreter, with packages; one that the user named has what the user gave it.
-#[cfg(feature = "linear")]
+#[cfg(feature = "files")]
 pub fn with(packages: &[&str], tell: &mut dyn FnMut(&str)) -> Result<PathBuf> {
     let python = interpreter(tell)?;
     if named().is_some() {

@@ -222,3 +222,51 @@ fn vtk_arrays_of_whole_numbers_are_names() {
         [0, 1, 2, 3]
     );
 }
+
+/// An OBJ of the cube, moved by `by`.
+fn cube_obj(head: &str, by: [f64; 3]) -> String {
+    let mut text = format!("{head}\n");
+    for corner in CORNERS {
+        let [x, y, z] = std::array::from_fn(|k| corner[k] + by[k]);
+        text += &format!("v {x} {y} {z}\n");
+    }
+    for [a, b, c] in FACES {
+        text += &format!("f {} {} {}\n", a + 1, b + 1, c + 1);
+    }
+    text
+}
+
+#[test]
+fn a_surface_is_turned_where_both_files_name_another_space() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: String| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        path
+    };
+    let lps = "# 3D Slicer output. SPACE=LPS";
+    let ras = "# 3D Slicer output. SPACE=RAS";
+    for (body, inside, is_turned) in [
+        (ras, lps, true),
+        (lps, ras, true),
+        (lps, lps, false),
+        (ras, "", false),
+        ("", lps, false),
+    ] {
+        let body = write("body.obj", cube_obj(body, [0.0; 3]));
+        let mesh = filled(&body);
+        // The half of the cube with x over 5, or where that would be after half a turn.
+        let by = match is_turned {
+            true => [-15.0, -10.0, 0.0],
+            false => [5.0, 0.0, 0.0],
+        };
+        let other = write("inside.obj", cube_obj(inside, by));
+        let text = format!("inside:{}", other.display());
+        let rows = tets_in(&mesh, &region(&text, &body));
+        assert!(rows.len() * 3 > mesh.tets.len(), "{}", rows.len());
+        for row in rows {
+            let x = mesh.tets[row].map(|node| mesh.positions[node as usize][0]);
+            assert!(x.iter().sum::<f32>() / 4.0 > 4.99);
+        }
+    }
+}

@@ -9,10 +9,9 @@ use tissue::mesh_import::{
 };
 use tissue::mesh_quality::{Quality, measure};
 
-use super::foreign;
 use super::options::Options;
 use super::stages::Stage;
-use crate::preview;
+use crate::{foreign, preview};
 
 /// A body's longest side, mm: outside of this the unit is taken to be wrong.
 const LENGTH_MM: [f64; 2] = [3.0, 2000.0];
@@ -113,7 +112,13 @@ fn read(options: &Options, stage: &mut Stage) -> Result<(Mesh, PathBuf)> {
         }
         return Ok((Mesh::read(&options.input)?, options.input.clone()));
     }
-    let input = foreign::convert(&options.input, &options.label, stage)?;
+    let input = foreign::convert(
+        &options.input,
+        &options.label,
+        &stage.folder.clone(),
+        options.json,
+        &mut |said| stage.decided(said),
+    )?;
     let stem = name.split('.').next().unwrap_or_default().to_owned();
     let imported = import(
         &input,

@@ -8,7 +8,6 @@
 mod body;
 mod bundle;
 mod emit;
-mod foreign;
 mod learn;
 mod options;
 mod patches;

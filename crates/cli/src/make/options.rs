@@ -34,7 +34,7 @@ const DRAFT: u32 = 5;
   upt make liver.obj --out liver --fixed plane:0,0,-1,-20 --emit slurm jobs")]
 pub struct Options {
     /// A closed surface (.stl, .obj, .ply, .vtp), tetrahedra (.msh, .vtk, .vtu, .inp, .feb, .mesh.safetensors) or a label volume
-    /// (.nii, .nii.gz; read by Python libraries, which the command installs for itself).
+    /// (.nii, .nii.gz, .nrrd, .mha; read by Python libraries, which the command installs for itself).
     pub input: PathBuf,
     /// Folder of the bundle.
     #[arg(long)]

@@ -11,13 +11,15 @@ use tissue::mesh_quality::measure;
 use tissue::stuffing::{GridField, HalfSpace, stuff};
 
 use super::print_quality;
+use crate::foreign;
 
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  upt mesh import liver.msh liver.mesh.safetensors --fixed-sphere 0,0,0,20 --domain-sphere 60,0,30,25\n  upt mesh import kidney.stl kidney.mesh.safetensors --nodes 5000 --scale 1000"
 )]
 pub struct Import {
-    /// File to read: .vtk, .vtu, .vtp, .msh (1, 2 or 4.1), .inp, .feb, .mesh, .node, .ele, .stl, .obj, .ply or .off.
+    /// File to read: .vtk, .vtu, .vtp, .msh (1, 2 or 4.1), .inp, .feb, .mesh, .node, .ele, .stl, .obj, .ply, .off, or a
+    /// label volume (.nii, .nii.gz, .nrrd, .mha; read by Python libraries), whose surfaces go to a folder beside the output.
     input: PathBuf,
     /// Mesh file to write (*.mesh.safetensors).
     output: PathBuf,
@@ -42,6 +44,9 @@ pub struct Import {
     /// Which body, where the file holds several: its number or its name in the list that the command then prints.
     #[arg(long, value_name = "NUMBER|NAME")]
     part: Option<String>,
+    /// Labels of a label volume that are the body: one or several (`--label 1,3`). Default: all but 0.
+    #[arg(long, value_name = "LABELS", value_delimiter = ',')]
+    label: Vec<i64>,
     /// Hold the nodes in this ball (x,y,z,r in mm); may be repeated.
     #[arg(long, value_name = "X,Y,Z,R", allow_hyphen_values = true)]
     fixed_sphere: Vec<Ball>,
@@ -94,13 +99,21 @@ pub fn run_import(args: &Import) -> anyhow::Result<ExitCode> {
         (_, Some(spacing)) => Some(Resolution::Spacing(spacing)),
         _ => None,
     };
+    let mut found = Vec::new();
+    let name = args.input.file_name().unwrap_or_default();
+    let stem = name.to_string_lossy().split('.').next().map(String::from);
+    let folder = args.output.with_extension("").with_extension("labels");
+    let input = foreign::convert(&args.input, &args.label, &folder, args.json, &mut |said| {
+        found.push(said.to_owned())
+    })?;
+    let is_volume = input != args.input;
     let imported = import(
-        &args.input,
+        &input,
         &ImportOptions {
-            name: args.name.clone(),
+            name: args.name.clone().or(stem.filter(|_| is_volume)),
             scale: args.scale,
             resolution,
-            repair: args.repair,
+            repair: args.repair || is_volume,
             part: args.part.clone(),
             refill: args.refill,
             fixed: args.fixed_sphere.clone(),
@@ -117,7 +130,8 @@ pub fn run_import(args: &Import) -> anyhow::Result<ExitCode> {
     if args.json {
         let mut value = serde_json::to_value(&quality)?;
         value["repairs"] = serde_json::to_value(&imported.repairs)?;
-        value["notes"] = serde_json::to_value(&imported.notes)?;
+        found.extend(imported.notes);
+        value["notes"] = serde_json::to_value(&found)?;
         value["sha256"] = json!(imported.mesh.hash());
         println!("{value:#}");
         return Ok(ExitCode::SUCCESS);
@@ -125,7 +139,8 @@ pub fn run_import(args: &Import) -> anyhow::Result<ExitCode> {
     for repair in &imported.repairs {
         println!("{:24}{repair}", "repaired");
     }
-    for note in &imported.notes {
+    found.extend(imported.notes);
+    for note in &found {
         println!("{:24}{note}", "note");
     }
     print_quality(&quality);

@@ -17,7 +17,7 @@ pub enum ImportError {
         error: std::io::Error,
     },
     #[error(
-        "{path}: unknown extension; use .vtk, .vtu, .msh, .inp, .feb, .mesh, .node or .ele (tetrahedra), .stl, .obj, .ply, .off or .vtp (closed surface); label volumes are read by `upt make`"
+        "{path}: unknown extension; use .vtk, .vtu, .msh, .inp, .feb, .mesh, .node or .ele (tetrahedra), .stl, .obj, .ply, .off or .vtp (closed surface); label volumes (.nii, .nii.gz, .nrrd, .mha) are read by the commands `upt make` and `upt mesh import`"
     )]
     Extension { path: PathBuf },
     #[error("{path}: {reason}")]

@@ -36,6 +36,7 @@ mod repair;
 mod self_crossing;
 mod sets;
 mod solid;
+mod space;
 mod surface_files;
 mod surface_repair;
 mod tetgen;

@@ -2,7 +2,7 @@
 //! a part that the mesh's file names.
 
 use super::labels::{Group, sorted};
-use super::{Ball, ImportError, SurfaceDistance, closed_surface, surface_files};
+use super::{Ball, ImportError, SurfaceDistance, closed_surface, space, surface_files};
 use crate::mesh::{Mesh, face_centroid};
 use crate::stuffing::Field;
 use std::collections::HashSet;
@@ -15,7 +15,7 @@ pub enum Region {
     Ball(Ball),
     /// Where `a x + b y + c z + d > 0`, with `(a, b, c)` of length 1.
     Plane([f64; 4]),
-    /// Inside of a closed surface (`.stl`, `.obj`, `.ply`) in the units of the mesh's file.
+    /// Inside of a closed surface (`.stl`, `.obj`, `.ply`) in the units of the mesh's file, and in its space where both files name one.
     Inside(PathBuf),
     /// What the mesh's own file calls so ([`super::Labels`]).
     Group(String),
@@ -109,6 +109,7 @@ impl Region {
                     });
                 }
                 let mut surface = surface_files::read(path, &extension)?;
+                space::turn(&mut surface.positions, path, input)?;
                 super::scale(&mut surface.positions, scale);
                 closed_surface::check(&mut surface, true, &mut Vec::new())?;
                 Opened::Inside(Box::new(SurfaceDistance::new(surface)?))
