@@ -5,6 +5,7 @@
 //! |---|---|
 //! | [`tool`] | what a host gives: shape, pose, how it holds; and what it gets back |
 //! | [`past`] | what is remembered from step to step: poses, forces, grasps |
+//! | [`buried`] | tools that lie in the tissue, and their way out |
 //! | [`compliance`] | how samples move under forces on samples: the Delassus matrix `W = B A B^T` |
 //! | [`held_back`] | the same at any time after a step |
 //! | [`rows`] | gaps and slips of samples near the tools, at a state of the tissue |
@@ -12,6 +13,7 @@
 //!
 //! Shapes, samples and sweeps are those of the reference solver (crate `contact`). Lengths mm, forces mN.
 
+mod buried;
 pub mod compliance;
 mod held_back;
 pub mod past;

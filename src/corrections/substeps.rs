@@ -5,7 +5,7 @@ use ::contact::{Pose, pose};
 
 use super::input::{Input, Lent, Report};
 use super::shorter::Shorter;
-use super::stage::Stage;
+use super::stage::{SMALLEST_DET, Stage};
 use crate::contact::{Delassus, MAX_TOOLS, Past, Problem, Tool};
 use crate::error::Result;
 use crate::memory;
@@ -71,14 +71,18 @@ impl Stage {
         substeps: Option<(&mut Substeps, &mut Shorter)>,
         next: &mut [f32],
     ) -> Result<Report> {
+        problem.end_by(input.enough.until);
         let Some((substeps, shorter)) = substeps else {
             return self.correct_loaded(lent, input, problem, next);
         };
-        if substeps.helps(self.motion.truncated_mm) {
+        let lost = self.motion.min_det < SMALLEST_DET;
+        if substeps.helps(self.motion.truncated_mm) && !lost {
             return self.drive_substeps(lent, input, problem, (substeps, shorter), next);
         }
         let whole = self.correct_loaded(lent, input, problem, next)?;
-        if !substeps.helps(self.next.truncated_mm.hypot(whole.remaining_mm)) {
+        // Where the iterations have lost the contact they would lose it again.
+        let helps = substeps.helps(self.next.truncated_mm.hypot(whole.remaining_mm));
+        if whole.fell_back || !helps {
             return Ok(whole);
         }
         let parts = self.drive_substeps(lent, input, problem, (substeps, shorter), next)?;

@@ -190,14 +190,14 @@ impl Link {
             held,
             inertia: Some((&step.corrections.space, &self.held_back)),
         };
-        let rows = self.samples.rows();
-        let of = self.found.iter().map(|(_, row)| rows[*row as usize]);
+        let samples = &*self.samples;
+        let of = self.found.iter().map(|(_, row)| samples.at(*row));
         let masses = of
             .clone()
             .map(|sample| mass(sample, &step.corrections.body.mass, held));
         self.sampled.clear();
         self.sampled.extend(self.found.iter().map(|(_, row)| *row));
-        let w = self.delassus.of(compliance, rows, &self.sampled)?;
+        let w = self.delassus.of(compliance, samples, &self.sampled)?;
         let slow = self.out.buffer();
         slow.delassus[..w.len()].copy_from_slice(w);
         slow.delay_s = delay(w, masses);
@@ -247,7 +247,7 @@ impl Link {
         slow.pose = past.map(|(_, tool)| tool.pose);
         slow.count = self.found.len();
         for (at, &(_, row)) in self.found.iter().enumerate() {
-            let sample = self.samples.rows()[row as usize];
+            let sample = self.samples.at(row);
             let point = sample.gather(|node| state.position(node));
             let anchor = past.and_then(|(_, tool)| tool.grasp.place(row));
             let force = past.map_or(Vector::ZERO, |(past, _)| {
@@ -269,6 +269,7 @@ impl Link {
                     now: &pose,
                     anchor,
                     put: false,
+                    way_out: None,
                 };
                 let pushed = force != Vector::ZERO;
                 let contact = pair.contact(point, point, slow.outward[at], force);

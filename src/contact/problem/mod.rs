@@ -9,18 +9,20 @@ mod look;
 mod solve;
 
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use ::contact::grasp::REACH_MM;
-use ::contact::{Contact, Pose, Sample, Samples, Search, Sweeps, Vector};
+use ::contact::{Contact, Pose, SPACING_MM, Sample, Samples, Search, Sweeps, Vector, pose};
 
 pub use solve::Change;
 
+use super::buried::Buried;
 use super::compliance::Delassus;
 use super::held_back::HeldBack;
 use super::past::{Force, Held, Past};
-use super::rows::{Row, State};
+use super::rows::{Row, State, outward};
 use super::tool::{MAX_TOOLS, Mode, Reading, Tool};
+use crate::bundle::Mesh;
 use crate::error::{Error, Result};
 use crate::memory;
 use look::MOST_ROWS;
@@ -28,17 +30,26 @@ use look::MOST_ROWS;
 /// A tool that moves farther in a step was put there, not moved, mm.
 const PUT_MM: f32 = 40.0;
 const WHAT: &str = "the contact of instruments";
-/// Parts of a step's way at most.
-const MOST_PARTS: f32 = 16.0;
+/// Parts of a step's way at most: of a thin tool that goes as far as one may.
+const MOST_PARTS: f32 = 80.0;
+/// Work of the solves of a step at most, those of its substeps included: about so many multiplications, some ten milliseconds.
+const STEP_WORK: u64 = 40_000_000;
+/// Parts of the tools' ways in a step that has taken its time.
+const LEAST_PARTS: u32 = 4;
+/// Tissue that is farther from a tool is not pushed by it, mm.
+const OPEN_MM: f32 = 0.5;
 
 /// The contact of one scene.
 pub struct Problem {
     samples: Arc<Samples>,
+    mesh: Arc<Mesh>,
     tools: Vec<Tool>,
     /// Where each tool was when the step began.
     before: Vec<Pose>,
     /// Which of them were put there in this step.
     put: Vec<bool>,
+    /// Which of them lay in the tissue then, and where they come out.
+    buried: Vec<Option<Buried>>,
     /// At the end of the last published step.
     pub past: Past,
     /// Of the step being made.
@@ -48,12 +59,26 @@ pub struct Problem {
     delassus: Delassus,
     held_back: HeldBack,
     rows: Vec<Row>,
+    /// Rows that a solve had no room for: their forces go.
+    shed: Vec<Row>,
+    /// Samples that the last look found.
+    found: usize,
     contacts: Vec<Contact>,
     forces: Vec<Vector>,
+    /// The same before a linearisation.
+    earlier: Vec<Vector>,
     /// Forces before the last solve, to go part of the way.
     kept: Vec<Force>,
-    /// What the solves of this step took.
+    /// Those of a step's first guess.
+    guessed: Vec<Force>,
+    /// Where the tools came from, while they take another way.
+    ways: Vec<(Pose, bool, Option<Buried>)>,
+    /// What the solves of this step took, multiplications that are left to them, and what the last of them left unsolved, mm.
     spent: Duration,
+    work_left: u64,
+    unsolved_mm: f32,
+    /// When the step's budget ends.
+    until: Option<Instant>,
     columns: Vec<u32>,
     change: Vec<f32>,
     nodes: Vec<u32>,
@@ -65,7 +90,7 @@ impl Problem {
     ///
     /// # Errors
     /// [`Error::OutOfMemory`].
-    pub fn new(samples: Arc<Samples>) -> Result<Problem> {
+    pub fn new(samples: Arc<Samples>, mesh: Arc<Mesh>) -> Result<Problem> {
         let mut sweeps = Sweeps::default();
         memory::tried(sweeps.reserve(MOST_ROWS), WHAT)?;
         // Those of a solve and of the one before it, each with the nodes of its sample and their three axes.
@@ -74,6 +99,7 @@ impl Problem {
             tools: memory::room(MAX_TOOLS, WHAT)?,
             before: memory::room(MAX_TOOLS, WHAT)?,
             put: memory::room(MAX_TOOLS, WHAT)?,
+            buried: memory::room(MAX_TOOLS, WHAT)?,
             past: Past::with_room(room)?,
             next: Past::with_room(room)?,
             search: memory::tried(Search::with_room(&samples), WHAT)?,
@@ -81,15 +107,24 @@ impl Problem {
             delassus: Delassus::default(),
             held_back: HeldBack::default(),
             rows: memory::room(room, WHAT)?,
+            shed: memory::room(room, WHAT)?,
+            found: 0,
             contacts: memory::room(room, WHAT)?,
             forces: memory::room(room, WHAT)?,
+            earlier: memory::room(room, WHAT)?,
             kept: memory::room(room, WHAT)?,
+            guessed: memory::room(room, WHAT)?,
+            ways: memory::room(MAX_TOOLS, WHAT)?,
             spent: Duration::ZERO,
+            work_left: STEP_WORK,
+            unsolved_mm: 0.0,
+            until: None,
             columns: memory::room(dofs, WHAT)?,
             change: memory::room(dofs, WHAT)?,
             nodes: memory::room(nodes, WHAT)?,
             vectors: memory::room(3 * nodes, WHAT)?,
             samples,
+            mesh,
         })
     }
 
@@ -104,6 +139,7 @@ impl Problem {
         self.tools.clear();
         self.before.clear();
         self.put.clear();
+        self.buried.clear();
         self.next.clear();
     }
 
@@ -133,6 +169,9 @@ impl Problem {
     /// [`Error::Argument`] for friction, tear-off force or number, [`Error::OutOfMemory`]; the past stays.
     pub fn begin(&mut self, tools: &[Tool], rest: &[f32], start: &[f32]) -> Result<()> {
         self.spent = Duration::ZERO;
+        self.work_left = STEP_WORK;
+        self.unsolved_mm = 0.0;
+        self.until = None;
         self.enter(tools, rest, start)
     }
 
@@ -162,12 +201,16 @@ impl Problem {
         };
         self.before.clear();
         self.put.clear();
+        self.buried.clear();
         for (index, tool) in tools.iter().enumerate() {
             let known = self.past.tools.get(index).map(|held| held.pose);
             let moved = known.filter(|from| tool.body.motion(from, &tool.pose) <= PUT_MM);
             let from = moved.unwrap_or(tool.pose);
             self.before.push(from);
             self.put.push(moved.is_none());
+            let (samples, mesh) = (&self.samples, &self.mesh);
+            self.buried
+                .push(Buried::find(&tool.body, &from, samples, mesh, state));
             if self.next.tools.len() <= index {
                 self.next.tools.push(Held::default());
             }
@@ -196,8 +239,18 @@ impl Problem {
         if !self.next.forces.is_empty() || self.holds() {
             return Ok(true);
         }
-        self.look(state, 1.0, true)?;
+        self.look(state, 1.0, true, MOST_ROWS)?;
         Ok(!self.rows.is_empty())
+    }
+
+    /// Whether the solves of this step have taken their time.
+    pub fn is_spent(&self) -> bool {
+        self.work_left == 0 || self.until.is_some_and(|until| Instant::now() >= until)
+    }
+
+    /// Sets the time by which the step's solves are to be through.
+    pub fn end_by(&mut self, until: Option<Instant>) {
+        self.until = until;
     }
 
     /// Whether forces were at work at the end of the last step.
@@ -210,9 +263,13 @@ impl Problem {
         !self.next.forces.is_empty()
     }
 
-    /// Whether the tissue lies inside of a tool deeper than `depth_mm`, tools at their ends.
+    /// Whether the tissue lies inside of a tool deeper than `depth_mm` anywhere on the tools' ways.
     pub fn intrudes(&mut self, state: State<'_>, depth_mm: f32) -> bool {
-        (0..self.tools.len()).any(|index| self.deepest(index, state) > depth_mm)
+        let parts = self.parts();
+        (0..self.tools.len()).any(|index| {
+            let mut ways = (1..=parts).rev().map(|part| part as f32 / parts as f32);
+            ways.any(|way| self.deepest(index, state, way) > depth_mm)
+        })
     }
 
     /// Whether a grasper holds a sample.
@@ -224,6 +281,9 @@ impl Problem {
     /// In how many parts the tools' ways are taken: no tool may pass a sample between two looks, and none may push it over its own
     /// edge.
     pub fn parts(&self) -> u32 {
+        if self.is_spent() {
+            return LEAST_PARTS;
+        }
         let parts = self.tools.iter().zip(&self.before).map(|(tool, from)| {
             let most = (0.5 * tool.body.radius()).clamp(0.5, 2.0);
             (tool.body.motion(from, &tool.pose) / most).ceil()
@@ -245,9 +305,120 @@ impl Problem {
         self.next.forces.retain(there);
     }
 
-    /// Gives up all forces: the tissue starts from rest.
+    /// Keeps the forces as those of the first guess.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`].
+    pub fn keep_guess(&mut self) -> Result<()> {
+        memory::replace(&mut self.guessed, &self.next.forces, WHAT)
+    }
+
+    /// Takes the forces of the first guess back.
+    pub fn take_guess(&mut self) {
+        self.next.forces.clear();
+        self.next.forces.extend_from_slice(&self.guessed);
+    }
+
+    /// Gives up all forces.
     pub fn let_go(&mut self) {
         self.next.forces.clear();
+    }
+
+    /// The tissue starts from rest and without forces, and each tool outside of it: back where it came from, against its push, or where it
+    /// comes out by the shortest way. Until [`Problem::return_to_ways`] that is the tools' way.
+    pub fn start_from_rest(&mut self, rest: &[f32]) {
+        self.let_go();
+        self.ways.clear();
+        let ways = self.before.iter().zip(&self.put).zip(&self.buried);
+        self.ways
+            .extend(ways.map(|((before, put), buried)| (*before, *put, *buried)));
+        let state = State {
+            rest,
+            u: &[],
+            start: &[],
+        };
+        for (index, tool) in self.tools.iter().enumerate() {
+            let (samples, mesh) = (&self.samples, &self.mesh);
+            let found = Buried::find(&tool.body, &tool.pose, samples, mesh, state);
+            let clear = tool.body.size() + OPEN_MM;
+            let came = self.before[index].translation - tool.pose.translation;
+            let own = self.past.forces.iter();
+            let own = own.filter(|force| force.tool == index as u32);
+            let pushed: Vector = own.map(|force| -force.force).sum();
+            let came = if came.length() > OPEN_MM {
+                came
+            } else {
+                pushed
+            };
+            let way = found.map_or(Vector::ZERO, |buried| {
+                let back = came.try_normalize();
+                let back = back.and_then(|back| buried.way_along(back, mesh, state));
+                let way = back.unwrap_or(buried.out * buried.depth);
+                way + way.normalize_or_zero() * clear
+            });
+            self.before[index] = Pose::from_parts(tool.pose.translation + way, tool.pose.rotation);
+            self.put[index] = false;
+            self.buried[index] = None;
+        }
+    }
+
+    /// The tools' ways are again those of the step.
+    pub fn return_to_ways(&mut self) {
+        for (index, (before, put, buried)) in self.ways.drain(..).enumerate() {
+            self.before[index] = before;
+            self.put[index] = put;
+            self.buried[index] = buried;
+        }
+    }
+
+    /// How deep the tissue lies inside of a tool, or a tool in the tissue, tools at part `part` of their ways, mm.
+    pub fn sunk(&mut self, state: State<'_>, part: f32) -> f32 {
+        (0..self.tools.len())
+            .map(|index| self.depth(index, state, part))
+            .fold(0.0, f32::max)
+    }
+
+    /// The same of one tool.
+    fn depth(&mut self, index: usize, state: State<'_>, part: f32) -> f32 {
+        let depth = self.deepest(index, state, part);
+        // What pushes from outside is outside; but a thin tool's side may be pushed by what its tip has pierced.
+        let body = &self.tools[index].body;
+        let is_thin = body.sinks_between(SPACING_MM);
+        match !is_thin && self.pushes_from_outside(index, state, part) {
+            true => depth,
+            false => depth.max(self.buried_by(index, state, part)),
+        }
+    }
+
+    /// Whether forces of a tool are at its surface, and none where the tissue has left it.
+    fn pushes_from_outside(&self, index: usize, state: State<'_>, part: f32) -> bool {
+        let own = |force: &&Force| force.tool == index as u32;
+        let mut forces = self.next.forces.iter().filter(own).peekable();
+        let moving = self.moving(state, part);
+        forces.peek().is_some()
+            && forces.all(|force| moving.contact(&self.row_of(force, state), part).gap < OPEN_MM)
+    }
+
+    /// The row of a force.
+    fn row_of(&self, force: &Force, state: State<'_>) -> Row {
+        let sample = self.samples.at(force.sample);
+        Row {
+            tool: force.tool,
+            sample: force.sample,
+            force: force.force,
+            far: false,
+            gap: 0.0,
+            point: sample.gather(|node| state.position(node)),
+            outward: outward(&self.samples, force.sample, state),
+        }
+    }
+
+    /// How deep a tool lies in the tissue, mm; 0 where it does not.
+    fn buried_by(&self, index: usize, state: State<'_>, part: f32) -> f32 {
+        let tool = &self.tools[index];
+        let pose = pose::between(&self.before[index], &tool.pose, part);
+        let found = Buried::find(&tool.body, &pose, &self.samples, &self.mesh, state);
+        found.map_or(0.0, |buried| buried.depth + tool.body.size())
     }
 
     /// Nodes of the surface that tools may touch, all that a solve asks of a state of the tissue.
@@ -257,7 +428,7 @@ impl Problem {
 
     /// The sample of a force.
     pub fn sample(&self, row: u32) -> Sample {
-        self.samples.rows()[row as usize]
+        self.samples.at(row)
     }
 
     /// The step being made becomes the last.

@@ -131,7 +131,7 @@ fn cone(
     let position = |n: u32| Vector::from(mesh.positions[n as usize]) + Vector::from(u[n as usize]);
     let (mut across, mut along) = (0.0, 0.0);
     for entry in forces {
-        let point = samples.rows()[entry.sample as usize].gather(position);
+        let point = samples.at(entry.sample).gather(position);
         let normal = (point - centre).normalize();
         let force = Vector::from(entry.force);
         let push = force.dot(normal);
