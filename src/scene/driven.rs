@@ -253,14 +253,15 @@ impl Core {
 
     fn tell_depth(problem: &Problem, stats: &mut SceneStats) {
         stats.contact_ms = problem.spent_ms();
-        let mut readings = problem.next.tools.iter().map(|held| held.reading);
+        let readings = problem.next.tools.iter().map(|held| held.reading);
         if readings
             .clone()
             .any(|reading| reading.residual_mm > UNSOLVED_MM)
         {
             stats.flags |= flag::UNSOLVED;
         }
-        if readings.map(|r| r.penetration_mm).fold(0.0, f32::max) > DEEP_MM {
+        let deepest = readings.map(|r| r.penetration_mm).fold(0.0, f32::max);
+        if deepest > DEEP_MM || problem.lay_in_tissue {
             stats.flags |= flag::DEEP;
         }
     }

@@ -9,6 +9,9 @@ use crate::contact::rows::{State, vector};
 use crate::contact::tool::{Push, Reading, Told};
 use crate::envelope::Used;
 
+/// No grasp pulls harder than this, mN: soft tissue tears before.
+const STRONGEST_GRASP_MN: f32 = 10_000.0;
+
 impl Problem {
     /// Whether a grasp has torn off in this step.
     pub fn tears(&self) -> bool {
@@ -68,7 +71,11 @@ impl Problem {
             }
             let held = &mut self.next.tools[index];
             let pull = tension(pull, normal.normalize_or_zero());
-            let torn = held.reading.torn || held.grasp.tear(pull, tool.tear_off_mn);
+            let tear_off = match tool.tear_off_mn > 0.0 {
+                true => tool.tear_off_mn,
+                false => STRONGEST_GRASP_MN,
+            };
+            let torn = held.reading.torn || held.grasp.tear(pull, tear_off);
             held.reading = Reading {
                 force: force.to_array(),
                 torque: torque.to_array(),

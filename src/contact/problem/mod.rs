@@ -77,6 +77,8 @@ pub struct Problem {
     spent: Duration,
     work_left: u64,
     unsolved_mm: f32,
+    /// A tool lay in the tissue when the step, or a part of it, began.
+    pub lay_in_tissue: bool,
     /// When the step's budget ends.
     until: Option<Instant>,
     columns: Vec<u32>,
@@ -119,6 +121,7 @@ impl Problem {
             work_left: STEP_WORK,
             unsolved_mm: 0.0,
             until: None,
+            lay_in_tissue: false,
             columns: memory::room(dofs, WHAT)?,
             change: memory::room(dofs, WHAT)?,
             nodes: memory::room(nodes, WHAT)?,
@@ -172,6 +175,7 @@ impl Problem {
         self.work_left = STEP_WORK;
         self.unsolved_mm = 0.0;
         self.until = None;
+        self.lay_in_tissue = false;
         self.enter(tools, rest, start)
     }
 
@@ -209,14 +213,20 @@ impl Problem {
             self.before.push(from);
             self.put.push(moved.is_none());
             let (samples, mesh) = (&self.samples, &self.mesh);
-            self.buried
-                .push(Buried::find(&tool.body, &from, samples, mesh, state));
+            let buried = Buried::find(&tool.body, &from, samples, mesh, state);
+            self.lay_in_tissue |= buried.is_some();
+            self.buried.push(buried);
             if self.next.tools.len() <= index {
                 self.next.tools.push(Held::default());
             }
             let held = &mut self.next.tools[index];
             held.pose = tool.pose;
             held.reading = Reading::default();
+            // What is put elsewhere takes nothing along.
+            if known.is_some() && moved.is_none() && !held.grasp.anchors().is_empty() {
+                held.grasp.open();
+                held.reading.torn = true;
+            }
             let closes = tool.mode == Mode::Grasp;
             if closes && !held.closed {
                 let position = |node| state.position(node);
