@@ -4,7 +4,6 @@ use ::contact::{Placed, SKIN_MM, SPACING_MM, Vector, pose};
 
 use super::{Problem, WHAT};
 use crate::contact::buried::Buried;
-use crate::contact::past::Force;
 use crate::contact::rows::{Moving, Row, State, outward};
 use crate::contact::tool::MAX_TOOLS;
 use crate::error::Result;
@@ -138,44 +137,5 @@ impl Problem {
         rows.truncate(most);
         rows.sort_unstable_by_key(|row| (row.tool, row.sample));
         (self.rows, self.shed) = (rows, shed_rows);
-    }
-
-    /// How deep the deepest sample lies inside of a tool at part `part` of its way, or beyond it where the tool has passed, mm: the way that it
-    /// has to come out. 0 where none does.
-    pub(super) fn deepest(&mut self, index: usize, state: State<'_>, part: f32) -> f32 {
-        let tool = &self.tools[index];
-        let at = pose::between(&self.before[index], &tool.pose, part);
-        let placed = Placed {
-            body: &tool.body,
-            pose: at,
-            skin: 0.0,
-        };
-        let search = &mut self.search;
-        search.find(&self.samples, &[placed], |node| state.position(node));
-        let moving = self.moving(state, part);
-        let gap = |sample: u32, force: Vector| {
-            let row = Row {
-                tool: index as u32,
-                sample,
-                force,
-                far: false,
-                gap: 0.0,
-                point: self.samples.at(sample).gather(|node| state.position(node)),
-                outward: outward(&self.samples, sample, state),
-            };
-            moving.contact(&row, part).gap
-        };
-        let forces = &self.next.forces;
-        let inside = self.search.found().iter().map(|candidate| {
-            let key = (index as u32, candidate.sample);
-            let place = forces.binary_search_by_key(&key, Force::key);
-            let force = place.map_or(Vector::ZERO, |at| forces[at].force);
-            // What no tool touches, because it is reached from within, lies in it all the same.
-            (-gap(candidate.sample, force)).max(-candidate.distance)
-        });
-        let pushed = forces.iter().filter(|force| force.tool == index as u32);
-        let pushed = pushed.map(|force| -gap(force.sample, force.force));
-        let buried = self.buried[index].map(|buried| -gap(buried.row, Vector::ZERO));
-        inside.chain(pushed).chain(buried).fold(0.0, f32::max)
     }
 }

@@ -4,6 +4,7 @@
 //! A step solves it several times, as the tissue's state gets better; each solve goes on from the forces of the one before, since
 //! the state that it is given is the tissue under those.
 
+mod depth;
 mod loads;
 mod look;
 mod solve;
@@ -12,7 +13,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use ::contact::grasp::REACH_MM;
-use ::contact::{Contact, Pose, SPACING_MM, Sample, Samples, Search, Sweeps, Vector, pose};
+use ::contact::{Contact, Pose, Sample, Samples, Search, Sweeps, Vector, pose};
 
 pub use solve::Change;
 
@@ -20,7 +21,7 @@ use super::buried::Buried;
 use super::compliance::Delassus;
 use super::held_back::HeldBack;
 use super::past::{Force, Held, Past};
-use super::rows::{Row, State, outward};
+use super::rows::{Row, State};
 use super::tool::{MAX_TOOLS, Mode, Reading, Tool};
 use crate::bundle::Mesh;
 use crate::error::{Error, Result};
@@ -332,95 +333,6 @@ impl Problem {
     /// Gives up all forces.
     pub fn let_go(&mut self) {
         self.next.forces.clear();
-    }
-
-    /// The tissue starts from rest and without forces, and each tool outside of it: back where it came from, against its push, or where it
-    /// comes out by the shortest way. Until [`Problem::return_to_ways`] that is the tools' way.
-    pub fn start_from_rest(&mut self, rest: &[f32]) {
-        self.let_go();
-        self.ways.clear();
-        let ways = self.before.iter().zip(&self.put).zip(&self.buried);
-        self.ways
-            .extend(ways.map(|((before, put), buried)| (*before, *put, *buried)));
-        let state = State {
-            rest,
-            u: &[],
-            start: &[],
-        };
-        for (index, tool) in self.tools.iter().enumerate() {
-            let (samples, mesh) = (&self.samples, &self.mesh);
-            let found = Buried::find(&tool.body, &tool.pose, samples, mesh, state);
-            let clear = tool.body.size() + OPEN_MM;
-            let came = self.before[index].translation - tool.pose.translation;
-            let own = self.past.forces.iter();
-            let own = own.filter(|force| force.tool == index as u32);
-            let pushed: Vector = own.map(|force| -force.force).sum();
-            let came = if came.length() > OPEN_MM {
-                came
-            } else {
-                pushed
-            };
-            let way = found.map_or(Vector::ZERO, |buried| {
-                let back = came.try_normalize();
-                let back = back.and_then(|back| buried.way_along(back, mesh, state));
-                let way = back.unwrap_or(buried.out * buried.depth);
-                way + way.normalize_or_zero() * clear
-            });
-            self.before[index] = Pose::from_parts(tool.pose.translation + way, tool.pose.rotation);
-            self.put[index] = false;
-            self.buried[index] = None;
-        }
-    }
-
-    /// The tools' ways are again those of the step.
-    pub fn return_to_ways(&mut self) {
-        for (index, (before, put, buried)) in self.ways.drain(..).enumerate() {
-            self.before[index] = before;
-            self.put[index] = put;
-            self.buried[index] = buried;
-        }
-    }
-
-    /// How deep the tissue lies inside of a tool, or a tool in the tissue, tools at part `part` of their ways, mm.
-    pub fn sunk(&mut self, state: State<'_>, part: f32) -> f32 {
-        (0..self.tools.len())
-            .map(|index| self.depth(index, state, part))
-            .fold(0.0, f32::max)
-    }
-
-    /// The same of one tool.
-    fn depth(&mut self, index: usize, state: State<'_>, part: f32) -> f32 {
-        let depth = self.deepest(index, state, part);
-        // What pushes from outside is outside; but a thin tool's side may be pushed by what its tip has pierced.
-        let body = &self.tools[index].body;
-        let is_thin = body.sinks_between(SPACING_MM);
-        match !is_thin && self.pushes_from_outside(index, state, part) {
-            true => depth,
-            false => depth.max(self.buried_by(index, state, part)),
-        }
-    }
-
-    /// Whether forces of a tool are at its surface, and none where the tissue has left it.
-    fn pushes_from_outside(&self, index: usize, state: State<'_>, part: f32) -> bool {
-        let own = |force: &&Force| force.tool == index as u32;
-        let mut forces = self.next.forces.iter().filter(own).peekable();
-        let moving = self.moving(state, part);
-        forces.peek().is_some()
-            && forces.all(|force| moving.contact(&self.row_of(force, state), part).gap < OPEN_MM)
-    }
-
-    /// The row of a force.
-    fn row_of(&self, force: &Force, state: State<'_>) -> Row {
-        let sample = self.samples.at(force.sample);
-        Row {
-            tool: force.tool,
-            sample: force.sample,
-            force: force.force,
-            far: false,
-            gap: 0.0,
-            point: sample.gather(|node| state.position(node)),
-            outward: outward(&self.samples, force.sample, state),
-        }
     }
 
     /// How deep a tool lies in the tissue, mm; 0 where it does not.
