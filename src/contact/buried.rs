@@ -4,7 +4,7 @@
 use ::contact::samples::LATTICE;
 use ::contact::{Body, Pose, Samples, Vector};
 
-use super::rows::State;
+use super::state::State;
 use crate::bundle::Mesh;
 
 /// A tool whose middle lies less deep than this, or than its half thickness, is in contact and not in the tissue, mm.

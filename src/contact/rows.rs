@@ -4,6 +4,7 @@ use ::contact::{Body, Contact, Law, Pose, Samples, Vector, pose};
 
 use super::buried::Buried;
 use super::past::Held;
+use super::state::State;
 use super::tool::Tool;
 
 /// Longest way out of a tool, or to its far side, mm.
@@ -18,40 +19,6 @@ const LONG_WAY: f32 = 4.0;
 const THIN_MM: f32 = 1.45;
 /// A tool's normal may lean this much (cosine) to the outside of the tissue; beyond, the tool reaches the sample from within.
 const LEAN: f32 = 0.2;
-
-/// Where the tissue is, `[K,3]` each.
-#[derive(Clone, Copy)]
-pub struct State<'a> {
-    /// Rest positions, mm.
-    pub rest: &'a [f32],
-    /// Displacements, mm; empty: none.
-    pub u: &'a [f32],
-    /// Displacements at the start of the step, mm; empty: none.
-    pub start: &'a [f32],
-}
-
-pub(crate) fn vector(field: &[f32], node: u32) -> Vector {
-    let at = 3 * node as usize;
-    Vector::new(field[at], field[at + 1], field[at + 2])
-}
-
-impl State<'_> {
-    pub(crate) fn position(&self, node: u32) -> Vector {
-        self.place(self.u, node)
-    }
-
-    /// Where a node was when the step began.
-    fn position_before(&self, node: u32) -> Vector {
-        self.place(self.start, node)
-    }
-
-    fn place(&self, u: &[f32], node: u32) -> Vector {
-        match u.is_empty() {
-            true => vector(self.rest, node),
-            false => vector(self.rest, node) + vector(u, node),
-        }
-    }
-}
 
 /// A sample that is looked at.
 #[derive(Clone, Copy, Debug)]

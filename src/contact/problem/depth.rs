@@ -5,7 +5,8 @@ use ::contact::{Placed, Pose, SPACING_MM, Vector, pose};
 use super::{OPEN_MM, Problem};
 use crate::contact::buried::Buried;
 use crate::contact::past::Force;
-use crate::contact::rows::{Row, State, outward};
+use crate::contact::rows::{Row, outward};
+use crate::contact::state::State;
 
 impl Problem {
     /// How deep the tissue lies inside of a tool, or a tool in the tissue, tools at part `part` of their ways, mm.

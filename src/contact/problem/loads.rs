@@ -5,7 +5,7 @@ use ::contact::grasp::tension;
 
 use super::Problem;
 use crate::contact::past::Force;
-use crate::contact::rows::{State, vector};
+use crate::contact::state::{State, vector};
 use crate::contact::tool::{Push, Reading, Told};
 use crate::envelope::Used;
 

@@ -4,7 +4,8 @@ use ::contact::{Placed, SKIN_MM, SPACING_MM, Vector, pose};
 
 use super::{Problem, WHAT};
 use crate::contact::buried::Buried;
-use crate::contact::rows::{Moving, Row, State, outward};
+use crate::contact::rows::{Moving, Row, outward};
+use crate::contact::state::State;
 use crate::contact::tool::MAX_TOOLS;
 use crate::error::Result;
 use crate::memory;

@@ -8,7 +8,8 @@ use super::look::MOST_ROWS;
 use super::{Problem, STEP_WORK, WHAT};
 use crate::contact::Compliance;
 use crate::contact::past::Force;
-use crate::contact::rows::{Moving, State, vector};
+use crate::contact::rows::Moving;
+use crate::contact::state::{State, vector};
 use crate::error::Result;
 use crate::memory;
 
