@@ -3,6 +3,7 @@
 use indicatif::{ProgressBar, ProgressStyle};
 
 /// A counter for work of unknown length.
+#[cfg(feature = "linear")]
 pub fn spinner(quiet: bool, message: &'static str) -> ProgressBar {
     if quiet {
         return ProgressBar::hidden();
