@@ -40,6 +40,8 @@ struct Iterate<'a> {
     g: &'a mut Vec<f32>,
     /// Smallest det F.
     det: f32,
+    /// How deep tools and tissue lie in each other, where an iteration has looked, mm.
+    sunk_mm: Option<f32>,
 }
 
 impl Stage {
@@ -98,6 +100,7 @@ impl Stage {
             u: &mut u,
             g: &mut g,
             det: 1.0,
+            sunk_mm: None,
         };
         let result = self
             .iterate_loaded(lent, input, problem, &mut at, &mut report)
@@ -123,7 +126,6 @@ impl Stage {
         report: &mut Report,
     ) -> Result<()> {
         self.guess_loaded(lent, input, problem, at, report)?;
-        let guessed = self.sunk(input, problem, at);
         self.guess.copy_from_slice(at.u);
         problem.keep_guess()?;
         let mut size = self.improve_loaded(lent, input, problem, at, report)?;
@@ -133,17 +135,21 @@ impl Stage {
             self.stay(lent, input, problem, at, report)?;
             size = self.improve_loaded(lent, input, problem, at, report)?;
         }
-        if !is_sound(size, at.det) || self.sunk(input, problem, at) > SUNK_MM {
+        let left = (at.sunk_mm).unwrap_or_else(|| sunk(input, problem, at.u, 1.0));
+        if !is_sound(size, at.det) || left > SUNK_MM {
             report.fell_back = true;
             self.memory.clear();
+            problem.take_guess();
+            at.u.copy_from_slice(&self.guess);
+            let guessed = sunk(input, problem, at.u, 1.0);
             if guessed > SUNK_MM {
                 self.respond_from_rest(lent, input, problem, at, report)?;
+                if sunk(input, problem, at.u, 1.0) > guessed {
+                    problem.take_guess();
+                    at.u.copy_from_slice(&self.guess);
+                }
             }
-            if guessed <= SUNK_MM || self.sunk(input, problem, at) > guessed {
-                problem.take_guess();
-                at.u.copy_from_slice(&self.guess);
-                self.evaluate(lent, input, at, report)?;
-            }
+            self.evaluate(lent, input, at, report)?;
         }
         report.min_det = at.det;
         Ok(())
@@ -174,16 +180,6 @@ impl Stage {
         self.settle(lent.env(), at.u)?;
         report.parts = parts;
         self.evaluate(lent, input, at, report)
-    }
-
-    /// How deep tools and tissue lie in each other, mm.
-    fn sunk(&self, input: &Input<'_>, problem: &mut Problem, at: &Iterate<'_>) -> f32 {
-        let state = State {
-            rest: input.rest,
-            u: at.u,
-            start: input.last,
-        };
-        problem.sunk(state, 1.0)
     }
 
     /// The state of the step before, with the forces that it had.
@@ -250,6 +246,7 @@ impl Stage {
     ) -> Result<()> {
         (at.det, _) = self.residual(lent, [input.last, at.u, at.u], at.g, report)?;
         self.is_projected = false;
+        at.sunk_mm = None;
         Ok(())
     }
 
@@ -368,6 +365,16 @@ impl Stage {
 pub(super) fn is_spent(input: &Input<'_>, report: &Report, iterations: u32) -> bool {
     let most = input.enough.iterations + iterations * (EVALUATIONS - 1) + MORE_EVALUATIONS;
     report.evaluations >= most
+}
+
+/// How deep tissue `u` and the tools lie in each other, at part `way` of their way, mm.
+fn sunk(input: &Input<'_>, problem: &mut Problem, u: &[f32], way: f32) -> f32 {
+    let state = State {
+        rest: input.rest,
+        u,
+        start: input.last,
+    };
+    problem.sunk(state, way)
 }
 
 /// Whether the elements can go on from a state.

@@ -1,7 +1,7 @@
 //! One iteration of a step that tools drive: a direction of the elements with the contact's answer in it, and how far along it.
 
-use super::{Iterate, SUNK_MM, each_free_load, is_spent};
-use crate::contact::{Problem, State};
+use super::{Iterate, SUNK_MM, each_free_load, is_spent, sunk};
+use crate::contact::Problem;
 use crate::corrections::input::{Input, Lent, Report};
 use crate::corrections::passes;
 use crate::corrections::precondition::Env;
@@ -18,16 +18,6 @@ impl Stage {
             self.is_projected = true;
         }
         Ok(())
-    }
-
-    /// How deep tissue `u` and the tools lie in each other, mm.
-    fn sunk_at(&self, input: &Input<'_>, problem: &mut Problem, u: &[f32], way: f32) -> f32 {
-        let state = State {
-            rest: input.rest,
-            u,
-            start: input.last,
-        };
-        problem.sunk(state, way)
     }
 
     /// One iteration with the tools at part `way` of their way, from the residual in `q`; tells whether it leads to
@@ -89,7 +79,6 @@ impl Stage {
         self.moved = moved;
         let work = work(problem, d);
         let slope = along - work;
-        let held = self.sunk_at(input, problem, at.u, way).max(0.5 * SUNK_MM);
         let mut t = 1.0f32;
         for attempt in 0..=SHORTENINGS {
             if attempt > 0 {
@@ -97,7 +86,12 @@ impl Stage {
             }
             let (det, slope_new) = self.residual(lent, [input.last, q, d], g_new, report)?;
             let slope_new = slope_new - work;
-            let keeps = det > SMALLEST_DET && self.sunk_at(input, problem, q, way) <= held;
+            let left = match det > SMALLEST_DET {
+                true => sunk(input, problem, q, way),
+                false => f32::MAX,
+            };
+            // An iteration may not lose the contact, unless it had been lost.
+            let keeps = left <= 0.5 * SUNK_MM || left <= sunk(input, problem, at.u, way);
             if keeps && 0.5 * (slope + slope_new) <= SLOPE * slope {
                 std::mem::swap(at.u, q);
                 passes::difference(env, g_new, at.g, q)?;
@@ -111,6 +105,7 @@ impl Stage {
                 }
                 std::mem::swap(at.g, g_new);
                 at.det = det;
+                at.sunk_mm = (way >= 1.0).then_some(left);
                 better = true;
                 if t < 1.0 {
                     problem.blend(t);
