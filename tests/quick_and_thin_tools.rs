@@ -277,3 +277,22 @@ fn a_step_of_deep_tools_is_bounded_and_says_what_it_left() {
     }
     assert!(cut_short, "no solve was cut short: deeper tools are needed");
 }
+
+#[test]
+fn a_frame_shows_the_tissue_in_front_of_a_quick_tool() {
+    let model = model();
+    let scene = scene(&model, Corrections::Recommended);
+    let shape = Shape::Sphere { radius: 3.0 };
+    for place in places(&scene, 6) {
+        scene.reset().unwrap();
+        step(&scene, place.tool(&shape, 3.0, 2.0));
+        // 7 mm in half a step: the ball has gone past the surface.
+        let mut u = vec![0.0; 3 * scene.node_count()];
+        scene
+            .present(0.025, &[place.tool(&shape, 3.0, -5.0)], &mut u)
+            .unwrap();
+        let moved = u.as_chunks::<3>().0.iter().map(|u| Vector::from(*u));
+        let inward = moved.map(|u| -u.dot(place.outward)).fold(0.0, f32::max);
+        assert!(inward > 3.0, "{inward} mm at {:?}", place.at);
+    }
+}
