@@ -3,7 +3,7 @@
 
 use ::contact::{Pose, pose};
 
-use super::input::{Input, Lent, Report};
+use super::input::{Enough, Input, Lent, Report};
 use super::shorter::Shorter;
 use super::stage::{SMALLEST_DET, Stage};
 use crate::contact::{Delassus, MAX_TOOLS, Past, Problem, Tool};
@@ -11,6 +11,8 @@ use crate::error::Result;
 use crate::memory;
 
 const WHAT: &str = "the substeps of a scene";
+/// Iterations of a substep at most, after one that has lost the contact.
+const ONCE_LOST: u32 = 2;
 
 /// What contact has in them, made at the first.
 pub struct Substeps {
@@ -132,6 +134,7 @@ impl Stage {
         } = substeps;
         let count = shorter.count();
         let mut told = Report::default();
+        let mut lost = false;
         torn.fill(false);
         self.memory.clear();
         for part in 1..=count {
@@ -150,9 +153,15 @@ impl Stage {
             } = &mut *shorter;
             problem.enter(on_their_way, input.rest, last)?;
             let short = Lent { pace, ..lent };
+            let most = if lost { ONCE_LOST } else { u32::MAX };
+            let enough = Enough {
+                iterations: input.enough.iterations.min(most),
+                ..input.enough
+            };
             let own = Input {
                 last,
                 before,
+                enough,
                 ..*input
             };
             let report = self.make_loaded(short, &own, problem, next, |_| ())?;
@@ -165,6 +174,7 @@ impl Stage {
                 problem.commit();
             }
             shorter.advance();
+            lost |= report.fell_back;
             told = told.and(&report);
         }
         Ok(Report {

@@ -239,8 +239,10 @@ impl Body {
         let length = way.length();
         let direction = way.try_normalize()?;
         let at = self.first_inside(&Pose::IDENTITY, from, direction, length)?;
-        let point = from + direction * at;
-        Some((point, self.nearest(point).normal))
+        // The march ends a little inside.
+        let nearest = self.nearest(from + direction * at);
+        let point = from + direction * (at + nearest.distance).max(0.0);
+        Some((point, nearest.normal))
     }
 
     /// Length along a line at which it first lies inside of the tool.

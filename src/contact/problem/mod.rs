@@ -34,8 +34,8 @@ const PUT_MM: f32 = 40.0;
 const WHAT: &str = "the contact of instruments";
 /// Parts of a step's way at most: of a thin tool that goes as far as one may.
 const MOST_PARTS: f32 = 80.0;
-/// Work of the solves of a step at most, those of its substeps included: about so many multiplications, some ten milliseconds.
-const STEP_WORK: u64 = 40_000_000;
+/// Work of the solves of a step at most, those of its substeps included: about so many multiplications, some five milliseconds.
+const STEP_WORK: u64 = 20_000_000;
 /// Parts of the tools' ways in a step that has taken its time.
 const LEAST_PARTS: u32 = 4;
 /// Tissue that is farther from a tool is not pushed by it, mm.
