@@ -14,6 +14,7 @@
 //! What moves the whole field stays in the block coordinates until the elements ask for it: the contact is solved where the tissue
 //! would be at the nodes of the domain, and an iteration decodes once and projects once.
 
+mod fall_back;
 mod iteration;
 
 use std::time::Instant;
@@ -137,49 +138,10 @@ impl Stage {
         }
         let left = (at.sunk_mm).unwrap_or_else(|| sunk(input, problem, at.u, 1.0));
         if !is_sound(size, at.det) || left > SUNK_MM {
-            report.fell_back = true;
-            self.memory.clear();
-            problem.take_guess();
-            at.u.copy_from_slice(&self.guess);
-            let guessed = sunk(input, problem, at.u, 1.0);
-            if guessed > SUNK_MM {
-                self.respond_from_rest(lent, input, problem, at, report)?;
-                if sunk(input, problem, at.u, 1.0) > guessed {
-                    problem.take_guess();
-                    at.u.copy_from_slice(&self.guess);
-                }
-            }
-            self.evaluate(lent, input, at, report)?;
+            self.fall_back(lent, input, problem, at, report)?;
         }
         report.min_det = at.det;
         Ok(())
-    }
-
-    /// Linear elasticity from rest, with the tools where they are.
-    fn respond_from_rest(
-        &mut self,
-        lent: Lent<'_>,
-        input: &Input<'_>,
-        problem: &mut Problem,
-        at: &mut Iterate<'_>,
-        report: &mut Report,
-    ) -> Result<()> {
-        problem.start_from_rest(input.rest);
-        at.u.fill(0.0);
-        self.preconditioner.coordinates.fill(0.0);
-        let from_rest = Input {
-            last: &[],
-            ..*input
-        };
-        let parts = problem.parts();
-        for part in 1..=parts {
-            let way = part as f32 / parts as f32;
-            self.press(lent, &from_rest, problem, way, at.u)?;
-        }
-        problem.return_to_ways();
-        self.settle(lent.env(), at.u)?;
-        report.parts = parts;
-        self.evaluate(lent, input, at, report)
     }
 
     /// The state of the step before, with the forces that it had.
