@@ -4,7 +4,6 @@
 //! that time, `kappa = 9/(4 tau²) + 3 alpha/(2 tau)`.
 
 use std::mem::swap;
-use std::sync::Arc;
 
 use super::along::{Along, Ways};
 use super::nodes::{Means, Nodes};
@@ -84,7 +83,7 @@ impl Between {
         }
         let natural = corrections.space.natural_count();
         Ok(Between {
-            problem: Problem::new(model.samples()?, Arc::clone(&model.mesh))?,
+            problem: Problem::new(model.samples()?)?,
             other: Known {
                 last: field()?,
                 velocity: field()?,

@@ -1,7 +1,5 @@
 //! The instruments' part of a state.
 
-use std::sync::Arc;
-
 use crate::contact::{MAX_TOOLS, Past, Problem};
 use crate::error::Result;
 use crate::memory;
@@ -19,7 +17,7 @@ impl Core {
     }
 
     pub(super) fn admit_tools(&self, tools: &mut Tools) -> Result<()> {
-        tools.check(&*self.model.samples()?)
+        tools.check(self.model.samples()?.len() as u32)
     }
 
     pub(super) fn put_tools(&mut self, tools: Option<Tools>) -> Result<()> {
@@ -27,7 +25,7 @@ impl Core {
             (Some(problem), Some(past)) => problem.past = past,
             (Some(problem), None) => problem.past.clear(),
             (none @ None, Some(past)) => {
-                let mut problem = Problem::new(self.model.samples()?, Arc::clone(&self.mesh))?;
+                let mut problem = Problem::new(self.model.samples()?)?;
                 problem.past = past;
                 *none = Some(memory::boxed(problem, "the contact of instruments")?);
             }

@@ -30,10 +30,9 @@ impl Linear {
         decay: f32,
         threads: u32,
     ) -> Result<Self> {
-        let prior = PriorAlone::new(bundle, decay, threads)?;
         Ok(Self {
-            problem: Problem::new(samples.into(), prior.mesh().clone())?,
-            prior,
+            prior: PriorAlone::new(bundle, decay, threads)?,
+            problem: Problem::new(samples.into())?,
             rest: rest.as_flattened().to_vec(),
             state: vec![[0.0; 3]; rest.len()],
             told: Told::default(),
