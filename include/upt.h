@@ -311,8 +311,8 @@
 #define UPT_FLAG_REGULARISED 1024
 
 /**
- * The corrections ended with inverted elements: under tools the tissue stays where it was, otherwise the linear response
- * replaces them.
+ * The corrections ended with inverted elements, or had lost the contact of an instrument: the step's first guess or the linear response
+ * took their place.
  */
 #define UPT_FLAG_FELL_BACK 2048
 
@@ -322,9 +322,14 @@
 #define UPT_FLAG_ERROR 4096
 
 /**
- * Tissue lies more than 1 mm inside an instrument.
+ * Tissue lies more than 1 mm inside an instrument, or an instrument in the tissue.
  */
 #define UPT_FLAG_DEEP 8192
+
+/**
+ * The contact solve was cut short by its bounds or the budget and left more than 0.01 mm: `residual_mm` of the readings.
+ */
+#define UPT_FLAG_UNSOLVED 16384
 
 /**
  * Nodes of the surface.
@@ -749,6 +754,10 @@ typedef struct upt_instrument_reading {
    * Zero.
    */
   uint8_t reserved[3];
+  /**
+   * What the last contact solve left unsolved, mm: 0 where it came to its end.
+   */
+  float residual_mm;
 } upt_instrument_reading;
 
 /**

@@ -26,12 +26,14 @@ pub mod flag {
     pub const CLAMPED: u32 = 512;
     /// The contact block was near singular and was regularised.
     pub const REGULARISED: u32 = 1024;
-    /// The corrections ended with inverted elements: under tools the tissue stays where it was, otherwise the linear response replaces them.
+    /// The corrections ended with inverted elements, or had lost the contact of an instrument: something simpler took their place.
     pub const FELL_BACK: u32 = 2048;
     /// The estimated error is above the host's limit.
     pub const ERROR: u32 = 4096;
-    /// Tissue lies more than 1 mm inside an instrument.
+    /// Tissue lies more than 1 mm inside an instrument, or an instrument in the tissue.
     pub const DEEP: u32 = 8192;
+    /// The solve of the instruments' contact was stopped by its bounds; the readings say what it left.
+    pub const UNSOLVED: u32 = 16384;
 
     /// What the flags say, as text.
     pub fn names(flags: u32) -> String {
@@ -49,10 +51,14 @@ pub mod flag {
             (REGULARISED, "the contact block was nearly singular"),
             (
                 FELL_BACK,
-                "the corrections ended with inverted elements and were given up",
+                "the corrections ended with inverted elements or without their contact and were given up",
             ),
             (ERROR, "the estimated error is above the limit"),
             (DEEP, "tissue lies more than 1 mm inside an instrument"),
+            (
+                UNSOLVED,
+                "the instruments' contact was not solved to the end",
+            ),
         ];
         let said = meanings.iter().filter(|(flag, _)| flags & flag != 0);
         said.map(|(_, text)| *text).collect::<Vec<_>>().join("; ")

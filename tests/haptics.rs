@@ -104,6 +104,21 @@ fn play(
 }
 
 #[test]
+fn a_quick_hand_is_met_between_two_steps() {
+    let scene = scene(&model("tiny-corrected"), &corrected());
+    let mut hand = hand(&scene);
+    // At 1 m/s from 160 mm above to 1 mm below, where the step at 200 ms would find it.
+    let depth = |t: f64| (1000.0 * t - 160.0).min(1.0);
+    let mut met = 0;
+    play(&scene, &mut hand, 0.2, depth, |t, force| {
+        assert!(depth(t) > -1.0 || !force.contact, "{t} s: {force:?}");
+        met += u32::from(depth(t) >= 1.0 && force.contacts > 0);
+    });
+    // From 161 to 199 ms.
+    assert_eq!(met, 39);
+}
+
+#[test]
 fn a_tool_that_stays_feels_what_the_step_told() {
     let scene = scene(&model("tiny-corrected"), &corrected());
     let mut hand = hand(&scene);

@@ -186,12 +186,14 @@ class Flag(IntFlag):
     REGULARISED = 1024
     """The contact block was nearly singular and was regularised."""
     FELL_BACK = 2048
-    """The corrections ended with inverted elements: under tools the tissue stays where it was, otherwise the linear response
-    replaces them."""
+    """The corrections ended with inverted elements, or had lost the contact of an instrument: the step's first guess or the linear response
+    took their place."""
     ERROR = 4096
     """The estimated error is above the scene's `error_limit_mm`."""
     DEEP = 8192
-    """Tissue lies more than 1 mm inside an instrument."""
+    """Tissue lies more than 1 mm inside an instrument, or an instrument in the tissue."""
+    UNSOLVED = 16384
+    """The contact solve was cut short by its bounds or the budget and left more than 0.01 mm: `residual_mm` of the readings."""
 
 
 class IndexSet(IntEnum):
@@ -569,6 +571,8 @@ class InstrumentReading(Record):
     """1: its grasp tore off in this step."""
     reserved: tuple[int, ...] = vector("_reserved")
     """Zero."""
+    residual_mm: float
+    """What the last contact solve left unsolved, mm: 0 where it came to its end."""
 
     _fields_ = [
         ("struct_size", ctypes.c_uint32),
@@ -578,6 +582,7 @@ class InstrumentReading(Record):
         ("penetration_mm", ctypes.c_float),
         ("_torn", ctypes.c_uint8),
         ("_reserved", ctypes.c_uint8 * 3),
+        ("residual_mm", ctypes.c_float),
     ]
 
 

@@ -3,7 +3,7 @@
 //! With a coarse space, `A` is the compliance of `K + kappa M`: the static one less what inertia holds back,
 //! `A_k = A - N diag(kappa / (w² (w² + kappa))) N^T` with natural modes `N` of frequency `w`.
 
-use ::contact::{Sample, Vector};
+use ::contact::{Sample, Samples, Vector};
 
 use crate::corrections::CoarseSpace;
 use crate::error::Result;
@@ -86,7 +86,7 @@ impl Delassus {
     pub fn of(
         &mut self,
         compliance: Compliance<'_>,
-        all: &[Sample],
+        all: &Samples,
         rows: &[u32],
     ) -> Result<&[f32]> {
         self.read(compliance, all, rows)?;
@@ -100,7 +100,7 @@ impl Delassus {
     pub fn fixed(
         &mut self,
         compliance: Compliance<'_>,
-        all: &[Sample],
+        all: &Samples,
         rows: &[u32],
     ) -> Result<(&[f32], bool)> {
         let is_new = self.read(compliance, all, rows)?;
@@ -108,10 +108,10 @@ impl Delassus {
     }
 
     /// Makes `w` that of the samples; tells whether it was another's.
-    fn read(&mut self, compliance: Compliance<'_>, all: &[Sample], rows: &[u32]) -> Result<bool> {
+    fn read(&mut self, compliance: Compliance<'_>, all: &Samples, rows: &[u32]) -> Result<bool> {
         self.wanted.clear();
         memory::fit(&mut self.wanted, 3 * rows.len(), WHAT)?;
-        let samples = rows.iter().map(|row| all[*row as usize]);
+        let samples = rows.iter().map(|row| all.at(*row));
         self.gather(compliance, samples.clone())?;
         if self.of == rows {
             return Ok(false);

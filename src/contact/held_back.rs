@@ -1,7 +1,7 @@
 //! `W` at any time after a step: the static one less what inertia holds back at that time, `W_k = W - G diag(lost) G^T` with the natural modes `G` at
 //! the samples. `W` and `G` are kept from call to call; a row is computed when it is asked for, by contacts whose force changes.
 
-use ::contact::{Rows, Sample};
+use ::contact::{Rows, Samples};
 
 use super::compliance::{Compliance, Delassus, WHAT};
 use crate::error::Result;
@@ -38,7 +38,7 @@ impl HeldBack {
         &'a mut self,
         delassus: &'a mut Delassus,
         compliance: Compliance<'a>,
-        all: &[Sample],
+        all: &Samples,
         rows: &[u32],
     ) -> Result<At<'a>> {
         let order = 3 * rows.len();
@@ -63,7 +63,7 @@ impl HeldBack {
     }
 
     /// The natural modes at the samples.
-    fn read(&mut self, compliance: Compliance<'_>, all: &[Sample], rows: &[u32]) -> Result<()> {
+    fn read(&mut self, compliance: Compliance<'_>, all: &Samples, rows: &[u32]) -> Result<()> {
         self.modes.clear();
         let Some((space, lost)) = compliance.inertia else {
             return Ok(());
@@ -78,7 +78,7 @@ impl HeldBack {
         self.all.clear();
         self.all.extend(0..count as u32);
         for (at, &row) in rows.iter().enumerate() {
-            for (column, weight) in compliance.entries(all[row as usize]) {
+            for (column, weight) in compliance.entries(all.at(row)) {
                 for axis in 0..3 {
                     let own = space.at_contact(3 * column as usize + axis);
                     let to = self.modes.chunks_exact_mut(order);
@@ -165,10 +165,8 @@ mod tests {
                 inertia: Some((space, &lost)),
             };
             let mut whole = Delassus::default();
-            let wanted = whole.of(compliance, samples.rows(), &rows).unwrap();
-            let mut at = own
-                .at(&mut between, compliance, samples.rows(), &rows)
-                .unwrap();
+            let wanted = whole.of(compliance, &samples, &rows).unwrap();
+            let mut at = own.at(&mut between, compliance, &samples, &rows).unwrap();
             assert_eq!(at.contacts(), rows.len());
             let size = 9 * rows.len();
             let largest = wanted.iter().fold(0.0f32, |most, w| most.max(w.abs()));

@@ -5,18 +5,22 @@
 //! |---|---|
 //! | [`tool`] | what a host gives: shape, pose, how it holds; and what it gets back |
 //! | [`past`] | what is remembered from step to step: poses, forces, grasps |
+//! | [`buried`] | tools that lie in the tissue, and their way out |
 //! | [`compliance`] | how samples move under forces on samples: the Delassus matrix `W = B A B^T` |
 //! | [`held_back`] | the same at any time after a step |
+//! | [`state`] | where the tissue is, and where it was |
 //! | [`rows`] | gaps and slips of samples near the tools, at a state of the tissue |
 //! | [`problem`] | the samples near the tools, one solve for the forces on them, what the forces change, and what tools are told |
 //!
 //! Shapes, samples and sweeps are those of the reference solver (crate `contact`). Lengths mm, forces mN.
 
+mod buried;
 pub mod compliance;
 mod held_back;
 pub mod past;
 pub mod problem;
 pub mod rows;
+pub mod state;
 mod stored;
 pub mod tool;
 
@@ -24,8 +28,8 @@ pub use compliance::Compliance;
 pub(crate) use compliance::Delassus;
 pub use past::Past;
 pub use problem::Problem;
-pub use rows::State;
-pub(crate) use rows::vector;
 #[cfg(feature = "haptics")]
 pub(crate) use rows::{Pair, outward};
+pub use state::State;
+pub(crate) use state::vector;
 pub use tool::{MAX_TOOLS, Mode, Push, Reading, Told, Tool};

@@ -1,7 +1,7 @@
 //! What contact remembers from step to step: where the tools were, with which force each sample was pushed, what is grasped.
 
 use ::contact::grasp::Anchor;
-use ::contact::{Grasp, Pose, Vector};
+use ::contact::{Grasp, Pose, Samples, Vector};
 
 use serde::{Deserialize, Serialize};
 
@@ -68,11 +68,11 @@ impl Past {
         })
     }
 
-    /// Checks what was read: `samples` of the surface there are.
+    /// Checks what was read against the samples of the surface.
     ///
     /// # Errors
     /// [`Error::Snapshot`].
-    pub fn check(&self, samples: u32) -> Result<()> {
+    pub fn check(&self, samples: &Samples) -> Result<()> {
         let bad = |what: &str| {
             Err(Error::Snapshot(format!(
                 "holds {what} that no scene can have"
@@ -98,14 +98,14 @@ impl Past {
             }
             let anchors = grasp.anchors();
             let ascends = anchors.is_sorted_by(|a, b| a.sample < b.sample);
-            let known = |anchor: &Anchor| anchor.sample < samples && anchor.place.is_finite();
+            let known = |anchor: &Anchor| samples.is_row(anchor.sample) && anchor.place.is_finite();
             if !ascends || !anchors.iter().all(known) {
                 return bad("a grasp");
             }
         }
         let ascends = forces.is_sorted_by(|a, b| a.key() < b.key());
         let known = |one: &Force| {
-            (one.tool as usize) < tools.len() && one.sample < samples && one.force.is_finite()
+            (one.tool as usize) < tools.len() && samples.is_row(one.sample) && one.force.is_finite()
         };
         if !ascends || !forces.iter().all(known) {
             return bad("a force");

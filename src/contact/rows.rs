@@ -2,41 +2,23 @@
 
 use ::contact::{Body, Contact, Law, Pose, Samples, Vector, pose};
 
+use super::buried::Buried;
 use super::past::Held;
+use super::state::State;
 use super::tool::Tool;
 
-/// Longest way through a tool, mm.
-const THROUGH_MM: f32 = 30.0;
+/// Longest way out of a tool, or to its far side, mm.
+const THROUGH_MM: f32 = 45.0;
 /// What lies deeper inside of a tool at the start of a step comes out by this much a step, mm.
 const RECOVERY_MM: f32 = 3.0;
 /// A sample no deeper than this in a tool has not been gone through by it, mm, ...
 const SHALLOW_MM: f32 = 0.5;
 /// ... nor one from which the way back through the tool is more than so many times its depth: that way grazes the tool's side.
 const LONG_WAY: f32 = 4.0;
+/// A tool of less half thickness pierces the surface before it has pushed it, mm.
+const THIN_MM: f32 = 1.45;
 /// A tool's normal may lean this much (cosine) to the outside of the tissue; beyond, the tool reaches the sample from within.
 const LEAN: f32 = 0.2;
-
-/// Where the tissue is, `[K,3]` each.
-#[derive(Clone, Copy)]
-pub struct State<'a> {
-    /// Rest positions, mm.
-    pub rest: &'a [f32],
-    /// Displacements, mm.
-    pub u: &'a [f32],
-    /// Displacements at the start of the step, mm.
-    pub start: &'a [f32],
-}
-
-pub(crate) fn vector(field: &[f32], node: u32) -> Vector {
-    let at = 3 * node as usize;
-    Vector::new(field[at], field[at + 1], field[at + 2])
-}
-
-impl State<'_> {
-    pub(crate) fn position(&self, node: u32) -> Vector {
-        vector(self.rest, node) + vector(self.u, node)
-    }
-}
 
 /// A sample that is looked at.
 #[derive(Clone, Copy, Debug)]
@@ -45,6 +27,10 @@ pub(super) struct Row {
     pub(super) sample: u32,
     pub(super) force: Vector,
     pub(super) point: Vector,
+    /// Neither pushed nor held, and farther from its tool than [`::contact::SKIN_MM`].
+    pub(super) far: bool,
+    /// From its tool, where too many rows are ranked by it, mm.
+    pub(super) gap: f32,
     /// Of the tissue's surface, outward.
     pub(super) outward: Vector,
 }
@@ -67,13 +53,15 @@ pub(crate) struct Pair<'a> {
     pub(crate) anchor: Option<Vector>,
     /// The tool was put where it is: nobody knows which way it came.
     pub(crate) put: bool,
+    /// The tool lies in the tissue: unit direction of the shortest way out.
+    pub(crate) way_out: Option<Vector>,
 }
 
 impl Pair<'_> {
     /// Gap and slip of a sample that was at `start` and is at `point`, on a surface with normal `outward`, under `force` so far.
     ///
     /// It comes out of the tool where it is nearest to its surface, unless the tool has gone through the tissue's surface there: then
-    /// into the tissue, the way that the tool came.
+    /// into the tissue, the way that the tool came, to the tool's far side, be the tool still there or farther on.
     pub(crate) fn contact(
         &self,
         point: Vector,
@@ -91,18 +79,38 @@ impl Pair<'_> {
             };
         }
         let (mut normal, mut gap) = (nearest.normal, nearest.distance);
-        if normal.dot(outward) > LEAN {
+        let carried = self
+            .now
+            .transform_point(self.from.inverse_transform_point(start));
+        if let Some(out) = self.way_out
+            && normal.dot(out) > -LEAN
+        {
+            let way = self.body.way_through(self.now, point, -out, THROUGH_MM);
+            match way {
+                Some(way) => (normal, gap) = (-out, -way),
+                None if force == Vector::ZERO => return RELEASED,
+                None => {}
+            }
+        } else if let Some((face, depth)) = self.pierced(point, start, outward, gap) {
+            (normal, gap) = (face, -depth);
+        } else if normal.dot(outward) > LEAN {
             let pushed = force != Vector::ZERO;
-            let advance = self.now.translation - self.from.translation;
-            if !pushed && (gap >= 0.0 || advance.dot(outward) > 0.0) {
+            let leaves = (carried - start).dot(outward) > 0.0;
+            let passed = match gap >= 0.0 {
+                true => self.passed(point, start, outward),
+                false => None,
+            };
+            if !pushed && (leaves || (gap >= 0.0 && passed.is_none())) {
                 return RELEASED;
             }
-            if gap < 0.0 {
-                let way = self.body.way_out(self.now, point, -outward, THROUGH_MM);
+            if let Some((back, way)) = passed {
+                (normal, gap) = (back, -way);
+            } else if gap < 0.0 || force.dot(outward) < 0.0 {
+                let way = self.body.way_through(self.now, point, -outward, THROUGH_MM);
                 let length = way.unwrap_or(THROUGH_MM);
                 let back = force.dot(outward) < -force.dot(normal)
                     && length <= self.moved(point, start) + RECOVERY_MM;
-                if self.put || back || self.went(point, start, length) {
+                if back || (gap < 0.0 && (self.put || self.went(point, start, length))) {
                     let Some(way) = way else {
                         return RELEASED;
                     };
@@ -110,9 +118,6 @@ impl Pair<'_> {
                 }
             }
         }
-        let carried = self
-            .now
-            .transform_point(self.from.inverse_transform_point(start));
         Contact {
             law: Law::Touch {
                 friction: self.friction,
@@ -121,6 +126,40 @@ impl Pair<'_> {
             gap,
             slip: point - start - (carried - start),
         }
+    }
+
+    /// Where a thin tool has pierced the surface at a sample that lies inside of it: the normal where it entered, and how far ago. By the
+    /// shortest way the surface would come out at its side.
+    fn pierced(
+        &self,
+        point: Vector,
+        start: Vector,
+        outward: Vector,
+        gap: f32,
+    ) -> Option<(Vector, f32)> {
+        if gap >= 0.0 || self.body.size() >= THIN_MM {
+            return None;
+        }
+        let [now, then] = [(self.now, point), (self.from, start)]
+            .map(|(pose, point)| pose.inverse_transform_point(point));
+        let (entry, normal) = self.body.entry(then, now)?;
+        let face = self.now.rotation * normal;
+        let depth = (entry - now).dot(normal);
+        (face.dot(outward) < -LEAN && depth > 0.0).then_some((face, depth))
+    }
+
+    /// Where the tool has gone past a sample and on into the tissue since the sample was at `start`: the direction back along its way as the
+    /// tool sees it, and how far it is back to the tool's far side.
+    fn passed(&self, point: Vector, start: Vector, outward: Vector) -> Option<(Vector, f32)> {
+        let [now, then] = [(self.now, point), (self.from, start)]
+            .map(|(pose, point)| pose.inverse_transform_point(point));
+        let way = self.now.rotation * (then - now);
+        if way.dot(outward) >= 0.0 || self.body.nearest(then).distance < -SHALLOW_MM {
+            return None;
+        }
+        let back = way.try_normalize()?;
+        let length = way.length() + SHALLOW_MM;
+        Some((back, self.body.way_through(self.now, point, back, length)?))
     }
 
     /// Whether a sample may have come `way` into the tool since it was at `start`, or lay in it already.
@@ -153,6 +192,8 @@ pub(super) struct Moving<'a> {
     pub before: &'a [Pose],
     /// Which of them were put there in this step.
     pub put: &'a [bool],
+    /// Those that lie in the tissue.
+    pub buried: &'a [Option<Buried>],
     /// What each holds.
     pub held: &'a [Held],
     pub samples: &'a Samples,
@@ -166,8 +207,8 @@ impl Moving<'_> {
     pub(super) fn measure(&self, row: &Row) -> Contact {
         let mut contact = self.contact(row, self.part);
         if contact.gap < 0.0 {
-            let sample = self.samples.rows()[row.sample as usize];
-            let point = sample.gather(|node| self.start(node));
+            let sample = self.samples.at(row.sample);
+            let point = sample.gather(|node| self.state.position_before(node));
             let then = self.contact(&Row { point, ..*row }, 0.0);
             contact.gap += (-then.gap - RECOVERY_MM).max(0.0);
         }
@@ -188,15 +229,13 @@ impl Moving<'_> {
             now: &pose::between(before, &tool.pose, part),
             anchor: self.held[index].grasp.place(row.sample),
             put: self.put[index],
+            way_out: self.buried[index]
+                .filter(|buried| row.sample == buried.row || buried.out.dot(row.outward) > 0.5)
+                .map(|buried| buried.out),
         };
-        let sample = self.samples.rows()[row.sample as usize];
-        let start = sample.gather(|node| self.start(node));
+        let sample = self.samples.at(row.sample);
+        let start = sample.gather(|node| self.state.position_before(node));
         pair.contact(row.point, start, row.outward, row.force)
-    }
-
-    /// Where a node was when the step began.
-    fn start(&self, node: u32) -> Vector {
-        vector(self.state.rest, node) + vector(self.state.start, node)
     }
 }
 
@@ -217,6 +256,7 @@ mod tests {
             now: &pose(to),
             anchor: None,
             put,
+            way_out: None,
         };
         pair.contact(at, at, outward, force)
     }

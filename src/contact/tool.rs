@@ -124,6 +124,8 @@ pub struct Reading {
     pub penetration_mm: f32,
     /// The grasp tore off in this step.
     pub torn: bool,
+    /// What the step's last contact solve left unsolved, mm.
+    pub residual_mm: f32,
 }
 
 /// A sample that pushes or holds a tool.

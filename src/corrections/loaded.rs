@@ -14,6 +14,7 @@
 //! What moves the whole field stays in the block coordinates until the elements ask for it: the contact is solved where the tissue
 //! would be at the nodes of the domain, and an iteration decodes once and projects once.
 
+mod fall_back;
 mod iteration;
 
 use std::time::Instant;
@@ -26,6 +27,13 @@ use super::stage::{MOST_PARTS, SMALLEST_DET, Stage};
 use crate::contact::{Compliance, Problem, State};
 use crate::error::Result;
 
+/// A step that leaves tissue deeper inside of a tool than this has lost the contact, mm.
+const SUNK_MM: f32 = 0.9;
+
+/// Evaluations of the element forces that a step may take beyond [`EVALUATIONS`] for each of its iterations.
+const MORE_EVALUATIONS: u32 = 6;
+const EVALUATIONS: u32 = 2;
+
 /// The state of an iteration.
 struct Iterate<'a> {
     u: &'a mut Vec<f32>,
@@ -33,6 +41,8 @@ struct Iterate<'a> {
     g: &'a mut Vec<f32>,
     /// Smallest det F.
     det: f32,
+    /// How deep tools and tissue lie in each other, where an iteration has looked, mm.
+    sunk_mm: Option<f32>,
 }
 
 impl Stage {
@@ -91,6 +101,7 @@ impl Stage {
             u: &mut u,
             g: &mut g,
             det: 1.0,
+            sunk_mm: None,
         };
         let result = self
             .iterate_loaded(lent, input, problem, &mut at, &mut report)
@@ -116,6 +127,8 @@ impl Stage {
         report: &mut Report,
     ) -> Result<()> {
         self.guess_loaded(lent, input, problem, at, report)?;
+        self.guess.copy_from_slice(at.u);
+        problem.keep_guess()?;
         let mut size = self.improve_loaded(lent, input, problem, at, report)?;
         let sound = self.motion.min_det >= SMALLEST_DET && !input.still;
         if !is_sound(size, at.det) && sound {
@@ -123,21 +136,9 @@ impl Stage {
             self.stay(lent, input, problem, at, report)?;
             size = self.improve_loaded(lent, input, problem, at, report)?;
         }
-        if !is_sound(size, at.det) {
-            report.fell_back = true;
-            self.memory.clear();
-            if sound {
-                // As it was, under the forces that held it there.
-                self.stay(lent, input, problem, at, report)?;
-            } else {
-                // Linear elasticity from rest, with the tools where they are.
-                problem.let_go();
-                at.u.fill(0.0);
-                self.preconditioner.coordinates.fill(0.0);
-                self.press(lent, input, problem, 1.0, at.u)?;
-                self.settle(lent.env(), at.u)?;
-                self.evaluate(lent, input, at, report)?;
-            }
+        let left = (at.sunk_mm).unwrap_or_else(|| sunk(input, problem, at.u, 1.0));
+        if !is_sound(size, at.det) || left > SUNK_MM {
+            self.fall_back(lent, input, problem, at, report)?;
         }
         report.min_det = at.det;
         Ok(())
@@ -171,14 +172,20 @@ impl Stage {
         self.preconditioner.engage(env, touched)?;
         let start = self.unbalanced(env, problem, at.g)?;
         let mut size = start;
+        let mut failed = 0;
         for iteration in 0..input.enough.iterations {
             let until = input.enough.until;
             let late = until.is_some_and(|until| Instant::now() >= until);
-            if !is_sound(size, at.det) || (iteration > 0 && late) {
+            let spent = late || is_spent(input, report, input.enough.iterations);
+            if !is_sound(size, at.det) || (iteration > 0 && spent) {
                 break;
             }
-            self.improve_at(lent, input, problem, at, 1.0, report)?;
+            let better = self.improve_at(lent, input, problem, at, 1.0, report)?;
             report.iterations += 1;
+            failed = if better { 0 } else { failed + 1 };
+            if failed > 1 {
+                break;
+            }
             let before = size;
             size = self.unbalanced(env, problem, at.g)?;
             let moved = self.moved / (at.u.len() / 3) as f64;
@@ -201,6 +208,7 @@ impl Stage {
     ) -> Result<()> {
         (at.det, _) = self.residual(lent, [input.last, at.u, at.u], at.g, report)?;
         self.is_projected = false;
+        at.sunk_mm = None;
         Ok(())
     }
 
@@ -227,27 +235,24 @@ impl Stage {
         report: &mut Report,
     ) -> Result<()> {
         let env = lent.env();
-        let lost = self.motion.min_det < SMALLEST_DET && !input.still;
+        if self.motion.min_det < SMALLEST_DET && !input.still {
+            return self.respond_from_rest(lent, input, problem, at, report);
+        }
         let least = SMALLEST_DET.max(0.5 * self.motion.min_det.min(1.0));
         let ways = problem.parts();
         let mut iterated = 1;
         loop {
             problem.restart();
-            if lost {
-                at.u.fill(0.0);
-                self.preconditioner.coordinates.fill(0.0);
-                problem.let_go();
-            } else {
-                at.u.copy_from_slice(input.last);
-                self.move_freely(env)?;
-            }
+            at.u.copy_from_slice(input.last);
+            self.move_freely(env)?;
             let parts = ways.max(iterated);
             for part in 1..=parts {
                 let way = part as f32 / parts as f32;
                 self.press(lent, input, problem, way, at.u)?;
                 // An iteration after each of `iterated` parts of the load but the last.
                 let due = part * iterated / parts > (part - 1) * iterated / parts;
-                if due && part < parts {
+                let spent = problem.is_spent() || is_spent(input, report, 1);
+                if due && part < parts && !spent {
                     self.settle(env, at.u)?;
                     self.evaluate(lent, input, at, report)?;
                     if at.det > SMALLEST_DET {
@@ -261,7 +266,11 @@ impl Stage {
             self.settle(env, at.u)?;
             self.evaluate(lent, input, at, report)?;
             report.parts = parts;
-            if at.det > least || iterated >= MOST_PARTS {
+            if at.det > least
+                || iterated >= MOST_PARTS
+                || problem.is_spent()
+                || is_spent(input, report, 1)
+            {
                 return Ok(());
             }
             iterated *= 2;
@@ -312,6 +321,22 @@ impl Stage {
         self.preconditioner
             .add_load(env, change.dofs, change.forces)
     }
+}
+
+/// Whether a step has taken its evaluations, of which it leaves those of its iterations but for `iterations` of them.
+pub(super) fn is_spent(input: &Input<'_>, report: &Report, iterations: u32) -> bool {
+    let most = input.enough.iterations + iterations * (EVALUATIONS - 1) + MORE_EVALUATIONS;
+    report.evaluations >= most
+}
+
+/// How deep tissue `u` and the tools lie in each other, at part `way` of their way, mm.
+fn sunk(input: &Input<'_>, problem: &mut Problem, u: &[f32], way: f32) -> f32 {
+    let state = State {
+        rest: input.rest,
+        u,
+        start: input.last,
+    };
+    problem.sunk(state, way)
 }
 
 /// Whether the elements can go on from a state.

@@ -39,6 +39,9 @@ pub struct Stage {
     pub(super) d: Vec<f32>,
     pub(super) q: Vec<f32>,
     pub(super) u: Vec<f32>,
+    /// The first guess of a step that tools drive.
+    #[cfg(feature = "contact")]
+    pub(super) guess: Vec<f32>,
     /// `M p`: inertia of the step at the last displacement, µN.
     pub(super) drift: Vec<f32>,
     pub(super) partial: PartialSums,
@@ -84,6 +87,8 @@ impl Stage {
             d: field()?,
             q: field()?,
             u: field()?,
+            #[cfg(feature = "contact")]
+            guess: field()?,
             drift: field()?,
             partial: PartialSums::with_room(len, PAIRS)?,
             #[cfg(feature = "contact")]
@@ -116,6 +121,7 @@ impl Stage {
         self.next.velocity.fill(0.0);
         self.next.velocity_before.fill(0.0);
         self.next.inertia.fill(0.0);
+        self.next.truncated_mm = 0.0;
         self.memory.clear();
     }
 
@@ -153,8 +159,8 @@ impl Stage {
 
     /// Bytes held.
     pub fn memory_bytes(&self) -> usize {
-        // Seven fields, two velocities and the inertia of two states; contact forces of two states and two evaluations, contact nodes.
-        let fields = (7 + 6 + 4) * 4 * self.g.len() + 4 * self.g.len() / 3;
+        // Eight fields, two velocities and the inertia of two states; contact forces of two states and two evaluations, contact nodes.
+        let fields = (8 + 6 + 4) * 4 * self.g.len() + 4 * self.g.len() / 3;
         #[cfg(feature = "contact")]
         let fields = fields + 4 * self.projected.len();
         self.memory.memory_bytes()

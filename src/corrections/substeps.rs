@@ -3,14 +3,16 @@
 
 use ::contact::{Pose, pose};
 
-use super::input::{Input, Lent, Report};
+use super::input::{Enough, Input, Lent, Report};
 use super::shorter::Shorter;
-use super::stage::Stage;
+use super::stage::{SMALLEST_DET, Stage};
 use crate::contact::{Delassus, MAX_TOOLS, Past, Problem, Tool};
 use crate::error::Result;
 use crate::memory;
 
 const WHAT: &str = "the substeps of a scene";
+/// Iterations of a substep at most, after one that has lost the contact.
+const ONCE_LOST: u32 = 2;
 
 /// What contact has in them, made at the first.
 pub struct Substeps {
@@ -71,14 +73,18 @@ impl Stage {
         substeps: Option<(&mut Substeps, &mut Shorter)>,
         next: &mut [f32],
     ) -> Result<Report> {
+        problem.end_by(input.enough.until);
         let Some((substeps, shorter)) = substeps else {
             return self.correct_loaded(lent, input, problem, next);
         };
-        if substeps.helps(self.motion.truncated_mm) {
+        let lost = self.motion.min_det < SMALLEST_DET;
+        if substeps.helps(self.motion.truncated_mm) && !lost {
             return self.drive_substeps(lent, input, problem, (substeps, shorter), next);
         }
         let whole = self.correct_loaded(lent, input, problem, next)?;
-        if !substeps.helps(self.next.truncated_mm.hypot(whole.remaining_mm)) {
+        // Where the iterations have lost the contact they would lose it again.
+        let helps = substeps.helps(self.next.truncated_mm.hypot(whole.remaining_mm));
+        if whole.fell_back || !helps {
             return Ok(whole);
         }
         let parts = self.drive_substeps(lent, input, problem, (substeps, shorter), next)?;
@@ -128,6 +134,7 @@ impl Stage {
         } = substeps;
         let count = shorter.count();
         let mut told = Report::default();
+        let mut lost = false;
         torn.fill(false);
         self.memory.clear();
         for part in 1..=count {
@@ -146,9 +153,15 @@ impl Stage {
             } = &mut *shorter;
             problem.enter(on_their_way, input.rest, last)?;
             let short = Lent { pace, ..lent };
+            let most = if lost { ONCE_LOST } else { u32::MAX };
+            let enough = Enough {
+                iterations: input.enough.iterations.min(most),
+                ..input.enough
+            };
             let own = Input {
                 last,
                 before,
+                enough,
                 ..*input
             };
             let report = self.make_loaded(short, &own, problem, next, |_| ())?;
@@ -161,6 +174,7 @@ impl Stage {
                 problem.commit();
             }
             shorter.advance();
+            lost |= report.fell_back;
             told = told.and(&report);
         }
         Ok(Report {

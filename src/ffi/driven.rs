@@ -132,6 +132,7 @@ pub unsafe extern "C" fn upt_scene_instrument_readings(
                             penetration_mm: reading.penetration_mm,
                             torn: reading.torn.into(),
                             reserved: [0; 3],
+                            residual_mm: reading.residual_mm,
                         })
                     };
                     // SAFETY: `out` points to a struct whose first field is its size, as the header asks.

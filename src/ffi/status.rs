@@ -133,13 +133,15 @@ pub const UPT_FLAG_GROWTH: u32 = 256;
 pub const UPT_FLAG_CLAMPED: u32 = 512;
 /// The contact block was nearly singular and was regularised.
 pub const UPT_FLAG_REGULARISED: u32 = 1024;
-/// The corrections ended with inverted elements: under tools the tissue stays where it was, otherwise the linear response
-/// replaces them.
+/// The corrections ended with inverted elements, or had lost the contact of an instrument: the step's first guess or the linear response
+/// took their place.
 pub const UPT_FLAG_FELL_BACK: u32 = 2048;
 /// The estimated error is above the scene's `error_limit_mm`.
 pub const UPT_FLAG_ERROR: u32 = 4096;
-/// Tissue lies more than 1 mm inside an instrument.
+/// Tissue lies more than 1 mm inside an instrument, or an instrument in the tissue.
 pub const UPT_FLAG_DEEP: u32 = 8192;
+/// The contact solve was cut short by its bounds or the budget and left more than 0.01 mm: `residual_mm` of the readings.
+pub const UPT_FLAG_UNSOLVED: u32 = 16384;
 
 /// Nodes of the surface.
 pub const UPT_SET_SURFACE_NODES: i32 = 0;
@@ -219,6 +221,7 @@ const _: () = {
         UPT_FLAG_FELL_BACK = flag::FELL_BACK;
         UPT_FLAG_ERROR = flag::ERROR;
         UPT_FLAG_DEEP = flag::DEEP;
+        UPT_FLAG_UNSOLVED = flag::UNSOLVED;
     }
 };
 

@@ -217,6 +217,8 @@ pub struct upt_instrument_reading {
     pub torn: u8,
     /// Zero.
     pub reserved: [u8; 3],
+    /// What the last contact solve left unsolved, mm: 0 where it came to its end.
+    pub residual_mm: f32,
 }
 
 /// A point of the surface that pushes or holds an instrument; filled by `upt_scene_instrument_contacts`.

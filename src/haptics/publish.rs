@@ -56,6 +56,8 @@ pub struct Link {
     rows: Vec<u32>,
     number: u64,
     latency_s: Option<f64>,
+    /// Where the hand was when the last state was published.
+    last_pose: Option<Pose>,
 }
 
 /// A published state.
@@ -119,6 +121,7 @@ pub fn join(
         rows: memory::collected(count, 0..count as u32, WHAT)?,
         number: 0,
         latency_s: options.latency_s,
+        last_pose: None,
     };
     let haptics = Haptics::new(options, modes, slow, at, ends)?;
     Ok((link, haptics))
@@ -190,14 +193,14 @@ impl Link {
             held,
             inertia: Some((&step.corrections.space, &self.held_back)),
         };
-        let rows = self.samples.rows();
-        let of = self.found.iter().map(|(_, row)| rows[*row as usize]);
+        let samples = &*self.samples;
+        let of = self.found.iter().map(|(_, row)| samples.at(*row));
         let masses = of
             .clone()
             .map(|sample| mass(sample, &step.corrections.body.mass, held));
         self.sampled.clear();
         self.sampled.extend(self.found.iter().map(|(_, row)| *row));
-        let w = self.delassus.of(compliance, rows, &self.sampled)?;
+        let w = self.delassus.of(compliance, samples, &self.sampled)?;
         let slow = self.out.buffer();
         slow.delassus[..w.len()].copy_from_slice(w);
         slow.delay_s = delay(w, masses);
@@ -247,7 +250,7 @@ impl Link {
         slow.pose = past.map(|(_, tool)| tool.pose);
         slow.count = self.found.len();
         for (at, &(_, row)) in self.found.iter().enumerate() {
-            let sample = self.samples.rows()[row as usize];
+            let sample = self.samples.at(row);
             let point = sample.gather(|node| state.position(node));
             let anchor = past.and_then(|(_, tool)| tool.grasp.place(row));
             let force = past.map_or(Vector::ZERO, |(past, _)| {
@@ -269,6 +272,7 @@ impl Link {
                     now: &pose,
                     anchor,
                     put: false,
+                    way_out: None,
                 };
                 let pushed = force != Vector::ZERO;
                 let contact = pair.contact(point, point, slow.outward[at], force);
@@ -308,16 +312,38 @@ impl Link {
                     .extend(anchors.map(|anchor| (f32::MIN, anchor.sample)));
             }
         }
-        let placed = Placed {
-            body: &self.body,
-            pose,
-            skin: REACH_MM,
+        // A quick hand is elsewhere before the next state: what lies on its way, if it goes on as it did, is within reach too.
+        let last = self.last_pose.replace(pose).unwrap_or(pose);
+        let ahead = pose.translation - last.translation;
+        let on = |part: f32| Pose::from_parts(pose.translation + ahead * part, pose.rotation);
+        let is_quick = ahead.length() > REACH_MM;
+        let placed = match is_quick {
+            true => Placed {
+                body: &self.body,
+                pose: on(0.5),
+                skin: REACH_MM + 0.5 * ahead.length(),
+            },
+            false => Placed {
+                body: &self.body,
+                pose,
+                skin: REACH_MM,
+            },
         };
         let position = |node| vector(step.rest, node) + vector(step.u, node);
         let near = self.search.find(&self.samples, &[placed], position);
         memory::reserve(&mut self.found, near.len(), WHAT)?;
-        self.found
-            .extend(near.iter().map(|near| (near.distance, near.sample)));
+        let body = &self.body;
+        let near = near.iter().map(|near| {
+            let ways = (0..=8).map(|part| on(part as f32 / 8.0));
+            let distance = match is_quick {
+                true => ways.fold(f32::MAX, |least, pose| {
+                    least.min(body.nearest_at(&pose, near.point).distance)
+                }),
+                false => near.distance,
+            };
+            (distance, near.sample)
+        });
+        self.found.extend(near);
         // Of equals the pushed one comes first, and stays.
         self.found
             .sort_unstable_by(|a, b| a.1.cmp(&b.1).then(a.0.total_cmp(&b.0)));

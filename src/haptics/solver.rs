@@ -21,6 +21,7 @@ const LIMITS: Limits = Limits {
     tolerance_mm: 1e-4,
     least_sweeps: 4,
     most_sweeps: 40,
+    most_work: u64::MAX,
 };
 
 /// The samples between two steps.
@@ -174,6 +175,7 @@ impl Solver {
                 now,
                 anchor: slow.anchors[at],
                 put: false,
+                way_out: None,
             };
             let (point, start) = (self.place(slow, at), self.points[at]);
             let mut contact = pair.contact(point, start, slow.outward[at], force);

@@ -20,6 +20,8 @@ const WHAT: &str = "the contact of instruments";
 const INTRUSION_MM: f32 = 0.02;
 /// Tissue this deep inside of a tool raises [`flag::DEEP`], mm.
 const DEEP_MM: f32 = 1.0;
+/// A contact solve that leaves more than this raises [`flag::UNSOLVED`], mm.
+const UNSOLVED_MM: f32 = 0.01;
 
 impl Core {
     /// Takes the tools of a step; tells whether one is near enough to touch the tissue.
@@ -42,7 +44,10 @@ impl Core {
         }
         let mut problem = match self.problem.take() {
             Some(problem) => problem,
-            None => memory::boxed(Problem::new(self.model.samples()?)?, WHAT)?,
+            None => {
+                let mesh = Arc::clone(&self.mesh);
+                memory::boxed(Problem::new(self.model.samples()?, mesh)?, WHAT)?
+            }
         };
         let shared = lock_read(published);
         let (rest, start) = (&self.mesh.positions, &shared.last.field);
@@ -249,7 +254,14 @@ impl Core {
     fn tell_depth(problem: &Problem, stats: &mut SceneStats) {
         stats.contact_ms = problem.spent_ms();
         let readings = problem.next.tools.iter().map(|held| held.reading);
-        if readings.map(|r| r.penetration_mm).fold(0.0, f32::max) > DEEP_MM {
+        if readings
+            .clone()
+            .any(|reading| reading.residual_mm > UNSOLVED_MM)
+        {
+            stats.flags |= flag::UNSOLVED;
+        }
+        let deepest = readings.map(|r| r.penetration_mm).fold(0.0, f32::max);
+        if deepest > DEEP_MM || problem.lay_in_tissue {
             stats.flags |= flag::DEEP;
         }
     }

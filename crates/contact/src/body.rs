@@ -5,10 +5,22 @@
 //! projected point is rounding.
 
 use crate::error::ShapeError;
-use crate::shape::Shape;
+use crate::shape::{Shape, THINNEST_MM};
 use crate::triangles::Triangles;
 use parry3d::math::{Pose, Vector};
 use std::sync::Arc;
+
+/// A tool may sink this deep between the samples, mm.
+const SUNK_MM: f32 = 0.5;
+/// Rods touch as ones of this radius at least, and blades as ones of half this half thickness, mm: what is thinner than an element of
+/// the tissue feels no difference, and the contact of a finer tip is not to be solved on it. Ends of rods stay where they are.
+const LEAST_RADIUS_MM: f32 = 1.0;
+/// See [`Body::check_hull`], mm.
+const POINTED_MM: f32 = 0.2;
+/// Corners of a hull that serve as probes at most.
+const MOST_CORNERS: usize = 64;
+/// Ways along a line are followed at least by this, mm: what a line cuts off less deeply is missed.
+const GRAZING_MM: f32 = 0.02;
 
 #[derive(Clone, Debug)]
 enum Core {
@@ -65,19 +77,28 @@ impl Body {
                 half_length,
                 radius,
             } => {
-                let half_length = *half_length;
-                (Core::Segment { half_length }, *radius)
+                let end = half_length + radius;
+                let radius = radius.max(LEAST_RADIUS_MM.min(end));
+                let half_length = end - radius;
+                (Core::Segment { half_length }, radius)
             }
             Shape::Box { half_extents } => {
                 let half = Vector::from(*half_extents);
+                let half = half.max(Vector::splat(0.5 * LEAST_RADIUS_MM));
                 (Core::Cuboid { half }, 0.0)
             }
             Shape::Spatula {
                 half_extents,
                 radius,
             } => {
-                let half = Vector::from(*half_extents) - Vector::splat(*radius);
-                (Core::Cuboid { half }, *radius)
+                let half = Vector::from(*half_extents);
+                let half = half.max(Vector::splat(0.5 * LEAST_RADIUS_MM));
+                (
+                    Core::Cuboid {
+                        half: half - Vector::splat(*radius),
+                    },
+                    *radius,
+                )
             }
             Shape::Hull { points, margin } => {
                 (Core::Triangles(Arc::new(Triangles::hull(points)?)), *margin)
@@ -99,12 +120,45 @@ impl Body {
             Core::Cuboid { half } => (-*half, *half),
             Core::Triangles(surface) => surface.bounds(),
         };
-        Ok(Self {
+        let body = Self {
             core,
             radius,
             middle: 0.5 * (low + high),
             half: 0.5 * (high - low) + Vector::splat(radius),
-        })
+        };
+        if let (Core::Triangles(surface), Shape::Hull { .. }) = (&body.core, shape) {
+            body.check_hull(surface)?;
+        }
+        Ok(body)
+    }
+
+    /// A hull is thick, and no more pointed than that it is [`POINTED_MM`] thick a millimetre behind each corner.
+    fn check_hull(&self, hull: &Triangles) -> Result<(), ShapeError> {
+        let thickness = 2.0 * self.size();
+        if thickness < 0.4 * THINNEST_MM {
+            return Err(ShapeError::Thin { thickness });
+        }
+        for (corner, inward) in hull.corners().iter().zip(hull.inward()) {
+            let behind = *corner + inward;
+            let thickness = -2.0 * self.nearest(behind).distance;
+            if thickness < POINTED_MM {
+                let corner = corner.to_array();
+                return Err(ShapeError::Pointed { corner, thickness });
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether it sinks more than [`SUNK_MM`] between samples `spacing` apart, or passes between them: by its half thickness, or by
+    /// the margin of a hull, which may have a point.
+    pub fn sinks_between(&self, spacing: f32) -> bool {
+        let round = match self.core {
+            Core::Segment { .. } | Core::Cuboid { .. } => self.size(),
+            Core::Triangles(_) => self.radius,
+        };
+        // A point of an equilateral triangle is at most so far from its corners.
+        let far = spacing / 3.0f32.sqrt();
+        round < far || round - (round * round - far * far).sqrt() > SUNK_MM
     }
 
     /// How round its edges are at least, mm; 0 where they are sharp.
@@ -165,6 +219,51 @@ impl Body {
         None
     }
 
+    /// The same from a point that may lie outside: length of the way along the direction until the tool is behind, none where that is longer than
+    /// `limit` or the line misses the tool.
+    pub fn way_through(
+        &self,
+        pose: &Pose,
+        from: Vector,
+        direction: Vector,
+        limit: f32,
+    ) -> Option<f32> {
+        let entry = self.first_inside(pose, from, direction, limit)?;
+        let out = self.way_out(pose, from + direction * entry, direction, limit - entry)?;
+        Some(entry + out)
+    }
+
+    /// Where a straight way from one point of the tool's own frame to another first lies inside of it, and the outward normal there.
+    pub fn entry(&self, from: Vector, to: Vector) -> Option<(Vector, Vector)> {
+        let way = to - from;
+        let length = way.length();
+        let direction = way.try_normalize()?;
+        let at = self.first_inside(&Pose::IDENTITY, from, direction, length)?;
+        // The march ends a little inside.
+        let nearest = self.nearest(from + direction * at);
+        let point = from + direction * (at + nearest.distance).max(0.0);
+        Some((point, nearest.normal))
+    }
+
+    /// Length along a line at which it first lies inside of the tool.
+    fn first_inside(
+        &self,
+        pose: &Pose,
+        from: Vector,
+        direction: Vector,
+        limit: f32,
+    ) -> Option<f32> {
+        let mut length = 0.0;
+        while length <= limit {
+            let distance = self.nearest_at(pose, from + direction * length).distance;
+            if distance < 0.0 {
+                return Some(length);
+            }
+            length += distance.max(GRAZING_MM);
+        }
+        None
+    }
+
     /// Corners of the axis-aligned box around the tool at `pose`, widened by `margin`.
     pub fn bounds(&self, pose: &Pose, margin: f32) -> (Vector, Vector) {
         let axes = [Vector::X, Vector::Y, Vector::Z].map(|axis| (pose.rotation * axis).abs());
@@ -181,12 +280,23 @@ impl Body {
         shift.length() + turn * self.half.length()
     }
 
-    /// Points inside the tool, in its frame, by which to see whether it lies in something: the middle, and the middles of
-    /// the faces of the box around it, drawn in to the core.
-    pub fn probes(&self) -> [Vector; 7] {
+    /// Points inside the tool, in its frame, by which to see whether it lies in something: the middle, the middles of the faces of the box
+    /// around it, drawn in to the core, and corners of a hull.
+    pub fn probes(&self) -> impl Iterator<Item = Vector> {
         let core = self.half - Vector::splat(self.radius);
         let [x, y, z] = [Vector::X, Vector::Y, Vector::Z].map(|axis| axis * core);
-        [Vector::ZERO, x, -x, y, -y, z, -z].map(|offset| self.middle + 0.98 * offset)
+        let corners: &[Vector] = match &self.core {
+            Core::Triangles(surface) => surface.corners(),
+            _ => &[],
+        };
+        let middle = self.middle;
+        let corners = corners
+            .iter()
+            .step_by(corners.len().div_ceil(MOST_CORNERS).max(1));
+        [Vector::ZERO, x, -x, y, -y, z, -z]
+            .into_iter()
+            .chain(corners.map(move |corner| *corner - middle))
+            .map(move |offset| middle + 0.999 * offset)
     }
 }
 

@@ -23,4 +23,12 @@ pub enum ShapeError {
     Open { a: u32, b: u32 },
     #[error("the {count} points of the tool have no volume ({reason}); give a solid tool")]
     Flat { count: usize, reason: String },
+    #[error(
+        "it is {thickness} mm thick, less than contact can be solved for; lengths are mm, and a rod must be 0.5 mm thick and a blade 0.2 mm"
+    )]
+    Thin { thickness: f32 },
+    #[error(
+        "the hull is too pointed at [{}, {}, {}] mm: a millimetre behind that corner it is {thickness} mm thick, and contact needs 0.2 mm; blunt it", .corner[0], .corner[1], .corner[2]
+    )]
+    Pointed { corner: [f32; 3], thickness: f32 },
 }

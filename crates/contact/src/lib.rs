@@ -29,5 +29,5 @@ pub use grasp::Grasp;
 pub use parry3d::math::{Matrix, Pose, Rotation, Vector};
 pub use samples::{SPACING_MM, Sample, Samples};
 pub use search::{Candidate, Placed, SKIN_MM, Search};
-pub use shape::Shape;
+pub use shape::{Shape, THINNEST_MM};
 pub use sweeps::{Contact, Law, Limits, Outcome, Rows, Sweeps, Whole};

@@ -4,6 +4,9 @@
 //! `B^T f` on the nodes. Neighbours are at most [`SPACING_MM`] apart at rest, and each point occurs once: an edge's
 //! samples belong to the first face that has it. Positions, faces and spacing alone decide the samples and their order, so
 //! the reference solver and the runtime see the same ones.
+//!
+//! A thin tool passes between samples, and a thicker one where the tissue is stretched. There a finer *lattice* of points is
+//! touched too, [`LATTICE`] parts to an edge, whose rows are numbered after those of the samples and computed when asked for ([`Samples::at`], [`Samples::lattice_row`]).
 
 use parry3d::math::Vector;
 use std::collections::{HashSet, TryReserveError};
@@ -11,6 +14,11 @@ use std::collections::{HashSet, TryReserveError};
 /// Largest distance between neighbouring samples, mm: with 2.8 mm errors are seven times larger, with nodes alone 500
 /// times.
 pub const SPACING_MM: f32 = 1.7;
+
+/// Parts of a face's edge in the lattice: 0.06 mm on an edge of 4 mm.
+pub const LATTICE: u32 = 64;
+/// Numbers that a face's lattice takes up; those with `i + j > LATTICE` name no point.
+const PER_FACE: u32 = (LATTICE + 1) * (LATTICE + 1);
 
 /// A point of the surface: nodes and weights that sum to 1. Unused places repeat the first node with weight 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,11 +53,15 @@ pub struct Samples {
     corners: Vec<[u32; 3]>,
     /// Samples of face `f` are `rows[offsets[f]..offsets[f + 1]]`.
     offsets: Vec<u32>,
+    /// Parts that the samples make of each face's longest edge.
+    parts: Vec<u16>,
+    /// Whether there is a lattice between them.
+    has_lattice: bool,
 }
 
 impl Samples {
-    /// Samples `faces` (mesh nodes) of a mesh with rest positions `[K,3]`, at most `spacing_mm` apart. Samples with no node
-    /// but `held` ones cannot move and are left out.
+    /// Samples `faces` (mesh nodes) of a mesh with rest positions `[K,3]`, at most `spacing_mm` apart; with a larger spacing than
+    /// [`SPACING_MM`] there is no lattice. Samples with no node but `held` ones cannot move and are left out.
     ///
     /// Panics when a face names a node that `positions` does not have, and where there is no memory: see [`Samples::try_new`].
     pub fn new(
@@ -98,9 +110,11 @@ impl Samples {
         builder.held.extend(held);
         builder.seen_nodes.try_reserve(nodes.len())?;
         builder.seen_edges.try_reserve(3 * faces.len())?;
+        let mut parts = Vec::new();
+        parts.try_reserve_exact(faces.len())?;
         offsets.push(0);
         for face in faces {
-            builder.face(*face)?;
+            parts.push(builder.face(*face)?.min(usize::from(u16::MAX)) as u16);
             offsets.push(builder.rows.len() as u32);
         }
         Ok(Self {
@@ -108,6 +122,8 @@ impl Samples {
             nodes,
             corners,
             offsets,
+            parts,
+            has_lattice: spacing_mm <= SPACING_MM,
         })
     }
 
@@ -128,6 +144,51 @@ impl Samples {
     /// All samples.
     pub fn rows(&self) -> &[Sample] {
         &self.rows
+    }
+
+    /// The point of a row: a sample, or one of the lattice.
+    ///
+    /// Panics when there is no such row ([`Samples::is_row`]).
+    #[inline]
+    pub fn at(&self, row: u32) -> Sample {
+        match self.rows.get(row as usize) {
+            Some(sample) => *sample,
+            None => {
+                let (face, [i, j]) = self.lattice_place(row);
+                let part = |n: u32| n as f32 / LATTICE as f32;
+                Sample {
+                    nodes: self.corners[face].map(|place| self.nodes[place as usize]),
+                    weights: [part(LATTICE - i - j), part(i), part(j)],
+                }
+            }
+        }
+    }
+
+    /// Whether a number is that of a sample or of a point of the lattice.
+    pub fn is_row(&self, row: u32) -> bool {
+        (row as usize) < self.rows.len() || {
+            let (face, [i, j]) = self.lattice_place(row);
+            face < self.corners.len() && i + j <= LATTICE
+        }
+    }
+
+    /// The row of a face's lattice point with weights `(LATTICE - i - j, i, j) / LATTICE`; none on a surface with so many faces that
+    /// the numbers do not suffice.
+    pub fn lattice_row(&self, face: usize, [i, j]: [u32; 2]) -> Option<u32> {
+        let face = u32::try_from(face).ok()?;
+        let own = i * (LATTICE + 1) + j;
+        let start = u32::try_from(self.rows.len()).ok()?;
+        face.checked_mul(PER_FACE)?
+            .checked_add(own)?
+            .checked_add(start)
+    }
+
+    /// Face and place of a row of the lattice.
+    fn lattice_place(&self, row: u32) -> (usize, [u32; 2]) {
+        let row = row - self.rows.len() as u32;
+        let own = row % PER_FACE;
+        let (i, j) = (own / (LATTICE + 1), own % (LATTICE + 1));
+        ((row / PER_FACE) as usize, [i, j])
     }
 
     /// Number of samples.
@@ -155,9 +216,18 @@ impl Samples {
         self.corners[face]
     }
 
-    /// The face that a sample belongs to.
-    pub fn face_of(&self, sample: u32) -> usize {
-        self.offsets.partition_point(|start| *start <= sample) - 1
+    /// How far apart the samples of a face are where its longest edge has become `longest` mm; none where that does not matter.
+    pub fn spacing(&self, face: usize, longest: f32) -> Option<f32> {
+        self.has_lattice
+            .then(|| longest / f32::from(self.parts[face]))
+    }
+
+    /// The face that a row belongs to.
+    pub fn face_of(&self, row: u32) -> usize {
+        match (row as usize) < self.rows.len() {
+            true => self.offsets.partition_point(|start| *start <= row) - 1,
+            false => self.lattice_place(row).0,
+        }
     }
 
     /// Samples that belong to a face, as a range of [`Samples::rows`].
@@ -176,7 +246,8 @@ struct Builder<'a> {
 }
 
 impl Builder<'_> {
-    fn face(&mut self, face: [u32; 3]) -> Result<(), TryReserveError> {
+    /// Gives the parts that it makes of the longest edge.
+    fn face(&mut self, face: [u32; 3]) -> Result<usize, TryReserveError> {
         for node in face {
             if self.seen_nodes.insert(node) {
                 self.push([node; 3], [1.0, 0.0, 0.0])?;
@@ -204,7 +275,7 @@ impl Builder<'_> {
                 self.push(face, [part(parts - i - j), part(i), part(j)])?;
             }
         }
-        Ok(())
+        Ok(parts)
     }
 
     fn push(&mut self, nodes: [u32; 3], weights: [f32; 3]) -> Result<(), TryReserveError> {

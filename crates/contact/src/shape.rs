@@ -28,6 +28,8 @@ pub enum Shape {
 
 /// No tool is as large, mm.
 const LARGEST: f32 = 1e4;
+/// No rod is thinner than this, mm: it would pass between the points at which contact is looked at.
+pub const THINNEST_MM: f32 = 0.5;
 
 impl Shape {
     /// The convex hull of points, such as those of an STL or OBJ file, with only its corners kept.
@@ -53,15 +55,22 @@ impl Shape {
     /// [`ShapeError`], naming the field.
     pub fn check(&self) -> Result<(), ShapeError> {
         match self {
-            Shape::Sphere { radius } => positive("radius", *radius),
+            Shape::Sphere { radius } => {
+                positive("radius", *radius)?;
+                thick(2.0 * radius)
+            }
             Shape::Capsule {
                 half_length,
                 radius,
             } => {
                 not_negative("half_length", *half_length)?;
-                positive("radius", *radius)
+                positive("radius", *radius)?;
+                thick(2.0 * radius)
             }
-            Shape::Box { half_extents } => all_positive(*half_extents),
+            Shape::Box { half_extents } => {
+                all_positive(*half_extents)?;
+                is_thick_blade(*half_extents)
+            }
             Shape::Spatula {
                 half_extents,
                 radius,
@@ -75,7 +84,7 @@ impl Shape {
                         smallest,
                     });
                 }
-                Ok(())
+                is_thick_blade(*half_extents)
             }
             Shape::Hull { points, margin } | Shape::Mesh { points, margin, .. } => {
                 let far = |p: &[f32; 3]| !p.iter().all(|v| v.abs() < LARGEST);
@@ -97,6 +106,25 @@ fn positive(field: &'static str, value: f32) -> Result<(), ShapeError> {
             value,
             wanted: "above 0 mm",
         })
+    }
+}
+
+/// A rod's thickness, mm.
+fn thick(thickness: f32) -> Result<(), ShapeError> {
+    match thickness < THINNEST_MM {
+        true => Err(ShapeError::Thin { thickness }),
+        false => Ok(()),
+    }
+}
+
+/// A blade may be thin in one direction, if it is no thinner than two fifths of a rod.
+fn is_thick_blade(mut half_extents: [f32; 3]) -> Result<(), ShapeError> {
+    half_extents.sort_unstable_by(f32::total_cmp);
+    let [thickness, width, _] = half_extents.map(|half| 2.0 * half);
+    thick(width)?;
+    match thickness < 0.4 * THINNEST_MM {
+        true => Err(ShapeError::Thin { thickness }),
+        false => Ok(()),
     }
 }
 

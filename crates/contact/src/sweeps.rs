@@ -40,6 +40,8 @@ pub struct Limits {
     pub least_sweeps: u32,
     /// Default 200.
     pub most_sweeps: u32,
+    /// Multiplications at most, from the second sweep on. Default: as many as it takes.
+    pub most_work: u64,
 }
 
 impl Default for Limits {
@@ -48,6 +50,7 @@ impl Default for Limits {
             tolerance_mm: 1e-4,
             least_sweeps: 15,
             most_sweeps: 200,
+            most_work: u64::MAX,
         }
     }
 }
@@ -60,6 +63,8 @@ pub struct Outcome {
     pub change_mm: f32,
     /// Within the tolerance.
     pub converged: bool,
+    /// Multiplications of the solve.
+    pub work: u64,
 }
 
 /// A Delassus matrix `[3n,3n]`, symmetric, in millimetres a unit of force, of which a solve reads the rows of those contacts alone whose
@@ -117,6 +122,7 @@ pub struct Sweeps {
     blocks: Vec<Option<Block>>,
     /// `W df`, three numbers a contact, mm.
     shift: Vec<f32>,
+    work: u64,
 }
 
 impl Sweeps {
@@ -159,12 +165,18 @@ impl Sweeps {
             sweeps: 0,
             change_mm: 0.0,
             converged: true,
+            work: 0,
         };
+        self.work = 0;
         while outcome.sweeps < limits.most_sweeps.max(1) {
             outcome.change_mm = self.sweep(delassus, contacts, forces);
             outcome.sweeps += 1;
             outcome.converged = outcome.change_mm <= limits.tolerance_mm;
+            outcome.work = self.work;
             if outcome.converged && outcome.sweeps >= limits.least_sweeps {
+                break;
+            }
+            if outcome.sweeps > 1 && outcome.work >= limits.most_work {
                 break;
             }
         }
@@ -210,6 +222,7 @@ impl Sweeps {
             largest = largest.max((block.w * change).abs().max_element());
             let change = block.frame * change;
             forces[i] = block.frame * wanted;
+            self.work += 3 * self.shift.len() as u64;
             let rows = delassus.rows(i).chunks_exact(self.shift.len());
             for (row, df) in rows.zip(change.to_array()) {
                 for (shift, w) in self.shift.iter_mut().zip(row) {

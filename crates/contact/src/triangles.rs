@@ -100,6 +100,19 @@ impl Triangles {
         self.faces.vertices()
     }
 
+    /// Unit directions from its corners inward: the mean of those along the edges.
+    pub fn inward(&self) -> Vec<Vector> {
+        let corners = self.faces.vertices();
+        let mut inward = vec![Vector::ZERO; corners.len()];
+        for face in self.faces.indices() {
+            for k in 0..3 {
+                let (a, b) = (face[k] as usize, face[(k + 1) % 3] as usize);
+                inward[a] += (corners[b] - corners[a]).normalize_or_zero();
+            }
+        }
+        inward.into_iter().map(Vector::normalize_or_zero).collect()
+    }
+
     /// Corners of the box around it.
     pub fn bounds(&self) -> (Vector, Vector) {
         let vertices = self.faces.vertices();

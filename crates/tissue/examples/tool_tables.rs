@@ -315,7 +315,7 @@ fn sliding(friction: f32) -> Outcome<f32> {
         // Reported forces are means over 2 ms: in their middle the tool was 0.01 mm back.
         let centre = at - Vector::X * 0.01;
         for entry in &report.sample_forces {
-            let point = samples.rows()[entry.sample as usize].gather(position);
+            let point = samples.at(entry.sample).gather(position);
             let normal = (point - centre).normalize();
             let force = Vector::from(entry.force);
             let push = force.dot(normal);

@@ -158,7 +158,7 @@ fn collision_field(
 ) -> (Vec<ContactNode>, Vec<[f32; 3]>) {
     let mut nodal: BTreeMap<u32, Vector> = BTreeMap::new();
     for entry in forces {
-        for (node, weight) in samples.rows()[entry.sample as usize].entries() {
+        for (node, weight) in samples.at(entry.sample).entries() {
             if held.binary_search(&node).is_err() {
                 *nodal.entry(node).or_default() += Vector::from(entry.force) * weight;
             }

@@ -5,9 +5,12 @@ use ::contact::grasp::tension;
 
 use super::Problem;
 use crate::contact::past::Force;
-use crate::contact::rows::{State, vector};
+use crate::contact::state::{State, vector};
 use crate::contact::tool::{Push, Reading, Told};
 use crate::envelope::Used;
+
+/// No grasp pulls harder than this, mN: soft tissue tears before.
+const STRONGEST_GRASP_MN: f32 = 10_000.0;
 
 impl Problem {
     /// Whether a grasp has torn off in this step.
@@ -19,7 +22,7 @@ impl Problem {
     pub fn touched(&mut self, held: &[bool]) -> &[u32] {
         self.nodes.clear();
         for force in &self.next.forces {
-            let sample = self.samples.rows()[force.sample as usize];
+            let sample = self.samples.at(force.sample);
             let nodes = sample.entries().map(|entry| entry.0);
             self.nodes
                 .extend(nodes.filter(|node| !held[*node as usize]));
@@ -41,7 +44,7 @@ impl Problem {
 
     fn share(&self, forces: &[Force], mut take: impl FnMut(u32, Vector)) {
         for force in forces {
-            for (node, weight) in self.samples.rows()[force.sample as usize].entries() {
+            for (node, weight) in self.samples.at(force.sample).entries() {
                 take(node, force.force * weight);
             }
         }
@@ -50,14 +53,14 @@ impl Problem {
     /// Tells each tool what it feels, tears grasps that are pulled too hard. `state` is that at the end of the step.
     pub fn finish(&mut self, state: State<'_>) {
         for index in 0..self.tools.len() {
-            let penetration_mm = self.deepest(index, state);
+            let penetration_mm = self.depth(index, state, 1.0);
             let tool = &self.tools[index];
             let (mut force, mut torque) = (Vector::ZERO, Vector::ZERO);
             let (mut pull, mut normal) = (Vector::ZERO, Vector::ZERO);
             let mut contacts = 0;
             let held = &self.next.tools[index];
             for row in self.next.forces.iter().filter(|f| f.tool == index as u32) {
-                let point = self.samples.rows()[row.sample as usize].gather(|n| state.position(n));
+                let point = self.samples.at(row.sample).gather(|n| state.position(n));
                 force -= row.force;
                 torque -= (point - tool.pose.translation).cross(row.force);
                 contacts += 1;
@@ -68,13 +71,18 @@ impl Problem {
             }
             let held = &mut self.next.tools[index];
             let pull = tension(pull, normal.normalize_or_zero());
-            let torn = held.reading.torn || held.grasp.tear(pull, tool.tear_off_mn);
+            let tear_off = match tool.tear_off_mn > 0.0 {
+                true => tool.tear_off_mn,
+                false => STRONGEST_GRASP_MN,
+            };
+            let torn = held.reading.torn || held.grasp.tear(pull, tear_off);
             held.reading = Reading {
                 force: force.to_array(),
                 torque: torque.to_array(),
                 contacts,
                 penetration_mm,
                 torn,
+                residual_mm: if contacts > 0 { self.unsolved_mm } else { 0.0 },
             };
         }
     }
@@ -103,7 +111,7 @@ impl Problem {
         told.readings
             .extend(self.past.tools.iter().map(|held| held.reading));
         for force in &self.past.forces {
-            let sample = self.samples.rows()[force.sample as usize];
+            let sample = self.samples.at(force.sample);
             told.pushes.push(Push {
                 tool: force.tool,
                 point: sample

@@ -1,10 +1,11 @@
-//! Where tools may touch: the samples near them, those that are pushed, and those that are held.
+//! Where tools may touch: the samples near them and on their ways, those that are pushed, and those that are held.
 
-use ::contact::{Placed, SKIN_MM, Vector, pose};
+use ::contact::{Placed, SKIN_MM, SPACING_MM, Vector, pose};
 
 use super::{Problem, WHAT};
-use crate::contact::past::Force;
-use crate::contact::rows::{Moving, Row, State, outward};
+use crate::contact::buried::Buried;
+use crate::contact::rows::{Moving, Row, outward};
+use crate::contact::state::State;
 use crate::contact::tool::MAX_TOOLS;
 use crate::error::Result;
 use crate::memory;
@@ -13,29 +14,45 @@ use crate::memory;
 pub(super) const MOST_ROWS: usize = 256;
 
 impl Problem {
-    /// Fills `rows`: samples near the tools at part `part` of their way, those that are pushed, and those that are held. `wide`
-    /// looks as far as the tools move.
+    /// Fills `rows`: samples near the tools at part `part` of their way, those that are pushed, and those that are held; at the end of the
+    /// way also those that the tools have passed; `most` rows at most. `wide` takes all that the tools may reach as they move.
     ///
     /// # Errors
     /// [`crate::Error::OutOfMemory`].
-    pub(super) fn look(&mut self, state: State<'_>, part: f32, wide: bool) -> Result<()> {
+    pub(super) fn look(
+        &mut self,
+        state: State<'_>,
+        part: f32,
+        wide: bool,
+        most: usize,
+    ) -> Result<()> {
         let mut placed: [Option<Placed>; MAX_TOOLS] = [const { None }; MAX_TOOLS];
-        for (place, (tool, from)) in placed.iter_mut().zip(self.tools.iter().zip(&self.before)) {
-            let motion = match wide {
+        for (index, (tool, from)) in self.tools.iter().zip(&self.before).enumerate() {
+            if tool.body.sinks_between(SPACING_MM) {
+                let at = pose::between(from, &tool.pose, part);
+                let tip = Buried::tip(&tool.body, &at, &self.samples, state);
+                self.buried[index] = tip.or(self.buried[index]);
+            }
+            let motion = match wide || part >= 1.0 {
                 true => tool.body.motion(from, &tool.pose),
                 false => 0.0,
             };
-            *place = Some(Placed {
+            let depth = self.buried[index].map_or(0.0, |buried| buried.depth);
+            placed[index] = Some(Placed {
                 body: &tool.body,
                 pose: pose::between(from, &tool.pose, part),
-                skin: SKIN_MM + motion,
+                skin: SKIN_MM + motion.max(depth),
             });
         }
         self.rows.clear();
-        let row = |tool: u32, sample: u32, force: Vector| Row {
+        self.found = 0;
+        self.shed.clear();
+        let row = |tool: u32, sample: u32, force: Vector, far: bool| Row {
             tool,
             sample,
             force,
+            far,
+            gap: 0.0,
             point: Vector::ZERO,
             outward: Vector::ZERO,
         };
@@ -45,86 +62,81 @@ impl Problem {
                 .find(&self.samples, std::slice::from_ref(placed), |node| {
                     state.position(node)
                 });
+            let tool = index as u32;
+            self.found += found.len();
             let anchors = self.next.tools[index].grasp.anchors();
-            memory::reserve(&mut self.rows, found.len() + anchors.len(), WHAT)?;
-            let samples = found.iter().map(|c| c.sample);
-            let samples = samples.chain(anchors.iter().map(|anchor| anchor.sample));
+            memory::reserve(&mut self.rows, found.len() + anchors.len() + 1, WHAT)?;
+            let found = found
+                .iter()
+                .map(|c| row(tool, c.sample, Vector::ZERO, c.distance > SKIN_MM));
+            self.rows.extend(found);
+            let own = anchors.iter().map(|anchor| anchor.sample);
+            let own = own.chain(self.buried[index].map(|buried| buried.row));
             self.rows
-                .extend(samples.map(|sample| row(index as u32, sample, Vector::ZERO)));
+                .extend(own.map(|sample| row(tool, sample, Vector::ZERO, false)));
         }
         memory::reserve(&mut self.rows, self.next.forces.len(), WHAT)?;
         let pushed = self.next.forces.iter();
         self.rows
-            .extend(pushed.map(|force| row(force.tool, force.sample, force.force)));
-        // Those with a force come first of their equals, and stay.
+            .extend(pushed.map(|force| row(force.tool, force.sample, force.force, false)));
+        // Those with a force come first of their equals, and stay; then those that are held.
         self.rows
-            .sort_unstable_by_key(|row| (row.tool, row.sample, row.force == Vector::ZERO));
+            .sort_unstable_by_key(|row| (row.tool, row.sample, row.force == Vector::ZERO, row.far));
         self.rows.dedup_by_key(|row| (row.tool, row.sample));
         for row in &mut self.rows {
-            let sample = self.samples.rows()[row.sample as usize];
+            let sample = self.samples.at(row.sample);
             row.point = sample.gather(|node| state.position(node));
             row.outward = outward(&self.samples, row.sample, state);
         }
-        if self.rows.len() > MOST_ROWS {
-            self.keep_nearest(part);
+        if !wide && self.rows.iter().any(|row| row.far) {
+            let mut rows = std::mem::take(&mut self.rows);
+            let moving = self.moving(state, part);
+            rows.retain(|row| !row.far || moving.contact(row, part).gap <= SKIN_MM);
+            self.rows = rows;
+        }
+        if self.rows.len() > most {
+            memory::fit(&mut self.shed, self.rows.len() - most, WHAT)?;
+            self.keep_deepest(state, part, most);
         }
         Ok(())
     }
 
-    /// Keeps [`MOST_ROWS`] rows: those with a force first, then those deepest inside of their tool.
-    fn keep_nearest(&mut self, part: f32) {
-        let depth = |row: &Row| match self.tools.get(row.tool as usize) {
-            Some(tool) => {
-                let from = &self.before[row.tool as usize];
-                let pose = pose::between(from, &tool.pose, part);
-                tool.body.nearest_at(&pose, row.point).distance
-            }
-            None => f32::MAX,
-        };
-        let rank = |row: &Row| (row.force == Vector::ZERO, depth(row), row.sample);
-        self.rows.sort_unstable_by(|a, b| {
-            let ((a0, a1, a2), (b0, b1, b2)) = (rank(a), rank(b));
-            a0.cmp(&b0).then(a1.total_cmp(&b1)).then(a2.cmp(&b2))
-        });
-        self.rows.truncate(MOST_ROWS);
-        self.rows.sort_unstable_by_key(|row| (row.tool, row.sample));
-    }
-
-    /// How deep the deepest sample lies inside of a tool at its end, the way that it has to come out, mm; 0 where none does.
-    pub(super) fn deepest(&mut self, index: usize, state: State<'_>) -> f32 {
-        let tool = &self.tools[index];
-        let placed = Placed {
-            body: &tool.body,
-            pose: tool.pose,
-            skin: 0.0,
-        };
-        let search = &mut self.search;
-        search.find(&self.samples, &[placed], |node| state.position(node));
-        let moving = Moving {
+    /// The tools at part `part` of their way.
+    pub(super) fn moving<'a>(&'a self, state: State<'a>, part: f32) -> Moving<'a> {
+        Moving {
             tools: &self.tools,
             before: &self.before,
             put: &self.put,
+            buried: &self.buried,
             held: &self.next.tools,
             samples: &self.samples,
             state,
-            part: 1.0,
-        };
-        let depths = self.search.found().iter().map(|candidate| {
-            let (tool, sample) = (index as u32, candidate.sample);
-            let place = self
-                .next
-                .forces
-                .binary_search_by_key(&(tool, sample), Force::key);
-            let row = Row {
-                tool,
-                sample,
-                force: place.map_or(Vector::ZERO, |at| self.next.forces[at].force),
-                point: candidate.point,
-                outward: outward(&self.samples, sample, state),
+            part,
+        }
+    }
+
+    /// Keeps `most` rows: those with a force first, then those deepest inside of their tool. Where they are fewer than [`MOST_ROWS`] those at nodes
+    /// come first instead, which hold the tissue between them too, and forces of the others are shed.
+    fn keep_deepest(&mut self, state: State<'_>, part: f32, most: usize) {
+        let mut rows = std::mem::take(&mut self.rows);
+        let mut shed_rows = std::mem::take(&mut self.shed);
+        let moving = self.moving(state, part);
+        let samples = &self.samples;
+        for row in &mut rows {
+            row.gap = moving.contact(row, part).gap;
+        }
+        rows.sort_unstable_by(|a, b| {
+            let late = |row: &Row| match most < MOST_ROWS {
+                true => samples.at(row.sample).entries().count() > 1 || row.gap > SKIN_MM,
+                false => row.force == Vector::ZERO,
             };
-            // What no tool touches, because it is reached from within, lies in it all the same.
-            (-moving.contact(&row, 1.0).gap).max(-candidate.distance)
+            let order = late(a).cmp(&late(b)).then(a.gap.total_cmp(&b.gap));
+            order.then(a.sample.cmp(&b.sample))
         });
-        depths.fold(0.0, f32::max)
+        let shed = rows[most..].iter();
+        shed_rows.extend(shed.filter(|row| row.force != Vector::ZERO));
+        rows.truncate(most);
+        rows.sort_unstable_by_key(|row| (row.tool, row.sample));
+        (self.rows, self.shed) = (rows, shed_rows);
     }
 }

@@ -4,23 +4,27 @@
 //! A step solves it several times, as the tissue's state gets better; each solve goes on from the forces of the one before, since
 //! the state that it is given is the tissue under those.
 
+mod depth;
 mod loads;
 mod look;
 mod solve;
 
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use ::contact::grasp::REACH_MM;
-use ::contact::{Contact, Pose, Sample, Samples, Search, Sweeps, Vector};
+use ::contact::{Contact, Pose, Sample, Samples, Search, Sweeps, Vector, pose};
 
 pub use solve::Change;
 
+use super::buried::Buried;
 use super::compliance::Delassus;
 use super::held_back::HeldBack;
 use super::past::{Force, Held, Past};
-use super::rows::{Row, State};
+use super::rows::Row;
+use super::state::State;
 use super::tool::{MAX_TOOLS, Mode, Reading, Tool};
+use crate::bundle::Mesh;
 use crate::error::{Error, Result};
 use crate::memory;
 use look::MOST_ROWS;
@@ -28,17 +32,26 @@ use look::MOST_ROWS;
 /// A tool that moves farther in a step was put there, not moved, mm.
 const PUT_MM: f32 = 40.0;
 const WHAT: &str = "the contact of instruments";
-/// Parts of a step's way at most.
-const MOST_PARTS: f32 = 16.0;
+/// Parts of a step's way at most: of a thin tool that goes as far as one may.
+const MOST_PARTS: f32 = 80.0;
+/// Work of the solves of a step at most, those of its substeps included: about so many multiplications, some five milliseconds.
+const STEP_WORK: u64 = 20_000_000;
+/// Parts of the tools' ways in a step that has taken its time.
+const LEAST_PARTS: u32 = 4;
+/// Tissue that is farther from a tool is not pushed by it, mm.
+const OPEN_MM: f32 = 0.5;
 
 /// The contact of one scene.
 pub struct Problem {
     samples: Arc<Samples>,
+    mesh: Arc<Mesh>,
     tools: Vec<Tool>,
     /// Where each tool was when the step began.
     before: Vec<Pose>,
     /// Which of them were put there in this step.
     put: Vec<bool>,
+    /// Which of them lay in the tissue then, and where they come out.
+    buried: Vec<Option<Buried>>,
     /// At the end of the last published step.
     pub past: Past,
     /// Of the step being made.
@@ -48,12 +61,28 @@ pub struct Problem {
     delassus: Delassus,
     held_back: HeldBack,
     rows: Vec<Row>,
+    /// Rows that a solve had no room for: their forces go.
+    shed: Vec<Row>,
+    /// Samples that the last look found.
+    found: usize,
     contacts: Vec<Contact>,
     forces: Vec<Vector>,
+    /// The same before a linearisation.
+    earlier: Vec<Vector>,
     /// Forces before the last solve, to go part of the way.
     kept: Vec<Force>,
-    /// What the solves of this step took.
+    /// Those of a step's first guess.
+    guessed: Vec<Force>,
+    /// Where the tools came from, while they take another way.
+    ways: Vec<(Pose, bool, Option<Buried>)>,
+    /// What the solves of this step took, multiplications that are left to them, and what the last of them left unsolved, mm.
     spent: Duration,
+    work_left: u64,
+    unsolved_mm: f32,
+    /// A tool lay in the tissue when the step, or a part of it, began.
+    pub lay_in_tissue: bool,
+    /// When the step's budget ends.
+    until: Option<Instant>,
     columns: Vec<u32>,
     change: Vec<f32>,
     nodes: Vec<u32>,
@@ -65,7 +94,7 @@ impl Problem {
     ///
     /// # Errors
     /// [`Error::OutOfMemory`].
-    pub fn new(samples: Arc<Samples>) -> Result<Problem> {
+    pub fn new(samples: Arc<Samples>, mesh: Arc<Mesh>) -> Result<Problem> {
         let mut sweeps = Sweeps::default();
         memory::tried(sweeps.reserve(MOST_ROWS), WHAT)?;
         // Those of a solve and of the one before it, each with the nodes of its sample and their three axes.
@@ -74,6 +103,7 @@ impl Problem {
             tools: memory::room(MAX_TOOLS, WHAT)?,
             before: memory::room(MAX_TOOLS, WHAT)?,
             put: memory::room(MAX_TOOLS, WHAT)?,
+            buried: memory::room(MAX_TOOLS, WHAT)?,
             past: Past::with_room(room)?,
             next: Past::with_room(room)?,
             search: memory::tried(Search::with_room(&samples), WHAT)?,
@@ -81,15 +111,25 @@ impl Problem {
             delassus: Delassus::default(),
             held_back: HeldBack::default(),
             rows: memory::room(room, WHAT)?,
+            shed: memory::room(room, WHAT)?,
+            found: 0,
             contacts: memory::room(room, WHAT)?,
             forces: memory::room(room, WHAT)?,
+            earlier: memory::room(room, WHAT)?,
             kept: memory::room(room, WHAT)?,
+            guessed: memory::room(room, WHAT)?,
+            ways: memory::room(MAX_TOOLS, WHAT)?,
             spent: Duration::ZERO,
+            work_left: STEP_WORK,
+            unsolved_mm: 0.0,
+            until: None,
+            lay_in_tissue: false,
             columns: memory::room(dofs, WHAT)?,
             change: memory::room(dofs, WHAT)?,
             nodes: memory::room(nodes, WHAT)?,
             vectors: memory::room(3 * nodes, WHAT)?,
             samples,
+            mesh,
         })
     }
 
@@ -104,6 +144,7 @@ impl Problem {
         self.tools.clear();
         self.before.clear();
         self.put.clear();
+        self.buried.clear();
         self.next.clear();
     }
 
@@ -133,6 +174,10 @@ impl Problem {
     /// [`Error::Argument`] for friction, tear-off force or number, [`Error::OutOfMemory`]; the past stays.
     pub fn begin(&mut self, tools: &[Tool], rest: &[f32], start: &[f32]) -> Result<()> {
         self.spent = Duration::ZERO;
+        self.work_left = STEP_WORK;
+        self.unsolved_mm = 0.0;
+        self.until = None;
+        self.lay_in_tissue = false;
         self.enter(tools, rest, start)
     }
 
@@ -162,18 +207,28 @@ impl Problem {
         };
         self.before.clear();
         self.put.clear();
+        self.buried.clear();
         for (index, tool) in tools.iter().enumerate() {
             let known = self.past.tools.get(index).map(|held| held.pose);
             let moved = known.filter(|from| tool.body.motion(from, &tool.pose) <= PUT_MM);
             let from = moved.unwrap_or(tool.pose);
             self.before.push(from);
             self.put.push(moved.is_none());
+            let (samples, mesh) = (&self.samples, &self.mesh);
+            let buried = Buried::find(&tool.body, &from, samples, mesh, state);
+            self.lay_in_tissue |= buried.is_some();
+            self.buried.push(buried);
             if self.next.tools.len() <= index {
                 self.next.tools.push(Held::default());
             }
             let held = &mut self.next.tools[index];
             held.pose = tool.pose;
             held.reading = Reading::default();
+            // What is put elsewhere takes nothing along.
+            if known.is_some() && moved.is_none() && !held.grasp.anchors().is_empty() {
+                held.grasp.open();
+                held.reading.torn = true;
+            }
             let closes = tool.mode == Mode::Grasp;
             if closes && !held.closed {
                 let position = |node| state.position(node);
@@ -196,8 +251,18 @@ impl Problem {
         if !self.next.forces.is_empty() || self.holds() {
             return Ok(true);
         }
-        self.look(state, 1.0, true)?;
+        self.look(state, 1.0, true, MOST_ROWS)?;
         Ok(!self.rows.is_empty())
+    }
+
+    /// Whether the solves of this step have taken their time.
+    pub fn is_spent(&self) -> bool {
+        self.work_left == 0 || self.until.is_some_and(|until| Instant::now() >= until)
+    }
+
+    /// Sets the time by which the step's solves are to be through.
+    pub fn end_by(&mut self, until: Option<Instant>) {
+        self.until = until;
     }
 
     /// Whether forces were at work at the end of the last step.
@@ -210,9 +275,13 @@ impl Problem {
         !self.next.forces.is_empty()
     }
 
-    /// Whether the tissue lies inside of a tool deeper than `depth_mm`, tools at their ends.
+    /// Whether the tissue lies inside of a tool deeper than `depth_mm` anywhere on the tools' ways.
     pub fn intrudes(&mut self, state: State<'_>, depth_mm: f32) -> bool {
-        (0..self.tools.len()).any(|index| self.deepest(index, state) > depth_mm)
+        let parts = self.parts();
+        (0..self.tools.len()).any(|index| {
+            let mut ways = (1..=parts).rev().map(|part| part as f32 / parts as f32);
+            ways.any(|way| self.deepest(index, state, way) > depth_mm)
+        })
     }
 
     /// Whether a grasper holds a sample.
@@ -224,6 +293,9 @@ impl Problem {
     /// In how many parts the tools' ways are taken: no tool may pass a sample between two looks, and none may push it over its own
     /// edge.
     pub fn parts(&self) -> u32 {
+        if self.is_spent() {
+            return LEAST_PARTS;
+        }
         let parts = self.tools.iter().zip(&self.before).map(|(tool, from)| {
             let most = (0.5 * tool.body.radius()).clamp(0.5, 2.0);
             (tool.body.motion(from, &tool.pose) / most).ceil()
@@ -245,9 +317,31 @@ impl Problem {
         self.next.forces.retain(there);
     }
 
-    /// Gives up all forces: the tissue starts from rest.
+    /// Keeps the forces as those of the first guess.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`].
+    pub fn keep_guess(&mut self) -> Result<()> {
+        memory::replace(&mut self.guessed, &self.next.forces, WHAT)
+    }
+
+    /// Takes the forces of the first guess back.
+    pub fn take_guess(&mut self) {
+        self.next.forces.clear();
+        self.next.forces.extend_from_slice(&self.guessed);
+    }
+
+    /// Gives up all forces.
     pub fn let_go(&mut self) {
         self.next.forces.clear();
+    }
+
+    /// How deep a tool lies in the tissue, mm; 0 where it does not.
+    fn buried_by(&self, index: usize, state: State<'_>, part: f32) -> f32 {
+        let tool = &self.tools[index];
+        let pose = pose::between(&self.before[index], &tool.pose, part);
+        let found = Buried::find(&tool.body, &pose, &self.samples, &self.mesh, state);
+        found.map_or(0.0, |buried| buried.depth + tool.body.size())
     }
 
     /// Nodes of the surface that tools may touch, all that a solve asks of a state of the tissue.
@@ -257,7 +351,7 @@ impl Problem {
 
     /// The sample of a force.
     pub fn sample(&self, row: u32) -> Sample {
-        self.samples.rows()[row as usize]
+        self.samples.at(row)
     }
 
     /// The step being made becomes the last.

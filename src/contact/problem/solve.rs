@@ -4,21 +4,40 @@ use std::time::Instant;
 
 use ::contact::{Limits, Rows, Vector, Whole};
 
-use super::{Problem, WHAT};
+use super::look::MOST_ROWS;
+use super::{Problem, STEP_WORK, WHAT};
 use crate::contact::Compliance;
 use crate::contact::past::Force;
-use crate::contact::rows::{Moving, State, vector};
+use crate::contact::rows::Moving;
+use crate::contact::state::{State, vector};
 use crate::error::Result;
 use crate::memory;
 
+/// Multiplications of one linearisation at most: about half a millisecond.
+const SOLVE_WORK: u64 = 2_000_000;
+/// What else a solve takes, as so many multiplications: for each node and sample that is looked at, for each row and linearisation, and for
+/// each pair of rows.
+const LOOK_WORK: u64 = 60;
+const MEASURE_WORK: u64 = 1000;
+const READ_WORK: u64 = 80;
+/// Those of a step that are left when its solves begin to take fewer samples.
+const SHORT_OF_WORK: u64 = STEP_WORK / 2;
+/// Samples of a solve that is short of work.
+const FEW_ROWS: usize = 64;
+
 /// Linearisations of the gap.
 const LINEARISATIONS: usize = 2;
+/// How often a linearisation that goes too far is made again.
+const MOST_REPEATS: usize = 8;
+/// The surface of a tool is as its tangents say for this way at least, mm, and for the tool's half thickness.
+const LEAST_WAY_MM: f32 = 1.0;
 
 /// Of a solve that a picture shows: a thousandth of a millimetre is not seen, and a frame has little time.
 const SHOWN: Limits = Limits {
     tolerance_mm: 1e-3,
     least_sweeps: 8,
     most_sweeps: 60,
+    most_work: SOLVE_WORK,
 };
 
 /// Which compliance a solve takes, and how long it goes on.
@@ -33,7 +52,10 @@ enum Time {
 impl Time {
     fn limits(self) -> Limits {
         match self {
-            Self::StepEnd => Limits::default(),
+            Self::StepEnd => Limits {
+                most_work: SOLVE_WORK,
+                ..Limits::default()
+            },
             Self::Any => SHOWN,
         }
     }
@@ -84,14 +106,19 @@ impl Problem {
     ) -> Result<Change<'_>> {
         let start = Instant::now();
         memory::replace(&mut self.kept, &self.next.forces, WHAT)?;
-        self.look(state, part, false)?;
+        if self.is_spent() {
+            self.work_left = 0;
+        }
+        let is_short = self.work_left < SHORT_OF_WORK;
+        let most = if is_short { FEW_ROWS } else { MOST_ROWS };
+        self.look(state, part, false, most)?;
         self.fit()?;
         self.forces.clear();
         self.forces.extend(self.rows.iter().map(|row| row.force));
         let samples = &self.samples;
         self.columns.clear();
         self.columns.extend(self.rows.iter().map(|row| row.sample));
-        let (own, all, rows) = (&mut self.delassus, samples.rows(), &self.columns);
+        let (own, all, rows) = (&mut self.delassus, &**samples, &self.columns);
         let (mut whole, mut at);
         let w: &mut dyn Rows = match time {
             Time::StepEnd => {
@@ -103,30 +130,65 @@ impl Problem {
                 &mut at
             }
         };
+        let read = READ_WORK * (self.rows.len() * self.rows.len()) as u64;
+        let found = LOOK_WORK * (self.samples.nodes().len() + self.found) as u64;
+        self.work_left = self.work_left.saturating_sub(read + found);
         let moving = Moving {
             tools: &self.tools,
             before: &self.before,
             put: &self.put,
+            buried: &self.buried,
             held: &self.next.tools,
-            samples,
+            samples: &self.samples,
             state,
             part,
         };
-        for pass in 0..LINEARISATIONS {
+        let (mut pass, mut extra) = (0, MOST_REPEATS);
+        while pass < LINEARISATIONS {
             self.contacts.clear();
+            self.contacts
+                .extend(self.rows.iter().map(|row| moving.measure(row)));
+            self.earlier.clear();
+            self.earlier.extend_from_slice(&self.forces);
+            let limits = time.limits();
+            let limits = Limits {
+                most_work: limits.most_work.min(self.work_left),
+                ..limits
+            };
+            let outcome = self
+                .sweeps
+                .solve(w, &self.contacts, &mut self.forces, limits);
+            let measured = MEASURE_WORK * self.rows.len() as u64;
+            self.work_left = self.work_left.saturating_sub(outcome.work + measured);
+            self.unsolved_mm = match outcome.converged {
+                true => 0.0,
+                false => outcome.change_mm,
+            };
+            // A tool's surface is as its tangents say only so far: beyond, the solve goes part of the way and is made again.
+            let pairs = self.forces.iter().zip(&self.earlier).enumerate();
+            let ways =
+                pairs.filter(|(_, (now, before))| **now != **before || **now != Vector::ZERO);
+            let ways = ways.map(|(at, _)| {
+                let tool = self.tools.get(self.rows[at].tool as usize);
+                let size = tool.map_or(1.0, |tool| tool.body.size().max(LEAST_WAY_MM));
+                self.sweeps.shift(at).length() / size
+            });
+            let part = 1.0 / ways.fold(1.0, f32::max);
             for (at, row) in self.rows.iter_mut().enumerate() {
-                if pass > 0 {
-                    row.point += self.sweeps.shift(at);
-                }
-                self.contacts.push(moving.measure(row));
+                row.point += self.sweeps.shift(at) * part;
             }
-            self.sweeps
-                .solve(w, &self.contacts, &mut self.forces, time.limits());
+            if part < 1.0 && extra > 0 && !is_short {
+                let forces = self.forces.iter_mut().zip(&self.earlier);
+                forces.for_each(|(now, before)| *now = *before + (*now - *before) * part);
+                extra -= 1;
+            } else {
+                pass += 1;
+            }
         }
         self.next.forces.clear();
         self.columns.clear();
         for (row, force) in self.rows.iter().zip(&self.forces) {
-            let sample = self.samples.rows()[row.sample as usize];
+            let sample = self.samples.at(row.sample);
             if *force != row.force {
                 self.columns
                     .extend(compliance.entries(sample).map(|entry| entry.0));
@@ -139,17 +201,23 @@ impl Problem {
                 });
             }
         }
+        for row in &self.shed {
+            let sample = self.samples.at(row.sample);
+            self.columns
+                .extend(compliance.entries(sample).map(|entry| entry.0));
+        }
         self.columns.sort_unstable();
         self.columns.dedup();
         self.change.clear();
         self.change.resize(3 * self.columns.len(), 0.0);
-        for (row, force) in self.rows.iter().zip(&self.forces) {
-            let sample = self.samples.rows()[row.sample as usize];
-            let change = *force - row.force;
-            if *force == row.force {
+        let changes = self.rows.iter().zip(&self.forces);
+        let changes = changes.map(|(row, force)| (row.sample, *force - row.force));
+        let shed = self.shed.iter().map(|row| (row.sample, -row.force));
+        for (sample, change) in changes.chain(shed) {
+            if change == Vector::ZERO {
                 continue;
             }
-            for (column, weight) in compliance.entries(sample) {
+            for (column, weight) in compliance.entries(self.samples.at(sample)) {
                 let at = 3 * self.columns.partition_point(|c| *c < column);
                 for (sum, value) in self.change[at..at + 3].iter_mut().zip(change.to_array()) {
                     *sum += weight * value;
@@ -177,12 +245,14 @@ impl Problem {
         let rows = self.rows.len();
         memory::tried(self.sweeps.reserve(rows), WHAT)?;
         memory::fit(&mut self.forces, rows, WHAT)?;
+        memory::fit(&mut self.earlier, rows, WHAT)?;
         memory::fit(&mut self.contacts, rows, WHAT)?;
         // Three nodes a sample and three axes a node; `blend` gives forces of before their part back.
-        memory::fit(&mut self.columns, 9 * rows, WHAT)?;
-        memory::fit(&mut self.change, 9 * rows, WHAT)?;
+        let changed = rows + self.shed.len();
+        memory::fit(&mut self.columns, 9 * changed, WHAT)?;
+        memory::fit(&mut self.change, 9 * changed, WHAT)?;
         let forces = rows + self.kept.len();
-        memory::fit(&mut self.next.forces, forces, WHAT)?;
+        memory::fit(&mut self.next.forces, forces.max(self.guessed.len()), WHAT)?;
         memory::fit(&mut self.nodes, 3 * forces, WHAT)?;
         memory::fit(&mut self.vectors, 9 * forces, WHAT)
     }
@@ -204,7 +274,7 @@ impl Problem {
         self.solve(compliance, state, 1.0)?;
         self.nodes.clear();
         for force in &self.next.forces {
-            let sample = self.samples.rows()[force.sample as usize];
+            let sample = self.samples.at(force.sample);
             let own = |node: &u32| {
                 matches!(
                     compliance.prior.column_for(compliance.held, *node),

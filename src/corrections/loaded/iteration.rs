@@ -1,6 +1,6 @@
 //! One iteration of a step that tools drive: a direction of the elements with the contact's answer in it, and how far along it.
 
-use super::{Iterate, each_free_load};
+use super::{Iterate, SUNK_MM, each_free_load, is_spent, sunk};
 use crate::contact::Problem;
 use crate::corrections::input::{Input, Lent, Report};
 use crate::corrections::passes;
@@ -20,7 +20,8 @@ impl Stage {
         Ok(())
     }
 
-    /// One iteration with the tools at part `way` of their way, from the residual in `q`.
+    /// One iteration with the tools at part `way` of their way, from the residual in `q`; tells whether it leads to
+    /// another state.
     pub(super) fn improve_at(
         &mut self,
         lent: Lent<'_>,
@@ -29,7 +30,7 @@ impl Stage {
         at: &mut Iterate<'_>,
         way: f32,
         report: &mut Report,
-    ) -> Result<()> {
+    ) -> Result<bool> {
         self.with_fields(|stage, fields| {
             stage.improve_at_in(lent, input, (problem, at), way, fields, report)
         })
@@ -43,8 +44,9 @@ impl Stage {
         way: f32,
         [d, q, g_new]: [&mut Vec<f32>; 3],
         report: &mut Report,
-    ) -> Result<()> {
+    ) -> Result<bool> {
         let env = lent.env();
+        let mut better = false;
         // The coordinates of the residual: those of F less those of the loads.
         self.project_standing(env, at.g)?;
         let pre = &mut self.preconditioner;
@@ -84,7 +86,13 @@ impl Stage {
             }
             let (det, slope_new) = self.residual(lent, [input.last, q, d], g_new, report)?;
             let slope_new = slope_new - work;
-            if det > SMALLEST_DET && 0.5 * (slope + slope_new) <= SLOPE * slope {
+            let left = match det > SMALLEST_DET {
+                true => sunk(input, problem, q, way),
+                false => f32::MAX,
+            };
+            // An iteration may not lose the contact, unless it had been lost.
+            let keeps = left <= 0.5 * SUNK_MM || left <= sunk(input, problem, at.u, way);
+            if keeps && 0.5 * (slope + slope_new) <= SLOPE * slope {
                 std::mem::swap(at.u, q);
                 passes::difference(env, g_new, at.g, q)?;
                 if self.memory.store(env, d, t, q)? {
@@ -97,23 +105,26 @@ impl Stage {
                 }
                 std::mem::swap(at.g, g_new);
                 at.det = det;
+                at.sunk_mm = (way >= 1.0).then_some(left);
+                better = true;
                 if t < 1.0 {
                     problem.blend(t);
                 }
                 break;
             }
-            if attempt == SHORTENINGS || slope >= 0.0 {
+            let spent = attempt > 1 && is_spent(input, report, input.enough.iterations);
+            if attempt == SHORTENINGS || spent || slope >= 0.0 {
                 problem.undo();
                 self.memory.clear();
                 break;
             }
-            t *= if det > SMALLEST_DET && slope_new.is_finite() {
+            t *= if keeps && slope_new.is_finite() {
                 (-slope / (slope_new - slope)).clamp(0.1, 0.5) as f32
             } else {
                 0.5
             };
         }
-        Ok(())
+        Ok(better)
     }
 }
 

@@ -4,6 +4,7 @@
 //! that time, `kappa = 9/(4 tau²) + 3 alpha/(2 tau)`.
 
 use std::mem::swap;
+use std::sync::Arc;
 
 use super::along::{Along, Ways};
 use super::nodes::{Means, Nodes};
@@ -83,7 +84,7 @@ impl Between {
         }
         let natural = corrections.space.natural_count();
         Ok(Between {
-            problem: Problem::new(model.samples()?)?,
+            problem: Problem::new(model.samples()?, Arc::clone(&model.mesh))?,
             other: Known {
                 last: field()?,
                 velocity: field()?,

@@ -1,5 +1,7 @@
 //! The instruments' part of a state.
 
+use std::sync::Arc;
+
 use crate::contact::{MAX_TOOLS, Past, Problem};
 use crate::error::Result;
 use crate::memory;
@@ -17,7 +19,7 @@ impl Core {
     }
 
     pub(super) fn admit_tools(&self, tools: &mut Tools) -> Result<()> {
-        tools.check(self.model.samples()?.len() as u32)
+        tools.check(&*self.model.samples()?)
     }
 
     pub(super) fn put_tools(&mut self, tools: Option<Tools>) -> Result<()> {
@@ -25,7 +27,7 @@ impl Core {
             (Some(problem), Some(past)) => problem.past = past,
             (Some(problem), None) => problem.past.clear(),
             (none @ None, Some(past)) => {
-                let mut problem = Problem::new(self.model.samples()?)?;
+                let mut problem = Problem::new(self.model.samples()?, Arc::clone(&self.mesh))?;
                 problem.past = past;
                 *none = Some(memory::boxed(problem, "the contact of instruments")?);
             }

@@ -196,6 +196,8 @@ namespace Upt.Interop
         public byte torn;
         /// <summary>Zero.</summary>
         public fixed byte reserved[3];
+        /// <summary>What the last contact solve left unsolved, mm: 0 where it came to its end.</summary>
+        public float residual_mm;
     }
 
     /// <summary>A point of the surface that pushes or holds an instrument; filled by `upt_scene_instrument_contacts`.</summary>
@@ -493,14 +495,16 @@ namespace Upt.Interop
         /// <summary>The contact block was nearly singular and was regularised.</summary>
         public const uint UPT_FLAG_REGULARISED = 1024;
         /// <summary>
-        /// The corrections ended with inverted elements: under tools the tissue stays where it was, otherwise the linear response
-        /// replaces them.
+        /// The corrections ended with inverted elements, or had lost the contact of an instrument: the step's first guess or the linear response
+        /// took their place.
         /// </summary>
         public const uint UPT_FLAG_FELL_BACK = 2048;
         /// <summary>The estimated error is above the scene's `error_limit_mm`.</summary>
         public const uint UPT_FLAG_ERROR = 4096;
-        /// <summary>Tissue lies more than 1 mm inside an instrument.</summary>
+        /// <summary>Tissue lies more than 1 mm inside an instrument, or an instrument in the tissue.</summary>
         public const uint UPT_FLAG_DEEP = 8192;
+        /// <summary>The contact solve was cut short by its bounds or the budget and left more than 0.01 mm: `residual_mm` of the readings.</summary>
+        public const uint UPT_FLAG_UNSOLVED = 16384;
         /// <summary>Nodes of the surface.</summary>
         public const int UPT_SET_SURFACE_NODES = 0;
         /// <summary>Nodes that instruments may touch.</summary>

@@ -1,6 +1,8 @@
 //! Linear elasticity by a bundle's own tables, without what the bundle learned: `u = L(c)` in contact, a fitted decay after
 //! a release. What the factorised baseline computes, at the run time of the library's kernels.
 
+use std::sync::Arc;
+
 use anyhow::{Context, Result};
 use upt::bundle::{BundleFiles, Mesh};
 use upt::kernels::rows::{RowPlan, decode_rows};
@@ -10,6 +12,7 @@ use upt::prior::{ContactResponse, PriorTable};
 use super::bundle_folder::BundleFolder;
 
 pub struct PriorAlone {
+    mesh: Arc<Mesh>,
     table: PriorTable,
     response: ContactResponse,
     rows: RowPlan,
@@ -55,7 +58,13 @@ impl PriorAlone {
             coordinates: vec![0.0; table.width()],
             state: vec![[0.0; 3]; mesh.node_count()],
             table,
+            mesh: Arc::new(mesh),
         })
+    }
+
+    /// The bundle's mesh.
+    pub fn mesh(&self) -> &Arc<Mesh> {
+        &self.mesh
     }
 
     /// The tables.

@@ -96,7 +96,7 @@ impl ToolCase {
         let tracks = self.tracks();
         let tool = tracks.sample_tools[row] as usize;
         let field = self.trajectory.frame(frame);
-        let sample = &samples.rows()[tracks.sample_rows[row] as usize];
+        let sample = samples.at(tracks.sample_rows[row]);
         let point = sample
             .gather(|node| Vector::from(rest[node as usize]) + Vector::from(field[node as usize]));
         let nearest = self.bodies[tool].nearest_at(&self.poses[frame][tool].pose, point);
@@ -113,7 +113,7 @@ impl ToolCase {
         let rows = tracks.sample_offsets[frame] as usize..tracks.sample_offsets[frame + 1] as usize;
         let mut nodes = Vec::new();
         for row in rows {
-            let sample = samples.rows()[tracks.sample_rows[row] as usize];
+            let sample = samples.at(tracks.sample_rows[row]);
             nodes.extend(sample.entries().map(|(node, _)| node));
         }
         nodes

@@ -53,6 +53,42 @@ fn a_pressed_sphere_feels_the_tissue_and_hardly_sinks_into_it() {
     assert!(largest(&solver, &mesh) > 2.8);
 }
 
+/// A needle of half a millimetre comes down between the samples, 0.6 mm beside the middle, and pushes as the tissue does at any point.
+#[test]
+fn a_needle_does_not_pass_between_the_samples() {
+    let mesh = block();
+    let mut solver = solver(&mesh, 1, 20.0);
+    let needle = Tool {
+        shape: Shape::Capsule {
+            half_length: 20.0,
+            radius: 0.25,
+        },
+        friction: 0.0,
+        tear_off_mn: 0.0,
+    };
+    // Its shaft is along y: upright on the block.
+    let upright = contact::Rotation::from_rotation_x(std::f32::consts::FRAC_PI_2);
+    let pose = |depth: f32| {
+        let at = TOP + Vector::new(0.6, 0.4, 20.25 - depth);
+        contact::Pose::from_parts(at, upright)
+    };
+    let samples = mesh.samples(Boundary::Fixed);
+    solver.set_tools(samples, &[needle], &[pose(-0.2)]).unwrap();
+    let mut last = 0.0;
+    for frame in 1..=8 {
+        let to = ToolPose {
+            pose: pose(0.375 * frame as f32),
+            grasp: false,
+        };
+        let report = solver.step_tools(&[], &[to], 0.05).unwrap();
+        let tool = &report.tools[0];
+        assert!(tool.penetration_mm < 0.6, "frame {frame}: {tool:?}");
+        last = tool.force[2];
+    }
+    assert!(last > 5.0, "{last} mN");
+    assert!(largest(&solver, &mesh) > 2.0);
+}
+
 #[test]
 fn a_frictionless_press_and_release_gives_no_energy() {
     let mesh = block();
@@ -131,7 +167,7 @@ fn cone(
     let position = |n: u32| Vector::from(mesh.positions[n as usize]) + Vector::from(u[n as usize]);
     let (mut across, mut along) = (0.0, 0.0);
     for entry in forces {
-        let point = samples.rows()[entry.sample as usize].gather(position);
+        let point = samples.at(entry.sample).gather(position);
         let normal = (point - centre).normalize();
         let force = Vector::from(entry.force);
         let push = force.dot(normal);

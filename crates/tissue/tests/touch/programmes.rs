@@ -223,7 +223,8 @@ fn a_tool_of_ones_own_takes_the_place_of_the_tables() {
     let tracks = trajectory.tools.unwrap();
     assert!(tracks.contacts.iter().any(|c| *c > 0));
     let deepest = tracks.penetration.iter().copied().fold(0.0, f32::max);
-    assert!(deepest < 0.05, "{deepest} mm");
+    // Between the samples too, where a point is met up to a millisecond after the edge has come to it.
+    assert!(deepest < 0.3, "{deepest} mm");
     let flat = Shape::Hull {
         points: vec![[0.0; 3]; 4],
         margin: 0.0,

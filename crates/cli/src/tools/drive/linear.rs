@@ -30,9 +30,10 @@ impl Linear {
         decay: f32,
         threads: u32,
     ) -> Result<Self> {
+        let prior = PriorAlone::new(bundle, decay, threads)?;
         Ok(Self {
-            prior: PriorAlone::new(bundle, decay, threads)?,
-            problem: Problem::new(samples.into())?,
+            problem: Problem::new(samples.into(), prior.mesh().clone())?,
+            prior,
             rest: rest.as_flattened().to_vec(),
             state: vec![[0.0; 3]; rest.len()],
             told: Told::default(),

@@ -11,6 +11,7 @@ mod step;
 
 use contact::{Body, Grasp, Pose, Samples, Search, Shape, Vector};
 use rows::{Reached, Row};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 pub(super) use step::Access;
@@ -66,7 +67,7 @@ pub struct ToolReport {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SampleForce {
     pub tool: u32,
-    /// Row of [`contact::Samples`].
+    /// Row of [`contact::Samples`]: a sample, or a point of the lattice that a thin tool touches.
     pub sample: u32,
     /// On the tissue, mN.
     pub force: [f32; 3],
@@ -111,8 +112,8 @@ pub(super) struct Touch {
     before: Vec<Row>,
     /// Nodes of the rows.
     reached: Vec<Reached>,
-    /// By tool and sample: sum of forces in the reported part of the frame, µN.
-    sums: Vec<Vector>,
+    /// By tool and row: sum of forces in the reported part of the frame, µN.
+    sums: BTreeMap<(u32, u32), Vector>,
     steps: u32,
     dt: f64,
 }
@@ -126,7 +127,7 @@ impl Touch {
     pub fn begin(&mut self, poses: &[ToolPose], steps: u32, dt: f64) {
         self.steps = steps;
         self.dt = dt;
-        self.sums.fill(Vector::ZERO);
+        self.sums.clear();
         for (tool, to) in self.tools.iter_mut().zip(poses) {
             tool.from = tool.to;
             tool.to = to.pose;
@@ -149,14 +150,17 @@ impl Touch {
     /// What each tool felt in the frame that ended.
     pub fn reports(&self) -> Vec<ToolReport> {
         let part = 1e-3 / f64::from(self.reported());
-        let samples = self.scene.samples.len();
         let mean = |sum: [f64; 3]| sum.map(|v| (v * part) as f32);
-        let tools = self.tools.iter().zip(self.sums.chunks(samples.max(1)));
+        let contacts = |index: u32| {
+            let own = self.sums.range((index, 0)..=(index, u32::MAX));
+            own.filter(|(_, force)| **force != Vector::ZERO).count() as u32
+        };
+        let tools = self.tools.iter().zip(0..);
         tools
-            .map(|(tool, sums)| ToolReport {
+            .map(|(tool, index)| ToolReport {
                 force: mean(tool.force),
                 torque: mean(tool.torque),
-                contacts: sums.iter().filter(|f| **f != Vector::ZERO).count() as u32,
+                contacts: contacts(index),
                 penetration_mm: tool.penetration,
                 work: tool.work * 1e-6,
                 held: tool.grasp.anchors().len() as u32,
@@ -168,13 +172,12 @@ impl Touch {
     /// Forces at samples that are not zero, by tool and sample.
     pub fn sample_forces(&self) -> Vec<SampleForce> {
         let part = 1e-3 / self.reported() as f32;
-        let samples = self.scene.samples.len().max(1);
-        let loaded = self.sums.iter().enumerate();
+        let loaded = self.sums.iter();
         loaded
             .filter(|(_, sum)| **sum != Vector::ZERO)
-            .map(|(at, sum)| SampleForce {
-                tool: (at / samples) as u32,
-                sample: (at % samples) as u32,
+            .map(|(&(tool, sample), sum)| SampleForce {
+                tool,
+                sample,
                 force: (*sum * part).to_array(),
             })
             .collect()

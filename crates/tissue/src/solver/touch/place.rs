@@ -4,6 +4,7 @@ use super::{Held, START_DEPTH_MM, Scene, Tool, ToolPose, Touch};
 use crate::solver::{Solver, SolverError};
 use contact::{Body, Grasp, Pose, Samples, Search, Vector};
 use elements::vector::{cross, dot, subtract};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 impl Solver {
@@ -62,7 +63,7 @@ impl Solver {
             rows: Vec::new(),
             before: Vec::new(),
             reached: Vec::new(),
-            sums: vec![Vector::ZERO; samples.len() * tools.len()],
+            sums: BTreeMap::new(),
             steps: 1,
             dt: self.dt,
             scene: Arc::new(Scene {

@@ -93,10 +93,11 @@ impl Touch {
                 }
             }
         }
+        self.keep_pushed();
         self.keep_forces();
         self.reached.clear();
         for row in &self.rows {
-            for node in scene.samples.rows()[row.sample as usize].nodes {
+            for node in scene.samples.at(row.sample).nodes {
                 self.reached.push(Reached {
                     slot: scene.slot_of_node[node as usize],
                     node,
@@ -111,10 +112,25 @@ impl Touch {
         self.reached.sort_unstable_by_key(|r| r.slot);
         self.reached.dedup_by_key(|r| r.slot);
         for row in &mut self.rows {
-            row.nodes = scene.samples.rows()[row.sample as usize].nodes.map(|node| {
+            row.nodes = scene.samples.at(row.sample).nodes.map(|node| {
                 let slot = scene.slot_of_node[node as usize];
                 self.reached.partition_point(|r| r.slot < slot) as u32
             });
+        }
+    }
+
+    /// Keeps the points of the lattice that push, though another is nearer to the tool now.
+    fn keep_pushed(&mut self) {
+        let scene = &self.scene;
+        let first = scene.samples.len() as u32;
+        let pushed = |r: &&Row| r.sample >= first && r.force != Vector::ZERO;
+        let kept = self.before.iter().filter(pushed);
+        let kept = kept.map(|r| row(scene, r.tool, r.sample, None));
+        let found = self.rows.len();
+        self.rows.extend(kept);
+        if self.rows.len() > found {
+            self.rows.sort_by_key(|r| (r.tool, r.sample));
+            self.rows.dedup_by_key(|r| (r.tool, r.sample));
         }
     }
 
@@ -143,7 +159,7 @@ fn row(scene: &super::Scene, tool: u32, sample: u32, bound: Option<Vector>) -> R
         sample,
         bound,
         nodes: [0; 3],
-        weights: scene.samples.rows()[sample as usize].weights,
+        weights: scene.samples.at(sample).weights,
         force: Vector::ZERO,
         last_gap: None,
         last_slip: None,

@@ -189,7 +189,6 @@ impl Touch {
     /// The tools' share of the step; returns the work on the tissue, nJ.
     fn account(&mut self, poses: &[(Pose, Pose)], step: u32) -> f64 {
         let reported = step + self.reported() > self.steps;
-        let samples = self.scene.samples.len();
         let mut total = 0.0;
         let mut pulls = vec![(Vector::ZERO, Vector::ZERO); self.tools.len()];
         for at in 0..self.rows.len() {
@@ -218,7 +217,7 @@ impl Touch {
                     tool.force[k] -= f64::from(row.force[k]);
                     tool.torque[k] -= f64::from(torque[k]);
                 }
-                self.sums[row.tool as usize * samples + row.sample as usize] += row.force;
+                *self.sums.entry((row.tool, row.sample)).or_default() += row.force;
             }
             let mean = 0.5 * (self.value(&row, |r| r.increment + r.earlier) + moved);
             total += f64::from(row.force.dot(mean));

@@ -1,0 +1,188 @@
+//! Tools that lie in the tissue. Samples of the surface do not tell: none of them lies in such a tool. So inside is known by the
+//! solid that the whole surface bounds, and the tissue gives way along the shortest way out.
+
+use ::contact::samples::LATTICE;
+use ::contact::{Body, Pose, Samples, Vector};
+
+use super::state::State;
+use crate::bundle::Mesh;
+
+/// A tool whose middle lies less deep than this, or than its half thickness, is in contact and not in the tissue, mm.
+const LEAST_MM: f32 = 1.0;
+/// What lies deeper than this is looked for by the solid, mm.
+const PIERCED_MM: f32 = 4.0;
+/// Ways out of the solid are looked for as far as this, mm.
+const LONGEST_MM: u32 = 30;
+
+/// Where a tool in the tissue comes out.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Buried {
+    /// Unit direction of the shortest way out.
+    pub out: Vector,
+    /// Length of that way from the deepest of the tool's probes, mm.
+    pub depth: f32,
+    /// Row of the samples at which that way meets the surface.
+    pub row: u32,
+    /// The deepest probe, mm.
+    point: Vector,
+}
+
+impl Buried {
+    /// The way from the deepest probe out of the solid along a unit direction, mm; none where it is longer than [`LONGEST_MM`].
+    pub fn way_along(&self, direction: Vector, mesh: &Mesh, state: State<'_>) -> Option<Vector> {
+        let mut ways = (1..=LONGEST_MM).map(|length| direction * length as f32);
+        ways.find(|way| !is_inside(self.point + way, mesh, state))
+    }
+
+    /// Where the tip of a thin tool has pierced the touchable surface, by no more than [`PIERCED_MM`].
+    pub fn tip(body: &Body, pose: &Pose, samples: &Samples, state: State<'_>) -> Option<Buried> {
+        deepest(body, pose, samples, state, 0.0).filter(|buried| buried.depth < PIERCED_MM)
+    }
+
+    /// Where the deepest probe of a tool comes out through the touchable surface; none where no probe lies in the tissue, or only
+    /// beneath a part of the surface that no tool touches.
+    pub fn find(
+        body: &Body,
+        pose: &Pose,
+        samples: &Samples,
+        mesh: &Mesh,
+        state: State<'_>,
+    ) -> Option<Buried> {
+        let buried = deepest(body, pose, samples, state, LEAST_MM.min(body.size()))?;
+        let point = buried.point;
+        (is_touchable(point, buried.depth, mesh, state) && is_inside(point, mesh, state))
+            .then_some(buried)
+    }
+}
+
+/// The deepest of a tool's probes that lie more than `least` mm below the touchable surface.
+fn deepest(
+    body: &Body,
+    pose: &Pose,
+    samples: &Samples,
+    state: State<'_>,
+    least: f32,
+) -> Option<Buried> {
+    let mut deepest: Option<Buried> = None;
+    let mut last = None;
+    for probe in body.probes() {
+        // Those of a ball are all its middle.
+        if last.replace(probe) == Some(probe) {
+            continue;
+        }
+        let found = below(pose.transform_point(probe), samples, state);
+        let depth = |of: &Option<Buried>| of.map_or(least, |buried| buried.depth);
+        if depth(&found) > depth(&deepest) {
+            deepest = found;
+        }
+    }
+    deepest
+}
+
+/// The way out of a point that lies below the touchable surface where that is nearest.
+fn below(point: Vector, samples: &Samples, state: State<'_>) -> Option<Buried> {
+    let place = |node: u32| state.position(node).distance_squared(point);
+    let nearest = (0..)
+        .zip(samples.nodes())
+        .map(|(at, node)| (place(*node), at));
+    let (_, nearest) = nearest.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let mut best: Option<(f32, usize, [f32; 3], Vector)> = None;
+    let mut face_outward = Vector::ZERO;
+    let mut outward = Vector::ZERO;
+    for face in 0..samples.face_count() {
+        let corners = samples.corners(face);
+        if !corners.contains(&nearest) {
+            continue;
+        }
+        let [a, b, c] = corners.map(|at| state.position(samples.nodes()[at as usize]));
+        let weights = nearest_weights(point, [a, b, c]);
+        let [u, v, w] = weights;
+        let away = a * u + b * v + c * w - point;
+        outward += (b - a).cross(c - a);
+        if best.is_none_or(|best| away.length_squared() < best.0) {
+            best = Some((away.length_squared(), face, weights, away));
+            face_outward = (b - a).cross(c - a);
+        }
+    }
+    let (_, face, [_, v, w], out) = best?;
+    // Above the surface there is no way out to be found. The mean of the faces' normals holds on edges and nodes too.
+    if out.dot(outward) <= 0.0 || out.dot(face_outward) <= 0.0 {
+        return None;
+    }
+    let i = (v * LATTICE as f32).round() as u32;
+    let j = (w * LATTICE as f32).round() as u32;
+    Some(Buried {
+        out: out.try_normalize()?,
+        depth: out.length(),
+        row: samples.lattice_row(face, [i, j.min(LATTICE - i)])?,
+        point,
+    })
+}
+
+/// Whether no part of the surface that tools do not touch is clearly nearer to a point than a touchable one, `depth` away.
+fn is_touchable(point: Vector, depth: f32, mesh: &Mesh, state: State<'_>) -> bool {
+    let nodes = mesh.surface_nodes.iter();
+    let nearest = nodes.map(|node| state.position(*node).distance(point));
+    depth <= 1.5 * nearest.fold(f32::MAX, f32::min)
+}
+
+/// Whether a ray from a point leaves the surface more often than it enters it.
+fn is_inside(point: Vector, mesh: &Mesh, state: State<'_>) -> bool {
+    // Along no axis or diagonal, with two directions across it.
+    let [ray, e, f] = [
+        Vector::new(0.365_148, 0.547_723, 0.752_773),
+        Vector::new(0.930_949, -0.214_834, -0.295_260),
+        Vector::new(0.0, 0.808_608, -0.588_348),
+    ];
+    let mut leaves = 0i32;
+    for face in mesh.surface_faces.as_chunks::<3>().0 {
+        let [a, b, c] = face.map(|node| state.position(node) - point);
+        let [p, q, r] = [a, b, c].map(|v| (v.dot(e), v.dot(f)));
+        let side = |s: (f32, f32), t: (f32, f32)| s.0 * t.1 - s.1 * t.0;
+        let weights = [side(q, r), side(r, p), side(p, q)];
+        let is_hit = weights.iter().all(|w| *w > 0.0) || weights.iter().all(|w| *w < 0.0);
+        if is_hit {
+            let [u, v, w] = weights;
+            let along = (u * a + v * b + w * c).dot(ray) / (u + v + w);
+            if along > 0.0 {
+                leaves += if u > 0.0 { 1 } else { -1 };
+            }
+        }
+    }
+    leaves != 0
+}
+
+/// Barycentric weights of the point of a triangle that is nearest to `p` (Ericson 2005, section 5.1.5).
+fn nearest_weights(p: Vector, [a, b, c]: [Vector; 3]) -> [f32; 3] {
+    let (ab, ac) = (b - a, c - a);
+    let [d1, d2] = [ab, ac].map(|edge| edge.dot(p - a));
+    if d1 <= 0.0 && d2 <= 0.0 {
+        return [1.0, 0.0, 0.0];
+    }
+    let [d3, d4] = [ab, ac].map(|edge| edge.dot(p - b));
+    if d3 >= 0.0 && d4 <= d3 {
+        return [0.0, 1.0, 0.0];
+    }
+    let vc = d1 * d4 - d3 * d2;
+    if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
+        let v = d1 / (d1 - d3);
+        return [1.0 - v, v, 0.0];
+    }
+    let [d5, d6] = [ab, ac].map(|edge| edge.dot(p - c));
+    if d6 >= 0.0 && d5 <= d6 {
+        return [0.0, 0.0, 1.0];
+    }
+    let vb = d5 * d2 - d1 * d6;
+    if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
+        let w = d2 / (d2 - d6);
+        return [1.0 - w, 0.0, w];
+    }
+    let va = d3 * d6 - d5 * d4;
+    let (to_c, to_b) = (d4 - d3, d5 - d6);
+    if va <= 0.0 && to_c >= 0.0 && to_b >= 0.0 {
+        let w = to_c / (to_c + to_b);
+        return [0.0, 1.0 - w, w];
+    }
+    let whole = va + vb + vc;
+    [va / whole, vb / whole, vc / whole]
+}

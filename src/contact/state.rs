@@ -1,0 +1,37 @@
+//! Where the tissue is while contact is solved, and where it was when the step began.
+
+use ::contact::Vector;
+
+/// Where the tissue is, `[K,3]` each.
+#[derive(Clone, Copy)]
+pub struct State<'a> {
+    /// Rest positions, mm.
+    pub rest: &'a [f32],
+    /// Displacements, mm; empty: none.
+    pub u: &'a [f32],
+    /// Displacements at the start of the step, mm; empty: none.
+    pub start: &'a [f32],
+}
+
+pub(crate) fn vector(field: &[f32], node: u32) -> Vector {
+    let at = 3 * node as usize;
+    Vector::new(field[at], field[at + 1], field[at + 2])
+}
+
+impl State<'_> {
+    pub(crate) fn position(&self, node: u32) -> Vector {
+        self.place(self.u, node)
+    }
+
+    /// Where a node was when the step began.
+    pub(crate) fn position_before(&self, node: u32) -> Vector {
+        self.place(self.start, node)
+    }
+
+    fn place(&self, u: &[f32], node: u32) -> Vector {
+        match u.is_empty() {
+            true => vector(self.rest, node),
+            false => vector(self.rest, node) + vector(u, node),
+        }
+    }
+}

@@ -1,0 +1,80 @@
+//! What takes the place of a step that lost the contact or inverted elements: its first guess, linear elasticity from rest, or the state before it
+//! (`docs/decisions/018-swept-contact.md`).
+
+use super::{Iterate, SUNK_MM, sunk};
+use crate::contact::Problem;
+use crate::corrections::input::{Input, Lent, Report};
+use crate::corrections::stage::Stage;
+use crate::error::Result;
+
+/// The response of linear elasticity is not shown where it goes farther than this, mm.
+const FARTHEST_MM: f32 = 30.0;
+
+impl Stage {
+    /// The first of the three in which the contact holds, or that in which it is lost by least.
+    pub(super) fn fall_back(
+        &mut self,
+        lent: Lent<'_>,
+        input: &Input<'_>,
+        problem: &mut Problem,
+        at: &mut Iterate<'_>,
+        report: &mut Report,
+    ) -> Result<()> {
+        report.fell_back = true;
+        self.memory.clear();
+        problem.take_guess();
+        at.u.copy_from_slice(&self.guess);
+        let guessed = lost_by(input, problem, at.u);
+        let mut left = guessed;
+        if guessed > SUNK_MM {
+            self.respond_from_rest(lent, input, problem, at, report)?;
+            left = lost_by(input, problem, at.u).min(guessed);
+            if left == guessed {
+                problem.take_guess();
+                at.u.copy_from_slice(&self.guess);
+            }
+        }
+        match left < f32::MAX {
+            true => self.evaluate(lent, input, at, report)?,
+            // As it was, under the forces that held it there.
+            false => self.stay(lent, input, problem, at, report)?,
+        }
+        Ok(())
+    }
+
+    /// Linear elasticity from rest, with the tools where they are.
+    pub(super) fn respond_from_rest(
+        &mut self,
+        lent: Lent<'_>,
+        input: &Input<'_>,
+        problem: &mut Problem,
+        at: &mut Iterate<'_>,
+        report: &mut Report,
+    ) -> Result<()> {
+        problem.start_from_rest(input.rest);
+        at.u.fill(0.0);
+        self.preconditioner.coordinates.fill(0.0);
+        let from_rest = Input {
+            last: &[],
+            ..*input
+        };
+        let parts = problem.parts();
+        for part in 1..=parts {
+            let way = part as f32 / parts as f32;
+            self.press(lent, &from_rest, problem, way, at.u)?;
+        }
+        problem.return_to_ways();
+        self.settle(lent.env(), at.u)?;
+        report.parts = parts;
+        self.evaluate(lent, input, at, report)
+    }
+}
+
+/// How deep tools and tissue lie in each other in a state that takes the place of one that lost the contact; without bounds where it has none.
+fn lost_by(input: &Input<'_>, problem: &mut Problem, u: &[f32]) -> f32 {
+    let near = |u: &[f32; 3]| u.iter().map(|x| x * x).sum::<f32>() <= FARTHEST_MM * FARTHEST_MM;
+    match u.as_chunks::<3>().0.iter().all(near) {
+        true => sunk(input, problem, u, 1.0),
+        false => f32::MAX,
+    }
+}
