@@ -2,8 +2,8 @@
 
 use crate::bundle::{Envelope, Mesh, ToolEnvelope};
 use crate::error::Result;
+use crate::field::ContactSet;
 use crate::memory;
-use crate::scene::ContactSet;
 use crate::stats::flag;
 
 /// Rounding that is no violation, relative.

@@ -4,8 +4,7 @@
 
 use std::path::PathBuf;
 
-use crate::ffi;
-use crate::kernels::PoolError;
+use crate::status::*;
 
 /// Everything that can fail in this library.
 ///
@@ -66,15 +65,6 @@ pub enum Error {
     Panic(String),
 }
 
-impl From<PoolError> for Error {
-    fn from(error: PoolError) -> Error {
-        match error {
-            PoolError::Panicked { .. } => Error::Panic(error.to_string()),
-            PoolError::Spawn { .. } => Error::Argument(error.to_string()),
-        }
-    }
-}
-
 /// The library's result.
 pub type Result<T> = std::result::Result<T, Error>;
 
@@ -82,20 +72,20 @@ impl Error {
     /// The status code of `docs/reference/abi.md`.
     pub fn status(&self) -> i32 {
         match self {
-            Error::Argument(_) => ffi::UPT_ERR_ARGUMENT,
-            Error::Busy(_) => ffi::UPT_ERR_BUSY,
-            Error::NonFinite(_) => ffi::UPT_ERR_NON_FINITE,
-            Error::State(_) => ffi::UPT_ERR_STATE,
-            Error::Unsupported(_) => ffi::UPT_ERR_UNSUPPORTED,
-            Error::OutOfMemory(_) => ffi::UPT_ERR_OUT_OF_MEMORY,
-            Error::Runtime(_) => ffi::UPT_ERR_RUNTIME,
-            Error::Provider(_) => ffi::UPT_ERR_PROVIDER,
-            Error::Io { .. } => ffi::UPT_ERR_IO,
-            Error::Bundle { .. } => ffi::UPT_ERR_BUNDLE,
-            Error::Version(_) => ffi::UPT_ERR_VERSION,
-            Error::Snapshot(_) => ffi::UPT_ERR_SNAPSHOT,
-            Error::Guard(_) => ffi::UPT_ERR_GUARD,
-            Error::Panic(_) => ffi::UPT_ERR_PANIC,
+            Error::Argument(_) => UPT_ERR_ARGUMENT,
+            Error::Busy(_) => UPT_ERR_BUSY,
+            Error::NonFinite(_) => UPT_ERR_NON_FINITE,
+            Error::State(_) => UPT_ERR_STATE,
+            Error::Unsupported(_) => UPT_ERR_UNSUPPORTED,
+            Error::OutOfMemory(_) => UPT_ERR_OUT_OF_MEMORY,
+            Error::Runtime(_) => UPT_ERR_RUNTIME,
+            Error::Provider(_) => UPT_ERR_PROVIDER,
+            Error::Io { .. } => UPT_ERR_IO,
+            Error::Bundle { .. } => UPT_ERR_BUNDLE,
+            Error::Version(_) => UPT_ERR_VERSION,
+            Error::Snapshot(_) => UPT_ERR_SNAPSHOT,
+            Error::Guard(_) => UPT_ERR_GUARD,
+            Error::Panic(_) => UPT_ERR_PANIC,
         }
     }
 
@@ -143,7 +133,7 @@ mod tests {
     fn lack_of_memory_that_onnx_runtime_tells_is_lack_of_memory() {
         let told = |text: &str| Error::of_onnx(text.into(), Error::Provider).status();
         let cpu = "cpu: Exception during initialization: std::bad_alloc";
-        assert_eq!(told(cpu), crate::ffi::UPT_ERR_OUT_OF_MEMORY);
-        assert_eq!(told("cpu: no such operator"), crate::ffi::UPT_ERR_PROVIDER);
+        assert_eq!(told(cpu), UPT_ERR_OUT_OF_MEMORY);
+        assert_eq!(told("cpu: no such operator"), UPT_ERR_PROVIDER);
     }
 }

@@ -46,8 +46,10 @@ pub mod haptics;
 #[cfg(feature = "contact")]
 pub mod instrument;
 
+mod field;
 mod memory;
 mod output;
+mod status;
 mod stored;
 
 // For the repository's own commands, benches and tests: no part of the interface, and it changes without notice.

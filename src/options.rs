@@ -190,6 +190,10 @@ pub struct SceneOptions {
     pub damping_per_s: f64,
 }
 
+/// Most corrections of a step.
+pub(crate) const MOST_CORRECTIONS: u32 = 64;
+/// Most substeps of a step.
+pub(crate) const MOST_SUBSTEPS: u32 = 8;
 /// Bounds of [`SceneOptions::step_s`], s.
 pub const SHORTEST_STEP_S: f64 = 0.01;
 /// See [`SHORTEST_STEP_S`].

@@ -3,7 +3,8 @@
 use super::faults::{bad, check};
 use super::manifest::{Envelope, Manifest, ManifestKind, ReducedEntry, ToolEnvelope, UptEntry};
 use crate::error::Result;
-use crate::options::{LONGEST_STEP_S, SHORTEST_STEP_S};
+use crate::field::INPUT_LIMIT;
+use crate::options::{LONGEST_STEP_S, MOST_CORRECTIONS, MOST_SUBSTEPS, SHORTEST_STEP_S};
 
 impl Manifest {
     pub(super) fn check(&self) -> Result<()> {
@@ -45,7 +46,7 @@ impl Manifest {
         self.envelope.check()?;
         if let Some(corrections) = &self.corrections {
             check(
-                corrections.recommended <= crate::corrections::LIMIT,
+                corrections.recommended <= MOST_CORRECTIONS,
                 "corrections.recommended",
                 "must be at most 64",
             )?;
@@ -55,7 +56,7 @@ impl Manifest {
                 "must be zero or positive",
             )?;
             check(
-                (1..=crate::corrections::MOST_SUBSTEPS).contains(&corrections.substeps),
+                (1..=MOST_SUBSTEPS).contains(&corrections.substeps),
                 "corrections.substeps",
                 "must be 1 to 8",
             )?;
@@ -181,7 +182,7 @@ fn check_name(name: &str, field: &str) -> Result<()> {
 impl Envelope {
     fn check(&self) -> Result<()> {
         // No tissue is longer than the largest input.
-        let positive = |x: f32| x > 0.0 && x <= crate::scene::INPUT_LIMIT;
+        let positive = |x: f32| x > 0.0 && x <= INPUT_LIMIT;
         check(
             positive(self.max_push_mm),
             "envelope.max_push_mm",
@@ -214,9 +215,9 @@ impl Envelope {
 
 impl ToolEnvelope {
     fn check(&self) -> Result<()> {
-        let positive = |x: f32| x > 0.0 && x <= crate::scene::INPUT_LIMIT;
+        let positive = |x: f32| x > 0.0 && x <= INPUT_LIMIT;
         check(
-            (1..=crate::corrections::LIMIT).contains(&self.corrections),
+            (1..=MOST_CORRECTIONS).contains(&self.corrections),
             "envelope.tools.corrections",
             "must be in 1..=64",
         )?;

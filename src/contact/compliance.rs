@@ -5,10 +5,9 @@
 
 use ::contact::{Sample, Samples, Vector};
 
-use crate::corrections::CoarseSpace;
 use crate::error::Result;
 use crate::memory;
-use crate::prior::PriorTable;
+use crate::prior::{CoarseSpace, PriorTable};
 
 pub(super) const WHAT: &str = "the compliance of a contact";
 

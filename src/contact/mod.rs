@@ -32,4 +32,5 @@ pub use problem::Problem;
 pub(crate) use rows::{Pair, outward};
 pub use state::State;
 pub(crate) use state::vector;
+pub(crate) use tool::PUT_MM;
 pub use tool::{MAX_TOOLS, Mode, Push, Reading, Told, Tool};

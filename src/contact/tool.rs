@@ -3,9 +3,11 @@
 use ::contact::{Body, Pose, Shape, pose};
 
 use crate::error::{Error, Result};
+use crate::field::INPUT_LIMIT;
 use crate::memory;
-use crate::scene::INPUT_LIMIT;
 
+/// A tool that is farther than this from where it was has been put there, not moved, mm.
+pub(crate) const PUT_MM: f32 = 40.0;
 /// Tools at once.
 pub const MAX_TOOLS: usize = 64;
 

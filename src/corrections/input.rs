@@ -5,9 +5,9 @@ use std::time::Instant;
 use super::Corrections;
 use super::pace::Pace;
 use super::precondition::Env;
+use crate::field::ContactSet;
 use crate::kernels::{Isa, Pool};
 use crate::prior::PriorTable;
-use crate::scene::ContactSet;
 
 /// How the corrections of a step went.
 #[derive(Debug, Clone, Copy, Default)]

@@ -23,7 +23,6 @@ mod passes;
 mod precondition;
 mod prescribed;
 mod shorter;
-mod space;
 mod stage;
 #[cfg(feature = "contact")]
 mod substeps;
@@ -35,7 +34,7 @@ use elements::Material;
 use crate::bundle::{BundleFiles, CorrectionsEntry, Manifest, Mesh};
 use crate::error::{Error, Result};
 use crate::kernels::Isa;
-use crate::prior::PriorTable;
+use crate::prior::{CoarseSpace, PriorTable};
 use pace::Diagonal;
 
 pub use body::Body;
@@ -44,15 +43,9 @@ pub use input::{Enough, Input, Lent, Report};
 pub use motion::Motion;
 pub use pace::{Integrator, Pace};
 pub use shorter::Shorter;
-pub use space::CoarseSpace;
 pub use stage::{SMALLEST_DET, Stage};
 #[cfg(feature = "contact")]
 pub use substeps::Substeps;
-
-/// Most iterations a step.
-pub const LIMIT: u32 = 64;
-/// Most substeps of a step.
-pub const MOST_SUBSTEPS: u32 = 8;
 
 /// The tables and elements of a bundle's corrections.
 pub struct Corrections {

@@ -14,14 +14,13 @@ mod response;
 
 use super::body::Body;
 use super::pace::Pace;
-use super::space::CoarseSpace;
 use crate::error::{Error, Result};
 use crate::kernels::contact::{ContactFactor, subtract_gram};
 use crate::kernels::project::{project_field, row_dots};
 use crate::kernels::rows::{RowPlan, decode_rows};
 use crate::kernels::{Isa, Pool};
 use crate::memory;
-use crate::prior::PriorTable;
+use crate::prior::{CoarseSpace, PriorTable};
 
 /// Weight of the diagonal level; 1.0 and 0.15 are three to seven times worse.
 pub(super) const DIAGONAL_WEIGHT: f32 = 0.4;

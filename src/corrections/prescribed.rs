@@ -4,8 +4,8 @@ use super::input::{Input, Lent, Report};
 use super::precondition::mask_held;
 use super::stage::{MOST_PARTS, SMALLEST_DET, Stage};
 use crate::error::Result;
+use crate::field::ContactSet;
 use crate::memory;
-use crate::scene::ContactSet;
 
 impl Stage {
     /// Corrects `next`, which holds the model's prediction with the boundary conditions on it.

@@ -6,9 +6,9 @@ use std::ffi::c_char;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicU32, Ordering};
 
+use super::constants::{UPT_ERR_PANIC, UPT_ERR_STATE, upt_status};
 use super::failure::{Answer, Failure, fail};
 use super::log;
-use super::status::{UPT_ERR_PANIC, UPT_ERR_STATE, upt_status};
 use crate::kernels::MaskExceptions;
 
 thread_local! {

@@ -1,10 +1,10 @@
 //! Integers of the host -> the library's enums and options.
 
+use super::constants::*;
 use super::failure::{Failure, fail};
 use super::pointers::{optional_path, slice};
-use super::status::*;
 use super::structs::*;
-use crate::corrections::LIMIT;
+use crate::options::MOST_CORRECTIONS;
 use crate::{
     Corrections, DecoderKernel, GuardPolicy, IndexSet, InitOptions, ModelOptions, Precision,
     Provider, SceneOptions, StepPath, UserStream,
@@ -211,7 +211,7 @@ fn corrections(raw: &upt_scene_options) -> Result<Corrections, Failure> {
         budget_us: raw.corrections_budget_us,
     };
     match raw.corrections {
-        UPT_CORRECTIONS_AUTO => Ok(until(LIMIT)),
+        UPT_CORRECTIONS_AUTO => Ok(until(MOST_CORRECTIONS)),
         count @ 1.. if limited => Ok(until(count as u32)),
         0 if limited && !target => Ok(Corrections::RecommendedWithin {
             budget_us: raw.corrections_budget_us,

@@ -1,12 +1,12 @@
 //! `upt_scene`: steps that instruments drive, and what the tissue does to them; `upt_hull`.
 
 use super::call::call;
+use super::constants::*;
 #[cfg(not(feature = "contact"))]
 use super::failure::fail;
 use super::output::{copy_out, place};
 use super::pointers::slice;
 use super::registry::call_scene;
-use super::status::*;
 use super::structs::*;
 #[cfg(feature = "contact")]
 use {

@@ -1,6 +1,6 @@
 //! Why a call fails: its status, and the message that `upt_last_error` gives.
 
-use super::status::upt_status;
+use super::constants::upt_status;
 use crate::error::Error;
 
 /// A status with its message.

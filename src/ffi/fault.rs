@@ -1,7 +1,7 @@
 //! Fault injection for the C tests (feature `fault`, never in a release): a call that panics.
 
+use super::constants::upt_status;
 use super::registry::call_scene;
-use super::status::upt_status;
 use super::structs::upt_scene;
 
 /// Panics inside a call on the scene.

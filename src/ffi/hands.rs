@@ -4,9 +4,9 @@
 use std::cell::UnsafeCell;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use super::constants::*;
 use super::failure::{Failure, fail};
 use super::registry::{next_hand, refuse_hand};
-use super::status::*;
 use crate::haptics::Haptics;
 use crate::memory;
 

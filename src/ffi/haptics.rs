@@ -1,12 +1,12 @@
 //! `upt_haptics`: forces of one tool for a hand, from a thread of its own.
 
 use super::call::call;
+use super::constants::*;
 #[cfg(not(feature = "haptics"))]
 use super::failure::fail;
 use super::output::{fill, place};
 use super::pointers::required;
 use super::registry::call_scene;
-use super::status::*;
 use super::structs::*;
 use super::{convert, pointers};
 #[cfg(feature = "haptics")]

@@ -1,5 +1,6 @@
 //! `upt_scene`: instruments -> contacts, displacement -> forces.
 
+use super::constants::*;
 use super::convert;
 #[cfg(feature = "contact")]
 use super::failure::Failure;
@@ -8,7 +9,6 @@ use super::failure::fail;
 use super::output::{output, place};
 use super::pointers::each;
 use super::registry::call_scene;
-use super::status::*;
 use super::structs::*;
 #[cfg(feature = "contact")]
 use {

@@ -3,8 +3,8 @@
 use core::ffi::{c_char, c_void};
 
 use super::call::{call, last_error};
+use super::constants::*;
 use super::failure::{Answer, fail};
-use super::status::*;
 use super::structs::*;
 use super::{convert, log, output, pointers};
 
@@ -77,7 +77,7 @@ pub extern "C" fn upt_last_error() -> *const c_char {
 /// Threads: any.
 #[unsafe(no_mangle)]
 pub extern "C" fn upt_status_name(status: upt_status) -> *const c_char {
-    super::status::name(status).as_ptr()
+    super::constants::name(status).as_ptr()
 }
 
 /// Sets the function that receives log messages; NULL removes it. When the call returns, the former receiver is no longer

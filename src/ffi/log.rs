@@ -17,8 +17,8 @@ use tracing::span::{Attributes, Id, Record};
 use tracing::subscriber::Interest;
 use tracing::{Event, Level, Metadata, Subscriber};
 
+use super::constants::*;
 use super::failure::{Answer, fail};
-use super::status::*;
 use super::structs::upt_log_fn;
 
 struct Receiver {

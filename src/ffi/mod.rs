@@ -6,6 +6,7 @@
 #![allow(non_camel_case_types, clippy::missing_safety_doc)]
 
 mod call;
+mod constants;
 mod convert;
 mod driven;
 mod failure;
@@ -24,13 +25,13 @@ mod region;
 mod registry;
 mod scene;
 mod state;
-mod status;
 mod structs;
 mod worker;
 
 #[cfg(feature = "fault")]
 mod fault;
 
+pub use constants::*;
 pub use driven::*;
 pub use haptics::*;
 pub use instrument::*;
@@ -41,6 +42,5 @@ pub use present::*;
 pub use region::*;
 pub use scene::*;
 pub use state::*;
-pub use status::*;
 pub use structs::*;
 pub use worker::*;

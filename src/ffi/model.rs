@@ -3,8 +3,8 @@
 use core::ffi::c_char;
 
 use super::call::call;
+use super::constants::*;
 use super::registry::{add_model, find_model, remove_model};
-use super::status::*;
 use super::structs::*;
 use super::{convert, output, pointers};
 use crate::Model;

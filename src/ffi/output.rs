@@ -5,9 +5,9 @@ use std::borrow::Cow;
 use std::ffi::c_char;
 use std::marker::PhantomData;
 
+use super::constants::*;
 use super::failure::{Answer, Failure, fail};
 use super::pointers::{Sized32, check, length, struct_size};
-use super::status::*;
 use crate::memory;
 use crate::output::Output;
 

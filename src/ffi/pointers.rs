@@ -4,8 +4,8 @@
 use std::ffi::{CStr, c_char};
 use std::path::PathBuf;
 
+use super::constants::*;
 use super::failure::{Failure, fail};
-use super::status::*;
 use super::structs::*;
 
 /// A struct that starts with `struct_size`. Later versions only grow; each size ever published stays known.

@@ -1,9 +1,9 @@
 //! `upt_scene`: points that move with the tissue, such as a render mesh's vertices.
 
+use super::constants::*;
 use super::output::output;
 use super::pointers::optional;
 use super::registry::call_scene;
-use super::status::*;
 use super::structs::*;
 use crate::scene::Values;
 

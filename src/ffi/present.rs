@@ -1,9 +1,9 @@
 //! `upt_scene`: frames between steps.
 
+use super::constants::*;
 #[cfg(not(feature = "contact"))]
 use super::failure::fail;
 use super::registry::call_scene;
-use super::status::*;
 use super::structs::*;
 use crate::scene::Values;
 #[cfg(feature = "contact")]

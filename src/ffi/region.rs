@@ -1,9 +1,9 @@
 //! `upt_scene`: which nodes are decoded.
 
+use super::constants::*;
 use super::output::output;
 use super::pointers::{optional, slice};
 use super::registry::call_scene;
-use super::status::*;
 use super::structs::*;
 
 /// Limits a step to these nodes: `upt_scene_step`, `_read` and `_sample` write them alone, in this order. Fewer nodes

@@ -8,8 +8,8 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, LazyLock, PoisonError, RwLock};
 
 use super::call::call;
+use super::constants::*;
 use super::failure::{Answer, Failure, fail};
-use super::status::*;
 #[cfg(feature = "contact")]
 use super::structs::upt_hull;
 use super::structs::{upt_model, upt_scene};

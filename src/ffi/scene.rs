@@ -1,11 +1,11 @@
 //! `upt_scene`: make, end, reset, step, read.
 
 use super::call::call;
+use super::constants::*;
 use super::failure::Failure;
 use super::output::{apart, optional_output, output, place};
 use super::pointers::slice;
 use super::registry::{add_scene, call_scene, find_model, remove_scene};
-use super::status::*;
 use super::structs::*;
 use super::{convert, pointers};
 use crate::scene::Values;

@@ -3,8 +3,8 @@
 use std::sync::atomic::Ordering;
 
 use super::call::call;
+use super::constants::*;
 use super::registry::{call_scene, find_scene};
-use super::status::*;
 use super::structs::*;
 use super::{output, pointers};
 

@@ -2,11 +2,11 @@
 
 use std::time::Duration;
 
+use super::constants::*;
 use super::failure::Answer;
 use super::output::output;
 use super::registry::call_scene;
 use super::scene::contacts;
-use super::status::*;
 use super::structs::*;
 use crate::Progress;
 use crate::scene::Values;

@@ -12,12 +12,11 @@ use super::passivity::Observer;
 use super::slow::Slow;
 use super::solver::{FADE_MM, Solver};
 use super::{HapticForce, HapticOptions, HapticPose};
+use crate::contact::PUT_MM;
 use crate::error::{Error, Result};
+use crate::field::INPUT_LIMIT;
 use crate::kernels::FlushToZero;
-use crate::scene::INPUT_LIMIT;
 
-/// A tool that is farther from where it was has been put there, mm.
-const PUT_MM: f32 = 40.0;
 /// Time between calls that is taken at most, s.
 const MOST_S: f64 = 0.1;
 /// The time of the first call, s.

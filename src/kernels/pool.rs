@@ -16,6 +16,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 
 use super::flush::FlushToZero;
+use crate::error::Error;
 use worker::{Job, Shared, Task, panic_message, worker_loop};
 
 /// Bytes from which on streaming a table is split over threads. Waking a worker and waiting for its last chunk costs what
@@ -44,6 +45,15 @@ pub enum PoolError {
         count: usize,
         message: String,
     },
+}
+
+impl From<PoolError> for Error {
+    fn from(error: PoolError) -> Error {
+        match error {
+            PoolError::Panicked { .. } => Error::Panic(error.to_string()),
+            PoolError::Spawn { .. } => Error::Argument(error.to_string()),
+        }
+    }
 }
 
 /// A small thread pool. Shared by reference; any thread may call [`Pool::run`].

@@ -11,10 +11,12 @@ mod numbers;
 mod reaction;
 mod release;
 mod response;
+mod space;
 mod table;
 mod vibration;
 
 pub use numbers::Numbers;
 pub use response::{ContactResponse, SolveReport};
+pub use space::CoarseSpace;
 pub use table::PriorTable;
 pub use vibration::{FreeVibration, propagator};

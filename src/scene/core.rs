@@ -4,7 +4,6 @@ use std::sync::{Arc, PoisonError, RwLock};
 use std::time::Instant;
 
 use super::StepInput;
-use super::contact::{ContactSet, check_displacement};
 use super::corrected::Corrected;
 use super::counters::Counters;
 use super::engine::Engine;
@@ -19,6 +18,7 @@ use crate::bundle::Mesh;
 use crate::contact::Problem;
 use crate::envelope::{EnvelopeCheck, Used};
 use crate::error::Result;
+use crate::field::{ContactSet, check_displacement};
 use crate::guard;
 use crate::kernels::{FlushToZero, Isa, Machine, Pool};
 use crate::memory;
@@ -190,7 +190,7 @@ impl Core {
         if let Some(out) = &out {
             lock_read(published).check_len(Values::Region, out.len())?;
         }
-        self.incoming.gather(input.contact, count)?;
+        input.contact.gather(&mut self.incoming, count)?;
         let given = match input.displacement {
             Some(field) => {
                 check_displacement(field, count)?;

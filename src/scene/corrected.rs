@@ -6,12 +6,12 @@ use std::time::Instant;
 use super::own_pace::OwnPace;
 #[cfg(feature = "contact")]
 use crate::corrections::Substeps;
-use crate::corrections::{Enough, LIMIT, Lent, MOST_SUBSTEPS, Pace, Report, Shorter, Stage};
+use crate::corrections::{Enough, Lent, Pace, Report, Shorter, Stage};
 use crate::error::{Error, Result};
 use crate::kernels::{Isa, Pool};
 use crate::memory;
 use crate::model::Model;
-use crate::options::{Corrections, SceneOptions};
+use crate::options::{Corrections, MOST_CORRECTIONS, MOST_SUBSTEPS, SceneOptions};
 use crate::stats::{SceneStats, flag};
 
 const WHAT: &str = "the corrections of a scene";
@@ -78,9 +78,9 @@ impl Corrected {
                 (most, target_mm, budget_us)
             }
         };
-        if !(1..=LIMIT).contains(&most) {
+        if !(1..=MOST_CORRECTIONS).contains(&most) {
             return Err(Error::Argument(format!(
-                "corrections is {most}, must be 1 to {LIMIT}"
+                "corrections is {most}, must be 1 to {MOST_CORRECTIONS}"
             )));
         }
         let most_substeps = match options.substeps {

@@ -218,8 +218,8 @@ impl Core {
                 start: &shared.last.field,
             };
             let (nodes, vectors) = problem.prescribe(compliance, state)?;
-            self.incoming
-                .gather(Contact::Sparse { nodes, vectors }, self.mesh.node_count())?;
+            let count = self.mesh.node_count();
+            self.incoming.take_sparse(nodes, vectors, count)?;
             stats.check_ms += watch.lap();
         }
         self.predict_and_decode(published, None, true, stats)?;

@@ -1,8 +1,8 @@
 //! What a step and a decode of either kind read.
 
-use super::contact::ContactSet;
 use super::plan::NodePlan;
 use super::points::AttachedPoints;
+use crate::field::ContactSet;
 
 /// What a step reads.
 pub struct Inputs<'a> {

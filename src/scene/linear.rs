@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use super::contact::ContactSet;
 use super::plan::NodePlan;
 use crate::error::Result;
+use crate::field::ContactSet;
 use crate::kernels::rows::decode_rows;
 use crate::kernels::{Compute, Isa};
 use crate::prior::{ContactResponse, PriorTable, SolveReport};

@@ -2,7 +2,6 @@
 //! [`Error::Busy`]. Reading the published states (`read`, `sample`, their points, `stats`) is allowed from any thread
 //! at any time, also while a submitted step is in flight, and never waits for a step.
 
-mod contact;
 mod core;
 mod correct;
 mod corrected;
@@ -35,6 +34,7 @@ mod region;
 mod shared;
 mod snapshot;
 mod state;
+mod step_input;
 mod timing;
 mod tools;
 #[cfg(not(feature = "contact"))]
@@ -46,16 +46,15 @@ mod worker;
 use std::sync::Arc;
 use std::time::Duration;
 
-pub use contact::{ContactSet, INPUT_LIMIT};
 pub use points::check_point_count;
 pub use publish::{QUIET_DISPLACEMENT, QUIET_STEPS};
 pub(crate) use published::Values;
+pub use step_input::{Contact, Progress, StepInput};
 
 use crate::bundle::{Mesh, TensorFile};
-#[cfg(feature = "contact")]
-use crate::contact::Tool;
 use crate::corrections::Integrator;
 use crate::error::{Error, Result};
+use crate::field::check_count;
 use crate::kernels::{Isa, Pool};
 use crate::memory;
 use crate::model::{KindModel, Model};
@@ -69,44 +68,6 @@ use published::{Frame, Published};
 use region::check_nodes;
 use shared::Shared;
 use worker::Worker;
-
-/// The collision field `c` of a step: what the instruments impose at its end.
-#[derive(Debug, Clone, Copy)]
-pub enum Contact<'a> {
-    /// No contact.
-    None,
-    /// `[K,3]`, mm, zero but at nodes in contact.
-    Dense(&'a [f32]),
-    /// Nodes in contact and their displacement.
-    Sparse {
-        /// Node indices, each at most once, in any order.
-        nodes: &'a [u32],
-        /// `[m,3]`, mm.
-        vectors: &'a [f32],
-    },
-    /// Rigid tools where they are at the end of the step; their contact is solved.
-    #[cfg(feature = "contact")]
-    Tools(&'a [Tool]),
-}
-
-/// Inputs of a step.
-#[derive(Debug, Clone, Copy)]
-pub struct StepInput<'a> {
-    /// Current displacement `[K,3]`, mm; `None` takes the scene's own state. A field that equals the scene's last
-    /// state at its decoded nodes is taken as that state.
-    pub displacement: Option<&'a [f32]>,
-    /// Collision field. A node that the boundary condition holds stays held.
-    pub contact: Contact<'a>,
-}
-
-/// What has become of a submitted step.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Progress {
-    /// It has finished, or nothing was submitted since the last one finished.
-    Done,
-    /// It has not finished.
-    Pending,
-}
 
 /// A tissue that is stepped. All methods take `&self`; concurrent use gives [`Error::Busy`], never a wait.
 pub struct Scene {
@@ -212,7 +173,7 @@ impl Scene {
     /// # Errors
     /// [`Error::Argument`].
     pub fn check_node_count(&self, name: &str, count: u64) -> Result<()> {
-        contact::check_count(name, count, self.node_count())
+        check_count(name, count, self.node_count())
     }
 
     /// One step of `dt`; `out` is `[n,3]` (n: `K`, or the region's count).

@@ -3,9 +3,9 @@
 //! node a point moves with the node, boundary conditions included. A point outside of the mesh takes the closest combination of the nearest tetrahedra, weights clamped to `[0, 1]`; one
 //! that is [`REACH`] or more away is refused, because a mesh in other axes or units is a mistake, not a surface.
 
-use super::contact::check;
 use crate::bundle::Mesh;
 use crate::error::{Error, Result};
+use crate::field::check;
 use crate::grid::PointGrid;
 use crate::memory;
 

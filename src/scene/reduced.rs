@@ -6,12 +6,12 @@ mod record;
 
 use std::sync::Arc;
 
-use super::contact::ContactSet;
 use super::inputs::Inputs;
 use super::linear::{Linear, solve_flags};
 use super::timing::Stopwatch;
 use crate::bundle::ReducedInput;
 use crate::error::Result;
+use crate::field::ContactSet;
 use crate::kernels::Compute;
 use crate::kernels::project::{project_field, row_dots};
 use crate::kernels::respond::accumulate_rows;

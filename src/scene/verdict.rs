@@ -3,12 +3,12 @@
 
 use std::sync::RwLock;
 
-use super::contact::ContactSet;
 use super::core::{Core, lock_write};
 use super::inversion::ContactElements;
 use super::published::Published;
 use super::timing::Stopwatch;
 use crate::error::{Error, Result};
+use crate::field::ContactSet;
 use crate::guard;
 use crate::kernels::largest::largest;
 use crate::options::GuardPolicy;

@@ -7,12 +7,12 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use super::contact::ContactSet;
 use super::shared::Shared;
 use super::{Contact, Progress, StepInput};
 #[cfg(feature = "contact")]
 use crate::contact::Tool;
 use crate::error::{Error, Result};
+use crate::field::ContactSet;
 use crate::memory;
 
 #[derive(Default)]
@@ -77,7 +77,7 @@ impl Worker {
         node_count: usize,
     ) -> Result<()> {
         let mut checked = self.checked.lock().unwrap_or_else(PoisonError::into_inner);
-        checked.gather(Contact::Sparse { nodes, vectors }, node_count)?;
+        checked.take_sparse(nodes, vectors, node_count)?;
         drop(checked);
         self.start(shared)?;
         let mut slot = self.free_slot()?;

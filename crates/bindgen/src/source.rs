@@ -9,8 +9,9 @@ use syn::{Attribute, Expr, FnArg, Item, Lit, Pat, ReturnType, Type};
 pub const FOLDER: &str = "src/ffi";
 
 /// The files with exported items, in the order of the header.
-pub const FILES: [&str; 13] = [
-    "status.rs",
+pub const FILES: [&str; 14] = [
+    "../status.rs",
+    "constants.rs",
     "structs.rs",
     "library.rs",
     "model.rs",

@@ -7,7 +7,7 @@
 use ::contact::{Pose, Vector};
 
 use crate::contact::vector;
-use crate::contact::{MAX_TOOLS, Problem, Tool};
+use crate::contact::{MAX_TOOLS, PUT_MM, Problem, Tool};
 use crate::error::Result;
 use crate::memory;
 
@@ -19,8 +19,6 @@ const STRETCH: [f32; 2] = [0.0, 1.0];
 const SMALL_MM: f32 = 0.05;
 /// A tool drives the tissue around it, to half at this distance, mm.
 const NEAR_MM: f32 = 24.0;
-/// A tool that goes farther in a step than this has been put there, mm.
-const PUT_MM: f32 = 40.0;
 
 /// The tools' ways to the last step.
 #[derive(Default)]

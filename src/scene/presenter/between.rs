@@ -13,12 +13,13 @@ use super::{AT_ONCE_S, WHAT};
 use crate::contact::problem::Change;
 use crate::contact::{Compliance, Past, Problem, State};
 use crate::error::{Error, Result};
+use crate::field::ContactSet;
 use crate::kernels::respond::accumulate_rows;
 use crate::kernels::rows::{RowPlan, decode_rows};
 use crate::kernels::{Isa, Pool};
 use crate::memory;
 use crate::scene::moment::Moment;
-use crate::scene::{Contact, ContactSet, Scene};
+use crate::scene::{Contact, Scene};
 
 /// The last velocities are followed for at most this many steps.
 const MOST_STEPS: f64 = 2.0;
@@ -179,7 +180,7 @@ impl Between {
                     .look(&self.problem, tools, (rest, last), (tau, alpha));
             }
             nodes => {
-                self.now.gather(nodes, self.held.len())?;
+                nodes.gather(&mut self.now, self.held.len())?;
                 let stretch = self.nodes.stretch(&self.now, last, velocity, tau);
                 self.along.follow_evenly(stretch, (tau, alpha));
             }

@@ -2,13 +2,13 @@
 //! go of since the step lose the force that held them.
 
 use crate::contact::vector;
-use crate::corrections::CoarseSpace;
 use crate::error::{Error, Result};
+use crate::field::ContactSet;
 use crate::kernels::Isa;
 use crate::kernels::contact::ContactFactor;
 use crate::memory;
+use crate::prior::CoarseSpace;
 use crate::prior::PriorTable;
-use crate::scene::ContactSet;
 
 /// What forces at nodes are solved with.
 pub(super) struct Means<'a> {

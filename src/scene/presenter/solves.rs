@@ -8,8 +8,8 @@ use ::contact::Vector;
 use super::along::Along;
 use crate::contact::Tool;
 use crate::error::Result;
+use crate::field::ContactSet;
 use crate::memory;
-use crate::scene::ContactSet;
 
 const WHAT: &str = "the present state of a scene";
 

@@ -13,13 +13,13 @@ use std::sync::RwLock;
 
 use serde::{Deserialize, Serialize};
 
-use super::contact::ContactSet;
 use super::core::{Core, lock_read, lock_write};
 use super::counters::Counters;
 use super::engine::Engine;
 use super::published::Published;
 use crate::corrections::{History, PAIRS};
 use crate::error::{Error, Result};
+use crate::field::ContactSet;
 use crate::{memory, stored};
 use records::Records;
 #[cfg(not(feature = "contact"))]

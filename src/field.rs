@@ -1,8 +1,7 @@
-//! The collision field of a step, as a sparse set in ascending node order, checked.
+//! Fields over the nodes: what a displacement may be, and a sparse set of nodes with a vector each, ascending, checked.
 
 use serde::{Deserialize, Serialize};
 
-use super::Contact;
 use crate::error::{Error, Result};
 use crate::{memory, stored};
 
@@ -60,11 +59,7 @@ impl ContactSet {
     /// Checks what was read for a mesh of `node_count` nodes.
     pub fn admit(&mut self, node_count: usize) -> Result<()> {
         let mut set = ContactSet::default();
-        let contact = Contact::Sparse {
-            nodes: &self.nodes,
-            vectors: &self.vectors,
-        };
-        match set.gather(contact, node_count) {
+        match set.take_sparse(&self.nodes, &self.vectors, node_count) {
             Ok(()) => *self = set,
             Err(error @ Error::OutOfMemory(_)) => return Err(error),
             Err(error) => return Err(Error::Snapshot(error.to_string())),
@@ -122,19 +117,12 @@ impl ContactSet {
             .sqrt()
     }
 
-    /// Takes a step's collision field over a mesh of `node_count` nodes.
-    pub fn gather(&mut self, contact: Contact<'_>, node_count: usize) -> Result<()> {
+    /// Takes the nodes of a field `[K,3]` that is not zero there.
+    ///
+    /// # Errors
+    /// [`Error::Argument`], [`Error::NonFinite`], [`Error::OutOfMemory`].
+    pub fn take_dense(&mut self, field: &[f32], node_count: usize) -> Result<()> {
         self.clear();
-        match contact {
-            Contact::None => Ok(()),
-            #[cfg(feature = "contact")]
-            Contact::Tools(_) => Ok(()),
-            Contact::Dense(field) => self.gather_dense(field, node_count),
-            Contact::Sparse { nodes, vectors } => self.gather_sparse(nodes, vectors, node_count),
-        }
-    }
-
-    fn gather_dense(&mut self, field: &[f32], node_count: usize) -> Result<()> {
         if field.len() != 3 * node_count {
             return Err(Error::Argument(format!(
                 "collision has {} floats, must have 3 K = {}",
@@ -159,7 +147,12 @@ impl ContactSet {
         Ok(())
     }
 
-    fn gather_sparse(&mut self, nodes: &[u32], vectors: &[f32], node_count: usize) -> Result<()> {
+    /// Takes nodes in any order, each at most once, with a vector each `[m,3]`.
+    ///
+    /// # Errors
+    /// [`Error::Argument`], [`Error::NonFinite`], [`Error::OutOfMemory`].
+    pub fn take_sparse(&mut self, nodes: &[u32], vectors: &[f32], node_count: usize) -> Result<()> {
+        self.clear();
         if vectors.len() != 3 * nodes.len() {
             return Err(Error::Argument(format!(
                 "contact_vectors has {} floats, must have 3 per node, {}",
@@ -252,11 +245,8 @@ mod tests {
     #[test]
     fn sparse_input_is_sorted_and_its_order_kept() {
         let mut set = ContactSet::default();
-        let contact = Contact::Sparse {
-            nodes: &[5, 2, 9],
-            vectors: &[5., 0., 0., 2., 0., 0., 9., 0., 0.],
-        };
-        set.gather(contact, 10).unwrap();
+        let vectors = [5., 0., 0., 2., 0., 0., 9., 0., 0.];
+        set.take_sparse(&[5, 2, 9], &vectors, 10).unwrap();
         assert_eq!(set.nodes, [2, 5, 9]);
         assert_eq!(set.order, [1, 0, 2]);
         assert_eq!(set.at(5), Some([5.0, 0.0, 0.0]));
@@ -270,12 +260,8 @@ mod tests {
         dense[4] = -0.0;
         dense[9] = 1.0;
         let (mut a, mut b) = (ContactSet::default(), ContactSet::default());
-        a.gather(Contact::Dense(&dense), 4).unwrap();
-        let contact = Contact::Sparse {
-            nodes: &[3],
-            vectors: &[1.0, 0.0, 0.0],
-        };
-        b.gather(contact, 4).unwrap();
+        a.take_dense(&dense, 4).unwrap();
+        b.take_sparse(&[3], &[1.0, 0.0, 0.0], 4).unwrap();
         assert_eq!((a.nodes, a.vectors), (b.nodes, b.vectors));
     }
 
@@ -283,9 +269,7 @@ mod tests {
     fn bad_input_is_named() {
         let mut set = ContactSet::default();
         let mut status = |nodes: &[u32], vectors: &[f32]| {
-            set.gather(Contact::Sparse { nodes, vectors }, 4)
-                .unwrap_err()
-                .status()
+            set.take_sparse(nodes, vectors, 4).unwrap_err().status()
         };
         assert_eq!(status(&[4], &[0.0; 3]), -2);
         assert_eq!(status(&[1, 1], &[0.0; 6]), -2);

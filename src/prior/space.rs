@@ -7,11 +7,11 @@
 
 use half::f16;
 
+use super::table::PriorTable;
 use crate::bundle::TensorFile;
 use crate::error::Result;
 use crate::kernels::rows::Stored;
 use crate::memory;
-use crate::prior::PriorTable;
 
 const WHAT: &str = "the modes of the corrections";
 /// Most modes that a file may hold.
