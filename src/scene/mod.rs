@@ -8,11 +8,15 @@ mod corrected;
 mod counters;
 #[cfg(feature = "contact")]
 mod driven;
+#[cfg(feature = "forces")]
+mod elastic;
 mod engine;
 mod free_motion;
 #[cfg(feature = "haptics")]
 mod haptics;
 mod inputs;
+#[cfg(feature = "contact")]
+mod instruments;
 mod inversion;
 mod linear;
 #[cfg(feature = "contact")]
@@ -36,6 +40,8 @@ mod snapshot;
 mod state;
 mod step_input;
 mod timing;
+#[cfg(feature = "contact")]
+mod tissue;
 mod tools;
 #[cfg(not(feature = "contact"))]
 mod undriven;
@@ -67,6 +73,8 @@ use points::AttachedPoints;
 use published::{Frame, Published};
 use region::check_nodes;
 use shared::Shared;
+#[cfg(feature = "contact")]
+use tissue::Tissue;
 use worker::Worker;
 
 /// A tissue that is stepped. All methods take `&self`; concurrent use gives [`Error::Busy`], never a wait.
@@ -136,10 +144,15 @@ impl Scene {
         self.integrator.step_s
     }
 
-    /// The length of a step and the damping.
+    /// What its readers know of it.
     #[cfg(feature = "contact")]
-    pub(crate) fn integrator(&self) -> Integrator {
-        self.integrator
+    fn tissue(&self) -> Tissue<'_> {
+        Tissue {
+            published: &self.shared.published,
+            model: &self.model,
+            mesh: &self.mesh,
+            integrator: self.integrator,
+        }
     }
 
     /// Nodes of the scene's mesh, `K`.

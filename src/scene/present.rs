@@ -82,14 +82,15 @@ impl Scene {
         lock_read(&self.shared.published).check_len(values, out.len())?;
         let _flush = FlushToZero::enter();
         let mut presenters = lock(&self.tools.presenters)?;
-        presenters.prepare(self, values, || {
+        let tissue = self.tissue();
+        presenters.prepare(&tissue, values, || {
             let begun = lock_read(&self.shared.published).moment.is_some();
             match begun {
                 true => Ok(()),
                 false => self.with(|core, published| core.begin_moments(published)),
             }
         })?;
-        presenters.frame(self, (values, seconds), contact, out)
+        presenters.frame(&tissue, (values, seconds), contact, out)
     }
 
     /// Bytes of what presents.

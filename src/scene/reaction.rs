@@ -10,28 +10,14 @@
 use std::sync::RwLock;
 
 use super::Scene;
-use super::core::{Core, lock_read};
+use super::core::Core;
+use super::elastic::Haptics;
 use super::published::Published;
 use super::shared::lock;
-use crate::bundle::Mesh;
 use crate::error::{Error, Result};
-use crate::forces::ReactionForces;
 use crate::kernels::FlushToZero;
 use crate::memory;
-use crate::model::Model;
 use crate::output::Output;
-
-const WHAT: &str = "the elements' forces";
-
-/// The elements' forces of a scene without a prior.
-pub struct Haptics {
-    forces: ReactionForces,
-    /// The contact nodes, nodes around them, and the field they are decoded into.
-    nodes: Vec<u32>,
-    around: Vec<u32>,
-    decoded: Vec<f32>,
-    field: Vec<f32>,
-}
 
 impl Scene {
     /// Force of the tissue on the instruments at the last step's contact nodes, in their order: `out [m,3]`, mN.
@@ -98,52 +84,5 @@ impl Core {
             .solve
             .reaction(table, &self.held, &contact.nodes, &contact.order, out);
         Ok(true)
-    }
-}
-
-impl Haptics {
-    fn new(mesh: &Mesh, model: &Model) -> Result<Haptics> {
-        let material = &model.manifest.material;
-        Ok(Haptics {
-            forces: ReactionForces::new(
-                &mesh.positions,
-                &mesh.tets,
-                &mesh.stiffness,
-                &mesh.surface_nodes,
-                material.moduli(),
-            )?,
-            nodes: Vec::new(),
-            around: Vec::new(),
-            decoded: Vec::new(),
-            field: memory::zeros(mesh.positions.len(), WHAT)?,
-        })
-    }
-
-    fn reaction(
-        &mut self,
-        core: &mut Core,
-        published: &RwLock<Published>,
-        out: &mut [f32],
-    ) -> Result<()> {
-        let shared = lock_read(published);
-        if shared.region.is_none() {
-            let (field, nodes) = (&shared.last.field, &shared.contact_nodes);
-            return self.forces.reaction(field, nodes, out).map(|_| ());
-        }
-        memory::replace(&mut self.nodes, &shared.contact_nodes, WHAT)?;
-        drop(shared);
-        self.around.clear();
-        (self.forces).neighbourhood(&self.nodes, &mut self.around)?;
-        let floats = 3 * self.around.len();
-        memory::fit(&mut self.decoded, floats, WHAT)?;
-        self.decoded.resize(floats, 0.0);
-        if !self.around.is_empty() {
-            core.decode(published, &self.around, self.decoded.as_mut_slice().into())?;
-        }
-        for (&node, u) in self.around.iter().zip(self.decoded.chunks_exact(3)) {
-            self.field[3 * node as usize..][..3].copy_from_slice(u);
-        }
-        let forces = self.forces.reaction(&self.field, &self.nodes, out);
-        forces.map(|_| ())
     }
 }

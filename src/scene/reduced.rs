@@ -24,8 +24,7 @@ use crate::prior::PriorTable;
 use crate::stats::{SceneStats, flag};
 
 pub use record::ReducedRecord;
-
-const STATE: &str = "a scene's reduced states";
+use record::STATE;
 
 /// Buffers and session of a scene of kind `reduced`.
 pub struct ReducedEngine {

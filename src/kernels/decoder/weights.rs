@@ -5,8 +5,8 @@
 //! output. The affine parts of LN_2 and LN_3 are folded into `W_1` and `W_3`; the attention's
 //! `1/sqrt(h/heads)` and the `log2 e` of its exponential are folded into the keys.
 
-use super::DecoderPrecision;
 use super::pack::{GROUP, block_count, pack, pack_blocks, pack_pairs, pair_count, panel_floats};
+use super::precision::DecoderPrecision;
 use crate::error::Error;
 use crate::memory;
 use half::bf16;

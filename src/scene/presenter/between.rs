@@ -9,7 +9,6 @@ use std::sync::Arc;
 use super::along::{Along, Ways};
 use super::nodes::{Means, Nodes};
 use super::solves::{Drive, Question, Solves};
-use super::{AT_ONCE_S, WHAT};
 use crate::contact::problem::Change;
 use crate::contact::{Compliance, Past, Problem, State};
 use crate::error::{Error, Result};
@@ -19,8 +18,12 @@ use crate::kernels::rows::{RowPlan, decode_rows};
 use crate::kernels::{Isa, Pool};
 use crate::memory;
 use crate::scene::moment::Moment;
-use crate::scene::{Contact, Scene};
+use crate::scene::step_input::Contact;
+use crate::scene::tissue::Tissue;
 
+pub(super) const WHAT: &str = "the present state of a scene";
+/// Below this nothing has moved since the step, s.
+pub(super) const AT_ONCE_S: f64 = 1e-5;
 /// The last velocities are followed for at most this many steps.
 const MOST_STEPS: f64 = 2.0;
 
@@ -70,14 +73,14 @@ pub(super) struct Between {
 }
 
 impl Between {
-    pub(super) fn new(scene: &Scene) -> Result<Between> {
-        let model = &scene.model;
+    pub(super) fn new(scene: &Tissue<'_>) -> Result<Between> {
+        let model = scene.model;
         let (true, Ok(corrections)) = (model.prior.is_some(), model.corrections()) else {
             return Err(Error::Unsupported(
                 "present: the bundle has no linear response or no corrections; show its steps with upt_scene_sample".into(),
             ));
         };
-        let count = scene.node_count();
+        let count = scene.mesh.node_count();
         let field = || memory::zeros(3 * count, WHAT);
         let mut held = memory::filled(count, false, WHAT)?;
         for &node in &scene.mesh.held_nodes {
@@ -158,20 +161,20 @@ impl Between {
     /// Those of [`Scene::present`] for the tools or nodes.
     pub(super) fn show(
         &mut self,
-        scene: &Scene,
+        scene: &Tissue<'_>,
         tau: f64,
         driven: Contact<'_>,
         (view, solves): (View<'_>, &mut Solves),
         out: &mut [f32],
     ) -> Result<()> {
-        let model = &scene.model;
+        let model = scene.model;
         let (Some(prior), corrections, Some(step)) =
             (&model.prior, model.corrections()?, self.step)
         else {
             return Ok(());
         };
-        let tau = tau.min(MOST_STEPS * scene.step_s());
-        let alpha = scene.integrator().damping_per_s;
+        let tau = tau.min(MOST_STEPS * scene.integrator.step_s);
+        let alpha = scene.integrator.damping_per_s;
         let rest = scene.mesh.positions.as_slice();
         let (last, velocity) = (self.last.as_slice(), self.velocity.as_slice());
         match driven {
@@ -206,7 +209,7 @@ impl Between {
             self.along.follow(nodes, fields, &mut self.free);
         }
         let make = |q: &mut [f32]| -> Result<bool> {
-            let kappa = scene.integrator().over(tau.max(AT_ONCE_S)).kappa();
+            let kappa = scene.integrator.over(tau.max(AT_ONCE_S)).kappa();
             // As many as before.
             self.held_back.clear();
             self.held_back.extend(corrections.space.holds_back(kappa));

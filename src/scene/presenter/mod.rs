@@ -14,19 +14,16 @@ use std::sync::Arc;
 use super::core::lock_read;
 use super::points::AttachedPoints;
 use super::published::{Published, Values};
-use super::{Contact, Scene};
+use super::step_input::Contact;
+use super::tissue::Tissue;
 use crate::error::{Error, Result};
 use crate::kernels::rows::RowPlan;
 use crate::memory;
 use crate::model::Model;
 use crate::output::Output;
-use between::{Between, View};
+use between::{AT_ONCE_S, Between, View, WHAT};
 use over::Over;
 use solves::Solves;
-
-const WHAT: &str = "the present state of a scene";
-/// Below this nothing has moved since the step, s.
-const AT_ONCE_S: f64 = 1e-5;
 
 /// What makes a scene's frames, each part from its first use.
 #[derive(Default)]
@@ -63,7 +60,7 @@ impl Presenters {
     /// [`Error::Unsupported`] for a bundle without linear response or corrections, [`Error::OutOfMemory`], and what `begin` gives.
     pub fn prepare(
         &mut self,
-        scene: &Scene,
+        scene: &Tissue<'_>,
         values: Values,
         begin: impl FnOnce() -> Result<()>,
     ) -> Result<()> {
@@ -82,10 +79,10 @@ impl Presenters {
     /// The values `tau` after the last published step, into `out`. Nothing happens before [`Presenters::prepare`].
     ///
     /// # Errors
-    /// Those of [`Scene::present`].
+    /// Those of [`Scene::present`](crate::Scene::present).
     pub fn frame(
         &mut self,
-        scene: &Scene,
+        scene: &Tissue<'_>,
         (values, tau): (Values, f64),
         driven: Contact<'_>,
         out: Output<'_, f32>,
@@ -110,7 +107,7 @@ impl Presenters {
 }
 
 impl Presenter {
-    fn new(scene: &Scene, values: Values) -> Result<Presenter> {
+    fn new(scene: &Tissue<'_>, values: Values) -> Result<Presenter> {
         Ok(Presenter {
             values,
             attached: Arc::default(),
@@ -169,16 +166,16 @@ impl Presenter {
     /// The region or the points `tau` after the last published step, into `out`.
     fn frame(
         &mut self,
-        scene: &Scene,
+        scene: &Tissue<'_>,
         tau: f64,
         driven: Contact<'_>,
         solves: &mut Solves,
         out: Output<'_, f32>,
     ) -> Result<()> {
-        let step_s = scene.step_s();
+        let step_s = scene.integrator.step_s;
         let step = {
-            let shared = lock_read(&scene.shared.published);
-            self.take_region(&scene.model, &shared, out.len())?;
+            let shared = lock_read(scene.published);
+            self.take_region(scene.model, &shared, out.len())?;
             step_of(&shared)?
         };
         let mut nodal = std::mem::take(&mut self.nodal);
@@ -211,7 +208,7 @@ impl Presenter {
     /// The region's nodes `tau` after the step that is known, into `out`; nothing blended in.
     fn show(
         &mut self,
-        scene: &Scene,
+        scene: &Tissue<'_>,
         tau: f64,
         driven: Contact<'_>,
         solves: &mut Solves,
@@ -228,13 +225,13 @@ impl Presenter {
     /// The first frame of a step.
     fn arrive(
         &mut self,
-        scene: &Scene,
+        scene: &Tissue<'_>,
         (step, tau): (u64, f64),
         driven: Contact<'_>,
         solves: &mut Solves,
         out: &mut [f32],
     ) -> Result<()> {
-        let step_s = scene.step_s();
+        let step_s = scene.integrator.step_s;
         let known = self.between.step;
         let mut since_s = 0.0;
         if let Some(known) = known {
@@ -249,7 +246,7 @@ impl Presenter {
             made?;
         }
         {
-            let shared = lock_read(&scene.shared.published);
+            let shared = lock_read(scene.published);
             if let Some(moment) = &shared.moment {
                 let steps = known.map(|known| moment.step.saturating_sub(known));
                 let later_s = steps.map(|steps| steps as f64 * step_s);

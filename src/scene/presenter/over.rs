@@ -2,7 +2,7 @@
 //! of a step, or at 25 mm/s where that takes longer; within two steps in any case: a way of 10 mm, after a tool was put into the tissue, may lead
 //! through the tool, and begins anew at each step.
 
-use super::AT_ONCE_S;
+use super::between::AT_ONCE_S;
 use crate::error::Result;
 use crate::memory;
 

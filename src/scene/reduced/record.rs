@@ -2,11 +2,12 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::STATE;
 use crate::error::Result;
 use crate::model::ReducedModel;
 use crate::prior::PriorTable;
 use crate::{memory, stored};
+
+pub(super) const STATE: &str = "a scene's reduced states";
 
 /// The reduced state after one step.
 #[derive(Debug, Serialize, Deserialize)]

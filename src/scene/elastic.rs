@@ -1,0 +1,70 @@
+//! The elastic force of the elements around the contact nodes, for scenes without a prior.
+
+use std::sync::RwLock;
+
+use super::core::{Core, lock_read};
+use super::published::Published;
+use crate::bundle::Mesh;
+use crate::error::Result;
+use crate::forces::ReactionForces;
+use crate::memory;
+use crate::model::Model;
+
+const WHAT: &str = "the elements' forces";
+
+/// The elements' forces of a scene without a prior.
+pub struct Haptics {
+    forces: ReactionForces,
+    /// The contact nodes, nodes around them, and the field they are decoded into.
+    nodes: Vec<u32>,
+    around: Vec<u32>,
+    decoded: Vec<f32>,
+    field: Vec<f32>,
+}
+
+impl Haptics {
+    pub(super) fn new(mesh: &Mesh, model: &Model) -> Result<Haptics> {
+        let material = &model.manifest.material;
+        Ok(Haptics {
+            forces: ReactionForces::new(
+                &mesh.positions,
+                &mesh.tets,
+                &mesh.stiffness,
+                &mesh.surface_nodes,
+                material.moduli(),
+            )?,
+            nodes: Vec::new(),
+            around: Vec::new(),
+            decoded: Vec::new(),
+            field: memory::zeros(mesh.positions.len(), WHAT)?,
+        })
+    }
+
+    pub(super) fn reaction(
+        &mut self,
+        core: &mut Core,
+        published: &RwLock<Published>,
+        out: &mut [f32],
+    ) -> Result<()> {
+        let shared = lock_read(published);
+        if shared.region.is_none() {
+            let (field, nodes) = (&shared.last.field, &shared.contact_nodes);
+            return self.forces.reaction(field, nodes, out).map(|_| ());
+        }
+        memory::replace(&mut self.nodes, &shared.contact_nodes, WHAT)?;
+        drop(shared);
+        self.around.clear();
+        (self.forces).neighbourhood(&self.nodes, &mut self.around)?;
+        let floats = 3 * self.around.len();
+        memory::fit(&mut self.decoded, floats, WHAT)?;
+        self.decoded.resize(floats, 0.0);
+        if !self.around.is_empty() {
+            core.decode(published, &self.around, self.decoded.as_mut_slice().into())?;
+        }
+        for (&node, u) in self.around.iter().zip(self.decoded.chunks_exact(3)) {
+            self.field[3 * node as usize..][..3].copy_from_slice(u);
+        }
+        let forces = self.forces.reaction(&self.field, &self.nodes, out);
+        forces.map(|_| ())
+    }
+}

@@ -1,0 +1,94 @@
+//! Instruments: lists that a host's are read into, steps that they drive, what they were told, and poses to contacts.
+
+use std::sync::MutexGuard;
+
+use super::Scene;
+use super::core::lock_read;
+use super::shared::lock;
+use super::tools::Asked;
+use crate::contact::{MAX_TOOLS, Told, Tool};
+use crate::error::Result;
+use crate::instrument::{Instrument, InstrumentContacts};
+use crate::memory;
+
+impl Scene {
+    /// A list for the tools of a step, kept from call to call.
+    ///
+    /// # Errors
+    /// [`Error::Busy`].
+    pub fn tool_list(&self) -> Result<MutexGuard<'_, Vec<Tool>>> {
+        lock(&self.tools.list)
+    }
+
+    /// A list for the tools of a frame between steps.
+    ///
+    /// # Errors
+    /// [`Error::Busy`].
+    pub fn frame_tools(&self) -> Result<MutexGuard<'_, Vec<Tool>>> {
+        lock(&self.tools.frame_list)
+    }
+
+    /// A list for instruments whose contacts are asked for.
+    ///
+    /// # Errors
+    /// [`Error::Busy`].
+    pub fn instrument_list(&self) -> Result<MutexGuard<'_, Vec<Instrument>>> {
+        lock(&self.tools.asked_list)
+    }
+
+    /// Starts a step that tools drive on the scene's worker.
+    ///
+    /// # Errors
+    /// As [`Scene::submit`], and what [`Tool::check`] says.
+    pub fn submit_tools(&self, tools: &[Tool]) -> Result<()> {
+        self.worker.submit_tools(&self.shared, tools)
+    }
+
+    /// Reads what the tools of the last step were told, and the samples that push them.
+    pub fn with_told<T>(&self, read: impl FnOnce(&Told) -> T) -> T {
+        read(&lock_read(&self.shared.published).tools)
+    }
+
+    /// The contacts of instruments with the tissue in its last state: `take(nodes, vectors)` gets the
+    /// nodes, ascending, and `[m,3]` mm, the input of the next step.
+    ///
+    /// The scene remembers what is touched between calls ([`crate::instrument`]); [`Scene::reset`] forgets it.
+    /// With a region, surface nodes outside of it are taken where they last were.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for more than [`MAX_TOOLS`](crate::contact::MAX_TOOLS), [`Error::Busy`], [`Error::OutOfMemory`], and what `take`
+    /// gives.
+    pub fn contacts_from_instruments<T>(
+        &self,
+        instruments: &[Instrument],
+        take: impl FnOnce(&[u32], &[f32]) -> Result<T>,
+    ) -> Result<T> {
+        let mut contacts = lock(&self.tools.contacts)?;
+        let mesh = &self.mesh;
+        let asked = match &mut *contacts {
+            Some(asked) => asked,
+            none => none.insert(Asked {
+                contacts: InstrumentContacts::new(
+                    &mesh.positions,
+                    &mesh.surface_faces,
+                    &mesh.held_nodes,
+                )?,
+                instruments: memory::room(MAX_TOOLS, "the instruments' contacts")?,
+                step: None,
+            }),
+        };
+        let published = lock_read(&self.shared.published);
+        let step = Some(published.stats.step_count);
+        let mut pairs = asked.instruments.iter().zip(instruments);
+        let same = asked.instruments.len() == instruments.len() && pairs.all(|(a, b)| a.is_same(b));
+        if asked.step != step || !same {
+            asked.step = None;
+            asked.contacts.find(instruments, &published.last.field)?;
+            asked.instruments.clear();
+            asked.instruments.extend_from_slice(instruments);
+            asked.step = step;
+        }
+        let (nodes, vectors) = asked.contacts.found();
+        take(nodes, vectors)
+    }
+}
