@@ -15,8 +15,6 @@ const RECOVERY_MM: f32 = 3.0;
 const SHALLOW_MM: f32 = 0.5;
 /// ... nor one from which the way back through the tool is more than so many times its depth: that way grazes the tool's side.
 const LONG_WAY: f32 = 4.0;
-/// A tool of less half thickness pierces the surface before it has pushed it, mm.
-const THIN_MM: f32 = 1.45;
 /// A tool's normal may lean this much (cosine) to the outside of the tissue; beyond, the tool reaches the sample from within.
 const LEAN: f32 = 0.2;
 
@@ -53,8 +51,8 @@ pub(crate) struct Pair<'a> {
     pub(crate) anchor: Option<Vector>,
     /// The tool was put where it is: nobody knows which way it came.
     pub(crate) put: bool,
-    /// The tool lies in the tissue: unit direction of the shortest way out.
-    pub(crate) way_out: Option<Vector>,
+    /// The tool lies in the tissue: unit direction of the shortest way out, and how far the surface may have to go against it, mm.
+    pub(crate) way_out: Option<(Vector, f32)>,
 }
 
 impl Pair<'_> {
@@ -82,15 +80,13 @@ impl Pair<'_> {
         let carried = self
             .now
             .transform_point(self.from.inverse_transform_point(start));
-        if let Some(out) = self.way_out
-            && normal.dot(out) > -LEAN
-        {
-            let way = self.body.way_through(self.now, point, -out, THROUGH_MM);
-            match way {
-                Some(way) => (normal, gap) = (-out, -way),
-                None if force == Vector::ZERO => return RELEASED,
-                None => {}
-            }
+        let way_out = self.way_out.filter(|(out, _)| normal.dot(*out) > -LEAN);
+        let way_out = way_out.and_then(|(out, most)| {
+            let way = self.body.way_through(self.now, point, -out, most)?;
+            Some((out, way))
+        });
+        if let Some((out, way)) = way_out {
+            (normal, gap) = (-out, -way);
         } else if let Some((face, depth)) = self.pierced(point, start, outward, gap) {
             (normal, gap) = (face, -depth);
         } else if normal.dot(outward) > LEAN {
@@ -137,7 +133,7 @@ impl Pair<'_> {
         outward: Vector,
         gap: f32,
     ) -> Option<(Vector, f32)> {
-        if gap >= 0.0 || self.body.size() >= THIN_MM {
+        if gap >= 0.0 || !self.body.pierces() {
             return None;
         }
         let [now, then] = [(self.now, point), (self.from, start)]
@@ -230,8 +226,8 @@ impl Moving<'_> {
             anchor: self.held[index].grasp.place(row.sample),
             put: self.put[index],
             way_out: self.buried[index]
-                .filter(|buried| row.sample == buried.row || buried.out.dot(row.outward) > 0.5)
-                .map(|buried| buried.out),
+                .filter(|buried| row.sample == buried.row || buried.takes(row))
+                .map(|buried| (buried.out, buried.depth + 2.0 * tool.body.size())),
         };
         let sample = self.samples.at(row.sample);
         let start = sample.gather(|node| self.state.position_before(node));

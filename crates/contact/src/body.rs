@@ -15,6 +15,10 @@ const SUNK_MM: f32 = 0.5;
 /// Rods touch as ones of this radius at least, and blades as ones of half this half thickness, mm: what is thinner than an element of
 /// the tissue feels no difference, and the contact of a finer tip is not to be solved on it. Ends of rods stay where they are.
 const LEAST_RADIUS_MM: f32 = 1.0;
+/// A tool of less half thickness pierces the surface before it has pushed it, mm.
+const THIN_MM: f32 = 1.45;
+/// Hulls at least this thick a millimetre behind each corner, as boxes are, have no point, mm.
+const BLUNT_MM: f32 = 0.75;
 /// See [`Body::check_hull`], mm.
 const POINTED_MM: f32 = 0.2;
 /// Corners of a hull that serve as probes at most.
@@ -39,6 +43,8 @@ enum Core {
 pub struct Body {
     core: Core,
     radius: f32,
+    /// It has a corner that is less than [`BLUNT_MM`] thick a millimetre behind.
+    pointed: bool,
     /// Middle and half sizes of the box around it, in its frame.
     middle: Vector,
     half: Vector,
@@ -120,24 +126,27 @@ impl Body {
             Core::Cuboid { half } => (-*half, *half),
             Core::Triangles(surface) => surface.bounds(),
         };
-        let body = Self {
+        let mut body = Self {
             core,
             radius,
+            pointed: false,
             middle: 0.5 * (low + high),
             half: 0.5 * (high - low) + Vector::splat(radius),
         };
-        if let (Core::Triangles(surface), Shape::Hull { .. }) = (&body.core, shape) {
-            body.check_hull(surface)?;
+        if let (Core::Triangles(surface), Shape::Hull { .. }) = (body.core.clone(), shape) {
+            body.pointed = body.check_hull(&surface)? < BLUNT_MM;
         }
         Ok(body)
     }
 
     /// A hull is thick, and no more pointed than that it is [`POINTED_MM`] thick a millimetre behind each corner.
-    fn check_hull(&self, hull: &Triangles) -> Result<(), ShapeError> {
+    /// Returns that thickness of its finest corner.
+    fn check_hull(&self, hull: &Triangles) -> Result<f32, ShapeError> {
         let thickness = 2.0 * self.size();
         if thickness < 0.4 * THINNEST_MM {
             return Err(ShapeError::Thin { thickness });
         }
+        let mut least = f32::MAX;
         for (corner, inward) in hull.corners().iter().zip(hull.inward()) {
             let behind = *corner + inward;
             let thickness = -2.0 * self.nearest(behind).distance;
@@ -145,20 +154,27 @@ impl Body {
                 let corner = corner.to_array();
                 return Err(ShapeError::Pointed { corner, thickness });
             }
+            least = least.min(thickness);
         }
-        Ok(())
+        Ok(least)
     }
 
     /// Whether it sinks more than [`SUNK_MM`] between samples `spacing` apart, or passes between them: by its half thickness, or by
     /// the margin of a hull, which may have a point.
     pub fn sinks_between(&self, spacing: f32) -> bool {
         let round = match self.core {
-            Core::Segment { .. } | Core::Cuboid { .. } => self.size(),
-            Core::Triangles(_) => self.radius,
+            Core::Triangles(_) if self.pointed => self.radius,
+            Core::Triangles(_) | Core::Cuboid { .. } if !self.pierces() => return false,
+            _ => self.size(),
         };
         // A point of an equilateral triangle is at most so far from its corners.
         let far = spacing / 3.0f32.sqrt();
         round < far || round - (round * round - far * far).sqrt() > SUNK_MM
+    }
+
+    /// Whether it is so thin that it pierces the surface before it has pushed it.
+    pub fn pierces(&self) -> bool {
+        self.size() < THIN_MM
     }
 
     /// How round its edges are at least, mm; 0 where they are sharp.

@@ -9,11 +9,16 @@ use crate::contact::rows::{Row, outward};
 use crate::contact::state::State;
 
 impl Problem {
-    /// How deep the tissue lies inside of a tool, or a tool in the tissue, tools at part `part` of their ways, mm.
+    /// How deep the tissue lies inside of a tool that was clear of it when the step began, or the tool in the tissue, tools at part `part`
+    /// of their ways, mm. A tool that was put there comes out over a few steps, however deep it lies.
     pub fn sunk(&mut self, state: State<'_>, part: f32) -> f32 {
-        (0..self.tools.len())
-            .map(|index| self.depth(index, state, part))
-            .fold(0.0, f32::max)
+        let mut deepest = 0.0f32;
+        for index in 0..self.tools.len() {
+            if self.clear[index] {
+                deepest = deepest.max(self.depth(index, state, part));
+            }
+        }
+        deepest
     }
 
     /// The same of one tool.
@@ -26,6 +31,17 @@ impl Problem {
             true => depth,
             false => depth.max(self.buried_by(index, state, part)),
         }
+    }
+
+    /// Whether a sample of the surface lies inside of a tool where it was when the step began.
+    pub(super) fn reaches(&mut self, index: usize, state: State<'_>) -> bool {
+        let placed = Placed {
+            body: &self.tools[index].body,
+            pose: self.before[index],
+            skin: 0.0,
+        };
+        let position = |node| state.position(node);
+        !self.search.find(&self.samples, &[placed], position).is_empty()
     }
 
     /// Whether forces of a tool are at its surface, and none where the tissue has left it.

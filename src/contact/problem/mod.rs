@@ -38,6 +38,8 @@ const MOST_PARTS: f32 = 80.0;
 const STEP_WORK: u64 = 20_000_000;
 /// Parts of the tools' ways in a step that has taken its time.
 const LEAST_PARTS: u32 = 4;
+/// Tissue no deeper than this in a tool is clear of it, mm.
+const RESTING_MM: f32 = 0.9;
 /// Tissue that is farther from a tool is not pushed by it, mm.
 const OPEN_MM: f32 = 0.5;
 
@@ -50,6 +52,8 @@ pub struct Problem {
     before: Vec<Pose>,
     /// Which of them were put there in this step.
     put: Vec<bool>,
+    /// Which of them were clear of the tissue then.
+    clear: Vec<bool>,
     /// Which of them lay in the tissue then, and where they come out.
     buried: Vec<Option<Buried>>,
     /// At the end of the last published step.
@@ -103,6 +107,7 @@ impl Problem {
             tools: memory::room(MAX_TOOLS, WHAT)?,
             before: memory::room(MAX_TOOLS, WHAT)?,
             put: memory::room(MAX_TOOLS, WHAT)?,
+            clear: memory::room(MAX_TOOLS, WHAT)?,
             buried: memory::room(MAX_TOOLS, WHAT)?,
             past: Past::with_room(room)?,
             next: Past::with_room(room)?,
@@ -144,6 +149,7 @@ impl Problem {
         self.tools.clear();
         self.before.clear();
         self.put.clear();
+        self.clear.clear();
         self.buried.clear();
         self.next.clear();
     }
@@ -207,6 +213,7 @@ impl Problem {
         };
         self.before.clear();
         self.put.clear();
+        self.clear.clear();
         self.buried.clear();
         for (index, tool) in tools.iter().enumerate() {
             let known = self.past.tools.get(index).map(|held| held.pose);
@@ -216,8 +223,8 @@ impl Problem {
             self.put.push(moved.is_none());
             let (samples, mesh) = (&self.samples, &self.mesh);
             let buried = Buried::find(&tool.body, &from, samples, mesh, state);
-            self.lay_in_tissue |= buried.is_some();
             self.buried.push(buried);
+            self.clear.push(false);
             if self.next.tools.len() <= index {
                 self.next.tools.push(Held::default());
             }
@@ -239,6 +246,15 @@ impl Problem {
                 held.grasp.open();
             }
             held.closed = closes;
+        }
+        for index in 0..tools.len() {
+            // Samples inside of a thick tool come out of it as they are.
+            if !self.tools[index].body.pierces() && self.reaches(index, state) {
+                self.buried[index] = None;
+            }
+            self.lay_in_tissue |= self.buried[index].is_some();
+            self.clear[index] =
+                !self.put[index] && self.depth(index, state, 0.0) <= RESTING_MM;
         }
         Ok(())
     }
