@@ -18,7 +18,7 @@ const LEAST_RADIUS_MM: f32 = 1.0;
 /// A tool of less half thickness pierces the surface before it has pushed it, mm.
 const THIN_MM: f32 = 1.45;
 /// Hulls at least this thick a millimetre behind each corner, as boxes are, have no point, mm.
-const BLUNT_MM: f32 = 0.75;
+const BLUNT_MM: f32 = 0.65;
 /// See [`Body::check_hull`], mm.
 const POINTED_MM: f32 = 0.2;
 /// Corners of a hull that serve as probes at most.

@@ -35,7 +35,7 @@ const WHAT: &str = "the contact of instruments";
 /// Parts of a step's way at most: of a thin tool that goes as far as one may.
 const MOST_PARTS: f32 = 80.0;
 /// Work of the solves of a step at most, those of its substeps included: about so many multiplications, some five milliseconds.
-const STEP_WORK: u64 = 20_000_000;
+const STEP_WORK: u64 = 60_000_000;
 /// Parts of the tools' ways in a step that has taken its time.
 const LEAST_PARTS: u32 = 4;
 /// Tissue no deeper than this in a tool is clear of it, mm.
@@ -54,6 +54,8 @@ pub struct Problem {
     put: Vec<bool>,
     /// Which of them were clear of the tissue then.
     clear: Vec<bool>,
+    /// How far the surface of each is as its tangents say, mm.
+    trusted: Vec<f32>,
     /// Which of them lay in the tissue then, and where they come out.
     buried: Vec<Option<Buried>>,
     /// At the end of the last published step.
@@ -108,6 +110,7 @@ impl Problem {
             before: memory::room(MAX_TOOLS, WHAT)?,
             put: memory::room(MAX_TOOLS, WHAT)?,
             clear: memory::room(MAX_TOOLS, WHAT)?,
+            trusted: memory::room(MAX_TOOLS, WHAT)?,
             buried: memory::room(MAX_TOOLS, WHAT)?,
             past: Past::with_room(room)?,
             next: Past::with_room(room)?,

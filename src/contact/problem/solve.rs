@@ -14,7 +14,7 @@ use crate::error::Result;
 use crate::memory;
 
 /// Multiplications of one linearisation at most: about half a millisecond.
-const SOLVE_WORK: u64 = 2_000_000;
+const SOLVE_WORK: u64 = 10_000_000;
 /// What else a solve takes, as so many multiplications: for each node and sample that is looked at, for each row and linearisation, and for
 /// each pair of rows.
 const LOOK_WORK: u64 = 60;
@@ -143,6 +143,13 @@ impl Problem {
             state,
             part,
         };
+        // What was put into the tissue may find its way out by any of its sides.
+        self.trusted.clear();
+        let tools = self.tools.iter().zip(&self.clear);
+        self.trusted.extend(tools.map(|(tool, clear)| match clear {
+            true => tool.body.size().max(LEAST_WAY_MM),
+            false => f32::MAX,
+        }));
         let (mut pass, mut extra) = (0, MOST_REPEATS);
         while pass < LINEARISATIONS {
             self.contacts.clear();
@@ -169,9 +176,9 @@ impl Problem {
             let ways =
                 pairs.filter(|(_, (now, before))| **now != **before || **now != Vector::ZERO);
             let ways = ways.map(|(at, _)| {
-                let tool = self.tools.get(self.rows[at].tool as usize);
-                let size = tool.map_or(1.0, |tool| tool.body.size().max(LEAST_WAY_MM));
-                self.sweeps.shift(at).length() / size
+                let tool = self.rows[at].tool as usize;
+                let way = self.trusted.get(tool).map_or(LEAST_WAY_MM, |way| *way);
+                self.sweeps.shift(at).length() / way
             });
             let part = 1.0 / ways.fold(1.0, f32::max);
             for (at, row) in self.rows.iter_mut().enumerate() {
