@@ -9,12 +9,12 @@ use crate::contact::rows::{Row, outward};
 use crate::contact::state::State;
 
 impl Problem {
-    /// How deep the tissue lies inside of a tool that was clear of it when the step began, or the tool in the tissue, tools at part `part`
-    /// of their ways, mm. A tool that was put there comes out over a few steps, however deep it lies.
+    /// How deep the tissue lies inside of a quick or thin tool that was clear of it when the step began, or the tool in the tissue, tools at
+    /// part `part` of their ways, mm. A tool that was put there comes out over a few steps, however deep it lies.
     pub fn sunk(&mut self, state: State<'_>, part: f32) -> f32 {
         let mut deepest = 0.0f32;
         for index in 0..self.tools.len() {
-            if self.clear[index] {
+            if self.may_lose[index] {
                 deepest = deepest.max(self.depth(index, state, part));
             }
         }

@@ -38,6 +38,8 @@ const MOST_PARTS: f32 = 80.0;
 const STEP_WORK: u64 = 60_000_000;
 /// Parts of the tools' ways in a step that has taken its time.
 const LEAST_PARTS: u32 = 4;
+/// A tool that goes farther in a step is quick, mm.
+const QUICK_MM: f32 = 0.5;
 /// Tissue no deeper than this in a tool is clear of it, mm.
 const RESTING_MM: f32 = 0.9;
 /// Tissue that is farther from a tool is not pushed by it, mm.
@@ -52,8 +54,8 @@ pub struct Problem {
     before: Vec<Pose>,
     /// Which of them were put there in this step.
     put: Vec<bool>,
-    /// Which of them were clear of the tissue then.
-    clear: Vec<bool>,
+    /// Which of them were clear of the tissue then, and are so quick or thin that they may lose it.
+    may_lose: Vec<bool>,
     /// How far the surface of each is as its tangents say, mm.
     trusted: Vec<f32>,
     /// Which of them lay in the tissue then, and where they come out.
@@ -109,7 +111,7 @@ impl Problem {
             tools: memory::room(MAX_TOOLS, WHAT)?,
             before: memory::room(MAX_TOOLS, WHAT)?,
             put: memory::room(MAX_TOOLS, WHAT)?,
-            clear: memory::room(MAX_TOOLS, WHAT)?,
+            may_lose: memory::room(MAX_TOOLS, WHAT)?,
             trusted: memory::room(MAX_TOOLS, WHAT)?,
             buried: memory::room(MAX_TOOLS, WHAT)?,
             past: Past::with_room(room)?,
@@ -152,7 +154,7 @@ impl Problem {
         self.tools.clear();
         self.before.clear();
         self.put.clear();
-        self.clear.clear();
+        self.may_lose.clear();
         self.buried.clear();
         self.next.clear();
     }
@@ -216,7 +218,7 @@ impl Problem {
         };
         self.before.clear();
         self.put.clear();
-        self.clear.clear();
+        self.may_lose.clear();
         self.buried.clear();
         for (index, tool) in tools.iter().enumerate() {
             let known = self.past.tools.get(index).map(|held| held.pose);
@@ -227,7 +229,7 @@ impl Problem {
             let (samples, mesh) = (&self.samples, &self.mesh);
             let buried = Buried::find(&tool.body, &from, samples, mesh, state);
             self.buried.push(buried);
-            self.clear.push(false);
+            self.may_lose.push(false);
             if self.next.tools.len() <= index {
                 self.next.tools.push(Held::default());
             }
@@ -256,8 +258,11 @@ impl Problem {
                 self.buried[index] = None;
             }
             self.lay_in_tissue |= self.buried[index].is_some();
-            self.clear[index] =
-                !self.put[index] && self.depth(index, state, 0.0) <= RESTING_MM;
+            let tool = &self.tools[index];
+            let is_quick = tool.body.motion(&self.before[index], &tool.pose) > QUICK_MM;
+            self.may_lose[index] = (is_quick || tool.body.pierces())
+                && !self.put[index]
+                && self.depth(index, state, 0.0) <= RESTING_MM;
         }
         Ok(())
     }

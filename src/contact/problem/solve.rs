@@ -143,10 +143,10 @@ impl Problem {
             state,
             part,
         };
-        // What was put into the tissue may find its way out by any of its sides.
+        // Only for what is quick or thin: what was put into the tissue may find its way out by any side.
         self.trusted.clear();
-        let tools = self.tools.iter().zip(&self.clear);
-        self.trusted.extend(tools.map(|(tool, clear)| match clear {
+        let tools = self.tools.iter().zip(&self.may_lose);
+        self.trusted.extend(tools.map(|(tool, may_lose)| match may_lose {
             true => tool.body.size().max(LEAST_WAY_MM),
             false => f32::MAX,
         }));
