@@ -6,6 +6,7 @@
 
 mod cursor;
 mod groups;
+mod parts;
 mod version_1;
 
 use super::ImportError;
@@ -14,8 +15,7 @@ use super::error::{Fault, fault};
 use super::labels::Labels;
 use super::words::{bytes_of, short};
 use cursor::Cursor;
-use groups::Groups;
-use std::collections::HashMap;
+use parts::{Parts, shape};
 use std::path::Path;
 
 /// Reads the tetrahedra of a file.
@@ -26,86 +26,13 @@ pub fn read(path: &Path) -> Result<Read, ImportError> {
 /// Reads the triangles and tetrahedra with their physical groups; coordinates as the file has them.
 pub(super) fn read_labels(path: &Path) -> Result<Labels, ImportError> {
     named(path, |bytes| {
-        parse(bytes).and_then(|parts| groups::labels(parts, bytes.len()))
+        parse(bytes).and_then(|parts| parts::labels(parts, bytes.len()))
     })
 }
 
 fn named<T>(path: &Path, read: impl FnOnce(&[u8]) -> Result<T, Fault>) -> Result<T, ImportError> {
     let bytes = bytes_of(path)?;
     read(&bytes).map_err(|fault| fault.of(path))
-}
-
-/// What an element is, by its type in Gmsh.
-#[derive(Clone, Copy, PartialEq)]
-enum Shape {
-    /// A point or a line, or a face of more than three corners.
-    Other,
-    Triangle,
-    Tetrahedron,
-}
-
-/// The shape and the number of nodes of a type.
-fn shape(kind: i64, element: usize) -> Result<(Shape, usize), Fault> {
-    Ok(match kind {
-        2 => (Shape::Triangle, 3),
-        9 => (Shape::Triangle, 6),
-        20 => (Shape::Triangle, 9),
-        21 => (Shape::Triangle, 10),
-        22 => (Shape::Triangle, 12),
-        23 | 24 => (Shape::Triangle, 15),
-        25 => (Shape::Triangle, 21),
-        4 => (Shape::Tetrahedron, 4),
-        11 => (Shape::Tetrahedron, 10),
-        29 => (Shape::Tetrahedron, 20),
-        30 => (Shape::Tetrahedron, 35),
-        31 => (Shape::Tetrahedron, 56),
-        15 => (Shape::Other, 1),
-        1 => (Shape::Other, 2),
-        8 => (Shape::Other, 3),
-        26 => (Shape::Other, 4),
-        27 => (Shape::Other, 5),
-        28 => (Shape::Other, 6),
-        3 => (Shape::Other, 4),
-        10 => (Shape::Other, 9),
-        16 => (Shape::Other, 8),
-        _ => {
-            let kind = format!("Gmsh element type {kind}");
-            return Err(Fault::Kind { element, kind });
-        }
-    })
-}
-
-/// What the sections give: coordinates by order of appearance, and their tags.
-#[derive(Default)]
-struct Parts {
-    positions: Vec<[f64; 3]>,
-    node_of_tag: HashMap<u64, u32>,
-    /// Node tags of each tetrahedron.
-    tets: Vec<Vec<u64>>,
-    groups: Groups,
-}
-
-impl Parts {
-    fn node(&mut self, tag: u64, point: [f64; 3]) -> Result<(), Fault> {
-        let node = self.positions.len() as u32;
-        if self.node_of_tag.insert(tag, node).is_some() {
-            return fault(format!("node tag {tag} appears twice"));
-        }
-        self.positions.push(point);
-        Ok(())
-    }
-
-    /// An element by its node tags; `physical` is a list of [`Groups`].
-    fn element(&mut self, shape: Shape, nodes: Vec<u64>, physical: usize) {
-        match shape {
-            Shape::Other => {}
-            Shape::Triangle => self.groups.add(&nodes[..3], physical),
-            Shape::Tetrahedron => {
-                self.groups.add(&nodes[..4], physical);
-                self.tets.push(nodes);
-            }
-        }
-    }
 }
 
 fn parse(bytes: &[u8]) -> Result<Parts, Fault> {

@@ -27,10 +27,12 @@ mod far;
 mod fill;
 mod found_body;
 mod gmsh;
+mod labelled;
 mod labels;
 mod medit;
 mod named_tets;
 mod polygons;
+mod raw;
 mod region;
 mod repair;
 mod self_crossing;
@@ -58,56 +60,10 @@ use body::{Body, Read};
 use choice::Names;
 
 use crate::mesh::Mesh;
+pub use labelled::read_labels;
+use raw::extension_of;
+pub use raw::{ImportOptions, RawSurface, RawTets, Resolution};
 use std::path::{Path, PathBuf};
-
-/// How large the elements of a filled surface are.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Resolution {
-    /// Lattice spacing, mm.
-    Spacing(f64),
-    /// Wanted number of nodes, met within 15 %; where thin places do not allow it, a note says so.
-    Nodes(usize),
-}
-
-/// What to do with a file.
-#[derive(Clone, Debug)]
-pub struct ImportOptions {
-    /// Name of the mesh. Default: the file's stem.
-    pub name: Option<String>,
-    /// Millimetres a unit of the file. Default 1.
-    pub scale: f64,
-    /// For surfaces (and `refill`) only, and needed there.
-    pub resolution: Option<Resolution>,
-    /// Remove faults that can be removed safely, instead of failing. Default false.
-    pub repair: bool,
-    /// Of tetrahedra take only the boundary, and fill it anew; needs `resolution`. Default false.
-    pub refill: bool,
-    /// Which of several bodies is wanted: its number in the file's order, from 1, or its name.
-    pub part: Option<String>,
-    /// Nodes in any of these balls are held: the set `fixed`.
-    pub fixed: Vec<Ball>,
-    /// Surface faces with their centroid in any of these balls may be touched: the set `domain`.
-    pub domain: Vec<Ball>,
-    /// Surface nodes outside all of these balls, and not in `fixed`, are the set `supported`;
-    /// empty: none.
-    pub window: Vec<Ball>,
-}
-
-impl Default for ImportOptions {
-    fn default() -> Self {
-        Self {
-            name: None,
-            scale: 1.0,
-            resolution: None,
-            repair: false,
-            refill: false,
-            part: None,
-            fixed: Vec::new(),
-            domain: Vec::new(),
-            window: Vec::new(),
-        }
-    }
-}
 
 /// A mesh that passed every check, and what was changed on the way.
 #[derive(Clone, Debug)]
@@ -116,24 +72,6 @@ pub struct Imported {
     pub repairs: Vec<Repair>,
     /// What else there is to know, in words: where a filled surface is finer, how far a count was missed.
     pub notes: Vec<String>,
-}
-
-/// Tetrahedra as a file holds them, unchecked.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct RawTets {
-    /// `[K, 3]`, mm.
-    pub positions: Vec<[f64; 3]>,
-    /// `[T, 4]`.
-    pub tets: Vec<[u32; 4]>,
-}
-
-/// Triangles as a file holds them, unchecked; coinciding points are one.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct RawSurface {
-    /// `[V, 3]`, mm.
-    pub positions: Vec<[f64; 3]>,
-    /// `[F, 3]`.
-    pub faces: Vec<[u32; 3]>,
 }
 
 /// Reads `path` by its extension, checks it, fills it if it is a surface, and selects the sets.
@@ -209,34 +147,12 @@ fn read_file(path: &Path) -> Result<Read, ImportError> {
     })
 }
 
-/// Reads the names that a file gives to parts of itself; formats without any have none.
-///
-/// # Errors
-/// [`ImportError`] of the file.
-pub fn read_labels(path: &Path) -> Result<Labels, ImportError> {
-    match extension_of(path).as_str() {
-        extension @ ("obj" | "ply") => surface_files::read_labels(path, extension),
-        "msh" => gmsh::read_labels(path),
-        "vtk" | "vtu" | "vtp" => vtk::read_labels(path),
-        "inp" | "feb" => named_tets::read_labels(path),
-        "mesh" => medit::read_labels(path),
-        "node" | "ele" => tetgen::read_labels(path),
-        _ => Ok(Labels::default()),
-    }
-}
-
 /// The files that [`import`] reads for `path`: TetGen's come in pairs.
 pub fn files_of(path: &Path) -> Vec<PathBuf> {
     match extension_of(path).as_str() {
         "node" | "ele" => vec![path.with_extension("node"), path.with_extension("ele")],
         _ => vec![path.into()],
     }
-}
-
-/// In lower case; empty without one.
-fn extension_of(path: &Path) -> String {
-    let extension = path.extension().unwrap_or_default();
-    extension.to_string_lossy().to_lowercase()
 }
 
 /// Checks tetrahedra and makes them a mesh without named sets.

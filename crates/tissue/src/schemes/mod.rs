@@ -11,12 +11,14 @@
 mod load;
 mod programme;
 mod random;
+mod scheme;
 mod slide;
 mod table;
 
 pub use load::{Draw, PROBE_S, Pose};
 pub use programme::Programme;
 pub use random::{Range, SplitMix};
+pub use scheme::Scheme;
 pub use table::{Group, PAPER_SECTION, Specification, TABLE};
 
 /// Length of every simulation, s.
@@ -26,40 +28,7 @@ pub const FRAME_S: f64 = 0.05;
 /// Frames of a trajectory, rest included.
 pub const FRAMES: usize = 161;
 
-/// A row of [`TABLE`], by name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Scheme {
-    One,
-    Two,
-    Three,
-    Four,
-    /// Withheld from training.
-    Five,
-    HardDeep,
-    HardFast,
-    HardTwo,
-    HardSlide,
-    HardRing,
-    /// Many sites in a row. Sites are what a learned correction lacks, and 160 frames at one site say little more
-    /// about it than 32.
-    Probe,
-    Static,
-    StaticTwo,
-    StaticDeep,
-}
-
 impl Scheme {
-    /// Number of schemes.
-    pub const COUNT: usize = Scheme::StaticDeep as usize + 1;
-    /// The paper's five.
-    pub const NUMBERED: [Scheme; 5] = [
-        Scheme::One,
-        Scheme::Two,
-        Scheme::Three,
-        Scheme::Four,
-        Scheme::Five,
-    ];
-
     /// Its row.
     pub fn specification(self) -> &'static Specification {
         &TABLE[self as usize]

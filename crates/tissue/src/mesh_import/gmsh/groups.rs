@@ -1,7 +1,6 @@
 //! Physical groups of a Gmsh file: the sections `$PhysicalNames` and `$Entities` (4.1), and which elements are in which group.
 
-use super::{Cursor, Fault, Parts};
-use crate::mesh_import::labels::{Labels, Part};
+use super::{Cursor, Fault};
 use std::collections::HashMap;
 
 /// Triangles and tetrahedra with the groups that they are in.
@@ -10,13 +9,13 @@ pub(super) struct Groups {
     /// Names by dimension and number.
     names: HashMap<(i64, i64), String>,
     /// Lists of physical groups. Elements share them, since an entity may have many of both.
-    lists: Vec<Vec<i64>>,
+    pub(super) lists: Vec<Vec<i64>>,
     /// The list of an entity, by dimension and tag (4.1).
     entities: HashMap<(i64, i64), usize>,
     /// The list of one group alone.
     singles: HashMap<i64, usize>,
     /// Node tags of the corners of each triangle and tetrahedron, and its list.
-    elements: Vec<(Vec<u64>, usize)>,
+    pub(super) elements: Vec<(Vec<u64>, usize)>,
 }
 
 impl Groups {
@@ -98,34 +97,4 @@ impl Groups {
         }
         Ok(())
     }
-}
-
-/// Names of the triangles and tetrahedra that are in groups.
-pub(super) fn labels(parts: Parts, bytes: usize) -> Result<Labels, Fault> {
-    let mut labels = Labels::of_file(bytes);
-    labels.positions = parts.positions;
-    for (tags, list) in &parts.groups.elements {
-        let nodes: Option<Vec<u32>> = tags
-            .iter()
-            .map(|tag| parts.node_of_tag.get(tag).copied())
-            .collect();
-        let (part, dimension) = match nodes.as_deref() {
-            Some(&[a, b, c]) => {
-                labels.faces.push([a, b, c]);
-                (Part::Face(labels.faces.len() - 1), 2)
-            }
-            Some(&[a, b, c, d]) => {
-                labels.tets.push([a, b, c, d]);
-                (Part::Tet(labels.tets.len() - 1), 3)
-            }
-            _ => continue,
-        };
-        for &group in &parts.groups.lists[*list] {
-            for word in parts.groups.words(dimension, group) {
-                let name = labels.name(&word);
-                labels.add(name, part)?;
-            }
-        }
-    }
-    Ok(labels)
 }

@@ -5,8 +5,10 @@
 
 mod cells;
 mod cursor;
+mod data;
 mod kinds;
 mod legacy;
+mod lists;
 mod packed;
 mod xml;
 
@@ -15,35 +17,11 @@ use super::error::{Fault, fault};
 use super::labels::{Labels, Part, boundary};
 use super::words::bytes_of;
 use super::{ImportError, body::TetList};
-use cells::Role;
+pub use data::{Array, DataSet, Piece};
 use std::path::Path;
 
 /// Different values of an array that counts as labels, at most.
 const MOST_VALUES: usize = 64;
-
-/// A part of a data set.
-#[derive(Default)]
-pub struct Piece {
-    pub points: Vec<[f64; 3]>,
-    /// In the order in which arrays over cells count them.
-    pub cells: Vec<(Role, cells::Lists)>,
-    /// VTK's number for the kind of each cell of a grid; empty for polydata.
-    pub kinds: Vec<u8>,
-    pub of_points: Vec<Array>,
-    pub of_cells: Vec<Array>,
-}
-
-/// An array of one number a row.
-pub struct Array {
-    pub name: String,
-    pub values: Vec<f64>,
-}
-
-/// What a file holds; arrays only where they are asked for.
-pub struct DataSet {
-    pub is_grid: bool,
-    pub pieces: Vec<Piece>,
-}
 
 fn open(path: &Path, with_arrays: bool) -> Result<(DataSet, usize), ImportError> {
     let bytes = bytes_of(path)?;

@@ -6,11 +6,12 @@
 //! a fixed order: the same bits for any number of threads. Forces are µN inside and mN in reports.
 
 mod place;
+mod row;
 mod rows;
 mod step;
 
 use contact::{Body, Grasp, Pose, Samples, Search, Shape, Vector};
-use rows::{Reached, Row};
+use row::{Reached, Row};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 

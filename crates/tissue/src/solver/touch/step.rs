@@ -5,7 +5,8 @@
 //! matrix is a number. Wanted are `gap >= 0` at the end of the step and Coulomb's law for the slip over the step.
 //! What is already inside comes out by [`RECOVERY`] a step: put out at once, it would leave with that speed.
 
-use super::rows::{Row, SEARCH_STEPS};
+use super::row::Row;
+use super::rows::SEARCH_STEPS;
 use super::{SWEEPS, TEAR_S, Touch};
 use crate::solver::fields::Node;
 use contact::grasp::tension;
