@@ -4,6 +4,7 @@
 //! recommends, another leaves its corrections out; for a bundle without a learned map the latter is linear elasticity, static in
 //! contact and swinging freely after a release.
 
+mod bundle;
 mod case;
 mod certificate;
 mod page;
@@ -16,24 +17,24 @@ pub use certificate::Certificate;
 pub use recording::Recording;
 pub use score::{nearest, regions};
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
-use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use serde_json::Value;
-use tissue::mesh::{Boundary, Mesh};
+use tissue::mesh::Mesh;
 use tissue::programmes::ToolProgramme;
 use tissue::schemes::{FRAMES, Scheme};
-use upt::{Corrections, Model, ModelOptions};
+use upt::Corrections;
 
 use crate::parallel::{in_parallel, workers};
 use crate::tool_scale::{self, Chosen};
 use crate::{loads, progress};
-use case::{Body, Case, Replay};
-use score::{Regions, Score};
+use bundle::Bundle;
+pub use bundle::{Plan, ToolSizes};
+use case::{Case, Replay};
 
 /// Programmes in the order in which they are run: `probe` has five sites, the others are the paper's.
 const ORDER: [Scheme; 8] = [
@@ -76,44 +77,6 @@ pub struct Options {
     /// Print the certificate as JSON.
     #[arg(long)]
     json: bool,
-}
-
-/// Where the sizes of tools come from.
-#[derive(Clone)]
-pub enum ToolSizes {
-    /// From the user, the body and the bundle's deepest push.
-    Asked(tool_scale::Arguments),
-    /// From a certificate that is repeated.
-    Stated(Chosen),
-}
-
-impl ToolSizes {
-    fn choose(&self, bundle: &Bundle) -> Chosen {
-        match self {
-            Self::Stated(chosen) => chosen.clone(),
-            Self::Asked(arguments) => {
-                let push = f64::from(bundle.model.manifest.envelope.max_push_mm);
-                Chosen::of(*arguments, &bundle.mesh, Some(push))
-            }
-        }
-    }
-}
-
-/// What to measure.
-pub struct Plan {
-    pub bundle: PathBuf,
-    /// Cases; none: as many as fit into `seconds`, at most [`ORDER`]'s, the last ones perhaps not to their ends.
-    pub cases: Option<usize>,
-    /// Frames of each case, where a certificate that is repeated had no time for all.
-    pub frames: Vec<Option<usize>>,
-    pub seconds: f64,
-    pub seed: u64,
-    /// Programmes of rigid tools in addition to the contacts.
-    pub tools: Vec<ToolProgramme>,
-    /// Their sizes.
-    pub sizes: ToolSizes,
-    pub threads: usize,
-    pub quiet: bool,
 }
 
 /// Runs the command. Exit code 1 where the errors are not the certificate's.
@@ -249,62 +212,5 @@ fn held_out(seed: u64, at: usize) -> Case {
     Case {
         scheme: ORDER[at % ORDER.len()],
         seed: seed.wrapping_mul(1000).wrapping_add(at as u64),
-    }
-}
-
-/// A bundle with what a check needs of it.
-struct Bundle {
-    model: Arc<Model>,
-    mesh: Mesh,
-    boundary: Boundary,
-    regions: Regions,
-}
-
-impl Bundle {
-    fn open(folder: &Path) -> Result<Self> {
-        let options = ModelOptions {
-            threads: 1,
-            ..Default::default()
-        };
-        let model = Model::open(folder, &options)?;
-        if model.prior.is_none() {
-            bail!(
-                "{}: has no linear response to compare with; use `upt report`",
-                folder.display()
-            );
-        }
-        let mesh = Mesh::read(&folder.join(&model.manifest.mesh.file))?;
-        let boundary = match model.manifest.boundary {
-            upt::bundle::Boundary::Fixed => Boundary::Fixed,
-            upt::bundle::Boundary::Supported => Boundary::Supported,
-        };
-        let regions = score::regions(&mesh);
-        Ok(Self {
-            model,
-            mesh,
-            boundary,
-            regions,
-        })
-    }
-
-    fn body(&self) -> Body<'_> {
-        Body {
-            mesh: &self.mesh,
-            boundary: self.boundary,
-            regions: &self.regions,
-        }
-    }
-
-    fn certificate(&self, seed: u64, scores: Vec<Score>) -> Result<Certificate> {
-        let speed = case::speed(&self.model, &scores)?;
-        let regions = self.regions.len();
-        Ok(Certificate::of(
-            &self.model,
-            &self.mesh,
-            seed,
-            scores,
-            regions,
-            &speed,
-        ))
     }
 }

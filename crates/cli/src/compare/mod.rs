@@ -7,6 +7,7 @@ mod outside;
 mod pair;
 mod picture;
 mod rank;
+mod release;
 mod replay;
 mod tables;
 mod tools;
@@ -22,6 +23,7 @@ use crate::bench::{Bench, push, ramp};
 use crate::stress::{progress, replace_between};
 use observer::Moment;
 use pair::Pair;
+use release::{CASE, HELD, Release};
 
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
@@ -56,17 +58,6 @@ pub struct Options {
     /// Folder for the plots.
     #[arg(long)]
     images: Option<PathBuf>,
-}
-
-/// Steps of a scheme.
-const CASE: usize = 160;
-/// Steps in contact before the release.
-const HELD: usize = 20;
-/// What a release came to.
-struct Release {
-    moments: Vec<Moment>,
-    /// First step after which the scene sleeps.
-    asleep: Option<usize>,
 }
 
 pub fn run(options: &Options) -> Result<ExitCode> {

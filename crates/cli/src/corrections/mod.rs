@@ -8,6 +8,7 @@ mod constraint;
 mod extend;
 pub mod manifest;
 mod patches;
+mod principal;
 mod pushes;
 mod space;
 mod trajectories;
@@ -31,8 +32,8 @@ use upt::{LONGEST_STEP_S, SHORTEST_STEP_S};
 use crate::effort::Effort;
 use crate::manifest::Manifest;
 use extend::Existing;
-
-const FILE: &str = "corrections.safetensors";
+use principal::FILE;
+pub use principal::principal;
 
 /// Options of `upt corrections`.
 #[derive(Debug, Args)]
@@ -260,31 +261,4 @@ fn write(args: &Options) -> Result<(usize, usize)> {
     }
     let count = bench.write_space(&args.bundle, more.into_iter(), &entry)?;
     Ok((count, natural))
-}
-
-/// The leading principal directions of some vectors, by their Gram matrix.
-pub fn principal(vectors: &[Vec<f32>], count: usize) -> Vec<Vec<f32>> {
-    let n = vectors.len();
-    let dot = |a: &[f32], b: &[f32]| -> f64 {
-        let pairs = a.iter().zip(b);
-        pairs.map(|(a, b)| f64::from(*a) * f64::from(*b)).sum()
-    };
-    let gram = nalgebra::DMatrix::from_fn(n, n, |i, j| dot(&vectors[i], &vectors[j]));
-    let eigen = gram.symmetric_eigen();
-    let mut order: Vec<usize> = (0..n).collect();
-    order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
-    order
-        .into_iter()
-        .take(count)
-        .filter(|&at| eigen.eigenvalues[at] > 1e-9 * eigen.eigenvalues.max())
-        .map(|at| {
-            let mut mode = vec![0.0f32; vectors[0].len()];
-            for (vector, &weight) in vectors.iter().zip(eigen.eigenvectors.column(at).iter()) {
-                for (mode, value) in mode.iter_mut().zip(vector) {
-                    *mode += weight as f32 * value;
-                }
-            }
-            mode
-        })
-        .collect()
 }

@@ -34,7 +34,7 @@ use crate::tools::bundles::fitting;
 use crate::tools::cases::{Split, ToolCases};
 use crate::tools::drive::{Drive, Driver};
 use crate::tools::yard::Yard;
-use figures::{CaseFigures, Row};
+use figures::CaseFigures;
 use host::{Clock, Shown};
 use truth::Truth;
 
@@ -205,6 +205,3 @@ pub fn report(plan: &Plan) -> Result<ExitCode> {
     }
     Ok(ExitCode::SUCCESS)
 }
-
-/// Rows for a document: [`Row`] is what the JSON has too.
-type Rows = [Row];

@@ -6,7 +6,6 @@ use anyhow::{Context, Result};
 use tissue::mesh::Mesh;
 use tissue::schemes::FRAME_S;
 
-use super::Rows;
 use super::figures::{ALL, DatasetRow, Row};
 use super::host::{LAST, LATE, PRESENT, Shown, WAYS};
 use super::timing::Time;
@@ -23,7 +22,7 @@ const PLOTTED: &str = "probe";
 const PICTURED: &str = "stroke";
 
 /// The rows over all, the ratios by programme and by dataset with the bundle's frame step, and the times.
-pub fn markdown(lead: &str, rows: &Rows, datasets: &[DatasetRow], times: &[Time]) -> String {
+pub fn markdown(lead: &str, rows: &[Row], datasets: &[DatasetRow], times: &[Time]) -> String {
     let mut out = format!("\n{lead}\n\n");
     out += "| shown | MSE, mm² | over one step late | the steps' own MSE, mm² | over the steps' own | latency, ms | jump at an arrival, mm: median / worst | frame to frame against the truth, mm: median / worst | tool inside, mm: median / worst |\n";
     out += "|---|---:|---:|---:|---:|---:|---:|---:|---:|\n";

@@ -5,6 +5,7 @@ mod half;
 mod inputs;
 mod outside;
 mod reference;
+mod row;
 mod storm;
 mod surrogate;
 mod tools;
@@ -13,11 +14,9 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::{Context, Result};
-use indicatif::ProgressBar;
-use serde::Serialize;
 
-use crate::bench::{Bench, Run};
 use crate::counted::counted;
+pub use row::{Row, Verdict, progress};
 
 #[derive(clap::Args)]
 #[command(
@@ -42,62 +41,6 @@ pub struct Options {
     /// The tables as a page; text outside its markers is kept.
     #[arg(long)]
     markdown: Option<PathBuf>,
-}
-
-/// What a case came to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Verdict {
-    /// What must happen happened.
-    Good,
-    /// It did not.
-    Bad,
-    /// The case does not apply; `happened` says why.
-    Left,
-}
-
-/// A row of the table.
-#[derive(Clone, Debug, Serialize)]
-pub struct Row {
-    pub subject: String,
-    pub case: String,
-    pub happened: String,
-    pub verdict: Verdict,
-}
-
-impl Row {
-    pub fn new(subject: &str, case: &str, happened: String, good: bool) -> Self {
-        Self {
-            subject: subject.into(),
-            case: case.into(),
-            happened,
-            verdict: if good { Verdict::Good } else { Verdict::Bad },
-        }
-    }
-
-    pub fn left(subject: &str, case: &str, why: &str) -> Self {
-        Self {
-            verdict: Verdict::Left,
-            ..Self::new(subject, case, why.into(), true)
-        }
-    }
-}
-
-impl Bench {
-    pub(crate) fn row(&self, case: &str, run: &Run, good: bool) -> Row {
-        Row::new(&self.subject, case, run.text(), good)
-    }
-}
-
-/// Runs `case` for each entry with a progress bar; `None` is a case whose row was pushed elsewhere.
-pub fn progress(count: usize, label: &str) -> ProgressBar {
-    let bar = ProgressBar::new(count as u64);
-    bar.set_style(
-        indicatif::ProgressStyle::with_template("{msg} {bar:30} {pos}/{len} {eta}")
-            .expect("the template is valid"),
-    );
-    bar.set_message(label.to_string());
-    bar
 }
 
 pub fn run(options: &Options) -> Result<ExitCode> {

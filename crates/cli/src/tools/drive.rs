@@ -1,5 +1,6 @@
 //! How the library is driven by the poses of tools, through the C calls of a host.
 
+mod alone;
 mod geometric;
 mod linear;
 mod solved;

@@ -16,13 +16,13 @@ mod film;
 mod force;
 pub mod measure;
 mod page;
+mod plan;
 mod row;
 pub mod section;
 mod table;
 mod write;
 pub mod yard;
 
-use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
@@ -34,68 +34,15 @@ use crate::host;
 use crate::report::method::BundleFolder;
 use crate::report::prior_alone::PriorAlone;
 use crate::stress::progress;
-use cases::{Split, ToolCases};
+use cases::ToolCases;
 use drive::{Drive, Driver};
-use measure::{Outcome, Truth};
+use measure::Truth;
+pub use plan::Plan;
+use plan::{Measured, Method};
 pub use row::CaseFigures;
-use row::{Label, Row};
+use row::Label;
 use write::{Made, write};
 use yard::Yard;
-
-/// What is measured.
-pub struct Plan<'a> {
-    /// Dataset folders and trajectories.
-    pub paths: &'a [PathBuf],
-    pub split: Split,
-    /// Cases of a programme at most.
-    pub per_programme: usize,
-    pub bundles: &'a [PathBuf],
-    /// Corrections a step; none: 0 and as many as a bundle recommends.
-    pub corrections: &'a [Effort],
-    pub threads: u32,
-    pub out: PathBuf,
-    pub title: &'a str,
-    /// Documents whose tables are written.
-    pub markdown: &'a [PathBuf],
-    pub json: bool,
-}
-
-/// A bundle in one configuration.
-struct Method {
-    bundle: BundleFolder,
-    drive: Drive,
-    corrections: Effort,
-}
-
-impl Method {
-    fn label(&self) -> Label {
-        Label {
-            bundle: self.bundle.name.clone(),
-            drive: self.drive.name(),
-            corrections: self.corrections,
-        }
-    }
-
-    fn name(&self) -> String {
-        if self.drive == Drive::Linear {
-            return format!("{}, {}", self.bundle.name, self.drive.name());
-        }
-        format!(
-            "{}, {}, k = {}",
-            self.bundle.name,
-            self.drive.name(),
-            self.corrections
-        )
-    }
-}
-
-/// A method's cases.
-struct Measured {
-    name: String,
-    outcomes: Vec<Outcome>,
-    rows: Vec<Row>,
-    figures: Vec<CaseFigures>,
-}
 
 /// Measures, and writes tools.json and tools.html.
 pub fn report(plan: &Plan) -> Result<ExitCode> {

@@ -4,11 +4,9 @@
 use std::time::Instant;
 
 use anyhow::Result;
-use contact::{Samples, Vector};
-use tissue::solver::ToolPose;
-use upt::contact::{Compliance, Mode, Problem, State, Told, Tool};
+use contact::Samples;
+use upt::contact::{Compliance, Problem, State, Told, Tool};
 
-use super::{Driver, Felt, Step, Taken, load};
 use crate::report::method::BundleFolder;
 use crate::report::prior_alone::PriorAlone;
 
@@ -18,7 +16,7 @@ pub struct Linear {
     problem: Problem,
     rest: Vec<f32>,
     state: Vec<[f32; 3]>,
-    told: Told,
+    pub(super) told: Told,
 }
 
 impl Linear {
@@ -47,7 +45,7 @@ impl Linear {
     }
 
     /// The step; the time of its contact solve, ms.
-    fn step(&mut self, tools: &[Tool], out: &mut [[f32; 3]]) -> Result<f64> {
+    pub(super) fn step(&mut self, tools: &[Tool], out: &mut [[f32; 3]]) -> Result<f64> {
         let started = Instant::now();
         let start = self.state.as_flattened();
         let state = State {
@@ -78,45 +76,5 @@ impl Linear {
             .tell(&mut self.told, &self.rest, out.as_flattened());
         self.state.copy_from_slice(out);
         Ok(contact_ms)
-    }
-}
-
-/// A tool as the library's contact takes it.
-fn placed(taken: &Taken, to: &ToolPose) -> Tool {
-    Tool {
-        body: taken.body.clone(),
-        pose: to.pose,
-        mode: if to.grasp { Mode::Grasp } else { Mode::Slide },
-        friction: taken.tool.friction,
-        tear_off_mn: taken.tool.tear_off_mn,
-    }
-}
-
-impl Driver {
-    pub(super) fn linear(&mut self, poses: &[ToolPose], out: &mut [[f32; 3]]) -> Result<Step> {
-        let tools = self.tools.iter().zip(poses);
-        let tools: Vec<Tool> = tools.map(|(taken, to)| placed(taken, to)).collect();
-        let linear = self.linear.as_mut().expect("made with the driver");
-        let started = Instant::now();
-        let contact_ms = linear.step(&tools, out)?;
-        let ms = started.elapsed().as_secs_f64() * 1e3;
-        let felt = linear.told.readings.iter().map(|reading| Felt {
-            force: reading.force.map(f64::from),
-            torque: reading.torque.map(f64::from),
-            contacts: reading.contacts,
-        });
-        let loads = linear.told.pushes.iter().map(|push| {
-            let tool = push.tool as usize;
-            let point = Vector::from(push.point);
-            let nearest = self.tools[tool].body.nearest_at(&poses[tool].pose, point);
-            load(tool, -Vector::from(push.force), nearest.normal)
-        });
-        Ok(Step {
-            ms,
-            contact_ms,
-            flags: 0,
-            felt: felt.collect(),
-            loads: loads.collect(),
-        })
     }
 }
