@@ -9,7 +9,7 @@ import sys
 import weakref
 from collections.abc import Sequence
 from reprlib import repr as short
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -26,12 +26,22 @@ if TYPE_CHECKING:
         from typing_extensions import Unpack
 
     from upt._native import SceneOptionsKeywords
-    from upt.model import Model
 
 _step_contacts, _step_instruments = lib.upt_scene_step_contacts, lib.upt_scene_step_instruments
 
 #: How long `wait` waits when nothing is stated, milliseconds: 49 days.
 FOREVER_MS = 0xFFFFFFFF
+
+
+class OpenModel(Protocol):
+    """What a scene needs of its `Model`."""
+
+    _handle: int | None
+
+    @property
+    def node_count(self) -> int:
+        """Nodes of the model's mesh."""
+        ...
 
 
 class Scene:
@@ -43,7 +53,7 @@ class Scene:
     threads at once; one scene is used by one thread at a time (another gets `upt.BusyError`).
     """
 
-    def __init__(self, model: Model, **options: Unpack[SceneOptionsKeywords]) -> None:
+    def __init__(self, model: OpenModel, **options: Unpack[SceneOptionsKeywords]) -> None:
         handle = ctypes.c_void_p()
         fields = SceneOptions(**options)
         check(lib.upt_scene_create(model._handle, ctypes.byref(fields), ctypes.byref(handle)))

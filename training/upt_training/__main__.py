@@ -183,7 +183,7 @@ def main(arguments: list[str] | None = None) -> int:
 
             return transfer_command(options)
         if options.command == "anchors":
-            from upt_training.anchors import anchors_command
+            from upt_training.add_anchors import anchors_command
 
             return anchors_command(options)
         if options.command == "rest":

@@ -9,7 +9,6 @@ around a node lie in a line or a plane, a small ridge keeps the weights bounded.
 
 from __future__ import annotations
 
-import argparse
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -112,12 +111,3 @@ def add_to_bundle(bundle: Path, spacing_mm: float, per_node: int) -> Anchors:
     manifest["upt"]["anchors"] = FILE
     write_manifest(bundle, manifest)
     return anchors
-
-
-def anchors_command(options: argparse.Namespace) -> int:
-    anchors = add_to_bundle(options.bundle, options.spacing, options.neighbours)
-    from upt_training.rest import write_rest  # which runs a bundle, anchors included
-
-    write_rest(options.bundle)
-    print(f"{options.bundle}: {len(anchors.nodes)} of {len(anchors.neighbours)} nodes are decoded")
-    return 0

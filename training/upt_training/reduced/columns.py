@@ -98,3 +98,11 @@ def contact_forces(compliance: np.ndarray, rows: np.ndarray, vectors: np.ndarray
         half = np.linalg.solve(factor, flat.reshape(-1, len(dofs)).T)
         return np.linalg.solve(factor.T, half).T.reshape(np.shape(vectors))
     raise InputError("the compliance of the contact nodes is singular: the contact set repeats a node")
+
+
+def linear_fields(columns: Columns, forces: np.ndarray) -> np.ndarray:
+    """`L = forces @ columns` over the touched degrees of freedom only, `[n, 3K]` float32, mm."""
+    touched = np.flatnonzero(np.any(forces != 0.0, axis=0))
+    if not len(touched):
+        return np.zeros((len(forces), columns.columns.shape[1]), np.float32)
+    return forces[:, touched].astype(np.float32) @ columns.columns[touched]

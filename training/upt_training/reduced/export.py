@@ -18,10 +18,10 @@ from upt_training.bundle_folder import new_bundle, write_manifest
 from upt_training.errors import InputError
 from upt_training.mesh_file import Mesh
 from upt_training.reduced.block_basis import BlockBasis
-from upt_training.reduced.columns import Columns
+from upt_training.reduced.columns import Columns, linear_fields
 from upt_training.reduced.latent_graph import latent_graph
 from upt_training.reduced.make_prior import block_basis_of
-from upt_training.reduced.modes import Modes, linear_fields
+from upt_training.reduced.modes import Modes
 from upt_training.reduced.near import near_tensors
 from upt_training.reduced.network import INPUTS, Correction
 from upt_training.reduced.prior import Prior, response_in_blocks, save_prior

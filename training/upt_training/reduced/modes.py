@@ -7,14 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from upt_training.reduced.columns import Columns
-
-if TYPE_CHECKING:
-    from upt_training.reduced.transfer import Source
+from upt_training.reduced.transfer import Source
 
 
 @dataclass
@@ -25,14 +21,6 @@ class Modes:
     residual_amplitudes: np.ndarray
     response: np.ndarray
     response_amplitudes: np.ndarray
-
-
-def linear_fields(columns: Columns, forces: np.ndarray) -> np.ndarray:
-    """`L = forces @ columns` over the touched degrees of freedom only, `[n, 3K]` float32, mm."""
-    touched = np.flatnonzero(np.any(forces != 0.0, axis=0))
-    if not len(touched):
-        return np.zeros((len(forces), columns.columns.shape[1]), np.float32)
-    return forces[:, touched].astype(np.float32) @ columns.columns[touched]
 
 
 def leading_modes(frames: np.ndarray, count: int, seed: int = 3, iterations: int = 2) -> tuple[np.ndarray, np.ndarray]:

@@ -14,8 +14,7 @@ import scipy.sparse
 from scipy.spatial import cKDTree
 
 from upt_training.mesh_file import Mesh
-from upt_training.reduced.columns import Columns
-from upt_training.reduced.modes import linear_fields
+from upt_training.reduced.columns import Columns, linear_fields
 from upt_training.reduced.trajectories import Case
 
 INWARD = 0.2
