@@ -46,7 +46,7 @@ pub const STAGES: &[&[&[Stage]]] = &[
     &[&[
         stage("fmt", "cargo fmt --check", "", Cargo("fmt --all --check")),
         stage("clippy", "cargo clippy, warnings are errors; also of builds with a single feature or none", "", Function(clippy)),
-        stage("style", "ruff, clang-format, dependencies, licences, circles and sizes of files", "", Function(style)),
+        stage("style", "ruff, clang-format, dependencies, licences, circles and upward imports, sizes of files", "", Function(style)),
         stage("rust", "cargo test --release --workspace", "", Function(rust)),
     ]],
     &[
