@@ -4,7 +4,6 @@
 use ::contact::samples::LATTICE;
 use ::contact::{Body, Pose, Samples, Vector};
 
-use super::rows::Row;
 use super::state::State;
 use crate::bundle::Mesh;
 
@@ -37,10 +36,10 @@ impl Buried {
         ways.find(|way| !is_inside(self.point + way, mesh, state))
     }
 
-    /// Whether a row is of the surface over the tool, which it has to leave by.
-    pub fn takes(&self, row: &Row) -> bool {
+    /// Whether a sample is of the surface over the tool, which it has to leave by.
+    pub fn takes(&self, point: Vector, outward: Vector) -> bool {
         let over = self.point + self.out * self.depth;
-        self.out.dot(row.outward) > 0.5 && row.point.distance(over) <= 2.0 * self.depth + NEAR_MM
+        self.out.dot(outward) > 0.5 && point.distance(over) <= 2.0 * self.depth + NEAR_MM
     }
 
     /// Where the tip of a thin tool has pierced the touchable surface, by no more than [`PIERCED_MM`].

@@ -7,6 +7,9 @@ use super::past::Held;
 use super::state::State;
 use super::tool::Tool;
 
+/// Samples that one solve may have: what a tool as large as the organ touches beyond these is left to the next solve.
+pub(super) const MOST_ROWS: usize = 256;
+
 /// Longest way out of a tool, or to its far side, mm.
 const THROUGH_MM: f32 = 45.0;
 /// What lies deeper inside of a tool at the start of a step comes out by this much a step, mm.
@@ -226,7 +229,7 @@ impl Moving<'_> {
             anchor: self.held[index].grasp.place(row.sample),
             put: self.put[index],
             way_out: self.buried[index]
-                .filter(|buried| row.sample == buried.row || buried.takes(row))
+                .filter(|buried| row.sample == buried.row || buried.takes(row.point, row.outward))
                 .map(|buried| (buried.out, buried.depth + 2.0 * tool.body.size())),
         };
         let sample = self.samples.at(row.sample);

@@ -10,8 +10,7 @@ use crate::contact::tool::MAX_TOOLS;
 use crate::error::Result;
 use crate::memory;
 
-/// Samples that one solve may have: what a tool as large as the organ touches beyond these is left to the next solve.
-pub(super) const MOST_ROWS: usize = 256;
+pub(super) use crate::contact::rows::MOST_ROWS;
 
 impl Problem {
     /// Fills `rows`: samples near the tools at part `part` of their way, those that are pushed, and those that are held; at the end of the
