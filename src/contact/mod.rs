@@ -5,9 +5,9 @@
 //! |---|---|
 //! | [`tool`] | what a host gives: shape, pose, how it holds; and what it gets back |
 //! | [`past`] | what is remembered from step to step: poses, forces, grasps |
-//! | [`buried`] | tools that lie in the tissue, and their way out |
+//! | `buried` | tools that lie in the tissue, and their way out |
 //! | [`compliance`] | how samples move under forces on samples: the Delassus matrix `W = B A B^T` |
-//! | [`held_back`] | the same at any time after a step |
+//! | `held_back` | the same at any time after a step |
 //! | [`state`] | where the tissue is, and where it was |
 //! | [`rows`] | gaps and slips of samples near the tools, at a state of the tissue |
 //! | [`problem`] | the samples near the tools, one solve for the forces on them, what the forces change, and what tools are told |

@@ -5,14 +5,14 @@
 //!
 //! | module | what |
 //! |---|---|
-//! | [`slow`] | what a step publishes: samples near the tool, how they move, forces, velocities |
-//! | [`publish`] | the scene's end: fills it |
-//! | [`ends`] | what both ends see of each other |
-//! | [`modes`] | the natural modes between two steps |
-//! | [`render`] | the hand's end: a wrench at a pose |
-//! | [`solver`] | the samples between two steps, and contact at a pose |
-//! | [`stiffness`] | how the wrench changes with the pose |
-//! | [`passivity`] | no more energy to the hand than came from it |
+//! | `slow` | what a step publishes: samples near the tool, how they move, forces, velocities |
+//! | `publish` | the scene's end: fills it |
+//! | `ends` | what both ends see of each other |
+//! | `modes` | the natural modes between two steps |
+//! | `render` | the hand's end: a wrench at a pose |
+//! | `solver` | the samples between two steps, and contact at a pose |
+//! | `stiffness` | how the wrench changes with the pose |
+//! | `passivity` | no more energy to the hand than came from it |
 //!
 //! At this boundary metres, newtons and newton metres; inside millimetres and millinewtons.
 

@@ -1,7 +1,7 @@
 //! The numerical kernels of a step, in f32: everything that runs natively between the graphs.
 //!
 //! Each kernel is a file with a scalar reference and one vector body, generic over the lanes of
-//! [`lanes`], compiled for AVX2, AVX-512 and NEON and chosen at run time by [`Isa`]. Threads come
+//! `lanes`, compiled for AVX2, AVX-512 and NEON and chosen at run time by [`Isa`]. Threads come
 //! from a [`Pool`]. All results have the same bits for any thread count, and any subset of rows
 //! gives the bits that the whole set gives (on one `Isa`; different sets differ in rounding).
 

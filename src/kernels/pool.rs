@@ -4,7 +4,7 @@
 //! computes may depend on its index only, never on the thread that runs it, so results have the
 //! same bits for any thread count. Between jobs workers sleep on a condition variable: the game owns
 //! the cores. Only while a caller holds [`Pool::keep_awake`], for the few milliseconds of many short jobs
-//! in a row, does a worker look for the next one for [`worker::LOOKS`] turns before it sleeps. `run` allocates
+//! in a row, does a worker look for the next one for `worker::LOOKS` turns before it sleeps. `run` allocates
 //! nothing. A worker that wakes late finds the job closed and goes back to sleep, so `run` never waits
 //! for a thread that has not started.
 

@@ -1,6 +1,6 @@
 //! Products of long vectors: many inner products with one vector, and one sum of many.
 //!
-//! Vectors are cut in pieces of [`PIECE`] floats. Within a piece an inner product is summed in f32 lanes, over the pieces in f64
+//! Vectors are cut in pieces of `PIECE` floats. Within a piece an inner product is summed in f32 lanes, over the pieces in f64
 //! and in order, so the bits do not depend on the number of threads.
 
 use super::isa::{Isa, by_isa};

@@ -30,7 +30,7 @@ pub struct PriorTable {
     /// `[3D,r]`; empty where the bundle has none.
     pub force_to_p: Vec<f32>,
     /// For each node the column (index into `contact_nodes`) of itself or of the nearest contact node within
-    /// four typical edges of the domain; [`NO_COLUMN`] for nodes farther away.
+    /// four typical edges of the domain; `NO_COLUMN` for nodes farther away.
     pub nearest_column: Vec<u32>,
     /// Whether a node belongs to the domain `[K]`. A bundle may have columns of a part of the domain only.
     pub in_domain: Vec<bool>,

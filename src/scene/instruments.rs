@@ -15,7 +15,7 @@ impl Scene {
     /// A list for the tools of a step, kept from call to call.
     ///
     /// # Errors
-    /// [`Error::Busy`].
+    /// [`Error::Busy`](crate::Error::Busy).
     pub fn tool_list(&self) -> Result<MutexGuard<'_, Vec<Tool>>> {
         lock(&self.tools.list)
     }
@@ -23,7 +23,7 @@ impl Scene {
     /// A list for the tools of a frame between steps.
     ///
     /// # Errors
-    /// [`Error::Busy`].
+    /// [`Error::Busy`](crate::Error::Busy).
     pub fn frame_tools(&self) -> Result<MutexGuard<'_, Vec<Tool>>> {
         lock(&self.tools.frame_list)
     }
@@ -31,7 +31,7 @@ impl Scene {
     /// A list for instruments whose contacts are asked for.
     ///
     /// # Errors
-    /// [`Error::Busy`].
+    /// [`Error::Busy`](crate::Error::Busy).
     pub fn instrument_list(&self) -> Result<MutexGuard<'_, Vec<Instrument>>> {
         lock(&self.tools.asked_list)
     }
@@ -56,7 +56,7 @@ impl Scene {
     /// With a region, surface nodes outside of it are taken where they last were.
     ///
     /// # Errors
-    /// [`Error::Argument`] for more than [`MAX_TOOLS`](crate::contact::MAX_TOOLS), [`Error::Busy`], [`Error::OutOfMemory`], and what `take`
+    /// [`Error::Argument`](crate::Error::Argument) for more than [`MAX_TOOLS`], [`Error::Busy`](crate::Error::Busy), [`Error::OutOfMemory`](crate::Error::OutOfMemory), and what `take`
     /// gives.
     pub fn contacts_from_instruments<T>(
         &self,

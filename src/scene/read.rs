@@ -43,7 +43,7 @@ impl Scene {
     /// Displacement `[n,3]` of any nodes in the last state.
     ///
     /// # Errors
-    /// [`Error::State`] before the first step.
+    /// [`Error::State`](crate::Error::State) before the first step.
     pub fn decode(&self, nodes: &[u32], out: &mut [f32]) -> Result<()> {
         self.decode_to(nodes, out.into())
     }

@@ -46,6 +46,7 @@ pub const STAGES: &[&[&[Stage]]] = &[
     &[&[
         stage("fmt", "cargo fmt --check", "", Cargo("fmt --all --check")),
         stage("clippy", "cargo clippy, warnings are errors; also of builds with a single feature or none", "", Function(clippy)),
+        stage("rustdoc", "cargo doc of the libraries, warnings are errors", "", Function(rustdoc)),
         stage("style", "ruff, clang-format, dependencies, licences, circles and upward imports, sizes of files", "", Function(style)),
         stage("rust", "cargo test --release --workspace", "", Function(rust)),
     ]],
@@ -101,6 +102,13 @@ fn style(workspace: &Workspace) -> Result<Outcome> {
 fn clippy(workspace: &Workspace) -> Result<Outcome> {
     let mut command = workspace.bash("tests/style/clippy.sh");
     counted(workspace, "cargo clippy", &mut command, counts::summary)
+}
+
+/// In release, as `clippy` before it: what the two check of other crates is the same.
+fn rustdoc(workspace: &Workspace) -> Result<Outcome> {
+    let mut command = workspace.cargo("doc --release --no-deps --workspace --lib");
+    command.env("RUSTDOCFLAGS", "-D warnings");
+    check(workspace, "cargo doc", &mut command)
 }
 
 fn rust(workspace: &Workspace) -> Result<Outcome> {

@@ -159,7 +159,7 @@ impl Body {
         Ok(least)
     }
 
-    /// Whether it sinks more than [`SUNK_MM`] between samples `spacing` apart, or passes between them: by its half thickness, or by
+    /// Whether it sinks more than `SUNK_MM` between samples `spacing` apart, or passes between them: by its half thickness, or by
     /// the margin of a hull, which may have a point.
     pub fn sinks_between(&self, spacing: f32) -> bool {
         let round = match self.core {

@@ -26,7 +26,7 @@ pub struct Element {
     pub number: u32,
     /// Twice the chunk-local slots of its corners.
     pub slots: [u16; 4],
-    /// See [`Cluster::bulk`].
+    /// See `Cluster::bulk`.
     pub bulk: f32,
 }
 

@@ -14,7 +14,7 @@ use crate::tetrahedra::Tetrahedra;
 use std::collections::TryReserveError;
 
 /// Runs `task(chunk, worker)` for each chunk below a count, in any order and on any threads; `worker` is below the number of
-/// workers that [`Scratch::new`] was given, and two tasks that run at once have different ones.
+/// workers that `Scratch::new` was given, and two tasks that run at once have different ones.
 pub type ParallelFor<'a> = &'a dyn Fn(usize, &(dyn Fn(usize, usize) + Sync));
 
 /// The elements of a body, ready for [`ElementForces::evaluate`].

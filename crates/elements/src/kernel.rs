@@ -38,7 +38,7 @@ use moduli::moduli;
 pub use shape::Shape;
 use shape::{cross, dot, edges, load, shape};
 
-/// Floating-point operations of one cluster in [`add_forces`], a fused multiply-add counted as two.
+/// Floating-point operations of one cluster in `add_forces`, a fused multiply-add counted as two.
 pub fn flops(nodes: usize, tets: usize, law: &Law) -> usize {
     match law {
         Law::NeoHookean(law) => flops_of(*law, nodes, tets),

@@ -2,7 +2,7 @@
 
 use crate::lanes::{Lanes, WIDTH};
 
-/// Floating-point operations of one node in [`place`] and [`advance`], a fused multiply-add counted as two.
+/// Floating-point operations of one node in `place` and `advance`, a fused multiply-add counted as two.
 pub const FLOPS_PER_NODE: usize = 3 + 3 * 6;
 
 /// Slots are padded to a multiple of this, a register's worth at most.

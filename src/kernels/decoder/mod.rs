@@ -5,8 +5,8 @@
 //!
 //! Nodes lie in the lanes, so every sum over features or latent tokens runs within a lane in one
 //! fixed order: what a node gets does not depend on its place in a tile, on the other nodes or on
-//! threads, and a region has the bits of the full decode. [`weights`] packs once a model and once a
-//! step, [`gemm`] is the micro-kernel, [`tile`] the layers, [`scalar`] the readable reference.
+//! threads, and a region has the bits of the full decode. `weights` packs once a model and once a
+//! step, `gemm` is the micro-kernel, `tile` the layers, `scalar` the readable reference.
 
 // On other processors nothing computes in bf16; only sizes are read.
 #[cfg_attr(not(target_arch = "x86_64"), allow(dead_code))]

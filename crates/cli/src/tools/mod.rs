@@ -7,7 +7,7 @@
 //! | [`drive`] | how the library is driven |
 //! | [`yard`] | det F and penetration of one state |
 //! | [`measure`], [`row`] | a case, and the rows over cases |
-//! | [`film`], [`section`], [`force`], [`table`], [`page`], [`write`] | what is shown |
+//! | [`film`], [`section`], [`force`], [`table`], [`page`], `write` | what is shown |
 
 pub mod bundles;
 pub mod cases;

@@ -44,6 +44,6 @@ pub trait Isochoric: Copy {
     /// Slopes of `w` in lanes; `root` is `J^(-1/3)`, and `second` is anything where [`Isochoric::SECOND`] is false.
     ///
     /// # Safety
-    /// As for [`Lanes`]. No closures, see `kernel`.
+    /// As for `Lanes`. No closures, see `kernel`.
     unsafe fn lane_slopes<L: Lanes>(self, first: L, second: L, root: L) -> LaneSlopes<L>;
 }

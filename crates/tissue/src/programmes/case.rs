@@ -61,7 +61,7 @@ impl ToolCase {
     /// y axis is the shaft, and the end that touches the lowest. Sizes are the table's.
     ///
     /// # Errors
-    /// [`ProgrammeError`] where the mesh has no domain, or no site of [`TRIES`] passes the checks.
+    /// [`ProgrammeError`] where the mesh has no domain, or no site of `TRIES` passes the checks.
     pub fn new(
         programme: ToolProgramme,
         mesh: &Mesh,

@@ -1,7 +1,7 @@
 //! Programmes of rigid tools: what a surgeon's hand does, as one table of specifications.
 //!
 //! A case draws everything that its row leaves open from a seed: site, sizes, depth, speeds, direction. Poses are checked before
-//! anything is simulated ([`case`]): a tool starts just outside of the tissue, wherever else its shaft may be. All programmes
+//! anything is simulated (`case`): a tool starts just outside of the tissue, wherever else its shaft may be. All programmes
 //! are the same sequence with parts left out: press in, slide, tilt and turn, close and pull, hold, go back, wait. Frames are
 //! those of the schemes, 50 ms; their number depends on the case.
 

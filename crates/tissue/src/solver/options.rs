@@ -25,7 +25,7 @@ pub enum Substep {
     Refuse,
 }
 
-/// Settings of a [`Solver`].
+/// Settings of a `Solver`.
 #[derive(Clone, Debug)]
 pub struct SolverOptions {
     /// Default: brain tissue, see [`Material`].
@@ -35,7 +35,7 @@ pub struct SolverOptions {
     /// Part of the estimated critical step that is used. Default 0.8.
     pub safety: f64,
     /// Selective mass scaling: elements whose own critical step is shorter get mass until it is this long, s.
-    /// Default 0: none. See [`Solver::added_mass`].
+    /// Default 0: none. See `Solver::added_mass`.
     pub mass_scaling_s: f64,
     /// Default [`Substep::Automatic`].
     pub substep: Substep,

@@ -1,6 +1,6 @@
 //! What filling gives: tetrahedra, or why there are none.
 
-/// Tetrahedra made by [`stuff`], before they become a checked mesh.
+/// Tetrahedra made by [`stuff`](super::stuff), before they become a checked mesh.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Stuffed {
     /// `[K, 3]`, in the unit of the field.
