@@ -54,6 +54,8 @@ pub(crate) struct Pair<'a> {
     pub(crate) anchor: Option<Vector>,
     /// The tool was put where it is: nobody knows which way it came.
     pub(crate) put: bool,
+    /// The tool is so quick or thin that it may go past a sample between two looks.
+    pub(crate) swept: bool,
     /// The tool lies in the tissue: unit direction of the shortest way out, and how far the surface may have to go against it, mm.
     pub(crate) way_out: Option<(Vector, f32)>,
 }
@@ -94,8 +96,11 @@ impl Pair<'_> {
             (normal, gap) = (face, -depth);
         } else if normal.dot(outward) > LEAN {
             let pushed = force != Vector::ZERO;
-            let leaves = (carried - start).dot(outward) > 0.0;
-            let passed = match gap >= 0.0 {
+            let leaves = match self.swept {
+                true => (carried - start).dot(outward) > 0.0,
+                false => (self.now.translation - self.from.translation).dot(outward) > 0.0,
+            };
+            let passed = match self.swept && gap >= 0.0 {
                 true => self.passed(point, start, outward),
                 false => None,
             };
@@ -104,7 +109,7 @@ impl Pair<'_> {
             }
             if let Some((back, way)) = passed {
                 (normal, gap) = (back, -way);
-            } else if gap < 0.0 || force.dot(outward) < 0.0 {
+            } else if gap < 0.0 || (self.swept && force.dot(outward) < 0.0) {
                 let way = self.body.way_through(self.now, point, -outward, THROUGH_MM);
                 let length = way.unwrap_or(THROUGH_MM);
                 let back = force.dot(outward) < -force.dot(normal)
@@ -191,6 +196,8 @@ pub(super) struct Moving<'a> {
     pub before: &'a [Pose],
     /// Which of them were put there in this step.
     pub put: &'a [bool],
+    /// Which of them are quick or thin.
+    pub swept: &'a [bool],
     /// Those that lie in the tissue.
     pub buried: &'a [Option<Buried>],
     /// What each holds.
@@ -228,6 +235,7 @@ impl Moving<'_> {
             now: &pose::between(before, &tool.pose, part),
             anchor: self.held[index].grasp.place(row.sample),
             put: self.put[index],
+            swept: self.swept[index],
             way_out: self.buried[index]
                 .filter(|buried| row.sample == buried.row || buried.takes(row.point, row.outward))
                 .map(|buried| (buried.out, buried.depth + 2.0 * tool.body.size())),
@@ -255,6 +263,7 @@ mod tests {
             now: &pose(to),
             anchor: None,
             put,
+            swept: !put,
             way_out: None,
         };
         pair.contact(at, at, outward, force)

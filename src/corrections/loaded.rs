@@ -176,7 +176,7 @@ impl Stage {
         for iteration in 0..input.enough.iterations {
             let until = input.enough.until;
             let late = until.is_some_and(|until| Instant::now() >= until);
-            let spent = late || is_spent(input, report, input.enough.iterations);
+            let spent = late || is_spent(input, problem, report, input.enough.iterations);
             if !is_sound(size, at.det) || (iteration > 0 && spent) {
                 break;
             }
@@ -251,7 +251,7 @@ impl Stage {
                 self.press(lent, input, problem, way, at.u)?;
                 // An iteration after each of `iterated` parts of the load but the last.
                 let due = part * iterated / parts > (part - 1) * iterated / parts;
-                let spent = problem.is_spent() || is_spent(input, report, 1);
+                let spent = problem.is_spent() || is_spent(input, problem, report, 1);
                 if due && part < parts && !spent {
                     self.settle(env, at.u)?;
                     self.evaluate(lent, input, at, report)?;
@@ -269,7 +269,7 @@ impl Stage {
             if at.det > least
                 || iterated >= MOST_PARTS
                 || problem.is_spent()
-                || is_spent(input, report, 1)
+                || is_spent(input, problem, report, 1)
             {
                 return Ok(());
             }
@@ -323,8 +323,17 @@ impl Stage {
     }
 }
 
-/// Whether a step has taken its evaluations, of which it leaves those of its iterations but for `iterations` of them.
-pub(super) fn is_spent(input: &Input<'_>, report: &Report, iterations: u32) -> bool {
+/// Whether a step whose contact may be lost has taken its evaluations, of which it leaves those of its iterations but for `iterations` of
+/// them.
+pub(super) fn is_spent(
+    input: &Input<'_>,
+    problem: &Problem,
+    report: &Report,
+    iterations: u32,
+) -> bool {
+    if !problem.may_lose() {
+        return false;
+    }
     let most = input.enough.iterations + iterations * (EVALUATIONS - 1) + MORE_EVALUATIONS;
     report.evaluations >= most
 }

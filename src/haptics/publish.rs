@@ -272,6 +272,7 @@ impl Link {
                     now: &pose,
                     anchor,
                     put: false,
+                    swept: true,
                     way_out: None,
                 };
                 let pushed = force != Vector::ZERO;

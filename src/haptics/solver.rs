@@ -175,6 +175,7 @@ impl Solver {
                 now,
                 anchor: slow.anchors[at],
                 put: false,
+                swept: true,
                 way_out: None,
             };
             let (point, start) = (self.place(slow, at), self.points[at]);

@@ -41,7 +41,10 @@ impl Problem {
             skin: 0.0,
         };
         let position = |node| state.position(node);
-        !self.search.find(&self.samples, &[placed], position).is_empty()
+        !self
+            .search
+            .find(&self.samples, &[placed], position)
+            .is_empty()
     }
 
     /// Whether forces of a tool are at its surface, and none where the tissue has left it.

@@ -106,6 +106,7 @@ impl Problem {
             tools: &self.tools,
             before: &self.before,
             put: &self.put,
+            swept: &self.swept,
             buried: &self.buried,
             held: &self.next.tools,
             samples: &self.samples,

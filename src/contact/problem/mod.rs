@@ -35,7 +35,7 @@ const WHAT: &str = "the contact of instruments";
 /// Parts of a step's way at most: of a thin tool that goes as far as one may.
 const MOST_PARTS: f32 = 80.0;
 /// Work of the solves of a step at most, those of its substeps included: about so many multiplications, some five milliseconds.
-const STEP_WORK: u64 = 60_000_000;
+const STEP_WORK: u64 = 120_000_000;
 /// Parts of the tools' ways in a step that has taken its time.
 const LEAST_PARTS: u32 = 4;
 /// A tool that goes farther in a step is quick, mm.
@@ -54,7 +54,9 @@ pub struct Problem {
     before: Vec<Pose>,
     /// Which of them were put there in this step.
     put: Vec<bool>,
-    /// Which of them were clear of the tissue then, and are so quick or thin that they may lose it.
+    /// Which of them are so quick or thin that they may go past a sample between two looks.
+    swept: Vec<bool>,
+    /// Which of those were clear of the tissue then, and are so quick or thin that they may lose it.
     may_lose: Vec<bool>,
     /// How far the surface of each is as its tangents say, mm.
     trusted: Vec<f32>,
@@ -111,6 +113,7 @@ impl Problem {
             tools: memory::room(MAX_TOOLS, WHAT)?,
             before: memory::room(MAX_TOOLS, WHAT)?,
             put: memory::room(MAX_TOOLS, WHAT)?,
+            swept: memory::room(MAX_TOOLS, WHAT)?,
             may_lose: memory::room(MAX_TOOLS, WHAT)?,
             trusted: memory::room(MAX_TOOLS, WHAT)?,
             buried: memory::room(MAX_TOOLS, WHAT)?,
@@ -154,6 +157,7 @@ impl Problem {
         self.tools.clear();
         self.before.clear();
         self.put.clear();
+        self.swept.clear();
         self.may_lose.clear();
         self.buried.clear();
         self.next.clear();
@@ -218,6 +222,7 @@ impl Problem {
         };
         self.before.clear();
         self.put.clear();
+        self.swept.clear();
         self.may_lose.clear();
         self.buried.clear();
         for (index, tool) in tools.iter().enumerate() {
@@ -229,6 +234,9 @@ impl Problem {
             let (samples, mesh) = (&self.samples, &self.mesh);
             let buried = Buried::find(&tool.body, &from, samples, mesh, state);
             self.buried.push(buried);
+            let is_quick = tool.body.motion(&from, &tool.pose) > QUICK_MM;
+            self.swept
+                .push((is_quick || tool.body.pierces()) && moved.is_some());
             self.may_lose.push(false);
             if self.next.tools.len() <= index {
                 self.next.tools.push(Held::default());
@@ -258,11 +266,7 @@ impl Problem {
                 self.buried[index] = None;
             }
             self.lay_in_tissue |= self.buried[index].is_some();
-            let tool = &self.tools[index];
-            let is_quick = tool.body.motion(&self.before[index], &tool.pose) > QUICK_MM;
-            self.may_lose[index] = (is_quick || tool.body.pierces())
-                && !self.put[index]
-                && self.depth(index, state, 0.0) <= RESTING_MM;
+            self.may_lose[index] = self.swept[index] && self.depth(index, state, 0.0) <= RESTING_MM;
         }
         Ok(())
     }
@@ -277,6 +281,11 @@ impl Problem {
         }
         self.look(state, 1.0, true, MOST_ROWS)?;
         Ok(!self.rows.is_empty())
+    }
+
+    /// Whether a tool is so quick or thin that this step may lose its contact.
+    pub fn may_lose(&self) -> bool {
+        self.may_lose.contains(&true)
     }
 
     /// Whether the solves of this step have taken their time.

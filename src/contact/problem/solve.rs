@@ -14,7 +14,7 @@ use crate::error::Result;
 use crate::memory;
 
 /// Multiplications of one linearisation at most: about half a millisecond.
-const SOLVE_WORK: u64 = 10_000_000;
+const SOLVE_WORK: u64 = 30_000_000;
 /// What else a solve takes, as so many multiplications: for each node and sample that is looked at, for each row and linearisation, and for
 /// each pair of rows.
 const LOOK_WORK: u64 = 60;
@@ -137,6 +137,7 @@ impl Problem {
             tools: &self.tools,
             before: &self.before,
             put: &self.put,
+            swept: &self.swept,
             buried: &self.buried,
             held: &self.next.tools,
             samples: &self.samples,
@@ -146,10 +147,11 @@ impl Problem {
         // Only for what is quick or thin: what was put into the tissue may find its way out by any side.
         self.trusted.clear();
         let tools = self.tools.iter().zip(&self.may_lose);
-        self.trusted.extend(tools.map(|(tool, may_lose)| match may_lose {
-            true => tool.body.size().max(LEAST_WAY_MM),
-            false => f32::MAX,
-        }));
+        self.trusted
+            .extend(tools.map(|(tool, may_lose)| match may_lose {
+                true => tool.body.size().max(LEAST_WAY_MM),
+                false => f32::MAX,
+            }));
         let (mut pass, mut extra) = (0, MOST_REPEATS);
         while pass < LINEARISATIONS {
             self.contacts.clear();

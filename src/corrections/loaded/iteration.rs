@@ -112,7 +112,7 @@ impl Stage {
                 }
                 break;
             }
-            let spent = attempt > 1 && is_spent(input, report, input.enough.iterations);
+            let spent = attempt > 1 && is_spent(input, problem, report, input.enough.iterations);
             if attempt == SHORTENINGS || spent || slope >= 0.0 {
                 problem.undo();
                 self.memory.clear();
