@@ -68,7 +68,7 @@ fn instruments(positions: &[f32], faces: &[u32], displacement: &[f32]) {
     for (name, shape) in shapes {
         let (at, turn) = ([170.0, 170.0, 14.0], [0.0, 0.0, 0.0, 1.0]);
         let instrument = [Instrument {
-            tool: Tool::new(0, &shape, at, turn).expect("a tool"),
+            tool: Tool::new(&shape, at, turn).expect("a tool"),
             sticking: false,
         }];
         let mut touched = 0;

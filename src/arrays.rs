@@ -64,6 +64,15 @@ impl<'a> Contact<'a> {
 
     /// Nodes in contact, and `[m,3]` where they go, mm.
     ///
+    /// ```
+    /// use ndarray::array;
+    /// use upt::Contact;
+    ///
+    /// let down = array![[0.0, 0.0, -1.0], [0.0, 0.0, -0.5]];
+    /// assert!(Contact::at(&[12, 40], down.view()).is_ok());
+    /// assert!(Contact::at(&[12, 40], array![[0.0]].view()).is_err());
+    /// ```
+    ///
     /// # Errors
     /// As [`StepInput::with_displacement`].
     pub fn at(nodes: &'a [u32], vectors: ArrayView2<'a, f32>) -> Result<Contact<'a>> {

@@ -70,6 +70,12 @@ pub type Result<T> = std::result::Result<T, Error>;
 
 impl Error {
     /// The status code of `docs/reference/abi.md`.
+    ///
+    /// ```
+    /// let error = upt::Error::Busy("a step is in flight".into());
+    /// assert_eq!(error.status(), -5); // UPT_ERR_BUSY
+    /// assert_eq!(error.to_string(), "a step is in flight");
+    /// ```
     pub fn status(&self) -> i32 {
         match self {
             Error::Argument(_) => UPT_ERR_ARGUMENT,
@@ -101,6 +107,16 @@ impl Error {
         }
     }
 
+    /// Says which of a host's instruments an argument is of.
+    #[cfg(feature = "contact")]
+    pub(crate) fn of_instrument(self, index: usize) -> Self {
+        match self {
+            Error::Argument(text) => Error::Argument(format!("instruments[{index}]: {text}")),
+            Error::NonFinite(text) => Error::NonFinite(format!("instruments[{index}]: {text}")),
+            other => other,
+        }
+    }
+
     /// What ONNX Runtime said, as `or`, or as lack of memory where it said so.
     pub(crate) fn of_onnx(text: String, or: impl FnOnce(String) -> Self) -> Self {
         let memory = ["std::bad_alloc", "Failed to allocate memory"];
@@ -128,6 +144,13 @@ impl Error {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    #[cfg(feature = "contact")]
+    fn an_argument_tells_its_instrument() {
+        let error = Error::Argument("radius is 0".into()).of_instrument(3);
+        assert_eq!(error.to_string(), "instruments[3]: radius is 0");
+    }
 
     #[test]
     fn lack_of_memory_that_onnx_runtime_tells_is_lack_of_memory() {

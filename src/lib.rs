@@ -22,7 +22,7 @@
 //! let ball = Shape::Sphere { radius: 6.0 };
 //! for step in 0..5 {
 //!     let position = [x, y, z + 6.0 - step as f32];
-//!     let tool = Tool::new(0, &ball, position, [0.0, 0.0, 0.0, 1.0])?;
+//!     let tool = Tool::new(&ball, position, [0.0, 0.0, 0.0, 1.0])?;
 //!     let input = StepInput { displacement: None, contact: Contact::Tools(&[tool]) };
 //!     scene.step(input, Some(&mut u))?;
 //! }

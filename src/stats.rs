@@ -36,6 +36,13 @@ pub mod flag {
     pub const UNSOLVED: u32 = 16384;
 
     /// What the flags say, as text.
+    ///
+    /// ```
+    /// use upt::flag;
+    ///
+    /// let text = flag::names(flag::PUSH | flag::BOUND);
+    /// assert_eq!(text, "a push is longer than trained; guard: a displacement passes the bound");
+    /// ```
     pub fn names(flags: u32) -> String {
         let meanings = [
             (PUSH, "a push is longer than trained"),

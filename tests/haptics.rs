@@ -43,7 +43,7 @@ fn ball(scene: &Scene, depth: f64) -> Tool {
     let [x, y, z] = top(scene);
     let shape = Shape::Sphere { radius: 3.0 };
     let at = [x, y, z + 3.0 - depth as f32];
-    Tool::new(0, &shape, at, [0.0, 0.0, 0.0, 1.0]).unwrap()
+    Tool::new(&shape, at, [0.0, 0.0, 0.0, 1.0]).unwrap()
 }
 
 fn pose(scene: &Scene, depth: f64, time_s: f64) -> HapticPose {

@@ -52,7 +52,7 @@ fn tools_allocate_nothing() {
             .map(|t| {
                 let depth = 0.2 * (t as f32).min(6.0) - 3.0 * (t as f32 - 14.0).max(0.0);
                 let centre = [at[0] + 0.1 * t as f32, at[1], at[2] + 3.0 - depth];
-                let tool = upt::contact::Tool::new(0, &shape, centre, [0.0, 0.0, 0.0, 1.0]);
+                let tool = upt::contact::Tool::new(&shape, centre, [0.0, 0.0, 0.0, 1.0]);
                 vec![tool.unwrap()]
             })
             .collect();
@@ -86,7 +86,7 @@ fn frames_allocate_nothing() {
     let shape = contact::Shape::Sphere { radius: 3.0 };
     let tool = |depth: f32| {
         let centre = [at[0], at[1], at[2] + 3.0 - depth];
-        [upt::contact::Tool::new(0, &shape, centre, [0.0, 0.0, 0.0, 1.0]).unwrap()]
+        [upt::contact::Tool::new(&shape, centre, [0.0, 0.0, 0.0, 1.0]).unwrap()]
     };
     let depths = [0.5, 0.8, 1.1, 0.8].map(|depth| [tool(depth), tool(depth + 0.1)]);
     scene.attach_points(Some(&model.positions()[..9])).unwrap();
@@ -122,7 +122,7 @@ fn haptics_allocate_nothing() {
     let shape = contact::Shape::Sphere { radius: 3.0 };
     let tool = |depth: f32| {
         let centre = [at[0], at[1], at[2] + 3.0 - depth];
-        upt::contact::Tool::new(0, &shape, centre, [0.0, 0.0, 0.0, 1.0]).unwrap()
+        upt::contact::Tool::new(&shape, centre, [0.0, 0.0, 0.0, 1.0]).unwrap()
     };
     let tools = [[tool(0.5)], [tool(1.0)]];
     let mut hand = scene.haptics(&HapticOptions::new(0, tool(0.0))).unwrap();

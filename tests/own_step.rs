@@ -29,7 +29,7 @@ fn ball(scene: &Scene, depth: f64) -> Vec<Tool> {
     let [x, y, z] = nodes().min_by(|a, b| far(a).total_cmp(&far(b))).unwrap();
     let centre = [x, y, z + 3.0 - depth as f32];
     let shape = Shape::Sphere { radius: 3.0 };
-    vec![Tool::new(0, &shape, centre, [0.0, 0.0, 0.0, 1.0]).unwrap()]
+    vec![Tool::new(&shape, centre, [0.0, 0.0, 0.0, 1.0]).unwrap()]
 }
 
 /// In within 0.2 s, held until 0.4 s, gone after.
@@ -256,7 +256,7 @@ fn a_fine_mesh_comes_to_rest_in_short_steps() {
         } else {
             -120.0
         };
-        let tool = Tool::new(0, &shape, [x, -14.0, 8.0], [0.0, 0.0, 0.0, 1.0]).unwrap();
+        let tool = Tool::new(&shape, [x, -14.0, 8.0], [0.0, 0.0, 0.0, 1.0]).unwrap();
         let input = StepInput {
             displacement: None,
             contact: Contact::Tools(&[tool]),

@@ -37,7 +37,7 @@ fn pressing(scene: &Scene, t: f64) -> Vec<Tool> {
     let [x, y, z] = place(*nearest.unwrap());
     let centre = [x, y, z + 3.0 - 0.4 * t as f32];
     let shape = Shape::Sphere { radius: 3.0 };
-    vec![Tool::new(0, &shape, centre, [0.0, 0.0, 0.0, 1.0]).unwrap()]
+    vec![Tool::new(&shape, centre, [0.0, 0.0, 0.0, 1.0]).unwrap()]
 }
 
 fn step(scene: &Scene, tools: &[Tool]) -> Vec<f32> {

@@ -27,7 +27,7 @@ fn ball(scene: &Scene, depth: f32, aside: f32) -> Tool {
     let at = Vector::from_slice(&mesh.positions[3 * node..][..3]);
     let centre = at + Vector::new(aside, 0.0, 3.0 - depth);
     let shape = Shape::Sphere { radius: 3.0 };
-    let mut tool = Tool::new(0, &shape, centre.to_array(), [0.0, 0.0, 0.0, 1.0]).unwrap();
+    let mut tool = Tool::new(&shape, centre.to_array(), [0.0, 0.0, 0.0, 1.0]).unwrap();
     tool.friction = 0.2;
     tool
 }

@@ -51,7 +51,7 @@ fn balls(scene: &Scene, radius: f32, depth: f32, count: usize) -> Vec<Tool> {
             let shift = aside * (index as f32 - 0.5 * (count as f32 - 1.0)) * 2.5 * radius;
             let at = middle + normal * (radius - depth) + shift;
             let shape = Shape::Sphere { radius };
-            Tool::new(index, &shape, at.to_array(), [0.0, 0.0, 0.0, 1.0]).unwrap()
+            Tool::new(&shape, at.to_array(), [0.0, 0.0, 0.0, 1.0]).unwrap()
         })
         .collect()
 }

@@ -83,7 +83,7 @@ fn tools(model: &Model) -> upt::Result<Vec<Tool>> {
                 half_length: 20.0,
                 radius: 6.0,
             };
-            let mut tool = Tool::new(0, &shape, at.to_array(), rotation)?;
+            let mut tool = Tool::new(&shape, at.to_array(), rotation)?;
             tool.friction = 0.2;
             Ok(tool)
         })

@@ -37,41 +37,41 @@ pub struct Tool {
 }
 
 impl Tool {
-    /// A sliding tool without friction.
+    /// A sliding tool without friction: `position` in mm, `rotation` a unit quaternion `[x, y, z, w]`.
+    ///
+    /// ```
+    /// use upt::{Mode, Shape, Tool};
+    ///
+    /// let rod = Shape::Capsule { half_length: 20.0, radius: 2.5 };
+    /// let mut tool = Tool::new(&rod, [0.0, 0.0, 30.0], [0.0, 0.0, 0.0, 1.0])?;
+    /// tool.mode = Mode::Grasp;
+    /// tool.tear_off_mn = 400.0;
+    ///
+    /// let lost = Tool::new(&rod, [f32::NAN, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]);
+    /// assert!(matches!(lost, Err(upt::Error::NonFinite(_))));
+    /// # upt::Result::Ok(())
+    /// ```
     ///
     /// # Errors
-    /// [`Error::Argument`] for a shape that no tool has, [`Error::NonFinite`] for its pose; `index` names it.
-    pub fn new(
-        index: usize,
-        shape: &Shape,
-        position: [f32; 3],
-        rotation: [f32; 4],
-    ) -> Result<Tool> {
-        let body = Body::new(shape)
-            .map_err(|error| Error::Argument(format!("instruments[{index}]: {error}")))?;
-        Tool::of_body(index, body, position, rotation)
+    /// [`Error::Argument`] for a shape that no tool has, for a rotation that is none and for a place beyond a kilometre,
+    /// [`Error::NonFinite`].
+    pub fn new(shape: &Shape, position: [f32; 3], rotation: [f32; 4]) -> Result<Tool> {
+        let body = Body::new(shape).map_err(|error| Error::Argument(error.to_string()))?;
+        Tool::of_body(body, position, rotation)
     }
 
     /// The same of a shape that is ready.
     ///
     /// # Errors
     /// As [`Tool::new`].
-    pub fn of_body(
-        index: usize,
-        body: Body,
-        position: [f32; 3],
-        rotation: [f32; 4],
-    ) -> Result<Tool> {
-        let pose = pose::checked(position, rotation).map_err(|error| {
-            let message = format!("instruments[{index}]: {error}");
-            match error {
-                pose::PoseError::NotFinite => Error::NonFinite(message),
-                pose::PoseError::NotUnit { .. } => Error::Argument(message),
-            }
+    pub fn of_body(body: Body, position: [f32; 3], rotation: [f32; 4]) -> Result<Tool> {
+        let pose = pose::checked(position, rotation).map_err(|error| match error {
+            pose::PoseError::NotFinite => Error::NonFinite(error.to_string()),
+            pose::PoseError::NotUnit { .. } => Error::Argument(error.to_string()),
         })?;
         if position.iter().any(|x| x.abs() > INPUT_LIMIT) {
             return Err(Error::Argument(format!(
-                "instruments[{index}]: position is {position:?}, beyond {INPUT_LIMIT} mm; units are mm"
+                "position is {position:?}, beyond {INPUT_LIMIT} mm; units are mm"
             )));
         }
         Ok(Tool {

@@ -99,7 +99,7 @@ pub(super) fn tool(index: usize, raw: &upt_instrument) -> Result<crate::contact:
         },
         UPT_SHAPE_HULL => {
             let body = super::registry::find_hull(raw.hull)?;
-            return held(index, raw, Tool::of_body(index, (*body).clone(), at, turn)?);
+            return held(index, raw, Tool::of_body((*body).clone(), at, turn));
         }
         value => return unknown("instruments[].shape", value),
     };
@@ -109,10 +109,15 @@ pub(super) fn tool(index: usize, raw: &upt_instrument) -> Result<crate::contact:
             format!("instruments[{index}]: hull is set and shape is not UPT_SHAPE_HULL"),
         );
     }
-    return held(index, raw, Tool::new(index, &shape, at, turn)?);
+    return held(index, raw, Tool::new(&shape, at, turn));
 
     /// How it holds.
-    fn held(index: usize, raw: &upt_instrument, mut tool: Tool) -> Result<Tool, Failure> {
+    fn held(
+        index: usize,
+        raw: &upt_instrument,
+        tool: crate::Result<Tool>,
+    ) -> Result<Tool, Failure> {
+        let mut tool = tool.map_err(|error| error.of_instrument(index))?;
         tool.mode = match raw.mode {
             UPT_MODE_SLIDE => Mode::Slide,
             UPT_MODE_GRASP => Mode::Grasp,

@@ -157,7 +157,7 @@ mod tests {
 
     fn hand() -> Haptics {
         let shape = ::contact::Shape::Sphere { radius: 3.0 };
-        let tool = Tool::new(0, &shape, [0.0; 3], [0.0, 0.0, 0.0, 1.0]).unwrap();
+        let tool = Tool::new(&shape, [0.0; 3], [0.0, 0.0, 0.0, 1.0]).unwrap();
         test_hand(&HapticOptions::new(0, tool))
     }
 

@@ -28,7 +28,7 @@ const LEVEL: [f32; 4] = [0.0, 0.0, 0.0, 1.0];
 
 fn instrument(shape: Shape, at: [f32; 3], turn: [f32; 4], sticking: bool) -> Instrument {
     Instrument {
-        tool: Tool::new(0, &shape, at, turn).unwrap(),
+        tool: Tool::new(&shape, at, turn).unwrap(),
         sticking,
     }
 }

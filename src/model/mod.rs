@@ -77,14 +77,18 @@ pub enum KindModel {
 /// A bundle made ready to step.
 pub struct Model {
     /// The manifest.
+    #[doc(hidden)]
     pub manifest: Manifest,
     /// SHA-256 of `bundle.json`.
     pub hash: [u8; 32],
     /// The bundle's mesh.
+    #[doc(hidden)]
     pub mesh: Arc<Mesh>,
     /// The linear response, where the bundle has one.
+    #[doc(hidden)]
     pub prior: Option<Arc<PriorTable>>,
     /// The kind's own part.
+    #[doc(hidden)]
     pub kind: KindModel,
     corrections: OnceLock<Corrections>,
     #[cfg(feature = "contact")]
@@ -104,6 +108,19 @@ pub struct Model {
 impl Model {
     /// Opens and validates the bundle in the folder `path`, loads ONNX Runtime where the bundle has a graph, and computes the
     /// static tables.
+    ///
+    /// ```
+    /// use std::path::Path;
+    /// use upt::{Kind, Model, ModelOptions};
+    ///
+    /// let model = Model::open(Path::new("onnx/liver-coarse"), &ModelOptions::default())?;
+    /// let info = model.info();
+    /// assert_eq!((info.kind, info.dt), (Kind::Reduced, 0.05));
+    ///
+    /// let missing = Model::open(Path::new("onnx/no-such-bundle"), &ModelOptions::default());
+    /// assert!(matches!(missing, Err(upt::Error::Io { .. })));
+    /// # upt::Result::Ok(())
+    /// ```
     ///
     /// # Errors
     /// [`crate::Error::Io`], [`crate::Error::Bundle`] (names file and field), [`crate::Error::Version`],
@@ -217,6 +234,7 @@ impl Model {
     /// # Errors
     /// [`crate::Error::Unsupported`] where the bundle lacks what they need; [`crate::Error::Io`] and
     /// [`crate::Error::Bundle`] for their file.
+    #[doc(hidden)]
     pub fn corrections(&self) -> Result<&Corrections> {
         let _opening = self.opening.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(made) = self.corrections.get() {
@@ -232,6 +250,7 @@ impl Model {
     /// # Errors
     /// [`crate::Error::OutOfMemory`].
     #[cfg(feature = "contact")]
+    #[doc(hidden)]
     pub fn samples(&self) -> Result<Arc<::contact::Samples>> {
         if let Some(made) = self.samples.get() {
             return Ok(Arc::clone(made));
@@ -346,6 +365,17 @@ impl Model {
     }
 
     /// A static index set.
+    ///
+    /// ```
+    /// # use std::path::Path;
+    /// # use upt::{Model, ModelOptions};
+    /// use upt::IndexSet;
+    /// # let model = Model::open(Path::new("onnx/liver-coarse"), &ModelOptions::default())?;
+    /// let tets = model.indices(IndexSet::Tets);
+    /// let nodes = model.positions().len() / 3;
+    /// assert!(tets.len() % 4 == 0 && tets.iter().all(|&node| (node as usize) < nodes));
+    /// # upt::Result::Ok(())
+    /// ```
     pub fn indices(&self, set: IndexSet) -> &[u32] {
         match set {
             IndexSet::SurfaceNodes => &self.mesh.surface_nodes,

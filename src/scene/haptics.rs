@@ -16,6 +16,27 @@ const MOST_HANDS: usize = 8;
 impl Scene {
     /// Makes a tool felt: from the next step on each is published for it.
     ///
+    /// ```
+    /// # use std::path::Path;
+    /// # use upt::{Contact, Model, ModelOptions, Scene, SceneOptions, StepInput};
+    /// # let model = Model::open(Path::new("onnx/liver-coarse"), &ModelOptions::default())?;
+    /// # let scene = Scene::new(model.clone(), &SceneOptions::default())?;
+    /// use upt::haptics::{HapticOptions, HapticPose};
+    /// use upt::{Shape, Tool};
+    ///
+    /// let ball = Tool::new(&Shape::Sphere { radius: 5.0 }, [0.0; 3], [0.0, 0.0, 0.0, 1.0])?;
+    /// let mut hand = scene.haptics(&HapticOptions::new(0, ball))?;
+    /// // In the thread of the device, a thousand times a second:
+    /// let pose = HapticPose {
+    ///     time_s: 0.001,
+    ///     position_m: [0.5, 0.0, 0.0], // far away
+    ///     rotation: [0.0, 0.0, 0.0, 1.0],
+    ///     velocity: None,
+    /// };
+    /// assert_eq!(hand.render(&pose)?.force_n, [0.0; 3]);
+    /// # upt::Result::Ok(())
+    /// ```
+    ///
     /// # Errors
     /// [`Error::Argument`] for the tool, an option, or one hand too many; [`Error::Unsupported`] for a bundle without linear response or
     /// corrections and a scene that does not correct; [`Error::Busy`] while the scene is used or a step is in flight.

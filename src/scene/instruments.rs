@@ -16,7 +16,7 @@ impl Scene {
     ///
     /// # Errors
     /// [`Error::Busy`](crate::Error::Busy).
-    pub fn tool_list(&self) -> Result<MutexGuard<'_, Vec<Tool>>> {
+    pub(crate) fn tool_list(&self) -> Result<MutexGuard<'_, Vec<Tool>>> {
         lock(&self.tools.list)
     }
 
@@ -24,7 +24,7 @@ impl Scene {
     ///
     /// # Errors
     /// [`Error::Busy`](crate::Error::Busy).
-    pub fn frame_tools(&self) -> Result<MutexGuard<'_, Vec<Tool>>> {
+    pub(crate) fn frame_tools(&self) -> Result<MutexGuard<'_, Vec<Tool>>> {
         lock(&self.tools.frame_list)
     }
 
@@ -32,7 +32,7 @@ impl Scene {
     ///
     /// # Errors
     /// [`Error::Busy`](crate::Error::Busy).
-    pub fn instrument_list(&self) -> Result<MutexGuard<'_, Vec<Instrument>>> {
+    pub(crate) fn instrument_list(&self) -> Result<MutexGuard<'_, Vec<Instrument>>> {
         lock(&self.tools.asked_list)
     }
 

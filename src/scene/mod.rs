@@ -93,6 +93,22 @@ pub struct Scene {
 impl Scene {
     /// Makes a scene at rest.
     ///
+    /// ```
+    /// # use std::path::Path;
+    /// # use upt::{Contact, Model, ModelOptions, Scene, SceneOptions, StepInput};
+    /// # let model = Model::open(Path::new("onnx/liver-coarse"), &ModelOptions::default())?;
+    /// use upt::{Corrections, GuardPolicy};
+    ///
+    /// let options = SceneOptions {
+    ///     corrections: Corrections::Fixed(4),
+    ///     guard_policy: GuardPolicy::Blend,
+    ///     ..SceneOptions::default()
+    /// };
+    /// let scene = Scene::new(model, &options)?;
+    /// assert_eq!(scene.stats().step_count, 0);
+    /// # upt::Result::Ok(())
+    /// ```
+    ///
     /// # Errors
     /// What [`Model::open`] says of sessions; [`Error::Unsupported`] for a mesh of the scene's own with a bundle that
     /// has a prior; [`Error::Io`] and [`Error::Bundle`] for that mesh.
@@ -135,6 +151,7 @@ impl Scene {
     }
 
     /// The scene's mesh: the bundle's, or its own.
+    #[doc(hidden)]
     pub fn mesh(&self) -> &Arc<Mesh> {
         &self.mesh
     }
@@ -185,11 +202,25 @@ impl Scene {
     ///
     /// # Errors
     /// [`Error::Argument`].
-    pub fn check_node_count(&self, name: &str, count: u64) -> Result<()> {
+    pub(crate) fn check_node_count(&self, name: &str, count: u64) -> Result<()> {
         check_count(name, count, self.node_count())
     }
 
     /// One step of `dt`; `out` is `[n,3]` (n: `K`, or the region's count).
+    ///
+    /// ```
+    /// # use std::path::Path;
+    /// # use upt::{Contact, Model, ModelOptions, Scene, SceneOptions, StepInput};
+    /// # let model = Model::open(Path::new("onnx/liver-coarse"), &ModelOptions::default())?;
+    /// # let scene = Scene::new(model.clone(), &SceneOptions::default())?;
+    /// # use upt::IndexSet;
+    /// let node = model.indices(IndexSet::DomainNodes)[0];
+    /// let mut u = vec![0.0; 3 * scene.node_count()];
+    /// let pushed = Contact::Sparse { nodes: &[node], vectors: &[0.0, 0.0, -0.5] };
+    /// scene.step(StepInput { displacement: None, contact: pushed }, Some(&mut u))?;
+    /// assert_eq!(u[3 * node as usize..][..3], [0.0, 0.0, -0.5]);
+    /// # upt::Result::Ok(())
+    /// ```
     ///
     /// # Errors
     /// [`Error::Argument`], [`Error::NonFinite`] for inputs, [`Error::Guard`] for a refused state: the last good state
@@ -205,6 +236,18 @@ impl Scene {
 
     /// Restricts output to these nodes (any order); `None` is all nodes. Both published states are decoded for the new
     /// region at once, to the bits that a full decode would have given.
+    ///
+    /// ```
+    /// # use std::path::Path;
+    /// # use upt::{Contact, Model, ModelOptions, Scene, SceneOptions, StepInput};
+    /// # let model = Model::open(Path::new("onnx/liver-coarse"), &ModelOptions::default())?;
+    /// # let scene = Scene::new(model.clone(), &SceneOptions::default())?;
+    /// scene.set_region(Some(&[7, 3]))?;
+    /// let mut two = [0.0; 6];
+    /// scene.step(StepInput { displacement: None, contact: Contact::None }, Some(&mut two))?;
+    /// assert!(scene.set_region(Some(&[u32::MAX])).is_err());
+    /// # upt::Result::Ok(())
+    /// ```
     pub fn set_region(&self, nodes: Option<&[u32]>) -> Result<()> {
         self.with(|core, published| {
             if let Some(nodes) = nodes {
@@ -218,6 +261,20 @@ impl Scene {
 
     /// Attaches points `[n,3]` in rest mm; `None` detaches. A `upt` bundle decodes them, unless the scene was made with
     /// `interpolate_points`; a `reduced` bundle has no network in space: its tables are interpolated.
+    ///
+    /// ```
+    /// # use std::path::Path;
+    /// # use upt::{Contact, Model, ModelOptions, Scene, SceneOptions, StepInput};
+    /// # let model = Model::open(Path::new("onnx/liver-coarse"), &ModelOptions::default())?;
+    /// # let scene = Scene::new(model.clone(), &SceneOptions::default())?;
+    /// let corner = &model.positions()[..3];
+    /// scene.attach_points(Some(corner))?;
+    /// scene.step(StepInput { displacement: None, contact: Contact::None }, None)?;
+    /// let mut u = [0.0; 3];
+    /// scene.read_points(&mut u)?;
+    /// assert_eq!(scene.point_count(), 1);
+    /// # upt::Result::Ok(())
+    /// ```
     pub fn attach_points(&self, points: Option<&[f32]>) -> Result<()> {
         self.with(|core, published| {
             let mut points = match points {
@@ -256,11 +313,40 @@ impl Scene {
     }
 
     /// Waits for the submitted step at most `timeout`.
+    ///
+    /// ```
+    /// # use std::path::Path;
+    /// # use upt::{Contact, Model, ModelOptions, Scene, SceneOptions, StepInput};
+    /// # let model = Model::open(Path::new("onnx/liver-coarse"), &ModelOptions::default())?;
+    /// # let scene = Scene::new(model.clone(), &SceneOptions::default())?;
+    /// use std::time::Duration;
+    /// use upt::Progress;
+    ///
+    /// scene.submit(&[], &[])?;
+    /// let done = scene.wait(Duration::from_secs(60))?;
+    /// assert_eq!(done, Progress::Done);
+    /// assert_eq!(scene.stats().step_count, 1);
+    /// # upt::Result::Ok(())
+    /// ```
     pub fn wait(&self, timeout: Duration) -> Result<Progress> {
         self.worker.wait(timeout)
     }
 
     /// A snapshot from which the scene resumes to the bit.
+    ///
+    /// ```
+    /// # use std::path::Path;
+    /// # use upt::{Contact, Model, ModelOptions, Scene, SceneOptions, StepInput};
+    /// # let model = Model::open(Path::new("onnx/liver-coarse"), &ModelOptions::default())?;
+    /// # let scene = Scene::new(model.clone(), &SceneOptions::default())?;
+    /// let input = StepInput { displacement: None, contact: Contact::None };
+    /// let saved = scene.save()?;
+    /// scene.step(input, None)?;
+    /// scene.restore(&saved)?;
+    /// assert_eq!(scene.save()?, saved);
+    /// assert!(scene.restore(&saved[1..]).is_err());
+    /// # upt::Result::Ok(())
+    /// ```
     pub fn save(&self) -> Result<Vec<u8>> {
         self.with(|core, published| core.save(published))
     }

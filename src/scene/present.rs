@@ -18,6 +18,18 @@ const WHAT: &str = "the present state of a scene";
 impl Scene {
     /// The displacements `[n,3]` of the region `seconds` after the last published step, with instruments where they are then.
     ///
+    /// ```
+    /// # use std::path::Path;
+    /// # use upt::{Contact, Model, ModelOptions, Scene, SceneOptions, StepInput};
+    /// # let model = Model::open(Path::new("onnx/liver-coarse"), &ModelOptions::default())?;
+    /// # let scene = Scene::new(model.clone(), &SceneOptions::default())?;
+    /// scene.step(StepInput { displacement: None, contact: Contact::None }, None)?;
+    /// let mut u = vec![0.0; 3 * scene.node_count()];
+    /// scene.present(0.01, &[], &mut u)?; // 10 ms after the step, without tools
+    /// assert!(u.iter().all(|x| x.is_finite()));
+    /// # upt::Result::Ok(())
+    /// ```
+    ///
     /// # Errors
     /// [`Error::NonFinite`] and [`Error::Argument`] for a time or an instrument, [`Error::Unsupported`] for a bundle without linear response or
     /// corrections or a scene that does not correct, [`Error::Busy`] while another thread presents, and at the first call while a step is in flight.

@@ -133,7 +133,7 @@ fn what_cannot_be_is_refused_and_changes_nothing() {
     assert!(matches!(tried(&[tear]), Error::Argument(_)));
     assert!(matches!(tried(&vec![tool; 65]), Error::Argument(_)));
     let turn = [0.0, 0.0, 0.0, 1.0];
-    let made = |at: [f32; 3], turn| Tool::new(3, &Shape::Sphere { radius: 1.0 }, at, turn);
+    let made = |at: [f32; 3], turn| Tool::new(&Shape::Sphere { radius: 1.0 }, at, turn);
     assert!(matches!(
         made([f32::NAN; 3], turn),
         Err(Error::NonFinite(_))
@@ -145,7 +145,7 @@ fn what_cannot_be_is_refused_and_changes_nothing() {
     ));
     let flat = Shape::Sphere { radius: 0.0 };
     assert!(matches!(
-        Tool::new(0, &flat, [0.0; 3], turn),
+        Tool::new(&flat, [0.0; 3], turn),
         Err(Error::Argument(_))
     ));
     assert!(scene.save().unwrap() == before);
@@ -163,7 +163,7 @@ fn the_same_question_has_the_same_contacts() {
         };
         let turn = [0.0, 0.0, 0.0, 1.0];
         [Instrument {
-            tool: Tool::new(0, &shape, at.to_array(), turn).unwrap(),
+            tool: Tool::new(&shape, at.to_array(), turn).unwrap(),
             sticking: true,
         }]
     };

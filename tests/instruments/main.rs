@@ -15,7 +15,7 @@ use upt::{Contact, Corrections, Scene, SceneOptions, StepInput};
 
 /// A ball at a place.
 fn ball(radius: f32, at: [f32; 3]) -> Tool {
-    Tool::new(0, &Shape::Sphere { radius }, at, [0.0, 0.0, 0.0, 1.0]).unwrap()
+    Tool::new(&Shape::Sphere { radius }, at, [0.0, 0.0, 0.0, 1.0]).unwrap()
 }
 
 fn step(scene: &Scene, tools: &[Tool]) -> Vec<f32> {

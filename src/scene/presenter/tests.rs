@@ -44,7 +44,7 @@ impl Host {
         let [x, y, z] = nodes.max_by(|a, b| a[2].total_cmp(&b[2])).unwrap();
         let shape = Shape::Sphere { radius: 3.0 };
         let centre = [x, y, z + 3.0 - 0.4 * t as f32];
-        [Tool::new(0, &shape, centre, [0.0, 0.0, 0.0, 1.0]).unwrap()]
+        [Tool::new(&shape, centre, [0.0, 0.0, 0.0, 1.0]).unwrap()]
     }
 
     fn step(&self, t: f64) {

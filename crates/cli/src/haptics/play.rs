@@ -52,7 +52,7 @@ impl Player {
         let tools = site.tools.iter().enumerate().map(|(index, tool)| {
             let at = site.pose(index, Vector::ZERO);
             let body = contact::Body::new(&tool.shape)?;
-            let mut made = Tool::of_body(index, body, [0.0; 3], at.rotation.to_array())?;
+            let mut made = Tool::of_body(body, [0.0; 3], at.rotation.to_array())?;
             (made.friction, made.tear_off_mn) = (tool.friction, tool.tear_off_mn);
             anyhow::Ok(made)
         });
