@@ -54,7 +54,7 @@ pub struct Options {
 
 /// Runs the command.
 pub fn run(args: &Options) -> anyhow::Result<ExitCode> {
-    write(args)?;
+    write(args, &|| true)?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -76,8 +76,9 @@ pub fn read(path: &Path) -> anyhow::Result<NaturalModes> {
     })
 }
 
-/// Writes the file; returns the lowest and the highest frequency, Hz.
-pub fn write(args: &Options) -> anyhow::Result<[f64; 2]> {
+/// Writes the file; returns the lowest and the highest frequency, Hz. `go_on` is asked before each solve: where it says no, the error is
+/// [`LinearError::Stopped`](tissue::linear::LinearError::Stopped).
+pub fn write(args: &Options, go_on: &(dyn Fn() -> bool + Sync)) -> anyhow::Result<[f64; 2]> {
     let mesh = Mesh::read(&args.mesh)?;
     let held = mesh.held_nodes(args.boundary);
     let lame = Lame::from_young(args.young, args.poisson)?;
@@ -95,7 +96,10 @@ pub fn write(args: &Options) -> anyhow::Result<[f64; 2]> {
         &factor,
         args.density,
         args.count,
-        &|| bar.inc(1),
+        &|| {
+            bar.inc(1);
+            go_on()
+        },
     )?;
     let solves = bar.position();
     bar.finish_and_clear();

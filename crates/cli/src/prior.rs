@@ -14,7 +14,7 @@ use anyhow::{Context, bail};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
-use tissue::linear::{Factor, Lame, Stiffness, remaining_columns};
+use tissue::linear::{Factor, Lame, LinearError, Stiffness, remaining_columns};
 use tissue::mesh::{Boundary, Mesh};
 
 /// Options of `upt prior`.
@@ -160,12 +160,28 @@ pub struct Written {
 
 /// Runs the command.
 pub fn run(args: &Options) -> anyhow::Result<ExitCode> {
-    let written = write_columns(args)?;
+    let written = write_columns(args, &mut |_| Ok(()))?;
     report(args, &written)
 }
 
-/// Solves for the columns and writes the file.
-pub fn write_columns(args: &Options) -> anyhow::Result<Written> {
+/// Columns that are there.
+#[derive(Clone, Copy, Debug)]
+pub struct Made {
+    /// All of them, and how many of them in this run.
+    pub done: usize,
+    pub here: usize,
+    /// How many there will be.
+    pub rows: usize,
+    /// Time for those of this run, s.
+    pub seconds: f64,
+}
+
+/// Solves for the columns and writes the file. `go_on` hears of the columns before each batch, and may end it there: what is written
+/// stays, and the next call goes on from it.
+pub fn write_columns(
+    args: &Options,
+    go_on: &mut dyn FnMut(Made) -> anyhow::Result<()>,
+) -> anyhow::Result<Written> {
     let mesh = Mesh::read(&args.mesh)?;
     let held = mesh.held_nodes(args.boundary);
     let nodes = contact_nodes(&mesh, &held);
@@ -225,6 +241,16 @@ pub fn write_columns(args: &Options) -> anyhow::Result<Written> {
     let started = Instant::now();
     let mut bytes = vec![0; 4 * width];
     let mut source = partial.reader()?;
+    let mut made = Made {
+        done,
+        here: 0,
+        rows,
+        seconds: 0.0,
+    };
+    if done < rows {
+        go_on(made)?;
+    }
+    let mut ended = None;
     let compliance = remaining_columns(
         &stiffness,
         &factor,
@@ -240,10 +266,27 @@ pub fn write_columns(args: &Options) -> anyhow::Result<Written> {
         },
         |first, fields| {
             partial.out.write_all(&floats(fields.iter().copied()))?;
-            bar.set_position((first + fields.len() / width) as u64);
+            made.done = first + fields.len() / width;
+            made.here = made.done - done;
+            made.seconds = started.elapsed().as_secs_f64();
+            bar.set_position(made.done as u64);
+            if made.done < rows
+                && let Err(error) = go_on(made)
+            {
+                ended = Some(error);
+                return Err(LinearError::Stopped);
+            }
             Ok(())
         },
-    )?;
+    );
+    if let Some(error) = ended {
+        partial
+            .out
+            .flush()
+            .with_context(|| format!("{}: writing failed", temporary.display()))?;
+        return Err(error);
+    }
+    let compliance = compliance?;
     let mut out = partial.out;
     bar.finish_and_clear();
     let solve_seconds = started.elapsed().as_secs_f64();

@@ -9,6 +9,7 @@ use crate::tool_tracks::ToolTracks;
 use crate::trajectory::{Trajectory, TrajectoryHeader};
 use contact::{Samples, Shape, Vector};
 use std::collections::BTreeMap;
+use std::time::Instant;
 
 /// Name and version that trajectories carry.
 pub const SOLVER_NAME: &str = concat!("libupt tled ", env!("CARGO_PKG_VERSION"));
@@ -80,7 +81,12 @@ pub struct ToolOrder<'a> {
     pub scale: ToolScale,
     /// Frames that each step of the programme is recorded in.
     pub frames_per_step: usize,
+    /// Its last frame is the one at whose end this is over, but not one of the first [`LEAST_FRAMES`].
+    pub until: Option<Instant>,
 }
+
+/// Frames of a case that are simulated whatever the time.
+pub const LEAST_FRAMES: usize = 24;
 
 impl ToolOrder<'_> {
     /// A programme with the table's shape and sizes, a frame a step.
@@ -91,6 +97,7 @@ impl ToolOrder<'_> {
             seed,
             scale: ToolScale::TABLE,
             frames_per_step: 1,
+            until: None,
         }
     }
 }
@@ -111,6 +118,7 @@ pub fn simulate_tools(
         own,
         seed,
         scale,
+        until,
         ..
     } = order;
     let parts = order.frames_per_step.max(1);
@@ -144,6 +152,9 @@ pub fn simulate_tools(
         close_row(&mut trajectory);
         tracks.push(poses, &report);
         progress(frame + 1, case.frames.len());
+        if frame + 1 >= LEAST_FRAMES && until.is_some_and(|until| Instant::now() > until) {
+            break;
+        }
     }
     trajectory.tools = Some(tracks);
     Ok(trajectory)

@@ -37,7 +37,7 @@ impl ToolSizes {
 /// What to measure.
 pub struct Plan {
     pub bundle: PathBuf,
-    /// Cases; none: as many as fit into `seconds`, at most `ORDER`'s, the last ones perhaps not to their ends.
+    /// Cases at most; none: `ORDER`'s. As many as fit into `seconds`, the last ones perhaps not to their ends.
     pub cases: Option<usize>,
     /// Frames of each case, where a certificate that is repeated had no time for all.
     pub frames: Vec<Option<usize>>,

@@ -7,6 +7,7 @@ use anyhow::Result;
 use tissue::contact::ContactDomain;
 use tissue::mesh::{Boundary, Mesh};
 use tissue::schemes::{FRAME_S, FRAMES, Programme, Scheme};
+use tissue::simulate::LEAST_FRAMES;
 use tissue::solver::{Solver, SolverOptions};
 use upt::{Contact, Corrections, Error, Model, Scene, SceneOptions, StepInput};
 
@@ -15,8 +16,6 @@ use crate::preview::Film;
 
 /// Push of the programmes as they are written, mm.
 const PROGRAMME_PUSH_MM: f64 = 15.0;
-/// Frames of a case that are simulated whatever the time.
-const LEAST_FRAMES: usize = 24;
 /// Steps whose time is measured.
 const TIMED: usize = 400;
 

@@ -6,6 +6,7 @@ use anyhow::{Context, Result};
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 use tissue::mesh::Mesh;
+use tissue::programmes::ToolProgramme;
 use tissue::tensors::{f32_values, write_whole};
 use upt::Model;
 
@@ -155,10 +156,43 @@ impl Certificate {
             .collect()
     }
 
-    /// What rigid tools came to, a row a programme, and how large they were.
-    pub fn add_tools(&mut self, rows: Value, sizes: &Chosen) {
+    /// What rigid tools came to, a row a programme, and how large they were. Programmes that were `asked` for and have no row had no time.
+    pub fn add_tools(&mut self, rows: Value, sizes: &Chosen, asked: &[ToolProgramme]) {
+        let has_row = |name: &str| {
+            let rows = rows.as_array().into_iter().flatten();
+            rows.into_iter().any(|row| row["programme"] == name)
+        };
+        let left_out: Vec<&str> = (asked.iter().map(|programme| programme.name()))
+            .filter(|name| !has_row(name))
+            .collect();
+        if !left_out.is_empty() {
+            self.value["tools_left_out"] = json!(left_out);
+        }
         self.value["tools"] = rows;
         self.value["tool_sizes"] = sizes.json();
+    }
+
+    /// What was asked for and had no time, a line each.
+    pub fn left_out(&self, cases: Option<usize>) -> Vec<String> {
+        let mut lines = Vec::new();
+        let found = self.value["tested"]["cases"].as_u64().unwrap_or(0);
+        if let Some(asked) = cases.filter(|&asked| asked as u64 > found) {
+            lines.push(format!(
+                "no time for {} of the {asked} --cases; a larger --minutes has it",
+                asked as u64 - found
+            ));
+        }
+        let left_out = self.value["tools_left_out"].as_array();
+        let names: Vec<&str> = (left_out.into_iter().flatten())
+            .filter_map(Value::as_str)
+            .collect();
+        if !names.is_empty() {
+            lines.push(format!(
+                "no time for --tools {}; a larger --minutes has it",
+                names.join(",")
+            ));
+        }
+        lines
     }
 
     /// The first case, for the page.

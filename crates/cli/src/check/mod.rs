@@ -164,8 +164,14 @@ pub fn run(options: &Options) -> Result<ExitCode> {
 /// Simulates and replays; the certificate lacks the bundle's identity until it is finished.
 pub fn measure(plan: &Plan) -> Result<Certificate> {
     let started = Instant::now();
-    let until = (plan.cases.is_none() && plan.seconds.is_finite())
-        .then(|| started + Duration::from_secs_f64(plan.seconds.max(0.0)));
+    // The tools have half of the time, and what the contacts leave of theirs.
+    let seconds = match plan.tools.is_empty() {
+        true => plan.seconds,
+        false => 0.5 * plan.seconds,
+    };
+    let until = seconds
+        .is_finite()
+        .then(|| started + Duration::from_secs_f64(seconds.max(0.0)));
     let bundle = Bundle::open(&plan.bundle)?;
     let most = plan.cases.unwrap_or(ORDER.len());
     let workers = workers(plan.threads).min(most);
@@ -174,7 +180,7 @@ pub fn measure(plan: &Plan) -> Result<Certificate> {
         let spent = started.elapsed().as_secs_f64();
         // Another case takes about as long as those before it.
         let rounds = (at / workers) as f64;
-        plan.cases.is_none() && at >= workers && spent * (rounds + 1.0) / rounds > plan.seconds
+        at >= workers && spent * (rounds + 1.0) / rounds > seconds
     };
     let scores = in_parallel(workers, &|at| at < most && !late(at), &|at| {
         let case = held_out(plan.seed, at);
@@ -201,7 +207,9 @@ pub fn measure(plan: &Plan) -> Result<Certificate> {
     let mut certificate = bundle.certificate(plan.seed, scores)?;
     if !plan.tools.is_empty() {
         let sizes = plan.sizes.choose(&bundle);
-        certificate.add_tools(tools::measure(plan, &bundle, sizes.scale)?, &sizes);
+        let left = plan.seconds - started.elapsed().as_secs_f64();
+        let rows = tools::measure(plan, &bundle, sizes.scale, left)?;
+        certificate.add_tools(rows, &sizes, &plan.tools);
     }
     certificate.judge();
     Ok(certificate)

@@ -126,6 +126,12 @@ fn faults(certificate: &Value) -> Vec<(String, String)> {
             found.push((what, "give a smaller --tool-scale or --push".to_owned()));
         }
     }
+    let left_out = list(&certificate["tools_left_out"]);
+    if !left_out.is_empty() {
+        let names: Vec<&str> = left_out.iter().filter_map(Value::as_str).collect();
+        let what = format!("tools of `{}` were not tested", names.join("`, `"));
+        found.push((what, "give more --minutes".to_owned()));
+    }
     found
 }
 
@@ -181,5 +187,11 @@ mod tests {
         let mut tools = certificate(0.004, Value::Null);
         tools["tools"] = json!([{"programme": "press", "steps": 100, "inverted_steps": 30}]);
         assert!(line(&tools).contains("`press`"), "{}", line(&tools));
+        let mut untested = certificate(0.004, Value::Null);
+        untested["tools_left_out"] = json!(["stroke"]);
+        assert_eq!(
+            line(&untested),
+            "not good enough: tools of `stroke` were not tested; give more --minutes"
+        );
     }
 }

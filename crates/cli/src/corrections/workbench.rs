@@ -80,7 +80,10 @@ impl Workbench {
             None => {
                 let bar = spinner(quiet, "natural modes: solves with the factor");
                 let density = material.density_kg_m3;
-                let done = || bar.inc(1);
+                let done = || {
+                    bar.inc(1);
+                    true
+                };
                 let found = natural_modes(&mesh, &stiffness, &factor, density, natural, &done)?;
                 bar.finish_and_clear();
                 found

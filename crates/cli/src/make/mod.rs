@@ -7,6 +7,8 @@
 
 mod body;
 mod bundle;
+mod certify;
+mod clock;
 mod emit;
 mod learn;
 mod options;
@@ -21,39 +23,24 @@ pub use options::Options;
 
 use std::path::Path;
 use std::process::ExitCode;
-use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 use serde_json::json;
-use tissue::linear::ColumnsFile;
+use tissue::linear::{ColumnsFile, LinearError};
 use tissue::mesh::Mesh;
 
-use crate::check;
 use crate::corrections::{Known, Workbench, principal};
-use crate::effort::Effort;
 use crate::{corrections, modes, preview, prior};
+use clock::Clock;
 use options::Sizes;
 use stages::{Work, key_of};
 
-/// Part of the time after which the coarse space is made from the patches that are there.
-const PATCHED: f64 = 0.3;
-/// Part of the time after which no equilibrium is computed.
-const REFINED: f64 = 0.4;
-/// Part of it after which no tool is simulated but by the check.
-const LEARNED: f64 = 0.75;
-/// Part of it that the check has whatever came before.
-const LEAST_CHECKED: f64 = 0.1;
-/// Part of what is left that simulates the check's cases.
-const SIMULATED: f64 = 0.8;
-/// Where `--target-error` is missed, so many corrections are added and a target is halved, at most up to so many corrections.
-const MORE_CORRECTIONS: u32 = 3;
-const MOST_CORRECTIONS: u32 = 16;
 /// Length of step for hosts that show frames, where one takes less than half of it here, s.
 const FRAME_STEP_S: f64 = 0.02;
 
 /// Runs the command.
 pub fn run(options: &Options) -> Result<ExitCode> {
-    let started = Instant::now();
+    let clock = Clock::start(options.minutes);
     options.check()?;
     if let [cluster, folder] = options.emit.as_slice() {
         let start = emit::write(options, cluster, Path::new(folder))?;
@@ -124,16 +111,20 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     ]);
     let columns_file = work.file("columns.safetensors");
     work.stage("columns", &held_key, &["columns.safetensors"], |stage| {
-        let found = prior::write_columns(&prior::Options {
-            mesh: mesh_file.clone(),
-            boundary: options.boundary,
-            out: columns_file.clone(),
-            young: material.young_pa,
-            poisson: material.poisson,
-            batch: 96,
-            threads: options.threads,
-            json: options.json,
-        })?;
+        clock.go_on(clock::COLUMNS, "the tetrahedra took all of it")?;
+        let found = prior::write_columns(
+            &prior::Options {
+                mesh: mesh_file.clone(),
+                boundary: options.boundary,
+                out: columns_file.clone(),
+                young: material.young_pa,
+                poisson: material.poisson,
+                batch: 96,
+                threads: options.threads,
+                json: options.json,
+            },
+            &mut |made| clock.columns(made),
+        )?;
         stage.decided(&format!(
             "{} columns of {} degrees of freedom",
             found.rows, found.width
@@ -148,7 +139,8 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     ]);
     let modes_file = work.file("modes.safetensors");
     work.stage("modes", &modes_key, &["modes.safetensors"], |stage| {
-        let hertz = modes::write(&modes::Options {
+        let go_on = || clock.go_on(clock::MODES, "the natural modes are not there");
+        let order = modes::Options {
             mesh: mesh_file.clone(),
             boundary: options.boundary,
             count: vibration::count(&mesh, options),
@@ -158,7 +150,13 @@ pub fn run(options: &Options) -> Result<ExitCode> {
             density: material.density_kg_m3,
             threads: options.threads,
             json: options.json,
-        })?;
+        };
+        let hertz = match modes::write(&order, &|| go_on().is_ok()) {
+            Err(error) if matches!(error.downcast_ref(), Some(LinearError::Stopped)) => {
+                return go_on();
+            }
+            found => found?,
+        };
         stage.decided(&format!(
             "natural modes from {:.2} to {:.2} Hz",
             hertz[0], hertz[1]
@@ -182,7 +180,7 @@ pub fn run(options: &Options) -> Result<ExitCode> {
             material.poisson,
         )?;
         let modes = vibration::Modes::read(&modes_file)?;
-        tables::make(options, &mesh, &columns, &modes, &sizes, stage)
+        tables::make(options, &mesh, &columns, &modes, &sizes, &clock, stage)
     })?;
 
     // From here on there is a bundle that works.
@@ -197,9 +195,7 @@ pub fn run(options: &Options) -> Result<ExitCode> {
         options.draft().to_string().as_bytes(),
     ]);
     let draft = work.file("bundle");
-    let budget = 60.0 * options.minutes;
-    let until =
-        Instant::now() + Duration::from_secs_f64((PATCHED * budget - work.spent()).max(0.0));
+    let until = clock.until(clock::PATCHED);
     work.stage(
         "coarse",
         &coarse_key,
@@ -227,15 +223,15 @@ pub fn run(options: &Options) -> Result<ExitCode> {
         },
     )?;
 
-    if work.spent() > budget {
+    if clock.left(clock::REFINED) < 0.0 {
         work.tell(&format!(
-            "what every bundle needs took {:.1} minutes, more than --minutes {}: the check is short, and nothing is refined",
-            work.spent() / 60.0,
+            "what every bundle needs took {:.1} of {} minutes: nothing is refined",
+            clock.spent() / 60.0,
             options.minutes
         ));
     }
-    let refine_key = key_of(&[coarse_key.as_bytes(), budget.to_string().as_bytes()]);
-    let seconds = REFINED * budget - work.spent();
+    let refine_key = key_of(&[coarse_key.as_bytes(), clock.budget().to_string().as_bytes()]);
+    let seconds = clock.left(clock::REFINED);
     let made = work.stage(
         "refine",
         &refine_key,
@@ -254,7 +250,7 @@ pub fn run(options: &Options) -> Result<ExitCode> {
         },
     )?;
     let work_refined = work.file("refined");
-    let seconds = LEARNED * budget - work.spent();
+    let seconds = clock.left(clock::LEARNED);
     let learn_key = key_of(&[made.key.as_bytes(), effort.to_string().as_bytes()]);
     let made = work.stage("learn", &learn_key, &["learned/bundle.json"], |stage| {
         let learning = learn::Learning {
@@ -270,20 +266,11 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     })?;
     let draft = work.file("learned");
 
-    let mut corrections = effort;
-    let (mut certificate, certified) = loop {
-        let found = certify(options, &mut work, &made.key, &draft, corrections, budget)?;
-        let error = found.worst_mse();
-        let missed = options.target_error.is_some_and(|target| error > target);
-        if !missed || corrections.most >= MOST_CORRECTIONS || work.spent() > budget {
-            break (found, work.file(&name_of_check(corrections)));
-        }
-        corrections.most = (corrections.most + MORE_CORRECTIONS).min(MOST_CORRECTIONS);
-        corrections.target_mm *= 0.5;
-        work.tell(&format!(
-            "{error:.2e} mm² is above --target-error: {corrections} corrections a step"
-        ));
-    };
+    let certify::Certified {
+        mut certificate,
+        folder: certified,
+        corrections,
+    } = certify::run(options, &mut work, &made.key, &draft, effort, &clock)?;
     if corrections.most > 0 && certificate.median_step_ms() < 0.5e3 * FRAME_STEP_S {
         let change = corrections::Change {
             frame_step_s: Some(FRAME_STEP_S),
@@ -303,7 +290,7 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     )?;
     certificate.write(&certified, &mesh, &sizes.scene(&mesh))?;
     bundle::publish(&certified, &options.out)?;
-    let seconds = started.elapsed().as_secs_f64();
+    let seconds = clock.spent();
     if options.json {
         println!(
             "{}",
@@ -325,63 +312,4 @@ pub fn run(options: &Options) -> Result<ExitCode> {
         );
     }
     Ok(ExitCode::SUCCESS)
-}
-
-/// The name of a stage is that of its files.
-fn name_of_check(corrections: Effort) -> String {
-    format!("check-{corrections}").replace('/', "-")
-}
-
-/// Held-out contacts of the bundle with so many corrections a step, in a copy of its own.
-fn certify(
-    options: &Options,
-    work: &mut Work,
-    key: &str,
-    draft: &Path,
-    corrections: Effort,
-    budget: f64,
-) -> Result<check::Certificate> {
-    let name = name_of_check(corrections);
-    let key = key_of(&[
-        key.as_bytes(),
-        format!(
-            "{corrections} {} {:?} {:?} {:?}",
-            options.seed, options.cases, options.tools, options.sizes.tool_scale
-        )
-        .as_bytes(),
-    ]);
-    let left = (budget - work.spent()).max(LEAST_CHECKED * budget);
-    let copy = work.file(&name);
-    bundle::copy(draft, &copy)?;
-    let change = corrections::Change {
-        recommended: Some(corrections),
-        ..corrections::Change::default()
-    };
-    corrections::recommend(&copy, &change)?;
-    let files = ["json", "errors", "film"].map(|end| format!("{name}.{end}"));
-    let paths = files.each_ref().map(|file| work.file(file));
-    work.stage(
-        &name,
-        &key,
-        &files.each_ref().map(String::as_str),
-        |stage| {
-            let found = check::measure(&check::Plan {
-                bundle: copy,
-                cases: options.cases,
-                frames: Vec::new(),
-                seconds: SIMULATED * left,
-                seed: options.seed ^ 0xCE27,
-                tools: options.programmes()?,
-                sizes: check::ToolSizes::Asked(options.sizes),
-                threads: options.threads,
-                quiet: options.json,
-            })?;
-            stage.decided(&found.words());
-            std::fs::write(&paths[0], serde_json::to_vec_pretty(&found.json())?)?;
-            std::fs::write(&paths[1], found.node_errors_bytes())?;
-            std::fs::write(&paths[2], serde_json::to_vec(found.film())?)?;
-            Ok(())
-        },
-    )?;
-    check::Certificate::read(&paths)
 }

@@ -70,10 +70,10 @@ pub struct Options {
     /// Number of nodes to aim for when a surface is filled.
     #[arg(long, default_value_t = 5000)]
     pub nodes: usize,
-    /// Time to spend, minutes. It sets how many held-out cases the check simulates.
+    /// Time for the whole run, minutes, by the clock. What is optional stops in time; where the rest does not fit, an error says how many are needed.
     #[arg(long, default_value_t = 10.0)]
     pub minutes: f64,
-    /// Held-out cases of the check. Default: as many as there is time for, at most 8.
+    /// Held-out cases of the check at most. Default: as many as there is time for, at most 8.
     #[arg(long)]
     pub cases: Option<usize>,
     #[arg(long, help = loads::programmes_help() + ". Two cases of each are part of the certificate and of --target-error")]

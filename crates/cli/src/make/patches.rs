@@ -16,13 +16,15 @@ fn normal(random: &mut SplitMix) -> f64 {
 }
 
 /// `count` random patches of the domain, each pushed by two thirds of the deepest push in a random direction; a hundredth of it
-/// varies from node to node, so that patches that deform are spanned too. At least three nodes a patch.
+/// varies from node to node, so that patches that deform are spanned too. At least three nodes a patch. `go_on` may
+/// end it.
 pub fn sample(
     mesh: &Mesh,
     compliance: &Compliance,
     sizes: &Sizes,
     count: usize,
     seed: u64,
+    go_on: &dyn Fn() -> Result<()>,
 ) -> Result<Vec<Forces>> {
     let mut random = SplitMix(seed);
     let points: Vec<[f64; 3]> = compliance
@@ -33,6 +35,7 @@ pub fn sample(
     let push = sizes.push_mm * 2.0 / 3.0;
     let mut samples = Vec::with_capacity(count);
     for _ in 0..count {
+        go_on()?;
         let centre = points[random.below(points.len())];
         let [low, high] = sizes.area_mm2;
         let radius = ((low + (high - low) * random.unit()) / std::f64::consts::PI).sqrt();

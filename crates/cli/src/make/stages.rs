@@ -61,7 +61,6 @@ impl Stage {
 pub struct Work {
     folder: PathBuf,
     quiet: bool,
-    spent: f64,
     _lock: File,
 }
 
@@ -85,7 +84,6 @@ impl Work {
         Ok(Self {
             folder: folder.into(),
             quiet,
-            spent: 0.0,
             _lock: lock,
         })
     }
@@ -93,11 +91,6 @@ impl Work {
     /// A file of the folder.
     pub fn file(&self, name: &str) -> PathBuf {
         self.folder.join(name)
-    }
-
-    /// Seconds that the stages so far took, this time or in an earlier run.
-    pub fn spent(&self) -> f64 {
-        self.spent
     }
 
     /// A line for the user.
@@ -132,7 +125,6 @@ impl Work {
                     record.seconds
                 );
             }
-            self.spent += record.seconds;
             return Ok(record);
         }
         if !self.quiet {
@@ -173,7 +165,6 @@ impl Work {
         if !self.quiet {
             eprintln!("      done in {:.1} s", record.seconds);
         }
-        self.spent += record.seconds;
         Ok(record)
     }
 }

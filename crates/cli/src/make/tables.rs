@@ -13,6 +13,7 @@ use tissue::linear::{Blocks, ColumnsFile, Compliance, leading_directions};
 use tissue::mesh::Mesh;
 use tissue::tensors::{Dtype, Tensor, write_file};
 
+use super::clock::{self, Clock};
 use super::options::{Options, Sizes};
 use super::patches::{self, Forces};
 use super::projected::Projected;
@@ -36,8 +37,10 @@ pub fn make(
     columns: &ColumnsFile,
     modes: &Modes,
     sizes: &Sizes,
+    clock: &Clock,
     stage: &mut Stage,
 ) -> Result<()> {
+    let go_on = |what: &str| clock.go_on(clock::TABLES, what);
     let compliance = &columns.compliance;
     let width = 3 * mesh.node_count();
     let samples = patches::sample(
@@ -46,6 +49,7 @@ pub fn make(
         sizes,
         (3 * compliance.nodes.len() / 2).clamp(512, 3000),
         options.seed ^ 0x5A3F,
+        &|| go_on("the tables are not begun"),
     )?;
     let force_to_mode = modes.force_to_mode(&compliance.nodes);
     let (fields, _) = modes.scaled();
@@ -70,6 +74,10 @@ pub fn make(
         columns.each_column(|_, column| part.extend(dofs.iter().map(|&dof| column[dof])))?;
         let mut start = 0;
         for block in group {
+            go_on(&format!(
+                "{block} of {} blocks of the tables are made",
+                blocks.count()
+            ))?;
             let size = 3 * blocks.nodes_of(block).len();
             let here = start..start + size;
             start += size;

@@ -48,6 +48,9 @@ pub enum LinearError {
     /// The iteration for the natural modes ended early.
     #[error("only {found} of {asked} natural modes converged; ask for fewer")]
     NotConverged { asked: usize, found: usize },
+    /// The caller wanted no more of it.
+    #[error("stopped before its end")]
+    Stopped,
     /// A sink of columns failed.
     #[error("writing compliance columns: {0}")]
     Sink(#[from] std::io::Error),

@@ -9,6 +9,7 @@ use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
 use faer::matrix_free::LinOp;
 use faer::matrix_free::eigen::{partial_self_adjoint_eigen, partial_self_adjoint_eigen_scratch};
 use faer::{Col, Mat, MatMut, MatRef, Par};
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
 /// The lowest modes, ascending by frequency.
 #[derive(Debug, Clone)]
@@ -35,8 +36,11 @@ fn lumped_mass(mesh: &Mesh, density_kg_m3: f64) -> Vec<f64> {
 struct Flexibility<'a> {
     factor: &'a Factor,
     root: &'a [f64],
-    solved: &'a (dyn Fn() + Sync),
+    go_on: &'a (dyn Fn() -> bool + Sync),
 }
+
+/// Unwinds out of an iteration that knows no other end.
+struct Stopped;
 
 impl std::fmt::Debug for Flexibility<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
@@ -65,6 +69,9 @@ impl LinOp<f64> for Flexibility<'_> {
         _stack: &mut MemStack,
     ) {
         for column in 0..right.ncols() {
+            if !(self.go_on)() {
+                resume_unwind(Box::new(Stopped));
+            }
             let mut values: Vec<f64> = (self.root.iter().enumerate())
                 .map(|(row, root)| root * right[(row, column)])
                 .collect();
@@ -72,7 +79,6 @@ impl LinOp<f64> for Flexibility<'_> {
             for (row, (root, value)) in self.root.iter().zip(&values).enumerate() {
                 out[(row, column)] = root * value;
             }
-            (self.solved)();
         }
     }
 
@@ -89,17 +95,17 @@ impl LinOp<f64> for Flexibility<'_> {
 
 /// The `count` lowest natural modes of `mesh` with the held nodes that `stiffness` was assembled without.
 ///
-/// `solved` is called after every solve, for progress. Memory: the factor and `4 count` vectors of its size.
+/// `go_on` is asked before every solve. Memory: the factor and `4 count` vectors of its size.
 ///
 /// # Errors
-/// More modes than degrees of freedom; not all converge.
+/// More modes than degrees of freedom; not all converge; [`LinearError::Stopped`] where `go_on` says no.
 pub fn natural_modes(
     mesh: &Mesh,
     stiffness: &Stiffness,
     factor: &Factor,
     density_kg_m3: f64,
     count: usize,
-    solved: &(dyn Fn() + Sync),
+    go_on: &(dyn Fn() -> bool + Sync),
 ) -> Result<NaturalModes, LinearError> {
     let n = stiffness.dofs();
     if count == 0 || 2 * count >= n {
@@ -116,7 +122,7 @@ pub fn natural_modes(
     let operator = Flexibility {
         factor,
         root: &root,
-        solved,
+        go_on,
     };
     // Any start that no mode is orthogonal to: a fixed sequence, so that the modes are the same every time.
     let start = Col::<f64>::from_fn(n, |row| {
@@ -132,17 +138,25 @@ pub fn natural_modes(
     ));
     let mut vectors = Mat::<f64>::zeros(n, count);
     let mut values = vec![0.0; count];
-    let found = partial_self_adjoint_eigen(
-        vectors.as_mut(),
-        &mut values,
-        &operator,
-        start.as_ref(),
-        1e-9,
-        Par::Seq,
-        MemStack::new(&mut memory),
-        Default::default(),
-    )
-    .n_converged_eigen;
+    // What is half written where it stops is dropped below.
+    let found = catch_unwind(AssertUnwindSafe(|| {
+        partial_self_adjoint_eigen(
+            vectors.as_mut(),
+            &mut values,
+            &operator,
+            start.as_ref(),
+            1e-9,
+            Par::Seq,
+            MemStack::new(&mut memory),
+            Default::default(),
+        )
+        .n_converged_eigen
+    }));
+    let found = match found {
+        Ok(found) => found,
+        Err(cause) if cause.is::<Stopped>() => return Err(LinearError::Stopped),
+        Err(cause) => resume_unwind(cause),
+    };
     if found < count || values.iter().any(|&value| value.is_nan() || value <= 0.0) {
         return Err(LinearError::NotConverged {
             asked: count,
