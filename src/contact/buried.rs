@@ -11,8 +11,6 @@ use crate::bundle::Mesh;
 const LEAST_MM: f32 = 1.0;
 /// What lies deeper than this is looked for by the solid, mm.
 const PIERCED_MM: f32 = 4.0;
-/// Samples this much farther from the place where the tool comes out than twice its depth stay as they are, mm.
-const NEAR_MM: f32 = 2.0;
 /// Ways out of the solid are looked for as far as this, mm.
 const LONGEST_MM: u32 = 30;
 
@@ -34,12 +32,6 @@ impl Buried {
     pub fn way_along(&self, direction: Vector, mesh: &Mesh, state: State<'_>) -> Option<Vector> {
         let mut ways = (1..=LONGEST_MM).map(|length| direction * length as f32);
         ways.find(|way| !is_inside(self.point + way, mesh, state))
-    }
-
-    /// Whether a sample is of the surface over the tool, which it has to leave by.
-    pub fn takes(&self, point: Vector, outward: Vector) -> bool {
-        let over = self.point + self.out * self.depth;
-        self.out.dot(outward) > 0.5 && point.distance(over) <= 2.0 * self.depth + NEAR_MM
     }
 
     /// Where the tip of a thin tool has pierced the touchable surface, by no more than [`PIERCED_MM`].

@@ -56,8 +56,8 @@ pub(crate) struct Pair<'a> {
     pub(crate) put: bool,
     /// The tool is so quick or thin that it may go past a sample between two looks.
     pub(crate) swept: bool,
-    /// The tool lies in the tissue: unit direction of the shortest way out, and how far the surface may have to go against it, mm.
-    pub(crate) way_out: Option<(Vector, f32)>,
+    /// The tool lies in the tissue: unit direction of the shortest way out.
+    pub(crate) way_out: Option<Vector>,
 }
 
 impl Pair<'_> {
@@ -85,13 +85,15 @@ impl Pair<'_> {
         let carried = self
             .now
             .transform_point(self.from.inverse_transform_point(start));
-        let way_out = self.way_out.filter(|(out, _)| normal.dot(*out) > -LEAN);
-        let way_out = way_out.and_then(|(out, most)| {
-            let way = self.body.way_through(self.now, point, -out, most)?;
-            Some((out, way))
-        });
-        if let Some((out, way)) = way_out {
-            (normal, gap) = (-out, -way);
+        if let Some(out) = self.way_out
+            && normal.dot(out) > -LEAN
+        {
+            let way = self.body.way_through(self.now, point, -out, THROUGH_MM);
+            match way {
+                Some(way) => (normal, gap) = (-out, -way),
+                None if force == Vector::ZERO => return RELEASED,
+                None => {}
+            }
         } else if let Some((face, depth)) = self.pierced(point, start, outward, gap) {
             (normal, gap) = (face, -depth);
         } else if normal.dot(outward) > LEAN {
@@ -237,8 +239,8 @@ impl Moving<'_> {
             put: self.put[index],
             swept: self.swept[index],
             way_out: self.buried[index]
-                .filter(|buried| row.sample == buried.row || buried.takes(row.point, row.outward))
-                .map(|buried| (buried.out, buried.depth + 2.0 * tool.body.size())),
+                .filter(|buried| row.sample == buried.row || buried.out.dot(row.outward) > 0.5)
+                .map(|buried| buried.out),
         };
         let sample = self.samples.at(row.sample);
         let start = sample.gather(|node| self.state.position_before(node));

@@ -164,7 +164,7 @@ impl Body {
     pub fn sinks_between(&self, spacing: f32) -> bool {
         let round = match self.core {
             Core::Triangles(_) if self.pointed => self.radius,
-            Core::Triangles(_) | Core::Cuboid { .. } if !self.pierces() => return false,
+            _ if self.is_broad() => return false,
             _ => self.size(),
         };
         // A point of an equilateral triangle is at most so far from its corners.
@@ -175,6 +175,16 @@ impl Body {
     /// Whether it is so thin that it pierces the surface before it has pushed it.
     pub fn pierces(&self) -> bool {
         self.size() < THIN_MM
+    }
+
+    /// Whether it has broad sides, as thick boxes, spatulas and hulls without a point have: several folds of the tissue may lie on them.
+    pub fn is_broad(&self) -> bool {
+        let is_flat = match self.core {
+            Core::Segment { .. } => false,
+            Core::Cuboid { .. } => true,
+            Core::Triangles(_) => !self.pointed,
+        };
+        is_flat && !self.pierces()
     }
 
     /// How round its edges are at least, mm; 0 where they are sharp.

@@ -14,11 +14,6 @@ use std::collections::TryReserveError;
 /// How far from a tool samples are looked at, in addition to its motion, mm.
 pub const SKIN_MM: f32 = 1.0;
 
-/// A face's lattice is left out where a sample of the face is within this of the deepest point of it, mm.
-const COVERED_MM: f32 = 0.25;
-/// The same as long as the tool's normal at that point leans no more than this (cosine) against the face's.
-const FACING: f32 = -0.2;
-
 /// A tool where it is, and how far from it to look: [`SKIN_MM`] and its motion ([`Body::motion`]).
 #[derive(Clone, Copy, Debug)]
 pub struct Placed<'a> {
@@ -96,23 +91,20 @@ impl Search {
                 if a & b & c != 0 {
                     continue;
                 }
-                let mut reached = f32::MAX;
+                let nearest = nearest_of_face(samples, face, tool, &position);
+                let nearest = nearest.map(|(row, at, nearest)| candidate(index, row, at, nearest));
+                self.between.extend(nearest);
                 for row in samples.of_face(face) {
                     let point = samples.rows()[row].gather(&position);
                     if point.cmplt(low).any() || point.cmpgt(high).any() {
                         continue;
                     }
                     let nearest = tool.body.nearest_at(&tool.pose, point);
-                    reached = reached.min(nearest.distance);
                     if nearest.distance <= tool.skin {
                         self.found
                             .push(candidate(index, row as u32, point, nearest));
                     }
                 }
-                let nearest = nearest_of_face(samples, face, tool, &position)
-                    .filter(|(.., nearest)| nearest.distance < reached - COVERED_MM)
-                    .map(|(row, at, nearest)| candidate(index, row, at, nearest));
-                self.between.extend(nearest);
             }
             self.found.append(&mut self.between);
         }
@@ -193,9 +185,7 @@ fn nearest_of_face(
         }
     }
     let (place, (point, nearest)) = best;
-    let outward = (b - a).cross(c - a).normalize_or_zero();
-    let faces = tool.body.pierces() || nearest.normal.dot(outward) < FACING;
-    if nearest.distance > tool.skin || !faces {
+    if nearest.distance > tool.skin {
         return None;
     }
     let row = samples.lattice_row(face, place.map(|n| n as u32))?;

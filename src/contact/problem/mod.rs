@@ -35,7 +35,9 @@ const WHAT: &str = "the contact of instruments";
 /// Parts of a step's way at most: of a thin tool that goes as far as one may.
 const MOST_PARTS: f32 = 80.0;
 /// Work of the solves of a step at most, those of its substeps included: about so many multiplications, some five milliseconds.
-const STEP_WORK: u64 = 120_000_000;
+const STEP_WORK: u64 = 20_000_000;
+/// A step whose contact is not to be lost may take so many times that.
+const PATIENCE: u64 = 6;
 /// Parts of the tools' ways in a step that has taken its time.
 const LEAST_PARTS: u32 = 4;
 /// A tool that goes farther in a step is quick, mm.
@@ -193,7 +195,11 @@ impl Problem {
         self.unsolved_mm = 0.0;
         self.until = None;
         self.lay_in_tissue = false;
-        self.enter(tools, rest, start)
+        self.enter(tools, rest, start)?;
+        if !self.may_lose() {
+            self.work_left = PATIENCE * STEP_WORK;
+        }
+        Ok(())
     }
 
     /// The same in the middle of a step.
@@ -235,8 +241,8 @@ impl Problem {
             let buried = Buried::find(&tool.body, &from, samples, mesh, state);
             self.buried.push(buried);
             let is_quick = tool.body.motion(&from, &tool.pose) > QUICK_MM;
-            self.swept
-                .push((is_quick || tool.body.pierces()) && moved.is_some());
+            let is_broad = tool.body.is_broad();
+            self.swept.push(!is_broad || (is_quick && moved.is_some()));
             self.may_lose.push(false);
             if self.next.tools.len() <= index {
                 self.next.tools.push(Held::default());
@@ -262,11 +268,13 @@ impl Problem {
         }
         for index in 0..tools.len() {
             // Samples inside of a thick tool come out of it as they are.
-            if !self.tools[index].body.pierces() && self.reaches(index, state) {
+            let is_broad = self.tools[index].body.is_broad();
+            if is_broad && self.reaches(index, state) {
                 self.buried[index] = None;
             }
             self.lay_in_tissue |= self.buried[index].is_some();
-            self.may_lose[index] = self.swept[index] && self.depth(index, state, 0.0) <= RESTING_MM;
+            self.may_lose[index] =
+                self.swept[index] && (!is_broad || self.depth(index, state, 0.0) <= RESTING_MM);
         }
         Ok(())
     }

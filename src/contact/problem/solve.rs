@@ -14,7 +14,9 @@ use crate::error::Result;
 use crate::memory;
 
 /// Multiplications of one linearisation at most: about half a millisecond.
-const SOLVE_WORK: u64 = 30_000_000;
+const SOLVE_WORK: u64 = 2_000_000;
+/// A step whose contact is not to be lost may take so many times that.
+const PATIENCE: u64 = 15;
 /// What else a solve takes, as so many multiplications: for each node and sample that is looked at, for each row and linearisation, and for
 /// each pair of rows.
 const LOOK_WORK: u64 = 60;
@@ -160,8 +162,12 @@ impl Problem {
             self.earlier.clear();
             self.earlier.extend_from_slice(&self.forces);
             let limits = time.limits();
+            let most_work = match self.may_lose.contains(&true) {
+                true => limits.most_work,
+                false => limits.most_work.saturating_mul(PATIENCE),
+            };
             let limits = Limits {
-                most_work: limits.most_work.min(self.work_left),
+                most_work: most_work.min(self.work_left),
                 ..limits
             };
             let outcome = self
