@@ -1,6 +1,6 @@
 //! The body that the corrections move: element forces and lumped mass.
 
-use elements::{ElementForces, Material, Simd, Tetrahedra};
+use elements::{ElementForces, Material, Tetrahedra};
 
 use super::pace::Diagonal;
 use crate::bundle::Mesh;
@@ -47,7 +47,7 @@ impl Body {
         Ok(Body {
             held_nodes: memory::collected(mesh.held_nodes.len(), ascending, WHAT)?,
             mass_of_dof: memory::collected(3 * count, of_dof, WHAT)?,
-            forces: memory::tried(ElementForces::new(body, material, simd(isa)), WHAT)?,
+            forces: memory::tried(ElementForces::new(body, material, isa), WHAT)?,
             mass,
             held,
         })
@@ -56,16 +56,5 @@ impl Body {
     /// Bytes held.
     pub fn memory_bytes(&self) -> usize {
         self.forces.bytes() + self.mass.len() * (4 + 12 + 1) + 4 * self.held_nodes.len()
-    }
-}
-
-/// The element kernel's set for the runtime's.
-fn simd(isa: Isa) -> Simd {
-    match isa {
-        Isa::Scalar => Simd::Scalar,
-        Isa::Avx2 => Simd::Avx2,
-        Isa::Avx512 if Simd::Avx512.is_available() => Simd::Avx512,
-        Isa::Avx512 => Simd::Avx2,
-        Isa::Neon => Simd::Neon,
     }
 }

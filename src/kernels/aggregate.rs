@@ -8,11 +8,11 @@
 
 use super::Compute;
 use super::encode::LowRank;
-use super::isa::{Isa, by_isa};
-use super::lanes::{Lanes, load_some, store_some};
 use super::math::{gelu, gelu_lanes};
 use super::parts::Parts;
 use super::pool::{Pool, PoolError};
+use lanes::{DenseLanes, load_some, store_some};
+use lanes::{Isa, by_isa};
 
 /// Rows of a neighbour list: row `i` is `neighbours[offsets[i]..offsets[i + 1]]`.
 #[derive(Debug, Clone, Copy)]
@@ -156,7 +156,12 @@ fn row_scalar(neighbours: &[u32], source: &[f32], target: &[f32], out: &mut [f32
 by_isa! { fn row(neighbours: &[u32], source: &[f32], target: &[f32], out: &mut [f32]) = row_body, row_scalar; }
 
 #[inline(always)]
-unsafe fn row_body<V: Lanes>(neighbours: &[u32], source: &[f32], target: &[f32], out: &mut [f32]) {
+unsafe fn row_body<V: DenseLanes>(
+    neighbours: &[u32],
+    source: &[f32],
+    target: &[f32],
+    out: &mut [f32],
+) {
     let width = target.len();
     let last = neighbours.iter().copied().max().unwrap_or(0) as usize;
     assert!(
@@ -167,24 +172,24 @@ unsafe fn row_body<V: Lanes>(neighbours: &[u32], source: &[f32], target: &[f32],
     // SAFETY: columns stay below `width`, rows are checked above.
     unsafe {
         let mean = V::splat(1.0 / neighbours.len().max(1) as f32);
-        while column + 2 * V::N <= width {
-            let t = [0, 1].map(|v| V::load(target.as_ptr().add(column + v * V::N)));
+        while column + 2 * V::COUNT <= width {
+            let t = [0, 1].map(|v| V::load(target.as_ptr().add(column + v * V::COUNT)));
             let mut sum = [V::splat(0.0); 2];
             for &j in neighbours {
                 let from = source.as_ptr().add(j as usize * width + column);
                 for v in 0..2 {
-                    sum[v] = sum[v].add(gelu_lanes(V::load(from.add(v * V::N)).add(t[v])));
+                    sum[v] = sum[v].add(gelu_lanes(V::load(from.add(v * V::COUNT)).add(t[v])));
                 }
             }
             for v in 0..2 {
                 sum[v]
                     .mul(mean)
-                    .store(out.as_mut_ptr().add(column + v * V::N));
+                    .store(out.as_mut_ptr().add(column + v * V::COUNT));
             }
-            column += 2 * V::N;
+            column += 2 * V::COUNT;
         }
         while column < width {
-            let count = (width - column).min(V::N);
+            let count = (width - column).min(V::COUNT);
             let t = load_some::<V>(target.as_ptr().add(column), count);
             let mut sum = V::splat(0.0);
             for &j in neighbours {
@@ -220,7 +225,7 @@ by_isa! {
 }
 
 #[inline(always)]
-unsafe fn fused_row_body<V: Lanes>(
+unsafe fn fused_row_body<V: DenseLanes>(
     neighbours: &[u32],
     source: LowRank<'_>,
     features: &[f32],
@@ -238,18 +243,18 @@ unsafe fn fused_row_body<V: Lanes>(
     // SAFETY: columns stay below `width`, rows are checked above.
     unsafe {
         let mean = V::splat(1.0 / neighbours.len().max(1) as f32);
-        while column + 2 * V::N <= width {
-            let t = [0, 1].map(|v| V::load(target.as_ptr().add(column + v * V::N)));
+        while column + 2 * V::COUNT <= width {
+            let t = [0, 1].map(|v| V::load(target.as_ptr().add(column + v * V::COUNT)));
             let mut sum = [V::splat(0.0); 2];
             for &j in neighbours {
                 let from = source.table.as_ptr().add(j as usize * width + column);
                 let feature = features.as_ptr().add(j as usize * rank);
-                let mut message = [0, 1].map(|v| V::load(from.add(v * V::N)));
+                let mut message = [0, 1].map(|v| V::load(from.add(v * V::COUNT)));
                 for k in 0..rank {
                     let f = V::splat(*feature.add(k));
                     let weight = source.weight_t.as_ptr().add(k * width + column);
                     for v in 0..2 {
-                        message[v] = V::load(weight.add(v * V::N)).mul_add(f, message[v]);
+                        message[v] = V::load(weight.add(v * V::COUNT)).mul_add(f, message[v]);
                     }
                 }
                 for v in 0..2 {
@@ -259,12 +264,12 @@ unsafe fn fused_row_body<V: Lanes>(
             for v in 0..2 {
                 sum[v]
                     .mul(mean)
-                    .store(out.as_mut_ptr().add(column + v * V::N));
+                    .store(out.as_mut_ptr().add(column + v * V::COUNT));
             }
-            column += 2 * V::N;
+            column += 2 * V::COUNT;
         }
         while column < width {
-            let count = (width - column).min(V::N);
+            let count = (width - column).min(V::COUNT);
             let t = load_some::<V>(target.as_ptr().add(column), count);
             let mut sum = V::splat(0.0);
             for &j in neighbours {

@@ -12,9 +12,9 @@ mod upper;
 
 pub use gram::subtract_gram;
 
-use super::isa::Isa;
 use crate::memory;
 use gram::whiten_rows;
+use lanes::Isa;
 use upper::{factor_upper, solve_upper};
 
 /// First Tikhonov term, relative to the mean diagonal; ten times more on each further attempt.

@@ -3,11 +3,11 @@
 //!
 //! `table [n,d]`, `features [n,f]` (6 to 16 numbers a node), `W [d,f]` stored transposed `[f,d]`.
 
-use super::isa::{Isa, by_isa};
-use super::lanes::{Lanes, load_some, store_some};
 use super::parts::Parts;
 use super::pool::{Pool, PoolError};
 use crate::memory;
+use lanes::{DenseLanes, load_some, store_some};
+use lanes::{Isa, by_isa};
 
 /// A table `[n,width]` and its update's weight, transposed: `[rank,width]`.
 #[derive(Debug, Clone, Copy)]
@@ -58,7 +58,7 @@ impl<'a> LowRank<'a> {
 
     /// `count <= N` entries of a row from `column` on.
     #[inline(always)]
-    pub(super) unsafe fn lanes<V: Lanes>(
+    pub(super) unsafe fn lanes<V: DenseLanes>(
         &self,
         features: &[f32],
         row: usize,
@@ -137,7 +137,12 @@ by_isa! {
 }
 
 #[inline(always)]
-unsafe fn row_body<V: Lanes>(update: LowRank<'_>, features: &[f32], index: usize, out: &mut [f32]) {
+unsafe fn row_body<V: DenseLanes>(
+    update: LowRank<'_>,
+    features: &[f32],
+    index: usize,
+    out: &mut [f32],
+) {
     let width = update.width;
     assert!(
         (index + 1) * width <= update.table.len() && (index + 1) * update.rank <= features.len(),
@@ -145,7 +150,7 @@ unsafe fn row_body<V: Lanes>(update: LowRank<'_>, features: &[f32], index: usize
     );
     let mut column = 0;
     while column < width {
-        let count = (width - column).min(V::N);
+        let count = (width - column).min(V::COUNT);
         // SAFETY: the row is checked above, the column stays below the width.
         unsafe {
             let sum = update.lanes::<V>(features, index, column, count);

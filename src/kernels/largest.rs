@@ -2,8 +2,8 @@
 //!
 //! One thread: it reads what the decoder has just written, some hundred kilobytes in cache.
 
-use super::isa::{Isa, by_isa};
-use super::lanes::Lanes;
+use lanes::DenseLanes;
+use lanes::{Isa, by_isa};
 
 /// Nodes a block of the contiguous pass.
 const BLOCK: usize = 16;
@@ -41,7 +41,7 @@ by_isa! { fn all_nodes(field: &[f32], bits: &mut u32) = all_nodes_body, all_node
 
 /// The same in blocks. Only the compiler's vector instructions depend on `V`.
 #[inline(always)]
-unsafe fn all_nodes_body<V: Lanes>(field: &[f32], bits: &mut u32) {
+unsafe fn all_nodes_body<V: DenseLanes>(field: &[f32], bits: &mut u32) {
     let mut worst = [0u32; BLOCK];
     let blocks = field.chunks_exact(3 * BLOCK);
     all_nodes_scalar(blocks.remainder(), bits);

@@ -1,7 +1,7 @@
 //! The two transcendental functions of the network, in f32: exact GELU
 //! `x Phi(x) = x/2 (1 + erf(x / sqrt 2))` and `2^x`.
 
-use super::lanes::Lanes;
+use lanes::DenseLanes;
 
 /// `GELU(x) = x/2 (1 + erf(x / sqrt 2))`: the readable reference.
 pub fn gelu(x: f32) -> f32 {
@@ -40,7 +40,7 @@ const EXP2: [f32; 7] = [
 ];
 
 #[inline(always)]
-unsafe fn horner<V: Lanes, const M: usize>(coefficients: &[f32; M], x: V) -> V {
+unsafe fn horner<V: DenseLanes, const M: usize>(coefficients: &[f32; M], x: V) -> V {
     // SAFETY: see `Lanes`.
     unsafe {
         let mut sum = V::splat(coefficients[M - 1]);
@@ -56,7 +56,7 @@ unsafe fn horner<V: Lanes, const M: usize>(coefficients: &[f32; M], x: V) -> V {
 /// # Safety
 /// See [`Lanes`].
 #[inline(always)]
-pub(crate) unsafe fn gelu_lanes<V: Lanes>(x: V) -> V {
+pub(crate) unsafe fn gelu_lanes<V: DenseLanes>(x: V) -> V {
     // SAFETY: the caller's.
     unsafe {
         let end = x.max(V::splat(-ERF_END)).min(V::splat(ERF_END));
@@ -72,7 +72,7 @@ pub(crate) unsafe fn gelu_lanes<V: Lanes>(x: V) -> V {
 /// # Safety
 /// See [`Lanes`].
 #[inline(always)]
-pub(crate) unsafe fn exp2_lanes<V: Lanes>(x: V) -> V {
+pub(crate) unsafe fn exp2_lanes<V: DenseLanes>(x: V) -> V {
     // SAFETY: the caller's.
     unsafe {
         let x = x.max(V::splat(-126.0));
@@ -83,19 +83,19 @@ pub(crate) unsafe fn exp2_lanes<V: Lanes>(x: V) -> V {
 
 #[cfg(test)]
 mod tests {
-    use super::super::isa::{Isa, by_isa};
     use super::*;
+    use lanes::{Isa, by_isa};
 
-    unsafe fn gelu_body<V: Lanes>(x: &[f32], out: &mut [f32]) {
-        for (x, out) in x.chunks(V::N).zip(out.chunks_mut(V::N)) {
+    unsafe fn gelu_body<V: DenseLanes>(x: &[f32], out: &mut [f32]) {
+        for (x, out) in x.chunks(V::COUNT).zip(out.chunks_mut(V::COUNT)) {
             // SAFETY: the parts are as long as said.
             unsafe {
-                let y = if x.len() == V::N {
+                let y = if x.len() == V::COUNT {
                     V::load(x.as_ptr())
                 } else {
                     V::load_part(x.as_ptr(), x.len())
                 };
-                if x.len() == V::N {
+                if x.len() == V::COUNT {
                     gelu_lanes(y).store(out.as_mut_ptr());
                 } else {
                     gelu_lanes(y).store_part(out.as_mut_ptr(), out.len());
@@ -110,8 +110,8 @@ mod tests {
     }
     by_isa! { fn gelu_slice(x: &[f32], out: &mut [f32]) = gelu_body, gelu_scalar; }
 
-    unsafe fn exp2_body<V: Lanes>(x: &[f32], out: &mut [f32]) {
-        for (x, out) in x.chunks_exact(V::N).zip(out.chunks_exact_mut(V::N)) {
+    unsafe fn exp2_body<V: DenseLanes>(x: &[f32], out: &mut [f32]) {
+        for (x, out) in x.chunks_exact(V::COUNT).zip(out.chunks_exact_mut(V::COUNT)) {
             // SAFETY: whole registers.
             unsafe { exp2_lanes(V::load(x.as_ptr())).store(out.as_mut_ptr()) }
         }

@@ -1,7 +1,7 @@
 //! The numerical kernels of a step, in f32: everything that runs natively between the graphs.
 //!
 //! Each kernel is a file with a scalar reference and one vector body, generic over the lanes of
-//! `lanes`, compiled for AVX2, AVX-512 and NEON and chosen at run time by [`Isa`]. Threads come
+//! [`lanes`], compiled for AVX2, AVX-512 and NEON and chosen at run time by [`Isa`]. Threads come
 //! from a [`Pool`]. All results have the same bits for any thread count, and any subset of rows
 //! gives the bits that the whole set gives (on one `Isa`; different sets differ in rounding).
 
@@ -12,9 +12,6 @@ pub mod aggregate;
 pub mod contact;
 pub mod decoder;
 pub mod encode;
-pub mod flush;
-pub mod isa;
-mod lanes;
 pub mod largest;
 mod math;
 pub(crate) mod parts;
@@ -26,8 +23,7 @@ pub mod respond;
 pub mod rows;
 pub mod vectors;
 
-pub use flush::{FlushToZero, MaskExceptions};
-pub use isa::Isa;
+pub use lanes::{FlushToZero, Isa, MaskExceptions, flush};
 pub use math::gelu;
 pub use pool::{Pool, PoolError};
 

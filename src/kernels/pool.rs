@@ -15,8 +15,8 @@ use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 
-use super::flush::FlushToZero;
 use crate::error::Error;
+use lanes::flush::FlushToZero;
 use worker::{Job, Shared, Task, panic_message, worker_loop};
 
 /// Bytes from which on streaming a table is split over threads. Waking a worker and waiting for its last chunk costs what

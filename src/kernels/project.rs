@@ -3,12 +3,12 @@
 //! What [`super::rows`] and [`super::respond`] are to a step's prediction, these are to its corrections: forces on nodes become
 //! forces on coordinates.
 
-use super::isa::{Isa, by_isa};
-use super::lanes::Lanes;
 use super::parts::Parts;
 use super::pool::{Pool, PoolError};
 use super::rows::{BlockBasis, Number, Stored};
 use half::f16;
+use lanes::DenseLanes;
+use lanes::{Isa, by_isa};
 
 /// `q = U^T r`: `r [K,3]`, `q [Q]`.
 ///
@@ -74,17 +74,25 @@ fn block_scalar<T: Number>(basis: &[T], nodes: &[u32], r: &[f32], q: &mut [f32])
 
 #[inline(always)]
 #[allow(clippy::extra_unused_type_parameters)]
-unsafe fn block_body<V: Lanes>(basis: &[impl Number], nodes: &[u32], r: &[f32], q: &mut [f32]) {
+unsafe fn block_body<V: DenseLanes>(
+    basis: &[impl Number],
+    nodes: &[u32],
+    r: &[f32],
+    q: &mut [f32],
+) {
     let rank = q.len();
     assert!(basis.len() >= 3 * nodes.len() * rank, "basis of the block");
-    assert!(rank.is_multiple_of(V::N), "rank must be whole registers");
+    assert!(
+        rank.is_multiple_of(V::COUNT),
+        "rank must be whole registers"
+    );
     let mut column = 0;
     // SAFETY: rows and columns are inside `basis` by the checks above.
     unsafe {
         // Every sweep reads the whole block: as few of them as there are registers for.
         while column < rank {
             let (from, to) = (basis.as_ptr().add(column), &mut q[column..]);
-            let registers = ((rank - column) / V::N).min(8);
+            let registers = ((rank - column) / V::COUNT).min(8);
             match registers {
                 8 => tile::<V, 8>(from, rank, nodes, r, to),
                 7 => tile::<V, 7>(from, rank, nodes, r, to),
@@ -95,13 +103,13 @@ unsafe fn block_body<V: Lanes>(basis: &[impl Number], nodes: &[u32], r: &[f32], 
                 2 => narrow_tile::<V, 2>(from, rank, nodes, r, to),
                 _ => narrow_tile::<V, 1>(from, rank, nodes, r, to),
             }
-            column += registers * V::N;
+            column += registers * V::COUNT;
         }
     }
 }
 
 #[inline(always)]
-unsafe fn tile<V: Lanes, const M: usize>(
+unsafe fn tile<V: DenseLanes, const M: usize>(
     basis: *const impl Number,
     rank: usize,
     nodes: &[u32],
@@ -116,20 +124,20 @@ unsafe fn tile<V: Lanes, const M: usize>(
             for &force in &r[3 * node as usize..3 * node as usize + 3] {
                 let force = V::splat(force);
                 for v in 0..M {
-                    sum[v] = Number::lanes::<V>(row.add(v * V::N)).mul_add(force, sum[v]);
+                    sum[v] = Number::lanes::<V>(row.add(v * V::COUNT)).mul_add(force, sum[v]);
                 }
                 row = row.wrapping_add(rank);
             }
         }
         for v in 0..M {
-            sum[v].store(q.as_mut_ptr().add(v * V::N));
+            sum[v].store(q.as_mut_ptr().add(v * V::COUNT));
         }
     }
 }
 
 /// The same with a sum an axis: few sums would wait for each other.
 #[inline(always)]
-unsafe fn narrow_tile<V: Lanes, const M: usize>(
+unsafe fn narrow_tile<V: DenseLanes, const M: usize>(
     basis: *const impl Number,
     rank: usize,
     nodes: &[u32],
@@ -145,7 +153,7 @@ unsafe fn narrow_tile<V: Lanes, const M: usize>(
             for (sum, &force) in sums.iter_mut().zip(forces) {
                 let force = V::splat(force);
                 for v in 0..M {
-                    sum[v] = Number::lanes::<V>(row.add(v * V::N)).mul_add(force, sum[v]);
+                    sum[v] = Number::lanes::<V>(row.add(v * V::COUNT)).mul_add(force, sum[v]);
                 }
                 row = row.wrapping_add(rank);
             }
@@ -153,7 +161,7 @@ unsafe fn narrow_tile<V: Lanes, const M: usize>(
         for v in 0..M {
             let one = V::splat(1.0);
             let total = sums[0][v].mul_add(one, sums[1][v]).mul_add(one, sums[2][v]);
-            total.store(q.as_mut_ptr().add(v * V::N));
+            total.store(q.as_mut_ptr().add(v * V::COUNT));
         }
     }
 }
@@ -212,7 +220,12 @@ fn dots_scalar<T: Number>(table: &[T], rows: &[u32], q: &[f32], out: &mut [f32])
 
 #[inline(always)]
 #[allow(clippy::extra_unused_type_parameters)]
-unsafe fn dots_body<V: Lanes>(table: &[impl Number], rows: &[u32], q: &[f32], out: &mut [f32]) {
+unsafe fn dots_body<V: DenseLanes>(
+    table: &[impl Number],
+    rows: &[u32],
+    q: &[f32],
+    out: &mut [f32],
+) {
     for (rows, out) in rows.chunks(4).zip(out.chunks_mut(4)) {
         // SAFETY: `row_dots` has checked every row.
         unsafe {
@@ -223,12 +236,12 @@ unsafe fn dots_body<V: Lanes>(table: &[impl Number], rows: &[u32], q: &[f32], ou
             let rows = [row(0), row(1), row(2), row(3)];
             let mut total = [V::splat(0.0); 4];
             let mut at = 0;
-            while at + V::N <= q.len() {
+            while at + V::COUNT <= q.len() {
                 let x = V::load(q.as_ptr().add(at));
                 for i in 0..4 {
                     total[i] = Number::lanes::<V>(rows[i].add(at)).mul_add(x, total[i]);
                 }
-                at += V::N;
+                at += V::COUNT;
             }
             let mut sums = V::sums(total);
             for (at, q) in q.iter().enumerate().skip(at) {

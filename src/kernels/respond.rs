@@ -5,12 +5,12 @@
 //! in registers while the rows stream by; each column is summed in the order of `rows`, so the bits
 //! do not depend on tiles or threads.
 
-use super::isa::{Isa, by_isa};
-use super::lanes::Lanes;
 use super::parts::Parts;
 use super::pool::{Pool, PoolError};
 use super::rows::{Number, Stored};
 use half::f16;
+use lanes::DenseLanes;
+use lanes::{Isa, by_isa};
 
 /// Columns a chunk.
 const COLUMNS: usize = 512;
@@ -84,7 +84,7 @@ by_isa! {
 }
 
 #[inline(always)]
-unsafe fn columns_body<V: Lanes>(
+unsafe fn columns_body<V: DenseLanes>(
     table: &[impl Number],
     width: usize,
     rows: &[u32],
@@ -96,13 +96,13 @@ unsafe fn columns_body<V: Lanes>(
     // SAFETY: `accumulate_rows` has checked every row; columns stay below `q.len()`.
     unsafe {
         let table = table.as_ptr();
-        while column + 8 * V::N <= q.len() {
+        while column + 8 * V::COUNT <= q.len() {
             register_tile::<V, 8>(table, width, column, rows, factors, add, q);
-            column += 8 * V::N;
+            column += 8 * V::COUNT;
         }
-        while column + V::N <= q.len() {
+        while column + V::COUNT <= q.len() {
             register_tile::<V, 1>(table, width, column, rows, factors, add, q);
-            column += V::N;
+            column += V::COUNT;
         }
         // Fewer columns than lanes are left: one at a time, with the lanes' single rounding.
         while column < q.len() {
@@ -118,7 +118,7 @@ unsafe fn columns_body<V: Lanes>(
 }
 
 #[inline(always)]
-unsafe fn register_tile<V: Lanes, const M: usize>(
+unsafe fn register_tile<V: DenseLanes, const M: usize>(
     table: *const impl Number,
     width: usize,
     column: usize,
@@ -133,18 +133,18 @@ unsafe fn register_tile<V: Lanes, const M: usize>(
         let mut sum = [V::splat(0.0); M];
         if add {
             for v in 0..M {
-                sum[v] = V::load(to.add(v * V::N));
+                sum[v] = V::load(to.add(v * V::COUNT));
             }
         }
         for (&row, &factor) in rows.iter().zip(factors) {
             let from = table.add(row as usize * width + column);
             let factor = V::splat(factor);
             for v in 0..M {
-                sum[v] = Number::lanes::<V>(from.add(v * V::N)).mul_add(factor, sum[v]);
+                sum[v] = Number::lanes::<V>(from.add(v * V::COUNT)).mul_add(factor, sum[v]);
             }
         }
         for v in 0..M {
-            sum[v].store(to.add(v * V::N));
+            sum[v].store(to.add(v * V::COUNT));
         }
     }
 }

@@ -6,12 +6,12 @@
 //! nodes are wanted, block by block, and where each goes in the output. Every row is summed in one
 //! fixed order, so a region gives the bits of the full decode, for any thread count.
 
-use super::isa::{Isa, by_isa};
-use super::lanes::Lanes;
 use super::parts::Parts;
 use super::pool::{Pool, PoolError};
 use crate::memory;
 use half::f16;
+use lanes::DenseLanes;
+use lanes::{Isa, by_isa};
 
 /// Numbers stored as f32 or f16.
 #[derive(Debug, Clone, Copy)]
@@ -246,14 +246,14 @@ pub fn decode_rows(
 pub(super) trait Number: Copy {
     fn wide(self) -> f32;
     /// `N` numbers.
-    unsafe fn lanes<V: Lanes>(from: *const Self) -> V;
+    unsafe fn lanes<V: DenseLanes>(from: *const Self) -> V;
 }
 impl Number for f32 {
     fn wide(self) -> f32 {
         self
     }
     #[inline(always)]
-    unsafe fn lanes<V: Lanes>(from: *const Self) -> V {
+    unsafe fn lanes<V: DenseLanes>(from: *const Self) -> V {
         // SAFETY: the caller's.
         unsafe { V::load(from) }
     }
@@ -263,7 +263,7 @@ impl Number for f16 {
         self.to_f32()
     }
     #[inline(always)]
-    unsafe fn lanes<V: Lanes>(from: *const Self) -> V {
+    unsafe fn lanes<V: DenseLanes>(from: *const Self) -> V {
         // SAFETY: the caller's.
         unsafe { V::load_f16(from) }
     }
@@ -297,7 +297,7 @@ by_isa! {
 /// Four nodes, twelve rows at a time; a short last group repeats its last node.
 #[inline(always)]
 #[allow(clippy::extra_unused_type_parameters)]
-unsafe fn nodes_body<V: Lanes>(
+unsafe fn nodes_body<V: DenseLanes>(
     basis: &[impl Number],
     q: &[f32],
     locals: &[u32],
@@ -310,7 +310,10 @@ unsafe fn nodes_body<V: Lanes>(
         (3 * highest + 3) * rank <= basis.len(),
         "node outside its block"
     );
-    assert!(rank.is_multiple_of(V::N), "rank must be whole registers");
+    assert!(
+        rank.is_multiple_of(V::COUNT),
+        "rank must be whole registers"
+    );
     for (locals, outputs) in locals.chunks(4).zip(outputs.chunks(4)) {
         // SAFETY: rows are inside `basis` by the check above; a plan names each output row once.
         unsafe {
@@ -329,7 +332,7 @@ unsafe fn nodes_body<V: Lanes>(
                         sums[axis][i] = row.mul_add(q, sums[axis][i]);
                     }
                 }
-                column += V::N;
+                column += V::COUNT;
             }
             for axis in 0..3 {
                 let u = V::sums(sums[axis]);

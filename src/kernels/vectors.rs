@@ -3,11 +3,11 @@
 //! Vectors are cut in pieces of `PIECE` floats. Within a piece an inner product is summed in f32 lanes, over the pieces in f64
 //! and in order, so the bits do not depend on the number of threads.
 
-use super::isa::{Isa, by_isa};
-use super::lanes::Lanes;
 use super::parts::Parts;
 use super::pool::{Pool, PoolError};
 use crate::memory;
+use lanes::DenseLanes;
+use lanes::{Isa, by_isa};
 
 /// Floats a piece.
 const PIECE: usize = 4096;
@@ -99,7 +99,7 @@ fn dots_scalar(rows: &[&[f32]], x: &[f32], start: usize, sums: &mut [f32]) {
 
 #[inline(always)]
 #[allow(clippy::extra_unused_type_parameters)]
-unsafe fn dots_body<V: Lanes>(rows: &[&[f32]], x: &[f32], start: usize, sums: &mut [f32]) {
+unsafe fn dots_body<V: DenseLanes>(rows: &[&[f32]], x: &[f32], start: usize, sums: &mut [f32]) {
     for (rows, sums) in rows.chunks(4).zip(sums.chunks_mut(4)) {
         // SAFETY: every row is as long as the whole vector that `x` is a piece of.
         unsafe {
@@ -107,12 +107,12 @@ unsafe fn dots_body<V: Lanes>(rows: &[&[f32]], x: &[f32], start: usize, sums: &m
             let rows = [row(0), row(1), row(2), row(3)];
             let mut total = [V::splat(0.0); 4];
             let mut at = 0;
-            while at + V::N <= x.len() {
+            while at + V::COUNT <= x.len() {
                 let x = V::load(x.as_ptr().add(at));
                 for i in 0..4 {
                     total[i] = V::load(rows[i].add(at)).mul_add(x, total[i]);
                 }
-                at += V::N;
+                at += V::COUNT;
             }
             if at < x.len() {
                 let left = x.len() - at;
@@ -169,17 +169,17 @@ fn add_scalar(rows: &[&[f32]], factors: &[f32], start: usize, to: &mut [f32]) {
 
 #[inline(always)]
 #[allow(clippy::extra_unused_type_parameters)]
-unsafe fn add_body<V: Lanes>(rows: &[&[f32]], factors: &[f32], start: usize, to: &mut [f32]) {
+unsafe fn add_body<V: DenseLanes>(rows: &[&[f32]], factors: &[f32], start: usize, to: &mut [f32]) {
     let mut at = 0;
     // SAFETY: every row is as long as the whole vector that `to` is a piece of.
     unsafe {
-        while at + V::N <= to.len() {
+        while at + V::COUNT <= to.len() {
             let mut sum = V::load(to.as_ptr().add(at));
             for (row, &factor) in rows.iter().zip(factors) {
                 sum = V::load(row.as_ptr().add(start + at)).mul_add(V::splat(factor), sum);
             }
             sum.store(to.as_mut_ptr().add(at));
-            at += V::N;
+            at += V::COUNT;
         }
         if at < to.len() {
             let left = to.len() - at;

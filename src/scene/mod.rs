@@ -2,6 +2,7 @@
 //! [`Error::Busy`]. Reading the published states (`read`, `sample`, their points, `stats`) is allowed from any thread
 //! at any time, also while a submitted step is in flight, and never waits for a step.
 
+mod build;
 mod core;
 mod correct;
 mod corrected;
@@ -57,18 +58,16 @@ pub use publish::{QUIET_DISPLACEMENT, QUIET_STEPS};
 pub(crate) use published::Values;
 pub use step_input::{Contact, Progress, StepInput};
 
-use crate::bundle::{Mesh, TensorFile};
+use crate::bundle::Mesh;
 use crate::corrections::Integrator;
 use crate::error::{Error, Result};
 use crate::field::check_count;
-use crate::kernels::{Isa, Pool};
 use crate::memory;
 use crate::model::{KindModel, Model};
-use crate::options::{SceneOptions, StepPath};
+use crate::options::SceneOptions;
 use crate::output::Output;
-use core::{Core, CoreParts};
-use corrected::Corrected;
-use engine::Engine;
+use build::build;
+use core::Core;
 use points::AttachedPoints;
 use published::{Frame, Published};
 use region::check_nodes;
@@ -358,74 +357,6 @@ impl Scene {
     pub fn restore(&self, bytes: &[u8]) -> Result<()> {
         self.with(|core, published| core.restore(published, bytes))
     }
-}
-
-fn build(model: &Arc<Model>, options: &SceneOptions) -> Result<Core> {
-    let threads = match options.threads {
-        0 => model.threads,
-        threads => threads,
-    };
-    if threads > 1024 {
-        return Err(Error::Argument(format!(
-            "threads is {threads}, must be at most 1024"
-        )));
-    }
-    let pool = Pool::new(threads)?;
-    let own_mesh = match &options.mesh_path {
-        None => None,
-        Some(path) => {
-            if model.prior.is_some() {
-                return Err(Error::Unsupported(
-                    "mesh_path: this bundle has a prior, which is valid only for its own mesh; leave mesh_path out".into(),
-                ));
-            }
-            let bytes = crate::bundle::read_regular(path)?;
-            let file = TensorFile::parse(&path.display().to_string(), bytes)?;
-            Some(Arc::new(Mesh::parse(&file, model.manifest.boundary)?))
-        }
-    };
-    let engine = match &model.kind {
-        KindModel::Reduced(_) if options.step_path == StepPath::Whole => {
-            return Err(Error::Unsupported(
-                "step_path: bundles of kind reduced have no step.onnx".into(),
-            ));
-        }
-        KindModel::Reduced(kind) => {
-            let table = model
-                .prior
-                .as_ref()
-                .ok_or_else(|| Error::bundle("bundle.json", "field `prior` is missing"))?;
-            let engine = reduced::ReducedEngine::new(model, kind, table)?;
-            Engine::Reduced(memory::boxed(engine, core::SCENE)?)
-        }
-        KindModel::Upt(kind) => {
-            let (tables, nodes) = match &own_mesh {
-                None => (Arc::clone(&kind.tables), model.mesh.node_count()),
-                Some(mesh) => (
-                    Arc::new(kind.tables_of(mesh, model.runtime()?, threads)?),
-                    mesh.node_count(),
-                ),
-            };
-            let parts = upt::step_path::Parts {
-                model,
-                kind,
-                tables: &tables,
-                pool: &pool,
-                node_count: nodes,
-            };
-            let engine = parts.engine(options)?;
-            Engine::Upt(memory::boxed(engine, core::SCENE)?)
-        }
-    };
-    let corrected = Corrected::new(model, options, Isa::detect(), &pool)?;
-    Core::new(CoreParts {
-        model: Arc::clone(model),
-        mesh: own_mesh.unwrap_or_else(|| Arc::clone(&model.mesh)),
-        options: options.clone(),
-        pool,
-        engine,
-        corrected,
-    })
 }
 
 #[cfg(all(test, target_arch = "x86_64"))] // MXCSR tells what was met

@@ -53,7 +53,7 @@ installed() {
 
 # The lanes: kernels of elements, contact and the library.
 quick_tests() {
-  unit_tests -p elements -p contact -p exchange --lib --tests
+  unit_tests -p elements -p contact -p exchange -p lanes --lib --tests
   unit_tests -p upt --lib
   leave_out "$(tests_in tests crates/tissue)" "tests of the library's calls and of the reference solver: nightly"
 }

@@ -42,7 +42,7 @@ tests_in() {
 
 echo "== unit tests"
 if [ "$nightly" = 1 ]; then
-  unit_tests -p upt -p tissue -p elements -p contact -p exchange --no-default-features --features upt/default --lib --tests
+  unit_tests -p upt -p tissue -p elements -p contact -p exchange -p lanes --no-default-features --features upt/default --lib --tests
   echo "== equilibria, by the sparse factorisation"
   unit_tests -p tissue --lib
 else

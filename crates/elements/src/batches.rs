@@ -1,11 +1,11 @@
 //! Clusters packed into batches of 16, with the constants of their tetrahedra.
 
 use crate::cluster::{Cluster, Group, corners};
-use crate::lanes::WIDTH;
 use crate::material::Material;
 use crate::room::{collected, room};
 use crate::tetrahedra::Tetrahedra;
 use crate::vector::{cross, dot};
+use lanes::WIDTH;
 use std::collections::{HashSet, TryReserveError};
 use std::ops::Range;
 

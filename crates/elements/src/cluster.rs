@@ -4,8 +4,8 @@
 //! sixteen corners; the cells of a BCC lattice, so three quarters of a stuffed mesh), a
 //! *pair* shares a face (five instead of eight), and what is left is single.
 
-use crate::lanes::WIDTH;
 use crate::room::{collected, filled, push, room};
+use lanes::WIDTH;
 use std::collections::{HashMap, TryReserveError};
 
 /// Sixteen clusters of one kind, structure of arrays. All tetrahedra of a cluster share the edge of its nodes 0 and 1.

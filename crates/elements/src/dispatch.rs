@@ -5,69 +5,10 @@
 )]
 
 use crate::kernel::{Shape, add_forces, add_volumes};
-use crate::lanes::{Lanes, Scalar};
 use crate::laws::{Isochoric, Law};
 use crate::partition::{Chunk, Partition};
 use crate::slots::{advance, place};
-
-/// Instruction set of the element kernels.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Simd {
-    /// Portable code; the readable reference.
-    Scalar,
-    /// AVX2 with FMA, registers of 8.
-    Avx2,
-    /// AVX-512 (F, VL), one register of 16.
-    Avx512,
-    /// NEON, 4 registers of 4.
-    Neon,
-}
-
-impl Simd {
-    /// All sets, best first.
-    pub const ALL: [Simd; 4] = [Simd::Avx512, Simd::Avx2, Simd::Neon, Simd::Scalar];
-
-    /// The best set of this processor, or the one that the environment variable `UPT_ISA` names (`scalar`, `avx2`,
-    /// `avx512`, `neon`), where the processor has it.
-    pub fn detect() -> Self {
-        let asked = std::env::var("UPT_ISA").ok();
-        let asked = asked.and_then(|name| Self::parse(&name));
-        asked
-            .into_iter()
-            .chain(Self::ALL)
-            .find(|simd| simd.is_available())
-            .unwrap_or(Simd::Scalar)
-    }
-
-    /// The set of that name in `UPT_ISA`.
-    pub fn parse(name: &str) -> Option<Self> {
-        match name.trim().to_ascii_lowercase().as_str() {
-            "scalar" => Some(Simd::Scalar),
-            "avx2" => Some(Simd::Avx2),
-            "avx512" => Some(Simd::Avx512),
-            "neon" => Some(Simd::Neon),
-            _ => None,
-        }
-    }
-
-    /// Whether this processor has the set.
-    pub fn is_available(self) -> bool {
-        match self {
-            Simd::Scalar => true,
-            #[cfg(target_arch = "x86_64")]
-            Simd::Avx2 => is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma"),
-            #[cfg(target_arch = "x86_64")]
-            Simd::Avx512 => {
-                is_x86_feature_detected!("avx512f")
-                    && is_x86_feature_detected!("avx512vl")
-                    && is_x86_feature_detected!("fma")
-            }
-            Simd::Neon => cfg!(target_arch = "aarch64"),
-            #[cfg(not(target_arch = "x86_64"))]
-            Simd::Avx2 | Simd::Avx512 => false,
-        }
-    }
-}
+use lanes::{Isa, NodeLanes, Scalar};
 
 type ForceKernel = unsafe fn(&Partition, &Chunk, *const [f32; 4], *mut [f32; 4]) -> f32;
 type VolumeKernel = unsafe fn(&Partition, &Chunk, *const [f32; 4], *mut [f32; 4]);
@@ -86,7 +27,7 @@ pub struct Kernels {
 
 /// Forces of all clusters of a chunk; returns the smallest det F.
 #[inline(always)]
-unsafe fn all_forces<L: Lanes, const AVERAGED: bool>(
+unsafe fn all_forces<L: NodeLanes, const AVERAGED: bool>(
     partition: &Partition,
     chunk: &Chunk,
     nodes: *const [f32; 4],
@@ -106,7 +47,7 @@ unsafe fn all_forces<L: Lanes, const AVERAGED: bool>(
 
 /// The same by a law.
 #[inline(always)]
-unsafe fn forces_by<L: Lanes, M: Isochoric, const AVERAGED: bool>(
+unsafe fn forces_by<L: NodeLanes, M: Isochoric, const AVERAGED: bool>(
     law: M,
     partition: &Partition,
     chunk: &Chunk,
@@ -201,26 +142,26 @@ macro_rules! kernels {
 
 kernels!(scalar, Scalar);
 #[cfg(target_arch = "x86_64")]
-kernels!(avx2, crate::lanes::Avx2, "avx2,fma");
+kernels!(avx2, lanes::Avx2, "avx2,fma");
 #[cfg(target_arch = "x86_64")]
-kernels!(avx512, crate::lanes::Avx512, "avx512f,avx512vl,avx2,fma");
+kernels!(avx512, lanes::Avx512, "avx512f,avx512vl,avx2,fma");
 #[cfg(target_arch = "aarch64")]
-kernels!(neon, crate::lanes::Neon, "neon");
+kernels!(neon, lanes::NeonFour, "neon");
 
 impl Kernels {
-    /// The kernels of `simd`; `None` where this processor lacks it.
-    pub fn of(simd: Simd) -> Option<Self> {
-        if !simd.is_available() {
+    /// The kernels of `isa`; `None` where this processor lacks it.
+    pub fn of(isa: Isa) -> Option<Self> {
+        if !isa.is_available() {
             return None;
         }
-        match simd {
-            Simd::Scalar => Some(scalar::KERNELS),
+        match isa {
+            Isa::Scalar => Some(scalar::KERNELS),
             #[cfg(target_arch = "x86_64")]
-            Simd::Avx2 => Some(avx2::KERNELS),
+            Isa::Avx2 => Some(avx2::KERNELS),
             #[cfg(target_arch = "x86_64")]
-            Simd::Avx512 => Some(avx512::KERNELS),
+            Isa::Avx512 => Some(avx512::KERNELS),
             #[cfg(target_arch = "aarch64")]
-            Simd::Neon => Some(neon::KERNELS),
+            Isa::Neon => Some(neon::KERNELS),
             #[allow(unreachable_patterns)]
             _ => None,
         }

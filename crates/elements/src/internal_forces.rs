@@ -5,12 +5,13 @@
 //! bits for any number of threads.
 
 use crate::batches::PADDING;
-use crate::dispatch::{Kernels, Simd};
+use crate::dispatch::Kernels;
 use crate::material::Material;
 use crate::partition::{Chunk, Partition};
 use crate::room::filled;
 use crate::slots::PADDED;
 use crate::tetrahedra::Tetrahedra;
+use lanes::Isa;
 use std::collections::TryReserveError;
 
 /// Runs `task(chunk, worker)` for each chunk below a count, in any order and on any threads; `worker` is below the number of
@@ -71,11 +72,11 @@ impl ElementForces {
     pub fn new(
         body: Tetrahedra<'_>,
         material: &Material,
-        simd: Simd,
+        isa: Isa,
     ) -> Result<Self, TryReserveError> {
-        let kernels = Kernels::of(simd);
+        let kernels = Kernels::of(isa);
         Ok(Self {
-            kernels: kernels.unwrap_or_else(|| panic!("{simd:?} is not available here")),
+            kernels: kernels.unwrap_or_else(|| panic!("{isa:?} is not available here")),
             partition: Partition::new(body, material)?,
             node_count: body.positions.len(),
         })

@@ -31,9 +31,9 @@ mod moduli;
 mod shape;
 
 use crate::cluster::{Cluster, corners};
-use crate::lanes::{Lanes, WIDTH, prefetch};
 use crate::laws::{Isochoric, Law};
 use forces::scatter;
+use lanes::{NodeLanes, WIDTH, prefetch};
 use moduli::moduli;
 pub use shape::Shape;
 use shape::{cross, dot, edges, load, shape};
@@ -67,7 +67,7 @@ fn flops_of<M: Isochoric>(_: M, nodes: usize, tets: usize) -> usize {
 /// instead of the element's `J - 1`. `law` comes with the material's bulk modulus over its shear modulus.
 #[inline(always)]
 pub unsafe fn add_forces<
-    L: Lanes,
+    L: NodeLanes,
     M: Isochoric,
     const NODES: usize,
     const TETS: usize,
@@ -90,7 +90,7 @@ pub unsafe fn add_forces<
                 for first in (0..WIDTH).step_by(L::COUNT) {
                     let ratio =
                         moduli::<L, M, NODES, TETS, AVERAGED>(law, cluster, tet, first, buffer);
-                    smallest = smallest.min(ratio);
+                    smallest = ratio.min(smallest);
                 }
             }
             for first in (0..WIDTH).step_by(L::COUNT) {
@@ -105,7 +105,7 @@ pub unsafe fn add_forces<
 
 /// Adds each element's current volume times its bulk modulus (nJ) to the third component of its corners' `forces`.
 #[inline(always)]
-pub unsafe fn add_volumes<L: Lanes, const NODES: usize, const TETS: usize>(
+pub unsafe fn add_volumes<L: NodeLanes, const NODES: usize, const TETS: usize>(
     clusters: &[Cluster<NODES, TETS>],
     nodes: *const [f32; 4],
     forces: *mut [f32; 4],

@@ -1,6 +1,6 @@
 //! Passes over a chunk's slots: where nodes are, and where the step takes them. Nodes are `[x, y, z, w]`.
 
-use crate::lanes::{Lanes, WIDTH};
+use lanes::{NodeLanes, WIDTH};
 
 /// Floating-point operations of one node in `place` and `advance`, a fused multiply-add counted as two.
 pub const FLOPS_PER_NODE: usize = 3 + 3 * 6;
@@ -10,7 +10,7 @@ pub const PADDED: usize = 4;
 
 /// `positions = rest + displacement`, `count` nodes rounded up to [`PADDED`]; the fourth component of `rest` is zero.
 #[inline(always)]
-pub unsafe fn place<L: Lanes>(
+pub unsafe fn place<L: NodeLanes>(
     count: usize,
     rest: *const [f32; 4],
     displacement: *const [f32; 4],
@@ -30,7 +30,7 @@ pub unsafe fn place<L: Lanes>(
 ///
 /// The fourth components, gain and dilatation, stay.
 #[inline(always)]
-pub unsafe fn advance<L: Lanes>(
+pub unsafe fn advance<L: NodeLanes>(
     count: usize,
     beta: f32,
     force: *const [f32; 4],

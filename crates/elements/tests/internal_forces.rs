@@ -1,6 +1,6 @@
 //! The SIMD forces of a whole body against the f64 law, element by element.
 
-use elements::{ElementForces, Law, Material, MooneyRivlin, Simd, Tetrahedron};
+use elements::{ElementForces, Isa, Law, Material, MooneyRivlin, Tetrahedron};
 use tissue::mesh::{Mesh, box_phantom};
 
 fn body() -> Mesh {
@@ -57,16 +57,16 @@ fn check(material: &Material) {
     let u = wave(&mesh, 0.6);
     let (want, least) = exact(&mesh, material, &u);
     let scale = want.iter().fold(0.0f64, |a, b| a.max(b.abs()));
-    for simd in Simd::ALL.into_iter().filter(|simd| simd.is_available()) {
-        let forces = ElementForces::new(mesh.tetrahedra(), material, simd).unwrap();
+    for isa in Isa::available() {
+        let forces = ElementForces::new(mesh.tetrahedra(), material, isa).unwrap();
         let mut scratch = forces.scratch(1).unwrap();
         let mut out = vec![f32::NAN; u.len()];
         let det = forces.evaluate(&u, &mut scratch, &mut out, &serial);
         for (got, want) in out.iter().zip(&want) {
             let error = (f64::from(*got) - want).abs();
-            assert!(error < 1e-4 * scale, "{simd:?}: {got} for {want}");
+            assert!(error < 1e-4 * scale, "{isa:?}: {got} for {want}");
         }
-        assert!((f64::from(det) - least).abs() < 1e-4, "{simd:?}");
+        assert!((f64::from(det) - least).abs() < 1e-4, "{isa:?}");
     }
 }
 
@@ -74,7 +74,7 @@ fn check(material: &Material) {
 fn threads_do_not_change_a_bit() {
     let (mesh, material) = (body(), Material::default());
     let u = wave(&mesh, 0.6);
-    let forces = ElementForces::new(mesh.tetrahedra(), &material, Simd::detect()).unwrap();
+    let forces = ElementForces::new(mesh.tetrahedra(), &material, Isa::detect()).unwrap();
     let run = |parallel: elements::ParallelFor<'_>| {
         let mut scratch = forces.scratch(3).unwrap();
         let mut out = vec![0.0; u.len()];
@@ -94,7 +94,7 @@ fn threads_do_not_change_a_bit() {
 #[test]
 fn an_inverted_state_shows_in_det_and_a_nan_in_the_forces() {
     let (mesh, material) = (body(), Material::default());
-    let forces = ElementForces::new(mesh.tetrahedra(), &material, Simd::detect()).unwrap();
+    let forces = ElementForces::new(mesh.tetrahedra(), &material, Isa::detect()).unwrap();
     let mut scratch = forces.scratch(1).unwrap();
     let mut u = vec![0.0; 3 * mesh.positions.len()];
     let mut out = u.clone();

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 use tissue::mesh::{Boundary, Mesh, box_phantom};
-use tissue::solver::{ContactNode, Simd, Solver, SolverOptions};
+use tissue::solver::{ContactNode, Isa, Solver, SolverOptions};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
@@ -16,21 +16,21 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let face = mesh.surface[mesh.domain[mesh.domain.len() / 2] as usize];
     let mut nodes = face.to_vec();
     nodes.sort_unstable();
-    for simd in Simd::ALL
+    for isa in Isa::available()
         .into_iter()
-        .filter(|simd| simd.is_available() && (!only_best || *simd == Simd::detect()))
+        .filter(|isa| !only_best || *isa == Isa::detect())
     {
         let mut solver = Solver::new(
             &mesh,
             Boundary::Fixed,
             SolverOptions {
                 threads,
-                simd: Some(simd),
+                isa: Some(isa),
                 ..SolverOptions::default()
             },
         )?;
         println!(
-            "{simd:?}, {} nodes, {} tets, critical step {:.4} ms, {:?}",
+            "{isa:?}, {} nodes, {} tets, critical step {:.4} ms, {:?}",
             mesh.node_count(),
             mesh.tets.len(),
             solver.critical_step_at_rest_s() * 1e3,

@@ -1,7 +1,7 @@
 //! Products with a factor and with itself: `R^-T Z`, and `A -= scale Z^T Z` in tiles that stay in registers.
 
-use crate::kernels::isa::{Isa, by_isa};
-use crate::kernels::lanes::Lanes;
+use lanes::DenseLanes;
+use lanes::{Isa, by_isa};
 
 fn whiten_rows_scalar(u: &[f64], columns: usize, z: &mut [f64]) {
     let n = z.len() / columns.max(1);
@@ -17,7 +17,7 @@ by_isa! { pub(super) fn whiten_rows(u: &[f64], columns: usize, z: &mut [f64]) = 
 
 /// The same, by rows of `u`. Only the compiler's vector instructions depend on `V`.
 #[inline(always)]
-unsafe fn whiten_rows_body<V: Lanes>(u: &[f64], columns: usize, z: &mut [f64]) {
+unsafe fn whiten_rows_body<V: DenseLanes>(u: &[f64], columns: usize, z: &mut [f64]) {
     let n = z.len() / columns.max(1);
     for k in 0..n {
         let (above, below) = z.split_at_mut((k + 1) * columns);
@@ -54,7 +54,7 @@ fn gram_scalar(z: &[f64], columns: usize, scale: f64, upper: &mut [f64]) {
 by_isa! { fn gram(z: &[f64], columns: usize, scale: f64, upper: &mut [f64]) = gram_body, gram_scalar; }
 
 #[inline(always)]
-unsafe fn gram_body<V: Lanes>(z: &[f64], columns: usize, scale: f64, upper: &mut [f64]) {
+unsafe fn gram_body<V: DenseLanes>(z: &[f64], columns: usize, scale: f64, upper: &mut [f64]) {
     let n = columns;
     let mut i = 0;
     while i + 4 <= n {

@@ -1,8 +1,8 @@
 //! `A = U^T U` of a dense block, in place, in its upper triangle, row-major f64; and `U^T U x = b`.
 
 use super::gram::subtract_scaled_tile;
-use crate::kernels::isa::by_isa;
-use crate::kernels::lanes::Lanes;
+use lanes::DenseLanes;
+use lanes::by_isa;
 
 /// Pivots below this part of their diagonal are rounding noise of the f32 compliance.
 const PIVOT_FLOOR: f64 = 1e-6;
@@ -39,7 +39,7 @@ by_isa! { pub(super) fn factor_upper(a: &mut [f64], n: usize, positive: &mut boo
 
 /// The same, by blocks of rows. Only the compiler's vector instructions depend on `V`.
 #[inline(always)]
-unsafe fn factor_upper_body<V: Lanes>(a: &mut [f64], n: usize, positive: &mut bool) {
+unsafe fn factor_upper_body<V: DenseLanes>(a: &mut [f64], n: usize, positive: &mut bool) {
     let mut start = 0;
     while start < n {
         let end = (start + BLOCK).min(n);
@@ -122,7 +122,7 @@ fn solve_upper_scalar(u: &[f64], x: &mut [f64]) {
 by_isa! { pub(super) fn solve_upper(u: &[f64], x: &mut [f64]) = solve_upper_body, solve_upper_scalar; }
 
 #[inline(always)]
-unsafe fn solve_upper_body<V: Lanes>(u: &[f64], x: &mut [f64]) {
+unsafe fn solve_upper_body<V: DenseLanes>(u: &[f64], x: &mut [f64]) {
     solve(u, x);
 }
 

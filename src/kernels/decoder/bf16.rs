@@ -49,9 +49,9 @@ mod x86 {
     use super::super::tile::{Layout, exponentials, gather, head, normalise};
     use super::super::weights::Narrow;
     use super::{DecoderTokens, MAX_NODES, NODES, PackedDecoder};
-    use crate::kernels::lanes::Avx512;
     use core::arch::x86_64::*;
     use half::bf16;
+    use lanes::Avx512;
 
     type V = Avx512;
     const C: usize = NODES / 16;

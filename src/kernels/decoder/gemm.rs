@@ -6,8 +6,8 @@
 //! length of a chain.
 
 use super::pack::GROUP;
-use crate::kernels::lanes::Lanes;
 use crate::kernels::math::gelu_lanes;
+use lanes::DenseLanes;
 
 /// Multiply-adds of a chain.
 pub(super) const BLOCK: usize = 32;
@@ -30,14 +30,14 @@ pub(super) enum Finish {
 /// # Safety
 /// See [`Lanes`]; the pointers hold what the shapes say.
 #[inline(always)]
-pub(super) unsafe fn multiply<V: Lanes, const R: usize, const C: usize>(
+pub(super) unsafe fn multiply<V: DenseLanes, const R: usize, const C: usize>(
     panels: &[f32],
     depth: usize,
     x: *const f32,
     y: *mut f32,
     finish: Finish,
 ) {
-    let stride = C * V::N;
+    let stride = C * V::COUNT;
     for (group, panel) in panels.chunks_exact(GROUP * depth).enumerate() {
         for part in (0..GROUP).step_by(R) {
             // SAFETY: the caller's.
@@ -65,7 +65,7 @@ pub(super) unsafe fn multiply<V: Lanes, const R: usize, const C: usize>(
 /// # Safety
 /// As [`multiply`].
 #[inline(always)]
-unsafe fn chain<V: Lanes, const R: usize, const C: usize>(
+unsafe fn chain<V: DenseLanes, const R: usize, const C: usize>(
     weight: &mut *const f32,
     from: &mut *const f32,
     length: usize,
@@ -76,7 +76,7 @@ unsafe fn chain<V: Lanes, const R: usize, const C: usize>(
         for _ in 0..length {
             let mut column = [V::splat(0.0); C];
             for c in 0..C {
-                column[c] = V::load(from.add(c * V::N));
+                column[c] = V::load(from.add(c * V::COUNT));
             }
             for r in 0..R {
                 let w = V::splat(*weight.add(r));
@@ -85,7 +85,7 @@ unsafe fn chain<V: Lanes, const R: usize, const C: usize>(
                 }
             }
             *weight = weight.add(GROUP);
-            *from = from.add(C * V::N);
+            *from = from.add(C * V::COUNT);
         }
         sum
     }
@@ -96,7 +96,7 @@ unsafe fn chain<V: Lanes, const R: usize, const C: usize>(
 /// # Safety
 /// As [`multiply`].
 #[inline(always)]
-pub(super) unsafe fn store<V: Lanes, const R: usize, const C: usize>(
+pub(super) unsafe fn store<V: DenseLanes, const R: usize, const C: usize>(
     sum: [[V; C]; R],
     y: *mut f32,
     row: usize,
@@ -108,15 +108,15 @@ pub(super) unsafe fn store<V: Lanes, const R: usize, const C: usize>(
             Finish::Plain => {
                 for r in 0..R {
                     for c in 0..C {
-                        sum[r][c].store(y.add((r * C + c) * V::N));
+                        sum[r][c].store(y.add((r * C + c) * V::COUNT));
                     }
                 }
             }
             Finish::Scale(scale) => {
                 for r in 0..R {
                     for c in 0..C {
-                        let scale = V::load(scale.add(c * V::N));
-                        sum[r][c].mul(scale).store(y.add((r * C + c) * V::N));
+                        let scale = V::load(scale.add(c * V::COUNT));
+                        sum[r][c].mul(scale).store(y.add((r * C + c) * V::COUNT));
                     }
                 }
             }
@@ -124,7 +124,7 @@ pub(super) unsafe fn store<V: Lanes, const R: usize, const C: usize>(
                 for r in 0..R {
                     let bias = V::splat(*bias.add(row + r));
                     for c in 0..C {
-                        gelu_lanes(sum[r][c].add(bias)).store(y.add((r * C + c) * V::N));
+                        gelu_lanes(sum[r][c].add(bias)).store(y.add((r * C + c) * V::COUNT));
                     }
                 }
             }
@@ -132,7 +132,7 @@ pub(super) unsafe fn store<V: Lanes, const R: usize, const C: usize>(
                 for r in 0..R {
                     let bias = V::splat(*bias.add(row + r));
                     for c in 0..C {
-                        let to = y.add((r * C + c) * V::N);
+                        let to = y.add((r * C + c) * V::COUNT);
                         V::load(to).add(sum[r][c].add(bias)).store(to);
                     }
                 }

@@ -26,10 +26,10 @@ pub use precision::DecoderPrecision;
 pub use weights::{DecoderTokens, DecoderWeights, PackedDecoder};
 
 use super::Compute;
-use super::isa::Isa;
 use super::parts::Parts;
 use super::pool::PoolError;
 use crate::memory;
+use lanes::Isa;
 
 /// Which nodes to decode, and where each goes.
 #[derive(Debug, Clone, Copy)]

@@ -1,7 +1,7 @@
 //! What the decoder computes in, and what this machine can.
 
 use super::amx;
-use crate::kernels::isa::Isa;
+use lanes::Isa;
 
 /// Arithmetic of the matrix products.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -4,8 +4,8 @@
 use super::CacheLine;
 use super::gemm::{Finish, multiply};
 use super::pack::panel_floats;
-use crate::kernels::isa::{Isa, by_isa};
-use crate::kernels::lanes::Lanes;
+use lanes::DenseLanes;
+use lanes::{Isa, by_isa};
 
 const WIDTH: usize = 128;
 
@@ -53,11 +53,11 @@ fn scalar(weights: &[f32], input: &[CacheLine], output: &mut [CacheLine]) {
 }
 
 #[inline(always)]
-unsafe fn body<V: Lanes>(weights: &[f32], input: &[CacheLine], output: &mut [CacheLine]) {
+unsafe fn body<V: DenseLanes>(weights: &[f32], input: &[CacheLine], output: &mut [CacheLine]) {
     let (x, y) = (input.as_ptr().cast(), output.as_mut_ptr().cast());
     // SAFETY: the buffers hold `WIDTH` rows of the largest tile.
     unsafe {
-        match V::N {
+        match V::COUNT {
             16 => multiply::<V, 8, 3>(weights, WIDTH, x, y, Finish::Plain),
             8 => multiply::<V, 4, 2>(weights, WIDTH, x, y, Finish::Plain),
             _ => multiply::<V, 8, 2>(weights, WIDTH, x, y, Finish::Plain),

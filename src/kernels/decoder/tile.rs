@@ -4,9 +4,9 @@ use super::gemm::{BLOCK, Finish, multiply};
 use super::pack::{GROUP, panel_floats};
 use super::scalar;
 use super::weights::{DecoderTokens, PackedDecoder};
-use crate::kernels::isa::{Isa, by_isa};
-use crate::kernels::lanes::Lanes;
 use crate::kernels::math::exp2_lanes;
+use lanes::DenseLanes;
+use lanes::{Isa, by_isa};
 
 /// Nodes of the largest tile.
 pub(super) const MAX_NODES: usize = 64;
@@ -81,7 +81,7 @@ fn scalar_tile(
 }
 
 #[inline(always)]
-unsafe fn body<V: Lanes>(
+unsafe fn body<V: DenseLanes>(
     decoder: &PackedDecoder,
     tokens: &DecoderTokens,
     queries: &[f32],
@@ -91,7 +91,7 @@ unsafe fn body<V: Lanes>(
 ) {
     // SAFETY: the caller's; the shape of the register tile fits the number of registers.
     unsafe {
-        match V::N {
+        match V::COUNT {
             16 => layers::<V, 8, 3>(decoder, tokens, queries, rows, scratch, out),
             8 => layers::<V, 4, 2>(decoder, tokens, queries, rows, scratch, out),
             _ => layers::<V, 8, 2>(decoder, tokens, queries, rows, scratch, out),
@@ -100,7 +100,7 @@ unsafe fn body<V: Lanes>(
 }
 
 #[inline(always)]
-unsafe fn layers<V: Lanes, const R: usize, const C: usize>(
+unsafe fn layers<V: DenseLanes, const R: usize, const C: usize>(
     decoder: &PackedDecoder,
     tokens: &DecoderTokens,
     queries: &[f32],
@@ -108,7 +108,7 @@ unsafe fn layers<V: Lanes, const R: usize, const C: usize>(
     scratch: &mut [f32],
     out: &mut [f32],
 ) {
-    let (h, nodes) = (decoder.hidden, C * V::N);
+    let (h, nodes) = (decoder.hidden, C * V::COUNT);
     let at = Layout::new(decoder, tokens.len(), nodes);
     assert!(rows.len() == nodes && out.len() == 3 * nodes && scratch.len() >= at.total);
     // SAFETY: every array lies inside `scratch` by its layout; rows were checked by `decode`.
@@ -150,7 +150,7 @@ unsafe fn layers<V: Lanes, const R: usize, const C: usize>(
 
 /// `to[k][i] = table[rows[i]][column + k]` for `k < count`.
 #[inline(always)]
-pub(super) unsafe fn gather<V: Lanes>(
+pub(super) unsafe fn gather<V: DenseLanes>(
     table: &[f32],
     rows: &[usize],
     width: usize,
@@ -159,20 +159,20 @@ pub(super) unsafe fn gather<V: Lanes>(
     to: *mut f32,
 ) {
     let stride = rows.len();
-    for (part, rows) in rows.chunks_exact(V::N).enumerate() {
+    for (part, rows) in rows.chunks_exact(V::COUNT).enumerate() {
         let mut offsets = [0usize; 16];
         for (offset, row) in offsets.iter_mut().zip(rows) {
             *offset = row * width + column;
         }
-        let whole = count - count % V::N;
+        let whole = count - count % V::COUNT;
         // SAFETY: the caller's.
         unsafe {
-            let to = to.add(part * V::N);
-            for k in (0..whole).step_by(V::N) {
+            let to = to.add(part * V::COUNT);
+            for k in (0..whole).step_by(V::COUNT) {
                 V::transpose(table.as_ptr().add(k), &offsets, to.add(k * stride), stride);
             }
             for k in whole..count {
-                for (i, offset) in offsets[..V::N].iter().enumerate() {
+                for (i, offset) in offsets[..V::COUNT].iter().enumerate() {
                     *to.add(k * stride + i) = *table.as_ptr().add(offset + k);
                 }
             }
@@ -182,19 +182,19 @@ pub(super) unsafe fn gather<V: Lanes>(
 
 /// `s = 2^(s - max s)` over the tokens of each node, and one over the sum to `scale`.
 #[inline(always)]
-pub(super) unsafe fn exponentials<V: Lanes, const C: usize>(
+pub(super) unsafe fn exponentials<V: DenseLanes, const C: usize>(
     scores: *mut f32,
     tokens: usize,
     scale: *mut f32,
 ) {
-    let stride = C * V::N;
+    let stride = C * V::COUNT;
     // SAFETY: the caller's.
     unsafe {
         let mut largest = [V::splat(f32::NEG_INFINITY); C];
         for l in 0..tokens {
             for c in 0..C {
                 // A NaN score stays a NaN in the exponential below.
-                largest[c] = largest[c].max(V::load(scores.add(l * stride + c * V::N)));
+                largest[c] = largest[c].max(V::load(scores.add(l * stride + c * V::COUNT)));
             }
         }
         let mut sum = [V::splat(0.0); C];
@@ -202,7 +202,7 @@ pub(super) unsafe fn exponentials<V: Lanes, const C: usize>(
             let mut part = [V::splat(0.0); C];
             for l in start..(start + BLOCK).min(tokens) {
                 for c in 0..C {
-                    let at = scores.add(l * stride + c * V::N);
+                    let at = scores.add(l * stride + c * V::COUNT);
                     let weight = exp2_lanes(V::load(at).sub(largest[c]));
                     weight.store(at);
                     part[c] = part[c].add(weight);
@@ -213,15 +213,19 @@ pub(super) unsafe fn exponentials<V: Lanes, const C: usize>(
             }
         }
         for c in 0..C {
-            V::splat(1.0).div(sum[c]).store(scale.add(c * V::N));
+            V::splat(1.0).div(sum[c]).store(scale.add(c * V::COUNT));
         }
     }
 }
 
 /// `y = (x - mean x) / sqrt(var x + eps)` over the features of each node.
 #[inline(always)]
-pub(super) unsafe fn normalise<V: Lanes, const C: usize>(x: *const f32, h: usize, y: *mut f32) {
-    let stride = C * V::N;
+pub(super) unsafe fn normalise<V: DenseLanes, const C: usize>(
+    x: *const f32,
+    h: usize,
+    y: *mut f32,
+) {
+    let stride = C * V::COUNT;
     let share = 1.0 / h as f32;
     // SAFETY: the caller's.
     unsafe {
@@ -230,7 +234,7 @@ pub(super) unsafe fn normalise<V: Lanes, const C: usize>(x: *const f32, h: usize
             let mut part = [V::splat(0.0); C];
             for k in start..(start + BLOCK).min(h) {
                 for c in 0..C {
-                    part[c] = part[c].add(V::load(x.add(k * stride + c * V::N)));
+                    part[c] = part[c].add(V::load(x.add(k * stride + c * V::COUNT)));
                 }
             }
             for c in 0..C {
@@ -245,7 +249,7 @@ pub(super) unsafe fn normalise<V: Lanes, const C: usize>(x: *const f32, h: usize
             let mut part = [V::splat(0.0); C];
             for k in start..(start + BLOCK).min(h) {
                 for c in 0..C {
-                    let d = V::load(x.add(k * stride + c * V::N)).sub(mean[c]);
+                    let d = V::load(x.add(k * stride + c * V::COUNT)).sub(mean[c]);
                     part[c] = d.mul_add(d, part[c]);
                 }
             }
@@ -260,7 +264,7 @@ pub(super) unsafe fn normalise<V: Lanes, const C: usize>(x: *const f32, h: usize
         }
         for k in 0..h {
             for c in 0..C {
-                let at = k * stride + c * V::N;
+                let at = k * stride + c * V::COUNT;
                 V::load(x.add(at))
                     .sub(mean[c])
                     .mul(scale[c])
@@ -272,19 +276,19 @@ pub(super) unsafe fn normalise<V: Lanes, const C: usize>(x: *const f32, h: usize
 
 /// `out [3][nodes] = W_3 x + b_3`.
 #[inline(always)]
-pub(super) unsafe fn head<V: Lanes, const C: usize>(
+pub(super) unsafe fn head<V: DenseLanes, const C: usize>(
     decoder: &PackedDecoder,
     x: *const f32,
     out: *mut f32,
 ) {
-    let (h, stride) = (decoder.hidden, C * V::N);
+    let (h, stride) = (decoder.hidden, C * V::COUNT);
     let layer = &decoder.head;
     // SAFETY: the caller's.
     unsafe {
         let mut sum = [[V::splat(0.0); C]; 3];
         for k in 0..h {
             for c in 0..C {
-                let x = V::load(x.add(k * stride + c * V::N));
+                let x = V::load(x.add(k * stride + c * V::COUNT));
                 for axis in 0..3 {
                     let w = V::splat(*layer.panels.as_ptr().add(k * GROUP + axis));
                     sum[axis][c] = x.mul_add(w, sum[axis][c]);
@@ -296,7 +300,7 @@ pub(super) unsafe fn head<V: Lanes, const C: usize>(
             for c in 0..C {
                 sum[axis][c]
                     .add(bias)
-                    .store(out.add(axis * stride + c * V::N));
+                    .store(out.add(axis * stride + c * V::COUNT));
             }
         }
     }

@@ -4,7 +4,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
-use crate::kernels::flush::FlushToZero;
+use lanes::flush::FlushToZero;
 
 /// Looks of a worker that is kept awake for the next job, and of a caller for the end of one, before it sleeps: about 0.1 ms.
 pub const LOOKS: u32 = 2000;

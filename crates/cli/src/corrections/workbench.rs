@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use anyhow::{Context, Result, bail};
-use elements::{ElementForces, Material, Simd};
+use elements::{ElementForces, Isa, Material};
 use serde_json::Value;
 use tissue::linear::{
     ColumnsFile, Factor, Lame, NaturalModes, Stiffness, compliance_columns, natural_modes,
@@ -146,7 +146,7 @@ impl Workbench {
     }
 
     pub fn element_forces(&self) -> Result<ElementForces> {
-        let made = ElementForces::new(self.mesh.tetrahedra(), &self.material, Simd::detect());
+        let made = ElementForces::new(self.mesh.tetrahedra(), &self.material, Isa::detect());
         Ok(made?)
     }
 

@@ -2,12 +2,12 @@
 
 use super::shape::{Shape, load};
 use crate::cluster::{Cluster, corners};
-use crate::lanes::Lanes;
 use crate::laws::Isochoric;
+use lanes::NodeLanes;
 
 /// Adds a spring to a sum: the stored one times its factor, or one that the law has made anew.
 #[inline(always)]
-unsafe fn add_spring<L: Lanes, M: Isochoric>(factor: L, spring: L, sum: L) -> L {
+unsafe fn add_spring<L: NodeLanes, M: Isochoric>(factor: L, spring: L, sum: L) -> L {
     unsafe {
         if M::SECOND {
             sum.add(spring)
@@ -30,7 +30,7 @@ struct Pull<L, const NODES: usize, const TETS: usize> {
 
 /// Adds the forces to the nodes.
 #[inline(always)]
-pub(super) unsafe fn scatter<L: Lanes, M: Isochoric, const NODES: usize, const TETS: usize>(
+pub(super) unsafe fn scatter<L: NodeLanes, M: Isochoric, const NODES: usize, const TETS: usize>(
     cluster: &Cluster<NODES, TETS>,
     first: usize,
     shape: &Shape,
@@ -78,7 +78,7 @@ pub(super) unsafe fn scatter<L: Lanes, M: Isochoric, const NODES: usize, const T
 
 /// Adds the force on one node, and takes it from `rest`. The node is a constant so that its neighbours are, too.
 #[inline(always)]
-unsafe fn add_node<L: Lanes, const NODES: usize, const TETS: usize, const NODE: usize>(
+unsafe fn add_node<L: NodeLanes, const NODES: usize, const TETS: usize, const NODE: usize>(
     cluster: &Cluster<NODES, TETS>,
     first: usize,
     shape: &Shape,

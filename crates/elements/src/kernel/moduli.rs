@@ -2,12 +2,12 @@
 
 use super::shape::{Shape, load, store};
 use crate::cluster::Cluster;
-use crate::lanes::Lanes;
 use crate::laws::Isochoric;
+use lanes::NodeLanes;
 
 /// `x^(-1/3)` for positive `x`, relative error about 1e-7.
 #[inline(always)]
-unsafe fn inverse_cube_root<L: Lanes>(x: L) -> L {
+unsafe fn inverse_cube_root<L: NodeLanes>(x: L) -> L {
     unsafe {
         let y = x.inverse_cube_root_guess();
         // y (1 - e)^(-1/3) with e = 1 - x y^3: a Chebyshev fit over -0.121..0.091, the guess's whole range.
@@ -28,7 +28,7 @@ const ENTRY: [[usize; 3]; 3] = [[0, 1, 2], [1, 3, 4], [2, 4, 5]];
 /// Turns determinant, invariant and products into the factors of springs and pressure; returns det F.
 #[inline(always)]
 pub(super) unsafe fn moduli<
-    L: Lanes,
+    L: NodeLanes,
     M: Isochoric,
     const NODES: usize,
     const TETS: usize,
@@ -44,7 +44,7 @@ pub(super) unsafe fn moduli<
         let determinant = load::<L>(&shape.determinant[tet], first);
         let inverse = load::<L>(&cluster.inverse[tet], first);
         let ratio = determinant.mul(inverse);
-        let root = inverse_cube_root(ratio.max(L::splat(1e-3)));
+        let root = inverse_cube_root(L::splat(1e-3).max(ratio));
         let loss = if AVERAGED {
             load::<L>(&shape.dilatation[tet], first).mul(L::splat(-0.25))
         } else {
@@ -58,7 +58,7 @@ pub(super) unsafe fn moduli<
             let scale = bulk
                 .mul(inverse)
                 .mul(L::splat(-bulk_over_shear))
-                .div(bulk.mul(bulk).max(L::splat(f32::MIN_POSITIVE)));
+                .div(L::splat(f32::MIN_POSITIVE).max(bulk.mul(bulk)));
             let volume = springs::<L, M, NODES, TETS>(
                 law,
                 [invariant.mul(scale), scale, root],
@@ -81,7 +81,7 @@ pub(super) unsafe fn moduli<
 
 /// Of a law with `I2`: puts the springs in place of the edges' products; returns the two factors of `-dw/dJ`.
 #[inline(always)]
-unsafe fn springs<L: Lanes, M: Isochoric, const NODES: usize, const TETS: usize>(
+unsafe fn springs<L: NodeLanes, M: Isochoric, const NODES: usize, const TETS: usize>(
     law: M,
     [invariant, scale, root]: [L; 3],
     cluster: &Cluster<NODES, TETS>,

@@ -1,8 +1,8 @@
 //! The first loop of a batch: nodes gathered, and what the edges of its tetrahedra have between them.
 
 use crate::cluster::{Cluster, corners};
-use crate::lanes::{Lanes, WIDTH};
 use crate::laws::Isochoric;
+use lanes::{NodeLanes, WIDTH};
 
 /// A vector of 16 elements.
 type Vectors = [[f32; WIDTH]; 3];
@@ -40,17 +40,17 @@ impl Shape {
 }
 
 #[inline(always)]
-pub(super) unsafe fn load<L: Lanes>(row: &[f32; WIDTH], first: usize) -> L {
+pub(super) unsafe fn load<L: NodeLanes>(row: &[f32; WIDTH], first: usize) -> L {
     unsafe { L::load(row.as_ptr().add(first)) }
 }
 
 #[inline(always)]
-pub(super) unsafe fn store<L: Lanes>(value: L, row: &mut [f32; WIDTH], first: usize) {
+pub(super) unsafe fn store<L: NodeLanes>(value: L, row: &mut [f32; WIDTH], first: usize) {
     unsafe { value.store(row.as_mut_ptr().add(first)) }
 }
 
 #[inline(always)]
-pub(super) unsafe fn store_vector<L: Lanes>(value: [L; 3], rows: &mut Vectors, first: usize) {
+pub(super) unsafe fn store_vector<L: NodeLanes>(value: [L; 3], rows: &mut Vectors, first: usize) {
     unsafe {
         for i in 0..3 {
             store(value[i], &mut rows[i], first);
@@ -59,7 +59,7 @@ pub(super) unsafe fn store_vector<L: Lanes>(value: [L; 3], rows: &mut Vectors, f
 }
 
 #[inline(always)]
-pub(super) unsafe fn cross<L: Lanes>(a: [L; 3], b: [L; 3]) -> [L; 3] {
+pub(super) unsafe fn cross<L: NodeLanes>(a: [L; 3], b: [L; 3]) -> [L; 3] {
     unsafe {
         [
             a[2].neg_mul_add(b[1], a[1].mul(b[2])),
@@ -70,13 +70,13 @@ pub(super) unsafe fn cross<L: Lanes>(a: [L; 3], b: [L; 3]) -> [L; 3] {
 }
 
 #[inline(always)]
-pub(super) unsafe fn dot<L: Lanes>(a: [L; 3], b: [L; 3]) -> L {
+pub(super) unsafe fn dot<L: NodeLanes>(a: [L; 3], b: [L; 3]) -> L {
     unsafe { a[2].mul_add(b[2], a[1].mul_add(b[1], a[0].mul(b[0]))) }
 }
 
 /// Edges from node 0 of the clusters from lane `first` on (entry 0 is zero), and the nodes' fourth components.
 #[inline(always)]
-pub(super) unsafe fn edges<L: Lanes, const NODES: usize, const TETS: usize>(
+pub(super) unsafe fn edges<L: NodeLanes, const NODES: usize, const TETS: usize>(
     cluster: &Cluster<NODES, TETS>,
     first: usize,
     nodes: *const [f32; 4],
@@ -99,7 +99,7 @@ pub(super) unsafe fn edges<L: Lanes, const NODES: usize, const TETS: usize>(
 /// Gathers the nodes and fills `out`.
 #[inline(always)]
 pub(super) unsafe fn shape<
-    L: Lanes,
+    L: NodeLanes,
     M: Isochoric,
     const NODES: usize,
     const TETS: usize,

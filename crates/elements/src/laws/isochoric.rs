@@ -1,6 +1,6 @@
 //! What a law without change of volume is made of.
 
-use crate::lanes::Lanes;
+use lanes::Lanes;
 
 /// `I1`, `I2` and `J^(-1/3)`.
 #[derive(Clone, Copy, Debug)]

@@ -6,7 +6,7 @@
 //! (J Biomech Eng 117, 1995, 279-285) found `C10 = 0.9 C01`: the default.
 
 use super::{Invariants, Isochoric, LaneSlopes, Slopes};
-use crate::lanes::Lanes;
+use lanes::Lanes;
 use serde::{Deserialize, Serialize};
 
 /// The law's own constant.

@@ -1,7 +1,7 @@
 //! Neo-Hookean: `w = (J^(-2/3) I1 - 3) / 2`. The fast path of the kernel: springs along the edges do not change but by a factor.
 
 use super::{Invariants, Isochoric, LaneSlopes, Slopes};
-use crate::lanes::Lanes;
+use lanes::Lanes;
 use serde::{Deserialize, Serialize};
 
 /// It has no constant of its own.

@@ -6,7 +6,7 @@
 
 mod verification;
 
-use elements::{ElementForces, Law, MooneyRivlin, Simd};
+use elements::{ElementForces, Isa, Law, MooneyRivlin};
 use std::error::Error;
 use std::path::Path;
 use tissue::contact::{ContactDomain, FACE_AREA_MM2};
@@ -103,13 +103,13 @@ fn laws(mesh: &Mesh) -> Outcome<String> {
     let u: Vec<f32> = (mesh.positions.iter().flatten())
         .map(|x| 0.5 * (0.1 * x).sin())
         .collect();
-    for simd in Simd::ALL.into_iter().filter(|simd| simd.is_available()) {
+    for isa in Isa::available().into_iter().rev() {
         let bodies = all.map(|law| {
             let material = Material {
                 law,
                 ..Material::default()
             };
-            ElementForces::new(mesh.tetrahedra(), &material, simd).expect("memory for a body")
+            ElementForces::new(mesh.tetrahedra(), &material, isa).expect("memory for a body")
         });
         let mut scratch = bodies[0].scratch(1)?;
         let mut out = vec![0.0; u.len()];
@@ -129,7 +129,7 @@ fn laws(mesh: &Mesh) -> Outcome<String> {
         });
         for (law, median) in all.iter().zip(medians) {
             table += &format!(
-                "| {law:.3} | {simd:?} | {median:.3} | {:.2} |\n",
+                "| {law:.3} | {isa:?} | {median:.3} | {:.2} |\n",
                 median / medians[0]
             );
         }

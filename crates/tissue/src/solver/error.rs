@@ -13,9 +13,9 @@ pub enum SolverError {
     #[error("no memory for the elements of the mesh: {0}")]
     Memory(#[from] std::collections::TryReserveError),
     #[error(
-        "instruction set {0:?} is not available on this processor; leave `simd` unset to detect"
+        "instruction set {0:?} is not available on this processor; leave `isa` unset to detect"
     )]
-    SimdUnavailable(super::Simd),
+    IsaUnavailable(lanes::Isa),
     #[error("cannot start {threads} solver threads: {reason}")]
     Threads { threads: usize, reason: String },
     #[error("solver option `{field}` is {value}; it must be {wanted}")]

@@ -7,11 +7,12 @@
 //! end the frame exactly at their target. Tools ([`super::touch`]) then correct what has moved. Two phases a step, a barrier after each:
 //! chunks add element forces to their own slots; owners collect ghost forces and move.
 
-use super::barrier::{FlushDenormals, SpinBarrier};
+use super::barrier::SpinBarrier;
 use super::fields::{Fields, Node};
 use super::touch::{Access, Touch};
 use elements::PADDED;
 use elements::{Chunk, Kernels, Partition};
+use lanes::FlushToZero;
 use rayon::ThreadPool;
 use std::sync::Mutex;
 
@@ -143,14 +144,14 @@ impl March<'_> {
         let count = self.partition.chunks.len();
         match pool {
             None => {
-                let _mode = FlushDenormals::new();
+                let _mode = FlushToZero::enter();
                 work(true, 0..count, &SpinBarrier::new(1));
             }
             Some(pool) => {
                 let threads = pool.current_num_threads();
                 let barrier = SpinBarrier::new(threads);
                 pool.broadcast(|context| {
-                    let _mode = FlushDenormals::new();
+                    let _mode = FlushToZero::enter();
                     let index = context.index();
                     work(
                         index == 0,

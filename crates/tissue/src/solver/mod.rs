@@ -20,8 +20,8 @@ mod touch;
 #[cfg(all(test, feature = "linear"))]
 mod tests;
 
-pub use elements::Simd;
 pub use error::SolverError;
+pub use lanes::Isa;
 pub use options::{Pressure, SolverOptions, Substep};
 pub use touch::{SampleForce, Tool, ToolPose, ToolReport};
 
@@ -113,8 +113,8 @@ impl Solver {
     ) -> Result<Self, SolverError> {
         mesh.validate()?;
         options.validate()?;
-        let simd = options.simd.unwrap_or_else(Simd::detect);
-        let kernels = Kernels::of(simd).ok_or(SolverError::SimdUnavailable(simd))?;
+        let isa = options.isa.unwrap_or_else(Isa::detect);
+        let kernels = Kernels::of(isa).ok_or(SolverError::IsaUnavailable(isa))?;
         let pool = match options.threads {
             0 | 1 => None,
             threads => Some(

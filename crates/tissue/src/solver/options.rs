@@ -2,7 +2,7 @@
 
 use super::error::SolverError;
 use crate::material::Material;
-use elements::Simd;
+use lanes::Isa;
 
 /// How the pressure of an element is found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -44,7 +44,7 @@ pub struct SolverOptions {
     /// Default 1.
     pub threads: usize,
     /// Default: the best set of this processor.
-    pub simd: Option<Simd>,
+    pub isa: Option<Isa>,
 }
 
 impl Default for SolverOptions {
@@ -57,7 +57,7 @@ impl Default for SolverOptions {
             substep: Substep::Automatic,
             pressure: Pressure::Element,
             threads: 1,
-            simd: None,
+            isa: None,
         }
     }
 }

@@ -6,11 +6,10 @@ use crate::mesh::box_phantom;
 use crate::statics::energy::StrainEnergy;
 
 /// Forces of a displacement, mN, by every instruction set of this processor.
-fn forces(mesh: &Mesh, material: Material, u: &[[f32; 3]]) -> Vec<(Simd, Vec<[f32; 3]>)> {
-    let available = Simd::ALL.into_iter().filter(|simd| simd.is_available());
-    let found = available.map(|simd| {
+fn forces(mesh: &Mesh, material: Material, u: &[[f32; 3]]) -> Vec<(Isa, Vec<[f32; 3]>)> {
+    let found = Isa::available().into_iter().map(|isa| {
         let options = SolverOptions {
-            simd: Some(simd),
+            isa: Some(isa),
             material,
             ..SolverOptions::default()
         };
@@ -24,7 +23,7 @@ fn forces(mesh: &Mesh, material: Material, u: &[[f32; 3]]) -> Vec<(Simd, Vec<[f3
             let [x, y, z, _] = solver.fields.force[*slot as usize].0;
             [x * 1e-3, y * 1e-3, z * 1e-3]
         });
-        (simd, rows.collect())
+        (isa, rows.collect())
     });
     found.collect()
 }
@@ -65,7 +64,7 @@ fn forces_are_the_derivative_of_the_energy() {
         let energy = StrainEnergy::new(&mesh, &material).evaluate(&wide, &mut gradient);
         assert!(energy.min_det > 0.2 && energy.min_det < 0.9, "{energy:?}");
         let largest = gradient.iter().fold(0.0f64, |m, v| m.max(v.abs()));
-        for (simd, found) in forces(&mesh, material, &u) {
+        for (isa, found) in forces(&mesh, material, &u) {
             let worst = found
                 .as_flattened()
                 .iter()
@@ -73,7 +72,7 @@ fn forces_are_the_derivative_of_the_energy() {
                 .fold(0.0f64, |m, (f, g)| m.max((f64::from(*f) + g).abs()));
             assert!(
                 worst < 3e-6 * largest,
-                "{simd:?}, nu = {poisson}: {worst} of {largest} mN"
+                "{isa:?}, nu = {poisson}: {worst} of {largest} mN"
             );
         }
     }
@@ -87,12 +86,12 @@ fn forces_at_rest_are_rounding() {
     let u = vec![[0.0; 3]; mesh.node_count()];
     // Pa mm² = µN; a node's share of its elements' faces is about 36 mm², the modulus up to three times the material's.
     let bound = (3e-7 * 3.0 * material.bulk_pa() * 36.0 * 1e-3) as f32;
-    for (simd, found) in forces(&mesh, material, &u) {
+    for (isa, found) in forces(&mesh, material, &u) {
         let worst = found
             .as_flattened()
             .iter()
             .fold(0.0f32, |m, f| m.max(f.abs()));
-        assert!(worst < bound, "{simd:?}: {worst} mN, bound {bound}");
+        assert!(worst < bound, "{isa:?}: {worst} mN, bound {bound}");
     }
 }
 

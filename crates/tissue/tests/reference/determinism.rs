@@ -1,14 +1,14 @@
 //! The same bits for any number of threads; the same answer on any instruction set.
 
 use tissue::mesh::{Boundary, box_phantom};
-use tissue::solver::{ContactNode, FrameReport, Pressure, Simd, Solver, SolverOptions};
+use tissue::solver::{ContactNode, FrameReport, Isa, Pressure, Solver, SolverOptions};
 
-fn march(threads: usize, simd: Option<Simd>, pressure: Pressure) -> (Vec<[f32; 3]>, FrameReport) {
+fn march(threads: usize, isa: Option<Isa>, pressure: Pressure) -> (Vec<[f32; 3]>, FrameReport) {
     // Six chunks, so that threads really share nodes.
     let mesh = box_phantom([60.0; 3], [12; 3]).unwrap();
     let options = SolverOptions {
         threads,
-        simd,
+        isa,
         pressure,
         ..SolverOptions::default()
     };
@@ -57,15 +57,15 @@ fn any_number_of_threads_gives_the_same_bits() {
 #[test]
 fn every_instruction_set_gives_the_scalar_answer() {
     for pressure in [Pressure::Element, Pressure::AverageNodal] {
-        let (reference, scalar) = march(1, Some(Simd::Scalar), pressure);
-        for simd in Simd::ALL.into_iter().filter(|s| s.is_available()) {
-            let (found, report) = march(1, Some(simd), pressure);
+        let (reference, scalar) = march(1, Some(Isa::Scalar), pressure);
+        for isa in Isa::available() {
+            let (found, report) = march(1, Some(isa), pressure);
             let worst = found
                 .as_flattened()
                 .iter()
                 .zip(reference.as_flattened())
                 .fold(0.0f32, |m, (a, b)| m.max((a - b).abs()));
-            assert!(worst < 1e-4, "{simd:?} is off by {worst} mm");
+            assert!(worst < 1e-4, "{isa:?} is off by {worst} mm");
             assert!((report.strain_energy / scalar.strain_energy - 1.0).abs() < 1e-5);
         }
     }

@@ -4,29 +4,75 @@
     reason = "one contract for all: the instruction set is enabled in the caller, and pointers hold what the shapes say"
 )]
 
-use super::Lanes;
+use super::{DenseLanes, Lanes};
 use core::arch::aarch64::*;
 
 /// Four f32.
 #[derive(Clone, Copy)]
-pub(crate) struct Neon(float32x4_t);
+pub struct Neon(float32x4_t);
 
-// SAFETY (all functions): the trait's contract; NEON is part of every AArch64 target used here.
+// SAFETY (all functions): the traits' contract; NEON is part of every AArch64 target.
 impl Lanes for Neon {
-    const N: usize = 4;
+    const COUNT: usize = 4;
 
     #[inline(always)]
     unsafe fn splat(x: f32) -> Self {
         unsafe { Self(vdupq_n_f32(x)) }
     }
+
     #[inline(always)]
     unsafe fn load(from: *const f32) -> Self {
         unsafe { Self(vld1q_f32(from)) }
     }
+
     #[inline(always)]
     unsafe fn store(self, to: *mut f32) {
         unsafe { vst1q_f32(to, self.0) }
     }
+
+    #[inline(always)]
+    unsafe fn add(self, other: Self) -> Self {
+        unsafe { Self(vaddq_f32(self.0, other.0)) }
+    }
+
+    #[inline(always)]
+    unsafe fn sub(self, other: Self) -> Self {
+        unsafe { Self(vsubq_f32(self.0, other.0)) }
+    }
+
+    #[inline(always)]
+    unsafe fn mul(self, other: Self) -> Self {
+        unsafe { Self(vmulq_f32(self.0, other.0)) }
+    }
+
+    #[inline(always)]
+    unsafe fn div(self, other: Self) -> Self {
+        unsafe { Self(vdivq_f32(self.0, other.0)) }
+    }
+
+    #[inline(always)]
+    unsafe fn mul_add(self, a: Self, b: Self) -> Self {
+        unsafe { Self(vfmaq_f32(b.0, self.0, a.0)) }
+    }
+
+    #[inline(always)]
+    unsafe fn neg_mul_add(self, a: Self, b: Self) -> Self {
+        unsafe { Self(vfmsq_f32(b.0, self.0, a.0)) }
+    }
+
+    #[inline(always)]
+    unsafe fn min(self, other: Self) -> Self {
+        unsafe { Self(vminq_f32(self.0, other.0)) }
+    }
+
+    #[inline(always)]
+    unsafe fn max(self, other: Self) -> Self {
+        unsafe { Self(vmaxq_f32(self.0, other.0)) }
+    }
+}
+
+// SAFETY (all functions): the traits' contract; NEON is part of every AArch64 target.
+impl DenseLanes for Neon {
     #[inline(always)]
     unsafe fn load_part(from: *const f32, count: usize) -> Self {
         let mut lanes = [0.0f32; 4];
@@ -35,6 +81,7 @@ impl Lanes for Neon {
             Self(vld1q_f32(lanes.as_ptr()))
         }
     }
+
     #[inline(always)]
     unsafe fn store_part(self, to: *mut f32, count: usize) {
         let mut lanes = [0.0f32; 4];
@@ -43,6 +90,7 @@ impl Lanes for Neon {
             core::ptr::copy_nonoverlapping(lanes.as_ptr(), to, count);
         }
     }
+
     #[inline(always)]
     unsafe fn load_f16(from: *const half::f16) -> Self {
         unsafe {
@@ -57,42 +105,17 @@ impl Lanes for Neon {
             Self(wide)
         }
     }
-    #[inline(always)]
-    unsafe fn add(self, other: Self) -> Self {
-        unsafe { Self(vaddq_f32(self.0, other.0)) }
-    }
-    #[inline(always)]
-    unsafe fn sub(self, other: Self) -> Self {
-        unsafe { Self(vsubq_f32(self.0, other.0)) }
-    }
-    #[inline(always)]
-    unsafe fn mul(self, other: Self) -> Self {
-        unsafe { Self(vmulq_f32(self.0, other.0)) }
-    }
-    #[inline(always)]
-    unsafe fn div(self, other: Self) -> Self {
-        unsafe { Self(vdivq_f32(self.0, other.0)) }
-    }
-    #[inline(always)]
-    unsafe fn mul_add(self, a: Self, b: Self) -> Self {
-        unsafe { Self(vfmaq_f32(b.0, self.0, a.0)) }
-    }
+
     #[inline(always)]
     unsafe fn sqrt(self) -> Self {
         unsafe { Self(vsqrtq_f32(self.0)) }
     }
-    #[inline(always)]
-    unsafe fn max(self, other: Self) -> Self {
-        unsafe { Self(vmaxq_f32(self.0, other.0)) }
-    }
-    #[inline(always)]
-    unsafe fn min(self, other: Self) -> Self {
-        unsafe { Self(vminq_f32(self.0, other.0)) }
-    }
+
     #[inline(always)]
     unsafe fn round(self) -> Self {
         unsafe { Self(vrndnq_f32(self.0)) }
     }
+
     #[inline(always)]
     unsafe fn scale_by_power(self, exponent: Self) -> Self {
         unsafe {
@@ -101,6 +124,7 @@ impl Lanes for Neon {
             Self(vmulq_f32(self.0, power))
         }
     }
+
     #[inline(always)]
     unsafe fn sums(four: [Self; 4]) -> [f32; 4] {
         unsafe {
@@ -111,6 +135,7 @@ impl Lanes for Neon {
             out
         }
     }
+
     #[inline(always)]
     unsafe fn transpose(from: *const f32, row_offset: &[usize], to: *mut f32, stride: usize) {
         unsafe {

@@ -1,14 +1,15 @@
-//! NEON: four registers of 4 lanes.
+//! Four registers of Advanced SIMD as one.
 #![allow(
     clippy::undocumented_unsafe_blocks,
     reason = "one contract for all: the instruction set is enabled in the caller, and pointers hold what the shapes say"
 )]
 
-use super::{CUBE_ROOT_GUESS, Lanes, WIDTH};
-use std::arch::aarch64::*;
+use super::{CUBE_ROOT_GUESS, Lanes, NodeLanes, WIDTH};
+use core::arch::aarch64::*;
 
+/// Sixteen f32 in four registers.
 #[derive(Clone, Copy)]
-pub struct Neon([float32x4_t; 4]);
+pub struct NeonFour([float32x4_t; 4]);
 
 /// Transposes four rows `[x y z w]` to columns, and back.
 #[inline(always)]
@@ -27,8 +28,8 @@ unsafe fn transpose(rows: [float32x4_t; 4]) -> [float32x4_t; 4] {
     }
 }
 
-// SAFETY: see the trait; NEON is part of every aarch64 target.
-impl Lanes for Neon {
+// SAFETY (all functions): the traits' contract; NEON is part of every AArch64 target.
+impl Lanes for NeonFour {
     const COUNT: usize = WIDTH;
 
     #[inline(always)]
@@ -150,7 +151,10 @@ impl Lanes for Neon {
             ])
         }
     }
+}
 
+// SAFETY (all functions): the traits' contract; NEON is part of every AArch64 target.
+impl NodeLanes for NeonFour {
     #[inline(always)]
     unsafe fn inverse_cube_root_guess(self) -> Self {
         unsafe {

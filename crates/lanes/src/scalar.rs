@@ -4,8 +4,9 @@
     reason = "one contract for all: the instruction set is enabled in the caller, and pointers hold what the shapes say"
 )]
 
-use super::{CUBE_ROOT_GUESS, Lanes, WIDTH};
+use super::{CUBE_ROOT_GUESS, Lanes, NodeLanes, WIDTH};
 
+/// Sixteen f32 in an array.
 #[derive(Clone, Copy)]
 pub struct Scalar([f32; WIDTH]);
 
@@ -16,7 +17,7 @@ impl Scalar {
     }
 }
 
-// SAFETY: no instruction set beyond the target's baseline is used.
+// SAFETY (all functions): no instruction set beyond the target's baseline is used.
 impl Lanes for Scalar {
     const COUNT: usize = WIDTH;
 
@@ -67,14 +68,17 @@ impl Lanes for Scalar {
 
     #[inline(always)]
     unsafe fn min(self, other: Self) -> Self {
-        self.zip(other, |a, b| if a < b { a } else { b })
+        self.zip(other, |a, b| if b < a { b } else { a })
     }
 
     #[inline(always)]
     unsafe fn max(self, other: Self) -> Self {
-        self.zip(other, |a, b| if a > b { a } else { b })
+        self.zip(other, |a, b| if b > a { b } else { a })
     }
+}
 
+// SAFETY (all functions): no instruction set beyond the target's baseline is used.
+impl NodeLanes for Scalar {
     #[inline(always)]
     unsafe fn inverse_cube_root_guess(self) -> Self {
         Self(self.0.map(|x| {

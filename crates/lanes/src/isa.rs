@@ -18,7 +18,7 @@ pub enum Isa {
 
 impl Isa {
     /// The best of this machine. The environment variable `UPT_ISA` (`scalar`, `neon`, `avx2`,
-    /// `avx512`) lowers it, for comparisons; a set that the machine lacks is ignored. The solver of `tissue` obeys it too.
+    /// `avx512`) lowers it, for comparisons; a set that the machine lacks is ignored.
     pub fn detect() -> Self {
         static BEST: OnceLock<Isa> = OnceLock::new();
         *BEST.get_or_init(|| {
@@ -96,45 +96,44 @@ impl Isa {
 /// Defines `fn name(isa, args..)`: the scalar function for `Isa::Scalar`, else `body::<Lanes>`
 /// compiled with the instruction set's features. An `Isa` that the machine lacks takes the scalar
 /// path, so the function is safe to call with any value.
+#[macro_export]
 macro_rules! by_isa {
     ($(#[$meta:meta])* $vis:vis fn $name:ident($($arg:ident : $ty:ty),* $(,)?) = $body:ident, $scalar:ident;) => {
         $(#[$meta])*
-        $vis fn $name(isa: $crate::kernels::Isa, $($arg: $ty),*) {
+        $vis fn $name(isa: $crate::Isa, $($arg: $ty),*) {
             #[cfg(target_arch = "x86_64")]
             #[target_feature(enable = "avx2,fma,f16c")]
             fn avx2($($arg: $ty),*) {
                 // SAFETY: the features of these lanes are enabled here.
-                unsafe { $body::<$crate::kernels::lanes::Avx2>($($arg),*) }
+                unsafe { $body::<$crate::Avx2>($($arg),*) }
             }
             #[cfg(target_arch = "x86_64")]
             #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx2,fma,f16c")]
             fn avx512($($arg: $ty),*) {
                 // SAFETY: the features of these lanes are enabled here.
-                unsafe { $body::<$crate::kernels::lanes::Avx512>($($arg),*) }
+                unsafe { $body::<$crate::Avx512>($($arg),*) }
             }
             #[cfg(target_arch = "aarch64")]
             #[target_feature(enable = "neon")]
             fn neon($($arg: $ty),*) {
                 // SAFETY: the features of these lanes are enabled here.
-                unsafe { $body::<$crate::kernels::lanes::Neon>($($arg),*) }
+                unsafe { $body::<$crate::Neon>($($arg),*) }
             }
             match isa {
                 #[cfg(target_arch = "x86_64")]
                 // SAFETY: the machine has the features.
-                $crate::kernels::Isa::Avx512 if isa.is_available() => unsafe { avx512($($arg),*) },
+                $crate::Isa::Avx512 if isa.is_available() => unsafe { avx512($($arg),*) },
                 #[cfg(target_arch = "x86_64")]
                 // SAFETY: the machine has the features.
-                $crate::kernels::Isa::Avx2 if isa.is_available() => unsafe { avx2($($arg),*) },
+                $crate::Isa::Avx2 if isa.is_available() => unsafe { avx2($($arg),*) },
                 #[cfg(target_arch = "aarch64")]
                 // SAFETY: the machine has the features.
-                $crate::kernels::Isa::Neon if isa.is_available() => unsafe { neon($($arg),*) },
+                $crate::Isa::Neon if isa.is_available() => unsafe { neon($($arg),*) },
                 _ => $scalar($($arg),*),
             }
         }
     };
 }
-pub(crate) use by_isa;
-
 #[cfg(test)]
 mod tests {
     use super::Isa;

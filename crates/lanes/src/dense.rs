@@ -1,0 +1,35 @@
+//! Parts of a register.
+
+use super::DenseLanes;
+
+/// `count <= COUNT` lanes from memory; zeros behind them.
+///
+/// # Safety
+/// As [`DenseLanes`].
+#[inline(always)]
+pub unsafe fn load_some<V: DenseLanes>(from: *const f32, count: usize) -> V {
+    // SAFETY: the caller's.
+    unsafe {
+        if count == V::COUNT {
+            V::load(from)
+        } else {
+            V::load_part(from, count)
+        }
+    }
+}
+
+/// `count <= COUNT` lanes to memory.
+///
+/// # Safety
+/// As [`DenseLanes`].
+#[inline(always)]
+pub unsafe fn store_some<V: DenseLanes>(x: V, to: *mut f32, count: usize) {
+    // SAFETY: the caller's.
+    unsafe {
+        if count == V::COUNT {
+            x.store(to)
+        } else {
+            x.store_part(to, count)
+        }
+    }
+}

@@ -1,0 +1,49 @@
+//! Vector registers of f32, the instruction set that a machine has of them, and the floating-point mode of a computation.
+//!
+//! One body of a kernel compiles for AVX2 (8 lanes), AVX-512 (16) and NEON (4). [`Lanes`] is arithmetic, [`DenseLanes`] what
+//! products over tables need besides, [`NodeLanes`] what the elements of a mesh need. [`Isa`] chooses at run time, and
+//! [`by_isa!`] writes the function that does.
+//!
+//! Every function of the traits is unsafe for one reason: the instruction set must be enabled in the function that it is
+//! inlined into, and pointers must be valid for the lanes that they name.
+
+#[cfg(target_arch = "x86_64")]
+mod avx2;
+#[cfg(target_arch = "x86_64")]
+mod avx512;
+mod dense;
+pub mod flush;
+mod isa;
+#[cfg(target_arch = "aarch64")]
+mod neon;
+#[cfg(target_arch = "aarch64")]
+mod neon_four;
+mod scalar;
+mod traits;
+
+#[cfg(target_arch = "x86_64")]
+pub use avx2::Avx2;
+#[cfg(target_arch = "x86_64")]
+pub use avx512::Avx512;
+pub use dense::{load_some, store_some};
+pub use flush::{FlushToZero, MaskExceptions};
+pub use isa::Isa;
+#[cfg(target_arch = "aarch64")]
+pub use neon::Neon;
+#[cfg(target_arch = "aarch64")]
+pub use neon_four::NeonFour;
+pub use scalar::Scalar;
+pub use traits::{CUBE_ROOT_GUESS, DenseLanes, Lanes, NodeLanes, WIDTH};
+
+/// Asks for a value's cache lines; the pointer may be beyond any allocation.
+#[inline(always)]
+pub fn prefetch<T>(value: *const T) {
+    #[cfg(target_arch = "x86_64")]
+    for line in (0..size_of::<T>()).step_by(64) {
+        let line = value.cast::<i8>().wrapping_add(line);
+        // SAFETY: a prefetch does not access memory; SSE is part of the architecture.
+        unsafe { std::arch::x86_64::_mm_prefetch::<{ std::arch::x86_64::_MM_HINT_T0 }>(line) };
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = value;
+}

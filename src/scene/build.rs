@@ -1,0 +1,83 @@
+//! What a scene of a model is made of.
+
+use std::sync::Arc;
+
+use super::core::{self, Core, CoreParts};
+use super::corrected::Corrected;
+use super::engine::Engine;
+use super::{reduced, upt};
+use crate::bundle::{Mesh, TensorFile};
+use crate::error::{Error, Result};
+use crate::kernels::{Isa, Pool};
+use crate::memory;
+use crate::model::{KindModel, Model};
+use crate::options::{SceneOptions, StepPath};
+
+/// The core of a new scene, at rest.
+pub(super) fn build(model: &Arc<Model>, options: &SceneOptions) -> Result<Core> {
+    let threads = match options.threads {
+        0 => model.threads,
+        threads => threads,
+    };
+    if threads > 1024 {
+        return Err(Error::Argument(format!(
+            "threads is {threads}, must be at most 1024"
+        )));
+    }
+    let pool = Pool::new(threads)?;
+    let own_mesh = match &options.mesh_path {
+        None => None,
+        Some(path) => {
+            if model.prior.is_some() {
+                return Err(Error::Unsupported(
+                    "mesh_path: this bundle has a prior, which is valid only for its own mesh; leave mesh_path out".into(),
+                ));
+            }
+            let bytes = crate::bundle::read_regular(path)?;
+            let file = TensorFile::parse(&path.display().to_string(), bytes)?;
+            Some(Arc::new(Mesh::parse(&file, model.manifest.boundary)?))
+        }
+    };
+    let engine = match &model.kind {
+        KindModel::Reduced(_) if options.step_path == StepPath::Whole => {
+            return Err(Error::Unsupported(
+                "step_path: bundles of kind reduced have no step.onnx".into(),
+            ));
+        }
+        KindModel::Reduced(kind) => {
+            let table = model
+                .prior
+                .as_ref()
+                .ok_or_else(|| Error::bundle("bundle.json", "field `prior` is missing"))?;
+            let engine = reduced::ReducedEngine::new(model, kind, table)?;
+            Engine::Reduced(memory::boxed(engine, core::SCENE)?)
+        }
+        KindModel::Upt(kind) => {
+            let (tables, nodes) = match &own_mesh {
+                None => (Arc::clone(&kind.tables), model.mesh.node_count()),
+                Some(mesh) => (
+                    Arc::new(kind.tables_of(mesh, model.runtime()?, threads)?),
+                    mesh.node_count(),
+                ),
+            };
+            let parts = upt::step_path::Parts {
+                model,
+                kind,
+                tables: &tables,
+                pool: &pool,
+                node_count: nodes,
+            };
+            let engine = parts.engine(options)?;
+            Engine::Upt(memory::boxed(engine, core::SCENE)?)
+        }
+    };
+    let corrected = Corrected::new(model, options, Isa::detect(), &pool)?;
+    Core::new(CoreParts {
+        model: Arc::clone(model),
+        mesh: own_mesh.unwrap_or_else(|| Arc::clone(&model.mesh)),
+        options: options.clone(),
+        pool,
+        engine,
+        corrected,
+    })
+}
