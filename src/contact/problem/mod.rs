@@ -23,14 +23,12 @@ use super::held_back::HeldBack;
 use super::past::{Force, Held, Past};
 use super::rows::Row;
 use super::state::State;
-use super::tool::{MAX_TOOLS, Mode, Reading, Tool};
+use super::tool::{MAX_TOOLS, Mode, PUT_MM, Reading, Tool};
 use crate::bundle::Mesh;
 use crate::error::{Error, Result};
 use crate::memory;
 use look::MOST_ROWS;
 
-/// A tool that moves farther in a step was put there, not moved, mm.
-const PUT_MM: f32 = 40.0;
 const WHAT: &str = "the contact of instruments";
 /// Parts of a step's way at most: of a thin tool that goes as far as one may.
 const MOST_PARTS: f32 = 80.0;
