@@ -7,6 +7,8 @@
 
 // Register tiles are small arrays walked by index, several of them at once.
 #![allow(clippy::needless_range_loop)]
+// `by_isa!` gives each body its lanes; those that the compiler makes vectors of itself do not name them.
+#![allow(clippy::extra_unused_type_parameters)]
 
 pub mod aggregate;
 pub mod contact;
