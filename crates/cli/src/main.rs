@@ -40,6 +40,7 @@ mod prior;
 #[cfg(feature = "files")]
 mod progress;
 mod python;
+mod quantile;
 mod reference;
 mod render;
 mod report;

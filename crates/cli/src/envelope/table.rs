@@ -3,7 +3,8 @@
 use super::limits::{Limits, Tried};
 use crate::counted::counted;
 use crate::effort::Effort;
-use crate::report::{plot::label, quantile};
+use crate::quantile::quantile;
+use crate::report::plot::label;
 
 /// A range of one quantity.
 type Part = (&'static str, fn(&Tried) -> bool);

@@ -9,7 +9,8 @@ use super::cases::Cases;
 use super::errors::{CaseErrors, StepErrors, step_errors};
 use super::memory::Resident;
 use super::method::{Method, Stepper};
-use super::row::{Measurement, PRIOR_ALONE, Pictured, Row, mean_and_deviation, quantile};
+use super::row::{Measurement, PRIOR_ALONE, Pictured, Row, mean_and_deviation};
+use crate::quantile::quantile;
 
 /// What a measurement is asked to do.
 pub struct Plan<'a> {

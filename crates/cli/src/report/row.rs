@@ -115,15 +115,6 @@ impl Row {
     }
 }
 
-/// The value below which the share `q` of the sorted `values` lies (nearest rank).
-pub fn quantile(sorted: &[f64], q: f64) -> f64 {
-    if sorted.is_empty() {
-        return f64::NAN;
-    }
-    let rank = (q * sorted.len() as f64).ceil() as usize;
-    sorted[rank.clamp(1, sorted.len()) - 1]
-}
-
 /// Mean and (population) standard deviation.
 pub fn mean_and_deviation(values: &[f64]) -> (f64, f64) {
     let count = values.len().max(1) as f64;
@@ -141,17 +132,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn quantiles_are_values_of_the_sample() {
-        let values: Vec<f64> = (1..=100).map(f64::from).collect();
-        assert_eq!(
-            (
-                quantile(&values, 0.5),
-                quantile(&values, 0.95),
-                quantile(&values, 1.0)
-            ),
-            (50.0, 95.0, 100.0)
-        );
-        assert_eq!(quantile(&[3.0], 0.99), 3.0);
+    fn deviation_is_of_the_population() {
         assert_eq!(mean_and_deviation(&[1.0, 3.0]), (2.0, 1.0));
     }
 }

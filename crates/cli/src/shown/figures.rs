@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::host::{LATE, PRESENT, Shown, WAYS};
-use crate::report::quantile;
+use crate::quantile::median;
 use crate::tools::cases::ToolCase;
 
 /// Programme of the row over all.
@@ -107,32 +107,32 @@ impl CaseFigures {
     }
 }
 
-fn median(values: impl Iterator<Item = f64>) -> f64 {
-    let mut values: Vec<f64> = values.filter(|v| v.is_finite()).collect();
-    values.sort_by(f64::total_cmp);
-    quantile(&values, 0.5)
+/// Of those that are numbers.
+fn finite_median(values: impl Iterator<Item = f64>) -> f64 {
+    median(values.filter(|v| v.is_finite()))
 }
 
 fn row(way: usize, programme: &str, cases: &[&CaseFigures]) -> Row {
     let each = |value: fn(&WayFigures) -> f64| cases.iter().map(move |case| value(&case.ways[way]));
     let mse = |way: usize| move |case: &&CaseFigures| case.ways[way].mse_mm2;
     let own = mse(way);
-    let over =
-        |other: &dyn Fn(&&CaseFigures) -> f64| median(cases.iter().map(|c| own(c) / other(c)));
+    let over = |other: &dyn Fn(&&CaseFigures) -> f64| {
+        finite_median(cases.iter().map(|c| own(c) / other(c)))
+    };
     Row {
         way: cases[0].ways[way].way.clone(),
         programme: programme.into(),
         cases: cases.len(),
-        mse_mm2: median(each(|w| w.mse_mm2)),
+        mse_mm2: finite_median(each(|w| w.mse_mm2)),
         over_late: over(&mse(LATE)),
-        step_mse_mm2: median(each(|w| w.step_mse_mm2)),
+        step_mse_mm2: finite_median(each(|w| w.step_mse_mm2)),
         over_step: over(&|case| case.ways[way].step_mse_mm2),
-        latency_ms: median(each(|w| w.latency_ms)),
-        jump_median_mm: median(each(|w| w.jump_mm)),
+        latency_ms: finite_median(each(|w| w.latency_ms)),
+        jump_median_mm: finite_median(each(|w| w.jump_mm)),
         jump_mm: each(|w| w.jump_mm).fold(0.0, f64::max),
-        unlike_median_mm: median(each(|w| w.unlike_mm)),
+        unlike_median_mm: finite_median(each(|w| w.unlike_mm)),
         unlike_mm: each(|w| w.unlike_mm).fold(0.0, f64::max),
-        penetration_median_mm: median(each(|w| w.penetration_mm)),
+        penetration_median_mm: finite_median(each(|w| w.penetration_mm)),
         penetration_mm: each(|w| w.penetration_mm).fold(0.0, f64::max),
         true_penetration_mm: cases
             .iter()

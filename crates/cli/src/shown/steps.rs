@@ -16,8 +16,8 @@ use crate::counted::counted;
 use crate::effort::Effort;
 use crate::host::{Model, ModelSettings};
 use crate::machine::Machine;
+use crate::quantile::median;
 use crate::report::plot::label;
-use crate::report::quantile;
 use crate::stress::{progress, replace_between};
 use crate::tools::bundles::fitting;
 use crate::tools::cases::{Split, ToolCase, ToolCases};
@@ -228,12 +228,6 @@ fn true_force(case: &ToolCase, truth: &Truth, seconds: f64, tool: usize) -> [f64
         }
     }
     mean
-}
-
-fn median(values: impl Iterator<Item = f64>) -> f64 {
-    let mut values: Vec<f64> = values.collect();
-    values.sort_by(f64::total_cmp);
-    quantile(&values, 0.5)
 }
 
 fn row(bundle: &str, corrections: Effort, step_ms: f64, sums: &[Sums]) -> Row {

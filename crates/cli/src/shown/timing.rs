@@ -7,7 +7,7 @@ use tissue::schemes::FRAME_S;
 
 use super::host::Clock;
 use super::truth::Truth;
-use crate::report::quantile;
+use crate::quantile::quantile;
 use crate::tools::cases::ToolCases;
 use crate::tools::drive::Driver;
 

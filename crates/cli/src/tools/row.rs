@@ -6,7 +6,7 @@ use super::cases::ToolCase;
 use super::drive::Felt;
 use super::measure::{Moment, Outcome, Truth};
 use crate::effort::Effort;
-use crate::report::quantile;
+use crate::quantile::median;
 
 /// Programme of the row over all programmes without a grasp.
 pub const ALL: &str = "all but grasp";
@@ -228,9 +228,9 @@ fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len().max(1) as f64
 }
 
-fn median(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    (!values.is_empty()).then(|| quantile(&values, 0.5))
+/// None of none.
+fn middle(values: Vec<f64>) -> Option<f64> {
+    (!values.is_empty()).then(|| median(values))
 }
 
 fn largest(values: impl Iterator<Item = f64>) -> f64 {
@@ -251,7 +251,7 @@ impl Row {
         };
         let jumps = each(|case| case.jump_mm / case.true_jump_mm.max(1e-6));
         let pooled = |value: fn(&CaseFigures) -> &[f64]| {
-            median(cases.iter().flat_map(|case| value(case)).copied().collect())
+            middle(cases.iter().flat_map(|case| value(case)).copied().collect())
         };
         let known = |value: fn(&CaseFigures) -> Option<f64>| {
             cases.iter().filter_map(|case| value(case)).reduce(f64::max)
@@ -270,7 +270,7 @@ impl Row {
             programme: programme.to_owned(),
             cases: cases.len(),
             mse_mean_mm2: mean(&mse),
-            mse_median_mm2: median(mse).unwrap_or(0.0),
+            mse_median_mm2: middle(mse).unwrap_or(0.0),
             mse_worst_programme_mm2: worst,
             mse_with_slips_mm2: mean(&each(|case| case.mse_with_slips_mm2)),
             slips: cases.iter().map(|case| case.slips).sum(),
@@ -279,9 +279,9 @@ impl Row {
             inverted: share(|case| case.inverted_steps),
             inverted_silent: share(|case| case.silent_steps),
             penetration_mm: largest(each(|case| case.penetration_mm).into_iter()),
-            penetration_median_mm: median(each(|case| case.penetration_mm)).unwrap_or(0.0),
+            penetration_median_mm: middle(each(|case| case.penetration_mm)).unwrap_or(0.0),
             jump_worst: largest(jumps.iter().copied()),
-            jump_median: median(jumps).unwrap_or(0.0),
+            jump_median: middle(jumps).unwrap_or(0.0),
             force_error: pooled(|case| &case.force_error),
             torque_error: pooled(|case| &case.torque_error),
             friction_excess: known(|case| case.friction_excess),
