@@ -24,7 +24,7 @@ impl PointGrid {
     ///
     /// # Errors
     /// [`crate::Error::OutOfMemory`].
-    pub fn try_new(points: Vec<f32>) -> crate::Result<PointGrid> {
+    pub fn try_new(points: Vec<f32>) -> crate::error::Result<PointGrid> {
         const WHAT: &str = "a grid of points";
         let mut low = [f32::INFINITY; 3];
         let mut high = [f32::NEG_INFINITY; 3];

@@ -42,7 +42,7 @@ impl Pace {
     ///
     /// # Errors
     /// [`crate::Error::OutOfMemory`].
-    pub fn new(diagonal: &Diagonal, integrator: Integrator) -> crate::Result<Pace> {
+    pub fn new(diagonal: &Diagonal, integrator: Integrator) -> crate::error::Result<Pace> {
         let kappa = integrator.kappa();
         let pairs = diagonal.blocks.iter().zip(&diagonal.mass);
         let inverses = pairs.map(|(block, mass)| inverse(*block, kappa * mass));
@@ -69,7 +69,7 @@ impl Diagonal {
     ///
     /// # Errors
     /// [`crate::Error::OutOfMemory`].
-    pub fn of(mesh: &Mesh, material: &Material) -> crate::Result<Diagonal> {
+    pub fn of(mesh: &Mesh, material: &Material) -> crate::error::Result<Diagonal> {
         let positions = mesh.positions.as_chunks::<3>().0;
         let tets = mesh.tets.as_chunks::<4>().0;
         let body = Tetrahedra {

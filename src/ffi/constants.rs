@@ -133,8 +133,9 @@ pub const UPT_MODE_GRASP: u8 = 1;
 
 /// The library's own values are these; a difference does not compile.
 const _: () = {
+    use crate::model::Kind;
+    use crate::options::{DecoderKernel, GuardPolicy, IndexSet, Precision, Provider, StepPath};
     use crate::stats::flag;
-    use crate::{DecoderKernel, GuardPolicy, IndexSet, Kind, Precision, Provider, StepPath};
 
     macro_rules! same {
         ($($constant:ident = $value:expr;)*) => { $(assert!($constant == $value);)* };

@@ -5,7 +5,7 @@ use super::failure::{Failure, fail};
 use super::pointers::{optional_path, slice};
 use super::structs::*;
 use crate::options::MOST_CORRECTIONS;
-use crate::{
+use crate::options::{
     Corrections, DecoderKernel, GuardPolicy, IndexSet, InitOptions, ModelOptions, Precision,
     Provider, SceneOptions, StepPath, UserStream,
 };
@@ -115,7 +115,7 @@ pub(super) fn tool(index: usize, raw: &upt_instrument) -> Result<crate::contact:
     fn held(
         index: usize,
         raw: &upt_instrument,
-        tool: crate::Result<Tool>,
+        tool: crate::error::Result<Tool>,
     ) -> Result<Tool, Failure> {
         let mut tool = tool.map_err(|error| error.of_instrument(index))?;
         tool.mode = match raw.mode {

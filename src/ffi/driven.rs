@@ -17,7 +17,7 @@ use {
     super::registry::{add_hull, remove_hull},
     crate::contact::{MAX_TOOLS, Tool},
     crate::error::Error,
-    crate::{Contact, Scene, StepInput},
+    crate::scene::{Contact, Scene, StepInput},
     ::contact::{Body, Shape},
 };
 

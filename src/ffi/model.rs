@@ -7,7 +7,7 @@ use super::constants::*;
 use super::registry::{add_model, find_model, remove_model};
 use super::structs::*;
 use super::{convert, output, pointers};
-use crate::Model;
+use crate::model::Model;
 
 /// Opens a bundle, checks it (sizes, dtypes, the SHA-256 of the manifest and of every file that is read) and makes it
 /// ready to step.

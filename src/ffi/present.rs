@@ -12,7 +12,7 @@ use {
     super::failure::Failure,
     super::output::output,
     super::scene::contacts,
-    crate::{Contact, Scene},
+    crate::scene::{Contact, Scene},
 };
 
 #[cfg(not(feature = "contact"))]

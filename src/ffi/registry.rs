@@ -13,7 +13,8 @@ use super::failure::{Answer, Failure, fail};
 #[cfg(feature = "contact")]
 use super::structs::upt_hull;
 use super::structs::{upt_model, upt_scene};
-use crate::{Model, Scene};
+use crate::model::Model;
+use crate::scene::Scene;
 
 /// Numbers of the two kinds differ in their last digit, so that a wrong kind can be named.
 const STRIDE: usize = 16;

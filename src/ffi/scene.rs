@@ -9,7 +9,7 @@ use super::registry::{add_scene, call_scene, find_model, remove_scene};
 use super::structs::*;
 use super::{convert, pointers};
 use crate::scene::Values;
-use crate::{Contact, Scene, StepInput};
+use crate::scene::{Contact, Scene, StepInput};
 
 /// Creates a scene at rest.
 ///

@@ -75,7 +75,7 @@ impl ContactFactor {
     ///
     /// # Errors
     /// [`crate::Error::OutOfMemory`].
-    pub fn try_with_capacity(order: usize) -> crate::Result<Self> {
+    pub fn try_with_capacity(order: usize) -> crate::error::Result<Self> {
         let mut factor = Self::default();
         factor.reserve(order)?;
         Ok(factor)
@@ -85,7 +85,7 @@ impl ContactFactor {
     ///
     /// # Errors
     /// [`crate::Error::OutOfMemory`].
-    pub fn reserve(&mut self, order: usize) -> crate::Result<()> {
+    pub fn reserve(&mut self, order: usize) -> crate::error::Result<()> {
         const WHAT: &str = "the factor of a contact block";
         let upper = (order * order).saturating_sub(self.upper.len());
         let right = order.saturating_sub(self.right.len());

@@ -82,7 +82,11 @@ impl<'a> LowRank<'a> {
 ///
 /// # Errors
 /// [`crate::Error::OutOfMemory`].
-pub fn transpose_weight(weight: &[f32], width: usize, rank: usize) -> crate::Result<Vec<f32>> {
+pub fn transpose_weight(
+    weight: &[f32],
+    width: usize,
+    rank: usize,
+) -> crate::error::Result<Vec<f32>> {
     assert_eq!(weight.len(), width * rank, "weight must be [width, rank]");
     let mut out = memory::zeros(weight.len(), "the encoder's weights")?;
     for i in 0..width {

@@ -110,7 +110,11 @@ impl RowPlan {
     ///
     /// # Panics
     /// As [`RowPlan::region`].
-    pub fn try_region(basis: &BlockBasis<'_>, nodes: &[u32], compact: bool) -> crate::Result<Self> {
+    pub fn try_region(
+        basis: &BlockBasis<'_>,
+        nodes: &[u32],
+        compact: bool,
+    ) -> crate::error::Result<Self> {
         const WHAT: &str = "a plan of decoded rows";
         let node_count = basis.block_nodes.len();
         let blocks = basis.block_offsets.len();

@@ -21,7 +21,7 @@ impl PartialSums {
     ///
     /// # Errors
     /// [`crate::Error::OutOfMemory`].
-    pub fn with_room(len: usize, count: usize) -> crate::Result<Self> {
+    pub fn with_room(len: usize, count: usize) -> crate::error::Result<Self> {
         // Other passes cut the vectors a little shorter.
         let pieces = len.div_ceil(PIECE / 4 * 3) + 1;
         memory::room(pieces * count, "sums over long vectors").map(Self)

@@ -86,7 +86,7 @@ impl Model {
     pub fn open(path: &Path, options: &ModelOptions) -> Result<Arc<Model>> {
         let start = Instant::now();
         if options.device_id < 0 {
-            return Err(crate::Error::Argument(format!(
+            return Err(crate::error::Error::Argument(format!(
                 "device_id is {}; devices are counted from 0",
                 options.device_id
             )));
@@ -97,7 +97,7 @@ impl Model {
             ("gpu_memory_limit", options.gpu_memory_limit != 0),
         ] {
             if set && !on_device {
-                return Err(crate::Error::Argument(format!(
+                return Err(crate::error::Error::Argument(format!(
                     "{name} is set, but `providers` names no GPU provider"
                 )));
             }
@@ -117,7 +117,7 @@ impl Model {
         let mesh_file = files.tensors(&manifest.mesh.file)?;
         let mesh = Mesh::parse(&mesh_file, manifest.boundary)?;
         if mesh.node_count() != manifest.mesh.nodes {
-            return Err(crate::Error::bundle(
+            return Err(crate::error::Error::bundle(
                 "bundle.json",
                 format!(
                     "field `mesh.nodes` is {}, {} has {} nodes",
@@ -128,7 +128,7 @@ impl Model {
             ));
         }
         if !mesh.sha256.eq_ignore_ascii_case(&manifest.mesh.mesh_sha256) {
-            return Err(crate::Error::bundle(
+            return Err(crate::error::Error::bundle(
                 "bundle.json",
                 format!(
                     "field `mesh.mesh_sha256` is {}, the mesh in {} has {}",
@@ -306,7 +306,7 @@ impl Model {
     /// [`crate::Error::Unsupported`] for a bundle without graphs.
     pub(crate) fn runtime(&self) -> Result<&'static Runtime> {
         self.runtime.ok_or_else(|| {
-            crate::Error::Unsupported(format!("{} has no graph", self.manifest.name))
+            crate::error::Error::Unsupported(format!("{} has no graph", self.manifest.name))
         })
     }
 

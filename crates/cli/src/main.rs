@@ -13,6 +13,7 @@ mod completions;
 mod corrections;
 mod counted;
 mod dataset;
+mod date;
 mod doctor;
 mod effort;
 mod envelope;

@@ -64,7 +64,7 @@ pub fn dihedral_angles(corners: [[f64; 3]; 4]) -> [f64; 6] {
 /// Radius of a tetrahedron's inscribed ball, `3 V / (sum of the face areas)`.
 pub fn inscribed_radius(corners: [[f64; 3]; 4]) -> f64 {
     let [a, b, c, d] = corners;
-    let volume = crate::stuffing::volume6(a, b, c, d).abs() / 6.0;
+    let volume = crate::stuffing::stuffed::volume6(a, b, c, d).abs() / 6.0;
     let area =
         |p: [f64; 3], q: [f64; 3], r: [f64; 3]| 0.5 * length(cross(subtract(q, p), subtract(r, p)));
     3.0 * volume / (area(a, b, c) + area(a, b, d) + area(a, c, d) + area(b, c, d))

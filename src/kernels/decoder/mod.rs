@@ -64,7 +64,11 @@ impl DecoderScratch {
     ///
     /// # Errors
     /// [`crate::Error::OutOfMemory`].
-    pub fn try_new(decoder: &PackedDecoder, tokens: usize, threads: usize) -> crate::Result<Self> {
+    pub fn try_new(
+        decoder: &PackedDecoder,
+        tokens: usize,
+        threads: usize,
+    ) -> crate::error::Result<Self> {
         let a_worker = tile::scratch_floats(decoder, tokens).div_ceil(16);
         let line = CacheLine([0.0; 16]);
         Ok(Self {

@@ -73,7 +73,7 @@ impl Linear {
         depth: usize,
         weight: Vec<f32>,
         mut bias: Vec<f32>,
-    ) -> crate::Result<Self> {
+    ) -> crate::error::Result<Self> {
         let rows = outputs.next_multiple_of(GROUP);
         memory::fit(&mut bias, rows, WHAT)?;
         bias.resize(rows, 0.0);
@@ -104,7 +104,7 @@ impl Linear {
         depth: usize,
         layer: Tensors<'_>,
         norm: Tensors<'_>,
-    ) -> crate::Result<Self> {
+    ) -> crate::error::Result<Self> {
         let mut weight = memory::copied(layer.0, WHAT)?;
         let mut bias = memory::copied(layer.1, WHAT)?;
         for o in 0..outputs {
@@ -142,7 +142,7 @@ impl PackedDecoder {
     ///
     /// # Errors
     /// [`Error::Bundle`] of `file`, naming the tensor whose length does not fit; [`Error::OutOfMemory`].
-    pub fn new(file: &str, w: &DecoderWeights<'_>) -> crate::Result<Self> {
+    pub fn new(file: &str, w: &DecoderWeights<'_>) -> crate::error::Result<Self> {
         let (h, m) = (w.hidden, w.mlp);
         if h == 0 || w.heads == 0 || !h.is_multiple_of(w.heads) {
             let problem = format!("decoder width {h} is not a multiple of {} heads", w.heads);
@@ -224,7 +224,7 @@ impl DecoderTokens {
     ///
     /// # Errors
     /// [`crate::Error::OutOfMemory`].
-    pub fn try_new(decoder: &PackedDecoder, tokens: usize) -> crate::Result<Self> {
+    pub fn try_new(decoder: &PackedDecoder, tokens: usize) -> crate::error::Result<Self> {
         const WHAT: &str = "the decoder's tokens";
         let (h, heads) = (decoder.hidden, decoder.heads);
         let width = h / heads;

@@ -34,7 +34,6 @@ use crate::machine::Machine;
 use crate::shown;
 use crate::tools;
 use cache::Cache;
-pub use write::date;
 
 use cases::Cases;
 use float32::float32_frames;

@@ -73,7 +73,7 @@ pub fn report(plan: &Plan) -> Result<ExitCode> {
     std::fs::create_dir_all(&plan.out)
         .with_context(|| format!("cannot make {}", plan.out.display()))?;
     let header = &cases.list[0].trajectory.header;
-    let (machine, date) = (Machine::this(), crate::report::date());
+    let (machine, date) = (Machine::this(), crate::date::date());
     let mut reports = Vec::new();
     for bundle in &bundles {
         if bundle.corrections.is_none() {

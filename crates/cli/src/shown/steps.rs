@@ -95,7 +95,7 @@ pub fn report(plan: &Plan) -> Result<ExitCode> {
     let truths: Vec<Truth> = cases.list.iter().map(Truth::of).collect::<Result<_>>()?;
     let mut yard = Yard::new(&mesh, boundary);
     let header = &cases.list[0].trajectory.header;
-    let (machine, date) = (Machine::this(), crate::report::date());
+    let (machine, date) = (Machine::this(), crate::date::date());
     let mut all = Vec::new();
     for bundle in &bundles {
         let Some(recommended) = bundle.corrections else {

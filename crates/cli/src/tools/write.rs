@@ -80,7 +80,7 @@ pub(super) fn write(plan: &Plan, made: &Made) -> Result<serde_json::Value> {
         .with_context(|| format!("cannot make {}", plan.out.display()))?;
     let machine = Machine::this();
     let header = &cases.list[0].trajectory.header;
-    let date = crate::report::date();
+    let date = crate::date::date();
     let report = json!({
         "machine": machine,
         "date": date,

@@ -15,7 +15,7 @@ mod grid_file;
 mod lattice;
 mod manifold;
 mod stencils;
-mod stuffed;
+pub(crate) mod stuffed;
 
 pub use field::{Field, GridField, HalfSpace, Offset};
 
