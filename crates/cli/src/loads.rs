@@ -57,9 +57,16 @@ pub fn schemes_help() -> String {
 
 /// Help of an option that takes a list of programmes.
 pub fn programmes_help() -> String {
-    let names = programmes::TABLE.map(|row| format!("`{}`", row.name));
-    format!(
-        "Programmes of rigid tools, such as `press,stroke`; `all` for every one. One or more of {}",
+    let names = |extreme: bool| {
+        let rows = programmes::TABLE
+            .iter()
+            .filter(|row| row.extreme == extreme);
+        let names: Vec<String> = rows.map(|row| format!("`{}`", row.name)).collect();
         names.join(", ")
+    };
+    format!(
+        "Programmes of rigid tools, such as `press,stroke`; `all` for every one of {}; extreme ones are {}",
+        names(false),
+        names(true)
     )
 }

@@ -67,6 +67,8 @@ pub struct Specification {
     pub second_mm: Option<Range>,
     /// The site lies on the border of the domain.
     pub border: bool,
+    /// Quicker or finer than the tools that models learn from: left out of `all`.
+    pub extreme: bool,
 }
 
 /// What most rows share.
@@ -88,10 +90,11 @@ const PLAIN: Specification = Specification {
     lean_rad: 0.35,
     second_mm: None,
     border: false,
+    extreme: false,
 };
 
 /// All programmes.
-pub const TABLE: [Specification; 10] = [
+pub const TABLE: [Specification; 12] = [
     Specification {
         name: "press",
         summary: "presses, holds, leaves",
@@ -180,6 +183,25 @@ pub const TABLE: [Specification; 10] = [
         lean_rad: 0.15,
         ..PLAIN
     },
+    Specification {
+        name: "jab",
+        summary: "presses within a frame, as a slip of the hand does",
+        radius_mm: [1.0, 5.0],
+        press_mm_s: [200.0, 1000.0],
+        lift_mm_s: [50.0, 200.0],
+        lean_rad: 0.2,
+        extreme: true,
+        ..PLAIN
+    },
+    Specification {
+        name: "needle",
+        summary: "presses with a point thinner than the mesh is fine",
+        radius_mm: [0.5, 0.75],
+        depth_mm: [2.0, 5.0],
+        lean_rad: 0.2,
+        extreme: true,
+        ..PLAIN
+    },
 ];
 
 /// A row of [`TABLE`].
@@ -199,12 +221,19 @@ impl ToolProgramme {
         self.specification().name
     }
 
-    /// Parses a list: `press,lift` or `all`.
+    /// All of them, the extreme ones last.
+    pub fn every() -> impl Iterator<Item = Self> {
+        (0..TABLE.len()).map(|row| Self { row })
+    }
+
+    /// Parses a list: `press,lift`, or `all` for every one that is not extreme.
     pub fn parse_list(text: &str) -> Result<Vec<Self>, String> {
         let mut programmes = Vec::new();
         for part in text.split(',').map(str::trim) {
             match part {
-                "all" => programmes.extend((0..TABLE.len()).map(|row| Self { row })),
+                "all" => {
+                    programmes.extend(Self::every().filter(|one| !one.specification().extreme))
+                }
                 name => programmes.push(name.parse()?),
             }
         }

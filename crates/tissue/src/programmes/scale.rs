@@ -89,7 +89,7 @@ impl ToolScale {
     pub(super) fn of(&self, row: &Specification) -> Specification {
         let by = |range: Range| range.map(|x| x * self.factor);
         Specification {
-            radius_mm: by(row.radius_mm).map(|x| x.max(LEAST_RADIUS_MM)),
+            radius_mm: by(row.radius_mm).map(|x| x.max(LEAST_RADIUS_MM.min(row.radius_mm[0]))),
             depth_mm: by(row.depth_mm),
             press_mm_s: by(row.press_mm_s),
             slide_mm: by(row.slide_mm),

@@ -28,7 +28,7 @@ pub fn rod(radius: f32, friction: f32) -> Tool {
     )
 }
 
-fn tool(shape: Shape, friction: f32) -> Tool {
+pub fn tool(shape: Shape, friction: f32) -> Tool {
     Tool {
         shape,
         friction,

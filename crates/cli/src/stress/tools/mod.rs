@@ -3,6 +3,7 @@
 
 mod hand;
 mod inputs;
+mod sudden;
 
 use std::path::Path;
 
@@ -187,12 +188,14 @@ impl<'a> Hands<'a> {
 /// All cases of the bundle at `path`.
 pub fn rows(bench: &Bench, path: &Path) -> Result<Vec<Row>> {
     let mut hands = Hands::new(bench, path)?;
-    let bar = progress(5, &bench.subject);
+    let bar = progress(6, &bench.subject);
     let mut rows = programmes(&mut hands)?;
     bar.inc(1);
     rows.extend(jumps(&mut hands)?);
     bar.inc(1);
     rows.extend(inside(&mut hands)?);
+    bar.inc(1);
+    rows.extend(sudden::rows(&mut hands)?);
     bar.inc(1);
     rows.push(random(&mut hands)?);
     bar.inc(1);
@@ -205,7 +208,7 @@ pub fn rows(bench: &Bench, path: &Path) -> Result<Vec<Row>> {
 fn programmes(hands: &mut Hands) -> Result<Vec<Row>> {
     let cases = if hands.bench.quick { 1 } else { 4 };
     let mut rows = Vec::new();
-    for programme in ToolProgramme::parse_list("all").map_err(anyhow::Error::msg)? {
+    for programme in ToolProgramme::every() {
         let name = format!("tools, {} x {}", cases, programme.name());
         let mut run = Run::new();
         let mut placed = 0;
