@@ -84,3 +84,70 @@ fn faults_end_with_code_2_and_name_the_file() {
     }
     assert!(!Path::new(mesh).exists());
 }
+
+/// A distance field of 1 mm voxels, positive inside.
+fn field(path: &Path, inside: impl Fn([f64; 3]) -> f64) {
+    let side = 48usize;
+    let at = |k: usize| k as f64 - 23.5;
+    let mut bytes = Vec::new();
+    for x in 0..side {
+        for y in 0..side {
+            for z in 0..side {
+                let value = inside([at(x), at(y), at(z)]) as f32;
+                bytes.extend(value.to_le_bytes());
+            }
+        }
+    }
+    let metadata = [
+        ("format", "upt-distance-field"),
+        ("origin", "[-23.5,-23.5,-23.5]"),
+        ("voxel", "1.0"),
+    ];
+    let metadata = metadata.map(|(key, value)| (key.to_owned(), value.to_owned()));
+    let tensor = tissue::tensors::Tensor::new(
+        "distance",
+        tissue::tensors::Dtype::F32,
+        vec![side; 3],
+        bytes,
+    );
+    tissue::tensors::write_file(path, &metadata.into(), &[tensor]).unwrap();
+}
+
+#[test]
+fn stuff_refuses_a_lattice_that_loses_tissue() {
+    let folder = tempfile::tempdir().unwrap();
+    let grid = folder.path().join("grid.safetensors");
+    let out = folder.path().join("out.mesh.safetensors");
+    let stuff = |more: &[&str]| {
+        let _ = std::fs::remove_file(&out);
+        let files = [grid.to_str().unwrap(), out.to_str().unwrap()];
+        upt(&[&["mesh", "stuff"], &files[..], more].concat())
+    };
+    let length = |p: [f64; 3]| p.iter().map(|x| x * x).sum::<f64>().sqrt();
+    // A ball of 14 mm with a plate of 3 mm around it.
+    field(&grid, |p| {
+        let across = (p[0] * p[0] + p[1] * p[1]).sqrt();
+        let plate = (1.5 - p[2].abs()).min(21.0 - across);
+        (14.0 - length(p)).max(plate)
+    });
+    let coarse = stuff(&["--spacing", "7"]);
+    let said = String::from_utf8_lossy(&coarse.stderr).into_owned();
+    assert_eq!(coarse.status.code(), Some(2), "{said}");
+    assert!(
+        said.contains("grid.safetensors")
+            && said.contains("% of the")
+            && said.contains("smaller --spacing than 7 mm"),
+        "{said}"
+    );
+    assert!(!out.exists());
+    assert!(
+        stuff(&["--spacing", "7", "--least-share", "0.5"])
+            .status
+            .success()
+    );
+    let fine = stuff(&["--spacing", "1.5"]);
+    assert!(fine.status.success(), "{fine:?}");
+    // Half of it is held against half of the volume.
+    let half = stuff(&["--spacing", "1.5", "--half-space", "1,0,0,0"]);
+    assert!(half.status.success(), "{half:?}");
+}

@@ -52,6 +52,8 @@ def stuff(grid, spacing, side):
         )
         arguments = [command(), "mesh", "stuff", str(field), str(mesh)]
         arguments += ["--spacing", repr(float(spacing)), f"--half-space={side},0,0,0"]
+        # The search for a count tries coarse lattices too.
+        arguments += ["--least-share", "0.9"]
         done = subprocess.run(arguments, capture_output=True, text=True, check=False)
         if done.returncode:
             raise RuntimeError(f"{' '.join(arguments)}: {done.stderr.strip()}")

@@ -76,6 +76,9 @@ pub struct Stuff {
     /// Keep the side of a plane where a x + b y + c z + d > 0.
     #[arg(long, value_name = "A,B,C,D", allow_hyphen_values = true, value_parser = plane)]
     half_space: Option<[f64; 4]>,
+    /// The part of the field's volume that the tetrahedra must hold.
+    #[arg(long, value_name = "PART", default_value_t = 0.97)]
+    least_share: f64,
 }
 
 fn plane(text: &str) -> Result<[f64; 4], String> {
@@ -154,17 +157,17 @@ pub fn run_import(args: &Import) -> anyhow::Result<ExitCode> {
 /// A mesh from a distance field.
 pub fn run_stuff(args: &Stuff) -> anyhow::Result<ExitCode> {
     let field = GridField::read(&args.field)?;
-    let made = match args.half_space {
-        Some([a, b, c, offset]) => stuff(
-            &HalfSpace {
-                inner: field,
+    let (made, bounded) = match args.half_space {
+        Some([a, b, c, offset]) => {
+            let half = HalfSpace {
+                inner: field.clone(),
                 normal: [a, b, c],
                 offset,
-            },
-            args.spacing,
-        ),
-        None => stuff(&field, args.spacing),
-    }?;
+            };
+            (stuff(&half, args.spacing)?, field.volume_of(&half))
+        }
+        None => (stuff(&field, args.spacing)?, field.volume_of(&field)),
+    };
     let raw = RawTets {
         positions: made.positions,
         tets: made.tets,
@@ -176,6 +179,18 @@ pub fn run_stuff(args: &Stuff) -> anyhow::Result<ExitCode> {
             "{}: {} repairs in a stuffed mesh",
             args.field.display(),
             repairs.len()
+        );
+    }
+    let share = measure(&mesh).volume_mm3 / bounded;
+    if !share.is_finite() || share < args.least_share {
+        bail!(
+            "{}: the tetrahedra would hold {:.0} % of the {:.1} ml that the field bounds, and --least-share asks for {:.0} %: give a smaller \
+             --spacing than {} mm, at most as wide as the thinnest wall",
+            args.field.display(),
+            100.0 * share,
+            1e-3 * bounded,
+            100.0 * args.least_share,
+            args.spacing
         );
     }
     mesh.name = "stuffed".into();

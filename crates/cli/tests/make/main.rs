@@ -1,5 +1,6 @@
 //! `upt make` as a user calls it: a small organ end to end, killed at each stage, and input that cannot become a bundle.
 
+mod defaults;
 mod interrupted;
 mod refused;
 mod short_time;

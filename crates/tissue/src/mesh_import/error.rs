@@ -205,6 +205,14 @@ impl ImportError {
         }
     }
 
+    /// The refusal of a thin place with another number of nodes.
+    pub(super) fn with_nodes(mut self, count: u64) -> Self {
+        if let Self::Thin { nodes, .. } = &mut self {
+            *nodes = count;
+        }
+        self
+    }
+
     /// Whether the message names the file; the other faults are found after reading.
     pub fn names_file(&self) -> bool {
         matches!(

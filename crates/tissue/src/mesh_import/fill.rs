@@ -4,7 +4,7 @@
 //! until their edges are shorter than the body is thick ([`thickness`]). What then still loses more than
 //! [`LEAST_SHARE`] allows is refused, with the thinnest place and the nodes that it needs.
 
-use super::solid::{FINE, Solid, characteristic};
+use super::solid::{FINE, Solid, characteristic, two_digits};
 use super::walls::Walls;
 use super::{ImportError, RawSurface, RawTets, Resolution};
 use crate::mesh_quality::dihedral_angles;
@@ -12,14 +12,14 @@ use crate::stuffing::{Offset, StuffError, Stuffed, stuff_graded, volume6};
 
 /// The part of the solid's volume that the tetrahedra hold at least.
 const LEAST_SHARE: f64 = 0.97;
-/// Walls are resolved by edges of their thickness over the first of these, necks by the second or third.
-const FINER: [f64; 3] = [FINE, 2.0, 3.0];
+/// Walls are resolved by edges of their thickness over the first of these, necks by one of the others.
+const FINER: [f64; 4] = [FINE, 2.0, 3.0, 4.5];
 /// Dihedral angles, degrees, from which on a mesh is fit for simulation.
 const SOUND_DEG: f64 = 5.0;
 /// Tunnels that a mesh may have and its surface not, where the body is not thin: two places that nearly touch.
 const FEW_HOLES: i64 = 2;
 /// Bisection goes down to this part of the spacing.
-const FINEST: f64 = 1.0 / 16.0;
+const FINEST: f64 = 1.0 / 64.0;
 /// Node counts within this part of the wanted one are accepted; within the second without a word.
 const COUNT_TOLERANCE: f64 = 0.02;
 const SAID_BEYOND: f64 = 0.15;
@@ -27,6 +27,10 @@ const SAID_BEYOND: f64 = 0.15;
 const SNUG: f64 = 0.97;
 /// Meshes that are made in search of a count.
 const TRIES: usize = 5;
+/// The nodes that a refusal advises are tried where they are so few, so often; more are advised with a margin.
+const TRIED_NODES: u64 = 20_000;
+const TRIED: usize = 4;
+const MARGIN: f64 = 1.4;
 
 /// A surface's tetrahedra and what there is to say about them.
 pub struct Filled {
@@ -66,9 +70,10 @@ pub fn fill(surface: RawSurface, resolution: Resolution) -> Result<Filled, Impor
     let solid = Solid::of(surface)?;
     let mut notes = Vec::new();
     let attempt = match resolution {
-        Resolution::Spacing(spacing) => solid.at_spacing(spacing, &mut notes)?,
-        Resolution::Nodes(wanted) => solid.to_count(wanted.max(8), &mut notes)?,
-    };
+        Resolution::Spacing(spacing) => solid.at_spacing(spacing, &mut notes),
+        Resolution::Nodes(wanted) => solid.to_count(wanted.max(8), &mut notes),
+    }
+    .map_err(|error| solid.with_enough_nodes(error))?;
     if !attempt.whole {
         notes.push(format!(
             "the mesh has another number of tunnels or gaps than the surface (Euler characteristic {} for {}): a bridge or a gap is \
@@ -91,6 +96,23 @@ fn boundary(made: &Stuffed) -> Vec<[u32; 3]> {
 }
 
 impl Solid {
+    /// A refusal with a number of nodes that is enough: tried, or with a margin.
+    fn with_enough_nodes(&self, refused: ImportError) -> ImportError {
+        let &ImportError::Thin { mut nodes, .. } = &refused else {
+            return refused;
+        };
+        for _ in 0..TRIED {
+            if nodes > TRIED_NODES {
+                break;
+            }
+            match self.to_count(nodes as usize, &mut Vec::new()) {
+                Err(ImportError::Thin { nodes: more, .. }) => nodes = more,
+                _ => return refused.with_nodes(nodes),
+            }
+        }
+        refused.with_nodes(two_digits(MARGIN * nodes as f64))
+    }
+
     /// A lattice that is finer where the body is thinner than `fine` times its edges, or a uniform one.
     fn attempt(&self, spacing: f64, fine: Option<f64>) -> Result<Attempt, StuffError> {
         if let Some(fine) = fine {

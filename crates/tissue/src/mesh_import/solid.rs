@@ -112,14 +112,12 @@ impl Solid {
         };
         // So many were tried.
         let needed = needed.max(1.3 * wanted.unwrap_or(0) as f64);
-        // Two digits, rounded up.
-        let unit = 10f64.powf(needed.max(10.0).log10().floor() - 1.0);
         ImportError::Thin {
             volume_ml: 1e-3 * self.volume,
             share: share.map(|share| 100.0 * share),
             thickness_mm: self.thinnest().map_or(f64::NAN, |s| s.thickness),
             at: self.thinnest().map_or([f64::NAN; 3], Sample::middle),
-            nodes: ((1.05 * needed / unit).ceil() * unit) as u64,
+            nodes: two_digits(1.05 * needed),
         }
     }
 }
@@ -137,6 +135,12 @@ fn rim(samples: &[Sample], volume: f64) -> f64 {
             left < 0.0
         })
         .map_or(f64::INFINITY, |(thickness, _)| thickness)
+}
+
+/// Two digits, rounded up.
+pub fn two_digits(count: f64) -> u64 {
+    let unit = 10f64.powf(count.max(10.0).log10().floor() - 1.0);
+    ((count / unit).ceil() * unit) as u64
 }
 
 /// V - E + F of triangles with two at each edge.

@@ -6,6 +6,8 @@ use rayon::prelude::*;
 
 /// Samples of a surface, about.
 const SAMPLES: f64 = 16_000.0;
+/// Samples along narrow faces, at most so many times as many.
+const MOST_ALONG: f64 = 2.0;
 /// A ball that touches at two places less than this apart, seen from its centre, lies in an edge of
 /// the body, not in a wall: the cosine of 120 degrees.
 const OPPOSITE: f64 = -0.5;
@@ -69,9 +71,31 @@ fn places(surface: &RawSurface) -> Vec<Sample> {
         })
         .collect();
     let each = sizes.iter().sum::<f64>() / SAMPLES;
+    // Narrow faces, as along a thin neck, have samples all along: too few of them lie at a face's middle.
+    let along: Vec<usize> = (surface.faces.iter().zip(&sizes))
+        .map(|(face, &area)| narrow(corners(face), area, each.sqrt()))
+        .collect();
+    let is_bounded = along.iter().sum::<usize>() as f64 <= MOST_ALONG * SAMPLES;
     let mut places = Vec::new();
     let mut left = 0.0;
-    for (face, &area) in surface.faces.iter().zip(&sizes) {
+    for ((face, &area), &along) in surface.faces.iter().zip(&sizes).zip(&along) {
+        if along > 0 && is_bounded {
+            let [a, b, c] = corners(face);
+            let inward = crossed([a, b, c]).map(|x| -x / (2.0 * area));
+            let (tip, base) = tip_and_base([a, b, c]);
+            for step in 0..along {
+                // From the tip to the middle of the side opposite to it.
+                let by = (step as f64 + 0.5) / along as f64;
+                places.push(Sample {
+                    at: [0, 1, 2].map(|k| tip[k] + by * (base[k] - tip[k])),
+                    inward,
+                    thickness: f64::INFINITY,
+                    is_wall: false,
+                    area: area / along as f64,
+                });
+            }
+            continue;
+        }
         left += area;
         if left < each || area == 0.0 {
             continue;
@@ -106,6 +130,29 @@ fn places(surface: &RawSurface) -> Vec<Sample> {
         }
     }
     places
+}
+
+/// The corner opposite to the shortest side, and that side's middle.
+fn tip_and_base(corners: [[f64; 3]; 3]) -> ([f64; 3], [f64; 3]) {
+    let side = |k: usize| {
+        let way = minus(corners[(k + 2) % 3], corners[(k + 1) % 3]);
+        dot(way, way)
+    };
+    let tip = (0..3).min_by(|&a, &b| side(a).total_cmp(&side(b)));
+    let tip = tip.unwrap_or(0);
+    let (one, other) = (corners[(tip + 1) % 3], corners[(tip + 2) % 3]);
+    (corners[tip], [0, 1, 2].map(|k| 0.5 * (one[k] + other[k])))
+}
+
+/// Samples along a face that is long and narrow beside the way from sample to sample; 0 for other faces.
+fn narrow(corners: [[f64; 3]; 3], area: f64, apart: f64) -> usize {
+    let (tip, base) = tip_and_base(corners);
+    let way = minus(base, tip);
+    let length = dot(way, way).sqrt();
+    match length > 2.0 * apart && area > 0.0 && 2.0 * area < length * apart {
+        true => ((length / apart).ceil() as usize).min(64),
+        false => 0,
+    }
 }
 
 /// Diameter of the largest ball inside that touches the surface at `at`, and the cosine of the angle between the places where it

@@ -50,6 +50,24 @@ impl Field for GridField {
     }
 }
 
+impl GridField {
+    /// Volume inside of a distance field within this grid, by its samples: of the voxel around each the part that is inside, about.
+    pub fn volume_of(&self, field: &impl Field) -> f64 {
+        let [nx, ny, nz] = self.shape;
+        let mut sum = 0.0;
+        for x in 0..nx {
+            for y in 0..ny {
+                for z in 0..nz {
+                    let index = [x as f64, y as f64, z as f64];
+                    let point = [0, 1, 2].map(|k| self.origin[k] + self.voxel * index[k]);
+                    sum += (0.5 + field.value(point) / self.voxel).clamp(0.0, 1.0);
+                }
+            }
+        }
+        sum * self.voxel.powi(3)
+    }
+}
+
 /// `inner` with its surface moved outward by `by`.
 pub struct Offset<'a, F> {
     pub inner: &'a F,

@@ -160,6 +160,21 @@ fn nodes_at_one_place_are_one() {
 }
 
 #[test]
+fn one_place_is_one_in_the_meshs_own_digits_and_what_is_beside_it_is_another() {
+    let apart = |by: f64| {
+        let mut raw = pair();
+        raw.positions
+            .extend([[3.0 + by, 0.0, 0.0], [0.0, 3.0, 0.0], [0.0, 0.0, 3.0]]);
+        raw.tets[1] = [5, 6, 7, 4];
+        from_tets(raw, false, &mut Vec::new()).map(|mesh| mesh.node_count())
+    };
+    // A mesh file holds float32: what rounds to the same place is there.
+    assert_eq!(apart(1e-8).unwrap(), 5);
+    // Beyond that nothing is moved.
+    assert_eq!(apart(1e-3).unwrap(), 6);
+}
+
+#[test]
 fn non_finite_nodes_are_named_and_dropped_with_their_tets() {
     let mut raw = pair();
     raw.positions[4][1] = f64::NAN;
