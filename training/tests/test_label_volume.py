@@ -185,6 +185,25 @@ def test_mesh_import_reads_label_volumes(tmp_path: Path) -> None:
     np.testing.assert_allclose(np.ptp(load_file(out)["positions"], axis=0), [24, 24, 24], atol=4)
 
 
+def test_the_labels_that_are_asked_for_are_the_body(tmp_path: Path) -> None:
+    """Of an ellipsoid around a ball: the ball, the ellipsoid with a void in it, or both as one."""
+    volume = save(tmp_path / "organ.nii.gz", labels())
+
+    def held(label: str) -> float:
+        made = make(volume, "--label", label, "--fixed", "plane:0,0,-1,-8")
+        assert made.returncode == 0, made.stderr
+        mesh = load_file(tmp_path / "organ.work" / "mesh.safetensors")
+        corners = mesh["positions"][mesh["tets"]].astype(np.float64)
+        return float(np.linalg.det(corners[:, 1:] - corners[:, :1]).sum()) / 6
+
+    for label, wanted in (("5", labels() == 5), ("1,5", labels() > 0), ("1", labels() == 1)):
+        # A ball of three voxels loses a quarter to the blur.
+        assert 0.7 < held(label) / (64 * np.count_nonzero(wanted)) < 1.1, label
+    missing = make(volume, "--label", "7", "--fixed", "plane:0,0,-1,-8")
+    assert missing.returncode == 2
+    assert "no voxel has label 7; the volume has 1, 5" in missing.stderr
+
+
 @pytest.mark.parametrize(
     ("name", "volume", "said"),
     [
