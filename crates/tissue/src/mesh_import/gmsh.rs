@@ -52,7 +52,7 @@ fn parse(bytes: &[u8]) -> Result<Parts, Fault> {
         "4.1" => true,
         other => {
             return fault(format!(
-                "MSH version {}; save as 4.1 or 2.2 (gmsh -format msh41)",
+                "MSH version {}; only 1, 2.0 to 2.2 and 4.1 are read; convert it with `gmsh IN.msh -save -format msh41 -o OUT.msh`",
                 short(other)
             ));
         }

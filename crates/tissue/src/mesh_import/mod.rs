@@ -143,7 +143,31 @@ fn read_file(path: &Path) -> Result<Read, ImportError> {
         surface if surface_files::EXTENSIONS.contains(&surface) => {
             surface_files::read(path, surface)?.into()
         }
-        _ => return Err(ImportError::Extension { path: path.into() }),
+        other => {
+            return Err(match unread(other) {
+                Some(reason) => ImportError::format(path, reason),
+                None => ImportError::Extension { path: path.into() },
+            });
+        }
+    })
+}
+
+/// What a known format is that is not read, and how to convert it.
+fn unread(extension: &str) -> Option<&'static str> {
+    Some(match extension {
+        "meshb" => {
+            "binary Medit (.meshb) is not read: write it as text, `transmesh IN.meshb OUT.mesh` (libMeshb) or `mmg3d_O3 -nomove -noinsert -noswap \
+             IN.meshb OUT.mesh`"
+        }
+        "nhdr" => {
+            "an NRRD header beside its data (.nhdr) is not read: write both into one file, in 3D Slicer by saving as .nrrd, or with `unu save -f nrrd \
+             -i IN.nhdr -o OUT.nrrd`"
+        }
+        "mhd" => {
+            "a MetaImage header beside its data (.mhd) is not read: write both into one file, in 3D Slicer or ITK-SNAP by saving as .mha, or in Python with \
+             `SimpleITK.WriteImage(SimpleITK.ReadImage('IN.mhd'), 'OUT.mha')`"
+        }
+        _ => return None,
     })
 }
 

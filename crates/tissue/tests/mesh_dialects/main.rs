@@ -123,6 +123,26 @@ fn what_is_no_place_or_no_file_is_refused_at_once() {
     refused(&sub, &["not a regular file"]);
 }
 
+#[test]
+fn formats_that_are_not_read_are_named_with_how_to_convert_them() {
+    let folder = Folder::new();
+    let text = "$MeshFormat\n4.0 0 8\n$EndMeshFormat\n$Entities\n";
+    let mut binary = b"$MeshFormat\n4 1 8\n".to_vec();
+    binary.extend(1i32.to_le_bytes());
+    binary.extend(b"\n$EndMeshFormat\n");
+    std::fs::write(folder.0.path().join("binary.msh"), binary).unwrap();
+    let convert = ["MSH version 4", "-format msh41"];
+    refused(&folder.write("text.msh", text), &convert);
+    refused(&folder.0.path().join("binary.msh"), &convert);
+    for (name, said) in [
+        ("organ.meshb", ["binary Medit", "OUT.mesh"]),
+        ("organ.nhdr", ["NRRD header beside its data", "OUT.nrrd"]),
+        ("organ.mhd", ["MetaImage header beside its data", "OUT.mha"]),
+    ] {
+        refused(&folder.write(name, "text"), &said);
+    }
+}
+
 /// Opening a pipe would wait for ever.
 #[cfg(unix)]
 #[test]
