@@ -9,6 +9,23 @@ use crate::contact::rows::{Row, outward};
 use crate::contact::state::State;
 
 impl Problem {
+    /// Whether the tissue lies inside of a tool deeper than `depth_mm` anywhere on the tools' ways.
+    pub fn intrudes(&mut self, state: State<'_>, depth_mm: f32) -> bool {
+        let parts = self.parts();
+        (0..self.tools.len()).any(|index| {
+            let mut ways = (1..=parts).rev().map(|part| part as f32 / parts as f32);
+            ways.any(|way| self.deepest(index, state, way) > depth_mm)
+        })
+    }
+
+    /// How deep a tool lies in the tissue, mm; 0 where it does not.
+    fn buried_by(&self, index: usize, state: State<'_>, part: f32) -> f32 {
+        let tool = &self.tools[index];
+        let pose = pose::between(&self.before[index], &tool.pose, part);
+        let found = Buried::find(&tool.body, &pose, &self.samples, &self.mesh, state);
+        found.map_or(0.0, |buried| buried.depth + tool.body.size())
+    }
+
     /// How deep the tissue lies inside of a quick or thin tool that was clear of it when the step began, or the tool in the tissue, tools at
     /// part `part` of their ways, mm. A tool that was put there comes out over a few steps, however deep it lies.
     pub fn sunk(&mut self, state: State<'_>, part: f32) -> f32 {

@@ -5,6 +5,7 @@
 //! the state that it is given is the tissue under those.
 
 mod depth;
+mod forces;
 mod loads;
 mod look;
 mod solve;
@@ -13,7 +14,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use ::contact::grasp::REACH_MM;
-use ::contact::{Contact, Pose, Sample, Samples, Search, Sweeps, Vector, pose};
+use ::contact::{Contact, Pose, Sample, Samples, Search, Sweeps, Vector};
 
 pub use solve::Change;
 
@@ -314,15 +315,6 @@ impl Problem {
         !self.next.forces.is_empty()
     }
 
-    /// Whether the tissue lies inside of a tool deeper than `depth_mm` anywhere on the tools' ways.
-    pub fn intrudes(&mut self, state: State<'_>, depth_mm: f32) -> bool {
-        let parts = self.parts();
-        (0..self.tools.len()).any(|index| {
-            let mut ways = (1..=parts).rev().map(|part| part as f32 / parts as f32);
-            ways.any(|way| self.deepest(index, state, way) > depth_mm)
-        })
-    }
-
     /// Whether a grasper holds a sample.
     pub fn holds(&self) -> bool {
         let holds = |held: &Held| !held.grasp.anchors().is_empty();
@@ -340,47 +332,6 @@ impl Problem {
             (tool.body.motion(from, &tool.pose) / most).ceil()
         });
         parts.fold(1.0, f32::max).min(MOST_PARTS) as u32
-    }
-
-    /// Back to the forces at the start of the step.
-    pub fn restart(&mut self) {
-        self.next.forces.clear();
-        self.next.forces.extend_from_slice(&self.past.forces);
-    }
-
-    /// Back to the forces at the start of the step, without those of tools that are gone.
-    pub fn stay(&mut self) {
-        self.restart();
-        let count = self.tools.len();
-        let there = |force: &Force| (force.tool as usize) < count;
-        self.next.forces.retain(there);
-    }
-
-    /// Keeps the forces as those of the first guess.
-    ///
-    /// # Errors
-    /// [`Error::OutOfMemory`].
-    pub fn keep_guess(&mut self) -> Result<()> {
-        memory::replace(&mut self.guessed, &self.next.forces, WHAT)
-    }
-
-    /// Takes the forces of the first guess back.
-    pub fn take_guess(&mut self) {
-        self.next.forces.clear();
-        self.next.forces.extend_from_slice(&self.guessed);
-    }
-
-    /// Gives up all forces.
-    pub fn let_go(&mut self) {
-        self.next.forces.clear();
-    }
-
-    /// How deep a tool lies in the tissue, mm; 0 where it does not.
-    fn buried_by(&self, index: usize, state: State<'_>, part: f32) -> f32 {
-        let tool = &self.tools[index];
-        let pose = pose::between(&self.before[index], &tool.pose, part);
-        let found = Buried::find(&tool.body, &pose, &self.samples, &self.mesh, state);
-        found.map_or(0.0, |buried| buried.depth + tool.body.size())
     }
 
     /// Nodes of the surface that tools may touch, all that a solve asks of a state of the tissue.

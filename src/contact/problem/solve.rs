@@ -320,34 +320,4 @@ impl Problem {
         }
         Ok((&self.nodes, &self.vectors))
     }
-
-    /// Goes only part of the way from the forces before the last solve to those after it.
-    pub fn blend(&mut self, part: f32) {
-        for force in &mut self.next.forces {
-            force.force *= part;
-        }
-        for at in 0..self.kept.len() {
-            let kept = self.kept[at];
-            let found = self
-                .next
-                .forces
-                .binary_search_by_key(&kept.key(), Force::key);
-            let share = kept.force * (1.0 - part);
-            match found {
-                Ok(place) => self.next.forces[place].force += share,
-                Err(place) => self.next.forces.insert(
-                    place,
-                    Force {
-                        force: share,
-                        ..kept
-                    },
-                ),
-            }
-        }
-    }
-
-    /// Takes the forces before the last solve back.
-    pub fn undo(&mut self) {
-        std::mem::swap(&mut self.next.forces, &mut self.kept);
-    }
 }

@@ -1,0 +1,71 @@
+//! Forces that a step starts from, keeps and takes back.
+
+use super::{Problem, WHAT};
+use crate::contact::past::Force;
+use crate::error::Result;
+use crate::memory;
+
+impl Problem {
+    /// Back to the forces at the start of the step.
+    pub fn restart(&mut self) {
+        self.next.forces.clear();
+        self.next.forces.extend_from_slice(&self.past.forces);
+    }
+
+    /// Back to the forces at the start of the step, without those of tools that are gone.
+    pub fn stay(&mut self) {
+        self.restart();
+        let count = self.tools.len();
+        let there = |force: &Force| (force.tool as usize) < count;
+        self.next.forces.retain(there);
+    }
+
+    /// Keeps the forces as those of the first guess.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`].
+    pub fn keep_guess(&mut self) -> Result<()> {
+        memory::replace(&mut self.guessed, &self.next.forces, WHAT)
+    }
+
+    /// Takes the forces of the first guess back.
+    pub fn take_guess(&mut self) {
+        self.next.forces.clear();
+        self.next.forces.extend_from_slice(&self.guessed);
+    }
+
+    /// Gives up all forces.
+    pub fn let_go(&mut self) {
+        self.next.forces.clear();
+    }
+
+    /// Goes only part of the way from the forces before the last solve to those after it.
+    pub fn blend(&mut self, part: f32) {
+        for force in &mut self.next.forces {
+            force.force *= part;
+        }
+        for at in 0..self.kept.len() {
+            let kept = self.kept[at];
+            let found = self
+                .next
+                .forces
+                .binary_search_by_key(&kept.key(), Force::key);
+            let share = kept.force * (1.0 - part);
+            match found {
+                Ok(place) => self.next.forces[place].force += share,
+                Err(place) => self.next.forces.insert(
+                    place,
+                    Force {
+                        force: share,
+                        ..kept
+                    },
+                ),
+            }
+        }
+    }
+
+    /// Takes the forces before the last solve back.
+    pub fn undo(&mut self) {
+        std::mem::swap(&mut self.next.forces, &mut self.kept);
+    }
+}
