@@ -8,7 +8,8 @@ use tissue::solver::{Tool, ToolPose};
 use upt::flag;
 
 use super::hand::{Site, any, at, between, moved, sites, tool};
-use super::{Hands, Row};
+use super::run::Hands;
+use crate::stress::Row;
 
 /// Places of a leap or of a ball that begins in the tissue.
 const PLACES: usize = 100;
