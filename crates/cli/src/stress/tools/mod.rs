@@ -17,7 +17,7 @@ use tissue::solver::Tool;
 use super::{Row, progress};
 use crate::bench::Bench;
 use hand::{any, at, between, central, moved, rod, sites};
-use run::{Hands, REST_STEPS, Run};
+use run::{Hands, Run};
 
 /// All cases of the bundle at `path`.
 pub fn rows(bench: &Bench, path: &Path) -> Result<Vec<Row>> {

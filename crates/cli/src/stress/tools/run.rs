@@ -19,7 +19,7 @@ const INVERTED: u32 = flag::INVERTED | flag::FELL_BACK;
 /// 1.7 mm apart lies at most 1 mm from one.
 const DEEP_MM: f64 = 2.0;
 /// Steps without tools after which the tissue must be at rest, and how near, mm.
-pub const REST_STEPS: usize = 400;
+const REST_STEPS: usize = 400;
 const REST_MM: f32 = 0.05;
 
 /// What a run came to.
