@@ -23,7 +23,7 @@ pub struct EnvelopeReport {
 
 /// The tools that push in a step, as the envelope sees them.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Used {
+pub struct ToolUse {
     /// Smallest and largest of their sizes (half their smallest extent), mm.
     pub size_mm: [f32; 2],
     /// Of the fastest point of any of them, mm/s.
@@ -128,7 +128,7 @@ impl EnvelopeCheck {
     pub fn check_tools(
         &self,
         limits: &ToolEnvelope,
-        used: &Used,
+        used: &ToolUse,
         touched: &ContactSet,
     ) -> EnvelopeReport {
         let max_push = touched.max_push();

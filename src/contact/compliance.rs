@@ -18,7 +18,7 @@ pub struct Compliance<'a> {
     pub prior: &'a PriorTable,
     /// Held nodes `[K]`.
     pub held: &'a [bool],
-    /// The natural modes, and for each what inertia takes off its part, mm/mN ([`CoarseSpace::held_back`]); none: static.
+    /// The natural modes, and for each what inertia takes off its part, mm/mN ([`CoarseSpace::inertial_compliance`]); none: static.
     pub inertia: Option<(&'a CoarseSpace, &'a [f32])>,
 }
 
@@ -231,7 +231,7 @@ impl Delassus {
         self.a.clear();
         let modes = compliance
             .inertia
-            .map_or(0, |(_, held_back)| held_back.len());
+            .map_or(0, |(_, inertial_compliance)| inertial_compliance.len());
         let made = memory::fit(&mut self.upper, order * order, WHAT)
             .and_then(|()| memory::fit(&mut self.a, order * order, WHAT))
             .and_then(|()| memory::fit(&mut self.modes, modes * order, WHAT))
@@ -248,8 +248,8 @@ impl Delassus {
             .prior
             .gather_compliance(&self.columns, &mut self.upper, &mut self.widened);
         self.a.extend(self.upper.iter().map(|value| *value as f32));
-        if let Some((space, held_back)) = compliance.inertia {
-            self.hold_back(space, held_back, order);
+        if let Some((space, inertial_compliance)) = compliance.inertia {
+            self.hold_back(space, inertial_compliance, order);
         }
         for i in 0..order {
             for j in 0..i {
@@ -260,13 +260,13 @@ impl Delassus {
     }
 
     /// Takes the natural modes' part off the upper triangle, where it is not known from before.
-    fn hold_back(&mut self, space: &CoarseSpace, held_back: &[f32], order: usize) {
+    fn hold_back(&mut self, space: &CoarseSpace, inertial_compliance: &[f32], order: usize) {
         let dof = |at: usize| 3 * self.columns[at / 3] as usize + at % 3;
         self.modes.clear();
-        self.modes.resize(held_back.len() * order, 0.0);
+        self.modes.resize(inertial_compliance.len() * order, 0.0);
         for at in 0..order {
             let own = space.at_contact(dof(at));
-            for (mode, value) in own.iter().take(held_back.len()).enumerate() {
+            for (mode, value) in own.iter().take(inertial_compliance.len()).enumerate() {
                 self.modes[mode * order + at] = *value;
             }
         }
@@ -293,7 +293,7 @@ impl Delassus {
                         *value = line[before(column) as usize];
                     }
                 } else {
-                    for (mode, lost) in held_back.iter().enumerate() {
+                    for (mode, lost) in inertial_compliance.iter().enumerate() {
                         let values = &self.modes[mode * order..(mode + 1) * order];
                         let factor = lost * values[at];
                         for (a, value) in row[start..end].iter_mut().zip(&values[start..end]) {

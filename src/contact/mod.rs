@@ -7,7 +7,7 @@
 //! | [`past`] | what is remembered from step to step: poses, forces, grasps |
 //! | `buried` | tools that lie in the tissue, and their way out |
 //! | [`compliance`] | how samples move under forces on samples: the Delassus matrix `W = B A B^T` |
-//! | `held_back` | the same at any time after a step |
+//! | `inertial_compliance` | the same at any time after a step |
 //! | [`state`] | where the tissue is, and where it was |
 //! | [`rows`] | gaps and slips of samples near the tools, at a state of the tissue |
 //! | [`problem`] | the samples near the tools, one solve for the forces on them, what the forces change, and what tools are told |
@@ -16,7 +16,7 @@
 
 mod buried;
 pub mod compliance;
-mod held_back;
+mod inertial_compliance;
 pub mod past;
 pub mod problem;
 pub mod rows;
@@ -27,7 +27,7 @@ pub mod tool;
 pub use compliance::Compliance;
 pub(crate) use compliance::Delassus;
 pub use past::Past;
-pub use problem::Problem;
+pub use problem::ContactProblem;
 #[cfg(feature = "haptics")]
 pub(crate) use rows::{Pair, outward};
 pub use state::State;

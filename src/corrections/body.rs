@@ -2,7 +2,7 @@
 
 use elements::{ElementForces, Material, Tetrahedra};
 
-use super::pace::Diagonal;
+use super::time_step::Diagonal;
 use crate::bundle::Mesh;
 use crate::error::Result;
 use crate::kernels::Isa;

@@ -5,7 +5,7 @@
 use super::input::{Enough, Report};
 use super::passes;
 use super::precondition::Env;
-use super::stage::Stage;
+use super::solver::ImplicitSolver;
 use crate::error::Result;
 
 /// Part of a state's error that the next one keeps.
@@ -13,7 +13,7 @@ const KEPT: f32 = 0.7;
 /// Iterations that a target does not end: what the first one moves says little of what the next would.
 const LEAST: u32 = 2;
 
-impl Stage {
+impl ImplicitSolver {
     /// The estimated error of the state being made: what further iterations would move, what a step of this length leaves out, and
     /// what is left of the error of the state before, from which this one started.
     pub(super) fn estimate(&mut self, report: &mut Report) {

@@ -3,20 +3,20 @@
 //!
 //! The oscillators and the forces that make BDF2 follow them are in [`super::oscillators`].
 
-use super::input::{Input, Lent, Report};
+use super::input::{Input, Report, SolverContext};
 use super::passes;
 use super::precondition::mask_held;
-use super::stage::{SMALLEST_DET, Stage};
+use super::solver::{ImplicitSolver, SMALLEST_DET};
 use crate::error::Result;
 
 /// What of the last field stays in a step where no free motion was found.
 const KEPT: f32 = 0.8;
 
-impl Stage {
+impl ImplicitSolver {
     /// Makes the free step from `input.last` in one.
     pub(super) fn swing_once(
         &mut self,
-        lent: Lent<'_>,
+        context: SolverContext<'_>,
         input: &Input<'_>,
         next: &mut [f32],
     ) -> Result<Report> {
@@ -24,23 +24,23 @@ impl Stage {
         let rests = |field: &[f32]| field.iter().all(|value| *value == 0.0);
         if rests(input.last) && rests(input.before) && (input.still || self.rests()) {
             next.fill(0.0);
-            self.finish(lent, input, next)?;
+            self.finish(context, input, next)?;
             report.min_det = 1.0;
             return Ok(report);
         }
-        let _awake = lent.pool.keep_awake();
+        let _awake = context.pool.keep_awake();
         self.nodes.clear();
-        self.preconditioner.prescribe(lent.env(), &[])?;
+        self.preconditioner.prescribe(context.env(), &[])?;
         self.memory.mask(&[]);
-        self.prepare(lent, input)?;
+        self.prepare(context, input)?;
         let mut u = std::mem::take(&mut self.u);
         let mut g = std::mem::take(&mut self.g);
         let result = self
-            .swing_from(lent, input, &mut u, &mut g, &mut report)
-            .and_then(|()| self.finish(lent, input, &u));
+            .swing_from(context, input, &mut u, &mut g, &mut report)
+            .and_then(|()| self.finish(context, input, &u));
         if result.is_ok() {
             next.copy_from_slice(&u);
-            self.finish_free(lent, input.last, next);
+            self.finish_free(context, input.last, next);
             if report.fell_back {
                 self.stop_next();
             }
@@ -58,18 +58,21 @@ impl Stage {
 
     fn swing_from(
         &mut self,
-        lent: Lent<'_>,
+        context: SolverContext<'_>,
         input: &Input<'_>,
         u: &mut [f32],
         g: &mut [f32],
         report: &mut Report,
     ) -> Result<()> {
-        let (h, kappa) = (lent.pace.integrator.step_s, lent.pace.integrator.kappa());
-        self.free.ready(lent)?;
+        let (h, kappa) = (
+            context.time_step.integrator.step_s,
+            context.time_step.integrator.kappa(),
+        );
+        self.free.ready(context)?;
         let still = input.last;
-        let (det, _) = self.residual(lent, [still, still, still], g, report)?;
-        self.measure(lent, input, g)?;
-        let env = lent.env();
+        let (det, _) = self.residual(context, [still, still, still], g, report)?;
+        self.measure(context, input, g)?;
+        let env = context.env();
         // What the modes lack under BDF2 goes into the inertia of the step, ...
         self.free.give(|mode| mode.forced(h, kappa));
         self.preconditioner
@@ -88,35 +91,35 @@ impl Stage {
         passes::shorten(env, input.last, &self.d, 1.0, u)?;
         mask_held(&env.body.held, u);
         let lost = det.is_nan() || det < SMALLEST_DET;
-        let mut det = self.residual(lent, [input.last, u, u], g, report)?.0;
+        let mut det = self.residual(context, [input.last, u, u], g, report)?.0;
         if !lost && (det.is_nan() || det < SMALLEST_DET) {
             u.copy_from_slice(input.last);
-            det = self.residual(lent, [input.last, u, u], g, report)?.0;
+            det = self.residual(context, [input.last, u, u], g, report)?.0;
         }
         report.parts = 1;
-        self.relax(lent, input, det, u, g, report)?;
+        self.relax(context, input, det, u, g, report)?;
         if report.fell_back {
             // Without contact that was rest. The field dies away instead of a jump there.
             for (u, last) in u.iter_mut().zip(input.last) {
                 *u = KEPT * last;
             }
-            report.min_det = self.residual(lent, [input.last, u, u], g, report)?.0;
+            report.min_det = self.residual(context, [input.last, u, u], g, report)?.0;
             self.stand();
         }
         Ok(())
     }
 
     /// Places, velocities, drifts and forces of the modes, from the residual `g` of the last state.
-    fn measure(&mut self, lent: Lent<'_>, input: &Input<'_>, g: &[f32]) -> Result<()> {
-        let env = lent.env();
+    fn measure(&mut self, context: SolverContext<'_>, input: &Input<'_>, g: &[f32]) -> Result<()> {
+        let env = context.env();
         let known = if input.still { 0.0 } else { 1.0 };
-        let weighted = |stage: &mut Stage, field: &[f32], scale: f32| {
-            for (i, (q, value)) in stage.q.iter_mut().zip(field).enumerate() {
+        let weighted = |solver: &mut ImplicitSolver, field: &[f32], scale: f32| {
+            for (i, (q, value)) in solver.q.iter_mut().zip(field).enumerate() {
                 *q = scale * env.body.mass[i / 3] * value;
             }
-            mask_held(&env.body.held, &mut stage.q);
-            let (preconditioner, values) = (&mut stage.preconditioner, &mut stage.free.values);
-            preconditioner.on_natural(env, &stage.q, values)
+            mask_held(&env.body.held, &mut solver.q);
+            let (preconditioner, values) = (&mut solver.preconditioner, &mut solver.free.values);
+            preconditioner.on_natural(env, &solver.q, values)
         };
         weighted(self, input.last, 1.0)?;
         self.free.take(|mode| &mut mode.place);
@@ -143,9 +146,9 @@ impl Stage {
     }
 
     /// The modes' own velocities and forces in the state being made.
-    fn finish_free(&mut self, lent: Lent<'_>, last: &[f32], next: &[f32]) {
-        let kappa = lent.pace.integrator.kappa() as f32;
-        let masses = &lent.corrections.body.mass;
+    fn finish_free(&mut self, context: SolverContext<'_>, last: &[f32], next: &[f32]) {
+        let kappa = context.time_step.integrator.kappa() as f32;
+        let masses = &context.corrections.body.mass;
         for i in 0..next.len() {
             self.next.velocity[i] += self.free.faster[i];
             self.next.inertia[i] = masses[i / 3] * kappa * (next[i] - last[i]) + self.drift[i];

@@ -20,7 +20,7 @@ pub struct Pair {
     pub change: Vec<f32>,
 }
 
-/// All that a [`super::Stage`] knows of the past.
+/// All that a [`super::ImplicitSolver`] knows of the past.
 #[derive(Debug, Serialize, Deserialize)]
 pub struct History {
     /// Velocities and contact forces.

@@ -3,8 +3,8 @@
 use std::time::Instant;
 
 use super::Corrections;
-use super::pace::Pace;
 use super::precondition::Env;
+use super::time_step::TimeStep;
 use crate::field::ContactSet;
 use crate::kernels::{Isa, Pool};
 use crate::prior::PriorTable;
@@ -73,16 +73,16 @@ pub struct Enough {
 
 /// What a scene lends.
 #[derive(Clone, Copy)]
-pub struct Lent<'a> {
+pub struct SolverContext<'a> {
     pub isa: Isa,
     pub pool: &'a Pool,
     pub prior: &'a PriorTable,
     pub corrections: &'a Corrections,
     /// The length of the scene's steps.
-    pub pace: &'a Pace,
+    pub time_step: &'a TimeStep,
 }
 
-impl<'a> Lent<'a> {
+impl<'a> SolverContext<'a> {
     pub(super) fn env(&self) -> Env<'a> {
         Env {
             isa: self.isa,
@@ -90,7 +90,7 @@ impl<'a> Lent<'a> {
             prior: self.prior,
             space: &self.corrections.space,
             body: &self.corrections.body,
-            pace: self.pace,
+            time_step: self.time_step,
         }
     }
 }

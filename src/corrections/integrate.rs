@@ -1,9 +1,9 @@
 //! BDF2 over the steps of a stage: what it knows before a step, velocities and inertia after it, and what it leaves out.
 
 use super::Integrator;
-use super::input::{Input, Lent};
+use super::input::{Input, SolverContext};
 use super::passes;
-use super::stage::Stage;
+use super::solver::ImplicitSolver;
 use crate::error::Result;
 use crate::kernels::parts::Parts;
 
@@ -11,16 +11,16 @@ use crate::kernels::parts::Parts;
 const BEND: f64 = 0.02;
 const JERK: f64 = 0.05;
 
-impl Stage {
+impl ImplicitSolver {
     /// Inertia and damping of the step at the last displacement.
-    pub(super) fn prepare(&mut self, lent: Lent<'_>, input: &Input<'_>) -> Result<()> {
-        let env = lent.env();
+    pub(super) fn prepare(&mut self, context: SolverContext<'_>, input: &Input<'_>) -> Result<()> {
+        let env = context.env();
         let (last, before) = (input.last, input.before);
         let known = if input.still { 0.0 } else { 1.0 };
         let Integrator {
             step_s,
             damping_per_s,
-        } = lent.pace.integrator;
+        } = context.time_step.integrator;
         let (half, alpha) = ((0.5 / step_s) as f32, damping_per_s as f32);
         let (mass, motion) = (&env.body.mass_of_dof, &self.motion);
         let len = self.drift.len();
@@ -43,13 +43,18 @@ impl Stage {
     }
 
     /// Velocity and inertia at `next`, the end of the step from `last`, and what a step of this length leaves out.
-    pub(super) fn finish(&mut self, lent: Lent<'_>, input: &Input<'_>, next: &[f32]) -> Result<()> {
-        let env = lent.env();
+    pub(super) fn finish(
+        &mut self,
+        context: SolverContext<'_>,
+        input: &Input<'_>,
+        next: &[f32],
+    ) -> Result<()> {
+        let env = context.env();
         let (last, before) = (input.last, input.before);
         let Integrator {
             step_s,
             damping_per_s,
-        } = lent.pace.integrator;
+        } = context.time_step.integrator;
         let (half, alpha) = ((0.5 / step_s) as f32, damping_per_s as f32);
         let known = if input.still { 0.0 } else { 1.0 };
         let (mass, motion) = (&env.body.mass_of_dof, &self.motion);

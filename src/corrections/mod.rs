@@ -4,7 +4,7 @@
 //! by BDF2: `r(u) = f_int(u) + M (a + alpha v) = 0` on the free nodes, with the contact nodes where the instruments hold them.
 //! `k` iterations of L-BFGS around a two-level preconditioner take it there; accuracy becomes a number that the host chooses.
 //!
-//! [`Corrections`] is what a model shares between scenes, made when the first scene asks for it; [`Stage`] is a scene's own.
+//! [`Corrections`] is what a model shares between scenes, made when the first scene asks for it; [`ImplicitSolver`] is a scene's own.
 //! Displacements mm, forces µN, masses g, times s.
 
 mod body;
@@ -13,19 +13,19 @@ mod free;
 mod history;
 mod input;
 mod integrate;
-#[cfg(feature = "contact")]
-mod loaded;
 mod memory;
 mod motion;
 mod oscillators;
-mod pace;
 mod passes;
 mod precondition;
 mod prescribed;
-mod shorter;
-mod stage;
+mod solver;
+mod substepper;
 #[cfg(feature = "contact")]
 mod substeps;
+mod time_step;
+#[cfg(feature = "contact")]
+mod tool_contact;
 
 use std::sync::Arc;
 
@@ -35,24 +35,24 @@ use crate::bundle::{BundleFiles, CorrectionsEntry, Manifest, Mesh};
 use crate::error::{Error, Result};
 use crate::kernels::Isa;
 use crate::prior::{CoarseSpace, PriorTable};
-use pace::Diagonal;
+use time_step::Diagonal;
 
 pub use body::Body;
 pub use history::{History, PAIRS};
-pub use input::{Enough, Input, Lent, Report};
+pub use input::{Enough, Input, Report, SolverContext};
 pub use motion::Motion;
-pub use pace::{Integrator, Pace};
-pub use shorter::Shorter;
-pub use stage::{SMALLEST_DET, Stage};
+pub use solver::{ImplicitSolver, SMALLEST_DET};
+pub use substepper::Substepper;
 #[cfg(feature = "contact")]
 pub use substeps::Substeps;
+pub use time_step::{Integrator, TimeStep};
 
 /// The tables and elements of a bundle's corrections.
 pub struct Corrections {
     pub space: CoarseSpace,
     pub body: Body,
     /// Steps as long as the bundle's.
-    pub pace: Arc<Pace>,
+    pub time_step: Arc<TimeStep>,
 }
 
 impl Corrections {
@@ -76,7 +76,7 @@ impl Corrections {
         Ok(Corrections {
             space: CoarseSpace::parse(&files.tensors(&entry.file)?, prior)?,
             body: Body::new(mesh, material, &diagonal, Isa::detect())?,
-            pace: Arc::new(Pace::new(&diagonal, integrator)?),
+            time_step: Arc::new(TimeStep::new(&diagonal, integrator)?),
         })
     }
 
@@ -84,13 +84,18 @@ impl Corrections {
     ///
     /// # Errors
     /// [`Error::OutOfMemory`].
-    pub fn pace(&self, mesh: &Mesh, material: &Material, integrator: Integrator) -> Result<Pace> {
-        Pace::new(&Diagonal::of(mesh, material)?, integrator)
+    pub fn time_step(
+        &self,
+        mesh: &Mesh,
+        material: &Material,
+        integrator: Integrator,
+    ) -> Result<TimeStep> {
+        TimeStep::new(&Diagonal::of(mesh, material)?, integrator)
     }
 
     /// Bytes held.
     pub fn memory_bytes(&self) -> usize {
-        self.space.memory_bytes() + self.body.memory_bytes() + self.pace.memory_bytes()
+        self.space.memory_bytes() + self.body.memory_bytes() + self.time_step.memory_bytes()
     }
 }
 

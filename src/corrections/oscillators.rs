@@ -5,7 +5,7 @@
 //! what the law adds to its linear force now, `g = m w² z - N^T f_int(u_n)`: `c = m w² z' + m kappa (z' - z) + N^T M p - g`; and its
 //! velocity becomes the oscillator's. Without `g` a law that is not linear is given two thirds of its impulse.
 
-use super::input::Lent;
+use super::input::SolverContext;
 use crate::error::Result;
 use crate::memory;
 use crate::prior::propagator;
@@ -42,13 +42,13 @@ pub(super) struct Oscillator {
 }
 
 impl Oscillators {
-    pub(super) fn ready(&mut self, lent: Lent<'_>) -> Result<()> {
+    pub(super) fn ready(&mut self, context: SolverContext<'_>) -> Result<()> {
         if !self.faster.is_empty() {
             return Ok(());
         }
         const WHAT: &str = "the free motion of a scene";
-        let natural = lent.corrections.space.natural()?;
-        let integrator = lent.pace.integrator;
+        let natural = context.corrections.space.natural()?;
+        let integrator = context.time_step.integrator;
         let turned = |omega: f32| f64::from(omega) * integrator.step_s;
         let resolved = natural.iter().take_while(|mode| turned(mode.0) <= RESOLVED);
         let count = resolved.clone().count();
@@ -63,7 +63,7 @@ impl Oscillators {
         });
         *self = Oscillators {
             values: memory::zeros(count, WHAT)?,
-            faster: memory::zeros(3 * lent.corrections.body.mass.len(), WHAT)?,
+            faster: memory::zeros(3 * context.corrections.body.mass.len(), WHAT)?,
             modes: memory::collected(count, oscillators, WHAT)?,
         };
         Ok(())

@@ -79,7 +79,7 @@ pub(super) fn smooth(
     let (len, count) = (r.len(), ys.len());
     let mut sums = Sums::new(partial, len, count);
     let (r, t, parts) = (Parts::new(r), Parts::new(t), sums.parts());
-    let blocks = &env.pace.inverse_blocks;
+    let blocks = &env.time_step.inverse_blocks;
     each(env.pool, len, count + 4, |range, piece| {
         // SAFETY: these parts belong to this piece alone.
         let (r, t, sums) = unsafe {

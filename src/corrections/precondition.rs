@@ -13,7 +13,7 @@
 mod response;
 
 use super::body::Body;
-use super::pace::Pace;
+use super::time_step::TimeStep;
 use crate::error::{Error, Result};
 use crate::kernels::contact::{ContactFactor, subtract_gram};
 use crate::kernels::project::{project_field, row_dots};
@@ -37,12 +37,12 @@ pub struct Env<'a> {
     pub prior: &'a PriorTable,
     pub space: &'a CoarseSpace,
     pub body: &'a Body,
-    pub pace: &'a Pace,
+    pub time_step: &'a TimeStep,
 }
 
 /// The preconditioner for one set of prescribed nodes, and its buffers.
 pub struct Preconditioner {
-    held_back: Vec<f32>,
+    inertial_compliance: Vec<f32>,
     /// `1 / (m (w² + kappa))` of each natural mode, mm/µN.
     #[cfg(feature = "contact")]
     moved_freely: Vec<f32>,
@@ -84,7 +84,7 @@ impl Preconditioner {
     /// # Errors
     /// [`Error::OutOfMemory`].
     pub fn new(env: Env<'_>) -> Result<Preconditioner> {
-        let kappa = env.pace.integrator.kappa();
+        let kappa = env.time_step.integrator.kappa();
         let count = env.space.count();
         let dofs = 3 * env.prior.contact_nodes.len();
         let room = dofs.min(ROOM);
@@ -98,7 +98,7 @@ impl Preconditioner {
             memory::collected(nodes.len(), inside, WHAT)?
         };
         Ok(Preconditioner {
-            held_back: env.space.held_back(kappa)?,
+            inertial_compliance: env.space.inertial_compliance(kappa)?,
             #[cfg(feature = "contact")]
             moved_freely: env.space.moved_freely(kappa)?,
             starts: env.prior.basis_starts()?,
@@ -134,7 +134,7 @@ impl Preconditioner {
         memory::reserve(&mut self.whitened, more, WHAT)?;
         self.whitened.resize(order * count, 0.0);
         for (list, wanted) in [
-            (&mut self.natural, order * self.held_back.len()),
+            (&mut self.natural, order * self.inertial_compliance.len()),
             (&mut self.lost, order),
             (&mut self.at_contact, order),
             (&mut self.forces, order),
@@ -183,7 +183,7 @@ impl Preconditioner {
         if order > 0 {
             for (at, &dof) in self.dofs.iter().enumerate() {
                 let own = env.space.at_contact(dof as usize);
-                for (mode, value) in own[..self.held_back.len()].iter().enumerate() {
+                for (mode, value) in own[..self.inertial_compliance.len()].iter().enumerate() {
                     self.natural[mode * order + at] = *value;
                 }
                 for (to, &from) in self.whitened[at * count..][..count].iter_mut().zip(own) {
@@ -191,13 +191,13 @@ impl Preconditioner {
                 }
             }
             let (columns, widened) = (&self.columns, &mut self.widened);
-            let (held_back, natural) = (&self.held_back, &self.natural);
+            let (inertial_compliance, natural) = (&self.inertial_compliance, &self.natural);
             let lost = &mut self.lost;
             self.compliance
                 .factor(env.isa, &self.dofs, |upper| {
                     env.prior.gather_compliance(columns, upper, widened);
                     for (at, row) in upper.chunks_exact_mut(order).enumerate() {
-                        lose(held_back, natural, at, lost);
+                        lose(inertial_compliance, natural, at, lost);
                         for (value, lost) in row[at..].iter_mut().zip(&lost[at..]) {
                             *value -= f64::from(*lost);
                         }
@@ -229,7 +229,7 @@ impl Preconditioner {
         project_field(isa, pool, &basis, &self.starts, r, &mut self.coordinates)?;
         self.coarse(env)?;
         decode_rows(isa, pool, &basis, &self.plan, &self.coordinates, z)?;
-        let blocks = env.pace.inverse_blocks.iter();
+        let blocks = env.time_step.inverse_blocks.iter();
         for ((z, r), [xx, xy, xz, yy, yz, zz]) in z
             .as_chunks_mut::<3>()
             .0
@@ -299,8 +299,10 @@ impl Preconditioner {
         )?;
         for (work, &dof) in self.at_contact.iter_mut().zip(&self.dofs) {
             let own = env.space.at_contact(dof as usize);
-            for ((held_back, own), on_mode) in self.held_back.iter().zip(own).zip(&self.on_modes) {
-                *work -= held_back * own * on_mode;
+            for ((inertial_compliance, own), on_mode) in
+                self.inertial_compliance.iter().zip(own).zip(&self.on_modes)
+            {
+                *work -= inertial_compliance * own * on_mode;
             }
         }
         Ok(())
@@ -335,12 +337,12 @@ impl Preconditioner {
 }
 
 /// Row `at` of what inertia takes off the compliance, from its diagonal on: `sum_n held_back_n N_n,at N_n`.
-fn lose(held_back: &[f32], natural: &[f32], at: usize, lost: &mut [f32]) {
+fn lose(inertial_compliance: &[f32], natural: &[f32], at: usize, lost: &mut [f32]) {
     let order = lost.len();
     let lost = &mut lost[at..];
     lost.fill(0.0);
-    for (mode, held_back) in natural.chunks_exact(order).zip(held_back) {
-        let factor = held_back * mode[at];
+    for (mode, inertial_compliance) in natural.chunks_exact(order).zip(inertial_compliance) {
+        let factor = inertial_compliance * mode[at];
         for (lost, value) in lost.iter_mut().zip(&mode[at..]) {
             *lost += factor * value;
         }

@@ -1,22 +1,22 @@
 //! A step whose contact is prescribed: where the nodes in contact end is known, and the rest of the field follows.
 
-use super::input::{Input, Lent, Report};
+use super::input::{Input, Report, SolverContext};
 use super::precondition::mask_held;
-use super::stage::{MOST_PARTS, SMALLEST_DET, Stage};
+use super::solver::{ImplicitSolver, MOST_PARTS, SMALLEST_DET};
 use crate::error::Result;
 use crate::field::ContactSet;
 use crate::memory;
 
-impl Stage {
+impl ImplicitSolver {
     /// Corrects `next`, which holds the model's prediction with the boundary conditions on it.
     pub fn correct(
         &mut self,
-        lent: Lent<'_>,
+        context: SolverContext<'_>,
         input: &Input<'_>,
         next: &mut [f32],
     ) -> Result<Report> {
-        let env = lent.env();
-        let _awake = lent.pool.keep_awake();
+        let env = context.env();
+        let _awake = context.pool.keep_awake();
         let held = &env.body.held;
         let forces = 3 * input.contact.len();
         memory::fit(&mut self.next.reaction, forces, "contact forces")?;
@@ -27,14 +27,14 @@ impl Stage {
         self.preconditioner.prescribe(env, &self.nodes)?;
         self.memory.begin();
         self.memory.mask(&self.nodes);
-        self.prepare(lent, input)?;
+        self.prepare(context, input)?;
         let mut report = Report::default();
 
         let mut u = std::mem::take(&mut self.u);
         let mut g = std::mem::take(&mut self.g);
         let result = self
-            .iterate(lent, input, &mut u, &mut g, &mut report)
-            .and_then(|()| self.finish(lent, input, &u));
+            .iterate(context, input, &mut u, &mut g, &mut report)
+            .and_then(|()| self.finish(context, input, &u));
         if result.is_ok() {
             next.copy_from_slice(&u);
             if report.fell_back {
@@ -43,7 +43,7 @@ impl Stage {
             self.next.min_det = report.min_det;
             self.estimate(&mut report);
         }
-        let result = result.and_then(|()| self.take_reaction(lent, input.contact, &g));
+        let result = result.and_then(|()| self.take_reaction(context, input.contact, &g));
         (self.u, self.g) = (u, g);
         result.map(|()| report)
     }
@@ -52,14 +52,14 @@ impl Stage {
     /// residual in `g`.
     pub(super) fn lead(
         &mut self,
-        lent: Lent<'_>,
+        context: SolverContext<'_>,
         input: &Input<'_>,
         part: f32,
         u: &mut [f32],
         g: &mut [f32],
         report: &mut Report,
     ) -> Result<f32> {
-        let env = lent.env();
+        let env = context.env();
         let target = |index: usize| {
             let node = self.nodes[index];
             let c = input.contact.at(node).unwrap_or_default();
@@ -72,14 +72,19 @@ impl Stage {
             u[at..at + 3].copy_from_slice(&target(index));
         }
         mask_held(&env.body.held, u);
-        let (det, _) = self.residual(lent, [input.last, u, u], g, report)?;
+        let (det, _) = self.residual(context, [input.last, u, u], g, report)?;
         self.stand();
         Ok(det)
     }
 
     /// Contact forces of the state that stands, `L_C^T r`: the virtual work of the whole residual on the response to each contact.
-    fn take_reaction(&mut self, lent: Lent<'_>, contact: &ContactSet, g: &[f32]) -> Result<()> {
-        let env = lent.env();
+    fn take_reaction(
+        &mut self,
+        context: SolverContext<'_>,
+        contact: &ContactSet,
+        g: &[f32],
+    ) -> Result<()> {
+        let env = context.env();
         let held = &env.body.held;
         let reaction = &mut self.next.reaction;
         let mut rows = self.at_nodes[1].as_chunks::<3>().0.iter();
@@ -112,7 +117,7 @@ impl Stage {
     /// halve the smallest det F; all parts but the last get an iteration each.
     fn guess(
         &mut self,
-        lent: Lent<'_>,
+        context: SolverContext<'_>,
         input: &Input<'_>,
         u: &mut [f32],
         g: &mut [f32],
@@ -129,7 +134,7 @@ impl Stage {
                 u.copy_from_slice(input.last);
             }
             let part = 1.0 / parts as f32;
-            let det = self.lead(lent, input, part, u, g, report)?;
+            let det = self.lead(context, input, part, u, g, report)?;
             if det > least || parts == MOST_PARTS {
                 break det;
             }
@@ -137,9 +142,9 @@ impl Stage {
         };
         for part in 2..=parts {
             if det > SMALLEST_DET {
-                self.improve(lent, input.last, u, g, det, report)?;
+                self.improve(context, input.last, u, g, det, report)?;
             }
-            det = self.lead(lent, input, part as f32 / parts as f32, u, g, report)?;
+            det = self.lead(context, input, part as f32 / parts as f32, u, g, report)?;
         }
         report.parts = parts;
         Ok(det)
@@ -147,13 +152,13 @@ impl Stage {
 
     fn iterate(
         &mut self,
-        lent: Lent<'_>,
+        context: SolverContext<'_>,
         input: &Input<'_>,
         u: &mut [f32],
         g: &mut [f32],
         report: &mut Report,
     ) -> Result<()> {
-        let det = self.guess(lent, input, u, g, report)?;
-        self.relax(lent, input, det, u, g, report)
+        let det = self.guess(context, input, u, g, report)?;
+        self.relax(context, input, det, u, g, report)
     }
 }

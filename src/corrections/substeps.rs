@@ -3,10 +3,10 @@
 
 use ::contact::{Pose, pose};
 
-use super::input::{Enough, Input, Lent, Report};
-use super::shorter::Shorter;
-use super::stage::{SMALLEST_DET, Stage};
-use crate::contact::{Delassus, MAX_TOOLS, Past, Problem, Tool};
+use super::input::{Enough, Input, Report, SolverContext};
+use super::solver::{ImplicitSolver, SMALLEST_DET};
+use super::substepper::Substepper;
+use crate::contact::{ContactProblem, Delassus, MAX_TOOLS, Past, Tool};
 use crate::error::Result;
 use crate::memory;
 
@@ -59,7 +59,7 @@ impl Substeps {
     }
 }
 
-impl Stage {
+impl ImplicitSolver {
     /// Makes the step from `input.last` that the tools of `problem` cause, and tells them what they feel; of substeps where that is called
     /// for: by what the last step left out, or else by what this one does.
     ///
@@ -67,63 +67,67 @@ impl Stage {
     /// [`crate::Error::OutOfMemory`], a panic on another thread of the pool; the past of stage and problem stays.
     pub fn drive(
         &mut self,
-        lent: Lent<'_>,
+        context: SolverContext<'_>,
         input: &Input<'_>,
-        problem: &mut Problem,
-        substeps: Option<(&mut Substeps, &mut Shorter)>,
+        problem: &mut ContactProblem,
+        substeps: Option<(&mut Substeps, &mut Substepper)>,
         next: &mut [f32],
     ) -> Result<Report> {
         problem.end_by(input.enough.until);
-        let Some((substeps, shorter)) = substeps else {
-            return self.correct_loaded(lent, input, problem, next);
+        let Some((substeps, substepper)) = substeps else {
+            return self.correct_loaded(context, input, problem, next);
         };
         let lost = self.motion.min_det < SMALLEST_DET;
         if substeps.helps(self.motion.truncated_mm) && !lost {
-            return self.drive_substeps(lent, input, problem, (substeps, shorter), next);
+            return self.drive_substeps(context, input, problem, (substeps, substepper), next);
         }
-        let whole = self.correct_loaded(lent, input, problem, next)?;
+        let whole = self.correct_loaded(context, input, problem, next)?;
         // Where the iterations have lost the contact they would lose it again.
         let helps = substeps.helps(self.next.truncated_mm.hypot(whole.remaining_mm));
         if whole.fell_back || !helps {
             return Ok(whole);
         }
-        let parts = self.drive_substeps(lent, input, problem, (substeps, shorter), next)?;
+        let parts = self.drive_substeps(context, input, problem, (substeps, substepper), next)?;
         Ok(whole.and(&parts))
     }
 
     fn drive_substeps(
         &mut self,
-        lent: Lent<'_>,
+        context: SolverContext<'_>,
         input: &Input<'_>,
-        problem: &mut Problem,
-        (substeps, shorter): (&mut Substeps, &mut Shorter),
+        problem: &mut ContactProblem,
+        (substeps, substepper): (&mut Substeps, &mut Substepper),
         next: &mut [f32],
     ) -> Result<Report> {
-        shorter.start(&self.motion, input, lent.pace.integrator.step_s as f32)?;
+        substepper.start(
+            &self.motion,
+            input,
+            context.time_step.integrator.step_s as f32,
+        )?;
         substeps.past.take(&problem.past)?;
         substeps.tools.clear();
         substeps.tools.extend_from_slice(problem.tools());
         substeps.from.clear();
         substeps.from.extend_from_slice(problem.before());
-        self.exchange(shorter);
+        self.exchange(substepper);
         problem.exchange(&mut substeps.responses);
-        let result = self.each_substep(lent, input, problem, (substeps, shorter));
-        self.exchange(shorter);
+        let result = self.each_substep(context, input, problem, (substeps, substepper));
+        self.exchange(substepper);
         problem.exchange(&mut substeps.responses);
         // The pairs are those of shorter steps.
         self.memory.begin();
         std::mem::swap(&mut problem.past, &mut substeps.past);
         let report = result?;
-        self.arrive(lent, input, shorter, next)?;
+        self.arrive(context, input, substepper, next)?;
         Ok(report)
     }
 
     fn each_substep(
         &mut self,
-        lent: Lent<'_>,
+        context: SolverContext<'_>,
         input: &Input<'_>,
-        problem: &mut Problem,
-        (substeps, shorter): (&mut Substeps, &mut Shorter),
+        problem: &mut ContactProblem,
+        (substeps, substepper): (&mut Substeps, &mut Substepper),
     ) -> Result<Report> {
         let Substeps {
             tools,
@@ -132,7 +136,7 @@ impl Stage {
             torn,
             ..
         } = substeps;
-        let count = shorter.count();
+        let count = substepper.count();
         let mut told = Report::default();
         let mut lost = false;
         torn.fill(false);
@@ -144,15 +148,18 @@ impl Stage {
             for (tool, from) in on_their_way.iter_mut().zip(&*from) {
                 tool.pose = pose::between(from, &tool.pose, way);
             }
-            let Shorter {
-                pace,
+            let Substepper {
+                time_step,
                 last,
                 before,
                 next,
                 ..
-            } = &mut *shorter;
+            } = &mut *substepper;
             problem.enter(on_their_way, input.rest, last)?;
-            let short = Lent { pace, ..lent };
+            let short = SolverContext {
+                time_step,
+                ..context
+            };
             let most = if lost { ONCE_LOST } else { u32::MAX };
             let enough = Enough {
                 iterations: input.enough.iterations.min(most),
@@ -173,7 +180,7 @@ impl Stage {
             if part < count {
                 problem.commit();
             }
-            shorter.advance();
+            substepper.advance();
             lost |= report.fell_back;
             told = told.and(&report);
         }

@@ -5,7 +5,7 @@
 //!
 //! | module | what |
 //! |---|---|
-//! | `slow` | what a step publishes: samples near the tool, how they move, forces, velocities |
+//! | `snapshot` | what a step publishes: samples near the tool, how they move, forces, velocities |
 //! | `publish` | the scene's end: fills it |
 //! | `ends` | what both ends see of each other |
 //! | `modes` | the natural modes between two steps |
@@ -21,7 +21,7 @@ mod modes;
 mod passivity;
 pub(crate) mod publish;
 mod render;
-mod slow;
+mod snapshot;
 mod solver;
 mod stiffness;
 
@@ -33,9 +33,10 @@ use crate::contact::Tool;
 #[cfg(test)]
 pub(crate) fn test_hand(options: &HapticOptions) -> Haptics {
     let modes = modes::Modes::new(&[], 0.0).unwrap();
-    let (_, slow) = exchange::exchange([0; 3].map(|modes| slow::Slow::new(modes).unwrap()));
+    let (_, snapshot) =
+        exchange::exchange([0; 3].map(|modes| snapshot::ContactSnapshot::new(modes).unwrap()));
     let (pose, _) = exchange::exchange([options.tool.pose; 3]);
-    Haptics::new(options, modes, slow, pose, Default::default()).unwrap()
+    Haptics::new(options, modes, snapshot, pose, Default::default()).unwrap()
 }
 
 /// How a tool is rendered.

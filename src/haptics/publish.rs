@@ -10,8 +10,8 @@ use super::HapticOptions;
 use super::ends::Ends;
 use super::modes::Modes;
 use super::render::Haptics;
-use super::slow::{MOST_SAMPLES, Slow};
-use crate::contact::{Compliance, Delassus, Mode, Pair, Problem, State, outward, vector};
+use super::snapshot::{ContactSnapshot, MOST_SAMPLES};
+use crate::contact::{Compliance, ContactProblem, Delassus, Mode, Pair, State, outward, vector};
 use crate::corrections::{Corrections, Integrator, Motion};
 use crate::error::{Error, Result};
 use crate::kernels::project::{project_field, row_dots};
@@ -35,7 +35,7 @@ pub struct Link {
     body: Body,
     friction: f32,
     grasps: bool,
-    out: Writer<Slow>,
+    out: Writer<ContactSnapshot>,
     pose: Reader<Pose>,
     /// Of one buffer.
     slow_bytes: usize,
@@ -43,7 +43,7 @@ pub struct Link {
     samples: Arc<Samples>,
     search: Search,
     delassus: Delassus,
-    held_back: Vec<f32>,
+    inertial_compliance: Vec<f32>,
     /// Nearest samples: distance, row.
     found: Vec<(f32, u32)>,
     /// Their rows alone.
@@ -67,7 +67,7 @@ pub struct Stepped<'a> {
     pub prior: &'a PriorTable,
     pub corrections: &'a Corrections,
     pub motion: &'a Motion,
-    pub problem: Option<&'a Problem>,
+    pub problem: Option<&'a ContactProblem>,
     /// `[K,3]`, mm.
     pub rest: &'a [f32],
     pub u: &'a [f32],
@@ -89,10 +89,10 @@ pub fn join(
     check(options)?;
     let tool = &options.tool;
     let natural = corrections.space.natural()?;
-    let slow = || Slow::new(natural.len());
-    let buffers = [slow()?, slow()?, slow()?];
+    let snapshot = || ContactSnapshot::new(natural.len());
+    let buffers = [snapshot()?, snapshot()?, snapshot()?];
     let slow_bytes = buffers[0].memory_bytes();
-    let (out, slow) = exchange(buffers);
+    let (out, snapshot) = exchange(buffers);
     let (at, pose) = exchange([tool.pose; 3]);
     let ends = Arc::new(Ends::default());
     let modes = Modes::new(&natural, integrator.damping_per_s)?;
@@ -111,7 +111,7 @@ pub fn join(
         samples: Arc::clone(&samples),
         search: memory::tried(Search::with_room(&samples), WHAT)?,
         delassus: Delassus::default(),
-        held_back: corrections.space.held_back(kappa)?,
+        inertial_compliance: corrections.space.inertial_compliance(kappa)?,
         found: memory::room(4 * MOST_SAMPLES, WHAT)?,
         sampled: memory::room(MOST_SAMPLES, WHAT)?,
         starts: prior.basis_starts()?,
@@ -123,7 +123,7 @@ pub fn join(
         latency_s: options.latency_s,
         last_pose: None,
     };
-    let haptics = Haptics::new(options, modes, slow, at, ends)?;
+    let haptics = Haptics::new(options, modes, snapshot, at, ends)?;
     Ok((link, haptics))
 }
 
@@ -191,7 +191,7 @@ impl Link {
         let compliance = Compliance {
             prior: step.prior,
             held,
-            inertia: Some((&step.corrections.space, &self.held_back)),
+            inertia: Some((&step.corrections.space, &self.inertial_compliance)),
         };
         let samples = &*self.samples;
         let of = self.found.iter().map(|(_, row)| samples.at(*row));
@@ -201,12 +201,12 @@ impl Link {
         self.sampled.clear();
         self.sampled.extend(self.found.iter().map(|(_, row)| *row));
         let w = self.delassus.of(compliance, samples, &self.sampled)?;
-        let slow = self.out.buffer();
-        slow.delassus[..w.len()].copy_from_slice(w);
-        slow.delay_s = delay(w, masses);
+        let snapshot = self.out.buffer();
+        snapshot.delassus[..w.len()].copy_from_slice(w);
+        snapshot.delay_s = delay(w, masses);
         let modes = self.rows.len();
         for (at, sample) in of.enumerate() {
-            let out = &mut slow.at_samples[3 * at * modes..3 * (at + 1) * modes];
+            let out = &mut snapshot.at_samples[3 * at * modes..3 * (at + 1) * modes];
             out.fill(0.0);
             for (column, weight) in compliance.entries(sample) {
                 for (axis, out) in out.chunks_exact_mut(modes.max(1)).enumerate() {
@@ -236,8 +236,8 @@ impl Link {
             }
             Ok(())
         };
-        project(&step.motion.velocity, true, &mut slow.velocity)?;
-        project(&step.motion.inertia, false, &mut slow.drive)?;
+        project(&step.motion.velocity, true, &mut snapshot.velocity)?;
+        project(&step.motion.inertia, false, &mut snapshot.drive)?;
         let state = State {
             rest: step.rest,
             u: step.u,
@@ -247,8 +247,8 @@ impl Link {
         let past = step
             .problem
             .and_then(|problem| Some((&problem.past, problem.past.tools.get(index)?)));
-        slow.pose = past.map(|(_, tool)| tool.pose);
-        slow.count = self.found.len();
+        snapshot.pose = past.map(|(_, tool)| tool.pose);
+        snapshot.count = self.found.len();
         for (at, &(_, row)) in self.found.iter().enumerate() {
             let sample = self.samples.at(row);
             let point = sample.gather(|node| state.position(node));
@@ -260,11 +260,11 @@ impl Link {
                     .binary_search_by_key(&(self.instrument, row), key);
                 found.map_or(Vector::ZERO, |place| past.forces[place].force)
             });
-            slow.points[at] = point;
-            slow.outward[at] = outward(&self.samples, row, state);
-            slow.forces[at] = force;
-            slow.anchors[at] = anchor;
-            slow.errors[at] = slow.pose.map_or(Vector::ZERO, |pose| {
+            snapshot.points[at] = point;
+            snapshot.outward[at] = outward(&self.samples, row, state);
+            snapshot.forces[at] = force;
+            snapshot.anchors[at] = anchor;
+            snapshot.errors[at] = snapshot.pose.map_or(Vector::ZERO, |pose| {
                 let pair = Pair {
                     body: &self.body,
                     friction: self.friction,
@@ -276,7 +276,7 @@ impl Link {
                     way_out: None,
                 };
                 let pushed = force != Vector::ZERO;
-                let contact = pair.contact(point, point, slow.outward[at], force);
+                let contact = pair.contact(point, point, snapshot.outward[at], force);
                 match (anchor, pushed) {
                     (Some(_), _) => contact.slip,
                     _ if contact.gap == f32::MAX => Vector::ZERO,
@@ -286,8 +286,8 @@ impl Link {
             });
         }
         self.number += 1;
-        slow.number = self.number;
-        slow.latency_s = self.latency_s.unwrap_or(step.took_s);
+        snapshot.number = self.number;
+        snapshot.latency_s = self.latency_s.unwrap_or(step.took_s);
         self.out.publish();
         Ok(())
     }

@@ -9,7 +9,7 @@ use exchange::{Reader, Writer};
 use super::ends::Ends;
 use super::modes::Modes;
 use super::passivity::Observer;
-use super::slow::Slow;
+use super::snapshot::ContactSnapshot;
 use super::solver::{FADE_MM, Solver};
 use super::{HapticForce, HapticOptions, HapticPose};
 use crate::contact::PUT_MM;
@@ -31,7 +31,7 @@ pub struct Haptics {
     passivity: bool,
     damping_limit: f32,
     force_limit_mn: f32,
-    slow: Reader<Slow>,
+    snapshot: Reader<ContactSnapshot>,
     pose: Writer<Pose>,
     ends: Arc<Ends>,
     /// Time and pose of the last call.
@@ -50,7 +50,7 @@ impl Haptics {
     pub(super) fn new(
         options: &HapticOptions,
         modes: Modes,
-        slow: Reader<Slow>,
+        snapshot: Reader<ContactSnapshot>,
         pose: Writer<Pose>,
         ends: Arc<Ends>,
     ) -> Result<Haptics> {
@@ -61,7 +61,7 @@ impl Haptics {
             passivity: options.passivity,
             damping_limit: options.damping_limit_n_s_per_m,
             force_limit_mn: 1e3 * options.force_limit_n,
-            slow,
+            snapshot,
             pose,
             ends,
             last: None,
@@ -103,31 +103,31 @@ impl Haptics {
         self.pose.write(now);
         self.observer.observe(&from, &now);
 
-        let arrived = self.slow.update();
-        let slow = self.slow.buffer();
+        let arrived = self.snapshot.update();
+        let snapshot = self.snapshot.buffer();
         let (mut before, mut time) = (from, seconds);
         if arrived {
-            self.contact.begin(slow);
-            self.seen = slow.number;
-            self.age_s = slow.latency_s;
+            self.contact.begin(snapshot);
+            self.seen = snapshot.number;
+            self.age_s = snapshot.latency_s;
             self.since_s = 0.0;
             let moved = |pose: &Pose| self.body.motion(pose, &now) <= PUT_MM;
-            before = slow.pose.filter(moved).unwrap_or(now);
-            time = slow.latency_s.min(MOST_S);
+            before = snapshot.pose.filter(moved).unwrap_or(now);
+            time = snapshot.latency_s.min(MOST_S);
         } else {
             self.age_s += passed;
             self.since_s += seconds;
         }
         if time > 0.0 {
-            self.contact.modes.advance(time, &slow.drive);
+            self.contact.modes.advance(time, &snapshot.drive);
         }
         let least = if arrived { FIRST_S } else { LEAST_S };
-        let part = self.contact.follow(slow, time.max(least) as f32);
+        let part = self.contact.follow(snapshot, time.max(least) as f32);
         let way = [&before, &now];
         self.contact
-            .solve(slow, &self.body, self.friction, way, part);
-        let [mut force, mut torque] = self.contact.wrench(slow.count, now.translation);
-        let contacts = self.contact.pushing(slow.count).count() as u32;
+            .solve(snapshot, &self.body, self.friction, way, part);
+        let [mut force, mut torque] = self.contact.wrench(snapshot.count, now.translation);
+        let contacts = self.contact.pushing(snapshot.count).count() as u32;
         // A force starts from none, and goes on from the one before.
         if arrived {
             self.offset = [self.shown[0] - force, self.shown[1] - torque];
@@ -165,7 +165,7 @@ impl Haptics {
         }
         self.observer.hold(force_n, torque_n_m);
         let stiffness = match contacts > 0 {
-            true => self.contact.stiffness(slow, now.translation),
+            true => self.contact.stiffness(snapshot, now.translation),
             false => [0.0; 36],
         };
         Ok(HapticForce {

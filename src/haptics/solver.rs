@@ -3,7 +3,7 @@
 use ::contact::{Body, Contact, Law, Limits, Pose, Sweeps, Vector, Whole};
 
 use super::modes::Modes;
-use super::slow::{MOST_SAMPLES, Slow};
+use super::snapshot::{ContactSnapshot, MOST_SAMPLES};
 use super::stiffness::{Direction, Stiffness};
 use crate::contact::Pair;
 use crate::error::Result;
@@ -69,23 +69,23 @@ impl Solver {
     }
 
     /// From the state of a step.
-    pub fn begin(&mut self, slow: &Slow) {
-        self.modes.begin(&slow.velocity);
-        self.forces[..slow.count].copy_from_slice(&slow.forces[..slow.count]);
-        self.points[..slow.count].copy_from_slice(&slow.points[..slow.count]);
+    pub fn begin(&mut self, snapshot: &ContactSnapshot) {
+        self.modes.begin(&snapshot.velocity);
+        self.forces[..snapshot.count].copy_from_slice(&snapshot.forces[..snapshot.count]);
+        self.points[..snapshot.count].copy_from_slice(&snapshot.points[..snapshot.count]);
         self.moved.fill(0.0);
         self.aim.fill(0.0);
     }
 
     /// A change of the force on a sample, and the part of what it moves that it moves now.
-    fn change(&mut self, slow: &Slow, at: usize, change: Vector, part: f32) {
+    fn change(&mut self, snapshot: &ContactSnapshot, at: usize, change: Vector, part: f32) {
         if change == Vector::ZERO {
             return;
         }
-        let all = 3 * slow.count;
+        let all = 3 * snapshot.count;
         for (axis, change) in change.to_array().into_iter().enumerate() {
             // Symmetric: a row is a column.
-            let row = &slow.delassus[(3 * at + axis) * all..][..all];
+            let row = &snapshot.delassus[(3 * at + axis) * all..][..all];
             let moves = self.moved.iter_mut().zip(&mut self.aim).zip(row);
             for ((moved, aim), w) in moves {
                 *aim += change * w;
@@ -100,19 +100,22 @@ impl Solver {
     }
 
     /// Where a sample is: the step's place, the modes, what forces have moved.
-    fn place(&self, slow: &Slow, at: usize) -> Vector {
-        let m = slow.modes;
+    fn place(&self, snapshot: &ContactSnapshot, at: usize) -> Vector {
+        let m = snapshot.modes;
         let axis = |k: usize| {
             let row = 3 * at + k;
-            self.moved[row] + self.modes.moved(&slow.at_samples[row * m..(row + 1) * m])
+            self.moved[row]
+                + self
+                    .modes
+                    .moved(&snapshot.at_samples[row * m..(row + 1) * m])
         };
-        slow.points[at] + Vector::new(axis(0), axis(1), axis(2))
+        snapshot.points[at] + Vector::new(axis(0), axis(1), axis(2))
     }
 
     /// Lets samples follow the forces so far, `delay_s x' + x = W f` by backward Euler. Gives the part of a change of the forces that
     /// moves them within that time.
-    pub fn follow(&mut self, slow: &Slow, seconds: f32) -> f32 {
-        let whole = seconds + slow.delay_s;
+    pub fn follow(&mut self, snapshot: &ContactSnapshot, seconds: f32) -> f32 {
+        let whole = seconds + snapshot.delay_s;
         let part = if whole > 0.0 { seconds / whole } else { 1.0 };
         for (moved, aim) in self.moved.iter_mut().zip(&self.aim) {
             *moved += part * (aim - *moved);
@@ -124,7 +127,7 @@ impl Solver {
     /// `part` of what it will.
     pub fn solve(
         &mut self,
-        slow: &Slow,
+        snapshot: &ContactSnapshot,
         body: &Body,
         friction: f32,
         [from, now]: [&Pose; 2],
@@ -134,11 +137,11 @@ impl Solver {
         let (low, high) = body.bounds(now, skin.max(FADE_MM));
         self.rows.clear();
         self.nearest = f32::MAX;
-        for at in 0..slow.count {
+        for at in 0..snapshot.count {
             let pushed = self.forces[at] != Vector::ZERO;
-            let point = self.place(slow, at);
+            let point = self.place(snapshot, at);
             let outside = point.cmplt(low).any() || point.cmpgt(high).any();
-            let held = slow.anchors[at].is_some();
+            let held = snapshot.anchors[at].is_some();
             let distance = match outside && !pushed && !held {
                 true => f32::MAX,
                 false => body.nearest_at(now, point).distance,
@@ -156,30 +159,30 @@ impl Solver {
             for row in MOST_ROWS..self.rows.len() {
                 let (_, at) = self.rows[row];
                 let force = std::mem::take(&mut self.forces[at]);
-                self.change(slow, at, -force, part);
+                self.change(snapshot, at, -force, part);
             }
             self.rows.truncate(MOST_ROWS);
             self.rows.sort_unstable_by_key(|row| row.1);
         }
-        let (n, all) = (self.rows.len(), 3 * slow.count);
+        let (n, all) = (self.rows.len(), 3 * snapshot.count);
         self.contacts.clear();
         self.solved.clear();
         self.w.clear();
         for &(_, at) in &self.rows {
             let force = self.forces[at];
-            let error = slow.errors[at];
+            let error = snapshot.errors[at];
             let pair = Pair {
                 body,
                 friction,
                 from,
                 now,
-                anchor: slow.anchors[at],
+                anchor: snapshot.anchors[at],
                 put: false,
                 swept: true,
                 way_out: None,
             };
-            let (point, start) = (self.place(slow, at), self.points[at]);
-            let mut contact = pair.contact(point, start, slow.outward[at], force);
+            let (point, start) = (self.place(snapshot, at), self.points[at]);
+            let mut contact = pair.contact(point, start, snapshot.outward[at], force);
             match contact.law {
                 Law::Bound => contact.slip -= error,
                 Law::Touch { .. } if contact.gap < f32::MAX => contact.gap -= error.x,
@@ -188,7 +191,7 @@ impl Solver {
             self.contacts.push(contact);
             self.solved.push(force);
             for axis in 0..3 {
-                let row = &slow.delassus[(3 * at + axis) * all..][..all];
+                let row = &snapshot.delassus[(3 * at + axis) * all..][..all];
                 for &(_, other) in &self.rows {
                     let block = &row[3 * other..3 * other + 3];
                     self.w.extend(block.iter().map(|w| part * w));
@@ -205,21 +208,21 @@ impl Solver {
             let ((_, at), force) = (self.rows[row], self.solved[row]);
             let change = force - self.forces[at];
             self.forces[at] = force;
-            self.change(slow, at, change, part);
+            self.change(snapshot, at, change, part);
         }
-        for at in 0..slow.count {
-            self.points[at] = self.place(slow, at);
+        for at in 0..snapshot.count {
+            self.points[at] = self.place(snapshot, at);
         }
-        let m = slow.modes;
+        let m = snapshot.modes;
         self.modes.push.fill(0.0);
-        for at in 0..slow.count {
-            let change = self.forces[at] - slow.forces[at];
+        for at in 0..snapshot.count {
+            let change = self.forces[at] - snapshot.forces[at];
             if change == Vector::ZERO {
                 continue;
             }
             for (axis, change) in change.to_array().into_iter().enumerate() {
                 let row = 3 * at + axis;
-                let own = &slow.at_samples[row * m..(row + 1) * m];
+                let own = &snapshot.at_samples[row * m..(row + 1) * m];
                 self.modes.add_push(own, change);
             }
         }
@@ -235,7 +238,7 @@ impl Solver {
         [force, torque]
     }
 
-    pub fn stiffness(&mut self, slow: &Slow, about: Vector) -> [f32; 36] {
+    pub fn stiffness(&mut self, snapshot: &ContactSnapshot, about: Vector) -> [f32; 36] {
         self.stiffness.directions.clear();
         for (&(_, at), contact) in self.rows.iter().zip(&self.contacts) {
             let force = self.forces[at];
@@ -258,8 +261,8 @@ impl Solver {
                 });
             }
         }
-        let all = 3 * slow.count;
-        self.stiffness.of(|i, j| slow.delassus[i * all + j])
+        let all = 3 * snapshot.count;
+        self.stiffness.of(|i, j| snapshot.delassus[i * all + j])
     }
 }
 
@@ -271,22 +274,22 @@ mod tests {
     #[test]
     fn a_sample_follows_a_force_with_a_delay() {
         let mut solver = Solver::new(Modes::new(&[], 0.0).unwrap()).unwrap();
-        let mut slow = Slow::new(0).unwrap();
-        slow.count = 1;
-        slow.delay_s = 4e-3;
+        let mut snapshot = ContactSnapshot::new(0).unwrap();
+        snapshot.count = 1;
+        snapshot.delay_s = 4e-3;
         for axis in 0..3 {
-            slow.delassus[4 * axis] = 0.02;
+            snapshot.delassus[4 * axis] = 0.02;
         }
-        solver.begin(&slow);
+        solver.begin(&snapshot);
         let mut force = Vector::new(50.0, 0.0, 0.0);
-        let part = solver.follow(&slow, 1e-3);
-        solver.change(&slow, 0, force, part);
+        let part = solver.follow(&snapshot, 1e-3);
+        solver.change(&snapshot, 0, force, part);
         let mut places = vec![solver.moved[0]];
         let mut work = force.x * places[0];
         for tick in 1..200 {
-            let part = solver.follow(&slow, 1e-3);
+            let part = solver.follow(&snapshot, 1e-3);
             let wanted = if tick < 100 { 50.0 } else { 0.0 };
-            solver.change(&slow, 0, Vector::new(wanted, 0.0, 0.0) - force, part);
+            solver.change(&snapshot, 0, Vector::new(wanted, 0.0, 0.0) - force, part);
             force.x = wanted;
             work += force.x * (solver.moved[0] - places[tick - 1]);
             places.push(solver.moved[0]);
@@ -298,8 +301,8 @@ mod tests {
         assert!(places[199].abs() < 1e-4, "{}", places[199]);
         assert!(work > 0.0, "{work} µJ");
         // Without a delay it is there at once.
-        slow.delay_s = 0.0;
-        assert_eq!(solver.follow(&slow, 1e-3), 1.0);
-        assert_eq!(solver.follow(&slow, 0.0), 1.0);
+        snapshot.delay_s = 0.0;
+        assert_eq!(solver.follow(&snapshot, 1e-3), 1.0);
+        assert_eq!(solver.follow(&snapshot, 0.0), 1.0);
     }
 }

@@ -122,7 +122,7 @@ impl CoarseSpace {
     ///
     /// # Errors
     /// [`crate::Error::OutOfMemory`].
-    pub fn held_back(&self, kappa: f64) -> Result<Vec<f32>> {
+    pub fn inertial_compliance(&self, kappa: f64) -> Result<Vec<f32>> {
         memory::collected(self.natural_count(), self.holds_back(kappa), WHAT)
     }
 

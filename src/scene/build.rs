@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::core::{self, Core, CoreParts};
-use super::corrected::Corrected;
+use super::corrected::Corrector;
 use super::engine::Engine;
 use super::{reduced, upt};
 use crate::bundle::{Mesh, TensorFile};
@@ -71,7 +71,7 @@ pub(super) fn build(model: &Arc<Model>, options: &SceneOptions) -> Result<Core> 
             Engine::Upt(memory::boxed(engine, core::SCENE)?)
         }
     };
-    let corrected = Corrected::new(model, options, Isa::detect(), &pool)?;
+    let corrected = Corrector::new(model, options, Isa::detect(), &pool)?;
     Core::new(CoreParts {
         model: Arc::clone(model),
         mesh: own_mesh.unwrap_or_else(|| Arc::clone(&model.mesh)),

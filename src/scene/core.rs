@@ -4,7 +4,7 @@ use std::sync::{Arc, PoisonError, RwLock};
 use std::time::Instant;
 
 use super::StepInput;
-use super::corrected::Corrected;
+use super::corrected::Corrector;
 use super::counters::Counters;
 use super::engine::Engine;
 use super::inputs::{Decode, Inputs, Which};
@@ -15,8 +15,8 @@ use super::published::{Frame, Published, Values};
 use super::timing::Stopwatch;
 use crate::bundle::Mesh;
 #[cfg(feature = "contact")]
-use crate::contact::Problem;
-use crate::envelope::{EnvelopeCheck, Used};
+use crate::contact::ContactProblem;
+use crate::envelope::{EnvelopeCheck, ToolUse};
 use crate::error::Result;
 use crate::field::{ContactSet, check_displacement};
 use crate::guard;
@@ -36,12 +36,12 @@ pub struct Core {
     pub(super) options: SceneOptions,
     pub(super) machine: Machine,
     pub(super) engine: Engine,
-    pub(super) corrected: Option<Corrected>,
+    pub(super) corrected: Option<Corrector>,
     /// Contact of tools, from the first step that has one.
     #[cfg(feature = "contact")]
-    pub(super) problem: Option<Box<Problem>>,
+    pub(super) problem: Option<Box<ContactProblem>>,
     /// The tools of the step being made, where the bundle's limits for tools say something about it.
-    pub(super) used: Option<Used>,
+    pub(super) used: Option<ToolUse>,
     /// Tools that hands feel, and how long the step being made took, s.
     #[cfg(feature = "haptics")]
     pub(super) hands: Vec<crate::haptics::publish::Link>,
@@ -73,7 +73,7 @@ pub struct CoreParts {
     pub options: SceneOptions,
     pub pool: Pool,
     pub engine: Engine,
-    pub corrected: Option<Corrected>,
+    pub corrected: Option<Corrector>,
 }
 
 pub(super) fn lock_read(
@@ -349,7 +349,7 @@ impl Core {
             + self
                 .corrected
                 .as_ref()
-                .map_or(0, Corrected::memory_bytes)
+                .map_or(0, Corrector::memory_bytes)
             + own_mesh
     }
 }

@@ -7,7 +7,7 @@ use super::core::{Core, lock_read};
 use super::engine::Engine;
 use super::published::Published;
 use super::timing::Stopwatch;
-use crate::corrections::{History, Input, Integrator, Lent};
+use crate::corrections::{History, Input, Integrator, SolverContext};
 use crate::error::Result;
 use crate::stats::SceneStats;
 
@@ -34,13 +34,13 @@ impl Core {
         };
         let mut watch = Stopwatch::start();
         let _span = tracing::trace_span!("corrections").entered();
-        let pace = Arc::clone(&corrected.pace);
-        let lent = Lent {
+        let time_step = Arc::clone(&corrected.time_step);
+        let context = SolverContext {
             isa: self.machine.isa,
             pool: &self.machine.pool,
             prior,
             corrections,
-            pace: &pace,
+            time_step: &time_step,
         };
         let touched = !self.incoming.is_empty();
         // The learned part goes on from what the elements swung, some steps later; at the scene's own pace it never does.
@@ -48,7 +48,7 @@ impl Core {
         // Steps of the scene's own length that are short enough stay whole.
         let in_parts = corrected.swings > 1 || !corrected.own_pace;
         if !touched && !learns && in_parts {
-            corrected.be_shorter(lent, &self.model)?;
+            corrected.be_shorter(context, &self.model)?;
         }
         let shared = lock_read(published);
         let input = Input {
@@ -62,16 +62,16 @@ impl Core {
         };
         if touched {
             let report = corrected
-                .stage
-                .correct(lent, &input, &mut self.next.field)?;
+                .solver
+                .correct(context, &input, &mut self.next.field)?;
             corrected.tell(&report, stats);
         } else if !learns {
-            let shorter = corrected.shorter.as_deref_mut().filter(|_| in_parts);
+            let substepper = corrected.substepper.as_deref_mut().filter(|_| in_parts);
             let next = &mut self.next.field;
-            let report = corrected.stage.swing(lent, &input, shorter, next)?;
+            let report = corrected.solver.swing(context, &input, substepper, next)?;
             corrected.tell(&report, stats);
         } else {
-            corrected.stage.follow(lent, &input, &self.next.field)?;
+            corrected.solver.follow(context, &input, &self.next.field)?;
         }
         drop(shared);
         stats.corrections_ms = watch.lap();
@@ -97,7 +97,7 @@ impl Core {
             damping_per_s: manifest.material.damping_per_s,
         };
         let corrected = self.corrected.as_ref();
-        corrected.map_or(of_bundle, |own| own.pace.integrator)
+        corrected.map_or(of_bundle, |own| own.time_step.integrator)
     }
 
     /// The length of a step, s.
@@ -118,13 +118,13 @@ impl Core {
             return self.loads_at_contacts(problem, out);
         }
         // A state that fell back has inverted elements, and what they push with means nothing.
-        let motion = &corrected.stage.motion;
+        let motion = &corrected.solver.motion;
         let sound = motion.min_det >= crate::corrections::SMALLEST_DET
             && motion.reaction.len() == out.len();
         if self.contact.is_empty() || !sound {
             return false;
         }
-        corrected.stage.reaction(&self.contact, out);
+        corrected.solver.reaction(&self.contact, out);
         true
     }
 
@@ -144,7 +144,7 @@ impl Core {
                 compute,
                 &corrected.basis_starts,
                 [&shared.last.field, &shared.before.field],
-                &corrected.stage.motion.velocity,
+                &corrected.solver.motion.velocity,
                 self.model.manifest.dt_s as f32,
             )?;
         }
@@ -165,14 +165,14 @@ impl Core {
         else {
             return Ok(());
         };
-        let lent = Lent {
+        let context = SolverContext {
             isa: self.machine.isa,
             pool: &self.machine.pool,
             prior,
             corrections: self.model.corrections()?,
-            pace: &corrected.pace,
+            time_step: &corrected.time_step,
         };
-        corrected.stage.restore(lent, &history)
+        corrected.solver.restore(context, &history)
     }
 
     /// Whether every node is decoded in each step, and kept.

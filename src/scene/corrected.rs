@@ -6,7 +6,7 @@ use std::time::Instant;
 use super::own_pace::OwnPace;
 #[cfg(feature = "contact")]
 use crate::corrections::Substeps;
-use crate::corrections::{Enough, Lent, Pace, Report, Shorter, Stage};
+use crate::corrections::{Enough, ImplicitSolver, Report, SolverContext, Substepper, TimeStep};
 use crate::error::{Error, Result};
 use crate::kernels::{Isa, Pool};
 use crate::memory;
@@ -17,8 +17,8 @@ use crate::stats::{SceneStats, flag};
 const WHAT: &str = "the corrections of a scene";
 
 /// The stage of a scene that corrects, and how far it goes.
-pub struct Corrected {
-    pub stage: Box<Stage>,
+pub struct Corrector {
+    pub solver: Box<ImplicitSolver>,
     /// From the first contact of tools, where the steps may have any.
     #[cfg(feature = "contact")]
     pub substeps: Option<Box<Substeps>>,
@@ -27,7 +27,7 @@ pub struct Corrected {
     /// Of how many shorter ones a free step is made.
     pub(super) swings: u32,
     /// From the first step that needs them.
-    pub shorter: Option<Box<Shorter>>,
+    pub substepper: Option<Box<Substepper>>,
     most: u32,
     target_mm: f32,
     budget_us: u32,
@@ -35,19 +35,19 @@ pub struct Corrected {
     calibration: f32,
     pub(super) basis_starts: Vec<usize>,
     /// The length of the scene's steps, and the damping.
-    pub pace: Arc<Pace>,
+    pub time_step: Arc<TimeStep>,
     /// One of them is not the bundle's.
     pub(super) own_pace: bool,
 }
 
-impl Corrected {
+impl Corrector {
     /// What the options and the bundle ask for; none where that is no correction.
     pub fn new(
         model: &Arc<Model>,
         options: &SceneOptions,
         isa: Isa,
         pool: &Pool,
-    ) -> Result<Option<Corrected>> {
+    ) -> Result<Option<Corrector>> {
         let entry = model.manifest.corrections.as_ref();
         let own = OwnPace::new(model, options)?;
         let (most, target_mm, budget_us) = match options.corrections {
@@ -119,27 +119,29 @@ impl Corrected {
         let prior = model.prior.as_ref().ok_or_else(|| {
             Error::Unsupported("corrections: the bundle has no linear response".into())
         })?;
-        let integrator = own.integrator(corrections.pace.integrator);
-        let pace = match own.is_some() {
-            false => Arc::clone(&corrections.pace),
-            true => {
-                Arc::new(corrections.pace(&model.mesh, &model.manifest.material, integrator)?)
-            }
+        let integrator = own.integrator(corrections.time_step.integrator);
+        let time_step = match own.is_some() {
+            false => Arc::clone(&corrections.time_step),
+            true => Arc::new(corrections.time_step(
+                &model.mesh,
+                &model.manifest.material,
+                integrator,
+            )?),
         };
-        let lent = Lent {
+        let context = SolverContext {
             isa,
             pool,
             prior,
             corrections,
-            pace: &pace,
+            time_step: &time_step,
         };
-        Ok(Some(Corrected {
-            stage: memory::boxed(Stage::new(lent)?, WHAT)?,
+        Ok(Some(Corrector {
+            solver: memory::boxed(ImplicitSolver::new(context)?, WHAT)?,
             #[cfg(feature = "contact")]
             substeps: None,
             most_substeps,
             swings: own.swings(integrator.step_s),
-            shorter: None,
+            substepper: None,
             most,
             target_mm,
             budget_us,
@@ -147,13 +149,13 @@ impl Corrected {
             calibration: entry.map_or(1.0, |entry| entry.calibration),
             basis_starts: prior.basis_starts()?,
             own_pace: own.is_some(),
-            pace,
+            time_step,
         }))
     }
 }
 
 /// A scene that does not correct.
-fn none(own: OwnPace, substeps: u32) -> Result<Option<Corrected>> {
+fn none(own: OwnPace, substeps: u32) -> Result<Option<Corrector>> {
     if substeps > 1 {
         return Err(Error::Argument(format!(
             "substeps is {substeps}: only corrections have substeps, and this scene makes none; leave substeps at 0, or set `corrections`"
@@ -163,7 +165,7 @@ fn none(own: OwnPace, substeps: u32) -> Result<Option<Corrected>> {
     Ok(None)
 }
 
-impl Corrected {
+impl Corrector {
     /// When a step that began at `start` has been corrected enough.
     pub(super) fn enough(&self, start: Instant) -> Enough {
         Enough {
@@ -182,27 +184,28 @@ impl Corrected {
 
     /// Makes what substeps need, where the steps may have any.
     #[cfg(feature = "contact")]
-    pub(super) fn be_ready(&mut self, lent: Lent<'_>, model: &Model) -> Result<()> {
+    pub(super) fn be_ready(&mut self, context: SolverContext<'_>, model: &Model) -> Result<()> {
         if self.most_substeps < 2 || self.substeps.is_some() {
             return Ok(());
         }
-        self.be_shorter(lent, model)?;
+        self.be_shorter(context, model)?;
         let limit_mm = self.target_mm / self.calibration;
         self.substeps = Some(memory::boxed(Substeps::new(limit_mm)?, WHAT)?);
         Ok(())
     }
 
     /// Makes what shorter steps need: they are as long under tools as without.
-    pub(super) fn be_shorter(&mut self, lent: Lent<'_>, model: &Model) -> Result<()> {
+    pub(super) fn be_shorter(&mut self, context: SolverContext<'_>, model: &Model) -> Result<()> {
         let count = self.most_substeps.max(self.swings);
-        if count < 2 || self.shorter.is_some() {
+        if count < 2 || self.substepper.is_some() {
             return Ok(());
         }
-        let whole = self.pace.integrator;
+        let whole = self.time_step.integrator;
         let integrator = whole.over(whole.step_s / f64::from(count));
-        let pace = (lent.corrections).pace(&model.mesh, &model.manifest.material, integrator)?;
-        let shorter = Shorter::new(lent, Arc::new(pace), count)?;
-        self.shorter = Some(memory::boxed(shorter, WHAT)?);
+        let time_step =
+            (context.corrections).time_step(&model.mesh, &model.manifest.material, integrator)?;
+        let substepper = Substepper::new(context, Arc::new(time_step), count)?;
+        self.substepper = Some(memory::boxed(substepper, WHAT)?);
         Ok(())
     }
 
@@ -212,12 +215,12 @@ impl Corrected {
         let substeps = self.substeps.as_ref().map_or(0, |own| own.memory_bytes());
         #[cfg(not(feature = "contact"))]
         let substeps = 0;
-        let shorter = self.shorter.as_ref().map_or(0, |own| own.memory_bytes());
+        let substepper = self.substepper.as_ref().map_or(0, |own| own.memory_bytes());
         let own = match self.own_pace {
-            true => self.pace.memory_bytes(),
+            true => self.time_step.memory_bytes(),
             false => 0,
         };
-        self.stage.memory_bytes() + own + shorter + substeps
+        self.solver.memory_bytes() + own + substepper + substeps
     }
 
     /// Puts what the iterations report into the statistics.

@@ -5,12 +5,12 @@ use std::sync::{Arc, RwLock};
 use std::time::Instant;
 
 use super::core::{Core, lock_read, lock_write};
-use super::corrected::Corrected;
+use super::corrected::Corrector;
 use super::published::Published;
 use super::timing::Stopwatch;
 use super::{Contact, StepInput};
-use crate::contact::{Compliance, Problem, State};
-use crate::corrections::{Input, Lent};
+use crate::contact::{Compliance, ContactProblem, State};
+use crate::corrections::{Input, SolverContext};
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::stats::{SceneStats, flag};
@@ -46,7 +46,7 @@ impl Core {
             Some(problem) => problem,
             None => {
                 let mesh = Arc::clone(&self.mesh);
-                memory::boxed(Problem::new(self.model.samples()?, mesh)?, WHAT)?
+                memory::boxed(ContactProblem::new(self.model.samples()?, mesh)?, WHAT)?
             }
         };
         let shared = lock_read(published);
@@ -88,7 +88,7 @@ impl Core {
     fn drive_corrected(
         &mut self,
         published: &RwLock<Published>,
-        problem: &mut Problem,
+        problem: &mut ContactProblem,
         near: bool,
         start: Instant,
         stats: &mut SceneStats,
@@ -126,7 +126,7 @@ impl Core {
     fn load(
         &mut self,
         published: &RwLock<Published>,
-        problem: &mut Problem,
+        problem: &mut ContactProblem,
         start: Instant,
         stats: &mut SceneStats,
     ) -> Result<()> {
@@ -135,15 +135,15 @@ impl Core {
         };
         let mut watch = Stopwatch::start();
         let span = tracing::trace_span!("corrections").entered();
-        let pace = Arc::clone(&corrected.pace);
-        let lent = Lent {
+        let time_step = Arc::clone(&corrected.time_step);
+        let context = SolverContext {
             isa: self.machine.isa,
             pool: &self.machine.pool,
             prior,
             corrections: self.model.corrections()?,
-            pace: &pace,
+            time_step: &time_step,
         };
-        corrected.be_ready(lent, &self.model)?;
+        corrected.be_ready(context, &self.model)?;
         let shared = lock_read(published);
         let rest = &self.mesh.positions;
         let input = Input {
@@ -155,14 +155,14 @@ impl Core {
             enough: corrected.enough(start),
         };
         let next = &mut self.next.field;
-        let Corrected {
-            stage,
+        let Corrector {
+            solver,
             substeps,
-            shorter,
+            substepper,
             ..
         } = corrected;
-        let parts = substeps.as_deref_mut().zip(shorter.as_deref_mut());
-        let report = stage.drive(lent, &input, problem, parts, next)?;
+        let parts = substeps.as_deref_mut().zip(substepper.as_deref_mut());
+        let report = solver.drive(context, &input, problem, parts, next)?;
         corrected.tell(&report, stats);
         drop(shared);
         drop(span);
@@ -188,7 +188,7 @@ impl Core {
             .tools
             .map(|tools| tools.corrections);
         let corrected = self.corrected.as_ref();
-        needed.is_some_and(|needed| corrected.is_some_and(|stage| stage.most() >= needed))
+        needed.is_some_and(|needed| corrected.is_some_and(|solver| solver.most() >= needed))
     }
 
     /// Contact once on the linear response, as a collision field for the model.
@@ -197,7 +197,7 @@ impl Core {
     fn drive_linear(
         &mut self,
         published: &RwLock<Published>,
-        problem: &mut Problem,
+        problem: &mut ContactProblem,
         near: bool,
         stats: &mut SceneStats,
     ) -> Result<bool> {
@@ -230,7 +230,7 @@ impl Core {
     fn finish_tools(
         &mut self,
         published: &RwLock<Published>,
-        problem: &mut Problem,
+        problem: &mut ContactProblem,
         stats: &mut SceneStats,
     ) {
         let shared = lock_read(published);
@@ -251,7 +251,7 @@ impl Core {
         }
     }
 
-    fn tell_depth(problem: &Problem, stats: &mut SceneStats) {
+    fn tell_depth(problem: &ContactProblem, stats: &mut SceneStats) {
         stats.contact_ms = problem.spent_ms();
         let readings = problem.next.tools.iter().map(|held| held.reading);
         if readings
@@ -287,7 +287,7 @@ impl Core {
 
     /// The tools' loads at the contact nodes, in the host's order: what the tissue does to them, mN.
     #[cfg(feature = "forces")]
-    pub(super) fn loads_at_contacts(&self, problem: &Problem, out: &mut [f32]) -> bool {
+    pub(super) fn loads_at_contacts(&self, problem: &ContactProblem, out: &mut [f32]) -> bool {
         out.fill(0.0);
         problem.each_push(|node, force| {
             if let Ok(at) = self.contact.nodes.binary_search(&node) {

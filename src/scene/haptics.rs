@@ -83,7 +83,7 @@ impl Core {
             pool: &self.machine.pool,
             prior: self.model.prior.as_ref()?,
             corrections: self.model.corrections().ok()?,
-            motion: &self.corrected.as_ref()?.stage.motion,
+            motion: &self.corrected.as_ref()?.solver.motion,
             problem: self.problem.as_deref(),
             rest: &self.mesh.positions,
             u: &shared.last.field,

@@ -12,6 +12,8 @@ mod driven;
 #[cfg(feature = "forces")]
 mod elastic;
 mod engine;
+#[cfg(feature = "contact")]
+mod frame_state;
 mod free_motion;
 #[cfg(feature = "haptics")]
 mod haptics;
@@ -20,8 +22,6 @@ mod inputs;
 mod instruments;
 mod inversion;
 mod linear;
-#[cfg(feature = "contact")]
-mod moment;
 mod own_pace;
 mod plan;
 mod points;
@@ -129,7 +129,7 @@ impl Scene {
             #[cfg(feature = "contact")]
             tools: Default::default(),
             #[cfg(feature = "contact")]
-            moment: None,
+            frame_state: None,
             #[cfg(feature = "contact")]
             attached: Arc::default(),
         };

@@ -3,7 +3,7 @@
 use std::sync::RwLock;
 
 use super::core::{Core, lock_read, lock_write};
-use super::moment::Moment;
+use super::frame_state::FrameState;
 use super::published::{Published, Values};
 use super::shared::lock;
 use super::{Contact, Scene};
@@ -96,7 +96,7 @@ impl Scene {
         let mut presenters = lock(&self.tools.presenters)?;
         let tissue = self.tissue();
         presenters.prepare(&tissue, values, || {
-            let begun = lock_read(&self.shared.published).moment.is_some();
+            let begun = lock_read(&self.shared.published).frame_state.is_some();
             match begun {
                 true => Ok(()),
                 false => self.with(|core, published| core.begin_moments(published)),
@@ -120,9 +120,9 @@ impl Core {
             ));
         }
         let mut shared = lock_write(published);
-        if shared.moment.is_none() {
+        if shared.frame_state.is_none() {
             let len = shared.last.field.len();
-            let mut moment = Moment {
+            let mut frame_state = FrameState {
                 velocity: memory::zeros(len, WHAT)?,
                 past: Past::with_room(1024)?,
                 next: Past::with_room(1024)?,
@@ -131,8 +131,8 @@ impl Core {
                 step: 0,
             };
             let past = self.problem.as_ref().map(|problem| &problem.past);
-            moment.prepare(past, self.contact.len())?;
-            shared.moment = Some(moment);
+            frame_state.prepare(past, self.contact.len())?;
+            shared.frame_state = Some(frame_state);
         }
         self.leave_moment(&mut shared);
         Ok(())
@@ -144,8 +144,8 @@ impl Core {
         let next = self.problem.as_ref().map(|problem| &problem.next);
         let counts = next.map_or((0, 0), |next| (next.tools.len(), next.forces.len()));
         shared.tools.fit(counts.0, counts.1)?;
-        match &mut shared.moment {
-            Some(moment) => moment.prepare(next, self.incoming.len()),
+        match &mut shared.frame_state {
+            Some(frame_state) => frame_state.prepare(next, self.incoming.len()),
             None => Ok(()),
         }
     }
@@ -153,30 +153,31 @@ impl Core {
     /// The same for a state that is about to be published without a step.
     pub(super) fn fit_state(&self, published: &RwLock<Published>) -> Result<()> {
         let past = self.problem.as_ref().map(|problem| &problem.past);
-        match &mut lock_write(published).moment {
-            Some(moment) => moment.prepare(past, self.contact.len()),
+        match &mut lock_write(published).frame_state {
+            Some(frame_state) => frame_state.prepare(past, self.contact.len()),
             None => Ok(()),
         }
     }
 
     /// Leaves the moment of the state that has just been published, where frames are made of it.
     pub(super) fn leave_moment(&self, shared: &mut Published) {
-        let (Some(moment), Some(corrected)) = (&mut shared.moment, &self.corrected) else {
+        let (Some(frame_state), Some(corrected)) = (&mut shared.frame_state, &self.corrected)
+        else {
             return;
         };
-        moment
+        frame_state
             .velocity
-            .copy_from_slice(&corrected.stage.motion.velocity);
-        std::mem::swap(&mut moment.past, &mut moment.next);
-        moment.nodes.clear();
-        moment.forces.clear();
-        let reaction = &corrected.stage.motion.reaction;
-        if moment.past.forces.is_empty() && reaction.len() == 3 * self.contact.len() {
-            moment.nodes.extend_from_slice(&self.contact.nodes);
-            moment
+            .copy_from_slice(&corrected.solver.motion.velocity);
+        std::mem::swap(&mut frame_state.past, &mut frame_state.next);
+        frame_state.nodes.clear();
+        frame_state.forces.clear();
+        let reaction = &corrected.solver.motion.reaction;
+        if frame_state.past.forces.is_empty() && reaction.len() == 3 * self.contact.len() {
+            frame_state.nodes.extend_from_slice(&self.contact.nodes);
+            frame_state
                 .forces
                 .extend(reaction.iter().map(|force| 1e-3 * force));
         }
-        moment.step += 1;
+        frame_state.step += 1;
     }
 }

@@ -30,9 +30,9 @@ impl Core {
         self.engine.commit();
         if let Some(corrected) = &mut self.corrected {
             if replaced {
-                corrected.stage.stop_next();
+                corrected.solver.stop_next();
             }
-            corrected.stage.commit();
+            corrected.solver.commit();
         }
         self.counters.was_corrected = [
             self.next_corrected && !replaced,
@@ -99,7 +99,7 @@ impl Core {
         self.counters.rest_frames += 1;
         self.engine.reset();
         if let Some(corrected) = &mut self.corrected {
-            corrected.stage.reset();
+            corrected.solver.reset();
         }
         self.counters.was_corrected = [false; 2];
         self.counters.source_before = Source::Rest;

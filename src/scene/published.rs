@@ -74,7 +74,7 @@ pub struct Published {
     pub tools: crate::contact::Told,
     /// What frames between steps are made of, from the first that a host asks for.
     #[cfg(feature = "contact")]
-    pub moment: Option<super::moment::Moment>,
+    pub frame_state: Option<super::frame_state::FrameState>,
     /// The attached points.
     #[cfg(feature = "contact")]
     pub attached: std::sync::Arc<super::points::AttachedPoints>,

@@ -2,13 +2,13 @@
 
 use ::contact::{Placed, Pose, SPACING_MM, Vector, pose};
 
-use super::{OPEN_MM, Problem};
+use super::{ContactProblem, OPEN_MM};
 use crate::contact::buried::Buried;
 use crate::contact::past::Force;
 use crate::contact::rows::{Row, outward};
 use crate::contact::state::State;
 
-impl Problem {
+impl ContactProblem {
     /// Whether the tissue lies inside of a tool deeper than `depth_mm` anywhere on the tools' ways.
     pub fn intrudes(&mut self, state: State<'_>, depth_mm: f32) -> bool {
         let parts = self.parts();
@@ -127,7 +127,7 @@ impl Problem {
     }
 
     /// The tissue starts from rest and without forces, and each tool outside of it: back where it came from, against its push, or where it
-    /// comes out by the shortest way. Until [`Problem::return_to_ways`] that is the tools' way.
+    /// comes out by the shortest way. Until [`ContactProblem::return_to_ways`] that is the tools' way.
     pub fn start_from_rest(&mut self, rest: &[f32]) {
         self.let_go();
         self.ways.clear();

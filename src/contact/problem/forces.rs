@@ -1,11 +1,11 @@
 //! Forces that a step starts from, keeps and takes back.
 
-use super::{Problem, WHAT};
+use super::{ContactProblem, WHAT};
 use crate::contact::past::Force;
 use crate::error::Result;
 use crate::memory;
 
-impl Problem {
+impl ContactProblem {
     /// Back to the forces at the start of the step.
     pub fn restart(&mut self) {
         self.next.forces.clear();

@@ -3,16 +3,16 @@
 use ::contact::Vector;
 use ::contact::grasp::tension;
 
-use super::Problem;
+use super::ContactProblem;
 use crate::contact::past::Force;
 use crate::contact::state::{State, vector};
 use crate::contact::tool::{Push, Reading, Told};
-use crate::envelope::Used;
+use crate::envelope::ToolUse;
 
 /// No grasp pulls harder than this, mN: soft tissue tears before.
 const STRONGEST_GRASP_MN: f32 = 10_000.0;
 
-impl Problem {
+impl ContactProblem {
     /// Whether a grasp has torn off in this step.
     pub fn tears(&self) -> bool {
         self.next.tools.iter().any(|held| held.reading.torn)
@@ -88,8 +88,8 @@ impl Problem {
     }
 
     /// What the tools that push in this step are like; `step_s`: how long it takes. None pushes: no tools.
-    pub fn used(&self, step_s: f32) -> Used {
-        let mut used = Used {
+    pub fn used(&self, step_s: f32) -> ToolUse {
+        let mut used = ToolUse {
             size_mm: [f32::INFINITY, 0.0],
             speed_mm_s: 0.0,
             count: 0,

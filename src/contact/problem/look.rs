@@ -2,7 +2,7 @@
 
 use ::contact::{Placed, SKIN_MM, SPACING_MM, Vector, pose};
 
-use super::{Problem, WHAT};
+use super::{ContactProblem, WHAT};
 use crate::contact::buried::Buried;
 use crate::contact::rows::{Moving, Row, outward};
 use crate::contact::state::State;
@@ -12,7 +12,7 @@ use crate::memory;
 
 pub(super) use crate::contact::rows::MOST_ROWS;
 
-impl Problem {
+impl ContactProblem {
     /// Fills `rows`: samples near the tools at part `part` of their way, those that are pushed, and those that are held; at the end of the
     /// way also those that the tools have passed; `most` rows at most. `wide` takes all that the tools may reach as they move.
     ///

@@ -20,7 +20,7 @@ pub use solve::Change;
 
 use super::buried::Buried;
 use super::compliance::Delassus;
-use super::held_back::HeldBack;
+use super::inertial_compliance::InertialCompliance;
 use super::past::{Force, Held, Past};
 use super::rows::Row;
 use super::state::State;
@@ -47,7 +47,7 @@ const RESTING_MM: f32 = 0.9;
 const OPEN_MM: f32 = 0.5;
 
 /// The contact of one scene.
-pub struct Problem {
+pub struct ContactProblem {
     samples: Arc<Samples>,
     mesh: Arc<Mesh>,
     tools: Vec<Tool>,
@@ -70,7 +70,7 @@ pub struct Problem {
     search: Search,
     sweeps: Sweeps,
     delassus: Delassus,
-    held_back: HeldBack,
+    inertial_compliance: InertialCompliance,
     rows: Vec<Row>,
     /// Rows that a solve had no room for: their forces go.
     shed: Vec<Row>,
@@ -100,17 +100,17 @@ pub struct Problem {
     vectors: Vec<f32>,
 }
 
-impl Problem {
+impl ContactProblem {
     /// A scene without tools.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`].
-    pub fn new(samples: Arc<Samples>, mesh: Arc<Mesh>) -> Result<Problem> {
+    pub fn new(samples: Arc<Samples>, mesh: Arc<Mesh>) -> Result<ContactProblem> {
         let mut sweeps = Sweeps::default();
         memory::tried(sweeps.reserve(MOST_ROWS), WHAT)?;
         // Those of a solve and of the one before it, each with the nodes of its sample and their three axes.
         let (room, nodes, dofs) = (2 * MOST_ROWS, 6 * MOST_ROWS, 18 * MOST_ROWS);
-        Ok(Problem {
+        Ok(ContactProblem {
             tools: memory::room(MAX_TOOLS, WHAT)?,
             before: memory::room(MAX_TOOLS, WHAT)?,
             put: memory::room(MAX_TOOLS, WHAT)?,
@@ -123,7 +123,7 @@ impl Problem {
             search: memory::tried(Search::with_room(&samples), WHAT)?,
             sweeps,
             delassus: Delassus::default(),
-            held_back: HeldBack::default(),
+            inertial_compliance: InertialCompliance::default(),
             rows: memory::room(room, WHAT)?,
             shed: memory::room(room, WHAT)?,
             found: 0,
@@ -204,7 +204,7 @@ impl Problem {
     /// The same in the middle of a step.
     ///
     /// # Errors
-    /// As [`Problem::begin`].
+    /// As [`ContactProblem::begin`].
     pub fn enter(&mut self, tools: &[Tool], rest: &[f32], start: &[f32]) -> Result<()> {
         if tools.len() > MAX_TOOLS {
             return Err(Error::Argument(format!(
@@ -362,6 +362,6 @@ impl Problem {
             + self.search.memory_bytes()
             + self.sweeps.memory_bytes()
             + self.delassus.memory_bytes()
-            + self.held_back.memory_bytes()
+            + self.inertial_compliance.memory_bytes()
     }
 }

@@ -5,7 +5,7 @@ use std::time::Instant;
 use ::contact::{Limits, Rows, Vector, Whole};
 
 use super::look::MOST_ROWS;
-use super::{Problem, STEP_WORK, WHAT};
+use super::{ContactProblem, STEP_WORK, WHAT};
 use crate::contact::Compliance;
 use crate::contact::past::Force;
 use crate::contact::rows::Moving;
@@ -72,8 +72,8 @@ pub struct Change<'a> {
     pub forces: &'a [f32],
 }
 
-impl Problem {
-    /// As [`Problem::solve`] at the tools' ends, with what does not depend on how long ago the step was kept from call to call.
+impl ContactProblem {
+    /// As [`ContactProblem::solve`] at the tools' ends, with what does not depend on how long ago the step was kept from call to call.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`].
@@ -128,7 +128,7 @@ impl Problem {
                 &mut whole
             }
             Time::Any => {
-                at = self.held_back.at(own, compliance, all, rows)?;
+                at = self.inertial_compliance.at(own, compliance, all, rows)?;
                 &mut at
             }
         };

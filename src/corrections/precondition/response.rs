@@ -38,8 +38,13 @@ impl Preconditioner {
     pub(super) fn spread(&mut self, env: Env<'_>) -> Result<()> {
         for (&dof, force) in self.dofs.iter().zip(&self.forces) {
             let own = env.space.at_contact(dof as usize);
-            for ((y, held_back), own) in self.solved.iter_mut().zip(&self.held_back).zip(own) {
-                *y -= held_back * own * force;
+            for ((y, inertial_compliance), own) in self
+                .solved
+                .iter_mut()
+                .zip(&self.inertial_compliance)
+                .zip(own)
+            {
+                *y -= inertial_compliance * own * force;
             }
         }
         let (isa, pool, q) = (env.isa, env.pool, &mut self.coordinates);
@@ -90,19 +95,24 @@ impl Preconditioner {
 
     /// For each natural mode what inertia takes off its part of the compliance, mm/mN.
     #[cfg(feature = "contact")]
-    pub fn held_back(&self) -> &[f32] {
-        &self.held_back
+    pub fn inertial_compliance(&self) -> &[f32] {
+        &self.inertial_compliance
     }
 
     /// `coordinates += A_k f` of forces `f` (mN) on degrees of freedom with columns.
     #[cfg(feature = "contact")]
     pub fn add_load(&mut self, env: Env<'_>, dofs: &[u32], forces: &[f32]) -> Result<()> {
-        let count = self.held_back.len();
+        let count = self.inertial_compliance.len();
         self.solved.fill(0.0);
         for (&dof, force) in dofs.iter().zip(forces) {
             let own = env.space.at_contact(dof as usize);
-            for ((y, held_back), own) in self.solved.iter_mut().zip(&self.held_back).zip(own) {
-                *y -= held_back * own * force;
+            for ((y, inertial_compliance), own) in self
+                .solved
+                .iter_mut()
+                .zip(&self.inertial_compliance)
+                .zip(own)
+            {
+                *y -= inertial_compliance * own * force;
             }
         }
         let (isa, pool, q) = (env.isa, env.pool, &mut self.coordinates);
@@ -118,7 +128,7 @@ impl Preconditioner {
     #[cfg(feature = "contact")]
     pub fn move_natural(&mut self, env: Env<'_>, r: &[f32]) -> Result<()> {
         let (isa, pool) = (env.isa, env.pool);
-        let count = self.held_back.len();
+        let count = self.inertial_compliance.len();
         self.project(env, r)?;
         let q = &mut self.coordinates;
         let (modes, rows) = (env.space.modes(), &env.space.rows()[..count]);

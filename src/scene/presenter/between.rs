@@ -6,18 +6,18 @@
 use std::mem::swap;
 use std::sync::Arc;
 
-use super::along::{Along, Ways};
+use super::extrapolation::{VelocityExtrapolation, Ways};
 use super::nodes::{Means, Nodes};
 use super::solves::{Drive, Question, Solves};
 use crate::contact::problem::Change;
-use crate::contact::{Compliance, Past, Problem, State};
+use crate::contact::{Compliance, ContactProblem, Past, State};
 use crate::error::{Error, Result};
 use crate::field::ContactSet;
 use crate::kernels::respond::accumulate_rows;
 use crate::kernels::rows::{RowPlan, decode_rows};
 use crate::kernels::{Isa, Pool};
 use crate::memory;
-use crate::scene::moment::Moment;
+use crate::scene::frame_state::FrameState;
 use crate::scene::step_input::Contact;
 use crate::scene::tissue::Tissue;
 
@@ -51,7 +51,7 @@ struct Known {
 
 /// A step, and what its tissue does after it.
 pub(super) struct Between {
-    problem: Problem,
+    problem: ContactProblem,
     /// The step before the known one, or what the next is read into.
     other: Known,
     pool: Pool,
@@ -64,9 +64,9 @@ pub(super) struct Between {
     /// Which step that is.
     pub step: Option<u64>,
     natural: Vec<f32>,
-    held_back: Vec<f32>,
+    inertial_compliance: Vec<f32>,
     rows: Vec<u32>,
-    along: Along,
+    extrapolation: VelocityExtrapolation,
     nodes: Box<Nodes>,
     /// Where the host has nodes in this frame.
     now: ContactSet,
@@ -88,7 +88,7 @@ impl Between {
         }
         let natural = corrections.space.natural_count();
         Ok(Between {
-            problem: Problem::new(model.samples()?, Arc::clone(&model.mesh))?,
+            problem: ContactProblem::new(model.samples()?, Arc::clone(&model.mesh))?,
             other: Known {
                 last: field()?,
                 velocity: field()?,
@@ -102,9 +102,9 @@ impl Between {
             free: field()?,
             step: None,
             natural: memory::zeros(natural, WHAT)?,
-            held_back: memory::zeros(natural, WHAT)?,
+            inertial_compliance: memory::zeros(natural, WHAT)?,
             rows: memory::collected(natural, 0..natural as u32, WHAT)?,
-            along: Along::new()?,
+            extrapolation: VelocityExtrapolation::new()?,
             nodes: memory::boxed(Nodes::default(), WHAT)?,
             now: ContactSet::default(),
         })
@@ -117,20 +117,22 @@ impl Between {
     pub(super) fn take(
         &mut self,
         state: &[f32],
-        moment: &Moment,
+        frame_state: &FrameState,
         later_s: Option<f64>,
     ) -> Result<()> {
         let other = &mut self.other;
         match later_s {
-            Some(seconds) => (other.ways).follow(&self.along.ways, &self.problem, seconds)?,
+            Some(seconds) => {
+                (other.ways).follow(&self.extrapolation.ways, &self.problem, seconds)?
+            }
             None => other.ways.forget(),
         }
         other.last.copy_from_slice(state);
-        other.velocity.copy_from_slice(&moment.velocity);
-        other.past.take(&moment.past)?;
-        memory::replace(&mut other.then, &moment.nodes, WHAT)?;
-        memory::replace(&mut other.forces, &moment.forces, WHAT)?;
-        other.step = Some(moment.step);
+        other.velocity.copy_from_slice(&frame_state.velocity);
+        other.past.take(&frame_state.past)?;
+        memory::replace(&mut other.then, &frame_state.nodes, WHAT)?;
+        memory::replace(&mut other.forces, &frame_state.forces, WHAT)?;
+        other.step = Some(frame_state.step);
         self.give_back();
         Ok(())
     }
@@ -152,7 +154,7 @@ impl Between {
         swap(&mut self.problem.past, past);
         swap(&mut self.nodes.then, then);
         swap(&mut self.nodes.forces, forces);
-        swap(&mut self.along.ways, ways);
+        swap(&mut self.extrapolation.ways, ways);
     }
 
     /// The displacements of a view's nodes `tau` after the step, into `out [n,3]`.
@@ -179,19 +181,19 @@ impl Between {
         let (last, velocity) = (self.last.as_slice(), self.velocity.as_slice());
         match driven {
             Contact::Tools(tools) => {
-                self.along
+                self.extrapolation
                     .look(&self.problem, tools, (rest, last), (tau, alpha));
             }
             nodes => {
                 nodes.gather(&mut self.now, self.held.len())?;
                 let stretch = self.nodes.stretch(&self.now, last, velocity, tau);
-                self.along.follow_evenly(stretch, (tau, alpha));
+                self.extrapolation.follow_evenly(stretch, (tau, alpha));
             }
         }
         let question = Question {
             step,
             tau,
-            along: &self.along,
+            extrapolation: &self.extrapolation,
             drive: match driven {
                 Contact::Tools(tools) => Drive::Tools(tools),
                 _ => Drive::Nodes(&self.now),
@@ -206,13 +208,14 @@ impl Between {
         };
         for nodes in [touched, view.region] {
             let fields = (rest, last, velocity);
-            self.along.follow(nodes, fields, &mut self.free);
+            self.extrapolation.follow(nodes, fields, &mut self.free);
         }
         let make = |q: &mut [f32]| -> Result<bool> {
             let kappa = scene.integrator.over(tau.max(AT_ONCE_S)).kappa();
             // As many as before.
-            self.held_back.clear();
-            self.held_back.extend(corrections.space.holds_back(kappa));
+            self.inertial_compliance.clear();
+            self.inertial_compliance
+                .extend(corrections.space.holds_back(kappa));
             let change = match question.drive {
                 Drive::Tools(tools) => {
                     self.problem.begin(tools, rest, last)?;
@@ -227,7 +230,7 @@ impl Between {
                     let compliance = Compliance {
                         prior,
                         held: &self.held,
-                        inertia: Some((&corrections.space, &self.held_back)),
+                        inertia: Some((&corrections.space, &self.inertial_compliance)),
                     };
                     self.problem.solve_between(compliance, state)?
                 }
@@ -240,7 +243,7 @@ impl Between {
                         isa: self.isa,
                         prior,
                         space: &corrections.space,
-                        held_back: &self.held_back,
+                        inertial_compliance: &self.inertial_compliance,
                         held: &self.held,
                     };
                     self.nodes.solve(&means, now, &self.free)?;
@@ -253,8 +256,13 @@ impl Between {
             self.natural.fill(0.0);
             for (&dof, force) in change.dofs.iter().zip(change.forces) {
                 let own = corrections.space.at_contact(dof as usize);
-                for ((y, held_back), own) in self.natural.iter_mut().zip(&self.held_back).zip(own) {
-                    *y -= held_back * own * force;
+                for ((y, inertial_compliance), own) in self
+                    .natural
+                    .iter_mut()
+                    .zip(&self.inertial_compliance)
+                    .zip(own)
+                {
+                    *y -= inertial_compliance * own * force;
                 }
             }
             let (isa, pool) = (self.isa, &self.pool);
@@ -297,7 +305,7 @@ impl Between {
         4 * (2 * self.last.len() + 3 * self.velocity.len() + self.free.len())
             + 4 * (self.other.then.capacity() + self.other.forces.capacity())
             + self.other.past.memory_bytes()
-            + self.along.memory_bytes()
+            + self.extrapolation.memory_bytes()
             + self.nodes.memory_bytes()
             + self.now.memory_bytes()
             + self.held.len()

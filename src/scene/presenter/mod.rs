@@ -1,11 +1,11 @@
 //! What makes frames between steps: the tissue after the last step ([`between`]), solved once for the region and the attached points ([`solves`]),
-//! and on over the arrival of the next ([`over`]).
+//! and on over the arrival of the next ([`step_blend`]).
 
-mod along;
 mod between;
+mod extrapolation;
 mod nodes;
-mod over;
 mod solves;
+mod step_blend;
 #[cfg(test)]
 mod tests;
 
@@ -22,8 +22,8 @@ use crate::memory;
 use crate::model::Model;
 use crate::output::Output;
 use between::{AT_ONCE_S, Between, View, WHAT};
-use over::Over;
 use solves::Solves;
+use step_blend::StepBlend;
 
 /// What makes a scene's frames, each part from its first use.
 #[derive(Default)]
@@ -48,7 +48,7 @@ struct Presenter {
     shown: Vec<f32>,
     /// The frame at the region's nodes.
     nodal: Vec<f32>,
-    over: Over,
+    step_blend: StepBlend,
     /// Time of the last frame, after its step.
     before_s: f64,
 }
@@ -117,7 +117,7 @@ impl Presenter {
             moved: Vec::new(),
             shown: Vec::new(),
             nodal: Vec::new(),
-            over: Over::default(),
+            step_blend: StepBlend::default(),
             before_s: 0.0,
         })
     }
@@ -152,7 +152,7 @@ impl Presenter {
         let plan = RowPlan::try_region(&prior.basis(), &region, true)?;
         let field = || memory::zeros(3 * region.len(), WHAT);
         let (moved, shown, nodal) = (field()?, field()?, field()?);
-        self.over = Over::of(region.len())?;
+        self.step_blend = StepBlend::of(region.len())?;
         (self.moved, self.shown, self.nodal) = (moved, shown, nodal);
         self.plan = plan;
         self.region = region;
@@ -181,14 +181,14 @@ impl Presenter {
         let mut nodal = std::mem::take(&mut self.nodal);
         let made = match self.between.step == Some(step) {
             true => {
-                self.over.look(tau);
+                self.step_blend.look(tau);
                 self.show(scene, tau, driven, solves, &mut nodal)
             }
             false => self.arrive(scene, (step, tau), driven, solves, &mut nodal),
         };
         if made.is_ok() {
             self.before_s = tau;
-            self.over.blend(tau, step_s, &mut nodal);
+            self.step_blend.blend(tau, step_s, &mut nodal);
             match self.values {
                 Values::Region => out.copy_from(&nodal),
                 Values::Points => {
@@ -241,16 +241,17 @@ impl Presenter {
             since_s = (then - self.before_s).max(0.0);
             let mut shown = std::mem::take(&mut self.shown);
             let made = self.show(scene, then, driven, solves, &mut shown);
-            self.over.blend(then, step_s, &mut shown);
+            self.step_blend.blend(then, step_s, &mut shown);
             self.shown = shown;
             made?;
         }
         {
             let shared = lock_read(scene.published);
-            if let Some(moment) = &shared.moment {
-                let steps = known.map(|known| moment.step.saturating_sub(known));
+            if let Some(frame_state) = &shared.frame_state {
+                let steps = known.map(|known| frame_state.step.saturating_sub(known));
                 let later_s = steps.map(|steps| steps as f64 * step_s);
-                self.between.take(&shared.last.field, moment, later_s)?;
+                self.between
+                    .take(&shared.last.field, frame_state, later_s)?;
             }
         }
         if let Err(error) = self.show(scene, tau, driven, solves, out) {
@@ -260,8 +261,8 @@ impl Presenter {
         }
         let seen_s = tau - since_s;
         match known {
-            Some(_) if tau > AT_ONCE_S => self.over.begin(seen_s, &self.shown, out),
-            _ => self.over.forget(seen_s),
+            Some(_) if tau > AT_ONCE_S => self.step_blend.begin(seen_s, &self.shown, out),
+            _ => self.step_blend.forget(seen_s),
         }
         Ok(())
     }
@@ -270,15 +271,15 @@ impl Presenter {
         let lists = self.region.len() + self.moved.len() + self.shown.len() + self.nodal.len();
         4 * lists
             + self.between.memory_bytes()
-            + self.over.memory_bytes()
+            + self.step_blend.memory_bytes()
             + self.plan.memory_bytes()
     }
 }
 
 /// Steps made, by which a new one is known.
 fn step_of(shared: &Published) -> Result<u64> {
-    match &shared.moment {
-        Some(moment) => Ok(moment.step),
+    match &shared.frame_state {
+        Some(frame_state) => Ok(frame_state.step),
         None => Err(Error::State("present: the scene keeps no moments".into())),
     }
 }

@@ -15,8 +15,8 @@ pub(super) struct Means<'a> {
     pub isa: Isa,
     pub prior: &'a PriorTable,
     pub space: &'a CoarseSpace,
-    /// [`CoarseSpace::held_back`].
-    pub held_back: &'a [f32],
+    /// [`CoarseSpace::inertial_compliance`].
+    pub inertial_compliance: &'a [f32],
     pub held: &'a [bool],
 }
 
@@ -111,7 +111,7 @@ impl Nodes {
             let own = means.space.at_contact(self.dofs[i] as usize);
             for j in i..order {
                 let other = means.space.at_contact(self.dofs[j] as usize);
-                let pairs = means.held_back.iter().zip(own).zip(other);
+                let pairs = means.inertial_compliance.iter().zip(own).zip(other);
                 let lost: f32 = pairs.map(|((lost, a), b)| lost * a * b).sum();
                 self.upper[i * order + j] -= f64::from(lost);
             }

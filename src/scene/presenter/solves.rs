@@ -5,7 +5,7 @@
 
 use ::contact::Vector;
 
-use super::along::Along;
+use super::extrapolation::VelocityExtrapolation;
 use crate::contact::Tool;
 use crate::error::Result;
 use crate::field::ContactSet;
@@ -26,7 +26,7 @@ pub(super) struct Question<'a> {
     pub step: u64,
     /// Time after the step, s.
     pub tau: f64,
-    pub along: &'a Along,
+    pub extrapolation: &'a VelocityExtrapolation,
     pub drive: Drive<'a>,
 }
 
@@ -59,7 +59,7 @@ pub struct Solves {
 
 impl Solve {
     fn answers(&self, question: &Question<'_>) -> bool {
-        let (driven, free) = question.along.times();
+        let (driven, free) = question.extrapolation.times();
         self.step == Some(question.step)
             && self.tau.to_bits() == question.tau.to_bits()
             && self.free.to_bits() == free.to_bits()
@@ -80,7 +80,7 @@ impl Solve {
     }
 
     fn take(&mut self, question: &Question<'_>) -> Result<()> {
-        let (driven, free) = question.along.times();
+        let (driven, free) = question.extrapolation.times();
         self.tau = question.tau;
         self.free = free;
         memory::replace(&mut self.driven, driven, WHAT)?;

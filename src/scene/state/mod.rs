@@ -74,7 +74,7 @@ impl Core {
             records: self.engine.records()?,
             fields,
             history: corrected
-                .map(|corrected| corrected.stage.history(self.contact.len()))
+                .map(|corrected| corrected.solver.history(self.contact.len()))
                 .transpose()?,
             tools: self.tools()?,
         })
@@ -189,7 +189,7 @@ impl Core {
         self.contact_before.clear();
         self.engine.reset();
         if let Some(corrected) = &mut self.corrected {
-            corrected.stage.reset();
+            corrected.solver.reset();
         }
         #[cfg(feature = "contact")]
         if let Some(problem) = &mut self.problem {

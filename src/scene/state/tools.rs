@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::contact::{MAX_TOOLS, Past, Problem};
+use crate::contact::{ContactProblem, MAX_TOOLS, Past};
 use crate::error::Result;
 use crate::memory;
 use crate::scene::core::Core;
@@ -27,7 +27,8 @@ impl Core {
             (Some(problem), Some(past)) => problem.past = past,
             (Some(problem), None) => problem.past.clear(),
             (none @ None, Some(past)) => {
-                let mut problem = Problem::new(self.model.samples()?, Arc::clone(&self.mesh))?;
+                let mut problem =
+                    ContactProblem::new(self.model.samples()?, Arc::clone(&self.mesh))?;
                 problem.past = past;
                 *none = Some(memory::boxed(problem, "the contact of instruments")?);
             }

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use anyhow::Result;
 use contact::Samples;
-use upt::contact::{Compliance, Problem, State, Told, Tool};
+use upt::contact::{Compliance, ContactProblem, State, Told, Tool};
 
 use crate::report::method::BundleFolder;
 use crate::report::prior_alone::PriorAlone;
@@ -13,7 +13,7 @@ use crate::report::prior_alone::PriorAlone;
 /// The state of a body that answers linearly.
 pub struct Linear {
     prior: PriorAlone,
-    problem: Problem,
+    problem: ContactProblem,
     rest: Vec<f32>,
     state: Vec<[f32; 3]>,
     pub(super) told: Told,
@@ -30,7 +30,7 @@ impl Linear {
     ) -> Result<Self> {
         let prior = PriorAlone::new(bundle, decay, threads)?;
         Ok(Self {
-            problem: Problem::new(samples.into(), prior.mesh().clone())?,
+            problem: ContactProblem::new(samples.into(), prior.mesh().clone())?,
             prior,
             rest: rest.as_flattened().to_vec(),
             state: vec![[0.0; 3]; rest.len()],

@@ -19,12 +19,12 @@ mod iteration;
 
 use std::time::Instant;
 
-use super::input::{Input, Lent, Report};
+use super::input::{Input, Report, SolverContext};
 use super::memory::Memory;
 use super::passes;
 use super::precondition::{Env, Preconditioner, mask_held};
-use super::stage::{MOST_PARTS, SMALLEST_DET, Stage};
-use crate::contact::{Compliance, Problem, State};
+use super::solver::{ImplicitSolver, MOST_PARTS, SMALLEST_DET};
+use crate::contact::{Compliance, ContactProblem, State};
 use crate::error::Result;
 
 /// A step that leaves tissue deeper inside of a tool than this has lost the contact, mm.
@@ -45,31 +45,31 @@ struct Iterate<'a> {
     sunk_mm: Option<f32>,
 }
 
-impl Stage {
+impl ImplicitSolver {
     /// Makes the step from `input.last` that the tools of `problem` cause, and tells them what they feel.
     pub(super) fn correct_loaded(
         &mut self,
-        lent: Lent<'_>,
+        context: SolverContext<'_>,
         input: &Input<'_>,
-        problem: &mut Problem,
+        problem: &mut ContactProblem,
         next: &mut [f32],
     ) -> Result<Report> {
-        self.make_loaded(lent, input, problem, next, Memory::begin)
+        self.make_loaded(context, input, problem, next, Memory::begin)
     }
 
     /// The same with the pairs that `remember` leaves; once more where a grasp tears off, which then holds nothing at the end.
     pub(super) fn make_loaded(
         &mut self,
-        lent: Lent<'_>,
+        context: SolverContext<'_>,
         input: &Input<'_>,
-        problem: &mut Problem,
+        problem: &mut ContactProblem,
         next: &mut [f32],
         remember: impl Fn(&mut Memory),
     ) -> Result<Report> {
-        let _awake = lent.pool.keep_awake();
-        let mut made = |problem: &mut Problem| {
+        let _awake = context.pool.keep_awake();
+        let mut made = |problem: &mut ContactProblem| {
             remember(&mut self.memory);
-            let report = self.balance_loaded(lent, input, problem, next)?;
+            let report = self.balance_loaded(context, input, problem, next)?;
             problem.finish(State {
                 rest: input.rest,
                 u: next,
@@ -86,14 +86,14 @@ impl Stage {
 
     fn balance_loaded(
         &mut self,
-        lent: Lent<'_>,
+        context: SolverContext<'_>,
         input: &Input<'_>,
-        problem: &mut Problem,
+        problem: &mut ContactProblem,
         next: &mut [f32],
     ) -> Result<Report> {
         self.nodes.clear();
         self.memory.mask(&[]);
-        self.prepare(lent, input)?;
+        self.prepare(context, input)?;
         let mut report = Report::default();
         let mut u = std::mem::take(&mut self.u);
         let mut g = std::mem::take(&mut self.g);
@@ -104,8 +104,8 @@ impl Stage {
             sunk_mm: None,
         };
         let result = self
-            .iterate_loaded(lent, input, problem, &mut at, &mut report)
-            .and_then(|()| self.finish(lent, input, at.u));
+            .iterate_loaded(context, input, problem, &mut at, &mut report)
+            .and_then(|()| self.finish(context, input, at.u));
         if result.is_ok() {
             next.copy_from_slice(&u);
             if report.fell_back {
@@ -120,25 +120,25 @@ impl Stage {
 
     fn iterate_loaded(
         &mut self,
-        lent: Lent<'_>,
+        context: SolverContext<'_>,
         input: &Input<'_>,
-        problem: &mut Problem,
+        problem: &mut ContactProblem,
         at: &mut Iterate<'_>,
         report: &mut Report,
     ) -> Result<()> {
-        self.guess_loaded(lent, input, problem, at, report)?;
+        self.guess_loaded(context, input, problem, at, report)?;
         self.guess.copy_from_slice(at.u);
         problem.keep_guess()?;
-        let mut size = self.improve_loaded(lent, input, problem, at, report)?;
+        let mut size = self.improve_loaded(context, input, problem, at, report)?;
         let sound = self.motion.min_det >= SMALLEST_DET && !input.still;
         if !is_sound(size, at.det) && sound {
             // The guess inverts, however short its parts: the tools push their way in by iterations alone.
-            self.stay(lent, input, problem, at, report)?;
-            size = self.improve_loaded(lent, input, problem, at, report)?;
+            self.stay(context, input, problem, at, report)?;
+            size = self.improve_loaded(context, input, problem, at, report)?;
         }
         let left = (at.sunk_mm).unwrap_or_else(|| sunk(input, problem, at.u, 1.0));
         if !is_sound(size, at.det) || left > SUNK_MM {
-            self.fall_back(lent, input, problem, at, report)?;
+            self.fall_back(context, input, problem, at, report)?;
         }
         report.min_det = at.det;
         Ok(())
@@ -147,27 +147,27 @@ impl Stage {
     /// The state of the step before, with the forces that it had.
     fn stay(
         &mut self,
-        lent: Lent<'_>,
+        context: SolverContext<'_>,
         input: &Input<'_>,
-        problem: &mut Problem,
+        problem: &mut ContactProblem,
         at: &mut Iterate<'_>,
         report: &mut Report,
     ) -> Result<()> {
         problem.stay();
         at.u.copy_from_slice(input.last);
-        self.evaluate(lent, input, at, report)
+        self.evaluate(context, input, at, report)
     }
 
     /// The iterations from a guess; returns the length of what they left unbalanced.
     fn improve_loaded(
         &mut self,
-        lent: Lent<'_>,
+        context: SolverContext<'_>,
         input: &Input<'_>,
-        problem: &mut Problem,
+        problem: &mut ContactProblem,
         at: &mut Iterate<'_>,
         report: &mut Report,
     ) -> Result<f64> {
-        let env = lent.env();
+        let env = context.env();
         let touched = problem.touched(&env.body.held);
         self.preconditioner.engage(env, touched)?;
         let start = self.unbalanced(env, problem, at.g)?;
@@ -180,7 +180,7 @@ impl Stage {
             if !is_sound(size, at.det) || (iteration > 0 && spent) {
                 break;
             }
-            let better = self.improve_at(lent, input, problem, at, 1.0, report)?;
+            let better = self.improve_at(context, input, problem, at, 1.0, report)?;
             report.iterations += 1;
             failed = if better { 0 } else { failed + 1 };
             if failed > 1 {
@@ -201,19 +201,19 @@ impl Stage {
     /// `F(u)` and det F of a state that no iteration led to.
     fn evaluate(
         &mut self,
-        lent: Lent<'_>,
+        context: SolverContext<'_>,
         input: &Input<'_>,
         at: &mut Iterate<'_>,
         report: &mut Report,
     ) -> Result<()> {
-        (at.det, _) = self.residual(lent, [input.last, at.u, at.u], at.g, report)?;
+        (at.det, _) = self.residual(context, [input.last, at.u, at.u], at.g, report)?;
         self.is_projected = false;
         at.sunk_mm = None;
         Ok(())
     }
 
     /// `F - B^T f`, left in `q`; returns its length.
-    fn unbalanced(&mut self, env: Env<'_>, problem: &Problem, g: &[f32]) -> Result<f64> {
+    fn unbalanced(&mut self, env: Env<'_>, problem: &ContactProblem, g: &[f32]) -> Result<f64> {
         self.q.copy_from_slice(g);
         each_free_load(problem, &env.body.held, |node, force| {
             let at = 3 * node as usize;
@@ -228,15 +228,15 @@ impl Stage {
     /// their way; in so many that the first of them does not halve the smallest det F, with an iteration each.
     fn guess_loaded(
         &mut self,
-        lent: Lent<'_>,
+        context: SolverContext<'_>,
         input: &Input<'_>,
-        problem: &mut Problem,
+        problem: &mut ContactProblem,
         at: &mut Iterate<'_>,
         report: &mut Report,
     ) -> Result<()> {
-        let env = lent.env();
+        let env = context.env();
         if self.motion.min_det < SMALLEST_DET && !input.still {
-            return self.respond_from_rest(lent, input, problem, at, report);
+            return self.respond_from_rest(context, input, problem, at, report);
         }
         let least = SMALLEST_DET.max(0.5 * self.motion.min_det.min(1.0));
         let ways = problem.parts();
@@ -248,23 +248,23 @@ impl Stage {
             let parts = ways.max(iterated);
             for part in 1..=parts {
                 let way = part as f32 / parts as f32;
-                self.press(lent, input, problem, way, at.u)?;
+                self.press(context, input, problem, way, at.u)?;
                 // An iteration after each of `iterated` parts of the load but the last.
                 let due = part * iterated / parts > (part - 1) * iterated / parts;
                 let spent = problem.is_spent() || is_spent(input, problem, report, 1);
                 if due && part < parts && !spent {
                     self.settle(env, at.u)?;
-                    self.evaluate(lent, input, at, report)?;
+                    self.evaluate(context, input, at, report)?;
                     if at.det > SMALLEST_DET {
                         self.preconditioner.prescribe(env, &[])?;
                         self.unbalanced(env, problem, at.g)?;
-                        self.improve_at(lent, input, problem, at, way, report)?;
+                        self.improve_at(context, input, problem, at, way, report)?;
                     }
                     self.preconditioner.coordinates.fill(0.0);
                 }
             }
             self.settle(env, at.u)?;
-            self.evaluate(lent, input, at, report)?;
+            self.evaluate(context, input, at, report)?;
             report.parts = parts;
             if at.det > least
                 || iterated >= MOST_PARTS
@@ -294,13 +294,13 @@ impl Stage {
     /// coordinates take on `A_k B^T (f' - f)`.
     fn press(
         &mut self,
-        lent: Lent<'_>,
+        context: SolverContext<'_>,
         input: &Input<'_>,
-        problem: &mut Problem,
+        problem: &mut ContactProblem,
         way: f32,
         u: &[f32],
     ) -> Result<()> {
-        let env = lent.env();
+        let env = context.env();
         self.preconditioner.decode_domain(env, &mut self.touched)?;
         for &node in &self.preconditioner.domain_nodes {
             let range = 3 * node as usize..3 * node as usize + 3;
@@ -316,7 +316,7 @@ impl Stage {
             u: &self.touched,
             start: input.last,
         };
-        let compliance = compliance(lent, &self.preconditioner);
+        let compliance = compliance(context, &self.preconditioner);
         let change = problem.solve(compliance, state, way)?;
         self.preconditioner
             .add_load(env, change.dofs, change.forces)
@@ -327,7 +327,7 @@ impl Stage {
 /// them.
 pub(super) fn is_spent(
     input: &Input<'_>,
-    problem: &Problem,
+    problem: &ContactProblem,
     report: &Report,
     iterations: u32,
 ) -> bool {
@@ -339,7 +339,7 @@ pub(super) fn is_spent(
 }
 
 /// How deep tissue `u` and the tools lie in each other, at part `way` of their way, mm.
-fn sunk(input: &Input<'_>, problem: &mut Problem, u: &[f32], way: f32) -> f32 {
+fn sunk(input: &Input<'_>, problem: &mut ContactProblem, u: &[f32], way: f32) -> f32 {
     let state = State {
         rest: input.rest,
         u,
@@ -353,16 +353,22 @@ fn is_sound(unbalanced: f64, min_det: f32) -> bool {
     unbalanced.is_finite() && min_det >= SMALLEST_DET
 }
 
-fn compliance<'a>(lent: Lent<'a>, preconditioner: &'a Preconditioner) -> Compliance<'a> {
+fn compliance<'a>(
+    context: SolverContext<'a>,
+    preconditioner: &'a Preconditioner,
+) -> Compliance<'a> {
     Compliance {
-        prior: lent.prior,
-        held: &lent.corrections.body.held,
-        inertia: Some((&lent.corrections.space, preconditioner.held_back())),
+        prior: context.prior,
+        held: &context.corrections.body.held,
+        inertia: Some((
+            &context.corrections.space,
+            preconditioner.inertial_compliance(),
+        )),
     }
 }
 
 /// Calls with each free node's share of the tools' loads, µN.
-fn each_free_load(problem: &Problem, held: &[bool], mut take: impl FnMut(u32, [f32; 3])) {
+fn each_free_load(problem: &ContactProblem, held: &[bool], mut take: impl FnMut(u32, [f32; 3])) {
     problem.each_load(|node, force| {
         if !held[node as usize] {
             take(node, force.to_array().map(|f| 1e3 * f));

@@ -1,14 +1,14 @@
 //! One iteration of a step that tools drive: a direction of the elements with the contact's answer in it, and how far along it.
 
 use super::{Iterate, SUNK_MM, each_free_load, is_spent, sunk};
-use crate::contact::Problem;
-use crate::corrections::input::{Input, Lent, Report};
+use crate::contact::ContactProblem;
+use crate::corrections::input::{Input, Report, SolverContext};
 use crate::corrections::passes;
 use crate::corrections::precondition::Env;
-use crate::corrections::stage::{SHORTENINGS, SLOPE, SMALLEST_DET, Stage};
+use crate::corrections::solver::{ImplicitSolver, SHORTENINGS, SLOPE, SMALLEST_DET};
 use crate::error::Result;
 
-impl Stage {
+impl ImplicitSolver {
     /// `U^T F(u)` of the state that stands.
     fn project_standing(&mut self, env: Env<'_>, g: &[f32]) -> Result<()> {
         if !self.is_projected {
@@ -24,28 +24,28 @@ impl Stage {
     /// another state.
     pub(super) fn improve_at(
         &mut self,
-        lent: Lent<'_>,
+        context: SolverContext<'_>,
         input: &Input<'_>,
-        problem: &mut Problem,
+        problem: &mut ContactProblem,
         at: &mut Iterate<'_>,
         way: f32,
         report: &mut Report,
     ) -> Result<bool> {
-        self.with_fields(|stage, fields| {
-            stage.improve_at_in(lent, input, (problem, at), way, fields, report)
+        self.with_fields(|solver, fields| {
+            solver.improve_at_in(context, input, (problem, at), way, fields, report)
         })
     }
 
     fn improve_at_in(
         &mut self,
-        lent: Lent<'_>,
+        context: SolverContext<'_>,
         input: &Input<'_>,
-        (problem, at): (&mut Problem, &mut Iterate<'_>),
+        (problem, at): (&mut ContactProblem, &mut Iterate<'_>),
         way: f32,
         [d, q, g_new]: [&mut Vec<f32>; 3],
         report: &mut Report,
     ) -> Result<bool> {
-        let env = lent.env();
+        let env = context.env();
         let mut better = false;
         // The coordinates of the residual: those of F less those of the loads.
         self.project_standing(env, at.g)?;
@@ -73,7 +73,7 @@ impl Stage {
                 *q = u + d;
             }
         }
-        self.press(lent, input, problem, way, q)?;
+        self.press(context, input, problem, way, q)?;
         self.preconditioner.decode(env, q)?;
         let [along, moved] = passes::advance(env, [at.u, at.g], d, q, &mut self.partial)?;
         self.moved = moved;
@@ -84,7 +84,7 @@ impl Stage {
             if attempt > 0 {
                 passes::shorten(env, at.u, d, t, q)?;
             }
-            let (det, slope_new) = self.residual(lent, [input.last, q, d], g_new, report)?;
+            let (det, slope_new) = self.residual(context, [input.last, q, d], g_new, report)?;
             let slope_new = slope_new - work;
             let left = match det > SMALLEST_DET {
                 true => sunk(input, problem, q, way),
@@ -129,7 +129,7 @@ impl Stage {
 }
 
 /// Work of the tools' loads over a field, nJ.
-fn work(problem: &Problem, d: &[f32]) -> f64 {
+fn work(problem: &ContactProblem, d: &[f32]) -> f64 {
     let mut sum = 0.0f64;
     problem.each_load(|node, force| {
         let at = 3 * node as usize;

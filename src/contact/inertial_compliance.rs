@@ -11,7 +11,7 @@ use crate::memory;
 
 /// The modes at the samples of the last call, and rows that were made since it.
 #[derive(Debug, Default)]
-pub struct HeldBack {
+pub struct InertialCompliance {
     /// By mode, `[m,3n]`.
     modes: Vec<f32>,
     /// All modes.
@@ -24,12 +24,12 @@ pub struct HeldBack {
 
 /// `W` at one time.
 pub struct At<'a> {
-    own: &'a mut HeldBack,
+    own: &'a mut InertialCompliance,
     fixed: &'a [f32],
     lost: &'a [f32],
 }
 
-impl HeldBack {
+impl InertialCompliance {
     /// `W` of samples, with what each mode loses at this time (`Compliance::inertia`).
     ///
     /// # Errors
@@ -153,7 +153,7 @@ mod tests {
         }
         let samples = model.samples().unwrap();
         let count = samples.rows().len() as u32;
-        let mut own = HeldBack::default();
+        let mut own = InertialCompliance::default();
         let mut between = Delassus::default();
         for (step, seconds) in [(1, 0.01f64), (1, 0.04), (3, 0.04)] {
             let rows: Vec<u32> = (0..count).step_by(step).take(20).collect();

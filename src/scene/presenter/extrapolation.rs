@@ -7,7 +7,7 @@
 use ::contact::{Pose, Vector};
 
 use crate::contact::vector;
-use crate::contact::{MAX_TOOLS, PUT_MM, Problem, Tool};
+use crate::contact::{ContactProblem, MAX_TOOLS, PUT_MM, Tool};
 use crate::error::Result;
 use crate::memory;
 
@@ -33,7 +33,12 @@ impl Ways {
     ///
     /// # Errors
     /// [`crate::Error::OutOfMemory`].
-    pub(super) fn follow(&mut self, known: &Ways, problem: &Problem, seconds: f64) -> Result<()> {
+    pub(super) fn follow(
+        &mut self,
+        known: &Ways,
+        problem: &ContactProblem,
+        seconds: f64,
+    ) -> Result<()> {
         let tools = &problem.past.tools;
         let [last, before] = &mut self.before;
         memory::replace(before, &known.before[0], WHAT)?;
@@ -56,7 +61,7 @@ impl Ways {
 
 /// The tools' ways of the last step, and the tissue that each drives.
 #[derive(Default)]
-pub(super) struct Along {
+pub(super) struct VelocityExtrapolation {
     pub(super) ways: Ways,
     /// Where tools push, and how far velocities are followed there, s.
     driven: Vec<(Vector, f32)>,
@@ -64,18 +69,18 @@ pub(super) struct Along {
     free: f32,
 }
 
-impl Along {
-    pub(super) fn new() -> Result<Along> {
-        Ok(Along {
+impl VelocityExtrapolation {
+    pub(super) fn new() -> Result<VelocityExtrapolation> {
+        Ok(VelocityExtrapolation {
             driven: memory::room(MAX_TOOLS, WHAT)?,
-            ..Along::default()
+            ..VelocityExtrapolation::default()
         })
     }
 
     /// Looks at the tools `tau` after the last state `u`.
     pub(super) fn look(
         &mut self,
-        problem: &Problem,
+        problem: &ContactProblem,
         tools: &[Tool],
         (rest, u): (&[f32], &[f32]),
         (tau, alpha): (f64, f64),
@@ -162,19 +167,22 @@ impl Along {
 
     /// Where a node at a rest position, a displacement and a velocity goes.
     fn each(&self) -> impl Fn(&[f32; 3], &[f32; 3], &[f32; 3]) -> [f32; 3] {
-        let even = self.driven.iter().all(|(_, along)| *along == self.free);
+        let even = self
+            .driven
+            .iter()
+            .all(|(_, extrapolation)| *extrapolation == self.free);
         let driven: &[_] = if even { &[] } else { &self.driven };
         let near = NEAR_MM.powi(-2);
         move |rest, last, velocity| {
-            let mut along = self.free;
+            let mut extrapolation = self.free;
             if !driven.is_empty() {
                 let place = Vector::from(*rest) + Vector::from(*last);
                 for (centre, own) in driven {
                     let weight = 1.0 / (1.0 + near * place.distance_squared(*centre));
-                    along += weight * (own - self.free);
+                    extrapolation += weight * (own - self.free);
                 }
             }
-            std::array::from_fn(|k| last[k] + along * velocity[k])
+            std::array::from_fn(|k| last[k] + extrapolation * velocity[k])
         }
     }
 
@@ -222,31 +230,31 @@ mod tests {
     fn a_tool_that_slows_down_has_the_speed_of_its_end() {
         let at = |z: f32| vec![Pose::from_translation(Vector::new(0.0, 0.0, z))];
         // 4 mm, then 2 mm: at the end 1 mm a step.
-        let mut along = Along {
+        let mut extrapolation = VelocityExtrapolation {
             ways: Ways {
                 before: [at(4.0), at(0.0)],
                 before_s: [0.05; 2],
             },
-            ..Along::default()
+            ..VelocityExtrapolation::default()
         };
         let now = Vector::new(0.0, 0.0, 6.0);
-        let speed = along.speed(0, Vector::ZERO, now).unwrap();
+        let speed = extrapolation.speed(0, Vector::ZERO, now).unwrap();
         assert!((speed.z - 20.0).abs() < 1e-3, "{speed}");
-        along.ways.before_s[1] = 0.1;
-        assert!((along.speed(0, Vector::ZERO, now).unwrap().z - 40.0).abs() < 1e-3);
-        assert!(along.speed(1, Vector::ZERO, now).is_none());
+        extrapolation.ways.before_s[1] = 0.1;
+        assert!((extrapolation.speed(0, Vector::ZERO, now).unwrap().z - 40.0).abs() < 1e-3);
+        assert!(extrapolation.speed(1, Vector::ZERO, now).is_none());
     }
 
     #[test]
     fn each_tool_drives_the_tissue_around_it() {
-        let along = Along {
+        let extrapolation = VelocityExtrapolation {
             driven: vec![(Vector::ZERO, 0.0), (Vector::new(100.0, 0.0, 0.0), 1.0)],
             free: 1.0,
-            ..Along::default()
+            ..VelocityExtrapolation::default()
         };
         let rest = [0.0, 0.0, 0.0, 100.0, 0.0, 0.0, 50.0, 0.0, 0.0];
         let mut out = [0.0; 9];
-        along.follow(&[0, 1, 2], (&rest, &[0.0; 9], &[1.0; 9]), &mut out);
+        extrapolation.follow(&[0, 1, 2], (&rest, &[0.0; 9], &[1.0; 9]), &mut out);
         assert!(
             out[0] < 1e-3 && out[3] > 0.9 && out[6] > 0.7 && out[6] < 0.9,
             "{out:?}"

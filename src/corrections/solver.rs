@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use super::history::{History, PAIRS, Pair};
-use super::input::{Input, Lent, Report};
+use super::input::{Input, Report, SolverContext};
 use super::memory::Memory;
 use super::motion::Motion;
 use super::oscillators::Oscillators;
@@ -24,7 +24,7 @@ pub(super) const SHORTENINGS: u32 = 6;
 pub(super) const MOST_PARTS: u32 = 16;
 
 /// A scene's own part.
-pub struct Stage {
+pub struct ImplicitSolver {
     pub(super) preconditioner: Preconditioner,
     pub(super) memory: Memory,
     scratch: elements::Scratch,
@@ -60,19 +60,19 @@ pub struct Stage {
     pub(super) free: Oscillators,
 }
 
-impl Stage {
+impl ImplicitSolver {
     /// Buffers of a scene at rest.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`].
-    pub fn new(lent: Lent<'_>) -> Result<Stage> {
-        let env = lent.env();
+    pub fn new(context: SolverContext<'_>) -> Result<ImplicitSolver> {
+        let env = context.env();
         let len = 3 * env.body.mass.len();
         let field = || memory::zeros(len, "the corrections of a scene");
-        Ok(Stage {
+        Ok(ImplicitSolver {
             preconditioner: Preconditioner::new(env)?,
             memory: Memory::new(len, env.prior.width())?,
-            scratch: (env.body.forces.scratch(lent.pool.threads())).map_err(|_| {
+            scratch: (env.body.forces.scratch(context.pool.threads())).map_err(|_| {
                 Error::OutOfMemory("no memory for the element forces of a scene".into())
             })?,
             motion: Motion::at_rest(len)?,
@@ -145,13 +145,13 @@ impl Stage {
     ///
     /// # Errors
     /// A panic on another thread of the pool.
-    pub fn restore(&mut self, lent: Lent<'_>, history: &History) -> Result<()> {
+    pub fn restore(&mut self, context: SolverContext<'_>, history: &History) -> Result<()> {
         let History { motion, pairs } = history;
         self.motion.take(motion)?;
         self.memory.clear();
         self.memory.commit();
         for Pair { step, change } in pairs {
-            self.memory.store(lent.env(), step, 1.0, change)?;
+            self.memory.store(context.env(), step, 1.0, change)?;
         }
         self.memory.commit();
         Ok(())
@@ -171,26 +171,31 @@ impl Stage {
     }
 
     /// Velocities of a state that the model predicted and nothing corrected.
-    pub fn follow(&mut self, lent: Lent<'_>, input: &Input<'_>, next: &[f32]) -> Result<()> {
+    pub fn follow(
+        &mut self,
+        context: SolverContext<'_>,
+        input: &Input<'_>,
+        next: &[f32],
+    ) -> Result<()> {
         self.memory.begin();
-        self.finish(lent, input, next)
+        self.finish(context, input, next)
     }
 
     /// `r(u)` to `out`, zero at held and prescribed nodes; returns the smallest det F and `r . d` with a field that is zero there.
     pub(super) fn residual(
         &mut self,
-        lent: Lent<'_>,
+        context: SolverContext<'_>,
         [last, u, d]: [&[f32]; 3],
         out: &mut [f32],
         report: &mut Report,
     ) -> Result<(f32, f64)> {
-        let env = lent.env();
+        let env = context.env();
         let failed = std::sync::Mutex::new(None);
         let det = env
             .body
             .forces
             .evaluate(u, &mut self.scratch, out, &|count, task| {
-                if let Err(error) = lent.pool.run(count, task) {
+                if let Err(error) = context.pool.run(count, task) {
                     *failed
                         .lock()
                         .unwrap_or_else(std::sync::PoisonError::into_inner) = Some(error);
@@ -200,7 +205,7 @@ impl Stage {
         if let Some(error) = failed.unwrap_or_else(std::sync::PoisonError::into_inner) {
             return Err(error.into());
         }
-        let kappa = lent.pace.integrator.kappa() as f32;
+        let kappa = context.time_step.integrator.kappa() as f32;
         let fields = [self.drift.as_slice(), u, last, d];
         let slope = passes::inertia(env, kappa, fields, out, &mut self.partial)?;
         self.at_nodes[0].clear();
@@ -227,14 +232,14 @@ impl Stage {
     /// The iterations from a guess whose smallest det F is `det`.
     pub(super) fn relax(
         &mut self,
-        lent: Lent<'_>,
+        context: SolverContext<'_>,
         input: &Input<'_>,
         mut det: f32,
         u: &mut [f32],
         g: &mut [f32],
         report: &mut Report,
     ) -> Result<()> {
-        let env = lent.env();
+        let env = context.env();
         let start = self.size(env, g)?;
         for iteration in 0..input.enough.iterations {
             let size = self.size(env, g)?;
@@ -243,7 +248,7 @@ impl Stage {
             if !size.is_finite() || det < SMALLEST_DET || (iteration > 0 && late) {
                 break;
             }
-            det = self.improve(lent, input.last, u, g, det, report)?;
+            det = self.improve(context, input.last, u, g, det, report)?;
             report.iterations += 1;
             report.remaining_mm = self.remaining(env, g, size)?;
             if self.suffices(iteration + 1, report.remaining_mm, input.enough) {
@@ -253,7 +258,7 @@ impl Stage {
         let end = self.size(env, g)?;
         if !end.is_finite() || det < SMALLEST_DET {
             u.fill(0.0);
-            det = self.lead(lent, input, 1.0, u, g, report)?;
+            det = self.lead(context, input, 1.0, u, g, report)?;
             report.fell_back = true;
             self.memory.clear();
         }
@@ -265,20 +270,22 @@ impl Stage {
     /// One iteration: `u`, its residual `g` and its smallest det F become those of a better state.
     pub(super) fn improve(
         &mut self,
-        lent: Lent<'_>,
+        context: SolverContext<'_>,
         last: &[f32],
         u: &mut [f32],
         g: &mut [f32],
         det: f32,
         report: &mut Report,
     ) -> Result<f32> {
-        self.with_fields(|stage, fields| stage.improve_in(lent, (last, u, g), det, fields, report))
+        self.with_fields(|solver, fields| {
+            solver.improve_in(context, (last, u, g), det, fields, report)
+        })
     }
 
     /// Calls with `d`, `q` and the new residual, which come back whatever the call gives.
     pub(super) fn with_fields<T>(
         &mut self,
-        call: impl FnOnce(&mut Stage, [&mut Vec<f32>; 3]) -> Result<T>,
+        call: impl FnOnce(&mut ImplicitSolver, [&mut Vec<f32>; 3]) -> Result<T>,
     ) -> Result<T> {
         let [mut d, mut q, mut g_new] =
             [&mut self.d, &mut self.q, &mut self.g_new].map(std::mem::take);
@@ -289,13 +296,13 @@ impl Stage {
 
     fn improve_in(
         &mut self,
-        lent: Lent<'_>,
+        context: SolverContext<'_>,
         (last, u, g): (&[f32], &mut [f32], &mut [f32]),
         det: f32,
         [d, q, g_new]: [&mut Vec<f32>; 3],
         report: &mut Report,
     ) -> Result<f32> {
-        let env = lent.env();
+        let env = context.env();
         let preconditioner = &mut self.preconditioner;
         let nodes = &self.nodes;
         self.memory.direction(env, g, q, d, |q, z| {
@@ -310,7 +317,7 @@ impl Stage {
         let mut accepted = det;
         for attempt in 0..=SHORTENINGS {
             passes::shorten(env, u, d, t, q)?;
-            let (det_new, slope_new) = self.residual(lent, [last, q, d], g_new, report)?;
+            let (det_new, slope_new) = self.residual(context, [last, q, d], g_new, report)?;
             if det_new > SMALLEST_DET && 0.5 * (slope + slope_new) <= SLOPE * slope {
                 self.stand();
                 u.copy_from_slice(q);

@@ -6,12 +6,12 @@
 use std::mem::swap;
 use std::sync::Arc;
 
-use super::input::{Enough, Input, Lent, Report};
+use super::input::{Enough, Input, Report, SolverContext};
 use super::motion::Motion;
 use super::oscillators::Oscillators;
-use super::pace::Pace;
 use super::precondition::Preconditioner;
-use super::stage::Stage;
+use super::solver::ImplicitSolver;
+use super::time_step::TimeStep;
 use crate::error::Result;
 use crate::memory;
 
@@ -19,9 +19,9 @@ use crate::memory;
 const LEAST_SWING: u32 = 2;
 
 /// What a scene has for them.
-pub struct Shorter {
+pub struct Substepper {
     count: u32,
-    pub(super) pace: Arc<Pace>,
+    pub(super) time_step: Arc<TimeStep>,
     preconditioner: Preconditioner,
     free: Oscillators,
     pub(super) motion: Motion,
@@ -31,22 +31,26 @@ pub struct Shorter {
     pub(super) next: Vec<f32>,
 }
 
-impl Shorter {
-    /// `count` of them to a step of `lent`, of the length of `pace`.
+impl Substepper {
+    /// `count` of them to a step of `context`, of the length of `time_step`.
     ///
     /// # Errors
     /// [`crate::Error::OutOfMemory`].
-    pub fn new(lent: Lent<'_>, pace: Arc<Pace>, count: u32) -> Result<Shorter> {
-        let len = 3 * lent.corrections.body.mass.len();
-        let field = || memory::zeros(len, "the shorter steps of a scene");
-        let short = Lent {
-            pace: &pace,
-            ..lent
+    pub fn new(
+        context: SolverContext<'_>,
+        time_step: Arc<TimeStep>,
+        count: u32,
+    ) -> Result<Substepper> {
+        let len = 3 * context.corrections.body.mass.len();
+        let field = || memory::zeros(len, "the substepper steps of a scene");
+        let short = SolverContext {
+            time_step: &time_step,
+            ..context
         };
-        Ok(Shorter {
+        Ok(Substepper {
             count,
             preconditioner: Preconditioner::new(short.env())?,
-            pace,
+            time_step,
             free: Oscillators::default(),
             motion: Motion::at_rest(len)?,
             last: field()?,
@@ -64,7 +68,7 @@ impl Shorter {
     pub fn memory_bytes(&self) -> usize {
         let fields = 3 * self.last.len() + 3 * self.motion.velocity.len();
         4 * fields
-            + self.pace.memory_bytes()
+            + self.time_step.memory_bytes()
             + self.preconditioner.memory_bytes()
             + self.free.memory_bytes()
     }
@@ -120,26 +124,26 @@ impl Shorter {
     }
 }
 
-impl Stage {
+impl ImplicitSolver {
     /// The stage makes shorter steps from here on; or whole ones again.
-    pub(super) fn exchange(&mut self, shorter: &mut Shorter) {
-        swap(&mut self.motion, &mut shorter.motion);
-        swap(&mut self.preconditioner, &mut shorter.preconditioner);
-        swap(&mut self.free, &mut shorter.free);
+    pub(super) fn exchange(&mut self, substepper: &mut Substepper) {
+        swap(&mut self.motion, &mut substepper.motion);
+        swap(&mut self.preconditioner, &mut substepper.preconditioner);
+        swap(&mut self.free, &mut substepper.free);
     }
 
     /// Takes the end of the last shorter step as that of the step from `input.last`.
     pub(super) fn arrive(
         &mut self,
-        lent: Lent<'_>,
+        context: SolverContext<'_>,
         input: &Input<'_>,
-        shorter: &Shorter,
+        substepper: &Substepper,
         next: &mut [f32],
     ) -> Result<()> {
-        next.copy_from_slice(&shorter.last);
+        next.copy_from_slice(&substepper.last);
         // What a whole step would have left out, for the choice of the next; the rest is that of the last shorter one.
-        self.finish(lent, input, next)?;
-        let (own, last) = (&mut self.next, &shorter.motion);
+        self.finish(context, input, next)?;
+        let (own, last) = (&mut self.next, &substepper.motion);
         own.velocity.copy_from_slice(&last.velocity);
         own.inertia.copy_from_slice(&last.inertia);
         own.min_det = last.min_det;
@@ -154,9 +158,9 @@ impl Stage {
     /// A panic on another thread of the pool; the past of the stage stays.
     pub fn swing(
         &mut self,
-        lent: Lent<'_>,
+        context: SolverContext<'_>,
         input: &Input<'_>,
-        shorter: Option<&mut Shorter>,
+        substepper: Option<&mut Substepper>,
         next: &mut [f32],
     ) -> Result<Report> {
         self.memory.begin();
@@ -165,46 +169,50 @@ impl Stage {
             ..input.enough
         };
         let input = &Input { enough, ..*input };
-        let Some(shorter) = shorter else {
-            return self.swing_once(lent, input, next);
+        let Some(substepper) = substepper else {
+            return self.swing_once(context, input, next);
         };
-        shorter.start(&self.motion, input, lent.pace.integrator.step_s as f32)?;
-        self.exchange(shorter);
+        substepper.start(
+            &self.motion,
+            input,
+            context.time_step.integrator.step_s as f32,
+        )?;
+        self.exchange(substepper);
         self.memory.clear();
-        let result = self.swing_each(lent, input, shorter);
-        self.exchange(shorter);
+        let result = self.swing_each(context, input, substepper);
+        self.exchange(substepper);
         // The pairs are those of shorter steps.
         self.memory.begin();
         let report = result?;
-        self.arrive(lent, input, shorter, next)?;
+        self.arrive(context, input, substepper, next)?;
         Ok(report)
     }
 
     fn swing_each(
         &mut self,
-        lent: Lent<'_>,
+        context: SolverContext<'_>,
         input: &Input<'_>,
-        shorter: &mut Shorter,
+        substepper: &mut Substepper,
     ) -> Result<Report> {
         let mut told = Report::default();
-        for _ in 0..shorter.count {
-            let short = Lent {
-                pace: &shorter.pace,
-                ..lent
+        for _ in 0..substepper.count {
+            let short = SolverContext {
+                time_step: &substepper.time_step,
+                ..context
             };
             let own = Input {
-                last: &shorter.last,
-                before: &shorter.before,
+                last: &substepper.last,
+                before: &substepper.before,
                 still: false,
                 ..*input
             };
-            let report = self.swing_once(short, &own, &mut shorter.next)?;
+            let report = self.swing_once(short, &own, &mut substepper.next)?;
             told = told.and(&report);
             swap(&mut self.motion, &mut self.next);
-            shorter.advance();
+            substepper.advance();
         }
         Ok(Report {
-            substeps: shorter.count,
+            substeps: substepper.count,
             ..told
         })
     }

@@ -31,22 +31,22 @@ impl Integrator {
 
 /// A step's length with what is made for it.
 #[derive(Debug)]
-pub struct Pace {
+pub struct TimeStep {
     pub integrator: Integrator,
     /// Inverse of each node's block of `K + kappa M`, symmetric: xx, xy, xz, yy, yz, zz; mm/µN.
     pub inverse_blocks: Vec<[f32; 6]>,
 }
 
-impl Pace {
+impl TimeStep {
     /// Steps of one length for a body of these diagonal blocks.
     ///
     /// # Errors
     /// [`crate::Error::OutOfMemory`].
-    pub fn new(diagonal: &Diagonal, integrator: Integrator) -> crate::error::Result<Pace> {
+    pub fn new(diagonal: &Diagonal, integrator: Integrator) -> crate::error::Result<TimeStep> {
         let kappa = integrator.kappa();
         let pairs = diagonal.blocks.iter().zip(&diagonal.mass);
         let inverses = pairs.map(|(block, mass)| inverse(*block, kappa * mass));
-        Ok(Pace {
+        Ok(TimeStep {
             integrator,
             inverse_blocks: memory::collected(diagonal.mass.len(), inverses, WHAT)?,
         })

@@ -6,7 +6,7 @@ use crate::memory;
 
 /// Velocities, tools and forces of a published step.
 #[derive(Debug, Default)]
-pub struct Moment {
+pub struct FrameState {
     /// `[K,3]`, mm/s.
     pub velocity: Vec<f32>,
     /// Where the tools were, and their forces; of the step that is being made until it is published.
@@ -19,7 +19,7 @@ pub struct Moment {
     pub step: u64,
 }
 
-impl Moment {
+impl FrameState {
     /// Takes what contact remembers of a step that is about to be published, and makes room for forces at `nodes` nodes.
     ///
     /// # Errors

@@ -12,7 +12,7 @@ pub const MOST_SAMPLES: usize = 96;
 
 /// The contact problem near one tool at the end of a step. All lists have room for [`MOST_SAMPLES`], `count` are used.
 #[derive(Debug)]
-pub struct Slow {
+pub struct ContactSnapshot {
     /// Published states so far; 0: none.
     pub number: u64,
     /// How old it was when it was published, s.
@@ -45,15 +45,15 @@ pub struct Slow {
     pub drive: Vec<f32>,
 }
 
-impl Slow {
+impl ContactSnapshot {
     /// Room for a body of `modes` natural modes.
     ///
     /// # Errors
     /// [`crate::Error::OutOfMemory`].
-    pub fn new(modes: usize) -> Result<Slow> {
+    pub fn new(modes: usize) -> Result<ContactSnapshot> {
         let vectors = || memory::filled(MOST_SAMPLES, Vector::ZERO, WHAT);
         let rows = 3 * MOST_SAMPLES;
-        Ok(Slow {
+        Ok(ContactSnapshot {
             number: 0,
             latency_s: 0.0,
             pose: None,
@@ -87,21 +87,22 @@ mod tests {
     use std::sync::atomic::{AtomicBool, Ordering};
 
     /// One number in every field.
-    fn write(slow: &mut Slow, number: u64) {
+    fn write(snapshot: &mut ContactSnapshot, number: u64) {
         let value = number as f32;
-        slow.points.fill(Vector::splat(value));
-        slow.delassus.fill(value);
-        slow.velocity.fill(value);
-        slow.number = number;
+        snapshot.points.fill(Vector::splat(value));
+        snapshot.delassus.fill(value);
+        snapshot.velocity.fill(value);
+        snapshot.number = number;
     }
 
-    fn is_whole(slow: &Slow) -> bool {
-        let value = slow.number as f32;
-        slow.points
+    fn is_whole(snapshot: &ContactSnapshot) -> bool {
+        let value = snapshot.number as f32;
+        snapshot
+            .points
             .iter()
             .all(|point| *point == Vector::splat(value))
-            && slow.delassus.iter().all(|w| *w == value)
-            && slow.velocity.iter().all(|v| *v == value)
+            && snapshot.delassus.iter().all(|w| *w == value)
+            && snapshot.velocity.iter().all(|v| *v == value)
     }
 
     /// What is read while the other thread writes is of one step, whole, and never older than what was read before.
@@ -109,7 +110,8 @@ mod tests {
     fn a_problem_is_never_torn() {
         // Miri is slow, and looks at each access.
         let count = if cfg!(miri) { 3 } else { 20_000 };
-        let (mut out, mut slow) = exchange([4; 3].map(|modes| Slow::new(modes).unwrap()));
+        let (mut out, mut snapshot) =
+            exchange([4; 3].map(|modes| ContactSnapshot::new(modes).unwrap()));
         let done = AtomicBool::new(false);
         std::thread::scope(|scope| {
             scope.spawn(|| {
@@ -122,8 +124,8 @@ mod tests {
             let mut last = 0;
             loop {
                 let over = done.load(Ordering::Acquire);
-                slow.update();
-                let now = slow.buffer();
+                snapshot.update();
+                let now = snapshot.buffer();
                 assert!(is_whole(now), "torn at {}", now.number);
                 assert!(now.number >= last);
                 last = now.number;

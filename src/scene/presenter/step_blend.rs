@@ -15,7 +15,7 @@ const MOST_STEPS: f64 = 2.0;
 
 /// How far the frames without the last step are from those with it.
 #[derive(Default)]
-pub(super) struct Over {
+pub(super) struct StepBlend {
     /// At the region's nodes when the step was first seen, `[n,3]`, mm.
     offset: Vec<f32>,
     /// Longest of them, mm.
@@ -24,12 +24,12 @@ pub(super) struct Over {
     seen_s: f64,
 }
 
-impl Over {
+impl StepBlend {
     /// Nodes of another region.
-    pub(super) fn of(nodes: usize) -> Result<Over> {
-        Ok(Over {
+    pub(super) fn of(nodes: usize) -> Result<StepBlend> {
+        Ok(StepBlend {
             offset: memory::zeros(3 * nodes, "the present state of a scene")?,
-            ..Over::default()
+            ..StepBlend::default()
         })
     }
 
@@ -100,10 +100,10 @@ mod tests {
     /// What is left of offsets of 0.1, 1 and 20 mm `tau` after a step that was seen at once.
     fn left(tau: f64) -> [f32; 3] {
         let shown = [0.1, 0.0, 0.0, 1.0, 0.0, 0.0, 20.0, 0.0, 0.0];
-        let mut over = Over::of(3).unwrap();
-        over.begin(0.0, &shown, &[0.0; 9]);
+        let mut step_blend = StepBlend::of(3).unwrap();
+        step_blend.begin(0.0, &shown, &[0.0; 9]);
         let mut out = [0.0; 9];
-        over.blend(tau, STEP_S, &mut out);
+        step_blend.blend(tau, STEP_S, &mut out);
         [out[0], out[3], out[6]]
     }
 

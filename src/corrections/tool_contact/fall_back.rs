@@ -2,21 +2,21 @@
 //! (`docs/decisions/018-swept-contact.md`).
 
 use super::{Iterate, SUNK_MM, sunk};
-use crate::contact::Problem;
-use crate::corrections::input::{Input, Lent, Report};
-use crate::corrections::stage::Stage;
+use crate::contact::ContactProblem;
+use crate::corrections::input::{Input, Report, SolverContext};
+use crate::corrections::solver::ImplicitSolver;
 use crate::error::Result;
 
 /// The response of linear elasticity is not shown where it goes farther than this, mm.
 const FARTHEST_MM: f32 = 30.0;
 
-impl Stage {
+impl ImplicitSolver {
     /// The first of the three in which the contact holds, or that in which it is lost by least.
     pub(super) fn fall_back(
         &mut self,
-        lent: Lent<'_>,
+        context: SolverContext<'_>,
         input: &Input<'_>,
-        problem: &mut Problem,
+        problem: &mut ContactProblem,
         at: &mut Iterate<'_>,
         report: &mut Report,
     ) -> Result<()> {
@@ -27,7 +27,7 @@ impl Stage {
         let guessed = lost_by(input, problem, at.u);
         let mut left = guessed;
         if guessed > SUNK_MM {
-            self.respond_from_rest(lent, input, problem, at, report)?;
+            self.respond_from_rest(context, input, problem, at, report)?;
             left = lost_by(input, problem, at.u).min(guessed);
             if left == guessed {
                 problem.take_guess();
@@ -35,9 +35,9 @@ impl Stage {
             }
         }
         match left < f32::MAX {
-            true => self.evaluate(lent, input, at, report)?,
+            true => self.evaluate(context, input, at, report)?,
             // As it was, under the forces that held it there.
-            false => self.stay(lent, input, problem, at, report)?,
+            false => self.stay(context, input, problem, at, report)?,
         }
         Ok(())
     }
@@ -45,9 +45,9 @@ impl Stage {
     /// Linear elasticity from rest, with the tools where they are.
     pub(super) fn respond_from_rest(
         &mut self,
-        lent: Lent<'_>,
+        context: SolverContext<'_>,
         input: &Input<'_>,
-        problem: &mut Problem,
+        problem: &mut ContactProblem,
         at: &mut Iterate<'_>,
         report: &mut Report,
     ) -> Result<()> {
@@ -61,17 +61,17 @@ impl Stage {
         let parts = problem.parts();
         for part in 1..=parts {
             let way = part as f32 / parts as f32;
-            self.press(lent, &from_rest, problem, way, at.u)?;
+            self.press(context, &from_rest, problem, way, at.u)?;
         }
         problem.return_to_ways();
-        self.settle(lent.env(), at.u)?;
+        self.settle(context.env(), at.u)?;
         report.parts = parts;
-        self.evaluate(lent, input, at, report)
+        self.evaluate(context, input, at, report)
     }
 }
 
 /// How deep tools and tissue lie in each other in a state that takes the place of one that lost the contact; without bounds where it has none.
-fn lost_by(input: &Input<'_>, problem: &mut Problem, u: &[f32]) -> f32 {
+fn lost_by(input: &Input<'_>, problem: &mut ContactProblem, u: &[f32]) -> f32 {
     let near = |u: &[f32; 3]| u.iter().map(|x| x * x).sum::<f32>() <= FARTHEST_MM * FARTHEST_MM;
     match u.as_chunks::<3>().0.iter().all(near) {
         true => sunk(input, problem, u, 1.0),
