@@ -131,6 +131,8 @@ pub fn run(rounds: &Rounds<'_>, stage: &mut Stage) -> Result<()> {
                         options.json,
                     )?),
                 };
+                // Its files may be of another run, and are written over before the record is.
+                let _ = std::fs::remove_file(file(&folder, number, "json"));
                 let best = best.as_ref();
                 let Some(mut round) = make(rounds, bench, &folder, number, best, until)? else {
                     stage.decided("no time to end this round; a larger --minutes has it");
