@@ -133,8 +133,8 @@ pub fn run(rounds: &Rounds<'_>, stage: &mut Stage) -> Result<()> {
                 };
                 // Its files may be of another run, and are written over before the record is.
                 let _ = std::fs::remove_file(file(&folder, number, "json"));
-                let best = best.as_ref();
-                let Some(mut round) = make(rounds, bench, &folder, number, best, until)? else {
+                let found = make(rounds, bench, &folder, number, best.as_ref(), until)?;
+                let Some(mut round) = found else {
                     stage.decided("no time to end this round; a larger --minutes has it");
                     break;
                 };
@@ -162,12 +162,10 @@ pub fn run(rounds: &Rounds<'_>, stage: &mut Stage) -> Result<()> {
             break;
         }
     }
-    let found = Best {
-        round: best.as_ref().map_or(0, |(number, _)| *number),
-        errors: best
-            .as_ref()
-            .map_or(Vec::new(), |(_, round)| round.errors.clone()),
-    };
+    let (round, errors) = (best.as_ref()).map_or((0, Vec::new()), |(number, round)| {
+        (*number, round.errors.clone())
+    });
+    let found = Best { round, errors };
     let path = folder.join(ERRORS);
     std::fs::write(&path, serde_json::to_vec_pretty(&found)?)
         .with_context(|| format!("{}: cannot be written", path.display()))?;
