@@ -1441,7 +1441,7 @@ upt_status upt_scene_sample_points(struct upt_scene *scene,
  *
  * - `instruments`: at most 64, all with the same `struct_size`; NULL with count 0 makes a step without contact.
  * - `out`, `out_count`, threads and errors: as in `upt_scene_step`; also `UPT_ERR_UNSUPPORTED` in a build without
- *   feature "contact" and for a bundle without a linear response, `UPT_ERR_STRUCT_SIZE`, and `UPT_ERR_HANDLE` for a hull
+ *   feature "instruments" and for a bundle without a linear response, `UPT_ERR_STRUCT_SIZE`, and `UPT_ERR_HANDLE` for a hull
  *   that was destroyed.
  */
 upt_status upt_scene_step_instruments(struct upt_scene *scene,
@@ -1468,7 +1468,7 @@ upt_status upt_scene_submit_instruments(struct upt_scene *scene,
  * - `count`: instruments of that step.
  *
  * Threads: any, at any time, even while a step runs.
- * Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "contact", `UPT_ERR_NULL`, `UPT_ERR_HANDLE`,
+ * Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "instruments", `UPT_ERR_NULL`, `UPT_ERR_HANDLE`,
  * `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT` if the last step had another number of instruments.
  */
 upt_status upt_scene_instrument_readings(struct upt_scene *scene,
@@ -1482,7 +1482,7 @@ upt_status upt_scene_instrument_readings(struct upt_scene *scene,
  * - `needed`: number of points, always written; may be NULL.
  *
  * Threads: any, at any time, even while a step runs.
- * Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "contact", `UPT_ERR_NULL`, `UPT_ERR_HANDLE`,
+ * Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "instruments", `UPT_ERR_NULL`, `UPT_ERR_HANDLE`,
  * `UPT_ERR_ARGUMENT` if capacity is too small.
  */
 upt_status upt_scene_instrument_contacts(struct upt_scene *scene,
@@ -1499,7 +1499,7 @@ upt_status upt_scene_instrument_contacts(struct upt_scene *scene,
  *
  * Threads: any.
  * Errors: `UPT_ERR_NULL`, `UPT_ERR_ARGUMENT` for points that are not finite, too many, or without volume,
- * `UPT_ERR_UNSUPPORTED` in a build without feature "contact", `UPT_ERR_OUT_OF_MEMORY`.
+ * `UPT_ERR_UNSUPPORTED` in a build without feature "instruments", `UPT_ERR_OUT_OF_MEMORY`.
  */
 upt_status upt_hull_create(const float *points,
                            uint64_t point_count,
@@ -1528,7 +1528,7 @@ upt_status upt_hull_destroy(struct upt_hull *hull);
  *
  * Threads: one thread at a time presents; another may step or submit meanwhile.
  * Errors: `UPT_ERR_BUSY` while another thread presents, and if a step is in flight at the first call;
- * `UPT_ERR_UNSUPPORTED` in a build without feature "contact", for a bundle without a linear response or corrections, and
+ * `UPT_ERR_UNSUPPORTED` in a build without feature "instruments", for a bundle without a linear response or corrections, and
  * for a scene without corrections; `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`,
  * `UPT_ERR_NON_FINITE`, `UPT_ERR_STATE`, `UPT_ERR_RUNTIME`, `UPT_ERR_IO`, `UPT_ERR_BUNDLE`, `UPT_ERR_OUT_OF_MEMORY`,
  * `UPT_ERR_PANIC`.
@@ -1611,7 +1611,7 @@ upt_status upt_scene_present_points_contacts(struct upt_scene *scene,
  * Threads: one at a time on the scene.
  * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also for a hull that was destroyed), `UPT_ERR_STRUCT_SIZE`,
  * `UPT_ERR_ARGUMENT`, `UPT_ERR_NON_FINITE`, `UPT_ERR_BUSY` also while a step is in flight, `UPT_ERR_UNSUPPORTED` in a
- * build without feature "haptics", for a bundle without a linear response or corrections, and for a scene without
+ * build without feature "instruments", for a bundle without a linear response or corrections, and for a scene without
  * corrections; `UPT_ERR_RUNTIME`, `UPT_ERR_IO`, `UPT_ERR_BUNDLE`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
  */
 upt_status upt_haptics_create(struct upt_scene *scene,
@@ -1631,7 +1631,7 @@ upt_status upt_haptics_create(struct upt_scene *scene,
  * Threads: one at a time on the object; any other on the scene.
  * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_NON_FINITE` and `UPT_ERR_ARGUMENT` for the
  * pose and a time before the last; `UPT_ERR_BUSY` while another thread is in a call on this object; `UPT_ERR_STATE` once
- * the scene was destroyed; `UPT_ERR_UNSUPPORTED` in a build without feature "haptics"; `UPT_ERR_PANIC`.
+ * the scene was destroyed; `UPT_ERR_UNSUPPORTED` in a build without feature "instruments"; `UPT_ERR_PANIC`.
  */
 upt_status upt_haptics_render(struct upt_haptics *haptics,
                               const struct upt_haptic_pose *pose,
@@ -1642,7 +1642,7 @@ upt_status upt_haptics_render(struct upt_haptics *haptics,
  *
  * Threads: any.
  * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also if it was destroyed before), `UPT_ERR_BUSY` while another thread is in
- * a call on it, `UPT_ERR_UNSUPPORTED` in a build without feature "haptics".
+ * a call on it, `UPT_ERR_UNSUPPORTED` in a build without feature "instruments".
  */
 upt_status upt_haptics_destroy(struct upt_haptics *haptics);
 
@@ -1658,7 +1658,7 @@ upt_status upt_haptics_destroy(struct upt_haptics *haptics);
  * - `contact_count`: number of contacts found, always written.
  *
  * Threads: one at a time.
- * Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "contact", `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`,
+ * Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "instruments", `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`,
  * `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_NON_FINITE`, `UPT_ERR_ARGUMENT` (also when capacity is too small),
  * `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
  */
@@ -1682,7 +1682,7 @@ upt_status upt_scene_contacts_from_instruments(struct upt_scene *scene,
  * - `out_count`: number of floats in `out`, 3 m.
  *
  * Threads: one at a time.
- * Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "forces", `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`,
+ * Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "instruments", `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`,
  * `UPT_ERR_ARGUMENT`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
  */
 upt_status upt_scene_contact_force(struct upt_scene *scene,

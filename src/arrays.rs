@@ -1,5 +1,5 @@
 //! Fields as arrays of the crate `ndarray`: `[n,3]` float32, row-major, without a copy where the library's own memory can be
-//! lent. The cargo feature `ndarray`; a C host has none of it.
+//! lent. A C host has none of it.
 
 use ndarray::{Array2, ArrayView2};
 

@@ -108,7 +108,6 @@ impl Error {
     }
 
     /// Says which of a host's instruments an argument is of.
-    #[cfg(feature = "contact")]
     pub(crate) fn of_instrument(self, index: usize) -> Self {
         match self {
             Error::Argument(text) => Error::Argument(format!("instruments[{index}]: {text}")),
@@ -146,7 +145,6 @@ mod tests {
     use super::*;
 
     #[test]
-    #[cfg(feature = "contact")]
     fn an_argument_tells_its_instrument() {
         let error = Error::Argument("radius is 0".into()).of_instrument(3);
         assert_eq!(error.to_string(), "instruments[3]: radius is 0");

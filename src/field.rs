@@ -87,7 +87,6 @@ impl ContactSet {
     }
 
     /// Takes nodes, ascending, each where `field [K,3]` has it.
-    #[cfg(feature = "contact")]
     pub fn take_nodes(&mut self, nodes: &[u32], field: &[f32]) {
         self.clear();
         for &node in nodes {

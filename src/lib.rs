@@ -5,8 +5,8 @@
 //! of the instruments, and gives the next displacement, `u[t+dt] = M(u[t], c[t])`.
 //! Lengths are mm, forces mN, fields row-major `[K,3]` float32.
 //!
-#![cfg_attr(feature = "contact", doc = "```")]
-#![cfg_attr(not(feature = "contact"), doc = "```ignore")]
+#![cfg_attr(feature = "instruments", doc = "```")]
+#![cfg_attr(not(feature = "instruments"), doc = "```ignore")]
 //! use std::path::Path;
 //! use upt::{Contact, IndexSet, Model, ModelOptions, Scene, SceneOptions, Shape, StepInput, Tool};
 //!
@@ -35,17 +35,15 @@
 //! The guide is `docs/guide/rust.md` of the repository; the C ABI, with all of the rules, is `docs/reference/abi.md`.
 
 /// The guide's program is compiled with the tests.
-#[cfg(all(doctest, feature = "contact"))]
+#[cfg(all(doctest, feature = "instruments"))]
 #[doc = include_str!("../docs/guide/rust.md")]
 struct Guide;
 
-#[cfg(feature = "ndarray")]
 mod arrays;
-#[cfg(feature = "haptics")]
 pub mod haptics;
-#[cfg(feature = "contact")]
 pub mod instrument;
 
+mod features;
 mod field;
 mod memory;
 mod output;
@@ -56,7 +54,6 @@ mod stored;
 #[doc(hidden)]
 pub mod bundle;
 #[doc(hidden)]
-#[cfg(feature = "contact")]
 pub mod contact;
 #[doc(hidden)]
 pub mod corrections;
@@ -67,7 +64,6 @@ pub mod error;
 #[doc(hidden)]
 pub mod ffi;
 #[doc(hidden)]
-#[cfg(feature = "forces")]
 pub mod forces;
 #[doc(hidden)]
 pub mod graph;
@@ -92,9 +88,7 @@ pub mod scene;
 #[doc(hidden)]
 pub mod stats;
 
-#[cfg(feature = "contact")]
 pub use ::contact::{Shape, ShapeError};
-#[cfg(feature = "contact")]
 pub use contact::{MAX_TOOLS, Mode, Push, Reading, Told, Tool};
 pub use error::{Error, Result};
 pub use library::{init, shutdown};

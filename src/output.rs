@@ -43,7 +43,6 @@ impl<'a, T: Copy> Output<'a, T> {
     ///
     /// # Panics
     /// Where there are fewer.
-    #[cfg(any(test, feature = "contact"))]
     pub fn first(self, len: usize) -> Output<'a, T> {
         assert!(
             len <= self.len,
@@ -81,7 +80,6 @@ impl<'a, T: Copy> Output<'a, T> {
     }
 
     /// Writes `value` everywhere; then it is a list as any other.
-    #[cfg(any(test, feature = "contact"))]
     pub fn filled(mut self, value: T) -> &'a mut [T] {
         // SAFETY: values are written, and nothing is read.
         unsafe { self.cells() }.fill(MaybeUninit::new(value));

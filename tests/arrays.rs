@@ -1,5 +1,4 @@
 //! The Rust interface with fields as arrays: the same bits as with slices, and errors that say what to do.
-#![cfg(feature = "ndarray")]
 
 mod fixture;
 

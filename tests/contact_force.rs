@@ -1,5 +1,5 @@
 //! The reaction at the contact nodes: which method, whose numbers, and that it belongs to the published contact.
-#![cfg(feature = "forces")]
+#![cfg(feature = "instruments")]
 
 mod fixture;
 

@@ -210,7 +210,7 @@ fn wild_contacts_stay_finite_and_the_tissue_comes_back() {
     }
 }
 
-#[cfg(feature = "forces")]
+#[cfg(feature = "instruments")]
 #[test]
 fn the_contact_force_is_the_works_derivative() {
     // The virtual work of the contact forces on a small change of depth is the change of the strain energy, at rest: a slow push, held.
@@ -249,7 +249,7 @@ fn the_contact_force_is_the_works_derivative() {
 }
 
 /// Strain energy, nJ.
-#[cfg(feature = "forces")]
+#[cfg(feature = "instruments")]
 fn energy(model: &upt::Model, u: &[f32]) -> f64 {
     let mesh = &model.mesh;
     let moduli = model.manifest.material.moduli();

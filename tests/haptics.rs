@@ -1,5 +1,5 @@
 //! The force of one tool between steps: what a hand feels.
-#![cfg(feature = "haptics")]
+#![cfg(feature = "instruments")]
 
 mod fixture;
 

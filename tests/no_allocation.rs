@@ -1,6 +1,6 @@
 //! A step in steady state makes no heap allocation through Rust's allocator, and leaves the host's floating-point
 //! mode as it was.
-#![cfg(all(feature = "contact", feature = "forces"))]
+#![cfg(feature = "instruments")]
 #![allow(
     clippy::undocumented_unsafe_blocks,
     reason = "a host in a test: every call keeps to the header, or breaks it on purpose"
@@ -112,7 +112,6 @@ fn frames_allocate_nothing() {
 }
 
 /// The hand's thread and a scene that a hand feels.
-#[cfg(feature = "haptics")]
 fn haptics_allocate_nothing() {
     use upt::haptics::{HapticOptions, HapticPose};
     let model = model("tiny-corrected");
@@ -164,7 +163,6 @@ fn steps_allocate_nothing_and_keep_the_floating_point_mode() {
     }
     tools_allocate_nothing();
     frames_allocate_nothing();
-    #[cfg(feature = "haptics")]
     haptics_allocate_nothing();
     for name in BUNDLES {
         for (kernel, step_path) in [

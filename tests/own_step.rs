@@ -1,5 +1,5 @@
 //! Scenes whose steps are shorter than the bundle's: what they refuse, and that they are the same tissue.
-#![cfg(feature = "contact")]
+#![cfg(feature = "instruments")]
 
 mod fixture;
 

@@ -1,5 +1,5 @@
 //! The tissue between steps: what a frame shows of it.
-#![cfg(feature = "contact")]
+#![cfg(feature = "instruments")]
 
 mod fixture;
 

@@ -1,5 +1,5 @@
 //! Tools that a sample of the surface alone would miss: quick ones, thin ones, ones that start in the tissue, and grasps that leap.
-#![cfg(feature = "contact")]
+#![cfg(feature = "instruments")]
 
 use std::path::Path;
 use std::sync::Arc;

@@ -107,7 +107,7 @@ fn a_restored_scene_knows_its_contacts() {
         restored.last_contacts().unwrap(),
         original.last_contacts().unwrap()
     );
-    #[cfg(feature = "forces")]
+    #[cfg(feature = "instruments")]
     {
         let (mut a, mut b) = ([0.0; 6], [0.0; 6]);
         original.contact_force(&mut a).unwrap();

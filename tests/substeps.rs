@@ -1,5 +1,5 @@
 //! Steps that are made of shorter ones where one alone would miss the target: when, what they gain, and what is refused.
-#![cfg(feature = "contact")]
+#![cfg(feature = "instruments")]
 
 mod fixture;
 

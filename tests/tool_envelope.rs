@@ -1,5 +1,5 @@
 //! Flags in the terms of tools: a bundle whose manifest says which rigid tools it is good for (`envelope.tools`).
-#![cfg(feature = "contact")]
+#![cfg(feature = "instruments")]
 
 mod fixture;
 

@@ -34,7 +34,7 @@ Tissue::Tissue(const std::string &bundle, const Effort &effort)
     scene_.step_instruments({});
     scene_.reset();
   } catch (const upt::error &error) {
-    // No linear response, or a library without feature "contact".
+    // No linear response, or a library without feature "instruments".
     if (error.status() != UPT_ERR_UNSUPPORTED) {
       throw;
     }

@@ -344,7 +344,7 @@ impl Manifest {
             .as_ref()
             .and_then(|entry| entry.frame_step_s);
         match own {
-            Some(step_s) if cfg!(feature = "contact") => step_s,
+            Some(step_s) if crate::features::HAS_INSTRUMENTS => step_s,
             _ => self.dt_s,
         }
     }

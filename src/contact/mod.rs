@@ -28,7 +28,6 @@ pub use compliance::Compliance;
 pub(crate) use compliance::Delassus;
 pub use past::Past;
 pub use problem::ContactProblem;
-#[cfg(feature = "haptics")]
 pub(crate) use rows::{Pair, outward};
 pub use state::State;
 pub(crate) use state::vector;

@@ -46,7 +46,6 @@ impl Report {
 /// The step being corrected.
 pub struct Input<'a> {
     /// Rest positions `[K,3]`, mm.
-    #[cfg(feature = "contact")]
     pub rest: &'a [f32],
     /// Prescribed nodes and where they end, mm.
     pub contact: &'a ContactSet,

@@ -4,7 +4,6 @@
 //! Prescribed nodes are masked: their rows of `s` and `y` are left out of every product, so the pairs need not be dropped when the
 //! contact changes.
 
-#[cfg(feature = "contact")]
 mod recursion;
 
 use super::history::{PAIRS, Pair};
@@ -25,9 +24,7 @@ pub struct Memory {
     /// The same of the last published state.
     published: Vec<usize>,
     /// `U^T y` in the block bases, of the slots of which it is known.
-    #[cfg(feature = "contact")]
     coordinates: Vec<Vec<f32>>,
-    #[cfg(feature = "contact")]
     projected: [bool; SLOTS],
     /// `s_i . y_j` over all nodes, by slot, where `i` is not newer than `j`: the recursions ask for no others.
     products: Vec<[f64; SLOTS]>,
@@ -41,7 +38,6 @@ impl Memory {
     ///
     /// # Errors
     /// [`crate::Error::OutOfMemory`].
-    #[cfg_attr(not(feature = "contact"), allow(unused_variables))]
     pub fn new(len: usize, width: usize) -> Result<Memory> {
         let vectors = |len: usize| -> Result<Vec<Vec<f32>>> {
             (0..SLOTS)
@@ -51,9 +47,7 @@ impl Memory {
         Ok(Memory {
             steps: vectors(len)?,
             changes: vectors(len)?,
-            #[cfg(feature = "contact")]
             coordinates: vectors(width)?,
-            #[cfg(feature = "contact")]
             projected: [false; SLOTS],
             order: memory::room(SLOTS, "L-BFGS pairs")?,
             published: memory::room(SLOTS, "L-BFGS pairs")?,
@@ -80,10 +74,7 @@ impl Memory {
 
     /// Bytes held.
     pub fn memory_bytes(&self) -> usize {
-        #[cfg(feature = "contact")]
         let width = self.coordinates[0].len();
-        #[cfg(not(feature = "contact"))]
-        let width = 0;
         SLOTS * (8 * self.steps[0].len() + 4 * width)
     }
 
@@ -153,10 +144,7 @@ impl Memory {
             self.products[i][slot] = value;
             self.masked[i][slot] = value;
         }
-        #[cfg(feature = "contact")]
-        {
-            self.projected[slot] = false;
-        }
+        self.projected[slot] = false;
         if self.products[slot][slot] <= 0.0 {
             self.order.retain(|&other| other != slot);
         }

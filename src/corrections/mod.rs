@@ -21,10 +21,8 @@ mod precondition;
 mod prescribed;
 mod solver;
 mod substepper;
-#[cfg(feature = "contact")]
 mod substeps;
 mod time_step;
-#[cfg(feature = "contact")]
 mod tool_contact;
 
 use std::sync::Arc;
@@ -43,7 +41,6 @@ pub use input::{Enough, Input, Report, SolverContext};
 pub use motion::Motion;
 pub use solver::{ImplicitSolver, SMALLEST_DET};
 pub use substepper::Substepper;
-#[cfg(feature = "contact")]
 pub use substeps::Substeps;
 pub use time_step::{Integrator, TimeStep};
 

@@ -3,13 +3,11 @@
 
 use std::ops::Range;
 
-#[cfg(feature = "contact")]
 use super::precondition::DIAGONAL_WEIGHT;
 use super::precondition::Env;
 use crate::error::Result;
 use crate::kernels::Pool;
 use crate::kernels::parts::Parts;
-#[cfg(feature = "contact")]
 use crate::kernels::vectors::piece_add;
 use crate::kernels::vectors::{PartialSums, piece_dots};
 
@@ -68,7 +66,6 @@ pub(super) fn sum_of_squares(count: usize, value: impl Fn(usize) -> f32) -> f32 
 }
 
 /// `r += sum_i factors_i ys_i`, `t = w D^-1 r`, `work_i = ys_i . t`.
-#[cfg(feature = "contact")]
 pub(super) fn smooth(
     env: Env<'_>,
     (ys, factors): (&[&[f32]], &[f32]),
@@ -100,7 +97,6 @@ pub(super) fn smooth(
 }
 
 /// `t = w D^-1 r`.
-#[cfg(feature = "contact")]
 fn diagonal(blocks: &[[f32; 6]], r: &[f32], t: &mut [f32]) {
     let w = DIAGONAL_WEIGHT;
     let rows = r.as_chunks::<3>().0.iter();
@@ -114,7 +110,6 @@ fn diagonal(blocks: &[[f32; 6]], r: &[f32], t: &mut [f32]) {
 }
 
 /// `t = -(t + sum_i factors_i rows_i)`.
-#[cfg(feature = "contact")]
 pub(super) fn negative_sum(
     env: Env<'_>,
     rows: &[&[f32]],
@@ -132,7 +127,6 @@ pub(super) fn negative_sum(
 }
 
 /// `d += change` where nodes are free and zero where they are held, `moved = u + d`; gives `g . d` and `d . d`.
-#[cfg(feature = "contact")]
 pub(super) fn advance(
     env: Env<'_>,
     [u, g]: [&[f32]; 2],
@@ -167,7 +161,6 @@ pub(super) fn advance(
 }
 
 /// `u += change` where nodes are free; the change is lost at held ones.
-#[cfg(feature = "contact")]
 pub(super) fn add(env: Env<'_>, change: &mut [f32], u: &mut [f32]) -> Result<()> {
     let len = u.len();
     let (u, change) = (Parts::new(u), Parts::new(change));

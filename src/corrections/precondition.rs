@@ -44,14 +44,11 @@ pub struct Env<'a> {
 pub struct Preconditioner {
     inertial_compliance: Vec<f32>,
     /// `1 / (m (w² + kappa))` of each natural mode, mm/µN.
-    #[cfg(feature = "contact")]
     moved_freely: Vec<f32>,
     pub(super) starts: Vec<usize>,
     plan: RowPlan,
     /// Nodes of the domain, which tools touch.
-    #[cfg(feature = "contact")]
     domain: RowPlan,
-    #[cfg(feature = "contact")]
     pub(super) domain_nodes: Vec<u32>,
     /// Contact dofs with columns, as rows of the prior's tables.
     dofs: Vec<u32>,
@@ -89,7 +86,6 @@ impl Preconditioner {
         let dofs = 3 * env.prior.contact_nodes.len();
         let room = dofs.min(ROOM);
         let nodes = memory::collected(env.body.mass.len(), 0..env.body.mass.len() as u32, WHAT)?;
-        #[cfg(feature = "contact")]
         let domain_nodes = {
             let inside = nodes
                 .iter()
@@ -99,13 +95,10 @@ impl Preconditioner {
         };
         Ok(Preconditioner {
             inertial_compliance: env.space.inertial_compliance(kappa)?,
-            #[cfg(feature = "contact")]
             moved_freely: env.space.moved_freely(kappa)?,
             starts: env.prior.basis_starts()?,
             plan: RowPlan::try_region(&env.prior.basis(), &nodes, false)?,
-            #[cfg(feature = "contact")]
             domain: RowPlan::try_region(&env.prior.basis(), &domain_nodes, false)?,
-            #[cfg(feature = "contact")]
             domain_nodes,
             dofs: memory::room(dofs, WHAT)?,
             columns: memory::room(dofs / 3, WHAT)?,
@@ -152,7 +145,6 @@ impl Preconditioner {
     }
 
     /// Takes nodes that loads act on (ascending): the responses to forces on them join the modes in the coarse space.
-    #[cfg(feature = "contact")]
     pub fn engage(&mut self, env: Env<'_>, nodes: &[u32]) -> Result<()> {
         self.take(env, nodes, true)
     }
@@ -329,10 +321,7 @@ impl Preconditioner {
     }
 
     fn domain_bytes(&self) -> usize {
-        #[cfg(feature = "contact")]
-        return self.domain.memory_bytes() + 4 * self.domain_nodes.capacity();
-        #[cfg(not(feature = "contact"))]
-        0
+        self.domain.memory_bytes() + 4 * self.domain_nodes.capacity()
     }
 }
 

@@ -40,22 +40,17 @@ pub struct ImplicitSolver {
     pub(super) q: Vec<f32>,
     pub(super) u: Vec<f32>,
     /// The first guess of a step that tools drive.
-    #[cfg(feature = "contact")]
     pub(super) guess: Vec<f32>,
     /// `M p`: inertia of the step at the last displacement, µN.
     pub(super) drift: Vec<f32>,
     pub(super) partial: PartialSums,
     /// Where the tissue would be, at the nodes of the domain.
-    #[cfg(feature = "contact")]
     pub(super) touched: Vec<f32>,
     /// `U^T g` of the state that stands.
-    #[cfg(feature = "contact")]
     pub(super) projected: Vec<f32>,
     /// Whether that is known.
-    #[cfg(feature = "contact")]
     pub(super) is_projected: bool,
     /// `d . d` of the last iteration.
-    #[cfg(feature = "contact")]
     pub(super) moved: f64,
     pub(super) free: Oscillators,
 }
@@ -87,17 +82,12 @@ impl ImplicitSolver {
             d: field()?,
             q: field()?,
             u: field()?,
-            #[cfg(feature = "contact")]
             guess: field()?,
             drift: field()?,
             partial: PartialSums::with_room(len, PAIRS)?,
-            #[cfg(feature = "contact")]
             touched: field()?,
-            #[cfg(feature = "contact")]
             projected: memory::zeros(env.prior.width(), "the corrections of a scene")?,
-            #[cfg(feature = "contact")]
             is_projected: false,
-            #[cfg(feature = "contact")]
             moved: 0.0,
             free: Oscillators::default(),
         })
@@ -161,7 +151,6 @@ impl ImplicitSolver {
     pub fn memory_bytes(&self) -> usize {
         // Eight fields, two velocities and the inertia of two states; contact forces of two states and two evaluations, contact nodes.
         let fields = (8 + 6 + 4) * 4 * self.g.len() + 4 * self.g.len() / 3;
-        #[cfg(feature = "contact")]
         let fields = fields + 4 * self.projected.len();
         self.memory.memory_bytes()
             + self.preconditioner.memory_bytes()

@@ -81,7 +81,6 @@ pub(super) fn index_set(value: i32) -> Result<IndexSet, Failure> {
 }
 
 /// An instrument, for each call that takes one.
-#[cfg(feature = "contact")]
 pub(super) fn tool(index: usize, raw: &upt_instrument) -> Result<crate::contact::Tool, Failure> {
     use crate::contact::{Mode, Tool};
     reserved(&raw.reserved)?;

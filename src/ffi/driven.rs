@@ -2,27 +2,17 @@
 
 use super::call::call;
 use super::constants::*;
-#[cfg(not(feature = "contact"))]
-use super::failure::fail;
-use super::output::{copy_out, place};
-use super::pointers::slice;
-use super::registry::call_scene;
+use super::convert;
+use super::failure::Failure;
+use super::output::{copy_out, fill, optional_output, place};
+use super::pointers::{each, slice};
+use super::registry::{add_hull, call_scene, remove_hull};
 use super::structs::*;
-#[cfg(feature = "contact")]
-use {
-    super::convert,
-    super::failure::Failure,
-    super::output::{fill, optional_output},
-    super::pointers::each,
-    super::registry::{add_hull, remove_hull},
-    crate::contact::{MAX_TOOLS, Tool},
-    crate::error::Error,
-    crate::scene::{Contact, Scene, StepInput},
-    ::contact::{Body, Shape},
-};
-
-#[cfg(not(feature = "contact"))]
-const WITHOUT: &str = "this build has no feature \"contact\"";
+use crate::contact::{MAX_TOOLS, Tool};
+use crate::error::Error;
+use crate::features;
+use crate::scene::{Contact, Scene, StepInput};
+use ::contact::{Body, Shape};
 
 /// One step from the scene's own state, driven by rigid instruments. Their contact with the tissue is solved.
 ///
@@ -34,7 +24,7 @@ const WITHOUT: &str = "this build has no feature \"contact\"";
 ///
 /// - `instruments`: at most 64, all with the same `struct_size`; NULL with count 0 makes a step without contact.
 /// - `out`, `out_count`, threads and errors: as in `upt_scene_step`; also `UPT_ERR_UNSUPPORTED` in a build without
-///   feature "contact" and for a bundle without a linear response, `UPT_ERR_STRUCT_SIZE`, and `UPT_ERR_HANDLE` for a hull
+///   feature "instruments" and for a bundle without a linear response, `UPT_ERR_STRUCT_SIZE`, and `UPT_ERR_HANDLE` for a hull
 ///   that was destroyed.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_scene_step_instruments(
@@ -44,27 +34,20 @@ pub unsafe extern "C" fn upt_scene_step_instruments(
     out: *mut f32,
     out_count: u64,
 ) -> upt_status {
-    call_scene("upt_scene_step_instruments", scene, |_scene| {
-        #[cfg(feature = "contact")]
-        {
-            _scene.with_tools(|tools| {
-                // SAFETY: the host passes that many instruments, as the header asks.
-                unsafe { read_tools(instruments, instrument_count, tools) }?;
-                let input = StepInput {
-                    displacement: None,
-                    contact: Contact::Tools(tools),
-                };
-                // SAFETY: the host passes room for that many elements, as the header asks.
-                let out = unsafe { optional_output(out, out_count, "out") }?;
-                _scene.step_to(input, out)?;
-                Ok(UPT_OK)
-            })
-        }
-        #[cfg(not(feature = "contact"))]
-        {
-            let _ = (instruments, instrument_count, out, out_count);
-            fail(UPT_ERR_UNSUPPORTED, WITHOUT)
-        }
+    call_scene("upt_scene_step_instruments", scene, |scene| {
+        features::instruments()?;
+        scene.with_tools(|tools| {
+            // SAFETY: the host passes that many instruments, as the header asks.
+            unsafe { read_tools(instruments, instrument_count, tools) }?;
+            let input = StepInput {
+                displacement: None,
+                contact: Contact::Tools(tools),
+            };
+            // SAFETY: the host passes room for that many elements, as the header asks.
+            let out = unsafe { optional_output(out, out_count, "out") }?;
+            scene.step_to(input, out)?;
+            Ok(UPT_OK)
+        })
     })
 }
 
@@ -79,21 +62,14 @@ pub unsafe extern "C" fn upt_scene_submit_instruments(
     instruments: *const upt_instrument,
     instrument_count: u64,
 ) -> upt_status {
-    call_scene("upt_scene_submit_instruments", scene, |_scene| {
-        #[cfg(feature = "contact")]
-        {
-            _scene.with_tools(|tools| {
-                // SAFETY: the host passes that many instruments, as the header asks.
-                unsafe { read_tools(instruments, instrument_count, tools) }?;
-                _scene.submit_tools(tools)?;
-                Ok(UPT_OK)
-            })
-        }
-        #[cfg(not(feature = "contact"))]
-        {
-            let _ = (instruments, instrument_count);
-            fail(UPT_ERR_UNSUPPORTED, WITHOUT)
-        }
+    call_scene("upt_scene_submit_instruments", scene, |scene| {
+        features::instruments()?;
+        scene.with_tools(|tools| {
+            // SAFETY: the host passes that many instruments, as the header asks.
+            unsafe { read_tools(instruments, instrument_count, tools) }?;
+            scene.submit_tools(tools)?;
+            Ok(UPT_OK)
+        })
     })
 }
 
@@ -103,7 +79,7 @@ pub unsafe extern "C" fn upt_scene_submit_instruments(
 /// - `count`: instruments of that step.
 ///
 /// Threads: any, at any time, even while a step runs.
-/// Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "contact", `UPT_ERR_NULL`, `UPT_ERR_HANDLE`,
+/// Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "instruments", `UPT_ERR_NULL`, `UPT_ERR_HANDLE`,
 /// `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT` if the last step had another number of instruments.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_scene_instrument_readings(
@@ -111,41 +87,34 @@ pub unsafe extern "C" fn upt_scene_instrument_readings(
     out: *mut upt_instrument_reading,
     count: u64,
 ) -> upt_status {
-    call_scene("upt_scene_instrument_readings", scene, |_scene| {
-        #[cfg(feature = "contact")]
-        {
-            _scene.with_told(|told| {
-                let have = told.readings.len() as u64;
-                if count != have {
-                    return Err(Error::Argument(format!(
-                        "count is {count}, the last step had {have} instruments"
-                    ))
-                    .into());
-                }
-                for (index, reading) in told.readings.iter().enumerate() {
-                    let make = |struct_size| {
-                        Ok(upt_instrument_reading {
-                            struct_size,
-                            contact_count: reading.contacts,
-                            force: reading.force,
-                            torque: reading.torque,
-                            penetration_mm: reading.penetration_mm,
-                            torn: reading.torn.into(),
-                            reserved: [0; 3],
-                            residual_mm: reading.residual_mm,
-                        })
-                    };
-                    // SAFETY: `out` points to a struct whose first field is its size, as the header asks.
-                    unsafe { fill(out.wrapping_add(index), make) }?;
-                }
-                Ok(UPT_OK)
-            })
-        }
-        #[cfg(not(feature = "contact"))]
-        {
-            let _ = (out, count);
-            fail(UPT_ERR_UNSUPPORTED, WITHOUT)
-        }
+    call_scene("upt_scene_instrument_readings", scene, |scene| {
+        features::instruments()?;
+        scene.with_told(|told| {
+            let have = told.readings.len() as u64;
+            if count != have {
+                return Err(Error::Argument(format!(
+                    "count is {count}, the last step had {have} instruments"
+                ))
+                .into());
+            }
+            for (index, reading) in told.readings.iter().enumerate() {
+                let make = |struct_size| {
+                    Ok(upt_instrument_reading {
+                        struct_size,
+                        contact_count: reading.contacts,
+                        force: reading.force,
+                        torque: reading.torque,
+                        penetration_mm: reading.penetration_mm,
+                        torn: reading.torn.into(),
+                        reserved: [0; 3],
+                        residual_mm: reading.residual_mm,
+                    })
+                };
+                // SAFETY: `out` points to a struct whose first field is its size, as the header asks.
+                unsafe { fill(out.wrapping_add(index), make) }?;
+            }
+            Ok(UPT_OK)
+        })
     })
 }
 
@@ -155,7 +124,7 @@ pub unsafe extern "C" fn upt_scene_instrument_readings(
 /// - `needed`: number of points, always written; may be NULL.
 ///
 /// Threads: any, at any time, even while a step runs.
-/// Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "contact", `UPT_ERR_NULL`, `UPT_ERR_HANDLE`,
+/// Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "instruments", `UPT_ERR_NULL`, `UPT_ERR_HANDLE`,
 /// `UPT_ERR_ARGUMENT` if capacity is too small.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_scene_instrument_contacts(
@@ -164,27 +133,23 @@ pub unsafe extern "C" fn upt_scene_instrument_contacts(
     capacity: u64,
     needed: *mut u64,
 ) -> upt_status {
-    call_scene("upt_scene_instrument_contacts", scene, |_scene| {
-        #[cfg(feature = "contact")]
-        {
-            _scene.with_told(|told| {
-                let contacts = told.pushes.iter().map(|push| upt_instrument_contact {
-                    instrument: push.tool,
-                    position: push.point,
-                    force: push.force,
-                });
-                let count = told.pushes.len();
-                let contacts = crate::memory::collected(count, contacts, "the contacts")?;
-                // SAFETY: `out` has room for `capacity` elements and `needed` is NULL or writable, as the header asks.
-                unsafe { copy_out(&contacts, out, capacity, needed) }
-            })
-        }
-        #[cfg(not(feature = "contact"))]
-        {
+    call_scene("upt_scene_instrument_contacts", scene, |scene| {
+        if let Err(error) = features::instruments() {
             // SAFETY: `out` has room for `capacity` elements and `needed` is NULL or writable, as the header asks.
             let _ = unsafe { copy_out::<upt_instrument_contact>(&[], out, capacity, needed) };
-            fail(UPT_ERR_UNSUPPORTED, WITHOUT)
+            return Err(error.into());
         }
+        scene.with_told(|told| {
+            let contacts = told.pushes.iter().map(|push| upt_instrument_contact {
+                instrument: push.tool,
+                position: push.point,
+                force: push.force,
+            });
+            let count = told.pushes.len();
+            let contacts = crate::memory::collected(count, contacts, "the contacts")?;
+            // SAFETY: `out` has room for `capacity` elements and `needed` is NULL or writable, as the header asks.
+            unsafe { copy_out(&contacts, out, capacity, needed) }
+        })
     })
 }
 
@@ -196,7 +161,7 @@ pub unsafe extern "C" fn upt_scene_instrument_contacts(
 ///
 /// Threads: any.
 /// Errors: `UPT_ERR_NULL`, `UPT_ERR_ARGUMENT` for points that are not finite, too many, or without volume,
-/// `UPT_ERR_UNSUPPORTED` in a build without feature "contact", `UPT_ERR_OUT_OF_MEMORY`.
+/// `UPT_ERR_UNSUPPORTED` in a build without feature "instruments", `UPT_ERR_OUT_OF_MEMORY`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_hull_create(
     points: *const f32,
@@ -208,32 +173,23 @@ pub unsafe extern "C" fn upt_hull_create(
         || (),
         || {
             // SAFETY: the header asks for a place to write.
-            let _out = unsafe { place(out, "out") }?;
-            #[cfg(feature = "contact")]
-            {
-                const MOST: u64 = 100_000;
-                if !(4..=MOST).contains(&point_count) {
-                    return Err(Error::Argument(format!(
-                        "point_count is {point_count}, must be 4 to {MOST}"
-                    ))
-                    .into());
-                }
-                // SAFETY: the host passes that many elements, as the header asks.
-                let points = unsafe { slice(points, 3 * point_count, "points") }?;
-                crate::memory::probe(1024 * point_count as usize, "a hull")?;
-                let bad =
-                    |error: ::contact::ShapeError| Error::Argument(format!("points: {error}"));
-                let shape = Shape::hull_of(points.as_chunks().0).map_err(bad)?;
-                let body = Body::new(&shape).map_err(bad)?;
-                _out.set(add_hull(body));
-                Ok(UPT_OK)
+            let out = unsafe { place(out, "out") }?;
+            const MOST: u64 = 100_000;
+            if !(4..=MOST).contains(&point_count) {
+                return Err(Error::Argument(format!(
+                    "point_count is {point_count}, must be 4 to {MOST}"
+                ))
+                .into());
             }
-            #[cfg(not(feature = "contact"))]
-            {
-                // SAFETY: the host passes that many elements, as the header asks.
-                let _ = unsafe { slice(points, point_count.saturating_mul(3), "points") }?;
-                fail(UPT_ERR_UNSUPPORTED, WITHOUT)
-            }
+            // SAFETY: the host passes that many elements, as the header asks.
+            let points = unsafe { slice(points, 3 * point_count, "points") }?;
+            features::instruments()?;
+            crate::memory::probe(1024 * point_count as usize, "a hull")?;
+            let bad = |error: ::contact::ShapeError| Error::Argument(format!("points: {error}"));
+            let shape = Shape::hull_of(points.as_chunks().0).map_err(bad)?;
+            let body = Body::new(&shape).map_err(bad)?;
+            out.set(add_hull(body));
+            Ok(UPT_OK)
         },
     )
 }
@@ -248,22 +204,14 @@ pub unsafe extern "C" fn upt_hull_destroy(hull: *mut upt_hull) -> upt_status {
         "upt_hull_destroy",
         || (),
         || {
-            #[cfg(feature = "contact")]
-            {
-                drop(remove_hull(hull)?);
-                Ok(UPT_OK)
-            }
-            #[cfg(not(feature = "contact"))]
-            {
-                let _ = hull;
-                fail(UPT_ERR_UNSUPPORTED, WITHOUT)
-            }
+            features::instruments()?;
+            drop(remove_hull(hull)?);
+            Ok(UPT_OK)
         },
     )
 }
 
 /// The host's instruments as tools.
-#[cfg(feature = "contact")]
 pub(super) unsafe fn read_tools(
     instruments: *const upt_instrument,
     count: u64,
@@ -285,7 +233,6 @@ pub(super) unsafe fn read_tools(
     unsafe { each(instruments, count, "instruments[]", read) }
 }
 
-#[cfg(feature = "contact")]
 impl Scene {
     /// Calls with the list that instruments are read into.
     fn with_tools(

@@ -2,22 +2,15 @@
 
 use super::call::call;
 use super::constants::*;
-#[cfg(not(feature = "haptics"))]
-use super::failure::fail;
+use super::failure::Failure;
 use super::output::{fill, place};
 use super::pointers::required;
 use super::registry::call_scene;
 use super::structs::*;
-use super::{convert, pointers};
-#[cfg(feature = "haptics")]
-use {
-    super::{failure::Failure, hands},
-    crate::haptics::{HapticForce, HapticOptions, HapticPose},
-    std::ptr::without_provenance_mut,
-};
-
-#[cfg(not(feature = "haptics"))]
-const WITHOUT: &str = "this build has no feature \"haptics\"";
+use super::{convert, hands};
+use crate::features;
+use crate::haptics::{HapticForce, HapticOptions, HapticPose};
+use std::ptr::without_provenance_mut;
 
 /// Lets a hand feel a tool: from now on, each step of the scene prepares what `upt_haptics_render` needs.
 ///
@@ -30,7 +23,7 @@ const WITHOUT: &str = "this build has no feature \"haptics\"";
 /// Threads: one at a time on the scene.
 /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also for a hull that was destroyed), `UPT_ERR_STRUCT_SIZE`,
 /// `UPT_ERR_ARGUMENT`, `UPT_ERR_NON_FINITE`, `UPT_ERR_BUSY` also while a step is in flight, `UPT_ERR_UNSUPPORTED` in a
-/// build without feature "haptics", for a bundle without a linear response or corrections, and for a scene without
+/// build without feature "instruments", for a bundle without a linear response or corrections, and for a scene without
 /// corrections; `UPT_ERR_RUNTIME`, `UPT_ERR_IO`, `UPT_ERR_BUNDLE`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_haptics_create(
@@ -38,34 +31,30 @@ pub unsafe extern "C" fn upt_haptics_create(
     options: *const upt_haptics_options,
     out: *mut *mut upt_haptics,
 ) -> upt_status {
-    call_scene("upt_haptics_create", scene, |_scene| {
+    call_scene("upt_haptics_create", scene, |scene| {
         // SAFETY: the header asks for a place to write.
-        let _out = unsafe { place(out, "out") }?;
+        let out = unsafe { place(out, "out") }?;
         // SAFETY: the host passes a struct whose first field is its size, as the header asks.
         let raw = unsafe { required(options, "options") }?;
         convert::reserved(&raw.reserved)?;
-        let _passivity = !convert::flag("no_passivity", raw.no_passivity)?;
+        let passivity = !convert::flag("no_passivity", raw.no_passivity)?;
         // SAFETY: the host passes a struct whose first field is its size, as the header asks.
-        let _tool = unsafe { required(raw.tool, "options.tool") }?;
-        #[cfg(feature = "haptics")]
-        {
-            let or = |value: f32, default: f32| if value == 0.0 { default } else { value };
-            let tool = convert::tool(0, &_tool)?;
-            let latency = f64::from(raw.step_latency_ms);
-            let options = HapticOptions {
-                blend_s: 1e-3 * f64::from(or(raw.blend_ms, 25.0)),
-                passivity: _passivity,
-                damping_limit_n_s_per_m: or(raw.damping_limit_n_s_per_m, 5.0),
-                force_limit_n: raw.force_limit_n,
-                latency_s: (latency != 0.0).then_some(1e-3 * latency),
-                ..HapticOptions::new(raw.instrument, tool)
-            };
-            let hand = hands::add(_scene.haptics(&options)?)?;
-            _out.set(without_provenance_mut(hand));
-            Ok(UPT_OK)
-        }
-        #[cfg(not(feature = "haptics"))]
-        fail(UPT_ERR_UNSUPPORTED, WITHOUT)
+        let tool = unsafe { required(raw.tool, "options.tool") }?;
+        features::instruments()?;
+        let or = |value: f32, default: f32| if value == 0.0 { default } else { value };
+        let tool = convert::tool(0, &tool)?;
+        let latency = f64::from(raw.step_latency_ms);
+        let options = HapticOptions {
+            blend_s: 1e-3 * f64::from(or(raw.blend_ms, 25.0)),
+            passivity,
+            damping_limit_n_s_per_m: or(raw.damping_limit_n_s_per_m, 5.0),
+            force_limit_n: raw.force_limit_n,
+            latency_s: (latency != 0.0).then_some(1e-3 * latency),
+            ..HapticOptions::new(raw.instrument, tool)
+        };
+        let hand = hands::add(scene.haptics(&options)?)?;
+        out.set(without_provenance_mut(hand));
+        Ok(UPT_OK)
     })
 }
 
@@ -81,7 +70,7 @@ pub unsafe extern "C" fn upt_haptics_create(
 /// Threads: one at a time on the object; any other on the scene.
 /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_NON_FINITE` and `UPT_ERR_ARGUMENT` for the
 /// pose and a time before the last; `UPT_ERR_BUSY` while another thread is in a call on this object; `UPT_ERR_STATE` once
-/// the scene was destroyed; `UPT_ERR_UNSUPPORTED` in a build without feature "haptics"; `UPT_ERR_PANIC`.
+/// the scene was destroyed; `UPT_ERR_UNSUPPORTED` in a build without feature "instruments"; `UPT_ERR_PANIC`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_haptics_render(
     haptics: *mut upt_haptics,
@@ -103,29 +92,22 @@ pub unsafe extern "C" fn upt_haptics_render(
             // SAFETY: `out` points to a struct whose first field is its size, as the header asks.
             unsafe { fill(out, none) }?;
             // SAFETY: the host passes a struct whose first field is its size, as the header asks.
-            let raw = unsafe { pointers::required(pose, "pose") }?;
+            let raw = unsafe { required(pose, "pose") }?;
             convert::reserved(&raw.reserved)?;
-            let _has_velocity = convert::flag("has_velocity", raw.has_velocity)?;
-            #[cfg(feature = "haptics")]
-            {
-                let velocity = [raw.velocity_m_per_s, raw.angular_velocity_rad_per_s];
-                let at = HapticPose {
-                    time_s: raw.time_s,
-                    position_m: raw.position_m,
-                    rotation: raw.rotation,
-                    velocity: _has_velocity.then_some(velocity),
-                };
-                let force = hands::with(haptics.addr(), |hand| {
-                    hand.render(&at).map_err(Failure::from)
-                })?;
-                // SAFETY: `out` points to a struct whose first field is its size, as the header asks.
-                unsafe { fill(out, |struct_size| Ok(written(struct_size, &force))) }
-            }
-            #[cfg(not(feature = "haptics"))]
-            {
-                let _ = haptics;
-                fail(UPT_ERR_UNSUPPORTED, WITHOUT)
-            }
+            let has_velocity = convert::flag("has_velocity", raw.has_velocity)?;
+            features::instruments()?;
+            let velocity = [raw.velocity_m_per_s, raw.angular_velocity_rad_per_s];
+            let at = HapticPose {
+                time_s: raw.time_s,
+                position_m: raw.position_m,
+                rotation: raw.rotation,
+                velocity: has_velocity.then_some(velocity),
+            };
+            let force = hands::with(haptics.addr(), |hand| {
+                hand.render(&at).map_err(Failure::from)
+            })?;
+            // SAFETY: `out` points to a struct whose first field is its size, as the header asks.
+            unsafe { fill(out, |struct_size| Ok(written(struct_size, &force))) }
         },
     )
 }
@@ -134,28 +116,20 @@ pub unsafe extern "C" fn upt_haptics_render(
 ///
 /// Threads: any.
 /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also if it was destroyed before), `UPT_ERR_BUSY` while another thread is in
-/// a call on it, `UPT_ERR_UNSUPPORTED` in a build without feature "haptics".
+/// a call on it, `UPT_ERR_UNSUPPORTED` in a build without feature "instruments".
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_haptics_destroy(haptics: *mut upt_haptics) -> upt_status {
     call(
         "upt_haptics_destroy",
         || (),
         || {
-            #[cfg(feature = "haptics")]
-            {
-                hands::remove(haptics.addr())?;
-                Ok(UPT_OK)
-            }
-            #[cfg(not(feature = "haptics"))]
-            {
-                let _ = haptics;
-                fail(UPT_ERR_UNSUPPORTED, WITHOUT)
-            }
+            features::instruments()?;
+            hands::remove(haptics.addr())?;
+            Ok(UPT_OK)
         },
     )
 }
 
-#[cfg(feature = "haptics")]
 fn written(struct_size: u32, force: &HapticForce) -> upt_haptic_force {
     let block = |row: usize, column: usize| {
         std::array::from_fn(|at| force.stiffness[6 * (row + at / 3) + column + at % 3])

@@ -2,18 +2,16 @@
 
 use super::constants::*;
 use super::convert;
-#[cfg(feature = "contact")]
 use super::failure::Failure;
-#[cfg(any(not(feature = "contact"), not(feature = "forces")))]
-use super::failure::fail;
 use super::output::{output, place};
 use super::pointers::each;
 use super::registry::call_scene;
 use super::structs::*;
-#[cfg(feature = "contact")]
-use {
-    crate::contact::MAX_TOOLS, crate::error::Error, crate::instrument::Instrument, crate::memory,
-};
+use crate::contact::MAX_TOOLS;
+use crate::error::Error;
+use crate::features;
+use crate::instrument::Instrument;
+use crate::memory;
 
 /// Finds the nodes that rigid instruments touch, and the displacement that they impose there: the input of a step.
 ///
@@ -26,7 +24,7 @@ use {
 /// - `contact_count`: number of contacts found, always written.
 ///
 /// Threads: one at a time.
-/// Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "contact", `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`,
+/// Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "instruments", `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`,
 /// `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_NON_FINITE`, `UPT_ERR_ARGUMENT` (also when capacity is too small),
 /// `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
 #[unsafe(no_mangle)]
@@ -39,7 +37,7 @@ pub unsafe extern "C" fn upt_scene_contacts_from_instruments(
     capacity: u64,
     contact_count: *mut u64,
 ) -> upt_status {
-    call_scene("upt_scene_contacts_from_instruments", scene, |_scene| {
+    call_scene("upt_scene_contacts_from_instruments", scene, |scene| {
         // SAFETY: the header asks for a place to write.
         let count_out = unsafe { place(contact_count, "contact_count") }?;
         let capacity_floats = capacity.saturating_mul(3);
@@ -48,44 +46,30 @@ pub unsafe extern "C" fn upt_scene_contacts_from_instruments(
         let vectors_out =
             // SAFETY: the host passes room for that many elements, as the header asks.
             unsafe { output(contact_vectors, capacity_floats, "contact_vectors") }?;
-        #[cfg(feature = "contact")]
-        {
-            let mut list = _scene.instrument_list()?;
-            // SAFETY: the host passes that many instruments, as the header asks.
-            unsafe { read_instruments(instruments, instrument_count, &mut list) }?;
-            _scene.contacts_from_instruments(&list, |nodes, vectors| {
-                count_out.set(nodes.len() as u64);
-                if capacity == 0 {
-                    return Ok(());
-                }
-                if nodes_out.len() < nodes.len() {
-                    return Err(Error::Argument(format!(
-                        "capacity is {capacity}, {} are needed",
-                        nodes.len()
-                    )));
-                }
-                nodes_out.first(nodes.len()).copy_from(nodes);
-                vectors_out.first(vectors.len()).copy_from(vectors);
-                Ok(())
-            })?;
-            Ok(UPT_OK)
-        }
-        #[cfg(not(feature = "contact"))]
-        {
-            let read = |_: usize, raw: upt_instrument| {
-                convert::flag("sticking", raw.sticking)?;
-                convert::reserved(&raw.reserved)
-            };
-            // SAFETY: the host passes that many instruments, as the header asks.
-            unsafe { each(instruments, instrument_count, "instruments[]", read) }?;
-            let _ = (count_out, nodes_out, vectors_out);
-            fail(UPT_ERR_UNSUPPORTED, "this build has no feature \"contact\"")
-        }
+        features::instruments()?;
+        let mut list = scene.instrument_list()?;
+        // SAFETY: the host passes that many instruments, as the header asks.
+        unsafe { read_instruments(instruments, instrument_count, &mut list) }?;
+        scene.contacts_from_instruments(&list, |nodes, vectors| {
+            count_out.set(nodes.len() as u64);
+            if capacity == 0 {
+                return Ok(());
+            }
+            if nodes_out.len() < nodes.len() {
+                return Err(Error::Argument(format!(
+                    "capacity is {capacity}, {} are needed",
+                    nodes.len()
+                )));
+            }
+            nodes_out.first(nodes.len()).copy_from(nodes);
+            vectors_out.first(vectors.len()).copy_from(vectors);
+            Ok(())
+        })?;
+        Ok(UPT_OK)
     })
 }
 
 /// The host's instruments.
-#[cfg(feature = "contact")]
 unsafe fn read_instruments(
     instruments: *const upt_instrument,
     count: u64,
@@ -121,7 +105,7 @@ unsafe fn read_instruments(
 /// - `out_count`: number of floats in `out`, 3 m.
 ///
 /// Threads: one at a time.
-/// Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "forces", `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`,
+/// Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "instruments", `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`,
 /// `UPT_ERR_ARGUMENT`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_scene_contact_force(
@@ -129,15 +113,11 @@ pub unsafe extern "C" fn upt_scene_contact_force(
     out: *mut f32,
     out_count: u64,
 ) -> upt_status {
-    call_scene("upt_scene_contact_force", scene, |_scene| {
+    call_scene("upt_scene_contact_force", scene, |scene| {
         // SAFETY: the host passes room for that many elements, as the header asks.
-        let _out = unsafe { output(out, out_count, "out") }?;
-        #[cfg(feature = "forces")]
-        {
-            _scene.contact_force_to(_out)?;
-            Ok(UPT_OK)
-        }
-        #[cfg(not(feature = "forces"))]
-        fail(UPT_ERR_UNSUPPORTED, "this build has no feature \"forces\"")
+        let out = unsafe { output(out, out_count, "out") }?;
+        features::instruments()?;
+        scene.contact_force_to(out)?;
+        Ok(UPT_OK)
     })
 }

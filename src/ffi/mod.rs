@@ -10,7 +10,6 @@ mod constants;
 mod convert;
 mod driven;
 mod failure;
-#[cfg(feature = "haptics")]
 mod hands;
 mod haptics;
 mod instrument;

@@ -1,38 +1,22 @@
 //! `upt_scene`: frames between steps.
 
 use super::constants::*;
-#[cfg(not(feature = "contact"))]
-use super::failure::fail;
+use super::driven::read_tools;
+use super::failure::Failure;
+use super::output::output;
 use super::registry::call_scene;
+use super::scene::contacts;
 use super::structs::*;
-use crate::scene::Values;
-#[cfg(feature = "contact")]
-use {
-    super::driven::read_tools,
-    super::failure::Failure,
-    super::output::output,
-    super::scene::contacts,
-    crate::scene::{Contact, Scene},
-};
-
-#[cfg(not(feature = "contact"))]
-const WITHOUT: &str = "this build has no feature \"contact\"";
+use crate::features;
+use crate::scene::{Contact, Scene, Values};
 
 /// What the tissue is driven by at the moment of a frame.
-#[cfg_attr(
-    not(feature = "contact"),
-    expect(dead_code, reason = "without it every frame is refused")
-)]
 enum Driver {
     Instruments(*const upt_instrument, u64),
     Contacts(*const u32, *const f32, u64),
 }
 
 /// The frame that the host wants, of the region or of the points.
-#[cfg_attr(
-    not(feature = "contact"),
-    expect(dead_code, reason = "without it every frame is refused")
-)]
 struct Frame {
     seconds: f64,
     values: Values,
@@ -50,24 +34,16 @@ unsafe fn present(
     driver: Driver,
     frame: Frame,
 ) -> upt_status {
-    call_scene(name, scene, |_scene| {
-        #[cfg(feature = "contact")]
-        {
-            // SAFETY: the caller's.
-            unsafe { made(_scene, driver, frame) }?;
-            Ok(UPT_OK)
-        }
-        #[cfg(not(feature = "contact"))]
-        {
-            let _ = (driver, frame);
-            fail(UPT_ERR_UNSUPPORTED, WITHOUT)
-        }
+    call_scene(name, scene, |scene| {
+        features::instruments()?;
+        // SAFETY: the caller's.
+        unsafe { made(scene, driver, frame) }?;
+        Ok(UPT_OK)
     })
 }
 
 /// # Safety
 /// As [`present`].
-#[cfg(feature = "contact")]
 unsafe fn made(scene: &Scene, driver: Driver, frame: Frame) -> Result<(), Failure> {
     match driver {
         Driver::Instruments(instruments, count) => {
@@ -88,7 +64,6 @@ unsafe fn made(scene: &Scene, driver: Driver, frame: Frame) -> Result<(), Failur
 
 /// # Safety
 /// The host passes room for that many elements, as the header asks.
-#[cfg(feature = "contact")]
 unsafe fn shown(scene: &Scene, contact: Contact<'_>, frame: Frame) -> Result<(), Failure> {
     // SAFETY: the caller's.
     let out = unsafe { output(frame.out, frame.out_count, "out") }?;
@@ -110,7 +85,7 @@ unsafe fn shown(scene: &Scene, contact: Contact<'_>, frame: Frame) -> Result<(),
 ///
 /// Threads: one thread at a time presents; another may step or submit meanwhile.
 /// Errors: `UPT_ERR_BUSY` while another thread presents, and if a step is in flight at the first call;
-/// `UPT_ERR_UNSUPPORTED` in a build without feature "contact", for a bundle without a linear response or corrections, and
+/// `UPT_ERR_UNSUPPORTED` in a build without feature "instruments", for a bundle without a linear response or corrections, and
 /// for a scene without corrections; `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`,
 /// `UPT_ERR_NON_FINITE`, `UPT_ERR_STATE`, `UPT_ERR_RUNTIME`, `UPT_ERR_IO`, `UPT_ERR_BUNDLE`, `UPT_ERR_OUT_OF_MEMORY`,
 /// `UPT_ERR_PANIC`.

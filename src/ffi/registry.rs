@@ -10,7 +10,6 @@ use std::sync::{Arc, LazyLock, PoisonError, RwLock};
 use super::call::call;
 use super::constants::*;
 use super::failure::{Answer, Failure, fail};
-#[cfg(feature = "contact")]
 use super::structs::upt_hull;
 use super::structs::{upt_model, upt_scene};
 use crate::model::Model;
@@ -21,14 +20,11 @@ const STRIDE: usize = 16;
 const MODEL_TAG: usize = 1;
 const SCENE_TAG: usize = 2;
 const HULL_TAG: usize = 3;
-#[cfg(feature = "haptics")]
 const HAND_TAG: usize = 4;
 
 static NEXT: AtomicUsize = AtomicUsize::new(STRIDE);
 static MODELS: Live<Model> = Live::new(MODEL_TAG, "model");
-#[cfg(feature = "contact")]
 static HULLS: Live<::contact::Body> = Live::new(HULL_TAG, "hull");
-#[cfg(feature = "haptics")]
 static HANDS: Live<()> = Live::new(HAND_TAG, "haptics");
 static SCENES: Live<SceneEntry> = Live::new(SCENE_TAG, "scene");
 
@@ -96,7 +92,6 @@ impl<T> Live<T> {
             MODEL_TAG if issued => "it is a model",
             SCENE_TAG if issued => "it is a scene",
             HULL_TAG if issued => "it is a hull",
-            #[cfg(feature = "haptics")]
             HAND_TAG if issued => "it is a haptics object",
             _ => "this library never made it",
         };
@@ -126,29 +121,24 @@ pub(super) fn remove_model(model: *mut upt_model) -> Result<Arc<Model>, Failure>
     MODELS.remove(model.addr(), false)
 }
 
-#[cfg(feature = "contact")]
 pub(super) fn add_hull(body: ::contact::Body) -> *mut upt_hull {
     without_provenance_mut(HULLS.insert(Arc::new(body)))
 }
 
-#[cfg(feature = "contact")]
 pub(super) fn find_hull(hull: *const std::ffi::c_void) -> Result<Arc<::contact::Body>, Failure> {
     HULLS.get(hull.addr())
 }
 
-#[cfg(feature = "contact")]
 pub(super) fn remove_hull(hull: *mut upt_hull) -> Result<Arc<::contact::Body>, Failure> {
     HULLS.remove(hull.addr(), false)
 }
 
 /// A number for a haptics object.
-#[cfg(feature = "haptics")]
 pub(super) fn next_hand() -> usize {
     NEXT.fetch_add(STRIDE, Ordering::Relaxed) + HAND_TAG
 }
 
 /// Why a number is no live haptics object.
-#[cfg(feature = "haptics")]
 pub(super) fn refuse_hand<T>(handle: usize) -> Result<T, Failure> {
     HANDS.refuse(handle)
 }

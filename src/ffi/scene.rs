@@ -193,7 +193,6 @@ unsafe fn step(
     let (dense, nodes, vectors);
     let contact = match input.contact {
         Contact::None => Contact::None,
-        #[cfg(feature = "contact")]
         Contact::Tools(tools) => Contact::Tools(tools),
         Contact::Dense(field) => {
             dense = apart(field, &out)?;

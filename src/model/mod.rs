@@ -49,7 +49,6 @@ pub struct Model {
     #[doc(hidden)]
     pub kind: KindModel,
     corrections: OnceLock<Corrections>,
-    #[cfg(feature = "contact")]
     samples: OnceLock<Arc<::contact::Samples>>,
     opening: Mutex<()>,
     files: Arc<BundleFiles>,
@@ -167,7 +166,6 @@ impl Model {
         let model = Model {
             hash: files.hash,
             corrections: OnceLock::new(),
-            #[cfg(feature = "contact")]
             samples: OnceLock::new(),
             opening: Mutex::new(()),
             files,
@@ -207,7 +205,6 @@ impl Model {
     ///
     /// # Errors
     /// [`crate::Error::OutOfMemory`].
-    #[cfg(feature = "contact")]
     #[doc(hidden)]
     pub fn samples(&self) -> Result<Arc<::contact::Samples>> {
         if let Some(made) = self.samples.get() {

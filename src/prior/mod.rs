@@ -7,7 +7,6 @@
 
 mod compliance;
 mod numbers;
-#[cfg(feature = "forces")]
 mod reaction;
 mod release;
 mod response;

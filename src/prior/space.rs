@@ -141,7 +141,6 @@ impl CoarseSpace {
     ///
     /// # Errors
     /// [`crate::Error::OutOfMemory`].
-    #[cfg(feature = "contact")]
     pub fn moved_freely(&self, kappa: f64) -> Result<Vec<f32>> {
         let count = self.count();
         let frequencies = self.frequency.iter().enumerate();

@@ -225,7 +225,6 @@ mod tests {
         );
     }
 
-    #[cfg(feature = "forces")]
     #[test]
     fn borrowers_share_a_columns_force_and_its_own_node_goes_before_them() {
         let mut table = table();

@@ -14,10 +14,10 @@ use super::points::AttachedPoints;
 use super::published::{Frame, Published, Values};
 use super::timing::Stopwatch;
 use crate::bundle::Mesh;
-#[cfg(feature = "contact")]
 use crate::contact::ContactProblem;
 use crate::envelope::{EnvelopeCheck, ToolUse};
 use crate::error::Result;
+use crate::features::OfInstruments;
 use crate::field::{ContactSet, check_displacement};
 use crate::guard;
 use crate::kernels::{FlushToZero, Isa, Machine, Pool};
@@ -38,14 +38,11 @@ pub struct Core {
     pub(super) engine: Engine,
     pub(super) corrected: Option<Corrector>,
     /// Contact of tools, from the first step that has one.
-    #[cfg(feature = "contact")]
-    pub(super) problem: Option<Box<ContactProblem>>,
+    pub(super) problem: Option<OfInstruments<ContactProblem>>,
     /// The tools of the step being made, where the bundle's limits for tools say something about it.
     pub(super) used: Option<ToolUse>,
     /// Tools that hands feel, and how long the step being made took, s.
-    #[cfg(feature = "haptics")]
     pub(super) hands: Vec<crate::haptics::publish::Link>,
-    #[cfg(feature = "haptics")]
     pub(super) took_s: f64,
     /// Whether the state being made is.
     pub(super) next_corrected: bool,
@@ -123,12 +120,9 @@ impl Core {
             },
             engine: parts.engine,
             corrected: parts.corrected,
-            #[cfg(feature = "contact")]
             problem: None,
             used: None,
-            #[cfg(feature = "haptics")]
             hands: Vec::new(),
-            #[cfg(feature = "haptics")]
             took_s: 0.0,
             next_corrected: false,
             driven: false,
@@ -202,7 +196,6 @@ impl Core {
         let near = self.meet_tools(published, &input)?;
 
         if self.counters.sleeping && given.is_none() && self.incoming.is_empty() && !near {
-            #[cfg(feature = "contact")]
             self.fit_published(published)?;
             self.publish_rest(published);
         } else {
@@ -216,19 +209,14 @@ impl Core {
             let verdict = self.judge(&mut stats)?;
             let replaced = verdict & guard::REFUSED != 0
                 && self.refuse(published, verdict, given.is_some(), &mut stats)?;
-            #[cfg(feature = "contact")]
             if replaced {
                 self.give_up_tools(published, &mut stats);
             }
-            #[cfg(feature = "contact")]
             self.fit_published(published)?;
             self.publish(published, given.is_some(), replaced, &stats);
         }
-        #[cfg(feature = "haptics")]
-        {
-            self.took_s = start.elapsed().as_secs_f64();
-            self.tell_hands(published);
-        }
+        self.took_s = start.elapsed().as_secs_f64();
+        self.tell_hands(published);
         self.counters.step_count += 1;
         stats.step_count = self.counters.step_count;
         stats.sleeping = self.counters.sleeping;
@@ -319,10 +307,7 @@ impl Core {
 
     /// Bytes of the scene's buffers, those of the published states included.
     pub(super) fn memory_bytes(&self) -> usize {
-        #[cfg(feature = "haptics")]
         let hands = self.hand_bytes();
-        #[cfg(not(feature = "haptics"))]
-        let hands = 0;
         let count = self.mesh.node_count();
         let frames = if self.options.cubic_sampling { 4 } else { 3 };
         let points = frames * 4 * self.next.points.len();

@@ -52,7 +52,6 @@ impl Core {
         }
         let shared = lock_read(published);
         let input = Input {
-            #[cfg(feature = "contact")]
             rest: &self.mesh.positions,
             contact: &self.incoming,
             last: given.unwrap_or(&shared.last.field),
@@ -106,12 +105,10 @@ impl Core {
     }
 
     /// The reaction of the last published state; false where it was not corrected.
-    #[cfg(feature = "forces")]
     pub(super) fn corrected_reaction(&self, out: &mut [f32]) -> bool {
         let Some(corrected) = &self.corrected else {
             return false;
         };
-        #[cfg(feature = "contact")]
         if let Some(problem) = &self.problem
             && !problem.past.forces.is_empty()
         {

@@ -4,7 +4,6 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::own_pace::OwnPace;
-#[cfg(feature = "contact")]
 use crate::corrections::Substeps;
 use crate::corrections::{Enough, ImplicitSolver, Report, SolverContext, Substepper, TimeStep};
 use crate::error::{Error, Result};
@@ -20,9 +19,7 @@ const WHAT: &str = "the corrections of a scene";
 pub struct Corrector {
     pub solver: Box<ImplicitSolver>,
     /// From the first contact of tools, where the steps may have any.
-    #[cfg(feature = "contact")]
     pub substeps: Option<Box<Substeps>>,
-    #[cfg_attr(not(feature = "contact"), allow(dead_code))]
     pub(super) most_substeps: u32,
     /// Of how many shorter ones a free step is made.
     pub(super) swings: u32,
@@ -137,7 +134,6 @@ impl Corrector {
         };
         Ok(Some(Corrector {
             solver: memory::boxed(ImplicitSolver::new(context)?, WHAT)?,
-            #[cfg(feature = "contact")]
             substeps: None,
             most_substeps,
             swings: own.swings(integrator.step_s),
@@ -177,13 +173,11 @@ impl Corrector {
     }
 
     /// Corrections that a step may get.
-    #[cfg(feature = "contact")]
     pub(super) fn most(&self) -> u32 {
         self.most
     }
 
     /// Makes what substeps need, where the steps may have any.
-    #[cfg(feature = "contact")]
     pub(super) fn be_ready(&mut self, context: SolverContext<'_>, model: &Model) -> Result<()> {
         if self.most_substeps < 2 || self.substeps.is_some() {
             return Ok(());
@@ -211,10 +205,7 @@ impl Corrector {
 
     /// Bytes held; the bundle's pace is the model's.
     pub(super) fn memory_bytes(&self) -> usize {
-        #[cfg(feature = "contact")]
         let substeps = self.substeps.as_ref().map_or(0, |own| own.memory_bytes());
-        #[cfg(not(feature = "contact"))]
-        let substeps = 0;
         let substepper = self.substepper.as_ref().map_or(0, |own| own.memory_bytes());
         let own = match self.own_pace {
             true => self.time_step.memory_bytes(),

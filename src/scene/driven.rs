@@ -12,7 +12,7 @@ use super::{Contact, StepInput};
 use crate::contact::{Compliance, ContactProblem, State};
 use crate::corrections::{Input, SolverContext};
 use crate::error::{Error, Result};
-use crate::memory;
+use crate::features::OfInstruments;
 use crate::stats::{SceneStats, flag};
 
 const WHAT: &str = "the contact of instruments";
@@ -45,8 +45,8 @@ impl Core {
         let mut problem = match self.problem.take() {
             Some(problem) => problem,
             None => {
-                let mesh = Arc::clone(&self.mesh);
-                memory::boxed(ContactProblem::new(self.model.samples()?, mesh)?, WHAT)?
+                let make = || ContactProblem::new(self.model.samples()?, Arc::clone(&self.mesh));
+                OfInstruments::new(make, WHAT)?
             }
         };
         let shared = lock_read(published);
@@ -286,7 +286,6 @@ impl Core {
     }
 
     /// The tools' loads at the contact nodes, in the host's order: what the tissue does to them, mN.
-    #[cfg(feature = "forces")]
     pub(super) fn loads_at_contacts(&self, problem: &ContactProblem, out: &mut [f32]) -> bool {
         out.fill(0.0);
         problem.each_push(|node, force| {

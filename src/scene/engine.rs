@@ -31,7 +31,6 @@ impl Engine {
     }
 
     /// As [`Engine::linear`].
-    #[cfg(feature = "forces")]
     pub fn linear_mut(&mut self) -> Option<&mut Linear> {
         match self {
             Engine::Reduced(engine) => Some(&mut engine.linear),

@@ -6,6 +6,7 @@ use super::Scene;
 use super::core::{Core, lock_read};
 use super::published::Published;
 use crate::error::{Error, Result};
+use crate::features::HAS_INSTRUMENTS;
 use crate::haptics::publish::{Stepped, join};
 use crate::haptics::{HapticOptions, Haptics};
 use crate::memory;
@@ -93,7 +94,7 @@ impl Core {
 
     /// Publishes the last state for each hand.
     pub(super) fn tell_hands(&mut self, published: &RwLock<Published>) {
-        if self.hands.is_empty() {
+        if !HAS_INSTRUMENTS || self.hands.is_empty() {
             return;
         }
         self.hands.retain(|hand| !hand.is_over());

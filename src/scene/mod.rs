@@ -7,31 +7,23 @@ mod core;
 mod correct;
 mod corrected;
 mod counters;
-#[cfg(feature = "contact")]
 mod driven;
-#[cfg(feature = "forces")]
 mod elastic;
 mod engine;
-#[cfg(feature = "contact")]
 mod frame_state;
 mod free_motion;
-#[cfg(feature = "haptics")]
 mod haptics;
 mod inputs;
-#[cfg(feature = "contact")]
 mod instruments;
 mod inversion;
 mod linear;
 mod own_pace;
 mod plan;
 mod points;
-#[cfg(feature = "contact")]
 mod present;
-#[cfg(feature = "contact")]
 mod presenter;
 mod publish;
 mod published;
-#[cfg(feature = "forces")]
 mod reaction;
 mod read;
 mod reduced;
@@ -41,11 +33,8 @@ mod snapshot;
 mod state;
 mod step_input;
 mod timing;
-#[cfg(feature = "contact")]
 mod tissue;
 mod tools;
-#[cfg(not(feature = "contact"))]
-mod undriven;
 mod upt;
 mod verdict;
 mod worker;
@@ -72,7 +61,6 @@ use points::AttachedPoints;
 use published::{Frame, Published};
 use region::check_nodes;
 use shared::Shared;
-#[cfg(feature = "contact")]
 use tissue::Tissue;
 use worker::Worker;
 
@@ -126,11 +114,8 @@ impl Scene {
             stats: core.blank_stats(),
             contact_nodes: memory::room(count, core::SCENE)?,
             contact_vectors: memory::room(3 * count, core::SCENE)?,
-            #[cfg(feature = "contact")]
             tools: Default::default(),
-            #[cfg(feature = "contact")]
             frame_state: None,
-            #[cfg(feature = "contact")]
             attached: Arc::default(),
         };
         Ok(Scene {
@@ -161,7 +146,6 @@ impl Scene {
     }
 
     /// What its readers know of it.
-    #[cfg(feature = "contact")]
     fn tissue(&self) -> Tissue<'_> {
         Tissue {
             published: &self.shared.published,

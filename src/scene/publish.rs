@@ -38,7 +38,6 @@ impl Core {
             self.next_corrected && !replaced,
             self.counters.was_corrected[0],
         ];
-        #[cfg(feature = "contact")]
         if let Some(problem) = &mut self.problem {
             problem.commit();
         }
@@ -90,7 +89,6 @@ impl Core {
         self.contact_before.clear();
         self.contact.clear();
         self.counters.max_displacement = 0.0;
-        #[cfg(feature = "contact")]
         self.rest_tools(published);
         let frames = if self.options.cubic_sampling { 4 } else { 3 };
         if self.counters.rest_frames >= frames {
@@ -119,9 +117,7 @@ impl Core {
         std::mem::swap(&mut shared.before, &mut shared.last);
         std::mem::swap(&mut shared.last, &mut self.next);
         self.show_contacts(shared);
-        #[cfg(feature = "contact")]
         self.show_tools(shared);
-        #[cfg(feature = "contact")]
         self.leave_moment(shared);
     }
 

@@ -70,13 +70,10 @@ pub struct Published {
     /// `[m,3]`, mm.
     pub contact_vectors: Vec<f32>,
     /// What the tools of the last step were told, and the samples that push them.
-    #[cfg(feature = "contact")]
     pub tools: crate::contact::Told,
     /// What frames between steps are made of, from the first that a host asks for.
-    #[cfg(feature = "contact")]
     pub frame_state: Option<super::frame_state::FrameState>,
     /// The attached points.
-    #[cfg(feature = "contact")]
     pub attached: std::sync::Arc<super::points::AttachedPoints>,
 }
 

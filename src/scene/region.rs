@@ -172,7 +172,6 @@ impl Core {
         self.next.points = spare;
         shared.region = region;
         self.plan = plan;
-        #[cfg(feature = "contact")]
         shared.attached.clone_from(&points);
         self.points = points;
         Ok(())

@@ -68,7 +68,6 @@ impl Core {
         let taken = self
             .put(published, state)
             .and_then(|()| self.recompute(published));
-        #[cfg(feature = "contact")]
         let taken = taken.and_then(|()| self.fit_state(published));
         if let Err(error) = taken {
             // Fails only where a worker panics, which has been reported by then: the old state's lists had their room.
@@ -142,9 +141,9 @@ impl Core {
                 saved.damping_per_s, own.damping_per_s
             )));
         }
-        if saved.driven && cfg!(not(feature = "contact")) {
+        if saved.driven && !crate::features::HAS_INSTRUMENTS {
             return Err(Error::Snapshot(
-                "was saved by a scene with instruments; this build has no feature \"contact\""
+                "was saved by a scene with instruments; this build has no feature \"instruments\""
                     .into(),
             ));
         }

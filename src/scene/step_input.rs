@@ -1,6 +1,5 @@
 //! What a step gets, and what has become of it.
 
-#[cfg(feature = "contact")]
 use crate::contact::Tool;
 use crate::error::Result;
 use crate::field::ContactSet;
@@ -20,7 +19,6 @@ pub enum Contact<'a> {
         vectors: &'a [f32],
     },
     /// Rigid tools where they are at the end of the step; their contact is solved.
-    #[cfg(feature = "contact")]
     Tools(&'a [Tool]),
 }
 
@@ -32,7 +30,6 @@ impl Contact<'_> {
     pub(crate) fn gather(self, set: &mut ContactSet, node_count: usize) -> Result<()> {
         match self {
             Contact::None => set.clear(),
-            #[cfg(feature = "contact")]
             Contact::Tools(_) => set.clear(),
             Contact::Dense(field) => set.take_dense(field, node_count)?,
             Contact::Sparse { nodes, vectors } => set.take_sparse(nodes, vectors, node_count)?,

@@ -9,7 +9,6 @@ use std::time::{Duration, Instant};
 
 use super::shared::Shared;
 use super::{Contact, Progress, StepInput};
-#[cfg(feature = "contact")]
 use crate::contact::Tool;
 use crate::error::{Error, Result};
 use crate::field::ContactSet;
@@ -23,9 +22,7 @@ struct Slot {
     nodes: Vec<u32>,
     vectors: Vec<f32>,
     /// Tools drive the step that waits.
-    #[cfg(feature = "contact")]
     driven: bool,
-    #[cfg(feature = "contact")]
     tools: Vec<Tool>,
     /// Errors that were not told: the first one, and how many came after it.
     failed: Option<Error>,
@@ -93,16 +90,12 @@ impl Worker {
         slot.nodes.extend_from_slice(nodes);
         slot.vectors.clear();
         slot.vectors.extend_from_slice(vectors);
-        #[cfg(feature = "contact")]
-        {
-            slot.driven = false;
-        }
+        slot.driven = false;
         self.set_off(slot);
         Ok(())
     }
 
     /// Hands tools to the worker, checked.
-    #[cfg(feature = "contact")]
     pub fn submit_tools(&self, shared: &Arc<Shared>, tools: &[Tool]) -> Result<()> {
         for (index, tool) in tools.iter().enumerate() {
             tool.check(index)?;
@@ -230,7 +223,6 @@ impl Drop for Worker {
 
 fn run(shared: &Shared, signal: &Signal) {
     let (mut nodes, mut vectors) = (Vec::new(), Vec::new());
-    #[cfg(feature = "contact")]
     let mut tools = Vec::new();
     let mut slot = signal.lock();
     loop {
@@ -247,16 +239,13 @@ fn run(shared: &Shared, signal: &Signal) {
         slot.running = true;
         std::mem::swap(&mut nodes, &mut slot.nodes);
         std::mem::swap(&mut vectors, &mut slot.vectors);
-        #[cfg(feature = "contact")]
         std::mem::swap(&mut tools, &mut slot.tools);
-        #[cfg(feature = "contact")]
         let driven = slot.driven;
         drop(slot);
         let contact = Contact::Sparse {
             nodes: &nodes,
             vectors: &vectors,
         };
-        #[cfg(feature = "contact")]
         let contact = match driven {
             true => Contact::Tools(&tools),
             false => contact,

@@ -11,7 +11,7 @@ extern float *before, *after; /* [K,3] */
 extern uint32_t contact_nodes[4];
 extern float contact_vectors[12];
 extern int log_count;
-extern int bare; /* 1: the library was built without features "contact" and "forces" */
+extern int bare; /* 1: the library was built without feature "instruments" */
 
 upt_scene *make_scene_with(int32_t guard_policy);
 

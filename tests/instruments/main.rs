@@ -1,5 +1,5 @@
 //! Steps that rigid instruments drive: what the contact obeys, in every state that a host can bring about, and what is refused.
-#![cfg(feature = "contact")]
+#![cfg(feature = "instruments")]
 
 mod extremes;
 #[path = "../fixture/mod.rs"]

@@ -44,7 +44,7 @@ fn a_reduced_scene_falls_asleep_and_wakes_at_once() {
         "a sleeping scene is exactly at rest"
     );
     assert_eq!(scene.stats().decoded_node_count, 0);
-    #[cfg(feature = "forces")]
+    #[cfg(feature = "instruments")]
     scene.contact_force(&mut []).unwrap();
     scene.step(sparse(&contact), Some(&mut out)).unwrap();
     assert!(!scene.stats().sleeping);

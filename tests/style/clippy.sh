@@ -15,7 +15,7 @@ alone() {
 }
 
 lint --workspace
-alone upt "" contact forces haptics ndarray
+alone upt "" instruments
 alone tissue "" files linear
 alone upt-cli "" files # the first is the demo's
 

@@ -9,11 +9,9 @@ use crate::process::{output, run_checked};
 use crate::workspace::{Workspace, write_between_markers};
 
 /// Features and what the table calls them.
-const FEATURES: [(&str, &str); 8] = [
+const FEATURES: [(&str, &str); 6] = [
     ("", "none"),
-    ("contact", "`contact`"),
-    ("forces", "`forces`"),
-    ("haptics", "`haptics`"),
+    ("instruments", "`instruments`"),
     ("cuda", "`cuda`"),
     ("tensorrt", "`tensorrt`"),
     ("tensorrt-rtx", "`tensorrt-rtx`"),

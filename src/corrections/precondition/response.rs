@@ -94,13 +94,11 @@ impl Preconditioner {
     }
 
     /// For each natural mode what inertia takes off its part of the compliance, mm/mN.
-    #[cfg(feature = "contact")]
     pub fn inertial_compliance(&self) -> &[f32] {
         &self.inertial_compliance
     }
 
     /// `coordinates += A_k f` of forces `f` (mN) on degrees of freedom with columns.
-    #[cfg(feature = "contact")]
     pub fn add_load(&mut self, env: Env<'_>, dofs: &[u32], forces: &[f32]) -> Result<()> {
         let count = self.inertial_compliance.len();
         self.solved.fill(0.0);
@@ -125,7 +123,6 @@ impl Preconditioner {
     }
 
     /// `coordinates = -N diag(1 / (m (w² + kappa))) N^T r` of a residual `[K,3]`, µN, that is zero at held nodes.
-    #[cfg(feature = "contact")]
     pub fn move_natural(&mut self, env: Env<'_>, r: &[f32]) -> Result<()> {
         let (isa, pool) = (env.isa, env.pool);
         let count = self.inertial_compliance.len();
@@ -141,7 +138,6 @@ impl Preconditioner {
     }
 
     /// `coordinates = U^T r` of a field `[K,3]`.
-    #[cfg(feature = "contact")]
     pub fn project(&mut self, env: Env<'_>, r: &[f32]) -> Result<()> {
         Ok(project_field(
             env.isa,
@@ -154,7 +150,6 @@ impl Preconditioner {
     }
 
     /// `to = U coordinates`, `[K,3]`.
-    #[cfg(feature = "contact")]
     pub fn decode(&mut self, env: Env<'_>, to: &mut [f32]) -> Result<()> {
         Ok(decode_rows(
             env.isa,
@@ -167,7 +162,6 @@ impl Preconditioner {
     }
 
     /// The same at the nodes of the domain only; other rows keep their values.
-    #[cfg(feature = "contact")]
     pub fn decode_domain(&mut self, env: Env<'_>, to: &mut [f32]) -> Result<()> {
         Ok(decode_rows(
             env.isa,

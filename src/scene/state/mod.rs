@@ -4,9 +4,6 @@
 //! What a part is, how it is written, and what of it follows from the rest is said where the part is declared.
 
 mod records;
-#[cfg(not(feature = "contact"))]
-mod toolless;
-#[cfg(feature = "contact")]
 mod tools;
 
 use std::sync::RwLock;
@@ -22,9 +19,6 @@ use crate::error::{Error, Result};
 use crate::field::ContactSet;
 use crate::{memory, stored};
 use records::Records;
-#[cfg(not(feature = "contact"))]
-use toolless::Tools;
-#[cfg(feature = "contact")]
 use tools::Tools;
 
 /// What lasts from one step to the next. Region, attached points and options are the host's and are not part of it.
@@ -191,7 +185,6 @@ impl Core {
         if let Some(corrected) = &mut self.corrected {
             corrected.solver.reset();
         }
-        #[cfg(feature = "contact")]
         if let Some(problem) = &mut self.problem {
             problem.reset();
         }
@@ -208,7 +201,6 @@ impl Core {
         }
         self.told = 0;
         // Of empty lists, for which there is room.
-        #[cfg(feature = "contact")]
         self.fit_state(published)?;
         self.tell_state(published);
         Ok(())
@@ -219,13 +211,9 @@ impl Core {
         let mut shared = lock_write(published);
         shared.stats = self.blank_stats();
         self.show_contacts(&mut shared);
-        #[cfg(feature = "contact")]
-        {
-            shared.tools.clear();
-            self.leave_moment(&mut shared);
-        }
+        shared.tools.clear();
+        self.leave_moment(&mut shared);
         drop(shared);
-        #[cfg(feature = "haptics")]
         self.tell_hands(published);
     }
 }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::contact::{ContactProblem, MAX_TOOLS, Past};
 use crate::error::Result;
-use crate::memory;
+use crate::features::OfInstruments;
 use crate::scene::core::Core;
 
 pub type Tools = Past;
@@ -27,10 +27,9 @@ impl Core {
             (Some(problem), Some(past)) => problem.past = past,
             (Some(problem), None) => problem.past.clear(),
             (none @ None, Some(past)) => {
-                let mut problem =
-                    ContactProblem::new(self.model.samples()?, Arc::clone(&self.mesh))?;
-                problem.past = past;
-                *none = Some(memory::boxed(problem, "the contact of instruments")?);
+                let make = || ContactProblem::new(self.model.samples()?, Arc::clone(&self.mesh));
+                none.insert(OfInstruments::new(make, "the contact of instruments")?)
+                    .past = past;
             }
             (None, None) => {}
         }
