@@ -116,15 +116,6 @@ impl Error {
         }
     }
 
-    /// What ONNX Runtime said, as `or`, or as lack of memory where it said so.
-    pub(crate) fn of_onnx(text: String, or: impl FnOnce(String) -> Self) -> Self {
-        let memory = ["std::bad_alloc", "Failed to allocate memory"];
-        match memory.iter().any(|said| text.contains(said)) {
-            true => Error::OutOfMemory(format!("ONNX Runtime: {text}")),
-            false => or(text),
-        }
-    }
-
     pub(crate) fn bundle(file: impl Into<String>, message: impl Into<String>) -> Self {
         Error::Bundle {
             file: file.into(),
@@ -148,13 +139,5 @@ mod tests {
     fn an_argument_tells_its_instrument() {
         let error = Error::Argument("radius is 0".into()).of_instrument(3);
         assert_eq!(error.to_string(), "instruments[3]: radius is 0");
-    }
-
-    #[test]
-    fn lack_of_memory_that_onnx_runtime_tells_is_lack_of_memory() {
-        let told = |text: &str| Error::of_onnx(text.into(), Error::Provider).status();
-        let cpu = "cpu: Exception during initialization: std::bad_alloc";
-        assert_eq!(told(cpu), UPT_ERR_OUT_OF_MEMORY);
-        assert_eq!(told("cpu: no such operator"), UPT_ERR_PROVIDER);
     }
 }

@@ -16,6 +16,26 @@ pub enum Provider {
     TensorRtRtx = 3,
 }
 
+impl Provider {
+    /// Every provider, in the order of the values.
+    pub const ALL: [Provider; 4] = [
+        Provider::Cpu,
+        Provider::Cuda,
+        Provider::TensorRt,
+        Provider::TensorRtRtx,
+    ];
+
+    /// Lower-case name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Provider::Cpu => "cpu",
+            Provider::Cuda => "cuda",
+            Provider::TensorRt => "tensorrt",
+            Provider::TensorRtRtx => "tensorrt-rtx",
+        }
+    }
+}
+
 /// Arithmetic of the heavy stages (values of `UPT_PRECISION_*`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(i32)]
@@ -100,11 +120,6 @@ impl UserStream {
     /// The handle as a number.
     pub fn address(self) -> usize {
         self.0
-    }
-
-    #[cfg(any(feature = "cuda", feature = "tensorrt", feature = "tensorrt-rtx"))]
-    pub(crate) fn handle(self) -> *mut () {
-        self.0 as *mut ()
     }
 }
 

@@ -1,23 +1,8 @@
-//! How a session is told which provider to use, and which one runs it.
+//! Which provider runs a session, and why others do not.
 
 use std::collections::BTreeMap;
 
-#[cfg(any(feature = "cuda", feature = "tensorrt", feature = "tensorrt-rtx"))]
-use ort::ep::ExecutionProviderDispatch;
-
 use crate::options::Provider;
-
-/// How a session is told which provider to use.
-pub(super) enum Wish {
-    /// Nothing to tell: the CPU.
-    Cpu,
-    /// A provider of the library.
-    #[cfg(any(feature = "cuda", feature = "tensorrt", feature = "tensorrt-rtx"))]
-    Builtin(ExecutionProviderDispatch),
-    /// The devices that a plugin provider offers, and its options.
-    #[cfg(feature = "tensorrt-rtx")]
-    Plugin(&'static str, Vec<(String, String)>),
-}
 
 /// What runs a session and why providers before it in the list do not.
 #[derive(Debug, Clone)]

@@ -1,35 +1,23 @@
-//! The only place that knows `ort`: finding the library, environment, providers, sessions.
+//! ONNX Runtime: the providers that a model may run on, and stages, each a graph with tensors bound to it.
 //!
-//! Nothing here is touched, and no library is opened, until a model is opened or the providers are asked for.
+//! `linked` is the only place that knows the crate `ort`. A build without the feature `learned` has `left_out` in its place, with the
+//! same names: there no runtime and no stage is ever made. Nothing here is touched, and no library is opened, until a model
+//! that has a graph is opened or the providers are asked for.
 
 mod choice;
-mod engine_cache;
-mod gpu;
-mod graph;
-mod locate;
-mod memory;
-mod placement;
-#[cfg(feature = "tensorrt-rtx")]
-mod plugin;
-mod providers;
-mod runtime;
-mod sessions;
-mod stage;
-mod status;
-mod version;
+#[cfg(not(feature = "learned"))]
+mod left_out;
+#[cfg(feature = "learned")]
+mod linked;
+mod plan;
+mod tensors;
 
+#[cfg(not(feature = "learned"))]
+use left_out as backend;
+#[cfg(feature = "learned")]
+use linked as backend;
+
+pub use backend::{Runtime, Stage, providers_json};
 pub use choice::ProviderChoice;
-pub use graph::Tensors;
-pub use providers::{ProviderPlan, providers_json};
-pub use runtime::Runtime;
-pub use stage::{Stage, StageOptions, StageTimes};
-
-use std::path::PathBuf;
-
-use crate::error::Result;
-
-/// File and build description of ONNX Runtime; loads it when needed.
-pub fn loaded() -> Result<(PathBuf, String)> {
-    let runtime = Runtime::get(crate::library::current().onnxruntime_path.as_deref())?;
-    Ok((runtime.path().to_owned(), runtime.version().to_owned()))
-}
+pub use plan::ProviderPlan;
+pub use tensors::{StageOptions, StageTimes, Tensors};

@@ -8,6 +8,7 @@ use super::engine::Engine;
 use super::{reduced, upt};
 use crate::bundle::{Mesh, TensorFile};
 use crate::error::{Error, Result};
+use crate::features::Proven;
 use crate::kernels::{Isa, Pool};
 use crate::memory;
 use crate::model::{KindModel, Model};
@@ -53,22 +54,24 @@ pub(super) fn build(model: &Arc<Model>, options: &SceneOptions) -> Result<Core> 
             Engine::Reduced(memory::boxed(engine, core::SCENE)?)
         }
         KindModel::Upt(kind) => {
-            let (tables, nodes) = match &own_mesh {
-                None => (Arc::clone(&kind.tables), model.mesh.node_count()),
-                Some(mesh) => (
-                    Arc::new(kind.tables_of(mesh, model.runtime()?, threads)?),
-                    mesh.node_count(),
-                ),
+            let make = || {
+                let (tables, node_count) = match &own_mesh {
+                    None => (Arc::clone(&kind.tables), model.mesh.node_count()),
+                    Some(mesh) => (
+                        Arc::new(kind.tables_of(mesh, model.runtime()?, threads)?),
+                        mesh.node_count(),
+                    ),
+                };
+                let parts = upt::step_path::Parts {
+                    model,
+                    kind,
+                    tables: &tables,
+                    pool: &pool,
+                    node_count,
+                };
+                parts.engine(options)
             };
-            let parts = upt::step_path::Parts {
-                model,
-                kind,
-                tables: &tables,
-                pool: &pool,
-                node_count: nodes,
-            };
-            let engine = parts.engine(options)?;
-            Engine::Upt(memory::boxed(engine, core::SCENE)?)
+            Engine::Upt(Proven::new(make, core::SCENE)?)
         }
     };
     let corrected = Corrector::new(model, options, Isa::detect(), &pool)?;

@@ -17,7 +17,7 @@ use crate::bundle::Mesh;
 use crate::contact::ContactProblem;
 use crate::envelope::{EnvelopeCheck, ToolUse};
 use crate::error::Result;
-use crate::features::OfInstruments;
+use crate::features::{Instruments, Proven};
 use crate::field::{ContactSet, check_displacement};
 use crate::guard;
 use crate::kernels::{FlushToZero, Isa, Machine, Pool};
@@ -38,7 +38,7 @@ pub struct Core {
     pub(super) engine: Engine,
     pub(super) corrected: Option<Corrector>,
     /// Contact of tools, from the first step that has one.
-    pub(super) problem: Option<OfInstruments<ContactProblem>>,
+    pub(super) problem: Option<Proven<Instruments, ContactProblem>>,
     /// The tools of the step being made, where the bundle's limits for tools say something about it.
     pub(super) used: Option<ToolUse>,
     /// Tools that hands feel, and how long the step being made took, s.

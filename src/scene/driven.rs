@@ -12,7 +12,7 @@ use super::{Contact, StepInput};
 use crate::contact::{Compliance, ContactProblem, State};
 use crate::corrections::{Input, SolverContext};
 use crate::error::{Error, Result};
-use crate::features::OfInstruments;
+use crate::features::Proven;
 use crate::stats::{SceneStats, flag};
 
 const WHAT: &str = "the contact of instruments";
@@ -46,7 +46,7 @@ impl Core {
             Some(problem) => problem,
             None => {
                 let make = || ContactProblem::new(self.model.samples()?, Arc::clone(&self.mesh));
-                OfInstruments::new(make, WHAT)?
+                Proven::new(make, WHAT)?
             }
         };
         let shared = lock_read(published);

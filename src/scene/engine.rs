@@ -7,6 +7,7 @@ use super::reduced::{ReducedEngine, ReducedRecord};
 use super::upt::UptEngine;
 use crate::bundle::Base;
 use crate::error::Result;
+use crate::features::{Learned, Proven};
 use crate::kernels::Compute;
 use crate::memory;
 use crate::options::{DecoderKernel, Precision, Provider, StepPath};
@@ -16,7 +17,7 @@ use crate::stats::SceneStats;
 /// The kind's own buffers, sessions and latent state, with the model that they belong to.
 pub enum Engine {
     /// Kind `upt`.
-    Upt(Box<UptEngine>),
+    Upt(Proven<Learned, UptEngine>),
     /// Kind `reduced`.
     Reduced(Box<ReducedEngine>),
 }

@@ -3,7 +3,7 @@
  *   abi_walk BUNDLE DAMAGED REDUCED whole|bare
  *
  * DAMAGED: folder with version/, hash/, json/: copies of BUNDLE made wrong. REDUCED: a bundle whose
- * tables belong to its mesh. bare: the library has no optional features. The parts are walk_*.c.
+ * tables belong to its mesh. bare: the library has no instruments. The parts are walk_*.c.
  *
  * UPT_ERR_RUNTIME needs a process without ONNX Runtime: runtime_missing.c. UPT_ERR_PANIC needs a
  * library built with feature "fault"; without it that part is left out and said.

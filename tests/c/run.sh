@@ -20,8 +20,8 @@ if [ ! -e "$libraries/libupt.so" ]; then
   exit 1
 fi
 
-# A library that can be made to panic and has no optional features, in a folder of its own so that it is never packaged.
-cargo build --release --quiet --manifest-path "$root/Cargo.toml" -p upt --no-default-features --features fault \
+# A library that can be made to panic and has no instruments, in a folder of its own so that it is never packaged.
+cargo build --release --quiet --manifest-path "$root/Cargo.toml" -p upt --no-default-features --features fault,learned \
   --target-dir "$build/fault"
 ln -sf libupt.so "$build/fault/release/libupt.so.0"
 

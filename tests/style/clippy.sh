@@ -15,7 +15,7 @@ alone() {
 }
 
 lint --workspace
-alone upt "" instruments
+alone upt "" instruments learned
 alone tissue "" files linear
 alone upt-cli "" files # the first is the demo's
 

@@ -9,12 +9,10 @@ use crate::process::{output, run_checked};
 use crate::workspace::{Workspace, write_between_markers};
 
 /// Features and what the table calls them.
-const FEATURES: [(&str, &str); 6] = [
+const FEATURES: [(&str, &str); 4] = [
     ("", "none"),
     ("instruments", "`instruments`"),
-    ("cuda", "`cuda`"),
-    ("tensorrt", "`tensorrt`"),
-    ("tensorrt-rtx", "`tensorrt-rtx`"),
+    ("learned", "`learned`"),
     ("default", "default"),
 ];
 

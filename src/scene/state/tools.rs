@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::contact::{ContactProblem, MAX_TOOLS, Past};
 use crate::error::Result;
-use crate::features::OfInstruments;
+use crate::features::Proven;
 use crate::scene::core::Core;
 
 pub type Tools = Past;
@@ -28,7 +28,7 @@ impl Core {
             (Some(problem), None) => problem.past.clear(),
             (none @ None, Some(past)) => {
                 let make = || ContactProblem::new(self.model.samples()?, Arc::clone(&self.mesh));
-                none.insert(OfInstruments::new(make, "the contact of instruments")?)
+                none.insert(Proven::new(make, "the contact of instruments")?)
                     .past = past;
             }
             (None, None) => {}

@@ -8,24 +8,14 @@ use ort::session::Session;
 use ort::session::builder::SessionBuilder;
 use ort::value::Tensor;
 
-use super::{Buffer, Stage, StageTimes};
+use super::{Buffer, Stage};
 use crate::error::{Error, Result};
-use crate::onnx::choice::{ProviderChoice, Wish};
-use crate::onnx::graph::Tensors;
-use crate::onnx::memory::Memory;
-use crate::onnx::placement;
-use crate::onnx::providers::ProviderPlan;
-use crate::onnx::runtime::Runtime;
+use crate::onnx::linked::memory::Memory;
+use crate::onnx::linked::placement;
+use crate::onnx::linked::runtime::Runtime;
+use crate::onnx::linked::wish::Wish;
+use crate::onnx::{ProviderChoice, StageOptions, StageTimes, Tensors};
 use crate::options::Provider;
-
-/// How a stage's session is made.
-#[derive(Debug, Clone)]
-pub struct StageOptions {
-    /// Threads of the session's own pool, the caller included.
-    pub threads: usize,
-    /// Providers to try.
-    pub plan: ProviderPlan,
-}
 
 impl Stage {
     /// Makes a session of the graph `bytes` and binds float32 tensors of the given names and shapes.
@@ -186,9 +176,7 @@ pub(super) fn configure(
     match wish {
         // With the shapes of a stage fixed, the arena finds its own blocks again; a pattern would hold as much once more.
         Wish::Cpu => builder.with_memory_pattern(false).map_err(text),
-        #[cfg(any(feature = "cuda", feature = "tensorrt", feature = "tensorrt-rtx"))]
         Wish::Builtin(dispatch) => builder.with_execution_providers([dispatch]).map_err(text),
-        #[cfg(feature = "tensorrt-rtx")]
         Wish::Plugin(name, settings) => {
             let devices = runtime.environment.devices();
             builder

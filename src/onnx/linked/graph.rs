@@ -1,22 +1,10 @@
-//! What a stage binds to its graph, and whether the graph has it.
+//! Whether a graph has what a stage binds to it.
 
 use ort::session::Session;
 use ort::value::{Outlet, TensorElementType, ValueType};
 
 use crate::error::{Error, Result};
-
-/// Names and shapes of a graph's tensors.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Tensors<'a> {
-    /// Float32 inputs that the host writes before a run.
-    pub inputs: &'a [(&'a str, &'a [usize])],
-    /// Float32 inputs that stay the same in every run, with their values: on a device they are copied there once.
-    pub constants: &'a [(&'a str, &'a [usize], &'a [f32])],
-    /// Int64 inputs that stay the same in every run, with their values.
-    pub indices: &'a [(&'a str, &'a [usize], &'a [i64])],
-    /// Float32 outputs.
-    pub outputs: &'a [(&'a str, &'a [usize])],
-}
+use crate::onnx::Tensors;
 
 impl Tensors<'_> {
     /// Names and shapes of all, as text.

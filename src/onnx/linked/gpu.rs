@@ -1,14 +1,10 @@
-//! ONNX Runtime's GPU providers, a cargo feature each: whether the loaded library offers one, and what it is told.
+//! ONNX Runtime's GPU providers: whether the loaded library offers one, and what it is told.
 
-#[cfg(any(feature = "cuda", feature = "tensorrt", feature = "tensorrt-rtx"))]
 use ort::ep::{self, ExecutionProvider};
 
-use super::choice::Wish;
-#[cfg(feature = "tensorrt-rtx")]
 use super::plugin;
-#[cfg(feature = "tensorrt-rtx")]
 use super::runtime::Runtime;
-#[cfg(feature = "tensorrt")]
+use super::wish::Wish;
 use crate::options::Precision;
 use crate::options::{ModelOptions, Provider};
 
@@ -16,13 +12,9 @@ use crate::options::{ModelOptions, Provider};
 pub(super) fn missing(provider: Provider) -> Option<String> {
     match provider {
         Provider::Cpu => None,
-        #[cfg(feature = "cuda")]
-        Provider::Cuda => left_out(provider, ep::CUDA::is_available()),
-        #[cfg(feature = "tensorrt")]
-        Provider::TensorRt => left_out(provider, ep::TensorRT::is_available()),
-        #[cfg(feature = "tensorrt-rtx")]
+        Provider::Cuda => not_offered(provider, ep::CUDA::is_available()),
+        Provider::TensorRt => not_offered(provider, ep::TensorRT::is_available()),
         Provider::TensorRtRtx if built_in_rtx() => None,
-        #[cfg(feature = "tensorrt-rtx")]
         Provider::TensorRtRtx => {
             let path = crate::library::current().onnxruntime_path;
             let registered = Runtime::get(path.as_deref())
@@ -30,18 +22,10 @@ pub(super) fn missing(provider: Provider) -> Option<String> {
                 .and_then(plugin::available);
             registered.err()
         }
-        #[cfg(not(all(feature = "cuda", feature = "tensorrt", feature = "tensorrt-rtx")))]
-        _ => Some(lacks_feature(provider)),
     }
 }
 
-#[cfg(not(all(feature = "cuda", feature = "tensorrt", feature = "tensorrt-rtx")))]
-fn lacks_feature(provider: Provider) -> String {
-    format!("this build lacks the feature `{}`", provider.name())
-}
-
-#[cfg(any(feature = "cuda", feature = "tensorrt"))]
-fn left_out(provider: Provider, available: ort::Result<bool>) -> Option<String> {
+fn not_offered(provider: Provider, available: ort::Result<bool>) -> Option<String> {
     match available {
         Ok(true) => None,
         Ok(false) => Some(format!(
@@ -53,7 +37,6 @@ fn left_out(provider: Provider, available: ort::Result<bool>) -> Option<String> 
 }
 
 /// Whether the loaded library itself holds TensorRT-RTX; otherwise it is a plugin.
-#[cfg(feature = "tensorrt-rtx")]
 fn built_in_rtx() -> bool {
     ep::NVRTX::is_available().unwrap_or(false)
 }
@@ -66,24 +49,17 @@ pub(super) fn wish(
 ) -> Result<Wish, String> {
     match (provider, options, cache) {
         (Provider::Cpu, ..) => Ok(Wish::Cpu),
-        #[cfg(feature = "cuda")]
         (Provider::Cuda, options, _) => Ok(cuda(options)),
-        #[cfg(feature = "tensorrt")]
         (Provider::TensorRt, options, cache) => Ok(tensorrt(options, cache)),
-        #[cfg(feature = "tensorrt-rtx")]
         (Provider::TensorRtRtx, options, cache) if built_in_rtx() => {
             Ok(tensorrt_rtx(options, cache))
         }
-        #[cfg(feature = "tensorrt-rtx")]
         (Provider::TensorRtRtx, options, cache) => {
             Ok(Wish::Plugin(plugin::NAME, plugin_options(options, cache)))
         }
-        #[cfg(not(all(feature = "cuda", feature = "tensorrt", feature = "tensorrt-rtx")))]
-        _ => Err(lacks_feature(provider)),
     }
 }
 
-#[cfg(feature = "cuda")]
 fn cuda(options: &ModelOptions) -> Wish {
     let mut cuda = ep::CUDA::default()
         .with_device_id(options.device_id)
@@ -94,12 +70,11 @@ fn cuda(options: &ModelOptions) -> Wish {
     }
     if let Some(stream) = options.user_stream {
         // SAFETY: whoever made the `UserStream` promised that the stream outlives the model.
-        cuda = unsafe { cuda.with_compute_stream(stream.handle()) };
+        cuda = unsafe { cuda.with_compute_stream(stream.address() as *mut ()) };
     }
     Wish::Builtin(cuda.build().error_on_failure())
 }
 
-#[cfg(feature = "tensorrt")]
 fn tensorrt(options: &ModelOptions, cache: Option<String>) -> Wish {
     let mut trt = ep::TensorRT::default()
         .with_device_id(options.device_id)
@@ -114,12 +89,11 @@ fn tensorrt(options: &ModelOptions, cache: Option<String>) -> Wish {
     }
     if let Some(stream) = options.user_stream {
         // SAFETY: as for CUDA.
-        trt = unsafe { trt.with_compute_stream(stream.handle()) };
+        trt = unsafe { trt.with_compute_stream(stream.address() as *mut ()) };
     }
     Wish::Builtin(trt.build().error_on_failure())
 }
 
-#[cfg(feature = "tensorrt-rtx")]
 fn tensorrt_rtx(options: &ModelOptions, cache: Option<String>) -> Wish {
     let mut rtx = ep::NVRTX::default()
         .with_device_id(options.device_id.max(0) as u32)
@@ -129,13 +103,12 @@ fn tensorrt_rtx(options: &ModelOptions, cache: Option<String>) -> Wish {
     }
     if let Some(stream) = options.user_stream {
         // SAFETY: as for CUDA.
-        rtx = unsafe { rtx.with_compute_stream(stream.handle()) };
+        rtx = unsafe { rtx.with_compute_stream(stream.address() as *mut ()) };
     }
     Wish::Builtin(rtx.build().error_on_failure())
 }
 
 /// Options of the TensorRT-RTX plugin, each with the provider's name before it.
-#[cfg(feature = "tensorrt-rtx")]
 fn plugin_options(options: &ModelOptions, cache: Option<String>) -> Vec<(String, String)> {
     let mut list = vec![(
         "enable_cuda_graph",

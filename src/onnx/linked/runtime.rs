@@ -8,6 +8,7 @@ use ort::environment::Environment;
 use ort::logging::LogLevel;
 
 use super::locate;
+use super::status::of_onnx;
 use super::version::version_of;
 use crate::error::{Error, Result};
 use crate::memory;
@@ -111,7 +112,7 @@ fn load(explicit: Option<&Path>) -> Result<Runtime> {
         tried.join("; "),
         locate::plain_name()
     );
-    Err(Error::of_onnx(problem, Error::Runtime))
+    Err(of_onnx(problem, Error::Runtime))
 }
 
 /// Microsoft's builds of ONNX Runtime from 1.29 on write a device identifier and upload a process event while the

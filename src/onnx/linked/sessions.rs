@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use ort::session::Session;
 
-use super::choice::ProviderChoice;
+use crate::onnx::ProviderChoice;
 
 /// A graph's file and the threads of its session.
 type Key = (String, usize);
@@ -17,7 +17,7 @@ type Entry = (Arc<Session>, ProviderChoice);
 
 /// Sessions by graph and threads.
 #[derive(Clone, Default)]
-pub(super) struct Sessions(Arc<Mutex<HashMap<Key, Entry>>>);
+pub(in crate::onnx) struct Sessions(Arc<Mutex<HashMap<Key, Entry>>>);
 
 impl Sessions {
     /// The session of a graph with this many threads, if there is one.

@@ -22,8 +22,8 @@ pub(super) fn engine_folder(file: &str, graph: &[u8], settings: Sha256) -> Strin
 
 #[cfg(test)]
 mod tests {
-    use super::super::graph::Tensors;
     use super::*;
+    use crate::onnx::Tensors;
 
     fn folder(version: &str, fp16: &str, graph: &[u8], rows: usize) -> String {
         let tensors = Tensors {

@@ -12,25 +12,12 @@ use ort::AsPointer;
 use ort::session::{IoBinding, Session};
 use ort::value::Tensor;
 
-pub use make::StageOptions;
-
-use super::choice::ProviderChoice;
 use super::memory::{Memory, copy};
 use super::runtime::Runtime;
 use super::status;
 use crate::error::{Error, Result};
+use crate::onnx::{ProviderChoice, StageTimes};
 use crate::options::Provider;
-
-/// Wall time of the last run, ms.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct StageTimes {
-    /// Inputs to the device; 0 on the CPU.
-    pub upload: f64,
-    /// The graph. Where tensors are bound anew in each run it holds the way of the outputs back.
-    pub compute: f64,
-    /// Outputs back; 0 on the CPU.
-    pub download: f64,
-}
 
 /// A tensor of the host's and its counterpart on a device.
 struct Buffer {
@@ -56,7 +43,7 @@ pub struct Stage {
 
 /// What a graph's run or its copies failed with.
 fn failed(file: &str, cause: &dyn std::fmt::Display) -> Error {
-    Error::of_onnx(format!("{file}: {cause}"), Error::Runtime)
+    status::of_onnx(format!("{file}: {cause}"), Error::Runtime)
 }
 
 impl Stage {

@@ -4,56 +4,18 @@ use std::collections::BTreeMap;
 
 use ort::session::Session;
 
-use super::choice::{ProviderChoice, Wish};
 use super::engine_cache::{engine_folder, engine_key};
 use super::gpu;
-use super::graph::Tensors;
 use super::memory::Memory;
 use super::runtime::Runtime;
-use super::sessions::Sessions;
+use super::status::of_onnx;
+use super::wish::Wish;
 use crate::error::{Error, Result};
 use crate::library;
-use crate::options::{ModelOptions, Precision, Provider};
-
-impl Provider {
-    /// Lower-case name.
-    pub fn name(self) -> &'static str {
-        match self {
-            Provider::Cpu => "cpu",
-            Provider::Cuda => "cuda",
-            Provider::TensorRt => "tensorrt",
-            Provider::TensorRtRtx => "tensorrt-rtx",
-        }
-    }
-}
-
-/// Which providers to try for a session, in order, with their options.
-#[derive(Debug, Clone)]
-pub struct ProviderPlan {
-    options: ModelOptions,
-    /// Shared by the clones of a plan.
-    pub(super) sessions: Sessions,
-}
+use crate::onnx::{ProviderChoice, ProviderPlan, Tensors};
+use crate::options::{Precision, Provider};
 
 impl ProviderPlan {
-    /// The plan of a model's options.
-    pub fn new(options: &ModelOptions) -> ProviderPlan {
-        let mut options = options.clone();
-        let order = &mut options.providers;
-        if order.is_empty() || (!options.no_fallback && !order.contains(&Provider::Cpu)) {
-            order.push(Provider::Cpu);
-        }
-        ProviderPlan {
-            options,
-            sessions: Sessions::default(),
-        }
-    }
-
-    /// The CPU alone.
-    pub fn cpu() -> ProviderPlan {
-        ProviderPlan::new(&ModelOptions::default())
-    }
-
     /// Calls `make` with one provider after the other until one works.
     pub(super) fn choose<T>(
         &self,
@@ -92,33 +54,10 @@ impl ProviderPlan {
         } else {
             ""
         };
-        Err(Error::of_onnx(
+        Err(of_onnx(
             format!("{}{note}", list.join("; ")),
             Error::Provider,
         ))
-    }
-
-    /// What a bundle without any graph runs on: the CPU, if the list allows it.
-    ///
-    /// # Errors
-    /// [`Error::Provider`] when it does not.
-    pub fn without_graph(&self, bundle: &str) -> Result<ProviderChoice> {
-        let reason = || format!("{bundle} has no graph to run there");
-        let wanted = self.options.providers.iter();
-        let refused = wanted
-            .take_while(|&&provider| provider != Provider::Cpu)
-            .map(|&provider| (provider, reason()))
-            .collect();
-        if !self.options.providers.contains(&Provider::Cpu) {
-            return Err(Error::Provider(format!(
-                "{}; add the CPU to the providers",
-                reason()
-            )));
-        }
-        Ok(ProviderChoice {
-            refused,
-            ..ProviderChoice::cpu()
-        })
     }
 
     /// Where the tensors of a session lie.
@@ -189,12 +128,7 @@ impl ProviderPlan {
 /// JSON list of providers: `[{"name","available","reason"}]`. Loads ONNX Runtime.
 pub fn providers_json() -> Result<String> {
     let runtime = Runtime::get(library::current().onnxruntime_path.as_deref())?;
-    let list: Vec<serde_json::Value> = [
-        Provider::Cpu,
-        Provider::Cuda,
-        Provider::TensorRt,
-        Provider::TensorRtRtx,
-    ]
+    let list: Vec<serde_json::Value> = Provider::ALL
     .into_iter()
     .map(|provider| {
         let reason = gpu::missing(provider);

@@ -1,9 +1,8 @@
 use super::make::configure;
 use super::*;
-use crate::onnx::choice::Wish;
-use crate::onnx::graph::Tensors;
-use crate::onnx::memory::round_trip;
-use crate::onnx::providers::ProviderPlan;
+use crate::onnx::linked::memory::round_trip;
+use crate::onnx::linked::wish::Wish;
+use crate::onnx::{ProviderPlan, StageOptions, Tensors};
 
 const FILE: &str = "latent.onnx";
 
