@@ -46,10 +46,10 @@ pub unsafe extern "C" fn upt_scene_contacts_from_instruments(
         let vectors_out =
             // SAFETY: the host passes room for that many elements, as the header asks.
             unsafe { output(contact_vectors, capacity_floats, "contact_vectors") }?;
-        features::instruments()?;
         let mut list = scene.instrument_list()?;
         // SAFETY: the host passes that many instruments, as the header asks.
         unsafe { read_instruments(instruments, instrument_count, &mut list) }?;
+        features::instruments()?;
         scene.contacts_from_instruments(&list, |nodes, vectors| {
             count_out.set(nodes.len() as u64);
             if capacity == 0 {
@@ -84,10 +84,12 @@ unsafe fn read_instruments(
     list.clear();
     memory::fit(list, count as usize, "the instruments")?;
     let read = |index: usize, raw: upt_instrument| {
-        list.push(Instrument {
-            sticking: convert::flag("sticking", raw.sticking)?,
-            tool: convert::tool(index, &raw)?,
-        });
+        let sticking = convert::flag("sticking", raw.sticking)?;
+        convert::reserved(&raw.reserved)?;
+        // A build without tools finds these mistakes too.
+        features::instruments()?;
+        let tool = convert::tool(index, &raw)?;
+        list.push(Instrument { sticking, tool });
         Ok(())
     };
     // SAFETY: the host passes that many instruments, as the header asks.
