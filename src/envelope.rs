@@ -3,7 +3,7 @@
 use crate::bundle::{Envelope, Mesh, ToolEnvelope};
 use crate::error::Result;
 use crate::field::ContactSet;
-use crate::memory;
+use crate::memory::{self, HeldBytes};
 use crate::stats::flag;
 
 /// Rounding that is no violation, relative.
@@ -33,7 +33,7 @@ pub struct ToolUse {
 }
 
 /// Contact patches of a mesh, found by its surface edges; kept while the contact nodes stay the same.
-#[derive(Debug)]
+#[derive(Debug, HeldBytes)]
 pub struct EnvelopeCheck {
     offsets: Vec<u32>,
     neighbours: Vec<u32>,
@@ -79,16 +79,6 @@ impl EnvelopeCheck {
             patch_flags: 0,
             patch_ratio: 0.0,
         })
-    }
-
-    /// Bytes held.
-    pub fn memory_bytes(&self) -> usize {
-        let lists = self.offsets.len()
-            + self.neighbours.len()
-            + self.patch.len()
-            + self.stack.capacity()
-            + self.nodes.capacity();
-        4 * lists + self.in_domain.len()
     }
 
     /// Compares a step's contact, and the one of the step before, with the envelope; `step`: the length of a step in the bundle's.

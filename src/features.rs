@@ -7,7 +7,7 @@
 use std::ops::{Deref, DerefMut};
 
 use crate::error::{Error, Result};
-use crate::memory;
+use crate::memory::{self, HeldBytes};
 
 /// A proof that a feature is there.
 pub(crate) trait Feature: Sized {
@@ -94,6 +94,12 @@ impl<P: Feature, T> Proven<P, T> {
             _proof: proof()?,
             value: memory::boxed(make()?, what)?,
         })
+    }
+}
+
+impl<P, T: HeldBytes> HeldBytes for Proven<P, T> {
+    fn held_bytes(&self) -> usize {
+        self.value.held_bytes()
     }
 }
 

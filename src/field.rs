@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
+use crate::memory::HeldBytes;
 use crate::{memory, stored};
 
 /// Displacements beyond this are refused as input, mm.
@@ -11,7 +12,7 @@ pub const INPUT_LIMIT: f32 = 1e6;
 const CONTACTS: &str = "a step's contacts";
 
 /// Nodes in contact and what is imposed there.
-#[derive(Debug, Default, Serialize, Deserialize)]
+#[derive(Debug, Default, HeldBytes, Serialize, Deserialize)]
 pub struct ContactSet {
     /// Ascending.
     #[serde(with = "stored")]
@@ -32,11 +33,6 @@ impl ContactSet {
             vectors: memory::room(3 * node_count, CONTACTS)?,
             order: memory::room(node_count, CONTACTS)?,
         })
-    }
-
-    /// Bytes held.
-    pub fn memory_bytes(&self) -> usize {
-        4 * (self.nodes.capacity() + self.vectors.capacity() + self.order.capacity())
     }
 
     /// Nodes in contact.

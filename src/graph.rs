@@ -5,12 +5,12 @@
 use crate::bundle::{Graph, Mesh};
 use crate::error::Result;
 use crate::grid::PointGrid;
-use crate::memory;
+use crate::memory::{self, HeldBytes};
 
 const WHAT: &str = "the graph of the supernodes";
 
 /// Supernodes and, for each, a CSR row of neighbours.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, HeldBytes)]
 pub struct SupernodeGraph {
     /// `[n_S]`, ascending.
     pub supernodes: Vec<u32>,

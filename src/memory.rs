@@ -1,6 +1,10 @@
 //! Room whose size a host or a bundle decides: asked for, so that there being none is an error and not the end of the
 //! process.
 
+mod held;
+
+pub(crate) use self::held::{HeldBytes, behind};
+
 use crate::error::{Error, Result};
 
 /// The error of what there is no memory for.

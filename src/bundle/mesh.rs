@@ -6,13 +6,13 @@ use super::files::hex;
 use super::manifest::Boundary;
 use super::tensors::TensorFile;
 use crate::error::{Error, Result};
-use crate::memory;
+use crate::memory::{self, HeldBytes};
 use safetensors::Dtype;
 
 const WHAT: &str = "a mesh";
 
 /// A checked mesh; lengths in mm.
-#[derive(Debug)]
+#[derive(Debug, HeldBytes)]
 pub struct Mesh {
     /// Rest positions `[K,3]`.
     pub positions: Vec<f32>,
@@ -138,19 +138,6 @@ impl Mesh {
             self.positions[i + 1],
             self.positions[i + 2],
         ]
-    }
-
-    /// Bytes held.
-    pub fn memory_bytes(&self) -> usize {
-        4 * (self.positions.len()
-            + self.tets.len()
-            + self.stiffness.len()
-            + self.surface_faces.len()
-            + self.domain_faces.len()
-            + self.surface_nodes.len()
-            + self.domain_nodes.len()
-            + self.held_nodes.len()
-            + self.node_area.len())
     }
 }
 

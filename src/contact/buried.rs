@@ -6,6 +6,7 @@ use ::contact::{Body, Pose, Samples, Vector};
 
 use super::state::State;
 use crate::bundle::Mesh;
+use crate::memory::HeldBytes;
 
 /// A tool whose middle lies less deep than this, or than its half thickness, is in contact and not in the tissue, mm.
 const LEAST_MM: f32 = 1.0;
@@ -15,7 +16,7 @@ const PIERCED_MM: f32 = 4.0;
 const LONGEST_MM: u32 = 30;
 
 /// Where a tool in the tissue comes out.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, HeldBytes)]
 pub(super) struct Buried {
     /// Unit direction of the shortest way out.
     pub out: Vector,

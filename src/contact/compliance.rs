@@ -6,7 +6,7 @@
 use ::contact::{Sample, Samples, Vector};
 
 use crate::error::Result;
-use crate::memory;
+use crate::memory::{self, HeldBytes};
 use crate::prior::{CoarseSpace, PriorTable};
 
 pub(super) const WHAT: &str = "the compliance of a contact";
@@ -34,7 +34,7 @@ impl Compliance<'_> {
 }
 
 /// A sample's place among the columns, and its weight there, for up to three nodes.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, HeldBytes)]
 struct Entries {
     count: usize,
     places: [(u32, f32); 3],
@@ -42,7 +42,7 @@ struct Entries {
 
 /// `A` at some columns, and `W` of samples on them. From call to call only what is new is computed: each value is a function of its
 /// two columns, or samples, alone, so what was kept has the bits of what would be made anew.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, HeldBytes)]
 pub struct Delassus {
     /// Ascending.
     columns: Vec<u32>,
@@ -318,22 +318,5 @@ impl Delassus {
             }
         }
         Vector::from(moved)
-    }
-
-    /// Bytes held.
-    pub fn memory_bytes(&self) -> usize {
-        4 * (self.columns.capacity()
-            + self.wanted.capacity()
-            + self.widened.capacity()
-            + self.modes.capacity()
-            + self.a.capacity()
-            + self.a_before.capacity()
-            + self.w.capacity()
-            + self.w_before.capacity()
-            + self.of.capacity()
-            + self.of_before.capacity()
-            + 2 * self.known.capacity())
-            + size_of::<Entries>() * self.entries.capacity()
-            + 8 * self.upper.capacity()
     }
 }

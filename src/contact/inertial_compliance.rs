@@ -7,10 +7,10 @@ use super::compliance::{Compliance, Delassus, WHAT};
 use crate::error::Result;
 use crate::kernels::Isa;
 use crate::kernels::respond::columns_f32;
-use crate::memory;
+use crate::memory::{self, HeldBytes};
 
 /// The modes at the samples of the last call, and rows that were made since it.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, HeldBytes)]
 pub struct InertialCompliance {
     /// By mode, `[m,3n]`.
     modes: Vec<f32>,
@@ -89,12 +89,6 @@ impl InertialCompliance {
             }
         }
         Ok(())
-    }
-
-    /// Bytes held.
-    pub fn memory_bytes(&self) -> usize {
-        let floats = self.modes.capacity() + self.factors.capacity() + self.rows.capacity();
-        4 * (floats + self.all.capacity()) + self.made.capacity()
     }
 }
 

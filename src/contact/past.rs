@@ -8,12 +8,12 @@ use serde::{Deserialize, Serialize};
 use super::stored;
 use super::tool::{MAX_TOOLS, Reading};
 use crate::error::{Error, Result};
-use crate::memory;
+use crate::memory::{self, HeldBytes};
 
 const WHAT: &str = "the forces of instruments";
 
 /// The force on one sample, mN.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, HeldBytes, Serialize, Deserialize)]
 pub struct Force {
     /// Place in the list of tools.
     pub tool: u32,
@@ -32,7 +32,7 @@ impl Force {
 }
 
 /// A tool's own part.
-#[derive(Debug, Default, Serialize, Deserialize)]
+#[derive(Debug, Default, HeldBytes, Serialize, Deserialize)]
 pub struct Held {
     /// Where it was at the end of the step.
     #[serde(with = "stored::pose")]
@@ -48,7 +48,7 @@ pub struct Held {
 }
 
 /// The state of contact at the end of a step.
-#[derive(Debug, Default, Serialize, Deserialize)]
+#[derive(Debug, Default, HeldBytes, Serialize, Deserialize)]
 pub struct Past {
     /// One a tool, in the host's order.
     pub tools: Vec<Held>,
@@ -144,10 +144,5 @@ impl Past {
     pub fn clear(&mut self) {
         self.tools.clear();
         self.forces.clear();
-    }
-
-    /// Bytes held.
-    pub fn memory_bytes(&self) -> usize {
-        size_of::<Held>() * self.tools.capacity() + size_of::<Force>() * self.forces.capacity()
     }
 }

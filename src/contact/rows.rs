@@ -6,6 +6,7 @@ use super::buried::Buried;
 use super::past::Held;
 use super::state::State;
 use super::tool::Tool;
+use crate::memory::HeldBytes;
 
 /// Samples that one solve may have: what a tool as large as the organ touches beyond these is left to the next solve.
 pub(super) const MOST_ROWS: usize = 256;
@@ -22,7 +23,7 @@ const LONG_WAY: f32 = 4.0;
 const LEAN: f32 = 0.2;
 
 /// A sample that is looked at.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, HeldBytes)]
 pub(super) struct Row {
     pub(super) tool: u32,
     pub(super) sample: u32,

@@ -4,7 +4,7 @@ use ::contact::{Body, Pose, Shape, pose};
 
 use crate::error::{Error, Result};
 use crate::field::INPUT_LIMIT;
-use crate::memory;
+use crate::memory::{self, HeldBytes};
 
 /// A tool that is farther than this from where it was has been put there, not moved, mm.
 pub(crate) const PUT_MM: f32 = 40.0;
@@ -12,7 +12,7 @@ pub(crate) const PUT_MM: f32 = 40.0;
 pub const MAX_TOOLS: usize = 64;
 
 /// How a tool holds the tissue.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, HeldBytes)]
 pub enum Mode {
     /// Pushes, with Coulomb friction.
     #[default]
@@ -22,9 +22,10 @@ pub enum Mode {
 }
 
 /// A rigid tool where it is at the end of a step.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, HeldBytes)]
 pub struct Tool {
     /// Its shape.
+    #[held(skip)]
     pub body: Body,
     /// Where it is, mm, in the mesh's frame.
     pub pose: Pose,
@@ -114,7 +115,7 @@ impl Tool {
 }
 
 /// What the tissue does to a tool at the end of a step.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, HeldBytes)]
 pub struct Reading {
     /// Force on the tool, mN.
     pub force: [f32; 3],

@@ -6,11 +6,12 @@ use super::time_step::Diagonal;
 use crate::bundle::Mesh;
 use crate::error::Result;
 use crate::kernels::Isa;
-use crate::memory;
+use crate::memory::{self, HeldBytes};
 
 const WHAT: &str = "the elements of the corrections";
 
 /// Made once a model.
+#[derive(HeldBytes)]
 pub struct Body {
     /// `f_int(u)`, µN.
     pub forces: ElementForces,
@@ -51,10 +52,5 @@ impl Body {
             mass,
             held,
         })
-    }
-
-    /// Bytes held.
-    pub fn memory_bytes(&self) -> usize {
-        self.forces.bytes() + self.mass.len() * (4 + 12 + 1) + 4 * self.held_nodes.len()
     }
 }

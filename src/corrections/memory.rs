@@ -10,12 +10,13 @@ use super::history::{PAIRS, Pair};
 use super::precondition::Env;
 use crate::error::Result;
 use crate::kernels::vectors::{PartialSums, add_scaled, dots};
-use crate::memory;
+use crate::memory::{self, HeldBytes};
 
 /// Room for the pairs of the last published state and for those of the step being made: a step that is refused leaves no trace.
 const SLOTS: usize = 2 * PAIRS;
 
 /// The pairs, oldest first by `order`.
+#[derive(HeldBytes)]
 pub struct Memory {
     steps: Vec<Vec<f32>>,
     changes: Vec<Vec<f32>>,
@@ -70,12 +71,6 @@ impl Memory {
     /// The state being made is published.
     pub fn commit(&mut self) {
         self.published.clone_from(&self.order);
-    }
-
-    /// Bytes held.
-    pub fn memory_bytes(&self) -> usize {
-        let width = self.coordinates[0].len();
-        SLOTS * (8 * self.steps[0].len() + 4 * width)
     }
 
     /// A copy of the published pairs, oldest first.

@@ -89,11 +89,6 @@ impl Corrections {
     ) -> Result<TimeStep> {
         TimeStep::new(&Diagonal::of(mesh, material)?, integrator)
     }
-
-    /// Bytes held.
-    pub fn memory_bytes(&self) -> usize {
-        self.space.memory_bytes() + self.body.memory_bytes() + self.time_step.memory_bytes()
-    }
 }
 
 fn needed<'a>(

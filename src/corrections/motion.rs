@@ -3,10 +3,11 @@
 use serde::{Deserialize, Serialize};
 
 use crate::error::Result;
+use crate::memory::HeldBytes;
 use crate::{memory, stored};
 
 /// What BDF2 knows of the past, `[K,3]` each.
-#[derive(Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, PartialEq, HeldBytes, Serialize, Deserialize)]
 pub struct Motion {
     /// Velocity at the last state, mm/s.
     #[serde(with = "stored")]

@@ -7,14 +7,14 @@
 
 use super::input::SolverContext;
 use crate::error::Result;
-use crate::memory;
+use crate::memory::{self, HeldBytes};
 use crate::prior::propagator;
 
 /// Modes that turn by more than this in a step are left to BDF2, which damps them: in closed form they would ring undamped, and what the
 /// iterations leave of them would grow from step to step, rad.
 const RESOLVED: f64 = 2.0;
 /// The oscillators of a scene whose free steps are made here; empty before the first.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, HeldBytes)]
 pub(super) struct Oscillators {
     pub(super) modes: Vec<Oscillator>,
     /// A number a mode.
@@ -24,7 +24,7 @@ pub(super) struct Oscillators {
 }
 
 /// A natural mode in a step, per unit mass where it is a force.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, HeldBytes)]
 pub(super) struct Oscillator {
     /// `w²`, 1/s², and mass, g.
     square: f64,
@@ -81,10 +81,6 @@ impl Oscillators {
         for (value, mode) in self.values.iter_mut().zip(&self.modes) {
             *value = of(mode) as f32;
         }
-    }
-
-    pub(super) fn memory_bytes(&self) -> usize {
-        size_of::<Oscillator>() * self.modes.len() + 4 * (self.values.len() + self.faster.len())
     }
 }
 

@@ -19,7 +19,7 @@ use crate::kernels::contact::{ContactFactor, subtract_gram};
 use crate::kernels::project::{project_field, row_dots};
 use crate::kernels::rows::{RowPlan, decode_rows};
 use crate::kernels::{Isa, Pool};
-use crate::memory;
+use crate::memory::{self, HeldBytes};
 use crate::prior::{CoarseSpace, PriorTable};
 
 /// Weight of the diagonal level; 1.0 and 0.15 are three to seven times worse.
@@ -41,6 +41,7 @@ pub struct Env<'a> {
 }
 
 /// The preconditioner for one set of prescribed nodes, and its buffers.
+#[derive(HeldBytes)]
 pub struct Preconditioner {
     inertial_compliance: Vec<f32>,
     /// `1 / (m (w² + kappa))` of each natural mode, mm/µN.
@@ -298,30 +299,6 @@ impl Preconditioner {
             }
         }
         Ok(())
-    }
-
-    /// Bytes held.
-    pub fn memory_bytes(&self) -> usize {
-        let lists = self.lost.capacity()
-            + self.natural.capacity()
-            + 2 * self.whitened.capacity()
-            + self.dofs.capacity()
-            + self.columns.capacity()
-            + self.nodes.capacity()
-            + self.widened.len()
-            + self.coordinates.len()
-            + self.at_contact.capacity()
-            + self.forces.capacity();
-        4 * lists
-            + 8 * self.galerkin_free.len()
-            + self.compliance.memory_bytes()
-            + self.galerkin.memory_bytes()
-            + self.plan.memory_bytes()
-            + self.domain_bytes()
-    }
-
-    fn domain_bytes(&self) -> usize {
-        self.domain.memory_bytes() + 4 * self.domain_nodes.capacity()
     }
 }
 

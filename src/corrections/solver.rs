@@ -11,7 +11,7 @@ use super::passes;
 use super::precondition::{Env, Preconditioner, mask};
 use crate::error::{Error, Result};
 use crate::kernels::vectors::{PartialSums, dots};
-use crate::memory;
+use crate::memory::{self, HeldBytes};
 
 /// A state whose smallest det F falls below this is not accepted.
 pub const SMALLEST_DET: f32 = 0.02;
@@ -24,6 +24,7 @@ pub(super) const SHORTENINGS: u32 = 6;
 pub(super) const MOST_PARTS: u32 = 16;
 
 /// A scene's own part.
+#[derive(HeldBytes)]
 pub struct ImplicitSolver {
     pub(super) preconditioner: Preconditioner,
     pub(super) memory: Memory,
@@ -145,18 +146,6 @@ impl ImplicitSolver {
         }
         self.memory.commit();
         Ok(())
-    }
-
-    /// Bytes held.
-    pub fn memory_bytes(&self) -> usize {
-        // Eight fields, two velocities and the inertia of two states; contact forces of two states and two evaluations, contact nodes.
-        let fields = (8 + 6 + 4) * 4 * self.g.len() + 4 * self.g.len() / 3;
-        let fields = fields + 4 * self.projected.len();
-        self.memory.memory_bytes()
-            + self.preconditioner.memory_bytes()
-            + self.scratch.bytes()
-            + self.free.memory_bytes()
-            + fields
     }
 
     /// Velocities of a state that the model predicted and nothing corrected.

@@ -13,14 +13,16 @@ use super::precondition::Preconditioner;
 use super::solver::ImplicitSolver;
 use super::time_step::TimeStep;
 use crate::error::Result;
-use crate::memory;
+use crate::memory::{self, HeldBytes};
 
 /// Iterations that a free step gets at least: after one alone, what it leaves grows from step to step.
 const LEAST_SWING: u32 = 2;
 
 /// What a scene has for them.
+#[derive(HeldBytes)]
 pub struct Substepper {
     count: u32,
+    #[held(own)]
     pub(super) time_step: Arc<TimeStep>,
     preconditioner: Preconditioner,
     free: Oscillators,
@@ -62,15 +64,6 @@ impl Substepper {
     /// How many make a step.
     pub fn count(&self) -> u32 {
         self.count
-    }
-
-    /// Bytes held.
-    pub fn memory_bytes(&self) -> usize {
-        let fields = 3 * self.last.len() + 3 * self.motion.velocity.len();
-        4 * fields
-            + self.time_step.memory_bytes()
-            + self.preconditioner.memory_bytes()
-            + self.free.memory_bytes()
     }
 
     /// The state a shorter step before `input.last`, and the velocity there: the cubic through two states `step_s` apart.

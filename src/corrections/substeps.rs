@@ -8,13 +8,14 @@ use super::solver::{ImplicitSolver, SMALLEST_DET};
 use super::substepper::Substepper;
 use crate::contact::{ContactProblem, Delassus, MAX_TOOLS, Past, Tool};
 use crate::error::Result;
-use crate::memory;
+use crate::memory::{self, HeldBytes};
 
 const WHAT: &str = "the substeps of a scene";
 /// Iterations of a substep at most, after one that has lost the contact.
 const ONCE_LOST: u32 = 2;
 
 /// What contact has in them, made at the first.
+#[derive(HeldBytes)]
 pub struct Substeps {
     /// A step is made of substeps where it leaves out more than this, mm, before the bundle's calibration.
     limit_mm: f32,
@@ -47,15 +48,6 @@ impl Substeps {
     /// Whether a step that leaves out so much is to be made of substeps, mm.
     fn helps(&self, left_out_mm: f32) -> bool {
         left_out_mm > self.limit_mm
-    }
-
-    /// Bytes held.
-    pub fn memory_bytes(&self) -> usize {
-        let tools = self.tools.capacity() + self.on_their_way.capacity();
-        self.responses.memory_bytes()
-            + self.past.memory_bytes()
-            + size_of::<Tool>() * tools
-            + size_of::<Pose>() * self.from.capacity()
     }
 }
 

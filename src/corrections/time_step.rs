@@ -4,12 +4,12 @@
 use elements::{Material, Tetrahedra, Tetrahedron};
 
 use crate::bundle::Mesh;
-use crate::memory;
+use crate::memory::{self, HeldBytes};
 
 const WHAT: &str = "the elements of the corrections";
 
 /// BDF2 over steps of one length.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, HeldBytes)]
 pub struct Integrator {
     /// Step `h`, s.
     pub step_s: f64,
@@ -30,7 +30,7 @@ impl Integrator {
 }
 
 /// A step's length with what is made for it.
-#[derive(Debug)]
+#[derive(Debug, HeldBytes)]
 pub struct TimeStep {
     pub integrator: Integrator,
     /// Inverse of each node's block of `K + kappa M`, symmetric: xx, xy, xz, yy, yz, zz; mm/µN.
@@ -50,11 +50,6 @@ impl TimeStep {
             integrator,
             inverse_blocks: memory::collected(diagonal.mass.len(), inverses, WHAT)?,
         })
-    }
-
-    /// Bytes held.
-    pub fn memory_bytes(&self) -> usize {
-        size_of::<[f32; 6]>() * self.inverse_blocks.len()
     }
 }
 

@@ -16,7 +16,7 @@ use crate::corrections::{Corrections, Integrator, Motion};
 use crate::error::{Error, Result};
 use crate::kernels::project::{project_field, row_dots};
 use crate::kernels::{Isa, Pool};
-use crate::memory;
+use crate::memory::{self, HeldBytes};
 use crate::prior::PriorTable;
 
 const WHAT: &str = "the haptics of a scene";
@@ -30,16 +30,22 @@ const AT_ONCE_S: f64 = 1e-3;
 const IMPEDANCE: f32 = 1.5;
 
 /// A tool of a scene that a hand feels.
+#[derive(HeldBytes)]
 pub struct Link {
     instrument: u32,
+    #[held(skip)]
     body: Body,
     friction: f32,
     grasps: bool,
+    #[held(skip)]
     out: Writer<ContactSnapshot>,
+    #[held(skip)]
     pose: Reader<Pose>,
     /// Of one buffer.
     slow_bytes: usize,
+    #[held(skip)]
     ends: Arc<Ends>,
+    #[held(skip)]
     samples: Arc<Samples>,
     search: Search,
     delassus: Delassus,
@@ -91,7 +97,7 @@ pub fn join(
     let natural = corrections.space.natural()?;
     let snapshot = || ContactSnapshot::new(natural.len());
     let buffers = [snapshot()?, snapshot()?, snapshot()?];
-    let slow_bytes = buffers[0].memory_bytes();
+    let slow_bytes = buffers[0].held_bytes();
     let (out, snapshot) = exchange(buffers);
     let (at, pose) = exchange([tool.pose; 3]);
     let ends = Arc::new(Ends::default());
@@ -358,11 +364,7 @@ impl Link {
 
     /// Bytes held, of both ends.
     pub fn memory_bytes(&self) -> usize {
-        3 * self.slow_bytes
-            + self.search.memory_bytes()
-            + self.delassus.memory_bytes()
-            + 4 * (self.coordinates.len() + self.field.len() + 2 * self.starts.len())
-            + 8 * self.found.capacity()
+        3 * self.slow_bytes + self.held_bytes()
     }
 }
 

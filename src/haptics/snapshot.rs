@@ -4,14 +4,14 @@
 use ::contact::{Pose, Vector};
 
 use crate::error::Result;
-use crate::memory;
+use crate::memory::{self, HeldBytes};
 
 const WHAT: &str = "a contact problem for haptics";
 /// Samples at most: what lies farther from the tool is left out.
 pub const MOST_SAMPLES: usize = 96;
 
 /// The contact problem near one tool at the end of a step. All lists have room for [`MOST_SAMPLES`], `count` are used.
-#[derive(Debug)]
+#[derive(Debug, HeldBytes)]
 pub struct ContactSnapshot {
     /// Published states so far; 0: none.
     pub number: u64,
@@ -70,13 +70,6 @@ impl ContactSnapshot {
             velocity: memory::zeros(modes, WHAT)?,
             drive: memory::zeros(modes, WHAT)?,
         })
-    }
-
-    /// Bytes held.
-    pub fn memory_bytes(&self) -> usize {
-        let rows = 4 * size_of::<Vector>() + size_of::<Option<Vector>>();
-        rows * MOST_SAMPLES
-            + 4 * (self.delassus.len() + self.at_samples.len() + 2 * self.velocity.len())
     }
 }
 

@@ -12,7 +12,7 @@ mod upper;
 
 pub use gram::subtract_gram;
 
-use crate::memory;
+use crate::memory::{self, HeldBytes};
 use gram::whiten_rows;
 use lanes::Isa;
 use upper::{factor_upper, solve_upper};
@@ -53,7 +53,7 @@ impl FactorReport {
 }
 
 /// A Cholesky factor of the contact block, kept while the contact nodes stay.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, HeldBytes)]
 pub struct ContactFactor {
     order: usize,
     upper: Vec<f64>,
@@ -91,11 +91,6 @@ impl ContactFactor {
         let right = order.saturating_sub(self.right.len());
         memory::reserve(&mut self.upper, upper, WHAT)?;
         memory::reserve(&mut self.right, right, WHAT)
-    }
-
-    /// Bytes held.
-    pub fn memory_bytes(&self) -> usize {
-        8 * (self.upper.capacity() + self.right.capacity())
     }
 
     /// Degrees of freedom of the current factor; 0 before the first.

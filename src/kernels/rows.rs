@@ -8,7 +8,7 @@
 
 use super::parts::Parts;
 use super::pool::{Pool, PoolError};
-use crate::memory;
+use crate::memory::{self, HeldBytes};
 use half::f16;
 use lanes::DenseLanes;
 use lanes::{Isa, by_isa};
@@ -57,7 +57,7 @@ pub struct BlockBasis<'a> {
 }
 
 /// A run of wanted nodes in one block.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, HeldBytes)]
 struct Run {
     block: u32,
     /// Into `RowPlan::{locals, outputs}`.
@@ -66,7 +66,7 @@ struct Run {
 }
 
 /// Which nodes to decode: made once a region, read each step.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, HeldBytes)]
 pub struct RowPlan {
     runs: Vec<Run>,
     /// Node's place in its block.
@@ -167,13 +167,6 @@ impl RowPlan {
             "a node of the list is unknown or twice in it"
         );
         Ok(plan)
-    }
-
-    /// Bytes held.
-    pub fn memory_bytes(&self) -> usize {
-        size_of::<Run>() * self.runs.capacity()
-            + 4 * (self.locals.capacity() + self.outputs.capacity())
-            + 8 * self.basis_offsets.capacity()
     }
 
     fn end_run(&mut self, block: usize, start: &mut usize) {

@@ -5,7 +5,7 @@
 
 use super::parts::Parts;
 use super::pool::{Pool, PoolError};
-use crate::memory;
+use crate::memory::{self, HeldBytes};
 use lanes::DenseLanes;
 use lanes::{Isa, by_isa};
 
@@ -13,7 +13,7 @@ use lanes::{Isa, by_isa};
 const PIECE: usize = 4096;
 
 /// Partial sums of [`dots`], kept between calls.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, HeldBytes)]
 pub struct PartialSums(Vec<f32>);
 
 impl PartialSums {

@@ -3,12 +3,13 @@
 
 use crate::bundle::TensorFile;
 use crate::error::Result;
+use crate::memory::HeldBytes;
 
 /// Largest difference of a node's sum of weights from one.
 const SUM_TOLERANCE: f32 = 1e-3;
 
 /// Nodes that are decoded, and how the others follow.
-#[derive(Debug)]
+#[derive(Debug, HeldBytes)]
 pub struct Anchors {
     nodes: Vec<u32>,
     /// Nodes of the mesh `[K,n]`.
@@ -62,10 +63,5 @@ impl Anchors {
     pub fn of(&self, node: u32) -> (&[u32], &[f32]) {
         let row = node as usize * self.per_node..(node as usize + 1) * self.per_node;
         (&self.neighbours[row.clone()], &self.weights[row])
-    }
-
-    /// Bytes held.
-    pub fn memory_bytes(&self) -> usize {
-        4 * (self.nodes.len() + self.neighbours.len() + self.weights.len())
     }
 }

@@ -20,6 +20,7 @@ use crate::bundle::{BundleFiles, Manifest, ManifestKind, Mesh};
 use crate::corrections::Corrections;
 use crate::error::Result;
 use crate::library::{self, Alive};
+use crate::memory::HeldBytes;
 use crate::onnx::{ProviderChoice, ProviderPlan, Runtime};
 use crate::options::{IndexSet, ModelOptions, Precision, Provider};
 use crate::prior::PriorTable;
@@ -227,11 +228,11 @@ impl Model {
             KindModel::Upt(upt) => (
                 Kind::Upt,
                 upt.tables.graph.supernodes.len(),
-                upt.memory_bytes() + upt.tables.memory_bytes(),
+                upt.held_bytes() + upt.tables.held_bytes(),
             ),
-            KindModel::Reduced(reduced) => (Kind::Reduced, 0, reduced.memory_bytes()),
+            KindModel::Reduced(reduced) => (Kind::Reduced, 0, reduced.held_bytes()),
         };
-        let prior = self.prior.as_ref().map_or(0, |table| table.memory_bytes());
+        let prior = self.prior.as_ref().map_or(0, |table| table.held_bytes());
         ModelInfo {
             kind,
             node_count: self.mesh.node_count() as u64,
@@ -247,7 +248,7 @@ impl Model {
                 KindModel::Upt(upt) => upt.precision,
                 KindModel::Reduced(reduced) => reduced.precision(),
             },
-            memory_bytes: (own + prior + self.mesh.memory_bytes()) as u64,
+            memory_bytes: (own + prior + self.mesh.held_bytes()) as u64,
             load_seconds: self.load_seconds,
             frame_step_s: self.manifest.frame_step_s(),
         }

@@ -3,21 +3,27 @@
 
 use crate::bundle::{BundleFiles, ReducedEntry};
 use crate::error::Result;
+use crate::memory::HeldBytes;
 use crate::onnx::{ProviderChoice, ProviderPlan, Runtime, Stage, StageOptions};
 use crate::options::Precision;
 
 /// The part of a model that only kind `reduced` has; the tables are in [`crate::prior::PriorTable`].
+#[derive(HeldBytes)]
 pub struct ReducedModel {
     /// The learned map; none in a bundle that was made without training.
     pub learned: Option<LearnedMap>,
 }
 
 /// The correction network.
+#[derive(HeldBytes)]
 pub struct LearnedMap {
     /// The manifest's entry.
+    #[held(skip)]
     pub entry: ReducedEntry,
     /// Precision of the graph: float32, float16 or int8.
+    #[held(skip)]
     pub precision: Precision,
+    #[held(skip)]
     runtime: &'static Runtime,
     file: String,
     latent: Vec<u8>,
@@ -56,11 +62,6 @@ impl ReducedModel {
         self.learned
             .as_ref()
             .map_or(Precision::F32, |map| map.precision)
-    }
-
-    /// Bytes held.
-    pub fn memory_bytes(&self) -> usize {
-        self.learned.as_ref().map_or(0, |map| map.latent.len())
     }
 }
 

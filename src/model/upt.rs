@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::graph::SupernodeGraph;
 use crate::kernels::decoder::{DecoderWeights, PackedDecoder};
 use crate::kernels::encode::transpose_weight;
-use crate::memory;
+use crate::memory::{self, HeldBytes};
 use crate::onnx::{ProviderChoice, ProviderPlan, Runtime, Stage, StageOptions};
 use crate::options::Precision;
 
@@ -18,7 +18,7 @@ const TABLES: &str = "the tables of a mesh";
 const EMBED_TILE: usize = 2048;
 
 /// Everything that depends on the mesh alone.
-#[derive(Debug)]
+#[derive(Debug, HeldBytes)]
 pub struct UptTables {
     /// Supernodes and radius graph, in nodes of the mesh.
     pub graph: SupernodeGraph,
@@ -40,26 +40,11 @@ pub struct UptTables {
     pub anchors: Option<Anchors>,
 }
 
-impl UptTables {
-    /// Bytes held.
-    pub fn memory_bytes(&self) -> usize {
-        4 * (self.encode_nodes.len()
-            + self.row_of_node.len()
-            + self.supernode_rows.len()
-            + self.neighbour_rows.len()
-            + self.graph.supernodes.len()
-            + self.graph.offsets.len()
-            + self.graph.neighbours.len()
-            + self.source_table.len()
-            + self.target_table.len()
-            + self.query_table.len())
-            + self.anchors.as_ref().map_or(0, Anchors::memory_bytes)
-    }
-}
-
 /// The part of a model that only kind `upt` has.
+#[derive(HeldBytes)]
 pub struct UptModel {
     /// The manifest's entry.
+    #[held(skip)]
     pub entry: UptEntry,
     /// `[f,d]`, transposed for the kernels.
     pub source_weight: Vec<f32>,
@@ -68,8 +53,10 @@ pub struct UptModel {
     /// Decoder, packed for the native kernel.
     pub decoder: PackedDecoder,
     /// Tables of the bundle's mesh.
+    #[held(skip)]
     pub tables: Arc<UptTables>,
     /// Precision of the graphs `latent` and `decoder`: float32, float16 or int8.
+    #[held(skip)]
     pub precision: Precision,
     embed: Vec<u8>,
     pub(super) latent_file: String,
@@ -163,15 +150,6 @@ impl UptModel {
             },
         )?;
         Ok(queries)
-    }
-
-    /// Bytes held in addition to the tables.
-    pub fn memory_bytes(&self) -> usize {
-        self.embed.len()
-            + self.latent.len()
-            + self.decoder_graph.len()
-            + self.step.as_ref().map_or(0, |(_, bytes)| bytes.len())
-            + 4 * (self.source_weight.len() + self.target_weight.len())
     }
 }
 

@@ -5,6 +5,7 @@ use std::path::Path;
 use super::{ProviderChoice, StageOptions, StageTimes, Tensors};
 use crate::error::{Error, Result};
 use crate::features::{Feature, Learned};
+use crate::memory::HeldBytes;
 use crate::options::Provider;
 
 /// There is none.
@@ -82,11 +83,6 @@ impl Stage {
         match self.0 {}
     }
 
-    /// Bytes of the host's tensors.
-    pub fn memory_bytes(&self) -> usize {
-        match self.0 {}
-    }
-
     /// What runs this stage.
     pub fn choice(&self) -> &ProviderChoice {
         match self.0 {}
@@ -104,6 +100,13 @@ impl Stage {
 
     /// Runs the graph.
     pub fn run(&mut self) -> Result<()> {
+        match self.0 {}
+    }
+}
+
+/// Of the host's tensors; the session is the model's.
+impl HeldBytes for Stage {
+    fn held_bytes(&self) -> usize {
         match self.0 {}
     }
 }

@@ -9,10 +9,10 @@ use half::slice::HalfFloatSliceExt;
 use super::numbers::Numbers;
 use crate::bundle::TensorFile;
 use crate::error::Result;
-use crate::memory;
+use crate::memory::{self, HeldBytes};
 
 /// Where the entries come from.
-#[derive(Debug)]
+#[derive(Debug, HeldBytes)]
 pub enum Compliance {
     /// `[3D,3D]`.
     Whole(Vec<f32>),
@@ -21,7 +21,7 @@ pub enum Compliance {
 }
 
 /// Blocks of neighbouring contact nodes, upper triangle.
-#[derive(Debug)]
+#[derive(Debug, HeldBytes)]
 pub struct Near {
     /// Row starts in `nodes` `[D+1]`.
     offsets: Vec<u32>,
@@ -150,18 +150,6 @@ impl Compliance {
                 }
             }
             Compliance::Near(near) => near.gather(bases, columns, upper, scratch),
-        }
-    }
-
-    /// Bytes held.
-    pub fn memory_bytes(&self) -> usize {
-        match self {
-            Compliance::Whole(whole) => 4 * whole.len(),
-            Compliance::Near(near) => {
-                4 * (near.offsets.len() + near.nodes.len() + near.rows.len())
-                    + 36 * near.blocks.len()
-                    + 8 * near.ranks.len()
-            }
         }
     }
 }

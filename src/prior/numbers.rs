@@ -5,9 +5,10 @@ use half::f16;
 use crate::bundle::TensorFile;
 use crate::error::Result;
 use crate::kernels::rows::Stored;
+use crate::memory::HeldBytes;
 
 /// Numbers kept at the width in which they are stored.
-#[derive(Debug)]
+#[derive(Debug, HeldBytes)]
 pub enum Numbers {
     /// float32.
     F32(Vec<f32>),
@@ -41,13 +42,6 @@ impl Numbers {
         match self {
             Numbers::F32(values) => values[index],
             Numbers::F16(values) => values[index].to_f32(),
-        }
-    }
-
-    pub(super) fn bytes(&self) -> usize {
-        match self {
-            Numbers::F32(values) => 4 * values.len(),
-            Numbers::F16(values) => 2 * values.len(),
         }
     }
 }

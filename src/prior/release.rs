@@ -3,7 +3,7 @@
 
 use crate::bundle::TensorFile;
 use crate::error::Result;
-use crate::memory;
+use crate::memory::{self, HeldBytes};
 
 /// Most modes that a file may hold.
 const LIMIT: usize = 128;
@@ -11,7 +11,7 @@ const LIMIT: usize = 128;
 const SQUARINGS: usize = 6;
 
 /// Modes and their step.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, HeldBytes)]
 pub struct Release {
     /// Modes `Phi` in block coordinates `[r,Q]`, orthonormal.
     pub modes: Vec<f32>,
@@ -46,11 +46,6 @@ impl Release {
                 *sum += value * weight;
             }
         }
-    }
-
-    /// Bytes held.
-    pub fn memory_bytes(&self) -> usize {
-        4 * (self.modes.len() + self.step.len())
     }
 }
 

@@ -6,7 +6,7 @@ use crate::kernels::contact::ContactFactor;
 use crate::kernels::respond::accumulate_rows;
 use crate::kernels::rows::Stored;
 use crate::kernels::{Isa, Pool};
-use crate::memory;
+use crate::memory::{self, HeldBytes};
 
 /// Contact nodes for which the factor has room from the start; larger sets allocate once.
 const ROOM: usize = 256;
@@ -21,7 +21,7 @@ pub struct SolveReport {
 }
 
 /// Contact forces, and the factor that is kept while the contact nodes stay the same.
-#[derive(Debug)]
+#[derive(Debug, HeldBytes)]
 pub struct ContactResponse {
     factor: ContactFactor,
     factored: Vec<u32>,
@@ -55,17 +55,6 @@ impl ContactResponse {
             count: memory::filled(columns, 0, WHAT)?,
             own: memory::filled(columns, false, WHAT)?,
         })
-    }
-
-    /// Bytes held.
-    pub fn memory_bytes(&self) -> usize {
-        let lists = self.factored.capacity()
-            + self.columns.capacity()
-            + self.rows.capacity()
-            + self.values.capacity()
-            + self.widened.len()
-            + self.forces.capacity();
-        self.factor.memory_bytes() + 4 * lists + 17 * self.own.len()
     }
 
     /// Solves for the forces. A node without a column of its own lends its displacement to the nearest column (the

@@ -11,14 +11,14 @@ use super::table::PriorTable;
 use crate::bundle::TensorFile;
 use crate::error::Result;
 use crate::kernels::rows::Stored;
-use crate::memory;
+use crate::memory::{self, HeldBytes};
 
 const WHAT: &str = "the modes of the corrections";
 /// Most modes that a file may hold.
 const LIMIT: usize = 1024;
 
 /// The modes and what the elements and the mass make of them.
-#[derive(Debug)]
+#[derive(Debug, HeldBytes)]
 pub struct CoarseSpace {
     /// `[r,Q]`, each of Euclidean length 1 as a field.
     modes: Vec<f16>,
@@ -160,11 +160,5 @@ impl CoarseSpace {
             values,
             "the corrections' preconditioner",
         )
-    }
-
-    /// Bytes held.
-    pub fn memory_bytes(&self) -> usize {
-        2 * self.modes.len()
-            + 4 * (self.stiffness.len() + self.mass.len() + self.at_contact.len() + self.rows.len())
     }
 }

@@ -7,12 +7,12 @@ use super::numbers::Numbers;
 use super::vibration::FreeVibration;
 use crate::error::Result;
 use crate::kernels::rows::BlockBasis;
-use crate::memory;
+use crate::memory::{self, HeldBytes};
 
 /// A node without a column near it.
 pub const NO_COLUMN: u32 = u32::MAX;
 /// The tables of the linear response, as `prior.safetensors` has them.
-#[derive(Debug)]
+#[derive(Debug, HeldBytes)]
 pub struct PriorTable {
     /// Nodes with compliance columns `[D]`, ascending.
     pub contact_nodes: Vec<u32>,
@@ -148,27 +148,6 @@ impl PriorTable {
                 }
             }
         }
-    }
-
-    /// Bytes held.
-    pub fn memory_bytes(&self) -> usize {
-        4 * (self.contact_nodes.len()
-            + self.block_nodes.len()
-            + self.block_offsets.len()
-            + self.rank_offsets.len()
-            + self.residual.len()
-            + self.force_to_z.len()
-            + self.force_to_p.len()
-            + self.nearest_column.len())
-            + self.compliance.memory_bytes()
-            + self.in_domain.len()
-            + 12 * self.places.len()
-            + self.basis.bytes()
-            + self.response.bytes()
-            + self
-                .vibration
-                .as_ref()
-                .map_or(0, FreeVibration::memory_bytes)
     }
 }
 

@@ -13,13 +13,13 @@ use crate::kernels::project::row_dots;
 use crate::kernels::respond::accumulate_rows;
 use crate::kernels::rows::Stored;
 use crate::kernels::{Isa, Pool};
-use crate::memory;
+use crate::memory::{self, HeldBytes};
 
 /// Most modes that a file may hold.
 const LIMIT: usize = 4096;
 
 /// Modes and their exact step.
-#[derive(Debug)]
+#[derive(Debug, HeldBytes)]
 pub struct FreeVibration {
     /// Mode amplitude of a unit force at a contact dof `[3D,m]`, mm/mN.
     force_to_mode: Vec<f32>,
@@ -156,16 +156,6 @@ impl FreeVibration {
         let rows = Stored::F32(&self.projection);
         let list = &self.rows[..self.count];
         Ok(row_dots(isa, pool, rows, list, q, out)?)
-    }
-
-    /// Bytes held.
-    pub fn memory_bytes(&self) -> usize {
-        4 * (self.force_to_mode.len()
-            + self.modes.len()
-            + self.projection.len()
-            + 4 * self.propagator.len()
-            + self.rows.len())
-            + self.release.memory_bytes()
     }
 }
 

@@ -21,7 +21,7 @@ use crate::features::{Instruments, Proven};
 use crate::field::{ContactSet, check_displacement};
 use crate::guard;
 use crate::kernels::{FlushToZero, Isa, Machine, Pool};
-use crate::memory;
+use crate::memory::{self, HeldBytes};
 use crate::model::Model;
 use crate::options::SceneOptions;
 use crate::output::Output;
@@ -30,18 +30,26 @@ use crate::stats::SceneStats;
 pub(super) const SCENE: &str = "a scene's states";
 
 /// Everything of a scene that only its stepping thread touches.
+#[derive(HeldBytes)]
 pub struct Core {
+    #[held(skip)]
     pub(super) model: Arc<Model>,
+    #[held(skip)]
     pub(super) mesh: Arc<Mesh>,
+    #[held(skip)]
     pub(super) options: SceneOptions,
+    #[held(skip)]
     pub(super) machine: Machine,
     pub(super) engine: Engine,
+    #[held(skip)]
     pub(super) corrected: Option<Corrector>,
     /// Contact of tools, from the first step that has one.
     pub(super) problem: Option<Proven<Instruments, ContactProblem>>,
     /// The tools of the step being made, where the bundle's limits for tools say something about it.
+    #[held(skip)]
     pub(super) used: Option<ToolUse>,
     /// Tools that hands feel, and how long the step being made took, s.
+    #[held(skip)]
     pub(super) hands: Vec<crate::haptics::publish::Link>,
     pub(super) took_s: f64,
     /// Whether the state being made is.
@@ -50,12 +58,14 @@ pub struct Core {
     pub(super) driven: bool,
     pub(super) held: Vec<bool>,
     pub(super) plan: NodePlan,
+    #[held(own)]
     pub(super) points: Arc<AttachedPoints>,
     pub(super) planned_tets: Vec<u32>,
     pub(super) contact_elements: Option<ContactElements>,
     pub(super) incoming: ContactSet,
     pub(super) contact: ContactSet,
     pub(super) contact_before: ContactSet,
+    #[held(skip)]
     pub(super) counters: Counters,
     /// Flags of the last step, of which the log has told.
     pub(super) told: u32,
@@ -307,34 +317,19 @@ impl Core {
 
     /// Bytes of the scene's buffers, those of the published states included.
     pub(super) fn memory_bytes(&self) -> usize {
-        let hands = self.hand_bytes();
-        let count = self.mesh.node_count();
-        let frames = if self.options.cubic_sampling { 4 } else { 3 };
-        let points = frames * 4 * self.next.points.len();
-        let contacts = [&self.incoming, &self.contact, &self.contact_before];
-        let contacts: usize = contacts.iter().map(|set| set.memory_bytes()).sum();
+        let published = if self.options.cubic_sampling { 3 } else { 2 };
+        let hands: usize = self.hands.iter().map(|hand| hand.memory_bytes()).sum();
         // A mesh of the scene's own is the scene's.
         let own_mesh = match Arc::ptr_eq(&self.mesh, &self.model.mesh) {
             true => 0,
-            false => self.mesh.memory_bytes() + self.engine.table_bytes(),
+            false => self.mesh.held_bytes() + self.engine.table_bytes(),
         };
-        12 * count * frames
+        let contacts_in_the_hosts_order = 16 * self.mesh.node_count();
+        self.held_bytes()
+            + published * self.next.held_bytes()
+            + contacts_in_the_hosts_order
+            + self.corrected.as_ref().map_or(0, Corrector::memory_bytes)
             + hands
-            + points
-            + contacts
-            + 16 * count // contacts in the host's order
-            + self.held.len()
-            + 4 * self.planned_tets.len()
-            + self.contact_elements.as_ref().map_or(0, ContactElements::memory_bytes)
-            + self.plan.memory_bytes()
-            + self.points.memory_bytes()
-            + self.envelope.memory_bytes()
-            + self.engine.memory_bytes()
-            + self.problem_bytes()
-            + self
-                .corrected
-                .as_ref()
-                .map_or(0, Corrector::memory_bytes)
             + own_mesh
     }
 }

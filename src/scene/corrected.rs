@@ -8,7 +8,7 @@ use crate::corrections::Substeps;
 use crate::corrections::{Enough, ImplicitSolver, Report, SolverContext, Substepper, TimeStep};
 use crate::error::{Error, Result};
 use crate::kernels::{Isa, Pool};
-use crate::memory;
+use crate::memory::{self, HeldBytes};
 use crate::model::Model;
 use crate::options::{Corrections, MOST_CORRECTIONS, MOST_SUBSTEPS, SceneOptions};
 use crate::stats::{SceneStats, flag};
@@ -16,6 +16,7 @@ use crate::stats::{SceneStats, flag};
 const WHAT: &str = "the corrections of a scene";
 
 /// The stage of a scene that corrects, and how far it goes.
+#[derive(HeldBytes)]
 pub struct Corrector {
     pub solver: Box<ImplicitSolver>,
     /// From the first contact of tools, where the steps may have any.
@@ -32,6 +33,7 @@ pub struct Corrector {
     calibration: f32,
     pub(super) basis_starts: Vec<usize>,
     /// The length of the scene's steps, and the damping.
+    #[held(skip)]
     pub time_step: Arc<TimeStep>,
     /// One of them is not the bundle's.
     pub(super) own_pace: bool,
@@ -205,13 +207,11 @@ impl Corrector {
 
     /// Bytes held; the bundle's pace is the model's.
     pub(super) fn memory_bytes(&self) -> usize {
-        let substeps = self.substeps.as_ref().map_or(0, |own| own.memory_bytes());
-        let substepper = self.substepper.as_ref().map_or(0, |own| own.memory_bytes());
         let own = match self.own_pace {
-            true => self.time_step.memory_bytes(),
+            true => memory::behind(&self.time_step),
             false => 0,
         };
-        self.solver.memory_bytes() + own + substepper + substeps
+        self.held_bytes() + own
     }
 
     /// Puts what the iterations report into the statistics.

@@ -298,11 +298,4 @@ impl Core {
         });
         true
     }
-
-    /// Bytes of the tools' contact.
-    pub(super) fn problem_bytes(&self) -> usize {
-        self.problem
-            .as_ref()
-            .map_or(0, |problem| problem.memory_bytes())
-    }
 }

@@ -9,12 +9,13 @@ use crate::bundle::Base;
 use crate::error::Result;
 use crate::features::{Learned, Proven};
 use crate::kernels::Compute;
-use crate::memory;
+use crate::memory::{self, HeldBytes};
 use crate::options::{DecoderKernel, Precision, Provider, StepPath};
 use crate::prior::PriorTable;
 use crate::stats::SceneStats;
 
 /// The kind's own buffers, sessions and latent state, with the model that they belong to.
+#[derive(HeldBytes)]
 pub enum Engine {
     /// Kind `upt`.
     Upt(Proven<Learned, UptEngine>),
@@ -246,16 +247,8 @@ impl Engine {
     /// Bytes of the tables of the scene's mesh.
     pub fn table_bytes(&self) -> usize {
         match self {
-            Engine::Upt(engine) => engine.tables.memory_bytes(),
+            Engine::Upt(engine) => engine.tables.held_bytes(),
             Engine::Reduced(_) => 0,
-        }
-    }
-
-    /// Bytes of the buffers.
-    pub fn memory_bytes(&self) -> usize {
-        match self {
-            Engine::Upt(engine) => engine.memory_bytes(),
-            Engine::Reduced(engine) => engine.memory_bytes(),
         }
     }
 }

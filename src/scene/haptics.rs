@@ -112,9 +112,4 @@ impl Core {
         drop(shared);
         self.hands = hands;
     }
-
-    /// Bytes of the hands.
-    pub(super) fn hand_bytes(&self) -> usize {
-        self.hands.iter().map(|hand| hand.memory_bytes()).sum()
-    }
 }

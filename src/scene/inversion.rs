@@ -2,12 +2,12 @@
 
 use crate::bundle::{Mesh, volume};
 use crate::error::Result;
-use crate::memory;
+use crate::memory::{self, HeldBytes};
 
 const WHAT: &str = "the elements at the contact";
 
 /// Elements around each node, made at the first contact.
-#[derive(Debug)]
+#[derive(Debug, HeldBytes)]
 pub struct ContactElements {
     /// Rows of `around` `[K+1]`.
     offsets: Vec<u32>,
@@ -63,10 +63,5 @@ impl ContactElements {
             f32::INFINITY => 1.0,
             det => det,
         }
-    }
-
-    /// Bytes held.
-    pub fn memory_bytes(&self) -> usize {
-        4 * (self.offsets.len() + self.around.len())
     }
 }

@@ -7,12 +7,15 @@ use crate::error::Result;
 use crate::field::ContactSet;
 use crate::kernels::rows::decode_rows;
 use crate::kernels::{Compute, Isa};
+use crate::memory::HeldBytes;
 use crate::prior::{ContactResponse, PriorTable, SolveReport};
 use crate::stats::flag;
 
 /// Tables, and the solve of the last contact.
+#[derive(HeldBytes)]
 pub struct Linear {
     /// The model's tables.
+    #[held(skip)]
     pub table: Arc<PriorTable>,
     /// The contact solve.
     pub solve: ContactResponse,

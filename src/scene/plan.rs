@@ -2,13 +2,13 @@
 
 use crate::error::Result;
 use crate::kernels::rows::RowPlan;
-use crate::memory;
+use crate::memory::{self, HeldBytes};
 use crate::prior::PriorTable;
 
 const WHAT: &str = "a plan of decoded nodes";
 
 /// Nodes to decode, ascending, and where the prior's rows of them lie.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, HeldBytes)]
 pub struct NodePlan {
     nodes: Vec<u32>,
     rows: RowPlan,
@@ -44,11 +44,6 @@ impl NodePlan {
             memory::collected(node_count, 0..node_count as u32, WHAT)?,
             table,
         )
-    }
-
-    /// Bytes held.
-    pub fn memory_bytes(&self) -> usize {
-        4 * self.nodes.capacity() + self.rows.memory_bytes()
     }
 
     /// The nodes, ascending.

@@ -7,7 +7,7 @@ use crate::bundle::Mesh;
 use crate::error::{Error, Result};
 use crate::field::check;
 use crate::grid::PointGrid;
-use crate::memory;
+use crate::memory::{self, HeldBytes};
 
 /// Farthest that an attached point may lie outside of the mesh, mm.
 pub const REACH: f64 = 25.0;
@@ -31,7 +31,7 @@ pub fn check_point_count(count: u64) -> Result<()> {
 }
 
 /// Attached points.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, HeldBytes)]
 pub struct AttachedPoints {
     nodes: Vec<[u32; 4]>,
     weights: Vec<[f32; 4]>,
@@ -113,11 +113,6 @@ impl AttachedPoints {
     /// Query rows and their list; both empty where points are interpolated only.
     pub fn queries(&self) -> (&[f32], &[u32]) {
         (&self.queries, &self.rows)
-    }
-
-    /// Bytes held.
-    pub fn memory_bytes(&self) -> usize {
-        4 * (8 * self.nodes.len() + self.places.len() + self.queries.len() + self.rows.len())
     }
 
     /// Adds `factor` times the interpolation of a field `[K,3]` to `out [n,3]`.

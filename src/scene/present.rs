@@ -10,7 +10,7 @@ use super::{Contact, Scene};
 use crate::contact::{Past, Tool};
 use crate::error::{Error, Result};
 use crate::kernels::FlushToZero;
-use crate::memory;
+use crate::memory::{self, HeldBytes};
 use crate::output::Output;
 
 const WHAT: &str = "the present state of a scene";
@@ -107,7 +107,7 @@ impl Scene {
 
     /// Bytes of what presents.
     pub(super) fn presenter_bytes(&self) -> usize {
-        lock(&self.tools.presenters).map_or(0, |presenters| presenters.memory_bytes())
+        lock(&self.tools.presenters).map_or(0, |presenters| presenters.held_bytes())
     }
 }
 

@@ -1,12 +1,12 @@
 //! What other threads may read of a scene while a step is in flight: the last states, region order, statistics.
 
 use crate::error::{Error, Result};
-use crate::memory;
+use crate::memory::{self, HeldBytes};
 use crate::output::Output;
 use crate::stats::SceneStats;
 
 /// One published state.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, HeldBytes)]
 pub struct Frame {
     /// `[K,3]`, mm; valid at the planned nodes.
     pub field: Vec<f32>,

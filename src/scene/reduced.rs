@@ -16,7 +16,7 @@ use crate::kernels::Compute;
 use crate::kernels::project::{project_field, row_dots};
 use crate::kernels::respond::accumulate_rows;
 use crate::kernels::rows::Stored;
-use crate::memory;
+use crate::memory::{self, HeldBytes};
 use crate::model::{LearnedMap, Model, ReducedModel};
 use crate::onnx::Stage;
 use crate::options::{Precision, Provider};
@@ -27,9 +27,11 @@ pub use record::ReducedRecord;
 use record::STATE;
 
 /// Buffers and session of a scene of kind `reduced`.
+#[derive(HeldBytes)]
 pub struct ReducedEngine {
     /// The linear response.
     pub linear: Linear,
+    #[held(skip)]
     kind: Arc<ReducedModel>,
     learned: Option<LearnedStage>,
     pub(super) given_q: Vec<f32>,
@@ -44,8 +46,10 @@ pub struct ReducedEngine {
 }
 
 /// Session and buffers of the correction network.
+#[derive(HeldBytes)]
 struct LearnedStage {
     stage: Stage,
+    #[held(skip)]
     precision: Precision,
     mode_rows: Vec<u32>,
     given_b: Vec<f32>,
@@ -312,16 +316,6 @@ impl ReducedEngine {
     /// `|b|` of the last state, or where it swings freely the largest it may swing to, mm.
     pub fn last_norm(&self) -> f32 {
         norm(&self.last.b).max(norm(&self.last.vibration))
-    }
-
-    /// Bytes of the buffers.
-    pub fn memory_bytes(&self) -> usize {
-        3 * self.next.memory_bytes()
-            + 4 * (self.given_q.len() + self.swing.len())
-            + self.linear.solve.memory_bytes()
-            + self.learned.as_ref().map_or(0, |learned| {
-                4 * (learned.given_b.len() + learned.mode_rows.len()) + learned.stage.memory_bytes()
-            })
     }
 }
 

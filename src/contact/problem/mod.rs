@@ -27,7 +27,7 @@ use super::state::State;
 use super::tool::{MAX_TOOLS, Mode, PUT_MM, Reading, Tool};
 use crate::bundle::Mesh;
 use crate::error::{Error, Result};
-use crate::memory;
+use crate::memory::{self, HeldBytes};
 use look::MOST_ROWS;
 
 const WHAT: &str = "the contact of instruments";
@@ -47,8 +47,11 @@ const RESTING_MM: f32 = 0.9;
 const OPEN_MM: f32 = 0.5;
 
 /// The contact of one scene.
+#[derive(HeldBytes)]
 pub struct ContactProblem {
+    #[held(skip)]
     samples: Arc<Samples>,
+    #[held(skip)]
     mesh: Arc<Mesh>,
     tools: Vec<Tool>,
     /// Where each tool was when the step began.
@@ -347,21 +350,5 @@ impl ContactProblem {
     /// The step being made becomes the last.
     pub fn commit(&mut self) {
         std::mem::swap(&mut self.past, &mut self.next);
-    }
-
-    /// Bytes held; the samples are the model's.
-    pub fn memory_bytes(&self) -> usize {
-        size_of::<Row>() * self.rows.capacity()
-            + size_of::<Contact>() * self.contacts.capacity()
-            + size_of::<Vector>() * self.forces.capacity()
-            + size_of::<Force>() * self.kept.capacity()
-            + 4 * (self.columns.capacity() + self.change.capacity())
-            + 4 * (self.nodes.capacity() + self.vectors.capacity())
-            + self.past.memory_bytes()
-            + self.next.memory_bytes()
-            + self.search.memory_bytes()
-            + self.sweeps.memory_bytes()
-            + self.delassus.memory_bytes()
-            + self.inertial_compliance.memory_bytes()
     }
 }

@@ -28,7 +28,7 @@ pub use weights::{DecoderTokens, DecoderWeights, PackedDecoder};
 use super::Compute;
 use super::parts::Parts;
 use super::pool::PoolError;
-use crate::memory;
+use crate::memory::{self, HeldBytes};
 use lanes::Isa;
 
 /// Which nodes to decode, and where each goes.
@@ -43,7 +43,7 @@ pub enum DecoderRows<'a> {
 }
 
 /// Working memory of the threads, made once; `len` grows with the model's widths only.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, HeldBytes)]
 pub struct DecoderScratch {
     blocks: Vec<CacheLine>,
     a_worker: usize,
@@ -51,7 +51,7 @@ pub struct DecoderScratch {
 
 /// Sixteen f32 on a cache line of their own.
 #[repr(align(64))]
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, HeldBytes)]
 pub(super) struct CacheLine(pub(super) [f32; 16]);
 
 impl DecoderScratch {
@@ -75,11 +75,6 @@ impl DecoderScratch {
             blocks: memory::filled(a_worker * threads, line, "the decoder's threads")?,
             a_worker,
         })
-    }
-
-    /// Bytes held.
-    pub fn memory_bytes(&self) -> usize {
-        64 * self.blocks.len()
     }
 }
 

@@ -8,7 +8,7 @@
 use super::pack::{GROUP, block_count, pack, pack_blocks, pack_pairs, pair_count, panel_floats};
 use super::precision::DecoderPrecision;
 use crate::error::Error;
-use crate::memory;
+use crate::memory::{self, HeldBytes};
 use half::bf16;
 
 /// The decoder's tensors as stored in `weights.safetensors`; matrices `[out,in]` row-major.
@@ -35,7 +35,7 @@ pub struct DecoderWeights<'a> {
 }
 
 /// `W x + b` ready for the micro-kernel.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, HeldBytes)]
 pub(super) struct Linear {
     pub depth: usize,
     /// `[out,in]`, for the scalar reference.
@@ -126,7 +126,7 @@ const WHAT: &str = "the decoder's weights";
 type Tensors<'a> = (&'a [f32], &'a [f32]);
 
 /// The decoder of a model, packed. Immutable; shared by scenes and threads.
-#[derive(Debug)]
+#[derive(Debug, HeldBytes)]
 pub struct PackedDecoder {
     pub(super) hidden: usize,
     pub(super) heads: usize,
@@ -195,7 +195,7 @@ impl PackedDecoder {
 
 /// One step's keys and values, packed. Made once ([`DecoderTokens::new`]), filled each step
 /// without allocation ([`DecoderTokens::set`]).
-#[derive(Debug)]
+#[derive(Debug, HeldBytes)]
 pub struct DecoderTokens {
     tokens: usize,
     hidden: usize,
@@ -243,19 +243,6 @@ impl DecoderTokens {
             key_blocks: memory::filled(heads * key_blocks, bf16::ZERO, WHAT)?,
             value_blocks: memory::filled(heads * value_blocks, bf16::ZERO, WHAT)?,
         })
-    }
-
-    /// Bytes held.
-    pub fn memory_bytes(&self) -> usize {
-        let floats = [
-            &self.keys,
-            &self.values,
-            &self.key_panels,
-            &self.value_panels,
-        ];
-        4 * floats.iter().map(|list| list.len()).sum::<usize>()
-            + 2 * (self.key_pairs.len() + self.value_pairs.len())
-            + 2 * (self.key_blocks.len() + self.value_blocks.len())
     }
 
     /// Takes a step's `keys [L,h]` and `values [L,h]`, the outputs of `latent.onnx`.

@@ -16,6 +16,7 @@ use super::memory::{Memory, copy};
 use super::runtime::Runtime;
 use super::status;
 use crate::error::{Error, Result};
+use crate::memory::HeldBytes;
 use crate::onnx::{ProviderChoice, StageTimes};
 use crate::options::Provider;
 
@@ -55,13 +56,6 @@ impl Stage {
     /// Output `index` of the last run.
     pub fn output(&self, index: usize) -> &[f32] {
         self.outputs[index].host.extract_tensor().1
-    }
-
-    /// Bytes of the host's tensors. The session is the model's.
-    pub fn memory_bytes(&self) -> usize {
-        let buffers = self.inputs.iter().chain(&self.outputs);
-        let floats: usize = buffers.map(|b| b.host.extract_tensor().1.len()).sum();
-        4 * floats + self.constant_bytes
     }
 
     /// What runs this stage.
@@ -149,6 +143,15 @@ impl Stage {
             }
         }
         Ok(())
+    }
+}
+
+/// Of the host's tensors; the session is the model's.
+impl HeldBytes for Stage {
+    fn held_bytes(&self) -> usize {
+        let buffers = self.inputs.iter().chain(&self.outputs);
+        let floats: usize = buffers.map(|b| b.host.extract_tensor().1.len()).sum();
+        4 * floats + self.constant_bytes
     }
 }
 

@@ -16,7 +16,7 @@ use crate::field::ContactSet;
 use crate::kernels::respond::accumulate_rows;
 use crate::kernels::rows::{RowPlan, decode_rows};
 use crate::kernels::{Isa, Pool};
-use crate::memory;
+use crate::memory::{self, HeldBytes};
 use crate::scene::frame_state::FrameState;
 use crate::scene::step_input::Contact;
 use crate::scene::tissue::Tissue;
@@ -37,7 +37,7 @@ pub(super) struct View<'a> {
 }
 
 /// A step: its state and velocity `[K,3]`, where tools were and pushed, nodes in contact and their forces, the tools' ways.
-#[derive(Default)]
+#[derive(Default, HeldBytes)]
 struct Known {
     /// Which step that is.
     step: Option<u64>,
@@ -50,11 +50,14 @@ struct Known {
 }
 
 /// A step, and what its tissue does after it.
+#[derive(HeldBytes)]
 pub(super) struct Between {
     problem: ContactProblem,
     /// The step before the known one, or what the next is read into.
     other: Known,
+    #[held(skip)]
     pool: Pool,
+    #[held(skip)]
     isa: Isa,
     held: Vec<bool>,
     /// State of the step, its velocity, and its tissue at the moment asked for, `[K,3]`.
@@ -297,18 +300,5 @@ impl Between {
             };
         }
         Ok(())
-    }
-
-    /// Bytes held.
-    pub(super) fn memory_bytes(&self) -> usize {
-        // The published moment holds velocities too.
-        4 * (2 * self.last.len() + 3 * self.velocity.len() + self.free.len())
-            + 4 * (self.other.then.capacity() + self.other.forces.capacity())
-            + self.other.past.memory_bytes()
-            + self.extrapolation.memory_bytes()
-            + self.nodes.memory_bytes()
-            + self.now.memory_bytes()
-            + self.held.len()
-            + self.problem.memory_bytes()
     }
 }

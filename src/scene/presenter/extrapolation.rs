@@ -9,7 +9,7 @@ use ::contact::{Pose, Vector};
 use crate::contact::vector;
 use crate::contact::{ContactProblem, MAX_TOOLS, PUT_MM, Tool};
 use crate::error::Result;
-use crate::memory;
+use crate::memory::{self, HeldBytes};
 
 const WHAT: &str = "the present state of a scene";
 /// What the time is stretched by. A tool that goes faster than it did pushes by itself; following it (up to 1.5) or taking tissue back (down
@@ -21,7 +21,7 @@ const SMALL_MM: f32 = 0.05;
 const NEAR_MM: f32 = 24.0;
 
 /// The tools' ways to the last step.
-#[derive(Default)]
+#[derive(Default, HeldBytes)]
 pub(super) struct Ways {
     /// Poses at the step before the last and at the one before it, and how far apart they are, s.
     before: [Vec<Pose>; 2],
@@ -53,14 +53,10 @@ impl Ways {
     pub(super) fn forget(&mut self) {
         self.before.iter_mut().for_each(Vec::clear);
     }
-
-    fn memory_bytes(&self) -> usize {
-        size_of::<Pose>() * (self.before[0].capacity() + self.before[1].capacity())
-    }
 }
 
 /// The tools' ways of the last step, and the tissue that each drives.
-#[derive(Default)]
+#[derive(Default, HeldBytes)]
 pub(super) struct VelocityExtrapolation {
     pub(super) ways: Ways,
     /// Where tools push, and how far velocities are followed there, s.
@@ -184,10 +180,6 @@ impl VelocityExtrapolation {
             }
             std::array::from_fn(|k| last[k] + extrapolation * velocity[k])
         }
-    }
-
-    pub(super) fn memory_bytes(&self) -> usize {
-        self.ways.memory_bytes() + size_of::<(Vector, f32)>() * self.driven.capacity()
     }
 }
 

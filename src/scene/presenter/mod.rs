@@ -18,7 +18,7 @@ use super::step_input::Contact;
 use super::tissue::Tissue;
 use crate::error::{Error, Result};
 use crate::kernels::rows::RowPlan;
-use crate::memory;
+use crate::memory::{self, HeldBytes};
 use crate::model::Model;
 use crate::output::Output;
 use between::{AT_ONCE_S, Between, View, WHAT};
@@ -26,7 +26,7 @@ use solves::Solves;
 use step_blend::StepBlend;
 
 /// What makes a scene's frames, each part from its first use.
-#[derive(Default)]
+#[derive(Default, HeldBytes)]
 pub struct Presenters {
     region: Option<Box<Presenter>>,
     points: Option<Box<Presenter>>,
@@ -35,9 +35,12 @@ pub struct Presenters {
 }
 
 /// What makes frames of the region, or of the attached points.
+#[derive(HeldBytes)]
 struct Presenter {
     /// What it shows: the region, or the attached points by the nodes around them.
+    #[held(skip)]
     values: Values,
+    #[held(skip)]
     attached: Arc<AttachedPoints>,
     between: Between,
     /// The region and its rows.
@@ -95,14 +98,6 @@ impl Presenters {
             Some(presenter) => presenter.frame(scene, tau, driven, &mut self.solves, out),
             None => Ok(()),
         }
-    }
-
-    /// Bytes held.
-    pub fn memory_bytes(&self) -> usize {
-        let made = [&self.region, &self.points].into_iter().flatten();
-        made.map(|presenter| presenter.memory_bytes())
-            .sum::<usize>()
-            + self.solves.memory_bytes()
     }
 }
 
@@ -265,14 +260,6 @@ impl Presenter {
             _ => self.step_blend.forget(seen_s),
         }
         Ok(())
-    }
-
-    fn memory_bytes(&self) -> usize {
-        let lists = self.region.len() + self.moved.len() + self.shown.len() + self.nodal.len();
-        4 * lists
-            + self.between.memory_bytes()
-            + self.step_blend.memory_bytes()
-            + self.plan.memory_bytes()
     }
 }
 

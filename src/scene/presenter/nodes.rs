@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::field::ContactSet;
 use crate::kernels::Isa;
 use crate::kernels::contact::ContactFactor;
-use crate::memory;
+use crate::memory::{self, HeldBytes};
 use crate::prior::CoarseSpace;
 use crate::prior::PriorTable;
 
@@ -21,7 +21,7 @@ pub(super) struct Means<'a> {
 }
 
 /// The nodes of the step before a frame, and the change of their forces.
-#[derive(Default)]
+#[derive(Default, HeldBytes)]
 pub(super) struct Nodes {
     /// Nodes in contact in the step, and the forces on them, mN `[m,3]`.
     pub then: Vec<u32>,
@@ -165,14 +165,5 @@ impl Nodes {
             self.change[at as usize] = force;
         }
         Ok(())
-    }
-
-    /// Bytes held.
-    pub fn memory_bytes(&self) -> usize {
-        4 * (self.then.capacity() + self.forces.capacity() + self.only.capacity())
-            + 8 * (self.columns.capacity() + self.upper.capacity())
-            + 4 * (self.dofs.capacity() + self.change.capacity() + self.held.capacity())
-            + 4 * (self.wanted.capacity() + self.solved.capacity() + self.widened.capacity())
-            + self.factor.memory_bytes()
     }
 }

@@ -9,7 +9,7 @@ use super::extrapolation::VelocityExtrapolation;
 use crate::contact::Tool;
 use crate::error::Result;
 use crate::field::ContactSet;
-use crate::memory;
+use crate::memory::{self, HeldBytes};
 
 const WHAT: &str = "the present state of a scene";
 
@@ -31,7 +31,7 @@ pub(super) struct Question<'a> {
 }
 
 /// A solve, and what it followed from.
-#[derive(Default)]
+#[derive(Default, HeldBytes)]
 struct Solve {
     /// None where it has no answer.
     step: Option<u64>,
@@ -48,7 +48,7 @@ struct Solve {
 }
 
 /// The last two solves.
-#[derive(Default)]
+#[derive(Default, HeldBytes)]
 pub struct Solves {
     kept: [Solve; 2],
     /// The older of them.
@@ -96,13 +96,6 @@ impl Solve {
         self.by_tools = matches!(question.drive, Drive::Tools(_));
         Ok(())
     }
-
-    fn memory_bytes(&self) -> usize {
-        4 * self.coordinates.capacity()
-            + size_of::<(Vector, f32)>() * self.driven.capacity()
-            + size_of::<Tool>() * self.tools.capacity()
-            + self.nodes.memory_bytes()
-    }
 }
 
 impl Solves {
@@ -142,10 +135,5 @@ impl Solves {
             self.made += 1;
         }
         Ok(place)
-    }
-
-    /// Bytes held.
-    pub fn memory_bytes(&self) -> usize {
-        self.kept.iter().map(Solve::memory_bytes).sum()
     }
 }

@@ -4,7 +4,7 @@
 
 use super::between::AT_ONCE_S;
 use crate::error::Result;
-use crate::memory;
+use crate::memory::{self, HeldBytes};
 
 /// A frame goes over from one step to the next within this many steps (longer carries the older step's error on), or at this
 /// speed, mm/s, where the way is long (faster is seen as a jerk), ...
@@ -14,7 +14,7 @@ const BLEND_MM_S: f64 = 25.0;
 const MOST_STEPS: f64 = 2.0;
 
 /// How far the frames without the last step are from those with it.
-#[derive(Default)]
+#[derive(Default, HeldBytes)]
 pub(super) struct StepBlend {
     /// At the region's nodes when the step was first seen, `[n,3]`, mm.
     offset: Vec<f32>,
@@ -79,11 +79,6 @@ impl StepBlend {
                 *out += part * offset;
             }
         }
-    }
-
-    /// Bytes held.
-    pub(super) fn memory_bytes(&self) -> usize {
-        4 * self.offset.capacity()
     }
 }
 

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::error::Result;
+use crate::memory::HeldBytes;
 use crate::model::ReducedModel;
 use crate::prior::PriorTable;
 use crate::{memory, stored};
@@ -10,7 +11,7 @@ use crate::{memory, stored};
 pub(super) const STATE: &str = "a scene's reduced states";
 
 /// The reduced state after one step.
-#[derive(Debug, Serialize, Deserialize)]
+#[derive(Debug, HeldBytes, Serialize, Deserialize)]
 pub struct ReducedRecord {
     /// Residual state `[r]`, mm.
     #[serde(with = "stored")]
@@ -90,19 +91,6 @@ impl ReducedRecord {
         self.q_prior = memory::copied(q_prior, STATE)?;
         self.q = memory::copied(q, STATE)?;
         Ok(())
-    }
-
-    /// Bytes held.
-    pub fn memory_bytes(&self) -> usize {
-        let lists = [
-            &self.b,
-            &self.z,
-            &self.p,
-            &self.q_prior,
-            &self.q,
-            &self.vibration,
-        ];
-        lists.iter().map(|list| 4 * list.len()).sum()
     }
 
     pub(super) fn clear(&mut self) {

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
-use crate::memory;
+use crate::memory::{self, HeldBytes};
 use crate::scene::engine::Engine;
 use crate::scene::reduced::ReducedRecord;
 use crate::scene::upt::UptRecord;
@@ -76,8 +76,8 @@ impl Engine {
     /// Bytes of its records at most.
     pub(super) fn record_bytes(&self) -> usize {
         2 * match self {
-            Engine::Upt(engine) => engine.last.memory_bytes(),
-            Engine::Reduced(engine) => engine.last.memory_bytes(),
+            Engine::Upt(engine) => engine.last.held_bytes(),
+            Engine::Reduced(engine) => engine.last.held_bytes(),
         }
     }
 }

@@ -3,14 +3,14 @@
 use crate::error::Result;
 use crate::kernels::Pool;
 use crate::kernels::parts::Parts;
-use crate::memory;
+use crate::memory::{self, HeldBytes};
 use crate::model::Anchors;
 
 /// Nodes a chunk of the interpolation.
 const CHUNK: usize = 1024;
 
 /// The anchors of the nodes that were asked for last, and a field for them.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, HeldBytes)]
 pub struct AnchorField {
     asked: Vec<u32>,
     anchors: Vec<u32>,
@@ -77,10 +77,5 @@ impl AnchorField {
             }
         })?;
         Ok(())
-    }
-
-    /// Bytes held.
-    pub fn memory_bytes(&self) -> usize {
-        4 * (self.asked.capacity() + self.anchors.capacity() + self.field.len()) + self.used.len()
     }
 }

@@ -5,11 +5,13 @@ use std::sync::Mutex;
 use super::record::UptRecord;
 use crate::error::{Error, Result};
 use crate::kernels::Pool;
+use crate::memory::HeldBytes;
 use crate::model::{DECODER_TILE, Model, UptModel, UptTables};
 use crate::onnx::Stage;
 use crate::options::DecoderKernel;
 
 /// What decodes nodes of the mesh.
+#[derive(HeldBytes)]
 pub enum Decoders {
     /// The fused native kernel.
     Native,
@@ -46,18 +48,6 @@ impl Decoders {
                 &tables.query_table,
             )?)),
         })
-    }
-
-    /// Bytes of the sessions' tensors.
-    pub fn memory_bytes(&self) -> usize {
-        match self {
-            Decoders::Native => 0,
-            Decoders::Tiles(stages) => stages
-                .iter()
-                .map(|stage| stage.lock().map_or(0, |stage| stage.memory_bytes()))
-                .sum(),
-            Decoders::Resident(stage) => stage.memory_bytes(),
-        }
     }
 
     /// Which kernel it is.

@@ -25,13 +25,14 @@ use crate::kernels::aggregate::{Csr, Messages, encode_aggregate};
 use crate::kernels::decoder::{DecoderPrecision, DecoderScratch, DecoderTokens};
 use crate::kernels::encode::LowRank;
 use crate::kernels::{Compute, Pool};
-use crate::memory;
+use crate::memory::{self, HeldBytes};
 use crate::model::{Model, UptModel, UptTables};
 use crate::onnx::Stage;
 use crate::options::{DecoderKernel, Precision, StepPath};
 use crate::stats::SceneStats;
 
 /// Who makes a step.
+#[derive(HeldBytes)]
 enum Path {
     /// Native encoder and message mean of `features`, then `latent.onnx`.
     Split {
@@ -55,10 +56,13 @@ pub struct Choice {
 }
 
 /// Buffers and sessions of a scene of kind `upt`.
+#[derive(HeldBytes)]
 pub struct UptEngine {
     /// The weights.
+    #[held(skip)]
     pub kind: Arc<UptModel>,
     /// Tables of the scene's mesh.
+    #[held(skip)]
     pub tables: Arc<UptTables>,
     /// The linear response; none where the network does not use it.
     pub linear: Option<Linear>,
@@ -67,7 +71,9 @@ pub struct UptEngine {
     decoder_scratch: DecoderScratch,
     decoders: Decoders,
     anchors: AnchorField,
+    #[held(skip)]
     precision: DecoderPrecision,
+    #[held(skip)]
     graphs: Precision,
     /// The step being made.
     pub next: UptRecord,
@@ -292,26 +298,5 @@ impl UptEngine {
     pub fn commit(&mut self) {
         std::mem::swap(&mut self.before, &mut self.last);
         std::mem::swap(&mut self.last, &mut self.next);
-    }
-
-    /// Bytes of the buffers.
-    pub fn memory_bytes(&self) -> usize {
-        let own = match &self.path {
-            Path::Split {
-                features, scratch, ..
-            } => 4 * (features.len() + scratch.len()),
-            Path::Whole(_) => 0,
-        };
-        3 * self.next.memory_bytes()
-            + own
-            + self.stage().memory_bytes()
-            + self.decoders.memory_bytes()
-            + self.tokens.memory_bytes()
-            + self.decoder_scratch.memory_bytes()
-            + self
-                .linear
-                .as_ref()
-                .map_or(0, |linear| linear.solve.memory_bytes())
-            + self.anchors.memory_bytes()
     }
 }

@@ -3,10 +3,11 @@
 use serde::{Deserialize, Serialize};
 
 use crate::error::Result;
+use crate::memory::HeldBytes;
 use crate::{memory, stored};
 
 /// The latent state after one step.
-#[derive(Debug, Serialize, Deserialize)]
+#[derive(Debug, HeldBytes, Serialize, Deserialize)]
 pub struct UptRecord {
     /// Decoder keys `[L,h]`.
     #[serde(with = "stored")]
@@ -56,15 +57,6 @@ impl UptRecord {
         stored::check(&self.vibration, vibration.len())?;
         self.prior_field = memory::copied(prior_field, "a scene's latent states")?;
         Ok(())
-    }
-
-    /// Bytes held.
-    pub fn memory_bytes(&self) -> usize {
-        4 * (self.keys.len()
-            + self.values.len()
-            + self.q_prior.len()
-            + self.prior_field.len()
-            + self.vibration.len())
     }
 
     /// Rest.
