@@ -4,7 +4,7 @@
     reason = "one contract for all: the instruction set is enabled in the caller, and pointers hold what the shapes say"
 )]
 
-use super::{CUBE_ROOT_GUESS, DenseLanes, Lanes, NodeLanes};
+use super::{CUBE_ROOT_GUESS, DenseLanes, FunctionLanes, Lanes, NodeLanes, ROOT_OF_HALF};
 use core::arch::x86_64::*;
 
 /// Eight f32.
@@ -117,22 +117,7 @@ impl Lanes for Avx2 {
 }
 
 // SAFETY (all functions): the traits' contract, AVX2, FMA and F16C enabled in the caller.
-impl DenseLanes for Avx2 {
-    #[inline(always)]
-    unsafe fn load_part(from: *const f32, count: usize) -> Self {
-        unsafe { Self(_mm256_maskload_ps(from, first(count))) }
-    }
-
-    #[inline(always)]
-    unsafe fn store_part(self, to: *mut f32, count: usize) {
-        unsafe { _mm256_maskstore_ps(to, first(count), self.0) }
-    }
-
-    #[inline(always)]
-    unsafe fn load_f16(from: *const half::f16) -> Self {
-        unsafe { Self(_mm256_cvtph_ps(_mm_loadu_si128(from.cast()))) }
-    }
-
+impl FunctionLanes for Avx2 {
     #[inline(always)]
     unsafe fn sqrt(self) -> Self {
         unsafe { Self(_mm256_sqrt_ps(self.0)) }
@@ -154,6 +139,46 @@ impl DenseLanes for Avx2 {
             let power = _mm256_castsi256_ps(_mm256_slli_epi32::<23>(biased));
             Self(_mm256_mul_ps(self.0, power))
         }
+    }
+
+    #[inline(always)]
+    unsafe fn split(self) -> [Self; 2] {
+        unsafe {
+            let bits = _mm256_castps_si256(self.0);
+            let power =
+                _mm256_srai_epi32::<23>(_mm256_sub_epi32(bits, _mm256_set1_epi32(ROOT_OF_HALF)));
+            let rest = _mm256_sub_epi32(bits, _mm256_slli_epi32::<23>(power));
+            [
+                Self(_mm256_castsi256_ps(rest)),
+                Self(_mm256_cvtepi32_ps(power)),
+            ]
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn below(self, limit: Self, then: Self, otherwise: Self) -> Self {
+        unsafe {
+            let mask = _mm256_cmp_ps::<_CMP_LT_OQ>(self.0, limit.0);
+            Self(_mm256_blendv_ps(otherwise.0, then.0, mask))
+        }
+    }
+}
+
+// SAFETY (all functions): the traits' contract, AVX2, FMA and F16C enabled in the caller.
+impl DenseLanes for Avx2 {
+    #[inline(always)]
+    unsafe fn load_part(from: *const f32, count: usize) -> Self {
+        unsafe { Self(_mm256_maskload_ps(from, first(count))) }
+    }
+
+    #[inline(always)]
+    unsafe fn store_part(self, to: *mut f32, count: usize) {
+        unsafe { _mm256_maskstore_ps(to, first(count), self.0) }
+    }
+
+    #[inline(always)]
+    unsafe fn load_f16(from: *const half::f16) -> Self {
+        unsafe { Self(_mm256_cvtph_ps(_mm_loadu_si128(from.cast()))) }
     }
 
     #[inline(always)]

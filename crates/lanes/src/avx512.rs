@@ -5,7 +5,7 @@
 )]
 
 use super::avx2::{add_row, row};
-use super::{CUBE_ROOT_GUESS, DenseLanes, Lanes, NodeLanes};
+use super::{CUBE_ROOT_GUESS, DenseLanes, FunctionLanes, Lanes, NodeLanes, ROOT_OF_HALF};
 use core::arch::x86_64::*;
 
 /// Sixteen f32.
@@ -118,22 +118,7 @@ impl Lanes for Avx512 {
 }
 
 // SAFETY (all functions): the traits' contract, AVX-512 enabled in the caller.
-impl DenseLanes for Avx512 {
-    #[inline(always)]
-    unsafe fn load_part(from: *const f32, count: usize) -> Self {
-        unsafe { Self(_mm512_maskz_loadu_ps((1u16 << count) - 1, from)) }
-    }
-
-    #[inline(always)]
-    unsafe fn store_part(self, to: *mut f32, count: usize) {
-        unsafe { _mm512_mask_storeu_ps(to, (1u16 << count) - 1, self.0) }
-    }
-
-    #[inline(always)]
-    unsafe fn load_f16(from: *const half::f16) -> Self {
-        unsafe { Self(_mm512_cvtph_ps(_mm256_loadu_si256(from.cast()))) }
-    }
-
+impl FunctionLanes for Avx512 {
     #[inline(always)]
     unsafe fn sqrt(self) -> Self {
         unsafe { Self(_mm512_sqrt_ps(self.0)) }
@@ -151,6 +136,46 @@ impl DenseLanes for Avx512 {
     #[inline(always)]
     unsafe fn scale_by_power(self, exponent: Self) -> Self {
         unsafe { Self(_mm512_scalef_ps(self.0, exponent.0)) }
+    }
+
+    #[inline(always)]
+    unsafe fn split(self) -> [Self; 2] {
+        unsafe {
+            let bits = _mm512_castps_si512(self.0);
+            let power =
+                _mm512_srai_epi32::<23>(_mm512_sub_epi32(bits, _mm512_set1_epi32(ROOT_OF_HALF)));
+            let rest = _mm512_sub_epi32(bits, _mm512_slli_epi32::<23>(power));
+            [
+                Self(_mm512_castsi512_ps(rest)),
+                Self(_mm512_cvtepi32_ps(power)),
+            ]
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn below(self, limit: Self, then: Self, otherwise: Self) -> Self {
+        unsafe {
+            let mask = _mm512_cmp_ps_mask::<_CMP_LT_OQ>(self.0, limit.0);
+            Self(_mm512_mask_blend_ps(mask, otherwise.0, then.0))
+        }
+    }
+}
+
+// SAFETY (all functions): the traits' contract, AVX-512 enabled in the caller.
+impl DenseLanes for Avx512 {
+    #[inline(always)]
+    unsafe fn load_part(from: *const f32, count: usize) -> Self {
+        unsafe { Self(_mm512_maskz_loadu_ps((1u16 << count) - 1, from)) }
+    }
+
+    #[inline(always)]
+    unsafe fn store_part(self, to: *mut f32, count: usize) {
+        unsafe { _mm512_mask_storeu_ps(to, (1u16 << count) - 1, self.0) }
+    }
+
+    #[inline(always)]
+    unsafe fn load_f16(from: *const half::f16) -> Self {
+        unsafe { Self(_mm512_cvtph_ps(_mm256_loadu_si256(from.cast()))) }
     }
 
     #[inline(always)]

@@ -1,7 +1,8 @@
 //! Vector registers of f32, the instruction set that a machine has of them, and the floating-point mode of a computation.
 //!
-//! One body of a kernel compiles for AVX2 (8 lanes), AVX-512 (16) and NEON (4). [`Lanes`] is arithmetic, [`DenseLanes`] what
-//! products over tables need besides, [`NodeLanes`] what the elements of a mesh need. [`Isa`] chooses at run time, and
+//! One body of a kernel compiles for AVX2 (8 lanes), AVX-512 (16) and NEON (4). [`Lanes`] is arithmetic, [`FunctionLanes`]
+//! what elementary functions ([`functions`]) need besides, [`DenseLanes`] what products over tables need, [`NodeLanes`] what the
+//! elements of a mesh need. [`Isa`] chooses at run time, and
 //! [`by_isa!`] writes the function that does.
 //!
 //! Every function of the traits is unsafe for one reason: the instruction set must be enabled in the function that it is
@@ -13,6 +14,7 @@ mod avx2;
 mod avx512;
 mod dense;
 pub mod flush;
+pub mod functions;
 mod isa;
 #[cfg(target_arch = "aarch64")]
 mod neon;
@@ -33,7 +35,8 @@ pub use neon::Neon;
 #[cfg(target_arch = "aarch64")]
 pub use neon_four::NeonFour;
 pub use scalar::Scalar;
-pub use traits::{CUBE_ROOT_GUESS, DenseLanes, Lanes, NodeLanes, WIDTH};
+pub(crate) use traits::ROOT_OF_HALF;
+pub use traits::{CUBE_ROOT_GUESS, DenseLanes, FunctionLanes, Lanes, NodeLanes, WIDTH};
 
 /// Asks for a value's cache lines; the pointer may be beyond any allocation.
 #[inline(always)]

@@ -4,12 +4,32 @@
     reason = "one contract for all: the instruction set is enabled in the caller, and pointers hold what the shapes say"
 )]
 
-use super::{DenseLanes, Lanes};
+use super::{DenseLanes, FunctionLanes, Lanes, ROOT_OF_HALF};
 use core::arch::aarch64::*;
 
 /// Four f32.
 #[derive(Clone, Copy)]
 pub struct Neon(float32x4_t);
+
+/// See [`FunctionLanes::split`].
+#[inline(always)]
+pub(super) unsafe fn split(x: float32x4_t) -> [float32x4_t; 2] {
+    unsafe {
+        let bits = vreinterpretq_s32_f32(x);
+        let power = vshrq_n_s32::<23>(vsubq_s32(bits, vdupq_n_s32(ROOT_OF_HALF)));
+        let rest = vsubq_s32(bits, vshlq_n_s32::<23>(power));
+        [vreinterpretq_f32_s32(rest), vcvtq_f32_s32(power)]
+    }
+}
+
+/// See [`FunctionLanes::scale_by_power`].
+#[inline(always)]
+pub(super) unsafe fn scale_by_power(x: float32x4_t, exponent: float32x4_t) -> float32x4_t {
+    unsafe {
+        let biased = vaddq_s32(vcvtq_s32_f32(exponent), vdupq_n_s32(127));
+        vmulq_f32(x, vreinterpretq_f32_s32(vshlq_n_s32::<23>(biased)))
+    }
+}
 
 // SAFETY (all functions): the traits' contract; NEON is part of every AArch64 target.
 impl Lanes for Neon {
@@ -72,6 +92,37 @@ impl Lanes for Neon {
 }
 
 // SAFETY (all functions): the traits' contract; NEON is part of every AArch64 target.
+impl FunctionLanes for Neon {
+    #[inline(always)]
+    unsafe fn sqrt(self) -> Self {
+        unsafe { Self(vsqrtq_f32(self.0)) }
+    }
+
+    #[inline(always)]
+    unsafe fn round(self) -> Self {
+        unsafe { Self(vrndnq_f32(self.0)) }
+    }
+
+    #[inline(always)]
+    unsafe fn scale_by_power(self, exponent: Self) -> Self {
+        unsafe { Self(scale_by_power(self.0, exponent.0)) }
+    }
+
+    #[inline(always)]
+    unsafe fn split(self) -> [Self; 2] {
+        unsafe {
+            let [rest, power] = split(self.0);
+            [Self(rest), Self(power)]
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn below(self, limit: Self, then: Self, otherwise: Self) -> Self {
+        unsafe { Self(vbslq_f32(vcltq_f32(self.0, limit.0), then.0, otherwise.0)) }
+    }
+}
+
+// SAFETY (all functions): the traits' contract; NEON is part of every AArch64 target.
 impl DenseLanes for Neon {
     #[inline(always)]
     unsafe fn load_part(from: *const f32, count: usize) -> Self {
@@ -103,25 +154,6 @@ impl DenseLanes for Neon {
                 options(pure, nomem, nostack, preserves_flags)
             );
             Self(wide)
-        }
-    }
-
-    #[inline(always)]
-    unsafe fn sqrt(self) -> Self {
-        unsafe { Self(vsqrtq_f32(self.0)) }
-    }
-
-    #[inline(always)]
-    unsafe fn round(self) -> Self {
-        unsafe { Self(vrndnq_f32(self.0)) }
-    }
-
-    #[inline(always)]
-    unsafe fn scale_by_power(self, exponent: Self) -> Self {
-        unsafe {
-            let biased = vaddq_s32(vcvtq_s32_f32(exponent.0), vdupq_n_s32(127));
-            let power = vreinterpretq_f32_s32(vshlq_n_s32::<23>(biased));
-            Self(vmulq_f32(self.0, power))
         }
     }
 

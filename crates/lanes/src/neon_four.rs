@@ -4,7 +4,8 @@
     reason = "one contract for all: the instruction set is enabled in the caller, and pointers hold what the shapes say"
 )]
 
-use super::{CUBE_ROOT_GUESS, Lanes, NodeLanes, WIDTH};
+use super::neon::{scale_by_power, split};
+use super::{CUBE_ROOT_GUESS, FunctionLanes, Lanes, NodeLanes, WIDTH};
 use core::arch::aarch64::*;
 
 /// Sixteen f32 in four registers.
@@ -150,6 +151,57 @@ impl Lanes for NeonFour {
                 vmaxq_f32(self.0[3], other.0[3]),
             ])
         }
+    }
+}
+
+// SAFETY (all functions): the traits' contract; NEON is part of every AArch64 target.
+impl FunctionLanes for NeonFour {
+    #[inline(always)]
+    unsafe fn sqrt(self) -> Self {
+        let mut parts = self.0;
+        for part in &mut parts {
+            unsafe { *part = vsqrtq_f32(*part) }
+        }
+        Self(parts)
+    }
+
+    #[inline(always)]
+    unsafe fn round(self) -> Self {
+        let mut parts = self.0;
+        for part in &mut parts {
+            unsafe { *part = vrndnq_f32(*part) }
+        }
+        Self(parts)
+    }
+
+    #[inline(always)]
+    unsafe fn scale_by_power(self, exponent: Self) -> Self {
+        let mut parts = self.0;
+        for i in 0..4 {
+            unsafe { parts[i] = scale_by_power(parts[i], exponent.0[i]) }
+        }
+        Self(parts)
+    }
+
+    #[inline(always)]
+    unsafe fn split(self) -> [Self; 2] {
+        let (mut rest, mut power) = (self.0, self.0);
+        for i in 0..4 {
+            unsafe { [rest[i], power[i]] = split(self.0[i]) }
+        }
+        [Self(rest), Self(power)]
+    }
+
+    #[inline(always)]
+    unsafe fn below(self, limit: Self, then: Self, otherwise: Self) -> Self {
+        let mut parts = self.0;
+        for i in 0..4 {
+            unsafe {
+                let mask = vcltq_f32(self.0[i], limit.0[i]);
+                parts[i] = vbslq_f32(mask, then.0[i], otherwise.0[i]);
+            }
+        }
+        Self(parts)
     }
 }
 

@@ -4,7 +4,7 @@
     reason = "one contract for all: the instruction set is enabled in the caller, and pointers hold what the shapes say"
 )]
 
-use super::{CUBE_ROOT_GUESS, Lanes, NodeLanes, WIDTH};
+use super::{CUBE_ROOT_GUESS, FunctionLanes, Lanes, NodeLanes, ROOT_OF_HALF, WIDTH};
 
 /// Sixteen f32 in an array.
 #[derive(Clone, Copy)]
@@ -74,6 +74,48 @@ impl Lanes for Scalar {
     #[inline(always)]
     unsafe fn max(self, other: Self) -> Self {
         self.zip(other, |a, b| if b > a { b } else { a })
+    }
+}
+
+// SAFETY (all functions): no instruction set beyond the target's baseline is used.
+impl FunctionLanes for Scalar {
+    #[inline(always)]
+    unsafe fn sqrt(self) -> Self {
+        Self(self.0.map(f32::sqrt))
+    }
+
+    #[inline(always)]
+    unsafe fn round(self) -> Self {
+        Self(self.0.map(f32::round_ties_even))
+    }
+
+    #[inline(always)]
+    unsafe fn scale_by_power(self, exponent: Self) -> Self {
+        self.zip(exponent, |x, e| {
+            x * f32::from_bits(((e as i32 + 127) as u32) << 23)
+        })
+    }
+
+    #[inline(always)]
+    unsafe fn split(self) -> [Self; 2] {
+        let power = |x: f32| (x.to_bits() as i32).wrapping_sub(ROOT_OF_HALF) >> 23;
+        [
+            Self(
+                (self.0).map(|x| f32::from_bits(x.to_bits().wrapping_sub((power(x) << 23) as u32))),
+            ),
+            Self(self.0.map(|x| power(x) as f32)),
+        ]
+    }
+
+    #[inline(always)]
+    unsafe fn below(self, limit: Self, then: Self, otherwise: Self) -> Self {
+        Self(std::array::from_fn(|i| {
+            if self.0[i] < limit.0[i] {
+                then.0[i]
+            } else {
+                otherwise.0[i]
+            }
+        }))
     }
 }
 

@@ -6,6 +6,9 @@ pub const WIDTH: usize = 16;
 /// Constant of the inverse cube root's first guess, `bits(y) = GUESS - bits(x) / 3`.
 pub const CUBE_ROOT_GUESS: f32 = 1_419_967_116.0;
 
+/// Bits of the root of a half, where [`FunctionLanes::split`] turns to the next power of two.
+pub(crate) const ROOT_OF_HALF: i32 = 0x3F35_04F3;
+
 /// Arithmetic on `COUNT` f32 lanes.
 ///
 /// # Safety
@@ -33,23 +36,35 @@ pub trait Lanes: Copy {
     unsafe fn max(self, other: Self) -> Self;
 }
 
+/// What elementary functions are made of ([`crate::functions`]).
+///
+/// # Safety
+/// As [`Lanes`].
+#[allow(clippy::missing_safety_doc)]
+pub trait FunctionLanes: Lanes {
+    unsafe fn sqrt(self) -> Self;
+    /// The nearest integer.
+    unsafe fn round(self) -> Self;
+    /// `self * 2^exponent` for integer `exponent` in `-126..=127`.
+    unsafe fn scale_by_power(self, exponent: Self) -> Self;
+    /// Of a positive normal number, `m` and the integer `e` with `self = m 2^e` and `m` from the root of a half to that of two.
+    unsafe fn split(self) -> [Self; 2];
+    /// By lane: `then` where `self < limit`, else `otherwise`; a NaN takes `otherwise`.
+    unsafe fn below(self, limit: Self, then: Self, otherwise: Self) -> Self;
+}
+
 /// Products over tables: parts of a register, half precision, sums over the lanes.
 ///
 /// # Safety
 /// As [`Lanes`].
 #[allow(clippy::missing_safety_doc)]
-pub trait DenseLanes: Lanes {
+pub trait DenseLanes: FunctionLanes {
     /// The first `count < COUNT` lanes from memory, zeros behind them.
     unsafe fn load_part(from: *const f32, count: usize) -> Self;
     /// The first `count < COUNT` lanes to memory.
     unsafe fn store_part(self, to: *mut f32, count: usize);
     /// `COUNT` IEEE half-precision numbers, widened exactly.
     unsafe fn load_f16(from: *const half::f16) -> Self;
-    unsafe fn sqrt(self) -> Self;
-    /// The nearest integer.
-    unsafe fn round(self) -> Self;
-    /// `self * 2^exponent` for integer `exponent` in `-126..=127`.
-    unsafe fn scale_by_power(self, exponent: Self) -> Self;
     /// Sums of the lanes of `four` registers, in `four`'s order: one fixed tree over the lanes, the same for each register.
     unsafe fn sums(four: [Self; 4]) -> [f32; 4];
     /// Transposes the `COUNT` rows at `from + row_offset[i]` into `COUNT` columns:
@@ -67,7 +82,7 @@ pub trait DenseLanes: Lanes {
 /// # Safety
 /// As [`Lanes`], for the nodes that the indices name.
 #[allow(clippy::missing_safety_doc)]
-pub trait NodeLanes: Lanes {
+pub trait NodeLanes: FunctionLanes {
     /// First guess of `self^(-1/3)` for positive values, within 4 %.
     unsafe fn inverse_cube_root_guess(self) -> Self;
     /// Of nodes that follow each other in memory, their fourth components in place of all four.
