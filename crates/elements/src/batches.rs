@@ -1,6 +1,7 @@
 //! Clusters packed into batches of 16, with the constants of their tetrahedra.
 
 use crate::cluster::{Cluster, Group, corners};
+use crate::gradients::Gradients;
 use crate::material::Material;
 use crate::room::{collected, room};
 use crate::tetrahedra::Tetrahedra;
@@ -16,6 +17,8 @@ pub const PADDING: u32 = u32::MAX;
 #[derive(Default)]
 pub struct Kind<const NODES: usize, const TETS: usize> {
     pub batches: Vec<Cluster<NODES, TETS>>,
+    /// A row a batch where the law takes displacements, else none.
+    pub gradients: Vec<Gradients<TETS>>,
     /// Mesh elements of each batch; [`PADDING`] in padding lanes.
     pub elements: Vec<[[u32; WIDTH]; TETS]>,
 }
@@ -54,6 +57,10 @@ impl<const NODES: usize, const TETS: usize> Kind<NODES, TETS> {
         let (groups, ends) = disjoint_batches(groups)?;
         self.batches.try_reserve(ends.len())?;
         self.elements.try_reserve(ends.len())?;
+        let from_displacements = source.material.law.from_displacements();
+        if from_displacements {
+            self.gradients.try_reserve(ends.len())?;
+        }
         let starts = std::iter::once(0).chain(ends.iter().copied());
         for (first, end) in starts.zip(&ends) {
             let groups = &groups[first..*end];
@@ -64,6 +71,7 @@ impl<const NODES: usize, const TETS: usize> Kind<NODES, TETS> {
                 slots: [[0; WIDTH]; NODES],
             };
             let mut elements = [[PADDING; WIDTH]; TETS];
+            let mut gradients = Gradients::EMPTY;
             for lane in 0..WIDTH {
                 // Beyond the last group its shape alone, without stiffness.
                 let group = groups[lane.min(groups.len() - 1)];
@@ -79,9 +87,11 @@ impl<const NODES: usize, const TETS: usize> Kind<NODES, TETS> {
                         shape_gradients([0, 1, 2, 3].map(|n| [x[n], y[n], z[n]]));
                     batch.inverse[tet][lane] = (1.0 / (6.0 * volume)) as f32;
                     if lane >= groups.len() {
+                        gradients.set(tet, lane, gradient, 0.0);
                         continue;
                     }
                     let stiffness = f64::from(source.mesh.stiffness_of(element as usize));
+                    gradients.set(tet, lane, gradient, volume.abs() * stiffness);
                     // The order of the corners in a group may turn the element around.
                     let factor = -source.material.shear_pa() * volume.abs() * stiffness;
                     for (row, [j, k]) in batch.springs[tet].iter_mut().zip(PAIRS) {
@@ -93,6 +103,9 @@ impl<const NODES: usize, const TETS: usize> Kind<NODES, TETS> {
                 }
             }
             self.batches.push(batch);
+            if from_displacements {
+                self.gradients.push(gradients);
+            }
             self.elements.push(elements);
         }
         Ok(start..self.batches.len())
@@ -129,7 +142,7 @@ impl<const NODES: usize, const TETS: usize> Kind<NODES, TETS> {
 
     /// Bytes of the batches.
     pub fn bytes(&self) -> usize {
-        size_of_val(self.batches.as_slice())
+        size_of_val(self.batches.as_slice()) + size_of_val(self.gradients.as_slice())
     }
 }
 

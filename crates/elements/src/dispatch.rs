@@ -4,7 +4,9 @@
     reason = "one contract for all: each function is chosen where the machine has its instruction set"
 )]
 
-use crate::kernel::{Shape, add_forces, add_volumes};
+use crate::kernel::{
+    LaneTerms, Shape, add_forces, add_forces_of_stretches, add_volumes, add_volumes_of_stretches,
+};
 use crate::laws::{Isochoric, Law};
 use crate::partition::{Chunk, Partition};
 use crate::slots::{advance, place};
@@ -41,6 +43,7 @@ unsafe fn all_forces<L: NodeLanes, const AVERAGED: bool>(
             Law::MooneyRivlin(law) => {
                 forces_by::<L, _, AVERAGED>(law, partition, chunk, nodes, forces)
             }
+            Law::Ogden(_) => forces_by_stretches::<L, AVERAGED>(partition, chunk, nodes, forces),
         }
     }
 }
@@ -64,6 +67,52 @@ unsafe fn forces_by<L: NodeLanes, M: Isochoric, const AVERAGED: bool>(
         let b = add_forces::<L, M, 5, 2, AVERAGED>(law, pairs, nodes, forces, shape);
         let c = add_forces::<L, M, 4, 1, AVERAGED>(law, singles, nodes, forces, shape);
         a.min(b).min(c)
+    }
+}
+
+/// The same by a law in principal stretches.
+#[inline(always)]
+unsafe fn forces_by_stretches<L: NodeLanes, const AVERAGED: bool>(
+    partition: &Partition,
+    chunk: &Chunk,
+    nodes: *const [f32; 4],
+    forces: *mut [f32; 4],
+) -> f32 {
+    unsafe {
+        let moduli = partition.moduli;
+        let law = &LaneTerms::new(&moduli.law, [moduli.shear_pa, moduli.bulk_pa]);
+        let (octahedra, pairs, singles) = partition.clusters(chunk);
+        let (of_octahedra, of_pairs, of_singles) = partition.gradients(chunk);
+        let octahedra = (octahedra, of_octahedra);
+        let (pairs, singles) = ((pairs, of_pairs), (singles, of_singles));
+        let a = add_forces_of_stretches::<L, 6, 4, AVERAGED>(law, octahedra, nodes, forces);
+        let b = add_forces_of_stretches::<L, 5, 2, AVERAGED>(law, pairs, nodes, forces);
+        let c = add_forces_of_stretches::<L, 4, 1, AVERAGED>(law, singles, nodes, forces);
+        a.min(b).min(c)
+    }
+}
+
+/// Adds the volumes of all clusters of a chunk.
+#[inline(always)]
+unsafe fn all_volumes<L: NodeLanes>(
+    partition: &Partition,
+    chunk: &Chunk,
+    nodes: *const [f32; 4],
+    forces: *mut [f32; 4],
+) {
+    unsafe {
+        let (octahedra, pairs, singles) = partition.clusters(chunk);
+        if partition.moduli.law.from_displacements() {
+            let bulk = partition.moduli.bulk_pa as f32;
+            let (of_octahedra, of_pairs, of_singles) = partition.gradients(chunk);
+            add_volumes_of_stretches::<L, 6, 4>(bulk, (octahedra, of_octahedra), nodes, forces);
+            add_volumes_of_stretches::<L, 5, 2>(bulk, (pairs, of_pairs), nodes, forces);
+            add_volumes_of_stretches::<L, 4, 1>(bulk, (singles, of_singles), nodes, forces);
+        } else {
+            add_volumes::<L, 6, 4>(octahedra, nodes, forces);
+            add_volumes::<L, 5, 2>(pairs, nodes, forces);
+            add_volumes::<L, 4, 1>(singles, nodes, forces);
+        }
     }
 }
 
@@ -100,12 +149,7 @@ macro_rules! kernels {
                 n: *const [f32; 4],
                 f: *mut [f32; 4],
             ) {
-                unsafe {
-                    let (octahedra, pairs, singles) = p.clusters(chunk);
-                    add_volumes::<$lanes, 6, 4>(octahedra, n, f);
-                    add_volumes::<$lanes, 5, 2>(pairs, n, f);
-                    add_volumes::<$lanes, 4, 1>(singles, n, f);
-                }
+                unsafe { all_volumes::<$lanes>(p, chunk, n, f) }
             }
 
             $(#[target_feature(enable = $feature)])?

@@ -173,7 +173,7 @@ impl ElementForces {
     /// Puts the chunk's nodes where they are now, from its centre.
     unsafe fn place(&self, chunk: &Chunk, displacement: &[f32], positions: *mut [f32; 4]) {
         let slots = chunk.first..chunk.first + chunk.slot_count();
-        let rest = &self.partition.rest[slots.clone()];
+        let rest = self.partition.base(chunk);
         for (at, (rest, &node)) in rest
             .iter()
             .zip(&self.partition.node_of_slot[slots])

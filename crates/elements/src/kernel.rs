@@ -27,22 +27,27 @@
 )]
 
 mod forces;
+mod gradients;
 mod moduli;
 mod shape;
+mod stretches;
 
 use crate::cluster::{Cluster, corners};
 use crate::laws::{Isochoric, Law};
 use forces::scatter;
+pub use gradients::{add_forces_of_stretches, add_volumes_of_stretches};
 use lanes::{NodeLanes, WIDTH, prefetch};
 use moduli::moduli;
 pub use shape::Shape;
 use shape::{cross, dot, edges, load, shape};
+pub use stretches::LaneTerms;
 
 /// Floating-point operations of one cluster in `add_forces`, a fused multiply-add counted as two.
 pub fn flops(nodes: usize, tets: usize, law: &Law) -> usize {
     match law {
         Law::NeoHookean(law) => flops_of(*law, nodes, tets),
         Law::MooneyRivlin(law) => flops_of(*law, nodes, tets),
+        Law::Ogden(law) => flops_of_stretches(law.terms.len(), nodes, tets),
     }
 }
 
@@ -58,6 +63,15 @@ fn flops_of<M: Isochoric>(_: M, nodes: usize, tets: usize) -> usize {
     let forces = 6 * (nodes - 1) + 12 * ring + tets * (12 + 18);
     // Balance and addition to the nodes.
     shape + tets * tet + forces + 3 * (nodes - 1) + 3 * nodes
+}
+
+/// The same of a law in principal stretches, with even exponents of size 16 to 31.
+fn flops_of_stretches(terms: usize, nodes: usize, tets: usize) -> usize {
+    // H; cof F and J; A, D and its invariants; the inverse; stress and forces.
+    let tet = 45 + 60 + 70 + 36 + 100;
+    // Three squarings, a product, the root's power and the sum.
+    let term = 4 * 42 + 4 + 24;
+    3 * (nodes - 1) + tets * (tet + terms * term) + 3 * (nodes - 1) + 3 * nodes
 }
 
 /// Adds the forces (µN) of the clusters to `forces`, given positions (mm, from any origin); returns the smallest det F

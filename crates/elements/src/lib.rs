@@ -14,25 +14,36 @@
 mod batches;
 mod cluster;
 mod dispatch;
+mod fault;
+mod gradients;
 mod internal_forces;
 mod kernel;
 mod laws;
 mod material;
 mod partition;
+mod principal;
 mod room;
 mod slots;
+mod spectrum;
+mod tangent;
 mod tetrahedra;
 mod tetrahedron;
 pub mod vector;
 
 pub use batches::{Element, Kind, PADDING, shape_gradients};
 pub use dispatch::Kernels;
+pub use fault::MaterialError;
 pub use internal_forces::{ElementForces, ParallelFor, Scratch};
 pub use kernel::flops;
 pub use lanes::{Isa, WIDTH};
-pub use laws::{Invariants, Isochoric, Law, MooneyRivlin, NeoHookean};
-pub use material::{Material, MaterialError, Moduli};
+pub use laws::{
+    Invariants, Isochoric, Law, MOST_TERMS, MooneyRivlin, NeoHookean, Ogden, Term, Terms,
+};
+pub use material::{Material, Moduli};
 pub use partition::{Chunk, Partition};
 pub use slots::{FLOPS_PER_NODE, PADDED};
+pub use tangent::tangent;
 pub use tetrahedra::Tetrahedra;
-pub use tetrahedron::{Deformation, Tetrahedron, energy_density, inverse_cube_root, stress};
+pub use tetrahedron::{
+    Deformation, Tetrahedron, energy_density, inverse_cube_root, shape_energy, stress,
+};

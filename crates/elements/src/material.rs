@@ -1,5 +1,6 @@
 //! A hyperelastic material: its constants, their admitted ranges, its law and its damping.
 
+use crate::fault::MaterialError;
 use crate::laws::Law;
 use serde::{Deserialize, Serialize};
 
@@ -43,16 +44,19 @@ pub struct Moduli {
     pub law: Law,
 }
 
-/// A material that the solver cannot use.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("material: `{field}` is {value}; it must be {wanted}")]
-pub struct MaterialError {
-    pub field: &'static str,
-    pub value: f64,
-    pub wanted: &'static str,
-}
+/// Part by which Young's modulus may differ from that of a law which has its own shear modulus.
+const SAME_MODULUS: f64 = 1e-3;
 
 impl Material {
+    /// The same with another law, and with Young's modulus as the law has it, if it does.
+    pub fn with_law(self, law: Law) -> Self {
+        Self {
+            young_pa: law.young_pa(self.poisson).unwrap_or(self.young_pa),
+            law,
+            ..self
+        }
+    }
+
     /// Shear and bulk modulus, and the law.
     pub fn moduli(&self) -> Moduli {
         Moduli {
@@ -85,12 +89,8 @@ impl Material {
 
     /// Checks that the constants describe a stable solid.
     pub fn validate(&self) -> Result<(), MaterialError> {
-        let fail = |field, value, wanted| {
-            Err(MaterialError {
-                field,
-                value,
-                wanted,
-            })
+        let fail = |field: &'static str, value, wanted: &'static str| {
+            MaterialError::some(field, value, wanted).map_or(Ok(()), Err)
         };
         if !(self.young_pa > 0.0 && self.young_pa <= 1e12) {
             return fail("young_pa", self.young_pa, "positive and at most 1e12 Pa");
@@ -105,9 +105,17 @@ impl Material {
         if !(0.0..=1e6).contains(&self.damping_per_s) {
             return fail("damping_per_s", self.damping_per_s, "in [0, 1e6] 1/s");
         }
-        match self.law.fault() {
-            Some((field, value, wanted)) => fail(field, value, wanted),
-            None => Ok(()),
+        if let Some(fault) = self.law.fault() {
+            return Err(fault);
+        }
+        match self.law.young_pa(self.poisson) {
+            Some(own) if (self.young_pa - own).abs() > SAME_MODULUS * own => {
+                let wanted = format!(
+                    "{own:.6}, 2 (1 + nu) times the shear modulus of `law`, in Pa as the law's mu"
+                );
+                MaterialError::some("young_pa", self.young_pa, wanted).map_or(Ok(()), Err)
+            }
+            _ => Ok(()),
         }
     }
 }

@@ -9,8 +9,10 @@
 
 use crate::batches::{Element, Kind, PADDING, Source};
 use crate::cluster::{Groups, Octahedra, Pairs, Singles};
+use crate::gradients::Gradients;
 use crate::material::{Material, Moduli};
 use crate::room::{collected, filled, room};
+use crate::slots::PADDED;
 use crate::tetrahedra::Tetrahedra;
 use std::collections::TryReserveError;
 use std::ops::Range;
@@ -56,6 +58,8 @@ pub struct Partition {
     /// Rest position of each slot from its chunk's centre, mm, and a zero: small numbers, so that a sum with the
     /// displacement keeps its last bits.
     pub rest: Vec<[f32; 4]>,
+    /// Zeros in place of `rest` where the kernel takes displacements, for the widest chunk.
+    zeros: Vec<[f32; 4]>,
     /// The material's.
     pub moduli: Moduli,
 }
@@ -99,12 +103,17 @@ impl Partition {
             node_of_slot: Vec::new(),
             slot_of_node: filled(positions.len(), PADDING)?,
             rest: Vec::new(),
+            zeros: Vec::new(),
             moduli: material.moduli(),
         };
         for (chunk, leaf) in leaves().enumerate() {
             partition.push_chunk(chunk as u32, leaf, &owner, mesh, material)?;
         }
         partition.connect()?;
+        if material.law.from_displacements() {
+            let widest = partition.chunks.iter().map(Chunk::slot_count).max();
+            partition.zeros = filled(widest.unwrap_or(0).next_multiple_of(PADDED), [0.0; 4])?;
+        }
         Ok(partition)
     }
 
@@ -172,6 +181,29 @@ impl Partition {
             &self.pairs.batches[chunk.pairs.clone()],
             &self.singles.batches[chunk.singles.clone()],
         )
+    }
+
+    /// The gradients of a chunk's batches; empty where the law takes positions.
+    #[inline(always)]
+    pub fn gradients(&self, chunk: &Chunk) -> (&[Gradients<4>], &[Gradients<2>], &[Gradients<1>]) {
+        if self.zeros.is_empty() {
+            return (&[], &[], &[]);
+        }
+        (
+            &self.octahedra.gradients[chunk.octahedra.clone()],
+            &self.pairs.gradients[chunk.pairs.clone()],
+            &self.singles.gradients[chunk.singles.clone()],
+        )
+    }
+
+    /// What the displacements of a chunk's slots are added to before the kernel reads them: rest positions, or zeros for a law that
+    /// takes displacements.
+    pub fn base(&self, chunk: &Chunk) -> &[[f32; 4]] {
+        if self.zeros.is_empty() {
+            &self.rest[chunk.first..chunk.first + chunk.slot_count()]
+        } else {
+            &self.zeros[..chunk.slot_count()]
+        }
     }
 
     /// The elements of a chunk, always in the same order.

@@ -5,8 +5,9 @@
 //! `P = F S = mu J^(-2/3) (F - I1/(3 J) cof F) + kappa (J - 1) cof F`, which is
 //! `S = mu J^(-2/3) (I - I1/3 C^-1) + kappa J (J - 1) C^-1`. Lengths are mm, moduli Pa: energies nJ, forces µN.
 
-use crate::laws::Invariants;
+use crate::laws::{Invariants, Isochoric, Law};
 use crate::material::Moduli;
+use crate::principal::{self, PLACE};
 use crate::vector::{cross, dot, subtract};
 
 /// Below this `det F` the isochoric factor is that of a nearly flat element, so that it stays finite.
@@ -116,9 +117,36 @@ impl Deformation {
     }
 }
 
+/// The least size of `det F` in the stress of a law in principal stretches.
+pub(crate) const LEAST_DET: f64 = 0.01;
+
 /// First Piola-Kirchhoff stress `P`, rows, Pa.
 pub fn stress(state: &Deformation, moduli: Moduli) -> [[f64; 3]; 3] {
-    let slopes = (moduli.law).slopes(state.invariants(state.det.max(SMALLEST_DET)));
+    match moduli.law {
+        Law::NeoHookean(law) => stress_by_invariants(law, state, moduli),
+        Law::MooneyRivlin(law) => stress_by_invariants(law, state, moduli),
+        Law::Ogden(_) => stress_by_stretches(state, moduli),
+    }
+}
+
+/// `P = cof F (T / J + kappa (J - 1))`.
+fn stress_by_stretches(state: &Deformation, moduli: Moduli) -> [[f64; 3]; 3] {
+    let deviator = principal::deviator(&moduli.law.stretches(), &state.f);
+    let scale = moduli.shear_pa / state.det.abs().max(LEAST_DET).copysign(state.det);
+    let mut inner = deviator.map(|t| t * scale);
+    for k in [0, 3, 5] {
+        inner[k] += moduli.bulk_pa * (state.det - 1.0);
+    }
+    let cofactor = &state.cofactor;
+    [0, 1, 2].map(|i| [0, 1, 2].map(|j| (0..3).map(|k| cofactor[i][k] * inner[PLACE[k][j]]).sum()))
+}
+
+fn stress_by_invariants<M: Isochoric>(
+    law: M,
+    state: &Deformation,
+    moduli: Moduli,
+) -> [[f64; 3]; 3] {
+    let slopes = law.slopes(state.invariants(state.det.max(SMALLEST_DET)));
     let along = moduli.bulk_pa * (state.det - 1.0) + moduli.shear_pa * slopes.volume;
     let own = moduli.shear_pa * (slopes.first + slopes.second * state.invariant);
     let mut stress =
@@ -140,8 +168,17 @@ pub fn stress(state: &Deformation, moduli: Moduli) -> [[f64; 3]; 3] {
 
 /// Strain energy a rest volume, `mu w + kappa/2 (J - 1)²`, Pa; `det F` must be positive.
 pub fn energy_density(state: &Deformation, moduli: Moduli) -> f64 {
-    moduli.shear_pa * moduli.law.energy(state.invariants(state.det))
+    moduli.shear_pa * shape_energy(state, moduli.law, state.det)
         + 0.5 * moduli.bulk_pa * (state.det - 1.0) * (state.det - 1.0)
+}
+
+/// `w`: the strain energy without change of volume over the shear modulus, where `det` stands for `det F`.
+pub fn shape_energy(state: &Deformation, law: Law, det: f64) -> f64 {
+    match law {
+        Law::NeoHookean(law) => law.energy(state.invariants(det)),
+        Law::MooneyRivlin(law) => law.energy(state.invariants(det)),
+        Law::Ogden(_) => principal::energy(&law.stretches(), &state.f),
+    }
 }
 
 /// `x^(-1/3)` of a positive normal number, to 1e-12: a guess from the exponent and two corrections of fourth order. The same

@@ -44,8 +44,8 @@ fn cauchy(f: Matrix, moduli: Moduli) -> Matrix {
 /// `C10`, `C01`, Pa.
 fn constants(moduli: Moduli) -> [f64; 2] {
     let share = match moduli.law {
-        Law::NeoHookean(_) => 0.0,
         Law::MooneyRivlin(law) => law.c01_share,
+        _ => 0.0,
     };
     [1.0 - share, share].map(|part| 0.5 * moduli.shear_pa * part)
 }

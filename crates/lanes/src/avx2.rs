@@ -162,6 +162,11 @@ impl FunctionLanes for Avx2 {
             Self(_mm256_blendv_ps(otherwise.0, then.0, mask))
         }
     }
+
+    #[inline(always)]
+    unsafe fn all_below(self, limit: Self) -> bool {
+        unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LT_OQ>(self.0, limit.0)) == 0xFF }
+    }
 }
 
 // SAFETY (all functions): the traits' contract, AVX2, FMA and F16C enabled in the caller.

@@ -159,6 +159,11 @@ impl FunctionLanes for Avx512 {
             Self(_mm512_mask_blend_ps(mask, otherwise.0, then.0))
         }
     }
+
+    #[inline(always)]
+    unsafe fn all_below(self, limit: Self) -> bool {
+        unsafe { _mm512_cmp_ps_mask::<_CMP_LT_OQ>(self.0, limit.0) == u16::MAX }
+    }
 }
 
 // SAFETY (all functions): the traits' contract, AVX-512 enabled in the caller.

@@ -120,6 +120,11 @@ impl FunctionLanes for Neon {
     unsafe fn below(self, limit: Self, then: Self, otherwise: Self) -> Self {
         unsafe { Self(vbslq_f32(vcltq_f32(self.0, limit.0), then.0, otherwise.0)) }
     }
+
+    #[inline(always)]
+    unsafe fn all_below(self, limit: Self) -> bool {
+        unsafe { vminvq_u32(vcltq_f32(self.0, limit.0)) == u32::MAX }
+    }
 }
 
 // SAFETY (all functions): the traits' contract; NEON is part of every AArch64 target.

@@ -203,6 +203,15 @@ impl FunctionLanes for NeonFour {
         }
         Self(parts)
     }
+
+    #[inline(always)]
+    unsafe fn all_below(self, limit: Self) -> bool {
+        let mut all = true;
+        for i in 0..4 {
+            all &= unsafe { vminvq_u32(vcltq_f32(self.0[i], limit.0[i])) == u32::MAX };
+        }
+        all
+    }
 }
 
 // SAFETY (all functions): the traits' contract; NEON is part of every AArch64 target.

@@ -117,6 +117,11 @@ impl FunctionLanes for Scalar {
             }
         }))
     }
+
+    #[inline(always)]
+    unsafe fn all_below(self, limit: Self) -> bool {
+        (0..WIDTH).all(|i| self.0[i] < limit.0[i])
+    }
 }
 
 // SAFETY (all functions): no instruction set beyond the target's baseline is used.

@@ -51,6 +51,8 @@ pub trait FunctionLanes: Lanes {
     unsafe fn split(self) -> [Self; 2];
     /// By lane: `then` where `self < limit`, else `otherwise`; a NaN takes `otherwise`.
     unsafe fn below(self, limit: Self, then: Self, otherwise: Self) -> Self;
+    /// Whether `self < limit` in every lane.
+    unsafe fn all_below(self, limit: Self) -> bool;
 }
 
 /// Products over tables: parts of a register, half precision, sums over the lanes.

@@ -7,7 +7,7 @@ use lanes::NodeLanes;
 
 /// `x^(-1/3)` for positive `x`, relative error about 1e-7.
 #[inline(always)]
-unsafe fn inverse_cube_root<L: NodeLanes>(x: L) -> L {
+pub(super) unsafe fn inverse_cube_root<L: NodeLanes>(x: L) -> L {
     unsafe {
         let y = x.inverse_cube_root_guess();
         // y (1 - e)^(-1/3) with e = 1 - x y^3: a Chebyshev fit over -0.121..0.091, the guess's whole range.

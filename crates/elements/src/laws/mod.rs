@@ -5,11 +5,18 @@
 //! at rest, natural modes and the linear response are the same for every law. With the slopes
 //! `f1 = 2 dw/dI1`, `f2 = 2 dw/dI2`, `g = dw/dJ` the stress is
 //! `P = mu [f1 F + f2 (I1 F - F F^T F)] + [kappa (J - 1) + mu g] cof F`.
+//!
+//! [`Ogden`]'s law has no such `w`: it is written in the principal stretches, has its own shear modulus, and files of its own for
+//! stress (`principal.rs`, `tangent.rs`) and kernel.
 
 mod isochoric;
 mod mooney_rivlin;
 mod neo_hookean;
+mod ogden;
+mod stretches;
+mod terms;
 
+use crate::fault::MaterialError;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
@@ -17,6 +24,9 @@ use std::str::FromStr;
 pub use isochoric::{Invariants, Isochoric, LaneSlopes, Slopes};
 pub use mooney_rivlin::MooneyRivlin;
 pub use neo_hookean::NeoHookean;
+pub use ogden::{CAP, MOST_TERMS, Ogden};
+pub use stretches::Stretches;
+pub use terms::{Term, Terms};
 
 /// The law of a material, as files name it: `{"name": "mooney-rivlin", "c01_share": 0.5}`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -26,11 +36,12 @@ pub enum Law {
     NeoHookean(NeoHookean),
     /// `w = (1 - s) (J^(-2/3) I1 - 3) / 2 + s (J^(-4/3) I2 - 3) / 2`.
     MooneyRivlin(MooneyRivlin),
+    /// `w = sum mu_t / alpha_t (l1^alpha_t + l2^alpha_t + l3^alpha_t - 3) / G` with `l = J^(-1/3) lambda`.
+    Ogden(Ogden),
 }
 
 /// The names that [`Law::from_str`] takes.
-const NAMES: &str =
-    "neo-hookean, mooney-rivlin or mooney-rivlin:SHARE with a share of C01 from 0 to 1";
+const NAMES: &str = "neo-hookean, mooney-rivlin, mooney-rivlin:SHARE with a share of C01 from 0 to 1, or ogden:MU,ALPHA[,MU,ALPHA...] with MU in Pa or with kPa behind it";
 
 impl Default for Law {
     fn default() -> Self {
@@ -44,27 +55,41 @@ impl Law {
         *self == Self::default()
     }
 
-    /// `w`: the strain energy without change of volume, over the shear modulus.
-    pub fn energy(&self, at: Invariants) -> f64 {
+    /// The law in principal stretches: its terms over the shear modulus, and where their exponential ends.
+    pub(crate) fn stretches(&self) -> Stretches {
+        let terms = |terms: &[[f64; 2]]| Stretches {
+            terms: Ogden::new(terms).unwrap_or_default().terms,
+            cap: f64::INFINITY,
+        };
         match self {
-            Self::NeoHookean(law) => law.energy(at),
-            Self::MooneyRivlin(law) => law.energy(at),
+            Self::NeoHookean(_) => terms(&[[1.0, 2.0]]),
+            Self::MooneyRivlin(law) => terms(&[[1.0 - law.c01_share, 2.0], [-law.c01_share, -2.0]]),
+            Self::Ogden(law) => Stretches {
+                terms: law.normalised(),
+                cap: CAP,
+            },
         }
     }
 
-    /// Slopes of `w`.
-    pub fn slopes(&self, at: Invariants) -> Slopes {
+    /// Whether the kernel takes displacements and gradients, and not positions and springs.
+    pub(crate) fn from_displacements(&self) -> bool {
+        matches!(self, Self::Ogden(_))
+    }
+
+    /// Young's modulus where the law has a shear modulus of its own, Pa.
+    pub fn young_pa(&self, poisson: f64) -> Option<f64> {
         match self {
-            Self::NeoHookean(law) => law.slopes(at),
-            Self::MooneyRivlin(law) => law.slopes(at),
+            Self::NeoHookean(_) | Self::MooneyRivlin(_) => None,
+            Self::Ogden(law) => Some(2.0 * (1.0 + poisson) * law.shear_pa()),
         }
     }
 
-    /// The constant that is not admitted: field, value, and what it must be.
-    pub(crate) fn fault(&self) -> Option<(&'static str, f64, &'static str)> {
+    /// The constant that is not admitted.
+    pub(crate) fn fault(&self) -> Option<MaterialError> {
         match self {
             Self::NeoHookean(_) => None,
             Self::MooneyRivlin(law) => law.fault(),
+            Self::Ogden(law) => law.fault(),
         }
     }
 }
@@ -77,6 +102,7 @@ impl fmt::Display for Law {
                 Some(digits) => write!(f, "mooney-rivlin:{:.digits$}", law.c01_share),
                 None => write!(f, "mooney-rivlin:{}", law.c01_share),
             },
+            Self::Ogden(law) => law.fmt(f),
         }
     }
 }
@@ -97,11 +123,15 @@ impl FromStr for Law {
                 c01_share: (constant.parse())
                     .map_err(|_| format!("law `{text}`: `{constant}` is not a number"))?,
             }),
+            ("ogden", Some(constants)) => Self::Ogden(Ogden::parse(constants)?),
             _ => return Err(format!("law `{text}` is unknown: use {NAMES}")),
         };
         match law.fault() {
             None => Ok(law),
-            Some((field, value, wanted)) => Err(format!("{field} is {value}; it must be {wanted}")),
+            Some(fault) => Err(format!(
+                "{} is {}; it must be {}",
+                fault.field, fault.value, fault.wanted
+            )),
         }
     }
 }

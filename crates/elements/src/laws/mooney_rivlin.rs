@@ -6,6 +6,7 @@
 //! (J Biomech Eng 117, 1995, 279-285) found `C10 = 0.9 C01`: the default.
 
 use super::{Invariants, Isochoric, LaneSlopes, Slopes};
+use crate::fault::MaterialError;
 use lanes::Lanes;
 use serde::{Deserialize, Serialize};
 
@@ -27,9 +28,11 @@ impl Default for MooneyRivlin {
 }
 
 impl MooneyRivlin {
-    pub(super) fn fault(&self) -> Option<(&'static str, f64, &'static str)> {
-        let fine = (0.0..=1.0).contains(&self.c01_share);
-        (!fine).then_some(("law.c01_share", self.c01_share, "in [0, 1]"))
+    pub(super) fn fault(&self) -> Option<MaterialError> {
+        if (0.0..=1.0).contains(&self.c01_share) {
+            return None;
+        }
+        MaterialError::some("law.c01_share", self.c01_share, "in [0, 1]")
     }
 }
 

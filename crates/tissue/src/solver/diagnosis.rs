@@ -5,7 +5,7 @@ use super::{ContactNode, FrameReport, Solver, SolverError};
 use elements::Chunk;
 use elements::shape_gradients;
 use elements::vector::{cross, dot};
-use elements::{Invariants, inverse_cube_root};
+use elements::{Deformation, shape_energy};
 use rayon::prelude::*;
 
 /// Sums and extremes over the elements of the present state.
@@ -64,7 +64,8 @@ impl Solver {
     fn diagnose_chunk(&self, chunk: &Chunk) -> Diagnosis {
         let mut result = Diagnosis::NONE;
         let bulk = self.options.material.bulk_pa();
-        let shear_over_bulk = self.options.material.shear_pa() / bulk;
+        let moduli = self.options.material.moduli();
+        let shear_over_bulk = moduli.shear_pa / bulk;
         self.partition.elements(chunk).for_each(|element| {
             let number = element.number as usize;
             let (mut rest, mut displacement) = ([[0.0; 3]; 4], [[0.0; 3]; 4]);
@@ -84,15 +85,11 @@ impl Solver {
                 }
             }
             let state = element_state(rest, displacement);
-            let determinant = state.determinant;
+            let determinant = state.deformation.det;
             result.note(determinant, number);
             let speed_squared = f64::from(self.speed_squared[number]);
             result.largest_bound = result.largest_bound.max(state.bound * speed_squared);
-            let invariants = Invariants {
-                root: inverse_cube_root(determinant.max(1e-3)),
-                ..state.invariants
-            };
-            let isochoric = self.options.material.law.energy(invariants);
+            let isochoric = shape_energy(&state.deformation, moduli.law, determinant.max(1e-3));
             let density = 2.0 * shear_over_bulk * isochoric + (determinant - 1.0).powi(2);
             // `bulk` is a sixth of the element's modulus.
             result.strain_energy += 3.0 * f64::from(element.bulk.abs()) * state.volume * density;
@@ -208,9 +205,7 @@ impl Solver {
 struct ElementState {
     /// At rest, mm³.
     volume: f64,
-    determinant: f64,
-    /// Without the root.
-    invariants: Invariants,
+    deformation: Deformation,
     bound: f64,
 }
 
@@ -239,11 +234,11 @@ fn element_state(rest: [[f32; 3]; 4], displacement: [[f64; 3]; 4]) -> ElementSta
     }
     ElementState {
         volume: volume.abs(),
-        determinant: dot(f[0], cofactor[0]),
-        invariants: Invariants {
-            first: f.iter().map(|row| dot(*row, *row)).sum(),
-            second: cofactor.iter().map(|row| dot(*row, *row)).sum(),
-            root: 1.0,
+        deformation: Deformation {
+            f,
+            cofactor,
+            det: dot(f[0], cofactor[0]),
+            invariant: f.iter().map(|row| dot(*row, *row)).sum(),
         },
         bound,
     }

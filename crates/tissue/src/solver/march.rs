@@ -217,7 +217,7 @@ impl March<'_> {
     unsafe fn prepare(&self, shared: Shared, chunk: &Chunk, positions: &mut [Node]) {
         // SAFETY: the caller's: the chunk's slots are this worker's in this phase.
         unsafe {
-            let rest = &self.partition.rest[chunk.first..chunk.first + chunk.slot_count()];
+            let rest = self.partition.base(chunk);
             (self.kernels.place)(
                 chunk.owned,
                 rest.as_ptr(),

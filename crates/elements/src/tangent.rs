@@ -1,0 +1,126 @@
+//! The tangent of the stress, `dP/dF`, of every law, and the stiffness of an element in its present shape, in f64.
+//!
+//! All laws are functions of the principal stretches, neo-Hookean and Mooney-Rivlin of exponents 2 and -2. With `P = cof F (T/J + p)`,
+//! `p = kappa (J - 1)`: `dP = dcof (T/J + p) + cof F (dT/J - T dJ/J² + kappa dJ)`. In the eigenvectors of `C` the
+//! diagonal of `dT` follows the principal stresses `f(s)`, `s = ln lambda - ln J / 3`, and its other entries are
+//! `(f_i - f_j) / (l_i - l_j) dC_ij` with the eigenvalues `l` of `C`.
+
+use crate::material::Moduli;
+use crate::spectrum::spectrum;
+use crate::tetrahedron::{Deformation, LEAST_DET, Tetrahedron};
+use crate::vector::{cross, dot};
+
+/// Eigenvalues of `C` closer than this, relative, have a derivative in place of a difference.
+const COINCIDENT: f64 = 1e-6;
+/// Least eigenvalue of `C`.
+const LEAST: f64 = 1e-12;
+
+type Matrix = [[f64; 3]; 3];
+
+/// `dP_ij / dF_kl` in row `3 i + j`, column `3 k + l`, Pa; symmetric.
+pub fn tangent(state: &Deformation, moduli: Moduli) -> [[f64; 9]; 9] {
+    let law = moduli.law.stretches();
+    let f = &state.f;
+    let c = [0, 1, 2].map(|i| [0, 1, 2].map(|j| (0..3).map(|k| f[k][i] * f[k][j]).sum::<f64>()));
+    let (values, vectors) = spectrum(c);
+    let values = values.map(|l| l.max(LEAST));
+    let log_det = values.map(f64::ln).iter().sum::<f64>() / 2.0;
+    let logarithm = |l: f64| 0.5 * l.ln() - log_det / 3.0;
+    let pulls = values.map(|l| moduli.shear_pa * law.pull(logarithm(l)));
+    let rises = values.map(|l| moduli.shear_pa * law.rise(logarithm(l)));
+    let mut slopes = [[0.0; 3]; 3];
+    for i in 0..3 {
+        for j in 0..3 {
+            let gap = values[i] - values[j];
+            let middle = 0.5 * (values[i] + values[j]);
+            slopes[i][j] = if gap.abs() < COINCIDENT * middle {
+                moduli.shear_pa * law.rise(logarithm(middle)) / (2.0 * middle)
+            } else {
+                (pulls[i] - pulls[j]) / gap
+            };
+        }
+    }
+    let mean = pulls.iter().sum::<f64>() / 3.0;
+    let deviator = from_principal(&vectors, |i, j| if i == j { pulls[i] - mean } else { 0.0 });
+    let cofactor = &state.cofactor;
+    let bounded = state.det.abs().max(LEAST_DET).copysign(state.det);
+    let pressure = moduli.bulk_pa * (state.det - 1.0);
+    let mut inner = deviator.map(|row| row.map(|t| t / bounded));
+    for i in 0..3 {
+        inner[i][i] += pressure;
+    }
+
+    let mut out = [[0.0; 9]; 9];
+    for column in 0..9 {
+        let (k, l) = (column / 3, column % 3);
+        // dF has a single one, in row k, column l.
+        let mut df = [[0.0; 3]; 3];
+        df[k][l] = 1.0;
+        let d_cofactor = [(1, 2), (2, 0), (0, 1)].map(|(a, b)| {
+            let (first, second) = (cross(df[a], f[b]), cross(f[a], df[b]));
+            [0, 1, 2].map(|i| first[i] + second[i])
+        });
+        let d_det = cofactor[k][l];
+        // dC in the eigenvectors: 2 sym(F^T dF) = f_k e_l^T + e_l f_k^T with row k of F.
+        let along = [0, 1, 2].map(|i| (0..3).map(|a| vectors[a][i] * f[k][a]).sum::<f64>());
+        let dc = |i: usize, j: usize| along[i] * vectors[l][j] + along[j] * vectors[l][i];
+        let stretch = [0, 1, 2].map(|i| dc(i, i) / (2.0 * values[i]));
+        let growth = stretch.iter().sum::<f64>() / 3.0;
+        let own = [0, 1, 2].map(|i| rises[i] * (stretch[i] - growth));
+        let own_mean = own.iter().sum::<f64>() / 3.0;
+        let d_deviator = from_principal(&vectors, |i, j| {
+            if i == j {
+                own[i] - own_mean
+            } else {
+                slopes[i][j] * dc(i, j)
+            }
+        });
+        let shrink = if state.det.abs() > LEAST_DET {
+            d_det / (bounded * bounded)
+        } else {
+            0.0
+        };
+        for i in 0..3 {
+            for j in 0..3 {
+                let mut sum = cofactor[i][j] * moduli.bulk_pa * d_det;
+                for a in 0..3 {
+                    let d_inner = d_deviator[a][j] / bounded - deviator[a][j] * shrink;
+                    sum += d_cofactor[i][a] * inner[a][j] + cofactor[i][a] * d_inner;
+                }
+                out[3 * i + j][column] = sum;
+            }
+        }
+    }
+    out
+}
+
+/// `V diag V^T` of a matrix that is given in the eigenvectors.
+fn from_principal(vectors: &Matrix, entry: impl Fn(usize, usize) -> f64) -> Matrix {
+    let inner = [0, 1, 2].map(|i| [0, 1, 2].map(|j| entry(i, j)));
+    let half = [0, 1, 2]
+        .map(|i| [0, 1, 2].map(|j| (0..3).map(|k| inner[i][k] * vectors[j][k]).sum::<f64>()));
+    [0, 1, 2].map(|i| [0, 1, 2].map(|j| (0..3).map(|k| vectors[i][k] * half[k][j]).sum()))
+}
+
+impl Tetrahedron {
+    /// Derivatives of [`Tetrahedron::forces`] by the corners' displacements, µN/mm: entry `[3 a + i][3 b + j]` of corners `a`, `b` and
+    /// axes `i`, `j`; symmetric. At rest its diagonal blocks are [`Tetrahedron::diagonal_blocks`].
+    pub fn stiffness(&self, state: &Deformation, moduli: Moduli) -> [[f64; 12]; 12] {
+        let tangent = tangent(state, moduli);
+        let [a, b, c] = self.gradients;
+        let gradients = [[0, 1, 2].map(|k| -(a[k] + b[k] + c[k])), a, b, c];
+        let mut out = [[0.0; 12]; 12];
+        for i in 0..3 {
+            for k in 0..3 {
+                let block = [0, 1, 2].map(|j| [0, 1, 2].map(|l| tangent[3 * i + j][3 * k + l]));
+                for (second, g) in gradients.iter().enumerate() {
+                    let image = block.map(|row| dot(row, *g));
+                    for (first, g) in gradients.iter().enumerate() {
+                        out[3 * first + i][3 * second + k] = self.volume * dot(*g, image);
+                    }
+                }
+            }
+        }
+        out
+    }
+}
