@@ -57,8 +57,8 @@ impl<const NODES: usize, const TETS: usize> Kind<NODES, TETS> {
         let (groups, ends) = disjoint_batches(groups)?;
         self.batches.try_reserve(ends.len())?;
         self.elements.try_reserve(ends.len())?;
-        let from_displacements = source.material.law.from_displacements();
-        if from_displacements {
+        let displacements = source.material.law.takes_displacements();
+        if displacements {
             self.gradients.try_reserve(ends.len())?;
         }
         let starts = std::iter::once(0).chain(ends.iter().copied());
@@ -103,7 +103,7 @@ impl<const NODES: usize, const TETS: usize> Kind<NODES, TETS> {
                 }
             }
             self.batches.push(batch);
-            if from_displacements {
+            if displacements {
                 self.gradients.push(gradients);
             }
             self.elements.push(elements);

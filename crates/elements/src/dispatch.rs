@@ -102,7 +102,7 @@ unsafe fn all_volumes<L: NodeLanes>(
 ) {
     unsafe {
         let (octahedra, pairs, singles) = partition.clusters(chunk);
-        if partition.moduli.law.from_displacements() {
+        if partition.moduli.law.takes_displacements() {
             let bulk = partition.moduli.bulk_pa as f32;
             let (of_octahedra, of_pairs, of_singles) = partition.gradients(chunk);
             add_volumes_of_stretches::<L, 6, 4>(bulk, (octahedra, of_octahedra), nodes, forces);

@@ -110,7 +110,7 @@ impl Partition {
             partition.push_chunk(chunk as u32, leaf, &owner, mesh, material)?;
         }
         partition.connect()?;
-        if material.law.from_displacements() {
+        if material.law.takes_displacements() {
             let widest = partition.chunks.iter().map(Chunk::slot_count).max();
             partition.zeros = filled(widest.unwrap_or(0).next_multiple_of(PADDED), [0.0; 4])?;
         }

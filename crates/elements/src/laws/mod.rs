@@ -24,9 +24,9 @@ use std::str::FromStr;
 pub use isochoric::{Invariants, Isochoric, LaneSlopes, Slopes};
 pub use mooney_rivlin::MooneyRivlin;
 pub use neo_hookean::NeoHookean;
-pub use ogden::{CAP, MOST_TERMS, Ogden};
+pub use ogden::{CAP, Ogden};
 pub use stretches::Stretches;
-pub use terms::{Term, Terms};
+pub use terms::{MOST_TERMS, Term, Terms};
 
 /// The law of a material, as files name it: `{"name": "mooney-rivlin", "c01_share": 0.5}`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -72,7 +72,7 @@ impl Law {
     }
 
     /// Whether the kernel takes displacements and gradients, and not positions and springs.
-    pub(crate) fn from_displacements(&self) -> bool {
+    pub(crate) fn takes_displacements(&self) -> bool {
         matches!(self, Self::Ogden(_))
     }
 

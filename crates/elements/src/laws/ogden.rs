@@ -10,13 +10,10 @@
 //! Beyond `x = alpha ln l = 3` ([`CAP`]) the exponential in the stress goes on as its tangent: `phi(x) = e^3 (x - 2)`. With exponent -24 that
 //! is a compression of 12 %, beyond what tests of brain tissue reach. Stress, tangent and critical step then stay bounded.
 
-use super::terms::{Term, Terms};
+use super::terms::{MOST_TERMS, Term, Terms};
 use crate::fault::MaterialError;
 use serde::{Deserialize, Serialize};
 use std::fmt;
-
-/// Terms of a law at most.
-pub const MOST_TERMS: usize = 6;
 
 /// `x = alpha ln l` from which the exponential goes on as its tangent.
 pub const CAP: f64 = 3.0;
@@ -89,7 +86,7 @@ impl Ogden {
                 let wanted = "from 0.01 to 100, or from -100 to -0.01";
                 return MaterialError::some(format!("law.terms[{at}].alpha"), term.alpha, wanted);
             }
-            if !(term.mu_pa.abs() <= SHEAR_PA[1]) {
+            if term.mu_pa.is_nan() || term.mu_pa.abs() > SHEAR_PA[1] {
                 let field = format!("law.terms[{at}].mu_pa");
                 return MaterialError::some(
                     field,
@@ -107,7 +104,7 @@ impl Ogden {
             self.terms.iter().nth(worst).map_or(0.0, |term| term.mu_pa),
         );
         let shear = self.shear_pa();
-        if !(shear > 0.0) {
+        if shear <= 0.0 {
             let wanted = format!(
                 "of the sign of its alpha: the shear modulus of all terms, the sum of mu alpha / 2, is {shear:.4} Pa"
             );
@@ -120,7 +117,7 @@ impl Ogden {
             return MaterialError::some(field, value, wanted);
         }
         let steps = (-100..=100).map(|k| LONGEST * f64::from(k) / 100.0);
-        let bad = steps.into_iter().find(|s| !(self.rise(*s) > 0.0))?;
+        let bad = steps.into_iter().find(|s| self.rise(*s) <= 0.0)?;
         let wanted = format!(
             "of the sign of its alpha, or smaller: the law is not elliptic, stress falls with stretch at a stretch of {:.2}",
             bad.exp()

@@ -1,7 +1,9 @@
 //! The terms of a law in principal stretches: a short list that is copied with its material.
 
-use super::ogden::MOST_TERMS;
 use serde::{Deserialize, Serialize};
+
+/// Terms of a law at most.
+pub const MOST_TERMS: usize = 6;
 
 /// One term `mu / alpha (l1^alpha + l2^alpha + l3^alpha - 3)`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -6,7 +6,7 @@
 
 mod verification;
 
-use elements::{ElementForces, Isa, Law, MooneyRivlin};
+use elements::{ElementForces, Isa, Law, MooneyRivlin, Ogden};
 use std::error::Error;
 use std::path::Path;
 use tissue::contact::{ContactDomain, FACE_AREA_MM2};
@@ -94,7 +94,14 @@ fn soft(damping_per_s: f64) -> Material {
 /// What each law costs: the forces of a mesh by one thread, the laws in turn, medians.
 fn laws(mesh: &Mesh) -> Outcome<String> {
     const ROUNDS: usize = 200;
-    let all = [Law::default(), Law::MooneyRivlin(MooneyRivlin::default())];
+    let ogden = |terms: &[[f64; 2]]| Ogden::new(terms).map(Law::Ogden).ok_or("too many terms");
+    // Cortex with an even exponent, and with the exponent that fits best.
+    let all = [
+        Law::default(),
+        Law::MooneyRivlin(MooneyRivlin::default()),
+        ogden(&[[-163.0, -18.0]])?,
+        ogden(&[[-157.0, -18.7]])?,
+    ];
     let count = mesh.node_count();
     let mut table = format!(
         "| law | instruction set | forces of {count} nodes, {} tetrahedra, ms | over neo-Hookean |\n|---|---|---|---|\n",
@@ -105,15 +112,12 @@ fn laws(mesh: &Mesh) -> Outcome<String> {
         .collect();
     for isa in Isa::available().into_iter().rev() {
         let bodies = all.map(|law| {
-            let material = Material {
-                law,
-                ..Material::default()
-            };
+            let material = Material::default().with_law(law);
             ElementForces::new(mesh.tetrahedra(), &material, isa).expect("memory for a body")
         });
         let mut scratch = bodies[0].scratch(1)?;
         let mut out = vec![0.0; u.len()];
-        let mut times = [Vec::new(), Vec::new()];
+        let mut times = all.map(|_| Vec::new());
         for _ in 0..ROUNDS {
             for (body, times) in bodies.iter().zip(&mut times) {
                 let start = std::time::Instant::now();

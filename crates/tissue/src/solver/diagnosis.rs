@@ -1,11 +1,12 @@
 //! What a frame reports, and why it failed: f64 passes over the elements, once a frame.
 
+use super::stiffest::stiffest;
 use super::touch::{ToolPose, Touch};
 use super::{ContactNode, FrameReport, Solver, SolverError};
 use elements::Chunk;
 use elements::shape_gradients;
 use elements::vector::{cross, dot};
-use elements::{Deformation, shape_energy};
+use elements::{Deformation, Law, Tetrahedron, shape_energy};
 use rayon::prelude::*;
 
 /// Sums and extremes over the elements of the present state.
@@ -16,7 +17,7 @@ pub(super) struct Diagnosis {
     /// Mesh element with the smallest det F.
     pub worst_element: usize,
     /// Largest `sum_a |cof F dN_a/dX|²` times the square of the element's relative wave speed, 1/mm²:
-    /// proportional to the largest eigenvalue bound.
+    /// proportional to the largest eigenvalue bound. Of a law that stiffens, the largest eigenvalue of the element's tangent instead.
     pub largest_bound: f64,
 }
 
@@ -88,7 +89,15 @@ impl Solver {
             let determinant = state.deformation.det;
             result.note(determinant, number);
             let speed_squared = f64::from(self.speed_squared[number]);
-            result.largest_bound = result.largest_bound.max(state.bound * speed_squared);
+            let bound = match moduli.law {
+                Law::NeoHookean(_) | Law::MooneyRivlin(_) => state.bound,
+                Law::Ogden(_) => {
+                    let corners = rest.map(|p| p.map(f64::from));
+                    let element = Tetrahedron::new([0, 1, 2, 3], corners, 1.0);
+                    stiffest(&element, &state.deformation, moduli)
+                }
+            };
+            result.largest_bound = result.largest_bound.max(bound * speed_squared);
             let isochoric = shape_energy(&state.deformation, moduli.law, determinant.max(1e-3));
             let density = 2.0 * shear_over_bulk * isochoric + (determinant - 1.0).powi(2);
             // `bulk` is a sixth of the element's modulus.

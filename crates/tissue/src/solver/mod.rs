@@ -1,6 +1,6 @@
 //! Total Lagrangian explicit dynamics (TLED; Miller et al. 2007) on linear tetrahedra.
 //!
-//! Compressible neo-Hookean elements, lumped mass, mass-proportional damping,
+//! Compressible hyperelastic elements, lumped mass, mass-proportional damping,
 //! central differences, f32 state. One [`Solver::step_frame`] moves the body by a
 //! frame (50 ms in the paper, 500 inner steps of 0.1 ms); contact nodes are led
 //! on straight lines to their prescribed displacement. The result has the same
@@ -15,6 +15,7 @@ mod march;
 mod mass;
 mod options;
 mod stability;
+mod stiffest;
 mod touch;
 // Against the energy of `statics`.
 #[cfg(all(test, feature = "linear"))]
