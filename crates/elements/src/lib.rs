@@ -45,5 +45,5 @@ pub use slots::{FLOPS_PER_NODE, PADDED};
 pub use tangent::tangent;
 pub use tetrahedra::Tetrahedra;
 pub use tetrahedron::{
-    Deformation, Tetrahedron, energy_density, inverse_cube_root, shape_energy, stress,
+    Deformation, Tetrahedron, energy_density, inverse_cube_root, shape_energy, stiffening, stress,
 };

@@ -86,6 +86,13 @@ const ENTRIES: [[usize; 2]; 6] = [[0, 0], [0, 1], [0, 2], [1, 1], [1, 2], [2, 2]
 /// Where row `i`, column `j` is in [`Symmetric`].
 pub const PLACE: [[usize; 3]; 3] = [[0, 1, 2], [1, 3, 4], [2, 4, 5]];
 
+/// How much steeper the steepest principal stress rises than at rest, there 1.
+pub fn stiffening(law: &Stretches, f: &[[f64; 3]; 3]) -> f64 {
+    let shape = Shape::new(f);
+    let rises = shape.eigenvalues().map(|d| law.rise(shape.logarithm(d)));
+    0.5 * rises.into_iter().fold(0.0, f64::max)
+}
+
 /// `w` over the shear modulus.
 pub fn energy(law: &Stretches, f: &[[f64; 3]; 3]) -> f64 {
     let shape = Shape::new(f);

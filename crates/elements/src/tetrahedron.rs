@@ -181,6 +181,15 @@ pub fn shape_energy(state: &Deformation, law: Law, det: f64) -> f64 {
     }
 }
 
+/// How much stiffer than at rest a law is against a change of the shape that a body has: of neo-Hookean and Mooney-Rivlin tissue 1, as an
+/// estimate; of Ogden's the steepest rise of a principal stress with the logarithm of its stretch, over that at rest.
+pub fn stiffening(state: &Deformation, law: Law) -> f64 {
+    match law {
+        Law::NeoHookean(_) | Law::MooneyRivlin(_) => 1.0,
+        Law::Ogden(_) => principal::stiffening(&law.stretches(), &state.f),
+    }
+}
+
 /// `x^(-1/3)` of a positive normal number, to 1e-12: a guess from the exponent and two corrections of fourth order. The same
 /// bits on every platform, and half the time of libm's root with the divisions after it.
 pub fn inverse_cube_root(x: f64) -> f64 {

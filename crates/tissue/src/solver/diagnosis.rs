@@ -6,7 +6,7 @@ use super::{ContactNode, FrameReport, Solver, SolverError};
 use elements::Chunk;
 use elements::shape_gradients;
 use elements::vector::{cross, dot};
-use elements::{Deformation, Law, Tetrahedron, shape_energy};
+use elements::{Deformation, Moduli, shape_energy};
 use rayon::prelude::*;
 
 /// Sums and extremes over the elements of the present state.
@@ -16,8 +16,7 @@ pub(super) struct Diagnosis {
     pub min_det_f: f64,
     /// Mesh element with the smallest det F.
     pub worst_element: usize,
-    /// Largest `sum_a |cof F dN_a/dX|²` times the square of the element's relative wave speed, 1/mm²:
-    /// proportional to the largest eigenvalue bound. Of a law that stiffens, the largest eigenvalue of the element's tangent instead.
+    /// Largest [`stiffest`] times the square of the element's relative wave speed, 1/mm²: proportional to the largest eigenvalue bound.
     pub largest_bound: f64,
 }
 
@@ -85,19 +84,11 @@ impl Solver {
                     displacement[corner][k] = f64::from(moved[k]);
                 }
             }
-            let state = element_state(rest, displacement);
+            let state = element_state(rest, displacement, moduli);
             let determinant = state.deformation.det;
             result.note(determinant, number);
             let speed_squared = f64::from(self.speed_squared[number]);
-            let bound = match moduli.law {
-                Law::NeoHookean(_) | Law::MooneyRivlin(_) => state.bound,
-                Law::Ogden(_) => {
-                    let corners = rest.map(|p| p.map(f64::from));
-                    let element = Tetrahedron::new([0, 1, 2, 3], corners, 1.0);
-                    stiffest(&element, &state.deformation, moduli)
-                }
-            };
-            result.largest_bound = result.largest_bound.max(bound * speed_squared);
+            result.largest_bound = result.largest_bound.max(state.bound * speed_squared);
             let isochoric = shape_energy(&state.deformation, moduli.law, determinant.max(1e-3));
             let density = 2.0 * shear_over_bulk * isochoric + (determinant - 1.0).powi(2);
             // `bulk` is a sixth of the element's modulus.
@@ -219,7 +210,7 @@ struct ElementState {
 }
 
 #[inline]
-fn element_state(rest: [[f32; 3]; 4], displacement: [[f64; 3]; 4]) -> ElementState {
+fn element_state(rest: [[f32; 3]; 4], displacement: [[f64; 3]; 4], moduli: Moduli) -> ElementState {
     let (slopes, volume) = shape_gradients(rest);
     let mut f = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let mut gradients = [[0.0; 3]; 4];
@@ -234,21 +225,15 @@ fn element_state(rest: [[f32; 3]; 4], displacement: [[f64; 3]; 4]) -> ElementSta
         }
     }
     let cofactor = [cross(f[1], f[2]), cross(f[2], f[0]), cross(f[0], f[1])];
-    let mut bound = 0.0;
-    for gradient in gradients {
-        for row in cofactor {
-            let image = dot(row, gradient);
-            bound += image * image;
-        }
-    }
+    let deformation = Deformation {
+        f,
+        cofactor,
+        det: dot(f[0], cofactor[0]),
+        invariant: f.iter().map(|row| dot(*row, *row)).sum(),
+    };
     ElementState {
         volume: volume.abs(),
-        deformation: Deformation {
-            f,
-            cofactor,
-            det: dot(f[0], cofactor[0]),
-            invariant: f.iter().map(|row| dot(*row, *row)).sum(),
-        },
-        bound,
+        bound: stiffest(&gradients, &deformation, moduli),
+        deformation,
     }
 }

@@ -4,8 +4,8 @@
 //! gives the eigenvalue at rest (the element bound `h/c` alone is 1.6 times too
 //! cautious). In motion that value is scaled by the ratio of the present element
 //! bound to the one at rest, `max_e sum_a |cof F dN_a/dX|²`: the pressure-wave
-//! speed across the thinnest element. Ogden's law stiffens in itself, so
-//! its bound is the largest eigenvalue of the element's tangent (`stiffest.rs`).
+//! speed across the thinnest element. Ogden's law stiffens in itself, which
+//! `stiffest.rs` adds.
 
 use super::Solver;
 
