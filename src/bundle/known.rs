@@ -58,7 +58,7 @@ const KEYS: &[(&str, &[&str])] = &[
             "law",
         ],
     ),
-    ("material.law", &["name", "c01_share"]),
+    ("material.law", &["name", "c01_share", "terms"]),
     ("mesh", &["file", "nodes", "mesh_sha256"]),
     (
         "envelope",

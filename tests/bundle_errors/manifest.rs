@@ -43,7 +43,31 @@ fn manifest_errors_name_the_field() {
             "tiny-upt",
             "/material/law",
             serde_json::json!({"name": "ogden"}),
-            "ogden",
+            "terms",
+        ),
+        (
+            "tiny-upt",
+            "/material/law",
+            serde_json::json!({"name": "fung"}),
+            "fung",
+        ),
+        (
+            "tiny-upt",
+            "/material/law",
+            serde_json::json!({"name": "ogden", "terms": [{"mu_pa": 157, "alpha": -18.7}]}),
+            "material.law.terms[0].mu_pa",
+        ),
+        (
+            "tiny-upt",
+            "/material/law",
+            serde_json::json!({"name": "ogden", "terms": [{"mu_pa": -0.157, "alpha": -18.7}]}),
+            "in Pa, not kPa",
+        ),
+        (
+            "tiny-upt",
+            "/material/law",
+            serde_json::json!({"name": "ogden", "terms": [{"mu_pa": -157, "alpha": -18.7}]}),
+            "material.young_pa",
         ),
         (
             "tiny-upt",

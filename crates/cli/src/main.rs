@@ -30,6 +30,7 @@ mod machine;
 #[cfg(feature = "linear")]
 mod make;
 mod manifest;
+mod materials;
 mod mesh;
 #[cfg(feature = "linear")]
 mod modes;
@@ -145,6 +146,8 @@ enum Command {
     Modes(left_out::Options),
     /// List the schemes and the programmes of tools, with the ranges that their cases are drawn from.
     Loads(loads::Options),
+    /// List tissues that a law may be named by, with their sources.
+    Materials(materials::Options),
     /// Run one reference simulation and write its trajectory.
     Simulate(simulate::Options),
     /// Run many reference simulations into a folder; resumes, and splits over machines.
@@ -205,6 +208,7 @@ fn main() -> ExitCode {
         #[cfg(not(feature = "linear"))]
         Command::Modes(options) => left_out::run("linear", &options),
         Command::Loads(options) => loads::run(&options),
+        Command::Materials(options) => materials::run(&options),
         Command::Simulate(options) => simulate::run(&options),
         Command::Dataset(options) => dataset::run(&options),
         Command::Rollout(options) => rollout::run(&options),

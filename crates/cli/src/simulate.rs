@@ -1,6 +1,6 @@
 //! `upt simulate`: one case of a scheme on a mesh, as a trajectory file.
 
-use crate::{loads, tool_scale};
+use crate::{loads, materials, tool_scale};
 use anyhow::Context;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -69,11 +69,12 @@ impl Options {
 /// Settings of the solver that `simulate` and `dataset` share.
 #[derive(clap::Args)]
 pub struct SolverArguments {
-    /// Young's modulus, Pa.
-    #[arg(long, default_value_t = 3000.0)]
-    young: f64,
-    /// Law of the tissue: neo-hookean, or mooney-rivlin:SHARE with the share of C01 in C10 + C01 (default: 0.526, brain).
-    #[arg(long, default_value_t = elements::Law::default())]
+    /// Young's modulus, Pa. Default: 3000, or that of the law where it has one of its own.
+    #[arg(long)]
+    young: Option<f64>,
+    /// Law of the tissue: neo-hookean, mooney-rivlin:SHARE with the share of C01 in C10 + C01 (default: 0.526, brain), ogden:MU,ALPHA[,MU,ALPHA...] with
+    /// MU in Pa or with kPa behind it, or a tissue that `upt materials` lists.
+    #[arg(long, default_value = "neo-hookean", value_parser = materials::law)]
     law: elements::Law,
     /// Poisson's ratio.
     #[arg(long, default_value_t = 0.49)]
@@ -103,11 +104,11 @@ impl SolverArguments {
             threads,
             ..SolverOptions::default()
         };
-        options.material.young_pa = self.young;
         options.material.poisson = self.poisson;
+        options.material = options.material.with_law(self.law);
+        options.material.young_pa = self.young.unwrap_or(options.material.young_pa);
         options.material.density_kg_m3 = self.density;
         options.material.damping_per_s = self.damping;
-        options.material.law = self.law;
         if self.average_pressure {
             options.pressure = Pressure::AverageNodal;
         }

@@ -12,6 +12,7 @@ use tissue::programmes::{BodySize, ToolProgramme, ToolScale};
 
 use crate::effort::Effort;
 use crate::loads;
+use crate::materials;
 use crate::tool_scale::{self, PUSH_MM};
 
 /// Areas that the checks' programmes have at scale 1, mm² (`tissue::schemes`).
@@ -83,11 +84,12 @@ pub struct Options {
     /// Material that sets Young's modulus, density and damping: brain, liver, kidney, heart or fat.
     #[arg(long, default_value = "brain")]
     pub material: String,
-    /// Young's modulus, Pa; overrides the material's.
+    /// Young's modulus, Pa; overrides the material's. A law with a modulus of its own sets it.
     #[arg(long)]
     pub young: Option<f64>,
-    /// Law of the tissue: neo-hookean, or mooney-rivlin:SHARE with the share of C01 in C10 + C01 (default: 0.526, brain).
-    #[arg(long, default_value_t = Law::default())]
+    /// Law of the tissue: neo-hookean, mooney-rivlin:SHARE with the share of C01 in C10 + C01 (default: 0.526, brain), ogden:MU,ALPHA[,MU,ALPHA...] with
+    /// MU in Pa or with kPa behind it, or a tissue that `upt materials` lists.
+    #[arg(long, default_value = "neo-hookean", value_parser = materials::law)]
     pub law: Law,
     /// Poisson's ratio, below 0.5.
     #[arg(long, default_value_t = 0.49)]
@@ -226,12 +228,17 @@ impl Options {
                 self.material
             );
         };
-        Ok(Material {
-            young_pa: self.young.unwrap_or(young),
+        let own = Material {
+            young_pa: young,
             poisson: self.poisson,
             density_kg_m3: self.density.unwrap_or(density),
             damping_per_s: self.damping.unwrap_or(damping),
-            law: self.law,
+            law: Law::default(),
+        }
+        .with_law(self.law);
+        Ok(Material {
+            young_pa: self.young.unwrap_or(own.young_pa),
+            ..own
         })
     }
 

@@ -1,0 +1,141 @@
+//! `upt materials`: tissues by name, each a law with its source, for every option that takes a law.
+//!
+//! The table is `tissues.csv` beside this file: a row a tissue, with the law in the form of `--law`, the stretches that its data reach
+//! (beyond them a law extrapolates) and the DOI of the data.
+
+use std::process::ExitCode;
+
+use anyhow::Context;
+use clap::Args;
+use elements::Law;
+use serde_json::json;
+
+/// `name, tissue, law, data, doi, source`, with a head line.
+const TABLE: &str = include_str!("tissues.csv");
+
+#[derive(Args)]
+#[command(after_help = "Examples:
+  upt materials
+  upt materials --json
+  upt simulate --mesh onnx/meshes/brain-coarse.mesh.safetensors --law corona-radiata --out press.safetensors --tool press")]
+pub struct Options {
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// One tissue of the table.
+#[derive(Clone, Copy, Debug)]
+pub struct Tissue<'a> {
+    /// What `--law` calls it.
+    pub name: &'a str,
+    pub tissue: &'a str,
+    /// As `--law` has it.
+    pub law: &'a str,
+    /// What the measured stretches and shears reach.
+    pub data: &'a str,
+    pub doi: &'a str,
+    pub source: &'a str,
+}
+
+/// All rows.
+pub fn tissues() -> Vec<Tissue<'static>> {
+    TABLE
+        .lines()
+        .skip(1)
+        .filter_map(|line| {
+            let mut fields = line.split(';').map(str::trim);
+            let mut next = || fields.next();
+            Some(Tissue {
+                name: next()?,
+                tissue: next()?,
+                law: next()?,
+                data: next()?,
+                doi: next()?,
+                source: next()?,
+            })
+        })
+        .collect()
+}
+
+/// A law by its formula or by the name of a tissue; what clap calls for `--law`.
+pub fn law(text: &str) -> Result<Law, String> {
+    match tissues().into_iter().find(|tissue| tissue.name == text) {
+        Some(tissue) => tissue.law.parse(),
+        None => text.parse().map_err(|error: String| {
+            if text.contains(':') {
+                error
+            } else {
+                format!("{error}; or a tissue that `upt materials` lists")
+            }
+        }),
+    }
+}
+
+pub fn run(options: &Options) -> anyhow::Result<ExitCode> {
+    let mut rows = Vec::new();
+    for tissue in tissues() {
+        let law: Law = (tissue.law.parse())
+            .map_err(anyhow::Error::msg)
+            .with_context(|| format!("tissues.csv: {}", tissue.name))?;
+        let shear = law.young_pa(0.5).map(|young| young / 3.0);
+        rows.push((tissue, shear));
+    }
+    if options.json {
+        let list: Vec<_> = rows
+            .iter()
+            .map(|(tissue, shear)| {
+                json!({"name": tissue.name, "tissue": tissue.tissue, "law": tissue.law, "shear_modulus_pa": shear,
+                    "data": tissue.data, "doi": tissue.doi, "source": tissue.source})
+            })
+            .collect();
+        println!("{}", serde_json::to_string_pretty(&list)?);
+        return Ok(ExitCode::SUCCESS);
+    }
+    println!(
+        "{:20}{:>10}  {:24}{:30}tissue",
+        "name", "G, Pa", "law", "DOI of the data"
+    );
+    for (tissue, shear) in &rows {
+        let shear = shear.map_or_else(String::new, |g| format!("{g:.0}"));
+        println!(
+            "{:20}{:>10}  {:24}{:30}{} ({})",
+            tissue.name, shear, tissue.law, tissue.doi, tissue.tissue, tissue.data
+        );
+    }
+    println!("\nSources:");
+    let mut sources: Vec<&str> = rows.iter().map(|(tissue, _)| tissue.source).collect();
+    sources.dedup();
+    for source in sources {
+        println!("  {source}");
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{law, tissues};
+
+    #[test]
+    fn every_tissue_is_a_law_with_a_doi_and_a_source() {
+        let all = tissues();
+        assert!(all.len() >= 4);
+        for tissue in &all {
+            let law = law(tissue.name).unwrap();
+            assert_eq!(law.to_string(), tissue.law, "{}", tissue.name);
+            assert!(law.young_pa(0.49).unwrap() > 0.0);
+            assert!(tissue.doi.starts_with("10."), "{}", tissue.doi);
+            assert!(!tissue.source.is_empty() && !tissue.data.is_empty());
+            assert_eq!(
+                all.iter().filter(|other| other.name == tissue.name).count(),
+                1
+            );
+        }
+    }
+
+    #[test]
+    fn a_name_that_is_none_leads_to_the_list() {
+        assert!(law("spleen").unwrap_err().contains("upt materials"));
+        assert!(!law("ogden:1,2,3").unwrap_err().contains("upt materials"));
+    }
+}
