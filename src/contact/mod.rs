@@ -31,5 +31,4 @@ pub use problem::ContactProblem;
 pub(crate) use rows::{Pair, outward};
 pub use state::State;
 pub(crate) use state::vector;
-pub(crate) use tool::PUT_MM;
-pub use tool::{MAX_TOOLS, Mode, Push, Reading, Told, Tool};
+pub use tool::{MAX_TOOLS, Mode, PUT_MM, Push, Reading, Told, Tool};

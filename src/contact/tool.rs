@@ -7,7 +7,7 @@ use crate::field::INPUT_LIMIT;
 use crate::memory::{self, HeldBytes};
 
 /// A tool that is farther than this from where it was has been put there, not moved, mm.
-pub(crate) const PUT_MM: f32 = 40.0;
+pub const PUT_MM: f32 = 40.0;
 /// Tools at once.
 pub const MAX_TOOLS: usize = 64;
 

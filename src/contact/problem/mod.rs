@@ -33,10 +33,10 @@ use look::MOST_ROWS;
 const WHAT: &str = "the contact of instruments";
 /// Parts of a step's way at most: of a thin tool that goes as far as one may.
 const MOST_PARTS: f32 = 80.0;
-/// Work of the solves of a step at most, those of its substeps included: about so many multiplications, some five milliseconds.
+/// Work of the solves of a step at most, those of its substeps included, in multiplications: about five milliseconds.
 const STEP_WORK: u64 = 20_000_000;
-/// A step whose contact is not to be lost may take so many times that.
-const PATIENCE: u64 = 6;
+/// The same bound for a step in which no tool may lose its contact: a broad tool put into the tissue needs it to find its way out.
+const LONGEST_STEP_WORK: u64 = 6 * STEP_WORK;
 /// Parts of the tools' ways in a step that has taken its time.
 const LEAST_PARTS: u32 = 4;
 /// A tool that goes farther in a step is quick, mm.
@@ -199,7 +199,7 @@ impl ContactProblem {
         self.lay_in_tissue = false;
         self.enter(tools, rest, start)?;
         if !self.may_lose() {
-            self.work_left = PATIENCE * STEP_WORK;
+            self.work_left = LONGEST_STEP_WORK;
         }
         Ok(())
     }

@@ -15,9 +15,9 @@ use crate::memory;
 
 /// Multiplications of one linearisation at most: about half a millisecond.
 const SOLVE_WORK: u64 = 2_000_000;
-/// A step whose contact is not to be lost may take so many times that.
-const PATIENCE: u64 = 15;
-/// What else a solve takes, as so many multiplications: for each node and sample that is looked at, for each row and linearisation, and for
+/// How many times that where no tool may lose its contact.
+const LONGEST_LINEARISATION: u64 = 15;
+/// What else a solve takes, in multiplications: for each node and sample that is looked at, for each row and linearisation, and for
 /// each pair of rows.
 const LOOK_WORK: u64 = 60;
 const MEASURE_WORK: u64 = 1000;
@@ -164,7 +164,7 @@ impl ContactProblem {
             let limits = time.limits();
             let most_work = match self.may_lose.contains(&true) {
                 true => limits.most_work,
-                false => limits.most_work.saturating_mul(PATIENCE),
+                false => limits.most_work.saturating_mul(LONGEST_LINEARISATION),
             };
             let limits = Limits {
                 most_work: most_work.min(self.work_left),

@@ -5,12 +5,12 @@
 
 use std::collections::VecDeque;
 
+use upt::contact::PUT_MM;
+
 use super::protocol::Tool;
 
 /// Frames that are kept.
 const MOST_POSES: usize = 256;
-/// A tool that moves farther from a frame to the next has been put there, mm.
-const PUT_MM: f32 = 40.0;
 /// What was lost for longer is not made up for, s.
 const LOST_S: f64 = 0.1;
 

@@ -4,10 +4,10 @@ use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
-/// A request's head may be so long, bytes.
+/// The longest head of a request that is read, bytes.
 const LONGEST_HEAD: usize = 8192;
-/// And take so long to arrive, the whole of it.
-const PATIENCE: Duration = Duration::from_secs(5);
+/// Within which the whole head must arrive.
+const HEAD_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// A request's head.
 pub struct Request {
@@ -21,11 +21,11 @@ pub struct Request {
 impl Request {
     /// Reads a head; `None` where it is none, too long or too late.
     pub fn read(stream: &mut TcpStream) -> Option<Self> {
-        Self::read_within(stream, PATIENCE)
+        Self::read_within(stream, HEAD_TIMEOUT)
     }
 
-    fn read_within(stream: &mut TcpStream, patience: Duration) -> Option<Self> {
-        let late = Instant::now() + patience;
+    fn read_within(stream: &mut TcpStream, timeout: Duration) -> Option<Self> {
+        let late = Instant::now() + timeout;
         let mut head = Vec::new();
         let mut byte = [0];
         // Byte by byte, so that what follows the head (a WebSocket's first frame) stays in the stream.
@@ -112,8 +112,8 @@ mod tests {
             }
         });
         let (mut stream, _) = listener.accept().unwrap();
-        let patience = Duration::from_millis(50);
-        assert!(Request::read_within(&mut stream, patience).is_none());
+        let timeout = Duration::from_millis(50);
+        assert!(Request::read_within(&mut stream, timeout).is_none());
         drop(stream);
         sender.join().unwrap();
     }

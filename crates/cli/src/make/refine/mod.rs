@@ -28,8 +28,8 @@ const MOST_MODES: usize = 90;
 const MOST_ROUNDS: usize = 12;
 /// A round is taken where the error, or the worst region's, falls below this part of what it was.
 const BETTER: f64 = 0.97;
-/// Rounds in a row that do not help before it is left.
-const PATIENCE: usize = 2;
+/// Rounds in a row that do not help before no more are made.
+const MOST_IDLE_ROUNDS: usize = 2;
 
 /// What the coarse stage's pushes added to the linear response, in the work folder.
 pub const PATCHES: &str = "patches.safetensors";
@@ -157,7 +157,7 @@ pub fn run(rounds: &Rounds<'_>, stage: &mut Stage) -> Result<()> {
         } else {
             idle += 1;
         }
-        if idle == PATIENCE {
+        if idle == MOST_IDLE_ROUNDS {
             stage.decided("more equilibria no longer help");
             break;
         }
