@@ -26,7 +26,7 @@
 //!     let input = StepInput { displacement: None, contact: Contact::Tools(&[tool]) };
 //!     scene.step(input, Some(&mut u))?;
 //! }
-//! let [_, _, lift] = scene.with_told(|told| told.readings[0].force); // on the tool, mN
+//! let [_, _, lift] = scene.with_contact_report(|report| report.readings[0].force); // on the tool, mN
 //! assert!(u.iter().all(|x| x.is_finite()) && lift.is_finite());
 //! # Ok(())
 //! # }
@@ -89,7 +89,7 @@ pub mod scene;
 pub mod stats;
 
 pub use ::contact::{Shape, ShapeError};
-pub use contact::{MAX_TOOLS, Mode, Push, Reading, Told, Tool};
+pub use contact::{ContactReport, MAX_TOOLS, Mode, Push, Tool, ToolReading};
 pub use error::{Error, Result};
 pub use library::{init, shutdown};
 pub use model::{Kind, Model, ModelInfo};

@@ -77,7 +77,7 @@ pub fn boxed<T>(value: T, what: &str) -> Result<Box<T>> {
     Ok(unsafe { Box::from_raw(Box::into_raw(one).cast::<T>()) })
 }
 
-/// Whether `bytes` are to be had now: for parts that are made of many lists at their first use.
+/// Whether there is room for `bytes` now: asked before a part is made of many lists, so that it fails as a whole or not at all.
 pub fn probe(bytes: usize, what: &str) -> Result<()> {
     room::<u8>(bytes, what).map(drop)
 }

@@ -224,7 +224,7 @@ pub enum Corrections {
     /// As many as the bundle recommends; none where it has no tables for them.
     #[default]
     Recommended,
-    /// As many as the bundle recommends, and none of them started after so many µs of a step: 0 for no budget.
+    /// As many as the bundle recommends, and none of them is started later than `budget_us` into the step; 0 is no budget.
     RecommendedWithin {
         /// The budget, µs.
         budget_us: u32,

@@ -1,4 +1,4 @@
-//! What a scene tells about its last step: stage times, flags, what ran where.
+//! What a scene reports about its last step: stage times, flags, what ran where.
 
 use crate::options::{DecoderKernel, Precision, Provider, StepPath};
 

@@ -68,7 +68,7 @@ fn step(scene: &Scene, tools: &[Tool]) {
 }
 
 fn felt(scene: &Scene) -> [f32; 3] {
-    scene.with_told(|told| told.readings[0].force)
+    scene.with_contact_report(|report| report.readings[0].force)
 }
 
 fn size(force: &[f32; 3]) -> f32 {

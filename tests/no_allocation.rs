@@ -66,7 +66,7 @@ fn tools_allocate_nothing() {
                     contact: Contact::Tools(tools),
                 };
                 scene.step(input, Some(&mut out)).unwrap();
-                touched |= scene.with_told(|told| told.readings[0].contacts > 0);
+                touched |= scene.with_contact_report(|report| report.readings[0].contacts > 0);
             }
             ALLOCATIONS.load(Ordering::Relaxed) - before
         };

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use contact::{Rotation, Shape, Vector};
-use upt::contact::{Mode, Reading, Tool};
+use upt::contact::{Mode, Tool, ToolReading};
 use upt::{Contact, Corrections, Model, ModelOptions, Scene, SceneOptions, StepInput, flag};
 
 fn model() -> Arc<Model> {
@@ -22,13 +22,13 @@ fn scene(model: &Arc<Model>, corrections: Corrections) -> Scene {
     Scene::new(Arc::clone(model), &options).unwrap()
 }
 
-fn step(scene: &Scene, tool: Tool) -> (Reading, u32) {
+fn step(scene: &Scene, tool: Tool) -> (ToolReading, u32) {
     let input = StepInput {
         displacement: None,
         contact: Contact::Tools(&[tool]),
     };
     scene.step(input, None).unwrap();
-    let reading = scene.with_told(|told| told.readings[0]);
+    let reading = scene.with_contact_report(|report| report.readings[0]);
     (reading, scene.stats().flags)
 }
 
@@ -265,8 +265,8 @@ fn a_step_of_deep_tools_is_bounded_and_says_what_it_left() {
         }
         let stats = scene.stats();
         assert!(stats.evaluations < 200, "{} evaluations", stats.evaluations);
-        let residual = scene.with_told(|told| {
-            let each = told.readings.iter().map(|reading| reading.residual_mm);
+        let residual = scene.with_contact_report(|report| {
+            let each = report.readings.iter().map(|reading| reading.residual_mm);
             each.fold(0.0, f32::max)
         });
         let flagged = stats.flags & flag::UNSOLVED != 0;

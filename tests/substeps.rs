@@ -54,7 +54,7 @@ fn programme(scene: &Scene, steps: std::ops::Range<i32>) -> Vec<u32> {
         }
         let state = step(scene, tool);
         all.extend(bits(&state));
-        scene.with_told(|told| all.extend(bits(&told.readings[0].force)));
+        scene.with_contact_report(|report| all.extend(bits(&report.readings[0].force)));
     }
     all
 }

@@ -70,7 +70,8 @@ fn flags(corrections: u32, radius: f32, depth: f32, by: f32, count: usize) -> (u
             contact: Contact::Tools(&tools),
         };
         scene.step(input, None).unwrap();
-        let pushed = scene.with_told(|told| told.readings.iter().all(|r| r.contacts > 0));
+        let pushed =
+            scene.with_contact_report(|report| report.readings.iter().all(|r| r.contacts > 0));
         assert!(pushed || at <= 0.0, "each tool pushes at {at} mm");
     }
     let stats = scene.stats();

@@ -22,7 +22,7 @@ pub struct BundleFiles {
     folder: PathBuf,
     /// The manifest, checked.
     pub manifest: Manifest,
-    /// The command that made the bundle, where the manifest tells.
+    /// The command that made the bundle, where the manifest says.
     made_with: Option<String>,
     /// SHA-256 of `bundle.json`, which holds the hashes of all other files: the identity of the bundle.
     pub hash: [u8; 32],
@@ -41,9 +41,9 @@ impl BundleFiles {
         }
         let bytes = read_regular(&path)?;
         let manifest = Manifest::parse(&bytes).map_err(|error| {
-            // What of the manifest can be read may still tell.
+            // The part of the manifest that can be read may still name it.
             let fields = serde_json::from_slice(&bytes).unwrap_or_default();
-            maker::tell(error, maker::of(&fields).as_deref())
+            maker::name(error, maker::of(&fields).as_deref())
         })?;
         let made_with = maker::of(&serde_json::from_slice(&bytes).unwrap_or_default());
         for (name, entry) in &manifest.files {
@@ -59,7 +59,7 @@ impl BundleFiles {
                     entry.bytes
                 );
                 let error = Error::bundle(name, problem);
-                return Err(maker::tell(error, made_with.as_deref()));
+                return Err(maker::name(error, made_with.as_deref()));
             }
         }
         Ok(BundleFiles {
@@ -70,9 +70,9 @@ impl BundleFiles {
         })
     }
 
-    /// An error about one of the files, with the tool that made them.
-    pub fn tell(&self, error: Error) -> Error {
-        maker::tell(error, self.made_with.as_deref())
+    /// Adds the tool that made the bundle to an error about one of its files.
+    pub fn name_maker(&self, error: Error) -> Error {
+        maker::name(error, self.made_with.as_deref())
     }
 
     /// Whether the manifest lists `name`.

@@ -7,7 +7,7 @@ use crate::error::Error;
 /// Longer words are no command.
 const LONGEST: usize = 80;
 
-/// The command that made the bundle of a manifest's fields, as far as they tell.
+/// The command that made the bundle of a manifest's fields, as far as they name it.
 pub(super) fn of(fields: &Value) -> Option<String> {
     if let Some(command) = fields["provenance"]["command"].as_str() {
         let plain = |c: char| c.is_ascii_graphic() || c == ' ';
@@ -23,7 +23,7 @@ pub(super) fn of(fields: &Value) -> Option<String> {
 }
 
 /// Adds the command to an error about the bundle.
-pub(super) fn tell(error: Error, command: Option<&str>) -> Error {
+pub(super) fn name(error: Error, command: Option<&str>) -> Error {
     match (error, command) {
         (Error::Bundle { file, message }, Some(command)) => Error::Bundle {
             file,

@@ -1,5 +1,5 @@
-//! Tools that lie in the tissue. Samples of the surface do not tell: none of them lies in such a tool. So inside is known by the
-//! solid that the whole surface bounds, and the tissue gives way along the shortest way out.
+//! Tools that lie in the tissue. Samples of the surface cannot show it, because none of them lies in such a tool. So a probe is tested
+//! against the solid that the whole surface bounds, and the tissue is moved along the shortest way out.
 
 use ::contact::samples::LATTICE;
 use ::contact::{Body, Pose, Samples, Vector};

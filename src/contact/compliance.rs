@@ -106,7 +106,7 @@ impl Delassus {
         Ok((&self.w, is_new))
     }
 
-    /// Makes `w` that of the samples; tells whether it was another's.
+    /// Makes `w` that of the samples; says whether it was another's.
     fn read(&mut self, compliance: Compliance<'_>, all: &Samples, rows: &[u32]) -> Result<bool> {
         self.wanted.clear();
         memory::fit(&mut self.wanted, 3 * rows.len(), WHAT)?;

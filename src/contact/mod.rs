@@ -31,4 +31,4 @@ pub use problem::ContactProblem;
 pub(crate) use rows::{Pair, outward};
 pub use state::State;
 pub(crate) use state::vector;
-pub use tool::{MAX_TOOLS, Mode, PUT_MM, Push, Reading, Told, Tool};
+pub use tool::{ContactReport, MAX_TOOLS, Mode, PUT_MM, Push, Tool, ToolReading};

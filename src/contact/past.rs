@@ -6,7 +6,7 @@ use ::contact::{Grasp, Pose, Samples, Vector};
 use serde::{Deserialize, Serialize};
 
 use super::stored;
-use super::tool::{MAX_TOOLS, Reading};
+use super::tool::{MAX_TOOLS, ToolReading};
 use crate::error::{Error, Result};
 use crate::memory::{self, HeldBytes};
 
@@ -44,7 +44,7 @@ pub struct Held {
     pub closed: bool,
     /// What it was told: of the step alone.
     #[serde(skip)]
-    pub reading: Reading,
+    pub reading: ToolReading,
 }
 
 /// The state of contact at the end of a step.

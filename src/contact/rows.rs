@@ -17,7 +17,7 @@ const THROUGH_MM: f32 = 45.0;
 const RECOVERY_MM: f32 = 3.0;
 /// A sample no deeper than this in a tool has not been gone through by it, mm, ...
 const SHALLOW_MM: f32 = 0.5;
-/// ... nor one from which the way back through the tool is more than so many times its depth: that way grazes the tool's side.
+/// ... nor one from which the way back through the tool is more than this many times its depth: that way grazes the tool's side.
 const LONG_WAY: f32 = 4.0;
 /// A tool's normal may lean this much (cosine) to the outside of the tissue; beyond, the tool reaches the sample from within.
 const LEAN: f32 = 0.2;

@@ -116,7 +116,7 @@ impl Tool {
 
 /// What the tissue does to a tool at the end of a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, HeldBytes)]
-pub struct Reading {
+pub struct ToolReading {
     /// Force on the tool, mN.
     pub force: [f32; 3],
     /// Torque on the tool about its position, mN mm.
@@ -142,17 +142,17 @@ pub struct Push {
     pub force: [f32; 3],
 }
 
-/// What the tools of the last step were told.
+/// What each tool of the last step feels, and the samples that push it.
 #[derive(Clone, Debug, Default)]
-pub struct Told {
+pub struct ContactReport {
     /// One a tool.
-    pub readings: Vec<Reading>,
+    pub readings: Vec<ToolReading>,
     /// Ascending by tool.
     pub pushes: Vec<Push>,
 }
 
-impl Told {
-    /// Room for what so many tools and samples are told.
+impl ContactReport {
+    /// Room for the readings of `tools` tools and for `pushes` samples.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`].

@@ -89,15 +89,15 @@ pub unsafe extern "C" fn upt_scene_instrument_readings(
 ) -> upt_status {
     call_scene("upt_scene_instrument_readings", scene, |scene| {
         features::instruments()?;
-        scene.with_told(|told| {
-            let have = told.readings.len() as u64;
+        scene.with_contact_report(|report| {
+            let have = report.readings.len() as u64;
             if count != have {
                 return Err(Error::Argument(format!(
                     "count is {count}, the last step had {have} instruments"
                 ))
                 .into());
             }
-            for (index, reading) in told.readings.iter().enumerate() {
+            for (index, reading) in report.readings.iter().enumerate() {
                 let make = |struct_size| {
                     Ok(upt_instrument_reading {
                         struct_size,
@@ -139,13 +139,13 @@ pub unsafe extern "C" fn upt_scene_instrument_contacts(
             let _ = unsafe { copy_out::<upt_instrument_contact>(&[], out, capacity, needed) };
             return Err(error.into());
         }
-        scene.with_told(|told| {
-            let contacts = told.pushes.iter().map(|push| upt_instrument_contact {
+        scene.with_contact_report(|report| {
+            let contacts = report.pushes.iter().map(|push| upt_instrument_contact {
                 instrument: push.tool,
                 position: push.point,
                 force: push.force,
             });
-            let count = told.pushes.len();
+            let count = report.pushes.len();
             let contacts = crate::memory::collected(count, contacts, "the contacts")?;
             // SAFETY: `out` has room for `capacity` elements and `needed` is NULL or writable, as the header asks.
             unsafe { copy_out(&contacts, out, capacity, needed) }

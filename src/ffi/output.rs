@@ -34,7 +34,7 @@ pub(super) unsafe fn place<'a, T>(pointer: *mut T, name: &str) -> Result<Place<'
 /// Room for `count` elements; for none it may be NULL.
 ///
 /// # Safety
-/// A pointer that is aligned and not NULL leads to so many elements, which may be written.
+/// An aligned pointer that is not NULL points to that many elements, which may be written.
 pub(super) unsafe fn output<'a, T: Copy>(
     pointer: *mut T,
     count: u64,

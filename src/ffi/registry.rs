@@ -15,7 +15,7 @@ use super::structs::{upt_model, upt_scene};
 use crate::model::Model;
 use crate::scene::Scene;
 
-/// Numbers of the two kinds differ in their last digit, so that a wrong kind can be named.
+/// Numbers of the four kinds differ in their last digit, so that an error can name the kind that was passed.
 const STRIDE: usize = 16;
 const MODEL_TAG: usize = 1;
 const SCENE_TAG: usize = 2;

@@ -104,7 +104,7 @@ impl Model {
         }
         let _span = tracing::info_span!("open", path = %path.display()).entered();
         let files = Arc::new(BundleFiles::open(path)?);
-        Model::of_files(Arc::clone(&files), options, start).map_err(|error| files.tell(error))
+        Model::of_files(Arc::clone(&files), options, start).map_err(|error| files.name_maker(error))
     }
 
     fn of_files(
@@ -198,7 +198,7 @@ impl Model {
             return Ok(made);
         }
         let made = Corrections::open(&self.files, &self.mesh, self.prior.as_deref())
-            .map_err(|error| self.files.tell(error))?;
+            .map_err(|error| self.files.name_maker(error))?;
         Ok(self.corrections.get_or_init(|| made))
     }
 

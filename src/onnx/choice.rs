@@ -10,7 +10,7 @@ pub struct ProviderChoice {
     /// What runs.
     pub provider: Provider,
     /// Nodes of the session's graph by ONNX Runtime's name of the provider that runs them: a GPU provider may leave
-    /// some to the CPU. Empty where the library does not tell.
+    /// some to the CPU. Empty where the library does not say.
     pub nodes: BTreeMap<String, usize>,
     /// Where the stage's tensors lie: `host`, `device`, or `bound anew in each run` where device memory is not to be had.
     pub memory: &'static str,

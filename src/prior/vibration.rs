@@ -129,7 +129,7 @@ impl FreeVibration {
 
     /// Sets `b` (`before`: the one before it) of a state from what its amplitudes `z` leave out of a field in block coordinates, which
     /// they are taken from.
-    pub fn leave(
+    pub fn set_remainder(
         &self,
         isa: Isa,
         pool: &Pool,

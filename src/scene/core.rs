@@ -48,28 +48,36 @@ pub struct Core {
     /// The tools of the step being made, where the bundle's limits for tools say something about it.
     #[held(skip)]
     pub(super) used: Option<ToolUse>,
-    /// Tools that hands feel, and how long the step being made took, s.
+    /// One for each haptics object of the scene. Each gets the contact of every published step.
     #[held(skip)]
     pub(super) hands: Vec<crate::haptics::publish::Link>,
+    /// Wall time of the last step, s: a hand takes it as the age of what it gets.
     pub(super) took_s: f64,
-    /// Whether the state being made is.
+    /// Whether the state being made comes from the corrections, and not from the learned part alone.
     pub(super) next_corrected: bool,
-    /// Whether tools drive the step being made.
+    /// Whether tools drive the step being made. Their contact is then in `problem`, and `incoming` is filled from it.
     pub(super) driven: bool,
+    /// By node: the boundary condition holds it, so its displacement is zero whatever the contact says.
     pub(super) held: Vec<bool>,
+    /// The nodes that a step decodes: all, or those of the region and of the attached points' tetrahedra.
     pub(super) plan: NodePlan,
     #[held(own)]
     pub(super) points: Arc<AttachedPoints>,
+    /// Tetrahedra whose four nodes are decoded, which the guard checks for inversion; empty without `check_inversion`.
     pub(super) planned_tets: Vec<u32>,
     pub(super) contact_elements: Option<ContactElements>,
+    /// Contact of the step being made; it becomes `contact` when that step is published, and is scratch between steps.
     pub(super) incoming: ContactSet,
+    /// Contact of the last published step, and of the one before it.
     pub(super) contact: ContactSet,
     pub(super) contact_before: ContactSet,
     #[held(skip)]
     pub(super) counters: Counters,
-    /// Flags of the last step, of which the log has told.
-    pub(super) told: u32,
+    /// Flags of the last step, which the log has.
+    pub(super) logged_flags: u32,
     envelope: EnvelopeCheck,
+    /// The state being made. It is valid from the end of the prediction or the contact solve until it is published, when it
+    /// changes places with the oldest published frame; a refused step leaves it behind, and the next one overwrites it.
     pub(super) next: Frame,
 }
 
@@ -119,7 +127,7 @@ impl Core {
             contact_before: ContactSet::with_capacity(count)?,
             contact,
             counters: Counters::REST,
-            told: 0,
+            logged_flags: 0,
             next: Frame::rest(count)?,
             model: parts.model,
             mesh: parts.mesh,
@@ -203,7 +211,7 @@ impl Core {
             None => None,
         };
         stats.check_ms = watch.lap();
-        let near = self.meet_tools(published, &input)?;
+        let near = self.update_tools(published, &input)?;
 
         if self.counters.sleeping && given.is_none() && self.incoming.is_empty() && !near {
             self.fit_published(published)?;
@@ -220,13 +228,13 @@ impl Core {
             let replaced = verdict & guard::REFUSED != 0
                 && self.refuse(published, verdict, given.is_some(), &mut stats)?;
             if replaced {
-                self.give_up_tools(published, &mut stats);
+                self.release_tools(published, &mut stats);
             }
             self.fit_published(published)?;
             self.publish(published, given.is_some(), replaced, &stats);
         }
         self.took_s = start.elapsed().as_secs_f64();
-        self.tell_hands(published);
+        self.publish_to_hands(published);
         self.counters.step_count += 1;
         stats.step_count = self.counters.step_count;
         stats.sleeping = self.counters.sleeping;
@@ -235,7 +243,7 @@ impl Core {
         if let Some(out) = out {
             lock_read(published).read(Values::Region, out)?;
         }
-        self.tell_flags(&stats);
+        self.log_flags(&stats);
         stats.step_ms = start.elapsed().as_secs_f64() * 1e3;
         lock_write(published).stats = stats;
         Ok(())
@@ -254,6 +262,10 @@ impl Core {
         })
     }
 
+    /// Checks the contact against what the bundle was measured with, lets the engine record the step, and decodes its field.
+    ///
+    /// With `learned` false the elements have made `next` already, or will: then the engine follows with the linear response
+    /// alone, and `next` keeps its field.
     pub(super) fn predict_and_decode(
         &mut self,
         published: &RwLock<Published>,
@@ -276,7 +288,7 @@ impl Core {
         stats.indicator = envelope.ratio;
         let shared = lock_read(published);
         if learned {
-            self.absorb(&shared)?;
+            self.start_from_corrected(&shared)?;
         }
         let compute = self.machine.compute();
         self.engine.predict(

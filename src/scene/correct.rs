@@ -11,9 +11,9 @@ use crate::corrections::{History, Input, Integrator, SolverContext};
 use crate::error::Result;
 use crate::stats::SceneStats;
 
-/// Tissue that tools let go swings by the elements while the last state is displaced by more than this, beside where the model's own free motion
-/// ends (a network that rests farther out would never take over), mm: they see what the tools did, where the
-/// learned part goes on from a field that it did not predict.
+/// After tools let go, the elements make the steps while the last state is displaced by more than this, mm. The displacement at which the
+/// model's own free motion ends is added, or a network that rests farther out would never take over. The elements know
+/// what the tools did; the learned part would go on from a field that it did not predict.
 const SWUNG_MM: f32 = 0.1;
 
 impl Core {
@@ -43,10 +43,10 @@ impl Core {
             time_step: &time_step,
         };
         let touched = !self.incoming.is_empty();
-        // The learned part goes on from what the elements swung, some steps later; at the scene's own pace it never does.
+        // The learned part takes over some steps after a release; with a length of step of the scene's own it never does.
         self.next_corrected = touched || (!learns && !corrected.own_pace);
-        // Steps of the scene's own length that are short enough stay whole.
-        let in_parts = corrected.swings > 1 || !corrected.own_pace;
+        // A length of step of the scene's own may be short enough to need no substeps.
+        let in_parts = corrected.free_substeps > 1 || !corrected.own_pace;
         if !touched && !learns && in_parts {
             corrected.be_shorter(context, &self.model)?;
         }
@@ -63,12 +63,12 @@ impl Core {
             let report = corrected
                 .solver
                 .correct(context, &input, &mut self.next.field)?;
-            corrected.tell(&report, stats);
+            corrected.report_to(&report, stats);
         } else if !learns {
             let substepper = corrected.substepper.as_deref_mut().filter(|_| in_parts);
             let next = &mut self.next.field;
             let report = corrected.solver.swing(context, &input, substepper, next)?;
-            corrected.tell(&report, stats);
+            corrected.report_to(&report, stats);
         } else {
             corrected.solver.follow(context, &input, &self.next.field)?;
         }
@@ -77,7 +77,7 @@ impl Core {
         Ok(())
     }
 
-    /// Whether a step without contact is the learned part's, or of the vibration that a bundle has instead; by the last state.
+    /// Whether the learned part (or, in a bundle without one, its free vibration) makes a step without contact; decided by the last state.
     pub(super) fn learns(&self) -> bool {
         let Some(corrected) = &self.corrected else {
             return true;
@@ -125,8 +125,8 @@ impl Core {
         true
     }
 
-    /// Before a step that the learned part makes: it goes on from the corrected states, which it did not predict.
-    pub(super) fn absorb(&mut self, shared: &Published) -> Result<()> {
+    /// Before a step that the learned part makes: its records become those of the corrected states, which it did not predict.
+    pub(super) fn start_from_corrected(&mut self, shared: &Published) -> Result<()> {
         let Some(corrected) = &self.corrected else {
             return Ok(());
         };
@@ -145,7 +145,7 @@ impl Core {
                 self.model.manifest.dt_s as f32,
             )?;
         }
-        engine.absorb(
+        engine.adopt_fields(
             compute,
             &corrected.basis_starts,
             [

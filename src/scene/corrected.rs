@@ -19,12 +19,12 @@ const WHAT: &str = "the corrections of a scene";
 #[derive(HeldBytes)]
 pub struct Corrector {
     pub solver: Box<ImplicitSolver>,
-    /// From the first contact of tools, where the steps may have any.
+    /// Substeps of steps that tools drive; made at their first contact, where the options allow any.
     pub substeps: Option<Box<Substeps>>,
     pub(super) most_substeps: u32,
-    /// Of how many shorter ones a free step is made.
-    pub(super) swings: u32,
-    /// From the first step that needs them.
+    /// Substeps of a step without contact; 1 for a whole one.
+    pub(super) free_substeps: u32,
+    /// The solver of steps in parts, made at the first step that needs it.
     pub substepper: Option<Box<Substepper>>,
     most: u32,
     target_mm: f32,
@@ -35,7 +35,7 @@ pub struct Corrector {
     /// The length of the scene's steps, and the damping.
     #[held(skip)]
     pub time_step: Arc<TimeStep>,
-    /// One of them is not the bundle's.
+    /// The scene has a length of step or a damping of its own.
     pub(super) own_pace: bool,
 }
 
@@ -138,7 +138,7 @@ impl Corrector {
             solver: memory::boxed(ImplicitSolver::new(context)?, WHAT)?,
             substeps: None,
             most_substeps,
-            swings: own.swings(integrator.step_s),
+            free_substeps: own.free_substeps(integrator.step_s),
             substepper: None,
             most,
             target_mm,
@@ -190,9 +190,9 @@ impl Corrector {
         Ok(())
     }
 
-    /// Makes what shorter steps need: they are as long under tools as without.
+    /// Makes the solver of substeps. There is one length for steps under tools and for free ones, so one solver serves both.
     pub(super) fn be_shorter(&mut self, context: SolverContext<'_>, model: &Model) -> Result<()> {
-        let count = self.most_substeps.max(self.swings);
+        let count = self.most_substeps.max(self.free_substeps);
         if count < 2 || self.substepper.is_some() {
             return Ok(());
         }
@@ -205,7 +205,7 @@ impl Corrector {
         Ok(())
     }
 
-    /// Bytes held; the bundle's pace is the model's.
+    /// Bytes held. The time step counts only where the scene has its own: else it is the model's.
     pub(super) fn memory_bytes(&self) -> usize {
         let own = match self.own_pace {
             true => memory::behind(&self.time_step),
@@ -215,7 +215,7 @@ impl Corrector {
     }
 
     /// Puts what the iterations report into the statistics.
-    pub(super) fn tell(&self, report: &Report, stats: &mut SceneStats) {
+    pub(super) fn report_to(&self, report: &Report, stats: &mut SceneStats) {
         stats.corrections = report.iterations;
         stats.evaluations = report.evaluations;
         stats.substeps = report.substeps;

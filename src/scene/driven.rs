@@ -24,8 +24,8 @@ const DEEP_MM: f32 = 1.0;
 const UNSOLVED_MM: f32 = 0.01;
 
 impl Core {
-    /// Takes the tools of a step; tells whether one is near enough to touch the tissue.
-    pub(super) fn meet_tools(
+    /// Takes the tools of a step; says whether one is near enough to touch the tissue.
+    pub(super) fn update_tools(
         &mut self,
         published: &RwLock<Published>,
         input: &StepInput<'_>,
@@ -33,7 +33,7 @@ impl Core {
         self.driven = matches!(input.contact, Contact::Tools(_));
         let Contact::Tools(tools) = input.contact else {
             if let Some(problem) = &mut self.problem {
-                problem.leave();
+                problem.forget_tools();
             }
             return Ok(false);
         };
@@ -99,7 +99,7 @@ impl Core {
             if problem.pushes() {
                 return Ok(true);
             }
-            // That state is given up, and what it said of itself.
+            // No tool pushes in that state: drop it together with its statistics.
             *stats = before;
         }
         // Nothing pushes: the model's own free motion, unless that runs into a tool.
@@ -163,12 +163,13 @@ impl Core {
         } = corrected;
         let parts = substeps.as_deref_mut().zip(substepper.as_deref_mut());
         let report = solver.drive(context, &input, problem, parts, next)?;
-        corrected.tell(&report, stats);
+        corrected.report_to(&report, stats);
         drop(shared);
         drop(span);
         self.next_corrected = true;
-        Self::tell_depth(problem, stats);
-        // What a collision field would say: the envelope, the engine's record and the host's list of contacts go by it.
+        Self::report_depth(problem, stats);
+        // The same contact as a collision field would give it: the envelope check, the engine's record and the host's list of
+        // contacts read it there.
         self.incoming
             .take_nodes(problem.touched(&self.held), &self.next.field);
         let made_of = report.substeps.max(1) as f32;
@@ -239,19 +240,20 @@ impl Core {
             u: &self.next.field,
             start: &shared.last.field,
         });
-        Self::tell_depth(problem, stats);
+        Self::report_depth(problem, stats);
     }
 
-    /// The state that tools drove was refused, and `next` is another: nothing pushes it, and it may lie in a tool.
-    pub(super) fn give_up_tools(&mut self, published: &RwLock<Published>, stats: &mut SceneStats) {
+    /// Clears the tools' forces after the guard replaced the state that they made. Nothing pushes the new state, and it may lie inside a
+    /// tool: the depth is measured again.
+    pub(super) fn release_tools(&mut self, published: &RwLock<Published>, stats: &mut SceneStats) {
         if let Some(mut problem) = self.problem.take() {
-            problem.let_go();
+            problem.clear_forces();
             self.finish_tools(published, &mut problem, stats);
             self.problem = Some(problem);
         }
     }
 
-    fn tell_depth(problem: &ContactProblem, stats: &mut SceneStats) {
+    fn report_depth(problem: &ContactProblem, stats: &mut SceneStats) {
         stats.contact_ms = problem.spent_ms();
         let readings = problem.next.tools.iter().map(|held| held.reading);
         if readings
@@ -266,20 +268,20 @@ impl Core {
         }
     }
 
-    /// The tools of a step in which the scene sleeps: known, and untouched.
-    pub(super) fn rest_tools(&mut self, published: &RwLock<Published>) {
+    /// Publishes the tools of a step in which the scene sleeps: their poses are remembered, and none touches the tissue.
+    pub(super) fn commit_untouched_tools(&mut self, published: &RwLock<Published>) {
         if let Some(problem) = &mut self.problem {
-            problem.let_go();
+            problem.clear_forces();
             problem.commit();
         }
-        self.show_tools(&mut lock_write(published));
+        self.publish_tools(&mut lock_write(published));
     }
 
     /// The tools' readings and forces become readable.
-    pub(super) fn show_tools(&self, shared: &mut Published) {
+    pub(super) fn publish_tools(&self, shared: &mut Published) {
         match &self.problem {
             Some(problem) => {
-                problem.tell(&mut shared.tools, &self.mesh.positions, &shared.last.field)
+                problem.report(&mut shared.tools, &self.mesh.positions, &shared.last.field)
             }
             None => shared.tools.clear(),
         }

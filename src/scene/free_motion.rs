@@ -9,7 +9,7 @@ use crate::kernels::project::project_field;
 
 impl ReducedEngine {
     /// A host's displacement `given [K,3]` sets the amplitudes of the last state and leaves the velocities.
-    pub(super) fn swing_at(&mut self, compute: Compute<'_>, given: &[f32]) -> Result<()> {
+    pub(super) fn set_amplitudes(&mut self, compute: Compute<'_>, given: &[f32]) -> Result<()> {
         let table = &self.linear.table;
         let Some(vibration) = &table.vibration else {
             return Ok(());
@@ -42,7 +42,7 @@ impl ReducedEngine {
         for (field, earlier) in [(before, true), (field, false)] {
             project_field(isa, pool, &table.basis(), starts, field, q)?;
             vibration.amplitudes(isa, pool, q, swing)?;
-            vibration.leave(isa, pool, swing, q, state, earlier)?;
+            vibration.set_remainder(isa, pool, swing, q, state, earlier)?;
         }
         let (place, speed) = state[..2 * count].split_at_mut(count);
         place.copy_from_slice(swing);

@@ -93,7 +93,7 @@ impl Core {
     }
 
     /// Publishes the last state for each hand.
-    pub(super) fn tell_hands(&mut self, published: &RwLock<Published>) {
+    pub(super) fn publish_to_hands(&mut self, published: &RwLock<Published>) {
         if !HAS_INSTRUMENTS || self.hands.is_empty() {
             return;
         }

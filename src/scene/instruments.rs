@@ -6,7 +6,7 @@ use super::Scene;
 use super::core::lock_read;
 use super::shared::lock;
 use super::tools::Asked;
-use crate::contact::{MAX_TOOLS, Told, Tool};
+use crate::contact::{ContactReport, MAX_TOOLS, Tool};
 use crate::error::Result;
 use crate::instrument::{Instrument, InstrumentContacts};
 use crate::memory;
@@ -45,7 +45,7 @@ impl Scene {
     }
 
     /// Reads what the tools of the last step were told, and the samples that push them.
-    pub fn with_told<T>(&self, read: impl FnOnce(&Told) -> T) -> T {
+    pub fn with_contact_report<T>(&self, read: impl FnOnce(&ContactReport) -> T) -> T {
         read(&lock_read(&self.shared.published).tools)
     }
 

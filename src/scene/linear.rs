@@ -34,13 +34,18 @@ impl Linear {
     }
 
     /// Solves for the forces of a contact.
-    pub fn meet(&mut self, isa: Isa, held: &[bool], contact: &ContactSet) -> Result<SolveReport> {
+    pub fn solve_contact(
+        &mut self,
+        isa: Isa,
+        held: &[bool],
+        contact: &ContactSet,
+    ) -> Result<SolveReport> {
         let (nodes, vectors) = (&contact.nodes, &contact.vectors);
         self.solve.solve(isa, &self.table, held, nodes, vectors)
     }
 
     /// Block coordinates `[Q]` and state of the free vibration (empty where the tables have none) after `contact`, which
-    /// has been met: static while it lasts, swinging on from the state `last` without it.
+    /// has been solved for: static while it lasts, swinging on from the state `last` without it.
     pub fn respond(
         &self,
         compute: Compute<'_>,

@@ -60,7 +60,7 @@ impl OwnPace {
     }
 
     /// Of how many shorter ones a free step is made.
-    pub fn swings(self, step_s: f64) -> u32 {
+    pub fn free_substeps(self, step_s: f64) -> u32 {
         match self.is_some() && step_s > LONGEST_SWING_S + 1e-9 {
             true => 2,
             false => 1,

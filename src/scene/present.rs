@@ -99,7 +99,7 @@ impl Scene {
             let begun = lock_read(&self.shared.published).frame_state.is_some();
             match begun {
                 true => Ok(()),
-                false => self.with(|core, published| core.begin_moments(published)),
+                false => self.with(|core, published| core.start_frame_states(published)),
             }
         })?;
         presenters.frame(&tissue, (values, seconds), contact, out)
@@ -113,7 +113,7 @@ impl Scene {
 
 impl Core {
     /// From now on each published step leaves a moment.
-    fn begin_moments(&mut self, published: &RwLock<Published>) -> Result<()> {
+    fn start_frame_states(&mut self, published: &RwLock<Published>) -> Result<()> {
         if self.corrected.is_none() {
             return Err(Error::Unsupported(
                 "present: the scene makes no corrections (`corrections`); show its steps with upt_scene_sample".into(),
@@ -134,7 +134,7 @@ impl Core {
             frame_state.prepare(past, self.contact.len())?;
             shared.frame_state = Some(frame_state);
         }
-        self.leave_moment(&mut shared);
+        self.publish_frame_state(&mut shared);
         Ok(())
     }
 
@@ -160,7 +160,7 @@ impl Core {
     }
 
     /// Leaves the moment of the state that has just been published, where frames are made of it.
-    pub(super) fn leave_moment(&self, shared: &mut Published) {
+    pub(super) fn publish_frame_state(&self, shared: &mut Published) {
         let (Some(frame_state), Some(corrected)) = (&mut shared.frame_state, &self.corrected)
         else {
             return;

@@ -89,7 +89,7 @@ impl Core {
         self.contact_before.clear();
         self.contact.clear();
         self.counters.max_displacement = 0.0;
-        self.rest_tools(published);
+        self.commit_untouched_tools(published);
         let frames = if self.options.cubic_sampling { 4 } else { 3 };
         if self.counters.rest_frames >= frames {
             return;
@@ -117,8 +117,8 @@ impl Core {
         std::mem::swap(&mut shared.before, &mut shared.last);
         std::mem::swap(&mut shared.last, &mut self.next);
         self.show_contacts(shared);
-        self.show_tools(shared);
-        self.leave_moment(shared);
+        self.publish_tools(shared);
+        self.publish_frame_state(shared);
     }
 
     /// The last step's contacts in the host's order.

@@ -70,7 +70,7 @@ pub struct Published {
     /// `[m,3]`, mm.
     pub contact_vectors: Vec<f32>,
     /// What the tools of the last step were told, and the samples that push them.
-    pub tools: crate::contact::Told,
+    pub tools: crate::contact::ContactReport,
     /// What frames between steps are made of, from the first that a host asks for.
     pub frame_state: Option<super::frame_state::FrameState>,
     /// The attached points.

@@ -78,7 +78,7 @@ impl Core {
         let contact = &self.contact;
         // The last solve may be of a contact that the guard refused, or, after a restore, of another time. The factor is
         // kept where the nodes are the same.
-        linear.meet(self.machine.isa, &self.held, contact)?;
+        linear.solve_contact(self.machine.isa, &self.held, contact)?;
         let table = &linear.table;
         linear
             .solve

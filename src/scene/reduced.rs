@@ -146,11 +146,13 @@ impl ReducedEngine {
         let (given, contact) = (inputs.given, inputs.contact);
         let mut watch = Stopwatch::start();
         let span = tracing::trace_span!("prior").entered();
-        let report = self.linear.meet(compute.isa, inputs.held, contact)?;
+        let report = self
+            .linear
+            .solve_contact(compute.isa, inputs.held, contact)?;
         stats.flags |= solve_flags(report);
         self.next.contact = !contact.is_empty();
         if let Some(field) = given {
-            self.swing_at(compute, field)?;
+            self.set_amplitudes(compute, field)?;
         }
         let next = &mut self.next;
         let (last, swung, q) = (&self.last.vibration, &mut next.vibration, &mut next.q_prior);
@@ -242,7 +244,7 @@ impl ReducedEngine {
 
     /// Takes corrected fields `[K,3]` as those that the last two records stand for, `b = Phi^T (u - L(c))`; where a record was
     /// not corrected there is none.
-    pub fn absorb(
+    pub fn adopt_fields(
         &mut self,
         compute: Compute<'_>,
         starts: &[usize],
@@ -296,7 +298,7 @@ impl ReducedEngine {
     ) -> Result<()> {
         let Compute { isa, pool } = compute;
         for (record, contact) in [(&mut self.before, before), (&mut self.last, last)] {
-            self.linear.meet(isa, held, contact)?;
+            self.linear.solve_contact(isa, held, contact)?;
             let (linear, table) = (&self.linear, &self.linear.table);
             match &table.vibration {
                 Some(vibration) if contact.is_empty() => {

@@ -74,7 +74,7 @@ impl Core {
             let _ = self.put(published, old);
             return Err(error);
         }
-        self.tell_state(published);
+        self.publish_state(published);
         Ok(())
     }
 

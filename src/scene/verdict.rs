@@ -83,9 +83,9 @@ impl Core {
     }
 
     /// One line of the log for the flags that this step has and the last one had not; none while they stay.
-    pub(super) fn tell_flags(&mut self, stats: &SceneStats) {
-        let risen = stats.flags & !self.told;
-        self.told = stats.flags;
+    pub(super) fn log_flags(&mut self, stats: &SceneStats) {
+        let risen = stats.flags & !self.logged_flags;
+        self.logged_flags = stats.flags;
         if risen != 0 {
             tracing::warn!(
                 step = self.counters.step_count,
@@ -127,7 +127,7 @@ impl Core {
             }
             return Ok(true);
         }
-        self.tell_flags(stats);
+        self.log_flags(stats);
         let mut shared = lock_write(published);
         stats.max_displacement_mm = self.counters.max_displacement;
         shared.stats = *stats;

@@ -10,7 +10,7 @@ mod through_the_abi;
 
 use contact::{Shape, Vector};
 use fixture::{bits, model, plain, scene};
-use upt::contact::{Mode, Reading, Tool};
+use upt::contact::{Mode, Tool, ToolReading};
 use upt::{Contact, Corrections, Scene, SceneOptions, StepInput};
 
 /// A ball at a place.
@@ -28,8 +28,8 @@ fn step(scene: &Scene, tools: &[Tool]) -> Vec<f32> {
     u
 }
 
-fn readings(scene: &Scene) -> Vec<Reading> {
-    scene.with_told(|told| told.readings.clone())
+fn readings(scene: &Scene) -> Vec<ToolReading> {
+    scene.with_contact_report(|report| report.readings.clone())
 }
 
 fn with(corrections: u32) -> SceneOptions {
@@ -97,8 +97,8 @@ fn a_press_leaves_no_penetration_and_pushes_back_and_a_lift_ends_it() {
                 reading.contacts > 0 && force.dot(normal) > 0.9 * force.length(),
                 "k = {corrections}, step {t}: {reading:?}"
             );
-            let sum = scene.with_told(|told| {
-                let pushes = told.pushes.iter().map(|push| Vector::from(push.force));
+            let sum = scene.with_contact_report(|report| {
+                let pushes = report.pushes.iter().map(|push| Vector::from(push.force));
                 pushes.sum::<Vector>()
             });
             assert!((sum - force).length() <= 1e-3 * force.length());
@@ -139,7 +139,9 @@ fn a_reset_scene_forgets_what_its_tools_read() {
     assert!(readings(&scene).is_empty(), "a snapshot has no readings");
     step(&scene, &[pressing(&scene, 0.5, Vector::ZERO)]);
     scene.reset().unwrap();
-    assert!(readings(&scene).is_empty() && scene.with_told(|told| told.pushes.is_empty()));
+    assert!(
+        readings(&scene).is_empty() && scene.with_contact_report(|report| report.pushes.is_empty())
+    );
 }
 
 #[test]
@@ -157,8 +159,8 @@ fn friction_obeys_coulomb_and_drags() {
             step(&scene, &[tool]);
             // Each point on its own: its push is along the ball's normal there.
             let centre = Vector::from(pressing(&scene, depth, aside).pose.translation);
-            scene.with_told(|told| {
-                for push in &told.pushes {
+            scene.with_contact_report(|report| {
+                for push in &report.pushes {
                     let force = -Vector::from(push.force);
                     let out = (Vector::from(push.point) - centre).normalize();
                     let normal = force.dot(out);

@@ -129,7 +129,7 @@ impl ContactProblem {
     /// The tissue starts from rest and without forces, and each tool outside of it: back where it came from, against its push, or where it
     /// comes out by the shortest way. Until [`ContactProblem::return_to_ways`] that is the tools' way.
     pub fn start_from_rest(&mut self, rest: &[f32]) {
-        self.let_go();
+        self.clear_forces();
         self.ways.clear();
         let ways = self.before.iter().zip(&self.put).zip(&self.buried);
         self.ways

@@ -6,13 +6,13 @@ use crate::error::Result;
 use crate::memory;
 
 impl ContactProblem {
-    /// Back to the forces at the start of the step.
+    /// Back to the forces at the start of the step, those of the last published one. Readings and grasps stay.
     pub fn restart(&mut self) {
         self.next.forces.clear();
         self.next.forces.extend_from_slice(&self.past.forces);
     }
 
-    /// Back to the forces at the start of the step, without those of tools that are gone.
+    /// As [`ContactProblem::restart`], without the forces of tools that are no longer in the list: the step keeps the last state.
     pub fn stay(&mut self) {
         self.restart();
         let count = self.tools.len();
@@ -34,12 +34,12 @@ impl ContactProblem {
         self.next.forces.extend_from_slice(&self.guessed);
     }
 
-    /// Gives up all forces.
-    pub fn let_go(&mut self) {
+    /// Drops the forces of this step. What the last published step left stays.
+    pub fn clear_forces(&mut self) {
         self.next.forces.clear();
     }
 
-    /// Goes only part of the way from the forces before the last solve to those after it.
+    /// Shortens the last solve: `f <- (1 - part) f_before + part f`, over the samples that either has forces at.
     pub fn blend(&mut self, part: f32) {
         for force in &mut self.next.forces {
             force.force *= part;

@@ -6,7 +6,7 @@ use ::contact::grasp::tension;
 use super::ContactProblem;
 use crate::contact::past::Force;
 use crate::contact::state::{State, vector};
-use crate::contact::tool::{Push, Reading, Told};
+use crate::contact::tool::{ContactReport, Push, ToolReading};
 use crate::envelope::ToolUse;
 
 /// No grasp pulls harder than this, mN: soft tissue tears before.
@@ -34,15 +34,15 @@ impl ContactProblem {
 
     /// Calls with each node's share of the forces on the tissue, mN.
     pub fn each_load(&self, take: impl FnMut(u32, Vector)) {
-        self.share(&self.next.forces, take);
+        self.each_nodal_force(&self.next.forces, take);
     }
 
     /// The same of the last published step.
     pub fn each_push(&self, take: impl FnMut(u32, Vector)) {
-        self.share(&self.past.forces, take);
+        self.each_nodal_force(&self.past.forces, take);
     }
 
-    fn share(&self, forces: &[Force], mut take: impl FnMut(u32, Vector)) {
+    fn each_nodal_force(&self, forces: &[Force], mut take: impl FnMut(u32, Vector)) {
         for force in forces {
             for (node, weight) in self.samples.at(force.sample).entries() {
                 take(node, force.force * weight);
@@ -50,7 +50,7 @@ impl ContactProblem {
         }
     }
 
-    /// Tells each tool what it feels, tears grasps that are pulled too hard. `state` is that at the end of the step.
+    /// Sums up what each tool feels at `state`, the end of the step, and tears grasps that are pulled too hard.
     pub fn finish(&mut self, state: State<'_>) {
         for index in 0..self.tools.len() {
             let penetration_mm = self.depth(index, state, 1.0);
@@ -76,7 +76,7 @@ impl ContactProblem {
                 false => STRONGEST_GRASP_MN,
             };
             let torn = held.reading.torn || held.grasp.tear(pull, tear_off);
-            held.reading = Reading {
+            held.reading = ToolReading {
                 force: force.to_array(),
                 torque: torque.to_array(),
                 contacts,
@@ -87,7 +87,7 @@ impl ContactProblem {
         }
     }
 
-    /// What the tools that push in this step are like; `step_s`: how long it takes. None pushes: no tools.
+    /// Size, speed and number of the tools that push in this step, which takes `step_s`; a count of 0 where none pushes.
     pub fn used(&self, step_s: f32) -> ToolUse {
         let mut used = ToolUse {
             size_mm: [f32::INFINITY, 0.0],
@@ -106,13 +106,14 @@ impl ContactProblem {
     }
 
     /// Makes the last step's readings and forces readable; displacements `[K,3]`, mm.
-    pub fn tell(&self, told: &mut Told, rest: &[f32], u: &[f32]) {
-        told.clear();
-        told.readings
+    pub fn report(&self, report: &mut ContactReport, rest: &[f32], u: &[f32]) {
+        report.clear();
+        report
+            .readings
             .extend(self.past.tools.iter().map(|held| held.reading));
         for force in &self.past.forces {
             let sample = self.samples.at(force.sample);
-            told.pushes.push(Push {
+            report.pushes.push(Push {
                 tool: force.tool,
                 point: sample
                     .gather(|node| vector(rest, node) + vector(u, node))

@@ -24,7 +24,7 @@ use super::inertial_compliance::InertialCompliance;
 use super::past::{Force, Held, Past};
 use super::rows::Row;
 use super::state::State;
-use super::tool::{MAX_TOOLS, Mode, PUT_MM, Reading, Tool};
+use super::tool::{MAX_TOOLS, Mode, PUT_MM, Tool, ToolReading};
 use crate::bundle::Mesh;
 use crate::error::{Error, Result};
 use crate::memory::{self, HeldBytes};
@@ -58,13 +58,13 @@ pub struct ContactProblem {
     before: Vec<Pose>,
     /// Which of them were put there in this step.
     put: Vec<bool>,
-    /// Which of them are so quick or thin that they may go past a sample between two looks.
+    /// Which of them are so quick or thin that they could pass a sample between two searches: samples are searched along their whole way.
     swept: Vec<bool>,
-    /// Which of those were clear of the tissue then, and are so quick or thin that they may lose it.
+    /// Which of those were clear of the tissue when the step began: their contact may be lost by the iterations.
     may_lose: Vec<bool>,
-    /// How far the surface of each is as its tangents say, mm.
+    /// How far a linearisation of each tool's gap may move a sample, mm: beyond that the tangent no longer describes the surface.
     trusted: Vec<f32>,
-    /// Which of them lay in the tissue then, and where they come out.
+    /// For each that lay in the tissue when the step began, the shortest way out.
     buried: Vec<Option<Buried>>,
     /// At the end of the last published step.
     pub past: Past,
@@ -150,14 +150,14 @@ impl ContactProblem {
         })
     }
 
-    /// No tool has ever been.
+    /// Back to a scene that has had no tools: forgets those of this step and what the last step left.
     pub fn reset(&mut self) {
-        self.leave();
+        self.forget_tools();
         self.past.clear();
     }
 
-    /// A step without tools: they are forgotten once it is published.
-    pub fn leave(&mut self) {
+    /// A step without tools. What the last step left stays in `past` until this one is published, in case it is refused.
+    pub fn forget_tools(&mut self) {
         self.tools.clear();
         self.before.clear();
         self.put.clear();
@@ -172,7 +172,7 @@ impl ContactProblem {
         1e3 * self.spent.as_secs_f64()
     }
 
-    /// Takes other responses, and gives its own: they hold what steps of one length leave of the compliance.
+    /// Exchanges the responses of the contact for those of another length of step, on which they depend.
     pub(crate) fn exchange(&mut self, responses: &mut Delassus) {
         std::mem::swap(&mut self.delassus, responses);
     }
@@ -204,7 +204,7 @@ impl ContactProblem {
         Ok(())
     }
 
-    /// The same in the middle of a step.
+    /// Takes the tools of a substep that begins at `start`. The step's budgets of time and work go on.
     ///
     /// # Errors
     /// As [`ContactProblem::begin`].
@@ -251,7 +251,7 @@ impl ContactProblem {
             }
             let held = &mut self.next.tools[index];
             held.pose = tool.pose;
-            held.reading = Reading::default();
+            held.reading = ToolReading::default();
             // What is put elsewhere takes nothing along.
             if known.is_some() && moved.is_none() && !held.grasp.anchors().is_empty() {
                 held.grasp.open();
@@ -303,7 +303,7 @@ impl ContactProblem {
         self.work_left == 0 || self.until.is_some_and(|until| Instant::now() >= until)
     }
 
-    /// Sets the time by which the step's solves are to be through.
+    /// Sets when the step's budget of time ends. From then on its solves take the least work.
     pub fn end_by(&mut self, until: Option<Instant>) {
         self.until = until;
     }

@@ -11,7 +11,7 @@ use super::status;
 /// The option that makes a session remember where its nodes went.
 pub(super) const RECORD: &str = "session.record_ep_graph_assignment_info";
 
-/// Nodes of the optimised graph by provider (`CPUExecutionProvider`, ...); empty where the library does not tell.
+/// Nodes of the optimised graph by provider (`CPUExecutionProvider`, ...); empty where the library does not say.
 pub(super) fn nodes_by_provider(session: &Session) -> BTreeMap<String, usize> {
     let api = ort::api();
     let mut counts = BTreeMap::new();

@@ -77,7 +77,7 @@ impl Runtime {
         &self.path
     }
 
-    /// Version of the library, for instance `1.31.1`; its build description where it does not tell.
+    /// Version of the library, for instance `1.31.1`; its build description where it has no version.
     pub fn version(&self) -> &str {
         &self.version
     }

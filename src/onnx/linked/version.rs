@@ -10,7 +10,7 @@ struct ApiBase {
     get_version_string: unsafe extern "C" fn() -> *const c_char,
 }
 
-/// Asks the library at `path`, which has been loaded before; `None` where it does not tell.
+/// Asks the library at `path`, which has been loaded before; `None` where it does not say.
 pub(super) fn version_of(path: &Path) -> Option<String> {
     // SAFETY: the library is ONNX Runtime and stays loaded; `OrtGetApiBase` returns a pointer to a static
     // table, and its second entry returns static text.

@@ -1,10 +1,10 @@
-//! How a session is told which provider to use.
+//! What a session asks ONNX Runtime for.
 
 use ort::ep::ExecutionProviderDispatch;
 
-/// How a session is told which provider to use.
+/// The provider that a session asks for.
 pub(super) enum Wish {
-    /// Nothing to tell: the CPU.
+    /// No provider is named: the CPU.
     Cpu,
     /// A provider of the library.
     Builtin(ExecutionProviderDispatch),

@@ -6,9 +6,9 @@
 use std::mem::swap;
 use std::sync::Arc;
 
-use super::extrapolation::{VelocityExtrapolation, Ways};
-use super::nodes::{Means, Nodes};
-use super::solves::{Drive, Question, Solves};
+use super::extrapolation::{ToolPaths, VelocityExtrapolation};
+use super::nodes::{Nodes, ResponseContext};
+use super::solves::{Drive, SolveKey, Solves};
 use crate::contact::problem::Change;
 use crate::contact::{Compliance, ContactProblem, Past, State};
 use crate::error::{Error, Result};
@@ -36,9 +36,9 @@ pub(super) struct View<'a> {
     pub moved: &'a mut [f32],
 }
 
-/// A step: its state and velocity `[K,3]`, where tools were and pushed, nodes in contact and their forces, the tools' ways.
+/// A step: its state and velocity `[K,3]`, where tools were and pushed, nodes in contact and their forces, the tools' paths.
 #[derive(Default, HeldBytes)]
-struct Known {
+struct KnownStep {
     /// Which step that is.
     step: Option<u64>,
     last: Vec<f32>,
@@ -46,7 +46,7 @@ struct Known {
     past: Past,
     then: Vec<u32>,
     forces: Vec<f32>,
-    ways: Ways,
+    paths: ToolPaths,
 }
 
 /// A step, and what its tissue does after it.
@@ -54,7 +54,7 @@ struct Known {
 pub(super) struct Between {
     problem: ContactProblem,
     /// The step before the known one, or what the next is read into.
-    other: Known,
+    other: KnownStep,
     #[held(skip)]
     pool: Pool,
     #[held(skip)]
@@ -92,10 +92,10 @@ impl Between {
         let natural = corrections.space.natural_count();
         Ok(Between {
             problem: ContactProblem::new(model.samples()?, Arc::clone(&model.mesh))?,
-            other: Known {
+            other: KnownStep {
                 last: field()?,
                 velocity: field()?,
-                ..Known::default()
+                ..KnownStep::default()
             },
             pool: Pool::new(1).map_err(|error| Error::Argument(error.to_string()))?,
             isa: Isa::detect(),
@@ -126,9 +126,9 @@ impl Between {
         let other = &mut self.other;
         match later_s {
             Some(seconds) => {
-                (other.ways).follow(&self.extrapolation.ways, &self.problem, seconds)?
+                (other.paths).follow(&self.extrapolation.paths, &self.problem, seconds)?
             }
-            None => other.ways.forget(),
+            None => other.paths.forget(),
         }
         other.last.copy_from_slice(state);
         other.velocity.copy_from_slice(&frame_state.velocity);
@@ -142,14 +142,14 @@ impl Between {
 
     /// Exchanges the known step and the other: takes the last [`Between::take`] back.
     pub(super) fn give_back(&mut self) {
-        let Known {
+        let KnownStep {
             step,
             last,
             velocity,
             past,
             then,
             forces,
-            ways,
+            paths,
         } = &mut self.other;
         swap(&mut self.step, step);
         swap(&mut self.last, last);
@@ -157,7 +157,7 @@ impl Between {
         swap(&mut self.problem.past, past);
         swap(&mut self.nodes.then, then);
         swap(&mut self.nodes.forces, forces);
-        swap(&mut self.extrapolation.ways, ways);
+        swap(&mut self.extrapolation.paths, paths);
     }
 
     /// The displacements of a view's nodes `tau` after the step, into `out [n,3]`.
@@ -193,7 +193,7 @@ impl Between {
                 self.extrapolation.follow_evenly(stretch, (tau, alpha));
             }
         }
-        let question = Question {
+        let question = SolveKey {
             step,
             tau,
             extrapolation: &self.extrapolation,
@@ -242,7 +242,7 @@ impl Between {
                     if tau <= AT_ONCE_S || !near {
                         return Ok(false);
                     }
-                    let means = Means {
+                    let means = ResponseContext {
                         isa: self.isa,
                         prior,
                         space: &corrections.space,

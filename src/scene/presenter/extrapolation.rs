@@ -15,27 +15,27 @@ const WHAT: &str = "the present state of a scene";
 /// What the time is stretched by. A tool that goes faster than it did pushes by itself; following it (up to 1.5) or taking tissue back (down
 /// to -1) was no better.
 const STRETCH: [f32; 2] = [0.0, 1.0];
-/// Ways shorter than this do not stretch it, mm.
+/// Paths shorter than this do not stretch it, mm.
 const SMALL_MM: f32 = 0.05;
 /// A tool drives the tissue around it, to half at this distance, mm.
 const NEAR_MM: f32 = 24.0;
 
 /// The tools' ways to the last step.
 #[derive(Default, HeldBytes)]
-pub(super) struct Ways {
+pub(super) struct ToolPaths {
     /// Poses at the step before the last and at the one before it, and how far apart they are, s.
     before: [Vec<Pose>; 2],
     before_s: [f64; 2],
 }
 
-impl Ways {
+impl ToolPaths {
     /// Becomes the ways to a step `seconds` after that of `problem`, to which `known` led.
     ///
     /// # Errors
     /// [`crate::Error::OutOfMemory`].
     pub(super) fn follow(
         &mut self,
-        known: &Ways,
+        known: &ToolPaths,
         problem: &ContactProblem,
         seconds: f64,
     ) -> Result<()> {
@@ -49,7 +49,7 @@ impl Ways {
         Ok(())
     }
 
-    /// Nothing is known of the tools' ways.
+    /// Nothing is known of the tools' paths.
     pub(super) fn forget(&mut self) {
         self.before.iter_mut().for_each(Vec::clear);
     }
@@ -58,7 +58,7 @@ impl Ways {
 /// The tools' ways of the last step, and the tissue that each drives.
 #[derive(Default, HeldBytes)]
 pub(super) struct VelocityExtrapolation {
-    pub(super) ways: Ways,
+    pub(super) paths: ToolPaths,
     /// Where tools push, and how far velocities are followed there, s.
     driven: Vec<(Vector, f32)>,
     /// Where none does.
@@ -116,7 +116,7 @@ impl VelocityExtrapolation {
     /// The speed of a tool at a place of its own, which is at `now`, at the end of the last step, mm/s: by BDF2, as the tissue's.
     fn speed(&self, index: usize, place: Vector, now: Vector) -> Option<Vector> {
         let at = |poses: &[Pose]| poses.get(index).map(|pose| pose.transform_point(place));
-        let Ways { before, before_s } = &self.ways;
+        let ToolPaths { before, before_s } = &self.paths;
         let [seconds, earlier_s] = *before_s;
         let last = at(&before[0]).filter(|_| seconds > 0.0)?;
         let far = |a: Vector, b: Vector| a.distance(b) > PUT_MM;
@@ -223,7 +223,7 @@ mod tests {
         let at = |z: f32| vec![Pose::from_translation(Vector::new(0.0, 0.0, z))];
         // 4 mm, then 2 mm: at the end 1 mm a step.
         let mut extrapolation = VelocityExtrapolation {
-            ways: Ways {
+            paths: ToolPaths {
                 before: [at(4.0), at(0.0)],
                 before_s: [0.05; 2],
             },
@@ -232,7 +232,7 @@ mod tests {
         let now = Vector::new(0.0, 0.0, 6.0);
         let speed = extrapolation.speed(0, Vector::ZERO, now).unwrap();
         assert!((speed.z - 20.0).abs() < 1e-3, "{speed}");
-        extrapolation.ways.before_s[1] = 0.1;
+        extrapolation.paths.before_s[1] = 0.1;
         assert!((extrapolation.speed(0, Vector::ZERO, now).unwrap().z - 40.0).abs() < 1e-3);
         assert!(extrapolation.speed(1, Vector::ZERO, now).is_none());
     }

@@ -1,5 +1,5 @@
-//! A frame with a collision field in place of instruments: nodes go where the host says, by the compliance of that time; those that it has let
-//! go of since the step lose the force that held them.
+//! A frame with a collision field in place of instruments: nodes go where the host says, by the compliance of that time. Nodes that the
+//! host has released since the step lose the force that held them.
 
 use crate::contact::vector;
 use crate::error::{Error, Result};
@@ -10,8 +10,8 @@ use crate::memory::{self, HeldBytes};
 use crate::prior::CoarseSpace;
 use crate::prior::PriorTable;
 
-/// What forces at nodes are solved with.
-pub(super) struct Means<'a> {
+/// What the forces at nodes are solved with: the linear response, and what inertia takes off it within the time of the frame.
+pub(super) struct ResponseContext<'a> {
     pub isa: Isa,
     pub prior: &'a PriorTable,
     pub space: &'a CoarseSpace,
@@ -69,7 +69,12 @@ impl Nodes {
     ///
     /// # Errors
     /// [`Error::Bundle`] for a compliance that has no factor, [`Error::OutOfMemory`].
-    pub fn solve(&mut self, means: &Means<'_>, now: &ContactSet, free: &[f32]) -> Result<()> {
+    pub fn solve(
+        &mut self,
+        means: &ResponseContext<'_>,
+        now: &ContactSet,
+        free: &[f32],
+    ) -> Result<()> {
         const WHAT: &str = "the present state of a scene";
         let own = |node: u32| match means.prior.column_for(means.held, node) {
             Some((column, true)) => Some(column as u32),

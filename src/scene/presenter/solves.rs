@@ -20,9 +20,9 @@ pub(super) enum Drive<'a> {
     Nodes(&'a ContactSet),
 }
 
-/// What a solve follows from.
+/// All that a solve depends on: two frames with the same key share one solve.
 #[derive(Clone, Copy)]
-pub(super) struct Question<'a> {
+pub(super) struct SolveKey<'a> {
     pub step: u64,
     /// Time after the step, s.
     pub tau: f64,
@@ -33,7 +33,7 @@ pub(super) struct Question<'a> {
 /// A solve, and what it followed from.
 #[derive(Default, HeldBytes)]
 struct Solve {
-    /// None where it has no answer.
+    /// None while the solve is invalid.
     step: Option<u64>,
     tau: f64,
     driven: Vec<(Vector, f32)>,
@@ -58,7 +58,7 @@ pub struct Solves {
 }
 
 impl Solve {
-    fn answers(&self, question: &Question<'_>) -> bool {
+    fn answers(&self, question: &SolveKey<'_>) -> bool {
         let (driven, free) = question.extrapolation.times();
         self.step == Some(question.step)
             && self.tau.to_bits() == question.tau.to_bits()
@@ -79,7 +79,7 @@ impl Solve {
             }
     }
 
-    fn take(&mut self, question: &Question<'_>) -> Result<()> {
+    fn take(&mut self, question: &SolveKey<'_>) -> Result<()> {
         let (driven, free) = question.extrapolation.times();
         self.tau = question.tau;
         self.free = free;
@@ -100,7 +100,7 @@ impl Solve {
 
 impl Solves {
     /// A question's answer of before.
-    pub(super) fn find(&self, question: &Question<'_>) -> Option<usize> {
+    pub(super) fn find(&self, question: &SolveKey<'_>) -> Option<usize> {
         self.kept.iter().position(|kept| kept.answers(question))
     }
 
@@ -110,13 +110,13 @@ impl Solves {
         solve.pushed.then_some(&*solve.coordinates)
     }
 
-    /// Makes the answer to a question, in place of the older one: `make` fills `width` coordinates and tells whether contact moves anything.
+    /// Solves for a key, in place of the older of the two solves: `make` fills `width` coordinates and returns whether contact moves anything.
     ///
     /// # Errors
     /// What `make` gives, [`crate::Error::OutOfMemory`]; that answer is gone then.
     pub(super) fn make(
         &mut self,
-        question: &Question<'_>,
+        question: &SolveKey<'_>,
         width: usize,
         make: impl FnOnce(&mut [f32]) -> Result<bool>,
     ) -> Result<usize> {

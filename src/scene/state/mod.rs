@@ -199,21 +199,21 @@ impl Core {
                 frame.points.fill(0.0);
             }
         }
-        self.told = 0;
+        self.logged_flags = 0;
         // Of empty lists, for which there is room.
         self.fit_state(published)?;
-        self.tell_state(published);
+        self.publish_state(published);
         Ok(())
     }
 
     /// Publishes a state that no step led to: without statistics and readings.
-    pub(super) fn tell_state(&mut self, published: &RwLock<Published>) {
+    pub(super) fn publish_state(&mut self, published: &RwLock<Published>) {
         let mut shared = lock_write(published);
         shared.stats = self.blank_stats();
         self.show_contacts(&mut shared);
         shared.tools.clear();
-        self.leave_moment(&mut shared);
+        self.publish_frame_state(&mut shared);
         drop(shared);
-        self.tell_hands(published);
+        self.publish_to_hands(published);
     }
 }

@@ -216,7 +216,7 @@ impl UptEngine {
         let mut watch = Stopwatch::start();
         let span = tracing::trace_span!("prior").entered();
         if let Some(linear) = &mut self.linear {
-            let report = linear.meet(compute.isa, inputs.held, inputs.contact)?;
+            let report = linear.solve_contact(compute.isa, inputs.held, inputs.contact)?;
             stats.flags |= solve_flags(report);
             let (touched, next) = (!inputs.contact.is_empty(), &mut self.next);
             let (last, swung, q) = (&self.last.vibration, &mut next.vibration, &mut next.q_prior);

@@ -110,7 +110,7 @@ impl Player {
                     contact: Contact::Tools(&self.tools),
                 };
                 scene.step(input, None)?;
-                scene.with_told(|all| {
+                scene.with_contact_report(|all| {
                     for (told, reading) in told.iter_mut().zip(&all.readings) {
                         *told = Vector::from(reading.force) * 1e-3;
                     }

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use anyhow::Result;
 use contact::Samples;
-use upt::contact::{Compliance, ContactProblem, State, Told, Tool};
+use upt::contact::{Compliance, ContactProblem, ContactReport, State, Tool};
 
 use crate::report::method::BundleFolder;
 use crate::report::prior_alone::PriorAlone;
@@ -16,7 +16,7 @@ pub struct Linear {
     problem: ContactProblem,
     rest: Vec<f32>,
     state: Vec<[f32; 3]>,
-    pub(super) told: Told,
+    pub(super) told: ContactReport,
 }
 
 impl Linear {
@@ -34,7 +34,7 @@ impl Linear {
             prior,
             rest: rest.as_flattened().to_vec(),
             state: vec![[0.0; 3]; rest.len()],
-            told: Told::default(),
+            told: ContactReport::default(),
         })
     }
 
@@ -73,7 +73,7 @@ impl Linear {
         });
         self.problem.commit();
         self.problem
-            .tell(&mut self.told, &self.rest, out.as_flattened());
+            .report(&mut self.told, &self.rest, out.as_flattened());
         self.state.copy_from_slice(out);
         Ok(contact_ms)
     }
