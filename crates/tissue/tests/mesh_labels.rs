@@ -1,24 +1,17 @@
 //! Parts that a mesh file names: OBJ materials, PLY colours, physical groups of Gmsh, VTK arrays.
 #![cfg(feature = "files")]
 
+mod inputs;
+
 use std::path::Path;
 
+use inputs::{CORNERS, TETS};
 use tissue::mesh::Mesh;
 use tissue::mesh_import::{
     ImportOptions, Region, Resolution, faces_in, import, nodes_in, read_labels, tets_in,
 };
 
-/// Corners of a cube of 10 mm and its triangles, outward; the first two are its floor.
-const CORNERS: [[f64; 3]; 8] = [
-    [0.0, 0.0, 0.0],
-    [10.0, 0.0, 0.0],
-    [10.0, 10.0, 0.0],
-    [0.0, 10.0, 0.0],
-    [0.0, 0.0, 10.0],
-    [10.0, 0.0, 10.0],
-    [10.0, 10.0, 10.0],
-    [0.0, 10.0, 10.0],
-];
+/// Triangles of the cube, outward; the first two are its floor.
 const FACES: [[usize; 3]; 12] = [
     [0, 2, 1],
     [0, 3, 2],
@@ -32,15 +25,6 @@ const FACES: [[usize; 3]; 12] = [
     [2, 7, 6],
     [3, 0, 4],
     [3, 4, 7],
-];
-/// The cube as tetrahedra around its diagonal from corner 0 to 6.
-const TETS: [[usize; 4]; 6] = [
-    [0, 1, 2, 6],
-    [0, 2, 3, 6],
-    [0, 3, 7, 6],
-    [0, 7, 4, 6],
-    [0, 4, 5, 6],
-    [0, 5, 1, 6],
 ];
 
 fn filled(path: &Path) -> Mesh {

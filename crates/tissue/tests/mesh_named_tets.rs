@@ -1,34 +1,16 @@
 //! Abaqus, CalculiX (`.inp`) and FEBio (`.feb`) files: what is read, what their sets are called, and what is refused.
 #![cfg(feature = "files")]
 
+mod inputs;
+
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
+use inputs::{CORNERS, TETS};
 use tissue::mesh::Mesh;
 use tissue::mesh_import::{
     ImportOptions, Region, faces_in, import, nodes_in, read_labels, tets_in,
 };
-
-/// Corners of a cube of 10 mm; the first four are its floor.
-const CORNERS: [[f64; 3]; 8] = [
-    [0.0, 0.0, 0.0],
-    [10.0, 0.0, 0.0],
-    [10.0, 10.0, 0.0],
-    [0.0, 10.0, 0.0],
-    [0.0, 0.0, 10.0],
-    [10.0, 0.0, 10.0],
-    [10.0, 10.0, 10.0],
-    [0.0, 10.0, 10.0],
-];
-/// The cube around its diagonal from corner 0 to 6; the first three are one half.
-const TETS: [[usize; 4]; 6] = [
-    [0, 1, 2, 6],
-    [0, 2, 3, 6],
-    [0, 3, 7, 6],
-    [0, 7, 4, 6],
-    [0, 4, 5, 6],
-    [0, 5, 1, 6],
-];
 
 /// Numbers in the files begin at 11, with gaps.
 fn number(place: usize) -> usize {

@@ -1,16 +1,11 @@
 //! VTK files as VTK 9 writes them (`fixtures/import/make_vtk.py`, which also writes all 1,080 dialects): a box of 24 ml.
 #![cfg(feature = "files")]
 
-use std::path::{Path, PathBuf};
+mod inputs;
 
+use inputs::fixture;
 use tissue::mesh_import::{ImportOptions, Region, Resolution, import, read_labels, tets_in};
 use tissue::mesh_quality::measure;
-
-fn fixture(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("tests/fixtures/import")
-        .join(name)
-}
 
 const GRIDS: [&str; 5] = [
     "vtk9-grid-51-text.vtk",

@@ -2,23 +2,20 @@
 #![cfg(feature = "files")]
 
 mod bodies;
+#[path = "../inputs/mod.rs"]
+mod inputs;
 mod surfaces;
 mod tets;
 mod thin;
 
 use contact::Shape;
-use std::path::{Path, PathBuf};
+use inputs::fixture;
+use std::path::Path;
 use tissue::mesh::Mesh;
 use tissue::mesh_import::{
     Ball, ImportError, ImportOptions, Imported, Resolution, import, tool_shape,
 };
 use tissue::mesh_quality::measure;
-
-fn fixture(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("tests/fixtures/import")
-        .join(name)
-}
 
 fn read(name: &str, options: &ImportOptions) -> Result<Imported, ImportError> {
     import(&fixture(name), options)
