@@ -28,6 +28,23 @@ namespace Upt
             return corners;
         }
 
+        /// <summary>The middle of the triangle nearest to the domain's mean corner, and its normal out of the tissue. Both stay as
+        /// they are where there is no triangle. Allocates.</summary>
+        public void DomainMiddle(ref Vector3 middle, ref Vector3 outward)
+        {
+            Vector3[] corners = DomainCorners();
+            if (corners.Length < 3) return;
+            Vector3 mean = Vector3.zero;
+            for (int i = 0; i < corners.Length; i++) mean += corners[i];
+            mean = mean * (1f / corners.Length);
+            int best = 0;
+            for (int i = 0; i + 2 < corners.Length; i += 3)
+                if ((corners[i] - mean).magnitude < (corners[best] - mean).magnitude) best = i;
+            middle = (corners[best] + corners[best + 1] + corners[best + 2]) * (1f / 3f);
+            // RAS winding is outward; the exchange of axes turns the cross product round.
+            outward = Vector3.Cross(corners[best + 2] - corners[best], corners[best + 1] - corners[best]).normalized;
+        }
+
         /// <summary>The border of the trained domain: 2 ends a line. Made once.</summary>
         public Vector3[] DomainOutline()
         {

@@ -135,6 +135,15 @@ namespace Upt
             return geometry == null ? new Vector3[0] : geometry.DomainCorners();
         }
 
+        /// <summary>The middle of the trained domain at rest, and the direction out of the tissue there, local space: a place
+        /// to begin with a tool. The origin and up where the tissue does not run or has no domain. Allocates.</summary>
+        public void DomainMiddle(out Vector3 middle, out Vector3 outward)
+        {
+            middle = Vector3.zero;
+            outward = Vector3.up;
+            if (geometry != null) geometry.DomainMiddle(ref middle, ref outward);
+        }
+
         /// <summary>The border of the trained domain at rest, local space, 2 ends a line. The array is the
         /// component's own: for gizmos.</summary>
         public Vector3[] DomainOutline()

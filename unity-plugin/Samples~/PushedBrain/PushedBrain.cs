@@ -55,7 +55,7 @@ namespace Upt.Samples
             tissue.instruments.Add(spatula);
             ShowBlade(tool.transform);
             brain.SetActive(true);
-            FindSite();
+            tissue.DomainMiddle(out site, out outward);
             Look();
         }
 
@@ -111,22 +111,6 @@ namespace Upt.Samples
             Vector3 sideways = Vector3.Cross(outward, Vector3.up);
             eye.transform.position = middle + (outward + sideways + Vector3.up * 0.4f).normalized * 0.3f;
             eye.transform.rotation = Quaternion.LookRotation(middle - eye.transform.position, Vector3.up);
-        }
-
-        /// <summary>The middle of the trained domain, and the direction out of the tissue there.</summary>
-        private void FindSite()
-        {
-            Vector3[] corners = tissue.DomainPoints();
-            if (corners.Length < 3) return;
-            Vector3 middle = Vector3.zero;
-            for (int i = 0; i < corners.Length; i++) middle += corners[i];
-            middle = middle * (1f / corners.Length);
-            int best = 0;
-            for (int i = 0; i + 2 < corners.Length; i += 3)
-                if ((corners[i] - middle).magnitude < (corners[best] - middle).magnitude) best = i;
-            site = (corners[best] + corners[best + 1] + corners[best + 2]) * (1f / 3f);
-            // RAS winding is outward; the exchange of axes turns the cross product round.
-            outward = Vector3.Cross(corners[best + 2] - corners[best], corners[best + 1] - corners[best]).normalized;
         }
     }
 }
