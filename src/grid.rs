@@ -5,10 +5,13 @@ use crate::memory;
 /// Points sorted into cubic cells.
 #[derive(Debug)]
 pub struct PointGrid {
+    /// `[n,3]`, mm.
     points: Vec<f32>,
+    /// Lowest corner of the grid, mm; edge of a cell, mm; cells along each axis.
     origin: [f32; 3],
     cell: f32,
     dims: [usize; 3],
+    /// Points by cell, ascending in each: those of cell `c` are `items[offsets[c]..offsets[c + 1]]`.
     offsets: Vec<u32>,
     items: Vec<u32>,
 }

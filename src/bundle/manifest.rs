@@ -118,7 +118,7 @@ pub enum Feature {
     PreviousDisplacement,
     /// Linear response to `c[t+1]`, or its free vibration without contact (3).
     Prior,
-    /// The same of the step before (3).
+    /// That response in the step before (3).
     PreviousPrior,
     /// 1 at nodes in contact (1).
     Contact,

@@ -44,27 +44,30 @@ struct Entries {
 /// two columns, or samples, alone, so what was kept has the bits of what would be made anew.
 #[derive(Debug, Default, HeldBytes)]
 pub struct Delassus {
-    /// Ascending.
+    /// Columns of the compliance that the samples touch, ascending.
     columns: Vec<u32>,
+    /// Those of the call being made, until it changes places with `columns`; afterwards those of the call before.
     wanted: Vec<u32>,
+    /// Scratch of the block that is read: packed upper triangle, then widened to f32.
     upper: Vec<f64>,
     widened: Vec<f32>,
     /// All natural modes at the columns, by mode `[n,3m]`.
     modes: Vec<f32>,
     /// `A [3m,3m]`, mm/mN.
     a: Vec<f32>,
-    /// The same of the columns before, which `wanted` holds then.
+    /// `A` of the call before, over the columns that `wanted` holds afterwards: what both have is copied from here.
     a_before: Vec<f32>,
-    /// The natural modes' part was left out of it.
+    /// `a` is the static compliance: nothing was taken off it for inertia.
     is_static: bool,
-    /// `W [3n,3n]`, mm/mN, and the samples that it is of.
+    /// `W = B A B^T [3n,3n]`, mm/mN, and the samples whose rows `B` it is made of.
     w: Vec<f32>,
     of: Vec<u32>,
-    /// The same of the call before.
+    /// `W` and its samples in the call before.
     w_before: Vec<f32>,
     of_before: Vec<u32>,
     /// Samples of the call before, ascending, and their rows there.
     known: Vec<(u32, u32)>,
+    /// By sample: its places among the columns.
     entries: Vec<Entries>,
 }
 

@@ -14,8 +14,9 @@ use crate::memory::{self, HeldBytes};
 pub struct InertialCompliance {
     /// By mode, `[m,3n]`.
     modes: Vec<f32>,
-    /// All modes.
+    /// `0..m`: the modes, all of which are used.
     all: Vec<u32>,
+    /// Scratch of a row: each mode's value there times what it loses.
     factors: Vec<f32>,
     /// `[3n,3n]`, and which contacts' rows are made.
     rows: Vec<f32>,
@@ -25,7 +26,9 @@ pub struct InertialCompliance {
 /// `W` at one time.
 pub struct At<'a> {
     own: &'a mut InertialCompliance,
+    /// The static `W [3n,3n]`, mm/mN.
     fixed: &'a [f32],
+    /// By mode, what inertia takes off its compliance at this time.
     lost: &'a [f32],
 }
 

@@ -61,7 +61,7 @@ impl Tool {
         Tool::of_body(body, position, rotation)
     }
 
-    /// The same of a shape that is ready.
+    /// A tool of a shape that was made ready before, as a hull is.
     ///
     /// # Errors
     /// As [`Tool::new`].

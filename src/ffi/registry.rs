@@ -22,9 +22,11 @@ const SCENE_TAG: usize = 2;
 const HULL_TAG: usize = 3;
 const HAND_TAG: usize = 4;
 
+/// The next number, without its tag: it only grows, so that a handle that was closed is never met again.
 static NEXT: AtomicUsize = AtomicUsize::new(STRIDE);
 static MODELS: Live<Model> = Live::new(MODEL_TAG, "model");
 static HULLS: Live<::contact::Body> = Live::new(HULL_TAG, "hull");
+/// Names the kind only: `hands` finds these without a lock.
 static HANDS: Live<()> = Live::new(HAND_TAG, "haptics");
 static SCENES: Live<SceneEntry> = Live::new(SCENE_TAG, "scene");
 
@@ -34,8 +36,11 @@ pub(super) struct SceneEntry {
     pub poisoned: AtomicBool,
 }
 
+/// The live objects of one kind, by handle. A call holds an `Arc` of its object, so that a close in another thread waits for nobody.
 struct Live<T> {
+    /// Last digit of the handles, base [`STRIDE`].
     tag: usize,
+    /// The word for it in errors.
     kind: &'static str,
     entries: LazyLock<RwLock<HashMap<usize, Arc<T>>>>,
 }

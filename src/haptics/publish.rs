@@ -32,6 +32,7 @@ const IMPEDANCE: f32 = 1.5;
 /// A tool of a scene that a hand feels.
 #[derive(HeldBytes)]
 pub struct Link {
+    /// Its place in the list of the scene's tools: forces and grasps of that place are its own.
     instrument: u32,
     #[held(skip)]
     body: Body,
@@ -41,26 +42,31 @@ pub struct Link {
     out: Writer<ContactSnapshot>,
     #[held(skip)]
     pose: Reader<Pose>,
-    /// Of one buffer.
-    slow_bytes: usize,
+    /// Bytes of one of the three buffers that the two threads exchange.
+    snapshot_bytes: usize,
+    /// Says to each end that the other has gone.
     #[held(skip)]
     ends: Arc<Ends>,
     #[held(skip)]
     samples: Arc<Samples>,
     search: Search,
+    /// `W` of the published samples within [`AT_ONCE_S`]: natural modes are too slow to take part, and go on in the hand's thread.
     delassus: Delassus,
     inertial_compliance: Vec<f32>,
-    /// Nearest samples: distance, row.
+    /// Nearest samples by distance and row, and their rows alone.
     found: Vec<(f32, u32)>,
-    /// Their rows alone.
     sampled: Vec<u32>,
+    /// Where the basis of each block starts.
     starts: Vec<usize>,
+    /// A field `[K,3]` that is projected on the modes, and its block coordinates `[Q]`.
     coordinates: Vec<f32>,
     field: Vec<f32>,
     /// Mass of the natural modes, g.
     masses: Vec<f32>,
     rows: Vec<u32>,
+    /// How many states were published: the hand sees by it how many it missed.
     number: u64,
+    /// Age of a state when the hand gets it, s; the time that the step took where the host gave none.
     latency_s: Option<f64>,
     /// Where the hand was when the last state was published.
     last_pose: Option<Pose>,
@@ -97,7 +103,7 @@ pub fn join(
     let natural = corrections.space.natural()?;
     let snapshot = || ContactSnapshot::new(natural.len());
     let buffers = [snapshot()?, snapshot()?, snapshot()?];
-    let slow_bytes = buffers[0].held_bytes();
+    let snapshot_bytes = buffers[0].held_bytes();
     let (out, snapshot) = exchange(buffers);
     let (at, pose) = exchange([tool.pose; 3]);
     let ends = Arc::new(Ends::default());
@@ -112,7 +118,7 @@ pub fn join(
         grasps: tool.mode == Mode::Grasp,
         out,
         pose,
-        slow_bytes,
+        snapshot_bytes,
         ends: Arc::clone(&ends),
         samples: Arc::clone(&samples),
         search: memory::tried(Search::with_room(&samples), WHAT)?,
@@ -226,6 +232,7 @@ impl Link {
                 }
             }
         }
+        // Velocity and drive of each natural mode: `N^T M v / m` and `N^T f / m`.
         let mut project = |field: &[f32], weighted: bool, out: &mut [f32]| -> Result<()> {
             let mass = &step.corrections.body.mass;
             for (i, (to, from)) in self.field.iter_mut().zip(field).enumerate() {
@@ -270,6 +277,7 @@ impl Link {
             snapshot.outward[at] = outward(&self.samples, row, state);
             snapshot.forces[at] = force;
             snapshot.anchors[at] = anchor;
+            // What the step's solve left, which the hand must not feel as a motion.
             snapshot.errors[at] = snapshot.pose.map_or(Vector::ZERO, |pose| {
                 let pair = Pair {
                     body: &self.body,
@@ -364,7 +372,7 @@ impl Link {
 
     /// Bytes held, of both ends.
     pub fn memory_bytes(&self) -> usize {
-        3 * self.slow_bytes + self.held_bytes()
+        3 * self.snapshot_bytes + self.held_bytes()
     }
 }
 

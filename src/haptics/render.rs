@@ -23,19 +23,25 @@ const MOST_S: f64 = 0.1;
 const FIRST_S: f64 = 0.001;
 /// Time between calls over which samples follow forces at least, s: in none they would be rigid.
 const LEAST_S: f64 = 1e-4;
+
 /// A tool that a hand feels. Used from one thread, which waits for nothing: no lock, no allocation.
 pub struct Haptics {
     body: Body,
     friction: f32,
+    /// The force of a new step is blended in over this time, s; 0 for at once.
     blend_s: f64,
+    /// Whether the damper gives back what the rendered spring makes of its own, up to `damping_limit`, N s/m.
     passivity: bool,
     damping_limit: f32,
+    /// Largest force, mN; 0 for none. The torque is scaled with it.
     force_limit_mn: f32,
+    /// The contact near the tool in the last published step, and the way back: where the hand is now.
     snapshot: Reader<ContactSnapshot>,
     pose: Writer<Pose>,
     ends: Arc<Ends>,
     /// Time and pose of the last call.
     last: Option<(f64, Pose)>,
+    /// Number of the last snapshot, how old its state is by now, and how long ago it was seen, s.
     seen: u64,
     age_s: f64,
     since_s: f64,
@@ -103,6 +109,7 @@ impl Haptics {
         self.pose.write(now);
         self.observer.observe(&from, &now);
 
+        // A new step: its forces belong to the pose at that step, from which the tool has gone on for the snapshot's age.
         let arrived = self.snapshot.update();
         let snapshot = self.snapshot.buffer();
         let (mut before, mut time) = (from, seconds);

@@ -93,10 +93,10 @@ impl Core {
         start: Instant,
         stats: &mut SceneStats,
     ) -> Result<bool> {
-        if near && (problem.pushed() || problem.holds()) {
+        if near && (problem.had_forces() || problem.has_grasp()) {
             let before = *stats;
             self.load(published, problem, start, stats)?;
-            if problem.pushes() {
+            if problem.has_forces() {
                 return Ok(true);
             }
             // No tool pushes in that state: drop it together with its statistics.
@@ -105,16 +105,16 @@ impl Core {
         // Nothing pushes: the model's own free motion, unless that runs into a tool.
         self.predict_and_decode(published, None, self.learns(), stats)?;
         self.correct(published, None, start, stats)?;
-        let intrudes = {
+        let is_penetrated = {
             let shared = lock_read(published);
             let state = State {
                 rest: &self.mesh.positions,
                 u: &self.next.field,
                 start: &shared.last.field,
             };
-            problem.intrudes(state, INTRUSION_MM)
+            problem.is_penetrated(state, INTRUSION_MM)
         };
-        if intrudes {
+        if is_penetrated {
             self.load(published, problem, start, stats)?;
         } else {
             self.finish_tools(published, problem, stats);

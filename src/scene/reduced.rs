@@ -33,7 +33,9 @@ pub struct ReducedEngine {
     pub linear: Linear,
     #[held(skip)]
     kind: Arc<ReducedModel>,
+    /// The correction `b'`; none in a bundle that was made without training.
     learned: Option<LearnedStage>,
+    /// Scratch: block coordinates `[Q]` of a field that is projected on the basis.
     pub(super) given_q: Vec<f32>,
     /// Amplitudes of the natural modes in a field `[m]`.
     pub(super) swing: Vec<f32>,
@@ -51,7 +53,9 @@ struct LearnedStage {
     stage: Stage,
     #[held(skip)]
     precision: Precision,
+    /// `0..r`: the rows of `Phi`, all of which are used.
     mode_rows: Vec<u32>,
+    /// `b [r]` of a host's displacement, mm.
     given_b: Vec<f32>,
 }
 

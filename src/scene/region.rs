@@ -26,7 +26,10 @@ impl Core {
             .transpose()
     }
 
-    /// Decodes any nodes of the last state into `out [n,3]`.
+    /// Decodes any nodes of the last state into `out [n,3]`, mm. Nothing of the scene changes but the spare frame.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for a node that is not of the mesh and a wrong length, [`Error::State`] before the first step.
     pub(super) fn decode(
         &mut self,
         published: &RwLock<Published>,
@@ -59,7 +62,11 @@ impl Core {
         Ok(())
     }
 
-    /// Decodes the nodes of a plan in a published state into the spare frame, and what points have in addition to them.
+    /// Decodes the nodes of a plan in a published state into the spare frame `next.field`, and into `detail` what a network says at attached
+    /// points beyond the interpolation of their nodes.
+    ///
+    /// A state is decoded by what made it: rest is zero, a model's state comes from its record, and a replaced one from the linear
+    /// response. Where every node is kept, the published field is copied instead.
     pub(super) fn decode_published(
         &mut self,
         published: &RwLock<Published>,
@@ -114,7 +121,12 @@ impl Core {
         Ok(())
     }
 
-    /// A new plan: the nodes of both published states are decoded for it at once.
+    /// Takes a new plan, and decodes the nodes of both published states for it: a reader that interpolates between them needs both.
+    ///
+    /// All that may fail comes before the first change, so that an error leaves region, points and states as they were.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`], and what the engine says of a plan.
     pub(super) fn set_plan(
         &mut self,
         published: &RwLock<Published>,
@@ -178,7 +190,7 @@ impl Core {
     }
 }
 
-/// All nodes exist.
+/// Checks that all nodes exist.
 pub(super) fn check_nodes(nodes: &[u32], count: usize) -> Result<()> {
     match nodes.iter().position(|&node| node as usize >= count) {
         Some(at) => Err(Error::Argument(format!(

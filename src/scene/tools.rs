@@ -19,11 +19,11 @@ pub(super) struct Asked {
 pub struct Tools {
     pub(super) contacts: Mutex<Option<Asked>>,
     pub(super) presenters: Mutex<Presenters>,
-    /// What a host's instruments are read into.
+    /// The instruments of a step are read into this list, so that a call allocates nothing.
     pub(super) list: Mutex<Vec<Tool>>,
-    /// The same of a frame between steps.
+    /// Those of a frame between steps: another thread may present while one steps.
     pub(super) frame_list: Mutex<Vec<Tool>>,
-    /// The same of contacts that a host asks for.
+    /// Those whose contacts a host asks for.
     pub(super) asked_list: Mutex<Vec<Instrument>>,
     pub(super) forces: Mutex<Option<Haptics>>,
     /// The contact forces of the last call that asked for them.

@@ -14,27 +14,35 @@ use crate::error::{Error, Result};
 use crate::field::ContactSet;
 use crate::memory;
 
+/// What host and worker share. The host writes an input only while none waits, or replaces one that has not started.
 #[derive(Default)]
 struct Slot {
+    /// An input is there that the worker has not taken.
     waiting: bool,
+    /// The worker is in a step.
     running: bool,
+    /// The scene goes: the worker ends after the step that it is in.
     stop: bool,
+    /// The input that waits: nodes and vectors `[m,3]`, mm, or tools. The worker exchanges them for its own lists, so that neither side
+    /// allocates once the lists have grown.
     nodes: Vec<u32>,
     vectors: Vec<f32>,
     /// Tools drive the step that waits.
     driven: bool,
     tools: Vec<Tool>,
-    /// Errors that were not told: the first one, and how many came after it.
+    /// Errors that no poll has returned yet: the first one, and how many came after it.
     failed: Option<Error>,
     failed_later: u64,
-    /// A step has finished since the host was last told that one had.
+    /// A step has finished since a poll last said so.
     finished: bool,
+    /// An input was submitted at some time: without one there is nothing to wait for, which is an error.
     ever: bool,
 }
 
 #[derive(Default)]
 struct Signal {
     slot: Mutex<Slot>,
+    /// Wakes the worker for an input or the end, and hosts for a step that is done.
     work: Condvar,
     done: Condvar,
 }
@@ -138,7 +146,7 @@ impl Worker {
         slot.waiting || slot.running
     }
 
-    /// An error that was not told; else whether a step has finished that was not told, or none is in flight.
+    /// An error that no call has returned yet; else whether a step has finished that no call has reported, or none is in flight.
     pub fn poll(&self) -> Result<Progress> {
         let mut slot = self.signal.lock();
         let progress = Self::progress(&mut slot)?;

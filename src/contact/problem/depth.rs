@@ -10,7 +10,7 @@ use crate::contact::state::State;
 
 impl ContactProblem {
     /// Whether the tissue lies inside of a tool deeper than `depth_mm` anywhere on the tools' ways.
-    pub fn intrudes(&mut self, state: State<'_>, depth_mm: f32) -> bool {
+    pub fn is_penetrated(&mut self, state: State<'_>, depth_mm: f32) -> bool {
         let parts = self.parts();
         (0..self.tools.len()).any(|index| {
             let mut ways = (1..=parts).rev().map(|part| part as f32 / parts as f32);
@@ -38,7 +38,7 @@ impl ContactProblem {
         deepest
     }
 
-    /// The same of one tool.
+    /// How deep the tissue lies in one tool, mm, at part `part` of its way.
     pub(super) fn depth(&mut self, index: usize, state: State<'_>, part: f32) -> f32 {
         let depth = self.deepest(index, state, part);
         // What pushes from outside is outside; but a thin tool's side may be pushed by what its tip has pierced.

@@ -37,7 +37,7 @@ impl ContactProblem {
         self.each_nodal_force(&self.next.forces, take);
     }
 
-    /// The same of the last published step.
+    /// Calls with each node's share of the forces of the last published step, mN.
     pub fn each_push(&self, take: impl FnMut(u32, Vector)) {
         self.each_nodal_force(&self.past.forces, take);
     }

@@ -286,7 +286,7 @@ impl ContactProblem {
     /// # Errors
     /// [`Error::OutOfMemory`].
     pub fn is_near(&mut self, state: State<'_>) -> Result<bool> {
-        if !self.next.forces.is_empty() || self.holds() {
+        if !self.next.forces.is_empty() || self.has_grasp() {
             return Ok(true);
         }
         self.look(state, 1.0, true, MOST_ROWS)?;
@@ -309,17 +309,17 @@ impl ContactProblem {
     }
 
     /// Whether forces were at work at the end of the last step.
-    pub fn pushed(&self) -> bool {
+    pub fn had_forces(&self) -> bool {
         !self.past.forces.is_empty()
     }
 
     /// Whether forces are at work in the step being made.
-    pub fn pushes(&self) -> bool {
+    pub fn has_forces(&self) -> bool {
         !self.next.forces.is_empty()
     }
 
     /// Whether a grasper holds a sample.
-    pub fn holds(&self) -> bool {
+    pub fn has_grasp(&self) -> bool {
         let holds = |held: &Held| !held.grasp.anchors().is_empty();
         self.next.tools.iter().any(holds)
     }

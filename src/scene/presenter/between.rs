@@ -52,9 +52,11 @@ struct KnownStep {
 /// A step, and what its tissue does after it.
 #[derive(HeldBytes)]
 pub(super) struct Between {
+    /// Contact at the poses of the frame. Its past is that of the known step, never of a frame: frames leave no trace.
     problem: ContactProblem,
     /// The step before the known one, or what the next is read into.
     other: KnownStep,
+    /// Of one thread: the scene's own pool may be at work on a step.
     #[held(skip)]
     pool: Pool,
     #[held(skip)]
@@ -66,6 +68,7 @@ pub(super) struct Between {
     pub free: Vec<f32>,
     /// Which step that is.
     pub step: Option<u64>,
+    /// Amplitudes of the natural modes, what inertia takes off their compliance at the time of the frame, and the list `0..n` of their rows.
     natural: Vec<f32>,
     inertial_compliance: Vec<f32>,
     rows: Vec<u32>,

@@ -82,7 +82,7 @@ impl VelocityExtrapolation {
         (tau, alpha): (f64, f64),
     ) {
         self.driven.clear();
-        self.free = match problem.pushed() {
+        self.free = match problem.had_forces() {
             true => tau as f32,
             false => slowed(tau, alpha),
         };
