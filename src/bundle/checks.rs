@@ -7,6 +7,10 @@ use crate::field::INPUT_LIMIT;
 use crate::options::{LONGEST_STEP_S, MOST_CORRECTIONS, MOST_SUBSTEPS, SHORTEST_STEP_S};
 
 impl Manifest {
+    /// Checks each value on its own and against the others. Whether files agree with them is found when they are read.
+    ///
+    /// # Errors
+    /// [`crate::Error::Bundle`] with the field and what it must be.
     pub(super) fn check(&self) -> Result<()> {
         check(
             self.dt_s > 0.0 && self.dt_s <= 10.0,

@@ -27,12 +27,13 @@ const LIMITS: Limits = Limits {
 /// The samples between two steps.
 pub struct Solver {
     pub modes: Modes,
-    /// By sample: force, place, what forces have moved it since the step `[3n]`, and what they will have if they stay.
+    /// By sample: the force on it, mN; its place, mm; how far forces have moved it since the step `[3n]`, mm, and how far they will have
+    /// moved it if they stay as they are.
     forces: Vec<Vector>,
     points: Vec<Vector>,
     moved: Vec<f32>,
     aim: Vec<f32>,
-    /// Of the samples in a solve.
+    /// The samples of a solve by their distance, their contacts and forces, and `W` among them.
     rows: Vec<(f32, usize)>,
     contacts: Vec<Contact>,
     solved: Vec<Vector>,
@@ -68,7 +69,7 @@ impl Solver {
         })
     }
 
-    /// From the state of a step.
+    /// Starts anew from the state of a step. What the hand's forces moved since the last one is dropped: the step has it.
     pub fn begin(&mut self, snapshot: &ContactSnapshot) {
         self.modes.begin(&snapshot.velocity);
         self.forces[..snapshot.count].copy_from_slice(&snapshot.forces[..snapshot.count]);
@@ -77,7 +78,7 @@ impl Solver {
         self.aim.fill(0.0);
     }
 
-    /// A change of the force on a sample, and the part of what it moves that it moves now.
+    /// Adds a change of the force on a sample: it moves all samples by `part` of `W` times the change now, and by the rest later.
     fn change(&mut self, snapshot: &ContactSnapshot, at: usize, change: Vector, part: f32) {
         if change == Vector::ZERO {
             return;

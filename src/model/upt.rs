@@ -58,7 +58,9 @@ pub struct UptModel {
     /// Precision of the graphs `latent` and `decoder`: float32, float16 or int8.
     #[held(skip)]
     pub precision: Precision,
+    /// Bytes of `embed.onnx`, run for a mesh or points of a scene's own.
     embed: Vec<u8>,
+    /// Names and bytes of the graphs: each scene makes its stages from them.
     pub(super) latent_file: String,
     pub(super) latent: Vec<u8>,
     pub(super) decoder_file: String,

@@ -33,6 +33,7 @@ pub fn check_point_count(count: u64) -> Result<()> {
 /// Attached points.
 #[derive(Debug, Clone, Default, HeldBytes)]
 pub struct AttachedPoints {
+    /// Corners of each point's tetrahedron, and their weights: a point's displacement is that mean of its corners'.
     nodes: Vec<[u32; 4]>,
     weights: Vec<[f32; 4]>,
     /// Where the network is asked, `[n,3]` rest mm: the point, or for one outside of the mesh the closest combination.

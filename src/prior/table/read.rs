@@ -37,6 +37,7 @@ impl PriorTable {
         Ok(table)
     }
 
+    /// Reads the tables and checks every length, index and order once, here: kernels and solves rely on them without looking.
     fn parse(file: &TensorFile, manifest: &Manifest, mesh: &Mesh) -> Result<PriorTable> {
         let count = mesh.node_count();
         let contact_nodes = file.ascending("contact_nodes", count)?;

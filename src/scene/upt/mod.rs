@@ -67,9 +67,11 @@ pub struct UptEngine {
     /// The linear response; none where the network does not use it.
     pub linear: Option<Linear>,
     path: Path,
+    /// Keys and values of the latent state that is decoded, packed for the native decoder, and its scratch.
     tokens: DecoderTokens,
     decoder_scratch: DecoderScratch,
     decoders: Decoders,
+    /// The nodes that the network decodes for the others to be interpolated from, where the bundle has anchors.
     anchors: AnchorField,
     #[held(skip)]
     precision: DecoderPrecision,
