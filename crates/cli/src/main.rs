@@ -19,6 +19,7 @@ mod effort;
 mod envelope;
 #[cfg(feature = "files")]
 mod export;
+mod fit;
 #[cfg(feature = "files")]
 mod foreign;
 mod haptics;
@@ -54,6 +55,8 @@ mod soak;
 mod stress;
 mod tool_scale;
 mod tools;
+#[cfg(feature = "linear")]
+mod validate;
 mod view;
 
 // For their features alone: see Cargo.toml.
@@ -146,6 +149,14 @@ enum Command {
     Modes(left_out::Options),
     /// List the schemes and the programmes of tools, with the ranges that their cases are drawn from.
     Loads(loads::Options),
+    /// Fit a law to measured curves of tension, compression and shear.
+    Fit(fit::Options),
+    /// Hold laws and solver against measured tissue and closed forms.
+    #[cfg(feature = "linear")]
+    Validate(validate::Options),
+    /// Left out of this small `upt`; `cargo build --release -p upt-cli` builds the whole.
+    #[cfg(not(feature = "linear"))]
+    Validate(left_out::Options),
     /// List tissues that a law may be named by, with their sources.
     Materials(materials::Options),
     /// Run one reference simulation and write its trajectory.
@@ -208,6 +219,11 @@ fn main() -> ExitCode {
         #[cfg(not(feature = "linear"))]
         Command::Modes(options) => left_out::run("linear", &options),
         Command::Loads(options) => loads::run(&options),
+        Command::Fit(options) => fit::run(&options),
+        #[cfg(feature = "linear")]
+        Command::Validate(options) => validate::run(&options),
+        #[cfg(not(feature = "linear"))]
+        Command::Validate(options) => left_out::run("linear", &options),
         Command::Materials(options) => materials::run(&options),
         Command::Simulate(options) => simulate::run(&options),
         Command::Dataset(options) => dataset::run(&options),

@@ -10,6 +10,7 @@
 //! Beyond `x = alpha ln l = 3` ([`CAP`]) the exponential in the stress goes on as its tangent: `phi(x) = e^3 (x - 2)`. With exponent -24 that
 //! is a compression of 12 %, beyond what tests of brain tissue reach. Stress, tangent and critical step then stay bounded.
 
+use super::stretches::Stretches;
 use super::terms::{MOST_TERMS, Term, Terms};
 use crate::fault::MaterialError;
 use serde::{Deserialize, Serialize};
@@ -50,6 +51,16 @@ impl Ogden {
     pub fn shear_pa(&self) -> f64 {
         let products = self.terms.iter().map(|term| term.mu_pa * term.alpha);
         0.5 * products.sum::<f64>()
+    }
+
+    /// `sum mu (phi(alpha s) - 1)`, Pa: a principal Cauchy stress but for a pressure, at the logarithm `s` of a stretch without change of
+    /// volume. `phi` is the exponential up to [`CAP`], then its tangent.
+    pub fn pull(&self, s: f64) -> f64 {
+        Stretches {
+            terms: self.terms,
+            cap: CAP,
+        }
+        .pull(s)
     }
 
     /// The terms over the shear modulus.

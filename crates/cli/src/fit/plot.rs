@@ -1,0 +1,74 @@
+//! The picture of a fit: measured points, and the law's curve through them.
+
+use elements::Ogden;
+
+use super::curve::{Curve, Mode, nominal_stress};
+use crate::report::plot::{Axes, Scale, colour};
+
+/// Points of a drawn curve.
+const STEPS: usize = 120;
+
+/// Strain or amount of shear of a stretch.
+fn strain(mode: Mode, x: f64) -> f64 {
+    if mode == Mode::Shear { x } else { x - 1.0 }
+}
+
+/// An SVG file: stress in kPa over strain or shear, discs measured, lines of each law, the first one solid.
+pub fn draw(curves: &[Curve], laws: &[(&str, &Ogden)]) -> String {
+    let range = |values: &mut dyn Iterator<Item = f64>| {
+        values.fold([0.0f64, 0.0], |[low, high], v| [low.min(v), high.max(v)])
+    };
+    let all = || {
+        curves
+            .iter()
+            .flat_map(|c| c.points.iter().map(move |p| (c.mode, p)))
+    };
+    let [left, right] = range(&mut all().map(|(mode, [x, _])| strain(mode, *x)));
+    let [low, high] = range(&mut all().map(|(_, [_, y])| 1e-3 * y));
+    let mut axes = Axes::new(
+        760.0,
+        440.0,
+        Scale::linear(left, right),
+        Scale::linear(low, high),
+        "strain, or amount of shear",
+        "nominal stress, kPa",
+    );
+    let mut keys = Vec::new();
+    for (at, curve) in curves.iter().enumerate() {
+        let xs = curve.points.iter().map(|[x, _]| *x);
+        let (from, to) = xs.fold((f64::MAX, f64::MIN), |(a, b), x| (a.min(x), b.max(x)));
+        for (which, (_, law)) in laws.iter().enumerate() {
+            let line: Vec<(f64, f64)> = (0..=STEPS)
+                .map(|k| from + (to - from) * k as f64 / STEPS as f64)
+                .map(|x| {
+                    (
+                        strain(curve.mode, x),
+                        1e-3 * nominal_stress(law, curve.mode, x),
+                    )
+                })
+                .filter(|(_, y)| (low..=high).contains(y))
+                .collect();
+            if line.len() > 1 {
+                axes.line(
+                    &line,
+                    colour(at),
+                    if which == 0 { 2.0 } else { 1.2 },
+                    which > 0,
+                );
+            }
+        }
+        for [x, y] in &curve.points {
+            let tip = format!("{} {x}: {y:.1} Pa", curve.mode.as_str());
+            axes.disc(
+                strain(curve.mode, *x),
+                1e-3 * y,
+                3.0,
+                colour(at),
+                true,
+                &tip,
+            );
+        }
+        keys.push((curve.mode.as_str(), colour(at)));
+    }
+    axes.standalone(&keys)
+}
