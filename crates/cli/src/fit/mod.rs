@@ -48,6 +48,9 @@ pub struct Options {
     json: bool,
 }
 
+/// Poisson's ratio of Young's modulus in the options that are printed: the default of `upt simulate` and `upt make`.
+const POISSON: f64 = 0.49;
+
 /// A law whose constants are not known yet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wanted {
@@ -142,7 +145,11 @@ pub fn run(options: &Options) -> Result<ExitCode> {
         }
     }
     let shear = terms.shear_pa();
-    let written = format!("{law:.4}");
+    // A law without a modulus of its own takes Young's.
+    let written = match law {
+        Law::Ogden(_) => format!("{law:.4}"),
+        _ => format!("{law:.4} --young {:.1}", 2.0 * (1.0 + POISSON) * shear),
+    };
     if let Some(path) = &options.plot {
         std::fs::write(path, plot::draw(&sample.curves, &[(&written, &terms)]))
             .with_context(|| format!("{}: cannot be written", path.display()))?;
