@@ -186,12 +186,15 @@ impl DenseLanes for Avx512 {
     #[inline(always)]
     unsafe fn sums(four: [Self; 4]) -> [f32; 4] {
         unsafe {
-            let [a, b, c, d] = four.map(|r| {
-                _mm256_add_ps(
-                    _mm512_castps512_ps256(r.0),
-                    _mm512_extractf32x8_ps::<1>(r.0),
-                )
-            });
+            // No closure: it would not take on the instruction set.
+            let mut halves = [_mm256_setzero_ps(); 4];
+            for i in 0..4 {
+                halves[i] = _mm256_add_ps(
+                    _mm512_castps512_ps256(four[i].0),
+                    _mm512_extractf32x8_ps::<1>(four[i].0),
+                );
+            }
+            let [a, b, c, d] = halves;
             let ab = _mm256_hadd_ps(a, b);
             let cd = _mm256_hadd_ps(c, d);
             let abcd = _mm256_hadd_ps(ab, cd);
