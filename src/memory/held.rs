@@ -34,7 +34,7 @@ macro_rules! plain {
 }
 
 plain!(bool, u8, u16, u32, u64, usize, i32, f16, bf16, f32, f64);
-plain!(Duration, Instant, lanes::Isa);
+plain!(Duration, Instant, lanes::Isa, std::ops::Range<usize>);
 plain!(Candidate, Contact, Grasp, Pose, Vector);
 
 /// A type of another crate that says itself what it holds.

@@ -12,6 +12,7 @@
 )]
 
 mod batches;
+mod chunks;
 mod cluster;
 mod dispatch;
 mod fault;

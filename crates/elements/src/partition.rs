@@ -18,7 +18,7 @@ use std::collections::TryReserveError;
 use std::ops::Range;
 
 /// Target number of elements in a chunk.
-const CHUNK_ELEMENTS: usize = 2048;
+pub const CHUNK_ELEMENTS: usize = 2048;
 
 /// A chunk's nodes and elements.
 pub struct Chunk {
@@ -70,12 +70,24 @@ impl Partition {
     /// # Errors
     /// No memory.
     pub fn new(mesh: Tetrahedra<'_>, material: &Material) -> Result<Self, TryReserveError> {
+        Self::in_chunks(mesh, material, CHUNK_ELEMENTS)
+    }
+
+    /// The same in chunks of about `elements` each.
+    ///
+    /// # Errors
+    /// No memory.
+    pub fn in_chunks(
+        mesh: Tetrahedra<'_>,
+        material: &Material,
+        elements: usize,
+    ) -> Result<Self, TryReserveError> {
         let (positions, tets) = (mesh.positions, mesh.tets);
         let centroids = collected(tets.iter().map(|tet| {
             [0, 1, 2].map(|k| tet.iter().map(|n| positions[*n as usize][k]).sum::<f32>())
         }))?;
         let mut order = collected(0..tets.len() as u32)?;
-        let count = tets.len().div_ceil(CHUNK_ELEMENTS);
+        let count = tets.len().div_ceil(elements);
         let mut sizes = room(count.max(1))?;
         bisect(&mut order, &centroids, count, &mut sizes);
         let leaves = || {
