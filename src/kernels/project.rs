@@ -9,6 +9,7 @@ use super::rows::{BlockBasis, Number, Stored};
 use half::f16;
 use lanes::DenseLanes;
 use lanes::{Isa, by_isa};
+use std::ops::Range;
 
 /// `q = U^T r`: `r [K,3]`, `q [Q]`.
 ///
@@ -196,6 +197,97 @@ pub fn row_dots(
             Stored::F16(table) => dots_f16(isa, table, rows, q, out),
         }
     })
+}
+
+/// The same over some ranges of columns alone, each of a multiple of eight, on this thread.
+///
+/// # Panics
+/// As [`row_dots`].
+pub fn row_dots_in(
+    isa: Isa,
+    table: Stored<'_>,
+    rows: &[u32],
+    ranges: &[Range<usize>],
+    q: &[f32],
+    out: &mut [f32],
+) {
+    assert_eq!(rows.len(), out.len(), "one result a row");
+    let width = q.len();
+    if let Some(&last) = rows.iter().max() {
+        assert!((last as usize + 1) * width <= table.len(), "row {last}");
+    }
+    let fits = |range: &Range<usize>| range.end <= width && range.len().is_multiple_of(8);
+    assert!(ranges.iter().all(fits), "ranges of eight columns");
+    // The ranges are of whole registers of eight.
+    let isa = if isa == Isa::Avx512 { Isa::Avx2 } else { isa };
+    match table {
+        Stored::F32(table) => range_f32(isa, table, rows, ranges, q, out),
+        Stored::F16(table) => range_f16(isa, table, rows, ranges, q, out),
+    }
+}
+
+by_isa! {
+    fn range_f32(table: &[f32], rows: &[u32], ranges: &[Range<usize>], q: &[f32], out: &mut [f32]) = range_body, range_scalar;
+}
+by_isa! {
+    fn range_f16(table: &[f16], rows: &[u32], ranges: &[Range<usize>], q: &[f32], out: &mut [f32]) = range_body, range_scalar;
+}
+
+fn range_scalar<T: Number>(
+    table: &[T],
+    rows: &[u32],
+    ranges: &[Range<usize>],
+    q: &[f32],
+    out: &mut [f32],
+) {
+    for (&row, out) in rows.iter().zip(out) {
+        let row = &table[row as usize * q.len()..][..q.len()];
+        let mut lanes = [0.0f32; 8];
+        for range in ranges {
+            let (row, q) = (&row[range.clone()], &q[range.clone()]);
+            for (row, q) in row.chunks(8).zip(q.chunks(8)) {
+                for ((lane, a), b) in lanes.iter_mut().zip(row).zip(q) {
+                    *lane += a.wide() * b;
+                }
+            }
+        }
+        *out = lanes.iter().sum();
+    }
+}
+
+#[inline(always)]
+#[allow(clippy::extra_unused_type_parameters)]
+unsafe fn range_body<V: DenseLanes>(
+    table: &[impl Number],
+    rows: &[u32],
+    ranges: &[Range<usize>],
+    q: &[f32],
+    out: &mut [f32],
+) {
+    for (rows, out) in rows.chunks(4).zip(out.chunks_mut(4)) {
+        // SAFETY: `row_dots_in` has checked every row and range.
+        unsafe {
+            let row = |i: usize| {
+                let row = rows[i.min(rows.len() - 1)] as usize;
+                table.as_ptr().add(row * q.len())
+            };
+            let rows = [row(0), row(1), row(2), row(3)];
+            let mut total = [V::splat(0.0); 4];
+            for range in ranges {
+                let mut at = range.start;
+                while at < range.end {
+                    let x = V::load(q.as_ptr().add(at));
+                    for i in 0..4 {
+                        total[i] = Number::lanes::<V>(rows[i].add(at)).mul_add(x, total[i]);
+                    }
+                    at += V::COUNT;
+                }
+            }
+            for (out, sum) in out.iter_mut().zip(V::sums(total)) {
+                *out = sum;
+            }
+        }
+    }
 }
 
 by_isa! {

@@ -11,6 +11,7 @@ use super::rows::{Number, Stored};
 use half::f16;
 use lanes::DenseLanes;
 use lanes::{Isa, by_isa};
+use std::ops::Range;
 
 /// Columns a chunk.
 const COLUMNS: usize = 512;
@@ -52,6 +53,37 @@ pub fn accumulate_rows(
             Stored::F16(table) => columns_f16(isa, &table[start..], width, rows, factors, add, q),
         }
     })
+}
+
+/// The same in some ranges of columns alone, on this thread; the others keep what they hold.
+///
+/// # Panics
+/// As [`accumulate_rows`].
+pub fn accumulate_in(
+    isa: Isa,
+    table: Stored<'_>,
+    (rows, factors): (&[u32], &[f32]),
+    ranges: &[Range<usize>],
+    add: bool,
+    q: &mut [f32],
+) {
+    assert_eq!(rows.len(), factors.len(), "one factor a row");
+    let width = q.len();
+    if let Some(&last) = rows.iter().max() {
+        assert!(
+            (last as usize + 1) * width <= table.len(),
+            "row {last} lies outside the table"
+        );
+    }
+    // The ranges are of whole registers of eight.
+    let isa = if isa == Isa::Avx512 { Isa::Avx2 } else { isa };
+    for range in ranges {
+        let (start, q) = (range.start, &mut q[range.clone()]);
+        match table {
+            Stored::F32(table) => columns_f32(isa, &table[start..], width, rows, factors, add, q),
+            Stored::F16(table) => columns_f16(isa, &table[start..], width, rows, factors, add, q),
+        }
+    }
 }
 
 fn columns_scalar<T: Number>(
@@ -96,13 +128,19 @@ unsafe fn columns_body<V: DenseLanes>(
     // SAFETY: `accumulate_rows` has checked every row; columns stay below `q.len()`.
     unsafe {
         let table = table.as_ptr();
-        while column + 8 * V::COUNT <= q.len() {
-            register_tile::<V, 8>(table, width, column, rows, factors, add, q);
-            column += 8 * V::COUNT;
-        }
         while column + V::COUNT <= q.len() {
-            register_tile::<V, 1>(table, width, column, rows, factors, add, q);
-            column += V::COUNT;
+            let registers = ((q.len() - column) / V::COUNT).min(8);
+            match registers {
+                8 => register_tile::<V, 8>(table, width, column, rows, factors, add, q),
+                7 => register_tile::<V, 7>(table, width, column, rows, factors, add, q),
+                6 => register_tile::<V, 6>(table, width, column, rows, factors, add, q),
+                5 => register_tile::<V, 5>(table, width, column, rows, factors, add, q),
+                4 => register_tile::<V, 4>(table, width, column, rows, factors, add, q),
+                3 => register_tile::<V, 3>(table, width, column, rows, factors, add, q),
+                2 => register_tile::<V, 2>(table, width, column, rows, factors, add, q),
+                _ => register_tile::<V, 1>(table, width, column, rows, factors, add, q),
+            }
+            column += registers * V::COUNT;
         }
         // Fewer columns than lanes are left: one at a time, with the lanes' single rounding.
         while column < q.len() {

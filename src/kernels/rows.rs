@@ -6,12 +6,16 @@
 //! nodes are wanted, block by block, and where each goes in the output. Every row is summed in one
 //! fixed order, so a region gives the bits of the full decode, for any thread count.
 
+mod some;
+
 use super::parts::Parts;
 use super::pool::{Pool, PoolError};
 use crate::memory::{self, HeldBytes};
 use half::f16;
 use lanes::DenseLanes;
 use lanes::{Isa, by_isa};
+
+pub use some::project_rows;
 
 /// Numbers stored as f32 or f16.
 #[derive(Debug, Clone, Copy)]

@@ -1,0 +1,172 @@
+//! Rows of some nodes that change from call to call: a plan filled anew in the room that it has, and the projection of a field at its nodes.
+
+use half::f16;
+use lanes::{DenseLanes, Isa, by_isa};
+
+use super::{BlockBasis, Number, RUN_NODES, RowPlan, Stored};
+use crate::memory;
+
+impl RowPlan {
+    /// Takes other nodes in place of the plan's: those of which `row_of` has an output row, of `rows` in all. The room stays.
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
+    pub fn refill(
+        &mut self,
+        basis: &BlockBasis<'_>,
+        rows: usize,
+        row_of: impl Fn(u32) -> Option<u32>,
+    ) -> crate::error::Result<()> {
+        const WHAT: &str = "a plan of decoded rows";
+        self.runs.clear();
+        self.locals.clear();
+        self.outputs.clear();
+        self.output_rows = rows;
+        memory::fit(&mut self.locals, rows, WHAT)?;
+        memory::fit(&mut self.outputs, rows, WHAT)?;
+        let blocks = basis.block_offsets.len() - 1;
+        memory::fit(&mut self.runs, blocks + rows / RUN_NODES, WHAT)?;
+        for k in 0..blocks {
+            let range = basis.block_offsets[k] as usize..basis.block_offsets[k + 1] as usize;
+            let mut start = self.locals.len();
+            for (local, &node) in basis.block_nodes[range].iter().enumerate() {
+                if let Some(row) = row_of(node) {
+                    self.locals.push(local as u32);
+                    self.outputs.push(row);
+                    if self.locals.len() - start == RUN_NODES {
+                        self.end_run(k, &mut start);
+                    }
+                }
+            }
+            self.end_run(k, &mut start);
+        }
+        Ok(())
+    }
+
+    /// The blocks that the plan's nodes are of, ascending.
+    pub fn blocks(&self) -> impl Iterator<Item = usize> + '_ {
+        let mut last = u32::MAX;
+        let own = self.runs.iter().map(|run| run.block);
+        own.filter(move |&block| std::mem::replace(&mut last, block) != block)
+            .map(|block| block as usize)
+    }
+}
+
+/// `q += U^T r` of a field at the plan's nodes alone, `r` by output row `[rows,3]`; only the coordinates of their blocks change.
+///
+/// # Panics
+/// If a length does not match the plan.
+pub fn project_rows(isa: Isa, basis: &BlockBasis<'_>, plan: &RowPlan, r: &[f32], q: &mut [f32]) {
+    let ranks = basis.rank_offsets;
+    assert_eq!(q.len(), ranks[ranks.len() - 1] as usize, "q must be [Q]");
+    assert_eq!(r.len(), 3 * plan.output_rows, "r must be [rows, 3]");
+    let isa = if isa == Isa::Avx512 { Isa::Avx2 } else { isa };
+    for run in &plan.runs {
+        let (k, items) = (run.block as usize, run.start as usize..run.end as usize);
+        let q = &mut q[ranks[k] as usize..ranks[k + 1] as usize];
+        let range = plan.basis_offsets[k]..plan.basis_offsets[k + 1];
+        let (locals, outputs) = (&plan.locals[items.clone()], &plan.outputs[items]);
+        match basis.basis {
+            Stored::F32(basis) => add_f32(isa, &basis[range], locals, outputs, r, q),
+            Stored::F16(basis) => add_f16(isa, &basis[range], locals, outputs, r, q),
+        }
+    }
+}
+
+by_isa! {
+    fn add_f32(basis: &[f32], locals: &[u32], outputs: &[u32], r: &[f32], q: &mut [f32]) = add_rows_body, add_rows_scalar;
+}
+by_isa! {
+    fn add_f16(basis: &[f16], locals: &[u32], outputs: &[u32], r: &[f32], q: &mut [f32]) = add_rows_body, add_rows_scalar;
+}
+
+fn add_rows_scalar<T: Number>(
+    basis: &[T],
+    locals: &[u32],
+    outputs: &[u32],
+    r: &[f32],
+    q: &mut [f32],
+) {
+    let rank = q.len();
+    for (&local, &output) in locals.iter().zip(outputs) {
+        for axis in 0..3 {
+            let force = r[3 * output as usize + axis];
+            let row = &basis[(3 * local as usize + axis) * rank..][..rank];
+            for (q, b) in q.iter_mut().zip(row) {
+                *q += force * b.wide();
+            }
+        }
+    }
+}
+
+#[inline(always)]
+#[allow(clippy::extra_unused_type_parameters)]
+unsafe fn add_rows_body<V: DenseLanes>(
+    basis: &[impl Number],
+    locals: &[u32],
+    outputs: &[u32],
+    r: &[f32],
+    q: &mut [f32],
+) {
+    let rank = q.len();
+    let highest = locals.iter().copied().max().unwrap_or(0) as usize;
+    assert!(
+        (3 * highest + 3) * rank <= basis.len(),
+        "node outside its block"
+    );
+    assert!(
+        rank.is_multiple_of(V::COUNT),
+        "rank must be whole registers"
+    );
+    let mut column = 0;
+    while column < rank {
+        let registers = ((rank - column) / V::COUNT).min(8);
+        // SAFETY: rows end below `highest`, columns below the rank.
+        unsafe {
+            let (from, to) = (basis.as_ptr().add(column), &mut q[column..]);
+            match registers {
+                8 => add_tile::<V, 8>(from, rank, locals, outputs, r, to),
+                7 => add_tile::<V, 7>(from, rank, locals, outputs, r, to),
+                6 => add_tile::<V, 6>(from, rank, locals, outputs, r, to),
+                5 => add_tile::<V, 5>(from, rank, locals, outputs, r, to),
+                4 => add_tile::<V, 4>(from, rank, locals, outputs, r, to),
+                3 => add_tile::<V, 3>(from, rank, locals, outputs, r, to),
+                2 => add_tile::<V, 2>(from, rank, locals, outputs, r, to),
+                _ => add_tile::<V, 1>(from, rank, locals, outputs, r, to),
+            }
+        }
+        column += registers * V::COUNT;
+    }
+}
+
+/// `M` registers of [`add_rows_body`].
+#[inline(always)]
+unsafe fn add_tile<V: DenseLanes, const M: usize>(
+    basis: *const impl Number,
+    rank: usize,
+    locals: &[u32],
+    outputs: &[u32],
+    r: &[f32],
+    q: &mut [f32],
+) {
+    // SAFETY: the caller's.
+    unsafe {
+        let mut sum = [V::splat(0.0); M];
+        for v in 0..M {
+            sum[v] = V::load(q.as_ptr().add(v * V::COUNT));
+        }
+        for (&local, &output) in locals.iter().zip(outputs) {
+            let mut row = basis.wrapping_add(3 * local as usize * rank);
+            for &force in &r[3 * output as usize..3 * output as usize + 3] {
+                let force = V::splat(force);
+                for v in 0..M {
+                    sum[v] = Number::lanes::<V>(row.add(v * V::COUNT)).mul_add(force, sum[v]);
+                }
+                row = row.wrapping_add(rank);
+            }
+        }
+        for v in 0..M {
+            sum[v].store(q.as_mut_ptr().add(v * V::COUNT));
+        }
+    }
+}
