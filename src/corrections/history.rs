@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::local::Record;
 use super::motion::Motion;
 use crate::error::{Error, Result};
 use crate::stored;
@@ -27,6 +28,8 @@ pub struct History {
     pub motion: Motion,
     /// L-BFGS pairs, oldest first.
     pub pairs: Vec<Pair>,
+    /// Those of local iterations.
+    pub local: Vec<Record>,
 }
 
 impl History {
@@ -35,12 +38,16 @@ impl History {
     /// # Errors
     /// [`Error::Snapshot`].
     pub fn check(&self, len: usize, contacts: usize) -> Result<()> {
-        let History { motion, pairs } = self;
+        let History {
+            motion,
+            pairs,
+            local,
+        } = self;
         motion.check(len, contacts)?;
-        if pairs.len() > PAIRS {
+        if pairs.len().max(local.len()) > PAIRS {
             return Err(Error::Snapshot(format!(
                 "holds {} pairs of corrections, more than any scene has",
-                pairs.len()
+                pairs.len().max(local.len())
             )));
         }
         for Pair { step, change } in pairs {

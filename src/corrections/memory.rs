@@ -4,8 +4,6 @@
 //! Prescribed nodes are masked: their rows of `s` and `y` are left out of every product, so the pairs need not be dropped when the
 //! contact changes.
 
-mod recursion;
-
 use super::history::{PAIRS, Pair};
 use super::precondition::Env;
 use crate::error::Result;
@@ -13,7 +11,7 @@ use crate::kernels::vectors::{PartialSums, add_scaled, dots};
 use crate::memory::{self, HeldBytes};
 
 /// Room for the pairs of the last published state and for those of the step being made: a step that is refused leaves no trace.
-const SLOTS: usize = 2 * PAIRS;
+pub(super) const SLOTS: usize = 2 * PAIRS;
 
 /// The pairs, oldest first by `order`.
 #[derive(HeldBytes)]
@@ -24,9 +22,6 @@ pub struct Memory {
     order: Vec<usize>,
     /// The same of the last published state.
     published: Vec<usize>,
-    /// `U^T y` in the block bases, of the slots of which it is known.
-    coordinates: Vec<Vec<f32>>,
-    projected: [bool; SLOTS],
     /// `s_i . y_j` over all nodes, by slot, where `i` is not newer than `j`: the recursions ask for no others.
     products: Vec<[f64; SLOTS]>,
     /// The same without the masked nodes.
@@ -35,11 +30,11 @@ pub struct Memory {
 }
 
 impl Memory {
-    /// Room for vectors of `len` with `width` coordinates.
+    /// Room for vectors of `len`.
     ///
     /// # Errors
     /// [`crate::Error::OutOfMemory`].
-    pub fn new(len: usize, width: usize) -> Result<Memory> {
+    pub fn new(len: usize) -> Result<Memory> {
         let vectors = |len: usize| -> Result<Vec<Vec<f32>>> {
             (0..SLOTS)
                 .map(|_| memory::zeros(len, "L-BFGS pairs"))
@@ -48,8 +43,6 @@ impl Memory {
         Ok(Memory {
             steps: vectors(len)?,
             changes: vectors(len)?,
-            coordinates: vectors(width)?,
-            projected: [false; SLOTS],
             order: memory::room(SLOTS, "L-BFGS pairs")?,
             published: memory::room(SLOTS, "L-BFGS pairs")?,
             products: memory::filled(SLOTS, [0.0; SLOTS], "L-BFGS pairs")?,
@@ -139,7 +132,6 @@ impl Memory {
             self.products[i][slot] = value;
             self.masked[i][slot] = value;
         }
-        self.projected[slot] = false;
         if self.products[slot][slot] <= 0.0 {
             self.order.retain(|&other| other != slot);
         }
@@ -159,31 +151,6 @@ impl Memory {
         (used, count)
     }
 
-    /// `alpha_i = s_i . (g - sum_{j > i} alpha_j y_j) / (s_i . y_i)`, newest first, from `first = s . g`.
-    fn alpha(&self, used: &[usize], first: &[f64]) -> [f64; PAIRS] {
-        let mut alpha = [0.0f64; PAIRS];
-        for i in (0..used.len()).rev() {
-            let later: f64 = (i + 1..used.len())
-                .map(|j| alpha[j] * self.masked[used[i]][used[j]])
-                .sum();
-            alpha[i] = (first[i] - later) / self.masked[used[i]][used[i]];
-        }
-        alpha
-    }
-
-    /// `alpha_i - beta_i` with `beta_i = y_i . (z + sum_{j < i} (alpha_j - beta_j) s_j) / (s_i . y_i)`, oldest first, from
-    /// `first = y . z`.
-    fn weight(&self, used: &[usize], alpha: &[f64; PAIRS], first: &[f64]) -> [f64; PAIRS] {
-        let mut weight = [0.0f64; PAIRS];
-        for i in 0..used.len() {
-            let earlier: f64 = (0..i)
-                .map(|j| weight[j] * self.masked[used[j]][used[i]])
-                .sum();
-            weight[i] = alpha[i] - (first[i] + earlier) / self.masked[used[i]][used[i]];
-        }
-        weight
-    }
-
     /// `d = -H g` with `H` from the pairs around `precondition`; `q` is scratch. All `[K,3]`, `g` zero at masked nodes.
     pub fn direction(
         &mut self,
@@ -200,20 +167,48 @@ impl Memory {
         let mut first = [0.0f64; PAIRS];
         let first = &mut first[..count];
         dots(isa, pool, &views[..count], g, &mut self.partial, first)?;
-        let alpha = self.alpha(used, first);
+        let alpha = alpha(&self.masked, used, first);
         q.copy_from_slice(g);
         let views = self::views(&self.changes, used);
         let factors = alpha.map(|a| -a as f32);
         add_scaled(isa, pool, &views[..count], &factors[..count], q)?;
         precondition(q, d)?;
         dots(isa, pool, &views[..count], d, &mut self.partial, first)?;
-        let weight = self.weight(used, &alpha, first);
+        let weight = weight(&self.masked, used, &alpha, first);
         let views = self::views(&self.steps, used);
         let factors = weight.map(|w| w as f32);
         add_scaled(isa, pool, &views[..count], &factors[..count], d)?;
         d.iter_mut().for_each(|d| *d = -*d);
         Ok(())
     }
+}
+
+/// `alpha_i = s_i . (g - sum_{j > i} alpha_j y_j) / (s_i . y_i)`, newest first, from `first = s . g`; `products[i][j] = s_i . y_j`.
+pub(super) fn alpha(products: &[[f64; SLOTS]], used: &[usize], first: &[f64]) -> [f64; PAIRS] {
+    let mut alpha = [0.0f64; PAIRS];
+    for i in (0..used.len()).rev() {
+        let later: f64 = (i + 1..used.len())
+            .map(|j| alpha[j] * products[used[i]][used[j]])
+            .sum();
+        alpha[i] = (first[i] - later) / products[used[i]][used[i]];
+    }
+    alpha
+}
+
+/// `alpha_i - beta_i` with `beta_i = y_i . (z + sum_{j < i} (alpha_j - beta_j) s_j) / (s_i . y_i)`, oldest first, from
+/// `first = y . z`.
+pub(super) fn weight(
+    products: &[[f64; SLOTS]],
+    used: &[usize],
+    alpha: &[f64; PAIRS],
+    first: &[f64],
+) -> [f64; PAIRS] {
+    let mut weight = [0.0f64; PAIRS];
+    for i in 0..used.len() {
+        let earlier: f64 = (0..i).map(|j| weight[j] * products[used[j]][used[i]]).sum();
+        weight[i] = alpha[i] - (first[i] + earlier) / products[used[i]][used[i]];
+    }
+    weight
 }
 
 /// The vectors of some slots; entries beyond are empty.

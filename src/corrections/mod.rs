@@ -9,10 +9,12 @@
 
 mod body;
 mod estimate;
+mod far;
 mod free;
 mod history;
 mod input;
 mod integrate;
+mod local;
 mod memory;
 mod motion;
 mod oscillators;
@@ -36,6 +38,7 @@ use crate::prior::{CoarseSpace, PriorTable};
 use time_step::Diagonal;
 
 pub use body::Body;
+pub use far::FarField;
 pub use history::{History, PAIRS};
 pub use input::{Enough, Input, Report, SolverContext};
 pub use motion::Motion;
@@ -48,6 +51,8 @@ pub use time_step::{Integrator, TimeStep};
 pub struct Corrections {
     pub space: CoarseSpace,
     pub body: Body,
+    /// The elements that tools do not touch.
+    pub far: FarField,
     /// Steps as long as the bundle's.
     pub time_step: Arc<TimeStep>,
 }
@@ -70,9 +75,12 @@ impl Corrections {
             damping_per_s: material.damping_per_s,
         };
         let diagonal = Diagonal::of(mesh, material)?;
+        let space = CoarseSpace::parse(&files.tensors(&entry.file)?, prior)?;
+        let body = Body::new(mesh, material, &diagonal, Isa::detect())?;
         Ok(Corrections {
-            space: CoarseSpace::parse(&files.tensors(&entry.file)?, prior)?,
-            body: Body::new(mesh, material, &diagonal, Isa::detect())?,
+            far: FarField::new(&body, mesh, material.moduli(), prior, &space)?,
+            space,
+            body,
             time_step: Arc::new(TimeStep::new(&diagonal, integrator)?),
         })
     }

@@ -8,7 +8,6 @@ use super::precondition::Env;
 use crate::error::Result;
 use crate::kernels::Pool;
 use crate::kernels::parts::Parts;
-use crate::kernels::vectors::piece_add;
 use crate::kernels::vectors::{PartialSums, piece_dots};
 
 /// Numbers a piece.
@@ -65,99 +64,43 @@ pub(super) fn sum_of_squares(count: usize, value: impl Fn(usize) -> f32) -> f32 
     lanes.into_iter().sum::<f32>() + rest.sum::<f32>()
 }
 
-/// `r += sum_i factors_i ys_i`, `t = w D^-1 r`, `work_i = ys_i . t`.
-pub(super) fn smooth(
+/// `u += change` where nodes are free, and `- w D^-1 r` with it where they are not near; the change is lost at held ones.
+pub(super) fn add_smoothed(
     env: Env<'_>,
-    (ys, factors): (&[&[f32]], &[f32]),
-    [r, t]: [&mut [f32]; 2],
-    partial: &mut PartialSums,
-    work: &mut [f64],
+    r: &[f32],
+    change: &mut [f32],
+    u: &mut [f32],
+    is_near: impl Fn(u32) -> bool + Sync,
 ) -> Result<()> {
-    let (len, count) = (r.len(), ys.len());
-    let mut sums = Sums::new(partial, len, count);
-    let (r, t, parts) = (Parts::new(r), Parts::new(t), sums.parts());
+    let len = u.len();
+    let (u, change) = (Parts::new(u), Parts::new(change));
     let blocks = &env.time_step.inverse_blocks;
-    each(env.pool, len, count + 4, |range, piece| {
+    each(env.pool, len, 4, |range, _| {
         // SAFETY: these parts belong to this piece alone.
-        let (r, t, sums) = unsafe {
-            (
-                r.part(range.start, range.len()),
-                t.part(range.start, range.len()),
-                parts.part(piece * count, count),
-            )
-        };
-        piece_add(env.isa, ys, factors, range.start, r);
-        diagonal(&blocks[range.start / 3..range.end / 3], r, t);
-        piece_dots(env.isa, ys, t, range.start, sums);
-    })?;
-    for (at, work) in work.iter_mut().enumerate() {
-        *work = sums.total(at);
-    }
-    Ok(())
-}
-
-/// `t = w D^-1 r`.
-fn diagonal(blocks: &[[f32; 6]], r: &[f32], t: &mut [f32]) {
-    let w = DIAGONAL_WEIGHT;
-    let rows = r.as_chunks::<3>().0.iter();
-    for ((t, r), [xx, xy, xz, yy, yz, zz]) in
-        t.as_chunks_mut::<3>().0.iter_mut().zip(rows).zip(blocks)
-    {
-        t[0] = w * (xx * r[0] + xy * r[1] + xz * r[2]);
-        t[1] = w * (xy * r[0] + yy * r[1] + yz * r[2]);
-        t[2] = w * (xz * r[0] + yz * r[1] + zz * r[2]);
-    }
-}
-
-/// `t = -(t + sum_i factors_i rows_i)`.
-pub(super) fn negative_sum(
-    env: Env<'_>,
-    rows: &[&[f32]],
-    factors: &[f32],
-    t: &mut [f32],
-) -> Result<()> {
-    let len = t.len();
-    let parts = Parts::new(t);
-    each(env.pool, len, rows.len() + 1, |range, _| {
-        // SAFETY: this part belongs to this piece alone.
-        let t = unsafe { parts.part(range.start, range.len()) };
-        piece_add(env.isa, rows, factors, range.start, t);
-        t.iter_mut().for_each(|t| *t = -*t);
-    })
-}
-
-/// `d += change` where nodes are free and zero where they are held, `moved = u + d`; gives `g . d` and `d . d`.
-pub(super) fn advance(
-    env: Env<'_>,
-    [u, g]: [&[f32]; 2],
-    d: &mut [f32],
-    moved: &mut [f32],
-    partial: &mut PartialSums,
-) -> Result<[f64; 2]> {
-    let len = d.len();
-    let mut sums = Sums::new(partial, len, 2);
-    let (d, moved, parts) = (Parts::new(d), Parts::new(moved), sums.parts());
-    each(env.pool, len, 4, |range, piece| {
-        // SAFETY: these parts belong to this piece alone; `moved` holds the change.
-        let (d, moved, sums) = unsafe {
-            (
-                d.part(range.start, range.len()),
-                moved.part(range.start, range.len()),
-                parts.part(2 * piece, 2),
-            )
-        };
-        d.iter_mut()
-            .zip(&*moved)
-            .for_each(|(d, change)| *d += change);
-        hold(env, &range, d);
-        let u = &u[range.clone()];
-        for ((moved, u), d) in moved.iter_mut().zip(u).zip(&*d) {
-            *moved = u + d;
+        let [u, change] =
+            unsafe { [&u, &change].map(|field| field.part(range.start, range.len())) };
+        let w = DIAGONAL_WEIGHT;
+        let rows = r[range.clone()].as_chunks::<3>().0.iter();
+        let nodes = range.start / 3..range.end / 3;
+        for ((change, r), node) in change
+            .as_chunks_mut::<3>()
+            .0
+            .iter_mut()
+            .zip(rows)
+            .zip(nodes)
+        {
+            if !is_near(node as u32) {
+                let [xx, xy, xz, yy, yz, zz] = blocks[node];
+                change[0] -= w * (xx * r[0] + xy * r[1] + xz * r[2]);
+                change[1] -= w * (xy * r[0] + yy * r[1] + yz * r[2]);
+                change[2] -= w * (xz * r[0] + yz * r[1] + zz * r[2]);
+            }
         }
-        let rows: [&[f32]; 2] = [&g[range.clone()], d];
-        piece_dots(env.isa, &rows, d, 0, sums);
-    })?;
-    Ok([sums.total(0), sums.total(1)])
+        hold(env, &range, change);
+        u.iter_mut()
+            .zip(&*change)
+            .for_each(|(u, change)| *u += change);
+    })
 }
 
 /// `u += change` where nodes are free; the change is lost at held ones.

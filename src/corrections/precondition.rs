@@ -10,6 +10,7 @@
 //!
 //! All products with fields go through the prior's block-wise bases: `U^T` once, the modes and columns on coordinates, `U` once.
 
+mod near;
 mod response;
 
 use super::body::Body;
@@ -65,6 +66,11 @@ pub struct Preconditioner {
     natural: Vec<f32>,
     galerkin: ContactFactor,
     galerkin_free: Vec<f64>,
+    /// That in f32 and its inverse, and forces on columns as two lists.
+    galerkin_narrow: Vec<f32>,
+    galerkin_inverse: Vec<f32>,
+    load_dofs: Vec<u32>,
+    load_forces: Vec<f32>,
     widened: Vec<f32>,
     pub(super) coordinates: Vec<f32>,
     on_modes: Vec<f32>,
@@ -94,6 +100,7 @@ impl Preconditioner {
                 .filter(|node| env.prior.in_domain[*node as usize]);
             memory::collected(nodes.len(), inside, WHAT)?
         };
+        let galerkin_free = env.space.galerkin(kappa)?;
         Ok(Preconditioner {
             inertial_compliance: env.space.inertial_compliance(kappa)?,
             moved_freely: env.space.moved_freely(kappa)?,
@@ -109,7 +116,14 @@ impl Preconditioner {
             lost: memory::room(room, WHAT)?,
             natural: memory::room(room * env.space.natural_count(), WHAT)?,
             galerkin: ContactFactor::try_with_capacity(count)?,
-            galerkin_free: env.space.galerkin(kappa)?,
+            galerkin_narrow: {
+                let narrow = galerkin_free.iter().map(|&value| value as f32);
+                memory::collected(galerkin_free.len(), narrow, WHAT)?
+            },
+            galerkin_free,
+            galerkin_inverse: env.space.galerkin_inverse(kappa, env.isa)?,
+            load_dofs: memory::room(dofs, WHAT)?,
+            load_forces: memory::room(dofs, WHAT)?,
             widened: memory::zeros(6 * env.prior.widest_block(), WHAT)?,
             coordinates: memory::zeros(env.prior.width(), WHAT)?,
             on_modes: memory::zeros(count, WHAT)?,
@@ -254,11 +268,20 @@ impl Preconditioner {
             &self.coordinates,
             &mut self.on_modes,
         )?;
+        if !self.dofs.is_empty() {
+            self.contact_work(env)?;
+        }
+        self.solve_coarse(env);
+        self.spread(env)
+    }
+
+    /// `solved` and `forces` from `on_modes = Phi^T r` and `at_contact = W^T r`.
+    fn solve_coarse(&mut self, env: Env<'_>) {
+        let isa = env.isa;
         if self.dofs.is_empty() {
             self.galerkin.solve(isa, &self.on_modes, &mut self.solved);
-            return self.spread(env);
+            return;
         }
-        self.contact_work(env)?;
         // Psi^T r = Phi^T r - Phi_C^T A_k,CC^-1 W^T r.
         self.compliance
             .solve(isa, &self.at_contact, &mut self.forces);
@@ -277,7 +300,6 @@ impl Preconditioner {
         }
         self.compliance
             .solve(isa, &self.at_contact, &mut self.forces);
-        self.spread(env)
     }
 
     /// `at_contact = W^T r` of the columns in contact, from `coordinates = U^T r` and `on_modes = Phi^T r`.

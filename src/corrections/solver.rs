@@ -4,6 +4,7 @@ use std::time::Instant;
 
 use super::history::{History, PAIRS, Pair};
 use super::input::{Input, Report, SolverContext};
+use super::local::Local;
 use super::memory::Memory;
 use super::motion::Motion;
 use super::oscillators::Oscillators;
@@ -28,7 +29,7 @@ pub(super) const MOST_PARTS: u32 = 16;
 pub struct ImplicitSolver {
     pub(super) preconditioner: Preconditioner,
     pub(super) memory: Memory,
-    scratch: elements::Scratch,
+    pub(super) scratch: elements::Scratch,
     /// Past of the last published state, and of the one being made.
     pub motion: Motion,
     pub(super) next: Motion,
@@ -47,12 +48,8 @@ pub struct ImplicitSolver {
     pub(super) partial: PartialSums,
     /// Where the tissue would be, at the nodes of the domain.
     pub(super) touched: Vec<f32>,
-    /// `U^T g` of the state that stands.
-    pub(super) projected: Vec<f32>,
-    /// Whether that is known.
-    pub(super) is_projected: bool,
-    /// `d . d` of the last iteration.
-    pub(super) moved: f64,
+    /// Made at the first step that tools drive.
+    pub(super) local: Option<Box<Local>>,
     pub(super) free: Oscillators,
 }
 
@@ -67,7 +64,7 @@ impl ImplicitSolver {
         let field = || memory::zeros(len, "the corrections of a scene");
         Ok(ImplicitSolver {
             preconditioner: Preconditioner::new(env)?,
-            memory: Memory::new(len, env.prior.width())?,
+            memory: Memory::new(len)?,
             scratch: (env.body.forces.scratch(context.pool.threads())).map_err(|_| {
                 Error::OutOfMemory("no memory for the element forces of a scene".into())
             })?,
@@ -87,9 +84,7 @@ impl ImplicitSolver {
             drift: field()?,
             partial: PartialSums::with_room(len, PAIRS)?,
             touched: field()?,
-            projected: memory::zeros(env.prior.width(), "the corrections of a scene")?,
-            is_projected: false,
-            moved: 0.0,
+            local: None,
             free: Oscillators::default(),
         })
     }
@@ -97,14 +92,37 @@ impl ImplicitSolver {
     /// Back to rest.
     pub fn reset(&mut self) {
         self.motion.clear();
+        self.clear_pairs();
+        self.commit_pairs();
+    }
+
+    /// Forgets the pairs, in the step being made.
+    pub(super) fn clear_pairs(&mut self) {
         self.memory.clear();
+        if let Some(local) = &mut self.local {
+            local.pairs.clear();
+        }
+    }
+
+    /// Back to the pairs of the last published state.
+    pub(super) fn begin_pairs(&mut self) {
+        self.memory.begin();
+        if let Some(local) = &mut self.local {
+            local.pairs.begin();
+        }
+    }
+
+    fn commit_pairs(&mut self) {
         self.memory.commit();
+        if let Some(local) = &mut self.local {
+            local.pairs.commit();
+        }
     }
 
     /// The state being made becomes the last.
     pub fn commit(&mut self) {
         std::mem::swap(&mut self.motion, &mut self.next);
-        self.memory.commit();
+        self.commit_pairs();
     }
 
     /// The state being made is one that no equation of motion led to: without velocity.
@@ -113,7 +131,7 @@ impl ImplicitSolver {
         self.next.velocity_before.fill(0.0);
         self.next.inertia.fill(0.0);
         self.next.truncated_mm = 0.0;
-        self.memory.clear();
+        self.clear_pairs();
     }
 
     /// A copy of what is remembered, with the forces at `contacts` nodes.
@@ -129,23 +147,41 @@ impl ImplicitSolver {
         Ok(History {
             motion,
             pairs: self.memory.pairs()?,
+            local: match &self.local {
+                Some(local) => local.pairs.copy()?,
+                None => Vec::new(),
+            },
         })
     }
 
     /// Takes what was remembered.
     ///
     /// # Errors
-    /// A panic on another thread of the pool.
+    /// [`Error::Snapshot`] for pairs of another body, a panic on another thread of the pool.
     pub fn restore(&mut self, context: SolverContext<'_>, history: &History) -> Result<()> {
-        let History { motion, pairs } = history;
+        let History {
+            motion,
+            pairs,
+            local,
+        } = history;
+        let corrections = context.corrections;
+        let sizes = [
+            corrections.body.mass.len(),
+            corrections.body.forces.chunk_count(),
+            corrections.space.count(),
+        ];
+        local.iter().try_for_each(|record| record.check(sizes))?;
         self.motion.take(motion)?;
-        self.memory.clear();
-        self.memory.commit();
+        self.clear_pairs();
+        self.commit_pairs();
         for Pair { step, change } in pairs {
             self.memory.store(context.env(), step, 1.0, change)?;
         }
         self.memory.commit();
-        Ok(())
+        if local.is_empty() {
+            return Ok(());
+        }
+        Local::made(&mut self.local, context)?.pairs.restore(local)
     }
 
     /// Velocities of a state that the model predicted and nothing corrected.

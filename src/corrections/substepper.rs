@@ -156,7 +156,7 @@ impl ImplicitSolver {
         substepper: Option<&mut Substepper>,
         next: &mut [f32],
     ) -> Result<Report> {
-        self.memory.begin();
+        self.begin_pairs();
         let enough = Enough {
             iterations: input.enough.iterations.max(LEAST_SWING),
             ..input.enough
@@ -171,11 +171,11 @@ impl ImplicitSolver {
             context.time_step.integrator.step_s as f32,
         )?;
         self.exchange(substepper);
-        self.memory.clear();
+        self.clear_pairs();
         let result = self.swing_each(context, input, substepper);
         self.exchange(substepper);
         // The pairs are those of shorter steps.
-        self.memory.begin();
+        self.begin_pairs();
         let report = result?;
         self.arrive(context, input, substepper, next)?;
         Ok(report)

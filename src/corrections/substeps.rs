@@ -107,7 +107,7 @@ impl ImplicitSolver {
         self.exchange(substepper);
         problem.exchange(&mut substeps.responses);
         // The pairs are those of shorter steps.
-        self.memory.begin();
+        self.begin_pairs();
         std::mem::swap(&mut problem.past, &mut substeps.past);
         let report = result?;
         self.arrive(context, input, substepper, next)?;
@@ -132,7 +132,7 @@ impl ImplicitSolver {
         let mut told = Report::default();
         let mut lost = false;
         torn.fill(false);
-        self.memory.clear();
+        self.clear_pairs();
         for part in 1..=count {
             let way = part as f32 / count as f32;
             on_their_way.clear();
@@ -163,7 +163,7 @@ impl ImplicitSolver {
                 enough,
                 ..*input
             };
-            let report = self.make_loaded(short, &own, problem, next, |_| ())?;
+            let report = self.make_loaded(short, &own, problem, next, false)?;
             for (torn, held) in torn.iter_mut().zip(&mut problem.next.tools) {
                 *torn |= held.reading.torn;
                 held.reading.torn = *torn;

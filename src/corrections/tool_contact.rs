@@ -15,12 +15,9 @@
 //! would be at the nodes of the domain, and an iteration decodes once and projects once.
 
 mod fall_back;
-mod iteration;
-
-use std::time::Instant;
+mod rounds;
 
 use super::input::{Input, Report, SolverContext};
-use super::memory::Memory;
 use super::passes;
 use super::precondition::{Env, Preconditioner, mask_held};
 use super::solver::{ImplicitSolver, MOST_PARTS, SMALLEST_DET};
@@ -28,7 +25,7 @@ use crate::contact::{Compliance, ContactProblem, State};
 use crate::error::Result;
 
 /// A step that leaves tissue deeper inside of a tool than this has lost the contact, mm.
-const SUNK_MM: f32 = 0.9;
+pub(super) const SUNK_MM: f32 = 0.9;
 
 /// Evaluations of the element forces that a step may take beyond [`EVALUATIONS`] for each of its iterations.
 const MORE_EVALUATIONS: u32 = 6;
@@ -54,21 +51,23 @@ impl ImplicitSolver {
         problem: &mut ContactProblem,
         next: &mut [f32],
     ) -> Result<Report> {
-        self.make_loaded(context, input, problem, next, Memory::begin)
+        self.make_loaded(context, input, problem, next, true)
     }
 
-    /// The same with the pairs that `remember` leaves; once more where a grasp tears off, which then holds nothing at the end.
+    /// The same with the pairs of the last published state, or with those that there are; once more where a grasp tears off, which then holds nothing at the end.
     pub(super) fn make_loaded(
         &mut self,
         context: SolverContext<'_>,
         input: &Input<'_>,
         problem: &mut ContactProblem,
         next: &mut [f32],
-        remember: impl Fn(&mut Memory),
+        from_published: bool,
     ) -> Result<Report> {
         let _awake = context.pool.keep_awake();
         let mut made = |problem: &mut ContactProblem| {
-            remember(&mut self.memory);
+            if from_published {
+                self.begin_pairs();
+            }
             let report = self.balance_loaded(context, input, problem, next)?;
             problem.finish(State {
                 rest: input.rest,
@@ -158,46 +157,6 @@ impl ImplicitSolver {
         self.evaluate(context, input, at, report)
     }
 
-    /// The iterations from a guess; returns the length of what they left unbalanced.
-    fn improve_loaded(
-        &mut self,
-        context: SolverContext<'_>,
-        input: &Input<'_>,
-        problem: &mut ContactProblem,
-        at: &mut Iterate<'_>,
-        report: &mut Report,
-    ) -> Result<f64> {
-        let env = context.env();
-        let touched = problem.touched(&env.body.held);
-        self.preconditioner.engage(env, touched)?;
-        let start = self.unbalanced(env, problem, at.g)?;
-        let mut size = start;
-        let mut failed = 0;
-        for iteration in 0..input.enough.iterations {
-            let until = input.enough.until;
-            let late = until.is_some_and(|until| Instant::now() >= until);
-            let spent = late || is_spent(input, problem, report, input.enough.iterations);
-            if !is_sound(size, at.det) || (iteration > 0 && spent) {
-                break;
-            }
-            let better = self.improve_at(context, input, problem, at, 1.0, report)?;
-            report.iterations += 1;
-            failed = if better { 0 } else { failed + 1 };
-            if failed > 1 {
-                break;
-            }
-            let before = size;
-            size = self.unbalanced(env, problem, at.g)?;
-            let moved = self.moved / (at.u.len() / 3) as f64;
-            report.remaining_mm = (moved.sqrt() * size / before.max(f64::MIN_POSITIVE)) as f32;
-            if self.suffices(iteration + 1, report.remaining_mm, input.enough) {
-                break;
-            }
-        }
-        report.residual = (size / start.max(f64::MIN_POSITIVE)) as f32;
-        Ok(size)
-    }
-
     /// `F(u)` and det F of a state that no iteration led to.
     fn evaluate(
         &mut self,
@@ -207,21 +166,8 @@ impl ImplicitSolver {
         report: &mut Report,
     ) -> Result<()> {
         (at.det, _) = self.residual(context, [input.last, at.u, at.u], at.g, report)?;
-        self.is_projected = false;
         at.sunk_mm = None;
         Ok(())
-    }
-
-    /// `F - B^T f`, left in `q`; returns its length.
-    fn unbalanced(&mut self, env: Env<'_>, problem: &ContactProblem, g: &[f32]) -> Result<f64> {
-        self.q.copy_from_slice(g);
-        each_free_load(problem, &env.body.held, |node, force| {
-            let at = 3 * node as usize;
-            for (r, f) in self.q[at..at + 3].iter_mut().zip(force) {
-                *r -= f;
-            }
-        });
-        Ok(passes::square(env, &self.q, &mut self.partial)?.sqrt())
     }
 
     /// The first guess: the last state, the free motion of the natural modes, and the linear response to the tools, in parts of
@@ -256,9 +202,9 @@ impl ImplicitSolver {
                     self.settle(env, at.u)?;
                     self.evaluate(context, input, at, report)?;
                     if at.det > SMALLEST_DET {
-                        self.preconditioner.prescribe(env, &[])?;
-                        self.unbalanced(env, problem, at.g)?;
-                        self.improve_at(context, input, problem, at, way, report)?;
+                        self.begin_round(context, input, problem, false, at)?;
+                        self.improve_at(context, input, problem, at, way)?;
+                        self.end_round(context, input, at)?;
                     }
                     self.preconditioner.coordinates.fill(0.0);
                 }
@@ -365,13 +311,4 @@ fn compliance<'a>(
             preconditioner.inertial_compliance(),
         )),
     }
-}
-
-/// Calls with each free node's share of the tools' loads, µN.
-fn each_free_load(problem: &ContactProblem, held: &[bool], mut take: impl FnMut(u32, [f32; 3])) {
-    problem.each_load(|node, force| {
-        if !held[node as usize] {
-            take(node, force.to_array().map(|f| 1e3 * f));
-        }
-    });
 }

@@ -9,7 +9,9 @@ use half::f16;
 
 use super::table::PriorTable;
 use crate::bundle::TensorFile;
-use crate::error::Result;
+use crate::error::{Error, Result};
+use crate::kernels::Isa;
+use crate::kernels::contact::ContactFactor;
 use crate::kernels::rows::Stored;
 use crate::memory::{self, HeldBytes};
 
@@ -82,6 +84,19 @@ impl CoarseSpace {
         }
     }
 
+    /// The block coordinates `[Q]` of a mode.
+    pub fn read_mode(&self, mode: usize, q: &mut [f32]) {
+        let own = &self.modes[mode * q.len()..(mode + 1) * q.len()];
+        for (q, value) in q.iter_mut().zip(own) {
+            *q = value.to_f32();
+        }
+    }
+
+    /// `Phi^T M Phi [r,r]`, g.
+    pub fn mass(&self) -> &[f32] {
+        &self.mass
+    }
+
     /// Modes, `r`.
     pub fn count(&self) -> usize {
         self.rows.len()
@@ -149,6 +164,26 @@ impl CoarseSpace {
             (1.0 / (mass * (f64::from(omega).powi(2) + kappa))) as f32
         });
         memory::collected(self.natural_count(), moved, WHAT)
+    }
+
+    /// The inverse of [`CoarseSpace::galerkin`], mm/µN.
+    ///
+    /// # Errors
+    /// [`crate::Error::Bundle`] where it has none, [`crate::Error::OutOfMemory`].
+    pub fn galerkin_inverse(&self, kappa: f64, isa: Isa) -> Result<Vec<f32>> {
+        let (count, galerkin) = (self.count(), self.galerkin(kappa)?);
+        let mut factor = ContactFactor::try_with_capacity(count)?;
+        factor
+            .factor(isa, &self.rows, |upper| upper.copy_from_slice(&galerkin))
+            .map_err(|error| Error::bundle("corrections.safetensors", error.to_string()))?;
+        let mut inverse = memory::zeros(count * count, WHAT)?;
+        let mut unit = memory::zeros(count, WHAT)?;
+        for (at, row) in inverse.chunks_exact_mut(count).enumerate() {
+            unit[at] = 1.0;
+            factor.solve(isa, &unit, row);
+            unit[at] = 0.0;
+        }
+        Ok(inverse)
     }
 
     /// `Phi^T (K + kappa M) Phi [r,r]`, µN/mm.

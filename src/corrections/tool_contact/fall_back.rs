@@ -21,7 +21,7 @@ impl ImplicitSolver {
         report: &mut Report,
     ) -> Result<()> {
         report.fell_back = true;
-        self.memory.clear();
+        self.clear_pairs();
         problem.take_guess();
         at.u.copy_from_slice(&self.guess);
         let guessed = lost_by(input, problem, at.u);

@@ -77,11 +77,11 @@ impl Core {
     /// Bytes of a saved state at most.
     pub(super) fn most_bytes(&self) -> usize {
         let count = self.mesh.node_count();
-        // Three velocities, contact forces, pairs.
+        // Three velocities, contact forces, pairs; of local ones six fields, and numbers of chunks and modes.
         let history = self
             .corrected
             .as_ref()
-            .map(|_| (4 + 2 * PAIRS) * 12 * count);
+            .map(|_| (4 + 8 * PAIRS) * 12 * count + PAIRS * 16384);
         let (contacts, fields) = (2 * 16 * count, 2 * 12 * count);
         let rest = history.unwrap_or(0) + self.tool_bytes() + 2048;
         self.engine.record_bytes() + contacts + fields + rest

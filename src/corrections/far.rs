@@ -1,0 +1,207 @@
+//! What of the elements' nonlinearity acts far from the tools: that of one element a cluster, at the cluster's mean deformation gradient.
+//!
+//! Far from the tools the field is smooth, but it is not small: an organ that a tool presses turns as a whole about where it is held, and
+//! linear elasticity takes a rotation for a strain. So the far elements add, to their linear forces, what their law adds to it at the mean
+//! of `F` over clusters of some hundred elements,
+//!
+//! ```text
+//! F_c = I + 1/V_c sum_e v_e grad u_e        f ~ K u + sum_c V_c g(F_c) : dF_c/du        g = P - (mu (H + H^T) + lambda tr H I)
+//! ```
+//!
+//! with the stress `P` of the law and `H = F - I`. The mean of a gradient over a cluster is a sum over the cluster's border, so the tables
+//! below are short; on the modes it is a matrix.
+
+use ::elements::{Deformation, Moduli, stress, vector};
+
+use super::body::Body;
+use crate::bundle::Mesh;
+use crate::error::Result;
+use crate::kernels::rows::{RowPlan, decode_rows};
+use crate::kernels::{Isa, Pool};
+use crate::memory::{self, HeldBytes};
+use crate::prior::{CoarseSpace, PriorTable};
+
+const WHAT: &str = "the far field of the corrections";
+/// Clusters that a body has at least, where its chunks are as many.
+const CLUSTERS: usize = 96;
+/// Numbers of a deformation gradient.
+pub(super) const NINE: usize = 9;
+
+/// The chunks of a body as what a far field is made of; made once a model.
+#[derive(HeldBytes)]
+pub struct FarField {
+    #[held(skip)]
+    pub(super) moduli: Moduli,
+    /// Chunks of a cluster, one after another.
+    pub(super) group: usize,
+    /// Rest volume of each chunk times its stiffness over the material's, mm³.
+    pub(super) volumes: Vec<f64>,
+    /// Where each chunk's nodes start in the two lists below `[C+1]`.
+    starts: Vec<u32>,
+    /// Nodes of each chunk whose displacement changes its mean gradient, those of its border.
+    nodes: Vec<u32>,
+    /// `sum_e v_e grad N` of such a node, mm².
+    weights: Vec<[f32; 3]>,
+    /// `sum_e v_e grad Phi` of each chunk on the modes `[C,9,r]`, rows of the gradient one after another.
+    pub(super) on_modes: Vec<f32>,
+    /// How many chunks have elements at a node `[K]`.
+    pub(super) chunks_at: Vec<u16>,
+    /// Box of each chunk at rest, mm.
+    pub(super) boxes: Vec<[[f32; 3]; 2]>,
+}
+
+impl FarField {
+    /// Prepares the chunks of a body, and their mean gradients on the modes of its coarse space.
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
+    pub fn new(
+        body: &Body,
+        mesh: &Mesh,
+        moduli: Moduli,
+        prior: &PriorTable,
+        space: &CoarseSpace,
+    ) -> Result<FarField> {
+        let elements = &body.forces;
+        let count = elements.chunk_count();
+        let mut own = FarField {
+            moduli,
+            group: (count / CLUSTERS).max(1),
+            volumes: memory::room(count, WHAT)?,
+            starts: memory::room(count + 1, WHAT)?,
+            nodes: Vec::new(),
+            weights: Vec::new(),
+            on_modes: memory::zeros(count * NINE * space.count(), WHAT)?,
+            chunks_at: memory::filled(mesh.node_count(), 0, WHAT)?,
+            boxes: memory::room(count, WHAT)?,
+        };
+        own.starts.push(0);
+        for chunk in 0..count {
+            own.push(body, mesh, chunk)?;
+        }
+        own.decode(prior, space)?;
+        Ok(own)
+    }
+
+    fn push(&mut self, body: &Body, mesh: &Mesh, chunk: usize) -> Result<()> {
+        let nodes = body.forces.chunk_nodes(chunk);
+        let mut sums = memory::filled(nodes.len(), [0.0f64; 3], WHAT)?;
+        let (mut volume, mut largest) = (0.0, 0.0f64);
+        for element in body.forces.chunk_tetrahedra(chunk) {
+            volume += element.volume;
+            let [a, b, c] = element.gradients;
+            let first = [0, 1, 2].map(|k| -(a[k] + b[k] + c[k]));
+            for (corner, gradient) in element.corners.into_iter().zip([first, a, b, c]) {
+                for (sum, value) in sums[corner as usize].iter_mut().zip(gradient) {
+                    *sum += element.volume * value;
+                    largest = largest.max((element.volume * value).abs());
+                }
+            }
+        }
+        self.volumes.push(volume);
+        memory::reserve(&mut self.nodes, nodes.len(), WHAT)?;
+        memory::reserve(&mut self.weights, nodes.len(), WHAT)?;
+        let mut bounds = [[f32::MAX; 3], [f32::MIN; 3]];
+        for (&node, sum) in nodes.iter().zip(sums) {
+            self.chunks_at[node as usize] += 1;
+            let at = &mesh.positions[3 * node as usize..][..3];
+            for (axis, &x) in at.iter().enumerate() {
+                bounds[0][axis] = bounds[0][axis].min(x);
+                bounds[1][axis] = bounds[1][axis].max(x);
+            }
+            // Inside of the chunk the shares of a node's elements cancel.
+            let matters = sum.iter().any(|value| value.abs() > 1e-5 * largest);
+            if matters && !body.held[node as usize] {
+                self.nodes.push(node);
+                self.weights.push(sum.map(|value| value as f32));
+            }
+        }
+        self.boxes.push(bounds);
+        self.starts.push(self.nodes.len() as u32);
+        Ok(())
+    }
+
+    /// The mean gradients on the modes.
+    fn decode(&mut self, prior: &PriorTable, space: &CoarseSpace) -> Result<()> {
+        let count = space.count();
+        let held = 3 * self.chunks_at.len();
+        let all = memory::collected(self.chunks_at.len(), 0..self.chunks_at.len() as u32, WHAT)?;
+        let plan = RowPlan::try_region(&prior.basis(), &all, false)?;
+        let (mut q, mut field) = (
+            memory::zeros(prior.width(), WHAT)?,
+            memory::zeros(held, WHAT)?,
+        );
+        let pool = Pool::new(1)?;
+        for mode in 0..count {
+            space.read_mode(mode, &mut q);
+            decode_rows(Isa::detect(), &pool, &prior.basis(), &plan, &q, &mut field)?;
+            for chunk in 0..self.volumes.len() {
+                let gradient = self.gradient(chunk, &field);
+                for (row, value) in gradient.into_iter().enumerate() {
+                    self.on_modes[(chunk * NINE + row) * count + mode] = value;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// `sum_e v_e grad u` of a chunk under a field `[K,3]` that is zero at held nodes, mm³.
+    pub(super) fn gradient(&self, chunk: usize, field: &[f32]) -> [f32; NINE] {
+        let range = self.starts[chunk] as usize..self.starts[chunk + 1] as usize;
+        let mut sum = [0.0f32; NINE];
+        for (&node, weight) in self.nodes[range.clone()].iter().zip(&self.weights[range]) {
+            let u = &field[3 * node as usize..][..3];
+            for (row, u) in sum.chunks_exact_mut(3).zip(u) {
+                for (sum, weight) in row.iter_mut().zip(weight) {
+                    *sum += u * weight;
+                }
+            }
+        }
+        sum
+    }
+
+    /// Clusters.
+    pub(super) fn clusters(&self) -> usize {
+        self.volumes.len().div_ceil(self.group)
+    }
+
+    /// Chunks of a cluster.
+    pub(super) fn chunks_of(&self, cluster: usize) -> std::ops::Range<usize> {
+        let first = cluster * self.group;
+        first..(first + self.group).min(self.volumes.len())
+    }
+
+    /// What the law adds to the linear stress at `H = F - I`, Pa, and det F.
+    pub(super) fn added_stress(&self, h: [f64; NINE]) -> ([f64; NINE], f64) {
+        let mut f = [[0.0; 3]; 3];
+        for (i, row) in f.iter_mut().enumerate() {
+            for (j, value) in row.iter_mut().enumerate() {
+                *value = h[3 * i + j] + if i == j { 1.0 } else { 0.0 };
+            }
+        }
+        let cofactor = [
+            vector::cross(f[1], f[2]),
+            vector::cross(f[2], f[0]),
+            vector::cross(f[0], f[1]),
+        ];
+        let det = vector::dot(f[0], cofactor[0]);
+        let state = Deformation {
+            f,
+            cofactor,
+            det,
+            invariant: f.iter().map(|row| vector::dot(*row, *row)).sum(),
+        };
+        let stress = stress(&state, self.moduli);
+        let lambda = self.moduli.bulk_pa - 2.0 / 3.0 * self.moduli.shear_pa;
+        let trace = h[0] + h[4] + h[8];
+        let mut added = [0.0; NINE];
+        for i in 0..3 {
+            for j in 0..3 {
+                let both = h[3 * i + j] + h[3 * j + i];
+                let volume = if i == j { lambda * trace } else { 0.0 };
+                added[3 * i + j] = stress[i][j] - self.moduli.shear_pa * both - volume;
+            }
+        }
+        (added, det)
+    }
+}

@@ -1,0 +1,256 @@
+//! One local iteration: a direction of L-BFGS with the contact's answer in it, and how far along it.
+
+use super::near::WHAT;
+use super::step::{add, dot, resize};
+use super::{Gain, Lent, Local, each_load};
+use crate::contact::{Compliance, ContactProblem, State};
+use crate::corrections::precondition::{DIAGONAL_WEIGHT, Env};
+use crate::corrections::solver::{SHORTENINGS, SLOPE, SMALLEST_DET};
+use crate::corrections::tool_contact::SUNK_MM;
+use crate::error::Result;
+use crate::memory;
+
+impl Local {
+    /// One iteration with the tools at part `way` of their way.
+    pub(in crate::corrections) fn improve(
+        &mut self,
+        lent: &mut Lent<'_>,
+        problem: &mut ContactProblem,
+        base: &[f32],
+        way: f32,
+        sunk: impl Fn(&mut ContactProblem, &[f32]) -> f32,
+    ) -> Result<Gain> {
+        let env = lent.context.env();
+        self.descend(lent, problem)?;
+        self.touch(lent, problem, base, way)?;
+        let stiff = &mut self.d_stiff;
+        lent.preconditioner.stiffen(env, &self.d.c, stiff)?;
+        self.near.linear(env, &self.d.v, &mut self.d_linear);
+        self.measure_direction(env);
+        let work = self.work(problem);
+        let slope = self.residual.over(&self.d) - work;
+        let (mut t, mut gain) = (1.0f32, Gain::default());
+        for attempt in 0..=SHORTENINGS {
+            self.look(base, t);
+            let det = self.evaluate(lent, t)?;
+            let slope_new = self.next.over(&self.d) - work;
+            let sunk_mm = match det > SMALLEST_DET {
+                true => sunk(problem, &self.trial),
+                false => f32::MAX,
+            };
+            // An iteration may not lose the contact, unless it had been lost.
+            let is_kept = sunk_mm <= 0.5 * SUNK_MM || {
+                self.look(base, 0.0);
+                sunk_mm <= sunk(problem, &self.trial)
+            };
+            if is_kept && 0.5 * (slope + slope_new) <= SLOPE * slope {
+                self.accept(lent, t)?;
+                self.det = det;
+                gain = Gain {
+                    is_better: true,
+                    sunk_mm,
+                };
+                if t < 1.0 {
+                    problem.blend(t);
+                }
+                break;
+            }
+            if attempt == SHORTENINGS || slope >= 0.0 {
+                self.look(base, 0.0);
+                problem.undo();
+                self.pairs.clear();
+                break;
+            }
+            t *= if is_kept && slope_new.is_finite() {
+                (-slope / (slope_new - slope)).clamp(0.1, 0.5) as f32
+            } else {
+                0.5
+            };
+        }
+        Ok(gain)
+    }
+
+    /// The direction of L-BFGS, without what the contact makes of it.
+    fn descend(&mut self, lent: &mut Lent<'_>, problem: &ContactProblem) -> Result<()> {
+        let env = lent.context.env();
+        self.reduced.take(&self.residual)?;
+        let (near, reduced) = (&self.near, &mut self.reduced);
+        each_load(problem, near, |place, force| {
+            add(-1.0, &force, &mut reduced.r[place..]);
+            add(-1.0, &force, &mut reduced.eta[place..]);
+        });
+        let recursion = self.pairs.descend(env.isa, &mut self.reduced);
+        // z = w D^-1 r on the inside nodes, and the coarse level.
+        self.d.clear(&self.near)?;
+        let rows = self.reduced.r.as_chunks::<3>().0.iter();
+        let nodes = self.near.nodes.iter();
+        for ((t, r), &node) in (self.d.t.as_chunks_mut::<3>().0.iter_mut())
+            .zip(rows)
+            .zip(nodes)
+        {
+            let [xx, xy, xz, yy, yz, zz] = env.time_step.inverse_blocks[node as usize];
+            t[0] = DIAGONAL_WEIGHT * (xx * r[0] + xy * r[1] + xz * r[2]);
+            t[1] = DIAGONAL_WEIGHT * (xy * r[0] + yy * r[1] + yz * r[2]);
+            t[2] = DIAGONAL_WEIGHT * (xz * r[0] + yz * r[1] + zz * r[2]);
+        }
+        self.precondition(lent)?;
+        self.pairs.ascend(env.isa, recursion, &mut self.d);
+        Ok(())
+    }
+
+    /// The coarse level of the reduced residual, added to the direction.
+    fn precondition(&mut self, lent: &mut Lent<'_>) -> Result<()> {
+        let env = lent.context.env();
+        let preconditioner = &mut *lent.preconditioner;
+        let (near, q) = (&self.near, &mut self.room.q);
+        // Phi^T r.
+        near.project(env, &self.reduced.eta, q);
+        preconditioner.on_modes_in(env, &near.ranges, q, &mut self.on_modes);
+        add(1.0, &self.reduced.modal, &mut self.on_modes);
+        // Of a column's response: (A_k E)_S^T r_S + E^T Phi G^-1 (Phi^T r - Phi_S^T r_S).
+        resize(&mut self.room.field, 3 * near.free)?;
+        self.room.field[..3 * near.inside].copy_from_slice(&self.reduced.r);
+        near.project(env, &self.room.field, q);
+        let inside = &mut self.more_on_modes;
+        preconditioner.on_modes_in(env, &near.ranges, q, inside);
+        memory::replace(&mut self.columns, preconditioner.dofs(), WHAT)?;
+        resize(&mut self.on_columns, self.columns.len())?;
+        let known = (q.as_slice(), inside.as_slice());
+        preconditioner.on_columns(
+            env,
+            &self.columns,
+            &near.ranges,
+            known,
+            &mut self.on_columns,
+        );
+        for (value, whole) in inside.iter_mut().zip(&self.on_modes) {
+            *value = whole - *value;
+        }
+        preconditioner.respond_on_modes(env, inside, &mut self.solved)?;
+        for (work, &dof) in self.on_columns.iter_mut().zip(&self.columns) {
+            let own = env.space.at_contact(dof as usize);
+            *work += 1e3 * dot(own, &self.solved) as f32;
+        }
+        let (c, forces) = preconditioner.coarse_on(env, &self.on_modes, &self.on_columns);
+        self.d.c.copy_from_slice(c);
+        self.loads.clear();
+        memory::fit(&mut self.loads, forces.len(), WHAT)?;
+        let loads = self.columns.iter().copied().zip(forces.iter().copied());
+        self.loads.extend(loads);
+        self.respond(lent)?;
+        self.decode_direction(lent)
+    }
+
+    /// Adds the response to `loads` to the direction, but for its `v`.
+    fn respond(&mut self, lent: &mut Lent<'_>) -> Result<()> {
+        let env = lent.context.env();
+        let preconditioner = &mut *lent.preconditioner;
+        preconditioner.work_of_modes(env, &self.loads, &mut self.more_on_modes);
+        preconditioner.respond_on_modes(env, &self.more_on_modes, &mut self.solved)?;
+        add(1.0, &self.solved, &mut self.d.c);
+        // What is near of it beside these modes.
+        self.solved.iter_mut().for_each(|c| *c = -*c);
+        let (ranges, q) = (&self.near.ranges, &mut self.room.q);
+        preconditioner.near_coordinates(env, &self.solved, &self.loads, ranges, q);
+        resize(&mut self.room.field, 3 * self.near.nodes.len())?;
+        self.near.decode(env, q, &mut self.room.field)?;
+        add(1.0, &self.room.field, &mut self.d.t);
+        Ok(())
+    }
+
+    /// The contact where the direction leads to: the direction takes on the response to what it changes.
+    fn touch(
+        &mut self,
+        lent: &mut Lent<'_>,
+        problem: &mut ContactProblem,
+        base: &[f32],
+        way: f32,
+    ) -> Result<()> {
+        let env = lent.context.env();
+        self.look(base, 1.0);
+        let state = State {
+            rest: lent.input.rest,
+            u: &self.trial,
+            start: lent.input.last,
+        };
+        let compliance = Compliance {
+            prior: lent.context.prior,
+            held: &env.body.held,
+            inertia: Some((env.space, lent.preconditioner.inertial_compliance())),
+        };
+        let change = problem.solve(compliance, state, way)?;
+        self.loads.clear();
+        memory::fit(&mut self.loads, change.dofs.len(), WHAT)?;
+        let loads = change
+            .dofs
+            .iter()
+            .copied()
+            .zip(change.forces.iter().copied());
+        self.loads.extend(loads.filter(|load| load.1 != 0.0));
+        if !self.loads.is_empty() {
+            self.respond(lent)?;
+        }
+        self.decode_direction(lent)
+    }
+
+    /// `v` of the direction.
+    pub(super) fn decode_direction(&mut self, lent: &mut Lent<'_>) -> Result<()> {
+        let env = lent.context.env();
+        let (ranges, q) = (&self.near.ranges, &mut self.room.q);
+        let preconditioner = &mut *lent.preconditioner;
+        preconditioner.near_coordinates(env, &self.d.c, &[], ranges, q);
+        self.near.decode(env, q, &mut self.d.v)
+    }
+
+    /// Root mean square of the direction, weighted by mass.
+    fn measure_direction(&mut self, env: Env<'_>) {
+        let mut square = 0.0f64;
+        let rows = self.d.t.as_chunks::<3>().0.iter();
+        for (t, &node) in rows.zip(&self.near.nodes) {
+            let own: f32 = t.iter().map(|t| t * t).sum();
+            square += f64::from(own) * f64::from(env.body.mass[node as usize]);
+        }
+        let count = env.space.count();
+        let rows = env.space.mass().chunks_exact(count);
+        for (row, value) in rows.zip(&self.d.c) {
+            square += dot(row, &self.d.c) * f64::from(*value);
+        }
+        self.moved_mm = (square.max(0.0) / self.mass_g).sqrt() as f32;
+    }
+
+    /// Work of the tools' loads over the direction, nJ.
+    fn work(&self, problem: &ContactProblem) -> f64 {
+        let mut sum = 0.0f64;
+        let inside = 3 * self.near.inside;
+        each_load(problem, &self.near, |place, force| {
+            for (axis, force) in force.into_iter().enumerate() {
+                let at = place + axis;
+                let mut d = self.d.v[at];
+                if at < inside {
+                    d += self.d.t[at];
+                }
+                sum += f64::from(d) * f64::from(force);
+            }
+        });
+        sum
+    }
+
+    /// The state at part `t` of the direction stands; it and what it changes are a pair.
+    fn accept(&mut self, lent: &mut Lent<'_>, t: f32) -> Result<()> {
+        let env = lent.context.env();
+        if t != 1.0 {
+            self.d.scale(t);
+            // The bits that a layout of the pair would have.
+            self.decode_direction(lent)?;
+        }
+        add(t, &self.d_linear, &mut self.linear);
+        add(t, &self.d_stiff, &mut self.stiff);
+        self.reduced.take(&self.next)?;
+        self.reduced.add(-1.0, &self.residual);
+        self.now.add(1.0, &self.d);
+        std::mem::swap(&mut self.residual, &mut self.next);
+        let (near, room) = (&self.near, &mut self.room);
+        let pair = (&self.d, &self.reduced);
+        (self.pairs).store(env, near, lent.preconditioner, room, &self.about, pair)
+    }
+}

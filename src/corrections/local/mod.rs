@@ -1,0 +1,318 @@
+//! Local iterations: all degrees of freedom near the tools, modes and responses elsewhere; an iteration costs what the tools touch.
+//!
+//! From a base `u_0`, whose residual is known at every node, the state is
+//!
+//! ```text
+//! u = u_0 + t + Phi c        t on the inside nodes S only
+//! r_S = F_S(u)                by the near elements
+//! Phi^T r = p_0 + Phi^T eta + G c + far(c)        eta = what the near elements have added since, less (K + kappa M) Phi c
+//! ```
+//!
+//! with `G = Phi^T (K + kappa M) Phi`, and `far` what the law adds in the far clusters ([`super::far`]): a Galerkin method on the modes and the
+//! nodes near the tools. The response to a force is all of it near, `t = (A_k E f - Phi c)_S`, and elsewhere what the modes have of it, `c =
+//! G^-1 Phi^T E f`. An iteration is L-BFGS around the two levels of the preconditioner, the contact solved in it, a search along the line.
+//! The field is decoded once, at the end, when the far nodes get the preconditioner's first level of the base. `docs/decisions/023-local-iterations.md` says
+//! what was tried.
+
+mod clusters;
+mod iteration;
+mod near;
+mod pairs;
+mod record;
+mod step;
+
+use ::elements::Scratch;
+
+use self::clusters::Clusters;
+use self::near::{NearSet, WHAT};
+use self::pairs::{Pairs, Room};
+use self::step::{Change, Step, add, dot, resize};
+use super::input::{Input, SolverContext};
+use super::precondition::Preconditioner;
+use crate::contact::ContactProblem;
+use crate::error::Result;
+use crate::memory::{self, HeldBytes};
+
+pub use self::record::Record;
+
+/// What a solver lends to the iterations of a step.
+pub(super) struct Lent<'a> {
+    pub context: SolverContext<'a>,
+    pub input: &'a Input<'a>,
+    pub preconditioner: &'a mut Preconditioner,
+    pub scratch: &'a mut Scratch,
+    /// What BDF2 takes from the past `[K,3]`, µN.
+    pub drift: &'a [f32],
+}
+
+/// A state whose residual is known at every node.
+#[derive(Clone, Copy)]
+pub(super) struct Base<'a> {
+    pub u: &'a [f32],
+    pub residual: &'a [f32],
+}
+
+/// How an iteration went.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Gain {
+    /// It led to another state.
+    pub is_better: bool,
+    /// How deep tools and tissue lie in each other there, mm.
+    pub sunk_mm: f32,
+}
+
+/// A scene's own part.
+#[derive(HeldBytes)]
+pub struct Local {
+    near: NearSet,
+    pub(super) pairs: Pairs,
+    clusters: Clusters,
+    /// Chunks about the tools, without those of older pairs.
+    about: Vec<u32>,
+    /// Since the base.
+    now: Step,
+    residual: Change,
+    /// Forces of the near elements at the free nodes, inertia with them at the inside ones, at the base and of the next state, and what of the change
+    /// is linear in `c`; `[3 free]`.
+    base: Vec<f32>,
+    inner: Vec<f32>,
+    linear: Vec<f32>,
+    /// `Phi^T r` at the base, and `G c` since.
+    base_modes: Vec<f32>,
+    stiff: Vec<f32>,
+    /// The direction, and what is linear in it.
+    d: Step,
+    d_linear: Vec<f32>,
+    d_stiff: Vec<f32>,
+    /// The residual without the loads, as the first recursion changes it; that of the next state.
+    reduced: Change,
+    next: Change,
+    /// Where the tissue would be `[K,3]`; at nodes that are not near, the base.
+    trial: Vec<f32>,
+    /// Of the whole body.
+    mass_g: f64,
+    /// Nodes that the tools touch, while a round begins.
+    pub(super) touched: Vec<u32>,
+    /// Smallest det F of the far elements at the base.
+    far_det: f32,
+    /// Smallest det F, and the root mean square that the last direction moves, mm.
+    pub(super) det: f32,
+    pub(super) moved_mm: f32,
+    room: Room,
+    on_modes: Vec<f32>,
+    more_on_modes: Vec<f32>,
+    solved: Vec<f32>,
+    on_columns: Vec<f32>,
+    columns: Vec<u32>,
+    loads: Vec<(u32, f32)>,
+}
+
+impl Local {
+    /// Buffers.
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
+    pub fn new(context: SolverContext<'_>) -> Result<Local> {
+        let env = context.env();
+        let far = &context.corrections.far;
+        let (count, width) = (env.space.count(), env.prior.width());
+        let columns = (3 * env.prior.contact_nodes.len()).min(768);
+        let modes = || memory::zeros(count, WHAT);
+        Ok(Local {
+            near: NearSet::new(env, far)?,
+            pairs: Pairs::new(count)?,
+            clusters: Clusters::new(far, count)?,
+            about: memory::room(far.volumes.len(), WHAT)?,
+            now: Step::with_modes(count)?,
+            residual: Change::with_modes(count)?,
+            base: Vec::new(),
+            inner: Vec::new(),
+            linear: Vec::new(),
+            base_modes: modes()?,
+            stiff: modes()?,
+            d: Step::with_modes(count)?,
+            d_linear: Vec::new(),
+            d_stiff: modes()?,
+            reduced: Change::with_modes(count)?,
+            next: Change::with_modes(count)?,
+            trial: memory::zeros(3 * env.body.mass.len(), WHAT)?,
+            mass_g: env.body.mass.iter().map(|&mass| f64::from(mass)).sum(),
+            touched: memory::room(256, WHAT)?,
+            far_det: 1.0,
+            det: 1.0,
+            moved_mm: 0.0,
+            room: Room {
+                q: memory::zeros(width, WHAT)?,
+                ..Room::default()
+            },
+            on_modes: modes()?,
+            more_on_modes: modes()?,
+            solved: modes()?,
+            on_columns: memory::room(columns, WHAT)?,
+            columns: memory::room(columns, WHAT)?,
+            loads: memory::room(columns, WHAT)?,
+        })
+    }
+
+    /// That of a solver, made at the first step that tools drive.
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
+    pub(super) fn made<'a>(
+        slot: &'a mut Option<Box<Local>>,
+        context: SolverContext<'_>,
+    ) -> Result<&'a mut Local> {
+        let local = match slot.take() {
+            Some(local) => local,
+            None => memory::boxed(Local::new(context)?, WHAT)?,
+        };
+        Ok(slot.insert(local))
+    }
+
+    /// Starts from `base`, with `touched` nodes. The preconditioner holds the columns of these nodes.
+    pub(super) fn begin(&mut self, lent: &mut Lent<'_>, base: Base<'_>) -> Result<()> {
+        let env = lent.context.env();
+        let far = &lent.context.corrections.far;
+        let rest = lent.input.rest;
+        let none = std::iter::empty();
+        // What is about the tools now lives as long as the pairs of this step do.
+        self.near.mark(far, rest, &self.touched, none);
+        self.about.clear();
+        self.about.extend(self.near.marked());
+        self.near
+            .mark(far, rest, &self.touched, self.pairs.chunks());
+        if self.near.take_marked(env, far)? {
+            self.pairs.forget_layout();
+            let modes = env.space.count();
+            self.clusters.leave_out(far, &self.near.is_near, modes);
+        }
+        self.pairs
+            .lay_out(env, &self.near, lent.preconditioner, &mut self.room)?;
+        self.now.clear(&self.near)?;
+        self.residual.clear(&self.near)?;
+        resize(&mut self.base, 3 * self.near.free)?;
+        resize(&mut self.linear, 3 * self.near.free)?;
+        resize(&mut self.d_linear, 3 * self.near.free)?;
+        resize(&mut self.inner, 3 * self.near.free)?;
+        lent.preconditioner.project(env, base.residual)?;
+        let q = &lent.preconditioner.coordinates;
+        lent.preconditioner.on_modes(env, q, &mut self.base_modes)?;
+        self.stiff.fill(0.0);
+        self.d_stiff.fill(0.0);
+        self.clusters.begin(far, &self.near, base.u);
+        self.trial.copy_from_slice(base.u);
+        self.d.clear(&self.near)?;
+        self.evaluate(lent, 0.0)?;
+        std::mem::swap(&mut self.residual, &mut self.next);
+        // What the base has is not what has come since.
+        self.base.copy_from_slice(&self.inner);
+        self.residual.eta.fill(0.0);
+        let dets = lent.scratch.smallest_by_chunk().iter();
+        let dets = dets
+            .zip(&self.near.is_near)
+            .map(|(det, is_near)| match is_near {
+                true => f32::MAX,
+                false => *det,
+            });
+        self.far_det = dets.fold(f32::MAX, f32::min);
+        Ok(())
+    }
+
+    /// Whether all nodes that the tools push are inside.
+    pub(super) fn holds_loads(&self, problem: &ContactProblem, held: &[bool]) -> bool {
+        let mut holds = true;
+        problem.each_load(|node, _| holds &= held[node as usize] || self.near.holds(node));
+        holds
+    }
+
+    /// `|r_S - loads|`, µN: what is out of balance near the tools.
+    pub(super) fn unbalanced(&mut self, problem: &ContactProblem) -> Result<f64> {
+        memory::replace(&mut self.reduced.r, &self.residual.r, WHAT)?;
+        let (near, r) = (&self.near, &mut self.reduced.r);
+        each_load(problem, near, |place, force| {
+            add(-1.0, &force, &mut r[place..])
+        });
+        Ok(dot(r, r).sqrt())
+    }
+
+    /// Puts the near nodes at part `t` of the direction.
+    fn look(&mut self, base: &[f32], t: f32) {
+        let inside = 3 * self.near.inside;
+        for (place, &node) in self.near.nodes[..self.near.free].iter().enumerate() {
+            for axis in 0..3 {
+                let (at, from) = (3 * place + axis, 3 * node as usize + axis);
+                let mut moved = self.now.v[at];
+                let mut along = if t == 0.0 { 0.0 } else { self.d.v[at] };
+                if at < inside {
+                    moved += self.now.t[at];
+                    along += if t == 0.0 { 0.0 } else { self.d.t[at] };
+                }
+                self.trial[from] = base[from] + moved + t * along;
+            }
+        }
+    }
+
+    /// The residual of the state at part `t` of the direction, where [`Local::look`] has put it, into `next`; gives the smallest det F.
+    fn evaluate(&mut self, lent: &mut Lent<'_>, t: f32) -> Result<f32> {
+        let env = lent.context.env();
+        let far = &lent.context.corrections.far;
+        self.next.clear(&self.near)?;
+        let (near, inner) = (&self.near, &mut self.inner);
+        let det = near.internal(&env.body.forces, &self.trial, lent.scratch, inner);
+        let kappa = env.time_step.integrator.kappa() as f32;
+        let rows = inner.as_chunks_mut::<3>().0.iter_mut();
+        for (r, &node) in rows.zip(&near.nodes[..near.inside]) {
+            let inertia = kappa * env.body.mass[node as usize];
+            for (axis, r) in r.iter_mut().enumerate() {
+                let at = 3 * node as usize + axis;
+                *r += lent.drift[at] + inertia * (self.trial[at] - lent.input.last[at]);
+            }
+        }
+        self.next.r.copy_from_slice(&inner[..3 * near.inside]);
+        for (at, eta) in self.next.eta.iter_mut().enumerate() {
+            let linear = self.linear[at] + t * self.d_linear[at];
+            *eta = inner[at] - self.base[at] - linear;
+        }
+        self.more_on_modes.copy_from_slice(&self.now.c);
+        add(t, &self.d.c, &mut self.more_on_modes);
+        let (c, modal) = (&self.more_on_modes, &mut self.next.modal);
+        let far_det = self.clusters.added_on_modes(env, far, c, modal)?;
+        add(1.0, &self.base_modes, modal);
+        add(1.0, &self.stiff, modal);
+        add(t, &self.d_stiff, modal);
+        Ok(det.min(far_det).min(self.far_det))
+    }
+
+    /// The whole field into `u`, which holds the base, of which `residual` is; `scratch [K,3]`.
+    pub(super) fn settle(
+        &mut self,
+        lent: &mut Lent<'_>,
+        residual: &[f32],
+        scratch: &mut [f32],
+        u: &mut [f32],
+    ) -> Result<()> {
+        let env = lent.context.env();
+        let preconditioner = &mut *lent.preconditioner;
+        preconditioner.take_coordinates(env, &self.now.c)?;
+        preconditioner.decode(env, scratch)?;
+        for (place, t) in self.now.t.as_chunks::<3>().0.iter().enumerate() {
+            let node = self.near.nodes[place] as usize;
+            add(1.0, t, &mut scratch[3 * node..][..3]);
+        }
+        let near = &self.near;
+        super::passes::add_smoothed(env, residual, scratch, u, |node| near.holds(node))
+    }
+}
+
+/// Calls with the place (as an index of fields) and the share, µN, of each free near node in the tools' loads.
+fn each_load(problem: &ContactProblem, near: &NearSet, mut take: impl FnMut(usize, [f32; 3])) {
+    problem.each_load(|node, force| {
+        if near.holds(node) {
+            let place = near.place(node).unwrap_or_default();
+            take(3 * place, force.to_array().map(|f| 1e3 * f));
+        }
+    });
+}
+
+#[cfg(test)]
+mod tests;

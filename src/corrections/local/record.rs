@@ -1,0 +1,90 @@
+//! What is kept of a pair of local iterations from step to step, and in snapshots.
+
+use serde::{Deserialize, Serialize};
+
+use super::near::{NearSet, WHAT};
+use super::step::{Change, Step};
+use crate::error::Result;
+use crate::memory::{self, HeldBytes};
+use crate::stored;
+
+/// What is kept of a pair.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, HeldBytes)]
+pub struct Record {
+    /// Chunks about the tools when it was made, and all that were near.
+    pub chunks: Vec<u32>,
+    pub near: Vec<u32>,
+    /// Inside nodes then.
+    pub nodes: Vec<u32>,
+    /// `[3 S]` each.
+    #[serde(with = "stored")]
+    pub t: Vec<f32>,
+    #[serde(with = "stored")]
+    pub r: Vec<f32>,
+    /// `[3 free]`, the inside nodes first.
+    #[serde(with = "stored")]
+    pub eta: Vec<f32>,
+    #[serde(with = "stored")]
+    pub c: Vec<f32>,
+    #[serde(with = "stored")]
+    pub modal: Vec<f32>,
+}
+
+impl Record {
+    /// Checks what was read.
+    pub fn check(&self, [nodes, chunks, modes]: [usize; 3]) -> Result<()> {
+        let ascends = |list: &[u32], end: usize| {
+            list.windows(2).all(|pair| pair[0] < pair[1])
+                && list.last().is_none_or(|&last| (last as usize) < end)
+        };
+        let sound = ascends(&self.chunks, chunks)
+            && ascends(&self.near, chunks)
+            && self.eta.len() >= 3 * self.nodes.len()
+            && ascends(&self.nodes, nodes);
+        if !sound {
+            return Err(crate::Error::Snapshot(
+                "holds corrections of another body".into(),
+            ));
+        }
+        for (list, len) in [
+            (&self.t, 3 * self.nodes.len()),
+            (&self.r, 3 * self.nodes.len()),
+            (&self.eta, self.eta.len()),
+            (&self.c, modes),
+            (&self.modal, modes),
+        ] {
+            stored::check(list, len)?;
+        }
+        Ok(())
+    }
+}
+
+impl Record {
+    pub(super) fn take(&mut self, other: &Record) -> Result<()> {
+        memory::replace(&mut self.chunks, &other.chunks, WHAT)?;
+        memory::replace(&mut self.near, &other.near, WHAT)?;
+        memory::replace(&mut self.nodes, &other.nodes, WHAT)?;
+        memory::replace(&mut self.t, &other.t, WHAT)?;
+        memory::replace(&mut self.r, &other.r, WHAT)?;
+        memory::replace(&mut self.eta, &other.eta, WHAT)?;
+        memory::replace(&mut self.c, &other.c, WHAT)?;
+        memory::replace(&mut self.modal, &other.modal, WHAT)
+    }
+
+    pub(super) fn fill(
+        &mut self,
+        near: &NearSet,
+        chunks: &[u32],
+        step: &Step,
+        change: &Change,
+    ) -> Result<()> {
+        memory::replace(&mut self.chunks, chunks, WHAT)?;
+        memory::replace(&mut self.near, &near.chunks, WHAT)?;
+        memory::replace(&mut self.nodes, &near.nodes[..near.inside], WHAT)?;
+        memory::replace(&mut self.t, &step.t, WHAT)?;
+        memory::replace(&mut self.r, &change.r, WHAT)?;
+        memory::replace(&mut self.eta, &change.eta, WHAT)?;
+        memory::replace(&mut self.c, &step.c, WHAT)?;
+        memory::replace(&mut self.modal, &change.modal, WHAT)
+    }
+}

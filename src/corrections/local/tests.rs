@@ -1,0 +1,186 @@
+//! What the local products say of a state against the residual of the whole body there.
+
+use std::path::Path;
+
+use super::*;
+use crate::bundle::{BundleFiles, Mesh};
+use crate::corrections::input::{Enough, Report};
+use crate::corrections::{Corrections, ImplicitSolver};
+use crate::field::ContactSet;
+use crate::kernels::random::Random;
+use crate::kernels::{Isa, Pool};
+use crate::prior::PriorTable;
+
+/// A solver at rest, in contact with nothing, of a shipped bundle.
+struct Bench {
+    mesh: Mesh,
+    prior: PriorTable,
+    corrections: Corrections,
+    pool: Pool,
+    contact: ContactSet,
+    zero: Vec<f32>,
+}
+
+impl Bench {
+    fn open() -> Bench {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("onnx/brain-coarse-reduced");
+        let files = BundleFiles::open(&folder).unwrap();
+        let manifest = &files.manifest;
+        let file = files.tensors(&manifest.mesh.file).unwrap();
+        let mesh = Mesh::parse(&file, manifest.boundary).unwrap();
+        let entry = manifest.prior.as_ref().unwrap();
+        let prior = PriorTable::open(&files, entry, &mesh).unwrap();
+        Bench {
+            corrections: Corrections::open(&files, &mesh, Some(&prior)).unwrap(),
+            pool: Pool::new(1).unwrap(),
+            contact: ContactSet::default(),
+            zero: vec![0.0; 3 * mesh.node_count()],
+            prior,
+            mesh,
+        }
+    }
+
+    fn context(&self) -> SolverContext<'_> {
+        SolverContext {
+            isa: Isa::detect(),
+            pool: &self.pool,
+            prior: &self.prior,
+            corrections: &self.corrections,
+            time_step: &self.corrections.time_step,
+        }
+    }
+
+    fn input(&self) -> Input<'_> {
+        Input {
+            rest: &self.mesh.positions,
+            contact: &self.contact,
+            last: &self.zero,
+            before: &self.zero,
+            still: false,
+            enough: Enough {
+                iterations: 3,
+                error_mm: 0.0,
+                until: None,
+            },
+        }
+    }
+
+    /// A field of modes `[K,3]`, about `size_mm` at its largest.
+    fn smooth(&self, random: &mut Random, size_mm: f32) -> (Vec<f32>, Vec<f32>) {
+        let env = self.context().env();
+        let mut preconditioner = Preconditioner::new(env).unwrap();
+        let mut c = random.normal(env.space.count(), 1.0);
+        // The first modes are the largest.
+        let weights = (0..c.len()).map(|at| 1.0 / (1.0 + at as f32));
+        c.iter_mut()
+            .zip(weights)
+            .for_each(|(c, weight)| *c *= weight);
+        let mut field = self.zero.clone();
+        preconditioner.take_coordinates(env, &c).unwrap();
+        preconditioner.decode(env, &mut field).unwrap();
+        crate::corrections::precondition::mask_held(&env.body.held, &mut field);
+        let largest = field.iter().fold(0.0f32, |most, u| most.max(u.abs()));
+        let factor = size_mm / largest;
+        c.iter_mut().for_each(|c| *c *= factor);
+        field.iter_mut().for_each(|u| *u *= factor);
+        (c, field)
+    }
+}
+
+fn relative(found: &[f32], wanted: &[f32], change: f64) -> f64 {
+    let mut difference = found.to_vec();
+    add(-1.0, wanted, &mut difference);
+    dot(&difference, &difference).sqrt() / change
+}
+
+/// Errors of `r_S` and `Phi^T r` over what they change, after a step of `t` and modes from a deformed base.
+fn errors(bench: &Bench, base_mm: f32, step_mm: f32) -> [f64; 2] {
+    let (context, input) = (bench.context(), bench.input());
+    let env = context.env();
+    let mut random = Random::new(11);
+    let mut solver = ImplicitSolver::new(context).unwrap();
+    let mut report = Report::default();
+    let (_, u) = bench.smooth(&mut random, base_mm);
+    let mut r = bench.zero.clone();
+    let still = bench.zero.clone();
+    solver
+        .residual(context, [&still, &u, &u], &mut r, &mut report)
+        .unwrap();
+    Local::made(&mut solver.local, context).unwrap();
+    let middle = bench.mesh.domain_nodes[bench.mesh.domain_nodes.len() / 2];
+    let local = solver.local.as_deref_mut().unwrap();
+    local.touched = vec![middle];
+    solver.preconditioner.engage(env, &[middle]).unwrap();
+    let mut lent = Lent {
+        context,
+        input: &input,
+        preconditioner: &mut solver.preconditioner,
+        scratch: &mut solver.scratch,
+        drift: &solver.drift,
+    };
+    let base = Base {
+        u: &u,
+        residual: &r,
+    };
+    local.begin(&mut lent, base).unwrap();
+    assert!(local.near.inside > 50 && local.near.nodes.len() < bench.mesh.node_count() / 2);
+
+    let (c, _) = bench.smooth(&mut random, step_mm);
+    local.d.clear(&local.near).unwrap();
+    local.d.c.copy_from_slice(&c);
+    local.d.t = random.normal(3 * local.near.inside, 0.05 * step_mm);
+    local.decode_direction(&mut lent).unwrap();
+    let stiff = &mut local.d_stiff;
+    lent.preconditioner.stiffen(env, &c, stiff).unwrap();
+    local.near.linear(env, &local.d.v, &mut local.d_linear);
+    local.look(&u, 1.0);
+    local.evaluate(&mut lent, 1.0).unwrap();
+    let mut found = vec![0.0; env.space.count()];
+    local.near.project(env, &local.next.eta, &mut local.room.q);
+    let ranges = &local.near.ranges;
+    lent.preconditioner
+        .on_modes_in(env, ranges, &local.room.q, &mut found);
+    add(1.0, &local.next.modal, &mut found);
+
+    // The same state of the whole body.
+    local.now.add(1.0, &local.d);
+    let (mut whole, mut scratch) = (u.clone(), bench.zero.clone());
+    local
+        .settle(&mut lent, &bench.zero, &mut scratch, &mut whole)
+        .unwrap();
+    let at_base = local.base_modes.clone();
+    let (near, r_found) = (local.near.nodes.clone(), local.next.r.clone());
+    let before = local.base.clone();
+    let inside = local.near.inside;
+    solver
+        .residual(context, [&still, &whole, &whole], &mut r, &mut report)
+        .unwrap();
+    let r_whole: Vec<f32> = near[..inside]
+        .iter()
+        .flat_map(|&node| r[3 * node as usize..][..3].to_vec())
+        .collect();
+    solver.preconditioner.project(env, &r).unwrap();
+    let q = solver.preconditioner.coordinates.clone();
+    let mut wanted = found.clone();
+    solver
+        .preconditioner
+        .on_modes(env, &q, &mut wanted)
+        .unwrap();
+    let change = relative(&wanted, &at_base, 1.0);
+    let change_near = relative(&r_whole, &before[..3 * inside], 1.0);
+    [
+        relative(&r_found, &r_whole, change_near),
+        relative(&found, &wanted, change),
+    ]
+}
+
+#[test]
+fn the_products_are_those_of_the_whole_body() {
+    let bench = Bench::open();
+    // Small steps from rest: all but the rounding.
+    let [near, modes] = errors(&bench, 0.01, 0.01);
+    assert!(near < 1e-3 && modes < 2e-3, "at rest: {near:e}, {modes:e}");
+    // From a body that has turned: near exact, far the nonlinearity of the clusters.
+    let [near, modes] = errors(&bench, 4.0, 0.5);
+    assert!(near < 1e-3 && modes < 0.1, "turned: {near:e}, {modes:e}");
+}

@@ -1,0 +1,175 @@
+//! The iterations of a step, in rounds: each from a base whose residual is known everywhere.
+
+use std::time::Instant;
+
+use super::{Iterate, is_sound, is_spent, sunk};
+use crate::contact::ContactProblem;
+use crate::corrections::input::{Input, Report, SolverContext};
+use crate::corrections::local::{Base, Lent, Local};
+use crate::corrections::solver::ImplicitSolver;
+use crate::error::Result;
+use crate::memory;
+
+/// Iterations from one base at most: the far field is that of the base, in all but its clusters.
+const ROUND: u32 = 16;
+
+/// What the iterations of a step have made.
+#[derive(Default)]
+struct Made {
+    iterations: u32,
+    /// One after another that led nowhere.
+    failed: u32,
+    start: f64,
+    size: f64,
+    is_enough: bool,
+}
+
+impl ImplicitSolver {
+    /// The iterations from a guess; returns the length of what they left unbalanced near the tools.
+    pub(super) fn improve_loaded(
+        &mut self,
+        context: SolverContext<'_>,
+        input: &Input<'_>,
+        problem: &mut ContactProblem,
+        at: &mut Iterate<'_>,
+        report: &mut Report,
+    ) -> Result<f64> {
+        let mut made = Made::default();
+        loop {
+            self.begin_round(context, input, problem, true, at)?;
+            self.improve_round(context, input, problem, at, (&mut made, report))?;
+            self.end_round(context, input, at)?;
+            if made.is_enough || made.iterations >= input.enough.iterations {
+                break;
+            }
+            self.evaluate(context, input, at, report)?;
+        }
+        report.residual = (made.size / made.start.max(f64::MIN_POSITIVE)) as f32;
+        Ok(made.size)
+    }
+
+    /// Iterations from one base.
+    fn improve_round(
+        &mut self,
+        context: SolverContext<'_>,
+        input: &Input<'_>,
+        problem: &mut ContactProblem,
+        at: &mut Iterate<'_>,
+        (made, report): (&mut Made, &mut Report),
+    ) -> Result<()> {
+        made.size = self.unbalanced(problem)?;
+        if made.iterations == 0 {
+            made.start = made.size;
+        }
+        let first = made.iterations;
+        made.is_enough = true;
+        while made.iterations < input.enough.iterations {
+            let until = input.enough.until;
+            let late = until.is_some_and(|until| Instant::now() >= until);
+            let spent = late || is_spent(input, problem, report, input.enough.iterations);
+            if !is_sound(made.size, at.det) || (made.iterations > 0 && spent) {
+                return Ok(());
+            }
+            let better = self.improve_at(context, input, problem, at, 1.0)?;
+            report.iterations += 1;
+            made.iterations += 1;
+            made.failed = if better { 0 } else { made.failed + 1 };
+            if made.failed > 1 {
+                return Ok(());
+            }
+            let before = made.size;
+            made.size = self.unbalanced(problem)?;
+            let moved = f64::from(self.local.as_ref().map_or(0.0, |local| local.moved_mm));
+            report.remaining_mm = (moved * made.size / before.max(f64::MIN_POSITIVE)) as f32;
+            if self.suffices(made.iterations, report.remaining_mm, input.enough) {
+                return Ok(());
+            }
+            let holds = (self.local.as_ref())
+                .is_none_or(|local| local.holds_loads(problem, &context.env().body.held));
+            if !holds || made.iterations - first == ROUND {
+                made.is_enough = false;
+                return Ok(());
+            }
+        }
+        Ok(())
+    }
+
+    /// Makes `at` the base of local iterations; with `touched` nodes in the coarse space, where they are to be.
+    pub(super) fn begin_round(
+        &mut self,
+        context: SolverContext<'_>,
+        input: &Input<'_>,
+        problem: &mut ContactProblem,
+        touched: bool,
+        at: &Iterate<'_>,
+    ) -> Result<()> {
+        let env = context.env();
+        let nodes = problem.touched(&env.body.held);
+        let engaged = if touched { nodes } else { &[] };
+        self.preconditioner.engage(env, engaged)?;
+        let (local, mut lent) = self.lend(context, input)?;
+        memory::replace(&mut local.touched, nodes, "local iterations")?;
+        let base = Base {
+            u: at.u,
+            residual: at.g,
+        };
+        local.begin(&mut lent, base)
+    }
+
+    /// The state of the iterations into `at`, whose residual is not known then.
+    pub(super) fn end_round(
+        &mut self,
+        context: SolverContext<'_>,
+        input: &Input<'_>,
+        at: &mut Iterate<'_>,
+    ) -> Result<()> {
+        let mut q = std::mem::take(&mut self.q);
+        let (local, mut lent) = self.lend(context, input)?;
+        let result = local.settle(&mut lent, at.g, &mut q, at.u);
+        self.q = q;
+        result
+    }
+
+    /// One local iteration with the tools at part `way` of their way; tells whether it leads to another state.
+    pub(super) fn improve_at(
+        &mut self,
+        context: SolverContext<'_>,
+        input: &Input<'_>,
+        problem: &mut ContactProblem,
+        at: &mut Iterate<'_>,
+        way: f32,
+    ) -> Result<bool> {
+        let (local, mut lent) = self.lend(context, input)?;
+        let deep = |problem: &mut ContactProblem, u: &[f32]| sunk(input, problem, u, way);
+        let gain = local.improve(&mut lent, problem, at.u, way, deep)?;
+        if gain.is_better {
+            at.det = local.det;
+            at.sunk_mm = (way >= 1.0).then_some(gain.sunk_mm);
+        }
+        Ok(gain.is_better)
+    }
+
+    /// What is out of balance near the tools.
+    fn unbalanced(&mut self, problem: &ContactProblem) -> Result<f64> {
+        match &mut self.local {
+            Some(local) => local.unbalanced(problem),
+            None => Ok(0.0),
+        }
+    }
+
+    fn lend<'a>(
+        &'a mut self,
+        context: SolverContext<'a>,
+        input: &'a Input<'a>,
+    ) -> Result<(&'a mut Local, Lent<'a>)> {
+        let local = Local::made(&mut self.local, context)?;
+        let lent = Lent {
+            context,
+            input,
+            preconditioner: &mut self.preconditioner,
+            scratch: &mut self.scratch,
+            drift: &self.drift,
+        };
+        Ok((local, lent))
+    }
+}
