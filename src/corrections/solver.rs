@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use super::history::{History, PAIRS, Pair};
 use super::input::{Input, Report, SolverContext};
-use super::local::Local;
+use super::local::LocalSolver;
 use super::memory::Memory;
 use super::motion::Motion;
 use super::oscillators::Oscillators;
@@ -49,7 +49,7 @@ pub struct ImplicitSolver {
     /// Where the tissue would be, at the nodes of the domain.
     pub(super) touched: Vec<f32>,
     /// Made at the first step that tools drive.
-    pub(super) local: Option<Box<Local>>,
+    pub(super) local: Option<Box<LocalSolver>>,
     pub(super) free: Oscillators,
 }
 
@@ -181,7 +181,9 @@ impl ImplicitSolver {
         if local.is_empty() {
             return Ok(());
         }
-        Local::made(&mut self.local, context)?.pairs.restore(local)
+        LocalSolver::made(&mut self.local, context)?
+            .pairs
+            .restore(local)
     }
 
     /// Velocities of a state that the model predicted and nothing corrected.

@@ -2,7 +2,7 @@
 
 use super::near::WHAT;
 use super::step::{add, dot, resize};
-use super::{Gain, Lent, Local, each_load};
+use super::{Gain, LocalSolver, StepContext, each_load};
 use crate::contact::{Compliance, ContactProblem, State};
 use crate::corrections::precondition::{DIAGONAL_WEIGHT, Env};
 use crate::corrections::solver::{SHORTENINGS, SLOPE, SMALLEST_DET};
@@ -10,29 +10,29 @@ use crate::corrections::tool_contact::SUNK_MM;
 use crate::error::Result;
 use crate::memory;
 
-impl Local {
+impl LocalSolver {
     /// One iteration with the tools at part `way` of their way.
     pub(in crate::corrections) fn improve(
         &mut self,
-        lent: &mut Lent<'_>,
+        step: &mut StepContext<'_>,
         problem: &mut ContactProblem,
         base: &[f32],
         way: f32,
         sunk: impl Fn(&mut ContactProblem, &[f32]) -> f32,
     ) -> Result<Gain> {
-        let env = lent.context.env();
-        self.descend(lent, problem)?;
-        self.touch(lent, problem, base, way)?;
+        let env = step.context.env();
+        self.descend(step, problem)?;
+        self.solve_contact(step, problem, base, way)?;
         let stiff = &mut self.d_stiff;
-        lent.preconditioner.stiffen(env, &self.d.c, stiff)?;
+        step.preconditioner.stiffen(env, &self.d.c, stiff)?;
         self.near.linear(env, &self.d.v, &mut self.d_linear);
         self.measure_direction(env);
         let work = self.work(problem);
         let slope = self.residual.over(&self.d) - work;
         let (mut t, mut gain) = (1.0f32, Gain::default());
         for attempt in 0..=SHORTENINGS {
-            self.look(base, t);
-            let det = self.evaluate(lent, t)?;
+            self.place_at(base, t);
+            let det = self.evaluate(step, t)?;
             let slope_new = self.next.over(&self.d) - work;
             let sunk_mm = match det > SMALLEST_DET {
                 true => sunk(problem, &self.trial),
@@ -40,11 +40,11 @@ impl Local {
             };
             // An iteration may not lose the contact, unless it had been lost.
             let is_kept = sunk_mm <= 0.5 * SUNK_MM || {
-                self.look(base, 0.0);
+                self.place_at(base, 0.0);
                 sunk_mm <= sunk(problem, &self.trial)
             };
             if is_kept && 0.5 * (slope + slope_new) <= SLOPE * slope {
-                self.accept(lent, t)?;
+                self.accept(step, t)?;
                 self.det = det;
                 gain = Gain {
                     is_better: true,
@@ -56,7 +56,7 @@ impl Local {
                 break;
             }
             if attempt == SHORTENINGS || slope >= 0.0 {
-                self.look(base, 0.0);
+                self.place_at(base, 0.0);
                 problem.undo();
                 self.pairs.clear();
                 break;
@@ -71,8 +71,8 @@ impl Local {
     }
 
     /// The direction of L-BFGS, without what the contact makes of it.
-    fn descend(&mut self, lent: &mut Lent<'_>, problem: &ContactProblem) -> Result<()> {
-        let env = lent.context.env();
+    fn descend(&mut self, step: &mut StepContext<'_>, problem: &ContactProblem) -> Result<()> {
+        let env = step.context.env();
         self.reduced.take(&self.residual)?;
         let (near, reduced) = (&self.near, &mut self.reduced);
         each_load(problem, near, |place, force| {
@@ -93,15 +93,15 @@ impl Local {
             t[1] = DIAGONAL_WEIGHT * (xy * r[0] + yy * r[1] + yz * r[2]);
             t[2] = DIAGONAL_WEIGHT * (xz * r[0] + yz * r[1] + zz * r[2]);
         }
-        self.precondition(lent)?;
+        self.precondition(step)?;
         self.pairs.ascend(env.isa, recursion, &mut self.d);
         Ok(())
     }
 
     /// The coarse level of the reduced residual, added to the direction.
-    fn precondition(&mut self, lent: &mut Lent<'_>) -> Result<()> {
-        let env = lent.context.env();
-        let preconditioner = &mut *lent.preconditioner;
+    fn precondition(&mut self, step: &mut StepContext<'_>) -> Result<()> {
+        let env = step.context.env();
+        let preconditioner = &mut *step.preconditioner;
         let (near, q) = (&self.near, &mut self.room.q);
         // Phi^T r.
         near.project(env, &self.reduced.eta, q);
@@ -137,14 +137,14 @@ impl Local {
         memory::fit(&mut self.loads, forces.len(), WHAT)?;
         let loads = self.columns.iter().copied().zip(forces.iter().copied());
         self.loads.extend(loads);
-        self.respond(lent)?;
-        self.decode_direction(lent)
+        self.respond(step)?;
+        self.decode_direction(step)
     }
 
     /// Adds the response to `loads` to the direction, but for its `v`.
-    fn respond(&mut self, lent: &mut Lent<'_>) -> Result<()> {
-        let env = lent.context.env();
-        let preconditioner = &mut *lent.preconditioner;
+    fn respond(&mut self, step: &mut StepContext<'_>) -> Result<()> {
+        let env = step.context.env();
+        let preconditioner = &mut *step.preconditioner;
         preconditioner.work_of_modes(env, &self.loads, &mut self.more_on_modes);
         preconditioner.respond_on_modes(env, &self.more_on_modes, &mut self.solved)?;
         add(1.0, &self.solved, &mut self.d.c);
@@ -159,24 +159,24 @@ impl Local {
     }
 
     /// The contact where the direction leads to: the direction takes on the response to what it changes.
-    fn touch(
+    fn solve_contact(
         &mut self,
-        lent: &mut Lent<'_>,
+        step: &mut StepContext<'_>,
         problem: &mut ContactProblem,
         base: &[f32],
         way: f32,
     ) -> Result<()> {
-        let env = lent.context.env();
-        self.look(base, 1.0);
+        let env = step.context.env();
+        self.place_at(base, 1.0);
         let state = State {
-            rest: lent.input.rest,
+            rest: step.input.rest,
             u: &self.trial,
-            start: lent.input.last,
+            start: step.input.last,
         };
         let compliance = Compliance {
-            prior: lent.context.prior,
+            prior: step.context.prior,
             held: &env.body.held,
-            inertia: Some((env.space, lent.preconditioner.inertial_compliance())),
+            inertia: Some((env.space, step.preconditioner.inertial_compliance())),
         };
         let change = problem.solve(compliance, state, way)?;
         self.loads.clear();
@@ -188,16 +188,16 @@ impl Local {
             .zip(change.forces.iter().copied());
         self.loads.extend(loads.filter(|load| load.1 != 0.0));
         if !self.loads.is_empty() {
-            self.respond(lent)?;
+            self.respond(step)?;
         }
-        self.decode_direction(lent)
+        self.decode_direction(step)
     }
 
     /// `v` of the direction.
-    pub(super) fn decode_direction(&mut self, lent: &mut Lent<'_>) -> Result<()> {
-        let env = lent.context.env();
+    pub(super) fn decode_direction(&mut self, step: &mut StepContext<'_>) -> Result<()> {
+        let env = step.context.env();
         let (ranges, q) = (&self.near.ranges, &mut self.room.q);
-        let preconditioner = &mut *lent.preconditioner;
+        let preconditioner = &mut *step.preconditioner;
         preconditioner.near_coordinates(env, &self.d.c, &[], ranges, q);
         self.near.decode(env, q, &mut self.d.v)
     }
@@ -236,12 +236,12 @@ impl Local {
     }
 
     /// The state at part `t` of the direction stands; it and what it changes are a pair.
-    fn accept(&mut self, lent: &mut Lent<'_>, t: f32) -> Result<()> {
-        let env = lent.context.env();
+    fn accept(&mut self, step: &mut StepContext<'_>, t: f32) -> Result<()> {
+        let env = step.context.env();
         if t != 1.0 {
             self.d.scale(t);
             // The bits that a layout of the pair would have.
-            self.decode_direction(lent)?;
+            self.decode_direction(step)?;
         }
         add(t, &self.d_linear, &mut self.linear);
         add(t, &self.d_stiff, &mut self.stiff);
@@ -251,6 +251,6 @@ impl Local {
         std::mem::swap(&mut self.residual, &mut self.next);
         let (near, room) = (&self.near, &mut self.room);
         let pair = (&self.d, &self.reduced);
-        (self.pairs).store(env, near, lent.preconditioner, room, &self.about, pair)
+        (self.pairs).store(env, near, step.preconditioner, room, &self.about, pair)
     }
 }

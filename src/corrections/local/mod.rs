@@ -1,4 +1,4 @@
-//! Local iterations: all degrees of freedom near the tools, modes and responses elsewhere; an iteration costs what the tools touch.
+//! LocalSolver iterations: all degrees of freedom near the tools, modes and responses elsewhere; an iteration costs what the tools touch.
 //!
 //! From a base `u_0`, whose residual is known at every node, the state is
 //!
@@ -36,7 +36,7 @@ use crate::memory::{self, HeldBytes};
 pub use self::record::Record;
 
 /// What a solver lends to the iterations of a step.
-pub(super) struct Lent<'a> {
+pub(super) struct StepContext<'a> {
     pub context: SolverContext<'a>,
     pub input: &'a Input<'a>,
     pub preconditioner: &'a mut Preconditioner,
@@ -63,7 +63,7 @@ pub(super) struct Gain {
 
 /// A scene's own part.
 #[derive(HeldBytes)]
-pub struct Local {
+pub struct LocalSolver {
     near: NearSet,
     pub(super) pairs: Pairs,
     clusters: Clusters,
@@ -107,18 +107,18 @@ pub struct Local {
     loads: Vec<(u32, f32)>,
 }
 
-impl Local {
+impl LocalSolver {
     /// Buffers.
     ///
     /// # Errors
     /// [`crate::Error::OutOfMemory`].
-    pub fn new(context: SolverContext<'_>) -> Result<Local> {
+    pub fn new(context: SolverContext<'_>) -> Result<LocalSolver> {
         let env = context.env();
         let far = &context.corrections.far;
         let (count, width) = (env.space.count(), env.prior.width());
         let columns = (3 * env.prior.contact_nodes.len()).min(768);
         let modes = || memory::zeros(count, WHAT);
-        Ok(Local {
+        Ok(LocalSolver {
             near: NearSet::new(env, far)?,
             pairs: Pairs::new(count)?,
             clusters: Clusters::new(far, count)?,
@@ -159,21 +159,21 @@ impl Local {
     /// # Errors
     /// [`crate::Error::OutOfMemory`].
     pub(super) fn made<'a>(
-        slot: &'a mut Option<Box<Local>>,
+        slot: &'a mut Option<Box<LocalSolver>>,
         context: SolverContext<'_>,
-    ) -> Result<&'a mut Local> {
+    ) -> Result<&'a mut LocalSolver> {
         let local = match slot.take() {
             Some(local) => local,
-            None => memory::boxed(Local::new(context)?, WHAT)?,
+            None => memory::boxed(LocalSolver::new(context)?, WHAT)?,
         };
         Ok(slot.insert(local))
     }
 
     /// Starts from `base`, with `touched` nodes. The preconditioner holds the columns of these nodes.
-    pub(super) fn begin(&mut self, lent: &mut Lent<'_>, base: Base<'_>) -> Result<()> {
-        let env = lent.context.env();
-        let far = &lent.context.corrections.far;
-        let rest = lent.input.rest;
+    pub(super) fn begin(&mut self, step: &mut StepContext<'_>, base: Base<'_>) -> Result<()> {
+        let env = step.context.env();
+        let far = &step.context.corrections.far;
+        let rest = step.input.rest;
         let none = std::iter::empty();
         // What is about the tools now lives as long as the pairs of this step do.
         self.near.mark(far, rest, &self.touched, none);
@@ -187,27 +187,27 @@ impl Local {
             self.clusters.leave_out(far, &self.near.is_near, modes);
         }
         self.pairs
-            .lay_out(env, &self.near, lent.preconditioner, &mut self.room)?;
+            .lay_out(env, &self.near, step.preconditioner, &mut self.room)?;
         self.now.clear(&self.near)?;
         self.residual.clear(&self.near)?;
         resize(&mut self.base, 3 * self.near.free)?;
         resize(&mut self.linear, 3 * self.near.free)?;
         resize(&mut self.d_linear, 3 * self.near.free)?;
         resize(&mut self.inner, 3 * self.near.free)?;
-        lent.preconditioner.project(env, base.residual)?;
-        let q = &lent.preconditioner.coordinates;
-        lent.preconditioner.on_modes(env, q, &mut self.base_modes)?;
+        step.preconditioner.project(env, base.residual)?;
+        let q = &step.preconditioner.coordinates;
+        step.preconditioner.on_modes(env, q, &mut self.base_modes)?;
         self.stiff.fill(0.0);
         self.d_stiff.fill(0.0);
         self.clusters.begin(far, &self.near, base.u);
         self.trial.copy_from_slice(base.u);
         self.d.clear(&self.near)?;
-        self.evaluate(lent, 0.0)?;
+        self.evaluate(step, 0.0)?;
         std::mem::swap(&mut self.residual, &mut self.next);
         // What the base has is not what has come since.
         self.base.copy_from_slice(&self.inner);
         self.residual.eta.fill(0.0);
-        let dets = lent.scratch.smallest_by_chunk().iter();
+        let dets = step.scratch.smallest_by_chunk().iter();
         let dets = dets
             .zip(&self.near.is_near)
             .map(|(det, is_near)| match is_near {
@@ -236,7 +236,7 @@ impl Local {
     }
 
     /// Puts the near nodes at part `t` of the direction.
-    fn look(&mut self, base: &[f32], t: f32) {
+    fn place_at(&mut self, base: &[f32], t: f32) {
         let inside = 3 * self.near.inside;
         for (place, &node) in self.near.nodes[..self.near.free].iter().enumerate() {
             for axis in 0..3 {
@@ -252,20 +252,20 @@ impl Local {
         }
     }
 
-    /// The residual of the state at part `t` of the direction, where [`Local::look`] has put it, into `next`; gives the smallest det F.
-    fn evaluate(&mut self, lent: &mut Lent<'_>, t: f32) -> Result<f32> {
-        let env = lent.context.env();
-        let far = &lent.context.corrections.far;
+    /// The residual of the state at part `t` of the direction, where [`LocalSolver::place_at`] has put it, into `next`; gives the smallest det F.
+    fn evaluate(&mut self, step: &mut StepContext<'_>, t: f32) -> Result<f32> {
+        let env = step.context.env();
+        let far = &step.context.corrections.far;
         self.next.clear(&self.near)?;
         let (near, inner) = (&self.near, &mut self.inner);
-        let det = near.internal(&env.body.forces, &self.trial, lent.scratch, inner);
+        let det = near.internal(&env.body.forces, &self.trial, step.scratch, inner);
         let kappa = env.time_step.integrator.kappa() as f32;
         let rows = inner.as_chunks_mut::<3>().0.iter_mut();
         for (r, &node) in rows.zip(&near.nodes[..near.inside]) {
             let inertia = kappa * env.body.mass[node as usize];
             for (axis, r) in r.iter_mut().enumerate() {
                 let at = 3 * node as usize + axis;
-                *r += lent.drift[at] + inertia * (self.trial[at] - lent.input.last[at]);
+                *r += step.drift[at] + inertia * (self.trial[at] - step.input.last[at]);
             }
         }
         self.next.r.copy_from_slice(&inner[..3 * near.inside]);
@@ -286,13 +286,13 @@ impl Local {
     /// The whole field into `u`, which holds the base, of which `residual` is; `scratch [K,3]`.
     pub(super) fn settle(
         &mut self,
-        lent: &mut Lent<'_>,
+        step: &mut StepContext<'_>,
         residual: &[f32],
         scratch: &mut [f32],
         u: &mut [f32],
     ) -> Result<()> {
-        let env = lent.context.env();
-        let preconditioner = &mut *lent.preconditioner;
+        let env = step.context.env();
+        let preconditioner = &mut *step.preconditioner;
         preconditioner.take_coordinates(env, &self.now.c)?;
         preconditioner.decode(env, scratch)?;
         for (place, t) in self.now.t.as_chunks::<3>().0.iter().enumerate() {

@@ -106,12 +106,12 @@ fn errors(bench: &Bench, base_mm: f32, step_mm: f32) -> [f64; 2] {
     solver
         .residual(context, [&still, &u, &u], &mut r, &mut report)
         .unwrap();
-    Local::made(&mut solver.local, context).unwrap();
+    LocalSolver::made(&mut solver.local, context).unwrap();
     let middle = bench.mesh.domain_nodes[bench.mesh.domain_nodes.len() / 2];
     let local = solver.local.as_deref_mut().unwrap();
     local.touched = vec![middle];
     solver.preconditioner.engage(env, &[middle]).unwrap();
-    let mut lent = Lent {
+    let mut step = StepContext {
         context,
         input: &input,
         preconditioner: &mut solver.preconditioner,
@@ -122,23 +122,23 @@ fn errors(bench: &Bench, base_mm: f32, step_mm: f32) -> [f64; 2] {
         u: &u,
         residual: &r,
     };
-    local.begin(&mut lent, base).unwrap();
+    local.begin(&mut step, base).unwrap();
     assert!(local.near.inside > 50 && local.near.nodes.len() < bench.mesh.node_count() / 2);
 
     let (c, _) = bench.smooth(&mut random, step_mm);
     local.d.clear(&local.near).unwrap();
     local.d.c.copy_from_slice(&c);
     local.d.t = random.normal(3 * local.near.inside, 0.05 * step_mm);
-    local.decode_direction(&mut lent).unwrap();
+    local.decode_direction(&mut step).unwrap();
     let stiff = &mut local.d_stiff;
-    lent.preconditioner.stiffen(env, &c, stiff).unwrap();
+    step.preconditioner.stiffen(env, &c, stiff).unwrap();
     local.near.linear(env, &local.d.v, &mut local.d_linear);
-    local.look(&u, 1.0);
-    local.evaluate(&mut lent, 1.0).unwrap();
+    local.place_at(&u, 1.0);
+    local.evaluate(&mut step, 1.0).unwrap();
     let mut found = vec![0.0; env.space.count()];
     local.near.project(env, &local.next.eta, &mut local.room.q);
     let ranges = &local.near.ranges;
-    lent.preconditioner
+    step.preconditioner
         .on_modes_in(env, ranges, &local.room.q, &mut found);
     add(1.0, &local.next.modal, &mut found);
 
@@ -146,7 +146,7 @@ fn errors(bench: &Bench, base_mm: f32, step_mm: f32) -> [f64; 2] {
     local.now.add(1.0, &local.d);
     let (mut whole, mut scratch) = (u.clone(), bench.zero.clone());
     local
-        .settle(&mut lent, &bench.zero, &mut scratch, &mut whole)
+        .settle(&mut step, &bench.zero, &mut scratch, &mut whole)
         .unwrap();
     let at_base = local.base_modes.clone();
     let (near, r_found) = (local.near.nodes.clone(), local.next.r.clone());

@@ -5,7 +5,7 @@ use std::time::Instant;
 use super::{Iterate, is_sound, is_spent, sunk};
 use crate::contact::ContactProblem;
 use crate::corrections::input::{Input, Report, SolverContext};
-use crate::corrections::local::{Base, Lent, Local};
+use crate::corrections::local::{Base, LocalSolver, StepContext};
 use crate::corrections::solver::ImplicitSolver;
 use crate::error::Result;
 use crate::memory;
@@ -107,13 +107,13 @@ impl ImplicitSolver {
         let nodes = problem.touched(&env.body.held);
         let engaged = if touched { nodes } else { &[] };
         self.preconditioner.engage(env, engaged)?;
-        let (local, mut lent) = self.lend(context, input)?;
+        let (local, mut step) = self.local_solver(context, input)?;
         memory::replace(&mut local.touched, nodes, "local iterations")?;
         let base = Base {
             u: at.u,
             residual: at.g,
         };
-        local.begin(&mut lent, base)
+        local.begin(&mut step, base)
     }
 
     /// The state of the iterations into `at`, whose residual is not known then.
@@ -124,8 +124,8 @@ impl ImplicitSolver {
         at: &mut Iterate<'_>,
     ) -> Result<()> {
         let mut q = std::mem::take(&mut self.q);
-        let (local, mut lent) = self.lend(context, input)?;
-        let result = local.settle(&mut lent, at.g, &mut q, at.u);
+        let (local, mut step) = self.local_solver(context, input)?;
+        let result = local.settle(&mut step, at.g, &mut q, at.u);
         self.q = q;
         result
     }
@@ -139,9 +139,9 @@ impl ImplicitSolver {
         at: &mut Iterate<'_>,
         way: f32,
     ) -> Result<bool> {
-        let (local, mut lent) = self.lend(context, input)?;
+        let (local, mut step) = self.local_solver(context, input)?;
         let deep = |problem: &mut ContactProblem, u: &[f32]| sunk(input, problem, u, way);
-        let gain = local.improve(&mut lent, problem, at.u, way, deep)?;
+        let gain = local.improve(&mut step, problem, at.u, way, deep)?;
         if gain.is_better {
             at.det = local.det;
             at.sunk_mm = (way >= 1.0).then_some(gain.sunk_mm);
@@ -157,19 +157,19 @@ impl ImplicitSolver {
         }
     }
 
-    fn lend<'a>(
+    fn local_solver<'a>(
         &'a mut self,
         context: SolverContext<'a>,
         input: &'a Input<'a>,
-    ) -> Result<(&'a mut Local, Lent<'a>)> {
-        let local = Local::made(&mut self.local, context)?;
-        let lent = Lent {
+    ) -> Result<(&'a mut LocalSolver, StepContext<'a>)> {
+        let local = LocalSolver::made(&mut self.local, context)?;
+        let step = StepContext {
             context,
             input,
             preconditioner: &mut self.preconditioner,
             scratch: &mut self.scratch,
             drift: &self.drift,
         };
-        Ok((local, lent))
+        Ok((local, step))
     }
 }
