@@ -54,7 +54,7 @@ impl Ogden {
     }
 
     /// `sum mu (phi(alpha s) - 1)`, Pa: a principal Cauchy stress but for a pressure, at the logarithm `s` of a stretch without change of
-    /// volume. `phi` is the exponential up to [`CAP`], then its tangent.
+    /// volume. `phi` is the exponential up to `CAP`, then its tangent.
     pub fn pull(&self, s: f64) -> f64 {
         Stretches {
             terms: self.terms,
