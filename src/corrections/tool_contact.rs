@@ -11,8 +11,8 @@
 //!
 //! The pairs hold `F` without the loads: they survive any change of contact.
 //!
-//! What moves the whole field stays in the block coordinates until the elements ask for it: the contact is solved where the tissue
-//! would be at the nodes of the domain, and an iteration decodes once and projects once.
+//! The guess stays in the block coordinates until the elements ask for it: its contact is solved where the tissue would be at the nodes of
+//! the domain. The iterations are local ([`super::local`]), in rounds that each begin with an evaluation of all elements.
 
 mod fall_back;
 mod rounds;
