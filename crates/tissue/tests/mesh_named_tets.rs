@@ -118,6 +118,53 @@ fn both_become_the_same_cube_and_keep_their_sets() {
 }
 
 #[test]
+fn a_set_that_announces_more_than_the_file_can_hold_is_refused_with_its_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let said = |name: &str, text: &str| {
+        let path = write(folder.path(), name, text);
+        let error = import(&path, &ImportOptions::default()).unwrap_err();
+        let groups = read_labels(&path).err().unwrap();
+        assert_eq!(error.to_string(), groups.to_string());
+        error.to_string()
+    };
+    let inp = inp();
+    // Of a set's first members, below its keyword.
+    let line = inp.lines().count() + 2;
+    for (range, count) in [
+        ("1, 4000000000", "4000000000"),
+        ("0, 18446744073709551615, 1", "18446744073709551615"),
+        ("1, 4000000000, 2", "2000000000"),
+    ] {
+        let said = said(
+            "range.inp",
+            &format!("{inp}*NSET, NSET=Wall, GENERATE\n{range}\n"),
+        );
+        let words = format!("range.inp: line {line}: set `Wall` announces {count} members");
+        assert!(said.contains(&words), "{said}");
+    }
+    // Each set names the last ten times: 4 members, 40, ...; the seventh has too many.
+    let mut powers = format!("{inp}*ELSET, ELSET=A0\n1, 2, 3, 4\n");
+    for level in 1..12 {
+        let ten = format!("A{}\n", level - 1).repeat(10);
+        powers += &format!("*ELSET, ELSET=A{level}\n{ten}");
+    }
+    let text = said("powers.inp", &powers);
+    let seventh = line + 2 + 5 * 11;
+    let words = format!("line {seventh}: set `A6` announces 4000000 members");
+    assert!(text.contains(&words), "{text}");
+    let feb = feb().replace("11, 14,\n17,20<", "11:4000000000<");
+    let text = said("range.feb", &feb);
+    assert!(text.contains("set `Floor` announces 3999999990"), "{text}");
+    // Ranges that reach over gaps, sets that name each other, and a few repeats are sound.
+    let sound = "*NSET, NSET=all of them, GENERATE\n1, 99999\n*NSET, NSET=X\nY, Y, Floor\n*NSET, NSET=Y\nX, Floor, Floor\n";
+    let path = write(folder.path(), "sound.inp", &format!("{inp}{sound}"));
+    assert_eq!(
+        nodes_in(&read(&path), &[open("group:all of them", &path)]).len(),
+        8
+    );
+}
+
+#[test]
 fn what_is_wrong_with_a_file_is_named() {
     let folder = tempfile::tempdir().unwrap();
     let refused = |name: &str, text: String, words: &[&str]| {

@@ -1,6 +1,7 @@
 //! Tetrahedra whose file names sets of nodes, elements and faces: Abaqus, CalculiX (`abaqus`) and FEBio (`febio`).
 
 mod abaqus;
+mod announced;
 mod febio;
 mod keywords;
 mod model;
@@ -21,8 +22,12 @@ fn parsed(path: &Path) -> Result<(Model, usize), ImportError> {
         "feb" => febio::parse(&text),
         _ => abaqus::parse(&text),
     };
-    let placed = read.and_then(|mut model| model.place_instances().map(|()| model));
-    let model = placed.map_err(|fault| fault.of(path))?;
+    let checked = read.and_then(|mut model| {
+        announced::check(&model, bytes.len())?;
+        model.place_instances()?;
+        Ok(model)
+    });
+    let model = checked.map_err(|fault| fault.of(path))?;
     Ok((model, bytes.len()))
 }
 

@@ -194,7 +194,7 @@ impl Parser {
                 let name = named("NSET", "*NSET")?;
                 if let Some(elements) = parameter(keyword, "ELSET") {
                     let entry = within(Entry::NodesOfElements(elements), &options.instance);
-                    self.open().node_sets.named(&name).push(entry);
+                    self.open().node_sets.named(&name, at).push(entry);
                 }
                 Block::NodeSet { name, options }
             }
@@ -256,7 +256,7 @@ impl Parser {
                 let scope = &mut self.model.scopes[self.scope];
                 scope.node(number, point)?;
                 if let Some(set) = set {
-                    scope.node_sets.named(set).push(Entry::Number(number));
+                    scope.node_sets.named(set, at).push(Entry::Number(number));
                 }
             }
             Block::Elements { shape, count, set } => {
@@ -285,18 +285,21 @@ impl Parser {
                 let scope = &mut self.model.scopes[self.scope];
                 scope.element(*number, *shape, nodes[..*count].to_vec())?;
                 if let Some(set) = set {
-                    scope.element_sets.named(set).push(Entry::Number(*number));
+                    scope
+                        .element_sets
+                        .named(set, at)
+                        .push(Entry::Number(*number));
                 }
             }
             Block::NodeSet { name, options } => {
                 let found = members(filled(), options, at)?;
                 let scope = &mut self.model.scopes[self.scope];
-                scope.node_sets.named(name).extend(found);
+                scope.node_sets.named(name, at).extend(found);
             }
             Block::ElementSet { name, options } => {
                 let found = members(filled(), options, at)?;
                 let scope = &mut self.model.scopes[self.scope];
-                scope.element_sets.named(name).extend(found);
+                scope.element_sets.named(name, at).extend(found);
             }
             Block::Surface { name, is_of_nodes } => {
                 let scope = &mut self.model.scopes[self.scope];
@@ -306,12 +309,12 @@ impl Parser {
                 };
                 let entry = member(first, &None);
                 if *is_of_nodes {
-                    scope.node_sets.named(name).push(entry);
+                    scope.node_sets.named(name, at).push(entry);
                 } else {
                     // S1 to S4 are sides; SPOS and SNEG are those of a shell.
                     let side = words.next().unwrap_or_default();
                     let side = side.trim_start_matches(['s', 'S']).parse().ok();
-                    scope.surfaces.named(name).push(Face::Side(entry, side));
+                    scope.surfaces.named(name, at).push(Face::Side(entry, side));
                 }
             }
             Block::Instance(lines) => {

@@ -235,14 +235,17 @@ impl Parser {
             (Some(Place::NodeSet(set)), "NodeSet" | "node_set") => {
                 let (set, inner) = (set.clone(), attribute(tag, "node_set", at)?);
                 if let Some(inner) = inner {
-                    self.scope.node_sets.named(&set).push(Entry::Set(inner));
+                    self.scope.node_sets.named(&set, at).push(Entry::Set(inner));
                 }
                 Ok(())
             }
             (Some(Place::ElementSet(set)), "ElementSet" | "elem_set") => {
                 let (set, inner) = (set.clone(), attribute(tag, "elem_set", at)?);
                 if let Some(inner) = inner {
-                    self.scope.element_sets.named(&set).push(Entry::Set(inner));
+                    self.scope
+                        .element_sets
+                        .named(&set, at)
+                        .push(Entry::Set(inner));
                 }
                 Ok(())
             }
@@ -299,7 +302,10 @@ impl Parser {
                 self.scope
                     .node(number, [real(x, at)?, real(y, at)?, real(z, at)?])?;
                 if let Some(set) = set {
-                    self.scope.node_sets.named(set).push(Entry::Number(number));
+                    self.scope
+                        .node_sets
+                        .named(set, at)
+                        .push(Entry::Number(number));
                 }
             }
             Some(Place::Elements { kind, name }) => {
@@ -326,7 +332,7 @@ impl Parser {
                 let name = self.material.as_ref().unwrap_or(name);
                 self.scope
                     .element_sets
-                    .named(name)
+                    .named(name, at)
                     .push(Entry::Number(number));
             }
             Some(Place::Surface(name)) => {
@@ -340,7 +346,7 @@ impl Parser {
                             nodes.len()
                         ));
                     }
-                    self.scope.surfaces.named(name).push(Face::Nodes(nodes));
+                    self.scope.surfaces.named(name, at).push(Face::Nodes(nodes));
                 }
             }
             _ => {}
@@ -355,7 +361,7 @@ impl Parser {
             Some(Place::ElementSet(name)) => (&mut self.scope.element_sets, name),
             _ => return Ok(()),
         };
-        let set = sets.named(name);
+        let set = sets.named(name, at);
         for word in words.split([',', ' ', '\n', '\t', '\r']) {
             if !word.is_empty() {
                 set.push(member(word, at)?);

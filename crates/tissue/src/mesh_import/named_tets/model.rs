@@ -42,9 +42,16 @@ pub enum Face {
     Nodes(Vec<u64>),
 }
 
+/// A set, and the line of its first entry.
+pub struct Set<T> {
+    pub name: String,
+    pub line: usize,
+    pub entries: Vec<T>,
+}
+
 /// Sets of one kind by name, in the order of the file. Names compare without case.
 pub struct Sets<T> {
-    pub list: Vec<(String, Vec<T>)>,
+    pub list: Vec<Set<T>>,
     place: HashMap<String, usize>,
 }
 
@@ -58,14 +65,18 @@ impl<T> Default for Sets<T> {
 }
 
 impl<T> Sets<T> {
-    /// The set of this name, new or known.
-    pub fn named(&mut self, name: &str) -> &mut Vec<T> {
+    /// The entries of a set, to which `line` adds.
+    pub fn named(&mut self, name: &str, line: usize) -> &mut Vec<T> {
         let key = name.to_uppercase();
         let place = *self.place.entry(key).or_insert_with(|| {
-            self.list.push((name.to_owned(), Vec::new()));
+            self.list.push(Set {
+                name: name.to_owned(),
+                line,
+                entries: Vec::new(),
+            });
             self.list.len() - 1
         });
-        &mut self.list[place].1
+        &mut self.list[place].entries
     }
 
     /// The number of a set.

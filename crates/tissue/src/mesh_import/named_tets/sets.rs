@@ -1,15 +1,15 @@
 //! Sets of nodes, elements and faces as names of parts of the body.
 //!
 //! Sets may name others, also such that come later. One that names what is not there, or itself, or others at many levels, is left
-//! out. What they hold in all is bounded by [`Labels::add`] and by the work of gathering it.
+//! out. What they hold in all is bounded by [`super::announced`], [`Labels::add`] and the work of gathering it.
 
 use super::super::error::{Fault, fault};
 use super::super::labels::{Labels, Part, boundary, sorted};
-use super::model::{Entry, Face, Model, Scope, Shape};
+use super::model::{Entry, Face, Model, Scope, Set, Shape};
 use std::collections::HashMap;
 
 /// Sets within sets, at most.
-const MOST_LEVELS: usize = 40;
+pub(super) const MOST_LEVELS: usize = 40;
 
 /// Names of a file of this many bytes.
 pub fn labels(model: &Model, bytes: usize) -> Result<Labels, Fault> {
@@ -110,7 +110,7 @@ impl Gatherer<'_> {
     /// Adds all names of a scope for one of its instances.
     fn scope(&mut self, at: usize, whose: Option<usize>, labels: &mut Labels) -> Result<(), Fault> {
         let scope = &self.model.scopes[at];
-        for (set, (name, _)) in scope.node_sets.list.iter().enumerate() {
+        for (set, Set { name, .. }) in scope.node_sets.list.iter().enumerate() {
             let members = self.set((at, Kind::Nodes, set, whose), 0)?;
             let id = labels.name(name);
             for (instance, place) in members.unwrap_or_default() {
@@ -118,7 +118,7 @@ impl Gatherer<'_> {
                 labels.add(id, Part::Point((first + place) as usize))?;
             }
         }
-        for (set, (name, _)) in scope.element_sets.list.iter().enumerate() {
+        for (set, Set { name, .. }) in scope.element_sets.list.iter().enumerate() {
             let members = self.set((at, Kind::Elements, set, whose), 0)?;
             let id = labels.name(name);
             for (instance, place) in members.unwrap_or_default() {
@@ -131,8 +131,8 @@ impl Gatherer<'_> {
                 }
             }
         }
-        for (name, faces) in &scope.surfaces.list {
-            let Some(faces) = self.surface(at, faces, whose, 0)? else {
+        for Set { name, entries, .. } in &scope.surfaces.list {
+            let Some(faces) = self.surface(at, entries, whose, 0)? else {
                 continue;
             };
             let id = labels.name(name);
@@ -176,8 +176,8 @@ impl Gatherer<'_> {
         let (scope, kind, set, whose) = key;
         let scope_of = &self.model.scopes[scope];
         let entries = match kind {
-            Kind::Nodes => &scope_of.node_sets.list[set].1,
-            Kind::Elements => &scope_of.element_sets.list[set].1,
+            Kind::Nodes => &scope_of.node_sets.list[set].entries,
+            Kind::Elements => &scope_of.element_sets.list[set].entries,
         };
         self.known.insert(key, None);
         let mut out = Vec::new();
@@ -256,7 +256,7 @@ impl Gatherer<'_> {
                 let Some(surface) = sets.surfaces.find(name) else {
                     return Ok(None);
                 };
-                let faces = &sets.surfaces.list[surface].1;
+                let faces = &sets.surfaces.list[surface].entries;
                 let faces = self.surface(scope, faces, whose, level + 1)?;
                 let all = &self.model.instances;
                 let member = |node: u32| {
