@@ -362,6 +362,16 @@
 #define UPT_SET_TETS 5
 
 /**
+ * The region's nodes in its order; all nodes where there is no region.
+ */
+#define UPT_VIEW_REGION 0
+
+/**
+ * The attached points.
+ */
+#define UPT_VIEW_POINTS 1
+
+/**
  * An instrument's shape: a capsule along local y.
  */
 #define UPT_SHAPE_CAPSULE 0
@@ -669,7 +679,7 @@ typedef struct upt_scene_options {
 } upt_scene_options;
 
 /**
- * A rigid instrument; the input of `upt_scene_step_instruments` and `upt_scene_contacts_from_instruments`.
+ * A rigid instrument, as `upt_input` and `upt_scene_contacts_from_instruments` take it.
  */
 typedef struct upt_instrument {
   /**
@@ -701,7 +711,7 @@ typedef struct upt_instrument {
    */
   uint8_t sticking;
   /**
-   * Only for `upt_scene_step_instruments`: `UPT_MODE_*`.
+   * Only for `upt_input`: `UPT_MODE_*`.
    */
   uint8_t mode;
   /**
@@ -709,7 +719,7 @@ typedef struct upt_instrument {
    */
   uint8_t reserved[2];
   /**
-   * Only for `upt_scene_step_instruments`: Coulomb's coefficient, 0 or more.
+   * Only for `upt_input`: Coulomb's coefficient, 0 or more.
    */
   float friction;
   /**
@@ -721,6 +731,57 @@ typedef struct upt_instrument {
    */
   const void *hull;
 } upt_instrument;
+
+/**
+ * The input of a step, submitted or not, and of a frame between steps. All zero but `struct_size`: nothing happens, the tissue moves on
+ * by itself.
+ *
+ * One thing drives a step: `instruments`, the nodes in contact, or `collision`; two at once are `UPT_ERR_ARGUMENT`. Later versions add
+ * fields at the end.
+ */
+typedef struct upt_input {
+  /**
+   * `sizeof(upt_input)`.
+   */
+  uint32_t struct_size;
+  /**
+   * Zero.
+   */
+  uint8_t reserved[4];
+  /**
+   * `[instrument_count]`: where rigid instruments are at the end of the step, all with the same `struct_size`. Pass every instrument
+   * every time, in the same order.
+   */
+  const struct upt_instrument *instruments;
+  /**
+   * At most 64.
+   */
+  uint64_t instrument_count;
+  /**
+   * `[contact_count]` nodes in contact, each at most once, in any order.
+   */
+  const uint32_t *contact_nodes;
+  /**
+   * `[contact_count,3]`, mm: the displacement of these nodes at the end of the step.
+   */
+  const float *contact_vectors;
+  /**
+   * At most K.
+   */
+  uint64_t contact_count;
+  /**
+   * `[K,3]`, mm, zero except at nodes in contact, where it is their displacement at the end of the step; NULL: no such field.
+   */
+  const float *collision;
+  /**
+   * `[K,3]`, mm, the displacement that the step starts from; NULL: the scene's own state. Not with `instruments`.
+   */
+  const float *displacement;
+  /**
+   * The moment of the end of the step on the host's clock, s, from which `upt_scene_present` counts; 0 for hosts that keep none.
+   */
+  double time_s;
+} upt_input;
 
 /**
  * What the tissue does to an instrument at the end of a step; filled by `upt_scene_instrument_readings`.
@@ -777,6 +838,20 @@ typedef struct upt_instrument_contact {
    */
   float force[3];
 } upt_instrument_contact;
+
+/**
+ * What is shown of a state. Where a call takes one, NULL is the region.
+ */
+typedef struct upt_view {
+  /**
+   * `sizeof(upt_view)`.
+   */
+  uint32_t struct_size;
+  /**
+   * `UPT_VIEW_*`.
+   */
+  int32_t kind;
+} upt_view;
 
 /**
  * Options of `upt_haptics_create`.
@@ -1251,41 +1326,47 @@ upt_status upt_scene_destroy(struct upt_scene *scene);
 upt_status upt_scene_reset(struct upt_scene *scene);
 
 /**
- * One step: u(t), c(t) -> u(t + dt).
+ * One step of the scene's `dt`, as `input` drives it.
  *
- * - `displacement`: `[K,3]`, mm; NULL uses the scene's own state.
- * - `collision`: `[K,3]`, mm, zero except at nodes in contact, where it is the displacement that the instrument imposes
- *   by the end of the step; NULL means no contact.
+ * Instruments are where they will be at the end of the step: each moves there on a straight line from its last pose, and their contact is
+ * solved. An instrument that would move more than 40 mm in a step is placed there without a motion. Contact is unilateral, with
+ * Coulomb friction, at points of the domain's surface at most 1.7 mm apart. A scene with corrections solves it inside each
+ * correction, as a load; with `corrections = UPT_CORRECTIONS_NONE` it is solved once, on the linear response. The scene remembers
+ * each place of the array: pass every instrument every time, in the same order.
+ *
+ * - `input`: what drives the step; NULL: nothing does, the tissue moves on by itself.
  * - `out`: `[n,3]`, mm (n: K, or the region's count), may be NULL; it may be the memory of an input, at the cost of a
  *   copy.
  * - `out_count`: number of floats in `out`, 3 n; 0 when out is NULL.
  *
  * Threads: one at a time.
- * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NON_FINITE`,
- * `UPT_ERR_UNSUPPORTED`, `UPT_ERR_GUARD`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`; the state does
- * not change.
+ * Errors: `UPT_ERR_STRUCT_SIZE` for an input of another size; `UPT_ERR_ARGUMENT` also for two drives at once, for a displacement with
+ * instruments and for a node beyond K or listed twice; `UPT_ERR_NON_FINITE`; for instruments `UPT_ERR_UNSUPPORTED` in a build without
+ * feature "instruments" and for a bundle without a linear response, and `UPT_ERR_HANDLE` for a hull that was destroyed; `UPT_ERR_NULL`,
+ * `UPT_ERR_BUSY`, `UPT_ERR_GUARD`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`; the state does not change.
  */
 upt_status upt_scene_step(struct upt_scene *scene,
-                          const float *displacement,
-                          const float *collision,
+                          const struct upt_input *input,
                           float *out,
                           uint64_t out_count);
 
 /**
- * One step from the scene's own state, with a list of the nodes in contact.
+ * One step of dense fields, `u(t), c(t) -> u(t + dt)`, as the paper writes it: `upt_scene_step` with `displacement` and `collision`.
  *
- * - `contact_nodes`: `[m]` node indices, each at most once, in any order.
- * - `contact_vectors`: `[m,3]`, mm: the displacement of these nodes at the end of the step.
- * - `contact_count`: m; 0 means no contact and both may be NULL.
- * - `out`, `out_count`, threads and errors: as in `upt_scene_step`; also `UPT_ERR_ARGUMENT` for an index or a count
- *   beyond K.
+ * - `displacement`: `[K,3]`, mm; NULL uses the scene's own state.
+ * - `collision`: `[K,3]`, mm, zero except at nodes in contact, where it is the displacement that is imposed by the end of the step; NULL
+ *   means no contact.
+ * - `out`, `out_count`, threads: as in `upt_scene_step`.
+ *
+ * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NON_FINITE`,
+ * `UPT_ERR_UNSUPPORTED`, `UPT_ERR_GUARD`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`; the state does
+ * not change.
  */
-upt_status upt_scene_step_contacts(struct upt_scene *scene,
-                                   const uint32_t *contact_nodes,
-                                   const float *contact_vectors,
-                                   uint64_t contact_count,
-                                   float *out,
-                                   uint64_t out_count);
+upt_status upt_scene_step_field(struct upt_scene *scene,
+                                const float *displacement,
+                                const float *collision,
+                                float *out,
+                                uint64_t out_count);
 
 /**
  * Copies the last published state.
@@ -1304,18 +1385,16 @@ upt_status upt_scene_read(struct upt_scene *scene,
  * Starts a step on the scene's worker thread and returns at once. An error of an earlier step that was not reported yet
  * is still reported.
  *
- * - `contact_nodes`, `contact_vectors`, `contact_count`: as in `upt_scene_step_contacts`; checked and copied before the
- *   call returns.
+ * - `input`: as in `upt_scene_step`; checked and copied before the call returns.
  *
  * Threads: one at a time.
  * Errors: `UPT_ERR_BUSY` while a step is in flight (unless the scene was made with `latest_wins`), `UPT_ERR_NULL`,
- * `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` (also for an index or a count beyond K, or a node listed twice),
- * `UPT_ERR_NON_FINITE`, `UPT_ERR_STATE` if no thread can be started, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
+ * `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT` and `UPT_ERR_NON_FINITE` for the input, `UPT_ERR_UNSUPPORTED` for
+ * instruments in a build without feature "instruments", `UPT_ERR_STATE` if no thread can be started, `UPT_ERR_OUT_OF_MEMORY`,
+ * `UPT_ERR_PANIC`.
  */
 upt_status upt_scene_submit(struct upt_scene *scene,
-                            const uint32_t *contact_nodes,
-                            const float *contact_vectors,
-                            uint64_t contact_count);
+                            const struct upt_input *input);
 
 /**
  * Asks whether the submitted step has finished. Never waits.
@@ -1431,37 +1510,6 @@ upt_status upt_scene_sample_points(struct upt_scene *scene,
                                    uint64_t out_count);
 
 /**
- * One step from the scene's own state, driven by rigid instruments. Their contact with the tissue is solved.
- *
- * Give the pose of each instrument at the end of the step; the instrument moves there on a straight line from its last
- * pose. An instrument that would move more than 40 mm in a step is placed there without a motion. Contact is unilateral, with Coulomb
- * friction, at points of the domain's surface at most 1.7 mm apart. A scene with corrections solves it inside each
- * correction, as a load; with `corrections = UPT_CORRECTIONS_NONE` it is solved once, on the linear response. The scene
- * remembers each place of the array: pass every instrument every time, in the same order.
- *
- * - `instruments`: at most 64, all with the same `struct_size`; NULL with count 0 makes a step without contact.
- * - `out`, `out_count`, threads and errors: as in `upt_scene_step`; also `UPT_ERR_UNSUPPORTED` in a build without
- *   feature "instruments" and for a bundle without a linear response, `UPT_ERR_STRUCT_SIZE`, and `UPT_ERR_HANDLE` for a hull
- *   that was destroyed.
- */
-upt_status upt_scene_step_instruments(struct upt_scene *scene,
-                                      const struct upt_instrument *instruments,
-                                      uint64_t instrument_count,
-                                      float *out,
-                                      uint64_t out_count);
-
-/**
- * Starts a step driven by rigid instruments on the scene's worker thread and returns at once.
- *
- * - `instruments`, `instrument_count`: as in `upt_scene_step_instruments`; checked and copied before the call returns.
- *
- * Threads and errors: those of `upt_scene_submit` and of `upt_scene_step_instruments`.
- */
-upt_status upt_scene_submit_instruments(struct upt_scene *scene,
-                                        const struct upt_instrument *instruments,
-                                        uint64_t instrument_count);
-
-/**
  * Copies the force, torque and penetration of each instrument at the end of the last step.
  *
  * - `out`: `[count]`, in the order of the step's instruments; set `struct_size` of every element.
@@ -1521,83 +1569,28 @@ upt_status upt_hull_destroy(struct upt_hull *hull);
  * frames start from where they would have been without it. They blend into the new step within two fifths of a step, or at 25 mm/s where
  * that takes longer, but always within two steps.
  *
- * - `seconds`: time since the last published step, 0 or more; velocities are followed for two steps at most.
- * - `instruments`: as `upt_scene_step_instruments`.
- * - `out`: `[n,3]`, mm, in the region's order.
+ * - `input`: what drives the tissue, where it is at `when`: instruments, or for scenes that nodes drive these nodes and where they are.
+ *   Nodes of the last step that are no longer listed are released: they lose the force that held them. Neither `displacement` nor
+ *   `time_s` may be set. NULL: nothing touches the tissue.
+ * - `when`: the moment on the clock of the steps' `time_s`, s, not before that of the last published step; for hosts whose steps have
+ *   no time, the time since the last published step. Velocities are followed for two steps at most.
+ * - `view`: the region or the attached points; NULL: the region.
+ * - `out`: `[n,3]`, mm, in the view's order.
  * - `out_count`: number of floats in `out`, 3 n.
  *
  * Threads: one thread at a time presents; another may step or submit meanwhile.
  * Errors: `UPT_ERR_BUSY` while another thread presents, and if a step is in flight at the first call;
  * `UPT_ERR_UNSUPPORTED` in a build without feature "instruments", for a bundle without a linear response or corrections, and
- * for a scene without corrections; `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`,
- * `UPT_ERR_NON_FINITE`, `UPT_ERR_STATE`, `UPT_ERR_RUNTIME`, `UPT_ERR_IO`, `UPT_ERR_BUNDLE`, `UPT_ERR_OUT_OF_MEMORY`,
- * `UPT_ERR_PANIC`.
+ * for a scene without corrections; `UPT_ERR_STATE` for the points when none are attached; `UPT_ERR_NULL`, `UPT_ERR_HANDLE`,
+ * `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NON_FINITE`, `UPT_ERR_RUNTIME`, `UPT_ERR_IO`, `UPT_ERR_BUNDLE`,
+ * `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
  */
 upt_status upt_scene_present(struct upt_scene *scene,
-                             double seconds,
-                             const struct upt_instrument *instruments,
-                             uint64_t instrument_count,
+                             const struct upt_input *input,
+                             double when,
+                             const struct upt_view *view,
                              float *out,
                              uint64_t out_count);
-
-/**
- * As `upt_scene_present`, at the attached points.
- *
- * - `seconds`, `instruments`: as `upt_scene_present`.
- * - `out`: `[n,3]`, mm.
- * - `out_count`: number of floats in `out`, 3 n.
- *
- * Threads: one thread at a time presents, the region or points; another may step or submit meanwhile.
- * Errors: those of `upt_scene_present`; `UPT_ERR_STATE` when no points are attached.
- */
-upt_status upt_scene_present_points(struct upt_scene *scene,
-                                    double seconds,
-                                    const struct upt_instrument *instruments,
-                                    uint64_t instrument_count,
-                                    float *out,
-                                    uint64_t out_count);
-
-/**
- * As `upt_scene_present`, with a collision field in place of instruments, for scenes that `upt_scene_step_contacts` drives.
- *
- * The listed nodes go where the list says; the others follow by the compliance of that time. Nodes of the last step that are no longer
- * listed are released: they lose the force that held them.
- *
- * - `seconds`: as `upt_scene_present`.
- * - `contact_nodes`: `[m]` node indices, each at most once, in any order.
- * - `contact_vectors`: `[m,3]`, mm: the displacement of these nodes at that moment.
- * - `contact_count`: m; 0 means no contact and both may be NULL.
- * - `out`: `[n,3]`, mm, in the region's order.
- * - `out_count`: number of floats in `out`, 3 n.
- *
- * Threads: as `upt_scene_present`.
- * Errors: those of `upt_scene_present`; also `UPT_ERR_ARGUMENT` for an index or a count beyond K.
- */
-upt_status upt_scene_present_contacts(struct upt_scene *scene,
-                                      double seconds,
-                                      const uint32_t *contact_nodes,
-                                      const float *contact_vectors,
-                                      uint64_t contact_count,
-                                      float *out,
-                                      uint64_t out_count);
-
-/**
- * As `upt_scene_present_contacts`, at the attached points.
- *
- * - `seconds`, `contact_nodes`, `contact_vectors`, `contact_count`: as `upt_scene_present_contacts`.
- * - `out`: `[n,3]`, mm.
- * - `out_count`: number of floats in `out`, 3 n.
- *
- * Threads: as `upt_scene_present_points`.
- * Errors: those of `upt_scene_present_contacts`; `UPT_ERR_STATE` when no points are attached.
- */
-upt_status upt_scene_present_points_contacts(struct upt_scene *scene,
-                                             double seconds,
-                                             const uint32_t *contact_nodes,
-                                             const float *contact_vectors,
-                                             uint64_t contact_count,
-                                             float *out,
-                                             uint64_t out_count);
 
 /**
  * Lets a hand feel a tool: from now on, each step of the scene prepares what `upt_haptics_render` needs.

@@ -8,7 +8,7 @@
 #![cfg_attr(feature = "instruments", doc = "```")]
 #![cfg_attr(not(feature = "instruments"), doc = "```ignore")]
 //! use std::path::Path;
-//! use upt::{Contact, IndexSet, Model, ModelOptions, Scene, SceneOptions, Shape, StepInput, Tool};
+//! use upt::{Contact, IndexSet, Model, ModelOptions, Scene, SceneOptions, Shape, Tool};
 //!
 //! # fn main() -> upt::Result<()> {
 //! // A bundle's folder; this one has no network, so that it needs no ONNX Runtime.
@@ -23,8 +23,7 @@
 //! for step in 0..5 {
 //!     let position = [x, y, z + 6.0 - step as f32];
 //!     let tool = Tool::new(&ball, position, [0.0, 0.0, 0.0, 1.0])?;
-//!     let input = StepInput { displacement: None, contact: Contact::Tools(&[tool]) };
-//!     scene.step(input, Some(&mut u))?;
+//!     scene.step(Contact::Tools(&[tool]), Some(&mut u))?;
 //! }
 //! let [_, _, lift] = scene.with_contact_report(|report| report.readings[0].force); // on the tool, mN
 //! assert!(u.iter().all(|x| x.is_finite()) && lift.is_finite());
@@ -98,5 +97,5 @@ pub use options::{
     Corrections, DecoderKernel, GuardPolicy, IndexSet, InitOptions, LONGEST_STEP_S, ModelOptions,
     Precision, Provider, SHORTEST_STEP_S, SceneOptions, StepPath, UserStream,
 };
-pub use scene::{Contact, Progress, Scene, StepInput};
+pub use scene::{Contact, Progress, Scene, StepInput, View};
 pub use stats::{SceneStats, flag};

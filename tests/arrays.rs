@@ -35,20 +35,18 @@ fn a_step_by_arrays_has_the_bits_of_a_step_by_slices() {
             false => Contact::at(&nodes, vectors.view()).unwrap(),
         };
         let before = by_arrays.displacement().unwrap();
-        let input = StepInput {
-            displacement: None,
-            contact,
-        };
+        let input = StepInput::from(contact);
         let input = input.with_displacement(before.view()).unwrap();
         by_arrays.step(input, None).unwrap();
-        let input = StepInput {
-            displacement: None,
-            contact: Contact::Sparse {
-                nodes: &nodes,
-                vectors: vectors.as_slice().unwrap(),
-            },
-        };
-        by_slices.step(input, None).unwrap();
+        by_slices
+            .step(
+                Contact::Sparse {
+                    nodes: &nodes,
+                    vectors: vectors.as_slice().unwrap(),
+                },
+                None,
+            )
+            .unwrap();
     }
     let after = by_arrays.displacement().unwrap();
     assert_eq!(after, by_slices.displacement().unwrap());

@@ -107,17 +107,10 @@ fn falls_asleep(path: &Path) {
                 nodes: &nodes,
                 vectors: &vectors,
             };
-            let input = StepInput {
-                displacement: None,
-                contact,
-            };
             // The guard may refuse a push; the tissue comes back from what there was.
-            let _ = scene.step(input, None);
+            let _ = scene.step(contact, None);
         }
-        let free = StepInput {
-            displacement: None,
-            contact: Contact::None,
-        };
+        let free = StepInput::from(Contact::None);
         let asleep = (1..=PATIENCE).find(|_| {
             scene.step(free, None).unwrap();
             scene.stats().sleeping

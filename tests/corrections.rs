@@ -3,7 +3,7 @@
 mod fixture;
 
 use fixture::{bits, model, plain, push, rollout, scene, sparse};
-use upt::{Contact, Corrections, Error, IndexSet, SceneOptions, StepInput, flag};
+use upt::{Contact, Corrections, Error, IndexSet, SceneOptions, flag};
 
 fn with(corrections: Corrections) -> SceneOptions {
     SceneOptions {
@@ -191,11 +191,7 @@ fn wild_contacts_stay_finite_and_the_tissue_comes_back() {
                 nodes,
                 vectors: &vectors,
             };
-            let input = StepInput {
-                displacement: None,
-                contact,
-            };
-            scene.step(input, Some(&mut out)).unwrap();
+            scene.step(contact, Some(&mut out)).unwrap();
             assert!(out.iter().all(|u| u.is_finite() && u.abs() < 1e3));
             let stats = scene.stats();
             assert!(stats.min_det > 0.0 || stats.flags & flag::FELL_BACK != 0);

@@ -68,7 +68,7 @@ fn every_call_of_a_host_that_traps_exceptions_returns() {
                 _ => [0.0; 3],
             };
             let nodes = if t > 10 { &domain[..0] } else { &domain[..4] };
-            let status = trapped("upt_scene_step_contacts", || host.step(nodes, push));
+            let status = trapped("upt_scene_step", || host.step(nodes, push));
             assert!(
                 matches!(status, UPT_OK | UPT_ERR_GUARD),
                 "{}",
@@ -96,12 +96,12 @@ fn every_call_of_a_host_that_traps_exceptions_returns() {
         assert_eq!(status, UPT_OK);
         let bad = [f32::NAN; 12];
         let status = trapped("upt_scene_submit", || unsafe {
-            upt_scene_submit(scene, domain.as_ptr(), bad.as_ptr(), 4)
+            upt_scene_submit(scene, &upt_input::of_contacts(&domain[..4], &bad))
         });
         assert_eq!(status, UPT_ERR_NON_FINITE);
         let push = [1.0f32; 12];
         let status = trapped("upt_scene_submit", || unsafe {
-            upt_scene_submit(scene, domain.as_ptr(), push.as_ptr(), 4)
+            upt_scene_submit(scene, &upt_input::of_contacts(&domain[..4], &push))
         });
         assert_eq!(status, UPT_OK);
         let wait = || unsafe { upt_scene_wait(scene, u32::MAX) };

@@ -18,7 +18,8 @@ fn calls_of_a_forked_child_are_refused_and_the_parent_goes_on() {
     let host = Host::new("tiny-upt", |options| options.threads = 2);
     let domain = host::indices(host.model, UPT_SET_DOMAIN_NODES);
     let vectors = [0.0f32, 0.0, -1.0];
-    let submit = || unsafe { upt_scene_submit(host.scene, domain.as_ptr(), vectors.as_ptr(), 1) };
+    let input = upt_input::of_contacts(&domain[..1], &vectors);
+    let submit = || unsafe { upt_scene_submit(host.scene, &input) };
     // The worker's and the pool's threads are there.
     assert_eq!(submit(), UPT_OK);
     assert_eq!(unsafe { upt_scene_wait(host.scene, u32::MAX) }, UPT_OK);

@@ -123,7 +123,7 @@ fn a_refused_step_without_contact_is_replaced_under_every_policy() {
         let given = vec![1.0; 3 * held.node_count()];
         let input = StepInput {
             displacement: Some(&given),
-            contact: Contact::None,
+            ..StepInput::default()
         };
         assert!(matches!(held.step(input, None), Err(Error::Guard(_))));
     }
@@ -161,6 +161,7 @@ fn inputs_that_are_not_numbers_are_refused_and_nothing_changes() {
                         StepInput {
                             displacement,
                             contact,
+                            ..StepInput::default()
                         },
                         None,
                     )
@@ -172,7 +173,7 @@ fn inputs_that_are_not_numbers_are_refused_and_nothing_changes() {
             let field = vec![0.0; len];
             let input = StepInput {
                 displacement: Some(&field),
-                contact: Contact::None,
+                ..StepInput::default()
             };
             assert_eq!(scene.step(input, None).unwrap_err().status(), -2);
         }
@@ -192,6 +193,7 @@ fn inputs_that_are_not_numbers_are_refused_and_nothing_changes() {
         let input = StepInput {
             displacement: Some(&field),
             contact: Contact::Dense(&field),
+            ..StepInput::default()
         };
         let wide = fixture::scene(&model, &with_policy(GuardPolicy::Report));
         wide.step(input, None).unwrap();
@@ -329,11 +331,7 @@ fn an_element_inside_out_at_the_contact_is_told_of_without_being_asked() {
             nodes: &[node],
             vectors: &vectors,
         };
-        let input = StepInput {
-            displacement: None,
-            contact,
-        };
-        scene.step(input, None).unwrap();
+        scene.step(contact, None).unwrap();
         let stats = scene.stats();
         (stats.min_det, stats.flags & flag::INVERTED != 0)
     };

@@ -7,7 +7,7 @@ use contact::Shape;
 use fixture::{model, plain, scene};
 use upt::contact::Tool;
 use upt::haptics::{HapticForce, HapticOptions, HapticPose, Haptics};
-use upt::{Contact, Corrections, Error, Scene, SceneOptions, StepInput};
+use upt::{Contact, Corrections, Error, Scene, SceneOptions};
 
 const DT: f64 = 0.05;
 
@@ -60,11 +60,7 @@ fn pose(scene: &Scene, depth: f64, time_s: f64) -> HapticPose {
 }
 
 fn step(scene: &Scene, tools: &[Tool]) {
-    let input = StepInput {
-        displacement: None,
-        contact: Contact::Tools(tools),
-    };
-    scene.step(input, None).unwrap();
+    scene.step(Contact::Tools(tools), None).unwrap();
 }
 
 fn felt(scene: &Scene) -> [f32; 3] {

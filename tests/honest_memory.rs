@@ -39,10 +39,8 @@ fn stepped(
     for &scene in &scenes {
         for depth in 0..4 {
             let vectors = [0.0, 0.0, -0.3 * depth as f32].repeat(nodes.len());
-            let (nodes, count) = (nodes.as_ptr(), nodes.len() as u64);
-            let none = std::ptr::null_mut();
-            let status =
-                unsafe { upt_scene_step_contacts(scene, nodes, vectors.as_ptr(), count, none, 0) };
+            let input = upt_input::of_contacts(nodes, &vectors);
+            let status = unsafe { upt_scene_step(scene, &input, std::ptr::null_mut(), 0) };
             assert!(
                 matches!(status, UPT_OK | UPT_ERR_GUARD),
                 "{}",
@@ -91,8 +89,8 @@ fn memory_is_stated_to_ten_percent_and_given_back() {
             for &scene in &scenes {
                 let status = unsafe { upt_scene_attach_points(scene, positions.as_ptr(), points) };
                 assert_eq!(status, UPT_OK, "{}", host::message());
-                let none = std::ptr::null();
-                let step = unsafe { upt_scene_step(scene, none, none, std::ptr::null_mut(), 0) };
+                let nothing = std::ptr::null();
+                let step = unsafe { upt_scene_step(scene, nothing, std::ptr::null_mut(), 0) };
                 assert_eq!(step, UPT_OK);
             }
             drop(positions);

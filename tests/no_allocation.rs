@@ -14,7 +14,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use fixture::{BUNDLES, model, plain, push, rollout, scene, sparse};
 use upt::kernels::Isa;
 use upt::kernels::flush::read_mode;
-use upt::{Contact, DecoderKernel, IndexSet, SceneOptions, StepInput, StepPath};
+use upt::{Contact, DecoderKernel, IndexSet, SceneOptions, StepInput, StepPath, View};
 
 struct Counting;
 
@@ -61,11 +61,7 @@ fn tools_allocate_nothing() {
         let mut turn = || {
             let before = ALLOCATIONS.load(Ordering::Relaxed);
             for tools in &programme {
-                let input = StepInput {
-                    displacement: None,
-                    contact: Contact::Tools(tools),
-                };
-                scene.step(input, Some(&mut out)).unwrap();
+                scene.step(Contact::Tools(tools), Some(&mut out)).unwrap();
                 touched |= scene.with_contact_report(|report| report.readings[0].contacts > 0);
             }
             ALLOCATIONS.load(Ordering::Relaxed) - before
@@ -94,14 +90,14 @@ fn frames_allocate_nothing() {
     let mut turn = || {
         let before = ALLOCATIONS.load(Ordering::Relaxed);
         for [now, later] in &depths {
-            let input = StepInput {
-                displacement: None,
-                contact: Contact::Tools(now),
-            };
-            scene.step(input, None).unwrap();
+            scene.step(Contact::Tools(now), None).unwrap();
             for part in [0.01, 0.02, 0.03] {
-                scene.present(part, later, &mut out).unwrap();
-                scene.present_points(part, later, &mut points).unwrap();
+                scene
+                    .present(Contact::Tools(later), part, View::Region, &mut out)
+                    .unwrap();
+                scene
+                    .present(Contact::Tools(later), part, View::Points, &mut points)
+                    .unwrap();
             }
         }
         ALLOCATIONS.load(Ordering::Relaxed) - before
@@ -129,11 +125,7 @@ fn haptics_allocate_nothing() {
     let mut turn = || {
         let before = ALLOCATIONS.load(Ordering::Relaxed);
         for tools in tools.iter().cycle().take(8) {
-            let input = StepInput {
-                displacement: None,
-                contact: Contact::Tools(tools),
-            };
-            scene.step(input, None).unwrap();
+            scene.step(Contact::Tools(tools), None).unwrap();
             for _ in 0..5 {
                 time_s += 1e-3;
                 let at = tools[0].pose.translation.to_array();
@@ -213,6 +205,7 @@ fn steps_allocate_nothing_and_keep_the_floating_point_mode() {
                     let inputs = StepInput {
                         displacement: Some(&given),
                         contact: Contact::Dense(&dense),
+                        ..StepInput::default()
                     };
                     scene.step(inputs, Some(&mut out)).unwrap();
                     ALLOCATIONS.load(Ordering::Relaxed) - before

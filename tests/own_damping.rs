@@ -3,7 +3,7 @@
 mod fixture;
 
 use fixture::{bits, model, plain, scene};
-use upt::{Contact, Corrections, Error, Scene, SceneOptions, StepInput};
+use upt::{Contact, Corrections, Error, Scene, SceneOptions};
 
 fn damped(damping_per_s: f64) -> SceneOptions {
     SceneOptions {
@@ -21,11 +21,9 @@ fn step(scene: &Scene, index: usize, u: &mut [f32]) {
         true => (&[node], &vector),
         false => (&[], &[]),
     };
-    let input = StepInput {
-        displacement: None,
-        contact: Contact::Sparse { nodes, vectors },
-    };
-    scene.step(input, Some(u)).unwrap();
+    scene
+        .step(Contact::Sparse { nodes, vectors }, Some(u))
+        .unwrap();
 }
 
 /// Mean square of the displacements of steps `from..to` of the programme, mm².

@@ -6,7 +6,7 @@ mod fixture;
 use contact::Shape;
 use fixture::{bits, model, plain, scene};
 use upt::contact::Tool;
-use upt::{Contact, Corrections, Error, Model, ModelOptions, Scene, SceneOptions, StepInput};
+use upt::{Contact, Corrections, Error, Model, ModelOptions, Scene, SceneOptions};
 
 const DT: f64 = 0.05;
 
@@ -44,11 +44,7 @@ fn depth(seconds: f64) -> f64 {
 fn step(scene: &Scene, seconds: f64) -> Vec<f32> {
     let mut u = vec![0.0; 3 * scene.node_count()];
     let tools = ball(scene, depth(seconds));
-    let input = StepInput {
-        displacement: None,
-        contact: Contact::Tools(&tools),
-    };
-    scene.step(input, Some(&mut u)).unwrap();
+    scene.step(Contact::Tools(&tools), Some(&mut u)).unwrap();
     u
 }
 
@@ -220,11 +216,7 @@ fn a_collision_field_drives_it_too() {
             false => (&[], &[]),
         };
         let contact = Contact::Sparse { nodes, vectors };
-        let input = StepInput {
-            displacement: None,
-            contact,
-        };
-        scene.step(input, Some(&mut u)).unwrap();
+        scene.step(contact, Some(&mut u)).unwrap();
         let at = &u[3 * node as usize..][..3];
         if index == 30 {
             assert_eq!(at, [0.0, 0.0, -1.0]);
@@ -257,11 +249,7 @@ fn a_fine_mesh_comes_to_rest_in_short_steps() {
             -120.0
         };
         let tool = Tool::new(&shape, [x, -14.0, 8.0], [0.0, 0.0, 0.0, 1.0]).unwrap();
-        let input = StepInput {
-            displacement: None,
-            contact: Contact::Tools(&[tool]),
-        };
-        scene.step(input, None).unwrap();
+        scene.step(Contact::Tools(&[tool]), None).unwrap();
         let stats = scene.stats();
         assert_eq!(
             stats.flags & upt::flag::FELL_BACK,
@@ -296,12 +284,8 @@ fn what_is_inverted_dies_away_and_does_not_jump() {
             false => (&[], &[]),
         };
         let contact = Contact::Sparse { nodes, vectors };
-        let input = StepInput {
-            displacement: None,
-            contact,
-        };
         let before = u.clone();
-        scene.step(input, Some(&mut u)).unwrap();
+        scene.step(contact, Some(&mut u)).unwrap();
         if index >= 4 && scene.stats().flags & upt::flag::FELL_BACK != 0 {
             fell_back += 1;
             let (way, size) = (farthest(&u, &before), farthest(&before, &rest));

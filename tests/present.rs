@@ -6,7 +6,7 @@ mod fixture;
 use contact::Shape;
 use fixture::{bits, model, plain, scene};
 use upt::contact::Tool;
-use upt::{Contact, Corrections, Error, Scene, SceneOptions, StepInput};
+use upt::{Contact, Corrections, Error, Scene, SceneOptions, View};
 
 const DT: f64 = 0.05;
 
@@ -42,17 +42,15 @@ fn pressing(scene: &Scene, t: f64) -> Vec<Tool> {
 
 fn step(scene: &Scene, tools: &[Tool]) -> Vec<f32> {
     let mut u = vec![0.0; 3 * scene.node_count()];
-    let input = StepInput {
-        displacement: None,
-        contact: Contact::Tools(tools),
-    };
-    scene.step(input, Some(&mut u)).unwrap();
+    scene.step(Contact::Tools(tools), Some(&mut u)).unwrap();
     u
 }
 
 fn present(scene: &Scene, seconds: f64, tools: &[Tool]) -> Vec<f32> {
     let mut u = vec![f32::NAN; 3 * scene.region_count()];
-    scene.present(seconds, tools, &mut u).unwrap();
+    scene
+        .present(Contact::Tools(tools), seconds, View::Region, &mut u)
+        .unwrap();
     u
 }
 
@@ -143,8 +141,7 @@ fn a_host_that_took_a_step_for_the_one_before_shows_the_step_as_it_is() {
         present(&scene, 0.02, &pressing(&scene, f64::from(t) + 0.4));
     }
     let u = step(&scene, &pressing(&scene, 4.0));
-    // The step has come in while the host still counts from the one before.
-    present(&scene, DT + 0.001, &pressing(&scene, 4.02));
+    // The step has come in while the host still counts from the one before.present(Contact::Tools(DT + 0.001), &scene, View::Region, &pressing(&scene, 4.02));
     let shown = present(&scene, 0.001, &pressing(&scene, 4.02));
     assert!(farthest(&shown, &u) < 0.05);
 }
@@ -176,7 +173,9 @@ fn a_frame_may_be_made_while_a_step_is_in_flight_and_changes_nothing() {
     let before = scene.save().unwrap();
     present(&scene, 0.02, &pressing(&scene, 4.4));
     assert!(scene.save().unwrap() == before);
-    scene.submit_tools(&pressing(&scene, 5.0)).unwrap();
+    scene
+        .submit(Contact::Tools(&pressing(&scene, 5.0)))
+        .unwrap();
     for frame in 0..20 {
         let shown = present(&scene, 0.002 * f64::from(frame), &pressing(&scene, 4.5));
         assert!(shown.iter().all(|x| x.is_finite()));
@@ -206,25 +205,31 @@ fn points_at_nodes_go_with_them() {
     let rest = scene.mesh().positions.clone();
     let tools = pressing(&scene, 4.5);
     let mut points = vec![0.0; rest.len()];
-    let none = scene.present_points(0.01, &tools, &mut points);
+    let none = scene.present(Contact::Tools(&tools), 0.01, View::Points, &mut points);
     assert!(matches!(none, Err(Error::State(_))));
     scene.attach_points(Some(&rest)).unwrap();
     for t in 1..5 {
         step(&scene, &pressing(&scene, f64::from(t)));
-        scene.present_points(0.01, &tools, &mut points).unwrap();
+        scene
+            .present(Contact::Tools(&tools), 0.01, View::Points, &mut points)
+            .unwrap();
         assert!(farthest(&present(&scene, 0.01, &tools), &points) < 1e-3);
     }
-    scene.present_points(0.025, &tools, &mut points).unwrap();
+    scene
+        .present(Contact::Tools(&tools), 0.025, View::Points, &mut points)
+        .unwrap();
     assert!(farthest(&present(&scene, 0.025, &tools), &points) < 1e-3);
     assert!(matches!(
-        scene.present_points(0.01, &tools, &mut points[3..]),
+        scene.present(Contact::Tools(&tools), 0.01, View::Points, &mut points[3..]),
         Err(Error::Argument(_))
     ));
     // Other points, in flight too.
     scene.attach_points(Some(&rest[..9])).unwrap();
-    scene.submit_tools(&pressing(&scene, 5.0)).unwrap();
     scene
-        .present_points(0.03, &tools, &mut points[..9])
+        .submit(Contact::Tools(&pressing(&scene, 5.0)))
+        .unwrap();
+    scene
+        .present(Contact::Tools(&tools), 0.03, View::Points, &mut points[..9])
         .unwrap();
     scene.wait(std::time::Duration::from_secs(600)).unwrap();
 }
@@ -251,7 +256,12 @@ fn tissue_stops_with_its_tool() {
 fn present_contacts(scene: &Scene, seconds: f64, nodes: &[u32], vectors: &[f32]) -> Vec<f32> {
     let mut u = vec![f32::NAN; 3 * scene.region_count()];
     scene
-        .present_contacts(seconds, nodes, vectors, &mut u)
+        .present(
+            Contact::Sparse { nodes, vectors },
+            seconds,
+            View::Region,
+            &mut u,
+        )
         .unwrap();
     u
 }
@@ -275,12 +285,8 @@ fn a_collision_field_is_presented_as_instruments_are() {
             nodes: &nodes,
             vectors: &vectors,
         };
-        let input = StepInput {
-            displacement: None,
-            contact,
-        };
         let mut u = vec![0.0; 3 * scene.node_count()];
-        scene.step(input, Some(&mut u)).unwrap();
+        scene.step(contact, Some(&mut u)).unwrap();
         u
     };
     let (mut of_frames, mut of_last) = (0.0, 0.0);
@@ -313,7 +319,15 @@ fn a_collision_field_is_presented_as_instruments_are() {
     let node = nodes[0] as usize;
     let free = present_contacts(&scene, 0.03, &[], &[]);
     assert!(free[3 * node + 2] > last[3 * node + 2] + 0.05);
-    let wrong = scene.present_contacts(0.01, &[1 << 30], &[0.0; 3], &mut vec![0.0; free.len()]);
+    let wrong = scene.present(
+        Contact::Sparse {
+            nodes: &[1 << 30],
+            vectors: &[0.0; 3],
+        },
+        0.01,
+        View::Region,
+        &mut vec![0.0; free.len()],
+    );
     assert!(matches!(wrong, Err(Error::Argument(_))));
 }
 
@@ -325,15 +339,15 @@ fn what_cannot_be_is_refused() {
     let mut out = vec![0.0; 3 * one.node_count()];
     let tools = pressing(&one, 1.0);
     assert!(matches!(
-        one.present(f64::NAN, &tools, &mut out),
+        one.present(Contact::Tools(&tools), f64::NAN, View::Region, &mut out),
         Err(Error::NonFinite(_))
     ));
     assert!(matches!(
-        one.present(-0.01, &tools, &mut out),
+        one.present(Contact::Tools(&tools), -0.01, View::Region, &mut out),
         Err(Error::Argument(_))
     ));
     assert!(matches!(
-        one.present(0.01, &tools, &mut out[3..]),
+        one.present(Contact::Tools(&tools), 0.01, View::Region, &mut out[3..]),
         Err(Error::Argument(_))
     ));
     let rough = Tool {
@@ -341,7 +355,7 @@ fn what_cannot_be_is_refused() {
         ..tools[0].clone()
     };
     assert!(matches!(
-        one.present(0.01, &[rough], &mut out),
+        one.present(Contact::Tools(&[rough]), 0.01, View::Region, &mut out),
         Err(Error::Argument(_))
     ));
     let none = SceneOptions {
@@ -349,6 +363,6 @@ fn what_cannot_be_is_refused() {
         ..plain()
     };
     let plain_scene = scene(&model, &none);
-    let refused = plain_scene.present(0.01, &tools, &mut out);
+    let refused = plain_scene.present(Contact::Tools(&tools), 0.01, View::Region, &mut out);
     assert!(matches!(refused, Err(Error::Unsupported(_))));
 }

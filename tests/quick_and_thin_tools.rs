@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use contact::{Rotation, Shape, Vector};
 use upt::contact::{Mode, Tool, ToolReading};
-use upt::{Contact, Corrections, Model, ModelOptions, Scene, SceneOptions, StepInput, flag};
+use upt::{Contact, Corrections, Model, ModelOptions, Scene, SceneOptions, View, flag};
 
 fn model() -> Arc<Model> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("onnx/liver-coarse");
@@ -23,11 +23,7 @@ fn scene(model: &Arc<Model>, corrections: Corrections) -> Scene {
 }
 
 fn step(scene: &Scene, tool: Tool) -> (ToolReading, u32) {
-    let input = StepInput {
-        displacement: None,
-        contact: Contact::Tools(&[tool]),
-    };
-    scene.step(input, None).unwrap();
+    scene.step(Contact::Tools(&[tool]), None).unwrap();
     let reading = scene.with_contact_report(|report| report.readings[0]);
     (reading, scene.stats().flags)
 }
@@ -255,12 +251,8 @@ fn a_step_of_deep_tools_is_bounded_and_says_what_it_left() {
                 tool
             })
             .collect();
-        let input = StepInput {
-            displacement: None,
-            contact: Contact::Tools(&tools),
-        };
         // The guard may refuse what three tools as large as the organ leave of the tissue.
-        if scene.step(input, None).is_err() {
+        if scene.step(Contact::Tools(&tools), None).is_err() {
             continue;
         }
         let stats = scene.stats();
@@ -287,7 +279,12 @@ fn a_frame_shows_the_tissue_in_front_of_a_quick_tool() {
         // 7 mm in half a step: the ball has gone past the surface.
         let mut u = vec![0.0; 3 * scene.node_count()];
         scene
-            .present(0.025, &[place.tool(&shape, 3.0, -5.0)], &mut u)
+            .present(
+                Contact::Tools(&[place.tool(&shape, 3.0, -5.0)]),
+                0.025,
+                View::Region,
+                &mut u,
+            )
             .unwrap();
         let moved = u.as_chunks::<3>().0.iter().map(|u| Vector::from(*u));
         let inward = moved.map(|u| -u.dot(place.outward)).fold(0.0, f32::max);

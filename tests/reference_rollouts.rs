@@ -6,7 +6,7 @@ mod fixture;
 use fixture::{largest_difference, model, path, plain, push, scene, sparse};
 use upt::bundle::TensorFile;
 use upt::onnx::{ProviderPlan, Runtime, Stage, StageOptions};
-use upt::{Contact, StepInput, flag};
+use upt::{Contact, flag};
 
 fn tensors(name: &str) -> TensorFile {
     TensorFile::parse(name, std::fs::read(path(name)).unwrap()).unwrap()
@@ -28,14 +28,15 @@ fn follow(name: &str) -> u32 {
     let mut flags = 0;
     for (t, want) in fields.chunks_exact(3 * count).enumerate() {
         let rows = offsets[t]..offsets[t + 1];
-        let input = StepInput {
-            displacement: None,
-            contact: Contact::Sparse {
-                nodes: &nodes[rows.clone()],
-                vectors: &vectors[3 * rows.start..3 * rows.end],
-            },
-        };
-        scene.step(input, Some(&mut out)).unwrap();
+        scene
+            .step(
+                Contact::Sparse {
+                    nodes: &nodes[rows.clone()],
+                    vectors: &vectors[3 * rows.start..3 * rows.end],
+                },
+                Some(&mut out),
+            )
+            .unwrap();
         flags |= scene.stats().flags;
         let difference = largest_difference(&out, want);
         assert!(difference < 1e-4, "{name}, step {t}: {difference} mm");

@@ -88,6 +88,7 @@ fn dense_input_and_a_displacement_handed_back_change_nothing() {
             let input = StepInput {
                 displacement: Some(&handed),
                 contact: Contact::Dense(&dense),
+                ..StepInput::default()
             };
             b.step(input, Some(&mut state)).unwrap();
             assert_eq!(bits(&out), bits(&state), "{name} step {t}");

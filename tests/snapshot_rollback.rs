@@ -4,7 +4,7 @@ mod fixture;
 
 use fixture::{bits, copy_of, find_runtime, plain, push, renew_hash, scene};
 use sha2::{Digest, Sha256};
-use upt::{Contact, Model, ModelOptions, Scene, StepInput};
+use upt::{Contact, Model, ModelOptions, Scene};
 
 fn touch(scene: &Scene, nodes: &[u32], depth: f32) -> upt::Result<()> {
     let vectors = [0.1, 0.0, -depth].repeat(nodes.len());
@@ -12,11 +12,7 @@ fn touch(scene: &Scene, nodes: &[u32], depth: f32) -> upt::Result<()> {
         nodes,
         vectors: &vectors,
     };
-    let input = StepInput {
-        displacement: None,
-        contact,
-    };
-    scene.step(input, None)
+    scene.step(contact, None)
 }
 
 /// A bundle in which the contact of two nodes has no solution, though each alone has one.

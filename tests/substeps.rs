@@ -6,7 +6,7 @@ mod fixture;
 use contact::{Shape, Vector};
 use fixture::{bits, model, plain, scene};
 use upt::contact::{Mode, Tool};
-use upt::{Contact, Corrections, Error, Scene, SceneOptions, StepInput};
+use upt::{Contact, Corrections, Error, Scene, SceneOptions};
 
 fn with(substeps: u32, target_mm: f32) -> SceneOptions {
     SceneOptions {
@@ -34,11 +34,7 @@ fn ball(scene: &Scene, depth: f32, aside: f32) -> Tool {
 
 fn step(scene: &Scene, tool: Tool) -> Vec<f32> {
     let mut u = vec![0.0; 3 * scene.node_count()];
-    let input = StepInput {
-        displacement: None,
-        contact: Contact::Tools(&[tool]),
-    };
-    scene.step(input, Some(&mut u)).unwrap();
+    scene.step(Contact::Tools(&[tool]), Some(&mut u)).unwrap();
     u
 }
 

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use contact::{Shape, Vector};
 use fixture::{copy_of, find_runtime, plain, scene};
 use upt::contact::Tool;
-use upt::{Contact, Corrections, Model, ModelOptions, Scene, SceneOptions, StepInput, flag};
+use upt::{Contact, Corrections, Model, ModelOptions, Scene, SceneOptions, flag};
 
 const STEP_S: f32 = 0.05;
 /// Everything that the envelope says of a contact.
@@ -65,11 +65,7 @@ fn flags(corrections: u32, radius: f32, depth: f32, by: f32, count: usize) -> (u
     for left in (0..=steps).rev() {
         let at = depth - by * left as f32;
         let tools = balls(&scene, radius, at, count);
-        let input = StepInput {
-            displacement: None,
-            contact: Contact::Tools(&tools),
-        };
-        scene.step(input, None).unwrap();
+        scene.step(Contact::Tools(&tools), None).unwrap();
         let pushed =
             scene.with_contact_report(|report| report.readings.iter().all(|r| r.contacts > 0));
         assert!(pushed || at <= 0.0, "each tool pushes at {at} mm");

@@ -108,10 +108,7 @@ fn take(model: &Arc<Model>, way: &[Tool], k: u32, threads: usize) -> upt::Result
     for tool in way {
         let start = Instant::now();
         scene.step(
-            StepInput {
-                displacement: None,
-                contact: Contact::Tools(std::slice::from_ref(tool)),
-            },
+            StepInput::from(Contact::Tools(std::slice::from_ref(tool))),
             Some(&mut field),
         )?;
         let ms = 1e3 * start.elapsed().as_secs_f64();

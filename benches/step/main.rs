@@ -131,6 +131,7 @@ fn limits(model: &Model, threads: usize, surface: bool) -> (Option<f64>, Option<
 const FREE: StepInput<'static> = StepInput {
     displacement: None,
     contact: Contact::None,
+    time_s: 0.0,
 };
 
 fn options(threads: usize) -> SceneOptions {

@@ -129,6 +129,7 @@ pub fn in_turns(
             StepInput {
                 displacement,
                 contact,
+                ..StepInput::default()
             },
             Some(out),
         )?;

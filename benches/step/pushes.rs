@@ -35,6 +35,7 @@ pub fn push(scene: &Scene, nodes: &[u32], t: usize, out: Option<&mut [f32]>) -> 
         StepInput {
             displacement,
             contact,
+            ..StepInput::default()
         },
         out,
     )

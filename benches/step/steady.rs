@@ -10,7 +10,7 @@ use super::measure::{Row, budget, median, quick};
 use super::tail::Tail;
 use super::windows::{Steady, p99};
 use super::{patch, pushed};
-use upt::{Contact, Kind, StepInput};
+use upt::{Contact, Kind};
 
 /// Steps of a row, where the time suffices for them.
 fn steps(kind: Kind) -> usize {
@@ -54,12 +54,8 @@ pub fn measure(
             nodes: &nodes,
             vectors: &vectors[t % 7],
         };
-        let input = StepInput {
-            displacement: None,
-            contact,
-        };
         let start = Instant::now();
-        scene.step(input, Some(&mut out))?;
+        scene.step(contact, Some(&mut out))?;
         let ms = start.elapsed().as_secs_f64() * 1e3;
         if t >= WARM_UP {
             times.push(ms);

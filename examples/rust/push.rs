@@ -86,10 +86,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             },
             false => Contact::None,
         };
-        let input = StepInput {
-            displacement: None,
-            contact,
-        };
+        let input = StepInput::from(contact);
         scene.step(input, Some(&mut displacement))?;
         let stats = scene.stats();
         times.push(stats.step_ms);

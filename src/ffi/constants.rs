@@ -116,6 +116,11 @@ pub const UPT_SET_DOMAIN_FACES: i32 = 4;
 /// Tetrahedra, 4 node indices each, positive volume.
 pub const UPT_SET_TETS: i32 = 5;
 
+/// The region's nodes in its order; all nodes where there is no region.
+pub const UPT_VIEW_REGION: i32 = 0;
+/// The attached points.
+pub const UPT_VIEW_POINTS: i32 = 1;
+
 /// An instrument's shape: a capsule along local y.
 pub const UPT_SHAPE_CAPSULE: i32 = 0;
 /// An instrument's shape: a box.

@@ -3,6 +3,7 @@
 use super::constants::*;
 use super::failure::{Failure, fail};
 use super::pointers::{optional_path, slice};
+use super::step_structs::*;
 use super::structs::*;
 use crate::options::MOST_CORRECTIONS;
 use crate::options::{
@@ -10,7 +11,7 @@ use crate::options::{
     Provider, SceneOptions, StepPath, UserStream,
 };
 
-fn unknown<T>(field: &str, value: i32) -> Result<T, Failure> {
+pub(super) fn unknown<T>(field: &str, value: i32) -> Result<T, Failure> {
     fail(
         UPT_ERR_ARGUMENT,
         format!("{field} is {value}, which is not a valid value; see upt.h"),

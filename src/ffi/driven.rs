@@ -1,77 +1,15 @@
-//! `upt_scene`: steps that instruments drive, and what the tissue does to them; `upt_hull`.
+//! `upt_scene`: what the tissue does to the instruments that drive it; `upt_hull`.
 
 use super::call::call;
 use super::constants::*;
-use super::convert;
-use super::failure::Failure;
-use super::output::{copy_out, fill, optional_output, place};
-use super::pointers::{each, slice};
+use super::output::{copy_out, fill, place};
+use super::pointers::slice;
 use super::registry::{add_hull, call_scene, remove_hull};
+use super::step_structs::*;
 use super::structs::*;
-use crate::contact::{MAX_TOOLS, Tool};
 use crate::error::Error;
 use crate::features;
-use crate::scene::{Contact, Scene, StepInput};
 use ::contact::{Body, Shape};
-
-/// One step from the scene's own state, driven by rigid instruments. Their contact with the tissue is solved.
-///
-/// Give the pose of each instrument at the end of the step; the instrument moves there on a straight line from its last
-/// pose. An instrument that would move more than 40 mm in a step is placed there without a motion. Contact is unilateral, with Coulomb
-/// friction, at points of the domain's surface at most 1.7 mm apart. A scene with corrections solves it inside each
-/// correction, as a load; with `corrections = UPT_CORRECTIONS_NONE` it is solved once, on the linear response. The scene
-/// remembers each place of the array: pass every instrument every time, in the same order.
-///
-/// - `instruments`: at most 64, all with the same `struct_size`; NULL with count 0 makes a step without contact.
-/// - `out`, `out_count`, threads and errors: as in `upt_scene_step`; also `UPT_ERR_UNSUPPORTED` in a build without
-///   feature "instruments" and for a bundle without a linear response, `UPT_ERR_STRUCT_SIZE`, and `UPT_ERR_HANDLE` for a hull
-///   that was destroyed.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn upt_scene_step_instruments(
-    scene: *mut upt_scene,
-    instruments: *const upt_instrument,
-    instrument_count: u64,
-    out: *mut f32,
-    out_count: u64,
-) -> upt_status {
-    call_scene("upt_scene_step_instruments", scene, |scene| {
-        features::instruments()?;
-        scene.with_tools(|tools| {
-            // SAFETY: the host passes that many instruments, as the header asks.
-            unsafe { read_tools(instruments, instrument_count, tools) }?;
-            let input = StepInput {
-                displacement: None,
-                contact: Contact::Tools(tools),
-            };
-            // SAFETY: the host passes room for that many elements, as the header asks.
-            let out = unsafe { optional_output(out, out_count, "out") }?;
-            scene.step_to(input, out)?;
-            Ok(UPT_OK)
-        })
-    })
-}
-
-/// Starts a step driven by rigid instruments on the scene's worker thread and returns at once.
-///
-/// - `instruments`, `instrument_count`: as in `upt_scene_step_instruments`; checked and copied before the call returns.
-///
-/// Threads and errors: those of `upt_scene_submit` and of `upt_scene_step_instruments`.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn upt_scene_submit_instruments(
-    scene: *mut upt_scene,
-    instruments: *const upt_instrument,
-    instrument_count: u64,
-) -> upt_status {
-    call_scene("upt_scene_submit_instruments", scene, |scene| {
-        features::instruments()?;
-        scene.with_tools(|tools| {
-            // SAFETY: the host passes that many instruments, as the header asks.
-            unsafe { read_tools(instruments, instrument_count, tools) }?;
-            scene.submit_tools(tools)?;
-            Ok(UPT_OK)
-        })
-    })
-}
 
 /// Copies the force, torque and penetration of each instrument at the end of the last step.
 ///
@@ -209,37 +147,4 @@ pub unsafe extern "C" fn upt_hull_destroy(hull: *mut upt_hull) -> upt_status {
             Ok(UPT_OK)
         },
     )
-}
-
-/// The host's instruments as tools.
-pub(super) unsafe fn read_tools(
-    instruments: *const upt_instrument,
-    count: u64,
-    tools: &mut Vec<Tool>,
-) -> Result<(), Failure> {
-    if count > MAX_TOOLS as u64 {
-        return Err(Error::Argument(format!(
-            "instrument_count is {count}, must be at most {MAX_TOOLS}"
-        ))
-        .into());
-    }
-    tools.clear();
-    crate::memory::fit(tools, count as usize, "the instruments")?;
-    let read = |index: usize, raw: upt_instrument| {
-        tools.push(convert::tool(index, &raw)?);
-        Ok(())
-    };
-    // SAFETY: the host passes that many instruments, as the header asks.
-    unsafe { each(instruments, count, "instruments[]", read) }
-}
-
-impl Scene {
-    /// Calls with the list that instruments are read into.
-    fn with_tools(
-        &self,
-        call: impl FnOnce(&mut Vec<Tool>) -> super::failure::Answer,
-    ) -> super::failure::Answer {
-        let mut list = self.tool_list()?;
-        call(&mut list)
-    }
 }

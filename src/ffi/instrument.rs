@@ -6,6 +6,7 @@ use super::failure::Failure;
 use super::output::{output, place};
 use super::pointers::each;
 use super::registry::call_scene;
+use super::step_structs::*;
 use super::structs::*;
 use crate::contact::MAX_TOOLS;
 use crate::error::Error;

@@ -24,7 +24,7 @@ pub unsafe extern "C" fn upt_init(options: *const upt_init_options) -> upt_statu
         || (),
         || {
             // SAFETY: NULL, or a struct whose first field is its size, as the header asks.
-            let raw = unsafe { pointers::options(options) }?;
+            let raw = unsafe { pointers::options(options, "options") }?;
             // SAFETY: the pointers in the struct are NULL or what the header asks for.
             crate::init(&unsafe { convert::init_options(&raw) }?)?;
             Ok(UPT_OK)

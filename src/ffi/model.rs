@@ -34,7 +34,7 @@ pub unsafe extern "C" fn upt_model_open(
             // SAFETY: NULL or a C string, as the header asks.
             let path = unsafe { pointers::path(path, "path") }?;
             // SAFETY: NULL, or a struct whose first field is its size, as the header asks.
-            let raw = unsafe { pointers::options(options) }?;
+            let raw = unsafe { pointers::options(options, "options") }?;
             // SAFETY: the pointers in the struct are NULL or what the header asks for.
             let model = Model::open(&path, &unsafe { convert::model_options(&raw) }?)?;
             out.set(add_model(model));

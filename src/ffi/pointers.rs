@@ -6,6 +6,7 @@ use std::path::PathBuf;
 
 use super::constants::*;
 use super::failure::{Failure, fail};
+use super::step_structs::*;
 use super::structs::*;
 
 /// A struct that starts with `struct_size`. Later versions only grow; each size ever published stays known.
@@ -32,7 +33,9 @@ sized!(
     upt_haptics_options,
     upt_haptic_pose,
     upt_haptic_force,
-    upt_scene_stats
+    upt_scene_stats,
+    upt_input,
+    upt_view
 );
 
 // SAFETY: as the trait asks.
@@ -168,14 +171,14 @@ pub(super) unsafe fn struct_size<T: Sized32>(
     )
 }
 
-/// An options struct; NULL means the defaults (all zero).
-pub(super) unsafe fn options<T: Sized32>(pointer: *const T) -> Result<T, Failure> {
+/// A struct that may be NULL, which means the defaults (all zero).
+pub(super) unsafe fn options<T: Sized32>(pointer: *const T, name: &str) -> Result<T, Failure> {
     if pointer.is_null() {
         // SAFETY: every bit pattern of zeros is a value of these structs.
         return Ok(unsafe { std::mem::zeroed() });
     }
     // SAFETY: the host passes a struct whose first field is its size, as the header asks.
-    unsafe { required(pointer, "options") }
+    unsafe { required(pointer, name) }
 }
 
 /// A struct to read; fields that the caller's version does not have are zero.

@@ -5,7 +5,7 @@ use super::output::output;
 use super::pointers::optional;
 use super::registry::call_scene;
 use super::structs::*;
-use crate::scene::Values;
+use crate::scene::View;
 
 /// Attaches points to the tissue. They replace those attached before. A bundle of kind `upt` decodes each point in every
 /// step (unless the scene has `interpolate_points`); one of kind `reduced` interpolates between nodes.
@@ -47,7 +47,7 @@ pub unsafe extern "C" fn upt_scene_read_points(
 ) -> upt_status {
     call_scene("upt_scene_read_points", scene, |scene| {
         // SAFETY: the host passes room for that many elements, as the header asks.
-        scene.read_to(Values::Points, unsafe { output(out, out_count, "out") }?)?;
+        scene.read_to(View::Points, unsafe { output(out, out_count, "out") }?)?;
         Ok(UPT_OK)
     })
 }
@@ -70,7 +70,7 @@ pub unsafe extern "C" fn upt_scene_sample_points(
     call_scene("upt_scene_sample_points", scene, |scene| {
         // SAFETY: the host passes room for that many elements, as the header asks.
         let out = unsafe { output(out, out_count, "out") }?;
-        scene.sample_to(Values::Points, alpha, out)?;
+        scene.sample_to(View::Points, alpha, out)?;
         Ok(UPT_OK)
     })
 }

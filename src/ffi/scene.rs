@@ -2,13 +2,13 @@
 
 use super::call::call;
 use super::constants::*;
-use super::failure::Failure;
+use super::input::{field, read_input};
 use super::output::{apart, optional_output, output, place};
-use super::pointers::slice;
 use super::registry::{add_scene, call_scene, find_model, remove_scene};
+use super::step_structs::upt_input;
 use super::structs::*;
 use super::{convert, pointers};
-use crate::scene::Values;
+use crate::scene::View;
 use crate::scene::{Contact, Scene, StepInput};
 
 /// Creates a scene at rest.
@@ -33,7 +33,7 @@ pub unsafe extern "C" fn upt_scene_create(
             let out = unsafe { place(out, "out") }?;
             let model = find_model(model)?;
             // SAFETY: NULL, or a struct whose first field is its size, as the header asks.
-            let raw = unsafe { pointers::options(options) }?;
+            let raw = unsafe { pointers::options(options, "options") }?;
             // SAFETY: the pointers in the struct are NULL or what the header asks for.
             let scene = Scene::new(model, &unsafe { convert::scene_options(&raw) }?)?;
             out.set(add_scene(scene));
@@ -72,69 +72,66 @@ pub unsafe extern "C" fn upt_scene_reset(scene: *mut upt_scene) -> upt_status {
     })
 }
 
-/// One step: u(t), c(t) -> u(t + dt).
+/// One step of the scene's `dt`, as `input` drives it.
 ///
-/// - `displacement`: `[K,3]`, mm; NULL uses the scene's own state.
-/// - `collision`: `[K,3]`, mm, zero except at nodes in contact, where it is the displacement that the instrument imposes
-///   by the end of the step; NULL means no contact.
+/// Instruments are where they will be at the end of the step: each moves there on a straight line from its last pose, and their contact is
+/// solved. An instrument that would move more than 40 mm in a step is placed there without a motion. Contact is unilateral, with
+/// Coulomb friction, at points of the domain's surface at most 1.7 mm apart. A scene with corrections solves it inside each
+/// correction, as a load; with `corrections = UPT_CORRECTIONS_NONE` it is solved once, on the linear response. The scene remembers
+/// each place of the array: pass every instrument every time, in the same order.
+///
+/// - `input`: what drives the step; NULL: nothing does, the tissue moves on by itself.
 /// - `out`: `[n,3]`, mm (n: K, or the region's count), may be NULL; it may be the memory of an input, at the cost of a
 ///   copy.
 /// - `out_count`: number of floats in `out`, 3 n; 0 when out is NULL.
 ///
 /// Threads: one at a time.
+/// Errors: `UPT_ERR_STRUCT_SIZE` for an input of another size; `UPT_ERR_ARGUMENT` also for two drives at once, for a displacement with
+/// instruments and for a node beyond K or listed twice; `UPT_ERR_NON_FINITE`; for instruments `UPT_ERR_UNSUPPORTED` in a build without
+/// feature "instruments" and for a bundle without a linear response, and `UPT_ERR_HANDLE` for a hull that was destroyed; `UPT_ERR_NULL`,
+/// `UPT_ERR_BUSY`, `UPT_ERR_GUARD`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`; the state does not change.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn upt_scene_step(
+    scene: *mut upt_scene,
+    input: *const upt_input,
+    out: *mut f32,
+    out_count: u64,
+) -> upt_status {
+    call_scene("upt_scene_step", scene, |scene| {
+        let mut tools = scene.tool_list()?;
+        // SAFETY: the host passes what the header asks for.
+        let input = unsafe { read_input(scene, input, &mut tools) }?;
+        // SAFETY: the host passes `out_count` floats of room, as the header asks.
+        unsafe { step(scene, input, out, out_count) }
+    })
+}
+
+/// One step of dense fields, `u(t), c(t) -> u(t + dt)`, as the paper writes it: `upt_scene_step` with `displacement` and `collision`.
+///
+/// - `displacement`: `[K,3]`, mm; NULL uses the scene's own state.
+/// - `collision`: `[K,3]`, mm, zero except at nodes in contact, where it is the displacement that is imposed by the end of the step; NULL
+///   means no contact.
+/// - `out`, `out_count`, threads: as in `upt_scene_step`.
+///
 /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NON_FINITE`,
 /// `UPT_ERR_UNSUPPORTED`, `UPT_ERR_GUARD`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`; the state does
 /// not change.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn upt_scene_step(
+pub unsafe extern "C" fn upt_scene_step_field(
     scene: *mut upt_scene,
     displacement: *const f32,
     collision: *const f32,
     out: *mut f32,
     out_count: u64,
 ) -> upt_status {
-    call_scene("upt_scene_step", scene, |scene| {
-        let floats = 3 * scene.node_count() as u64;
-        let field = |pointer: *const f32, name| match pointer.is_null() {
-            true => Ok(None),
-            // SAFETY: the host passes that many elements, as the header asks.
-            false => unsafe { slice(pointer, floats, name) }.map(Some),
-        };
-        let displacement = field(displacement, "displacement")?;
-        let contact = field(collision, "collision")?.map_or(Contact::None, Contact::Dense);
+    call_scene("upt_scene_step_field", scene, |scene| {
+        // SAFETY: the host passes NULL or `[K,3]`, as the header asks.
+        let collision = unsafe { field(scene, collision, "collision") }?;
         let input = StepInput {
-            displacement,
-            contact,
-        };
-        // SAFETY: the host passes `out_count` floats of room, as the header asks.
-        unsafe { step(scene, input, out, out_count) }
-    })
-}
-
-/// One step from the scene's own state, with a list of the nodes in contact.
-///
-/// - `contact_nodes`: `[m]` node indices, each at most once, in any order.
-/// - `contact_vectors`: `[m,3]`, mm: the displacement of these nodes at the end of the step.
-/// - `contact_count`: m; 0 means no contact and both may be NULL.
-/// - `out`, `out_count`, threads and errors: as in `upt_scene_step`; also `UPT_ERR_ARGUMENT` for an index or a count
-///   beyond K.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn upt_scene_step_contacts(
-    scene: *mut upt_scene,
-    contact_nodes: *const u32,
-    contact_vectors: *const f32,
-    contact_count: u64,
-    out: *mut f32,
-    out_count: u64,
-) -> upt_status {
-    call_scene("upt_scene_step_contacts", scene, |scene| {
-        let (nodes, vectors) =
-            // SAFETY: the host passes that many nodes and vectors, as the header asks.
-            unsafe { contacts(scene, contact_nodes, contact_vectors, contact_count) }?;
-        let contact = Contact::Sparse { nodes, vectors };
-        let input = StepInput {
-            displacement: None,
-            contact,
+            // SAFETY: the host passes NULL or `[K,3]`, as the header asks.
+            displacement: unsafe { field(scene, displacement, "displacement") }?,
+            contact: collision.map_or(Contact::None, Contact::Dense),
+            time_s: 0.0,
         };
         // SAFETY: the host passes `out_count` floats of room, as the header asks.
         unsafe { step(scene, input, out, out_count) }
@@ -156,24 +153,9 @@ pub unsafe extern "C" fn upt_scene_read(
 ) -> upt_status {
     call_scene("upt_scene_read", scene, |scene| {
         // SAFETY: the host passes room for that many elements, as the header asks.
-        scene.read_to(Values::Region, unsafe { output(out, out_count, "out") }?)?;
+        scene.read_to(View::Region, unsafe { output(out, out_count, "out") }?)?;
         Ok(UPT_OK)
     })
-}
-
-/// The sparse collision field `[m]`, `[m,3]`, with at most as many entries as the mesh has nodes.
-pub(super) unsafe fn contacts<'a>(
-    scene: &Scene,
-    nodes: *const u32,
-    vectors: *const f32,
-    count: u64,
-) -> Result<(&'a [u32], &'a [f32]), Failure> {
-    scene.check_node_count("contact_count", count)?;
-    // SAFETY: the host passes that many elements, as the header asks.
-    let nodes = unsafe { slice(nodes, count, "contact_nodes") }?;
-    // SAFETY: the host passes that many elements, as the header asks.
-    let vectors = unsafe { slice(vectors, count.saturating_mul(3), "contact_vectors") }?;
-    Ok((nodes, vectors))
 }
 
 /// `out` may be an input's memory; Rust's references may not, so such an input, whose size has been checked, is copied first.
@@ -188,7 +170,7 @@ unsafe fn step(
         scene.step(input, None)?;
         return Ok(UPT_OK);
     };
-    scene.check_len(Values::Region, out.len())?;
+    scene.check_len(View::Region, out.len())?;
     let displacement = input.displacement.map(|u| apart(u, &out)).transpose()?;
     let (dense, nodes, vectors);
     let contact = match input.contact {
@@ -212,6 +194,7 @@ unsafe fn step(
     let input = StepInput {
         displacement: displacement.as_deref(),
         contact,
+        time_s: input.time_s,
     };
     scene.step_to(input, Some(out))?;
     Ok(UPT_OK)

@@ -4,6 +4,8 @@
 use core::ffi::{c_char, c_void};
 use safer_ffi::derive_ReprC;
 
+use super::step_structs::upt_instrument;
+
 /// A bundle made ready to step. Immutable; any number of threads may use it at once.
 pub struct upt_model {
     _opaque: [u8; 0],
@@ -165,73 +167,6 @@ pub struct upt_scene_options {
     /// Mass-proportional damping of the tissue, 1/s: 0.01 to 1000, or 0 for the bundle's. A damping other than the bundle's
     /// needs corrections (without them: `UPT_ERR_UNSUPPORTED`) and leaves the learned part out.
     pub damping_per_s: f64,
-}
-
-/// A rigid instrument; the input of `upt_scene_step_instruments` and `upt_scene_contacts_from_instruments`.
-#[derive_ReprC]
-#[repr(C)]
-#[derive(Clone, Copy)]
-pub struct upt_instrument {
-    /// `sizeof(upt_instrument)`, the same in every element of an array.
-    pub struct_size: u32,
-    /// `UPT_SHAPE_*`.
-    pub shape: i32,
-    /// Centre, mm, in the mesh's frame.
-    pub position: [f32; 3],
-    /// Unit quaternion x, y, z, w.
-    pub rotation: [f32; 4],
-    /// Half sizes along the local axes, mm; a capsule's half length is `[1]` (local y).
-    pub half_extents: [f32; 3],
-    /// A capsule's radius or a spatula's corner radius, mm.
-    pub radius: f32,
-    /// Only for `upt_scene_contacts_from_instruments`. 1: touched nodes move with the instrument until it leaves; 0: they slide.
-    pub sticking: u8,
-    /// Only for `upt_scene_step_instruments`: `UPT_MODE_*`.
-    pub mode: u8,
-    /// Zero.
-    pub reserved: [u8; 2],
-    /// Only for `upt_scene_step_instruments`: Coulomb's coefficient, 0 or more.
-    pub friction: f32,
-    /// A grasp tears off when its points together pull harder than this, mN; 0: never.
-    pub tear_off_mn: f32,
-    /// `UPT_SHAPE_HULL`: the `upt_hull`; otherwise NULL.
-    pub hull: *const c_void,
-}
-
-/// What the tissue does to an instrument at the end of a step; filled by `upt_scene_instrument_readings`.
-#[derive_ReprC]
-#[repr(C)]
-#[derive(Clone, Copy)]
-pub struct upt_instrument_reading {
-    /// `sizeof(upt_instrument_reading)`, set by the caller, the same in every element of an array.
-    pub struct_size: u32,
-    /// Points of the surface that push or hold the instrument.
-    pub contact_count: u32,
-    /// On the instrument, mN.
-    pub force: [f32; 3],
-    /// On the instrument about its position, mN mm.
-    pub torque: [f32; 3],
-    /// Depth of the deepest point of the surface inside the instrument, mm.
-    pub penetration_mm: f32,
-    /// 1: its grasp tore off in this step.
-    pub torn: u8,
-    /// Zero.
-    pub reserved: [u8; 3],
-    /// What the last contact solve left unsolved, mm: 0 where it came to its end.
-    pub residual_mm: f32,
-}
-
-/// A point of the surface that pushes or holds an instrument; filled by `upt_scene_instrument_contacts`.
-#[derive_ReprC]
-#[repr(C)]
-#[derive(Clone, Copy)]
-pub struct upt_instrument_contact {
-    /// Place of the instrument in the step's array.
-    pub instrument: u32,
-    /// Position of the point, mm.
-    pub position: [f32; 3],
-    /// On the instrument, mN.
-    pub force: [f32; 3],
 }
 
 /// Options of `upt_haptics_create`.

@@ -4,35 +4,33 @@ use std::time::Duration;
 
 use super::constants::*;
 use super::failure::Answer;
+use super::input::read_input;
 use super::output::output;
 use super::registry::call_scene;
-use super::scene::contacts;
+use super::step_structs::upt_input;
 use super::structs::*;
 use crate::Progress;
-use crate::scene::Values;
+use crate::scene::View;
 
 /// Starts a step on the scene's worker thread and returns at once. An error of an earlier step that was not reported yet
 /// is still reported.
 ///
-/// - `contact_nodes`, `contact_vectors`, `contact_count`: as in `upt_scene_step_contacts`; checked and copied before the
-///   call returns.
+/// - `input`: as in `upt_scene_step`; checked and copied before the call returns.
 ///
 /// Threads: one at a time.
 /// Errors: `UPT_ERR_BUSY` while a step is in flight (unless the scene was made with `latest_wins`), `UPT_ERR_NULL`,
-/// `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` (also for an index or a count beyond K, or a node listed twice),
-/// `UPT_ERR_NON_FINITE`, `UPT_ERR_STATE` if no thread can be started, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
+/// `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT` and `UPT_ERR_NON_FINITE` for the input, `UPT_ERR_UNSUPPORTED` for
+/// instruments in a build without feature "instruments", `UPT_ERR_STATE` if no thread can be started, `UPT_ERR_OUT_OF_MEMORY`,
+/// `UPT_ERR_PANIC`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_scene_submit(
     scene: *mut upt_scene,
-    contact_nodes: *const u32,
-    contact_vectors: *const f32,
-    contact_count: u64,
+    input: *const upt_input,
 ) -> upt_status {
     call_scene("upt_scene_submit", scene, |scene| {
-        let (nodes, vectors) =
-            // SAFETY: the host passes that many nodes and vectors, as the header asks.
-            unsafe { contacts(scene, contact_nodes, contact_vectors, contact_count) }?;
-        scene.submit(nodes, vectors)?;
+        let mut tools = scene.tool_list()?;
+        // SAFETY: the host passes what the header asks for.
+        scene.submit(unsafe { read_input(scene, input, &mut tools) }?)?;
         Ok(UPT_OK)
     })
 }
@@ -81,7 +79,7 @@ pub unsafe extern "C" fn upt_scene_sample(
     call_scene("upt_scene_sample", scene, |scene| {
         // SAFETY: the host passes room for that many elements, as the header asks.
         let out = unsafe { output(out, out_count, "out") }?;
-        scene.sample_to(Values::Region, alpha, out)?;
+        scene.sample_to(View::Region, alpha, out)?;
         Ok(UPT_OK)
     })
 }

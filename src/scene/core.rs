@@ -11,7 +11,7 @@ use super::inputs::{Decode, Inputs, Which};
 use super::inversion::ContactElements;
 use super::plan::NodePlan;
 use super::points::AttachedPoints;
-use super::published::{Frame, Published, Values};
+use super::published::{Frame, Published, View};
 use super::timing::Stopwatch;
 use crate::bundle::Mesh;
 use crate::contact::ContactProblem;
@@ -55,7 +55,8 @@ pub struct Core {
     pub(super) took_s: f64,
     /// Whether the state being made comes from the corrections, and not from the learned part alone.
     pub(super) next_corrected: bool,
-    /// Whether tools drive the step being made. Their contact is then in `problem`, and `incoming` is filled from it.
+    /// Whether tools drive the step being made, or drove the last one before it that anything drove. Their contact is then in
+    /// `problem`, and `incoming` is filled from it.
     pub(super) driven: bool,
     /// By node: the boundary condition holds it, so its displacement is zero whatever the contact says.
     pub(super) held: Vec<bool>,
@@ -200,8 +201,9 @@ impl Core {
         let mut watch = Stopwatch::start();
         let count = self.mesh.node_count();
         if let Some(out) = &out {
-            lock_read(published).check_len(Values::Region, out.len())?;
+            lock_read(published).check_len(View::Region, out.len())?;
         }
+        input.check()?;
         input.contact.gather(&mut self.incoming, count)?;
         let given = match input.displacement {
             Some(field) => {
@@ -215,6 +217,7 @@ impl Core {
 
         if self.counters.sleeping && given.is_none() && self.incoming.is_empty() && !near {
             self.fit_published(published)?;
+            self.counters.time_s = input.time_s;
             self.publish_rest(published);
         } else {
             if !self.drive(published, near, start, &mut stats)? {
@@ -231,8 +234,10 @@ impl Core {
                 self.release_tools(published, &mut stats);
             }
             self.fit_published(published)?;
+            self.counters.time_s = input.time_s;
             self.publish(published, given.is_some(), replaced, &stats);
         }
+        self.counters.driven = self.driven;
         self.took_s = start.elapsed().as_secs_f64();
         self.publish_to_hands(published);
         self.counters.step_count += 1;
@@ -241,7 +246,7 @@ impl Core {
         stats.max_displacement_mm = self.counters.max_displacement;
         stats.contact_count = self.contact.len() as u64;
         if let Some(out) = out {
-            lock_read(published).read(Values::Region, out)?;
+            lock_read(published).read(View::Region, out)?;
         }
         self.log_flags(&stats);
         stats.step_ms = start.elapsed().as_secs_f64() * 1e3;

@@ -32,6 +32,10 @@ pub struct Counters {
     pub max_displacement: f32,
     /// Whether the last published state was corrected, and the one before it.
     pub was_corrected: [bool; 2],
+    /// Whether tools drove the last step that anything drove.
+    pub driven: bool,
+    /// The moment of the last step on the host's clock, s.
+    pub time_s: f64,
 }
 
 impl Counters {
@@ -45,5 +49,7 @@ impl Counters {
         source_before: Source::Rest,
         max_displacement: 0.0,
         was_corrected: [false; 2],
+        driven: false,
+        time_s: 0.0,
     };
 }

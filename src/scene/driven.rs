@@ -30,7 +30,11 @@ impl Core {
         published: &RwLock<Published>,
         input: &StepInput<'_>,
     ) -> Result<bool> {
-        self.driven = matches!(input.contact, Contact::Tools(_));
+        self.driven = match input.contact {
+            Contact::Tools(_) => true,
+            Contact::None => self.counters.driven,
+            Contact::Dense(_) | Contact::Sparse { .. } => false,
+        };
         let Contact::Tools(tools) = input.contact else {
             if let Some(problem) = &mut self.problem {
                 problem.forget_tools();
@@ -39,7 +43,7 @@ impl Core {
         };
         if self.model.prior.is_none() {
             return Err(Error::Unsupported(
-                "instruments: the bundle has no linear response to solve their contact with; use upt_scene_contacts_from_instruments and upt_scene_step_contacts".into(),
+                "instruments: the bundle has no linear response to solve their contact with; pass the nodes that upt_scene_contacts_from_instruments finds".into(),
             ));
         }
         let mut problem = match self.problem.take() {

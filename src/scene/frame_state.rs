@@ -17,6 +17,8 @@ pub struct FrameState {
     pub forces: Vec<f32>,
     /// Steps made, by which a new one is known.
     pub step: u64,
+    /// The moment of the last one on the host's clock, s.
+    pub time_s: f64,
 }
 
 impl FrameState {

@@ -19,7 +19,7 @@ impl Scene {
     ///
     /// ```
     /// # use std::path::Path;
-    /// # use upt::{Contact, Model, ModelOptions, Scene, SceneOptions, StepInput};
+    /// # use upt::{Contact, Model, ModelOptions, Scene, SceneOptions};
     /// # let model = Model::open(Path::new("onnx/liver-coarse"), &ModelOptions::default())?;
     /// # let scene = Scene::new(model.clone(), &SceneOptions::default())?;
     /// use upt::haptics::{HapticOptions, HapticPose};

@@ -36,14 +36,6 @@ impl Scene {
         lock(&self.tools.asked_list)
     }
 
-    /// Starts a step that tools drive on the scene's worker.
-    ///
-    /// # Errors
-    /// As [`Scene::submit`], and what [`Tool::check`] says.
-    pub fn submit_tools(&self, tools: &[Tool]) -> Result<()> {
-        self.worker.submit_tools(&self.shared, tools)
-    }
-
     /// Reads what the tools of the last step were told, and the samples that push them.
     pub fn with_contact_report<T>(&self, read: impl FnOnce(&ContactReport) -> T) -> T {
         read(&lock_read(&self.shared.published).tools)

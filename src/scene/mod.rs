@@ -44,7 +44,7 @@ use std::time::Duration;
 
 pub use points::check_point_count;
 pub use publish::{QUIET_DISPLACEMENT, QUIET_STEPS};
-pub(crate) use published::Values;
+pub use published::View;
 pub use step_input::{Contact, Progress, StepInput};
 
 use crate::bundle::Mesh;
@@ -200,7 +200,7 @@ impl Scene {
     /// let node = model.indices(IndexSet::DomainNodes)[0];
     /// let mut u = vec![0.0; 3 * scene.node_count()];
     /// let pushed = Contact::Sparse { nodes: &[node], vectors: &[0.0, 0.0, -0.5] };
-    /// scene.step(StepInput { displacement: None, contact: pushed }, Some(&mut u))?;
+    /// scene.step(pushed, Some(&mut u))?;
     /// assert_eq!(u[3 * node as usize..][..3], [0.0, 0.0, -0.5]);
     /// # upt::Result::Ok(())
     /// ```
@@ -208,8 +208,8 @@ impl Scene {
     /// # Errors
     /// [`Error::Argument`], [`Error::NonFinite`] for inputs, [`Error::Guard`] for a refused state: the last good state
     /// stays.
-    pub fn step(&self, input: StepInput<'_>, out: Option<&mut [f32]>) -> Result<()> {
-        self.step_to(input, out.map(Output::from))
+    pub fn step<'a>(&self, input: impl Into<StepInput<'a>>, out: Option<&mut [f32]>) -> Result<()> {
+        self.step_to(input.into(), out.map(Output::from))
     }
 
     /// [`Scene::step`] into memory that need not be initialised.
@@ -227,7 +227,7 @@ impl Scene {
     /// # let scene = Scene::new(model.clone(), &SceneOptions::default())?;
     /// scene.set_region(Some(&[7, 3]))?;
     /// let mut two = [0.0; 6];
-    /// scene.step(StepInput { displacement: None, contact: Contact::None }, Some(&mut two))?;
+    /// scene.step(Contact::None, Some(&mut two))?;
     /// assert!(scene.set_region(Some(&[u32::MAX])).is_err());
     /// # upt::Result::Ok(())
     /// ```
@@ -252,7 +252,7 @@ impl Scene {
     /// # let scene = Scene::new(model.clone(), &SceneOptions::default())?;
     /// let corner = &model.positions()[..3];
     /// scene.attach_points(Some(corner))?;
-    /// scene.step(StepInput { displacement: None, contact: Contact::None }, None)?;
+    /// scene.step(Contact::None, None)?;
     /// let mut u = [0.0; 3];
     /// scene.read_points(&mut u)?;
     /// assert_eq!(scene.point_count(), 1);
@@ -278,15 +278,15 @@ impl Scene {
         })
     }
 
-    /// Starts a step on the scene's worker.
+    /// Starts a step on the scene's worker; the input is checked and copied.
     ///
     /// # Errors
-    /// [`Error::Argument`] and [`Error::NonFinite`] for the contact, as [`Scene::step`]. [`Error::Busy`] while a submitted
+    /// [`Error::Argument`] and [`Error::NonFinite`] for the input, as [`Scene::step`]. [`Error::Busy`] while a submitted
     /// step has not finished, unless the scene was made with `latest_wins`: then an input that has not started is
     /// replaced. [`Error::State`] where no thread can be started.
-    pub fn submit(&self, nodes: &[u32], vectors: &[f32]) -> Result<()> {
+    pub fn submit<'a>(&self, input: impl Into<StepInput<'a>>) -> Result<()> {
         self.worker
-            .submit(&self.shared, nodes, vectors, self.node_count())
+            .submit(&self.shared, &input.into(), self.node_count())
     }
 
     /// Whether the submitted step has finished; an error that was not told yet, once, also of an earlier step. With
@@ -305,7 +305,7 @@ impl Scene {
     /// use std::time::Duration;
     /// use upt::Progress;
     ///
-    /// scene.submit(&[], &[])?;
+    /// scene.submit(Contact::None)?;
     /// let done = scene.wait(Duration::from_secs(60))?;
     /// assert_eq!(done, Progress::Done);
     /// assert_eq!(scene.stats().step_count, 1);
@@ -322,9 +322,8 @@ impl Scene {
     /// # use upt::{Contact, Model, ModelOptions, Scene, SceneOptions, StepInput};
     /// # let model = Model::open(Path::new("onnx/liver-coarse"), &ModelOptions::default())?;
     /// # let scene = Scene::new(model.clone(), &SceneOptions::default())?;
-    /// let input = StepInput { displacement: None, contact: Contact::None };
     /// let saved = scene.save()?;
-    /// scene.step(input, None)?;
+    /// scene.step(Contact::None, None)?;
     /// scene.restore(&saved)?;
     /// assert_eq!(scene.save()?, saved);
     /// assert!(scene.restore(&saved[1..]).is_err());

@@ -4,10 +4,10 @@ use std::sync::RwLock;
 
 use super::core::{Core, lock_read, lock_write};
 use super::frame_state::FrameState;
-use super::published::{Published, Values};
+use super::published::{Published, View};
 use super::shared::lock;
-use super::{Contact, Scene};
-use crate::contact::{Past, Tool};
+use super::{Scene, StepInput};
+use crate::contact::Past;
 use crate::error::{Error, Result};
 use crate::kernels::FlushToZero;
 use crate::memory::{self, HeldBytes};
@@ -16,93 +16,62 @@ use crate::output::Output;
 const WHAT: &str = "the present state of a scene";
 
 impl Scene {
-    /// The displacements `[n,3]` of the region `seconds` after the last published step, with instruments where they are then.
+    /// The displacements `[n,3]` of a view at a moment between steps, with the instruments or nodes of `input` where they are then.
+    ///
+    /// `when` is on the clock of [`StepInput::time_s`]; where a host gives its steps no time, it is the time since the last
+    /// published step, s. An input without a drive is tissue that nothing touches any more.
     ///
     /// ```
     /// # use std::path::Path;
-    /// # use upt::{Contact, Model, ModelOptions, Scene, SceneOptions, StepInput};
+    /// # use upt::{Contact, Model, ModelOptions, Scene, SceneOptions, View};
     /// # let model = Model::open(Path::new("onnx/liver-coarse"), &ModelOptions::default())?;
     /// # let scene = Scene::new(model.clone(), &SceneOptions::default())?;
-    /// scene.step(StepInput { displacement: None, contact: Contact::None }, None)?;
+    /// scene.step(Contact::None, None)?;
     /// let mut u = vec![0.0; 3 * scene.node_count()];
-    /// scene.present(0.01, &[], &mut u)?; // 10 ms after the step, without tools
+    /// scene.present(Contact::None, 0.01, View::Region, &mut u)?; // 10 ms after the step, without tools
     /// assert!(u.iter().all(|x| x.is_finite()));
     /// # upt::Result::Ok(())
     /// ```
     ///
     /// # Errors
-    /// [`Error::NonFinite`] and [`Error::Argument`] for a time or an instrument, [`Error::Unsupported`] for a bundle without linear response or
-    /// corrections or a scene that does not correct, [`Error::Busy`] while another thread presents, and at the first call while a step is in flight.
-    pub fn present(&self, seconds: f64, tools: &[Tool], out: &mut [f32]) -> Result<()> {
-        self.frame_to(Values::Region, seconds, Contact::Tools(tools), out.into())
-    }
-
-    /// As [`Scene::present`], at the attached points.
-    ///
-    /// # Errors
-    /// Those of [`Scene::present`], and [`Error::State`] where no points are attached.
-    pub fn present_points(&self, seconds: f64, tools: &[Tool], out: &mut [f32]) -> Result<()> {
-        self.frame_to(Values::Points, seconds, Contact::Tools(tools), out.into())
-    }
-
-    /// As [`Scene::present`], with a collision field in place of instruments: the nodes where they are then, of scenes that such fields drive.
-    ///
-    /// # Errors
-    /// Those of [`Scene::present`], and [`Error::Argument`] for nodes that are not of the mesh or there twice.
-    pub fn present_contacts(
+    /// [`Error::NonFinite`] and [`Error::Argument`] for `when`, an instrument or nodes that are not of the mesh or there twice, and for an
+    /// input with a displacement or a time, [`Error::Unsupported`] for a bundle without linear response or corrections or a scene
+    /// that does not correct, [`Error::Busy`] while another thread presents, and at the first call while a step is in flight,
+    /// [`Error::State`] for the points where none are attached.
+    pub fn present<'a>(
         &self,
-        seconds: f64,
-        nodes: &[u32],
-        vectors: &[f32],
+        input: impl Into<StepInput<'a>>,
+        when: f64,
+        view: View,
         out: &mut [f32],
     ) -> Result<()> {
-        let contact = Contact::Sparse { nodes, vectors };
-        self.frame_to(Values::Region, seconds, contact, out.into())
+        self.present_to(input.into(), when, view, out.into())
     }
 
-    /// As [`Scene::present_contacts`], at the attached points.
-    ///
-    /// # Errors
-    /// Those of [`Scene::present_contacts`], and [`Error::State`] where no points are attached.
-    pub fn present_points_contacts(
+    /// [`Scene::present`] into memory that need not be initialised.
+    pub(crate) fn present_to(
         &self,
-        seconds: f64,
-        nodes: &[u32],
-        vectors: &[f32],
-        out: &mut [f32],
-    ) -> Result<()> {
-        let contact = Contact::Sparse { nodes, vectors };
-        self.frame_to(Values::Points, seconds, contact, out.into())
-    }
-
-    /// Any of these frames, into memory that need not be initialised.
-    pub(crate) fn frame_to(
-        &self,
-        values: Values,
-        seconds: f64,
-        contact: Contact<'_>,
+        input: StepInput<'_>,
+        when: f64,
+        view: View,
         out: Output<'_, f32>,
     ) -> Result<()> {
-        if !seconds.is_finite() {
-            return Err(Error::NonFinite(format!("seconds is {seconds}")));
+        if !when.is_finite() {
+            return Err(Error::NonFinite(format!("when is {when}")));
         }
-        if seconds < 0.0 {
-            return Err(Error::Argument(format!(
-                "seconds is {seconds}; it is the time since the last step, 0 or more"
-            )));
-        }
-        lock_read(&self.shared.published).check_len(values, out.len())?;
+        input.check_of_frame()?;
+        lock_read(&self.shared.published).check_len(view, out.len())?;
         let _flush = FlushToZero::enter();
         let mut presenters = lock(&self.tools.presenters)?;
         let tissue = self.tissue();
-        presenters.prepare(&tissue, values, || {
+        presenters.prepare(&tissue, view, || {
             let begun = lock_read(&self.shared.published).frame_state.is_some();
             match begun {
                 true => Ok(()),
                 false => self.with(|core, published| core.start_frame_states(published)),
             }
         })?;
-        presenters.frame(&tissue, (values, seconds), contact, out)
+        presenters.frame(&tissue, (view, when), input.contact, out)
     }
 
     /// Bytes of what presents.
@@ -129,6 +98,7 @@ impl Core {
                 nodes: memory::room(1024, WHAT)?,
                 forces: memory::room(3 * 1024, WHAT)?,
                 step: 0,
+                time_s: 0.0,
             };
             let past = self.problem.as_ref().map(|problem| &problem.past);
             frame_state.prepare(past, self.contact.len())?;
@@ -179,5 +149,6 @@ impl Core {
                 .extend(reaction.iter().map(|force| 1e-3 * force));
         }
         frame_state.step += 1;
+        frame_state.time_s = self.counters.time_s;
     }
 }

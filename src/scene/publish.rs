@@ -92,6 +92,9 @@ impl Core {
         self.commit_untouched_tools(published);
         let frames = if self.options.cubic_sampling { 4 } else { 3 };
         if self.counters.rest_frames >= frames {
+            if let Some(frame_state) = &mut lock_write(published).frame_state {
+                frame_state.time_s = self.counters.time_s;
+            }
             return;
         }
         self.counters.rest_frames += 1;

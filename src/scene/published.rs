@@ -23,18 +23,18 @@ impl Frame {
         })
     }
 
-    fn values(&self, values: Values) -> &[f32] {
-        match values {
-            Values::Points => &self.points,
-            Values::Region => &self.field,
+    fn values(&self, view: View) -> &[f32] {
+        match view {
+            View::Points => &self.points,
+            View::Region => &self.field,
         }
     }
 
     /// Copies the points, or the nodes of `region` (`None`: all), to `out`.
-    fn copy(&self, values: Values, region: Option<&[u32]>, out: Output<'_, f32>) {
-        let from = self.values(values);
+    fn copy(&self, view: View, region: Option<&[u32]>, out: Output<'_, f32>) {
+        let from = self.values(view);
         match region {
-            Some(region) if values == Values::Region => {
+            Some(region) if view == View::Region => {
                 let from = from.as_chunks::<3>().0;
                 out.write_rows(region.iter().map(|&node| from[node as usize]));
             }
@@ -43,10 +43,11 @@ impl Frame {
     }
 }
 
-/// Which values of a frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Values {
-    /// The region's nodes, in the host's order.
+/// What is shown of a state.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum View {
+    /// The region's nodes, in the host's order; all nodes where there is no region.
+    #[default]
     Region,
     /// The attached points.
     Points,
@@ -78,19 +79,19 @@ pub struct Published {
 }
 
 impl Published {
-    /// Items of `values`.
-    pub fn count(&self, values: Values) -> usize {
-        match (values, &self.region) {
-            (Values::Points, _) => self.last.points.len() / 3,
-            (Values::Region, Some(region)) => region.len(),
-            (Values::Region, None) => self.last.field.len() / 3,
+    /// Nodes or points of a view.
+    pub fn count(&self, view: View) -> usize {
+        match (view, &self.region) {
+            (View::Points, _) => self.last.points.len() / 3,
+            (View::Region, Some(region)) => region.len(),
+            (View::Region, None) => self.last.field.len() / 3,
         }
     }
 
     /// The size that a host's buffer must have.
-    pub fn check_len(&self, values: Values, len: usize) -> Result<()> {
-        let want = 3 * self.count(values);
-        if values == Values::Points && want == 0 {
+    pub fn check_len(&self, view: View, len: usize) -> Result<()> {
+        let want = 3 * self.count(view);
+        if view == View::Points && want == 0 {
             return Err(Error::State(
                 "no points are attached; attach them first".into(),
             ));
@@ -98,9 +99,9 @@ impl Published {
         if len == want {
             return Ok(());
         }
-        let what = match values {
-            Values::Region => "the region's nodes",
-            Values::Points => "the attached points",
+        let what = match view {
+            View::Region => "the region's nodes",
+            View::Points => "the attached points",
         };
         Err(Error::Argument(format!(
             "out has {len} floats, must have {want}: 3 for each of {what}"
@@ -108,43 +109,43 @@ impl Published {
     }
 
     /// Copies the last state.
-    pub fn read(&self, values: Values, out: Output<'_, f32>) -> Result<()> {
-        self.check_len(values, out.len())?;
-        self.last.copy(values, self.region.as_deref(), out);
+    pub fn read(&self, view: View, out: Output<'_, f32>) -> Result<()> {
+        self.check_len(view, out.len())?;
+        self.last.copy(view, self.region.as_deref(), out);
         Ok(())
     }
 
     /// Interpolates between the state before (`alpha` 0) and the last state (1). `alpha` is clamped to `[0, 1]`.
-    pub fn sample(&self, values: Values, alpha: f64, out: Output<'_, f32>) -> Result<()> {
+    pub fn sample(&self, view: View, alpha: f64, out: Output<'_, f32>) -> Result<()> {
         if !alpha.is_finite() {
             return Err(Error::NonFinite("alpha is not finite".into()));
         }
-        self.check_len(values, out.len())?;
+        self.check_len(view, out.len())?;
         let t = alpha.clamp(0.0, 1.0) as f32;
         if t == 1.0 {
-            self.last.copy(values, self.region.as_deref(), out);
+            self.last.copy(view, self.region.as_deref(), out);
         } else if t == 0.0 {
-            self.before.copy(values, self.region.as_deref(), out);
+            self.before.copy(view, self.region.as_deref(), out);
         } else if self.earlier.is_none() {
-            self.each(values, out, |_, before, last| before + t * (last - before));
+            self.each(view, out, |_, before, last| before + t * (last - before));
         } else {
             // Cubic Hermite: central difference at the state before, one-sided at the last.
             let (t2, t3) = (t * t, t * t * t);
             let (h00, h10) = (2.0 * t3 - 3.0 * t2 + 1.0, t3 - 2.0 * t2 + t);
             let (h01, h11) = (3.0 * t2 - 2.0 * t3, t3 - t2);
-            self.each(values, out, |earlier, before, last| {
+            self.each(view, out, |earlier, before, last| {
                 h00 * before + h10 * 0.5 * (last - earlier) + h01 * last + h11 * (last - before)
             });
         }
         Ok(())
     }
 
-    fn each(&self, values: Values, out: Output<'_, f32>, combine: impl Fn(f32, f32, f32) -> f32) {
-        let last = self.last.values(values);
-        let before = self.before.values(values);
-        let earlier = self.earlier.as_ref().unwrap_or(&self.before).values(values);
-        match (&self.region, values) {
-            (Some(region), Values::Region) => {
+    fn each(&self, view: View, out: Output<'_, f32>, combine: impl Fn(f32, f32, f32) -> f32) {
+        let last = self.last.values(view);
+        let before = self.before.values(view);
+        let earlier = self.earlier.as_ref().unwrap_or(&self.before).values(view);
+        match (&self.region, view) {
+            (Some(region), View::Region) => {
                 let [earlier, before, last] = [earlier, before, last].map(|v| v.as_chunks::<3>().0);
                 out.write_rows(region.iter().map(|&node| {
                     let node = node as usize;

@@ -2,7 +2,7 @@
 
 use super::Scene;
 use super::core::lock_read;
-use super::published::Values;
+use super::published::View;
 use crate::error::Result;
 use crate::output::Output;
 use crate::stats::SceneStats;
@@ -10,34 +10,34 @@ use crate::stats::SceneStats;
 impl Scene {
     /// The last published state, `[n,3]`, mm, region order.
     pub fn read(&self, out: &mut [f32]) -> Result<()> {
-        self.read_to(Values::Region, out.into())
+        self.read_to(View::Region, out.into())
     }
 
     /// Nodes of `read` (`K`, or the region's count).
     pub fn region_count(&self) -> usize {
-        lock_read(&self.shared.published).count(Values::Region)
+        lock_read(&self.shared.published).count(View::Region)
     }
 
     /// Number of attached points.
     pub fn point_count(&self) -> usize {
-        lock_read(&self.shared.published).count(Values::Points)
+        lock_read(&self.shared.published).count(View::Points)
     }
 
     /// Displacement `[n,3]` at the attached points in the last state.
     pub fn read_points(&self, out: &mut [f32]) -> Result<()> {
-        self.read_to(Values::Points, out.into())
+        self.read_to(View::Points, out.into())
     }
 
     /// Between the state before (`alpha` 0) and the last state (1), region order. `alpha` is clamped to `[0, 1]`.
     ///
     /// What is shown is up to one `dt` old: at `alpha` 0 the state before, at 1 the newest.
     pub fn sample(&self, alpha: f64, out: &mut [f32]) -> Result<()> {
-        self.sample_to(Values::Region, alpha, out.into())
+        self.sample_to(View::Region, alpha, out.into())
     }
 
     /// As [`Scene::sample`], at the attached points.
     pub fn sample_points(&self, alpha: f64, out: &mut [f32]) -> Result<()> {
-        self.sample_to(Values::Points, alpha, out.into())
+        self.sample_to(View::Points, alpha, out.into())
     }
 
     /// Displacement `[n,3]` of any nodes in the last state.
@@ -49,13 +49,13 @@ impl Scene {
     }
 
     /// The last published state at the region or the points, into memory that need not be initialised.
-    pub(crate) fn read_to(&self, values: Values, out: Output<'_, f32>) -> Result<()> {
-        lock_read(&self.shared.published).read(values, out)
+    pub(crate) fn read_to(&self, view: View, out: Output<'_, f32>) -> Result<()> {
+        lock_read(&self.shared.published).read(view, out)
     }
 
     /// [`Scene::sample`] at the region or the points, into memory that need not be initialised.
-    pub(crate) fn sample_to(&self, values: Values, alpha: f64, out: Output<'_, f32>) -> Result<()> {
-        lock_read(&self.shared.published).sample(values, alpha, out)
+    pub(crate) fn sample_to(&self, view: View, alpha: f64, out: Output<'_, f32>) -> Result<()> {
+        lock_read(&self.shared.published).sample(view, alpha, out)
     }
 
     /// [`Scene::decode`] into memory that need not be initialised.
@@ -67,8 +67,8 @@ impl Scene {
     ///
     /// # Errors
     /// [`Error::Argument`]; [`Error::State`] where no points are attached.
-    pub(crate) fn check_len(&self, values: Values, len: usize) -> Result<()> {
-        lock_read(&self.shared.published).check_len(values, len)
+    pub(crate) fn check_len(&self, view: View, len: usize) -> Result<()> {
+        lock_read(&self.shared.published).check_len(view, len)
     }
 
     /// Statistics of the last step.

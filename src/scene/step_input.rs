@@ -1,13 +1,14 @@
 //! What a step gets, and what has become of it.
 
 use crate::contact::Tool;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::field::ContactSet;
 
 /// The collision field `c` of a step: what the instruments impose at its end.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub enum Contact<'a> {
     /// No contact.
+    #[default]
     None,
     /// `[K,3]`, mm, zero but at nodes in contact.
     Dense(&'a [f32]),
@@ -38,14 +39,59 @@ impl Contact<'_> {
     }
 }
 
-/// Inputs of a step.
-#[derive(Debug, Clone, Copy)]
+/// The input of a step, submitted or not, and of a frame between steps. By default nothing happens: the tissue moves on by itself.
+#[derive(Debug, Clone, Copy, Default)]
 pub struct StepInput<'a> {
     /// Current displacement `[K,3]`, mm; `None` takes the scene's own state. A field that equals the scene's last
-    /// state at its decoded nodes is taken as that state.
+    /// state at its decoded nodes is taken as that state. Not with tools, and not for a frame.
     pub displacement: Option<&'a [f32]>,
-    /// Collision field. A node that the boundary condition holds stays held.
+    /// What drives the step. A node that the boundary condition holds stays held.
     pub contact: Contact<'a>,
+    /// The moment of the end of the step on the host's clock, s, from which [`Scene::present`](crate::Scene::present) counts; 0 for hosts
+    /// that keep none. Not for a frame.
+    pub time_s: f64,
+}
+
+impl<'a> From<Contact<'a>> for StepInput<'a> {
+    fn from(contact: Contact<'a>) -> StepInput<'a> {
+        StepInput {
+            contact,
+            ..StepInput::default()
+        }
+    }
+}
+
+impl StepInput<'_> {
+    /// # Errors
+    /// [`Error::NonFinite`], and [`Error::Argument`] for fields that exclude each other.
+    pub(crate) fn check(&self) -> Result<()> {
+        if !self.time_s.is_finite() {
+            return Err(Error::NonFinite(format!("time_s is {}", self.time_s)));
+        }
+        if matches!(self.contact, Contact::Tools(_)) && self.displacement.is_some() {
+            return Err(Error::Argument(
+                "displacement and instruments are both set; instruments drive the scene's own state".into(),
+            ));
+        }
+        Ok(())
+    }
+
+    /// As [`StepInput::check`], for a frame between steps.
+    pub(crate) fn check_of_frame(&self) -> Result<()> {
+        self.check()?;
+        if self.displacement.is_some() {
+            return Err(Error::Argument(
+                "displacement is set; a frame shows the scene's own state".into(),
+            ));
+        }
+        if self.time_s != 0.0 {
+            return Err(Error::Argument(format!(
+                "time_s is {}; the moment of a frame is when",
+                self.time_s
+            )));
+        }
+        Ok(())
+    }
 }
 
 /// What has become of a submitted step.

@@ -11,8 +11,10 @@ use super::shared::Shared;
 use super::{Contact, Progress, StepInput};
 use crate::contact::Tool;
 use crate::error::{Error, Result};
-use crate::field::ContactSet;
+use crate::field::{ContactSet, check_displacement};
 use crate::memory;
+
+const SUBMITTED: &str = "a submitted input";
 
 /// What host and worker share. The host writes an input only while none waits, or replaces one that has not started.
 #[derive(Default)]
@@ -23,13 +25,8 @@ struct Slot {
     running: bool,
     /// The scene goes: the worker ends after the step that it is in.
     stop: bool,
-    /// The input that waits: nodes and vectors `[m,3]`, mm, or tools. The worker exchanges them for its own lists, so that neither side
-    /// allocates once the lists have grown.
-    nodes: Vec<u32>,
-    vectors: Vec<f32>,
-    /// Tools drive the step that waits.
-    driven: bool,
-    tools: Vec<Tool>,
+    /// The input that waits. The worker exchanges it for its own, so that neither side allocates once the lists have grown.
+    input: Copied,
     /// Errors that no poll has returned yet: the first one, and how many came after it.
     failed: Option<Error>,
     failed_later: u64,
@@ -37,6 +34,73 @@ struct Slot {
     finished: bool,
     /// An input was submitted at some time: without one there is nothing to wait for, which is an error.
     ever: bool,
+}
+
+/// A copy of the host's input.
+#[derive(Default)]
+struct Copied {
+    drive: Drive,
+    nodes: Vec<u32>,
+    /// `[m,3]`, mm.
+    vectors: Vec<f32>,
+    tools: Vec<Tool>,
+    /// Whether the step starts from `displacement [K,3]`, mm.
+    starts: bool,
+    displacement: Vec<f32>,
+    time_s: f64,
+}
+
+/// What of a copied input counts.
+#[derive(Clone, Copy, Default)]
+enum Drive {
+    #[default]
+    None,
+    Nodes,
+    Tools,
+}
+
+impl Copied {
+    /// Takes an input whose dense field is in `checked`. All lists have room before one changes: an input that waits stays whole.
+    fn take(&mut self, input: &StepInput<'_>, checked: &ContactSet) -> Result<()> {
+        let (drive, nodes, vectors, tools): (_, &[u32], &[f32], &[Tool]) = match input.contact {
+            Contact::None => (Drive::None, &[], &[], &[]),
+            Contact::Dense(_) => (Drive::Nodes, &checked.nodes, &checked.vectors, &[]),
+            Contact::Sparse { nodes, vectors } => (Drive::Nodes, nodes, vectors, &[]),
+            Contact::Tools(tools) => (Drive::Tools, &[], &[], tools),
+        };
+        let displacement = input.displacement.unwrap_or_default();
+        memory::fit(&mut self.nodes, nodes.len(), SUBMITTED)?;
+        memory::fit(&mut self.vectors, vectors.len(), SUBMITTED)?;
+        memory::fit(&mut self.tools, tools.len(), SUBMITTED)?;
+        memory::fit(&mut self.displacement, displacement.len(), SUBMITTED)?;
+        self.drive = drive;
+        self.starts = input.displacement.is_some();
+        self.time_s = input.time_s;
+        self.nodes.clear();
+        self.nodes.extend_from_slice(nodes);
+        self.vectors.clear();
+        self.vectors.extend_from_slice(vectors);
+        self.tools.clear();
+        self.tools.extend_from_slice(tools);
+        self.displacement.clear();
+        self.displacement.extend_from_slice(displacement);
+        Ok(())
+    }
+
+    fn input(&self) -> StepInput<'_> {
+        StepInput {
+            displacement: self.starts.then_some(&*self.displacement),
+            contact: match self.drive {
+                Drive::None => Contact::None,
+                Drive::Nodes => Contact::Sparse {
+                    nodes: &self.nodes,
+                    vectors: &self.vectors,
+                },
+                Drive::Tools => Contact::Tools(&self.tools),
+            },
+            time_s: self.time_s,
+        }
+    }
 }
 
 #[derive(Default)]
@@ -73,48 +137,27 @@ impl Worker {
         }
     }
 
-    /// Hands a contact on a mesh of `node_count` nodes to the worker, checked.
+    /// Hands an input on a mesh of `node_count` nodes to the worker, checked.
     pub fn submit(
         &self,
         shared: &Arc<Shared>,
-        nodes: &[u32],
-        vectors: &[f32],
+        input: &StepInput<'_>,
         node_count: usize,
     ) -> Result<()> {
+        input.check()?;
         let mut checked = self.checked.lock().unwrap_or_else(PoisonError::into_inner);
-        checked.take_sparse(nodes, vectors, node_count)?;
-        drop(checked);
-        self.start(shared)?;
-        let mut slot = self.free_slot()?;
-        // Both have room before either changes: a contact that waits stays whole.
-        let room = |list: usize, have: usize| list.saturating_sub(have);
-        let (more_nodes, more_floats) = (
-            room(nodes.len(), slot.nodes.len()),
-            room(vectors.len(), slot.vectors.len()),
-        );
-        memory::reserve(&mut slot.nodes, more_nodes, "a submitted contact")?;
-        memory::reserve(&mut slot.vectors, more_floats, "a submitted contact")?;
-        slot.nodes.clear();
-        slot.nodes.extend_from_slice(nodes);
-        slot.vectors.clear();
-        slot.vectors.extend_from_slice(vectors);
-        slot.driven = false;
-        self.set_off(slot);
-        Ok(())
-    }
-
-    /// Hands tools to the worker, checked.
-    pub fn submit_tools(&self, shared: &Arc<Shared>, tools: &[Tool]) -> Result<()> {
-        for (index, tool) in tools.iter().enumerate() {
-            tool.check(index)?;
+        input.contact.gather(&mut checked, node_count)?;
+        if let Contact::Tools(tools) = input.contact {
+            for (index, tool) in tools.iter().enumerate() {
+                tool.check(index)?;
+            }
+        }
+        if let Some(displacement) = input.displacement {
+            check_displacement(displacement, node_count)?;
         }
         self.start(shared)?;
         let mut slot = self.free_slot()?;
-        let more = tools.len().saturating_sub(slot.tools.len());
-        memory::reserve(&mut slot.tools, more, "submitted instruments")?;
-        slot.tools.clear();
-        slot.tools.extend_from_slice(tools);
-        slot.driven = true;
+        slot.input.take(input, &checked)?;
         self.set_off(slot);
         Ok(())
     }
@@ -230,8 +273,7 @@ impl Drop for Worker {
 }
 
 fn run(shared: &Shared, signal: &Signal) {
-    let (mut nodes, mut vectors) = (Vec::new(), Vec::new());
-    let mut tools = Vec::new();
+    let mut own = Copied::default();
     let mut slot = signal.lock();
     loop {
         while !slot.waiting && !slot.stop {
@@ -245,24 +287,9 @@ fn run(shared: &Shared, signal: &Signal) {
         }
         slot.waiting = false;
         slot.running = true;
-        std::mem::swap(&mut nodes, &mut slot.nodes);
-        std::mem::swap(&mut vectors, &mut slot.vectors);
-        std::mem::swap(&mut tools, &mut slot.tools);
-        let driven = slot.driven;
+        std::mem::swap(&mut own, &mut slot.input);
         drop(slot);
-        let contact = Contact::Sparse {
-            nodes: &nodes,
-            vectors: &vectors,
-        };
-        let contact = match driven {
-            true => Contact::Tools(&tools),
-            false => contact,
-        };
-        let input = StepInput {
-            displacement: None,
-            contact,
-        };
-        let result = shared.step_blocking(input);
+        let result = shared.step_blocking(own.input());
         slot = signal.lock();
         slot.running = false;
         match result {

@@ -43,7 +43,7 @@ pub fn documented() -> Documented {
             let words = |c: char| !c.is_ascii_alphanumeric() && c != '_';
             let mut words: Vec<String> = errors.split(words).map(str::to_owned).collect();
             if comment.contains("the step's") {
-                words.push("upt_scene_step_contacts".into());
+                words.push("upt_scene_step".into());
             }
             own.insert(name.to_owned(), words);
         }

@@ -27,7 +27,7 @@ impl World<'_> {
         unsafe {
             match call.function {
                 Function::SceneReset => ("upt_scene_reset", upt_scene_reset(scene)),
-                Function::Step => {
+                Function::StepField => {
                     let displacement = vectors(3 * nodes, 0.5);
                     let mut collision = vec![0.0; 3 * nodes];
                     let at = call.seed as usize % (3 * nodes);
@@ -41,69 +41,9 @@ impl World<'_> {
                         pointer(&displacement, call, 0)
                     };
                     let status = Self::output(call, 2, 3 * nodes, true, |out, count| {
-                        upt_scene_step(scene, given, pointer(&collision, call, 1), out, count)
+                        upt_scene_step_field(scene, given, pointer(&collision, call, 1), out, count)
                     });
-                    ("upt_scene_step", status)
-                }
-                Function::StepContacts | Function::Submit => {
-                    let contacts = call.seed as usize % 7;
-                    let shift = call.seed as usize / 7;
-                    let mut listed: Vec<u32> = (0..contacts)
-                        .map(|i| ((shift + 5 * i) % nodes) as u32)
-                        .collect();
-                    if let (true, Some(first)) = (wrong, listed.first_mut()) {
-                        *first = if call.seed.is_multiple_of(2) {
-                            nodes as u32
-                        } else {
-                            u32::MAX
-                        };
-                    }
-                    let imposed = vectors(
-                        3 * contacts,
-                        if call.seed.is_multiple_of(5) {
-                            60.0
-                        } else {
-                            2.0
-                        },
-                    );
-                    let (node_pointer, vector_pointer) =
-                        (pointer(&listed, call, 0), pointer(&imposed, call, 1));
-                    let passed = absurd(contacts, nodes, call);
-                    let refused = |status| {
-                        let right = passed == contacts as u64 || status != UPT_OK;
-                        assert!(right, "a count of {passed} was taken");
-                        status
-                    };
-                    if call.function == Function::Submit {
-                        let status = upt_scene_submit(scene, node_pointer, vector_pointer, passed);
-                        return ("upt_scene_submit", refused(status));
-                    }
-                    if call.seed.is_multiple_of(11) {
-                        // The output lies over the vectors, or over the nodes.
-                        let mut memory = vec![0.0f32; (3 * nodes).max(imposed.len())];
-                        let over = memory.as_mut_ptr();
-                        memory[..imposed.len()].copy_from_slice(&imposed);
-                        let (n, v) = if call.seed.is_multiple_of(2) {
-                            (node_pointer, over.cast_const())
-                        } else {
-                            over.cast::<u32>().copy_from(listed.as_ptr(), listed.len());
-                            (over.cast_const().cast(), vector_pointer)
-                        };
-                        let floats = 3 * nodes as u64;
-                        let status = upt_scene_step_contacts(scene, n, v, passed, over, floats);
-                        return ("upt_scene_step_contacts", refused(status));
-                    }
-                    let status = Self::output(call, 2, 3 * nodes, true, |out, count| {
-                        upt_scene_step_contacts(
-                            scene,
-                            node_pointer,
-                            vector_pointer,
-                            passed,
-                            out,
-                            count,
-                        )
-                    });
-                    ("upt_scene_step_contacts", refused(status))
+                    ("upt_scene_step_field", status)
                 }
                 Function::Read => {
                     let status = Self::output(call, 0, 3 * nodes, true, |out, count| {

@@ -196,17 +196,10 @@ impl<'a> World<'a> {
             | ModelPositions | ModelIndices | SceneCreate | SceneDestroy | SetLog | Texts => {
                 self.call_library(call, scene)
             }
-            Instruments
-            | StepInstruments
-            | SubmitInstruments
-            | Present
-            | PresentPoints
-            | PresentContacts
-            | PresentPointsContacts
-            | Readings
-            | InstrumentContacts
-            | HullCreate
-            | HullDestroy => self.call_instruments(call, scene, nodes),
+            Step | Submit | Present => self.call_driven(call, scene, nodes),
+            Instruments | Readings | InstrumentContacts | HullCreate | HullDestroy => {
+                self.call_instruments(call, scene, nodes)
+            }
             HapticsCreate | HapticsRender | HapticsDestroy => self.call_haptics(call, scene),
             _ => self.call_scene(call, scene, nodes),
         }

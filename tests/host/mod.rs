@@ -87,16 +87,8 @@ impl Host {
     /// Steps with these nodes pushed by `push`.
     pub fn step(&self, nodes: &[u32], push: [f32; 3]) -> i32 {
         let vectors = push.repeat(nodes.len());
-        unsafe {
-            upt_scene_step_contacts(
-                self.scene,
-                nodes.as_ptr(),
-                vectors.as_ptr(),
-                nodes.len() as u64,
-                null_mut(),
-                0,
-            )
-        }
+        let input = upt_input::of_contacts(nodes, &vectors);
+        unsafe { upt_scene_step(self.scene, &input, null_mut(), 0) }
     }
 }
 

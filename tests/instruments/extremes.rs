@@ -2,7 +2,7 @@
 
 use contact::{Shape, Vector};
 use upt::contact::{Mode, Tool};
-use upt::{Contact, Error, SceneOptions, StepInput, flag};
+use upt::{Contact, Error, SceneOptions, flag};
 
 use super::fixture::{model, plain, scene};
 use super::{ball, pressing, readings, site, step, with};
@@ -107,13 +107,7 @@ fn what_cannot_be_is_refused_and_changes_nothing() {
     }
     let before = scene.save().unwrap();
     let tool = pressing(&scene, 1.2, Vector::ZERO);
-    let tried = |tools: &[Tool]| {
-        let input = StepInput {
-            displacement: None,
-            contact: Contact::Tools(tools),
-        };
-        scene.step(input, None).unwrap_err()
-    };
+    let tried = |tools: &[Tool]| scene.step(Contact::Tools(tools), None).unwrap_err();
     let friction = Tool {
         friction: -0.1,
         ..tool.clone()
@@ -185,11 +179,9 @@ fn the_same_question_has_the_same_contacts() {
 #[test]
 fn a_bundle_without_a_linear_response_says_what_to_use_instead() {
     let scene = scene(&model("tiny-upt"), &plain());
-    let input = StepInput {
-        displacement: None,
-        contact: Contact::Tools(&[ball(1.0, [0.0; 3])]),
-    };
-    let error = scene.step(input, None).unwrap_err();
+    let error = scene
+        .step(Contact::Tools(&[ball(1.0, [0.0; 3])]), None)
+        .unwrap_err();
     assert!(matches!(error, Error::Unsupported(_)), "{error}");
     assert!(
         error

@@ -11,7 +11,7 @@ mod through_the_abi;
 use contact::{Shape, Vector};
 use fixture::{bits, model, plain, scene};
 use upt::contact::{Mode, Tool, ToolReading};
-use upt::{Contact, Corrections, Scene, SceneOptions, StepInput};
+use upt::{Contact, Corrections, Scene, SceneOptions};
 
 /// A ball at a place.
 fn ball(radius: f32, at: [f32; 3]) -> Tool {
@@ -20,11 +20,7 @@ fn ball(radius: f32, at: [f32; 3]) -> Tool {
 
 fn step(scene: &Scene, tools: &[Tool]) -> Vec<f32> {
     let mut u = vec![0.0; 3 * scene.node_count()];
-    let input = StepInput {
-        displacement: None,
-        contact: Contact::Tools(tools),
-    };
-    scene.step(input, Some(&mut u)).unwrap();
+    scene.step(Contact::Tools(tools), Some(&mut u)).unwrap();
     u
 }
 
@@ -267,7 +263,7 @@ fn a_submitted_step_is_the_hosts_own() {
     for t in 1..6 {
         let tools = [pressing(&own, 0.3 * t as f32, Vector::ZERO)];
         let wanted = step(&own, &tools);
-        submitted.submit_tools(&tools).unwrap();
+        submitted.submit(Contact::Tools(&tools)).unwrap();
         let long = std::time::Duration::from_secs(600);
         assert_eq!(submitted.wait(long).unwrap(), upt::Progress::Done);
         let mut u = vec![0.0; wanted.len()];

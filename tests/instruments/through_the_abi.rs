@@ -46,7 +46,8 @@ fn what_a_step_takes_gives_contacts_too() {
     let host = Host::new("tiny-reduced", |_| ());
     let mut ball = pressing(&host, 1.0);
     let step = |tool: &upt_instrument| unsafe {
-        upt_scene_step_instruments(host.scene, tool, 1, null_mut(), 0)
+        let input = upt_input::of_instruments(std::slice::from_ref(tool));
+        upt_scene_step(host.scene, &input, null_mut(), 0)
     };
     let (status, count) = contacts(&host, &ball);
     assert_eq!(status, UPT_OK, "{}", message());
@@ -96,7 +97,8 @@ fn no_place_with_a_capacity_is_an_error() {
             assert!(message().contains("out is NULL"), "{}", message());
         }
         let tool = pressing(&host, 1.0);
-        let status = unsafe { upt_scene_step_instruments(host.scene, &tool, 1, null_mut(), 0) };
+        let input = upt_input::of_instruments(std::slice::from_ref(&tool));
+        let status = unsafe { upt_scene_step(host.scene, &input, null_mut(), 0) };
         assert_eq!(status, UPT_OK, "{}", message());
     }
     let mut needed = 0;

@@ -89,9 +89,8 @@ impl Rig {
 
     pub fn drive(&mut self, depth: f32) -> i32 {
         self.pose(depth);
-        let status = counted(|| unsafe {
-            upt_scene_step_instruments(self.scene, self.tools.as_ptr(), 2, null_mut(), 0)
-        });
+        let input = upt_input::of_instruments(&self.tools);
+        let status = counted(|| unsafe { upt_scene_step(self.scene, &input, null_mut(), 0) });
         self.shown(status)
     }
 
@@ -133,24 +132,25 @@ impl Rig {
 
     pub fn present(&mut self, seconds: f64) -> i32 {
         let mut out = vec![0.0f32; self.positions.len()];
-        let (scene, tools, to) = (self.scene, self.tools.as_ptr(), out.as_mut_ptr());
-        let all = out.len() as u64;
-        let some = 3 * self.few().len() as u64;
-        let status =
-            match counted(|| unsafe { upt_scene_present(scene, seconds, tools, 2, to, all) }) {
-                UPT_ERR_ARGUMENT => {
-                    counted(|| unsafe { upt_scene_present(scene, seconds, tools, 2, to, some) })
-                }
-                status => status,
-            };
+        let input = upt_input::of_instruments(&self.tools);
+        let (scene, to) = (self.scene, out.as_mut_ptr());
+        let frame = |floats| {
+            counted(|| unsafe { upt_scene_present(scene, &input, seconds, null(), to, floats) })
+        };
+        let status = match frame(out.len() as u64) {
+            UPT_ERR_ARGUMENT => frame(3 * self.few().len() as u64),
+            status => status,
+        };
         self.give(status, &out)
     }
 
     pub fn present_points(&mut self) -> i32 {
         let mut out = vec![0.0f32; self.positions.len()];
-        let (tools, to, floats) = (self.tools.as_ptr(), out.as_mut_ptr(), out.len() as u64);
-        let status =
-            counted(|| unsafe { upt_scene_present_points(self.scene, 0.01, tools, 2, to, floats) });
+        let input = upt_input::of_instruments(&self.tools);
+        let (to, floats) = (out.as_mut_ptr(), out.len() as u64);
+        let status = counted(|| unsafe {
+            upt_scene_present(self.scene, &input, 0.01, &upt_view::POINTS, to, floats)
+        });
         self.give(status, &out)
     }
 
@@ -206,9 +206,9 @@ impl Rig {
 
     pub fn submit(&mut self, depth: f32) -> i32 {
         self.pose(depth);
-        let (scene, tools) = (self.scene, self.tools.as_ptr());
+        let (scene, input) = (self.scene, upt_input::of_instruments(&self.tools));
         let status = counted(|| unsafe {
-            match upt_scene_submit_instruments(scene, tools, 2) {
+            match upt_scene_submit(scene, &input) {
                 UPT_OK => upt_scene_wait(scene, u32::MAX),
                 failed => failed,
             }
@@ -219,10 +219,9 @@ impl Rig {
     pub fn submit_nodes(&mut self) -> i32 {
         let nodes = self.pushed();
         let push = [0.0f32, 0.0, -0.7].repeat(nodes.len());
-        let (scene, count) = (self.scene, nodes.len() as u64);
-        let (nodes, push) = (nodes.as_ptr(), push.as_ptr());
+        let (scene, input) = (self.scene, upt_input::of_contacts(nodes, &push));
         let status = counted(|| unsafe {
-            match upt_scene_submit(scene, nodes, push, count) {
+            match upt_scene_submit(scene, &input) {
                 UPT_OK => upt_scene_wait(scene, u32::MAX),
                 failed => failed,
             }
@@ -261,9 +260,7 @@ impl Rig {
     }
 
     pub fn free(&mut self) -> i32 {
-        let status = counted(|| unsafe {
-            upt_scene_step_contacts(self.scene, null(), null(), 0, null_mut(), 0)
-        });
+        let status = counted(|| unsafe { upt_scene_step(self.scene, null(), null_mut(), 0) });
         self.shown(status)
     }
 
@@ -297,10 +294,8 @@ impl Rig {
     pub fn push(&mut self, by: f32) -> i32 {
         let nodes = self.pushed();
         let push = [0.0, 0.0, by].repeat(nodes.len());
-        let (scene, count) = (self.scene, nodes.len() as u64);
-        let status = counted(|| unsafe {
-            upt_scene_step_contacts(scene, nodes.as_ptr(), push.as_ptr(), count, null_mut(), 0)
-        });
+        let (scene, input) = (self.scene, upt_input::of_contacts(nodes, &push));
+        let status = counted(|| unsafe { upt_scene_step(scene, &input, null_mut(), 0) });
         self.shown(status)
     }
 
@@ -308,12 +303,10 @@ impl Rig {
         let mut out = vec![0.0f32; 3 * self.few().len()];
         let nodes = self.pushed();
         let push = [0.0f32, 0.0, -0.8].repeat(nodes.len());
-        let (count, floats) = (nodes.len() as u64, out.len() as u64);
-        let (nodes, push, to) = (nodes.as_ptr(), push.as_ptr(), out.as_mut_ptr());
-        let scene = self.scene;
-        let status = counted(|| unsafe {
-            upt_scene_present_contacts(scene, 0.01, nodes, push, count, to, floats)
-        });
+        let input = upt_input::of_contacts(nodes, &push);
+        let (scene, to, floats) = (self.scene, out.as_mut_ptr(), out.len() as u64);
+        let status =
+            counted(|| unsafe { upt_scene_present(scene, &input, 0.01, null(), to, floats) });
         self.give(status, &out)
     }
 }

@@ -12,6 +12,7 @@ use upt::{Contact, Corrections, Error, SceneOptions, StepInput};
 const FREE: StepInput<'static> = StepInput {
     displacement: None,
     contact: Contact::None,
+    time_s: 0.0,
 };
 
 #[test]

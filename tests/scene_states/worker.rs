@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use upt::{Error, Progress, SceneOptions};
+use upt::{Contact, Error, Progress, SceneOptions};
 
 use super::FREE;
 use super::fixture::{BUNDLES, bits, model, plain, push, scene, sparse};
@@ -22,7 +22,12 @@ fn the_worker_gives_what_the_host_would_get() {
         );
         for t in 0..12 {
             let (nodes, vectors) = push(&model, t);
-            background.submit(&nodes, &vectors).unwrap();
+            background
+                .submit(Contact::Sparse {
+                    nodes: &nodes,
+                    vectors: &vectors,
+                })
+                .unwrap();
             // Reading is allowed at any time and never waits for the step.
             let mut seen = vec![0.0; 3 * background.node_count()];
             background.read(&mut seen).unwrap();
@@ -50,7 +55,12 @@ fn the_worker_gives_what_the_host_would_get() {
             (vec![5], vec![0.0; 2]),
             ((0..=count as u32).collect(), vec![0.0; 3 * count + 3]),
         ] {
-            let error = background.submit(&nodes, &vectors).unwrap_err();
+            let error = background
+                .submit(Contact::Sparse {
+                    nodes: &nodes,
+                    vectors: &vectors,
+                })
+                .unwrap_err();
             assert!(matches!(error.status(), -2 | -6), "{error}");
         }
         assert_eq!(background.poll().unwrap(), Progress::Done);
@@ -86,15 +96,35 @@ fn an_error_that_was_not_told_is_never_lost() {
             made
         };
         let (bad, good) = (refused(&model), push(&model, 1));
-        scene.submit(&bad.0, &bad.1).unwrap();
+        scene
+            .submit(Contact::Sparse {
+                nodes: &bad.0,
+                vectors: &bad.1,
+            })
+            .unwrap();
         settle();
         for _ in 0..3 {
-            scene.submit(&good.0, &good.1).unwrap();
+            scene
+                .submit(Contact::Sparse {
+                    nodes: &good.0,
+                    vectors: &good.1,
+                })
+                .unwrap();
             settle();
         }
-        scene.submit(&bad.0, &bad.1).unwrap();
+        scene
+            .submit(Contact::Sparse {
+                nodes: &bad.0,
+                vectors: &bad.1,
+            })
+            .unwrap();
         settle();
-        scene.submit(&good.0, &good.1).unwrap();
+        scene
+            .submit(Contact::Sparse {
+                nodes: &good.0,
+                vectors: &good.1,
+            })
+            .unwrap();
         let error = scene.wait(FOREVER).unwrap_err();
         assert!(matches!(error, Error::Guard(_)), "{error}");
         assert!(error.to_string().contains("1 later"), "{error}");
@@ -116,7 +146,12 @@ fn steady_submits_under_latest_wins_are_told_of_finished_steps() {
     let (nodes, vectors) = push(&model, 3);
     let mut told = 0;
     while scene.stats().step_count < STEPS {
-        scene.submit(&nodes, &vectors).unwrap();
+        scene
+            .submit(Contact::Sparse {
+                nodes: &nodes,
+                vectors: &vectors,
+            })
+            .unwrap();
         told += u64::from(scene.poll().unwrap() == Progress::Done);
     }
     // Between two polls at most the step that ran, the one that waited and the new one can finish.
@@ -140,7 +175,12 @@ fn the_latest_input_wins_where_asked() {
             .iter()
             .flat_map(|_| [0.0, 0.0, -0.01 * k as f32])
             .collect();
-        scene.submit(&nodes, &vectors).unwrap();
+        scene
+            .submit(Contact::Sparse {
+                nodes: &nodes,
+                vectors: &vectors,
+            })
+            .unwrap();
     }
     assert_eq!(scene.wait(FOREVER).unwrap(), Progress::Done);
     let mut out = vec![0.0; 3 * scene.node_count()];
@@ -160,12 +200,22 @@ fn eight_scenes_on_one_model_go_on_beside_each_other() {
         let (nodes, vectors) = push(&model, 3);
         let mut started = [1; 8];
         for scene in &scenes {
-            scene.submit(&nodes, &vectors).unwrap();
+            scene
+                .submit(Contact::Sparse {
+                    nodes: &nodes,
+                    vectors: &vectors,
+                })
+                .unwrap();
         }
         while scenes.iter().any(|scene| scene.stats().step_count < STEPS) {
             for (scene, started) in scenes.iter().zip(&mut started) {
                 if scene.poll().unwrap() == Progress::Done && *started < STEPS {
-                    scene.submit(&nodes, &vectors).unwrap();
+                    scene
+                        .submit(Contact::Sparse {
+                            nodes: &nodes,
+                            vectors: &vectors,
+                        })
+                        .unwrap();
                     *started += 1;
                 }
             }

@@ -61,6 +61,7 @@ fn group(constant: &str) -> Option<String> {
         "LOG" => "LogLevel".into(),
         "SET" => "IndexSet".into(),
         "STEP" => "StepPath".into(),
+        "VIEW" => "ViewKind".into(),
         _ => camel(&first.to_lowercase()),
     })
 }
@@ -159,7 +160,7 @@ fn seen(source: &Source, item: &Struct, field: &Named) -> Result<Seen> {
                 "str | os.PathLike[str] | None",
                 Some(format!("text(\"_{name}\")")),
             ),
-            Kind::Number(number) => {
+            Kind::Number(number) if item.name.ends_with("_options") => {
                 let count = format!("{}_count", name.trim_end_matches('s'));
                 if !item.fields.iter().any(|other| other.name == count) {
                     bail!("{}.{name}: a pointer without {count}", item.name);

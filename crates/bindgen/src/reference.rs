@@ -19,7 +19,7 @@ const CHAPTERS: [(&str, &str); 11] = [
     ("worker.rs", "Steps in the background"),
     ("region.rs", "Parts of the mesh"),
     ("points.rs", "Attached points"),
-    ("driven.rs", "Steps driven by instruments"),
+    ("driven.rs", "What instruments are told, and hulls"),
     ("present.rs", "Frames between steps"),
     ("haptics.rs", "Forces for a hand"),
     ("instrument.rs", "Contact found by geometry, and forces"),
@@ -27,7 +27,7 @@ const CHAPTERS: [(&str, &str); 11] = [
 ];
 
 /// Headings of the constants, by prefix.
-const FAMILIES: [(&str, &str); 13] = [
+const FAMILIES: [(&str, &str); 14] = [
     ("UPT_ABI_", "Version"),
     ("UPT_PROVIDER_", "Providers"),
     ("UPT_KIND_", "Model kinds"),
@@ -39,6 +39,7 @@ const FAMILIES: [(&str, &str); 13] = [
     ("UPT_GUARD_", "Guard policies"),
     ("UPT_FLAG_", "Flags of a step"),
     ("UPT_SET_", "Index sets"),
+    ("UPT_VIEW_", "Views"),
     ("UPT_SHAPE_", "Instrument shapes"),
     ("UPT_MODE_", "Instrument modes"),
 ];

@@ -9,10 +9,11 @@ use syn::{Attribute, Expr, FnArg, Item, Lit, Pat, ReturnType, Type};
 pub const FOLDER: &str = "src/ffi";
 
 /// The files with exported items, in the order of the header.
-pub const FILES: [&str; 14] = [
+pub const FILES: [&str; 15] = [
     "../status.rs",
     "constants.rs",
     "structs.rs",
+    "step_structs.rs",
     "library.rs",
     "model.rs",
     "scene.rs",

@@ -50,13 +50,15 @@ structs!(
     upt_model_options,
     upt_model_info,
     upt_scene_options,
-    upt_instrument,
-    upt_instrument_reading,
-    upt_instrument_contact,
     upt_haptics_options,
     upt_haptic_pose,
     upt_haptic_force,
-    upt_scene_stats
+    upt_scene_stats,
+    upt_input,
+    upt_view,
+    upt_instrument,
+    upt_instrument_reading,
+    upt_instrument_contact
 );
 
 fn run(command: &mut Command) -> String {

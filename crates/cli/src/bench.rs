@@ -219,13 +219,7 @@ impl Bench {
                 nodes: &nodes,
                 vectors: &vectors,
             };
-            match scene.step(
-                StepInput {
-                    displacement: None,
-                    contact,
-                },
-                Some(&mut field),
-            ) {
+            match scene.step(StepInput::from(contact), Some(&mut field)) {
                 Ok(()) => {
                     let size = largest(&field);
                     run.finite &= size.is_finite();

@@ -5,7 +5,7 @@ use std::process::Command;
 
 use tissue::mesh::{Boundary, Mesh};
 use tissue::solver::{ContactNode, Solver, SolverOptions};
-use upt::{Contact, Corrections, InitOptions, Model, ModelOptions, Scene, SceneOptions, StepInput};
+use upt::{Contact, Corrections, InitOptions, Model, ModelOptions, Scene, SceneOptions};
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
@@ -83,14 +83,15 @@ fn error(folder: &Path, corrections: Corrections) -> f64 {
         solver.step_frame(&contact, 0.05).unwrap();
         solver.displacement(&mut want);
         let vectors = c.repeat(nodes.len());
-        let input = StepInput {
-            displacement: None,
-            contact: Contact::Sparse {
-                nodes: &nodes,
-                vectors: &vectors,
-            },
-        };
-        scene.step(input, Some(&mut got)).unwrap();
+        scene
+            .step(
+                Contact::Sparse {
+                    nodes: &nodes,
+                    vectors: &vectors,
+                },
+                Some(&mut got),
+            )
+            .unwrap();
         let pairs = want.as_flattened().iter().zip(&got);
         let squares = pairs.map(|(a, b)| f64::from(a - b).powi(2));
         sum += squares.sum::<f64>() / mesh.node_count() as f64;

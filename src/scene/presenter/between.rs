@@ -28,7 +28,7 @@ pub(super) const AT_ONCE_S: f64 = 1e-5;
 const MOST_STEPS: f64 = 2.0;
 
 /// The nodes that are shown.
-pub(super) struct View<'a> {
+pub(super) struct ShownNodes<'a> {
     pub region: &'a [u32],
     /// Their rows of the linear response.
     pub plan: &'a RowPlan,
@@ -172,7 +172,7 @@ impl Between {
         scene: &Tissue<'_>,
         tau: f64,
         driven: Contact<'_>,
-        (view, solves): (View<'_>, &mut Solves),
+        (view, solves): (ShownNodes<'_>, &mut Solves),
         out: &mut [f32],
     ) -> Result<()> {
         let model = scene.model;
@@ -184,6 +184,11 @@ impl Between {
         let tau = tau.min(MOST_STEPS * scene.integrator.step_s);
         let alpha = scene.integrator.damping_per_s;
         let rest = scene.mesh.positions.as_slice();
+        // Without a drive the tools of the last step have left, or its nodes are released.
+        let driven = match driven {
+            Contact::None if self.nodes.then.is_empty() => Contact::Tools(&[]),
+            other => other,
+        };
         let (last, velocity) = (self.last.as_slice(), self.velocity.as_slice());
         match driven {
             Contact::Tools(tools) => {

@@ -13,7 +13,7 @@ use std::sync::Arc;
 
 use super::core::lock_read;
 use super::points::AttachedPoints;
-use super::published::{Published, Values};
+use super::published::{Published, View};
 use super::step_input::Contact;
 use super::tissue::Tissue;
 use crate::error::{Error, Result};
@@ -21,7 +21,7 @@ use crate::kernels::rows::RowPlan;
 use crate::memory::{self, HeldBytes};
 use crate::model::Model;
 use crate::output::Output;
-use between::{AT_ONCE_S, Between, View, WHAT};
+use between::{AT_ONCE_S, Between, ShownNodes, WHAT};
 use solves::Solves;
 use step_blend::StepBlend;
 
@@ -39,7 +39,7 @@ pub struct Presenters {
 struct Presenter {
     /// What it shows: the region, or the attached points by the nodes around them.
     #[held(skip)]
-    values: Values,
+    view: View,
     #[held(skip)]
     attached: Arc<AttachedPoints>,
     between: Between,
@@ -57,54 +57,54 @@ struct Presenter {
 }
 
 impl Presenters {
-    /// Makes what shows these values, unless it is there; `begin` makes steps leave moments.
+    /// Makes what shows this view, unless it is there; `begin` makes steps leave moments.
     ///
     /// # Errors
     /// [`Error::Unsupported`] for a bundle without linear response or corrections, [`Error::OutOfMemory`], and what `begin` gives.
     pub fn prepare(
         &mut self,
         scene: &Tissue<'_>,
-        values: Values,
+        view: View,
         begin: impl FnOnce() -> Result<()>,
     ) -> Result<()> {
-        let place = match values {
-            Values::Region => &mut self.region,
-            Values::Points => &mut self.points,
+        let place = match view {
+            View::Region => &mut self.region,
+            View::Points => &mut self.points,
         };
         if place.is_none() {
-            let made = memory::boxed(Presenter::new(scene, values)?, WHAT)?;
+            let made = memory::boxed(Presenter::new(scene, view)?, WHAT)?;
             begin()?;
             *place = Some(made);
         }
         Ok(())
     }
 
-    /// The values `tau` after the last published step, into `out`. Nothing happens before [`Presenters::prepare`].
+    /// The view at `when`, into `out`. Nothing happens before [`Presenters::prepare`].
     ///
     /// # Errors
     /// Those of [`Scene::present`](crate::Scene::present).
     pub fn frame(
         &mut self,
         scene: &Tissue<'_>,
-        (values, tau): (Values, f64),
+        (view, when): (View, f64),
         driven: Contact<'_>,
         out: Output<'_, f32>,
     ) -> Result<()> {
-        let presenter = match values {
-            Values::Region => &mut self.region,
-            Values::Points => &mut self.points,
+        let presenter = match view {
+            View::Region => &mut self.region,
+            View::Points => &mut self.points,
         };
         match presenter {
-            Some(presenter) => presenter.frame(scene, tau, driven, &mut self.solves, out),
+            Some(presenter) => presenter.frame(scene, when, driven, &mut self.solves, out),
             None => Ok(()),
         }
     }
 }
 
 impl Presenter {
-    fn new(scene: &Tissue<'_>, values: Values) -> Result<Presenter> {
+    fn new(scene: &Tissue<'_>, view: View) -> Result<Presenter> {
         Ok(Presenter {
-            values,
+            view,
             attached: Arc::default(),
             between: Between::new(scene)?,
             region: Vec::new(),
@@ -119,13 +119,13 @@ impl Presenter {
 
     /// Takes the nodes of the host's output of `len` floats.
     fn take_region(&mut self, model: &Model, shared: &Published, len: usize) -> Result<()> {
-        shared.check_len(self.values, len)?;
+        shared.check_len(self.view, len)?;
         let count = self.between.free.len() / 3;
         let wanted = shared.region.as_deref();
-        let same = match (self.values, wanted) {
-            (Values::Points, _) => Arc::ptr_eq(&self.attached, &shared.attached),
-            (Values::Region, Some(region)) => self.region == region,
-            (Values::Region, None) => self.region.len() == count && self.region.is_sorted(),
+        let same = match (self.view, wanted) {
+            (View::Points, _) => Arc::ptr_eq(&self.attached, &shared.attached),
+            (View::Region, Some(region)) => self.region == region,
+            (View::Region, None) => self.region.len() == count && self.region.is_sorted(),
         };
         if same && !self.region.is_empty() {
             return Ok(());
@@ -133,15 +133,15 @@ impl Presenter {
         let Some(prior) = &model.prior else {
             return Ok(());
         };
-        let region = match (self.values, wanted) {
-            (Values::Points, _) => {
+        let region = match (self.view, wanted) {
+            (View::Points, _) => {
                 let mut nodes = memory::copied(shared.attached.needed_nodes(), WHAT)?;
                 nodes.sort_unstable();
                 nodes.dedup();
                 nodes
             }
-            (Values::Region, Some(region)) => memory::copied(region, WHAT)?,
-            (Values::Region, None) => memory::collected(count, 0..count as u32, WHAT)?,
+            (View::Region, Some(region)) => memory::copied(region, WHAT)?,
+            (View::Region, None) => memory::collected(count, 0..count as u32, WHAT)?,
         };
         // All of it is there before any of it changes.
         let plan = RowPlan::try_region(&prior.basis(), &region, true)?;
@@ -151,27 +151,27 @@ impl Presenter {
         (self.moved, self.shown, self.nodal) = (moved, shown, nodal);
         self.plan = plan;
         self.region = region;
-        if self.values == Values::Points {
+        if self.view == View::Points {
             self.attached = Arc::clone(&shared.attached);
         }
         self.between.step = None;
         Ok(())
     }
 
-    /// The region or the points `tau` after the last published step, into `out`.
+    /// The region or the points at `when`, into `out`.
     fn frame(
         &mut self,
         scene: &Tissue<'_>,
-        tau: f64,
+        when: f64,
         driven: Contact<'_>,
         solves: &mut Solves,
         out: Output<'_, f32>,
     ) -> Result<()> {
         let step_s = scene.integrator.step_s;
-        let step = {
+        let (step, tau) = {
             let shared = lock_read(scene.published);
             self.take_region(scene.model, &shared, out.len())?;
-            step_of(&shared)?
+            step_before(&shared, when)?
         };
         let mut nodal = std::mem::take(&mut self.nodal);
         let made = match self.between.step == Some(step) {
@@ -184,9 +184,9 @@ impl Presenter {
         if made.is_ok() {
             self.before_s = tau;
             self.step_blend.blend(tau, step_s, &mut nodal);
-            match self.values {
-                Values::Region => out.copy_from(&nodal),
-                Values::Points => {
+            match self.view {
+                View::Region => out.copy_from(&nodal),
+                View::Points => {
                     let field = &mut self.between.free;
                     for (u, &node) in nodal.as_chunks::<3>().0.iter().zip(&self.region) {
                         field[3 * node as usize..][..3].copy_from_slice(u);
@@ -209,7 +209,7 @@ impl Presenter {
         solves: &mut Solves,
         out: &mut [f32],
     ) -> Result<()> {
-        let view = View {
+        let view = ShownNodes {
             region: &self.region,
             plan: &self.plan,
             moved: &mut self.moved,
@@ -263,10 +263,17 @@ impl Presenter {
     }
 }
 
-/// Steps made, by which a new one is known.
-fn step_of(shared: &Published) -> Result<u64> {
-    match &shared.frame_state {
-        Some(frame_state) => Ok(frame_state.step),
-        None => Err(Error::State("present: the scene keeps no moments".into())),
+/// The steps made, by which a new one is known, and how long the last of them is ago at `when`, s.
+fn step_before(shared: &Published, when: f64) -> Result<(u64, f64)> {
+    let Some(frame_state) = &shared.frame_state else {
+        return Err(Error::State("present: the scene keeps no moments".into()));
+    };
+    let since = when - frame_state.time_s;
+    if since < 0.0 {
+        return Err(Error::Argument(format!(
+            "when is {when}, before the last published step, whose time_s is {}",
+            frame_state.time_s
+        )));
     }
+    Ok((frame_state.step, since))
 }

@@ -7,8 +7,8 @@ use ::contact::Shape;
 
 use crate::contact::Tool;
 use crate::options::{Corrections, GuardPolicy, ModelOptions};
-use crate::scene::{Contact, Scene};
-use crate::{Model, SceneOptions, StepInput};
+use crate::scene::{Contact, Scene, View};
+use crate::{Model, SceneOptions};
 
 const STEP_S: f64 = 0.05;
 
@@ -48,17 +48,20 @@ impl Host {
     }
 
     fn step(&self, t: f64) {
-        let input = StepInput {
-            displacement: None,
-            contact: Contact::Tools(&self.tool(t)),
-        };
-        self.scene.step(input, None).unwrap();
+        self.scene
+            .step(Contact::Tools(&self.tool(t)), None)
+            .unwrap();
     }
 
     fn show(&mut self, t: f64, since: f64) -> Vec<u32> {
         let tool = self.tool(t);
         self.scene
-            .present(since * STEP_S, &tool, &mut self.region)
+            .present(
+                Contact::Tools(&tool),
+                since * STEP_S,
+                View::Region,
+                &mut self.region,
+            )
             .unwrap();
         self.region.iter().map(|x| x.to_bits()).collect()
     }
@@ -66,7 +69,12 @@ impl Host {
     fn show_points(&mut self, t: f64, since: f64) -> Vec<u32> {
         let tool = self.tool(t);
         self.scene
-            .present_points(since * STEP_S, &tool, &mut self.points)
+            .present(
+                Contact::Tools(&tool),
+                since * STEP_S,
+                View::Points,
+                &mut self.points,
+            )
             .unwrap();
         self.points.iter().map(|x| x.to_bits()).collect()
     }
@@ -136,24 +144,41 @@ fn points_of_a_frame_take_the_collision_field_of_its_region() {
     for step in 1..4 {
         let now = step as f32;
         for host in [&both, &points] {
-            let input = StepInput {
-                displacement: None,
-                contact: Contact::Sparse {
-                    nodes: &nodes,
-                    vectors: &at(now),
-                },
-            };
-            host.scene.step(input, None).unwrap();
+            host.scene
+                .step(
+                    Contact::Sparse {
+                        nodes: &nodes,
+                        vectors: &at(now),
+                    },
+                    None,
+                )
+                .unwrap();
         }
         let before = both.solves();
         let host = &mut both;
         let vectors = at(now + 0.5);
         host.scene
-            .present_contacts(0.5 * STEP_S, &nodes, &vectors, &mut host.region)
+            .present(
+                Contact::Sparse {
+                    nodes: &nodes,
+                    vectors: &vectors,
+                },
+                0.5 * STEP_S,
+                View::Region,
+                &mut host.region,
+            )
             .unwrap();
         for host in [&mut both, &mut points] {
             host.scene
-                .present_points_contacts(0.5 * STEP_S, &nodes, &vectors, &mut host.points)
+                .present(
+                    Contact::Sparse {
+                        nodes: &nodes,
+                        vectors: &vectors,
+                    },
+                    0.5 * STEP_S,
+                    View::Points,
+                    &mut host.points,
+                )
                 .unwrap();
         }
         assert_eq!(both.solves() - before, if step > 1 { 2 } else { 1 });
@@ -162,11 +187,27 @@ fn points_of_a_frame_take_the_collision_field_of_its_region() {
         // The same nodes elsewhere are another question.
         let vectors = at(now + 0.6);
         both.scene
-            .present_points_contacts(0.5 * STEP_S, &nodes, &vectors, &mut both.points)
+            .present(
+                Contact::Sparse {
+                    nodes: &nodes,
+                    vectors: &vectors,
+                },
+                0.5 * STEP_S,
+                View::Points,
+                &mut both.points,
+            )
             .unwrap();
         points
             .scene
-            .present_points_contacts(0.5 * STEP_S, &nodes, &vectors, &mut points.points)
+            .present(
+                Contact::Sparse {
+                    nodes: &nodes,
+                    vectors: &vectors,
+                },
+                0.5 * STEP_S,
+                View::Points,
+                &mut points.points,
+            )
             .unwrap();
         assert!(bits(&both) == bits(&points), "step {step}, elsewhere");
     }

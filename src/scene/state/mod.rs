@@ -100,6 +100,9 @@ impl Core {
         } = state;
         let count = self.mesh.node_count();
         stored::check(&[counters.max_displacement], 1)?;
+        if !counters.time_s.is_finite() {
+            return Err(Error::Snapshot("its time is not finite".into()));
+        }
         contact.admit(count)?;
         contact_before.admit(count)?;
         self.engine.admit(records)?;

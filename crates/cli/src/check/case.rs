@@ -9,7 +9,7 @@ use tissue::mesh::{Boundary, Mesh};
 use tissue::schemes::{FRAME_S, FRAMES, Programme, Scheme};
 use tissue::simulate::LEAST_FRAMES;
 use tissue::solver::{Solver, SolverOptions};
-use upt::{Contact, Corrections, Error, Model, Scene, SceneOptions, StepInput};
+use upt::{Contact, Corrections, Error, Model, Scene, SceneOptions};
 
 use super::score::{Regions, Score, Step, Touch};
 use crate::preview::Film;
@@ -143,11 +143,10 @@ impl<'a> Replay<'a> {
     pub fn step(&mut self, frame: &Frame<'_>) -> Result<()> {
         let (nodes, vectors) = frame.touch;
         for (scene, field) in self.scenes.iter().zip(&mut self.fields) {
-            let input = StepInput {
-                displacement: None,
-                contact: Contact::Sparse { nodes, vectors },
-            };
-            match scene.step(input, Some(field.as_flattened_mut())) {
+            match scene.step(
+                Contact::Sparse { nodes, vectors },
+                Some(field.as_flattened_mut()),
+            ) {
                 Ok(()) => {}
                 Err(Error::Guard(_)) => self.score.refused += 1,
                 Err(error) => return Err(error.into()),
@@ -187,11 +186,7 @@ pub fn speed(model: &Arc<Model>, scores: &[Score]) -> Result<Vec<f64>> {
     let scene = Scene::new(Arc::clone(model), &options)?;
     let mut times = Vec::new();
     for (nodes, vectors) in scores.iter().flat_map(|score| &score.touches) {
-        let input = StepInput {
-            displacement: None,
-            contact: Contact::Sparse { nodes, vectors },
-        };
-        if scene.step(input, None).is_ok() && !nodes.is_empty() {
+        if scene.step(Contact::Sparse { nodes, vectors }, None).is_ok() && !nodes.is_empty() {
             times.push(scene.stats().step_ms);
         }
         if times.len() == TIMED {

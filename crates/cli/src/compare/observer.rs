@@ -2,7 +2,7 @@
 
 use anyhow::{Result, ensure};
 use upt::forces::ReactionForces;
-use upt::{Contact, Error, Scene, StepInput, flag};
+use upt::{Contact, Error, Scene, flag};
 
 use crate::bench::Bench;
 
@@ -162,14 +162,13 @@ impl Observer {
         vectors: &[[f32; 3]],
         truth: &Truth<'_>,
     ) -> Result<Moment> {
-        let input = StepInput {
-            displacement: None,
-            contact: Contact::Sparse {
+        let refused = match self.scene.step(
+            Contact::Sparse {
                 nodes,
                 vectors: vectors.as_flattened(),
             },
-        };
-        let refused = match self.scene.step(input, Some(&mut self.found)) {
+            Some(&mut self.found),
+        ) {
             Ok(()) => false,
             Err(Error::Guard(_)) => {
                 self.scene.read(&mut self.found)?;

@@ -7,7 +7,7 @@ use anyhow::{Context, Result};
 use contact::Vector;
 use upt::contact::Tool;
 use upt::haptics::{HapticOptions, HapticPose, Haptics};
-use upt::{Contact, Model, Scene, SceneOptions, StepInput};
+use upt::{Contact, Model, Scene, SceneOptions};
 
 use super::device::{Device, Random};
 use super::gesture::{Gesture, Site};
@@ -105,11 +105,7 @@ impl Player {
             }
             if waiting.is_some_and(|at| time >= at) {
                 waiting = None;
-                let input = StepInput {
-                    displacement: None,
-                    contact: Contact::Tools(&self.tools),
-                };
-                scene.step(input, None)?;
+                scene.step(Contact::Tools(&self.tools), None)?;
                 scene.with_contact_report(|all| {
                     for (told, reading) in told.iter_mut().zip(&all.readings) {
                         *told = Vector::from(reading.force) * 1e-3;

@@ -55,25 +55,17 @@ impl Scene {
         check(unsafe { ffi::upt_scene_set_region(self.handle, pointer, nodes.len() as u64) })
     }
 
-    /// `upt_scene_step_contacts`: one step from the scene's own state.
+    /// `upt_scene_step` with nodes in contact.
     pub fn step(
         &mut self,
         nodes: &[u32],
         vectors: &[[f32; 3]],
         out: &mut [[f32; 3]],
     ) -> Result<()> {
+        let input = ffi::upt_input::of_contacts(nodes, vectors.as_flattened());
+        let floats = 3 * out.len() as u64;
         // SAFETY: the pointers and counts describe the slices, which live across the call.
-        let status = unsafe {
-            ffi::upt_scene_step_contacts(
-                self.handle,
-                nodes.as_ptr(),
-                vectors.as_ptr().cast(),
-                nodes.len() as u64,
-                out.as_mut_ptr().cast(),
-                3 * out.len() as u64,
-            )
-        };
-        check(status)
+        check(unsafe { ffi::upt_scene_step(self.handle, &input, out.as_mut_ptr().cast(), floats) })
     }
 
     /// `upt_scene_decode`: displacement of any nodes in the last state.
@@ -91,34 +83,34 @@ impl Scene {
         check(status)
     }
 
-    /// `upt_scene_step_instruments`: one step that instruments drive.
+    /// `upt_scene_step` with instruments.
     pub fn step_instruments(
         &mut self,
         instruments: &[ffi::upt_instrument],
         out: &mut [[f32; 3]],
     ) -> Result<()> {
+        let input = ffi::upt_input::of_instruments(instruments);
+        let floats = 3 * out.len() as u64;
         // SAFETY: the pointers and counts describe the slices, which live across the call.
-        check(unsafe {
-            ffi::upt_scene_step_instruments(
-                self.handle,
-                instruments.as_ptr(),
-                instruments.len() as u64,
-                out.as_mut_ptr().cast(),
-                3 * out.len() as u64,
-            )
-        })
+        check(unsafe { ffi::upt_scene_step(self.handle, &input, out.as_mut_ptr().cast(), floats) })
     }
 
-    /// `upt_scene_submit_instruments`: as [`Scene::step_instruments`], on the scene's worker.
+    /// Whether the bundle has a linear response, with which a step solves the contact of instruments. Makes a step that touches nothing.
+    pub fn solves_contact(&mut self) -> bool {
+        // SAFETY: zeros are valid numbers.
+        let mut far: ffi::upt_instrument = unsafe { std::mem::zeroed() };
+        far.struct_size = size::<ffi::upt_instrument>();
+        (far.position[0], far.rotation[3], far.radius) = (1e4, 1.0, 1.0);
+        let input = ffi::upt_input::of_instruments(std::slice::from_ref(&far));
+        // SAFETY: the input's list lives across the call; NULL keeps the result inside.
+        check(unsafe { ffi::upt_scene_step(self.handle, &input, std::ptr::null_mut(), 0) }).is_ok()
+    }
+
+    /// `upt_scene_submit`: as [`Scene::step_instruments`], on the scene's worker.
     pub fn submit_instruments(&mut self, instruments: &[ffi::upt_instrument]) -> Result<()> {
+        let input = ffi::upt_input::of_instruments(instruments);
         // SAFETY: the pointer and count describe the list, which the call copies.
-        check(unsafe {
-            ffi::upt_scene_submit_instruments(
-                self.handle,
-                instruments.as_ptr(),
-                instruments.len() as u64,
-            )
-        })
+        check(unsafe { ffi::upt_scene_submit(self.handle, &input) })
     }
 
     /// `upt_scene_wait`: until no step is in flight; what became of it does not matter here.
@@ -230,13 +222,14 @@ impl Scene {
         instruments: &[ffi::upt_instrument],
         out: &mut [[f32; 3]],
     ) -> Result<()> {
+        let input = ffi::upt_input::of_instruments(instruments);
         // SAFETY: the pointers and counts describe the slices.
         check(unsafe {
             ffi::upt_scene_present(
                 self.handle,
+                &input,
                 seconds,
-                instruments.as_ptr(),
-                instruments.len() as u64,
+                std::ptr::null(),
                 out.as_mut_ptr().cast(),
                 3 * out.len() as u64,
             )

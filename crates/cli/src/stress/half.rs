@@ -44,6 +44,7 @@ pub(super) fn row(bench: &Bench, path: &Path) -> Result<Row> {
             nodes: &nodes,
             vectors: &vectors,
         },
+        ..StepInput::default()
     };
     let refused = match scene.step(input, None) {
         Err(Error::Guard(_)) => true,

@@ -24,13 +24,10 @@ pub(super) fn bad_inputs(bench: &Bench) -> Result<Vec<Row>> {
         let (nodes, mut vectors) = push(&patch, patch.inward, 5.0);
         vectors[1] = value;
         let in_contact = scene.step(
-            StepInput {
-                displacement: None,
-                contact: Contact::Sparse {
-                    nodes: &nodes,
-                    vectors: &vectors,
-                },
-            },
+            StepInput::from(Contact::Sparse {
+                nodes: &nodes,
+                vectors: &vectors,
+            }),
             None,
         );
         let mut dense = vec![0.0; k];
@@ -38,7 +35,7 @@ pub(super) fn bad_inputs(bench: &Bench) -> Result<Vec<Row>> {
         let in_field = scene.step(
             StepInput {
                 displacement: Some(&dense),
-                contact: Contact::None,
+                ..StepInput::default()
             },
             None,
         );
@@ -106,6 +103,7 @@ pub(super) fn bad_inputs(bench: &Bench) -> Result<Vec<Row>> {
                 StepInput {
                     displacement: Some(&given),
                     contact,
+                    ..StepInput::default()
                 },
                 Some(&mut field),
             ) {
@@ -167,13 +165,10 @@ pub(super) fn same_bits(bench: &Bench) -> Result<Vec<Row>> {
         scene.set_region(if step % 3 == 0 { None } else { Some(&nodes) })?;
         let (nodes, vectors) = push(&patch, patch.inward, ramp(step as usize, depth));
         scene.step(
-            StepInput {
-                displacement: None,
-                contact: Contact::Sparse {
-                    nodes: &nodes,
-                    vectors: &vectors,
-                },
-            },
+            StepInput::from(Contact::Sparse {
+                nodes: &nodes,
+                vectors: &vectors,
+            }),
             None,
         )?;
     }

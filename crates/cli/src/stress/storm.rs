@@ -7,7 +7,7 @@ use std::sync::Arc;
 use anyhow::Result;
 use tissue::contact::Patch;
 use tissue::schemes::SplitMix;
-use upt::{Contact, Corrections, Error, Scene, SceneOptions, StepInput, flag};
+use upt::{Contact, Corrections, Error, Scene, SceneOptions, flag};
 
 use super::Row;
 use crate::bench::{Bench, Touch, largest, names, push};
@@ -112,11 +112,7 @@ fn row(bench: &Bench, k: u32, steps: usize) -> Result<Row> {
                 nodes: &nodes,
                 vectors: &vectors,
             };
-            let input = StepInput {
-                displacement: None,
-                contact,
-            };
-            match scene.step(input, Some(field.as_flattened_mut())) {
+            match scene.step(contact, Some(field.as_flattened_mut())) {
                 Ok(()) => {}
                 Err(Error::Guard(_)) => {
                     storm.refused += 1;
@@ -148,11 +144,7 @@ fn row(bench: &Bench, k: u32, steps: usize) -> Result<Row> {
         }
     }
     for _ in 0..REST_STEPS {
-        let input = StepInput {
-            displacement: None,
-            contact: Contact::None,
-        };
-        if let Err(error) = scene.step(input, Some(field.as_flattened_mut())) {
+        if let Err(error) = scene.step(Contact::None, Some(field.as_flattened_mut())) {
             storm.other.get_or_insert(format!("afterwards: {error}"));
         }
     }

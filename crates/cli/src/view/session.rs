@@ -71,7 +71,7 @@ impl Session {
         }
         scene.set_region(&nodes)?;
         let mut displacement = vec![[0.0; 3]; nodes.len()];
-        let solves = scene.step_instruments(&[], &mut displacement).is_ok();
+        let solves = scene.solves_contact();
         scene.reset()?;
         let presents = solves && scene.present(0.0, &[], &mut displacement).is_ok();
         let dt = model.step_s();

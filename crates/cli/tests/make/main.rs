@@ -92,23 +92,21 @@ fn works(bundle: &Path) {
     let scene = Scene::new(model, &SceneOptions::default()).unwrap();
     let nodes = &scene.model().indices(upt::IndexSet::DomainNodes)[..3];
     let mut field = vec![0.0; 3 * scene.node_count()];
-    let input = StepInput {
-        displacement: None,
-        contact: Contact::Sparse {
-            nodes,
-            vectors: &[0.0, 0.0, -1.0, 0.0, 0.0, -1.0, 0.0, 0.0, -1.0],
-        },
-    };
-    scene.step(input, Some(&mut field)).unwrap();
+    scene
+        .step(
+            Contact::Sparse {
+                nodes,
+                vectors: &[0.0, 0.0, -1.0, 0.0, 0.0, -1.0, 0.0, 0.0, -1.0],
+            },
+            Some(&mut field),
+        )
+        .unwrap();
     let moved = |field: &[f32]| field.iter().filter(|u| u.abs() > 1e-4).count();
     assert!(moved(&field) > 30, "{} numbers moved", moved(&field));
-    let free = StepInput {
-        displacement: None,
-        contact: Contact::Sparse {
-            nodes: &[],
-            vectors: &[],
-        },
-    };
+    let free = StepInput::from(Contact::Sparse {
+        nodes: &[],
+        vectors: &[],
+    });
     // Let go it swings on, from a snapshot to the same bits.
     scene.step(free, Some(&mut field)).unwrap();
     let snapshot = scene.save().unwrap();

@@ -11,7 +11,7 @@ use std::time::Instant;
 use anyhow::Result;
 use elements::ElementForces;
 use tissue::mesh::tet_volume;
-use upt::{Contact, Corrections, Error, Model, ModelOptions, Scene, SceneOptions, StepInput, flag};
+use upt::{Contact, Corrections, Error, Model, ModelOptions, Scene, SceneOptions, flag};
 
 use crate::corrections::{Constraint, Push, Workbench};
 use crate::progress;
@@ -87,14 +87,13 @@ fn error(
     for step in 1..=STEPS {
         let part = step as f32 / STEPS as f32;
         let vectors: Vec<f32> = push.vectors.iter().map(|v| part * v).collect();
-        let input = StepInput {
-            displacement: None,
-            contact: Contact::Sparse {
+        match scene.step(
+            Contact::Sparse {
                 nodes: &push.nodes,
                 vectors: &vectors,
             },
-        };
-        match scene.step(input, Some(&mut field)) {
+            Some(&mut field),
+        ) {
             Ok(()) | Err(Error::Guard(_)) => {}
             Err(error) => return Err(error.into()),
         }

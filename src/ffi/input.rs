@@ -1,0 +1,121 @@
+//! The host's `upt_input` -> the library's input of a step; `upt_view` -> what is shown.
+
+use super::constants::*;
+use super::convert;
+use super::failure::{Failure, fail};
+use super::pointers::{each, options, slice};
+use super::step_structs::*;
+use crate::contact::{MAX_TOOLS, Tool};
+use crate::features;
+use crate::scene::{Contact, Scene, StepInput, View};
+
+/// The host's input; its instruments are read into `tools`, its arrays stay where they are.
+///
+/// # Safety
+/// NULL, or a struct whose first field is its size; its pointers lead to as many elements as the header says.
+pub(super) unsafe fn read_input<'a>(
+    scene: &Scene,
+    raw: *const upt_input,
+    tools: &'a mut Vec<Tool>,
+) -> Result<StepInput<'a>, Failure> {
+    // SAFETY: the caller's.
+    let raw = unsafe { options(raw, "input") }?;
+    if raw.reserved != [0; 4] {
+        return fail(
+            UPT_ERR_ARGUMENT,
+            "input.reserved is not zero; clear the struct before you set its fields",
+        );
+    }
+    let drives = [
+        ("instruments", raw.instrument_count != 0),
+        ("contact_nodes", raw.contact_count != 0),
+        ("collision", !raw.collision.is_null()),
+    ];
+    let mut given = drives.iter().filter(|(_, given)| *given);
+    if let (Some((one, _)), Some((other, _))) = (given.next(), given.next()) {
+        return fail(
+            UPT_ERR_ARGUMENT,
+            format!("input.{one} and input.{other} are both set; one thing drives a step"),
+        );
+    }
+    let contact = if raw.instrument_count != 0 {
+        features::instruments()?;
+        // SAFETY: the caller's.
+        unsafe { read_tools(raw.instruments, raw.instrument_count, tools) }?;
+        Contact::Tools(tools)
+    } else if raw.contact_count != 0 {
+        scene.check_node_count("input.contact_count", raw.contact_count)?;
+        let floats = 3 * raw.contact_count;
+        Contact::Sparse {
+            // SAFETY: the caller's.
+            nodes: unsafe { slice(raw.contact_nodes, raw.contact_count, "input.contact_nodes") }?,
+            // SAFETY: the caller's.
+            vectors: unsafe { slice(raw.contact_vectors, floats, "input.contact_vectors") }?,
+        }
+    } else {
+        // SAFETY: the caller's.
+        unsafe { field(scene, raw.collision, "input.collision") }?
+            .map_or(Contact::None, Contact::Dense)
+    };
+    Ok(StepInput {
+        // SAFETY: the caller's.
+        displacement: unsafe { field(scene, raw.displacement, "input.displacement") }?,
+        contact,
+        time_s: raw.time_s,
+    })
+}
+
+/// A dense field `[K,3]`, or none.
+///
+/// # Safety
+/// NULL, or a pointer to 3 K floats.
+pub(super) unsafe fn field<'a>(
+    scene: &Scene,
+    pointer: *const f32,
+    name: &str,
+) -> Result<Option<&'a [f32]>, Failure> {
+    if pointer.is_null() {
+        return Ok(None);
+    }
+    // SAFETY: the caller's.
+    unsafe { slice(pointer, 3 * scene.node_count() as u64, name) }.map(Some)
+}
+
+/// What the host wants to see.
+///
+/// # Safety
+/// NULL, or a struct whose first field is its size.
+pub(super) unsafe fn read_view(raw: *const upt_view) -> Result<View, Failure> {
+    // SAFETY: the caller's.
+    let raw = unsafe { options(raw, "view") }?;
+    match raw.kind {
+        UPT_VIEW_REGION => Ok(View::Region),
+        UPT_VIEW_POINTS => Ok(View::Points),
+        value => convert::unknown("view.kind", value),
+    }
+}
+
+/// The host's instruments as tools.
+///
+/// # Safety
+/// The host passes that many instruments.
+unsafe fn read_tools(
+    instruments: *const upt_instrument,
+    count: u64,
+    tools: &mut Vec<Tool>,
+) -> Result<(), Failure> {
+    if count > MAX_TOOLS as u64 {
+        return fail(
+            UPT_ERR_ARGUMENT,
+            format!("input.instrument_count is {count}, must be at most {MAX_TOOLS}"),
+        );
+    }
+    tools.clear();
+    crate::memory::fit(tools, count as usize, "the instruments")?;
+    let read = |index: usize, raw: upt_instrument| {
+        tools.push(convert::tool(index, &raw)?);
+        Ok(())
+    };
+    // SAFETY: the caller's.
+    unsafe { each(instruments, count, "input.instruments", read) }
+}

@@ -1,0 +1,161 @@
+//! The structs of a step: what drives it, what is shown of it, and what instruments are told. Conventions: `structs.rs`.
+
+use core::ffi::c_void;
+use core::ptr::null;
+use safer_ffi::derive_ReprC;
+
+/// The input of a step, submitted or not, and of a frame between steps. All zero but `struct_size`: nothing happens, the tissue moves on
+/// by itself.
+///
+/// One thing drives a step: `instruments`, the nodes in contact, or `collision`; two at once are `UPT_ERR_ARGUMENT`. Later versions add
+/// fields at the end.
+#[derive_ReprC]
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct upt_input {
+    /// `sizeof(upt_input)`.
+    pub struct_size: u32,
+    /// Zero.
+    pub reserved: [u8; 4],
+    /// `[instrument_count]`: where rigid instruments are at the end of the step, all with the same `struct_size`. Pass every instrument
+    /// every time, in the same order.
+    pub instruments: *const upt_instrument,
+    /// At most 64.
+    pub instrument_count: u64,
+    /// `[contact_count]` nodes in contact, each at most once, in any order.
+    pub contact_nodes: *const u32,
+    /// `[contact_count,3]`, mm: the displacement of these nodes at the end of the step.
+    pub contact_vectors: *const f32,
+    /// At most K.
+    pub contact_count: u64,
+    /// `[K,3]`, mm, zero except at nodes in contact, where it is their displacement at the end of the step; NULL: no such field.
+    pub collision: *const f32,
+    /// `[K,3]`, mm, the displacement that the step starts from; NULL: the scene's own state. Not with `instruments`.
+    pub displacement: *const f32,
+    /// The moment of the end of the step on the host's clock, s, from which `upt_scene_present` counts; 0 for hosts that keep none.
+    pub time_s: f64,
+}
+
+/// For hosts in Rust; the pointers are the lists', which must outlive the call that reads them.
+impl upt_input {
+    /// Nothing happens.
+    pub const NOTHING: upt_input = upt_input {
+        struct_size: size_of::<upt_input>() as u32,
+        reserved: [0; 4],
+        instruments: null(),
+        instrument_count: 0,
+        contact_nodes: null(),
+        contact_vectors: null(),
+        contact_count: 0,
+        collision: null(),
+        displacement: null(),
+        time_s: 0.0,
+    };
+
+    /// Instruments drive the step.
+    pub fn of_instruments(instruments: &[upt_instrument]) -> upt_input {
+        upt_input {
+            instruments: instruments.as_ptr(),
+            instrument_count: instruments.len() as u64,
+            ..Self::NOTHING
+        }
+    }
+
+    /// These nodes are in contact; `vectors` is `[m,3]`, mm.
+    pub fn of_contacts(nodes: &[u32], vectors: &[f32]) -> upt_input {
+        debug_assert_eq!(vectors.len(), 3 * nodes.len());
+        upt_input {
+            contact_nodes: nodes.as_ptr(),
+            contact_vectors: vectors.as_ptr(),
+            contact_count: nodes.len() as u64,
+            ..Self::NOTHING
+        }
+    }
+}
+
+/// What is shown of a state. Where a call takes one, NULL is the region.
+#[derive_ReprC]
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct upt_view {
+    /// `sizeof(upt_view)`.
+    pub struct_size: u32,
+    /// `UPT_VIEW_*`.
+    pub kind: i32,
+}
+
+/// For hosts in Rust.
+impl upt_view {
+    /// The attached points.
+    pub const POINTS: upt_view = upt_view {
+        struct_size: size_of::<upt_view>() as u32,
+        kind: super::constants::UPT_VIEW_POINTS,
+    };
+}
+
+/// A rigid instrument, as `upt_input` and `upt_scene_contacts_from_instruments` take it.
+#[derive_ReprC]
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct upt_instrument {
+    /// `sizeof(upt_instrument)`, the same in every element of an array.
+    pub struct_size: u32,
+    /// `UPT_SHAPE_*`.
+    pub shape: i32,
+    /// Centre, mm, in the mesh's frame.
+    pub position: [f32; 3],
+    /// Unit quaternion x, y, z, w.
+    pub rotation: [f32; 4],
+    /// Half sizes along the local axes, mm; a capsule's half length is `[1]` (local y).
+    pub half_extents: [f32; 3],
+    /// A capsule's radius or a spatula's corner radius, mm.
+    pub radius: f32,
+    /// Only for `upt_scene_contacts_from_instruments`. 1: touched nodes move with the instrument until it leaves; 0: they slide.
+    pub sticking: u8,
+    /// Only for `upt_input`: `UPT_MODE_*`.
+    pub mode: u8,
+    /// Zero.
+    pub reserved: [u8; 2],
+    /// Only for `upt_input`: Coulomb's coefficient, 0 or more.
+    pub friction: f32,
+    /// A grasp tears off when its points together pull harder than this, mN; 0: never.
+    pub tear_off_mn: f32,
+    /// `UPT_SHAPE_HULL`: the `upt_hull`; otherwise NULL.
+    pub hull: *const c_void,
+}
+
+/// What the tissue does to an instrument at the end of a step; filled by `upt_scene_instrument_readings`.
+#[derive_ReprC]
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct upt_instrument_reading {
+    /// `sizeof(upt_instrument_reading)`, set by the caller, the same in every element of an array.
+    pub struct_size: u32,
+    /// Points of the surface that push or hold the instrument.
+    pub contact_count: u32,
+    /// On the instrument, mN.
+    pub force: [f32; 3],
+    /// On the instrument about its position, mN mm.
+    pub torque: [f32; 3],
+    /// Depth of the deepest point of the surface inside the instrument, mm.
+    pub penetration_mm: f32,
+    /// 1: its grasp tore off in this step.
+    pub torn: u8,
+    /// Zero.
+    pub reserved: [u8; 3],
+    /// What the last contact solve left unsolved, mm: 0 where it came to its end.
+    pub residual_mm: f32,
+}
+
+/// A point of the surface that pushes or holds an instrument; filled by `upt_scene_instrument_contacts`.
+#[derive_ReprC]
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct upt_instrument_contact {
+    /// Place of the instrument in the step's array.
+    pub instrument: u32,
+    /// Position of the point, mm.
+    pub position: [f32; 3],
+    /// On the instrument, mN.
+    pub force: [f32; 3],
+}

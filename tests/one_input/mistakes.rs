@@ -1,0 +1,272 @@
+//! What cannot be meant is refused by name, in steps, submitted steps and frames, and changes nothing.
+#![allow(
+    clippy::undocumented_unsafe_blocks,
+    reason = "a host in a test: every call keeps to the header, or breaks it on purpose"
+)]
+
+use std::ptr::null;
+
+use upt::ffi::*;
+
+use crate::host::{self, Host, message};
+use crate::{BUNDLE, awake, ball, frame, state, step};
+
+/// What is wrong with an input, how it is made wrong, the status, and the field that the message names.
+type Mistake = (&'static str, fn(&mut upt_input), i32, &'static str);
+
+#[test]
+fn mistakes_are_named_and_change_nothing() {
+    static NODES: [u32; 2] = [1, 1];
+    static FAR: [u32; 1] = [1 << 30];
+    static VECTORS: [f32; 6] = [0.1; 6];
+    static NAN: [f32; 3] = [0.0, f32::NAN, 0.0];
+    let host = Host::new(BUNDLE, awake);
+    let tools = [ball(&host, 1.0)];
+    let mut rough = tools[0];
+    rough.position[1] = f32::NAN;
+    let mut foreign = tools[0];
+    foreign.struct_size -= 4;
+    let field = vec![f32::NAN; 3 * host.nodes];
+    let leak = |list: &[upt_instrument]| upt_input::of_instruments(list);
+    let general: &[Mistake] = &[
+        (
+            "size",
+            |i| i.struct_size -= 8,
+            UPT_ERR_STRUCT_SIZE,
+            "input: struct_size",
+        ),
+        (
+            "larger",
+            |i| i.struct_size += 8,
+            UPT_ERR_STRUCT_SIZE,
+            "input: struct_size",
+        ),
+        (
+            "no size",
+            |i| i.struct_size = 0,
+            UPT_ERR_STRUCT_SIZE,
+            "input: struct_size",
+        ),
+        (
+            "reserved",
+            |i| i.reserved[2] = 1,
+            UPT_ERR_ARGUMENT,
+            "input.reserved",
+        ),
+        (
+            "time",
+            |i| i.time_s = f64::NAN,
+            UPT_ERR_NON_FINITE,
+            "time_s",
+        ),
+        (
+            "NULL nodes",
+            |i| i.contact_count = 1,
+            UPT_ERR_NULL,
+            "input.contact_nodes",
+        ),
+        (
+            "NULL vectors",
+            |i| (i.contact_nodes, i.contact_count) = (NODES.as_ptr(), 1),
+            UPT_ERR_NULL,
+            "input.contact_vectors",
+        ),
+        (
+            "too many nodes",
+            |i| (i.contact_nodes, i.contact_count) = (NODES.as_ptr(), u64::MAX / 2),
+            UPT_ERR_ARGUMENT,
+            "input.contact_count",
+        ),
+        (
+            "twice",
+            |i| *i = upt_input::of_contacts(&NODES, &VECTORS),
+            UPT_ERR_ARGUMENT,
+            "contact_nodes",
+        ),
+        (
+            "far",
+            |i| *i = upt_input::of_contacts(&FAR, &VECTORS[..3]),
+            UPT_ERR_ARGUMENT,
+            "contact_nodes",
+        ),
+        (
+            "NaN",
+            |i| *i = upt_input::of_contacts(&NODES[..1], &NAN),
+            UPT_ERR_NON_FINITE,
+            "contact_vectors",
+        ),
+        (
+            "NULL tools",
+            |i| i.instrument_count = 1,
+            UPT_ERR_NULL,
+            "input.instruments",
+        ),
+        (
+            "many tools",
+            |i| i.instrument_count = 65,
+            UPT_ERR_ARGUMENT,
+            "input.instrument_count",
+        ),
+    ];
+    let mut wrong: Vec<(&str, upt_input, i32, &str)> = general
+        .iter()
+        .map(|&(what, change, status, named)| {
+            let mut input = upt_input::NOTHING;
+            change(&mut input);
+            (what, input, status, named)
+        })
+        .collect();
+    let driven = leak(&tools);
+    let nodes = upt_input::of_contacts(&NODES[..1], &VECTORS[..3]);
+    let (roughly, foreignly) = ([rough], [foreign]);
+    wrong.extend([
+        (
+            "tools and nodes",
+            upt_input {
+                contact_count: 1,
+                ..driven
+            },
+            UPT_ERR_ARGUMENT,
+            "input.instruments and input.contact_nodes",
+        ),
+        (
+            "tools and a field",
+            upt_input {
+                collision: field.as_ptr(),
+                ..driven
+            },
+            UPT_ERR_ARGUMENT,
+            "input.instruments and input.collision",
+        ),
+        (
+            "nodes and a field",
+            upt_input {
+                collision: field.as_ptr(),
+                ..nodes
+            },
+            UPT_ERR_ARGUMENT,
+            "input.contact_nodes and input.collision",
+        ),
+        (
+            "tools and a state",
+            upt_input {
+                displacement: field.as_ptr(),
+                ..driven
+            },
+            UPT_ERR_ARGUMENT,
+            "displacement and instruments",
+        ),
+        (
+            "NaN in the field",
+            upt_input {
+                collision: field.as_ptr(),
+                ..upt_input::NOTHING
+            },
+            UPT_ERR_NON_FINITE,
+            "collision",
+        ),
+        (
+            "NaN in a tool",
+            leak(&roughly),
+            UPT_ERR_NON_FINITE,
+            "instruments[0]",
+        ),
+        (
+            "a tool of another size",
+            leak(&foreignly),
+            UPT_ERR_STRUCT_SIZE,
+            "input.instruments",
+        ),
+    ]);
+    step(&host, &driven);
+    frame(&host, &driven, 0.01);
+    let before = state(&host);
+    let mut u = vec![0.0f32; 3 * host.nodes];
+    let (to, floats) = (u.as_mut_ptr(), u.len() as u64);
+    let check = |call: &str, what: &str, status: i32, expected: i32, named: &str| {
+        assert_eq!(status, expected, "{call}, {what}: {}", message());
+        let said = message();
+        assert!(said.starts_with(&format!("{call}: ")), "{said}");
+        assert!(said.contains(named), "{call}, {what}: {said}");
+        assert_eq!(state(&host), before, "{call}, {what}");
+        assert_eq!(host::stats(host.scene).step_count, 1, "{call}, {what}");
+    };
+    for (what, input, expected, named) in &wrong {
+        let stepped = unsafe { upt_scene_step(host.scene, input, to, floats) };
+        check("upt_scene_step", what, stepped, *expected, named);
+        let sent = unsafe { upt_scene_submit(host.scene, input) };
+        check("upt_scene_submit", what, sent, *expected, named);
+        let shown = unsafe { upt_scene_present(host.scene, input, 0.01, null(), to, floats) };
+        check("upt_scene_present", what, shown, *expected, named);
+    }
+    // A displacement that is not finite, where it may be given.
+    let input = upt_input {
+        displacement: field.as_ptr(),
+        ..upt_input::NOTHING
+    };
+    let stepped = unsafe { upt_scene_step(host.scene, &input, to, floats) };
+    check(
+        "upt_scene_step",
+        "NaN",
+        stepped,
+        UPT_ERR_NON_FINITE,
+        "displacement",
+    );
+    let sent = unsafe { upt_scene_submit(host.scene, &input) };
+    check(
+        "upt_scene_submit",
+        "NaN",
+        sent,
+        UPT_ERR_NON_FINITE,
+        "displacement",
+    );
+    // A frame starts from the scene's own state, and says when itself.
+    let input = upt_input {
+        displacement: u.as_ptr(),
+        ..upt_input::NOTHING
+    };
+    let shown = unsafe { upt_scene_present(host.scene, &input, 0.01, null(), to, floats) };
+    check(
+        "upt_scene_present",
+        "a state",
+        shown,
+        UPT_ERR_ARGUMENT,
+        "displacement",
+    );
+    let input = upt_input {
+        time_s: 1.0,
+        ..driven
+    };
+    let shown = unsafe { upt_scene_present(host.scene, &input, 0.01, null(), to, floats) };
+    check(
+        "upt_scene_present",
+        "a time",
+        shown,
+        UPT_ERR_ARGUMENT,
+        "time_s",
+    );
+    let mut view = upt_view::POINTS;
+    view.kind = 9;
+    let shown = unsafe { upt_scene_present(host.scene, &driven, 0.01, &view, to, floats) };
+    check(
+        "upt_scene_present",
+        "a kind",
+        shown,
+        UPT_ERR_ARGUMENT,
+        "view.kind",
+    );
+    view.struct_size = 4;
+    let shown = unsafe { upt_scene_present(host.scene, &driven, 0.01, &view, to, floats) };
+    check(
+        "upt_scene_present",
+        "a size",
+        shown,
+        UPT_ERR_STRUCT_SIZE,
+        "view: struct_size",
+    );
+    for when in [f64::NAN, -1e-3] {
+        let shown = unsafe { upt_scene_present(host.scene, &driven, when, null(), to, floats) };
+        assert!(matches!(shown, UPT_ERR_NON_FINITE | UPT_ERR_ARGUMENT));
+        check("upt_scene_present", "when", shown, shown, "when is");
+    }
+}
