@@ -105,6 +105,95 @@ using instrument = upt_instrument;
 using instrument_reading = upt_instrument_reading;
 using instrument_contact = upt_instrument_contact;
 
+/// A ball, at the origin of the mesh's frame until you set `position`. radius: mm.
+inline upt_instrument sphere(float radius) noexcept {
+  upt_instrument made = make<upt_instrument>();
+  made.shape = UPT_SHAPE_CAPSULE;
+  made.rotation[3] = 1.0F;
+  made.radius = radius;
+  return made;
+}
+/// A capsule along its local y; half_length without the caps, mm.
+inline upt_instrument capsule(float radius, float half_length) noexcept {
+  upt_instrument made = sphere(radius);
+  made.half_extents[1] = half_length;
+  return made;
+}
+/// A box of these half sizes, rounded by `radius`; mm.
+inline upt_instrument spatula(float x, float y, float z, float radius) noexcept {
+  upt_instrument made = sphere(radius);
+  made.shape = UPT_SHAPE_SPATULA;
+  made.half_extents[0] = x;
+  made.half_extents[1] = y;
+  made.half_extents[2] = z;
+  return made;
+}
+/// A box of these half sizes, mm.
+inline upt_instrument box(float x, float y, float z) noexcept {
+  upt_instrument made = spatula(x, y, z, 0);
+  made.shape = UPT_SHAPE_BOX;
+  return made;
+}
+
+/// What is shown: UPT_VIEW_*.
+inline upt_view view(std::int32_t kind) noexcept {
+  upt_view made = make<upt_view>();
+  made.kind = kind;
+  return made;
+}
+
+/// The input of a step or a frame: what drives it; nothing, where it is made without arguments.
+/// What it is made of is not copied: it must live until the call that takes the input returns.
+class Input {
+public:
+  Input() noexcept : raw_(make<upt_input>()) {}
+  /// Rigid instruments where they are at the end of the step, or at the moment of a frame.
+  Input(const upt_instrument *instruments, std::size_t count) noexcept : Input() {
+    raw_.instruments = instruments;
+    raw_.instrument_count = count;
+  }
+  /// The same; instruments: an array, or anything with data() and size().
+  template <typename Instruments,
+            typename = std::enable_if_t<
+                !std::is_same_v<std::decay_t<Instruments>, Input> &&
+                std::is_constructible_v<span<const upt_instrument>, const Instruments &>>>
+  Input(const Instruments &instruments) noexcept
+      : Input(span<const upt_instrument>(instruments).data(),
+              span<const upt_instrument>(instruments).size()) {}
+  /// nodes: [m]; vectors: [m,3], mm.
+  static Input contacts(span<const std::uint32_t> nodes, span<const float> vectors) noexcept {
+    Input made;
+    made.raw_.contact_nodes = nodes.data();
+    made.raw_.contact_vectors = vectors.data();
+    made.raw_.contact_count = nodes.size();
+    made.fits_ = vectors.size() == 3 * nodes.size();
+    return made;
+  }
+  /// field: [K,3], mm, zero but at nodes in contact.
+  static Input collision(span<const float> field) noexcept {
+    Input made;
+    made.raw_.collision = field.data();
+    return made;
+  }
+  /// The step starts from this displacement, [K,3], mm.
+  Input &from(span<const float> displacement) noexcept {
+    raw_.displacement = displacement.data();
+    return *this;
+  }
+  /// The moment of the end of the step on a clock of your own, s.
+  Input &at(double time_s) noexcept {
+    raw_.time_s = time_s;
+    return *this;
+  }
+  const upt_input *get() const noexcept { return &raw_; }
+  /// Whether the spans' sizes agree; a call that takes an input that does not fit refuses it.
+  bool fits() const noexcept { return fits_; }
+
+private:
+  upt_input raw_;
+  bool fits_ = true;
+};
+
 inline upt_status init(const upt_init_options &options) { return check(upt_init(&options)); }
 inline upt_status shutdown() { return check(upt_shutdown()); }
 inline upt_status set_log(upt_log_fn callback, void *user, std::int32_t level) {
@@ -257,9 +346,8 @@ public:
 
   /// A sliding instrument of this shape, without friction, at the origin of the mesh's frame.
   upt_instrument instrument() const noexcept {
-    upt_instrument made = make<upt_instrument>();
+    upt_instrument made = sphere(0);
     made.shape = UPT_SHAPE_HULL;
-    made.rotation[3] = 1.0F;
     made.hull = handle_;
     return made;
   }
@@ -313,30 +401,30 @@ public:
 
   upt_status reset() { return check(upt_scene_reset(handle_)); }
 
-  /// displacement: [K,3] or empty (own state); collision: [K,3] or empty (no contact); out: [n,3]
-  /// or empty. K is the size of the scene's mesh; the spans must have these sizes.
-  upt_status step(span<const float> displacement, span<const float> collision, span<float> out) {
-    return check(
-        upt_scene_step(handle_, displacement.data(), collision.data(), out.data(), out.size()));
-  }
-  /// nodes: [m]; vectors: [m,3].
-  upt_status step_contacts(span<const std::uint32_t> nodes, span<const float> vectors,
-                           span<float> out = {}) {
-    if (vectors.size() != 3 * nodes.size()) {
+  /// One step, with contact of instruments solved; out: [n,3] or empty.
+  upt_status step(const Input &input = {}, span<float> out = {}) {
+    if (!input.fits()) {
       return detail::mismatch();
     }
-    return check(upt_scene_step_contacts(handle_, nodes.data(), vectors.data(), nodes.size(),
-                                         out.data(), out.size()));
+    return check(upt_scene_step(handle_, input.get(), out.data(), out.size()));
+  }
+  /// The paper's step. displacement: [K,3] or empty (own state); collision: [K,3] or empty (no
+  /// contact). K is the size of the scene's mesh; the spans must have these sizes.
+  upt_status step_field(span<const float> displacement, span<const float> collision,
+                        span<float> out) {
+    return check(upt_scene_step_field(handle_, displacement.data(), collision.data(), out.data(),
+                                      out.size()));
   }
   upt_status read(span<float> out) {
     return check(upt_scene_read(handle_, out.data(), out.size()));
   }
 
-  upt_status submit(span<const std::uint32_t> nodes, span<const float> vectors) {
-    if (vectors.size() != 3 * nodes.size()) {
+  /// The same on the scene's worker; the input is copied.
+  upt_status submit(const Input &input = {}) {
+    if (!input.fits()) {
       return detail::mismatch();
     }
-    return check(upt_scene_submit(handle_, nodes.data(), vectors.data(), nodes.size()));
+    return check(upt_scene_submit(handle_, input.get()));
   }
   upt_status poll() { return check(upt_scene_poll(handle_)); }
   upt_status wait(std::uint32_t timeout_ms) { return check(upt_scene_wait(handle_, timeout_ms)); }
@@ -367,38 +455,15 @@ public:
     return check(upt_scene_sample_points(handle_, alpha, out.data(), out.size()));
   }
 
-  /// A step that rigid instruments drive, with contact solved; out: [n,3] or empty.
-  upt_status step_instruments(span<const upt_instrument> instruments, span<float> out = {}) {
-    return check(upt_scene_step_instruments(handle_, instruments.data(), instruments.size(),
-                                            out.data(), out.size()));
-  }
-  /// The same on the scene's worker; the instruments are copied.
-  upt_status submit_instruments(span<const upt_instrument> instruments) {
-    return check(upt_scene_submit_instruments(handle_, instruments.data(), instruments.size()));
-  }
-  /// The tissue `seconds` after the last published step, with the instruments where they are then;
-  /// out: [n,3].
-  upt_status present(double seconds, span<const upt_instrument> instruments, span<float> out) {
-    return check(upt_scene_present(handle_, seconds, instruments.data(), instruments.size(),
-                                   out.data(), out.size()));
-  }
-  /// The same at the attached points.
-  upt_status present_points(double seconds, span<const upt_instrument> instruments,
-                            span<float> out) {
-    return check(upt_scene_present_points(handle_, seconds, instruments.data(), instruments.size(),
-                                          out.data(), out.size()));
-  }
-  /// The same with nodes [m] and their vectors [m,3] at that moment, in place of instruments.
-  upt_status present_contacts(double seconds, span<const std::uint32_t> nodes,
-                              span<const float> vectors, span<float> out) {
-    return check(upt_scene_present_contacts(handle_, seconds, nodes.data(), vectors.data(),
-                                            nodes.size(), out.data(), out.size()));
-  }
-  /// The same at the attached points.
-  upt_status present_points_contacts(double seconds, span<const std::uint32_t> nodes,
-                                     span<const float> vectors, span<float> out) {
-    return check(upt_scene_present_points_contacts(handle_, seconds, nodes.data(), vectors.data(),
-                                                   nodes.size(), out.data(), out.size()));
+  /// The tissue at a moment between steps, with what drives it where it is then; `when` is on the
+  /// clock of the steps' times, or without one the time since the last published step, s.
+  /// out: [n,3], in the view's order.
+  upt_status present(const Input &input, double when, span<float> out,
+                     const upt_view &shown = view(UPT_VIEW_REGION)) {
+    if (!input.fits()) {
+      return detail::mismatch();
+    }
+    return check(upt_scene_present(handle_, input.get(), when, &shown, out.data(), out.size()));
   }
   /// What the tissue did to each instrument of the last step; out has one element for each.
   upt_status readings(span<upt_instrument_reading> out) {
@@ -585,7 +650,7 @@ public:
     if (status == UPT_OK && due(now)) {
       look(scene);
       const std::vector<upt_instrument> &poses = start(now);
-      status = upt_scene_submit_instruments(scene.get(), poses.data(), poses.size());
+      status = upt_scene_submit(scene.get(), Input(poses).get());
       if (status < 0) {
         in_flight_ = false;
       }
@@ -683,8 +748,7 @@ private:
         break;
       }
       const std::vector<upt_instrument> &poses = start(now);
-      const upt_status status =
-          upt_scene_step_instruments(scene.get(), poses.data(), poses.size(), nullptr, 0);
+      const upt_status status = upt_scene_step(scene.get(), Input(poses).get(), nullptr, 0);
       finished();
       look(scene);
       if (status < 0) {
@@ -710,8 +774,8 @@ private:
   upt_status show(Scene &scene, double now, span<const upt_instrument> instruments,
                   span<float> out) {
     if (presents_) {
-      const upt_status status = upt_scene_present(scene.get(), since(now), instruments.data(),
-                                                  instruments.size(), out.data(), out.size());
+      const upt_status status = upt_scene_present(scene.get(), Input(instruments).get(), since(now),
+                                                  nullptr, out.data(), out.size());
       if (status != UPT_ERR_UNSUPPORTED) {
         return status;
       }

@@ -70,6 +70,7 @@ int main(int argc, char **argv) {
   upt_scene *scene = NULL;
   upt_model_info info;
   upt_scene_stats stats;
+  upt_input input;
   float *positions, *displacement, *vectors;
   uint32_t *domain, *faces, *patch;
   uint64_t domain_count, face_count, patch_count = 0, i;
@@ -124,6 +125,10 @@ int main(int argc, char **argv) {
   printf("site: %lu nodes around (%.1f, %.1f, %.1f) mm\n", (unsigned long)patch_count, seed[0],
          seed[1], seed[2]);
 
+  memset(&input, 0, sizeof input);
+  input.struct_size = sizeof input;
+  input.contact_nodes = patch;
+  input.contact_vectors = vectors;
   times = allocate((size_t)step_count, sizeof *times);
   for (step = 0; step < step_count; step++) {
     const double time = (step + 1) * info.dt;
@@ -135,8 +140,8 @@ int main(int argc, char **argv) {
         vectors[3 * i + axis] = (float)(length > 0.0 ? -push * normal[axis] / length : 0.0);
       }
     }
-    require(upt_scene_step_contacts(scene, patch, vectors, contact_count, displacement,
-                                    3 * info.node_count));
+    input.contact_count = contact_count;
+    require(upt_scene_step(scene, &input, displacement, 3 * info.node_count));
     memset(&stats, 0, sizeof stats);
     stats.struct_size = sizeof stats;
     require(upt_scene_get_stats(scene, &stats));

@@ -29,7 +29,9 @@ Tissue::Tissue(const std::string &bundle)
   // A bundle without a linear response has nothing to solve contact with; a library may lack the
   // feature.
   try {
-    scene_.step_instruments({});
+    upt_instrument far = upt::sphere(1.0F);
+    far.position[0] = 1e4F;
+    scene_.step({&far, 1});
     scene_.reset();
   } catch (const upt::error &error) {
     if (error.status() != UPT_ERR_UNSUPPORTED) {
@@ -111,7 +113,7 @@ void Tissue::advance(double now, const Contacts &contacts) {
     count_step(0);
   }
   if (now - last_start_ + 1e-9 >= info_.frame_step_s) {
-    scene_.submit(contacts.nodes, contacts.vectors);
+    scene_.submit(upt::Input::contacts(contacts.nodes, contacts.vectors));
     in_flight_ = true;
     last_start_ = std::max(last_start_ + info_.frame_step_s, now - info_.frame_step_s);
   }

@@ -31,7 +31,9 @@ Tissue::Tissue(const std::string &bundle, const Effort &effort)
     : model_(upt::Model::open(bundle)), step_s_(length_of_step(model_, effort)),
       scene_(make_scene(model_, effort, step_s_)), clock_(step_s_) {
   try {
-    scene_.step_instruments({});
+    upt_instrument far = upt::sphere(1.0F);
+    far.position[0] = 1e4F;
+    scene_.step({&far, 1});
     scene_.reset();
   } catch (const upt::error &error) {
     // No linear response, or a library without feature "instruments".
@@ -87,7 +89,8 @@ void Tissue::follow(double now, upt::span<const upt_instrument> tools) {
   scene_.sample(std::min(1.0, since / step_s_), displacement_);
   if (clock_.due(now)) {
     scene_.contacts_from_instruments(clock_.start(now), nodes_, vectors_, contact_count_);
-    scene_.submit({nodes_.data(), contact_count_}, {vectors_.data(), 3 * contact_count_});
+    scene_.submit(upt::Input::contacts({nodes_.data(), contact_count_},
+                                       {vectors_.data(), 3 * contact_count_}));
   }
 }
 

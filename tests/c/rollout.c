@@ -14,6 +14,7 @@
 int main(int argc, char **argv) {
   upt_scene_options options;
   upt_model_info info;
+  upt_input input;
   upt_model *model = NULL;
   upt_scene *scene = NULL;
   uint32_t nodes[PUSHED], *domain;
@@ -46,6 +47,10 @@ int main(int argc, char **argv) {
   for (i = 0; i < PUSHED; i++) {
     nodes[i] = domain[i];
   }
+  memset(&input, 0, sizeof input);
+  input.struct_size = sizeof input;
+  input.contact_nodes = nodes;
+  input.contact_vectors = vectors;
   file = fopen(argv[3], "wb");
   EXPECT_TRUE(file != NULL);
   for (step = 0; file != NULL && step < steps; step++) {
@@ -55,9 +60,8 @@ int main(int argc, char **argv) {
       vectors[3 * i + 1] = 0.0f;
       vectors[3 * i + 2] = -0.25f * (float)(step + 1);
     }
-    EXPECT(
-        upt_scene_step_contacts(scene, nodes, vectors, held ? PUSHED : 0, out, 3 * info.node_count),
-        UPT_OK);
+    input.contact_count = held ? PUSHED : 0;
+    EXPECT(upt_scene_step(scene, &input, out, 3 * info.node_count), UPT_OK);
     EXPECT_TRUE(fwrite(out, 3 * sizeof *out, info.node_count, file) == info.node_count);
   }
   if (file != NULL) {

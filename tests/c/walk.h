@@ -21,6 +21,15 @@ upt_scene *make_scene(void);
 /* The scene's state is what it was when `before` was read. */
 void expect_unchanged(upt_scene *scene);
 
+/* Steps, and submitted steps, with an input of nodes or of instruments alone. */
+upt_status step_nodes(upt_scene *scene, const uint32_t *nodes, const float *vectors, uint64_t count,
+                      float *out, uint64_t out_count);
+upt_status submit_nodes(upt_scene *scene, const uint32_t *nodes, const float *vectors,
+                        uint64_t count);
+upt_status step_tools(upt_scene *scene, const upt_instrument *tools, uint64_t count, float *out,
+                      uint64_t out_count);
+upt_status submit_tools(upt_scene *scene, const upt_instrument *tools, uint64_t count);
+
 void walk_library(void);
 void walk_model_open(const char *bundle, const char *damaged);
 void walk_model(void);

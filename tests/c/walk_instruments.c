@@ -54,13 +54,13 @@ static void walk_refusals(upt_scene *scene, upt_instrument good, const upt_hull 
   for (i = 0; i < 65; i++) {
     many[i] = good;
   }
-  EXPECT(upt_scene_step_instruments(NULL, &good, 1, NULL, 0), UPT_ERR_NULL);
-  EXPECT(upt_scene_step_instruments(scene, NULL, 1, NULL, 0), UPT_ERR_NULL);
-  EXPECT(upt_scene_step_instruments(scene, &good, 1, NULL, floats), UPT_ERR_NULL);
-  EXPECT(upt_scene_step_instruments(scene, &good, 1, after, 3), UPT_ERR_ARGUMENT);
-  EXPECT(upt_scene_step_instruments(scene, many, 65, NULL, 0), UPT_ERR_ARGUMENT);
-  EXPECT(upt_scene_submit_instruments(scene, many, UINT64_MAX), UPT_ERR_ARGUMENT);
-  EXPECT(upt_scene_submit_instruments(NULL, &good, 1), UPT_ERR_NULL);
+  EXPECT(step_tools(NULL, &good, 1, NULL, 0), UPT_ERR_NULL);
+  EXPECT(step_tools(scene, NULL, 1, NULL, 0), UPT_ERR_NULL);
+  EXPECT(step_tools(scene, &good, 1, NULL, floats), UPT_ERR_NULL);
+  EXPECT(step_tools(scene, &good, 1, after, 3), UPT_ERR_ARGUMENT);
+  EXPECT(step_tools(scene, many, 65, NULL, 0), UPT_ERR_ARGUMENT);
+  EXPECT(submit_tools(scene, many, UINT64_MAX), UPT_ERR_ARGUMENT);
+  EXPECT(submit_tools(NULL, &good, 1), UPT_ERR_NULL);
   for (i = 0; i < 10; i++) {
     upt_status wanted = UPT_ERR_ARGUMENT;
     two[0] = two[1] = good;
@@ -99,8 +99,8 @@ static void walk_refusals(upt_scene *scene, upt_instrument good, const upt_hull 
       two[1].hull = scene; /* another kind of handle */
       wanted = UPT_ERR_HANDLE;
     }
-    EXPECT(upt_scene_step_instruments(scene, two, 2, NULL, 0), wanted);
-    EXPECT(upt_scene_submit_instruments(scene, two, 2), wanted);
+    EXPECT(step_tools(scene, two, 2, NULL, 0), wanted);
+    EXPECT(submit_tools(scene, two, 2), wanted);
   }
   expect_unchanged(scene);
 }
@@ -149,7 +149,7 @@ static void walk_driven(upt_scene *scene, const float *rest, uint32_t node, upt_
     memset(readings, 0, sizeof readings);
     for (step = 0; step < 4; step++) {
       two[0].mode = step == 3 ? UPT_MODE_GRASP : UPT_MODE_SLIDE;
-      EXPECT(upt_scene_step_instruments(scene, two, 2, after, floats), UPT_OK);
+      EXPECT(step_tools(scene, two, 2, after, floats), UPT_OK);
       if (step == 0) { /* the fixture's weights are random: later states are anywhere */
         EXPECT(upt_scene_instrument_readings(scene, readings, 2), UPT_ERR_STRUCT_SIZE);
         readings[0].struct_size = readings[1].struct_size = sizeof *readings;
@@ -181,14 +181,14 @@ static void walk_driven(upt_scene *scene, const float *rest, uint32_t node, upt_
   }
 
   /* On the worker; a hull may end while its step runs. */
-  EXPECT(upt_scene_submit_instruments(scene, two, 2), UPT_OK);
+  EXPECT(submit_tools(scene, two, 2), UPT_OK);
   EXPECT(upt_hull_destroy(hull), UPT_OK);
   EXPECT(upt_scene_wait(scene, 60000), UPT_OK);
   EXPECT(upt_scene_instrument_readings(scene, readings, 2), UPT_OK);
-  EXPECT(upt_scene_step_instruments(scene, two, 2, NULL, 0), UPT_ERR_HANDLE);
+  EXPECT(step_tools(scene, two, 2, NULL, 0), UPT_ERR_HANDLE);
 
   /* A free step: nothing is read of instruments that are no longer passed. */
-  EXPECT(upt_scene_step_instruments(scene, NULL, 0, NULL, 0), UPT_OK);
+  EXPECT(upt_scene_step(scene, NULL, NULL, 0), UPT_OK);
   EXPECT(upt_scene_instrument_readings(scene, NULL, 0), UPT_OK);
   EXPECT(upt_scene_instrument_contacts(scene, NULL, 0, &needed), UPT_OK);
   EXPECT_TRUE(needed == 0);
@@ -212,8 +212,8 @@ void walk_instruments(const char *reduced_bundle) {
     upt_instrument_reading reading;
     memset(&reading, 0, sizeof reading);
     reading.struct_size = sizeof reading;
-    EXPECT(upt_scene_step_instruments(scene, &one, 1, NULL, 0), UPT_ERR_UNSUPPORTED);
-    EXPECT(upt_scene_submit_instruments(scene, &one, 1), UPT_ERR_UNSUPPORTED);
+    EXPECT(step_tools(scene, &one, 1, NULL, 0), UPT_ERR_UNSUPPORTED);
+    EXPECT(submit_tools(scene, &one, 1), UPT_ERR_UNSUPPORTED);
     EXPECT(upt_scene_instrument_readings(scene, &reading, 1), UPT_ERR_UNSUPPORTED);
     EXPECT(upt_scene_instrument_contacts(scene, NULL, 0, &needed), UPT_ERR_UNSUPPORTED);
     EXPECT(upt_hull_destroy(hull), UPT_ERR_UNSUPPORTED);
@@ -222,8 +222,8 @@ void walk_instruments(const char *reduced_bundle) {
   }
   if (info.kind != UPT_KIND_REDUCED) {
     /* The fixture of kind upt has no linear response to solve contact with. */
-    EXPECT(upt_scene_step_instruments(scene, &one, 1, NULL, 0), UPT_ERR_UNSUPPORTED);
-    EXPECT(upt_scene_step_contacts(scene, NULL, NULL, 0, NULL, 0), UPT_OK);
+    EXPECT(step_tools(scene, &one, 1, NULL, 0), UPT_ERR_UNSUPPORTED);
+    EXPECT(upt_scene_step(scene, NULL, NULL, 0), UPT_OK);
   }
   EXPECT(upt_scene_destroy(scene), UPT_OK);
 

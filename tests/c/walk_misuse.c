@@ -35,14 +35,14 @@ void walk_handles(void) {
   EXPECT(upt_scene_destroy(scene), UPT_ERR_HANDLE);
   EXPECT_TRUE(strstr(upt_last_error(), "it was closed") != NULL);
   EXPECT(upt_scene_destroy(NULL), UPT_ERR_NULL);
-  EXPECT(upt_scene_step(scene, NULL, NULL, NULL, 0), UPT_ERR_HANDLE);
+  EXPECT(upt_scene_step(scene, NULL, NULL, 0), UPT_ERR_HANDLE);
   EXPECT(upt_scene_get_stats(scene, &stats), UPT_ERR_HANDLE);
 }
 
 static void *step_often(void *scene) {
   int i;
   for (i = 0; i < 200; i++) {
-    upt_scene_step(scene, NULL, NULL, NULL, 0);
+    upt_scene_step(scene, NULL, NULL, 0);
   }
   return NULL;
 }
@@ -54,7 +54,7 @@ void walk_threads(void) {
   int i, other = 0;
   EXPECT_TRUE(pthread_create(&thread, NULL, step_often, scene) == 0);
   for (i = 0; i < 200; i++) {
-    const upt_status status = upt_scene_step(scene, NULL, NULL, NULL, 0);
+    const upt_status status = upt_scene_step(scene, NULL, NULL, 0);
     other += status != UPT_OK && status != UPT_ERR_BUSY;
   }
   pthread_join(thread, NULL);
@@ -76,11 +76,11 @@ int walk_panic(void) {
   memset(&stats, 0, sizeof stats);
   stats.struct_size = sizeof stats;
   EXPECT(test_panic(scene), UPT_ERR_PANIC);
-  EXPECT(upt_scene_step(scene, NULL, NULL, NULL, 0), UPT_ERR_PANIC);
+  EXPECT(upt_scene_step(scene, NULL, NULL, 0), UPT_ERR_PANIC);
   EXPECT(upt_scene_reset(scene), UPT_ERR_PANIC);
   EXPECT(upt_scene_get_stats(scene, &stats), UPT_OK);
   EXPECT_TRUE(stats.poisoned == 1);
-  EXPECT(upt_scene_step(sane, NULL, NULL, NULL, 0), UPT_OK);
+  EXPECT(upt_scene_step(sane, NULL, NULL, 0), UPT_OK);
   EXPECT(upt_scene_destroy(scene), UPT_OK);
   EXPECT(upt_scene_destroy(sane), UPT_OK);
   return 1;

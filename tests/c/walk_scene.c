@@ -12,7 +12,7 @@ void walk_region_and_points(void) {
   float *positions = calloc((size_t)floats, sizeof *positions);
   upt_status status;
   int i;
-  EXPECT(upt_scene_step_contacts(scene, contact_nodes, contact_vectors, 4, before, floats), UPT_OK);
+  EXPECT(step_nodes(scene, contact_nodes, contact_vectors, 4, before, floats), UPT_OK);
 
   EXPECT(upt_scene_decode(NULL, contact_nodes, 4, few, 12), UPT_ERR_NULL);
   EXPECT(upt_scene_decode(scene, NULL, 4, few, 12), UPT_ERR_NULL);
@@ -29,9 +29,8 @@ void walk_region_and_points(void) {
   EXPECT(upt_scene_set_region(scene, NULL, 4), UPT_ERR_NULL);
   EXPECT(upt_scene_set_region(scene, &far, 1), UPT_ERR_ARGUMENT);
   EXPECT(upt_scene_set_region(scene, contact_nodes, 4), UPT_OK);
-  EXPECT(upt_scene_step_contacts(scene, contact_nodes, contact_vectors, 4, before, floats),
-         UPT_ERR_ARGUMENT);
-  EXPECT(upt_scene_step_contacts(scene, contact_nodes, contact_vectors, 4, few, 12), UPT_OK);
+  EXPECT(step_nodes(scene, contact_nodes, contact_vectors, 4, before, floats), UPT_ERR_ARGUMENT);
+  EXPECT(step_nodes(scene, contact_nodes, contact_vectors, 4, few, 12), UPT_OK);
   EXPECT(upt_scene_set_region(scene, NULL, 0), UPT_OK);
 
   EXPECT(upt_model_positions(model, positions, floats), UPT_OK);
@@ -45,7 +44,7 @@ void walk_region_and_points(void) {
   EXPECT(upt_scene_attach_points(scene, points, 2), UPT_ERR_NON_FINITE);
   points[1] = positions[3 * contact_nodes[0] + 1];
   EXPECT(upt_scene_attach_points(scene, points, 2), UPT_OK);
-  EXPECT(upt_scene_step_contacts(scene, contact_nodes, contact_vectors, 4, before, floats), UPT_OK);
+  EXPECT(step_nodes(scene, contact_nodes, contact_vectors, 4, before, floats), UPT_OK);
   EXPECT(upt_scene_read_points(NULL, few, 6), UPT_ERR_NULL);
   EXPECT(upt_scene_read_points(scene, NULL, 6), UPT_ERR_NULL);
   EXPECT(upt_scene_read_points(scene, few, 3), UPT_ERR_ARGUMENT);
@@ -105,7 +104,7 @@ void walk_instrument(void) {
   EXPECT(upt_scene_contact_force(NULL, few, 12), UPT_ERR_NULL);
   EXPECT(upt_scene_contact_force(scene, NULL, 12), UPT_ERR_NULL);
   EXPECT(upt_scene_contact_force(scene, NULL, 0), bare ? UPT_ERR_UNSUPPORTED : UPT_OK);
-  EXPECT(upt_scene_step_contacts(scene, contact_nodes, contact_vectors, 4, NULL, 0), UPT_OK);
+  EXPECT(step_nodes(scene, contact_nodes, contact_vectors, 4, NULL, 0), UPT_OK);
   status = upt_scene_contact_force(scene, few, 12);
   if (bare) {
     EXPECT(status, UPT_ERR_UNSUPPORTED);
@@ -127,7 +126,7 @@ void walk_state(void) {
   int i;
   memset(&stats, 0, sizeof stats);
   for (i = 0; i < 3; i++) {
-    EXPECT(upt_scene_step_contacts(scene, contact_nodes, contact_vectors, 4, NULL, 0), UPT_OK);
+    EXPECT(step_nodes(scene, contact_nodes, contact_vectors, 4, NULL, 0), UPT_OK);
   }
   EXPECT(upt_scene_get_stats(NULL, &stats), UPT_ERR_NULL);
   EXPECT(upt_scene_get_stats(scene, NULL), UPT_ERR_NULL);
@@ -146,7 +145,7 @@ void walk_state(void) {
   EXPECT(upt_scene_save(scene, bytes, needed - 1, NULL), UPT_ERR_ARGUMENT);
   EXPECT(upt_scene_save(scene, bytes, needed, NULL), UPT_OK);
   EXPECT(upt_scene_read(scene, before, floats), UPT_OK);
-  EXPECT(upt_scene_step(scene, NULL, NULL, NULL, 0), UPT_OK);
+  EXPECT(upt_scene_step(scene, NULL, NULL, 0), UPT_OK);
   EXPECT(upt_scene_restore(NULL, bytes, needed), UPT_ERR_NULL);
   EXPECT(upt_scene_restore(scene, NULL, needed), UPT_ERR_NULL);
   EXPECT(upt_scene_restore(scene, bytes, needed), UPT_OK);

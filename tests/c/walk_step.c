@@ -91,44 +91,41 @@ void walk_step(void) {
     field[3 * contact_nodes[i / 3] + (uint32_t)(i % 3)] = contact_vectors[i];
   }
 
-  EXPECT(upt_scene_step(NULL, NULL, NULL, NULL, 0), UPT_ERR_NULL);
-  EXPECT(upt_scene_step(scene, NULL, field, NULL, floats), UPT_ERR_NULL);
-  EXPECT(upt_scene_step(scene, NULL, field, after, floats - 3), UPT_ERR_ARGUMENT);
-  EXPECT(upt_scene_step(scene, NULL, field, before, floats), UPT_OK);
+  EXPECT(upt_scene_step(NULL, NULL, NULL, 0), UPT_ERR_NULL);
+  EXPECT(upt_scene_step_field(scene, NULL, field, NULL, floats), UPT_ERR_NULL);
+  EXPECT(upt_scene_step_field(scene, NULL, field, after, floats - 3), UPT_ERR_ARGUMENT);
+  EXPECT(upt_scene_step_field(scene, NULL, field, before, floats), UPT_OK);
   for (i = 0; i < 12; i++) {
     EXPECT_TRUE(before[3 * contact_nodes[i / 3] + (uint32_t)(i % 3)] == contact_vectors[i]);
   }
   expect_unchanged(scene);
 
   /* The sparse form is the same step. */
-  EXPECT(upt_scene_step_contacts(twin, contact_nodes, contact_vectors, 4, after, floats), UPT_OK);
+  EXPECT(step_nodes(twin, contact_nodes, contact_vectors, 4, after, floats), UPT_OK);
   EXPECT_TRUE(memcmp(before, after, (size_t)floats * sizeof *before) == 0);
 
   /* A refused step leaves the state. */
   field[0] = NAN;
-  EXPECT(upt_scene_step(scene, NULL, field, NULL, 0), UPT_ERR_NON_FINITE);
-  EXPECT(upt_scene_step(scene, field, NULL, NULL, 0), UPT_ERR_NON_FINITE);
-  EXPECT(upt_scene_step_contacts(NULL, NULL, NULL, 0, NULL, 0), UPT_ERR_NULL);
-  EXPECT(upt_scene_step_contacts(scene, NULL, contact_vectors, 4, NULL, 0), UPT_ERR_NULL);
-  EXPECT(upt_scene_step_contacts(scene, contact_nodes, NULL, 4, NULL, 0), UPT_ERR_NULL);
-  EXPECT(upt_scene_step_contacts(scene, far, contact_vectors, 1, NULL, 0), UPT_ERR_ARGUMENT);
+  EXPECT(upt_scene_step_field(scene, NULL, field, NULL, 0), UPT_ERR_NON_FINITE);
+  EXPECT(upt_scene_step_field(scene, field, NULL, NULL, 0), UPT_ERR_NON_FINITE);
+  EXPECT(upt_scene_step(NULL, NULL, NULL, 0), UPT_ERR_NULL);
+  EXPECT(step_nodes(scene, NULL, contact_vectors, 4, NULL, 0), UPT_ERR_NULL);
+  EXPECT(step_nodes(scene, contact_nodes, NULL, 4, NULL, 0), UPT_ERR_NULL);
+  EXPECT(step_nodes(scene, far, contact_vectors, 1, NULL, 0), UPT_ERR_ARGUMENT);
   for (i = 0; i < (int)(sizeof absurd / sizeof *absurd); i++) {
-    EXPECT(upt_scene_step_contacts(scene, contact_nodes, contact_vectors, absurd[i], NULL, 0),
-           UPT_ERR_ARGUMENT);
-    EXPECT(upt_scene_submit(scene, contact_nodes, contact_vectors, absurd[i]), UPT_ERR_ARGUMENT);
-    EXPECT(upt_scene_step_contacts(scene, contact_nodes, before, absurd[i], before, floats),
-           UPT_ERR_ARGUMENT);
+    EXPECT(step_nodes(scene, contact_nodes, contact_vectors, absurd[i], NULL, 0), UPT_ERR_ARGUMENT);
+    EXPECT(submit_nodes(scene, contact_nodes, contact_vectors, absurd[i]), UPT_ERR_ARGUMENT);
+    EXPECT(step_nodes(scene, contact_nodes, before, absurd[i], before, floats), UPT_ERR_ARGUMENT);
   }
   contact_vectors[5] = INFINITY;
-  EXPECT(upt_scene_step_contacts(scene, contact_nodes, contact_vectors, 4, NULL, 0),
-         UPT_ERR_NON_FINITE);
+  EXPECT(step_nodes(scene, contact_nodes, contact_vectors, 4, NULL, 0), UPT_ERR_NON_FINITE);
   contact_vectors[5] = -2.0F;
   expect_unchanged(scene);
 
   /* So does one that the guard refuses. */
   EXPECT(upt_scene_read(held, before, floats), UPT_OK);
   contact_vectors[5] = 1000.0F;
-  EXPECT(upt_scene_step_contacts(held, contact_nodes, contact_vectors, 4, NULL, 0), UPT_ERR_GUARD);
+  EXPECT(step_nodes(held, contact_nodes, contact_vectors, 4, NULL, 0), UPT_ERR_GUARD);
   contact_vectors[5] = -2.0F;
   expect_unchanged(held);
   EXPECT(upt_scene_destroy(held), UPT_OK);
@@ -141,10 +138,10 @@ void walk_step(void) {
   /* The output may be the memory of an input. */
   field[0] = 0.0F;
   memset(field, 0, (size_t)floats * sizeof *field);
-  EXPECT(upt_scene_step(scene, field, NULL, field, floats), UPT_OK);
+  EXPECT(upt_scene_step_field(scene, field, NULL, field, floats), UPT_OK);
   memset(after, 0, (size_t)floats * sizeof *after);
   EXPECT(upt_scene_reset(twin), UPT_OK);
-  EXPECT(upt_scene_step(twin, after, NULL, before, floats), UPT_OK);
+  EXPECT(upt_scene_step_field(twin, after, NULL, before, floats), UPT_OK);
 
   EXPECT(upt_scene_reset(NULL), UPT_ERR_NULL);
   EXPECT(upt_scene_reset(scene), UPT_OK);
@@ -166,22 +163,22 @@ void walk_worker(void) {
   int i;
   far[0] = (uint32_t)info.node_count;
   twice[0] = twice[1] = contact_nodes[0];
-  EXPECT(upt_scene_submit(NULL, contact_nodes, contact_vectors, 4), UPT_ERR_NULL);
-  EXPECT(upt_scene_submit(scene, NULL, contact_vectors, 4), UPT_ERR_NULL);
+  EXPECT(submit_nodes(NULL, contact_nodes, contact_vectors, 4), UPT_ERR_NULL);
+  EXPECT(submit_nodes(scene, NULL, contact_vectors, 4), UPT_ERR_NULL);
   EXPECT(upt_scene_poll(NULL), UPT_ERR_NULL);
   EXPECT(upt_scene_wait(NULL, 0), UPT_ERR_NULL);
   EXPECT(upt_scene_wait(scene, 0), UPT_ERR_STATE);
-  EXPECT(upt_scene_submit(scene, contact_nodes, contact_vectors, 4), UPT_OK);
+  EXPECT(submit_nodes(scene, contact_nodes, contact_vectors, 4), UPT_OK);
   EXPECT(upt_scene_wait(scene, 60000), UPT_OK);
   EXPECT(upt_scene_read(scene, before, floats), UPT_OK);
-  EXPECT(upt_scene_step_contacts(twin, contact_nodes, contact_vectors, 4, after, floats), UPT_OK);
+  EXPECT(step_nodes(twin, contact_nodes, contact_vectors, 4, after, floats), UPT_OK);
   EXPECT_TRUE(memcmp(before, after, (size_t)floats * sizeof *before) == 0);
 
   /* A step in flight: pending, busy, and reads of published states go on. */
   for (i = 0; i < MANY && !(expect_seen[99] && expect_seen[-UPT_ERR_BUSY]); i++) {
     upt_status status;
-    EXPECT(upt_scene_submit(scene, contact_nodes, contact_vectors, 4), UPT_OK);
-    status = upt_scene_step(scene, NULL, NULL, NULL, 0);
+    EXPECT(submit_nodes(scene, contact_nodes, contact_vectors, 4), UPT_OK);
+    status = upt_scene_step(scene, NULL, NULL, 0);
     if (status == UPT_ERR_BUSY) {
       EXPECT(status, UPT_ERR_BUSY);
     }
@@ -198,12 +195,12 @@ void walk_worker(void) {
   EXPECT_TRUE(expect_seen[-UPT_ERR_BUSY]);
 
   /* What is wrong with an input is told at once. */
-  EXPECT(upt_scene_submit(scene, far, contact_vectors, 1), UPT_ERR_ARGUMENT);
-  EXPECT(upt_scene_submit(scene, twice, contact_vectors, 2), UPT_ERR_ARGUMENT);
+  EXPECT(submit_nodes(scene, far, contact_vectors, 1), UPT_ERR_ARGUMENT);
+  EXPECT(submit_nodes(scene, twice, contact_vectors, 2), UPT_ERR_ARGUMENT);
 
   /* The error of a submitted step is given once. */
   contact_vectors[5] = 1000.0F;
-  EXPECT(upt_scene_submit(held, contact_nodes, contact_vectors, 4), UPT_OK);
+  EXPECT(submit_nodes(held, contact_nodes, contact_vectors, 4), UPT_OK);
   EXPECT(upt_scene_wait(held, 60000), UPT_ERR_GUARD);
   EXPECT(upt_scene_destroy(held), UPT_OK);
   contact_vectors[5] = -2.0F;

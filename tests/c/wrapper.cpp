@@ -44,26 +44,24 @@ static void instruments(const char *bundle) {
   EXPECT(empty.create(points), UPT_OK);
   empty = std::move(cube);
   EXPECT_TRUE(!cube && empty);
-  upt_instrument tools[2] = {empty.instrument(), upt::make<upt_instrument>()};
+  upt_instrument tools[2] = {empty.instrument(), upt::sphere(2.0F)};
   tools[0].friction = 0.2F;
-  tools[1].rotation[3] = 1.0F;
-  tools[1].radius = 2.0F;
   for (int axis = 0; axis < 3; axis++) {
     tools[0].position[axis] = rest[3 * domain[domain.size() / 2] + static_cast<std::size_t>(axis)];
     tools[1].position[axis] = 900.0F;
   }
   std::vector<float> field(rest.size()), same(rest.size());
-  EXPECT(scene.step_instruments(tools, field), UPT_OK);
-  EXPECT(scene.step_instruments({tools, 2}), UPT_OK);
-  EXPECT(scene.submit_instruments(tools), UPT_OK);
+  EXPECT(scene.step(tools, field), UPT_OK);
+  EXPECT(scene.step({tools, 2}), UPT_OK);
+  EXPECT(scene.submit(tools), UPT_OK);
   EXPECT(scene.wait(60000), UPT_OK);
   const std::vector<upt_instrument_reading> readings = scene.readings(2);
   EXPECT_TRUE(readings[0].contact_count > 0 && readings[1].contact_count == 0);
   EXPECT_TRUE(thrown([&] { scene.readings(1); }) == UPT_ERR_ARGUMENT);
   EXPECT_TRUE(scene.instrument_contacts().size() == readings[0].contact_count);
   empty.destroy();
-  EXPECT_TRUE(thrown([&] { scene.step_instruments(tools); }) == UPT_ERR_HANDLE);
-  EXPECT(scene.step_instruments({}), UPT_OK);
+  EXPECT_TRUE(thrown([&] { scene.step(tools); }) == UPT_ERR_HANDLE);
+  EXPECT(scene.step(), UPT_OK);
   EXPECT_TRUE(scene.readings(0).empty() && scene.instrument_contacts().empty());
 }
 
@@ -72,15 +70,19 @@ static void haptics(const char *bundle) {
   upt::Model model = upt::Model::open(bundle);
   upt_scene_options corrected = upt::make<upt_scene_options>();
   corrected.corrections = 5;
-  upt_instrument tool = upt::make<upt_instrument>();
-  tool.rotation[3] = 1.0F;
-  tool.radius = 3.0F;
+  const upt_instrument tool = upt::sphere(3.0F);
   upt::Scene plain(model);
   upt::Scene scene;
   if (thrown([&] { scene.create(model, &corrected); }) == UPT_ERR_UNSUPPORTED) {
     EXPECT_TRUE(thrown([&] { upt::Haptics(plain, 0, tool); }) == UPT_ERR_UNSUPPORTED);
     return;
   }
+  std::vector<float> field(3 * model.info().node_count), at_points(3);
+  EXPECT(scene.attach_points({model.positions().data(), 3}), UPT_OK);
+  EXPECT(scene.step(upt::Input({&tool, 1}).at(8.0), field), UPT_OK);
+  EXPECT(scene.present({&tool, 1}, 8.01, field), UPT_OK);
+  EXPECT(scene.present({}, 8.01, at_points, upt::view(UPT_VIEW_POINTS)), UPT_OK);
+  EXPECT_TRUE(thrown([&] { scene.present({}, 7.9, field); }) == UPT_ERR_ARGUMENT);
   upt::Haptics hand(scene, 0, tool), other;
   other = std::move(hand);
   EXPECT_TRUE(!hand && other);
@@ -109,7 +111,7 @@ int main(int argc, char **argv) {
 
   upt::Scene scene(model);
   // A frame without contact: empty lists everywhere.
-  EXPECT(scene.step_contacts({}, {}), UPT_OK);
+  EXPECT(scene.step(upt::Input::contacts({}, {})), UPT_OK);
   EXPECT(scene.contact_force({}), UPT_OK);
   EXPECT(scene.decode({}, {}), UPT_OK);
   EXPECT(scene.reset(), UPT_OK);
@@ -121,20 +123,22 @@ int main(int argc, char **argv) {
   const std::array<std::uint32_t, 2> nodes = {domain[0], domain[1]};
   const float vectors[6] = {0, 0, -1, 0, 0, -1};
   std::vector<float> field(3 * info.node_count), same(field.size());
-  EXPECT(scene.step_contacts(nodes, vectors, field), UPT_OK);
+  EXPECT(scene.step(upt::Input::contacts(nodes, vectors), field), UPT_OK);
   EXPECT_TRUE(field[3 * nodes[0] + 2] == -1.0F);
   EXPECT(scene.read(same), UPT_OK);
   EXPECT_TRUE(field == same);
-  EXPECT_TRUE(thrown([&] { scene.step_contacts(nodes, {vectors, 3}); }) == UPT_ERR_ARGUMENT);
+  const upt::Input uneven = upt::Input::contacts(nodes, {vectors, 3});
+  EXPECT_TRUE(thrown([&] { scene.step(uneven); }) == UPT_ERR_ARGUMENT);
+  EXPECT_TRUE(thrown([&] { scene.submit(uneven); }) == UPT_ERR_ARGUMENT);
   EXPECT_TRUE(scene.stats().step_count == 1);
 
   const std::vector<std::uint8_t> snapshot = scene.save();
-  EXPECT(scene.step(nullptr, nullptr, field), UPT_OK);
+  EXPECT(scene.step_field(nullptr, nullptr, field), UPT_OK);
   EXPECT(scene.restore(snapshot), UPT_OK);
   EXPECT(scene.read(same), UPT_OK);
   EXPECT_TRUE(same[3 * nodes[0] + 2] == -1.0F);
 
-  EXPECT(scene.submit(nodes, vectors), UPT_OK);
+  EXPECT(scene.submit(upt::Input::contacts(nodes, vectors).at(1.5)), UPT_OK);
   EXPECT(scene.wait(60000), UPT_OK);
   EXPECT(scene.sample(0.5, field), UPT_OK);
 

@@ -23,9 +23,9 @@ int main(int argc, char **argv) {
   EXPECT(model.indices(UPT_SET_DOMAIN_NODES, domain), UPT_OK);
   const float vector[3] = {0, 0, -1};
   std::vector<float> field(3 * info.node_count);
-  EXPECT(scene.step_contacts({domain.data(), 1}, vector, field), UPT_OK);
+  EXPECT(scene.step(upt::Input::contacts({domain.data(), 1}, vector), field), UPT_OK);
   EXPECT_TRUE(field[3 * domain[0] + 2] == -1.0F);
-  EXPECT(scene.step_contacts({domain.data(), 2}, vector, field), UPT_ERR_ARGUMENT);
+  EXPECT(scene.step(upt::Input::contacts({domain.data(), 2}, vector), field), UPT_ERR_ARGUMENT);
   EXPECT(scene.read({field.data(), 3}), UPT_ERR_ARGUMENT);
   upt_scene_stats stats;
   EXPECT(scene.stats(stats), UPT_OK);

@@ -18,6 +18,7 @@ int main(int argc, char **argv) {
   upt_scene *scene = NULL;
   upt_model_info info = {0};
   upt_model_options model_options = {0};
+  upt_input input = {0};
   uint32_t *domain, *nodes;
   float *positions, *vectors, *u;
   uint64_t domain_count = 0, node_count;
@@ -63,8 +64,11 @@ int main(int argc, char **argv) {
       vectors[3 * count + 2] = 0.0f;
       count++;
     }
-    require(upt_scene_step_contacts(scene, nodes, vectors, count, u, 3 * node_count),
-            "upt_scene_step_contacts");
+    input.struct_size = sizeof input;
+    input.contact_nodes = nodes;
+    input.contact_vectors = vectors;
+    input.contact_count = count;
+    require(upt_scene_step(scene, &input, u, 3 * node_count), "upt_scene_step");
   }
   out = fopen(argv[2], "wb");
   if (!out || fwrite(u, sizeof *u, 3 * node_count, out) != 3 * node_count || fclose(out) != 0) {
