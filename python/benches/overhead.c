@@ -14,10 +14,18 @@ static double now(void) {
 upt_status steps(upt_scene *scene, const upt_instrument *tool, const uint32_t *nodes,
                  const float *vectors, uint64_t count, float *out, uint64_t length, long calls,
                  double *seconds) {
+  upt_input input = {sizeof input};
+  if (tool) {
+    input.instruments = tool;
+    input.instrument_count = 1;
+  } else {
+    input.contact_nodes = nodes;
+    input.contact_vectors = vectors;
+    input.contact_count = count;
+  }
   for (long i = 0; i < calls; i++) {
     double begin = now();
-    upt_status status = tool ? upt_scene_step_instruments(scene, tool, 1, out, length)
-                             : upt_scene_step_contacts(scene, nodes, vectors, count, out, length);
+    upt_status status = upt_scene_step(scene, &input, out, length);
     if (status < 0) {
       return status;
     }

@@ -62,16 +62,16 @@ def main() -> None:
         def by_nodes(scene: upt.Scene, seconds: Seconds) -> None:
             for i in range(len(seconds)):
                 begin = time.perf_counter()
-                scene.step_contacts(nodes, vectors, out)
+                scene.step(contacts=(nodes, vectors), out=out)
                 seconds[i] = time.perf_counter() - begin
 
         def by_tool(scene: upt.Scene, seconds: Seconds) -> None:
             for i in range(len(seconds)):
                 begin = time.perf_counter()
-                scene.step_instruments([tool], out)
+                scene.step([tool], out=out)
                 seconds[i] = time.perf_counter() - begin
 
-        for name, in_python in (("step_contacts", by_nodes), ("step_instruments", by_tool)):
+        for name, in_python in (("step(contacts=...)", by_nodes), ("step([tool])", by_tool)):
             described = ctypes.addressof(record) if in_python is by_tool else None
 
             def in_c(scene: upt.Scene, seconds: Seconds, described: int | None = described) -> None:

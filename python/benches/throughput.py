@@ -50,11 +50,11 @@ def main() -> None:
     def one_by_one() -> None:
         for _ in range(arguments.steps):
             for scene, (nodes, vectors), row in zip(batch.scenes, contacts, out, strict=True):
-                scene.step_contacts(nodes, vectors, row)
+                scene.step(contacts=(nodes, vectors), out=row)
 
     def together() -> None:
         for _ in range(arguments.steps):
-            batch.step_contacts(contacts, out)
+            batch.step(contacts=contacts, out=out)
 
     cores = core_count()
 
@@ -62,7 +62,7 @@ def main() -> None:
         mine = list(zip(batch.scenes, contacts, out, strict=True))[first::cores]
         for _ in range(arguments.steps):
             for scene, (nodes, vectors), place in mine:
-                scene.step_contacts(nodes, vectors, place)
+                scene.step(contacts=(nodes, vectors), out=place)
 
     threads = ThreadPoolExecutor(cores)
 

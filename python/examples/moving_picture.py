@@ -123,7 +123,7 @@ def main() -> None:
         tip = site - depth * outward + slid * along
         center = tip + (HALF_LENGTH + RADIUS) * axis
         probe = upt.Instrument.capsule(RADIUS, HALF_LENGTH, position=center, rotation=turn_to(axis), friction=0.1)
-        u = scene.step_instruments([probe]).astype(float)
+        u = scene.step([probe]).astype(float)
         force = float(np.linalg.norm(scene.readings()[0].force))
         # The deep red is for what the tool drags along, not for the sway of the whole hemisphere.
         amount = np.clip(np.linalg.norm(u, axis=1)[faces].mean(axis=1) / 13.0, 0, 1)[:, None] ** 2.2

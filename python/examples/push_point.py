@@ -85,7 +85,7 @@ class PushPoint(gymnasium.Env):
 
     def _step(self, moved: np.ndarray) -> None:
         self.ball.position = self.start + moved
-        self.scene.step_instruments([self.ball])
+        self.scene.step([self.ball])
 
     def _point(self) -> np.ndarray:
         return self.scene.read_points()[0] if self.time else np.zeros(3, np.float32)

@@ -15,10 +15,10 @@ def test_the_same_bits_for_any_number_of_workers(model, workers):
     expected = []
     for i in range(count):
         with model.scene(threads=1, no_sleep=True) as scene:
-            expected.append([scene.step_contacts(*push(model, t + i)) for t in range(4)])
+            expected.append([scene.step(contacts=push(model, t + i)) for t in range(4)])
     with upt.BatchedScenes(model, count, workers=workers, no_sleep=True) as batch:
         for t in range(4):
-            out = batch.step_contacts([push(model, t + i) for i in range(count)])
+            out = batch.step(contacts=[push(model, t + i) for i in range(count)])
             np.testing.assert_array_equal(out, [states[t] for states in expected])
         np.testing.assert_array_equal(batch.read(), out)
         batch.reset([2, 4])
@@ -32,11 +32,11 @@ def test_dense_fields(model):
         nodes, vectors = push(model, 3)
         collision[1, nodes] = vectors
         out = np.empty_like(collision)
-        assert batch.step(None, collision, out) is out
+        assert batch.step(collision=collision, out=out) is out
         np.testing.assert_array_equal(out[0], model.scene(no_sleep=True).step())
-        np.testing.assert_array_equal(out[1], model.scene(no_sleep=True).step_contacts(nodes, vectors))
+        np.testing.assert_array_equal(out[1], model.scene(no_sleep=True).step(contacts=(nodes, vectors)))
         with pytest.raises(ValueError, match="collision has shape"):
-            batch.step(None, collision[:1])
+            batch.step(collision=collision[:1])
 
 
 def test_instruments():
@@ -45,25 +45,25 @@ def test_instruments():
     expected = []
     for one in tools:
         with model.scene(threads=1, no_sleep=True) as scene:
-            expected.append([scene.step_instruments(one).copy() for _ in range(3)])
+            expected.append([scene.step(one).copy() for _ in range(3)])
     with upt.BatchedScenes(model, 3, no_sleep=True) as batch:
         for step in range(3):
-            np.testing.assert_array_equal(batch.step_instruments(tools), [states[step] for states in expected])
+            np.testing.assert_array_equal(batch.step(tools), [states[step] for states in expected])
         assert [len(scene.readings()) for scene in batch.scenes] == [0, 1, 1]
         assert batch.scenes[2].readings()[0].contact_count > 0
         with pytest.raises(ValueError, match="instruments has 1 entries, must have one for each of 3"):
-            batch.step_instruments(tools[:1])
+            batch.step(tools[:1])
 
 
 def test_one_failure_stops_no_other_scene(model):
     with upt.BatchedScenes(model, 3, no_sleep=True) as batch:
         good = push(model, 1)
         with pytest.raises(upt.ArgumentError) as caught:
-            batch.step_contacts([good, ([0], [[np.nan, 0, 0]]), good])
+            batch.step(contacts=[good, ([0], [[np.nan, 0, 0]]), good])
         assert "scene 1 of 3" in caught.value.__notes__[0]
         assert [scene.stats.step_count for scene in batch.scenes] == [1, 0, 1]
         with pytest.raises(ValueError, match="one for each of 3"):
-            batch.step_contacts([good])
+            batch.step(contacts=[good])
 
 
 def test_a_region_for_all(model):

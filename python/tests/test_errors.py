@@ -51,9 +51,9 @@ def test_the_librarys_own_checks_are_value_errors(model):
     ],
 )
 def test_bad_contacts(model, scene, nodes, vectors, message):
-    before = scene.step_contacts(*push(model, 2))
+    before = scene.step(contacts=push(model, 2))
     with pytest.raises((ValueError, TypeError), match=message):
-        scene.step_contacts(nodes, vectors)
+        scene.step(contacts=(nodes, vectors))
     np.testing.assert_array_equal(scene.read(), before)
 
 
@@ -76,15 +76,15 @@ def test_an_array_that_comes_again_is_still_checked(model, scene):
     nodes, vectors = push(model, 2)
     out = np.zeros((model.node_count, 3), np.float32)
     for _ in range(2):
-        scene.step_contacts(nodes, vectors, out)
+        scene.step(contacts=(nodes, vectors), out=out)
     before = out.copy()
     out.setflags(write=False)
     with pytest.raises(ValueError, match="writeable"):
-        scene.step_contacts(nodes, vectors, out)
+        scene.step(contacts=(nodes, vectors), out=out)
     out.setflags(write=True)
     scene.set_region(model.surface_nodes)
     with pytest.raises(ValueError, match=r"shape \(\d+, 3\)"):
-        scene.step_contacts(nodes, vectors, out)
+        scene.step(contacts=(nodes, vectors), out=out)
     np.testing.assert_array_equal(out, before)
     # What the scene writes to cannot be moved from under it.
     with pytest.raises(ValueError, match="resize"):
@@ -135,19 +135,21 @@ def test_a_process_may_end_with_scenes_alive():
         (lambda m, s: m.scene(kernel=[1]), "kernel"),
         (lambda m, s: m.scene(mesh_path=7), "mesh_path"),
         (lambda m, s: m.indices("tets"), "which"),
-        (lambda m, s: s.step("field"), "displacement"),
-        (lambda m, s: s.step(None, {}), "collision"),
+        (lambda m, s: s.step(displacement="field"), "displacement"),
+        (lambda m, s: s.step(collision={}), "collision"),
         (lambda m, s: s.step(out=[1.0]), "out"),
-        (lambda m, s: s.step_contacts("ab", [[0, 0, 0]]), "nodes"),
-        (lambda m, s: s.step_contacts([0], "there"), "contact"),
-        (lambda m, s: s.step_instruments(5), "instruments"),
-        (lambda m, s: s.step_instruments(upt.Instrument.capsule(1.0)), "instruments"),
-        (lambda m, s: s.step_instruments([1]), r"instruments\[0\]"),
-        (lambda m, s: s.step_instruments([upt.Instrument.capsule("six")]), r"instruments\[0\].radius"),
-        (lambda m, s: s.step_instruments([upt.Instrument.capsule(6, position=3)]), r"instruments\[0\].position"),
-        (lambda m, s: s.step_instruments([upt.Instrument.capsule(6, position="abc")]), r"instruments\[0\].position"),
+        (lambda m, s: s.step(contacts=("ab", [[0, 0, 0]])), "nodes"),
+        (lambda m, s: s.step(contacts=([0], "there")), "contact"),
+        (lambda m, s: s.step(5), "instruments"),
+        (lambda m, s: s.step(upt.Instrument.capsule(1.0)), "instruments"),
+        (lambda m, s: s.step([1]), r"instruments\[0\]"),
+        (lambda m, s: s.step([upt.Instrument.capsule("six")]), r"instruments\[0\].radius"),
+        (lambda m, s: s.step([upt.Instrument.capsule(6, position=3)]), r"instruments\[0\].position"),
+        (lambda m, s: s.step([upt.Instrument.capsule(6, position="abc")]), r"instruments\[0\].position"),
         (lambda m, s: s.sample("half"), "alpha"),
-        (lambda m, s: s.present("now"), "seconds"),
+        (lambda m, s: s.present("now"), "when"),
+        (lambda m, s: s.step(contacts=3), "contacts"),
+        (lambda m, s: s.step(time_s="now"), "time_s"),
         (lambda m, s: s.wait("long"), "timeout"),
         (lambda m, s: s.restore("bytes"), "snapshot"),
         (lambda m, s: s.attach_points("here"), "points"),

@@ -20,7 +20,7 @@ def test_a_hand_feels_what_the_step_told():
     assert free.force_n == (0.0, 0.0, 0.0) and not free.contact
     tool.position = pressing(model, 0.8)
     for _ in range(30):
-        scene.step_instruments([tool])
+        scene.step([tool])
         for _ in range(50):
             time += 1e-3
             felt = hand.render(time, 1e-3 * tool.position)

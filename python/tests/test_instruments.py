@@ -31,6 +31,10 @@ def pressing(model: upt.Model, depth: float, radius: float = 3.0) -> np.ndarray:
     return place + (radius - depth) * normal
 
 
+def test_a_sphere_is_a_capsule_without_length():
+    assert upt.Instrument.sphere(3.0, position=(1, 2, 3)) == upt.Instrument.capsule(3.0, position=(1, 2, 3))
+
+
 def test_a_press_is_read_and_a_lift_ends_it(corrected):
     _, normal = site(corrected)
     with corrected.scene() as scene:
@@ -39,7 +43,7 @@ def test_a_press_is_read_and_a_lift_ends_it(corrected):
         for depth in (0.3, 0.6, 0.9):
             ball.position = pressing(corrected, depth)
             out = np.empty((corrected.node_count, 3), np.float32)
-            assert scene.step_instruments([ball, other], out) is out and np.abs(out).max() > 0.1
+            assert scene.step([ball, other], out=out) is out and np.abs(out).max() > 0.1
         touched, free = scene.readings()
         force = np.array(touched.force)
         assert touched.contact_count > 0 and force @ normal > 0.7 * np.linalg.norm(force)
@@ -50,14 +54,14 @@ def test_a_press_is_read_and_a_lift_ends_it(corrected):
         np.testing.assert_allclose(np.sum([contact.force for contact in contacts], axis=0), force, rtol=1e-3, atol=1e-2)
         assert scene.stats.contact_ms > 0
         ball.position = pressing(corrected, -30.0)
-        scene.step_instruments([ball, other])
+        scene.step([ball, other])
         assert scene.readings()[0].force == (0.0, 0.0, 0.0) and scene.instrument_contacts() == []
-        scene.step_instruments([])
+        scene.step([])
         assert scene.readings() == []
-        scene.step_instruments([ball])
-        scene.step_contacts()
+        scene.step([ball])
+        scene.step()
         assert scene.readings() == []
-        scene.step_instruments([ball])
+        scene.step([ball])
         scene.reset()
         assert scene.readings() == []
 
@@ -73,8 +77,8 @@ def test_each_shape_pushes_the_same_when_submitted(corrected, shape):
     }
     tool = made[shape]()
     own, submitted = corrected.scene(), corrected.scene()
-    expected = own.step_instruments([tool])
-    submitted.submit_instruments([tool])
+    expected = own.step([tool])
+    submitted.submit([tool])
     assert submitted.wait()
     np.testing.assert_array_equal(submitted.read(), expected)
     (reading,) = submitted.readings()
@@ -87,36 +91,36 @@ def test_a_grasp_pulls_and_tears_off(corrected):
         tool = upt.Instrument.capsule(3.0)
         for depth in (0.3, 0.6, 0.9):
             tool.position = pressing(corrected, depth)
-            scene.step_instruments([tool])
+            scene.step([tool])
         tool.grasp = True
         for depth in (0.9, 0.6, 0.3, 0.0, -0.3, -0.6):
             tool.position = pressing(corrected, depth)
-            scene.step_instruments([tool])
+            scene.step([tool])
         pull = np.array(scene.readings()[0].force) @ normal
         assert pull < 0
         tool.position, tool.tear_off = pressing(corrected, -1.2), -0.5 * pull
-        scene.step_instruments([tool])
+        scene.step([tool])
         assert scene.readings()[0].torn is True
 
 
 def test_bad_instruments_are_refused(corrected):
     scene = corrected.scene()
     with pytest.raises(upt.ArgumentError, match="friction"):
-        scene.step_instruments([upt.Instrument.capsule(2.0, friction=-1.0)])
+        scene.step([upt.Instrument.capsule(2.0, friction=-1.0)])
     with pytest.raises(upt.ArgumentError, match=r"instruments\[1\]"):
-        scene.step_instruments([upt.Instrument.capsule(2.0), upt.Instrument.capsule(-2.0)])
+        scene.step([upt.Instrument.capsule(2.0), upt.Instrument.capsule(-2.0)])
     with pytest.raises(ValueError, match="rotation has 4 numbers"):
-        scene.step_instruments([upt.Instrument.capsule(2.0, rotation=(0, 0, 1))])
+        scene.step([upt.Instrument.capsule(2.0, rotation=(0, 0, 1))])
     with pytest.raises(upt.ArgumentError, match="volume|plane|flat"):
         upt.Hull(CUBE * [1, 1, 0])
     hull = upt.Hull(CUBE)
     tool = upt.Instrument.hull(hull)
     hull.close()
     with pytest.raises(upt.StateError, match="HANDLE"):
-        scene.step_instruments([tool])
+        scene.step([tool])
     without = upt.Model(FIXTURES / "tiny-upt").scene()
     with pytest.raises(upt.UnsupportedError, match="linear response"):
-        without.step_instruments([upt.Instrument.capsule(2.0)])
+        without.step([upt.Instrument.capsule(2.0)])
 
 
 def test_nodes_and_vectors_for_hosts_that_want_them(model, scene):
@@ -124,7 +128,7 @@ def test_nodes_and_vectors_for_hosts_that_want_them(model, scene):
     tool = upt.Instrument.capsule(2.0, 5.0, position=model.positions[node])
     nodes, vectors = scene.contacts([tool])
     assert node in nodes and vectors.shape == (len(nodes), 3) and np.abs(vectors).max() > 0.1
-    scene.step_contacts(nodes, vectors)
+    scene.step(contacts=(nodes, vectors))
     assert scene.stats.contact_count == len(nodes)
     force = scene.contact_force()
     assert force.shape == vectors.shape and np.isfinite(force).all() and np.abs(force).max() > 0
@@ -139,19 +143,19 @@ def test_a_frame_shows_the_tool_where_it_is(corrected):
     with corrected.scene(no_sleep=True, step_s=corrected.frame_step_s) as scene:
         ball = upt.Instrument.capsule(3.0, position=pressing(corrected, 0.3))
         scene.present(0.0)  # before the first step
-        state = scene.step_instruments([ball])
+        state = scene.step([ball])
         np.testing.assert_array_equal(scene.present(0.0, [ball]), state)
         ball.position = pressing(corrected, 1.2)
         out = np.empty_like(state)
-        assert scene.present(0.02, [ball], out) is out
+        assert scene.present(0.02, [ball], out=out) is out
         assert np.abs(out).max() > 1.5 * np.abs(state).max()
         np.testing.assert_array_equal(scene.read(), state)
-        scene.submit_instruments([ball])
+        scene.submit([ball])
         assert np.isfinite(scene.present(0.03, [ball])).all()
         assert scene.wait()
         scene.attach_points(corrected.positions[:5])
-        assert scene.present_points(0.01, [ball]).shape == (5, 3)
-        with pytest.raises(upt.ArgumentError, match="seconds is -1"):
+        assert scene.present(0.01, [ball], view="points").shape == (5, 3)
+        with pytest.raises(upt.ArgumentError, match="when is -1"):
             scene.present(-1.0)
     with upt.Model(FIXTURES / "tiny-upt").scene() as scene, pytest.raises(upt.UnsupportedError, match="sample"):
         scene.present(0.0)
@@ -163,16 +167,16 @@ def test_a_collision_field_is_presented_too(corrected):
     with corrected.scene(no_sleep=True) as scene:
         scene.attach_points(corrected.positions[nodes])
         for depth in (0.2, 0.4):
-            scene.step_contacts(nodes, np.tile([0, 0, -depth], (4, 1)))
-            scene.present_contacts(0.0, nodes, np.tile([0, 0, -depth], (4, 1)))
+            scene.step(contacts=(nodes, np.tile([0, 0, -depth], (4, 1))))
+            scene.present(0.0, contacts=(nodes, np.tile([0, 0, -depth], (4, 1))))
         contact = np.tile(np.float32([0, 0, -0.5]), (4, 1))
-        field = scene.present_contacts(0.025, nodes, contact)
+        field = scene.present(0.025, contacts=(nodes, contact))
         np.testing.assert_allclose(field[nodes], contact, atol=2e-3)
         out = np.empty((4, 3), np.float32)
-        assert scene.present_points_contacts(0.025, nodes, contact, out) is out
+        assert scene.present(0.025, contacts=(nodes, contact), view="points", out=out) is out
         np.testing.assert_allclose(out, contact, atol=2e-3)
         with pytest.raises(upt.ArgumentError):
-            scene.present_points_contacts(0.01, [10**6], contact[:1])
+            scene.present(0.01, contacts=([10**6], contact[:1]), view="points")
 
 
 def test_the_fast_way_to_a_struct_is_the_slow_one():

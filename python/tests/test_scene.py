@@ -19,7 +19,7 @@ def test_a_scene_follows_the_stored_rollout(name, scene):
     offsets = rollout["contact_offsets"]
     for t, expected in enumerate(rollout["displacement"]):
         rows = slice(offsets[t], offsets[t + 1])
-        u = scene.step_contacts(rollout["contact_nodes"][rows], rollout["contact_vectors"][rows])
+        u = scene.step(contacts=(rollout["contact_nodes"][rows], rollout["contact_vectors"][rows]))
         np.testing.assert_allclose(u, expected, atol=1e-4, rtol=0)
 
 
@@ -30,8 +30,8 @@ def test_dense_fields_and_listed_contacts_give_the_same_bits(model, scene):
         nodes, vectors = push(model, t)
         collision = np.zeros_like(state)
         collision[nodes] = vectors
-        np.testing.assert_array_equal(dense.step(None, collision), scene.step_contacts(nodes, vectors))
-    assert dense.step(state).shape == state.shape
+        np.testing.assert_array_equal(dense.step(collision=collision), scene.step(contacts=(nodes, vectors)))
+    assert dense.step(displacement=state).shape == state.shape
 
 
 def test_arrays_of_the_right_type_are_not_copied(model, scene):
@@ -44,48 +44,47 @@ def test_arrays_of_the_right_type_are_not_copied(model, scene):
     # In place: the result over the input.
     collision = np.zeros_like(out)
     collision[model.domain_nodes[0]] = [0, 0, -1]
-    expected = model.scene(no_sleep=True).step(np.zeros_like(out), collision)
+    expected = model.scene(no_sleep=True).step(displacement=np.zeros_like(out), collision=collision)
     out[:] = 0
-    model.scene(no_sleep=True).step(out, collision, out)
+    model.scene(no_sleep=True).step(displacement=out, collision=collision, out=out)
     np.testing.assert_array_equal(out, expected)
 
 
-@pytest.mark.parametrize("short", [0, 1000])
-def test_contacts_are_the_same_bits_copied_or_not(model, scene, monkeypatch, short):
-    """Below `SHORT` lists are copied; in either way they need not lie in one piece."""
-    monkeypatch.setattr(_arrays, "SHORT", short)
+def test_contacts_are_the_same_bits_copied_or_not(model, scene):
+    """The lists need not lie in one piece, and may come again with other values in them."""
     nodes, vectors = push(model, 3)
     other = model.scene(no_sleep=True)
-    expected = other.step_contacts(nodes.tolist(), vectors.tolist())
+    expected = other.step(contacts=(nodes.tolist(), vectors.tolist()))
     apart = np.repeat(nodes, 2)[::2], np.repeat(vectors, 2, axis=1)[:, ::2]
-    np.testing.assert_array_equal(scene.step_contacts(*apart), expected)
-    np.testing.assert_array_equal(scene.step_contacts(nodes, vectors), other.step_contacts(*apart))
+    np.testing.assert_array_equal(scene.step(contacts=apart), expected)
+    np.testing.assert_array_equal(scene.step(contacts=(nodes, vectors)), other.step(contacts=apart))
     # The same arrays again, with other values in them.
     vectors = vectors.copy()
     for depth in (1.0, 1.5, 2.0, 2.5):
         vectors[:, 2] = -depth
-        np.testing.assert_array_equal(scene.step_contacts(nodes, vectors), other.step_contacts(nodes, vectors.tolist()))
+        expected = other.step(contacts=(nodes, vectors.tolist()))
+        np.testing.assert_array_equal(scene.step(contacts=(nodes, vectors)), expected)
 
 
 @pytest.mark.parametrize("convert", [np.float64, list])
 def test_other_types_are_converted(model, scene, convert):
     nodes, vectors = push(model, 1)
-    expected = scene.step_contacts(nodes, vectors)
+    expected = scene.step(contacts=(nodes, vectors))
     other = model.scene(no_sleep=True)
     given = vectors.tolist() if convert is list else vectors.astype(convert)
-    np.testing.assert_array_equal(other.step_contacts(nodes.astype(np.int64), given), expected)
+    np.testing.assert_array_equal(other.step(contacts=(nodes.astype(np.int64), given)), expected)
 
 
 def test_region_decode_and_points(model, scene):
     nodes, vectors = push(model, 4)
-    whole = scene.step_contacts(nodes, vectors)
+    whole = scene.step(contacts=(nodes, vectors))
     chosen = model.surface_nodes[::3][::-1]
     np.testing.assert_allclose(scene.decode(chosen), whole[chosen], atol=1e-5)
     scene.attach_points(model.positions[chosen[:5]])
     scene.reset()
     scene.set_region(chosen)
     assert scene.out_count == len(chosen)
-    np.testing.assert_allclose(scene.step_contacts(nodes, vectors), whole[chosen], atol=1e-5)
+    np.testing.assert_allclose(scene.step(contacts=(nodes, vectors)), whole[chosen], atol=1e-5)
     assert scene.read_points().shape == (5, 3)
     np.testing.assert_array_equal(scene.read_points(), scene.sample_points(1.0))
     scene.set_region(None)
@@ -97,22 +96,22 @@ def test_region_decode_and_points(model, scene):
 
 def test_a_snapshot_resumes_to_the_bit(model, scene):
     for t in range(3):
-        scene.step_contacts(*push(model, t))
+        scene.step(contacts=push(model, t))
     snapshot = scene.save()
-    after = [scene.step_contacts(*push(model, t)) for t in range(3, 6)]
+    after = [scene.step(contacts=push(model, t)) for t in range(3, 6)]
     other = model.scene(no_sleep=True)
     other.restore(snapshot)
     for t, expected in zip(range(3, 6), after, strict=True):
-        np.testing.assert_array_equal(other.step_contacts(*push(model, t)), expected)
+        np.testing.assert_array_equal(other.step(contacts=push(model, t)), expected)
     with pytest.raises(upt.BundleError, match="SNAPSHOT"):
         other.restore(snapshot[: len(snapshot) // 2])
 
 
 def test_a_submitted_step_is_the_same_step(model, scene):
     nodes, vectors = push(model, 2)
-    scene.submit(nodes, vectors)
+    scene.submit(contacts=(nodes, vectors))
     assert scene.wait()
-    expected = model.scene(no_sleep=True).step_contacts(nodes, vectors)
+    expected = model.scene(no_sleep=True).step(contacts=(nodes, vectors))
     np.testing.assert_array_equal(scene.read(), expected)
     np.testing.assert_allclose(scene.sample(0.5), expected / 2, atol=1e-6)
     with pytest.raises(upt.StateError):
@@ -120,7 +119,7 @@ def test_a_submitted_step_is_the_same_step(model, scene):
 
 
 def test_statistics_are_typed(model, scene):
-    scene.step_contacts(*push(model, 120))
+    scene.step(contacts=push(model, 120))
     stats = scene.stats
     assert stats.step_count == 1 and stats.contact_count == 3 and stats.sleeping is False
     assert stats.flags & upt.Flag.PUSH, "a push of 24 mm is longer than the bundle was made for"
@@ -159,8 +158,8 @@ def test_scenes_outlive_their_model(name, model):
     own = upt.Model(FIXTURES / name)
     scene = own.scene(no_sleep=True)
     own.close()
-    expected = model.scene(no_sleep=True).step_contacts(*push(model, 1))
-    np.testing.assert_array_equal(scene.step_contacts(*push(model, 1)), expected)
+    expected = model.scene(no_sleep=True).step(contacts=push(model, 1))
+    np.testing.assert_array_equal(scene.step(contacts=push(model, 1)), expected)
     scene.close()
     scene.close()
     with pytest.raises(upt.StateError, match="HANDLE"):

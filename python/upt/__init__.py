@@ -4,7 +4,7 @@
 
     model = upt.Model(upt.bundle("brain-reduced"))
     scene = model.scene()
-    u = scene.step_contacts([17, 18], [[0, 0, -4], [0, 0, -4]])  # [K, 3], mm, 50 ms later
+    u = scene.step(contacts=([17, 18], [[0, 0, -4], [0, 0, -4]]))  # [K, 3], mm, 50 ms later
 
 Shapes and units: positions and displacements are float32 `[n, 3]`, mm; forces mN; times seconds, but in the statistics
 milliseconds. What a call may raise is in `upt.errors`; conventions of the library itself are in docs/reference/abi.md.
@@ -37,6 +37,7 @@ from upt._native import (
     Shape,
     Status,
     StepPath,
+    ViewKind,
 )
 from upt.batch import BatchedScenes
 from upt.bundles import bundle
@@ -111,6 +112,7 @@ __all__ = [
     "Status",
     "StepPath",
     "UnsupportedError",
+    "ViewKind",
     "bundle",
     "init",
     "providers",

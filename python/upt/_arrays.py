@@ -19,11 +19,8 @@ Indices = NDArray[np.uint32]
 _F32, _U32 = np.dtype(np.float32), np.dtype(np.uint32)
 
 Place = tuple[Floats, c_void_p, c_uint64, int]
-#: Both arrays, what stands for them in a call, their length, and whether that holds when the same arrays come again.
-Lists = tuple[object, object, bytes | c_void_p | int, bytes | c_void_p | int, c_uint64 | int, bool]
-
-#: Contacts below which their lists are copied: sooner done than asking the arrays where they lie.
-SHORT = 256
+#: The two arrays of a caller, where what stands for them lies, its length, and what must live over the call.
+Lists = tuple[object, object, int, int, int, object]
 
 
 class Outputs:
@@ -114,7 +111,7 @@ def indices(values: ArrayLike, name: str) -> Indices:
 
 
 class Contacts:
-    """The lists of contacts that calls get: where they lie is remembered once the same two arrays have come again.
+    """The lists of contacts that calls get: where they lie is remembered for when the same two arrays come again.
 
     Two threads may share one, as `Outputs`.
     """
@@ -122,30 +119,21 @@ class Contacts:
     __slots__ = ("_last",)
 
     def __init__(self) -> None:
-        self._last: Lists = (self, self, 0, 0, 0, False)
+        self._last: Lists = (self, self, 0, 0, 0, None)
 
     def place(self, nodes: ArrayLike, contact: ArrayLike) -> Lists:
-        """Nodes `[n]` and vectors `[n, 3]` with what stands for them in a call, and n; to be kept over the call."""
+        """Where nodes `[n]` and vectors `[n, 3]` lie, and n; to be kept over the call."""
         last = self._last
-        again = nodes is last[0] and contact is last[1]
-        if again and last[5]:
+        if nodes is last[0] and contact is last[1]:
             return last
-        found = _contacts(nodes, contact, again)
-        self._last = found
+        n = indices(nodes, "nodes")
+        if not n.size and not np.size(contact):
+            return nodes, contact, 0, 0, 0, None
+        c = vectors(contact, "contact", len(n))
+        found: Lists = (nodes, contact, address(n), address(c), len(n), (n, c))
+        if n is nodes and c is contact:
+            self._last = found
         return found
-
-
-def _contacts(nodes: ArrayLike, contact: ArrayLike, again: bool) -> Lists:
-    if type(nodes) is ndarray and type(contact) is ndarray and nodes.dtype is _U32 and contact.dtype is _F32:
-        count = len(nodes) if nodes.ndim == 1 else SHORT
-        if count < SHORT and contact.shape == (count, 3) and not again:
-            return nodes, contact, nodes.tobytes(), contact.tobytes(), count, False
-    n = indices(nodes, "nodes")
-    if not n.size and not np.size(contact):
-        return nodes, contact, b"", b"", 0, False
-    c = vectors(contact, "contact", len(n))
-    lies = n is nodes and c is contact
-    return n, c, c_void_p(address(n)), c_void_p(address(c)), c_uint64(len(n)), lies
 
 
 def output(out: Floats | None, count: int, name: str = "out") -> Floats:

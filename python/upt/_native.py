@@ -213,6 +213,15 @@ class IndexSet(IntEnum):
     """Tetrahedra, 4 node indices each, positive volume."""
 
 
+class ViewKind(IntEnum):
+    """`UPT_VIEW_*`."""
+
+    REGION = 0
+    """The region's nodes in its order; all nodes where there is no region."""
+    POINTS = 1
+    """The attached points."""
+
+
 class Shape(IntEnum):
     """`UPT_SHAPE_*`."""
 
@@ -510,99 +519,6 @@ class SceneOptionsKeywords(TypedDict, total=False):
     needs corrections (without them: `UPT_ERR_UNSUPPORTED`) and leaves the learned part out."""
 
 
-class Instrument(Record):
-    """A rigid instrument; the input of `upt_scene_step_instruments` and `upt_scene_contacts_from_instruments`."""
-
-    struct_size: int
-    """`sizeof(upt_instrument)`, the same in every element of an array."""
-    shape: Shape = choice("_shape", Shape)
-    """`UPT_SHAPE_*`."""
-    position: tuple[float, ...] = vector("_position")
-    """Centre, mm, in the mesh's frame."""
-    rotation: tuple[float, ...] = vector("_rotation")
-    """Unit quaternion x, y, z, w."""
-    half_extents: tuple[float, ...] = vector("_half_extents")
-    """Half sizes along the local axes, mm; a capsule's half length is `[1]` (local y)."""
-    radius: float
-    """A capsule's radius or a spatula's corner radius, mm."""
-    sticking: bool = boolean("_sticking")
-    """Only for `upt_scene_contacts_from_instruments`. 1: touched nodes move with the instrument until it leaves; 0: they slide."""
-    mode: Mode = choice("_mode", Mode)
-    """Only for `upt_scene_step_instruments`: `UPT_MODE_*`."""
-    reserved: tuple[int, ...] = vector("_reserved")
-    """Zero."""
-    friction: float
-    """Only for `upt_scene_step_instruments`: Coulomb's coefficient, 0 or more."""
-    tear_off_mn: float
-    """A grasp tears off when its points together pull harder than this, mN; 0: never."""
-    hull: int | None
-    """`UPT_SHAPE_HULL`: the `upt_hull`; otherwise NULL."""
-
-    _fields_ = [
-        ("struct_size", ctypes.c_uint32),
-        ("_shape", ctypes.c_int32),
-        ("_position", ctypes.c_float * 3),
-        ("_rotation", ctypes.c_float * 4),
-        ("_half_extents", ctypes.c_float * 3),
-        ("radius", ctypes.c_float),
-        ("_sticking", ctypes.c_uint8),
-        ("_mode", ctypes.c_uint8),
-        ("_reserved", ctypes.c_uint8 * 2),
-        ("friction", ctypes.c_float),
-        ("tear_off_mn", ctypes.c_float),
-        ("hull", ctypes.c_void_p),
-    ]
-
-
-class InstrumentReading(Record):
-    """What the tissue does to an instrument at the end of a step; filled by `upt_scene_instrument_readings`."""
-
-    struct_size: int
-    """`sizeof(upt_instrument_reading)`, set by the caller, the same in every element of an array."""
-    contact_count: int
-    """Points of the surface that push or hold the instrument."""
-    force: tuple[float, ...] = vector("_force")
-    """On the instrument, mN."""
-    torque: tuple[float, ...] = vector("_torque")
-    """On the instrument about its position, mN mm."""
-    penetration_mm: float
-    """Depth of the deepest point of the surface inside the instrument, mm."""
-    torn: bool = boolean("_torn")
-    """1: its grasp tore off in this step."""
-    reserved: tuple[int, ...] = vector("_reserved")
-    """Zero."""
-    residual_mm: float
-    """What the last contact solve left unsolved, mm: 0 where it came to its end."""
-
-    _fields_ = [
-        ("struct_size", ctypes.c_uint32),
-        ("contact_count", ctypes.c_uint32),
-        ("_force", ctypes.c_float * 3),
-        ("_torque", ctypes.c_float * 3),
-        ("penetration_mm", ctypes.c_float),
-        ("_torn", ctypes.c_uint8),
-        ("_reserved", ctypes.c_uint8 * 3),
-        ("residual_mm", ctypes.c_float),
-    ]
-
-
-class InstrumentContact(Record):
-    """A point of the surface that pushes or holds an instrument; filled by `upt_scene_instrument_contacts`."""
-
-    instrument: int
-    """Place of the instrument in the step's array."""
-    position: tuple[float, ...] = vector("_position")
-    """Position of the point, mm."""
-    force: tuple[float, ...] = vector("_force")
-    """On the instrument, mN."""
-
-    _fields_ = [
-        ("instrument", ctypes.c_uint32),
-        ("_position", ctypes.c_float * 3),
-        ("_force", ctypes.c_float * 3),
-    ]
-
-
 class HapticsOptions(Record):
     """Options of `upt_haptics_create`."""
 
@@ -849,6 +765,156 @@ class SceneStats(Record):
     ]
 
 
+class Input(Record):
+    """The input of a step, submitted or not, and of a frame between steps. All zero but `struct_size`: nothing happens, the tissue moves on
+    by itself.
+    
+    One thing drives a step: `instruments`, the nodes in contact, or `collision`; two at once are `UPT_ERR_ARGUMENT`. Later versions add
+    fields at the end."""
+
+    struct_size: int
+    """`sizeof(upt_input)`."""
+    reserved: tuple[int, ...] = vector("_reserved")
+    """Zero."""
+    instruments: int | None
+    """`[instrument_count]`: where rigid instruments are at the end of the step, all with the same `struct_size`. Pass every instrument
+    every time, in the same order."""
+    instrument_count: int
+    """At most 64."""
+    contact_nodes: int | None
+    """`[contact_count]` nodes in contact, each at most once, in any order."""
+    contact_vectors: int | None
+    """`[contact_count,3]`, mm: the displacement of these nodes at the end of the step."""
+    contact_count: int
+    """At most K."""
+    collision: int | None
+    """`[K,3]`, mm, zero except at nodes in contact, where it is their displacement at the end of the step; NULL: no such field."""
+    displacement: int | None
+    """`[K,3]`, mm, the displacement that the step starts from; NULL: the scene's own state. Not with `instruments`."""
+    time_s: float
+    """The moment of the end of the step on the host's clock, s, from which `upt_scene_present` counts; 0 for hosts that keep none."""
+
+    _fields_ = [
+        ("struct_size", ctypes.c_uint32),
+        ("_reserved", ctypes.c_uint8 * 4),
+        ("instruments", ctypes.c_void_p),
+        ("instrument_count", ctypes.c_uint64),
+        ("contact_nodes", ctypes.c_void_p),
+        ("contact_vectors", ctypes.c_void_p),
+        ("contact_count", ctypes.c_uint64),
+        ("collision", ctypes.c_void_p),
+        ("displacement", ctypes.c_void_p),
+        ("time_s", ctypes.c_double),
+    ]
+
+
+class View(Record):
+    """What is shown of a state. Where a call takes one, NULL is the region."""
+
+    struct_size: int
+    """`sizeof(upt_view)`."""
+    kind: ViewKind = choice("_kind", ViewKind)
+    """`UPT_VIEW_*`."""
+
+    _fields_ = [
+        ("struct_size", ctypes.c_uint32),
+        ("_kind", ctypes.c_int32),
+    ]
+
+
+class Instrument(Record):
+    """A rigid instrument, as `upt_input` and `upt_scene_contacts_from_instruments` take it."""
+
+    struct_size: int
+    """`sizeof(upt_instrument)`, the same in every element of an array."""
+    shape: Shape = choice("_shape", Shape)
+    """`UPT_SHAPE_*`."""
+    position: tuple[float, ...] = vector("_position")
+    """Centre, mm, in the mesh's frame."""
+    rotation: tuple[float, ...] = vector("_rotation")
+    """Unit quaternion x, y, z, w."""
+    half_extents: tuple[float, ...] = vector("_half_extents")
+    """Half sizes along the local axes, mm; a capsule's half length is `[1]` (local y)."""
+    radius: float
+    """A capsule's radius or a spatula's corner radius, mm."""
+    sticking: bool = boolean("_sticking")
+    """Only for `upt_scene_contacts_from_instruments`. 1: touched nodes move with the instrument until it leaves; 0: they slide."""
+    mode: Mode = choice("_mode", Mode)
+    """Only for `upt_input`: `UPT_MODE_*`."""
+    reserved: tuple[int, ...] = vector("_reserved")
+    """Zero."""
+    friction: float
+    """Only for `upt_input`: Coulomb's coefficient, 0 or more."""
+    tear_off_mn: float
+    """A grasp tears off when its points together pull harder than this, mN; 0: never."""
+    hull: int | None
+    """`UPT_SHAPE_HULL`: the `upt_hull`; otherwise NULL."""
+
+    _fields_ = [
+        ("struct_size", ctypes.c_uint32),
+        ("_shape", ctypes.c_int32),
+        ("_position", ctypes.c_float * 3),
+        ("_rotation", ctypes.c_float * 4),
+        ("_half_extents", ctypes.c_float * 3),
+        ("radius", ctypes.c_float),
+        ("_sticking", ctypes.c_uint8),
+        ("_mode", ctypes.c_uint8),
+        ("_reserved", ctypes.c_uint8 * 2),
+        ("friction", ctypes.c_float),
+        ("tear_off_mn", ctypes.c_float),
+        ("hull", ctypes.c_void_p),
+    ]
+
+
+class InstrumentReading(Record):
+    """What the tissue does to an instrument at the end of a step; filled by `upt_scene_instrument_readings`."""
+
+    struct_size: int
+    """`sizeof(upt_instrument_reading)`, set by the caller, the same in every element of an array."""
+    contact_count: int
+    """Points of the surface that push or hold the instrument."""
+    force: tuple[float, ...] = vector("_force")
+    """On the instrument, mN."""
+    torque: tuple[float, ...] = vector("_torque")
+    """On the instrument about its position, mN mm."""
+    penetration_mm: float
+    """Depth of the deepest point of the surface inside the instrument, mm."""
+    torn: bool = boolean("_torn")
+    """1: its grasp tore off in this step."""
+    reserved: tuple[int, ...] = vector("_reserved")
+    """Zero."""
+    residual_mm: float
+    """What the last contact solve left unsolved, mm: 0 where it came to its end."""
+
+    _fields_ = [
+        ("struct_size", ctypes.c_uint32),
+        ("contact_count", ctypes.c_uint32),
+        ("_force", ctypes.c_float * 3),
+        ("_torque", ctypes.c_float * 3),
+        ("penetration_mm", ctypes.c_float),
+        ("_torn", ctypes.c_uint8),
+        ("_reserved", ctypes.c_uint8 * 3),
+        ("residual_mm", ctypes.c_float),
+    ]
+
+
+class InstrumentContact(Record):
+    """A point of the surface that pushes or holds an instrument; filled by `upt_scene_instrument_contacts`."""
+
+    instrument: int
+    """Place of the instrument in the step's array."""
+    position: tuple[float, ...] = vector("_position")
+    """Position of the point, mm."""
+    force: tuple[float, ...] = vector("_force")
+    """On the instrument, mN."""
+
+    _fields_ = [
+        ("instrument", ctypes.c_uint32),
+        ("_position", ctypes.c_float * 3),
+        ("_force", ctypes.c_float * 3),
+    ]
+
+
 #: Name: (result, parameters).
 FUNCTIONS: dict[str, tuple[Any, list[Any]]] = {
     "upt_init": (ctypes.c_int32, [ctypes.c_void_p]),
@@ -868,10 +934,10 @@ FUNCTIONS: dict[str, tuple[Any, list[Any]]] = {
     "upt_scene_create": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p]),
     "upt_scene_destroy": (ctypes.c_int32, [ctypes.c_void_p]),
     "upt_scene_reset": (ctypes.c_int32, [ctypes.c_void_p]),
-    "upt_scene_step": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
-    "upt_scene_step_contacts": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p, ctypes.c_uint64]),
+    "upt_scene_step": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
+    "upt_scene_step_field": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
     "upt_scene_read": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
-    "upt_scene_submit": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
+    "upt_scene_submit": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p]),
     "upt_scene_poll": (ctypes.c_int32, [ctypes.c_void_p]),
     "upt_scene_wait": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_uint32]),
     "upt_scene_sample": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p, ctypes.c_uint64]),
@@ -880,16 +946,11 @@ FUNCTIONS: dict[str, tuple[Any, list[Any]]] = {
     "upt_scene_attach_points": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
     "upt_scene_read_points": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
     "upt_scene_sample_points": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p, ctypes.c_uint64]),
-    "upt_scene_step_instruments": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p, ctypes.c_uint64]),
-    "upt_scene_submit_instruments": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
     "upt_scene_instrument_readings": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
     "upt_scene_instrument_contacts": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p]),
     "upt_hull_create": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p]),
     "upt_hull_destroy": (ctypes.c_int32, [ctypes.c_void_p]),
-    "upt_scene_present": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p, ctypes.c_uint64]),
-    "upt_scene_present_points": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p, ctypes.c_uint64]),
-    "upt_scene_present_contacts": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p, ctypes.c_uint64]),
-    "upt_scene_present_points_contacts": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p, ctypes.c_uint64]),
+    "upt_scene_present": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
     "upt_haptics_create": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p]),
     "upt_haptics_render": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p]),
     "upt_haptics_destroy": (ctypes.c_int32, [ctypes.c_void_p]),

@@ -89,37 +89,41 @@ class BatchedScenes:
         return results  # type: ignore[return-value]
 
     def step(
-        self, displacement: ArrayLike | None = None, collision: ArrayLike | None = None, out: Floats | None = None
+        self,
+        instruments: Sequence[Sequence[Instrument]] | None = None,
+        *,
+        contacts: Sequence[tuple[ArrayLike, ArrayLike] | None] | None = None,
+        collision: ArrayLike | None = None,
+        displacement: ArrayLike | None = None,
+        out: Floats | None = None,
     ) -> Floats:
-        """One step of each scene with dense fields `[N, K, 3]`, as `Scene.step`; returns `[N, n, 3]`, mm."""
+        """One step of each scene with its own input, as `Scene.step`; returns `[N, n, 3]`, mm.
+
+        Args:
+            instruments: those of each scene; what the tissue does to them: `batch.scenes[i].readings()`.
+            contacts: `(nodes [m], vectors [m, 3])` of each scene, None for no contact.
+            collision: `[N, K, 3]`, mm.
+            displacement: `[N, K, 3]`, mm.
+            out: `[N, n, 3]` to write to.
+        """
+        for entries, name in ((instruments, "instruments"), (contacts, "contacts")):
+            if entries is not None and len(entries) != len(self.scenes):
+                wanted = f"must have one for each of {len(self.scenes)} scenes"
+                raise ValueError(f"{name} has {len(entries)} entries, {wanted}")
         u = self._each(displacement, "displacement")
         c = self._each(collision, "collision")
         result = self._output(out)
-        self.map(lambda i, scene: scene.step(None if u is None else u[i], None if c is None else c[i], result[i]))
-        return result
-
-    def step_contacts(
-        self, contacts: Sequence[tuple[ArrayLike, ArrayLike] | None], out: Floats | None = None
-    ) -> Floats:
-        """One step of each scene with its own `(nodes [m], vectors [m, 3])`, None for no contact; `[N, n, 3]`, mm."""
-        self._one_each(contacts, "contacts")
-        result = self._output(out)
 
         def step(i: int, scene: Scene) -> None:
-            nodes, vectors = contacts[i] or ((), ())
-            scene.step_contacts(nodes, vectors, result[i])
+            scene.step(
+                () if instruments is None else instruments[i],
+                contacts=None if contacts is None else contacts[i],
+                collision=None if c is None else c[i],
+                displacement=None if u is None else u[i],
+                out=result[i],
+            )
 
         self.map(step)
-        return result
-
-    def step_instruments(self, instruments: Sequence[Sequence[Instrument]], out: Floats | None = None) -> Floats:
-        """One step of each scene with its own instruments, as `Scene.step_instruments`; `[N, n, 3]`, mm.
-
-        What the tissue does to them: `batch.scenes[i].readings()`.
-        """
-        self._one_each(instruments, "instruments")
-        result = self._output(out)
-        self.map(lambda i, scene: scene.step_instruments(instruments[i], result[i]))
         return result
 
     def read(self, out: Floats | None = None) -> Floats:
@@ -152,10 +156,6 @@ class BatchedScenes:
 
     def __exit__(self, *_: object) -> None:
         self.close()
-
-    def _one_each(self, entries: Sequence[object], name: str) -> None:
-        if len(entries) != len(self.scenes):
-            raise ValueError(f"{name} has {len(entries)} entries, must have one for each of {len(self.scenes)} scenes")
 
     def _each(self, fields: ArrayLike | None, name: str) -> NDArray[np.float32] | None:
         if fields is None:

@@ -42,9 +42,9 @@ class Hull:
 
 @dataclass
 class Instrument:
-    """A rigid instrument: the input of `Scene.step_instruments` and `Scene.contacts`.
+    """A rigid instrument: what drives `Scene.step`, and what `Scene.contacts` takes.
 
-    Made by `capsule`, `box`, `spatula` or `hull`; move it by assigning `position` and `rotation`.
+    Made by `sphere`, `capsule`, `box`, `spatula` or `hull`; move it by assigning `position` and `rotation`.
     """
 
     shape: Shape | str
@@ -58,15 +58,28 @@ class Instrument:
     radius: float = 0.0
     """A capsule's radius or a spatula's corner radius, mm."""
     friction: float = 0.0
-    """Coulomb's coefficient, 0 or more. Only for `step_instruments`."""
+    """Coulomb's coefficient, 0 or more. Only for `step`."""
     grasp: bool = False
-    """Whether it holds what was within 0.5 mm of it when this became true. Only for `step_instruments`."""
+    """Whether it holds what was within 0.5 mm of it when this became true. Only for `step`."""
     tear_off: float = 0.0
     """A grasp tears off when the tissue pulls harder than this, mN; 0: never."""
     sticking: bool = False
     """Only for `contacts`: touched nodes move with the instrument until it leaves."""
     hull_of: Hull | None = None
     """The shape of an instrument of shape hull."""
+
+    @classmethod
+    def sphere(
+        cls,
+        radius: float,
+        *,
+        position: Sequence[float] = (0.0, 0.0, 0.0),
+        friction: float = 0.0,
+        grasp: bool = False,
+        tear_off: float = 0.0,
+    ) -> Instrument:
+        """A ball of this radius, mm."""
+        return cls.capsule(radius, position=position, friction=friction, grasp=grasp, tear_off=tear_off)
 
     @classmethod
     def capsule(

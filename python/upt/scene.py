@@ -14,9 +14,10 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from upt._arrays import Contacts, Floats, Indices, Outputs, address, indices, number, vectors
+from upt._arrays import Floats, Indices, Outputs, address, indices, number, vectors
+from upt._input import Inputs
 from upt._library import check, lib
-from upt._native import InstrumentContact, InstrumentReading, SceneOptions, SceneStats, Status
+from upt._native import InstrumentContact, InstrumentReading, SceneOptions, SceneStats, Status, View, ViewKind
 from upt.instrument import Instrument, records
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 
     from upt._native import SceneOptionsKeywords
 
-_step_contacts, _step_instruments = lib.upt_scene_step_contacts, lib.upt_scene_step_instruments
+_step = lib.upt_scene_step
 
 #: How long `wait` waits when nothing is stated, milliseconds: 49 days.
 FOREVER_MS = 0xFFFFFFFF
@@ -60,11 +61,11 @@ class Scene:
         self._handle = handle.value
         self._destroy = weakref.finalize(self, lib.upt_scene_destroy, handle.value)
         self._steps, self._frames, self._others = Outputs(), Outputs(), Outputs()
-        self._contacts = Contacts()
         self._point_count = 0
         self._instrument_count = 0
         self._node_count = model.node_count if fields.mesh_path is None else _node_count_of(fields.mesh_path)
         self._out_count = self._node_count
+        self._inputs = Inputs(self._node_count)
 
     @property
     def node_count(self) -> int:
@@ -77,83 +78,50 @@ class Scene:
         return self._out_count
 
     def step(
-        self, displacement: ArrayLike | None = None, collision: ArrayLike | None = None, out: Floats | None = None
+        self,
+        instruments: Sequence[Instrument] = (),
+        *,
+        contacts: tuple[ArrayLike, ArrayLike] | None = None,
+        collision: ArrayLike | None = None,
+        displacement: ArrayLike | None = None,
+        time_s: float = 0.0,
+        out: Floats | None = None,
     ) -> Floats:
-        """One step with dense fields.
+        """One step. Instruments, contacts or a collision field drive it; without any the tissue moves on by itself.
 
         Args:
-            displacement: `u(t)`, `[K, 3]`, mm; None takes the scene's own state.
+            instruments: rigid instruments where they will be at the end of the step, at most 64; their contact is
+                solved. From the last step's poses they get there on a line, or are put there where that is further than
+                40 mm. Pass every instrument every time, in the same order: the scene remembers each place of the list.
+                What the tissue does to them: `readings`.
+            contacts: nodes `[m]` in contact, each once, in any order, and their displacement at the end of the step,
+                `[m, 3]`, mm.
             collision: `c(t)`, `[K, 3]`, mm, zero but at the nodes in contact: their displacement at the end of the
-                step. None means no contact.
+                step.
+            displacement: `u(t)`, `[K, 3]`, mm, to start from; None takes the scene's own state. Not with instruments.
+            time_s: the moment of the end of the step on a clock of your own, s, from which `present` counts.
             out: `[n, 3]` to write to (n: K, or the region's count); None makes a new array.
-
-        Returns:
-            `u(t + dt)`, `[n, 3]`, mm.
-        """
-        u = None if displacement is None else vectors(displacement, "displacement", self._node_count)
-        c = None if collision is None else vectors(collision, "collision", self._node_count)
-        result, place, length, _ = self._steps.place(out, self._out_count)
-        check(
-            lib.upt_scene_step(
-                self._handle,
-                None if u is None else address(u),
-                None if c is None else address(c),
-                address(result),
-                result.size,
-            )
-        )
-        self._instrument_count = 0
-        return result
-
-    def step_contacts(self, nodes: ArrayLike = (), contact: ArrayLike = (), out: Floats | None = None) -> Floats:
-        """One step from the scene's own state with the nodes in contact listed.
-
-        Args:
-            nodes: `[m]` indices, each once, in any order.
-            contact: `[m, 3]`, mm: the displacement of these nodes at the end of the step.
-            out: as in `step`.
-
-        Returns:
-            `u(t + dt)`, `[n, 3]`, mm.
-        """
-        lists = self._contacts.place(nodes, contact)
-        result, place, length, _ = self._steps.place(out, self._out_count)
-        _, _, n, c, count, _ = lists
-        if (status := _step_contacts(self._handle, n, c, count, place, length)) < 0:
-            check(status)
-        self._instrument_count = 0
-        return result
-
-    def step_instruments(self, instruments: Sequence[Instrument], out: Floats | None = None) -> Floats:
-        """One step from the scene's own state that rigid instruments drive: their contact is solved.
-
-        The instruments are where they will be at the end of the step; from the last step's poses they get there on a
-        line, or are put there where that is further than 40 mm. Pass every instrument every time, in the same order:
-        the scene remembers each place of the list. What the tissue does to them: `readings`.
-
-        Args:
-            instruments: at most 64; none: a free step.
-            out: as in `step`.
 
         Returns:
             `u(t + dt)`, `[n, 3]`, mm.
 
         Raises:
-            upt.UnsupportedError: the bundle has no linear response to solve contact with; use `contacts` and
-                `step_contacts`.
+            upt.ArgumentError: two things drive the step.
+            upt.UnsupportedError: the bundle has no linear response to solve the contact of instruments with; use
+                `contacts` of this class for the nodes that they touch.
         """
-        array, count = records(instruments)
+        at, count, kept = self._inputs.place(instruments, contacts, collision, displacement, time_s)
         result, place, length, _ = self._steps.place(out, self._out_count)
-        if (status := _step_instruments(self._handle, array, count, place, length)) < 0:
+        if (status := _step(self._handle, at, place, length)) < 0:
             check(status)
         self._instrument_count = count
         return result
 
-    def submit_instruments(self, instruments: Sequence[Instrument]) -> None:
-        """Starts such a step on the scene's worker and returns at once; the instruments are copied."""
-        array, count = records(instruments)
-        check(lib.upt_scene_submit_instruments(self._handle, array, count))
-        self._instrument_count = count
+    def step_field(
+        self, displacement: ArrayLike | None = None, collision: ArrayLike | None = None, out: Floats | None = None
+    ) -> Floats:
+        """One step of dense fields, `u(t + dt) = M(u(t), c(t))`, as the paper writes it: `step` with these two."""
+        return self.step(collision=collision, displacement=displacement, out=out)
 
     def readings(self) -> list[InstrumentReading]:
         """What the tissue did to each instrument of the last step, in their order.
@@ -180,9 +148,9 @@ class Scene:
         return list(array)
 
     def contacts(self, instruments: Sequence[Instrument]) -> tuple[Indices, Floats]:
-        """The nodes that rigid instruments touch and the displacement that they impose: the input of `step_contacts`.
+        """The nodes that rigid instruments touch and the displacement that they impose: the `contacts` of a step.
 
-        For hosts that want nodes and vectors, and for bundles without a linear response; with one, `step_instruments`
+        For hosts that want nodes and vectors, and for bundles without a linear response; with one, a step
         solves contact. Pass every instrument every time, in the same order: the scene remembers what each one touches.
 
         Returns:
@@ -209,11 +177,19 @@ class Scene:
         check(lib.upt_scene_read(self._handle, place, length))
         return result
 
-    def submit(self, nodes: ArrayLike = (), contact: ArrayLike = ()) -> None:
-        """Starts a step on the scene's worker and returns at once; arguments as in `step_contacts`, copied."""
-        lists = self._contacts.place(nodes, contact)
-        check(lib.upt_scene_submit(self._handle, *lists[2:5]))
-        self._instrument_count = 0
+    def submit(
+        self,
+        instruments: Sequence[Instrument] = (),
+        *,
+        contacts: tuple[ArrayLike, ArrayLike] | None = None,
+        collision: ArrayLike | None = None,
+        displacement: ArrayLike | None = None,
+        time_s: float = 0.0,
+    ) -> None:
+        """Starts a step on the scene's worker and returns at once; arguments as in `step`, copied."""
+        at, count, kept = self._inputs.place(instruments, contacts, collision, displacement, time_s)
+        check(lib.upt_scene_submit(self._handle, at))
+        self._instrument_count = count
 
     def poll(self) -> bool:
         """True when the submitted step has finished; raises its error, once."""
@@ -231,15 +207,26 @@ class Scene:
         check(lib.upt_scene_sample(self._handle, number(alpha, "alpha"), place, length))
         return result
 
-    def present(self, seconds: float, instruments: Sequence[Instrument] = (), out: Floats | None = None) -> Floats:
-        """The tissue at this moment, between steps, with the instruments where they are now: frames without lag.
+    def present(
+        self,
+        when: float,
+        instruments: Sequence[Instrument] = (),
+        *,
+        contacts: tuple[ArrayLike, ArrayLike] | None = None,
+        view: ViewKind | str = ViewKind.REGION,
+        out: Floats | None = None,
+    ) -> Floats:
+        """The tissue at a moment between steps, with the instruments where they are then: frames without lag.
 
         Works while a step is in flight; make the first call before the first submit. Another thread may step meanwhile.
 
         Args:
-            seconds: time since the last published step, 0 or more; velocities are followed for two steps at most.
-            instruments: as in `step_instruments`, where they are at this moment.
-            out: `[n, 3]` to write to, in the region's order.
+            when: on the clock of the steps' `time_s`, s; where they have none, the time since the last published step.
+                Velocities are followed for two steps at most.
+            instruments: as in `step`, where they are at that moment.
+            contacts: as in `step`, where the nodes are at that moment, for scenes that nodes drive.
+            view: `upt.ViewKind` or its name: region or points.
+            out: `[n, 3]` to write to, in the view's order.
 
         Returns:
             `[n, 3]`, mm.
@@ -247,38 +234,13 @@ class Scene:
         Raises:
             upt.UnsupportedError: the scene has no linear response or does not correct; use `sample`.
         """
-        array, count = records(instruments)
-        result, place, length, _ = self._frames.place(out, self._out_count)
-        check(lib.upt_scene_present(self._handle, number(seconds, "seconds"), array, count, place, length))
-        return result
-
-    def present_contacts(
-        self, seconds: float, nodes: ArrayLike = (), contact: ArrayLike = (), out: Floats | None = None
-    ) -> Floats:
-        """As `present`, with nodes `[m]` and where they are at that moment, `[m, 3]`, mm, in place of instruments."""
-        lists = self._contacts.place(nodes, contact)
-        result, place, length, _ = self._frames.place(out, self._out_count)
-        when = number(seconds, "seconds")
-        check(lib.upt_scene_present_contacts(self._handle, when, *lists[2:5], place, length))
-        return result
-
-    def present_points(
-        self, seconds: float, instruments: Sequence[Instrument] = (), out: Floats | None = None
-    ) -> Floats:
-        """As `present`, at the attached points."""
-        array, count = records(instruments)
-        result, place, length, _ = self._others.place(out, self._point_count)
-        check(lib.upt_scene_present_points(self._handle, number(seconds, "seconds"), array, count, place, length))
-        return result
-
-    def present_points_contacts(
-        self, seconds: float, nodes: ArrayLike = (), contact: ArrayLike = (), out: Floats | None = None
-    ) -> Floats:
-        """As `present_contacts`, at the attached points."""
-        lists = self._contacts.place(nodes, contact)
-        result, place, length, _ = self._others.place(out, self._point_count)
-        when = number(seconds, "seconds")
-        check(lib.upt_scene_present_points_contacts(self._handle, when, *lists[2:5], place, length))
+        at, _, kept = self._inputs.place(instruments, contacts, None, None, 0.0)
+        seen = View(kind=view)
+        count, places = self._out_count, self._frames
+        if seen.kind == ViewKind.POINTS:
+            count, places = self._point_count, self._others
+        result, place, length, _ = places.place(out, count)
+        check(lib.upt_scene_present(self._handle, at, number(when, "when"), ctypes.byref(seen), place, length))
         return result
 
     def set_region(self, nodes: ArrayLike | None) -> None:
