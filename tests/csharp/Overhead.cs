@@ -25,9 +25,9 @@ internal static class Overhead
             Array.Resize(ref nodes, 20);
             float[] vectors = new float[60];
             for (int i = 2; i < 60; i += 3) vectors[i] = -5f;
-            for (int i = 0; i < 10; i++) scene.StepContacts(nodes, vectors, 20, null);
+            for (int i = 0; i < 10; i++) scene.Step(StepInput.OfContacts(nodes, vectors, 20), null);
             foreach (int count in new[] { 16384, 65536 }) Frame(model, scene, count);
-            Row("garbage of a step", Garbage(() => scene.StepContacts(nodes, vectors, 20, null)), "bytes", 0.0);
+            Row("garbage of a step", Garbage(() => scene.Step(StepInput.OfContacts(nodes, vectors, 20), null)), "bytes", 0.0);
         }
         return 0;
     }

@@ -17,7 +17,7 @@ namespace Upt.Tests
             Model model = new Model(Bundle.Path, 1);
             Scene scene = new Scene(model);
             uint node = model.Indices(Native.UPT_SET_DOMAIN_NODES)[0];
-            scene.Submit(new[] { node }, new[] { 1f, 0f, 0f }, 1);
+            scene.Submit(StepInput.OfContacts(new[] { node }, new[] { 1f, 0f, 0f }, 1));
             AppDomain.CurrentDomain.SetData("scene", scene);
         }
 
@@ -35,7 +35,7 @@ namespace Upt.Tests
                 using (Model model = new Model(Bundle.Path, 1))
                 using (Scene scene = new Scene(model))
                 {
-                    scene.Step(null, null, null);
+                    scene.StepField(null, null, null);
                     Assert.That(scene.Stats().step_count, Is.EqualTo(1));
                 }
             }

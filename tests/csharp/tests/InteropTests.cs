@@ -93,7 +93,7 @@ namespace Upt.Tests
                 for (int step = 1; step <= 160; step++)
                 {
                     int count = Push(model, step, nodes, vectors);
-                    scene.StepContacts(nodes, vectors, count, u);
+                    scene.Step(StepInput.OfContacts(nodes, vectors, count), u);
                     foreach (float x in u) largest = Math.Max(largest, Math.Abs(x));
                 }
                 Assert.That(largest, Is.GreaterThan(7.9f), "the contact nodes were pushed by 8 mm");
@@ -117,12 +117,12 @@ namespace Upt.Tests
                 float[] before = new float[3 * model.NodeCount];
                 float[] after = new float[3 * model.NodeCount];
                 int count = Push(model, 30, nodes, vectors);
-                scene.StepContacts(nodes, vectors, count, before);
-                Assert.Throws<ArgumentException>(() => scene.Step(null, new float[3], null));
-                Assert.Throws<ArgumentOutOfRangeException>(() => scene.StepContacts(new uint[1], new float[3], 2, null));
-                Assert.Throws<UptException>(() => scene.StepContacts(nodes, vectors, count, new float[5]));
+                scene.Step(StepInput.OfContacts(nodes, vectors, count), before);
+                Assert.Throws<ArgumentException>(() => scene.StepField(null, new float[3], null));
+                Assert.Throws<ArgumentOutOfRangeException>(() => scene.Step(StepInput.OfContacts(new uint[1], new float[3], 2), null));
+                Assert.Throws<UptException>(() => scene.Step(StepInput.OfContacts(nodes, vectors, count), new float[5]));
                 vectors[0] = float.NaN;
-                UptException error = Assert.Throws<UptException>(() => scene.StepContacts(nodes, vectors, count, null));
+                UptException error = Assert.Throws<UptException>(() => scene.Step(StepInput.OfContacts(nodes, vectors, count), null));
                 Assert.That(error.Status, Is.EqualTo(Native.UPT_ERR_NON_FINITE));
                 scene.Read(after);
                 Assert.That(after, Is.EqualTo(before));
@@ -142,8 +142,8 @@ namespace Upt.Tests
                 for (int step = 1; step <= 10; step++)
                 {
                     int count = Push(model, step, nodes, vectors);
-                    pushed.StepContacts(nodes, vectors, count, null);
-                    idle.StepContacts(null, null, 0, u);
+                    pushed.Step(StepInput.OfContacts(nodes, vectors, count), null);
+                    idle.Step(default(StepInput), u);
                 }
                 foreach (float x in u) Assert.That(x, Is.EqualTo(0f));
                 pushed.Read(u);
@@ -159,11 +159,11 @@ namespace Upt.Tests
             Model model = new Model(Bundle.Path, 1);
             Scene scene = new Scene(model);
             model.Dispose();
-            scene.Step(null, null, null);
+            scene.StepField(null, null, null);
             scene.Dispose();
             scene.Dispose();
             model.Dispose();
-            Assert.Throws<ObjectDisposedException>(() => scene.Step(null, null, null));
+            Assert.Throws<ObjectDisposedException>(() => scene.StepField(null, null, null));
             Assert.Throws<ObjectDisposedException>(() => new Scene(model));
         }
 
@@ -181,8 +181,8 @@ namespace Upt.Tests
                 for (int step = 1; step <= 20; step++)
                 {
                     int count = Push(model, step, nodes, vectors);
-                    direct.StepContacts(nodes, vectors, count, a);
-                    worker.Submit(nodes, vectors, count);
+                    direct.Step(StepInput.OfContacts(nodes, vectors, count), a);
+                    worker.Submit(StepInput.OfContacts(nodes, vectors, count));
                     Assert.That(worker.Wait(uint.MaxValue), "the step has finished");
                     worker.Read(b);
                     Assert.That(b, Is.EqualTo(a), "step " + step);
@@ -200,7 +200,7 @@ namespace Upt.Tests
                     Scene scene = new Scene(model);
                     uint[] nodes = new uint[model.NodeCount];
                     float[] vectors = new float[3 * model.NodeCount];
-                    scene.Submit(nodes, vectors, Push(model, 20, nodes, vectors));
+                    scene.Submit(StepInput.OfContacts(nodes, vectors, Push(model, 20, nodes, vectors)));
                     scene.Dispose();
                 }
             }
@@ -217,13 +217,13 @@ namespace Upt.Tests
                 float[] first = new float[3 * model.NodeCount];
                 float[] second = new float[3 * model.NodeCount];
                 for (int step = 1; step <= 10; step++)
-                    scene.StepContacts(nodes, vectors, Push(model, step, nodes, vectors), null);
+                    scene.Step(StepInput.OfContacts(nodes, vectors, Push(model, step, nodes, vectors)), null);
                 byte[] snapshot = scene.Save();
                 int count = Push(model, 11, nodes, vectors);
-                scene.StepContacts(nodes, vectors, count, first);
+                scene.Step(StepInput.OfContacts(nodes, vectors, count), first);
                 scene.Reset();
                 scene.Restore(snapshot);
-                scene.StepContacts(nodes, vectors, count, second);
+                scene.Step(StepInput.OfContacts(nodes, vectors, count), second);
                 Assert.That(second, Is.EqualTo(first));
                 snapshot[snapshot.Length / 2] ^= 0x40;
                 Assert.Throws<UptException>(() => scene.Restore(snapshot));
@@ -241,13 +241,13 @@ namespace Upt.Tests
                 scene.SetRegion(model.Indices(Native.UPT_SET_DOMAIN_NODES));
                 float[] region = new float[3 * scene.RegionCount];
                 int count = Push(model, 20, nodes, vectors);
-                for (int step = 0; step < 100; step++) scene.StepContacts(nodes, vectors, count, region);
+                for (int step = 0; step < 100; step++) scene.Step(StepInput.OfContacts(nodes, vectors, count), region);
                 GC.Collect();
                 GC.WaitForPendingFinalizers();
                 int collections = GC.CollectionCount(0);
                 long before = GC.GetTotalMemory(true);
                 int since = GC.CollectionCount(0);
-                for (int step = 0; step < 10000; step++) scene.StepContacts(nodes, vectors, count, region);
+                for (int step = 0; step < 10000; step++) scene.Step(StepInput.OfContacts(nodes, vectors, count), region);
                 long after = GC.GetTotalMemory(false);
                 Console.WriteLine("managed bytes over 10,000 steps: " + (after - before) + ", collections: " +
                                   (GC.CollectionCount(0) - since) + " (" + collections + " before)");

@@ -350,7 +350,7 @@ namespace Upt
                 submittedCount = clock.Start(now, ref stepPoses);
                 inFlight = true;
                 TakePlaces();
-                scene.SubmitInstruments(stepPoses, submittedCount);
+                scene.Submit(StepInput.OfInstruments(stepPoses, submittedCount));
             }
         }
 
@@ -367,7 +367,7 @@ namespace Upt
                     TakePlaces();
                     try
                     {
-                        scene.StepInstruments(stepPoses, submittedCount, null);
+                        scene.Step(StepInput.OfInstruments(stepPoses, submittedCount), null);
                     }
                     catch (UptException error)
                     {
@@ -442,11 +442,11 @@ namespace Upt
             TakePlaces();
             if (solvesContact)
             {
-                scene.SubmitInstruments(poses, count);
+                scene.Submit(StepInput.OfInstruments(poses, count));
                 return;
             }
             contactCount = count == 0 ? 0 : scene.ContactsFrom(poses, count, contactNodes, contactVectors);
-            scene.Submit(contactNodes, contactVectors, contactCount);
+            scene.Submit(StepInput.OfContacts(contactNodes, contactVectors, contactCount));
         }
 
         /// <summary>Where the instruments are now; their number.</summary>
@@ -499,7 +499,7 @@ namespace Upt
         {
             try
             {
-                scene.StepInstruments(null, 0, null);
+                scene.Step(StepInput.OfInstruments(new[] { FarAway() }, 1), null);
             }
             catch (UptException error)
             {

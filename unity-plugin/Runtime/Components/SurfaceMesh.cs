@@ -98,8 +98,8 @@ namespace Upt
         /// they are then. No managed memory is allocated.</summary>
         public void Present(Scene scene, double seconds, upt_instrument[] instruments, int count)
         {
-            scene.PresentPoints(seconds, instruments, count,
-                                (float*)NativeArrayUnsafeUtility.GetUnsafePtr(displacement), displacement.Length);
+            scene.Present(StepInput.OfInstruments(instruments, count), seconds, Native.UPT_VIEW_POINTS,
+                          (float*)NativeArrayUnsafeUtility.GetUnsafePtr(displacement), displacement.Length);
         }
 
         /// <summary>Uploads the sampled vertices. No managed memory is allocated.</summary>

@@ -148,70 +148,6 @@ namespace Upt.Interop
         public double damping_per_s;
     }
 
-    /// <summary>A rigid instrument; the input of `upt_scene_step_instruments` and `upt_scene_contacts_from_instruments`.</summary>
-    [StructLayout(LayoutKind.Sequential)]
-    public unsafe struct upt_instrument
-    {
-        /// <summary>`sizeof(upt_instrument)`, the same in every element of an array.</summary>
-        public uint struct_size;
-        /// <summary>`UPT_SHAPE_*`.</summary>
-        public int shape;
-        /// <summary>Centre, mm, in the mesh's frame.</summary>
-        public fixed float position[3];
-        /// <summary>Unit quaternion x, y, z, w.</summary>
-        public fixed float rotation[4];
-        /// <summary>Half sizes along the local axes, mm; a capsule's half length is `[1]` (local y).</summary>
-        public fixed float half_extents[3];
-        /// <summary>A capsule's radius or a spatula's corner radius, mm.</summary>
-        public float radius;
-        /// <summary>Only for `upt_scene_contacts_from_instruments`. 1: touched nodes move with the instrument until it leaves; 0: they slide.</summary>
-        public byte sticking;
-        /// <summary>Only for `upt_scene_step_instruments`: `UPT_MODE_*`.</summary>
-        public byte mode;
-        /// <summary>Zero.</summary>
-        public fixed byte reserved[2];
-        /// <summary>Only for `upt_scene_step_instruments`: Coulomb's coefficient, 0 or more.</summary>
-        public float friction;
-        /// <summary>A grasp tears off when its points together pull harder than this, mN; 0: never.</summary>
-        public float tear_off_mn;
-        /// <summary>`UPT_SHAPE_HULL`: the `upt_hull`; otherwise NULL.</summary>
-        public IntPtr hull;
-    }
-
-    /// <summary>What the tissue does to an instrument at the end of a step; filled by `upt_scene_instrument_readings`.</summary>
-    [StructLayout(LayoutKind.Sequential)]
-    public unsafe struct upt_instrument_reading
-    {
-        /// <summary>`sizeof(upt_instrument_reading)`, set by the caller, the same in every element of an array.</summary>
-        public uint struct_size;
-        /// <summary>Points of the surface that push or hold the instrument.</summary>
-        public uint contact_count;
-        /// <summary>On the instrument, mN.</summary>
-        public fixed float force[3];
-        /// <summary>On the instrument about its position, mN mm.</summary>
-        public fixed float torque[3];
-        /// <summary>Depth of the deepest point of the surface inside the instrument, mm.</summary>
-        public float penetration_mm;
-        /// <summary>1: its grasp tore off in this step.</summary>
-        public byte torn;
-        /// <summary>Zero.</summary>
-        public fixed byte reserved[3];
-        /// <summary>What the last contact solve left unsolved, mm: 0 where it came to its end.</summary>
-        public float residual_mm;
-    }
-
-    /// <summary>A point of the surface that pushes or holds an instrument; filled by `upt_scene_instrument_contacts`.</summary>
-    [StructLayout(LayoutKind.Sequential)]
-    public unsafe struct upt_instrument_contact
-    {
-        /// <summary>Place of the instrument in the step's array.</summary>
-        public uint instrument;
-        /// <summary>Position of the point, mm.</summary>
-        public fixed float position[3];
-        /// <summary>On the instrument, mN.</summary>
-        public fixed float force[3];
-    }
-
     /// <summary>Options of `upt_haptics_create`.</summary>
     [StructLayout(LayoutKind.Sequential)]
     public unsafe struct upt_haptics_options
@@ -366,6 +302,115 @@ namespace Upt.Interop
         public double contact_ms;
     }
 
+    /// <summary>
+    /// The input of a step, submitted or not, and of a frame between steps. All zero but `struct_size`: nothing happens, the tissue moves on
+    /// by itself.
+    ///
+    /// One thing drives a step: `instruments`, the nodes in contact, or `collision`; two at once are `UPT_ERR_ARGUMENT`. Later versions add
+    /// fields at the end.
+    /// </summary>
+    [StructLayout(LayoutKind.Sequential)]
+    public unsafe struct upt_input
+    {
+        /// <summary>`sizeof(upt_input)`.</summary>
+        public uint struct_size;
+        /// <summary>Zero.</summary>
+        public fixed byte reserved[4];
+        /// <summary>
+        /// `[instrument_count]`: where rigid instruments are at the end of the step, all with the same `struct_size`. Pass every instrument
+        /// every time, in the same order.
+        /// </summary>
+        public upt_instrument* instruments;
+        /// <summary>At most 64.</summary>
+        public ulong instrument_count;
+        /// <summary>`[contact_count]` nodes in contact, each at most once, in any order.</summary>
+        public uint* contact_nodes;
+        /// <summary>`[contact_count,3]`, mm: the displacement of these nodes at the end of the step.</summary>
+        public float* contact_vectors;
+        /// <summary>At most K.</summary>
+        public ulong contact_count;
+        /// <summary>`[K,3]`, mm, zero except at nodes in contact, where it is their displacement at the end of the step; NULL: no such field.</summary>
+        public float* collision;
+        /// <summary>`[K,3]`, mm, the displacement that the step starts from; NULL: the scene's own state. Not with `instruments`.</summary>
+        public float* displacement;
+        /// <summary>The moment of the end of the step on the host's clock, s, from which `upt_scene_present` counts; 0 for hosts that keep none.</summary>
+        public double time_s;
+    }
+
+    /// <summary>What is shown of a state. Where a call takes one, NULL is the region.</summary>
+    [StructLayout(LayoutKind.Sequential)]
+    public unsafe struct upt_view
+    {
+        /// <summary>`sizeof(upt_view)`.</summary>
+        public uint struct_size;
+        /// <summary>`UPT_VIEW_*`.</summary>
+        public int kind;
+    }
+
+    /// <summary>A rigid instrument, as `upt_input` and `upt_scene_contacts_from_instruments` take it.</summary>
+    [StructLayout(LayoutKind.Sequential)]
+    public unsafe struct upt_instrument
+    {
+        /// <summary>`sizeof(upt_instrument)`, the same in every element of an array.</summary>
+        public uint struct_size;
+        /// <summary>`UPT_SHAPE_*`.</summary>
+        public int shape;
+        /// <summary>Centre, mm, in the mesh's frame.</summary>
+        public fixed float position[3];
+        /// <summary>Unit quaternion x, y, z, w.</summary>
+        public fixed float rotation[4];
+        /// <summary>Half sizes along the local axes, mm; a capsule's half length is `[1]` (local y).</summary>
+        public fixed float half_extents[3];
+        /// <summary>A capsule's radius or a spatula's corner radius, mm.</summary>
+        public float radius;
+        /// <summary>Only for `upt_scene_contacts_from_instruments`. 1: touched nodes move with the instrument until it leaves; 0: they slide.</summary>
+        public byte sticking;
+        /// <summary>Only for `upt_input`: `UPT_MODE_*`.</summary>
+        public byte mode;
+        /// <summary>Zero.</summary>
+        public fixed byte reserved[2];
+        /// <summary>Only for `upt_input`: Coulomb's coefficient, 0 or more.</summary>
+        public float friction;
+        /// <summary>A grasp tears off when its points together pull harder than this, mN; 0: never.</summary>
+        public float tear_off_mn;
+        /// <summary>`UPT_SHAPE_HULL`: the `upt_hull`; otherwise NULL.</summary>
+        public IntPtr hull;
+    }
+
+    /// <summary>What the tissue does to an instrument at the end of a step; filled by `upt_scene_instrument_readings`.</summary>
+    [StructLayout(LayoutKind.Sequential)]
+    public unsafe struct upt_instrument_reading
+    {
+        /// <summary>`sizeof(upt_instrument_reading)`, set by the caller, the same in every element of an array.</summary>
+        public uint struct_size;
+        /// <summary>Points of the surface that push or hold the instrument.</summary>
+        public uint contact_count;
+        /// <summary>On the instrument, mN.</summary>
+        public fixed float force[3];
+        /// <summary>On the instrument about its position, mN mm.</summary>
+        public fixed float torque[3];
+        /// <summary>Depth of the deepest point of the surface inside the instrument, mm.</summary>
+        public float penetration_mm;
+        /// <summary>1: its grasp tore off in this step.</summary>
+        public byte torn;
+        /// <summary>Zero.</summary>
+        public fixed byte reserved[3];
+        /// <summary>What the last contact solve left unsolved, mm: 0 where it came to its end.</summary>
+        public float residual_mm;
+    }
+
+    /// <summary>A point of the surface that pushes or holds an instrument; filled by `upt_scene_instrument_contacts`.</summary>
+    [StructLayout(LayoutKind.Sequential)]
+    public unsafe struct upt_instrument_contact
+    {
+        /// <summary>Place of the instrument in the step's array.</summary>
+        public uint instrument;
+        /// <summary>Position of the point, mm.</summary>
+        public fixed float position[3];
+        /// <summary>On the instrument, mN.</summary>
+        public fixed float force[3];
+    }
+
     /// <summary>The C ABI, as it is.</summary>
     public static unsafe class Native
     {
@@ -517,6 +562,10 @@ namespace Upt.Interop
         public const int UPT_SET_DOMAIN_FACES = 4;
         /// <summary>Tetrahedra, 4 node indices each, positive volume.</summary>
         public const int UPT_SET_TETS = 5;
+        /// <summary>The region's nodes in its order; all nodes where there is no region.</summary>
+        public const int UPT_VIEW_REGION = 0;
+        /// <summary>The attached points.</summary>
+        public const int UPT_VIEW_POINTS = 1;
         /// <summary>An instrument's shape: a capsule along local y.</summary>
         public const int UPT_SHAPE_CAPSULE = 0;
         /// <summary>An instrument's shape: a box.</summary>
@@ -719,34 +768,42 @@ namespace Upt.Interop
         public static extern int upt_scene_reset(IntPtr scene);
 
         /// <summary>
-        /// One step: u(t), c(t) -&gt; u(t + dt).
+        /// One step of the scene's `dt`, as `input` drives it.
         ///
-        /// - `displacement`: `[K,3]`, mm; NULL uses the scene's own state.
-        /// - `collision`: `[K,3]`, mm, zero except at nodes in contact, where it is the displacement that the instrument imposes
-        /// by the end of the step; NULL means no contact.
+        /// Instruments are where they will be at the end of the step: each moves there on a straight line from its last pose, and their contact is
+        /// solved. An instrument that would move more than 40 mm in a step is placed there without a motion. Contact is unilateral, with
+        /// Coulomb friction, at points of the domain's surface at most 1.7 mm apart. A scene with corrections solves it inside each
+        /// correction, as a load; with `corrections = UPT_CORRECTIONS_NONE` it is solved once, on the linear response. The scene remembers
+        /// each place of the array: pass every instrument every time, in the same order.
+        ///
+        /// - `input`: what drives the step; NULL: nothing does, the tissue moves on by itself.
         /// - `out`: `[n,3]`, mm (n: K, or the region's count), may be NULL; it may be the memory of an input, at the cost of a
         /// copy.
         /// - `out_count`: number of floats in `out`, 3 n; 0 when out is NULL.
         ///
         /// Threads: one at a time.
+        /// Errors: `UPT_ERR_STRUCT_SIZE` for an input of another size; `UPT_ERR_ARGUMENT` also for two drives at once, for a displacement with
+        /// instruments and for a node beyond K or listed twice; `UPT_ERR_NON_FINITE`; for instruments `UPT_ERR_UNSUPPORTED` in a build without
+        /// feature "instruments" and for a bundle without a linear response, and `UPT_ERR_HANDLE` for a hull that was destroyed; `UPT_ERR_NULL`,
+        /// `UPT_ERR_BUSY`, `UPT_ERR_GUARD`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`; the state does not change.
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_scene_step(IntPtr scene, upt_input* input, float* @out, ulong out_count);
+
+        /// <summary>
+        /// One step of dense fields, `u(t), c(t) -&gt; u(t + dt)`, as the paper writes it: `upt_scene_step` with `displacement` and `collision`.
+        ///
+        /// - `displacement`: `[K,3]`, mm; NULL uses the scene's own state.
+        /// - `collision`: `[K,3]`, mm, zero except at nodes in contact, where it is the displacement that is imposed by the end of the step; NULL
+        /// means no contact.
+        /// - `out`, `out_count`, threads: as in `upt_scene_step`.
+        ///
         /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NON_FINITE`,
         /// `UPT_ERR_UNSUPPORTED`, `UPT_ERR_GUARD`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`; the state does
         /// not change.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_step(IntPtr scene, float* displacement, float* collision, float* @out, ulong out_count);
-
-        /// <summary>
-        /// One step from the scene's own state, with a list of the nodes in contact.
-        ///
-        /// - `contact_nodes`: `[m]` node indices, each at most once, in any order.
-        /// - `contact_vectors`: `[m,3]`, mm: the displacement of these nodes at the end of the step.
-        /// - `contact_count`: m; 0 means no contact and both may be NULL.
-        /// - `out`, `out_count`, threads and errors: as in `upt_scene_step`; also `UPT_ERR_ARGUMENT` for an index or a count
-        /// beyond K.
-        /// </summary>
-        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_step_contacts(IntPtr scene, uint* contact_nodes, float* contact_vectors, ulong contact_count, float* @out, ulong out_count);
+        public static extern int upt_scene_step_field(IntPtr scene, float* displacement, float* collision, float* @out, ulong out_count);
 
         /// <summary>
         /// Copies the last published state.
@@ -764,16 +821,16 @@ namespace Upt.Interop
         /// Starts a step on the scene's worker thread and returns at once. An error of an earlier step that was not reported yet
         /// is still reported.
         ///
-        /// - `contact_nodes`, `contact_vectors`, `contact_count`: as in `upt_scene_step_contacts`; checked and copied before the
-        /// call returns.
+        /// - `input`: as in `upt_scene_step`; checked and copied before the call returns.
         ///
         /// Threads: one at a time.
         /// Errors: `UPT_ERR_BUSY` while a step is in flight (unless the scene was made with `latest_wins`), `UPT_ERR_NULL`,
-        /// `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` (also for an index or a count beyond K, or a node listed twice),
-        /// `UPT_ERR_NON_FINITE`, `UPT_ERR_STATE` if no thread can be started, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
+        /// `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT` and `UPT_ERR_NON_FINITE` for the input, `UPT_ERR_UNSUPPORTED` for
+        /// instruments in a build without feature "instruments", `UPT_ERR_STATE` if no thread can be started, `UPT_ERR_OUT_OF_MEMORY`,
+        /// `UPT_ERR_PANIC`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_submit(IntPtr scene, uint* contact_nodes, float* contact_vectors, ulong contact_count);
+        public static extern int upt_scene_submit(IntPtr scene, upt_input* input);
 
         /// <summary>
         /// Asks whether the submitted step has finished. Never waits.
@@ -880,33 +937,6 @@ namespace Upt.Interop
         public static extern int upt_scene_sample_points(IntPtr scene, double alpha, float* @out, ulong out_count);
 
         /// <summary>
-        /// One step from the scene's own state, driven by rigid instruments. Their contact with the tissue is solved.
-        ///
-        /// Give the pose of each instrument at the end of the step; the instrument moves there on a straight line from its last
-        /// pose. An instrument that would move more than 40 mm in a step is placed there without a motion. Contact is unilateral, with Coulomb
-        /// friction, at points of the domain's surface at most 1.7 mm apart. A scene with corrections solves it inside each
-        /// correction, as a load; with `corrections = UPT_CORRECTIONS_NONE` it is solved once, on the linear response. The scene
-        /// remembers each place of the array: pass every instrument every time, in the same order.
-        ///
-        /// - `instruments`: at most 64, all with the same `struct_size`; NULL with count 0 makes a step without contact.
-        /// - `out`, `out_count`, threads and errors: as in `upt_scene_step`; also `UPT_ERR_UNSUPPORTED` in a build without
-        /// feature "instruments" and for a bundle without a linear response, `UPT_ERR_STRUCT_SIZE`, and `UPT_ERR_HANDLE` for a hull
-        /// that was destroyed.
-        /// </summary>
-        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_step_instruments(IntPtr scene, upt_instrument* instruments, ulong instrument_count, float* @out, ulong out_count);
-
-        /// <summary>
-        /// Starts a step driven by rigid instruments on the scene's worker thread and returns at once.
-        ///
-        /// - `instruments`, `instrument_count`: as in `upt_scene_step_instruments`; checked and copied before the call returns.
-        ///
-        /// Threads and errors: those of `upt_scene_submit` and of `upt_scene_step_instruments`.
-        /// </summary>
-        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_submit_instruments(IntPtr scene, upt_instrument* instruments, ulong instrument_count);
-
-        /// <summary>
         /// Copies the force, torque and penetration of each instrument at the end of the last step.
         ///
         /// - `out`: `[count]`, in the order of the step's instruments; set `struct_size` of every element.
@@ -963,65 +993,24 @@ namespace Upt.Interop
         /// frames start from where they would have been without it. They blend into the new step within two fifths of a step, or at 25 mm/s where
         /// that takes longer, but always within two steps.
         ///
-        /// - `seconds`: time since the last published step, 0 or more; velocities are followed for two steps at most.
-        /// - `instruments`: as `upt_scene_step_instruments`.
-        /// - `out`: `[n,3]`, mm, in the region's order.
+        /// - `input`: what drives the tissue, where it is at `when`: instruments, or for scenes that nodes drive these nodes and where they are.
+        /// Nodes of the last step that are no longer listed are released: they lose the force that held them. Neither `displacement` nor
+        /// `time_s` may be set. NULL: nothing touches the tissue.
+        /// - `when`: the moment on the clock of the steps' `time_s`, s, not before that of the last published step; for hosts whose steps have
+        /// no time, the time since the last published step. Velocities are followed for two steps at most.
+        /// - `view`: the region or the attached points; NULL: the region.
+        /// - `out`: `[n,3]`, mm, in the view's order.
         /// - `out_count`: number of floats in `out`, 3 n.
         ///
         /// Threads: one thread at a time presents; another may step or submit meanwhile.
         /// Errors: `UPT_ERR_BUSY` while another thread presents, and if a step is in flight at the first call;
         /// `UPT_ERR_UNSUPPORTED` in a build without feature "instruments", for a bundle without a linear response or corrections, and
-        /// for a scene without corrections; `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`,
-        /// `UPT_ERR_NON_FINITE`, `UPT_ERR_STATE`, `UPT_ERR_RUNTIME`, `UPT_ERR_IO`, `UPT_ERR_BUNDLE`, `UPT_ERR_OUT_OF_MEMORY`,
-        /// `UPT_ERR_PANIC`.
+        /// for a scene without corrections; `UPT_ERR_STATE` for the points when none are attached; `UPT_ERR_NULL`, `UPT_ERR_HANDLE`,
+        /// `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NON_FINITE`, `UPT_ERR_RUNTIME`, `UPT_ERR_IO`, `UPT_ERR_BUNDLE`,
+        /// `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_present(IntPtr scene, double seconds, upt_instrument* instruments, ulong instrument_count, float* @out, ulong out_count);
-
-        /// <summary>
-        /// As `upt_scene_present`, at the attached points.
-        ///
-        /// - `seconds`, `instruments`: as `upt_scene_present`.
-        /// - `out`: `[n,3]`, mm.
-        /// - `out_count`: number of floats in `out`, 3 n.
-        ///
-        /// Threads: one thread at a time presents, the region or points; another may step or submit meanwhile.
-        /// Errors: those of `upt_scene_present`; `UPT_ERR_STATE` when no points are attached.
-        /// </summary>
-        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_present_points(IntPtr scene, double seconds, upt_instrument* instruments, ulong instrument_count, float* @out, ulong out_count);
-
-        /// <summary>
-        /// As `upt_scene_present`, with a collision field in place of instruments, for scenes that `upt_scene_step_contacts` drives.
-        ///
-        /// The listed nodes go where the list says; the others follow by the compliance of that time. Nodes of the last step that are no longer
-        /// listed are released: they lose the force that held them.
-        ///
-        /// - `seconds`: as `upt_scene_present`.
-        /// - `contact_nodes`: `[m]` node indices, each at most once, in any order.
-        /// - `contact_vectors`: `[m,3]`, mm: the displacement of these nodes at that moment.
-        /// - `contact_count`: m; 0 means no contact and both may be NULL.
-        /// - `out`: `[n,3]`, mm, in the region's order.
-        /// - `out_count`: number of floats in `out`, 3 n.
-        ///
-        /// Threads: as `upt_scene_present`.
-        /// Errors: those of `upt_scene_present`; also `UPT_ERR_ARGUMENT` for an index or a count beyond K.
-        /// </summary>
-        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_present_contacts(IntPtr scene, double seconds, uint* contact_nodes, float* contact_vectors, ulong contact_count, float* @out, ulong out_count);
-
-        /// <summary>
-        /// As `upt_scene_present_contacts`, at the attached points.
-        ///
-        /// - `seconds`, `contact_nodes`, `contact_vectors`, `contact_count`: as `upt_scene_present_contacts`.
-        /// - `out`: `[n,3]`, mm.
-        /// - `out_count`: number of floats in `out`, 3 n.
-        ///
-        /// Threads: as `upt_scene_present_points`.
-        /// Errors: those of `upt_scene_present_contacts`; `UPT_ERR_STATE` when no points are attached.
-        /// </summary>
-        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_present_points_contacts(IntPtr scene, double seconds, uint* contact_nodes, float* contact_vectors, ulong contact_count, float* @out, ulong out_count);
+        public static extern int upt_scene_present(IntPtr scene, upt_input* input, double when, upt_view* view, float* @out, ulong out_count);
 
         /// <summary>
         /// Lets a hand feel a tool: from now on, each step of the scene prepares what `upt_haptics_render` needs.

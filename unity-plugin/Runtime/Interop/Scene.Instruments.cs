@@ -2,37 +2,9 @@ using System;
 
 namespace Upt.Interop
 {
-    // Steps that rigid instruments drive, and what they feel.
+    // What rigid instruments feel.
     public sealed unsafe partial class Scene
     {
-        /// <summary>One step from the scene's own state that the first <paramref name="count"/> instruments drive: their
-        /// contact is solved. Throws <c>UPT_ERR_UNSUPPORTED</c> for a bundle without a linear response.</summary>
-        public void StepInstruments(upt_instrument[] instruments, int count, float[] output)
-        {
-            RequireInstruments(instruments, count);
-            IntPtr scene = Enter();
-            try
-            {
-                fixed (upt_instrument* i = instruments)
-                fixed (float* o = output)
-                    Status.Check(Native.upt_scene_step_instruments(scene, i, (ulong)count, o, Length(output)));
-            }
-            finally { Leave(); }
-        }
-
-        /// <summary>Hands such a step to the scene's worker and returns at once; the instruments are copied.</summary>
-        public void SubmitInstruments(upt_instrument[] instruments, int count)
-        {
-            RequireInstruments(instruments, count);
-            IntPtr scene = Enter();
-            try
-            {
-                fixed (upt_instrument* i = instruments)
-                    Status.Check(Native.upt_scene_submit_instruments(scene, i, (ulong)count));
-            }
-            finally { Leave(); }
-        }
-
         /// <summary>What the tissue did to each instrument of the last step; <paramref name="count"/> is their
         /// number.</summary>
         public void Readings(upt_instrument_reading[] output, int count)
@@ -108,14 +80,6 @@ namespace Upt.Interop
                 return new Haptics(created);
             }
             finally { Leave(); }
-        }
-
-        private static void RequireInstruments(upt_instrument[] instruments, int count)
-        {
-            int room = instruments == null ? 0 : instruments.Length;
-            if (count < 0 || count > room)
-                throw new ArgumentOutOfRangeException(
-                    "count", "count is " + count + ", the array holds " + room + " instruments");
         }
     }
 }

@@ -40,65 +40,38 @@ namespace Upt.Interop
             finally { Leave(); }
         }
 
-        /// <summary>Displacement of the attached points <paramref name="seconds"/> after the last published step, with the first
-        /// <paramref name="count"/> instruments where they are then. Throws <c>UPT_ERR_UNSUPPORTED</c> where the scene does not
-        /// correct. The pointer may be a <c>NativeArray</c>'s.</summary>
-        public void PresentPoints(double seconds, upt_instrument[] instruments, int count, float* output, int floats)
+        /// <summary>Displacement at <paramref name="when"/>, between steps, with the instruments or nodes of
+        /// <paramref name="input"/> where they are then: of the region, or of the attached points
+        /// (<c>UPT_VIEW_*</c>). The moment is on the clock of the steps' times, or without one the time since the last
+        /// published step, s. Throws <c>UPT_ERR_UNSUPPORTED</c> where the scene does not correct. The pointer may be a
+        /// <c>NativeArray</c>'s.</summary>
+        public void Present(StepInput input, double when, int view, float* output, int floats)
         {
-            RequireInstruments(instruments, count);
+            input.Require(NodeCount);
+            upt_view shown = default(upt_view);
+            shown.struct_size = (uint)sizeof(upt_view);
+            shown.kind = view;
             IntPtr scene = Enter();
             try
             {
-                fixed (upt_instrument* i = instruments)
-                    Status.Check(Native.upt_scene_present_points(scene, seconds, i, (ulong)count, output,
-                                                                 checked((ulong)floats)));
+                fixed (upt_instrument* i = input.Instruments)
+                fixed (uint* n = input.ContactNodes)
+                fixed (float* v = input.ContactVectors)
+                fixed (float* c = input.Collision)
+                fixed (float* u = input.Displacement)
+                {
+                    upt_input raw = input.Raw(i, n, v, c, u);
+                    Status.Check(Native.upt_scene_present(scene, &raw, when, &shown, output, checked((ulong)floats)));
+                }
             }
             finally { Leave(); }
         }
 
         /// <summary>The same in the region's order.</summary>
-        public void Present(double seconds, upt_instrument[] instruments, int count, float[] output)
+        public void Present(StepInput input, double when, float[] output)
         {
-            RequireInstruments(instruments, count);
-            IntPtr scene = Enter();
-            try
-            {
-                fixed (upt_instrument* i = instruments)
-                fixed (float* o = output)
-                    Status.Check(Native.upt_scene_present(scene, seconds, i, (ulong)count, o, Length(output)));
-            }
-            finally { Leave(); }
-        }
-
-        /// <summary>As <see cref="Present"/>, with the first <paramref name="count"/> entries of a contact list, where the nodes are
-        /// then, in place of instruments.</summary>
-        public void PresentContacts(double seconds, uint[] nodes, float[] vectors, int count, float[] output)
-        {
-            RequireContacts(nodes, vectors, count);
-            IntPtr scene = Enter();
-            try
-            {
-                fixed (uint* n = nodes)
-                fixed (float* v = vectors)
-                fixed (float* o = output)
-                    Status.Check(Native.upt_scene_present_contacts(scene, seconds, n, v, (ulong)count, o, Length(output)));
-            }
-            finally { Leave(); }
-        }
-
-        /// <summary>The same at the attached points. The pointer may be a <c>NativeArray</c>'s.</summary>
-        public void PresentPointsContacts(double seconds, uint[] nodes, float[] vectors, int count, float* output, int floats)
-        {
-            RequireContacts(nodes, vectors, count);
-            IntPtr scene = Enter();
-            try
-            {
-                fixed (uint* n = nodes)
-                fixed (float* v = vectors)
-                    Status.Check(Native.upt_scene_present_points_contacts(scene, seconds, n, v, (ulong)count, output,
-                                                                          checked((ulong)floats)));
-            }
-            finally { Leave(); }
+            fixed (float* o = output)
+                Present(input, when, Native.UPT_VIEW_REGION, o, output == null ? 0 : output.Length);
         }
     }
 }

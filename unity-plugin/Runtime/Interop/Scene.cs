@@ -61,57 +61,54 @@ namespace Upt.Interop
         }
 
         /// <summary>
-        /// One step with dense fields. <paramref name="displacement"/> (<c>[K,3]</c>) null: the scene's
-        /// own state; <paramref name="collision"/> (<c>[K,3]</c>) null: no contact;
-        /// <paramref name="output"/> (<c>[RegionCount,3]</c>) null: keep it inside.
+        /// One step, with contact of instruments solved. <paramref name="output"/> (<c>[RegionCount,3]</c>) null: keep it
+        /// inside. Throws <c>UPT_ERR_UNSUPPORTED</c> for instruments and a bundle without a linear response.
         /// </summary>
-        public void Step(float[] displacement, float[] collision, float[] output)
+        public void Step(StepInput input, float[] output)
         {
-            RequireField(displacement, "displacement");
-            RequireField(collision, "collision");
+            input.Require(NodeCount);
             IntPtr scene = Enter();
             try
             {
-                fixed (float* u = displacement)
-                fixed (float* c = collision)
+                fixed (upt_instrument* i = input.Instruments)
+                fixed (uint* n = input.ContactNodes)
+                fixed (float* v = input.ContactVectors)
+                fixed (float* c = input.Collision)
+                fixed (float* u = input.Displacement)
                 fixed (float* o = output)
                 {
-                    Status.Check(Native.upt_scene_step(scene, u, c, o, Length(output)));
+                    upt_input raw = input.Raw(i, n, v, c, u);
+                    Status.Check(Native.upt_scene_step(scene, &raw, o, Length(output)));
                 }
             }
             finally { Leave(); }
         }
 
-        /// <summary>One step from the scene's own state with the first <paramref name="count"/> entries of
-        /// the contact list.</summary>
-        public void StepContacts(uint[] nodes, float[] vectors, int count, float[] output)
+        /// <summary>The paper's step, of dense fields: <paramref name="displacement"/> (<c>[K,3]</c>) null is the scene's own
+        /// state, <paramref name="collision"/> (<c>[K,3]</c>) null no contact.</summary>
+        public void StepField(float[] displacement, float[] collision, float[] output)
         {
-            RequireContacts(nodes, vectors, count);
-            IntPtr scene = Enter();
-            try
-            {
-                fixed (uint* n = nodes)
-                fixed (float* v = vectors)
-                fixed (float* o = output)
-                {
-                    Status.Check(Native.upt_scene_step_contacts(scene, n, v, (ulong)count, o, Length(output)));
-                }
-            }
-            finally { Leave(); }
+            StepInput input = StepInput.OfField(collision);
+            input.Displacement = displacement;
+            Step(input, output);
         }
 
-        /// <summary>Hands a step to the scene's worker and returns at once. Throws when one is in flight
-        /// and the scene was not made with <c>latest_wins</c>.</summary>
-        public void Submit(uint[] nodes, float[] vectors, int count)
+        /// <summary>Hands a step to the scene's worker and returns at once; the input is copied. Throws when one is in
+        /// flight and the scene was not made with <c>latest_wins</c>.</summary>
+        public void Submit(StepInput input)
         {
-            RequireContacts(nodes, vectors, count);
+            input.Require(NodeCount);
             IntPtr scene = Enter();
             try
             {
-                fixed (uint* n = nodes)
-                fixed (float* v = vectors)
+                fixed (upt_instrument* i = input.Instruments)
+                fixed (uint* n = input.ContactNodes)
+                fixed (float* v = input.ContactVectors)
+                fixed (float* c = input.Collision)
+                fixed (float* u = input.Displacement)
                 {
-                    Status.Check(Native.upt_scene_submit(scene, n, v, (ulong)count));
+                    upt_input raw = input.Raw(i, n, v, c, u);
+                    Status.Check(Native.upt_scene_submit(scene, &raw));
                 }
             }
             finally { Leave(); }
@@ -256,23 +253,6 @@ namespace Upt.Interop
         private static ulong Length(float[] array)
         {
             return array == null ? 0 : (ulong)array.Length;
-        }
-
-        private void RequireField(float[] field, string parameter)
-        {
-            if (field != null && field.Length != 3 * NodeCount)
-                throw new ArgumentException(
-                    parameter + " holds " + field.Length + " floats, the mesh has " + NodeCount + " nodes (" +
-                        3 * NodeCount + " floats)",
-                    parameter);
-        }
-
-        private static void RequireContacts(uint[] nodes, float[] vectors, int count)
-        {
-            int room = Math.Min(nodes == null ? 0 : nodes.Length, vectors == null ? 0 : vectors.Length / 3);
-            if (count < 0 || count > room)
-                throw new ArgumentOutOfRangeException(
-                    "count", "count is " + count + ", the contact arrays hold " + room + " entries");
         }
     }
 }

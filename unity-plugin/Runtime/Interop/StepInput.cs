@@ -1,0 +1,98 @@
+using System;
+
+namespace Upt.Interop
+{
+    /// <summary>
+    /// The input of a step or a frame: what drives it. By default nothing does, and the tissue moves on by itself. The
+    /// arrays are the caller's; calls read them and keep none.
+    /// </summary>
+    public unsafe struct StepInput
+    {
+        /// <summary>Rigid instruments where they are at the end of the step; the first <see cref="InstrumentCount"/>
+        /// count.</summary>
+        public upt_instrument[] Instruments;
+
+        /// <summary>Number of instruments.</summary>
+        public int InstrumentCount;
+
+        /// <summary>Nodes in contact; the first <see cref="ContactCount"/> count.</summary>
+        public uint[] ContactNodes;
+
+        /// <summary><c>[ContactCount,3]</c>, mm: their displacement at the end of the step.</summary>
+        public float[] ContactVectors;
+
+        /// <summary>Number of nodes in contact.</summary>
+        public int ContactCount;
+
+        /// <summary><c>[K,3]</c>, mm, zero but at nodes in contact; null: no such field.</summary>
+        public float[] Collision;
+
+        /// <summary><c>[K,3]</c>, mm: what the step starts from; null: the scene's own state.</summary>
+        public float[] Displacement;
+
+        /// <summary>The moment of the end of the step on a clock of the caller's, s.</summary>
+        public double Time;
+
+        /// <summary>The first <paramref name="count"/> instruments drive the step.</summary>
+        public static StepInput OfInstruments(upt_instrument[] instruments, int count)
+        {
+            return new StepInput { Instruments = instruments, InstrumentCount = count };
+        }
+
+        /// <summary>The first <paramref name="count"/> entries of a contact list.</summary>
+        public static StepInput OfContacts(uint[] nodes, float[] vectors, int count)
+        {
+            return new StepInput { ContactNodes = nodes, ContactVectors = vectors, ContactCount = count };
+        }
+
+        /// <summary>A collision field.</summary>
+        public static StepInput OfField(float[] collision)
+        {
+            return new StepInput { Collision = collision };
+        }
+
+        /// <summary>Refuses counts that the arrays do not hold, and fields of another size than <c>[K,3]</c>.</summary>
+        internal void Require(int nodeCount)
+        {
+            RequireCount(InstrumentCount, Instruments == null ? 0 : Instruments.Length, "InstrumentCount");
+            int room = Math.Min(ContactNodes == null ? 0 : ContactNodes.Length,
+                                ContactVectors == null ? 0 : ContactVectors.Length / 3);
+            RequireCount(ContactCount, room, "ContactCount");
+            RequireField(Collision, nodeCount, "Collision");
+            RequireField(Displacement, nodeCount, "Displacement");
+        }
+
+        /// <summary>As the library's struct, with the arrays where they are pinned.</summary>
+        internal upt_input Raw(upt_instrument* instruments, uint* nodes, float* vectors, float* collision,
+                               float* displacement)
+        {
+            upt_input raw = default(upt_input);
+            raw.struct_size = (uint)sizeof(upt_input);
+            raw.instruments = instruments;
+            raw.instrument_count = (ulong)InstrumentCount;
+            raw.contact_nodes = nodes;
+            raw.contact_vectors = vectors;
+            raw.contact_count = (ulong)ContactCount;
+            raw.collision = collision;
+            raw.displacement = displacement;
+            raw.time_s = Time;
+            return raw;
+        }
+
+        private static void RequireCount(int count, int room, string parameter)
+        {
+            if (count < 0 || count > room)
+                throw new ArgumentOutOfRangeException(
+                    parameter, parameter + " is " + count + ", the arrays hold " + room + " entries");
+        }
+
+        private static void RequireField(float[] field, int nodeCount, string parameter)
+        {
+            if (field != null && field.Length != 3 * nodeCount)
+                throw new ArgumentException(
+                    parameter + " holds " + field.Length + " floats, the mesh has " + nodeCount + " nodes (" +
+                        3 * nodeCount + " floats)",
+                    parameter);
+        }
+    }
+}
