@@ -135,8 +135,37 @@ impl Body {
         };
         if let (Core::Triangles(surface), Shape::Hull { .. }) = (body.core.clone(), shape) {
             body.pointed = body.check_hull(&surface)? < BLUNT_MM;
+            if body.pointed {
+                body.round_off(&surface)?;
+            }
         }
         Ok(body)
+    }
+
+    /// Gives a hull with a point that of a rod: a ball of [`LEAST_RADIUS_MM`], which ends where the point does. Its sides stay where they are
+    /// within some tenths of a millimetre, but for those of a hull that is thinner than the ball.
+    fn round_off(&mut self, hull: &Triangles) -> Result<(), ShapeError> {
+        let more = (LEAST_RADIUS_MM - self.radius).max(0.0);
+        let sides = more.min(0.5 * self.size());
+        let corners = hull.corners().iter().zip(hull.inward());
+        let core: Vec<[f32; 3]> = corners
+            .map(|(corner, inward)| {
+                // A millimetre behind the corner its faces are so far away; farther behind, in proportion.
+                let depth = -self.nearest(*corner + inward).distance - self.radius;
+                let by = match 2.0 * depth < BLUNT_MM {
+                    true => more,
+                    false => sides / depth,
+                };
+                (*corner + inward * by).to_array()
+            })
+            .collect();
+        let core = Triangles::hull(&core)?;
+        let (low, high) = core.bounds();
+        self.radius += more;
+        self.middle = 0.5 * (low + high);
+        self.half = 0.5 * (high - low) + Vector::splat(self.radius);
+        self.core = Core::Triangles(Arc::new(core));
+        Ok(())
     }
 
     /// A hull is thick, and no more pointed than that it is [`POINTED_MM`] thick a millimetre behind each corner.
@@ -162,11 +191,10 @@ impl Body {
     /// Whether it sinks more than `SUNK_MM` between samples `spacing` apart, or passes between them: by its half thickness, or by
     /// the margin of a hull, which may have a point.
     pub fn sinks_between(&self, spacing: f32) -> bool {
-        let round = match self.core {
-            Core::Triangles(_) if self.pointed => self.radius,
-            _ if self.is_broad() => return false,
-            _ => self.size(),
-        };
+        if self.is_broad() {
+            return false;
+        }
+        let round = self.finest();
         // A point of an equilateral triangle is at most so far from its corners.
         let far = spacing / 3.0f32.sqrt();
         round < far || round - (round * round - far * far).sqrt() > SUNK_MM
@@ -174,7 +202,15 @@ impl Body {
 
     /// Whether it is so thin that it pierces the surface before it has pushed it.
     pub fn pierces(&self) -> bool {
-        self.size() < THIN_MM
+        self.finest() < THIN_MM
+    }
+
+    /// Half the thickness of its thinnest part: its size, or the radius of its point.
+    pub fn finest(&self) -> f32 {
+        match self.pointed {
+            true => self.radius,
+            false => self.size(),
+        }
     }
 
     /// Whether it has broad sides, as thick boxes, spatulas and hulls without a point have: several folds of the tissue may lie on them.
@@ -184,7 +220,7 @@ impl Body {
             Core::Cuboid { .. } => true,
             Core::Triangles(_) => !self.pointed,
         };
-        is_flat && !self.pierces()
+        is_flat && self.size() >= THIN_MM
     }
 
     /// How round its edges are at least, mm; 0 where they are sharp.

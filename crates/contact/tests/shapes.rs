@@ -300,3 +300,24 @@ fn poses_between_start_and_end_exactly_and_turn_evenly() {
     assert!((contact::pose::angle(&a.rotation, &quarter.rotation) - 0.3).abs() < 1e-5);
     assert!((quarter.translation - Vector::new(1.0, 1.0, 1.0)).length() < 1e-6);
 }
+
+#[test]
+fn a_hull_with_a_point_ends_there_in_a_ball() {
+    let wide = 20.0 * 17.0f32.to_radians().tan();
+    let mut points = vec![[0.0, -20.0, 0.0]];
+    for side in 0..16 {
+        let (sin, cos) = (side as f32 * std::f32::consts::TAU / 16.0).sin_cos();
+        points.extend([0.0, 20.0].map(|y| [wide * cos, y, wide * sin]));
+    }
+    let margin = 0.0;
+    let hull = Body::new(&Shape::Hull { points, margin }).unwrap();
+    let distance = |x: f32, y: f32| hull.nearest(Vector::new(x, y, 0.0)).distance;
+    // The point, a millimetre before it, the end and a side of the shaft.
+    assert!(distance(0.0, -20.0).abs() < 1e-3);
+    assert!((distance(0.0, -21.0) - 1.0).abs() < 1e-3);
+    let (end, side) = (distance(0.0, 20.0), distance(wide, 10.0));
+    assert!(end.abs() < 0.4 && side.abs() < 0.4, "{end} {side}");
+    // Where the point as it was is 0.3 mm wide, it is that of a ball.
+    assert!((distance(0.0, -19.0) + 1.0).abs() < 1e-3);
+    assert!(hull.pierces() && !hull.is_broad() && hull.finest() == 1.0);
+}

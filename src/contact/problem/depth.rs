@@ -23,7 +23,7 @@ impl ContactProblem {
         let tool = &self.tools[index];
         let pose = pose::between(&self.before[index], &tool.pose, part);
         let found = Buried::find(&tool.body, &pose, &self.samples, &self.mesh, state);
-        found.map_or(0.0, |buried| buried.depth + tool.body.size())
+        found.map_or(0.0, |buried| buried.depth + tool.body.radius())
     }
 
     /// How deep the tissue lies inside of a quick or thin tool that was clear of it when the step began, or the tool in the tissue, tools at

@@ -151,7 +151,7 @@ impl ContactProblem {
         let tools = self.tools.iter().zip(&self.may_lose);
         self.trusted
             .extend(tools.map(|(tool, may_lose)| match may_lose {
-                true => tool.body.size().max(LEAST_WAY_MM),
+                true => tool.body.finest().max(LEAST_WAY_MM),
                 false => f32::MAX,
             }));
         let (mut pass, mut extra) = (0, MOST_REPEATS);
