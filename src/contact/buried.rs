@@ -1,6 +1,7 @@
 //! Tools that lie in the tissue. Samples of the surface cannot show it, because none of them lies in such a tool. So a probe is tested
 //! against the solid that the whole surface bounds, and the tissue is moved along the shortest way out.
 
+use ::contact::friction::frame;
 use ::contact::samples::LATTICE;
 use ::contact::{Body, Pose, Samples, Vector};
 
@@ -13,7 +14,9 @@ const LEAST_MM: f32 = 1.0;
 /// What lies deeper than this is looked for by the solid, mm.
 const PIERCED_MM: f32 = 4.0;
 /// Ways out of the solid are looked for as far as this, mm.
-const LONGEST_MM: u32 = 30;
+const LONGEST_MM: f32 = 30.0;
+/// A unit direction along no axis or diagonal.
+const OBLIQUE: Vector = Vector::new(0.365_148, 0.547_723, 0.752_773);
 
 /// Where a tool in the tissue comes out.
 #[derive(Clone, Copy, Debug, HeldBytes)]
@@ -31,8 +34,15 @@ pub(super) struct Buried {
 impl Buried {
     /// The way from the deepest probe out of the solid along a unit direction, mm; none where it is longer than [`LONGEST_MM`].
     pub fn way_along(&self, direction: Vector, mesh: &Mesh, state: State<'_>) -> Option<Vector> {
-        let mut ways = (1..=LONGEST_MM).map(|length| direction * length as f32);
-        ways.find(|way| !is_inside(self.point + way, mesh, state))
+        // A direction along edges of a regular mesh would hit none of the faces there.
+        let tilted = (direction + 1e-3 * OBLIQUE).normalize();
+        let mut length = f32::MAX;
+        each_crossing(self.point, tilted, mesh, state, |along, leaves| {
+            if leaves {
+                length = length.min(along);
+            }
+        });
+        (length <= LONGEST_MM).then_some(direction * length)
     }
 
     /// Where the tip of a thin tool has pierced the touchable surface, by no more than [`PIERCED_MM`].
@@ -129,28 +139,46 @@ fn is_touchable(point: Vector, depth: f32, mesh: &Mesh, state: State<'_>) -> boo
 
 /// Whether a ray from a point leaves the surface more often than it enters it.
 fn is_inside(point: Vector, mesh: &Mesh, state: State<'_>) -> bool {
-    // Along no axis or diagonal, with two directions across it.
-    let [ray, e, f] = [
-        Vector::new(0.365_148, 0.547_723, 0.752_773),
-        Vector::new(0.930_949, -0.214_834, -0.295_260),
-        Vector::new(0.0, 0.808_608, -0.588_348),
-    ];
     let mut leaves = 0i32;
+    each_crossing(point, OBLIQUE, mesh, state, |_, out| {
+        leaves += if out { 1 } else { -1 };
+    });
+    leaves != 0
+}
+
+/// Calls with how far along a ray it crosses a face of the whole surface, mm, and whether it leaves the solid there.
+fn each_crossing(
+    point: Vector,
+    ray: Vector,
+    mesh: &Mesh,
+    state: State<'_>,
+    mut take: impl FnMut(f32, bool),
+) {
+    let across = frame(ray);
+    let (e, f) = (across.y_axis, across.z_axis);
+    // Most faces lie on one side of a plane through the ray.
+    let is_beside = |at: [f32; 3]| at.iter().all(|x| *x > 0.0) || at.iter().all(|x| *x < 0.0);
     for face in mesh.surface_faces.as_chunks::<3>().0 {
-        let [a, b, c] = face.map(|node| state.position(node) - point);
-        let [p, q, r] = [a, b, c].map(|v| (v.dot(e), v.dot(f)));
-        let side = |s: (f32, f32), t: (f32, f32)| s.0 * t.1 - s.1 * t.0;
-        let weights = [side(q, r), side(r, p), side(p, q)];
-        let is_hit = weights.iter().all(|w| *w > 0.0) || weights.iter().all(|w| *w < 0.0);
+        let corners = face.map(|node| state.position(node) - point);
+        let x = corners.map(|corner| corner.dot(e));
+        if is_beside(x) {
+            continue;
+        }
+        let y = corners.map(|corner| corner.dot(f));
+        if is_beside(y) {
+            continue;
+        }
+        let side = |i: usize, j: usize| x[i] * y[j] - y[i] * x[j];
+        let [u, v, w] = [side(1, 2), side(2, 0), side(0, 1)];
+        let is_hit = is_beside([u, v, w]);
         if is_hit {
-            let [u, v, w] = weights;
+            let [a, b, c] = corners;
             let along = (u * a + v * b + w * c).dot(ray) / (u + v + w);
             if along > 0.0 {
-                leaves += if u > 0.0 { 1 } else { -1 };
+                take(along, u > 0.0);
             }
         }
     }
-    leaves != 0
 }
 
 /// Barycentric weights of the point of a triangle that is nearest to `p` (Ericson 2005, section 5.1.5).
