@@ -20,16 +20,24 @@ mod rounds;
 use super::input::{Input, Report, SolverContext};
 use super::passes;
 use super::precondition::{Env, Preconditioner, mask_held};
-use super::solver::{ImplicitSolver, MOST_PARTS, SMALLEST_DET};
+use super::solver::{ImplicitSolver, SMALLEST_DET};
 use crate::contact::{Compliance, ContactProblem, State};
 use crate::error::Result;
+use fall_back::lost_by;
 
 /// A step that leaves tissue deeper inside of a tool than this has lost the contact, mm.
 pub(super) const SUNK_MM: f32 = 0.9;
+/// An iteration may leave it so deep, mm.
+pub(super) const KEPT_MM: f32 = 0.5 * SUNK_MM;
+/// How often the contact on the linear response is solved again where the tissue has not come out of the tools.
+const MORE_PRESSES: u32 = 6;
 
 /// Evaluations of the element forces that a step may take beyond [`EVALUATIONS`] for each of its iterations.
 const MORE_EVALUATIONS: u32 = 6;
 const EVALUATIONS: u32 = 2;
+
+/// Parts of the tools' way after which a guess that inverts elements is improved by an iteration, at most.
+const MOST_PARTS: u32 = 4;
 
 /// The state of an iteration.
 struct Iterate<'a> {
@@ -130,12 +138,12 @@ impl ImplicitSolver {
         problem.keep_guess()?;
         let mut size = self.improve_loaded(context, input, problem, at, report)?;
         let sound = self.motion.min_det >= SMALLEST_DET && !input.still;
-        if !is_sound(size, at.det) && sound {
+        if !is_sound(size, at.det) && sound && !problem.is_spent() {
             // The guess inverts, however short its parts: the tools push their way in by iterations alone.
             self.stay(context, input, problem, at, report)?;
             size = self.improve_loaded(context, input, problem, at, report)?;
         }
-        let left = (at.sunk_mm).unwrap_or_else(|| sunk(input, problem, at.u, 1.0));
+        let left = sunk(input, problem, at.u, 1.0);
         if !is_sound(size, at.det) || left > SUNK_MM {
             self.fall_back(context, input, problem, at, report)?;
         }
@@ -192,11 +200,14 @@ impl ImplicitSolver {
             at.u.copy_from_slice(input.last);
             self.move_freely(env)?;
             let parts = ways.max(iterated);
-            for part in 1..=parts {
+            let mut part = 0;
+            while part < parts {
+                let last = part;
+                part = problem.next_part(part, parts);
                 let way = part as f32 / parts as f32;
                 self.press(context, input, problem, way, at.u)?;
                 // An iteration after each of `iterated` parts of the load but the last.
-                let due = part * iterated / parts > (part - 1) * iterated / parts;
+                let due = part * iterated / parts > last * iterated / parts;
                 let spent = problem.is_spent() || is_spent(input, problem, report, 1);
                 if due && part < parts && !spent {
                     self.settle(env, at.u)?;
@@ -210,6 +221,7 @@ impl ImplicitSolver {
                 }
             }
             self.settle(env, at.u)?;
+            self.press_on(context, input, problem, KEPT_MM, at.u)?;
             self.evaluate(context, input, at, report)?;
             report.parts = parts;
             if at.det > least
@@ -228,6 +240,29 @@ impl ImplicitSolver {
         passes::difference(env, &self.drift, &self.motion.inertia, &mut self.q)?;
         mask_held(&env.body.held, &mut self.q);
         self.preconditioner.move_natural(env, &self.q)
+    }
+
+    /// Solves the contact on the linear response again, each time about where the tissue has come to, until it lies no deeper in the tools than
+    /// `most_mm`. Gives how deep it lies then, mm.
+    fn press_on(
+        &mut self,
+        context: SolverContext<'_>,
+        input: &Input<'_>,
+        problem: &mut ContactProblem,
+        most_mm: f32,
+        u: &mut [f32],
+    ) -> Result<f32> {
+        let mut left = lost_by(input, problem, u);
+        for _ in 0..MORE_PRESSES {
+            if left <= most_mm || left == f32::MAX || problem.is_spent() {
+                break;
+            }
+            self.preconditioner.coordinates.fill(0.0);
+            self.press(context, input, problem, 1.0, u)?;
+            self.settle(context.env(), u)?;
+            left = lost_by(input, problem, u);
+        }
+        Ok(left)
     }
 
     /// `u` and what the coordinates hold become one.

@@ -36,7 +36,7 @@ const MOST_PARTS: f32 = 80.0;
 /// Work of the solves of a step at most, those of its substeps included, in multiplications: about five milliseconds.
 const STEP_WORK: u64 = 20_000_000;
 /// The same bound for a step in which no tool may lose its contact: a broad tool put into the tissue needs it to find its way out.
-const LONGEST_STEP_WORK: u64 = 6 * STEP_WORK;
+const LONGEST_STEP_WORK: u64 = 3 * STEP_WORK;
 /// Parts of the tools' ways in a step that has taken its time.
 const LEAST_PARTS: u32 = 4;
 /// A tool that goes farther in a step is quick, mm.
@@ -335,6 +335,15 @@ impl ContactProblem {
             (tool.body.motion(from, &tool.pose) / most).ceil()
         });
         parts.fold(1.0, f32::max).min(MOST_PARTS) as u32
+    }
+
+    /// The part of `parts` to take after part `part`: the next, or one of [`LEAST_PARTS`] once the solves have taken their time.
+    pub fn next_part(&self, part: u32, parts: u32) -> u32 {
+        let stride = match self.is_spent() {
+            true => parts.div_ceil(LEAST_PARTS),
+            false => 1,
+        };
+        (part + stride).min(parts)
     }
 
     /// Nodes of the surface that tools may touch, all that a solve asks of a state of the tissue.

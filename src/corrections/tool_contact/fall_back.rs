@@ -24,22 +24,32 @@ impl ImplicitSolver {
         self.clear_pairs();
         problem.take_guess();
         at.u.copy_from_slice(&self.guess);
-        let guessed = lost_by(input, problem, at.u);
-        let mut left = guessed;
-        if guessed > SUNK_MM {
+        let mut left = self.press_on(context, input, problem, SUNK_MM, at.u)?;
+        self.keep(problem, at)?;
+        if left > SUNK_MM {
             self.respond_from_rest(context, input, problem, at, report)?;
-            left = lost_by(input, problem, at.u).min(guessed);
-            if left == guessed {
-                problem.take_guess();
-                at.u.copy_from_slice(&self.guess);
+            let from_rest = self.press_on(context, input, problem, SUNK_MM, at.u)?;
+            if from_rest < left {
+                left = from_rest;
+                self.keep(problem, at)?;
             }
         }
-        match left < f32::MAX {
-            true => self.evaluate(context, input, at, report)?,
+        if left > SUNK_MM {
             // As it was, under the forces that held it there.
-            false => self.stay(context, input, problem, at, report)?,
+            problem.stay();
+            if lost_by(input, problem, input.last) <= left {
+                return self.stay(context, input, problem, at, report);
+            }
         }
-        Ok(())
+        problem.take_guess();
+        at.u.copy_from_slice(&self.guess);
+        self.evaluate(context, input, at, report)
+    }
+
+    /// What stands if nothing better is found.
+    fn keep(&mut self, problem: &mut ContactProblem, at: &Iterate<'_>) -> Result<()> {
+        self.guess.copy_from_slice(at.u);
+        problem.keep_guess()
     }
 
     /// Linear elasticity from rest, with the tools where they are.
@@ -59,7 +69,9 @@ impl ImplicitSolver {
             ..*input
         };
         let parts = problem.parts();
-        for part in 1..=parts {
+        let mut part = 0;
+        while part < parts {
+            part = problem.next_part(part, parts);
             let way = part as f32 / parts as f32;
             self.press(context, &from_rest, problem, way, at.u)?;
         }
@@ -71,7 +83,7 @@ impl ImplicitSolver {
 }
 
 /// How deep tools and tissue lie in each other in a state that takes the place of one that lost the contact; without bounds where it has none.
-fn lost_by(input: &Input<'_>, problem: &mut ContactProblem, u: &[f32]) -> f32 {
+pub(super) fn lost_by(input: &Input<'_>, problem: &mut ContactProblem, u: &[f32]) -> f32 {
     let near = |u: &[f32; 3]| u.iter().map(|x| x * x).sum::<f32>() <= FARTHEST_MM * FARTHEST_MM;
     match u.as_chunks::<3>().0.iter().all(near) {
         true => sunk(input, problem, u, 1.0),

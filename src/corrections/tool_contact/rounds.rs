@@ -6,7 +6,7 @@ use super::{Iterate, is_sound, is_spent, sunk};
 use crate::contact::ContactProblem;
 use crate::corrections::input::{Input, Report, SolverContext};
 use crate::corrections::local::{Base, LocalSolver, StepContext};
-use crate::corrections::solver::ImplicitSolver;
+use crate::corrections::solver::{ImplicitSolver, SMALLEST_DET};
 use crate::error::Result;
 use crate::memory;
 
@@ -35,11 +35,16 @@ impl ImplicitSolver {
         report: &mut Report,
     ) -> Result<f64> {
         let mut made = Made::default();
+        if at.det < SMALLEST_DET {
+            report.residual = 1.0;
+            return Ok(f64::INFINITY);
+        }
         loop {
             self.begin_round(context, input, problem, true, at)?;
             self.improve_round(context, input, problem, at, (&mut made, report))?;
             self.end_round(context, input, at)?;
-            if made.is_enough || made.iterations >= input.enough.iterations {
+            let most = input.enough.iterations;
+            if made.is_enough || made.iterations >= most || problem.is_spent() {
                 break;
             }
             self.evaluate(context, input, at, report)?;
@@ -67,7 +72,8 @@ impl ImplicitSolver {
             let until = input.enough.until;
             let late = until.is_some_and(|until| Instant::now() >= until);
             let spent = late || is_spent(input, problem, report, input.enough.iterations);
-            if !is_sound(made.size, at.det) || (made.iterations > 0 && spent) {
+            let spent = problem.is_spent() || (made.iterations > 0 && spent);
+            if spent || !is_sound(made.size, at.det) {
                 return Ok(());
             }
             let better = self.improve_at(context, input, problem, at, 1.0)?;
