@@ -40,6 +40,7 @@ mod parallel;
 mod preview;
 #[cfg(feature = "linear")]
 mod prior;
+mod processor_time;
 #[cfg(feature = "files")]
 mod progress;
 mod python;

@@ -20,7 +20,7 @@ pub use row::{Row, Verdict, progress};
 
 #[derive(clap::Args)]
 #[command(
-    after_help = "Examples:\n  upt stress --quick\n  upt stress --bundle onnx/brain-reduced --bundle onnx/brain-fast --markdown docs/results/stability.md"
+    after_help = "Examples:\n  upt stress --quick\n  upt stress --bundle onnx/brain-reduced --bundle onnx/brain-fast --markdown docs/results/stability.md\n  upt stress --no-reference --sudden --bundle onnx/brain-reduced"
 )]
 pub struct Options {
     /// Bundle folders to stress. Default: only the reference solver.
@@ -32,6 +32,9 @@ pub struct Options {
     /// Leave out the reference solver.
     #[arg(long)]
     no_reference: bool,
+    /// Of bundles only the rows of quick, thin, pointed and deep tools.
+    #[arg(long)]
+    sudden: bool,
     /// Make a twentieth of the steps, for tests.
     #[arg(long)]
     quick: bool,
@@ -49,9 +52,11 @@ pub fn run(options: &Options) -> Result<ExitCode> {
         rows.extend(reference::rows(options.mesh.as_deref(), options.quick)?);
     }
     for bundle in &options.bundles {
-        let found = surrogate::rows(bundle, options.quick)
-            .with_context(|| format!("{}", bundle.display()))?;
-        rows.extend(found);
+        let found = match options.sudden {
+            true => surrogate::sudden_rows(bundle, options.quick),
+            false => surrogate::rows(bundle, options.quick),
+        };
+        rows.extend(found.with_context(|| format!("{}", bundle.display()))?);
     }
     print!("{}", table(&rows));
     if let Some(path) = &options.json {

@@ -31,6 +31,11 @@ pub fn rows(path: &Path, quick: bool) -> Result<Vec<Row>> {
     Ok(rows)
 }
 
+/// Those of quick, thin, pointed and deep tools alone.
+pub fn sudden_rows(path: &Path, quick: bool) -> Result<Vec<Row>> {
+    tools::sudden_rows(&Bench::open(path, quick)?, path)
+}
+
 /// No false alarm on the schemes that the model was trained on.
 fn inside(bench: &Bench) -> Result<Vec<Row>> {
     let cases = if bench.quick { 1 } else { 4 };

@@ -46,6 +46,8 @@ pub struct Felt {
     /// About the tool's position, mN mm.
     pub torque: [f64; 3],
     pub contacts: u32,
+    /// How deep tool and tissue lie in each other, mm.
+    pub penetration_mm: f64,
 }
 
 /// The parts of a force between tool and tissue at one place, mN.

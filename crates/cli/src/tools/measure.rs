@@ -115,6 +115,7 @@ fn felt(case: &ToolCase, frame: usize) -> Vec<Felt> {
             force: [w[0], w[1], w[2]],
             torque: [w[3], w[4], w[5]],
             contacts: tracks.contacts[row],
+            ..Felt::default()
         }
     })
     .collect()

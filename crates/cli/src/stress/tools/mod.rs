@@ -1,6 +1,7 @@
 //! The same suite driven by tools: their contact is solved in the step. Expected: bounded states, no element inside out
 //! without a flag, no tool that stays deep in the tissue without one, and tissue that comes back to rest.
 
+mod deep;
 mod hand;
 mod inputs;
 mod run;
@@ -29,12 +30,19 @@ pub fn rows(bench: &Bench, path: &Path) -> Result<Vec<Row>> {
     bar.inc(1);
     rows.extend(inside(&mut hands)?);
     bar.inc(1);
-    rows.extend(sudden::rows(&mut hands)?);
+    rows.extend(sudden_rows(bench, path)?);
     bar.inc(1);
     rows.push(random(&mut hands)?);
     bar.inc(1);
     rows.extend(inputs::rows(bench, path)?);
     bar.finish_and_clear();
+    Ok(rows)
+}
+
+/// Tools that a step could lose, and those whose step takes longest.
+pub fn sudden_rows(bench: &Bench, path: &Path) -> Result<Vec<Row>> {
+    let mut rows = sudden::rows(&mut Hands::for_frames(bench, path)?)?;
+    rows.extend(deep::rows(bench, path)?);
     Ok(rows)
 }
 

@@ -83,15 +83,29 @@ pub struct Hands<'a> {
     pub driver: Driver,
     pub yard: Yard,
     pub field: Vec<[f32; 3]>,
+    /// Length of a step.
+    pub step_s: f64,
 }
 
 impl<'a> Hands<'a> {
+    /// With the bundle's steps.
     pub fn new(bench: &'a Bench, path: &Path) -> Result<Self> {
         let settings = host::ModelSettings::default();
-        let model = host::Model::open(path, &settings)?;
+        Self::of(bench, &host::Model::open(path, &settings)?)
+    }
+
+    /// With those that it recommends for frames.
+    pub fn for_frames(bench: &'a Bench, path: &Path) -> Result<Self> {
+        let settings = host::ModelSettings::default();
+        Self::of(bench, &host::Model::open(path, &settings)?.for_frames())
+    }
+
+    /// With the steps of a model.
+    pub fn of(bench: &'a Bench, model: &host::Model) -> Result<Self> {
         Ok(Self {
             bench,
-            driver: Driver::new(&model, Drive::Solved)?,
+            step_s: model.step_s(),
+            driver: Driver::new(model, Drive::Solved)?,
             yard: Yard::new(&bench.mesh, bench.boundary),
             field: vec![[0.0; 3]; bench.mesh.node_count()],
         })

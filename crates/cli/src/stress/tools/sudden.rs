@@ -1,57 +1,105 @@
-//! Tools that are in the tissue at once: balls that leap into it, balls that begin in it, and three tools at random deep poses, with the
-//! time that their worst step takes.
+//! Tools that a step could lose: quick balls, balls that leap, needles, pointed hulls, and balls that begin in the tissue. Places are at least
+//! [`BORDER_MM`] from what tools do not touch, and the way in is clear of the tissue at rest.
 
 use anyhow::Result;
-use contact::{Pose, Rotation, Shape, Vector};
+use contact::{Body, Shape, Vector};
 use tissue::schemes::SplitMix;
 use tissue::solver::{Tool, ToolPose};
 use upt::flag;
 
-use super::hand::{Site, any, at, between, moved, sites, tool};
+use super::hand::{Site, at, between, sites, tool};
 use super::run::Hands;
 use crate::stress::Row;
 
-/// Places of a leap or of a ball that begins in the tissue.
+/// Places of each row.
 const PLACES: usize = 100;
-/// What is deeper after a step is told, mm.
+/// How deep a tool may lie in the tissue at the end of a step, and how deep is the goal, mm.
 const MOST_MM: f64 = 1.0;
-/// Steps that a ball stays after it.
+const GOAL_MM: f64 = 0.3;
+/// Steps that a tool stays at the end of its way.
 const HELD: usize = 4;
-/// Steps of three deep tools.
-const DEEP_STEPS: usize = 1000;
+/// From the nearest node that tools do not touch, mm.
+const BORDER_MM: f32 = 8.0;
+/// A tool that begins its way deeper in the tissue at rest is not clear of it, mm.
+const CLEAR_MM: f64 = 0.3;
 
 pub(super) fn rows(hands: &mut Hands) -> Result<Vec<Row>> {
-    Ok(vec![leaps(hands)?, buried(hands)?, deep(hands)?])
+    let places = spread(hands)?;
+    let step_s = hands.step_s as f32;
+    let ball = |random: &mut SplitMix| {
+        let radius = between(random, 1.0, 5.0);
+        tool(Shape::Sphere { radius }, between(random, 0.0, 0.3))
+    };
+    let needle = |random: &mut SplitMix| {
+        let shape = Shape::Capsule {
+            half_length: 30.0,
+            radius: 0.25,
+        };
+        tool(shape, between(random, 0.0, 0.2))
+    };
+    let cone = |random: &mut SplitMix| tool(pointed_hull(), between(random, 0.0, 0.2));
+    let quick = |speed: f32| move |_: &mut SplitMix| speed * step_s;
+    let leap = |random: &mut SplitMix| between(random, 12.0, 39.0);
+    let slow = |_: &mut SplitMix| 1.0;
+    let mut rows = Vec::new();
+    for speed in [200.0, 1000.0] {
+        let name = format!("balls at {speed} mm/s");
+        rows.push(jabs(hands, &places, &name, ball, quick(speed))?);
+    }
+    let name = "balls that leap 12 to 39 mm in a step";
+    rows.push(jabs(hands, &places, name, ball, leap)?);
+    rows.push(jabs(hands, &places, "needles of 0.5 mm", needle, slow)?);
+    let name = "hulls with a point, half angle 17 degrees";
+    rows.push(jabs(hands, &places, name, cone, slow)?);
+    rows.push(buried(hands, &places)?);
+    Ok(rows)
 }
 
-/// What a ball met at all its places.
+/// A cone of 16 sides on a shaft, its point at its lowest end.
+fn pointed_hull() -> Shape {
+    let wide = 20.0 * 17.0f32.to_radians().tan();
+    let mut points = vec![[0.0, -20.0, 0.0]];
+    for side in 0..16 {
+        let (sin, cos) = (side as f32 * std::f32::consts::TAU / 16.0).sin_cos();
+        points.extend([0.0, 20.0].map(|y| [wide * cos, y, wide * sin]));
+    }
+    Shape::Hull {
+        points,
+        margin: 0.0,
+    }
+}
+
+/// What a tool met at all its places.
 #[derive(Default)]
 struct Met {
     places: usize,
     /// With contact in each of the steps that are looked at, and with contact or a flag.
     found: usize,
     told: usize,
-    /// At the end deeper than [`MOST_MM`], and those of them without a flag.
-    deep: usize,
+    /// Never deeper than [`MOST_MM`] at the end of a step in which it must be told of, and never deeper than [`GOAL_MM`].
+    held: usize,
+    good: usize,
+    /// Deeper without a flag.
     silent: usize,
     worst_mm: f64,
     error: Option<String>,
 }
 
 impl Met {
-    /// The ball goes through poses; in the steps `told_in` it must be told of.
+    /// The tool goes through poses; in the steps `told_in` it must be told of and held, or only in the last where it begins in the tissue.
     fn place(
         &mut self,
         hands: &mut Hands,
-        ball: &Tool,
+        tool: &Tool,
         poses: &[ToolPose],
         told_in: std::ops::Range<usize>,
+        held_from: usize,
     ) -> Result<()> {
         hands.driver.reset()?;
-        hands.driver.take(std::slice::from_ref(ball))?;
+        hands.driver.take(std::slice::from_ref(tool))?;
         self.places += 1;
-        let body = [contact::Body::new(&ball.shape)?];
-        let (mut found, mut told, mut depth, mut flags) = (true, true, 0.0, 0);
+        let body = [Body::new(&tool.shape)?];
+        let (mut found, mut told, mut deepest, mut silent) = (true, true, 0.0f64, false);
         for (step, pose) in poses.iter().enumerate() {
             let made = match hands.driver.step(&[*pose], &mut hands.field) {
                 Ok(made) => made,
@@ -61,132 +109,138 @@ impl Met {
                 }
             };
             let touches = made.felt.iter().any(|felt| felt.contacts > 0);
+            let is_told = made.flags & flag::DEEP != 0;
             if told_in.contains(&step) {
                 found &= touches;
-                told &= touches || made.flags & flag::DEEP != 0;
+                told &= touches || is_told;
             }
-            flags = made.flags;
-            depth = hands.yard.penetration(&hands.field, &body, &[pose.pose]);
+            if step >= held_from {
+                let felt = made.felt.iter().map(|felt| felt.penetration_mm);
+                let depth = hands.yard.penetration(&hands.field, &body, &[pose.pose]);
+                let depth = felt.fold(depth, f64::max);
+                deepest = deepest.max(depth);
+                silent |= depth > MOST_MM && !is_told;
+            }
         }
         self.found += usize::from(found);
         self.told += usize::from(told);
-        self.deep += usize::from(depth > MOST_MM);
-        self.silent += usize::from(depth > MOST_MM && flags & flag::DEEP == 0);
-        self.worst_mm = self.worst_mm.max(depth);
+        self.held += usize::from(deepest <= MOST_MM);
+        self.good += usize::from(deepest <= GOAL_MM);
+        self.silent += usize::from(silent);
+        self.worst_mm = self.worst_mm.max(deepest);
         Ok(())
     }
 
-    fn row(self, hands: &Hands, name: &str) -> Row {
+    /// Good if the tool was found, or told of, everywhere; `all_held`: and nowhere deeper than it may be.
+    fn row(self, hands: &Hands, name: &str, all_held: bool) -> Row {
         let mut text = format!(
-            "{} places: contact in {}, contact or a flag in {}; at the end deeper than {MOST_MM} mm in {} ({} without a flag), {:.2} mm at most",
-            self.places, self.found, self.told, self.deep, self.silent, self.worst_mm
+            "contact in {} of {} places, contact or a flag in {}; at most {MOST_MM} mm deep in {} of {} ({GOAL_MM} mm: {}), {:.2} mm at most, deeper without a flag in {}",
+            self.found,
+            self.places,
+            self.told,
+            self.held,
+            self.places,
+            self.good,
+            self.worst_mm,
+            self.silent
         );
         if let Some(error) = &self.error {
             text += &format!("; error: {error}");
         }
-        let good = self.error.is_none() && self.told == self.places && self.silent == 0;
-        Row::new(&hands.bench.subject, name, text, good)
+        let met = match all_held {
+            true => self.found == self.places && self.held == self.places,
+            false => self.told == self.places && self.silent == 0,
+        };
+        Row::new(
+            &hands.bench.subject,
+            name,
+            text,
+            self.error.is_none() && met,
+        )
     }
 }
 
-fn ball(random: &mut SplitMix) -> Tool {
-    let radius = between(random, 1.0, 5.0);
-    tool(Shape::Sphere { radius }, between(random, 0.0, 0.3))
-}
-
+/// As many places as there are to be, those whose surroundings are free.
 fn spread(hands: &Hands) -> Result<Vec<Site>> {
     let count = if hands.bench.quick {
         PLACES / 10
     } else {
         PLACES
     };
-    sites(hands.bench, count)
+    let mesh = &hands.bench.mesh;
+    let of = |rows: &mut dyn Iterator<Item = u32>| {
+        let faces = rows.map(|row| mesh.surface[row as usize]);
+        let mut nodes: Vec<u32> = faces.flatten().collect();
+        nodes.sort_unstable();
+        nodes.dedup();
+        nodes
+    };
+    let touched = of(&mut mesh.domain.iter().copied());
+    let mut border = of(&mut (0..mesh.surface.len() as u32));
+    border.retain(|node| touched.binary_search(node).is_err());
+    let place = |node: &u32| Vector::from(mesh.positions[*node as usize]);
+    let mut found = sites(hands.bench, 4 * count)?;
+    found.retain(|site| (border.iter()).all(|node| place(node).distance(site.at) >= BORDER_MM));
+    Ok(found)
 }
 
-/// From clear of the tissue to 2 to 8 mm deep, 12 to 24 mm at once.
-fn leaps(hands: &mut Hands) -> Result<Row> {
+/// Tools that come from clear of the tissue to 2 to 6 mm deep, `way` mm a step, and stay there.
+fn jabs(
+    hands: &mut Hands,
+    places: &[Site],
+    name: &str,
+    make: impl Fn(&mut SplitMix) -> Tool,
+    way: impl Fn(&mut SplitMix) -> f32,
+) -> Result<Row> {
     let mut random = SplitMix(42);
     let mut met = Met::default();
-    for site in spread(hands)? {
-        let ball = ball(&mut random);
-        let deep = at(&ball, &site, between(&mut random, 2.0, 8.0))?;
-        let away = moved(&deep, -site.inward * between(&mut random, 12.0, 24.0));
-        let mut poses = vec![away];
-        poses.resize(1 + HELD, deep);
-        met.place(hands, &ball, &poses, 1..1 + HELD)?;
+    let most = if hands.bench.quick {
+        PLACES / 10
+    } else {
+        PLACES
+    };
+    let still = vec![[0.0; 3]; hands.field.len()];
+    for site in places {
+        if met.places == most {
+            break;
+        }
+        let (tool, way) = (make(&mut random), way(&mut random));
+        let depth = between(&mut random, 2.0, 6.0);
+        let start = (way - depth).max(2.0);
+        let body = [Body::new(&tool.shape)?];
+        let mut clear = true;
+        for millimetres in 0..=start as usize {
+            let pose = at(&tool, site, -(millimetres as f32).max(0.3))?;
+            clear &= hands.yard.penetration(&still, &body, &[pose.pose]) < CLEAR_MM;
+        }
+        if !clear {
+            continue;
+        }
+        let count = ((start + depth) / way).ceil() as usize;
+        let heights = (0..=count).map(|step| (start - way * step as f32).max(-depth));
+        let mut poses = Vec::new();
+        for height in heights.chain(std::iter::repeat_n(-depth, HELD)) {
+            poses.push(at(&tool, site, -height)?);
+        }
+        let below = |step: &usize| start - way * *step as f32 <= -0.6;
+        let first = (0..poses.len()).find(below).unwrap_or(count);
+        met.place(hands, &tool, &poses, first..poses.len(), first)?;
     }
-    Ok(met.row(hands, "balls that leap 12 to 24 mm in a step"))
+    Ok(met.row(hands, name, true))
 }
 
 /// From the first step on wholly beneath the surface.
-fn buried(hands: &mut Hands) -> Result<Row> {
+fn buried(hands: &mut Hands, places: &[Site]) -> Result<Row> {
     let mut random = SplitMix(43);
     let mut met = Met::default();
-    for site in spread(hands)? {
-        let ball = ball(&mut random);
-        let Shape::Sphere { radius } = ball.shape else {
-            continue;
-        };
-        let deep = at(&ball, &site, 2.0 * radius + between(&mut random, 0.5, 3.0))?;
+    let every = (places.len() / PLACES).max(1);
+    for site in places.iter().step_by(every).take(PLACES) {
+        let radius = between(&mut random, 1.0, 5.0);
+        let ball = tool(Shape::Sphere { radius }, between(&mut random, 0.0, 0.3));
+        let deep = at(&ball, site, 2.0 * radius + between(&mut random, 0.5, 3.0))?;
         // Once it is out, the tissue may swing off it for a step.
-        met.place(hands, &ball, &vec![deep; 4 * HELD], 0..1)?;
+        let steps = 4 * HELD;
+        met.place(hands, &ball, &vec![deep; steps], 0..1, steps - 1)?;
     }
-    Ok(met.row(hands, "balls that begin beneath the surface"))
-}
-
-/// Three tools at new deep poses in every step, with much friction: the time of the worst step.
-fn deep(hands: &mut Hands) -> Result<Row> {
-    let mut random = SplitMix(44);
-    let spread = sites(hands.bench, 24)?;
-    let steps = hands.bench.steps(DEEP_STEPS);
-    hands.driver.reset()?;
-    let (mut times, mut contact, mut refused) = (Vec::new(), 0.0f64, 0usize);
-    while times.len() + refused < steps {
-        let tools: Vec<Tool> = (0..3)
-            .map(|_| {
-                let friction = between(&mut random, 0.6, 1.2);
-                Tool {
-                    friction,
-                    tear_off_mn: 0.0,
-                    ..any(&mut random)
-                }
-            })
-            .collect();
-        hands.driver.take(&tools)?;
-        for _ in 0..10 {
-            let mut poses = Vec::new();
-            for tool in &tools {
-                let site = spread[(random.unit() * spread.len() as f64) as usize];
-                let mut pose = at(tool, &site, between(&mut random, 2.0, 20.0))?;
-                let mut draw = || between(&mut random, -0.5, 0.5);
-                let turn = Rotation::from_scaled_axis(Vector::new(draw(), draw(), draw()));
-                pose.pose = Pose::from_parts(pose.pose.translation, turn * pose.pose.rotation);
-                poses.push(pose);
-            }
-            match hands.driver.step(&poses, &mut hands.field) {
-                Ok(step) => {
-                    times.push(step.ms);
-                    contact = contact.max(step.contact_ms);
-                }
-                Err(_) => refused += 1,
-            }
-        }
-    }
-    times.sort_by(f64::total_cmp);
-    let finite = hands.field.as_flattened().iter().all(|u| u.is_finite());
-    let at = |share: f64| {
-        times
-            .get((share * (times.len() as f64 - 1.0)) as usize)
-            .copied()
-            .unwrap_or(0.0)
-    };
-    let text = format!(
-        "{} steps, {refused} refused by the guard; a step takes {:.1} ms in the median, {:.1} ms at p99, {:.1} ms at most, its contact {contact:.1} ms at most",
-        steps,
-        at(0.5),
-        at(0.99),
-        at(1.0),
-    );
-    let name = "three tools at random deep poses, friction 0.6 to 1.2";
-    Ok(Row::new(&hands.bench.subject, name, text, finite))
+    Ok(met.row(hands, "balls that begin beneath the surface", false))
 }

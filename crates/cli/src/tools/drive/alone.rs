@@ -32,6 +32,7 @@ impl Driver {
             force: reading.force.map(f64::from),
             torque: reading.torque.map(f64::from),
             contacts: reading.contacts,
+            penetration_mm: f64::from(reading.penetration_mm),
         });
         let loads = linear.told.pushes.iter().map(|push| {
             let tool = push.tool as usize;

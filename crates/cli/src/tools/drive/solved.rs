@@ -26,6 +26,7 @@ impl Driver {
             force: reading.force.map(f64::from),
             torque: reading.torque.map(f64::from),
             contacts: reading.contact_count,
+            penetration_mm: f64::from(reading.penetration_mm),
         });
         let loads = contacts.iter().map(|contact| {
             let tool = contact.instrument as usize;
