@@ -23,12 +23,13 @@ use super::precondition::{Env, Preconditioner, mask_held};
 use super::solver::{ImplicitSolver, SMALLEST_DET};
 use crate::contact::{Compliance, ContactProblem, State};
 use crate::error::Result;
-use fall_back::lost_by;
 
 /// A step that leaves tissue deeper inside of a tool than this has lost the contact, mm.
 pub(super) const SUNK_MM: f32 = 0.9;
 /// An iteration may leave it so deep, mm.
 pub(super) const KEPT_MM: f32 = 0.5 * SUNK_MM;
+/// The response of linear elasticity is not shown where it goes farther than this, mm.
+const FARTHEST_MM: f32 = 30.0;
 /// How often the contact on the linear response is solved again where the tissue has not come out of the tools.
 const MORE_PRESSES: u32 = 6;
 
@@ -327,6 +328,15 @@ fn sunk(input: &Input<'_>, problem: &mut ContactProblem, u: &[f32], way: f32) ->
         start: input.last,
     };
     problem.sunk(state, way)
+}
+
+/// How deep tools and tissue lie in each other in a state of linear elasticity; without bounds where that goes too far.
+fn lost_by(input: &Input<'_>, problem: &mut ContactProblem, u: &[f32]) -> f32 {
+    let near = |u: &[f32; 3]| u.iter().map(|x| x * x).sum::<f32>() <= FARTHEST_MM * FARTHEST_MM;
+    match u.as_chunks::<3>().0.iter().all(near) {
+        true => sunk(input, problem, u, 1.0),
+        false => f32::MAX,
+    }
 }
 
 /// Whether the elements can go on from a state.

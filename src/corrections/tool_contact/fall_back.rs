@@ -1,14 +1,11 @@
 //! What takes the place of a step that lost the contact or inverted elements: its first guess, linear elasticity from rest, or the state before it
 //! (`docs/decisions/018-swept-contact.md`).
 
-use super::{Iterate, SUNK_MM, sunk};
+use super::{Iterate, SUNK_MM, lost_by};
 use crate::contact::ContactProblem;
 use crate::corrections::input::{Input, Report, SolverContext};
 use crate::corrections::solver::ImplicitSolver;
 use crate::error::Result;
-
-/// The response of linear elasticity is not shown where it goes farther than this, mm.
-const FARTHEST_MM: f32 = 30.0;
 
 impl ImplicitSolver {
     /// The first of the three in which the contact holds, or that in which it is lost by least.
@@ -79,14 +76,5 @@ impl ImplicitSolver {
         self.settle(context.env(), at.u)?;
         report.parts = parts;
         self.evaluate(context, input, at, report)
-    }
-}
-
-/// How deep tools and tissue lie in each other in a state that takes the place of one that lost the contact; without bounds where it has none.
-pub(super) fn lost_by(input: &Input<'_>, problem: &mut ContactProblem, u: &[f32]) -> f32 {
-    let near = |u: &[f32; 3]| u.iter().map(|x| x * x).sum::<f32>() <= FARTHEST_MM * FARTHEST_MM;
-    match u.as_chunks::<3>().0.iter().all(near) {
-        true => sunk(input, problem, u, 1.0),
-        false => f32::MAX,
     }
 }
