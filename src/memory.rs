@@ -18,6 +18,15 @@ pub fn reserve<T>(list: &mut Vec<T>, count: usize, what: &str) -> Result<()> {
         .map_err(|_| none(count.saturating_mul(size_of::<T>()), what))
 }
 
+/// One more element; the room doubles where there is none.
+pub fn push<T>(list: &mut Vec<T>, value: T, what: &str) -> Result<()> {
+    if list.len() == list.capacity() {
+        reserve(list, list.len().max(64), what)?;
+    }
+    list.push(value);
+    Ok(())
+}
+
 /// Room for `count` elements in all.
 pub fn fit<T>(list: &mut Vec<T>, count: usize, what: &str) -> Result<()> {
     reserve(list, count.saturating_sub(list.len()), what)

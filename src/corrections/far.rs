@@ -44,8 +44,10 @@ pub struct FarField {
     weights: Vec<[f32; 3]>,
     /// `sum_e v_e grad Phi` of each chunk on the modes `[C,9,r]`, rows of the gradient one after another.
     pub(super) on_modes: Vec<f32>,
-    /// How many chunks have elements at a node `[K]`.
-    pub(super) chunks_at: Vec<u16>,
+    /// How many elements a node has `[K]`.
+    pub(super) elements_at: Vec<u16>,
+    /// Cluster of each element `[T]`.
+    pub(super) cluster_of: Vec<u16>,
     /// Box of each chunk at rest, mm.
     pub(super) boxes: Vec<[[f32; 3]; 2]>,
 }
@@ -72,7 +74,8 @@ impl FarField {
             nodes: Vec::new(),
             weights: Vec::new(),
             on_modes: memory::zeros(count * NINE * space.count(), WHAT)?,
-            chunks_at: memory::filled(mesh.node_count(), 0, WHAT)?,
+            elements_at: memory::filled(mesh.node_count(), 0, WHAT)?,
+            cluster_of: memory::filled(mesh.tets.len() / 4, 0, WHAT)?,
             boxes: memory::room(count, WHAT)?,
         };
         own.starts.push(0);
@@ -87,11 +90,14 @@ impl FarField {
         let nodes = body.forces.chunk_nodes(chunk);
         let mut sums = memory::filled(nodes.len(), [0.0f64; 3], WHAT)?;
         let (mut volume, mut largest) = (0.0, 0.0f64);
-        for element in body.forces.chunk_tetrahedra(chunk) {
+        let elements_at = &mut self.elements_at;
+        for (number, element) in body.forces.chunk_tetrahedra(chunk) {
+            self.cluster_of[number as usize] = (chunk / self.group) as u16;
             volume += element.volume;
             let [a, b, c] = element.gradients;
             let first = [0, 1, 2].map(|k| -(a[k] + b[k] + c[k]));
             for (corner, gradient) in element.corners.into_iter().zip([first, a, b, c]) {
+                elements_at[nodes[corner as usize] as usize] += 1;
                 for (sum, value) in sums[corner as usize].iter_mut().zip(gradient) {
                     *sum += element.volume * value;
                     largest = largest.max((element.volume * value).abs());
@@ -103,7 +109,6 @@ impl FarField {
         memory::reserve(&mut self.weights, nodes.len(), WHAT)?;
         let mut bounds = [[f32::MAX; 3], [f32::MIN; 3]];
         for (&node, sum) in nodes.iter().zip(sums) {
-            self.chunks_at[node as usize] += 1;
             let at = &mesh.positions[3 * node as usize..][..3];
             for (axis, &x) in at.iter().enumerate() {
                 bounds[0][axis] = bounds[0][axis].min(x);
@@ -124,8 +129,8 @@ impl FarField {
     /// The mean gradients on the modes.
     fn decode(&mut self, prior: &PriorTable, space: &CoarseSpace) -> Result<()> {
         let count = space.count();
-        let held = 3 * self.chunks_at.len();
-        let all = memory::collected(self.chunks_at.len(), 0..self.chunks_at.len() as u32, WHAT)?;
+        let held = 3 * self.elements_at.len();
+        let all = memory::collected(self.elements_at.len(), 0..self.elements_at.len() as u32, WHAT)?;
         let plan = RowPlan::try_region(&prior.basis(), &all, false)?;
         let (mut q, mut field) = (
             memory::zeros(prior.width(), WHAT)?,

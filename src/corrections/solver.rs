@@ -165,11 +165,7 @@ impl ImplicitSolver {
             local,
         } = history;
         let corrections = context.corrections;
-        let sizes = [
-            corrections.body.mass.len(),
-            corrections.body.forces.chunk_count(),
-            corrections.space.count(),
-        ];
+        let sizes = [corrections.body.mass.len(), corrections.space.count()];
         local.iter().try_for_each(|record| record.check(sizes))?;
         self.motion.take(motion)?;
         self.clear_pairs();

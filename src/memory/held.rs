@@ -49,7 +49,7 @@ macro_rules! told {
 }
 
 told!(Search: memory_bytes, Sweeps: memory_bytes);
-told!(elements::ElementForces: bytes, elements::Scratch: bytes);
+told!(elements::ElementForces: bytes, elements::Scratch: bytes, elements::Subset: bytes);
 
 impl<T: HeldBytes> HeldBytes for [T] {
     fn held_bytes(&self) -> usize {

@@ -3,7 +3,7 @@
 use crate::cluster::{Cluster, Group, corners};
 use crate::gradients::Gradients;
 use crate::material::Material;
-use crate::room::{collected, room};
+use crate::room::{collected, push, room};
 use crate::tetrahedra::Tetrahedra;
 use crate::vector::{cross, dot};
 use lanes::WIDTH;
@@ -64,12 +64,7 @@ impl<const NODES: usize, const TETS: usize> Kind<NODES, TETS> {
         let starts = std::iter::once(0).chain(ends.iter().copied());
         for (first, end) in starts.zip(&ends) {
             let groups = &groups[first..*end];
-            let mut batch = Cluster {
-                springs: [[[0.0; WIDTH]; 6]; TETS],
-                inverse: [[0.0; WIDTH]; TETS],
-                bulk: [[0.0; WIDTH]; TETS],
-                slots: [[0; WIDTH]; NODES],
-            };
+            let mut batch = Cluster::EMPTY;
             let mut elements = [[PADDING; WIDTH]; TETS];
             let mut gradients = Gradients::EMPTY;
             for lane in 0..WIDTH {
@@ -132,6 +127,62 @@ impl<const NODES: usize, const TETS: usize> Kind<NODES, TETS> {
                     bulk: cluster.bulk[tet][lane],
                 }
             })
+    }
+
+    /// Takes one cluster of another body's batches, with other slots, into the lane behind the `used` lanes of the last batch; returns how many are
+    /// in use then.
+    ///
+    /// # Errors
+    /// No memory.
+    pub fn copy(
+        &mut self,
+        from: &Self,
+        (batch, lane): (usize, usize),
+        slots: [u16; NODES],
+        used: usize,
+    ) -> Result<usize, TryReserveError> {
+        let at = used % WIDTH;
+        if at == 0 {
+            push(&mut self.batches, Cluster::EMPTY)?;
+            push(&mut self.elements, [[PADDING; WIDTH]; TETS])?;
+            if !from.gradients.is_empty() {
+                push(&mut self.gradients, Gradients::EMPTY)?;
+            }
+        }
+        if let (Some(own), Some(elements)) = (self.batches.last_mut(), self.elements.last_mut()) {
+            let source = &from.batches[batch];
+            own.copy_lane(source, lane, at);
+            for (row, slot) in own.slots.iter_mut().zip(slots) {
+                row[at] = 2 * slot;
+            }
+            for (own, source) in elements.iter_mut().zip(&from.elements[batch]) {
+                own[at] = source[lane];
+            }
+        }
+        if let Some(own) = self.gradients.last_mut() {
+            own.copy_lane(&from.gradients[batch], lane, at);
+        }
+        Ok(at + 1)
+    }
+
+    /// Fills the last batch, whose first `used` lanes are in use, with the shape of the last of them, without stiffness.
+    pub fn pad(&mut self, used: usize) {
+        let Some(own) = self.batches.last_mut() else {
+            return;
+        };
+        for lane in used..WIDTH {
+            own.repeat_lane(used - 1, lane);
+            if let Some(gradients) = self.gradients.last_mut() {
+                gradients.repeat_lane(used - 1, lane);
+            }
+        }
+    }
+
+    /// Takes all batches out; the room stays.
+    pub fn clear(&mut self) {
+        self.batches.clear();
+        self.gradients.clear();
+        self.elements.clear();
     }
 
     /// Clusters in the batches.

@@ -24,6 +24,41 @@ pub struct Cluster<const NODES: usize, const TETS: usize> {
     pub slots: [[u16; WIDTH]; NODES],
 }
 
+impl<const NODES: usize, const TETS: usize> Cluster<NODES, TETS> {
+    /// Without any element.
+    pub const EMPTY: Self = Self {
+        springs: [[[0.0; WIDTH]; 6]; TETS],
+        inverse: [[0.0; WIDTH]; TETS],
+        bulk: [[0.0; WIDTH]; TETS],
+        slots: [[0; WIDTH]; NODES],
+    };
+
+    /// Takes the constants of another batch's cluster, not its slots.
+    pub fn copy_lane(&mut self, source: &Self, lane: usize, at: usize) {
+        for tet in 0..TETS {
+            for (own, source) in self.springs[tet].iter_mut().zip(&source.springs[tet]) {
+                own[at] = source[lane];
+            }
+            self.inverse[tet][at] = source.inverse[tet][lane];
+            self.bulk[tet][at] = source.bulk[tet][lane];
+        }
+    }
+
+    /// Lane `at` becomes the shape and the slots of `lane`, without stiffness.
+    pub fn repeat_lane(&mut self, lane: usize, at: usize) {
+        for row in self.springs.as_flattened_mut() {
+            row[at] = 0.0;
+        }
+        for tet in 0..TETS {
+            self.inverse[tet][at] = self.inverse[tet][lane];
+            self.bulk[tet][at] = 0.0;
+        }
+        for row in &mut self.slots {
+            row[at] = row[lane];
+        }
+    }
+}
+
 /// Four tetrahedra around the edge of nodes 0 and 1; nodes 2 to 5 are the ring.
 pub type Octahedra = Cluster<6, 4>;
 /// Two tetrahedra with the common face 0, 1, 2.

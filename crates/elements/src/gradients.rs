@@ -26,4 +26,25 @@ impl<const TETS: usize> Gradients<TETS> {
         }
         self.volume[tet][lane] = volume as f32;
     }
+
+    /// Takes the elements of another batch's cluster.
+    pub fn copy_lane(&mut self, source: &Self, lane: usize, at: usize) {
+        let own = self.rows.as_flattened_mut().iter_mut();
+        for (own, source) in own.zip(source.rows.as_flattened()) {
+            own[at] = source[lane];
+        }
+        for (own, source) in self.volume.iter_mut().zip(&source.volume) {
+            own[at] = source[lane];
+        }
+    }
+
+    /// Lane `at` becomes the shape of `lane`, without volume.
+    pub fn repeat_lane(&mut self, lane: usize, at: usize) {
+        for row in self.rows.as_flattened_mut() {
+            row[at] = row[lane];
+        }
+        for row in &mut self.volume {
+            row[at] = 0.0;
+        }
+    }
 }

@@ -7,9 +7,8 @@
 use crate::batches::PADDING;
 use crate::dispatch::Kernels;
 use crate::material::Material;
-use crate::partition::{Chunk, Partition};
+use crate::partition::{CHUNK_ELEMENTS, Chunk, Partition};
 use crate::room::filled;
-use crate::slots::PADDED;
 use crate::tetrahedra::Tetrahedra;
 use lanes::Isa;
 use std::collections::TryReserveError;
@@ -18,9 +17,10 @@ use std::collections::TryReserveError;
 /// workers that `Scratch::new` was given, and two tasks that run at once have different ones.
 pub type ParallelFor<'a> = &'a dyn Fn(usize, &(dyn Fn(usize, usize) + Sync));
 
-/// Target number of elements in a chunk. Small, so that the chunks about a tool are little more than what it moves: a whole evaluation takes
-/// 1.4 times as long as with 2,048, which is a tenth of a millisecond for 100,000 elements.
-const CHUNK_ELEMENTS: usize = 256;
+/// Chunks that a body is split into at least, where each has [`FEWEST_ELEMENTS`]: the far field of a scene takes its means over them.
+const CHUNKS: usize = 96;
+/// Elements of a chunk at least.
+const FEWEST_ELEMENTS: usize = 256;
 
 /// The elements of a body, ready for [`ElementForces::evaluate`].
 pub struct ElementForces {
@@ -32,7 +32,7 @@ pub struct ElementForces {
 /// A slot as the kernels read it.
 #[derive(Clone, Copy, Default)]
 #[repr(C, align(64))]
-pub(crate) struct Line([[f32; 4]; 4]);
+pub(crate) struct Line(pub(crate) [[f32; 4]; 4]);
 
 /// Buffers of an evaluation; kept between calls.
 pub struct Scratch {
@@ -79,9 +79,10 @@ impl ElementForces {
         isa: Isa,
     ) -> Result<Self, TryReserveError> {
         let kernels = Kernels::of(isa);
+        let elements = (body.tets.len() / CHUNKS).clamp(FEWEST_ELEMENTS, CHUNK_ELEMENTS);
         Ok(Self {
             kernels: kernels.unwrap_or_else(|| panic!("{isa:?} is not available here")),
-            partition: Partition::in_chunks(body, material, CHUNK_ELEMENTS)?,
+            partition: Partition::in_chunks(body, material, elements)?,
             node_count: body.positions.len(),
         })
     }
@@ -105,9 +106,7 @@ impl ElementForces {
     /// # Errors
     /// Where there is no memory for them.
     pub fn scratch(&self, workers: usize) -> Result<Scratch, TryReserveError> {
-        let chunks = &self.partition.chunks;
-        let widest = chunks.iter().map(Chunk::slot_count).max().unwrap_or(0);
-        let lines = widest.next_multiple_of(PADDED).div_ceil(4);
+        let lines = self.partition.widest().div_ceil(4);
         let mut positions = filled(workers.max(1), Vec::new())?;
         for room in &mut positions {
             *room = filled(lines, Line::default())?;
@@ -118,7 +117,7 @@ impl ElementForces {
                 Line::default(),
             )?,
             positions,
-            smallest: filled(chunks.len(), f32::MAX)?,
+            smallest: filled(self.partition.chunks.len(), f32::MAX)?,
         })
     }
 
@@ -146,7 +145,7 @@ impl ElementForces {
             // SAFETY: positions belong to this worker, slots and the entry of `smallest` to this chunk.
             unsafe {
                 let positions = (*positions.at(worker)).as_mut_ptr().cast::<[f32; 4]>();
-                self.place(chunk, displacement, positions);
+                place(&self.partition, chunk, displacement, positions);
                 let own = forces.at(chunk.first);
                 std::ptr::write_bytes(own, 0, chunk.slot_count());
                 let det = (self.kernels.forces)(&self.partition, chunk, positions, own);
@@ -173,27 +172,23 @@ impl ElementForces {
         });
         scratch.smallest.iter().copied().fold(f32::MAX, f32::min)
     }
+}
 
-    /// Puts the chunk's nodes where they are now, from its centre.
-    pub(crate) unsafe fn place(
-        &self,
-        chunk: &Chunk,
-        displacement: &[f32],
-        positions: *mut [f32; 4],
-    ) {
-        let slots = chunk.first..chunk.first + chunk.slot_count();
-        let rest = self.partition.base(chunk);
-        for (at, (rest, &node)) in rest
-            .iter()
-            .zip(&self.partition.node_of_slot[slots])
-            .enumerate()
-        {
-            debug_assert_ne!(node, PADDING);
-            let u = &displacement[3 * node as usize..][..3];
-            // SAFETY: the caller's room holds the widest chunk.
-            unsafe {
-                *positions.add(at) = [rest[0] + u[0], rest[1] + u[1], rest[2] + u[2], 0.0];
-            }
+/// Puts the nodes of a chunk where they are now, from its centre.
+pub(crate) unsafe fn place(
+    partition: &Partition,
+    chunk: &Chunk,
+    displacement: &[f32],
+    positions: *mut [f32; 4],
+) {
+    let slots = chunk.first..chunk.first + chunk.slot_count();
+    let rest = partition.base(chunk).iter();
+    for (at, (rest, &node)) in rest.zip(&partition.node_of_slot[slots]).enumerate() {
+        debug_assert_ne!(node, PADDING);
+        let u = &displacement[3 * node as usize..][..3];
+        // SAFETY: the caller's room holds the widest chunk.
+        unsafe {
+            *positions.add(at) = [rest[0] + u[0], rest[1] + u[1], rest[2] + u[2], 0.0];
         }
     }
 }

@@ -26,6 +26,7 @@ mod principal;
 mod room;
 mod slots;
 mod spectrum;
+mod subset;
 mod tangent;
 mod tetrahedra;
 mod tetrahedron;
@@ -43,6 +44,7 @@ pub use laws::{
 pub use material::{Material, Moduli};
 pub use partition::{Chunk, Partition};
 pub use slots::{FLOPS_PER_NODE, PADDED};
+pub use subset::Subset;
 pub use tangent::tangent;
 pub use tetrahedra::Tetrahedra;
 pub use tetrahedron::{

@@ -14,6 +14,7 @@ use crate::material::{Material, Moduli};
 use crate::room::{collected, filled, room};
 use crate::slots::PADDED;
 use crate::tetrahedra::Tetrahedra;
+use crate::tetrahedron::Tetrahedron;
 use std::collections::TryReserveError;
 use std::ops::Range;
 
@@ -122,11 +123,39 @@ impl Partition {
             partition.push_chunk(chunk as u32, leaf, &owner, mesh, material)?;
         }
         partition.connect()?;
-        if material.law.takes_displacements() {
-            let widest = partition.chunks.iter().map(Chunk::slot_count).max();
-            partition.zeros = filled(widest.unwrap_or(0).next_multiple_of(PADDED), [0.0; 4])?;
-        }
+        partition.fit_zeros()?;
         Ok(partition)
+    }
+
+    /// Slots of the widest chunk, padded.
+    pub fn widest(&self) -> usize {
+        let widest = self.chunks.iter().map(Chunk::slot_count).max();
+        widest.unwrap_or(0).next_multiple_of(PADDED)
+    }
+
+    /// Makes the zeros as long as the widest chunk, where the law takes displacements.
+    pub fn fit_zeros(&mut self) -> Result<(), TryReserveError> {
+        let widest = self.widest();
+        if self.moduli.law.takes_displacements() && self.zeros.len() < widest {
+            self.zeros.try_reserve(widest - self.zeros.len())?;
+            self.zeros.resize(widest, [0.0; 4]);
+        }
+        Ok(())
+    }
+
+    /// Without any element, for a law.
+    pub fn empty(moduli: Moduli) -> Self {
+        Self {
+            chunks: Vec::new(),
+            octahedra: Kind::default(),
+            pairs: Kind::default(),
+            singles: Kind::default(),
+            node_of_slot: Vec::new(),
+            slot_of_node: Vec::new(),
+            rest: Vec::new(),
+            zeros: Vec::new(),
+            moduli,
+        }
     }
 
     fn push_chunk(
@@ -163,7 +192,8 @@ impl Partition {
         };
         let here = self.node_of_slot[first..].iter();
         let here = collected(here.map(|node| mesh.positions[*node as usize]))?;
-        let rest = from_centre(&here)?;
+        let mut rest = room(here.len())?;
+        rest.extend(from_centre(here.iter().copied()));
         let groups = Groups::new(leaf, tets, mesh.positions)?;
         let source = Source {
             rest: &rest,
@@ -218,6 +248,29 @@ impl Partition {
         }
     }
 
+    /// The elements of a chunk in f64 with their numbers in the mesh, always in the same order; their corners are chunk-local slots.
+    pub fn tetrahedra(&self, chunk: &Chunk) -> impl Iterator<Item = (u32, Tetrahedron)> + '_ {
+        let rest = &self.rest[chunk.first..];
+        let bulk = self.moduli.bulk_pa;
+        self.elements(chunk).map(move |element| {
+            // Twice the slot, see `Cluster::slots`.
+            let corners = element.slots.map(|slot| u32::from(slot / 2));
+            let at = corners.map(|place| {
+                let [x, y, z, _] = rest[place as usize];
+                [x, y, z].map(f64::from)
+            });
+            let stiffness = 6.0 * f64::from(element.bulk.abs()) / bulk;
+            let tetrahedron = Tetrahedron::new(corners, at, stiffness);
+            // The order of the corners in a cluster may turn an element around.
+            let volume = tetrahedron.volume.abs();
+            let tetrahedron = Tetrahedron {
+                volume,
+                ..tetrahedron
+            };
+            (element.number, tetrahedron)
+        })
+    }
+
     /// The elements of a chunk, always in the same order.
     pub fn elements(&self, chunk: &Chunk) -> impl Iterator<Item = Element> + '_ {
         self.octahedra
@@ -256,20 +309,21 @@ impl Partition {
 }
 
 /// Positions from the middle of their box.
-fn from_centre(positions: &[[f32; 3]]) -> Result<Vec<[f32; 4]>, TryReserveError> {
+pub fn from_centre(
+    positions: impl Iterator<Item = [f32; 3]> + Clone,
+) -> impl Iterator<Item = [f32; 4]> {
     let centre = [0, 1, 2].map(|k| {
-        let values = positions.iter().map(|p| p[k]);
+        let values = positions.clone().map(|p| p[k]);
         let (low, high) = (
             values.clone().fold(f32::MAX, f32::min),
             values.fold(f32::MIN, f32::max),
         );
         0.5 * (f64::from(low) + f64::from(high))
     });
-    let local = |p: &[f32; 3]| {
+    positions.map(move |p| {
         let [x, y, z] = [0, 1, 2].map(|k| (f64::from(p[k]) - centre[k]) as f32);
         [x, y, z, 0.0]
-    };
-    collected(positions.iter().map(local))
+    })
 }
 
 /// Splits `order` into `count` spatially compact leaves of nearly equal size, one after another; `sizes` has room for theirs.

@@ -1,8 +1,10 @@
 //! The far clusters of a scene: which elements they have beside the near ones, and what their law adds on the modes.
 
 use super::near::{NearSet, WHAT};
+use super::pairs::Room;
+use super::step::{add, resize};
 use crate::corrections::far::{FarField, NINE};
-use crate::corrections::precondition::Env;
+use crate::corrections::precondition::{Env, Preconditioner};
 use crate::error::Result;
 use crate::kernels::project::row_dots;
 use crate::kernels::respond::accumulate_rows;
@@ -30,7 +32,7 @@ pub(super) struct Clusters {
 impl Clusters {
     pub fn new(far: &FarField, modes: usize) -> Result<Clusters> {
         let count = far.clusters();
-        let mut own = Clusters {
+        Ok(Clusters {
             on_modes: memory::zeros(count * NINE * modes, WHAT)?,
             rows: memory::collected(count * NINE, 0..(count * NINE) as u32, WHAT)?,
             volumes: memory::filled(count, 0.0, WHAT)?,
@@ -39,42 +41,82 @@ impl Clusters {
             base_stress: memory::filled(count * NINE, 0.0, WHAT)?,
             moved: memory::zeros(count * NINE, WHAT)?,
             stress: memory::zeros(count * NINE, WHAT)?,
-        };
-        let none = memory::filled(far.volumes.len(), false, WHAT)?;
-        own.leave_out(far, &none, modes);
-        Ok(own)
+        })
     }
 
-    /// Takes the near chunks out.
-    pub fn leave_out(&mut self, far: &FarField, is_near: &[bool], modes: usize) {
+    /// Takes what is near out.
+    ///
+    /// Exactly: the law of the far elements is convex about their own mean alone. With the mean of whole clusters in its place steps grew to 100 mm.
+    pub fn leave_out(
+        &mut self,
+        env: Env<'_>,
+        far: &FarField,
+        near: &NearSet,
+        preconditioner: &Preconditioner,
+        room: &mut Room,
+    ) -> Result<()> {
+        let modes = env.space.count();
+        let size = NINE * modes;
+        let part = |cluster: usize| {
+            let at = near.parts.binary_search_by_key(&cluster, |part| part.cluster);
+            at.ok().map(|at| &near.parts[at])
+        };
         for cluster in 0..self.volumes.len() {
-            let chunks = far.chunks_of(cluster);
-            let is_cut = is_near[chunks.clone()].contains(&true);
-            if !is_cut && !self.is_cut[cluster] {
+            let part = part(cluster);
+            if part.is_none() && !self.is_cut[cluster] {
                 continue;
             }
-            self.is_cut[cluster] = is_cut;
-            let size = NINE * modes;
+            self.is_cut[cluster] = part.is_some();
+            let chunks = far.chunks_of(cluster);
+            let whole: f64 = far.volumes[chunks.clone()].iter().sum();
+            let volume = whole - part.map_or(0.0, |part| part.volume);
             let own = &mut self.on_modes[cluster * size..(cluster + 1) * size];
             own.fill(0.0);
-            self.volumes[cluster] = 0.0;
-            for chunk in chunks.filter(|chunk| !is_near[*chunk]) {
-                self.volumes[cluster] += far.volumes[chunk];
-                let table = &far.on_modes[chunk * size..(chunk + 1) * size];
-                for (sum, value) in own.iter_mut().zip(table) {
-                    *sum += value;
+            // What rounding leaves of a cluster is nothing.
+            self.volumes[cluster] = if volume > 1e-4 * whole { volume } else { 0.0 };
+            if self.volumes[cluster] == 0.0 {
+                continue;
+            }
+            for chunk in chunks {
+                add(1.0, &far.on_modes[chunk * size..(chunk + 1) * size], own);
+            }
+            let Some(part) = part else {
+                continue;
+            };
+            resize(&mut room.field, 3 * near.free)?;
+            resize(&mut room.linear, modes)?;
+            for (row, own) in own.chunks_exact_mut(modes).enumerate() {
+                let (i, j) = (row / 3, row % 3);
+                room.field.fill(0.0);
+                for &(place, weight) in &near.weights[part.weights.clone()] {
+                    room.field[3 * place as usize + i] = weight[j];
                 }
+                near.project(env, &room.field, &mut room.q);
+                preconditioner.on_modes_in(env, &near.ranges, &room.q, &mut room.linear);
+                add(-1.0, &room.linear, own);
             }
         }
+        Ok(())
     }
 
     /// Takes the field `[K,3]` as the base.
     pub fn begin(&mut self, far: &FarField, near: &NearSet, u: &[f32]) {
         for (cluster, base) in self.base.chunks_exact_mut(NINE).enumerate() {
             base.fill(0.0);
-            for chunk in far.chunks_of(cluster).filter(|&at| !near.is_near[at]) {
+            for chunk in far.chunks_of(cluster) {
                 for (sum, value) in base.iter_mut().zip(far.gradient(chunk, u)) {
                     *sum += f64::from(value);
+                }
+            }
+        }
+        for part in &near.parts {
+            let base = &mut self.base[part.cluster * NINE..][..NINE];
+            for &(place, weight) in &near.weights[part.weights.clone()] {
+                let u = &u[3 * near.nodes[place as usize] as usize..][..3];
+                for (row, u) in base.chunks_exact_mut(3).zip(u) {
+                    for (sum, weight) in row.iter_mut().zip(weight) {
+                        *sum -= f64::from(u * weight);
+                    }
                 }
             }
         }

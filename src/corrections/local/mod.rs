@@ -24,7 +24,7 @@ mod step;
 use ::elements::Scratch;
 
 use self::clusters::Clusters;
-use self::near::{NearSet, WHAT};
+use self::near::{NearSet, WHAT, add_centres};
 use self::pairs::{Pairs, Room};
 use self::step::{Change, Step, add, dot, resize};
 use super::input::{Input, SolverContext};
@@ -34,6 +34,9 @@ use crate::error::Result;
 use crate::memory::{self, HeldBytes};
 
 pub use self::record::Record;
+
+/// What rounding makes of det F, with room.
+const DET_ROUNDING: f32 = 1e-3;
 
 /// What a solver lends to the iterations of a step.
 pub(super) struct StepContext<'a> {
@@ -67,7 +70,7 @@ pub struct LocalSolver {
     near: NearSet,
     pub(super) pairs: Pairs,
     clusters: Clusters,
-    /// Chunks about the tools, without those of older pairs.
+    /// Nodes that the tools touch, thinned out: what the pairs are about.
     about: Vec<u32>,
     /// Since the base.
     now: Step,
@@ -119,10 +122,10 @@ impl LocalSolver {
         let columns = (3 * env.prior.contact_nodes.len()).min(768);
         let modes = || memory::zeros(count, WHAT);
         Ok(LocalSolver {
-            near: NearSet::new(env, far)?,
+            near: NearSet::new(env)?,
             pairs: Pairs::new(count)?,
             clusters: Clusters::new(far, count)?,
-            about: memory::room(far.volumes.len(), WHAT)?,
+            about: memory::room(64, WHAT)?,
             now: Step::with_modes(count)?,
             residual: Change::with_modes(count)?,
             base: Vec::new(),
@@ -174,17 +177,16 @@ impl LocalSolver {
         let env = step.context.env();
         let far = &step.context.corrections.far;
         let rest = step.input.rest;
-        let none = std::iter::empty();
-        // What is about the tools now lives as long as the pairs of this step do.
-        self.near.mark(far, rest, &self.touched, none);
         self.about.clear();
-        self.about.extend(self.near.marked());
-        self.near
-            .mark(far, rest, &self.touched, self.pairs.chunks());
-        if self.near.take_marked(env, far)? {
+        add_centres(rest, &self.touched, &mut self.about)?;
+        let pairs = &self.pairs;
+        let abouts = pairs.records().map(|record| record.about.as_slice());
+        let last = pairs.records().last().map(|record| record.centres.as_slice());
+        self.near.choose(rest, last, &self.about, abouts)?;
+        if self.near.take_chosen(env, far, rest)? {
             self.pairs.forget_layout();
-            let modes = env.space.count();
-            self.clusters.leave_out(far, &self.near.is_near, modes);
+            let (near, room) = (&self.near, &mut self.room);
+            (self.clusters).leave_out(env, far, near, step.preconditioner, room)?;
         }
         self.pairs
             .lay_out(env, &self.near, step.preconditioner, &mut self.room)?;
@@ -202,19 +204,19 @@ impl LocalSolver {
         self.clusters.begin(far, &self.near, base.u);
         self.trial.copy_from_slice(base.u);
         self.d.clear(&self.near)?;
-        self.evaluate(step, 0.0)?;
+        self.far_det = f32::MAX;
+        let det = self.evaluate(step, 0.0)?;
         std::mem::swap(&mut self.residual, &mut self.next);
         // What the base has is not what has come since.
         self.base.copy_from_slice(&self.inner);
         self.residual.eta.fill(0.0);
+        // A chunk that is near in part counts where what is near does not explain it.
         let dets = step.scratch.smallest_by_chunk().iter();
-        let dets = dets
-            .zip(&self.near.is_near)
-            .map(|(det, is_near)| match is_near {
-                true => f32::MAX,
-                false => *det,
-            });
-        self.far_det = dets.fold(f32::MAX, f32::min);
+        let far_dets = dets.zip(&self.near.far_share).map(|(&found, &share)| {
+            let is_far = share == 1.0 || (share > 0.0 && found < det - DET_ROUNDING);
+            if is_far { found } else { f32::MAX }
+        });
+        self.far_det = far_dets.fold(f32::MAX, f32::min);
         Ok(())
     }
 
@@ -257,8 +259,8 @@ impl LocalSolver {
         let env = step.context.env();
         let far = &step.context.corrections.far;
         self.next.clear(&self.near)?;
-        let (near, inner) = (&self.near, &mut self.inner);
-        let det = near.internal(&env.body.forces, &self.trial, step.scratch, inner);
+        let (near, inner) = (&mut self.near, &mut self.inner);
+        let det = near.internal(&self.trial, inner);
         let kappa = env.time_step.integrator.kappa() as f32;
         let rows = inner.as_chunks_mut::<3>().0.iter_mut();
         for (r, &node) in rows.zip(&near.nodes[..near.inside]) {

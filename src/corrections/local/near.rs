@@ -1,11 +1,12 @@
 //! The elements near the tools: which they are, their forces, and how coordinates of the block bases reach their nodes.
 //!
-//! Whole chunks of elements are near. A *place* is the position of a node in [`NearSet::nodes`]: first the free nodes all of whose elements
-//! are near ([`NearSet::inside`] of them, `S` in the formulas), then the other free ones, then those that are held.
+//! Near are the elements of the nodes that lie within a reach of the set's *centres*, nodes that tools have touched. A *place* is the position of a
+//! node in [`NearSet::nodes`]: first the free nodes all of whose elements are near ([`NearSet::inside`] of them, `S` in the formulas), then the
+//! other free ones, then those that are held.
 
 use std::ops::Range;
 
-use ::elements::{ElementForces, Scratch};
+use ::elements::Subset;
 
 use crate::corrections::far::FarField;
 use crate::corrections::precondition::Env;
@@ -14,8 +15,13 @@ use crate::kernels::rows::{RowPlan, decode_rows, project_rows};
 use crate::memory::{self, HeldBytes};
 
 pub(super) const WHAT: &str = "the elements near the tools";
-/// Chunks are near that come this close to a node that a tool touches, at rest, mm.
+/// Nodes are near that lie this close to a centre at rest, mm.
 const REACH_MM: f32 = 20.0;
+/// Centres lie this far apart at least, and a set goes on as long as what the tools touch lies that close to them, mm.
+const APART_MM: f32 = 3.0;
+const SLACK_MM: f32 = 5.0;
+/// A centre is left out that lies this far from all that is touched, mm.
+const LEFT_MM: f32 = 12.0;
 /// A node that is not near.
 const NONE: u32 = u32::MAX;
 
@@ -23,6 +29,8 @@ const NONE: u32 = u32::MAX;
 #[derive(HeldBytes)]
 struct Linear {
     places: [u32; 4],
+    /// The cluster of the far field that it would be of.
+    cluster: u32,
     /// Of the shape functions 1, 2, 3, 1/mm.
     gradients: [[f32; 3]; 3],
     /// Lame's constants times the rest volume, µN mm.
@@ -30,49 +38,68 @@ struct Linear {
     lambda: f32,
 }
 
+/// What of a cluster of the far field is near.
+#[derive(HeldBytes)]
+pub(super) struct Part {
+    pub cluster: usize,
+    /// Rest volume times the stiffness over the material's, mm³.
+    pub volume: f64,
+    /// Into [`NearSet::weights`].
+    #[held(skip)]
+    pub weights: Range<usize>,
+}
+
 /// What is near.
 #[derive(HeldBytes)]
 pub(in crate::corrections) struct NearSet {
-    /// Ascending.
-    pub chunks: Vec<u32>,
-    /// By chunk.
-    pub is_near: Vec<bool>,
+    /// Centres, and those that the next filling will have.
+    pub centres: Vec<u32>,
+    chosen: Vec<u32>,
+    /// By chunk of the body: the share of its volume that is not near.
+    pub far_share: Vec<f32>,
     pub nodes: Vec<u32>,
     /// Places that are inside, and those that are free.
     pub inside: usize,
     pub free: usize,
     /// By node; [`NONE`] elsewhere.
     places: Vec<u32>,
-    /// Near chunks at a node, while they are counted.
+    /// Within reach of a centre, and near elements at a node, while a set is filled.
+    is_reached: Vec<bool>,
     counts: Vec<u16>,
-    /// Places of the nodes of each near chunk, one chunk after another.
-    of_slots: Vec<u32>,
+    subset: Subset,
     elements: Vec<Linear>,
+    /// By cluster, ascending; and `sum_e v_e grad N` of their free nodes, by place, mm².
+    pub(super) parts: Vec<Part>,
+    pub(super) weights: Vec<(u32, [f32; 3])>,
+    sums: Vec<[f32; 3]>,
     plan: RowPlan,
     /// Coordinates of the blocks that near nodes are of.
     pub ranges: Vec<Range<usize>>,
-    wanted: Vec<bool>,
     /// No error has left the lists half made.
     is_whole: bool,
 }
 
 impl NearSet {
-    pub fn new(env: Env<'_>, far: &FarField) -> Result<NearSet> {
+    pub fn new(env: Env<'_>) -> Result<NearSet> {
         let (count, chunks) = (env.body.mass.len(), env.body.forces.chunk_count());
         Ok(NearSet {
-            chunks: memory::room(chunks, WHAT)?,
-            is_near: memory::filled(chunks, false, WHAT)?,
+            centres: Vec::new(),
+            chosen: Vec::new(),
+            far_share: memory::filled(chunks, 1.0, WHAT)?,
             nodes: Vec::new(),
             inside: 0,
             free: 0,
             places: memory::filled(count, NONE, WHAT)?,
-            counts: memory::filled(far.chunks_at.len(), 0, WHAT)?,
-            of_slots: Vec::new(),
+            is_reached: memory::filled(count, false, WHAT)?,
+            counts: memory::filled(count, 0, WHAT)?,
+            subset: memory::tried(Subset::new(&env.body.forces), WHAT)?,
             elements: Vec::new(),
+            parts: Vec::new(),
+            weights: Vec::new(),
+            sums: Vec::new(),
             plan: RowPlan::try_region(&env.prior.basis(), &[], true)?,
             ranges: Vec::new(),
-            wanted: memory::filled(chunks, false, WHAT)?,
-            is_whole: true,
+            is_whole: false,
         })
     }
 
@@ -87,79 +114,56 @@ impl NearSet {
         (self.places[node as usize] as usize) < self.inside
     }
 
-    /// Marks the chunks about some nodes at rest, and those of `also`.
-    pub fn mark(
+    /// Chooses the centres: those of the last pair where they go on to serve, else what is touched, and about what older pairs were made.
+    pub fn choose<'a>(
         &mut self,
-        far: &FarField,
         rest: &[f32],
+        last: Option<&[u32]>,
         touched: &[u32],
-        also: impl Iterator<Item = u32>,
-    ) {
-        self.wanted.fill(false);
-        also.for_each(|chunk| self.wanted[chunk as usize] = true);
-        for (wanted, [low, high]) in self.wanted.iter_mut().zip(&far.boxes) {
-            *wanted |= touched.iter().any(|&node| {
-                let at = &rest[3 * node as usize..][..3];
-                let outside =
-                    |axis: usize| (low[axis] - at[axis]).max(at[axis] - high[axis]).max(0.0);
-                let [x, y, z] = [0, 1, 2].map(outside);
-                x * x + y * y + z * z < REACH_MM * REACH_MM
-            });
+        abouts: impl Iterator<Item = &'a [u32]>,
+    ) -> Result<()> {
+        self.chosen.clear();
+        add_centres(rest, touched, &mut self.chosen)?;
+        for about in abouts {
+            add_centres(rest, about, &mut self.chosen)?;
+        }
+        self.chosen.sort_unstable();
+        let Some(last) = last else {
+            return Ok(());
+        };
+        let serves = self.chosen.iter().all(|&node| is_by(rest, last, node, SLACK_MM))
+            && last.iter().all(|&node| is_by(rest, &self.chosen, node, LEFT_MM));
+        match serves {
+            true => memory::replace(&mut self.chosen, last, WHAT),
+            false => Ok(()),
         }
     }
 
-    /// The marked chunks.
-    pub fn marked(&self) -> impl Iterator<Item = u32> + '_ {
-        let wanted = self.wanted.iter().enumerate();
-        wanted
-            .filter(|(_, wanted)| **wanted)
-            .map(|(at, _)| at as u32)
-    }
-
-    /// Takes the marked chunks; tells whether others are near now.
-    pub fn take_marked(&mut self, env: Env<'_>, far: &FarField) -> Result<bool> {
-        if self.is_whole && self.wanted == self.is_near {
+    /// Takes the elements about the chosen centres; tells whether others are near now.
+    pub fn take_chosen(&mut self, env: Env<'_>, far: &FarField, rest: &[f32]) -> Result<bool> {
+        if self.is_whole && self.chosen == self.centres {
             return Ok(false);
         }
-        self.fill(env, far)?;
+        self.fill(env, far, rest)?;
         Ok(true)
     }
 
-    fn fill(&mut self, env: Env<'_>, far: &FarField) -> Result<()> {
+    fn fill(&mut self, env: Env<'_>, far: &FarField, rest: &[f32]) -> Result<()> {
         // Nothing is near until all is known.
         self.is_whole = false;
-        self.is_near.fill(false);
         for &node in &self.nodes {
             self.places[node as usize] = NONE;
-            self.counts[node as usize] = 0;
         }
+        self.is_reached.fill(false);
+        self.counts.fill(0);
         self.nodes.clear();
-        self.chunks.clear();
-        self.of_slots.clear();
         self.elements.clear();
+        self.subset.clear();
         (self.inside, self.free) = (0, 0);
-        let forces = &env.body.forces;
-        let wanted = self.wanted.iter().enumerate();
-        let marked = wanted
-            .filter(|(_, wanted)| **wanted)
-            .map(|(at, _)| at as u32);
-        self.chunks.extend(marked);
-        let slots: usize = (self.chunks.iter())
-            .map(|chunk| forces.chunk_nodes(*chunk as usize).len())
-            .sum();
-        memory::fit(&mut self.nodes, slots, WHAT)?;
-        memory::fit(&mut self.of_slots, slots, WHAT)?;
-        for &chunk in &self.chunks {
-            for &node in forces.chunk_nodes(chunk as usize) {
-                if self.counts[node as usize] == 0 {
-                    self.nodes.push(node);
-                }
-                self.counts[node as usize] += 1;
-            }
-        }
+        self.take_elements(env, far, rest)?;
         let rank = |node: u32| {
             let at = node as usize;
-            let whole = self.counts[at] == far.chunks_at[at];
+            let whole = self.counts[at] == far.elements_at[at];
             (env.body.held[at], !whole, node)
         };
         self.nodes.sort_unstable_by_key(|node| rank(*node));
@@ -169,7 +173,11 @@ impl NearSet {
             self.free += usize::from(!is_held);
             self.inside += usize::from(!is_held && !is_cut);
         }
-        self.fill_elements(env, far)?;
+        let places = &self.places;
+        for element in &mut self.elements {
+            element.places = element.places.map(|node| places[node as usize]);
+        }
+        self.take_parts(far)?;
         let (places, free) = (&self.places, self.free);
         let row_of = |node: u32| {
             let place = places[node as usize];
@@ -183,67 +191,115 @@ impl NearSet {
             let ends = &basis.rank_offsets[block..block + 2];
             self.ranges.push(ends[0] as usize..ends[1] as usize);
         }
-        self.is_near.copy_from_slice(&self.wanted);
+        memory::replace(&mut self.centres, &self.chosen, WHAT)?;
         self.is_whole = true;
         Ok(())
     }
 
-    fn fill_elements(&mut self, env: Env<'_>, far: &FarField) -> Result<()> {
+    /// The elements of the nodes within reach, and their nodes; `elements` have these for places.
+    fn take_elements(&mut self, env: Env<'_>, far: &FarField, rest: &[f32]) -> Result<()> {
         let forces = &env.body.forces;
+        let is_reached = |node: u32| is_by(rest, &self.chosen, node, REACH_MM);
+        let is_by_box = |[low, high]: &[[f32; 3]; 2]| {
+            self.chosen.iter().any(|&node| {
+                let at = &rest[3 * node as usize..][..3];
+                let outside =
+                    |axis: usize| (low[axis] - at[axis]).max(at[axis] - high[axis]).max(0.0);
+                [0, 1, 2].map(|axis| outside(axis).powi(2)).iter().sum::<f32>() < REACH_MM * REACH_MM
+            })
+        };
+        for (chunk, bounds) in far.boxes.iter().enumerate() {
+            self.far_share[chunk] = 1.0;
+            if is_by_box(bounds) {
+                for &node in forces.chunk_nodes(chunk) {
+                    self.is_reached[node as usize] = is_reached(node);
+                }
+                let is_reached = &self.is_reached;
+                let near = (self.subset).push(forces, chunk, |node| is_reached[node as usize]);
+                let near = memory::tried(near, WHAT)? / far.volumes[chunk];
+                // What rounding leaves of a chunk is nothing.
+                self.far_share[chunk] = if near > 1.0 - 1e-4 { 0.0 } else { 1.0 - near as f32 };
+            }
+        }
+        memory::tried(self.subset.finish(rest.as_chunks().0), WHAT)?;
         let moduli = far.moduli;
         let lambda = moduli.bulk_pa - 2.0 / 3.0 * moduli.shear_pa;
-        for &chunk in &self.chunks {
-            let start = self.of_slots.len();
-            let nodes = forces.chunk_nodes(chunk as usize).iter();
-            let places = &self.places;
-            self.of_slots
-                .extend(nodes.map(|&node| places[node as usize]));
-            for element in forces.chunk_tetrahedra(chunk as usize) {
-                let own = &self.of_slots[start..];
-                let places = element.corners.map(|corner| own[corner as usize]);
-                if places.iter().all(|place| *place as usize >= self.free) {
-                    continue;
+        for (number, element) in self.subset.tetrahedra() {
+            for node in element.corners {
+                let count = &mut self.counts[node as usize];
+                if *count == 0 {
+                    memory::push(&mut self.nodes, node, WHAT)?;
                 }
-                if self.elements.len() == self.elements.capacity() {
-                    let more = self.elements.len().max(512);
-                    memory::reserve(&mut self.elements, more, WHAT)?;
-                }
-                self.elements.push(Linear {
-                    places,
-                    gradients: element.gradients.map(|g| g.map(|x| x as f32)),
-                    shear: (moduli.shear_pa * element.volume) as f32,
-                    lambda: (lambda * element.volume) as f32,
-                });
+                *count += 1;
             }
+            let linear = Linear {
+                places: element.corners,
+                cluster: u32::from(far.cluster_of[number as usize]),
+                gradients: element.gradients.map(|g| g.map(|x| x as f32)),
+                shear: (moduli.shear_pa * element.volume) as f32,
+                lambda: (lambda * element.volume) as f32,
+            };
+            memory::push(&mut self.elements, linear, WHAT)?;
+        }
+        Ok(())
+    }
+
+    /// What of each cluster is near.
+    fn take_parts(&mut self, far: &FarField) -> Result<()> {
+        self.parts.clear();
+        self.weights.clear();
+        self.sums.clear();
+        memory::fit(&mut self.sums, self.free, WHAT)?;
+        self.sums.resize(self.free, [0.0; 3]);
+        for cluster in 0..far.clusters() {
+            let own = |element: &&Linear| element.cluster as usize == cluster;
+            let (mut volume, mut largest) = (0.0f64, 0.0f32);
+            for element in self.elements.iter().filter(own) {
+                let share = element.shear / far.moduli.shear_pa as f32;
+                volume += f64::from(share);
+                let [a, b, c] = element.gradients;
+                let first = [0, 1, 2].map(|k| -(a[k] + b[k] + c[k]));
+                for (place, gradient) in element.places.into_iter().zip([first, a, b, c]) {
+                    if let Some(sum) = self.sums.get_mut(place as usize) {
+                        for (sum, value) in sum.iter_mut().zip(gradient) {
+                            *sum += share * value;
+                            largest = largest.max((share * value).abs());
+                        }
+                    }
+                }
+            }
+            if volume == 0.0 {
+                continue;
+            }
+            let start = self.weights.len();
+            for (place, sum) in self.sums.iter_mut().enumerate() {
+                // Inside of the part the shares of a node's elements cancel.
+                if sum.iter().any(|value| value.abs() > 1e-5 * largest) {
+                    memory::push(&mut self.weights, (place as u32, *sum), WHAT)?;
+                }
+                *sum = [0.0; 3];
+            }
+            let part = Part {
+                cluster,
+                volume,
+                weights: start..self.weights.len(),
+            };
+            memory::push(&mut self.parts, part, WHAT)?;
         }
         Ok(())
     }
 
     /// `f_int` of the near elements at the free nodes, `[3 free]`, µN; the smallest det F of them all. `u [K,3]` is read at near nodes.
-    pub fn internal(
-        &self,
-        forces: &ElementForces,
-        u: &[f32],
-        scratch: &mut Scratch,
-        out: &mut [f32],
-    ) -> f32 {
+    pub fn internal(&mut self, u: &[f32], out: &mut [f32]) -> f32 {
         out.fill(0.0);
-        let mut smallest = f32::MAX;
-        let mut slots = self.of_slots.as_slice();
-        for &chunk in &self.chunks {
-            let (det, own) = forces.evaluate_chunk(chunk as usize, u, scratch);
-            smallest = smallest.min(det);
-            let (places, rest) = slots.split_at(own.len());
-            slots = rest;
-            for (&place, force) in places.iter().zip(own) {
-                if let Some(out) = out.as_chunks_mut::<3>().0.get_mut(place as usize) {
-                    for (out, force) in out.iter_mut().zip(force) {
-                        *out -= force;
-                    }
+        let (places, out) = (&self.places, out.as_chunks_mut::<3>().0);
+        self.subset.evaluate(u, |node, force| {
+            if let Some(out) = out.get_mut(places[node as usize] as usize) {
+                for (out, force) in out.iter_mut().zip(force) {
+                    *out -= force;
                 }
             }
-        }
-        smallest
+        })
     }
 
     /// `(K + kappa M) v` of the near elements at the free nodes, `[3 free]`, µN, of a field `[.., 3]` by place; without inertia at those that
@@ -317,4 +373,24 @@ impl NearSet {
         }
         project_rows(env.isa, &env.prior.basis(), &self.plan, r, q);
     }
+}
+
+/// Whether one of some nodes lies within a distance of a node at rest.
+fn is_by(rest: &[f32], nodes: &[u32], node: u32, distance: f32) -> bool {
+    let at = |node: u32| &rest[3 * node as usize..][..3];
+    let own = at(node);
+    nodes.iter().any(|&other| {
+        let apart = own.iter().zip(at(other)).map(|(a, b)| (a - b) * (a - b));
+        apart.sum::<f32>() < distance * distance
+    })
+}
+
+/// Adds those nodes that do not lie by one of the centres.
+pub(super) fn add_centres(rest: &[f32], nodes: &[u32], centres: &mut Vec<u32>) -> Result<()> {
+    for &node in nodes {
+        if !is_by(rest, centres, node, APART_MM) {
+            memory::push(centres, node, WHAT)?;
+        }
+    }
+    Ok(())
 }

@@ -105,10 +105,9 @@ impl Pairs {
         Ok(())
     }
 
-    /// Chunks that were about the tools when a pair was made; some more than once.
-    pub fn chunks(&self) -> impl Iterator<Item = u32> + '_ {
-        let records = self.order.iter().map(|&slot| &self.records[slot]);
-        records.flat_map(|record| record.chunks.iter().copied())
+    /// The pairs in use, oldest first.
+    pub fn records(&self) -> impl Iterator<Item = &Record> + '_ {
+        self.order.iter().map(|&slot| &self.records[slot])
     }
 
     /// Lays out all pairs for a near set.
@@ -158,7 +157,7 @@ impl Pairs {
                 near.decode(env, &room.q, &mut step.v)?;
             }
         }
-        let is_same = record.near == near.chunks
+        let is_same = record.centres == near.centres
             && record.t.len() == step.t.len()
             && record.eta.len() == change.eta.len();
         if is_same {
@@ -211,7 +210,7 @@ impl Pairs {
         near: &NearSet,
         preconditioner: &mut Preconditioner,
         room: &mut Room,
-        chunks: &[u32],
+        about: &[u32],
         (step, change): (&Step, &Change),
     ) -> Result<()> {
         if self.order.len() == PAIRS {
@@ -221,7 +220,7 @@ impl Pairs {
         let free = |slot: &usize| !self.order.contains(slot) && !self.published.contains(slot);
         let slot = (0..SLOTS).find(free).unwrap_or(0);
         self.laid_out[slot] = false;
-        self.records[slot].fill(near, chunks, step, change)?;
+        self.records[slot].fill(near, about, step, change)?;
         self.lay_out_one(env, near, preconditioner, room, (slot, Some(&step.v)))?;
         self.order.push(slot);
         self.multiply(self.order.len() - 1);

@@ -11,9 +11,9 @@ use crate::stored;
 /// What is kept of a pair.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, HeldBytes)]
 pub struct Record {
-    /// Chunks about the tools when it was made, and all that were near.
-    pub chunks: Vec<u32>,
-    pub near: Vec<u32>,
+    /// Nodes that the tools touched when it was made, thinned out, and the centres of what was near.
+    pub about: Vec<u32>,
+    pub centres: Vec<u32>,
     /// Inside nodes then.
     pub nodes: Vec<u32>,
     /// `[3 S]` each.
@@ -32,13 +32,13 @@ pub struct Record {
 
 impl Record {
     /// Checks what was read.
-    pub fn check(&self, [nodes, chunks, modes]: [usize; 3]) -> Result<()> {
+    pub fn check(&self, [nodes, modes]: [usize; 2]) -> Result<()> {
         let ascends = |list: &[u32], end: usize| {
             list.windows(2).all(|pair| pair[0] < pair[1])
                 && list.last().is_none_or(|&last| (last as usize) < end)
         };
-        let sound = ascends(&self.chunks, chunks)
-            && ascends(&self.near, chunks)
+        let sound = self.about.iter().all(|&node| (node as usize) < nodes)
+            && ascends(&self.centres, nodes)
             && self.eta.len() >= 3 * self.nodes.len()
             && ascends(&self.nodes, nodes);
         if !sound {
@@ -61,8 +61,8 @@ impl Record {
 
 impl Record {
     pub(super) fn take(&mut self, other: &Record) -> Result<()> {
-        memory::replace(&mut self.chunks, &other.chunks, WHAT)?;
-        memory::replace(&mut self.near, &other.near, WHAT)?;
+        memory::replace(&mut self.about, &other.about, WHAT)?;
+        memory::replace(&mut self.centres, &other.centres, WHAT)?;
         memory::replace(&mut self.nodes, &other.nodes, WHAT)?;
         memory::replace(&mut self.t, &other.t, WHAT)?;
         memory::replace(&mut self.r, &other.r, WHAT)?;
@@ -74,12 +74,12 @@ impl Record {
     pub(super) fn fill(
         &mut self,
         near: &NearSet,
-        chunks: &[u32],
+        about: &[u32],
         step: &Step,
         change: &Change,
     ) -> Result<()> {
-        memory::replace(&mut self.chunks, chunks, WHAT)?;
-        memory::replace(&mut self.near, &near.chunks, WHAT)?;
+        memory::replace(&mut self.about, about, WHAT)?;
+        memory::replace(&mut self.centres, &near.centres, WHAT)?;
         memory::replace(&mut self.nodes, &near.nodes[..near.inside], WHAT)?;
         memory::replace(&mut self.t, &step.t, WHAT)?;
         memory::replace(&mut self.r, &change.r, WHAT)?;
