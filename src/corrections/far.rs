@@ -130,7 +130,11 @@ impl FarField {
     fn decode(&mut self, prior: &PriorTable, space: &CoarseSpace) -> Result<()> {
         let count = space.count();
         let held = 3 * self.elements_at.len();
-        let all = memory::collected(self.elements_at.len(), 0..self.elements_at.len() as u32, WHAT)?;
+        let all = memory::collected(
+            self.elements_at.len(),
+            0..self.elements_at.len() as u32,
+            WHAT,
+        )?;
         let plan = RowPlan::try_region(&prior.basis(), &all, false)?;
         let (mut q, mut field) = (
             memory::zeros(prior.width(), WHAT)?,

@@ -123,7 +123,9 @@ impl Subset {
             let nodes = &partition.node_of_slot[chunk.first..chunk.first + chunk.owned];
             let at = nodes.iter().map(|node| positions[*node as usize]);
             partition.rest.extend(from_centre(at));
-            partition.rest.resize(partition.rest.len().next_multiple_of(4), [0.0; 4]);
+            partition
+                .rest
+                .resize(partition.rest.len().next_multiple_of(4), [0.0; 4]);
         }
         partition.fit_zeros()?;
         let lines = partition.widest().div_ceil(4);
@@ -193,11 +195,7 @@ impl Subset {
     ///
     /// # Panics
     /// If `displacement` is too short.
-    pub fn evaluate(
-        &mut self,
-        displacement: &[f32],
-        mut add: impl FnMut(u32, &[f32; 4]),
-    ) -> f32 {
+    pub fn evaluate(&mut self, displacement: &[f32], mut add: impl FnMut(u32, &[f32; 4])) -> f32 {
         let partition = &self.partition;
         let positions = self.positions.as_mut_ptr().cast::<[f32; 4]>();
         let forces = self.forces.as_mut_ptr().cast::<[f32; 4]>();

@@ -1,6 +1,6 @@
 //! The SIMD forces of a whole body against the f64 law, element by element.
 
-use elements::{ElementForces, Isa, Law, Material, MooneyRivlin, Ogden, Tetrahedron};
+use elements::{ElementForces, Isa, Law, Material, MooneyRivlin, Ogden, Subset, Tetrahedron};
 use tissue::mesh::{Mesh, box_phantom};
 
 fn body() -> Mesh {
@@ -188,4 +188,74 @@ fn check_inverted(material: &Material) {
     u[300] = f32::NAN;
     forces.evaluate(&u, &mut scratch, &mut out, &serial);
     assert!(out[300].is_nan());
+}
+
+/// The forces of the clusters that have one of some nodes, where all elements are theirs, and how many elements they have.
+fn forces_about(
+    subset: &mut Subset,
+    body: &ElementForces,
+    mesh: &Mesh,
+    is_wanted: impl Fn(u32) -> bool + Copy,
+    u: &[f32],
+) -> (Vec<Option<[f32; 3]>>, f64) {
+    subset.clear();
+    let mut volume = 0.0;
+    for chunk in 0..body.chunk_count() {
+        volume += subset.push(body, chunk, is_wanted).unwrap();
+    }
+    subset.finish(&mesh.positions).unwrap();
+    let mut missing = vec![0i32; mesh.positions.len()];
+    for &node in mesh.tets.iter().flatten() {
+        missing[node as usize] += 1;
+    }
+    for (number, element) in subset.tetrahedra() {
+        let mut corners = element.corners;
+        let mut own = mesh.tets[number as usize];
+        corners.sort_unstable();
+        own.sort_unstable();
+        assert_eq!(corners, own, "element {number}");
+        corners.iter().for_each(|node| missing[*node as usize] -= 1);
+    }
+    let mut sums = vec![[0.0f32; 3]; mesh.positions.len()];
+    subset.evaluate(u, |node, force| {
+        for (sum, force) in sums[node as usize].iter_mut().zip(force) {
+            *sum -= force;
+        }
+    });
+    let whole = sums.into_iter().zip(missing);
+    (
+        whole
+            .map(|(sum, missing)| (missing == 0).then_some(sum))
+            .collect(),
+        volume,
+    )
+}
+
+#[test]
+fn a_subset_has_the_forces_of_the_body_where_it_is_whole() {
+    let mesh = body();
+    let u = wave(&mesh, 0.3);
+    let all = mesh.positions.len() as u32;
+    for material in [Material::default(), ogden_laws()[0].clone()] {
+        for isa in Isa::available() {
+            let forces = ElementForces::new(mesh.tetrahedra(), &material, isa).unwrap();
+            let expected = forces_on(isa, &mesh, &material, &u);
+            let largest = expected.iter().fold(0.0f32, |most, f| most.max(f.abs()));
+            let mut subset = Subset::new(&forces).unwrap();
+            // Filled again and again in the room that it has: all, few, none, some.
+            for (first, end) in [(0, all), (40, 42), (0, 0), (100, 400)] {
+                let is_wanted = |node: u32| (first..end).contains(&node);
+                let (found, volume) = forces_about(&mut subset, &forces, &mesh, is_wanted, &u);
+                for node in first..end {
+                    let found = found[node as usize].expect("all elements of a wanted node");
+                    for (axis, found) in found.into_iter().enumerate() {
+                        let error = (found - expected[3 * node as usize + axis]).abs();
+                        assert!(error < 2e-5 * largest, "{isa:?}, node {node}: {error}");
+                    }
+                }
+                let own: f64 = subset.tetrahedra().map(|(_, element)| element.volume).sum();
+                assert!((own - volume).abs() <= 1e-5 * volume, "{own} of {volume}");
+            }
+        }
+    }
 }

@@ -58,7 +58,9 @@ impl Clusters {
         let modes = env.space.count();
         let size = NINE * modes;
         let part = |cluster: usize| {
-            let at = near.parts.binary_search_by_key(&cluster, |part| part.cluster);
+            let at = near
+                .parts
+                .binary_search_by_key(&cluster, |part| part.cluster);
             at.ok().map(|at| &near.parts[at])
         };
         for cluster in 0..self.volumes.len() {

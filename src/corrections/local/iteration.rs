@@ -25,7 +25,7 @@ impl LocalSolver {
         self.solve_contact(step, problem, base, way)?;
         let stiff = &mut self.d_stiff;
         step.preconditioner.stiffen(env, &self.d.c, stiff)?;
-        self.near.linear(env, &self.d.v, &mut self.d_linear);
+        self.near.linear(env, &self.d_modes, &mut self.d_linear);
         self.measure_direction(env);
         let work = self.work(problem);
         let slope = self.residual.over(&self.d) - work;
@@ -76,9 +76,9 @@ impl LocalSolver {
         self.reduced.take(&self.residual)?;
         let (near, reduced) = (&self.near, &mut self.reduced);
         each_load(problem, near, |place, force| {
-            add(-1.0, &force, &mut reduced.r[place..]);
-            add(-1.0, &force, &mut reduced.eta[place..]);
+            add(-1.0, &force, &mut reduced.r[place..])
         });
+        self.take_loads_off(step, problem)?;
         let recursion = self.pairs.descend(env.isa, &mut self.reduced);
         // z = w D^-1 r on the inside nodes, and the coarse level.
         self.d.clear(&self.near)?;
@@ -95,6 +95,39 @@ impl LocalSolver {
         }
         self.precondition(step)?;
         self.pairs.ascend(env.isa, recursion, &mut self.d);
+        self.decode_direction(step)
+    }
+
+    /// Takes the work of the modes on the tools' loads off the reduced residual.
+    fn take_loads_off(&mut self, step: &StepContext<'_>, problem: &ContactProblem) -> Result<()> {
+        let env = step.context.env();
+        let (p, mut is_known) = (&mut self.reduced.p, true);
+        problem.each_load(
+            |node, force| match env.prior.column_for(&env.body.held, node) {
+                Some((column, true)) => {
+                    for (axis, force) in force.to_array().into_iter().enumerate() {
+                        add(-1e3 * force, env.space.at_contact(3 * column + axis), p);
+                    }
+                }
+                _ => is_known = false,
+            },
+        );
+        if is_known {
+            return Ok(());
+        }
+        // On nodes without columns.
+        let (near, field) = (&self.near, &mut self.room.field);
+        resize(field, 3 * near.free)?;
+        each_load(problem, near, |place, force| {
+            let node = near.nodes[place / 3];
+            if !matches!(env.prior.column_for(&env.body.held, node), Some((_, true))) {
+                add(1.0, &force, &mut field[place..]);
+            }
+        });
+        near.project(env, field, &mut self.room.q);
+        let work = &mut self.on_modes;
+        (step.preconditioner).on_modes_in(env, &near.ranges, &self.room.q, work);
+        add(-1.0, work, p);
         Ok(())
     }
 
@@ -103,10 +136,7 @@ impl LocalSolver {
         let env = step.context.env();
         let preconditioner = &mut *step.preconditioner;
         let (near, q) = (&self.near, &mut self.room.q);
-        // Phi^T r.
-        near.project(env, &self.reduced.eta, q);
-        preconditioner.on_modes_in(env, &near.ranges, q, &mut self.on_modes);
-        add(1.0, &self.reduced.modal, &mut self.on_modes);
+        let whole = &self.reduced.p;
         // Of a column's response: (A_k E)_S^T r_S + E^T Phi G^-1 (Phi^T r - Phi_S^T r_S).
         resize(&mut self.room.field, 3 * near.free)?;
         self.room.field[..3 * near.inside].copy_from_slice(&self.reduced.r);
@@ -123,7 +153,7 @@ impl LocalSolver {
             known,
             &mut self.on_columns,
         );
-        for (value, whole) in inside.iter_mut().zip(&self.on_modes) {
+        for (value, whole) in inside.iter_mut().zip(whole) {
             *value = whole - *value;
         }
         preconditioner.respond_on_modes(env, inside, &mut self.solved)?;
@@ -131,17 +161,16 @@ impl LocalSolver {
             let own = env.space.at_contact(dof as usize);
             *work += 1e3 * dot(own, &self.solved) as f32;
         }
-        let (c, forces) = preconditioner.coarse_on(env, &self.on_modes, &self.on_columns);
+        let (c, forces) = preconditioner.coarse_on(env, whole, &self.on_columns);
         self.d.c.copy_from_slice(c);
         self.loads.clear();
         memory::fit(&mut self.loads, forces.len(), WHAT)?;
         let loads = self.columns.iter().copied().zip(forces.iter().copied());
         self.loads.extend(loads);
-        self.respond(step)?;
-        self.decode_direction(step)
+        self.respond(step)
     }
 
-    /// Adds the response to `loads` to the direction, but for its `v`.
+    /// Adds the response to `loads` to the direction.
     fn respond(&mut self, step: &mut StepContext<'_>) -> Result<()> {
         let env = step.context.env();
         let preconditioner = &mut *step.preconditioner;
@@ -187,19 +216,20 @@ impl LocalSolver {
             .copied()
             .zip(change.forces.iter().copied());
         self.loads.extend(loads.filter(|load| load.1 != 0.0));
-        if !self.loads.is_empty() {
-            self.respond(step)?;
+        if self.loads.is_empty() {
+            return Ok(());
         }
+        self.respond(step)?;
         self.decode_direction(step)
     }
 
-    /// `v` of the direction.
+    /// `Phi c` of the direction at the near nodes.
     pub(super) fn decode_direction(&mut self, step: &mut StepContext<'_>) -> Result<()> {
         let env = step.context.env();
         let (ranges, q) = (&self.near.ranges, &mut self.room.q);
         let preconditioner = &mut *step.preconditioner;
         preconditioner.near_coordinates(env, &self.d.c, &[], ranges, q);
-        self.near.decode(env, q, &mut self.d.v)
+        self.near.decode(env, q, &mut self.d_modes)
     }
 
     /// Root mean square of the direction, weighted by mass.
@@ -225,7 +255,7 @@ impl LocalSolver {
         each_load(problem, &self.near, |place, force| {
             for (axis, force) in force.into_iter().enumerate() {
                 let at = place + axis;
-                let mut d = self.d.v[at];
+                let mut d = self.d_modes[at];
                 if at < inside {
                     d += self.d.t[at];
                 }
@@ -240,9 +270,8 @@ impl LocalSolver {
         let env = step.context.env();
         if t != 1.0 {
             self.d.scale(t);
-            // The bits that a layout of the pair would have.
-            self.decode_direction(step)?;
         }
+        add(t, &self.d_modes, &mut self.modes);
         add(t, &self.d_linear, &mut self.linear);
         add(t, &self.d_stiff, &mut self.stiff);
         self.reduced.take(&self.next)?;

@@ -85,6 +85,9 @@ pub struct LocalSolver {
     stiff: Vec<f32>,
     /// The direction, and what is linear in it.
     d: Step,
+    /// `Phi c` of the direction and of the steps since the base at the near nodes `[.., 3]`, by place.
+    d_modes: Vec<f32>,
+    modes: Vec<f32>,
     d_linear: Vec<f32>,
     d_stiff: Vec<f32>,
     /// The residual without the loads, as the first recursion changes it; that of the next state.
@@ -134,6 +137,8 @@ impl LocalSolver {
             base_modes: modes()?,
             stiff: modes()?,
             d: Step::with_modes(count)?,
+            d_modes: Vec::new(),
+            modes: Vec::new(),
             d_linear: Vec::new(),
             d_stiff: modes()?,
             reduced: Change::with_modes(count)?,
@@ -181,7 +186,10 @@ impl LocalSolver {
         add_centres(rest, &self.touched, &mut self.about)?;
         let pairs = &self.pairs;
         let abouts = pairs.records().map(|record| record.about.as_slice());
-        let last = pairs.records().last().map(|record| record.centres.as_slice());
+        let last = pairs
+            .records()
+            .last()
+            .map(|record| record.centres.as_slice());
         self.near.choose(rest, last, &self.about, abouts)?;
         if self.near.take_chosen(env, far, rest)? {
             self.pairs.forget_layout();
@@ -196,6 +204,8 @@ impl LocalSolver {
         resize(&mut self.linear, 3 * self.near.free)?;
         resize(&mut self.d_linear, 3 * self.near.free)?;
         resize(&mut self.inner, 3 * self.near.free)?;
+        resize(&mut self.modes, 3 * self.near.nodes.len())?;
+        resize(&mut self.d_modes, 3 * self.near.nodes.len())?;
         step.preconditioner.project(env, base.residual)?;
         let q = &step.preconditioner.coordinates;
         step.preconditioner.on_modes(env, q, &mut self.base_modes)?;
@@ -209,7 +219,7 @@ impl LocalSolver {
         std::mem::swap(&mut self.residual, &mut self.next);
         // What the base has is not what has come since.
         self.base.copy_from_slice(&self.inner);
-        self.residual.eta.fill(0.0);
+        self.residual.p.copy_from_slice(&self.base_modes);
         // A chunk that is near in part counts where what is near does not explain it.
         let dets = step.scratch.smallest_by_chunk().iter();
         let far_dets = dets.zip(&self.near.far_share).map(|(&found, &share)| {
@@ -243,8 +253,8 @@ impl LocalSolver {
         for (place, &node) in self.near.nodes[..self.near.free].iter().enumerate() {
             for axis in 0..3 {
                 let (at, from) = (3 * place + axis, 3 * node as usize + axis);
-                let mut moved = self.now.v[at];
-                let mut along = if t == 0.0 { 0.0 } else { self.d.v[at] };
+                let mut moved = self.modes[at];
+                let mut along = if t == 0.0 { 0.0 } else { self.d_modes[at] };
                 if at < inside {
                     moved += self.now.t[at];
                     along += if t == 0.0 { 0.0 } else { self.d.t[at] };
@@ -271,17 +281,22 @@ impl LocalSolver {
             }
         }
         self.next.r.copy_from_slice(&inner[..3 * near.inside]);
-        for (at, eta) in self.next.eta.iter_mut().enumerate() {
+        // What the near elements have added to what is linear.
+        resize(&mut self.room.field, 3 * near.free)?;
+        for (at, added) in self.room.field.iter_mut().enumerate() {
             let linear = self.linear[at] + t * self.d_linear[at];
-            *eta = inner[at] - self.base[at] - linear;
+            *added = inner[at] - self.base[at] - linear;
         }
+        let (near, q, p) = (&self.near, &mut self.room.q, &mut self.next.p);
+        near.project(env, &self.room.field, q);
+        (step.preconditioner).on_modes_in(env, &near.ranges, q, &mut self.on_modes);
         self.more_on_modes.copy_from_slice(&self.now.c);
         add(t, &self.d.c, &mut self.more_on_modes);
-        let (c, modal) = (&self.more_on_modes, &mut self.next.modal);
-        let far_det = self.clusters.added_on_modes(env, far, c, modal)?;
-        add(1.0, &self.base_modes, modal);
-        add(1.0, &self.stiff, modal);
-        add(t, &self.d_stiff, modal);
+        let far_det = (self.clusters).added_on_modes(env, far, &self.more_on_modes, p)?;
+        add(1.0, &self.on_modes, p);
+        add(1.0, &self.base_modes, p);
+        add(1.0, &self.stiff, p);
+        add(t, &self.d_stiff, p);
         Ok(det.min(far_det).min(self.far_det))
     }
 

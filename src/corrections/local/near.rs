@@ -131,8 +131,13 @@ impl NearSet {
         let Some(last) = last else {
             return Ok(());
         };
-        let serves = self.chosen.iter().all(|&node| is_by(rest, last, node, SLACK_MM))
-            && last.iter().all(|&node| is_by(rest, &self.chosen, node, LEFT_MM));
+        let serves = self
+            .chosen
+            .iter()
+            .all(|&node| is_by(rest, last, node, SLACK_MM))
+            && last
+                .iter()
+                .all(|&node| is_by(rest, &self.chosen, node, LEFT_MM));
         match serves {
             true => memory::replace(&mut self.chosen, last, WHAT),
             false => Ok(()),
@@ -205,7 +210,11 @@ impl NearSet {
                 let at = &rest[3 * node as usize..][..3];
                 let outside =
                     |axis: usize| (low[axis] - at[axis]).max(at[axis] - high[axis]).max(0.0);
-                [0, 1, 2].map(|axis| outside(axis).powi(2)).iter().sum::<f32>() < REACH_MM * REACH_MM
+                [0, 1, 2]
+                    .map(|axis| outside(axis).powi(2))
+                    .iter()
+                    .sum::<f32>()
+                    < REACH_MM * REACH_MM
             })
         };
         for (chunk, bounds) in far.boxes.iter().enumerate() {
@@ -218,7 +227,11 @@ impl NearSet {
                 let near = (self.subset).push(forces, chunk, |node| is_reached[node as usize]);
                 let near = memory::tried(near, WHAT)? / far.volumes[chunk];
                 // What rounding leaves of a chunk is nothing.
-                self.far_share[chunk] = if near > 1.0 - 1e-4 { 0.0 } else { 1.0 - near as f32 };
+                self.far_share[chunk] = if near > 1.0 - 1e-4 {
+                    0.0
+                } else {
+                    1.0 - near as f32
+                };
             }
         }
         memory::tried(self.subset.finish(rest.as_chunks().0), WHAT)?;

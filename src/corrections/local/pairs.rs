@@ -1,12 +1,7 @@
 //! The L-BFGS pairs of local iterations: steps and changes of the residual where the tools are, and on the modes elsewhere.
 //!
 //! A step is `s = t + Phi c`: any field `t` at the inside nodes, and modes. A change of the residual is known by what it does over such steps,
-//!
-//! ```text
-//! y . s = y_S . t + eta . v + m . c        v = Phi c at the near nodes,  m = (K + kappa M of the modes) c_y + what the far clusters add
-//! ```
-//!
-//! with the change `y_S` at the inside nodes, and `eta` what of it at the near nodes is not linear in `c_y`.
+//! `y . s = y_S . t + (Phi^T y) . c`.
 //!
 //! A pair is kept as a [`Record`] that does not depend on what else is near, and laid out for the near set of the moment: where nodes
 //! have come to it the change is that of linear elasticity, as it was while they were far.
@@ -122,7 +117,7 @@ impl Pairs {
         for at in 0..self.order.len() {
             let slot = self.order[at];
             if !self.laid_out[slot] {
-                self.lay_out_one(env, near, preconditioner, room, (slot, None))?;
+                self.lay_out_one(env, near, preconditioner, room, slot)?;
                 is_new = true;
             }
         }
@@ -142,54 +137,39 @@ impl Pairs {
         near: &NearSet,
         preconditioner: &mut Preconditioner,
         room: &mut Room,
-        (slot, known_v): (usize, Option<&[f32]>),
+        slot: usize,
     ) -> Result<()> {
         let (record, step) = (&self.records[slot], &mut self.steps[slot]);
         let change = &mut self.changes[slot];
         step.clear(near)?;
         change.clear(near)?;
         step.c.copy_from_slice(&record.c);
-        change.modal.copy_from_slice(&record.modal);
-        match known_v {
-            Some(v) => step.v.copy_from_slice(v),
-            None => {
-                preconditioner.near_coordinates(env, &step.c, &[], &near.ranges, &mut room.q);
-                near.decode(env, &room.q, &mut step.v)?;
-            }
-        }
-        let is_same = record.centres == near.centres
-            && record.t.len() == step.t.len()
-            && record.eta.len() == change.eta.len();
-        if is_same {
+        change.p.copy_from_slice(&record.p);
+        if record.centres == near.centres && record.t.len() == step.t.len() {
             step.t.copy_from_slice(&record.t);
             change.r.copy_from_slice(&record.r);
-            change.eta.copy_from_slice(&record.eta);
         } else {
-            // Where it was far it was linear.
-            for (at, &node) in record.nodes.iter().enumerate() {
-                if near.holds(node) {
-                    let place = 3 * near.place(node).unwrap_or_default();
-                    step.t[place..place + 3].copy_from_slice(&record.t[3 * at..3 * at + 3]);
+            let places = record.nodes.iter().map(|&node| match near.holds(node) {
+                true => near.place(node),
+                false => None,
+            });
+            let kept = |from: &[f32], to: &mut [f32]| {
+                for (place, from) in places.clone().zip(from.as_chunks::<3>().0) {
+                    if let Some(place) = place {
+                        to[3 * place..3 * place + 3].copy_from_slice(from);
+                    }
                 }
-            }
+            };
+            kept(&record.t, &mut step.t);
+            // Where it was far it was linear.
             resize(&mut room.field, 3 * near.nodes.len())?;
             resize(&mut room.linear, 3 * near.free)?;
-            room.field.copy_from_slice(&step.v);
+            preconditioner.near_coordinates(env, &step.c, &[], &near.ranges, &mut room.q);
+            near.decode(env, &room.q, &mut room.field)?;
             add(1.0, &step.t, &mut room.field);
             near.linear(env, &room.field, &mut room.linear);
-            change.eta.copy_from_slice(&room.linear);
-            let inside = 3 * near.inside;
-            change.r.copy_from_slice(&change.eta[..inside]);
-            near.linear(env, &step.v, &mut room.linear);
-            add(-1.0, &room.linear, &mut change.eta);
-            for (at, &node) in record.nodes.iter().enumerate() {
-                if near.holds(node) {
-                    let place = 3 * near.place(node).unwrap_or_default();
-                    let from = 3 * at..3 * at + 3;
-                    change.r[place..place + 3].copy_from_slice(&record.r[from.clone()]);
-                    change.eta[place..place + 3].copy_from_slice(&record.eta[from]);
-                }
-            }
+            change.r.copy_from_slice(&room.linear[..3 * near.inside]);
+            kept(&record.r, &mut change.r);
         }
         self.laid_out[slot] = true;
         Ok(())
@@ -203,7 +183,7 @@ impl Pairs {
         }
     }
 
-    /// Stores a pair in place of the oldest, if it has curvature. The step's `v` is decoded from its `c`.
+    /// Stores a pair in place of the oldest, if it has curvature.
     pub fn store(
         &mut self,
         env: Env<'_>,
@@ -221,7 +201,7 @@ impl Pairs {
         let slot = (0..SLOTS).find(free).unwrap_or(0);
         self.laid_out[slot] = false;
         self.records[slot].fill(near, about, step, change)?;
-        self.lay_out_one(env, near, preconditioner, room, (slot, Some(&step.v)))?;
+        self.lay_out_one(env, near, preconditioner, room, slot)?;
         self.order.push(slot);
         self.multiply(self.order.len() - 1);
         if self.products[slot][slot] <= 0.0 {
@@ -233,73 +213,42 @@ impl Pairs {
     /// The first recursion: `r` becomes `r - sum_i alpha_i y_i`.
     pub fn descend(&self, isa: Isa, r: &mut Change) -> Recursion {
         let used = self.used();
-        let steps = |of: fn(&Step) -> &[f32]| self.steps(used, of);
+        let count = used.1;
         let mut products = [0.0; PAIRS];
-        sum_dots(isa, &steps(|s| &s.t), &r.r, used.1, &mut products);
-        sum_dots(isa, &steps(|s| &s.v), &r.eta, used.1, &mut products);
-        sum_dots(isa, &steps(|s| &s.c), &r.modal, used.1, &mut products);
-        let (slots, count) = (&used.0[..used.1], used.1);
-        let alpha = alpha(&self.products, slots, &products[..count]);
+        sum_dots(isa, &self.steps(used, |s| &s.t), &r.r, count, &mut products);
+        sum_dots(isa, &self.steps(used, |s| &s.c), &r.p, count, &mut products);
+        let alpha = alpha(&self.products, &used.0[..count], &products[..count]);
         let factors = alpha.map(|a| -a as f32);
-        let changes = |of: fn(&Change) -> &[f32]| self.changes(used, of);
-        piece_add(
-            isa,
-            &changes(|y| &y.r)[..count],
-            &factors[..count],
-            0,
-            &mut r.r,
-        );
-        piece_add(
-            isa,
-            &changes(|y| &y.eta)[..count],
-            &factors[..count],
-            0,
-            &mut r.eta,
-        );
-        piece_add(
-            isa,
-            &changes(|y| &y.modal)[..count],
-            &factors[..count],
-            0,
-            &mut r.modal,
-        );
+        let (rows, modes) = (self.changes(used, |y| &y.r), self.changes(used, |y| &y.p));
+        piece_add(isa, &rows[..count], &factors[..count], 0, &mut r.r);
+        piece_add(isa, &modes[..count], &factors[..count], 0, &mut r.p);
         Recursion { used, alpha }
     }
 
     /// The second recursion: `z` becomes `-(z + sum_i w_i s_i)`.
     pub fn ascend(&self, isa: Isa, recursion: Recursion, z: &mut Step) {
         let (used, count) = (recursion.used, recursion.used.1);
-        let changes = |of: fn(&Change) -> &[f32]| self.changes(used, of);
         let mut products = [0.0; PAIRS];
-        sum_dots(isa, &changes(|y| &y.r), &z.t, count, &mut products);
-        let (eta, free) = (changes(|y| &y.eta), self.free(used, z));
-        sum_dots(isa, &eta, &z.v[..free], count, &mut products);
-        sum_dots(isa, &changes(|y| &y.modal), &z.c, count, &mut products);
+        sum_dots(
+            isa,
+            &self.changes(used, |y| &y.r),
+            &z.t,
+            count,
+            &mut products,
+        );
+        sum_dots(
+            isa,
+            &self.changes(used, |y| &y.p),
+            &z.c,
+            count,
+            &mut products,
+        );
         let slots = &used.0[..count];
         let weights = weight(&self.products, slots, &recursion.alpha, &products[..count]);
         let factors = weights.map(|w| w as f32);
-        let steps = |of: fn(&Step) -> &[f32]| self.steps(used, of);
-        piece_add(
-            isa,
-            &steps(|s| &s.t)[..count],
-            &factors[..count],
-            0,
-            &mut z.t,
-        );
-        piece_add(
-            isa,
-            &steps(|s| &s.v)[..count],
-            &factors[..count],
-            0,
-            &mut z.v,
-        );
-        piece_add(
-            isa,
-            &steps(|s| &s.c)[..count],
-            &factors[..count],
-            0,
-            &mut z.c,
-        );
+        let (rows, modes) = (self.steps(used, |s| &s.t), self.steps(used, |s| &s.c));
+        piece_add(isa, &rows[..count], &factors[..count], 0, &mut z.t);
+        piece_add(isa, &modes[..count], &factors[..count], 0, &mut z.c);
         z.scale(-1.0);
     }
 
@@ -332,14 +281,6 @@ impl Pairs {
             *list = of(&self.changes[slot]);
         }
         lists
-    }
-
-    /// Numbers of `v` at the free nodes.
-    fn free(&self, (used, count): ([usize; PAIRS], usize), z: &Step) -> usize {
-        match count {
-            0 => z.v.len(),
-            _ => self.changes[used[0]].eta.len(),
-        }
     }
 }
 

@@ -16,18 +16,15 @@ pub struct Record {
     pub centres: Vec<u32>,
     /// Inside nodes then.
     pub nodes: Vec<u32>,
-    /// `[3 S]` each.
+    /// The step, and what it changed: `[3 S]` at these nodes each, and by mode.
     #[serde(with = "stored")]
     pub t: Vec<f32>,
     #[serde(with = "stored")]
     pub r: Vec<f32>,
-    /// `[3 free]`, the inside nodes first.
-    #[serde(with = "stored")]
-    pub eta: Vec<f32>,
     #[serde(with = "stored")]
     pub c: Vec<f32>,
     #[serde(with = "stored")]
-    pub modal: Vec<f32>,
+    pub p: Vec<f32>,
 }
 
 impl Record {
@@ -39,7 +36,6 @@ impl Record {
         };
         let sound = self.about.iter().all(|&node| (node as usize) < nodes)
             && ascends(&self.centres, nodes)
-            && self.eta.len() >= 3 * self.nodes.len()
             && ascends(&self.nodes, nodes);
         if !sound {
             return Err(crate::Error::Snapshot(
@@ -49,9 +45,8 @@ impl Record {
         for (list, len) in [
             (&self.t, 3 * self.nodes.len()),
             (&self.r, 3 * self.nodes.len()),
-            (&self.eta, self.eta.len()),
             (&self.c, modes),
-            (&self.modal, modes),
+            (&self.p, modes),
         ] {
             stored::check(list, len)?;
         }
@@ -66,9 +61,8 @@ impl Record {
         memory::replace(&mut self.nodes, &other.nodes, WHAT)?;
         memory::replace(&mut self.t, &other.t, WHAT)?;
         memory::replace(&mut self.r, &other.r, WHAT)?;
-        memory::replace(&mut self.eta, &other.eta, WHAT)?;
         memory::replace(&mut self.c, &other.c, WHAT)?;
-        memory::replace(&mut self.modal, &other.modal, WHAT)
+        memory::replace(&mut self.p, &other.p, WHAT)
     }
 
     pub(super) fn fill(
@@ -83,8 +77,7 @@ impl Record {
         memory::replace(&mut self.nodes, &near.nodes[..near.inside], WHAT)?;
         memory::replace(&mut self.t, &step.t, WHAT)?;
         memory::replace(&mut self.r, &change.r, WHAT)?;
-        memory::replace(&mut self.eta, &change.eta, WHAT)?;
         memory::replace(&mut self.c, &step.c, WHAT)?;
-        memory::replace(&mut self.modal, &change.modal, WHAT)
+        memory::replace(&mut self.p, &change.p, WHAT)
     }
 }

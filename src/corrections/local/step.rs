@@ -7,47 +7,43 @@ use crate::memory::{self, HeldBytes};
 /// `t + Phi c`.
 #[derive(Debug, Default, HeldBytes)]
 pub(in crate::corrections) struct Step {
-    /// `[3 S]`.
+    /// `[3 S]`, mm.
     pub t: Vec<f32>,
-    /// `Phi c` at the near nodes `[.., 3]`, by place.
-    pub v: Vec<f32>,
     pub c: Vec<f32>,
 }
 
-/// A change of the residual, as a functional of steps.
+/// A residual, or what of it changes, as a functional of steps: `r . t + p . c`.
 #[derive(Debug, Default, HeldBytes)]
 pub(in crate::corrections) struct Change {
+    /// At the inside nodes `[3 S]`, µN.
     pub r: Vec<f32>,
-    pub eta: Vec<f32>,
-    pub modal: Vec<f32>,
+    /// `Phi^T` of it, at all nodes.
+    pub p: Vec<f32>,
 }
 
 impl Step {
     pub fn with_modes(count: usize) -> Result<Step> {
         Ok(Step {
+            t: Vec::new(),
             c: memory::zeros(count, WHAT)?,
-            ..Step::default()
         })
     }
 
     /// No step, in the places of a near set.
     pub fn clear(&mut self, near: &NearSet) -> Result<()> {
-        resize(&mut self.t, 3 * near.inside)?;
-        resize(&mut self.v, 3 * near.nodes.len())?;
         self.c.fill(0.0);
-        Ok(())
+        resize(&mut self.t, 3 * near.inside)
     }
 
     /// `self += factor other`.
     pub fn add(&mut self, factor: f32, other: &Step) {
         add(factor, &other.t, &mut self.t);
-        add(factor, &other.v, &mut self.v);
         add(factor, &other.c, &mut self.c);
     }
 
     /// `self *= factor`.
     pub fn scale(&mut self, factor: f32) {
-        for list in [&mut self.t, &mut self.v, &mut self.c] {
+        for list in [&mut self.t, &mut self.c] {
             list.iter_mut().for_each(|value| *value *= factor);
         }
     }
@@ -56,37 +52,32 @@ impl Step {
 impl Change {
     pub fn with_modes(count: usize) -> Result<Change> {
         Ok(Change {
-            modal: memory::zeros(count, WHAT)?,
-            ..Change::default()
+            r: Vec::new(),
+            p: memory::zeros(count, WHAT)?,
         })
     }
 
     /// No change, in the places of a near set.
     pub fn clear(&mut self, near: &NearSet) -> Result<()> {
-        resize(&mut self.r, 3 * near.inside)?;
-        resize(&mut self.eta, 3 * near.free)?;
-        self.modal.fill(0.0);
-        Ok(())
+        self.p.fill(0.0);
+        resize(&mut self.r, 3 * near.inside)
     }
 
     /// Takes what another holds.
     pub fn take(&mut self, other: &Change) -> Result<()> {
-        memory::replace(&mut self.r, &other.r, WHAT)?;
-        memory::replace(&mut self.eta, &other.eta, WHAT)?;
-        self.modal.copy_from_slice(&other.modal);
-        Ok(())
+        self.p.copy_from_slice(&other.p);
+        memory::replace(&mut self.r, &other.r, WHAT)
     }
 
     /// `self += factor other`.
     pub fn add(&mut self, factor: f32, other: &Change) {
         add(factor, &other.r, &mut self.r);
-        add(factor, &other.eta, &mut self.eta);
-        add(factor, &other.modal, &mut self.modal);
+        add(factor, &other.p, &mut self.p);
     }
 
     /// The work over a step, nJ.
     pub fn over(&self, step: &Step) -> f64 {
-        dot(&self.r, &step.t) + dot(&self.eta, &step.v) + dot(&self.modal, &step.c)
+        dot(&self.r, &step.t) + dot(&self.p, &step.c)
     }
 }
 
