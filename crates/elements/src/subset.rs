@@ -236,8 +236,8 @@ impl Slots {
     fn of(&mut self, node: u32, nodes: &mut Vec<u32>) -> Result<u16, TryReserveError> {
         let slot = &mut self.of_node[node as usize];
         if *slot == PADDING {
-            *slot = (nodes.len() - self.first) as u32;
             push(nodes, node)?;
+            *slot = (nodes.len() - 1 - self.first) as u32;
         }
         Ok(*slot as u16)
     }

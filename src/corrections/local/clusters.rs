@@ -57,14 +57,8 @@ impl Clusters {
     ) -> Result<()> {
         let modes = env.space.count();
         let size = NINE * modes;
-        let part = |cluster: usize| {
-            let at = near
-                .parts
-                .binary_search_by_key(&cluster, |part| part.cluster);
-            at.ok().map(|at| &near.parts[at])
-        };
         for cluster in 0..self.volumes.len() {
-            let part = part(cluster);
+            let part = near.parts.of(cluster);
             if part.is_none() && !self.is_cut[cluster] {
                 continue;
             }
@@ -90,7 +84,7 @@ impl Clusters {
             for (row, own) in own.chunks_exact_mut(modes).enumerate() {
                 let (i, j) = (row / 3, row % 3);
                 room.field.fill(0.0);
-                for &(place, weight) in &near.weights[part.weights.clone()] {
+                for &(place, weight) in near.parts.weights(part) {
                     room.field[3 * place as usize + i] = weight[j];
                 }
                 near.project(env, &room.field, &mut room.q);
@@ -111,9 +105,9 @@ impl Clusters {
                 }
             }
         }
-        for part in &near.parts {
+        for part in near.parts.iter() {
             let base = &mut self.base[part.cluster * NINE..][..NINE];
-            for &(place, weight) in &near.weights[part.weights.clone()] {
+            for &(place, weight) in near.parts.weights(part) {
                 let u = &u[3 * near.nodes[place as usize] as usize..][..3];
                 for (row, u) in base.chunks_exact_mut(3).zip(u) {
                     for (sum, weight) in row.iter_mut().zip(weight) {

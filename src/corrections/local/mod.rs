@@ -1,4 +1,4 @@
-//! LocalSolver iterations: all degrees of freedom near the tools, modes and responses elsewhere; an iteration costs what the tools touch.
+//! Local iterations: all degrees of freedom near the tools, modes and responses elsewhere; an iteration costs what the tools touch.
 //!
 //! From a base `u_0`, whose residual is known at every node, the state is
 //!
@@ -16,6 +16,7 @@
 
 mod clusters;
 mod iteration;
+mod linear;
 mod near;
 mod pairs;
 mod record;
@@ -191,10 +192,12 @@ impl LocalSolver {
             .last()
             .map(|record| record.centres.as_slice());
         self.near.choose(rest, last, &self.about, abouts)?;
-        if self.near.take_chosen(env, far, rest)? {
+        if !self.near.is_chosen() {
             self.pairs.forget_layout();
+            self.near.fill(env, far, rest)?;
             let (near, room) = (&self.near, &mut self.room);
             (self.clusters).leave_out(env, far, near, step.preconditioner, room)?;
+            self.near.finish();
         }
         self.pairs
             .lay_out(env, &self.near, step.preconditioner, &mut self.room)?;

@@ -8,6 +8,7 @@ use std::ops::Range;
 
 use ::elements::Subset;
 
+use super::linear::{LinearElements, Parts};
 use crate::corrections::far::FarField;
 use crate::corrections::precondition::Env;
 use crate::error::Result;
@@ -16,7 +17,7 @@ use crate::memory::{self, HeldBytes};
 
 pub(super) const WHAT: &str = "the elements near the tools";
 /// Nodes are near that lie this close to a centre at rest, mm.
-const REACH_MM: f32 = 20.0;
+const REACH_MM: f32 = 25.0;
 /// Centres lie this far apart at least, and a set goes on as long as what the tools touch lies that close to them, mm.
 const APART_MM: f32 = 3.0;
 const SLACK_MM: f32 = 5.0;
@@ -24,30 +25,6 @@ const SLACK_MM: f32 = 5.0;
 const LEFT_MM: f32 = 12.0;
 /// A node that is not near.
 const NONE: u32 = u32::MAX;
-
-/// One element of the linear part.
-#[derive(HeldBytes)]
-struct Linear {
-    places: [u32; 4],
-    /// The cluster of the far field that it would be of.
-    cluster: u32,
-    /// Of the shape functions 1, 2, 3, 1/mm.
-    gradients: [[f32; 3]; 3],
-    /// Lame's constants times the rest volume, µN mm.
-    shear: f32,
-    lambda: f32,
-}
-
-/// What of a cluster of the far field is near.
-#[derive(HeldBytes)]
-pub(super) struct Part {
-    pub cluster: usize,
-    /// Rest volume times the stiffness over the material's, mm³.
-    pub volume: f64,
-    /// Into [`NearSet::weights`].
-    #[held(skip)]
-    pub weights: Range<usize>,
-}
 
 /// What is near.
 #[derive(HeldBytes)]
@@ -67,15 +44,13 @@ pub(in crate::corrections) struct NearSet {
     is_reached: Vec<bool>,
     counts: Vec<u16>,
     subset: Subset,
-    elements: Vec<Linear>,
-    /// By cluster, ascending; and `sum_e v_e grad N` of their free nodes, by place, mm².
-    pub(super) parts: Vec<Part>,
-    pub(super) weights: Vec<(u32, [f32; 3])>,
-    sums: Vec<[f32; 3]>,
+    elements: LinearElements,
+    /// What of the far field's clusters is near.
+    pub(super) parts: Parts,
     plan: RowPlan,
     /// Coordinates of the blocks that near nodes are of.
     pub ranges: Vec<Range<usize>>,
-    /// No error has left the lists half made.
+    /// No error has left something half made.
     is_whole: bool,
 }
 
@@ -93,10 +68,8 @@ impl NearSet {
             is_reached: memory::filled(count, false, WHAT)?,
             counts: memory::filled(count, 0, WHAT)?,
             subset: memory::tried(Subset::new(&env.body.forces), WHAT)?,
-            elements: Vec::new(),
-            parts: Vec::new(),
-            weights: Vec::new(),
-            sums: Vec::new(),
+            elements: LinearElements::default(),
+            parts: Parts::default(),
             plan: RowPlan::try_region(&env.prior.basis(), &[], true)?,
             ranges: Vec::new(),
             is_whole: false,
@@ -144,17 +117,18 @@ impl NearSet {
         }
     }
 
-    /// Takes the elements about the chosen centres; tells whether others are near now.
-    pub fn take_chosen(&mut self, env: Env<'_>, far: &FarField, rest: &[f32]) -> Result<bool> {
-        if self.is_whole && self.chosen == self.centres {
-            return Ok(false);
-        }
-        self.fill(env, far, rest)?;
-        Ok(true)
+    /// Whether what is near is what lies about the chosen centres.
+    pub fn is_chosen(&self) -> bool {
+        self.is_whole && self.chosen == self.centres
     }
 
-    fn fill(&mut self, env: Env<'_>, far: &FarField, rest: &[f32]) -> Result<()> {
-        // Nothing is near until all is known.
+    /// All that depends on what is near has been made for it.
+    pub fn finish(&mut self) {
+        self.is_whole = true;
+    }
+
+    /// Takes the elements about the chosen centres.
+    pub fn fill(&mut self, env: Env<'_>, far: &FarField, rest: &[f32]) -> Result<()> {
         self.is_whole = false;
         for &node in &self.nodes {
             self.places[node as usize] = NONE;
@@ -178,11 +152,8 @@ impl NearSet {
             self.free += usize::from(!is_held);
             self.inside += usize::from(!is_held && !is_cut);
         }
-        let places = &self.places;
-        for element in &mut self.elements {
-            element.places = element.places.map(|node| places[node as usize]);
-        }
-        self.take_parts(far)?;
+        self.elements.take_places(&self.places);
+        self.parts.fill(&self.elements, far, self.free)?;
         let (places, free) = (&self.places, self.free);
         let row_of = |node: u32| {
             let place = places[node as usize];
@@ -196,9 +167,7 @@ impl NearSet {
             let ends = &basis.rank_offsets[block..block + 2];
             self.ranges.push(ends[0] as usize..ends[1] as usize);
         }
-        memory::replace(&mut self.centres, &self.chosen, WHAT)?;
-        self.is_whole = true;
-        Ok(())
+        memory::replace(&mut self.centres, &self.chosen, WHAT)
     }
 
     /// The elements of the nodes within reach, and their nodes; `elements` have these for places.
@@ -235,8 +204,6 @@ impl NearSet {
             }
         }
         memory::tried(self.subset.finish(rest.as_chunks().0), WHAT)?;
-        let moduli = far.moduli;
-        let lambda = moduli.bulk_pa - 2.0 / 3.0 * moduli.shear_pa;
         for (number, element) in self.subset.tetrahedra() {
             for node in element.corners {
                 let count = &mut self.counts[node as usize];
@@ -245,59 +212,7 @@ impl NearSet {
                 }
                 *count += 1;
             }
-            let linear = Linear {
-                places: element.corners,
-                cluster: u32::from(far.cluster_of[number as usize]),
-                gradients: element.gradients.map(|g| g.map(|x| x as f32)),
-                shear: (moduli.shear_pa * element.volume) as f32,
-                lambda: (lambda * element.volume) as f32,
-            };
-            memory::push(&mut self.elements, linear, WHAT)?;
-        }
-        Ok(())
-    }
-
-    /// What of each cluster is near.
-    fn take_parts(&mut self, far: &FarField) -> Result<()> {
-        self.parts.clear();
-        self.weights.clear();
-        self.sums.clear();
-        memory::fit(&mut self.sums, self.free, WHAT)?;
-        self.sums.resize(self.free, [0.0; 3]);
-        for cluster in 0..far.clusters() {
-            let own = |element: &&Linear| element.cluster as usize == cluster;
-            let (mut volume, mut largest) = (0.0f64, 0.0f32);
-            for element in self.elements.iter().filter(own) {
-                let share = element.shear / far.moduli.shear_pa as f32;
-                volume += f64::from(share);
-                let [a, b, c] = element.gradients;
-                let first = [0, 1, 2].map(|k| -(a[k] + b[k] + c[k]));
-                for (place, gradient) in element.places.into_iter().zip([first, a, b, c]) {
-                    if let Some(sum) = self.sums.get_mut(place as usize) {
-                        for (sum, value) in sum.iter_mut().zip(gradient) {
-                            *sum += share * value;
-                            largest = largest.max((share * value).abs());
-                        }
-                    }
-                }
-            }
-            if volume == 0.0 {
-                continue;
-            }
-            let start = self.weights.len();
-            for (place, sum) in self.sums.iter_mut().enumerate() {
-                // Inside of the part the shares of a node's elements cancel.
-                if sum.iter().any(|value| value.abs() > 1e-5 * largest) {
-                    memory::push(&mut self.weights, (place as u32, *sum), WHAT)?;
-                }
-                *sum = [0.0; 3];
-            }
-            let part = Part {
-                cluster,
-                volume,
-                weights: start..self.weights.len(),
-            };
-            memory::push(&mut self.parts, part, WHAT)?;
+            self.elements.push(far, number, &element)?;
         }
         Ok(())
     }
@@ -318,52 +233,11 @@ impl NearSet {
     /// `(K + kappa M) v` of the near elements at the free nodes, `[3 free]`, µN, of a field `[.., 3]` by place; without inertia at those that
     /// are not inside.
     pub fn linear(&self, env: Env<'_>, v: &[f32], out: &mut [f32]) {
-        out.fill(0.0);
-        let v = v.as_chunks::<3>().0;
-        let out = out.as_chunks_mut::<3>().0;
-        for element in &self.elements {
-            let [first, rest @ ..] = element.places.map(|place| v[place as usize]);
-            let mut h = [[0.0f32; 3]; 3];
-            for (corner, gradient) in rest.iter().zip(&element.gradients) {
-                for i in 0..3 {
-                    let relative = corner[i] - first[i];
-                    for j in 0..3 {
-                        h[i][j] += relative * gradient[j];
-                    }
-                }
-            }
-            let pressure = element.lambda * (h[0][0] + h[1][1] + h[2][2]);
-            let mut stress = [[0.0f32; 3]; 3];
-            for i in 0..3 {
-                for j in 0..3 {
-                    stress[i][j] = element.shear * (h[i][j] + h[j][i]);
-                }
-                stress[i][i] += pressure;
-            }
-            let mut balance = [0.0f32; 3];
-            for (&place, gradient) in element.places[1..].iter().zip(&element.gradients) {
-                let mut force = [0.0f32; 3];
-                for i in 0..3 {
-                    force[i] = stress[i][0] * gradient[0]
-                        + stress[i][1] * gradient[1]
-                        + stress[i][2] * gradient[2];
-                    balance[i] -= force[i];
-                }
-                if let Some(out) = out.get_mut(place as usize) {
-                    for (out, force) in out.iter_mut().zip(force) {
-                        *out += force;
-                    }
-                }
-            }
-            if let Some(out) = out.get_mut(element.places[0] as usize) {
-                for (out, force) in out.iter_mut().zip(balance) {
-                    *out += force;
-                }
-            }
-        }
+        self.elements.apply(v, out);
         let kappa = env.time_step.integrator.kappa() as f32;
+        let rows = out.as_chunks_mut::<3>().0.iter_mut();
         let inside = self.nodes[..self.inside].iter();
-        for ((out, v), &node) in out.iter_mut().zip(v).zip(inside) {
+        for ((out, v), &node) in rows.zip(v.as_chunks::<3>().0).zip(inside) {
             let inertia = kappa * env.body.mass[node as usize];
             for (out, v) in out.iter_mut().zip(v) {
                 *out += inertia * v;

@@ -1,0 +1,187 @@
+//! The near elements in linear elasticity, and what of the far field's clusters they are.
+
+use std::ops::Range;
+
+use ::elements::Tetrahedron;
+
+use super::near::WHAT;
+use crate::corrections::far::FarField;
+use crate::error::Result;
+use crate::memory::{self, HeldBytes};
+
+/// One element.
+#[derive(HeldBytes)]
+struct Linear {
+    places: [u32; 4],
+    /// The cluster of the far field that it would be of.
+    cluster: u32,
+    /// Of the shape functions 1, 2, 3, 1/mm.
+    gradients: [[f32; 3]; 3],
+    /// Lame's constants times the rest volume, µN mm.
+    shear: f32,
+    lambda: f32,
+}
+
+/// The elements; see [`super::near`] for what a place is.
+#[derive(Default, HeldBytes)]
+pub(super) struct LinearElements(Vec<Linear>);
+
+impl LinearElements {
+    pub fn clear(&mut self) {
+        self.0.clear();
+    }
+
+    /// Adds an element, with mesh nodes for places until [`LinearElements::take_places`].
+    pub fn push(&mut self, far: &FarField, number: u32, element: &Tetrahedron) -> Result<()> {
+        let moduli = far.moduli;
+        let lambda = moduli.bulk_pa - 2.0 / 3.0 * moduli.shear_pa;
+        let linear = Linear {
+            places: element.corners,
+            cluster: u32::from(far.cluster_of[number as usize]),
+            gradients: element.gradients.map(|g| g.map(|x| x as f32)),
+            shear: (moduli.shear_pa * element.volume) as f32,
+            lambda: (lambda * element.volume) as f32,
+        };
+        memory::push(&mut self.0, linear, WHAT)
+    }
+
+    /// Takes the places of the corners.
+    pub fn take_places(&mut self, of_node: &[u32]) {
+        for element in &mut self.0 {
+            element.places = element.places.map(|node| of_node[node as usize]);
+        }
+    }
+
+    /// `K v` at the first places, as many as `out [.., 3]` has, µN, of a field `[.., 3]` by place, mm.
+    pub fn apply(&self, v: &[f32], out: &mut [f32]) {
+        out.fill(0.0);
+        let v = v.as_chunks::<3>().0;
+        let out = out.as_chunks_mut::<3>().0;
+        for element in &self.0 {
+            let [first, rest @ ..] = element.places.map(|place| v[place as usize]);
+            let mut h = [[0.0f32; 3]; 3];
+            for (corner, gradient) in rest.iter().zip(&element.gradients) {
+                for i in 0..3 {
+                    let relative = corner[i] - first[i];
+                    for j in 0..3 {
+                        h[i][j] += relative * gradient[j];
+                    }
+                }
+            }
+            let pressure = element.lambda * (h[0][0] + h[1][1] + h[2][2]);
+            let mut stress = [[0.0f32; 3]; 3];
+            for i in 0..3 {
+                for j in 0..3 {
+                    stress[i][j] = element.shear * (h[i][j] + h[j][i]);
+                }
+                stress[i][i] += pressure;
+            }
+            let mut balance = [0.0f32; 3];
+            for (&place, gradient) in element.places[1..].iter().zip(&element.gradients) {
+                let mut force = [0.0f32; 3];
+                for i in 0..3 {
+                    force[i] = stress[i][0] * gradient[0]
+                        + stress[i][1] * gradient[1]
+                        + stress[i][2] * gradient[2];
+                    balance[i] -= force[i];
+                }
+                if let Some(out) = out.get_mut(place as usize) {
+                    for (out, force) in out.iter_mut().zip(force) {
+                        *out += force;
+                    }
+                }
+            }
+            if let Some(out) = out.get_mut(element.places[0] as usize) {
+                for (out, force) in out.iter_mut().zip(balance) {
+                    *out += force;
+                }
+            }
+        }
+    }
+}
+
+/// What of the far field's clusters is near.
+#[derive(Default, HeldBytes)]
+pub(super) struct Parts {
+    /// By cluster, ascending.
+    list: Vec<Part>,
+    /// `sum_e v_e grad N` of their free nodes, by place, mm².
+    weights: Vec<(u32, [f32; 3])>,
+    sums: Vec<[f32; 3]>,
+}
+
+/// That of one of them.
+#[derive(HeldBytes)]
+pub(super) struct Part {
+    pub cluster: usize,
+    /// Rest volume times the stiffness over the material's, mm³.
+    pub volume: f64,
+    /// Into [`Parts::weights`].
+    #[held(skip)]
+    pub weights: Range<usize>,
+}
+
+impl Parts {
+    /// Takes the parts of some elements, of which `free` nodes are free.
+    pub fn fill(&mut self, elements: &LinearElements, far: &FarField, free: usize) -> Result<()> {
+        self.list.clear();
+        self.weights.clear();
+        self.sums.clear();
+        memory::fit(&mut self.sums, free, WHAT)?;
+        self.sums.resize(free, [0.0; 3]);
+        for cluster in 0..far.clusters() {
+            let own = |element: &&Linear| element.cluster as usize == cluster;
+            let (mut volume, mut largest) = (0.0f64, 0.0f32);
+            for element in elements.0.iter().filter(own) {
+                let share = element.shear / far.moduli.shear_pa as f32;
+                volume += f64::from(share);
+                let [a, b, c] = element.gradients;
+                let first = [0, 1, 2].map(|k| -(a[k] + b[k] + c[k]));
+                for (place, gradient) in element.places.into_iter().zip([first, a, b, c]) {
+                    if let Some(sum) = self.sums.get_mut(place as usize) {
+                        for (sum, value) in sum.iter_mut().zip(gradient) {
+                            *sum += share * value;
+                            largest = largest.max((share * value).abs());
+                        }
+                    }
+                }
+            }
+            if volume == 0.0 {
+                continue;
+            }
+            let start = self.weights.len();
+            for (place, sum) in self.sums.iter_mut().enumerate() {
+                // Inside of the part the shares of a node's elements cancel.
+                if sum.iter().any(|value| value.abs() > 1e-5 * largest) {
+                    memory::push(&mut self.weights, (place as u32, *sum), WHAT)?;
+                }
+                *sum = [0.0; 3];
+            }
+            let part = Part {
+                cluster,
+                volume,
+                weights: start..self.weights.len(),
+            };
+            memory::push(&mut self.list, part, WHAT)?;
+        }
+        Ok(())
+    }
+
+    /// All parts, by cluster.
+    pub fn iter(&self) -> impl Iterator<Item = &Part> + '_ {
+        self.list.iter()
+    }
+
+    /// That of a cluster, where it has one.
+    pub fn of(&self, cluster: usize) -> Option<&Part> {
+        let at = self
+            .list
+            .binary_search_by_key(&cluster, |part| part.cluster);
+        at.ok().map(|at| &self.list[at])
+    }
+
+    /// The weights of a part: a place, and `sum_e v_e grad N` there.
+    pub fn weights(&self, part: &Part) -> &[(u32, [f32; 3])] {
+        &self.weights[part.weights.clone()]
+    }
+}
