@@ -48,6 +48,8 @@ pub struct FarField {
     pub(super) elements_at: Vec<u16>,
     /// Cluster of each element `[T]`.
     pub(super) cluster_of: Vec<u16>,
+    /// Mean edge of the elements, were they regular, mm.
+    pub(super) edge_mm: f32,
     /// Box of each chunk at rest, mm.
     pub(super) boxes: Vec<[[f32; 3]; 2]>,
 }
@@ -76,12 +78,23 @@ impl FarField {
             on_modes: memory::zeros(count * NINE * space.count(), WHAT)?,
             elements_at: memory::filled(mesh.node_count(), 0, WHAT)?,
             cluster_of: memory::filled(mesh.tets.len() / 4, 0, WHAT)?,
+            edge_mm: 0.0,
             boxes: memory::room(count, WHAT)?,
         };
         own.starts.push(0);
         for chunk in 0..count {
             own.push(body, mesh, chunk)?;
         }
+        let whole: f64 = mesh
+            .tets
+            .as_chunks()
+            .0
+            .iter()
+            .map(|tet| volume(mesh, *tet))
+            .sum();
+        // That of a regular tetrahedron is a³ / (6 sqrt 2).
+        let mean = whole / own.cluster_of.len().max(1) as f64;
+        own.edge_mm = (6.0 * std::f64::consts::SQRT_2 * mean).cbrt() as f32;
         own.decode(prior, space)?;
         Ok(own)
     }
@@ -213,4 +226,14 @@ impl FarField {
         }
         (added, det)
     }
+}
+
+/// Volume of an element at rest, mm³.
+fn volume(mesh: &Mesh, tet: [u32; 4]) -> f64 {
+    let [a, b, c, d] = tet.map(|node| {
+        let at = &mesh.positions[3 * node as usize..][..3];
+        [0, 1, 2].map(|axis| f64::from(at[axis]))
+    });
+    let [b, c, d] = [b, c, d].map(|corner| vector::subtract(corner, a));
+    vector::dot(b, vector::cross(c, d)).abs() / 6.0
 }

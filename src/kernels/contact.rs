@@ -19,7 +19,7 @@ use upper::{factor_upper, solve_upper};
 
 /// First Tikhonov term, relative to the mean diagonal; ten times more on each further attempt.
 const FIRST_TERM: f64 = 1e-5;
-const ATTEMPTS: i32 = 6;
+const ATTEMPTS: i32 = 7;
 
 /// Why no factor could be made.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -116,6 +116,9 @@ impl ContactFactor {
         self.right.resize(order, 0.0);
         let (mut term, mut mean) = (0.0, 0.0);
         for attempt in 0..ATTEMPTS {
+            if attempt > 0 {
+                term = FIRST_TERM * 10f64.powi(attempt - 1);
+            }
             fill(&mut self.upper);
             if attempt == 0 {
                 for (&dof, value) in dofs.iter().zip(self.upper.iter().step_by(order + 1)) {
@@ -135,7 +138,6 @@ impl ContactFactor {
                 self.ready = true;
                 return Ok(FactorReport { order, term });
             }
-            term = FIRST_TERM * 10f64.powi(attempt);
         }
         Err(FactorError::Indefinite { order, term })
     }

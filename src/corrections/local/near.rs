@@ -16,8 +16,11 @@ use crate::kernels::rows::{RowPlan, decode_rows, project_rows};
 use crate::memory::{self, HeldBytes};
 
 pub(super) const WHAT: &str = "the elements near the tools";
-/// Nodes are near that lie this close to a centre at rest, mm.
+/// Nodes are near that lie this close to a centre at rest, mm, or as many mean edges of the mesh.
 const REACH_MM: f32 = 25.0;
+const REACH_EDGES: f32 = 3.0;
+/// Where a larger part of the nodes would be near, all are.
+const LARGEST_PART: f32 = 0.5;
 /// Centres lie this far apart at least, and a set goes on as long as what the tools touch lies that close to them, mm.
 const APART_MM: f32 = 3.0;
 const SLACK_MM: f32 = 5.0;
@@ -133,13 +136,12 @@ impl NearSet {
         for &node in &self.nodes {
             self.places[node as usize] = NONE;
         }
-        self.is_reached.fill(false);
-        self.counts.fill(0);
-        self.nodes.clear();
-        self.elements.clear();
-        self.subset.clear();
+        let reach = REACH_MM.max(REACH_EDGES * far.edge_mm);
+        self.take_elements(env, far, rest, reach)?;
+        if self.nodes.len() as f32 > LARGEST_PART * self.places.len() as f32 {
+            self.take_elements(env, far, rest, f32::MAX)?;
+        }
         (self.inside, self.free) = (0, 0);
-        self.take_elements(env, far, rest)?;
         let rank = |node: u32| {
             let at = node as usize;
             let whole = self.counts[at] == far.elements_at[at];
@@ -171,9 +173,20 @@ impl NearSet {
     }
 
     /// The elements of the nodes within reach, and their nodes; `elements` have these for places.
-    fn take_elements(&mut self, env: Env<'_>, far: &FarField, rest: &[f32]) -> Result<()> {
+    fn take_elements(
+        &mut self,
+        env: Env<'_>,
+        far: &FarField,
+        rest: &[f32],
+        reach: f32,
+    ) -> Result<()> {
+        self.is_reached.fill(false);
+        self.counts.fill(0);
+        self.nodes.clear();
+        self.elements.clear();
+        self.subset.clear();
         let forces = &env.body.forces;
-        let is_reached = |node: u32| is_by(rest, &self.chosen, node, REACH_MM);
+        let is_reached = |node: u32| is_by(rest, &self.chosen, node, reach);
         let is_by_box = |[low, high]: &[[f32; 3]; 2]| {
             self.chosen.iter().any(|&node| {
                 let at = &rest[3 * node as usize..][..3];
@@ -183,7 +196,7 @@ impl NearSet {
                     .map(|axis| outside(axis).powi(2))
                     .iter()
                     .sum::<f32>()
-                    < REACH_MM * REACH_MM
+                    < reach * reach
             })
         };
         for (chunk, bounds) in far.boxes.iter().enumerate() {
