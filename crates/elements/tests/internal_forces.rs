@@ -236,7 +236,7 @@ fn a_subset_has_the_forces_of_the_body_where_it_is_whole() {
     let mesh = body();
     let u = wave(&mesh, 0.3);
     let all = mesh.positions.len() as u32;
-    for material in [Material::default(), ogden_laws()[0].clone()] {
+    for material in [Material::default(), ogden_laws()[0]] {
         for isa in Isa::available() {
             let forces = ElementForces::new(mesh.tetrahedra(), &material, isa).unwrap();
             let expected = forces_on(isa, &mesh, &material, &u);
