@@ -1,6 +1,7 @@
 //! The far clusters of a scene: which elements they have beside the near ones, and what their law adds on the modes.
 
-use super::near::{NearSet, WHAT};
+use super::linear::WHAT;
+use super::near::NearSet;
 use super::pairs::Room;
 use super::step::{add, resize};
 use crate::corrections::far::{FarField, NINE};

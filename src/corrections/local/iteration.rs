@@ -1,6 +1,6 @@
 //! One local iteration: a direction of L-BFGS with the contact's answer in it, and how far along it.
 
-use super::near::WHAT;
+use super::linear::WHAT;
 use super::step::{add, dot, resize};
 use super::{Gain, LocalSolver, StepContext, each_load};
 use crate::contact::{Compliance, ContactProblem, State};

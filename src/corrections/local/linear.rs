@@ -4,10 +4,12 @@ use std::ops::Range;
 
 use ::elements::Tetrahedron;
 
-use super::near::WHAT;
 use crate::corrections::far::FarField;
 use crate::error::Result;
 use crate::memory::{self, HeldBytes};
+
+/// What there is no memory for, where there is none.
+pub(super) const WHAT: &str = "the elements near the tools";
 
 /// One element.
 #[derive(HeldBytes)]

@@ -25,7 +25,8 @@ mod step;
 use ::elements::Scratch;
 
 use self::clusters::Clusters;
-use self::near::{NearSet, WHAT, add_centres};
+use self::linear::WHAT;
+use self::near::{NearSet, add_centres};
 use self::pairs::{Pairs, Room};
 use self::step::{Change, Step, add, dot, resize};
 use super::input::{Input, SolverContext};

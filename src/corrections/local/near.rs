@@ -8,14 +8,13 @@ use std::ops::Range;
 
 use ::elements::Subset;
 
-use super::linear::{LinearElements, Parts};
+use super::linear::{LinearElements, Parts, WHAT};
 use crate::corrections::far::FarField;
 use crate::corrections::precondition::Env;
 use crate::error::Result;
 use crate::kernels::rows::{RowPlan, decode_rows, project_rows};
 use crate::memory::{self, HeldBytes};
 
-pub(super) const WHAT: &str = "the elements near the tools";
 /// Nodes are near that lie this close to a centre at rest, mm, or as many mean edges of the mesh.
 const REACH_MM: f32 = 25.0;
 const REACH_EDGES: f32 = 3.0;

@@ -6,7 +6,8 @@
 //! A pair is kept as a [`Record`] that does not depend on what else is near, and laid out for the near set of the moment: where nodes
 //! have come to it the change is that of linear elasticity, as it was while they were far.
 
-use super::near::{NearSet, WHAT};
+use super::linear::WHAT;
+use super::near::NearSet;
 use super::record::Record;
 use super::step::{Change, Step, add, resize};
 use crate::corrections::history::PAIRS;

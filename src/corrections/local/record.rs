@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::near::{NearSet, WHAT};
+use super::linear::WHAT;
+use super::near::NearSet;
 use super::step::{Change, Step};
 use crate::error::Result;
 use crate::memory::{self, HeldBytes};

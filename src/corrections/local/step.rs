@@ -1,6 +1,7 @@
 //! Steps of local iterations and what changes over them; see [`super::pairs`].
 
-use super::near::{NearSet, WHAT};
+use super::linear::WHAT;
+use super::near::NearSet;
 use crate::error::Result;
 use crate::memory::{self, HeldBytes};
 
