@@ -18,8 +18,9 @@ use crate::memory::{self, HeldBytes};
 /// Nodes are near that lie this close to a centre at rest, mm, or as many mean edges of the mesh.
 const REACH_MM: f32 = 25.0;
 const REACH_EDGES: f32 = 3.0;
-/// Where a larger part of the nodes would be near, all are.
+/// Where a larger part of the nodes would be near, all are, and so they are in a body of fewer nodes: whole, it costs no more than its modes do.
 const LARGEST_PART: f32 = 0.5;
+const FEWEST_NODES: usize = 1000;
 /// Centres lie this far apart at least, and a set goes on as long as what the tools touch lies that close to them, mm.
 const APART_MM: f32 = 3.0;
 const SLACK_MM: f32 = 5.0;
@@ -135,9 +136,13 @@ impl NearSet {
         for &node in &self.nodes {
             self.places[node as usize] = NONE;
         }
-        let reach = REACH_MM.max(REACH_EDGES * far.edge_mm);
+        let reach = match self.places.len() < FEWEST_NODES {
+            true => f32::MAX,
+            false => REACH_MM.max(REACH_EDGES * far.edge_mm),
+        };
         self.take_elements(env, far, rest, reach)?;
-        if self.nodes.len() as f32 > LARGEST_PART * self.places.len() as f32 {
+        let most = LARGEST_PART * self.places.len() as f32;
+        if reach < f32::MAX && self.nodes.len() as f32 > most {
             self.take_elements(env, far, rest, f32::MAX)?;
         }
         (self.inside, self.free) = (0, 0);
