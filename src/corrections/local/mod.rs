@@ -37,8 +37,8 @@ use crate::memory::{self, HeldBytes};
 
 pub use self::record::Record;
 
-/// What rounding makes of det F, with room.
-const DET_ROUNDING: f32 = 1e-3;
+/// Far elements of a chunk that is near in part are looked at where its smallest det F is below this.
+const LOOKED_AT_DET: f32 = 0.5;
 
 /// What a solver lends to the iterations of a step.
 pub(super) struct StepContext<'a> {
@@ -219,16 +219,19 @@ impl LocalSolver {
         self.trial.copy_from_slice(base.u);
         self.d.clear(&self.near)?;
         self.far_det = f32::MAX;
-        let det = self.evaluate(step, 0.0)?;
+        self.evaluate(step, 0.0)?;
         std::mem::swap(&mut self.residual, &mut self.next);
         // What the base has is not what has come since.
         self.base.copy_from_slice(&self.inner);
         self.residual.p.copy_from_slice(&self.base_modes);
-        // A chunk that is near in part counts where what is near does not explain it.
-        let dets = step.scratch.smallest_by_chunk().iter();
-        let far_dets = dets.zip(&self.near.far_share).map(|(&found, &share)| {
-            let is_far = share == 1.0 || (share > 0.0 && found < det - DET_ROUNDING);
-            if is_far { found } else { f32::MAX }
+        // Of a chunk that is near in part the far elements are looked at one by one where it is bad.
+        let forces = &env.body.forces;
+        let dets = step.scratch.smallest_by_chunk().iter().enumerate();
+        let far_dets = dets.map(|(chunk, &found)| match self.near.far_share[chunk] {
+            1.0 => found,
+            0.0 => f32::MAX,
+            _ if found > LOOKED_AT_DET => f32::MAX,
+            _ => self.near.far_det(forces, chunk, base.u),
         });
         self.far_det = far_dets.fold(f32::MAX, f32::min);
         Ok(())

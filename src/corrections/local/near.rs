@@ -6,7 +6,7 @@
 
 use std::ops::Range;
 
-use ::elements::Subset;
+use ::elements::{ElementForces, Subset};
 
 use super::linear::{LinearElements, Parts, WHAT};
 use crate::corrections::far::FarField;
@@ -47,6 +47,8 @@ pub(in crate::corrections) struct NearSet {
     is_reached: Vec<bool>,
     counts: Vec<u16>,
     subset: Subset,
+    /// Numbers of the near elements in the mesh, ascending.
+    numbers: Vec<u32>,
     elements: LinearElements,
     /// What of the far field's clusters is near.
     pub(super) parts: Parts,
@@ -71,6 +73,7 @@ impl NearSet {
             is_reached: memory::filled(count, false, WHAT)?,
             counts: memory::filled(count, 0, WHAT)?,
             subset: memory::tried(Subset::new(&env.body.forces), WHAT)?,
+            numbers: Vec::new(),
             elements: LinearElements::default(),
             parts: Parts::default(),
             plan: RowPlan::try_region(&env.prior.basis(), &[], true)?,
@@ -188,6 +191,7 @@ impl NearSet {
         self.counts.fill(0);
         self.nodes.clear();
         self.elements.clear();
+        self.numbers.clear();
         self.subset.clear();
         let forces = &env.body.forces;
         let is_reached = |node: u32| is_by(rest, &self.chosen, node, reach);
@@ -229,9 +233,24 @@ impl NearSet {
                 }
                 *count += 1;
             }
+            memory::push(&mut self.numbers, number, WHAT)?;
             self.elements.push(far, number, &element)?;
         }
+        self.numbers.sort_unstable();
         Ok(())
+    }
+
+    /// The smallest det F of those elements of a chunk that are not near, of a field `[K,3]`.
+    pub fn far_det(&self, forces: &ElementForces, chunk: usize, u: &[f32]) -> f32 {
+        let nodes = forces.chunk_nodes(chunk);
+        let elements = forces.chunk_tetrahedra(chunk);
+        let far = elements.filter(|(number, _)| self.numbers.binary_search(number).is_err());
+        let dets = far.map(|(_, element)| {
+            let corners = element.corners.map(|corner| nodes[corner as usize]);
+            let u = corners.map(|node| [0, 1, 2].map(|k| f64::from(u[3 * node as usize + k])));
+            element.deformation(u).det as f32
+        });
+        dets.fold(f32::MAX, f32::min)
     }
 
     /// `f_int` of the near elements at the free nodes, `[3 free]`, µN; the smallest det F of them all. `u [K,3]` is read at near nodes.

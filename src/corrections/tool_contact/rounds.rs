@@ -13,6 +13,9 @@ use crate::memory;
 /// Iterations from one base at most: the far field is that of the base, in all but its clusters.
 const ROUND: u32 = 16;
 
+/// Where an iteration's smallest det F is below this, all elements are evaluated once more where it ends.
+const LOOKED_AT_DET: f32 = 0.5;
+
 /// What the iterations of a step have made.
 #[derive(Default)]
 struct Made {
@@ -47,6 +50,10 @@ impl ImplicitSolver {
             if made.is_enough || made.iterations >= most || problem.is_spent() {
                 break;
             }
+            self.evaluate(context, input, at, report)?;
+        }
+        if at.det < LOOKED_AT_DET {
+            // What the far elements have come to since the base is known of their clusters alone.
             self.evaluate(context, input, at, report)?;
         }
         report.residual = (made.size / made.start.max(f64::MIN_POSITIVE)) as f32;
