@@ -14,7 +14,7 @@
 use ::elements::{Deformation, Moduli, stress, vector};
 
 use super::body::Body;
-use crate::bundle::Mesh;
+use crate::bundle::{Mesh, volume};
 use crate::error::Result;
 use crate::kernels::rows::{RowPlan, decode_rows};
 use crate::kernels::{Isa, Pool};
@@ -85,16 +85,11 @@ impl FarField {
         for chunk in 0..count {
             own.push(body, mesh, chunk)?;
         }
-        let whole: f64 = mesh
-            .tets
-            .as_chunks()
-            .0
-            .iter()
-            .map(|tet| volume(mesh, *tet))
-            .sum();
-        // That of a regular tetrahedron is a³ / (6 sqrt 2).
+        let sixfold = |tet: &[u32; 4]| volume(&mesh.positions, tet);
+        let whole: f64 = mesh.tets.as_chunks().0.iter().map(sixfold).sum();
+        // A regular tetrahedron's is a³ / sqrt 2.
         let mean = whole / own.cluster_of.len().max(1) as f64;
-        own.edge_mm = (6.0 * std::f64::consts::SQRT_2 * mean).cbrt() as f32;
+        own.edge_mm = (std::f64::consts::SQRT_2 * mean).cbrt() as f32;
         own.decode(prior, space)?;
         Ok(own)
     }
@@ -226,14 +221,4 @@ impl FarField {
         }
         (added, det)
     }
-}
-
-/// Volume of an element at rest, mm³.
-fn volume(mesh: &Mesh, tet: [u32; 4]) -> f64 {
-    let [a, b, c, d] = tet.map(|node| {
-        let at = &mesh.positions[3 * node as usize..][..3];
-        [0, 1, 2].map(|axis| f64::from(at[axis]))
-    });
-    let [b, c, d] = [b, c, d].map(|corner| vector::subtract(corner, a));
-    vector::dot(b, vector::cross(c, d)).abs() / 6.0
 }
