@@ -10,7 +10,7 @@ use crate::kernel::{
 use crate::laws::{Isochoric, Law};
 use crate::partition::{Chunk, Partition};
 use crate::slots::{advance, place};
-use lanes::{Isa, NodeLanes, Scalar};
+use lanes::{Isa, NodeLanes};
 
 type ForceKernel = unsafe fn(&Partition, &Chunk, *const [f32; 4], *mut [f32; 4]) -> f32;
 type VolumeKernel = unsafe fn(&Partition, &Chunk, *const [f32; 4], *mut [f32; 4]);
@@ -184,13 +184,16 @@ macro_rules! kernels {
     };
 }
 
-kernels!(scalar, Scalar);
+#[cfg(any(not(target_family = "wasm"), feature = "scalar"))]
+kernels!(scalar, lanes::Scalar);
 #[cfg(target_arch = "x86_64")]
 kernels!(avx2, lanes::Avx2, "avx2,fma");
 #[cfg(target_arch = "x86_64")]
 kernels!(avx512, lanes::Avx512, "avx512f,avx512vl,avx2,fma");
 #[cfg(target_arch = "aarch64")]
 kernels!(neon, lanes::NeonFour, "neon");
+#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+kernels!(simd128, lanes::Simd128);
 
 impl Kernels {
     /// The kernels of `isa`; `None` where this processor lacks it.
@@ -199,6 +202,7 @@ impl Kernels {
             return None;
         }
         match isa {
+            #[cfg(any(not(target_family = "wasm"), feature = "scalar"))]
             Isa::Scalar => Some(scalar::KERNELS),
             #[cfg(target_arch = "x86_64")]
             Isa::Avx2 => Some(avx2::KERNELS),
@@ -206,6 +210,8 @@ impl Kernels {
             Isa::Avx512 => Some(avx512::KERNELS),
             #[cfg(target_arch = "aarch64")]
             Isa::Neon => Some(neon::KERNELS),
+            #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+            Isa::Simd128 => Some(simd128::KERNELS),
             #[allow(unreachable_patterns)]
             _ => None,
         }

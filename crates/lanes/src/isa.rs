@@ -8,6 +8,8 @@ use std::sync::OnceLock;
 pub enum Isa {
     /// Plain Rust: the readable reference, right everywhere.
     Scalar,
+    /// 128-bit SIMD of WebAssembly, for which a module is compiled or not.
+    Simd128,
     /// 128-bit Advanced SIMD (AArch64).
     Neon,
     /// 256-bit AVX2 with FMA and F16C (x86-64).
@@ -16,11 +18,16 @@ pub enum Isa {
     Avx512,
 }
 
+/// What [`Isa::detect`] has found.
+static BEST: OnceLock<Isa> = OnceLock::new();
+
 impl Isa {
+    /// Every set, slowest first.
+    const ALL: [Isa; 5] = [Isa::Scalar, Isa::Simd128, Isa::Neon, Isa::Avx2, Isa::Avx512];
+
     /// The best of this machine. The environment variable `UPT_ISA` (`scalar`, `neon`, `avx2`,
-    /// `avx512`) lowers it, for comparisons; a set that the machine lacks is ignored.
+    /// `avx512`, `simd128`) lowers it, for comparisons; a set that the machine lacks is ignored.
     pub fn detect() -> Self {
-        static BEST: OnceLock<Isa> = OnceLock::new();
         *BEST.get_or_init(|| {
             let asked = std::env::var("UPT_ISA").ok().and_then(|s| Self::parse(&s));
             match asked {
@@ -30,18 +37,23 @@ impl Isa {
         })
     }
 
+    /// Makes this set the one that is found, for hosts without an environment; false where the machine lacks it, or another was found
+    /// before.
+    pub fn choose(self) -> bool {
+        self.is_available() && *BEST.get_or_init(|| self) == self
+    }
+
     /// All sets that this machine runs, slowest first; `Scalar` is always there.
     pub fn available() -> Vec<Self> {
-        [Isa::Scalar, Isa::Neon, Isa::Avx2, Isa::Avx512]
-            .into_iter()
-            .filter(|isa| isa.is_available())
-            .collect()
+        let all = Self::ALL.into_iter();
+        all.filter(|isa| isa.is_available()).collect()
     }
 
     /// Whether this machine runs the set.
     pub fn is_available(self) -> bool {
         match self {
             Isa::Scalar => true,
+            Isa::Simd128 => cfg!(all(target_arch = "wasm32", target_feature = "simd128")),
             #[cfg(target_arch = "aarch64")]
             Isa::Neon => std::arch::is_aarch64_feature_detected!("neon"),
             #[cfg(target_arch = "x86_64")]
@@ -79,6 +91,7 @@ impl Isa {
     pub fn name(self) -> &'static str {
         match self {
             Isa::Scalar => "scalar",
+            Isa::Simd128 => "simd128",
             Isa::Neon => "neon",
             Isa::Avx2 => "avx2",
             Isa::Avx512 => "avx512",
@@ -87,7 +100,7 @@ impl Isa {
 
     /// The set of that name, if there is one.
     pub fn parse(name: &str) -> Option<Self> {
-        [Isa::Scalar, Isa::Neon, Isa::Avx2, Isa::Avx512]
+        Self::ALL
             .into_iter()
             .find(|isa| isa.name().eq_ignore_ascii_case(name.trim()))
     }
@@ -120,6 +133,9 @@ macro_rules! by_isa {
                 unsafe { $body::<$crate::Neon>($($arg),*) }
             }
             match isa {
+                #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+                // SAFETY: the module is compiled with the feature.
+                $crate::Isa::Simd128 => unsafe { $body::<$crate::Simd128>($($arg),*) },
                 #[cfg(target_arch = "x86_64")]
                 // SAFETY: the machine has the features.
                 $crate::Isa::Avx512 if isa.is_available() => unsafe { avx512($($arg),*) },

@@ -1,6 +1,6 @@
 //! Vector registers of f32, the instruction set that a machine has of them, and the floating-point mode of a computation.
 //!
-//! One body of a kernel compiles for AVX2 (8 lanes), AVX-512 (16) and NEON (4). [`Lanes`] is arithmetic, [`FunctionLanes`]
+//! One body of a kernel compiles for AVX2 (8 lanes), AVX-512 (16), NEON and WebAssembly (4). [`Lanes`] is arithmetic, [`FunctionLanes`]
 //! what elementary functions ([`functions`]) need besides, [`DenseLanes`] what products over tables need, [`NodeLanes`] what the
 //! elements of a mesh need. [`Isa`] chooses at run time, and
 //! [`by_isa!`] writes the function that does.
@@ -21,6 +21,8 @@ mod neon;
 #[cfg(target_arch = "aarch64")]
 mod neon_four;
 mod scalar;
+#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+mod simd128;
 mod traits;
 
 #[cfg(target_arch = "x86_64")]
@@ -35,6 +37,8 @@ pub use neon::Neon;
 #[cfg(target_arch = "aarch64")]
 pub use neon_four::NeonFour;
 pub use scalar::Scalar;
+#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+pub use simd128::Simd128;
 pub(crate) use traits::ROOT_OF_HALF;
 pub use traits::{CUBE_ROOT_GUESS, DenseLanes, FunctionLanes, Lanes, NodeLanes, WIDTH};
 

@@ -16,7 +16,7 @@ pub(super) fn nodes(isa: Isa) -> usize {
     match isa {
         Isa::Avx512 => 48,
         Isa::Avx2 => 16,
-        Isa::Neon => 8,
+        Isa::Neon | Isa::Simd128 => 8,
         Isa::Scalar => 16,
     }
 }
