@@ -42,6 +42,7 @@ mod arrays;
 pub mod haptics;
 pub mod instrument;
 
+mod clock;
 mod features;
 mod field;
 mod memory;

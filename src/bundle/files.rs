@@ -1,25 +1,25 @@
 //! The files of a bundle: read once, size and SHA-256 checked against the manifest.
 
-use std::fs;
-use std::io::Read;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use sha2::{Digest, Sha256};
 
 use super::maker;
 use super::manifest::Manifest;
+use super::place::Place;
 use super::tensors::TensorFile;
 use crate::error::{Error, Result};
-use crate::memory;
 use crate::options::Precision;
 
+/// The manifest's file.
+const MANIFEST: &str = "bundle.json";
 /// Larger manifests are none.
 const LARGEST_MANIFEST: u64 = 16 << 20;
 
-/// An opened bundle folder.
+/// An opened bundle.
 #[derive(Debug)]
 pub struct BundleFiles {
-    folder: PathBuf,
+    place: Place,
     /// The manifest, checked.
     pub manifest: Manifest,
     /// The command that made the bundle, where the manifest says.
@@ -29,17 +29,21 @@ pub struct BundleFiles {
 }
 
 impl BundleFiles {
-    /// Reads `bundle.json` and checks that each listed file exists with its size.
+    /// Reads `bundle.json` of a folder and checks that each listed file exists with its size.
     pub fn open(folder: &Path) -> Result<BundleFiles> {
-        let path = folder.join("bundle.json");
-        let length = fs::metadata(&path).map_or(0, |found| found.len());
+        BundleFiles::at(Place::Folder(folder.to_owned()))
+    }
+
+    /// The same, wherever the files lie.
+    pub fn at(place: Place) -> Result<BundleFiles> {
+        let length = place.length(MANIFEST).unwrap_or(0);
         if length > LARGEST_MANIFEST {
             return Err(Error::bundle(
-                "bundle.json",
+                MANIFEST,
                 format!("has {length} bytes; at most {LARGEST_MANIFEST} are allowed"),
             ));
         }
-        let bytes = read_regular(&path)?;
+        let bytes = place.read(MANIFEST)?;
         let manifest = Manifest::parse(&bytes).map_err(|error| {
             // The part of the manifest that can be read may still name it.
             let fields = serde_json::from_slice(&bytes).unwrap_or_default();
@@ -47,15 +51,10 @@ impl BundleFiles {
         })?;
         let made_with = maker::of(&serde_json::from_slice(&bytes).unwrap_or_default());
         for (name, entry) in &manifest.files {
-            let path = folder.join(name);
-            let found = fs::metadata(&path).map_err(|error| Error::io(&path, error))?;
-            if !found.is_file() {
-                return Err(not_regular(&path));
-            }
-            if found.len() != entry.bytes {
+            let length = place.length(name)?;
+            if length != entry.bytes {
                 let problem = format!(
-                    "has {} bytes, bundle.json field `files.{name}.bytes` says {}; fetch or make the bundle again",
-                    found.len(),
+                    "has {length} bytes, bundle.json field `files.{name}.bytes` says {}; fetch or make the bundle again",
                     entry.bytes
                 );
                 let error = Error::bundle(name, problem);
@@ -63,7 +62,7 @@ impl BundleFiles {
             }
         }
         Ok(BundleFiles {
-            folder: folder.to_owned(),
+            place,
             manifest,
             made_with,
             hash: Sha256::digest(&bytes).into(),
@@ -88,8 +87,7 @@ impl BundleFiles {
                 format!("field `files`: `{name}` is not listed"),
             )
         })?;
-        let path = self.folder.join(name);
-        let bytes = read_regular(&path)?;
+        let bytes = self.place.read(name)?;
         let digest = hex(&Sha256::digest(&bytes));
         if !digest.eq_ignore_ascii_case(&entry.sha256) {
             return Err(Error::bundle(
@@ -131,40 +129,6 @@ impl BundleFiles {
     pub fn tensors(&self, name: &str) -> Result<TensorFile> {
         TensorFile::parse(name, self.read(name)?)
     }
-}
-
-fn not_regular(path: &Path) -> Error {
-    Error::io(
-        path,
-        "is not a regular file; a bundle and a mesh are made of plain files",
-    )
-}
-
-/// The bytes of a regular file. Anything else (a pipe, a device, a folder) is refused without waiting for it.
-pub(crate) fn read_regular(path: &Path) -> Result<Vec<u8>> {
-    let failed = |error: std::io::Error| Error::io(path, error);
-    let mut options = fs::OpenOptions::new();
-    options.read(true);
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::OpenOptionsExt;
-        // A pipe that nobody writes to would be waited for.
-        options.custom_flags(libc::O_NONBLOCK);
-    }
-    let mut file = options.open(path).map_err(failed)?;
-    let found = file.metadata().map_err(failed)?;
-    if !found.is_file() {
-        return Err(not_regular(path));
-    }
-    let size = usize::try_from(found.len()).unwrap_or(usize::MAX);
-    let mut bytes = memory::room(size, &format!("the file {}", path.display()))?;
-    file.read_to_end(&mut bytes).map_err(|error| {
-        match error.kind() == std::io::ErrorKind::OutOfMemory {
-            true => Error::OutOfMemory(format!("no memory for the file {}", path.display())),
-            false => failed(error),
-        }
-    })?;
-    Ok(bytes)
 }
 
 /// Lower-case hex.

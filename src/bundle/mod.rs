@@ -8,11 +8,12 @@ mod maker;
 mod manifest;
 mod mesh;
 mod parse;
+mod place;
 mod seal;
 mod tensors;
 
 pub use files::BundleFiles;
-pub(crate) use files::{hex, read_regular};
+pub(crate) use files::hex;
 pub use manifest::{
     Base, Bound, Boundary, Coordinates, CorrectionsEntry, Dims, Envelope, Fade, Feature, FileEntry,
     Graph, Manifest, ManifestKind, MeshEntry, Normalisation, PriorEntry, ReducedEntry,
@@ -20,4 +21,6 @@ pub use manifest::{
 };
 pub use mesh::Mesh;
 pub(crate) use mesh::volume;
+pub use place::Place;
+pub(crate) use place::read_regular;
 pub use tensors::TensorFile;

@@ -1,6 +1,6 @@
 //! What a step hands to its corrections, and what they report.
 
-use std::time::Instant;
+use crate::clock::Instant;
 
 use super::Corrections;
 use super::precondition::Env;

@@ -1,6 +1,6 @@
 //! A scene's corrections: its velocities, its L-BFGS memory, and the iterations of a step.
 
-use std::time::Instant;
+use crate::clock::Instant;
 
 use super::history::{History, PAIRS, Pair};
 use super::input::{Input, Report, SolverContext};

@@ -48,7 +48,11 @@ fn misplaced() -> Option<&'static str> {
     if log::in_receiver() {
         return Some("called from the log receiver, which must not call the library");
     }
-    let here = std::process::id();
+    // WebAssembly has no processes, and asking panics.
+    let here = match cfg!(target_family = "wasm") {
+        true => 1,
+        false => std::process::id(),
+    };
     match PROCESS.compare_exchange(0, here, Ordering::Relaxed, Ordering::Relaxed) {
         Err(first) if first != here => Some(
             "the process was forked after the library was used, and the library's threads stayed in the parent; use it in one of the two processes, or load it after the fork",
@@ -66,7 +70,7 @@ fn panic_message(payload: &(dyn Any + Send)) -> &str {
 }
 
 /// Stores `name: message` for [`last_error`]. At thread exit, when the storage is gone, the message is dropped.
-fn remember(name: &str, message: &str) {
+pub(super) fn remember(name: &str, message: &str) {
     let _ = LAST_ERROR.try_with(|last| {
         let mut last = last.borrow_mut();
         last.clear();

@@ -4,13 +4,13 @@
 //! thread that calls into it for one of its own, and its domain reload then waits for that thread for ever. So what
 //! the library's and ONNX Runtime's threads say waits in a queue for the next call of the host.
 
+use crate::clock::Instant;
 use std::cell::Cell;
 use std::collections::{HashMap, VecDeque};
 use std::ffi::{CString, c_void};
 use std::fmt::{Debug, Write};
 use std::sync::atomic::{AtomicBool, AtomicI32, AtomicU64, Ordering};
 use std::sync::{LazyLock, Mutex, Once, PoisonError, RwLock};
-use std::time::Instant;
 
 use tracing::field::{Field, Visit};
 use tracing::span::{Attributes, Id, Record};

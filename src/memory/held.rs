@@ -5,7 +5,9 @@
 //! `#[held(own)]`.
 
 use std::sync::{Arc, Mutex};
-use std::time::{Duration, Instant};
+use std::time::Duration;
+
+use crate::clock::Instant;
 
 use ::contact::{Candidate, Contact, Grasp, Pose, Search, Sweeps, Vector};
 use half::{bf16, f16};

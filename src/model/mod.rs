@@ -6,9 +6,10 @@ mod reduced;
 mod upt;
 mod upt_stages;
 
+use crate::clock::Instant;
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
-use std::time::Instant;
 
 pub use anchors::Anchors;
 pub use info::{Kind, ModelInfo};
@@ -16,7 +17,7 @@ pub use reduced::{LearnedMap, ReducedModel};
 pub use upt::{UptModel, UptTables};
 pub use upt_stages::DECODER_TILE;
 
-use crate::bundle::{BundleFiles, Manifest, ManifestKind, Mesh};
+use crate::bundle::{BundleFiles, Manifest, ManifestKind, Mesh, Place};
 use crate::corrections::Corrections;
 use crate::error::Result;
 use crate::library::{self, Alive};
@@ -84,6 +85,22 @@ impl Model {
     /// [`crate::Error::Io`], [`crate::Error::Bundle`] (names file and field), [`crate::Error::Version`],
     /// [`crate::Error::Runtime`], [`crate::Error::Provider`].
     pub fn open(path: &Path, options: &ModelOptions) -> Result<Arc<Model>> {
+        let _span = tracing::info_span!("open", path = %path.display()).entered();
+        Model::open_at(Place::Folder(path.to_owned()), options)
+    }
+
+    /// As [`Model::open`], of a bundle whose files are in memory, by name.
+    ///
+    /// # Errors
+    /// Those of [`Model::open`]; [`crate::Error::Io`] names a file that is not among them.
+    pub fn open_memory(
+        files: BTreeMap<String, Vec<u8>>,
+        options: &ModelOptions,
+    ) -> Result<Arc<Model>> {
+        Model::open_at(Place::Memory(Mutex::new(files)), options)
+    }
+
+    fn open_at(place: Place, options: &ModelOptions) -> Result<Arc<Model>> {
         let start = Instant::now();
         if options.device_id < 0 {
             return Err(crate::error::Error::Argument(format!(
@@ -102,8 +119,7 @@ impl Model {
                 )));
             }
         }
-        let _span = tracing::info_span!("open", path = %path.display()).entered();
-        let files = Arc::new(BundleFiles::open(path)?);
+        let files = Arc::new(BundleFiles::at(place)?);
         Model::of_files(Arc::clone(&files), options, start).map_err(|error| files.name_maker(error))
     }
 

@@ -5,7 +5,7 @@ use half::f16;
 use crate::bundle::TensorFile;
 use crate::error::Result;
 use crate::kernels::rows::Stored;
-use crate::memory::HeldBytes;
+use crate::memory::{self, HeldBytes};
 
 /// Numbers kept at the width in which they are stored.
 #[derive(Debug, HeldBytes)]
@@ -23,10 +23,23 @@ impl Numbers {
         shape: &[Option<usize>],
     ) -> Result<Numbers> {
         Ok(if file.is_f16(tensor) {
-            Numbers::F16(file.f16(tensor, shape)?)
+            Numbers::of_f16(file.f16(tensor, shape)?)?
         } else {
             Numbers::F32(file.f32(tensor, shape)?)
         })
+    }
+
+    /// Half-precision numbers as they are, or widened once where no instruction widens them in each step.
+    pub(super) fn of_f16(half: Vec<f16>) -> Result<Numbers> {
+        if cfg!(target_family = "wasm") {
+            let wide = half.iter().map(|x| x.to_f32());
+            return Ok(Numbers::F32(memory::collected(
+                half.len(),
+                wide,
+                "a table's numbers",
+            )?));
+        }
+        Ok(Numbers::F16(half))
     }
 
     /// As the kernels take it.

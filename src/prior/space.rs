@@ -5,8 +5,7 @@
 //! contact is the static one less what inertia holds back, `A_k = A - N diag(kappa / (w² (w² + kappa))) N^T` with
 //! natural modes `N` of frequency `w`.
 
-use half::f16;
-
+use super::numbers::Numbers;
 use super::table::PriorTable;
 use crate::bundle::TensorFile;
 use crate::error::{Error, Result};
@@ -23,7 +22,7 @@ const LIMIT: usize = 1024;
 #[derive(Debug, HeldBytes)]
 pub struct CoarseSpace {
     /// `[r,Q]`, each of Euclidean length 1 as a field.
-    modes: Vec<f16>,
+    modes: Numbers,
     /// `0..r`, as a row list.
     rows: Vec<u32>,
     /// `Phi^T K Phi [r,r]`, µN/mm.
@@ -61,7 +60,7 @@ impl CoarseSpace {
         let mut space = CoarseSpace {
             at_contact: memory::zeros(3 * prior.contact_nodes.len() * count, WHAT)?,
             rows: memory::collected(count, 0..count as u32, WHAT)?,
-            modes,
+            modes: Numbers::of_f16(modes)?,
             stiffness,
             mass,
             frequency,
@@ -76,9 +75,8 @@ impl CoarseSpace {
         for (i, &node) in prior.contact_nodes.iter().enumerate() {
             for axis in 0..3 {
                 for mode in 0..count {
-                    let q = &self.modes[mode * width..(mode + 1) * width];
-                    self.at_contact[(3 * i + axis) * count + mode] =
-                        prior.value_at(node, axis, |at| q[at].to_f32());
+                    let q = |at: usize| self.modes.at(mode * width + at);
+                    self.at_contact[(3 * i + axis) * count + mode] = prior.value_at(node, axis, q);
                 }
             }
         }
@@ -86,9 +84,9 @@ impl CoarseSpace {
 
     /// The block coordinates `[Q]` of a mode.
     pub fn read_mode(&self, mode: usize, q: &mut [f32]) {
-        let own = &self.modes[mode * q.len()..(mode + 1) * q.len()];
-        for (q, value) in q.iter_mut().zip(own) {
-            *q = value.to_f32();
+        let first = mode * q.len();
+        for (at, q) in q.iter_mut().enumerate() {
+            *q = self.modes.at(first + at);
         }
     }
 
@@ -109,7 +107,7 @@ impl CoarseSpace {
 
     /// `[r,Q]`, as the kernels take it.
     pub fn modes(&self) -> Stored<'_> {
-        Stored::F16(&self.modes)
+        self.modes.stored()
     }
 
     /// `0..r`.

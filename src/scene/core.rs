@@ -1,7 +1,7 @@
 //! The step itself: check, predict, decode, boundary conditions, guard, publish (design: the paper's Eq. 2).
 
+use crate::clock::Instant;
 use std::sync::{Arc, PoisonError, RwLock};
-use std::time::Instant;
 
 use super::StepInput;
 use super::corrected::Corrector;

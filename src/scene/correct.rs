@@ -1,7 +1,7 @@
 //! Corrections inside a step: after the prediction, before the guard.
 
+use crate::clock::Instant;
 use std::sync::{Arc, RwLock};
-use std::time::Instant;
 
 use super::core::{Core, lock_read};
 use super::engine::Engine;

@@ -1,7 +1,7 @@
 //! How a scene corrects: what its options and the bundle ask for, and when a step has been corrected enough.
 
+use crate::clock::Instant;
 use std::sync::Arc;
-use std::time::Instant;
 
 use super::own_pace::OwnPace;
 use crate::corrections::Substeps;

@@ -1,8 +1,8 @@
 //! A step that tools drive: where the bundle has corrections their contact is solved inside of them; with `corrections = 0` once, on
 //! the linear response.
 
+use crate::clock::Instant;
 use std::sync::{Arc, RwLock};
-use std::time::Instant;
 
 use super::core::{Core, lock_read, lock_write};
 use super::corrected::Corrector;

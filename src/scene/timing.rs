@@ -1,6 +1,6 @@
 //! Wall time of the stages of a step.
 
-use std::time::Instant;
+use crate::clock::Instant;
 
 /// Time since the last lap.
 pub struct Stopwatch(Instant);

@@ -12,7 +12,7 @@ from pathlib import Path
 from structure.rust import ROOT, Crate
 
 ORDER = """
-    status error memory features stored output field options stats
+    status clock error memory features stored output field options stats
     kernels grid library bundle graph guard onnx
     prior envelope contact corrections forces instrument haptics
     model scene arrays ffi

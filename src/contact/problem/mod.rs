@@ -11,7 +11,9 @@ mod look;
 mod solve;
 
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
+
+use crate::clock::Instant;
 
 use ::contact::grasp::REACH_MM;
 use ::contact::{Contact, Pose, Sample, Samples, Search, Sweeps, Vector};

@@ -1,6 +1,6 @@
 //! One solve: gaps and slips at a state of the tissue, the forces, and what they change.
 
-use std::time::Instant;
+use crate::clock::Instant;
 
 use ::contact::{Limits, Rows, Vector, Whole};
 

@@ -1,6 +1,6 @@
 //! The iterations of a step, in rounds: each from a base whose residual is known everywhere.
 
-use std::time::Instant;
+use crate::clock::Instant;
 
 use super::{Iterate, is_sound, is_spent, sunk};
 use crate::contact::ContactProblem;

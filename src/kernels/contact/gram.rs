@@ -3,6 +3,8 @@
 use lanes::DenseLanes;
 use lanes::{Isa, by_isa};
 
+use crate::kernels::math::fused;
+
 fn whiten_rows_scalar(u: &[f64], columns: usize, z: &mut [f64]) {
     let n = z.len() / columns.max(1);
     for k in 0..n {
@@ -26,7 +28,7 @@ unsafe fn whiten_rows_body<V: DenseLanes>(u: &[f64], columns: usize, z: &mut [f6
         row.iter_mut().for_each(|x| *x *= inverse);
         for (to, &factor) in below.chunks_exact_mut(columns).zip(&u[k * n + k + 1..]) {
             for (to, &x) in to.iter_mut().zip(&*row) {
-                *to = (-factor).mul_add(x, *to);
+                *to = fused(-factor, x, *to);
             }
         }
     }
@@ -99,7 +101,7 @@ pub(super) fn subtract_scaled_tile<const R: usize, const C: usize>(
         let right: &[f64; C] = row[j..j + C].try_into().expect("C numbers");
         for r in 0..R {
             for c in 0..C {
-                sum[r][c] = left[r].mul_add(right[c], sum[r][c]);
+                sum[r][c] = fused(left[r], right[c], sum[r][c]);
             }
         }
     }

@@ -1,6 +1,7 @@
 //! `A = U^T U` of a dense block, in place, in its upper triangle, row-major f64; and `U^T U x = b`.
 
 use super::gram::subtract_scaled_tile;
+use crate::kernels::math::fused;
 use lanes::DenseLanes;
 use lanes::by_isa;
 
@@ -96,7 +97,7 @@ fn factor_rows(a: &mut [f64], n: usize, start: usize, end: usize) -> bool {
             let factor = row[i];
             let to = &mut below[(i - k - 1) * n..][i..n];
             for (to, &x) in to.iter_mut().zip(&row[i..]) {
-                *to = (-factor).mul_add(x, *to);
+                *to = fused(-factor, x, *to);
             }
         }
     }

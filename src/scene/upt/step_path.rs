@@ -3,8 +3,8 @@
 //! the scene's own mesh while it is made, and the faster one stays. The first runs are a device's warm-up as well:
 //! kernels are loaded and engines built before the first step.
 
+use crate::clock::Instant;
 use std::sync::Arc;
-use std::time::Instant;
 
 use super::{Choice, UptEngine};
 use crate::error::Result;
