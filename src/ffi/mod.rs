@@ -12,6 +12,8 @@ mod driven;
 mod failure;
 mod hands;
 mod haptics;
+#[cfg(target_family = "wasm")]
+mod host;
 mod input;
 mod instrument;
 mod library;

@@ -6,16 +6,9 @@
 
 use super::{CUBE_ROOT_GUESS, FunctionLanes, Lanes, NodeLanes, ROOT_OF_HALF, WIDTH};
 
-/// Sixteen; in WebAssembly four, which are a quarter of the code that a page loads. The bits are the same.
-const COUNT: usize = if cfg!(target_family = "wasm") {
-    4
-} else {
-    WIDTH
-};
-
-/// Some f32 in an array.
+/// Sixteen f32 in an array.
 #[derive(Clone, Copy)]
-pub struct Scalar([f32; COUNT]);
+pub struct Scalar([f32; WIDTH]);
 
 impl Scalar {
     #[inline(always)]
@@ -26,21 +19,21 @@ impl Scalar {
 
 // SAFETY (all functions): no instruction set beyond the target's baseline is used.
 impl Lanes for Scalar {
-    const COUNT: usize = COUNT;
+    const COUNT: usize = WIDTH;
 
     #[inline(always)]
     unsafe fn splat(value: f32) -> Self {
-        Self([value; COUNT])
+        Self([value; WIDTH])
     }
 
     #[inline(always)]
     unsafe fn load(source: *const f32) -> Self {
-        Self(unsafe { source.cast::<[f32; COUNT]>().read_unaligned() })
+        Self(unsafe { source.cast::<[f32; WIDTH]>().read_unaligned() })
     }
 
     #[inline(always)]
     unsafe fn store(self, target: *mut f32) {
-        unsafe { target.cast::<[f32; COUNT]>().write_unaligned(self.0) }
+        unsafe { target.cast::<[f32; WIDTH]>().write_unaligned(self.0) }
     }
 
     #[inline(always)]
@@ -127,7 +120,7 @@ impl FunctionLanes for Scalar {
 
     #[inline(always)]
     unsafe fn all_below(self, limit: Self) -> bool {
-        (0..COUNT).all(|i| self.0[i] < limit.0[i])
+        (0..WIDTH).all(|i| self.0[i] < limit.0[i])
     }
 }
 
@@ -148,14 +141,14 @@ impl NodeLanes for Scalar {
 
     #[inline(always)]
     unsafe fn gather(nodes: *const [f32; 4], index: *const u16) -> [Self; 4] {
-        let values: [[f32; 4]; COUNT] =
+        let values: [[f32; 4]; WIDTH] =
             std::array::from_fn(|i| unsafe { *nodes.add(*index.add(i) as usize / 2) });
         [0, 1, 2, 3].map(|axis| Self(std::array::from_fn(|i| values[i][axis])))
     }
 
     #[inline(always)]
     unsafe fn scatter_add(nodes: *mut [f32; 4], index: *const u16, value: [Self; 3]) {
-        for i in 0..COUNT {
+        for i in 0..WIDTH {
             let node = unsafe { &mut *nodes.add(*index.add(i) as usize / 2) };
             for axis in 0..3 {
                 node[axis] += value[axis].0[i];
