@@ -17,6 +17,7 @@ CODE = (".rs", ".py", ".cs", ".c", ".h", ".cpp", ".hpp", ".sh", ".gd", ".js", ".
 # Written by a command, or somebody else's.
 NOT_OURS = {
     "include/upt.h": "written by `cargo xtask header`",
+    "web/src/abi.js": "written by `cargo xtask header`",
     "python/upt/_native.py": "written by `cargo xtask header`",
     "unity-plugin/Runtime/Interop/Native.g.cs": "written by `cargo xtask header`",
     "crates/cli/src/view/page/three.js": "three.js, vendored",

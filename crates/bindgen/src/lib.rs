@@ -1,10 +1,11 @@
 //! Writes the bindings of the C ABI from its one source, `src/ffi/`: the C header (cbindgen), the C# class, the Python
-//! structs and the reference in `docs/reference/abi.md`. All are committed; the test `fresh` fails when they are stale.
+//! structs, JavaScript's table and the reference in `docs/reference/abi.md`. All are committed; the test `fresh` fails when they are stale.
 
 pub mod csharp;
 pub mod python;
 pub mod reference;
 pub mod source;
+pub mod web;
 
 use std::path::{Path, PathBuf};
 
@@ -43,6 +44,10 @@ pub fn outputs() -> Result<Vec<Output>> {
         Output {
             path: "python/upt/_native.py",
             text: python::write(&source)?,
+        },
+        Output {
+            path: "web/src/abi.js",
+            text: web::write(&source)?,
         },
         Output {
             path: "docs/reference/abi.md",
