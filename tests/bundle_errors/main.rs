@@ -4,8 +4,9 @@
 mod fixture;
 mod manifest;
 
+use std::collections::BTreeMap;
 use std::io::{Seek, SeekFrom, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use fixture::{BUNDLES, copy_of, find_runtime};
 use upt::{Error, Model, ModelOptions};
@@ -57,6 +58,42 @@ fn missing_short_and_altered_files_are_named() {
             let error = open(folder.path()).unwrap_err();
             assert!(error.to_string().contains("SHA-256"), "{error}");
         }
+    }
+}
+
+#[test]
+fn files_in_memory_are_a_bundle_too() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("onnx/liver-coarse");
+    let files = || -> BTreeMap<String, Vec<u8>> {
+        let entries = std::fs::read_dir(&folder).unwrap();
+        let paths = entries.map(|entry| entry.unwrap().path());
+        let read = |path: PathBuf| {
+            let name = path.file_name().unwrap().to_str().unwrap().to_owned();
+            (name, std::fs::read(path).unwrap())
+        };
+        paths.map(read).collect()
+    };
+    let options = ModelOptions::default();
+    let inside = Model::open_memory(files(), &options).unwrap();
+    let outside = Model::open(&folder, &options).unwrap();
+    assert_eq!(inside.hash, outside.hash);
+    // The corrections' tables are read later.
+    upt::Scene::new(inside, &upt::SceneOptions::default()).unwrap();
+    for (status, damage) in [
+        (-30, "is not among the files that were given"),
+        (
+            -31,
+            "bundle.json field `files.prior.safetensors.bytes` says",
+        ),
+    ] {
+        let mut files = files();
+        match status {
+            -30 => drop(files.remove("prior.safetensors")),
+            _ => files.get_mut("prior.safetensors").unwrap().truncate(99),
+        }
+        let error = Model::open_memory(files, &options).err().unwrap();
+        assert_eq!(error.status(), status);
+        assert!(error.to_string().contains(damage), "{error}");
     }
 }
 
