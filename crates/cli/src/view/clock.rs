@@ -135,6 +135,7 @@ mod tests {
             radius: 5.0,
             half_length: 20.0,
             friction: 0.3,
+            grasp: false,
         })
     }
 

@@ -3,7 +3,7 @@
 //! From the page, JSON text of at most 1,024 bytes:
 //!
 //! ```json
-//! {"tool": {"position": [0,0,0], "rotation": [0,0,0,1], "radius": 5, "half_length": 20, "friction": 0.3}, "sequence": 7}
+//! {"tool": {"position": [0,0,0], "rotation": [0,0,0,1], "radius": 5, "half_length": 20, "friction": 0.3, "grasp": false}, "sequence": 7}
 //! {"tool": null, "sequence": 8}      no tool
 //! {"reset": true}                    back to rest
 //! {"record": true}                   start a recording (false: end it)
@@ -42,6 +42,9 @@ pub struct Tool {
     pub half_length: f32,
     /// Coulomb's coefficient.
     pub friction: f32,
+    /// It holds what it touches.
+    #[serde(default)]
+    pub grasp: bool,
 }
 
 /// One wish of the page.
@@ -132,8 +135,6 @@ pub struct Hello {
     pub max_push_mm: f32,
     /// Whether frames show the tissue of their own moment; otherwise they run one step behind.
     pub presents: bool,
-    /// Names of the bits of a frame's flags.
-    pub flags: Vec<(u32, &'static str)>,
 }
 
 #[cfg(test)]

@@ -33,7 +33,7 @@ const UNREAD: Duration = Duration::from_secs(5);
 const SPENT: f64 = 0.3;
 
 /// What the page is made of.
-const FILES: [(&str, &str, &[u8]); 6] = [
+const FILES: [(&str, &str, &[u8]); 9] = [
     (
         "/",
         "text/html; charset=utf-8",
@@ -48,6 +48,21 @@ const FILES: [(&str, &str, &[u8]); 6] = [
         "/view.js",
         "text/javascript",
         include_bytes!("page/view.js"),
+    ),
+    (
+        "/connection.js",
+        "text/javascript",
+        include_bytes!("page/connection.js"),
+    ),
+    (
+        "/hand.js",
+        "text/javascript",
+        include_bytes!("page/hand.js"),
+    ),
+    (
+        "/plot.js",
+        "text/javascript",
+        include_bytes!("page/plot.js"),
     ),
     (
         "/drawing.js",

@@ -114,21 +114,6 @@ impl Session {
             dt: self.dt as f32,
             max_push_mm: info.max_push_mm,
             presents: self.presents,
-            flags: vec![
-                (ffi::UPT_FLAG_PUSH, "push longer than trained"),
-                (ffi::UPT_FLAG_CONTACT_AREA, "contact area not trained"),
-                (ffi::UPT_FLAG_SITE, "contact outside the domain"),
-                (ffi::UPT_FLAG_RATE, "faster than trained"),
-                (ffi::UPT_FLAG_SITES, "several contacts"),
-                (ffi::UPT_FLAG_BOUND, "guard: bound"),
-                (ffi::UPT_FLAG_NON_FINITE, "guard: not finite"),
-                (ffi::UPT_FLAG_INVERTED, "guard: inverted"),
-                (ffi::UPT_FLAG_GROWTH, "guard: growth"),
-                (ffi::UPT_FLAG_CLAMPED, "correction bounded"),
-                (ffi::UPT_FLAG_REGULARISED, "contact regularised"),
-                (ffi::UPT_FLAG_FELL_BACK, "corrections given up"),
-                (ffi::UPT_FLAG_DEEP, "tool deep in the tissue"),
-            ],
         }
     }
 
@@ -339,7 +324,11 @@ fn capsule(tool: &Tool) -> ffi::upt_instrument {
         rotation: tool.rotation,
         half_extents: [0.0, tool.half_length, 0.0],
         radius: tool.radius,
-        sticking: u8::from(tool.friction >= STICKS),
+        sticking: u8::from(tool.grasp || tool.friction >= STICKS),
+        mode: match tool.grasp {
+            true => ffi::UPT_MODE_GRASP,
+            false => ffi::UPT_MODE_SLIDE,
+        },
         friction: tool.friction,
         ..instrument()
     }

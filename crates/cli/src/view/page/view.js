@@ -1,21 +1,38 @@
-// The page of `upt view`: shows the surface that the server streams, sends the tool that the mouse drags.
+// The page of `upt view` and of `cargo xtask site`: shows the surface that comes over the connection, sends the tool that the mouse drags.
 // What the two say to each other: protocol.rs. Each picture has one frame, asked for as late as it can be, so that it shows where the
 // mouse and the tissue are now.
 import * as three from "./three.js";
 import { makeRenderer, software, steelMaterial, tissueMaterial, turnNormals, whenDrawn } from "./drawing.js";
+import { connect } from "./connection.js";
 import { gltf } from "./gltf.js";
+import { HALF_LENGTH, Hand } from "./hand.js";
+import { ForcePlot } from "./plot.js";
 
 const HEADER = 24;
-const HALF_LENGTH = 25; // of the tool, mm
-const PRESS = 250; // ms until the tool is at its depth
-const SPEED = 0.1; // at which the tip follows the mouse at most, mm/ms: the bundles know tools of about this speed
-const TURN = 0.004; // at which the tool turns at most, rad/ms
 const READOUTS = 250; // ms between two of the readouts
 const AHEAD = 2; // frames that are asked for and have not come
 const OFTEN = 0.998; // of the frames come in time for their picture
 const LATEST = 0.85; // of a picture: its frame is asked for once the last picture is on its way, with all that the mouse has done until then
 const KEPT = 600; // frames by which that is judged
 const FEWEST = 60; // by which it can be
+// Of UPT_FLAG_*, from the first bit on.
+const FLAGS = [
+  "push longer than trained",
+  "contact area not trained",
+  "contact outside the domain",
+  "faster than trained",
+  "several contacts",
+  "guard: bound",
+  "guard: not finite",
+  "guard: inverted",
+  "guard: growth",
+  "correction bounded",
+  "contact regularised",
+  "corrections given up",
+  "error above the limit",
+  "tool deep in the tissue",
+  "contact not solved",
+];
 const PALE = new three.Color(0xd8bfb0);
 const GREY = new three.Color(0x8f9399); // where the model was not trained to be touched
 const RED = new three.Color(0xc8402a);
@@ -42,7 +59,8 @@ let restColours;
 let tool; // the capsule that is shown
 let pointer; // {x, y, last} while the tool is held: where the mouse is, since when
 let moves = []; // when it moved since a frame was asked for
-let pressed; // {point, normal, since, held} while the tool is held: where the mouse points, since when, where the hand is
+let hand; // while the tool is held
+const plot = new ForcePlot(at("plot"));
 let sequence = 0;
 let latest; // the frame that has come and is not shown yet
 let told = 0; // when the readouts were written
@@ -57,27 +75,23 @@ const pictures = []; // when the last ones were shown
 const status = { drawn: 0, shown: 0, largest: 0, force: 0, contacts: 0, latency: [], made: [], intervals: [], stepTimes: [], forces: [], steps: 0, sequence: 0, software };
 window.uptView = status; // for tests
 
-const socket = new WebSocket(`ws://${location.host}/socket${location.search}`);
-socket.binaryType = "arraybuffer";
-const say = (message) => {
-  if (socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(message));
-};
-socket.onmessage = ({ data }) => {
-  if (typeof data === "string") {
-    hello = JSON.parse(data);
+const say = connect({
+  hello: (said) => {
+    hello = said;
     show("bundle", `${hello.bundle}, ${hello.node_count.toLocaleString("en")} nodes`);
+    show("message", "");
     at("depth").max = hello.max_push_mm;
-  } else if (!surface) {
-    build(data);
-  } else {
+  },
+  geometry: build,
+  frame: (data) => {
     latest = data;
     const [came] = new Uint32Array(data, 0, 1);
     const asked = sent.find((one) => one.sequence === came);
     if (asked) needs.push(performance.now() - asked.due);
     if (needs.length > KEPT) needs.shift();
-  }
-};
-socket.onclose = ({ reason }) => show("message", reason || "The connection is closed: run upt view again, or close its other page.");
+  },
+  tell: (text) => show("message", text),
+});
 
 function build(data) {
   const { surface_node_count: nodes, surface_face_count: faces } = hello;
@@ -176,36 +190,13 @@ function readOut() {
   show("largest", `${status.largest.toFixed(1)} mm`);
   show("contacts", String(status.contacts));
   show("record", status.recording ? "Stop" : "Record");
-  const raised = hello.flags.filter(([bit]) => (status.flags & bit) !== 0).map(([, name]) => name);
+  const raised = FLAGS.filter((_, bit) => (status.flags & (1 << bit)) !== 0);
   show("flags", raised.join(", "));
   if (status.rate) show("rate", `${status.rate.toFixed(0)} /s`);
   if (status.latency.length > 0) {
     const sorted = status.latency.slice(-200).sort((a, b) => a - b);
     show("latency", `${sorted[sorted.length >> 1].toFixed(0)} ms`);
   }
-}
-
-// The hand: goes where the mouse points, as fast as a hand does. Behind a fissure the mouse is elsewhere at once.
-function follow(now) {
-  const { held } = pressed;
-  const passed = now - held.when;
-  held.when = now;
-  const way = pressed.point.clone().sub(held.point);
-  held.point.add(way.clampLength(0, SPEED * passed));
-  const angle = held.normal.angleTo(pressed.normal);
-  if (angle > 0) held.normal.lerp(pressed.normal, Math.min((TURN * passed) / angle, 1)).normalize();
-}
-
-// The tool: its tip `depth` below the place at rest where the hand is, its axis along the normal there.
-function pose(now) {
-  follow(now);
-  const { point, normal } = pressed.held;
-  const ramp = Math.min((now - pressed.since) / PRESS, 1);
-  const radius = Number(at("radius").value);
-  const up = HALF_LENGTH + radius - ramp * Number(at("depth").value);
-  const position = point.clone().addScaledVector(normal, up);
-  const rotation = new three.Quaternion().setFromUnitVectors(new three.Vector3(0, 1, 0), normal);
-  return { position, rotation, radius };
 }
 
 // The frame of the next picture is asked for as late as most of the last ones could have been.
@@ -228,36 +219,35 @@ function askInTime(now) {
 function ask() {
   if (sequence - status.sequence >= AHEAD) return;
   sequence += 1;
-  const moved = pressed ? moves : [];
+  const moved = hand ? moves : [];
   moves = [];
   sent.push({ sequence, due, moves: moved });
-  if (!pressed) {
+  if (!hand) {
     say({ tool: null, sequence });
     return;
   }
+  const now = performance.now();
+  const grasp = at("grasp").checked && hand.pressed(now);
   if (moved.length > 0) {
-    const found = place(pointer);
-    if (found) Object.assign(pressed, found);
+    const found = grasp ? pulled(pointer) : place(pointer);
+    if (found) hand.aim(found);
   }
-  const { position, rotation, radius } = pose(performance.now());
-  say({
-    tool: {
-      position: position.toArray(),
-      rotation: rotation.toArray(),
-      radius,
-      half_length: HALF_LENGTH,
-      friction: Number(at("friction").value),
-    },
-    sequence,
-  });
+  const radius = Number(at("radius").value);
+  const tool = { ...hand.pose(now, { depth: Number(at("depth").value), radius }), radius, half_length: HALF_LENGTH, friction: Number(at("friction").value), grasp };
+  say({ tool, sequence });
 }
 
 const ray = new three.Raycaster();
-function place({ x: left, y: top }) {
+function look({ x: left, y: top }) {
   const frame = renderer.domElement.getBoundingClientRect();
   const x = (2 * (left - frame.left)) / frame.width - 1;
   const y = 1 - (2 * (top - frame.top)) / frame.height;
   ray.setFromCamera(new three.Vector2(x, y), camera);
+}
+
+// Where the mouse points, of the tissue at rest.
+function place(where) {
+  look(where);
   const [hit] = rest ? ray.intersectObject(rest) : [];
   if (!hit) return null;
   // The mean normal of the face's corners: smoother than the face's own while sliding.
@@ -267,33 +257,40 @@ function place({ x: left, y: top }) {
   return { point: hit.point, normal: normal.normalize() };
 }
 
+// Where a tool that has taken hold is pulled to: with the mouse, at the distance at which it took hold.
+function pulled(where) {
+  look(where);
+  const away = camera.getWorldDirection(new three.Vector3());
+  const distance = hand.point.clone().sub(ray.ray.origin).dot(away) / ray.ray.direction.dot(away);
+  return { point: ray.ray.at(distance, new three.Vector3()), normal: hand.normal.clone() };
+}
+
 const canvas = renderer.domElement;
-const where = ({ clientX: x, clientY: y, timeStamp: last }) => ({ x, y, last });
+const where = ({ clientX: x, clientY: y, timeStamp: last, pointerId: id }) => ({ x, y, last, id });
 canvas.addEventListener(
   "pointerdown",
   (event) => {
-    const found = event.button === 0 && place(where(event));
+    const found = event.button === 0 && !hand && place(where(event));
+    if (hand || found) event.stopImmediatePropagation(); // the camera stays
     if (!found) return;
-    event.stopImmediatePropagation(); // the camera stays
     canvas.setPointerCapture(event.pointerId);
     pointer = where(event);
     moves = [event.timeStamp];
-    const now = performance.now();
-    pressed = { ...found, since: now, held: { point: found.point.clone(), normal: found.normal.clone(), when: now } };
+    hand = new Hand(found, performance.now());
   },
   { capture: true },
 );
 // The raw events come at once, the others wait for the next picture.
 for (const kind of ["pointerrawupdate", "pointermove"]) {
   canvas.addEventListener(kind, (event) => {
-    if (!pressed || event.timeStamp <= pointer.last) return;
+    if (!hand || event.pointerId !== pointer.id || event.timeStamp <= pointer.last) return;
     const times = (event.getCoalescedEvents?.() ?? []).map((one) => one.timeStamp).filter((when) => when > pointer.last);
     moves.push(...(times.length > 0 ? times : [event.timeStamp]));
     pointer = where(event);
   });
 }
-const lift = () => {
-  pressed = null;
+const lift = ({ pointerId }) => {
+  if (pointerId === pointer?.id) hand = null;
 };
 canvas.addEventListener("pointerup", lift);
 canvas.addEventListener("pointercancel", lift);
@@ -330,25 +327,26 @@ function seen() {
   return times;
 }
 
-// The organ in the middle of what the panel leaves free; where that is next to nothing, the panel lies on top.
+// The organ in the middle of what the panel leaves free, beside it or, on a narrow page, above it.
 function lookBesidePanel(width, height) {
-  const taken = at("panel").getBoundingClientRect().right;
-  const free = width - taken > 0.4 * width ? width - taken : width;
+  const panel = at("panel").getBoundingClientRect();
+  const below = panel.width > 0.6 * width;
+  const [wide, high] = below ? [width, panel.top] : [width - panel.right, height];
   camera.aspect = width / height;
   // A narrow part shows the organ smaller: at the start it is about as wide as the page is high.
-  camera.zoom = Math.min(1, free / (1.05 * height));
-  status.middle = [Math.round(width - free / 2), Math.round(height / 2)];
-  camera.setViewOffset(width, height, (free - width) / 2, 0, width, height);
+  camera.zoom = Math.min(high / height, wide / (1.05 * height));
+  status.middle = [Math.round(width - wide / 2), Math.round(high / 2)];
+  camera.setViewOffset(width, height, (wide - width) / 2, (height - high) / 2, width, height);
   camera.updateProjectionMatrix();
 }
 
+let panelHeight; // as the picture knows it
 renderer.setAnimationLoop((now) => {
   const { clientWidth: width, clientHeight: height } = canvas;
   const size = renderer.getSize(new three.Vector2());
-  if (size.x !== width || size.y !== height) {
-    renderer.setSize(width, height, false);
-    lookBesidePanel(width, height);
-  }
+  if (size.x !== width || size.y !== height) renderer.setSize(width, height, false);
+  if (size.x !== width || size.y !== height || at("panel").clientHeight !== panelHeight) lookBesidePanel(width, height);
+  panelHeight = at("panel").clientHeight;
   if (!surface) return;
   status.drawn += 1;
   const data = latest;
@@ -371,6 +369,8 @@ renderer.setAnimationLoop((now) => {
   while (pictures[0] < now - 2000) pictures.shift();
   status.rate = (1000 * (pictures.length - 1)) / Math.max(now - pictures[0], 1);
   status.shown += 1;
+  plot.add(now, status.force);
+  plot.draw(now);
   if (now - told > READOUTS) {
     told = now;
     readOut();

@@ -1,0 +1,17 @@
+// To the server of `upt view`; what the two say to each other is in protocol.rs. The page of `cargo xtask site` has another file of this name,
+// which asks a worker of its own.
+export function connect({ hello, geometry, frame, tell }) {
+  const socket = new WebSocket(`ws://${location.host}/socket${location.search}`);
+  socket.binaryType = "arraybuffer";
+  let built = false;
+  socket.onmessage = ({ data }) => {
+    if (typeof data === "string") hello(JSON.parse(data));
+    else if (built) frame(data);
+    else geometry(data);
+    built ||= typeof data !== "string";
+  };
+  socket.onclose = ({ reason }) => tell(reason || "The connection is closed: run upt view again, or close its other page.");
+  return (message) => {
+    if (socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(message));
+  };
+}
