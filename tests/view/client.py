@@ -125,7 +125,7 @@ class Mouse:
 class Browser:
     """Headless Chromium by chromedriver."""
 
-    def __init__(self, width: int = 1000, height: int = 700) -> None:
+    def __init__(self, width: int = 1000, height: int = 700, phone: bool = False) -> None:
         driver = shutil.which("chromedriver")
         browser = shutil.which("chromium") or shutil.which("google-chrome")
         if not driver or not browser:
@@ -137,7 +137,11 @@ class Browser:
         self.driver = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.STDOUT)
         arguments = ["--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--hide-scrollbars"]
         arguments += [*drawing(), f"--window-size={width},{height}"]
-        options = {"binary": browser, "args": arguments}
+        options: dict = {"binary": browser, "args": arguments}
+        self.pointer = "touch" if phone else "mouse"
+        if phone:
+            metrics = {"width": width, "height": height, "pixelRatio": 2, "touch": True, "mobile": True}
+            options["mobileEmulation"] = {"deviceMetrics": metrics}
         wanted = {"capabilities": {"alwaysMatch": {"goog:chromeOptions": options}}}
         for _ in range(100):
             try:
@@ -189,7 +193,7 @@ class Browser:
         return [{"type": "pointerMove", "duration": each_ms, "x": x, "y": y, "origin": "viewport"} for x, y in points]
 
     def _act(self, actions: list[dict]) -> None:
-        mouse = {"type": "pointer", "id": "mouse", "parameters": {"pointerType": "mouse"}, "actions": actions}
+        mouse = {"type": "pointer", "id": "mouse", "parameters": {"pointerType": self.pointer}, "actions": actions}
         self._call("POST", f"/session/{self.session}/actions", {"actions": [mouse]})
 
     def release(self) -> None:

@@ -16,6 +16,7 @@ mod system;
 mod test;
 mod upkeep;
 mod venv;
+mod web;
 mod wheel;
 mod workspace;
 
@@ -60,11 +61,18 @@ enum Task {
         #[arg(default_value = "onnx/brain-reduced")]
         bundle: std::path::PathBuf,
     },
-    /// Make the archive for C and C++ hosts, or the Unity package.
+    /// Make the archive for C and C++ hosts, the Unity package, the wheel or the npm package.
     #[command(
-        after_help = "Examples:\n  cargo xtask package\n  cargo xtask package --unity\n  cargo xtask package --wheel\n  cargo xtask package --platform windows-x64"
+        after_help = "Examples:\n  cargo xtask package\n  cargo xtask package --unity\n  cargo xtask package --wheel\n  cargo xtask package --platform windows-x64\n  cargo xtask package --platform web"
     )]
     Package(package::Options),
+    /// Write a static site that shows organs, for any host.
+    #[command(after_help = "Example:\n  cargo xtask site --out site")]
+    Site {
+        /// Folder for the result; what was in it goes.
+        #[arg(long, default_value = "target/site")]
+        out: std::path::PathBuf,
+    },
     /// Put tables that `upt report` wrote into a page, such as that of docs/results/README.md.
     #[command(after_help = "Example:\n  cargo xtask readme --report target/report/report.md")]
     Readme {
@@ -124,6 +132,7 @@ fn run(workspace: &Workspace, task: Task) -> Result<bool> {
         Task::Bench(options) => bench::run(workspace, &options),
         Task::View { bundle } => upkeep::view(workspace, &bundle),
         Task::Package(options) => package::run(workspace, &options),
+        Task::Site { out } => web::site(workspace, &out),
         Task::Readme { reports, page } => upkeep::readme(workspace, &page, &reports),
         Task::Footprint => footprint::run(workspace),
         Task::Header { check } => upkeep::header(workspace, check),

@@ -1,4 +1,4 @@
-//! `cargo xtask package`: a relocatable archive for C and C++ hosts, and the Unity package.
+//! `cargo xtask package`: a relocatable archive for C and C++ hosts, the Unity package, the wheel, and the npm package (`web.rs`).
 //!
 //! ```text
 //! libupt-VERSION-PLATFORM/
@@ -13,14 +13,13 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
-use clap::Args;
-use walkdir::WalkDir;
+use clap::{Args, ValueEnum};
 
 use crate::ort::{self, Platform};
 use crate::process::run_checked;
 use crate::system::has_program;
-use crate::workspace::{Workspace, library};
-use crate::{archive, cross, venv, wheel};
+use crate::workspace::{Workspace, copy, library};
+use crate::{archive, cross, venv, web, wheel};
 
 #[derive(Args)]
 pub struct Options {
@@ -30,19 +29,40 @@ pub struct Options {
     /// Make the Python wheel instead of the archive.
     #[arg(long, conflicts_with = "unity")]
     wheel: bool,
-    /// For another platform, with its ONNX Runtime: built here for Windows and Linux arm64; for macOS laid out only.
-    #[arg(long)]
-    platform: Option<Platform>,
+    /// For another platform, with its ONNX Runtime: built here for Windows and Linux arm64; for macOS laid out only. `web`: the npm package.
+    #[arg(long, value_parser = wanted)]
+    platform: Option<Wanted>,
     /// Folder for the result.
     #[arg(long, default_value = "target/package")]
     out: PathBuf,
+}
+
+/// A platform of its own, or any browser.
+#[derive(Clone, Copy)]
+enum Wanted {
+    Native(Platform),
+    Web,
+}
+
+fn wanted(text: &str) -> Result<Wanted, String> {
+    match text {
+        "web" => Ok(Wanted::Web),
+        name => Platform::from_str(name, false).map(Wanted::Native),
+    }
 }
 
 pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
     let out = workspace.root.join(&options.out);
     std::fs::create_dir_all(&out)?;
     venv::create(workspace, "target/venv")?;
-    let platform = options.platform.map_or_else(Platform::host, Ok)?;
+    let platform = match options.platform {
+        Some(Wanted::Web) => {
+            println!("{}", web::package(workspace, &out)?.display());
+            return Ok(true);
+        }
+        Some(Wanted::Native(platform)) => platform,
+        None => Platform::host()?,
+    };
     let made = match (options.wheel, options.unity) {
         (true, _) => wheel::make(workspace, platform, &out)?,
         (_, true) => unity(workspace, &out)?,
@@ -54,24 +74,6 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
 
 /// The workspace's.
 const VERSION: &str = env!("CARGO_PKG_VERSION");
-
-/// Copies a file or a folder; links are followed.
-pub fn copy(from: &Path, to: &Path) -> Result<()> {
-    for entry in WalkDir::new(from).follow_links(true) {
-        let entry = entry?;
-        let place = match entry.depth() {
-            0 => to.to_owned(),
-            _ => to.join(entry.path().strip_prefix(from)?),
-        };
-        if !entry.file_type().is_dir() {
-            std::fs::create_dir_all(place.with_file_name(""))?;
-            let (from, to) = (entry.path().display(), place.display());
-            std::fs::copy(entry.path(), &place)
-                .with_context(|| format!("cannot copy {from} to {to}"))?;
-        }
-    }
-    Ok(())
-}
 
 /// What is the same on every platform: bundles, examples, licences.
 fn shared(workspace: &Workspace, root: &Path, ort_folder: &Path) -> Result<()> {

@@ -5,7 +5,7 @@ use anyhow::Result;
 use crate::counts::{self, Outcome, check, counted, script};
 use crate::system::{self, Needs};
 use crate::workspace::Workspace;
-use crate::{cross, ort, venv, wheel};
+use crate::{cross, ort, venv, web, wheel};
 
 pub struct Stage {
     pub name: &'static str,
@@ -63,6 +63,7 @@ pub const STAGES: &[&[&[Stage]]] = &[
         ],
         &[
             stage("python", "pytest of training/", "", Function(python)),
+            stage("web", "WebAssembly in Node, the site in headless Chromium", system::WEB, Function(web::stage)),
             stage("windows", "built by MinGW, run by Wine", system::WINDOWS, Function(cross::windows)),
         ],
     ],

@@ -48,6 +48,10 @@ pub const BROWSER: Needs = "
     chromium-driver  chromedriver
     libegl-mesa0     /usr/lib/x86_64-linux-gnu/libEGL_mesa.so.0 /usr/lib/aarch64-linux-gnu/libEGL_mesa.so.0";
 
+/// What the tests of the module need; without a browser they leave out the page.
+pub const WEB: Needs = "
+    nodejs           node nodejs";
+
 /// What the tests for Windows need.
 pub const WINDOWS: Needs = "
     cmake                       cmake

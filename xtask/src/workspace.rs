@@ -5,6 +5,7 @@ use std::process::Command;
 
 use anyhow::{Context, Result};
 use ort_wheel::Platform;
+use walkdir::WalkDir;
 
 /// The repository's folders. Everything that a command makes lies under `target/`.
 #[derive(Clone, Debug)]
@@ -89,6 +90,24 @@ pub fn program_in(folder: &Path, name: &str) -> PathBuf {
         true => folder.join("Scripts").join(format!("{name}.exe")),
         false => folder.join("bin").join(name),
     }
+}
+
+/// Copies a file or a folder; links are followed.
+pub fn copy(from: &Path, to: &Path) -> Result<()> {
+    for entry in WalkDir::new(from).follow_links(true) {
+        let entry = entry?;
+        let place = match entry.depth() {
+            0 => to.to_owned(),
+            _ => to.join(entry.path().strip_prefix(from)?),
+        };
+        if !entry.file_type().is_dir() {
+            std::fs::create_dir_all(place.with_file_name(""))?;
+            let (from, to) = (entry.path().display(), place.display());
+            std::fs::copy(entry.path(), &place)
+                .with_context(|| format!("cannot copy {from} to {to}"))?;
+        }
+    }
+    Ok(())
 }
 
 /// Replaces what stands between the markers `<!-- cargo xtask NAME: begin -->` and `... end -->` of a page.

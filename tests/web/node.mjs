@@ -1,0 +1,220 @@
+// The npm package's library in Node: node node.mjs ROOT WASM NATIVE, where NATIVE holds NAME.CORRECTIONS.bin that press.c wrote. The last line is
+// `N passed, N failed, N skipped`.
+import assert from "node:assert/strict";
+import { readFileSync, readdirSync } from "node:fs";
+import { join } from "node:path";
+import { press } from "./press.mjs";
+
+const [root, wasm, native] = process.argv.slice(2);
+const { load, UptError } = await import(join(root, "web/src/index.js"));
+const { Clock, between } = await import(join(root, "web/src/clock.js"));
+const compiled = await WebAssembly.compile(readFileSync(wasm));
+
+/** Name and bytes of a bundle's files. */
+function bundle(name) {
+  const folder = join(root, name);
+  return Object.fromEntries(readdirSync(folder).map((file) => [file, readFileSync(join(folder, file))]));
+}
+const start = (isa) => load({ wasm: compiled, isa });
+const LIVER = "onnx/liver-coarse";
+
+function refused(status, words) {
+  return (error) => {
+    assert.ok(error instanceof UptError, String(error));
+    assert.equal(error.status, status);
+    assert.match(error.message, words);
+    return true;
+  };
+}
+
+// Of native scalar, from the file of press.c: the largest difference of each array.
+function differences(states, name, corrections) {
+  const bytes = readFileSync(join(native, `${name.split("/").pop()}.${corrections}.bin`));
+  const told = new Float32Array(bytes.buffer, bytes.byteOffset, bytes.length / 4);
+  assert.equal(told.length, states.reduce((sum, list) => sum + list.length, 0));
+  let at = 0;
+  return states.map((list) => list.reduce((most, x) => Math.max(most, Math.abs(x - told[(at += 1) - 1])), 0));
+}
+
+const tests = {
+  async scalar_lanes_have_the_bits_of_native_scalar() {
+    for (const [name, corrections] of rollouts()) {
+      const upt = await start("scalar");
+      const model = await upt.open(bundle(name));
+      assert.equal(model.describe().instruction_set, "Scalar");
+      const states = press(upt, model, { steps: 32, corrections });
+      assert.ok(Math.max(...states[45]) > 1, "the ball presses");
+      const apart = differences(states, name, corrections).filter((most) => most !== 0);
+      assert.equal(apart.length, 0, `${name}, ${corrections} corrections: ${apart.length} of ${states.length} arrays differ, by ${Math.max(...apart)}`);
+    }
+  },
+
+  async simd_lanes_are_near_native_scalar() {
+    for (const [name, corrections] of rollouts()) {
+      const upt = await start();
+      const model = await upt.open(bundle(name));
+      assert.equal(model.describe().instruction_set, "Simd128");
+      const states = press(upt, model, { steps: 32, corrections });
+      const shown = differences(states, name, corrections).filter((_, i) => i % 3 !== 1); // mm; forces are large numbers
+      const middle = shown.toSorted((a, b) => a - b)[shown.length >> 1];
+      console.log(`  ${name}, ${corrections} corrections: median ${middle.toExponential(1)}, most ${Math.max(...shown).toExponential(1)} mm`);
+      // Rounding that corrections carry on, and that contact may turn into another point of contact for a step.
+      assert.ok(middle < 5e-3 && Math.max(...shown) < 0.1, `${name}, ${corrections} corrections: ${middle} mm`);
+    }
+  },
+
+  async damaged_bundles_are_refused_in_the_librarys_words() {
+    const upt = await start();
+    const files = bundle(LIVER);
+    await assert.rejects(upt.open({ ...files, "prior.safetensors": files["prior.safetensors"].subarray(0, 1000) }), refused("UPT_ERR_BUNDLE", /^upt_model_open: prior\.safetensors: has 1000 bytes, bundle\.json field `files\.prior\.safetensors\.bytes` says/));
+    const damaged = Uint8Array.from(files["prior.safetensors"]);
+    damaged[damaged.length - 1] ^= 1;
+    await assert.rejects(upt.open({ ...files, "prior.safetensors": damaged }), refused("UPT_ERR_BUNDLE", /prior\.safetensors: SHA-256 is/));
+    const { "mesh.safetensors": _, ...lacking } = files;
+    await assert.rejects(upt.open(lacking), refused("UPT_ERR_IO", /mesh\.safetensors: is not among the files that were given/));
+    await assert.rejects(upt.open({}), refused("UPT_ERR_IO", /bundle\.json/));
+    await assert.rejects(upt.open({ "bundle.json": new Uint8Array(40) }), refused("UPT_ERR_BUNDLE", /bundle\.json/));
+    assert.ok(await upt.open(files), "and it still opens others");
+  },
+
+  async bundles_with_networks_are_refused() {
+    const upt = await start();
+    await assert.rejects(upt.open(bundle("tests/fixtures/tiny-reduced")), refused("UPT_ERR_UNSUPPORTED", /this build has no feature "learned"/));
+  },
+
+  async wrong_input_changes_nothing() {
+    const upt = await start();
+    const model = await upt.open(bundle(LIVER));
+    const scene = model.scene();
+    const far = { position: [500, 0, 0], radius: 5 };
+    const before = scene.step([far]).slice();
+    assert.throws(() => scene.step([{ ...far, position: [NaN, 0, 0] }]), refused("UPT_ERR_NON_FINITE", /instruments\[0\]: the pose is not finite/));
+    assert.throws(() => scene.step([{ ...far, rotation: [0, 0, 0, 0] }]), refused("UPT_ERR_ARGUMENT", /rotation/));
+    assert.throws(() => scene.step([{ ...far, mode: "bite" }]), refused("UPT_ERR_ARGUMENT", /mode is bite; it can be slide, grasp/));
+    assert.throws(() => model.scene({ stepSeconds: 7 }), refused("UPT_ERR_ARGUMENT", /step_s/));
+    assert.throws(() => model.indices("hair"), refused("UPT_ERR_ARGUMENT", /surfaceNodes/));
+    assert.throws(() => scene.setRegion([1e6]), refused("UPT_ERR_ARGUMENT", /./));
+    assert.deepEqual(scene.read().slice(), before);
+    await assert.rejects(load({ wasm: compiled, isa: "avx2" }), refused("UPT_ERR_ARGUMENT", /isa is avx2/));
+  },
+
+  async calls_after_close_are_refused() {
+    const upt = await start();
+    const model = await upt.open(bundle(LIVER));
+    const scene = model.scene();
+    model.close();
+    assert.throws(() => model.scene(), refused("UPT_ERR_HANDLE", /model/));
+    scene.step([{ position: [500, 0, 0], radius: 5 }]);
+    scene.close();
+    for (const late of [() => scene.step([{ position: [0, 0, 0], radius: 5 }]), () => scene.present(0), () => scene.read(), () => scene.readings(), () => scene.stats(), () => scene.close()]) {
+      assert.throws(late, refused("UPT_ERR_HANDLE", /scene/));
+    }
+  },
+
+  async the_region_and_points_follow() {
+    const upt = await start();
+    const model = await upt.open(bundle(LIVER));
+    const scene = model.scene();
+    const nodes = model.indices("surfaceNodes");
+    const [x, y, z] = model.positions().slice(3 * model.indices("domainNodes")[0]);
+    const tool = [{ position: [x, y, z + 3], radius: 6 }];
+    const all = scene.step(tool).slice();
+    scene.setRegion(nodes);
+    scene.attachPoints([x, y, z]);
+    const shown = scene.read().slice();
+    assert.equal(shown.length, 3 * nodes.length);
+    nodes.forEach((node, i) => assert.deepEqual([...shown.subarray(3 * i, 3 * i + 3)], [...all.subarray(3 * node, 3 * node + 3)]));
+    const node = 3 * model.indices("domainNodes")[0];
+    scene.readPoints().forEach((moved, axis) => assert.ok(Math.abs(moved - all[node + axis]) < 1e-4));
+    assert.equal(scene.present(0.01, tool, { points: true }).length, 3);
+    assert.ok(scene.stats().step_count === 1 && scene.readings()[0].contact_count > 0);
+  },
+
+  async memory_grows_and_is_used_again() {
+    const upt = await start();
+    const files = bundle(LIVER);
+    const model = await upt.open(files);
+    const states = press(upt, model, { steps: 6, corrections: 3 });
+    const first = upt.module.memoryBytes;
+    const scenes = [];
+    while (upt.module.memoryBytes < first + 50e6) scenes.push(model.scene());
+    const again = press(upt, model, { steps: 6, corrections: 3 });
+    again.forEach((list, i) => assert.deepEqual(list, states[i]));
+    scenes.forEach((scene) => scene.close());
+    const most = upt.module.memoryBytes;
+    for (let i = 0; i < 20; i += 1) {
+      (await upt.open(files)).close();
+      model.scene().close();
+    }
+    assert.equal(upt.module.memoryBytes, most, "what was closed is used again");
+  },
+
+  async a_panic_ends_one_instance() {
+    const [ends, stays] = [await start(), await start()];
+    const model = await ends.open(bundle(LIVER));
+    const scene = (await stays.open(bundle(LIVER))).scene();
+    assert.throws(() => ends.module.call("upt_test_panic", model.scene().handle), refused("UPT_ERR_PANIC", /has ended in upt_test_panic .*asked for by the test.*load another one/));
+    assert.throws(() => model.scene(), refused("UPT_ERR_PANIC", /has ended/));
+    scene.step([{ position: [500, 0, 0], radius: 5 }]);
+  },
+
+  async bundles_come_from_files_and_addresses() {
+    const files = bundle(LIVER);
+    const upt = await start();
+    const list = Object.entries(files).map(([name, bytes]) => new File([bytes], name));
+    assert.equal((await upt.open(list)).describe().name, (await upt.open(files)).describe().name);
+    const asked = [];
+    const told = [];
+    const get = async (url) => {
+      asked.push(url.href);
+      const bytes = files[url.pathname.split("/").pop()];
+      return bytes ? new Response(bytes) : new Response("", { status: 404, statusText: "Not Found" });
+    };
+    await upt.open("http://host/some/bundle", { fetch: get, progress: (done, total) => told.push(done / total) });
+    assert.equal(asked[0], "http://host/some/bundle/bundle.json");
+    assert.ok(asked.slice(1).every((url) => /\?sha256=[0-9a-f]{16}$/.test(url)), asked.join(" "));
+    assert.equal(told.at(-1), 1);
+    delete files["mesh.safetensors"];
+    await assert.rejects(upt.open("http://host/bundle/", { fetch: get }), refused("UPT_ERR_IO", /mesh\.safetensors.*404/));
+  },
+
+  async a_step_has_the_pose_of_its_own_moment() {
+    const tool = (x) => [{ position: [x, 0, 0], rotation: [0, 0, 0, 1] }];
+    const clock = new Clock(0.05);
+    clock.moved(1, tool(0));
+    assert.ok(clock.due(1));
+    assert.equal(clock.step(1)[0].position[0], 0);
+    clock.moved(1.04, tool(4));
+    assert.ok(!clock.due(1.04));
+    clock.moved(1.06, tool(6));
+    assert.ok(Math.abs(clock.step(1.06)[0].position[0] - 5) < 1e-6);
+    assert.ok(Math.abs(clock.since(1.06) - 0.01) < 1e-9);
+    clock.moved(9, tool(7));
+    clock.step(9);
+    assert.ok(!clock.due(9.04), "lost time is not made up for");
+    assert.deepEqual(between(tool(0), tool(100), 0.5), tool(100), "put, not moved");
+    assert.ok(Math.abs(between([{ ...tool(0)[0], rotation: [0, 0, 0, -1] }], tool(2), 0.5)[0].rotation[3]) > 0.999);
+  },
+};
+
+function rollouts() {
+  return readdirSync(native).flatMap((file) => {
+    const [, name, corrections] = /^(.*)\.(-?\d+)\.bin$/.exec(file) ?? [];
+    if (!name) return [];
+    return [[`onnx/${name}`, Number(corrections)]];
+  });
+}
+
+let [passed, failed] = [0, 0];
+for (const [name, test] of Object.entries(tests)) {
+  try {
+    await test();
+    passed += 1;
+    console.log(`passed: ${name}`);
+  } catch (error) {
+    failed += 1;
+    console.log(`FAILED: ${name}\n${error.stack}`);
+  }
+}
+console.log(`${passed} passed, ${failed} failed, 0 skipped`);
+process.exitCode = failed ? 1 : 0;

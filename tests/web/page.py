@@ -1,0 +1,149 @@
+"""The site of `cargo xtask site` in headless Chromium, on a desk and on a phone.
+
+    python3 tests/web/page.py SITE
+
+Pictures go to web/pictures/ in UPT_BUILD_DIR. The last line is `N passed, N failed, N skipped`.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+import traceback
+from collections.abc import Callable
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "tests/view"))
+
+from client import Browser  # noqa: E402
+
+PICTURES = Path(os.environ.get("UPT_BUILD_DIR", ROOT / "target")) / "web/pictures"
+
+
+class Files(SimpleHTTPRequestHandler):
+    """A static host that compresses nothing; says nothing, and counts what it sends."""
+
+    sent = 0
+
+    def log_message(self, *_: object) -> None:
+        pass
+
+    def copyfile(self, source, outputfile) -> None:
+        Files.sent += os.fstat(source.fileno()).st_size
+        super().copyfile(source, outputfile)
+
+
+def shown(browser: Browser, address: str, name: str) -> tuple[int, int]:
+    """The page with its organ at rest, and where that is."""
+    browser.open(address)
+    browser.wait("window.uptView && uptView.shown > 10")
+    browser.screenshot(str(PICTURES / f"{name}-rest.png"))
+    x, y = browser.run("return uptView.middle")
+    return x, y
+
+
+def a_drag_presses(browser: Browser, address: str, name: str) -> None:
+    x, y = shown(browser, address, name)
+    browser.drag([(x, y), (x + 6, y), (x + 16, y + 6)], release=False)
+    browser.wait("uptView.largest > 2 && uptView.contacts > 0 && uptView.force > 0")
+    steps = browser.run("return uptView.steps")
+    browser.wait(f"uptView.steps > {steps + 30}")
+    browser.screenshot(str(PICTURES / f"{name}-pressed.png"))
+    browser.release()
+    browser.wait("uptView.contacts == 0")
+
+
+def a_recording_comes_again(browser: Browser, address: str, name: str) -> None:
+    x, y = shown(browser, address, name)
+    browser.click("#record")
+    browser.wait("uptView.recording")
+    browser.drag([(x, y), (x + 6, y)], release=False)
+    browser.wait("uptView.largest > 2")
+    browser.release()
+    browser.click("#record")
+    browser.wait("!uptView.recording")
+    browser.click("#reset")
+    browser.wait("uptView.largest < 0.01")
+    browser.click("#replay")
+    browser.wait("uptView.replaying && uptView.largest > 2")
+    browser.wait("!uptView.replaying")
+
+
+def a_grasp_pulls(browser: Browser, address: str, name: str) -> None:
+    """What slides off when the tool is moved aside stays with a tool that has taken hold."""
+    x, y = shown(browser, address, name)
+    browser.click("#grasp")
+    browser.drag([(x, y)], release=False)
+    browser.wait("uptView.largest > 2 && uptView.contacts > 0")
+    browser.move([(x + 5 * i, y - 10 * i) for i in range(1, 7)])
+    browser.wait("uptView.largest > 8 && uptView.contacts > 0")
+    browser.screenshot(str(PICTURES / f"{name}-grasped.png"))
+    browser.release()
+    browser.wait("uptView.contacts == 0")
+
+
+def little_is_loaded(browser: Browser, address: str) -> None:
+    """Less than 4 MB to the first dent, with a module of 0.8 MB (the tested one has more in it) and text compressed."""
+    Files.sent = 0
+    shown(browser, f"{address}?first", "first")
+    site = Path(sys.argv[1])
+    text = sum(path.stat().st_size for path in site.glob("*.js"))
+    rest = Files.sent - text - (site / "libupt/upt.wasm.gz").stat().st_size
+    assert 1e6 < rest < 4e6 - 0.8e6 - text / 3, (Files.sent, text, rest)
+
+
+def errors_are_told(browser: Browser, address: str) -> None:
+    """A bundle that is not there, one that is damaged, a NaN, and a tissue that is closed."""
+    browser.open(address)
+    browser.run(Path(__file__).with_name("errors.js").read_text(encoding="utf-8"))
+    said = browser.wait("window.said")
+    wanted = ["404", "UPT_ERR_BUNDLE", "6 of true", "UPT_ERR_NON_FINITE", "true", "UPT_ERR_HANDLE: the tissue"]
+    assert len(said) == len(wanted) and all(word in one for one, word in zip(said, wanted, strict=True)), said
+
+
+def on(browser: Browser, test: Callable, *arguments: str) -> tuple[str, Callable]:
+    return f"{test.__name__} ({', '.join([browser.pointer, *arguments[1:]])})", partial(test, browser, *arguments)
+
+
+def main() -> int:
+    PICTURES.mkdir(parents=True, exist_ok=True)
+    server = ThreadingHTTPServer(("127.0.0.1", 0), partial(Files, directory=sys.argv[1]))
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    address = f"http://127.0.0.1:{server.server_address[1]}/"
+    try:
+        desk, phone = Browser(), Browser(390, 844, phone=True)
+    except FileNotFoundError as missing:
+        print(f"skipped: the page: {missing}\n0 passed, 0 failed, 1 skipped")
+        return 0
+    runs = [
+        on(desk, little_is_loaded, address),
+        on(desk, errors_are_told, address),
+        on(desk, a_drag_presses, address, "liver"),
+        on(desk, a_recording_comes_again, address, "liver"),
+        on(desk, a_grasp_pulls, address, "liver"),
+        on(phone, a_drag_presses, address, "phone"),
+    ]
+    passed = failed = 0
+    try:
+        for name, test in runs:
+            try:
+                test()
+                passed += 1
+                print(f"passed: {name}")
+            except Exception:
+                failed += 1
+                print(f"FAILED: {name}\n{traceback.format_exc()}")
+    finally:
+        desk.close()
+        phone.close()
+        server.shutdown()
+    print(f"{passed} passed, {failed} failed, 0 skipped")
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,45 @@
+#!/usr/bin/env bash
+# libupt in WebAssembly: the package in Node, beside the native library, and the site in headless Chromium.
+#
+#   UPT_WASM=upt.wasm UPT_SITE=FOLDER tests/web/run.sh
+#
+# Reads what tests/c/run.sh reads; UPT_WASM is built with the feature `fault`. The last line is `N passed, N failed, N skipped`.
+set -euo pipefail
+root="${UPT_ROOT:-$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)}"
+build="${UPT_BUILD_DIR:-$root/target}/web/tests"
+native="${UPT_LIB_DIR:-$root/target/release}"
+cd "$root"
+rm -rf "$build"
+mkdir -p "$build"
+source tests/cross/count.sh
+
+echo "== what native scalar lanes compute"
+cc -O2 -I include tests/web/press.c "$native/libupt.so" -Wl,-rpath,"$build" -o "$build/press"
+ln -s "$native/libupt.so" "$build/libupt.so.0"
+# press BUNDLE CORRECTIONS: 0 is as many as the bundle recommends.
+press() {
+  UPT_ISA=scalar "$build/press" "$1" 32 "$2" "$build/$(basename "$1").$2.bin"
+}
+press onnx/liver-coarse 3
+press onnx/liver-coarse 0
+
+# add COMMAND...: runs it and adds up its last line.
+add() {
+  local line
+  "$@" | tee "$build/log" || true
+  line="$(tail -n 1 "$build/log")"
+  if [[ "$line" =~ ^([0-9]+)\ passed,\ ([0-9]+)\ failed,\ ([0-9]+)\ skipped$ ]]; then
+    passed=$((passed + BASH_REMATCH[1]))
+    failed=$((failed + BASH_REMATCH[2]))
+    skipped=$((skipped + BASH_REMATCH[3]))
+  else
+    fail "$*"
+  fi
+}
+echo "== in Node"
+add node tests/web/node.mjs "$root" "$UPT_WASM" "$build"
+echo "== in a browser"
+add python3 tests/web/page.py "$UPT_SITE"
+
+echo "$passed passed, $failed failed, $skipped skipped"
+[ "$failed" -eq 0 ]

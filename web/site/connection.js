@@ -1,0 +1,67 @@
+// The page of `cargo xtask site`: what the server of `upt view` is there, a worker is here (crates/cli/src/view/protocol.rs).
+import { Tissue } from "./libupt/worker.js";
+
+const HEADER = 24;
+
+export function connect({ hello, geometry, frame, tell }) {
+  let tissue;
+  const failed = (error) => tell(error.message);
+  const begin = async () => {
+    const [bundle, made] = await open(tell);
+    const { info, positions, faces, domain, stepSeconds: dt } = made;
+    hello({ bundle, node_count: info.node_count, surface_node_count: domain.length, surface_face_count: faces.length / 3, dt, max_push_mm: info.max_push_mm });
+    geometry(await new Blob([positions, faces, domain]).arrayBuffer());
+    tissue = made;
+  };
+  begin().catch(failed);
+  return ({ tool, sequence, reset, record, replay }) => {
+    if (!tissue) return;
+    if (reset) tissue.reset().catch(failed);
+    else if (record !== undefined) tissue.record(record).catch(failed);
+    else if (replay) tissue.replay().catch(failed);
+    else tissue.frame(tool ? [instrument(tool)] : []).then((made) => frame(packed(made, sequence)), failed);
+  };
+}
+
+// The bundle of the address, of those that the site has.
+async function open(tell) {
+  const listed = await (await fetch("bundles.json")).json();
+  const wanted = new URLSearchParams(location.search).get("bundle");
+  const chosen = listed.find(({ name }) => name === wanted) ?? listed[0];
+  const list = document.getElementById("bundles");
+  for (const { name, title } of listed) list.add(new Option(title, name, false, name === chosen.name));
+  list.hidden = listed.length < 2;
+  list.addEventListener("change", () => {
+    location.search = `bundle=${list.value}`;
+  });
+  tell("Loading ...");
+  const progress = (done, total) => tell(done < total ? `Loading ${chosen.title}: ${((100 * done) / total).toFixed(0)} %` : "Opening ...");
+  return [chosen.title, await Tissue.open(`bundles/${chosen.name}`, { gzip: true, progress })];
+}
+
+function instrument({ position, rotation, radius, half_length: halfLength, friction, grasp }) {
+  return { position, rotation, radius, halfLength, friction, mode: grasp ? "grasp" : "slide" };
+}
+
+// A frame as the server sends it.
+function packed({ displacement, instruments: [tool], readings: [reading], stats, recording, replaying, frameMs }, sequence) {
+  const data = new ArrayBuffer(4 * (HEADER + displacement.length));
+  const [words, numbers] = [new Uint32Array(data, 0, HEADER), new Float32Array(data)];
+  words[0] = sequence;
+  words[1] = stats.flags;
+  words[2] = reading?.contact_count ?? 0;
+  words[3] = Number(recording) | (Number(replaying) << 1) | (stats.sleeping << 2);
+  numbers[4] = stats.step_ms;
+  numbers[5] = stats.indicator;
+  numbers.set(reading?.force ?? [0, 0, 0], 6);
+  numbers[9] = stats.max_displacement_mm;
+  numbers[10] = frameMs;
+  words[11] = stats.step_count;
+  words[12] = stats.corrections;
+  numbers[13] = stats.error_mm;
+  numbers[14] = reading?.penetration_mm ?? 0;
+  words[15] = tool ? 1 : 0;
+  if (tool) numbers.set([...tool.position, ...tool.rotation, tool.radius], 16);
+  numbers.set(displacement, HEADER);
+  return data;
+}

@@ -1,0 +1,148 @@
+/** What the library refuses, in its own words. */
+export class UptError extends Error {
+  /** The name of a status of the C ABI, such as "UPT_ERR_BUNDLE". */
+  readonly status: string;
+}
+
+export interface LoadOptions {
+  /** The module; by default `upt.wasm` beside the package's files. */
+  wasm?: WebAssembly.Module | BufferSource | Response | Promise<Response>;
+}
+
+/** Loads the library. Each call makes an instance with a memory of its own; a panic ends that instance and nothing else. */
+export function load(options?: LoadOptions): Promise<Upt>;
+
+/** Where a bundle is: the address of its folder, `File`s, or bytes by name. */
+export type BundleSource = string | URL | Iterable<File> | Record<string, ArrayBuffer | ArrayBufferView>;
+
+export interface OpenOptions {
+  /** In place of the browser's `fetch`. */
+  fetch?: (url: URL) => Promise<Response>;
+  /** Called as files come: bytes so far, and of all. */
+  progress?: (done: number, total: number) => void;
+}
+
+export interface Upt {
+  readonly version: string;
+  open(source: BundleSource, options?: OpenOptions): Promise<Model>;
+}
+
+export type IndexSet = "surfaceNodes" | "domainNodes" | "fixedNodes" | "surfaceFaces" | "domainFaces" | "tets";
+
+/** The fields of `upt_model_info`. */
+export interface ModelInfo {
+  node_count: number;
+  tet_count: number;
+  surface_face_count: number;
+  domain_node_count: number;
+  held_node_count: number;
+  /** s. */
+  dt: number;
+  /** mm. */
+  max_push_mm: number;
+  memory_bytes: number;
+  load_seconds: number;
+  /** The length of a step that suits hosts that show frames, s. */
+  frame_step_s: number;
+  [field: string]: number;
+}
+
+export interface SceneOptions {
+  /** Length of a step, 0.01 to 0.05 s; by default the bundle's. */
+  stepSeconds?: number;
+  /** By the elements, while there is contact: a number of them, 1 to 64. */
+  corrections?: "recommended" | "none" | "auto" | number;
+  /** Corrections stop below this estimated error, mm. */
+  targetMm?: number;
+  /** No correction but the first starts later than this in a step, µs. */
+  budgetUs?: number;
+  /** The flag UPT_FLAG_ERROR rises above this estimated error, mm. */
+  errorLimitMm?: number;
+  /** 1/s. */
+  dampingPerSecond?: number;
+  substeps?: number;
+  /** What is done with a state that is no longer plausible. */
+  guard?: "hold" | "report" | "blend";
+  neverSleeps?: boolean;
+}
+
+export interface Instrument {
+  /** Centre, mm, in the mesh's frame. */
+  position: ArrayLike<number> & Iterable<number>;
+  /** Unit quaternion x, y, z, w. */
+  rotation?: ArrayLike<number> & Iterable<number>;
+  shape?: "capsule" | "box" | "spatula";
+  /** Of a capsule, or a spatula's corners, mm. */
+  radius?: number;
+  /** Of a capsule's axis, its local y, mm. */
+  halfLength?: number;
+  /** Of a box or spatula, mm. */
+  halfExtents?: ArrayLike<number>;
+  mode?: "slide" | "grasp";
+  /** Coulomb's coefficient. */
+  friction?: number;
+  /** A grasp tears off at this pull, mN. */
+  tearOff?: number;
+}
+
+/** The fields of `upt_instrument_reading`. */
+export interface Reading {
+  contact_count: number;
+  /** On the instrument, mN. */
+  force: [number, number, number];
+  /** mN mm. */
+  torque: [number, number, number];
+  penetration_mm: number;
+  torn: number;
+  residual_mm: number;
+}
+
+/** The fields of `upt_scene_stats`. */
+export interface Stats {
+  /** UPT_FLAG_*. */
+  flags: number;
+  step_count: number;
+  step_ms: number;
+  max_displacement_mm: number;
+  corrections: number;
+  error_mm: number;
+  indicator: number;
+  sleeping: number;
+  [field: string]: number;
+}
+
+/** A bundle made ready to step. */
+export interface Model {
+  /** For the C ABI. */
+  readonly handle: number;
+  readonly info: ModelInfo;
+  /** Name, hash and more. */
+  describe(): { name: string; bundle_sha256: string; instruction_set: string; [field: string]: unknown };
+  /** At rest [K,3], mm. */
+  positions(): Float32Array;
+  indices(set: IndexSet): Uint32Array;
+  scene(options?: SceneOptions): Scene;
+  /** Its scenes stay usable. */
+  close(): void;
+}
+
+/** One tissue that is stepped. Arrays that a call returns are views of the module's memory, good until the next call. */
+export interface Scene {
+  /** For the C ABI. */
+  readonly handle: number;
+  /** Displacements [n,3] of the region after a step with the instruments where they are at its end, mm. */
+  step(instruments?: Instrument[], timeSeconds?: number): Float32Array;
+  /** The tissue `when` seconds after the last step, with the instruments there: of the region, or of the attached points. */
+  present(when: number, instruments?: Instrument[], options?: { points?: boolean }): Float32Array;
+  read(): Float32Array;
+  /** Of the last step's instruments, in their order. */
+  readings(): Reading[];
+  stats(): Stats;
+  /** The nodes that are shown from here on; none means all. */
+  setRegion(nodes?: ArrayLike<number> & Iterable<number>): void;
+  /** Points [p,3] at rest, mm. */
+  attachPoints(points: ArrayLike<number> & Iterable<number>): void;
+  readPoints(): Float32Array;
+  reset(): void;
+  close(): void;
+}

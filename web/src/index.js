@@ -1,0 +1,274 @@
+// libupt in WebAssembly: soft tissue that instruments press, grasp and pull, in real time. Lengths are mm, forces mN.
+import * as abi from "./abi.js";
+import { files } from "./files.js";
+import { Module, UptError } from "./module.js";
+
+export { UptError };
+
+const MODES = { slide: abi.UPT_MODE_SLIDE, grasp: abi.UPT_MODE_GRASP };
+const SHAPES = { capsule: abi.UPT_SHAPE_CAPSULE, box: abi.UPT_SHAPE_BOX, spatula: abi.UPT_SHAPE_SPATULA };
+const SETS = {
+  surfaceNodes: abi.UPT_SET_SURFACE_NODES,
+  domainNodes: abi.UPT_SET_DOMAIN_NODES,
+  fixedNodes: abi.UPT_SET_FIXED_NODES,
+  surfaceFaces: abi.UPT_SET_SURFACE_FACES,
+  domainFaces: abi.UPT_SET_DOMAIN_FACES,
+  tets: abi.UPT_SET_TETS,
+};
+const CORRECTIONS = { recommended: 0, none: abi.UPT_CORRECTIONS_NONE, auto: abi.UPT_CORRECTIONS_AUTO };
+const GUARDS = { hold: abi.UPT_GUARD_HOLD, report: abi.UPT_GUARD_REPORT, blend: abi.UPT_GUARD_BLEND };
+
+function choice(names, name, what) {
+  if (!(name in names)) throw new UptError("UPT_ERR_ARGUMENT", `${what} is ${name}; it can be ${Object.keys(names).join(", ")}`);
+  return names[name];
+}
+
+/** Loads the library. Each call makes an instance with a memory of its own. */
+export async function load({ wasm = fetch(new URL("./upt.wasm", import.meta.url)), isa } = {}) {
+  return new Upt(await Module.start(wasm, isa));
+}
+
+/** An instance of the library. */
+class Upt {
+  /** The module: for the C ABI itself. */
+  module;
+
+  constructor(module) {
+    this.module = module;
+  }
+
+  get version() {
+    return this.module.text(this.module.call("upt_version"));
+  }
+
+  /** Opens a bundle: the address of its folder, `File`s, or bytes by name. */
+  async open(source, options) {
+    const given = await files(source, options);
+    const { module } = this;
+    for (const [name, bytes] of given) {
+      const at = module.withText(name, (text) => module.call("upt_host_file", text, bytes.byteLength));
+      if (at === 0) throw new UptError("UPT_ERR_OUT_OF_MEMORY", module.text(module.call("upt_last_error")));
+      module.bytes(at, bytes.byteLength).set(bytes);
+    }
+    return new Model(module, module.out("upt_host_open", 0));
+  }
+}
+
+/** A bundle made ready to step. */
+class Model {
+  #module;
+  /** For the C ABI. */
+  handle;
+  #info;
+
+  constructor(module, handle) {
+    this.#module = module;
+    this.handle = handle;
+  }
+
+  /** What the model is: the fields of `upt_model_info`. */
+  get info() {
+    this.#info ??= this.#module.filled(abi.upt_model_info, "upt_model_get_info", this.handle);
+    return this.#info;
+  }
+
+  /** Name, hash of the bundle and more. */
+  describe() {
+    const bytes = this.#module.out("upt_model_describe", this.handle, 0, 0n);
+    return this.#module.withRoom(bytes, (at) => {
+      this.#module.run("upt_model_describe", this.handle, at, BigInt(bytes), 0);
+      return JSON.parse(this.#module.text(at));
+    });
+  }
+
+  /** Rest positions [K,3], mm. */
+  positions() {
+    const count = 3 * this.info.node_count;
+    return this.#module.withRoom(4 * count, (at) => {
+      this.#module.run("upt_model_positions", this.handle, at, BigInt(count));
+      return this.#module.floats(at, count).slice();
+    });
+  }
+
+  /** An index set, such as "surfaceFaces". */
+  indices(set) {
+    const number = choice(SETS, set, "the index set");
+    const count = this.#module.out("upt_model_indices", this.handle, number, 0, 0n);
+    return this.#module.withRoom(4 * count, (at) => {
+      this.#module.run("upt_model_indices", this.handle, number, at, BigInt(count), 0);
+      return this.#module.words(at, count).slice();
+    });
+  }
+
+  /** A scene at rest. */
+  scene(options) {
+    return new Scene(this.#module, this.handle, this.info.node_count, options);
+  }
+
+  /** Frees the model. Its scenes stay usable. */
+  close() {
+    this.#module.run("upt_model_close", this.handle);
+  }
+}
+
+/** One tissue that is stepped. */
+class Scene {
+  #module;
+  /** For the C ABI. */
+  handle;
+  #room; // {at, floats}: for displacements
+  #tools = { at: 0, room: 0, count: 0 };
+  #input; // upt_input, then upt_view
+  #shown; // nodes of the region
+  #points = 0;
+  #closed = false;
+
+  constructor(module, model, nodes, options = {}) {
+    const { corrections = "recommended", guard = "hold", stepSeconds = 0, ...more } = options;
+    const values = {
+      corrections: typeof corrections === "number" ? corrections : choice(CORRECTIONS, corrections, "corrections"),
+      guard_policy: choice(GUARDS, guard, "guard"),
+      step_s: stepSeconds,
+      damping_per_s: more.dampingPerSecond ?? 0,
+      corrections_target_mm: more.targetMm ?? 0,
+      corrections_budget_us: more.budgetUs ?? 0,
+      error_limit_mm: more.errorLimitMm ?? 0,
+      substeps: more.substeps ?? 0,
+      no_sleep: more.neverSleeps ? 1 : 0,
+    };
+    this.#module = module;
+    this.handle = module.withRoom(abi.upt_scene_options.size, (at) => {
+      module.write(at, abi.upt_scene_options, values);
+      return module.out("upt_scene_create", model, at);
+    });
+    this.#shown = nodes;
+    this.#input = module.alloc(abi.upt_input.size + abi.upt_view.size);
+    this.#room = { at: module.alloc(12 * nodes), floats: 3 * nodes };
+  }
+
+  /** A step that instruments drive: displacements [n,3] of the region, a view of the module's memory until the next call. */
+  step(instruments = [], timeS = 0) {
+    const input = this.#write(instruments, timeS);
+    return this.#filled(this.#shown, (at, floats) => this.#module.run("upt_scene_step", this.handle, input, at, floats));
+  }
+
+  /** The tissue `when` seconds after the last step, with the instruments there; as `step`, or of the attached points. */
+  present(when, instruments = [], { points = false } = {}) {
+    const input = this.#write(instruments, 0);
+    const view = this.#input + abi.upt_input.size;
+    if (points) this.#module.write(view, abi.upt_view, { kind: abi.UPT_VIEW_POINTS });
+    const count = points ? this.#points : this.#shown;
+    return this.#filled(count, (at, floats) => this.#module.run("upt_scene_present", this.handle, input, when, points ? view : 0, at, floats));
+  }
+
+  /** Displacements of the region in the last state. */
+  read() {
+    return this.#filled(this.#shown, (at, floats) => this.#module.run("upt_scene_read", this.handle, at, floats));
+  }
+
+  /** What the last step did to its instruments: the fields of `upt_instrument_reading`. */
+  readings() {
+    const { size } = abi.upt_instrument_reading;
+    const { count } = this.#tools;
+    this.#refuseIfClosed();
+    return this.#module.withRoom(size * count, (at) => {
+      for (let i = 0; i < count; i += 1) this.#module.write(at + size * i, abi.upt_instrument_reading, {});
+      this.#module.run("upt_scene_instrument_readings", this.handle, at, BigInt(count));
+      return Array.from({ length: count }, (_, i) => this.#module.read(at + size * i, abi.upt_instrument_reading));
+    });
+  }
+
+  /** What the last step did and cost: the fields of `upt_scene_stats`. */
+  stats() {
+    return this.#module.filled(abi.upt_scene_stats, "upt_scene_get_stats", this.handle);
+  }
+
+  /** The nodes that are shown from here on; none means all. */
+  setRegion(nodes = []) {
+    this.#withList(nodes, (at) => this.#module.run("upt_scene_set_region", this.handle, at, BigInt(nodes.length)));
+    this.#shown = nodes.length || this.#room.floats / 3;
+  }
+
+  /** Points [p,3] at rest, mm, that follow the tissue from here on. */
+  attachPoints(points) {
+    const floats = Float32Array.from(points);
+    this.#withList(floats, (at) => this.#module.run("upt_scene_attach_points", this.handle, at, BigInt(floats.length / 3)));
+    this.#points = floats.length / 3;
+  }
+
+  /** Displacements [p,3] of the attached points in the last state. */
+  readPoints() {
+    return this.#filled(this.#points, (at, floats) => this.#module.run("upt_scene_read_points", this.handle, at, floats));
+  }
+
+  /** Back to rest. */
+  reset() {
+    this.#module.run("upt_scene_reset", this.handle);
+  }
+
+  /** Frees the scene. */
+  close() {
+    this.#module.run("upt_scene_destroy", this.handle);
+    this.#closed = true;
+    this.#module.free(this.#room.at, 4 * this.#room.floats);
+    this.#module.free(this.#tools.at, this.#tools.room);
+    this.#module.free(this.#input, abi.upt_input.size + abi.upt_view.size);
+  }
+
+  // The library's own refusal, before anything is written to memory that has gone back.
+  #refuseIfClosed() {
+    if (this.#closed) this.reset();
+  }
+
+  // Calls with room for `count` vectors, and looks at it.
+  #filled(count, call) {
+    this.#refuseIfClosed();
+    const floats = 3 * count;
+    if (floats > this.#room.floats) {
+      this.#module.free(this.#room.at, 4 * this.#room.floats);
+      this.#room = { at: this.#module.alloc(4 * floats), floats };
+    }
+    call(this.#room.at, BigInt(floats));
+    return this.#module.floats(this.#room.at, floats);
+  }
+
+  // Numbers of 32 bits for the time of a call; NULL for none.
+  #withList(list, use) {
+    if (list.length === 0) return use(0);
+    return this.#module.withRoom(4 * list.length, (at) => {
+      const room = list instanceof Float32Array ? this.#module.floats(at, list.length) : this.#module.words(at, list.length);
+      room.set(list);
+      return use(at);
+    });
+  }
+
+  #write(instruments, timeS) {
+    this.#refuseIfClosed();
+    const { size } = abi.upt_instrument;
+    const needed = size * instruments.length;
+    if (needed > this.#tools.room) {
+      this.#module.free(this.#tools.at, this.#tools.room);
+      this.#tools = { at: this.#module.alloc(needed), room: needed };
+    }
+    this.#tools.count = instruments.length;
+    instruments.forEach((tool, i) => {
+      const { shape = "capsule", mode = "slide", halfLength = 0 } = tool;
+      this.#module.write(this.#tools.at + size * i, abi.upt_instrument, {
+        shape: choice(SHAPES, shape, `instruments[${i}].shape`),
+        position: tool.position,
+        rotation: tool.rotation ?? [0, 0, 0, 1],
+        half_extents: tool.halfExtents ?? [0, halfLength, 0],
+        radius: tool.radius ?? 0,
+        mode: choice(MODES, mode, `instruments[${i}].mode`),
+        friction: tool.friction ?? 0,
+        tear_off_mn: tool.tearOff ?? 0,
+      });
+    });
+    this.#module.write(this.#input, abi.upt_input, {
+      instruments: needed ? this.#tools.at : 0,
+      instrument_count: instruments.length,
+      time_s: timeS,
+    });
+    return this.#input;
+  }
+}

@@ -1,0 +1,122 @@
+// The worker's side of worker.js: owns the library, keeps step with the clock, answers one question after another.
+import { Clock, between } from "./clock.js";
+import { load } from "./index.js";
+
+const LONGEST_RECORDING = 45_000; // steps: a quarter of an hour of 20 ms
+
+let scene;
+let clock;
+let dt;
+let framed = 0; // when the last frame was made, s
+let timer;
+let attached = false;
+let instruments = []; // of the last step
+let last = { readings: [], stats: undefined };
+let recording;
+let recorded = [];
+let replayed; // the recorded step that comes next
+let failed; // what a step between two questions ended with
+
+const now = () => performance.now() / 1000;
+
+// A response whose bytes come compressed, for hosts that compress nothing themselves.
+async function unpacked(url, type) {
+  const response = await fetch(`${url}`.replace(/(\?|$)/, ".gz$1"));
+  if (!response.ok) return response;
+  return new Response(response.body.pipeThrough(new DecompressionStream("gzip")), { headers: { "content-type": type } });
+}
+
+const answers = {
+  async open({ source, scene: options = {}, wasm, isa, gzip }) {
+    const address = wasm ?? new URL("./upt.wasm", import.meta.url);
+    const upt = await load({ wasm: address instanceof WebAssembly.Module ? address : gzip ? unpacked(address, "application/wasm") : fetch(address), isa });
+    const get = gzip ? (url) => unpacked(url, "application/octet-stream") : fetch.bind(globalThis);
+    const model = await upt.open(source, { fetch: get, progress: (...progress) => postMessage({ progress }) });
+    const { info } = model;
+    dt = options.stepSeconds ?? info.frame_step_s;
+    // No correction begins after this share of a step, so that steps keep up with the clock.
+    scene = model.scene({ guard: "report", stepSeconds: dt, budgetUs: Math.round(0.3e6 * dt), ...options });
+    clock = new Clock(dt);
+    const nodes = model.indices("surfaceNodes");
+    const all = model.positions();
+    const place = new Map(Array.from(nodes, (node, i) => [node, i]));
+    const positions = new Float32Array(3 * nodes.length);
+    nodes.forEach((node, i) => positions.set(all.subarray(3 * node, 3 * node + 3), 3 * i));
+    const domain = new Uint32Array(nodes.length);
+    for (const node of model.indices("domainNodes")) if (place.has(node)) domain[place.get(node)] = 1;
+    const faces = model.indices("surfaceFaces").map((node) => place.get(node));
+    scene.setRegion(nodes);
+    last.stats = scene.stats();
+    return { info: { ...info, name: model.describe().name }, nodes, positions, faces, domain, stepSeconds: dt };
+  },
+
+  frame(given) {
+    const begun = performance.now();
+    framed = now();
+    let shown = given;
+    if (replayed !== undefined) {
+      const at = (step) => recorded[step] ?? [];
+      shown = between(at(Math.max(replayed - 1, 0)), at(replayed), clock.part(framed));
+    }
+    clock.moved(framed, shown);
+    const displacement = scene.present(clock.since(framed), shown).slice();
+    const points = attached ? scene.present(clock.since(framed), shown, { points: true }).slice() : undefined;
+    const frameMs = performance.now() - begun;
+    clearTimeout(timer);
+    timer = setTimeout(stepOn);
+    return { displacement, points, instruments: shown, frameMs, recording: recording !== undefined, replaying: replayed !== undefined, ...last };
+  },
+
+  attach(points) {
+    scene.attachPoints(points);
+    attached = points.length > 0;
+  },
+
+  reset() {
+    scene.reset();
+    clock = new Clock(dt);
+    replayed = undefined;
+    last = { readings: [], stats: scene.stats() };
+  },
+
+  record(on) {
+    if (on) recording = [];
+    else if (recording) [recorded, recording] = [recording, undefined];
+  },
+
+  replay() {
+    answers.reset();
+    recording = undefined;
+    replayed = 0;
+  },
+};
+
+// The steps that are due, one at a time, so that a frame that is asked for meanwhile comes between.
+function stepOn() {
+  if (!clock.due(framed)) return;
+  instruments = clock.step(framed);
+  if (replayed !== undefined) {
+    instruments = recorded[replayed] ?? [];
+    replayed = replayed < recorded.length ? replayed + 1 : undefined;
+  }
+  if (recording && recording.length < LONGEST_RECORDING) recording.push(instruments);
+  try {
+    scene.step(instruments);
+    last = { readings: scene.readings(), stats: scene.stats() };
+  } catch (error) {
+    failed = error;
+    return;
+  }
+  timer = setTimeout(stepOn);
+}
+onmessage = async ({ data: { what, value, number } }) => {
+  try {
+    if (failed) throw failed;
+    const answer = await answers[what](value);
+    const moved = answer?.displacement ?? answer?.positions;
+    postMessage({ number, value: answer }, moved ? [moved.buffer] : []);
+  } catch (error) {
+    failed = undefined;
+    postMessage({ number, error: { status: error.status ?? "UPT_ERR_STATE", message: error.message } });
+  }
+};

@@ -1,0 +1,195 @@
+//! `cargo xtask package --platform web` and `cargo xtask site`: libupt in WebAssembly, its npm package, and a static site that shows organs;
+//! and the stage that tests them.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, ensure};
+use flate2::{Compression, GzBuilder};
+use serde_json::{Value, json};
+
+use crate::counts::{self, Outcome};
+use crate::process::{output, run_checked};
+use crate::workspace::{Workspace, copy};
+use crate::{archive, venv};
+
+const TARGET: &str = "wasm32-unknown-unknown";
+const VIEW: &str = "crates/cli/src/view/page";
+
+/// An organ of the site.
+struct Organ {
+    /// Its folder there.
+    name: &'static str,
+    title: &'static str,
+    /// The bundle's folder; one below `target/` is made of the mesh first, by the command `upt make`.
+    bundle: &'static str,
+    mesh: Option<&'static str>,
+}
+
+/// The first is shown first. Bundles with a network are not among them: the module cannot run it.
+const ORGANS: [Organ; 3] = [
+    Organ {
+        name: "liver",
+        title: "liver",
+        bundle: "onnx/liver-coarse",
+        mesh: None,
+    },
+    Organ {
+        name: "brain",
+        title: "brain, coarse",
+        bundle: "target/web/brain-coarse",
+        mesh: Some("onnx/meshes/brain-coarse.mesh.safetensors"),
+    },
+    Organ {
+        name: "brain-fine",
+        title: "brain, fine (20 MB)",
+        bundle: "onnx/brain-supported",
+        mesh: None,
+    },
+];
+
+/// The module with the library's features. Rust's standard library for it comes by rustup, where it is missing.
+///
+/// # Errors
+/// Where it cannot be had, or something does not compile.
+fn module(workspace: &Workspace, features: &str) -> Result<PathBuf> {
+    ensure!(
+        has_target(workspace),
+        "Rust's standard library for {TARGET} is missing: rustup target add {TARGET}"
+    );
+    let words = format!(
+        "rustc --profile web --lib --crate-type cdylib --target {TARGET} -p upt --no-default-features --features {features}"
+    );
+    run_checked(
+        workspace,
+        "cargo build for the web",
+        &mut workspace.cargo(&words),
+    )?;
+    let target = workspace.release.with_file_name("");
+    Ok(target.join(TARGET).join("web/upt.wasm"))
+}
+
+fn has_target(workspace: &Workspace) -> bool {
+    let words = format!("--print target-libdir --target {TARGET}");
+    let is_there = || {
+        let folder = output(&mut workspace.command("rustc", &words));
+        folder.is_ok_and(|folder| Path::new(folder.trim()).is_dir())
+    };
+    let add = format!("target add {TARGET}");
+    is_there() || (output(&mut workspace.command("rustup", &add)).is_ok() && is_there())
+}
+
+/// The npm package.
+pub fn package(workspace: &Workspace, out: &Path) -> Result<PathBuf> {
+    let root = out.join("web/package");
+    std::fs::remove_dir_all(&root).ok();
+    modules(workspace, &module(workspace, "instruments")?, &root)?;
+    for name in ["package.json", "README.md"] {
+        copy(&workspace.path("web").join(name), &root.join(name))?;
+    }
+    for name in ["LICENSE-APACHE", "LICENSE-MIT"] {
+        copy(&workspace.path(name), &root.join(name))?;
+    }
+    let words = "tests/style/licences.py --write";
+    let mut licences = workspace.python(words);
+    run_checked(workspace, words, licences.arg(root.join("THIRD-PARTY.txt")))?;
+    let file = out.join(format!("libupt-{}.tgz", env!("CARGO_PKG_VERSION")));
+    archive::pack(&out.join("web"), "package", &file, archive::time(workspace))?;
+    Ok(file)
+}
+
+/// The JavaScript of the package with the module.
+fn modules(workspace: &Workspace, wasm: &Path, to: &Path) -> Result<()> {
+    copy(&workspace.path("web/src"), to)?;
+    copy(wasm, &to.join("upt.wasm"))
+}
+
+/// `cargo xtask site`.
+pub fn site(workspace: &Workspace, out: &Path) -> Result<bool> {
+    let out = workspace.root.join(out);
+    let wasm = module(workspace, "instruments")?;
+    make_bundles(workspace)?;
+    write_site(workspace, &wasm, &ORGANS, &out)?;
+    venv::install(workspace, venv::DOCS)?;
+    let mut book = workspace.command(workspace.venv_program("mdbook"), "build docs --dest-dir");
+    run_checked(workspace, "mdbook", book.arg(out.join("docs")))?;
+    println!("{}", out.join("index.html").display());
+    Ok(true)
+}
+
+/// The page of `upt view` over a worker. What is large comes compressed, whatever the host does.
+fn write_site(workspace: &Workspace, wasm: &Path, organs: &[Organ], out: &Path) -> Result<()> {
+    std::fs::remove_dir_all(out).ok();
+    copy(&workspace.path(VIEW), out)?;
+    std::fs::remove_file(out.join("vendor.sh"))?;
+    copy(&workspace.path("web/site"), out)?;
+    copy(&workspace.path("web/src"), &out.join("libupt"))?;
+    for name in ["NOTICE", "LICENSE-APACHE", "LICENSE-MIT"] {
+        copy(&workspace.path(name), &out.join(name))?;
+    }
+    compress(wasm, &out.join("libupt/upt.wasm"))?;
+    for organ in organs {
+        let to = out.join("bundles").join(organ.name);
+        write_bundle(&workspace.path(organ.bundle), &to).context(organ.bundle)?;
+    }
+    let entries = organs.iter();
+    let entries = entries.map(|organ| json!({"name": organ.name, "title": organ.title}));
+    let list: Vec<Value> = entries.collect();
+    std::fs::write(out.join("bundles.json"), serde_json::to_string(&list)?)?;
+    Ok(())
+}
+
+/// The bundles that are not committed, made once: minutes each.
+fn make_bundles(workspace: &Workspace) -> Result<()> {
+    for organ in &ORGANS {
+        let folder = workspace.path(organ.bundle);
+        let Some(mesh) = organ.mesh.filter(|_| !folder.join("bundle.json").is_file()) else {
+            continue;
+        };
+        workspace.build()?;
+        println!("making {}: some minutes, once", organ.bundle);
+        let words = format!("make {mesh} --minutes 6 --out");
+        let mut make = workspace.command(workspace.upt(), &words);
+        run_checked(workspace, "upt make", make.arg(&folder))?;
+    }
+    Ok(())
+}
+
+/// A bundle's files, compressed, without its certificate.
+fn write_bundle(from: &Path, to: &Path) -> Result<()> {
+    std::fs::create_dir_all(to)?;
+    let text = std::fs::read(from.join("bundle.json"))?;
+    let manifest: Value = serde_json::from_slice(&text)?;
+    let files = manifest["files"].as_object().context("files")?;
+    for name in files.keys().map(String::as_str).chain(["bundle.json"]) {
+        compress(&from.join(name), &to.join(name))?;
+    }
+    Ok(())
+}
+
+/// A file as `NAME.gz`.
+fn compress(from: &Path, to: &Path) -> Result<()> {
+    let bytes = std::fs::read(from).with_context(|| format!("cannot read {}", from.display()))?;
+    let mut name = to.as_os_str().to_owned();
+    name.push(".gz");
+    let file = std::fs::File::create(&name)?;
+    let mut packed = GzBuilder::new().mtime(0).write(file, Compression::best());
+    packed.write_all(&bytes)?;
+    packed.finish()?;
+    Ok(())
+}
+
+/// `cargo xtask test --only web`.
+pub fn stage(workspace: &Workspace) -> Result<Outcome> {
+    if !has_target(workspace) {
+        return Ok(Outcome::skipped(&format!(
+            "needs rustup target add {TARGET}"
+        )));
+    }
+    // With the call that panics.
+    let wasm = module(workspace, "instruments,fault")?;
+    let site = workspace.path("target/web/site");
+    write_site(workspace, &wasm, &ORGANS[..1], &site)?;
+    let environment = [("UPT_WASM", &*wasm), ("UPT_SITE", &*site)];
+    counts::script(workspace, "web", "tests/web/run.sh", &environment)
+}
