@@ -3,8 +3,8 @@
  *
  *   press BUNDLE STEPS CORRECTIONS FILE
  *
- * FILE, for each step: [K,3] displacements (mm), the force on the ball (mN), and [K,3]
- * displacements 7 ms later. One ball, 20 ms steps.
+ * Prints the milliseconds of each step. FILE, for each step: [K,3] displacements (mm), the force on
+ * the ball (mN), and [K,3] displacements 7 ms later. One ball, 20 ms steps.
  */
 #include "upt.h"
 
@@ -25,6 +25,7 @@ int main(int argc, char **argv) {
   upt_instrument ball;
   upt_input input;
   upt_instrument_reading reading;
+  upt_scene_stats stats;
   upt_model *model = NULL;
   upt_scene *scene = NULL;
   uint32_t *domain;
@@ -62,6 +63,8 @@ int main(int argc, char **argv) {
   input.instrument_count = 1;
   memset(&reading, 0, sizeof reading);
   reading.struct_size = sizeof reading;
+  memset(&stats, 0, sizeof stats);
+  stats.struct_size = sizeof stats;
   for (step = 0; step < atol(argv[2]); step++) {
     /* 8 mm down, 4 mm aside, and up: half a millimetre a step. */
     const double down = step < 16 ? step : step < 24 ? 16 : 40 - step;
@@ -71,6 +74,8 @@ int main(int argc, char **argv) {
     ball.position[2] = (float)((double)tip[2] + 6.0 - 0.5 * down);
     ok(upt_scene_step(scene, &input, out, 3 * info.node_count));
     fwrite(out, sizeof *out, 3 * info.node_count, file);
+    ok(upt_scene_get_stats(scene, &stats));
+    printf("%.4f\n", stats.step_ms);
     ok(upt_scene_instrument_readings(scene, &reading, 1));
     fwrite(reading.force, sizeof *out, 3, file);
     ok(upt_scene_present(scene, &input, 0.007, NULL, out, 3 * info.node_count));

@@ -7,12 +7,9 @@ export function press(upt, model, { steps, corrections, each = () => {} }) {
     const down = step < 16 ? step : step < 24 ? 16 : 40 - step;
     const aside = step < 16 ? 0 : step < 24 ? step - 16 : 8;
     const ball = [{ position: [x + 0.5 * aside, y, z + 6 - 0.5 * down], radius: 6, friction: 0.25 }];
-    const begun = performance.now();
     const moved = scene.step(ball).slice();
-    const ms = performance.now() - begun;
-    const [reading] = scene.readings();
-    states.push(moved, Float32Array.from(reading.force), scene.present(0.007, ball).slice());
-    each({ step, ms, moved, reading });
+    each(scene.stats());
+    states.push(moved, Float32Array.from(scene.readings()[0].force), scene.present(0.007, ball).slice());
   }
   scene.close();
   return states;

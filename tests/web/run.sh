@@ -18,7 +18,7 @@ cc -O2 -I include tests/web/press.c "$native/libupt.so" -Wl,-rpath,"$build" -o "
 ln -s "$native/libupt.so" "$build/libupt.so.0"
 # press BUNDLE CORRECTIONS: 0 is as many as the bundle recommends.
 press() {
-  UPT_ISA=scalar "$build/press" "$1" 32 "$2" "$build/$(basename "$1").$2.bin"
+  UPT_ISA=scalar "$build/press" "$1" 32 "$2" "$build/$(basename "$1").$2.bin" >"$build/times"
 }
 press onnx/liver-coarse 3
 press onnx/liver-coarse 0

@@ -36,7 +36,7 @@ async function open(tell) {
   });
   tell("Loading ...");
   const progress = (done, total) => tell(done < total ? `Loading ${chosen.title}: ${((100 * done) / total).toFixed(0)} %` : "Opening ...");
-  return [chosen.title, await Tissue.open(`bundles/${chosen.name}`, { gzip: true, progress })];
+  return [chosen.title.replace(/ \(.*/, ""), await Tissue.open(`bundles/${chosen.name}`, { gzip: true, progress })];
 }
 
 function instrument({ position, rotation, radius, half_length: halfLength, friction, grasp }) {
