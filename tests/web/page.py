@@ -7,7 +7,9 @@ Pictures go to web/pictures/ in UPT_BUILD_DIR. The last line is `N passed, N fai
 
 from __future__ import annotations
 
+import gzip
 import os
+import shutil
 import sys
 import threading
 import traceback
@@ -105,6 +107,39 @@ def errors_are_told(browser: Browser, address: str) -> None:
     assert len(said) == len(wanted) and all(word in one for one, word in zip(said, wanted, strict=True)), said
 
 
+def the_example_moves(browser: Browser, address: str) -> None:
+    """examples/web: a mesh of three.js follows, and so does a render mesh that it carries."""
+    site = Path(sys.argv[1])
+    example = site / "example"
+    shutil.rmtree(example, ignore_errors=True)
+    shutil.copytree(ROOT / "examples/web", example)
+    shutil.copytree(ROOT / "onnx/liver-coarse", example / "bundles/liver")
+    shutil.copytree(site / "libupt", example / "node_modules/libupt")
+    module = gzip.decompress((site / "libupt/upt.wasm.gz").read_bytes())
+    (example / "node_modules/libupt/upt.wasm").write_bytes(module)
+    (example / "node_modules/three/build").mkdir(parents=True)
+    shutil.copy(site / "three.js", example / "node_modules/three/build/three.module.js")
+    browser.open(f"{address}example/index.html")
+    browser.wait(
+        "window.organ && organ.frame && organ.frame.readings.length && organ.frame.readings[0].contact_count > 0"
+    )
+    moved = "Math.max(...organ.frame.displacement.map(Math.abs))"
+    browser.wait(f"{moved} > 1")
+    browser.run("requestAnimationFrame(() => requestAnimationFrame(() => { window.drawn = true; }))")
+    browser.wait("window.drawn")
+    browser.screenshot(str(PICTURES / "example.png"))
+    # A copy of the organ at rest as a render mesh.
+    browser.run(
+        "const Mesh = Object.getPrototypeOf(organ.constructor);"
+        "window.twin = new Mesh(organ.geometry.clone(), organ.material);"
+        "twin.geometry.attributes.position.array.set(tissue.positions);"
+        "organ.carry(twin).then(() => { window.carried = true; })"
+    )
+    place = "geometry.attributes.position.array"
+    browser.wait("window.carried && organ.frame.points")
+    browser.wait(f"twin.{place}.every((x, i) => Math.abs(x - organ.{place}[i]) < 0.05) && {moved} > 1")
+
+
 def on(browser: Browser, test: Callable, *arguments: str) -> tuple[str, Callable]:
     return f"{test.__name__} ({', '.join([browser.pointer, *arguments[1:]])})", partial(test, browser, *arguments)
 
@@ -125,6 +160,7 @@ def main() -> int:
         on(desk, a_drag_presses, address, "liver"),
         on(desk, a_recording_comes_again, address, "liver"),
         on(desk, a_grasp_pulls, address, "liver"),
+        on(desk, the_example_moves, address),
         on(phone, a_drag_presses, address, "phone"),
     ]
     passed = failed = 0
