@@ -66,6 +66,9 @@ impl Buried {
     }
 }
 
+/// Probes whose nearest nodes are looked for at once.
+const AT_ONCE: usize = 8;
+
 /// The deepest of a tool's probes that lie more than `least` mm below the touchable surface.
 fn deepest(
     body: &Body,
@@ -76,36 +79,58 @@ fn deepest(
 ) -> Option<Buried> {
     let mut deepest: Option<Buried> = None;
     let mut last = None;
-    for probe in body.probes() {
-        // Those of a ball are all its middle.
-        if last.replace(probe) == Some(probe) {
-            continue;
+    // Those of a ball are all its middle.
+    let is_new = |probe: &Vector| last.replace(*probe) != Some(*probe);
+    let probes = body.probes().filter(is_new);
+    let mut probes = probes.map(|probe| pose.transform_point(probe));
+    loop {
+        // By axis, which vectors of the processor take.
+        let ([mut x, mut y, mut z], mut count) = ([[0.0f32; AT_ONCE]; 3], 0);
+        for (at, probe) in (0..AT_ONCE).zip(&mut probes) {
+            [x[at], y[at], z[at]] = probe.to_array();
+            count += 1;
         }
-        let found = below(pose.transform_point(probe), samples, state);
-        let depth = |of: &Option<Buried>| of.map_or(least, |buried| buried.depth);
-        if depth(&found) > depth(&deepest) {
-            deepest = found;
+        if count == 0 {
+            return deepest;
+        }
+        let (mut nearest, mut places) = ([f32::MAX; AT_ONCE], [0u32; AT_ONCE]);
+        for (place, node) in (0..).zip(samples.nodes()) {
+            let position = state.position(*node);
+            for at in 0..AT_ONCE {
+                let [dx, dy, dz] = [position.x - x[at], position.y - y[at], position.z - z[at]];
+                let distance = dx * dx + dy * dy + dz * dz;
+                let is_nearer = distance < nearest[at];
+                nearest[at] = if is_nearer { distance } else { nearest[at] };
+                places[at] = if is_nearer { place } else { places[at] };
+            }
+        }
+        for at in 0..count {
+            let depth = deepest.map_or(least, |buried| buried.depth);
+            if nearest[at].sqrt() <= depth {
+                continue;
+            }
+            let point = Vector::new(x[at], y[at], z[at]);
+            let found = below(point, places[at], samples, state);
+            if found.is_some_and(|buried| buried.depth > depth) {
+                deepest = found;
+            }
         }
     }
-    deepest
 }
 
-/// The way out of a point that lies below the touchable surface where that is nearest.
-fn below(point: Vector, samples: &Samples, state: State<'_>) -> Option<Buried> {
-    let place = |node: u32| state.position(node).distance_squared(point);
-    let nearest = (0..)
-        .zip(samples.nodes())
-        .map(|(at, node)| (place(*node), at));
-    let (_, nearest) = nearest.min_by(|a, b| a.0.total_cmp(&b.0))?;
+/// The way out of a point that lies below the touchable surface where that is nearest, at the node in place `nearest` of the samples'.
+fn below(point: Vector, nearest: u32, samples: &Samples, state: State<'_>) -> Option<Buried> {
     let mut best: Option<(f32, usize, [f32; 3], Vector)> = None;
     let mut face_outward = Vector::ZERO;
     let mut outward = Vector::ZERO;
-    for face in 0..samples.face_count() {
-        let corners = samples.corners(face);
-        if !corners.contains(&nearest) {
-            continue;
-        }
-        let [a, b, c] = corners.map(|at| state.position(samples.nodes()[at as usize]));
+    if samples.nodes().is_empty() {
+        return None;
+    }
+    for &face in samples.faces_at(nearest) {
+        let face = face as usize;
+        let [a, b, c] = samples
+            .corners(face)
+            .map(|at| state.position(samples.nodes()[at as usize]));
         let weights = nearest_weights(point, [a, b, c]);
         let [u, v, w] = weights;
         let away = a * u + b * v + c * w - point;

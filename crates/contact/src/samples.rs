@@ -51,6 +51,9 @@ pub struct Samples {
     nodes: Vec<u32>,
     /// Places in `nodes` of each face's corners.
     corners: Vec<[u32; 3]>,
+    /// Faces at the node in place `n`, ascending: `around[starts[n]..starts[n + 1]]`.
+    around: Vec<u32>,
+    starts: Vec<u32>,
     /// Samples of face `f` are `rows[offsets[f]..offsets[f + 1]]`.
     offsets: Vec<u32>,
     /// Parts that the samples make of each face's longest edge.
@@ -98,6 +101,7 @@ impl Samples {
         nodes.dedup();
         let place = |node: u32| nodes.partition_point(|n| *n < node) as u32;
         corners.extend(faces.iter().map(|face| face.map(place)));
+        let (starts, around) = faces_at_nodes(&corners, nodes.len())?;
         let mut builder = Builder {
             positions,
             spacing: f64::from(spacing_mm),
@@ -121,6 +125,8 @@ impl Samples {
             rows: builder.rows,
             nodes,
             corners,
+            around,
+            starts,
             offsets,
             parts,
             has_lattice: spacing_mm <= SPACING_MM,
@@ -216,6 +222,12 @@ impl Samples {
         self.corners[face]
     }
 
+    /// Faces with a corner at a place in [`Samples::nodes`], ascending.
+    pub fn faces_at(&self, place: u32) -> &[u32] {
+        let [from, to] = [place, place + 1].map(|n| self.starts[n as usize] as usize);
+        &self.around[from..to]
+    }
+
     /// How far apart the samples of a face are where its longest edge has become `longest` mm; none where that does not matter.
     pub fn spacing(&self, face: usize, longest: f32) -> Option<f32> {
         self.has_lattice
@@ -234,6 +246,35 @@ impl Samples {
     pub fn of_face(&self, face: usize) -> std::ops::Range<usize> {
         self.offsets[face] as usize..self.offsets[face + 1] as usize
     }
+}
+
+/// Where the faces of each node start in a list by node, and that list.
+fn faces_at_nodes(
+    corners: &[[u32; 3]],
+    nodes: usize,
+) -> Result<(Vec<u32>, Vec<u32>), TryReserveError> {
+    let (mut starts, mut around) = (Vec::new(), Vec::new());
+    starts.try_reserve_exact(nodes + 1)?;
+    around.try_reserve_exact(3 * corners.len())?;
+    starts.resize(nodes + 1, 0);
+    around.resize(3 * corners.len(), 0);
+    for place in corners.as_flattened() {
+        starts[*place as usize] += 1;
+    }
+    let mut end = 0;
+    for start in &mut starts {
+        end += *start;
+        *start = end;
+    }
+    // From the last face back: each goes before the one that is there.
+    for (face, corners) in corners.iter().enumerate().rev() {
+        for place in corners {
+            let at = &mut starts[*place as usize];
+            *at -= 1;
+            around[*at as usize] = face as u32;
+        }
+    }
+    Ok((starts, around))
 }
 
 struct Builder<'a> {
