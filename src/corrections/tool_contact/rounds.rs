@@ -42,6 +42,11 @@ impl ImplicitSolver {
             report.residual = 1.0;
             return Ok(f64::INFINITY);
         }
+        if problem.is_spent() {
+            // No iteration would begin, and its base takes as long as several.
+            report.residual = 1.0;
+            return Ok(0.0);
+        }
         loop {
             self.begin_round(context, input, problem, true, at)?;
             self.improve_round(context, input, problem, at, (&mut made, report))?;
