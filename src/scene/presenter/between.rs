@@ -6,14 +6,15 @@
 use std::mem::swap;
 use std::sync::Arc;
 
+use super::contact_response::ContactResponse;
 use super::extrapolation::{ToolPaths, VelocityExtrapolation};
 use super::nodes::{Nodes, ResponseContext};
 use super::solves::{Drive, SolveKey, Solves};
+use super::touched::TouchedTissue;
 use crate::contact::problem::Change;
 use crate::contact::{Compliance, ContactProblem, Past, State};
 use crate::error::{Error, Result};
 use crate::field::ContactSet;
-use crate::kernels::respond::accumulate_rows;
 use crate::kernels::rows::{RowPlan, decode_rows};
 use crate::kernels::{Isa, Pool};
 use crate::memory::{self, HeldBytes};
@@ -24,6 +25,8 @@ use crate::scene::tissue::Tissue;
 pub(super) const WHAT: &str = "the present state of a scene";
 /// Below this nothing has moved since the step, s.
 pub(super) const AT_ONCE_S: f64 = 1e-5;
+/// How often the contact of a tool that has lost it is solved again.
+const MORE_PRESSES: u32 = 6;
 /// The last velocities are followed for at most this many steps.
 const MOST_STEPS: f64 = 2.0;
 
@@ -66,6 +69,9 @@ pub(super) struct Between {
     last: Vec<f32>,
     velocity: Vec<f32>,
     pub free: Vec<f32>,
+    touched: TouchedTissue,
+    /// Which of the solves was shown last.
+    shown: Option<usize>,
     /// Which step that is.
     pub step: Option<u64>,
     /// Amplitudes of the natural modes, what inertia takes off their compliance at the time of the frame, and the list `0..n` of their rows.
@@ -81,7 +87,7 @@ pub(super) struct Between {
 impl Between {
     pub(super) fn new(scene: &Tissue<'_>) -> Result<Between> {
         let model = scene.model;
-        let (true, Ok(corrections)) = (model.prior.is_some(), model.corrections()) else {
+        let (Some(prior), Ok(corrections)) = (&model.prior, model.corrections()) else {
             return Err(Error::Unsupported(
                 "present: the bundle has no linear response or no corrections; show its steps with upt_scene_sample".into(),
             ));
@@ -93,8 +99,11 @@ impl Between {
             held[node as usize] = true;
         }
         let natural = corrections.space.natural_count();
+        let problem = ContactProblem::new(model.samples()?, Arc::clone(&model.mesh))?;
         Ok(Between {
-            problem: ContactProblem::new(model.samples()?, Arc::clone(&model.mesh))?,
+            touched: TouchedTissue::new(prior, problem.nodes(), count)?,
+            shown: None,
+            problem,
             other: KnownStep {
                 last: field()?,
                 velocity: field()?,
@@ -213,8 +222,8 @@ impl Between {
         let known = solves.find(&question);
         // What is shown, and where contact is looked at.
         let touched = match (known, question.drive) {
-            (Some(_), _) => &[][..],
-            (None, Drive::Tools(_)) => self.problem.nodes(),
+            (Some(_), Drive::Nodes(_)) => &[][..],
+            (_, Drive::Tools(_)) => self.problem.nodes(),
             (None, Drive::Nodes(now)) => &now.nodes,
         };
         for nodes in [touched, view.region] {
@@ -227,24 +236,16 @@ impl Between {
             self.inertial_compliance.clear();
             self.inertial_compliance
                 .extend(corrections.space.holds_back(kappa));
-            let change = match question.drive {
-                Drive::Tools(tools) => {
-                    self.problem.begin(tools, rest, last)?;
-                    let state = State {
-                        rest,
-                        u: &self.free,
-                        start: last,
-                    };
-                    if tau <= AT_ONCE_S || !self.problem.is_near(state)? {
-                        return Ok(false);
-                    }
-                    let compliance = Compliance {
-                        prior,
-                        held: &self.held,
-                        inertia: Some((&corrections.space, &self.inertial_compliance)),
-                    };
-                    self.problem.solve_between(compliance, state)?
-                }
+            let response = ContactResponse {
+                isa: self.isa,
+                pool: &self.pool,
+                prior,
+                space: &corrections.space,
+                inertial_compliance: &self.inertial_compliance,
+                rows: &self.rows,
+            };
+            let tools = match question.drive {
+                Drive::Tools(tools) => tools,
                 Drive::Nodes(now) => {
                     let near = !now.is_empty() || !self.nodes.then.is_empty();
                     if tau <= AT_ONCE_S || !near {
@@ -258,35 +259,57 @@ impl Between {
                         held: &self.held,
                     };
                     self.nodes.solve(&means, now, &self.free)?;
-                    Change {
+                    let change = Change {
                         dofs: &self.nodes.dofs,
                         forces: &self.nodes.change,
-                    }
+                    };
+                    response.add(change, &mut self.natural, false, q)?;
+                    return Ok(true);
                 }
             };
-            self.natural.fill(0.0);
-            for (&dof, force) in change.dofs.iter().zip(change.forces) {
-                let own = corrections.space.at_contact(dof as usize);
-                for ((y, inertial_compliance), own) in self
-                    .natural
-                    .iter_mut()
-                    .zip(&self.inertial_compliance)
-                    .zip(own)
-                {
-                    *y -= inertial_compliance * own * force;
-                }
+            self.problem.begin(tools, rest, last)?;
+            let state = State {
+                rest,
+                u: &self.free,
+                start: last,
+            };
+            if tau <= AT_ONCE_S || !self.problem.is_near(state)? {
+                return Ok(false);
             }
-            let (isa, pool) = (self.isa, &self.pool);
-            let modes = corrections.space.modes();
-            accumulate_rows(isa, pool, modes, &self.rows, &self.natural, false, q)?;
-            let response = prior.response.stored();
-            accumulate_rows(isa, pool, response, change.dofs, change.forces, true, q)?;
+            let compliance = Compliance {
+                prior,
+                held: &self.held,
+                inertia: Some((&corrections.space, &self.inertial_compliance)),
+            };
+            let change = self.problem.solve_between(compliance, state)?;
+            response.add(change, &mut self.natural, false, q)?;
+            // As in a step: a quick or thin tool that has lost the contact is pressed again about where the tissue has come to.
+            for _ in 0..MORE_PRESSES {
+                if !self.problem.may_lose() || self.problem.is_spent() {
+                    break;
+                }
+                let means = (self.isa, &self.pool, &**prior);
+                let where_touched = (self.problem.nodes(), &*self.held);
+                let touched = &mut self.touched;
+                touched.place(means, where_touched, &self.free, Some(q))?;
+                if !touched.has_lost(&mut self.problem, rest, last) {
+                    break;
+                }
+                let state = State {
+                    rest,
+                    u: touched.displacement(),
+                    start: last,
+                };
+                let change = self.problem.solve_between(compliance, state)?;
+                response.add(change, &mut self.natural, true, q)?;
+            }
             Ok(true)
         };
         let place = match known {
             Some(place) => place,
             None => solves.make(&question, prior.width(), make)?,
         };
+        self.shown = Some(place);
         let moves = solves.moves(place);
         if let Some(q) = moves {
             decode_rows(
@@ -308,5 +331,35 @@ impl Between {
             };
         }
         Ok(())
+    }
+}
+
+impl Between {
+    /// Whether the frame that [`Between::show`] has made last would lose the contact of a quick or thin tool with these displacements at
+    /// the region's nodes.
+    ///
+    /// # Errors
+    /// Those of [`Between::show`].
+    pub(super) fn sinks(
+        &mut self,
+        scene: &Tissue<'_>,
+        driven: Contact<'_>,
+        solves: &Solves,
+        (region, u): (&[u32], &[f32]),
+    ) -> Result<bool> {
+        let (Some(prior), Contact::Tools(tools)) = (&scene.model.prior, driven) else {
+            return Ok(false);
+        };
+        let (rest, last) = (scene.mesh.positions.as_slice(), self.last.as_slice());
+        self.problem.begin(tools, rest, last)?;
+        if !self.problem.may_lose() {
+            return Ok(false);
+        }
+        let q = self.shown.and_then(|place| solves.moves(place));
+        let nodes = (self.problem.nodes(), &*self.held);
+        let means = (self.isa, &self.pool, &**prior);
+        self.touched.place(means, nodes, &self.free, q)?;
+        self.touched.replace(region, u);
+        Ok(self.touched.has_lost(&mut self.problem, rest, last))
     }
 }

@@ -2,12 +2,14 @@
 //! and on over the arrival of the next ([`step_blend`]).
 
 mod between;
+mod contact_response;
 mod extrapolation;
 mod nodes;
 mod solves;
 mod step_blend;
 #[cfg(test)]
 mod tests;
+mod touched;
 
 use std::sync::Arc;
 
@@ -181,9 +183,20 @@ impl Presenter {
             }
             false => self.arrive(scene, (step, tau), driven, solves, &mut nodal),
         };
-        if made.is_ok() {
+        let made = made.and_then(|()| {
             self.before_s = tau;
-            self.step_blend.blend(tau, step_s, &mut nodal);
+            self.shown.copy_from_slice(&nodal);
+            if self.step_blend.blend(tau, step_s, &mut nodal) {
+                // The way from one step to the next must not lead through a tool.
+                let frame = (&*self.region, &*nodal);
+                if self.between.sinks(scene, driven, solves, frame)? {
+                    self.step_blend.forget(tau);
+                    nodal.copy_from_slice(&self.shown);
+                }
+            }
+            Ok(())
+        });
+        if made.is_ok() {
             match self.view {
                 View::Region => out.copy_from(&nodal),
                 View::Points => {

@@ -58,18 +58,18 @@ impl StepBlend {
         }
     }
 
-    /// Takes a frame to its place on the way.
-    pub(super) fn blend(&self, tau: f64, step_s: f64, out: &mut [f32]) {
+    /// Takes a frame to its place on the way; tells whether that is another.
+    pub(super) fn blend(&self, tau: f64, step_s: f64, out: &mut [f32]) -> bool {
         // At its own time a step is shown as it is.
         if tau <= AT_ONCE_S {
-            return;
+            return false;
         }
         let since = (tau - self.seen_s).max(0.0);
         let left = |steps: f64| (1.0 - since / (steps * step_s)).max(0.0) as f32;
         let (part, most) = (left(BLEND_STEPS), left(MOST_STEPS));
         let gone = (BLEND_MM_S * since) as f32;
         if part == 0.0 && (most == 0.0 || self.longest <= gone) {
-            return;
+            return false;
         }
         let pairs = out.as_chunks_mut::<3>().0.iter_mut();
         for (out, offset) in pairs.zip(self.offset.as_chunks::<3>().0) {
@@ -79,6 +79,7 @@ impl StepBlend {
                 *out += part * offset;
             }
         }
+        self.longest > 0.0
     }
 }
 
