@@ -115,6 +115,21 @@ fn a_quick_hand_is_met_between_two_steps() {
 }
 
 #[test]
+fn a_hand_that_starts_suddenly_is_met_before_the_next_step() {
+    let scene = scene(&model("tiny-corrected"), &corrected());
+    let mut hand = hand(&scene);
+    // At rest 15 mm above until the step at 100 ms, then at 1 m/s to 1 mm below.
+    let depth = |t: f64| (1000.0 * (t - 0.1).max(0.0) - 15.0).min(1.0);
+    let mut met = 0;
+    play(&scene, &mut hand, 0.15, depth, |t, force| {
+        assert!(depth(t) > -1.0 || !force.contact, "{t} s: {force:?}");
+        met += u32::from(depth(t) >= 0.99 && force.contacts > 0);
+    });
+    // From 116 to 149 ms.
+    assert_eq!(met, 34);
+}
+
+#[test]
 fn a_tool_that_stays_feels_what_the_step_told() {
     let scene = scene(&model("tiny-corrected"), &corrected());
     let mut hand = hand(&scene);

@@ -11,7 +11,9 @@ use super::ends::Ends;
 use super::modes::Modes;
 use super::render::Haptics;
 use super::snapshot::{ContactSnapshot, MOST_SAMPLES};
-use crate::contact::{Compliance, ContactProblem, Delassus, Mode, Pair, State, outward, vector};
+use crate::contact::{
+    Compliance, ContactProblem, Delassus, Mode, PUT_MM, Pair, State, outward, vector,
+};
 use crate::corrections::{Corrections, Integrator, Motion};
 use crate::error::{Error, Result};
 use crate::kernels::project::{project_field, row_dots};
@@ -332,19 +334,17 @@ impl Link {
         let ahead = pose.translation - last.translation;
         let on = |part: f32| Pose::from_parts(pose.translation + ahead * part, pose.rotation);
         let is_quick = ahead.length() > REACH_MM;
-        let placed = match is_quick {
-            true => Placed {
-                body: &self.body,
-                pose: on(0.5),
-                skin: REACH_MM + 0.5 * ahead.length(),
-            },
-            false => Placed {
-                body: &self.body,
-                pose,
-                skin: REACH_MM,
-            },
-        };
         let position = |node| vector(step.rest, node) + vector(step.u, node);
+        // One that starts suddenly may be at the nearest part of the surface before the next state.
+        let nodes = self.samples.nodes().iter();
+        let gaps = nodes.map(|node| self.body.nearest_at(&pose, position(*node)).distance);
+        let gap = gaps.fold(f32::MAX, f32::min);
+        let gap = if gap <= PUT_MM { gap.max(0.0) } else { 0.0 };
+        let placed = Placed {
+            body: &self.body,
+            pose: if is_quick { on(0.5) } else { pose },
+            skin: REACH_MM + gap.max(if is_quick { 0.5 * ahead.length() } else { 0.0 }),
+        };
         let near = self.search.find(&self.samples, &[placed], position);
         memory::reserve(&mut self.found, near.len(), WHAT)?;
         let body = &self.body;
