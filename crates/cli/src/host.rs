@@ -3,9 +3,11 @@
 //! What is measured here is what a C or C# program gets. One row of `upt report` reaches behind the ABI, since no host can ask
 //! for it: a bundle's linear response alone (`report/prior_alone.rs`).
 
+mod hand;
 mod instrument;
 mod scene;
 
+pub use hand::Hand;
 pub use instrument::{Hull, instrument};
 pub use scene::Scene;
 

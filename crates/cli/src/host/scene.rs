@@ -3,7 +3,7 @@
 use anyhow::Result;
 use upt::ffi;
 
-use super::{Model, check, size, zeroed};
+use super::{Hand, Model, check, size, zeroed};
 use crate::effort::Effort;
 
 /// A scene; destroyed when dropped. Used by the thread that made it.
@@ -234,6 +234,11 @@ impl Scene {
                 3 * out.len() as u64,
             )
         })
+    }
+
+    /// The first instrument of the steps, for a hand that gets them `latency_ms` after their poses were taken.
+    pub fn hand(&mut self, tool: &ffi::upt_instrument, latency_ms: f32) -> Result<Hand> {
+        Hand::create(self.handle, tool, latency_ms)
     }
 
     /// `upt_scene_get_stats`.

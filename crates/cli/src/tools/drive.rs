@@ -183,6 +183,16 @@ impl Driver {
         Ok(started.elapsed().as_secs_f64() * 1e3)
     }
 
+    /// A hand that holds the first tool, at a pose at first; the steps reach it `latency_ms` after their poses were taken.
+    ///
+    /// # Errors
+    /// No tool was taken, and those of `upt_haptics_create`.
+    pub fn hand(&mut self, at: &ToolPose, latency_ms: f32) -> Result<host::Hand> {
+        let taken = self.tools.first().context("no tool")?;
+        let tool = instrument(&taken.tool, at, taken.hull.as_ref());
+        self.scene.hand(&tool, latency_ms)
+    }
+
     /// Nodes that steps and frames write; an empty list means all.
     pub fn set_region(&mut self, nodes: &[u32]) -> Result<()> {
         self.scene.set_region(nodes)

@@ -4,8 +4,10 @@
 mod deep;
 mod hand;
 mod inputs;
+mod met;
 mod run;
 mod sudden;
+mod truth;
 
 use std::path::Path;
 

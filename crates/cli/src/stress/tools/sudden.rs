@@ -1,22 +1,21 @@
 //! Tools that a step could lose: quick balls, balls that leap, needles, pointed hulls, and balls that begin in the tissue. Places are at least
-//! [`BORDER_MM`] from what tools do not touch, and the way in is clear of the tissue at rest.
+//! [`BORDER_MM`] from what tools do not touch, nearer ones are rows of their own, and the way in is clear of the tissue at rest.
 
 use anyhow::Result;
 use contact::{Body, Shape, Vector};
 use tissue::schemes::SplitMix;
-use tissue::solver::{Tool, ToolPose};
-use upt::flag;
+use tissue::solver::Tool;
 
 use super::hand::{Site, at, between, sites, tool};
+use super::met::{Met, Way};
 use super::run::Hands;
+use super::truth;
 use crate::stress::Row;
 
 /// Places of each row.
 const PLACES: usize = 100;
-/// How deep a tool may lie in the tissue at the end of a step, and how deep is the goal, mm.
-const MOST_MM: f64 = 1.0;
-const GOAL_MM: f64 = 0.3;
-/// Steps that a tool stays at the end of its way.
+/// Steps in which a tool comes near that does not leap, and steps that it stays at the end of its way.
+const LEAD: f32 = 2.0;
 const HELD: usize = 4;
 /// From the nearest node that tools do not touch, mm.
 const BORDER_MM: f32 = 8.0;
@@ -24,7 +23,7 @@ const BORDER_MM: f32 = 8.0;
 const CLEAR_MM: f64 = 0.3;
 
 pub(super) fn rows(hands: &mut Hands) -> Result<Vec<Row>> {
-    let places = spread(hands)?;
+    let [places, near] = spread(hands)?;
     let step_s = hands.step_s as f32;
     let ball = |random: &mut SplitMix| {
         let radius = between(random, 1.0, 5.0);
@@ -44,14 +43,26 @@ pub(super) fn rows(hands: &mut Hands) -> Result<Vec<Row>> {
     let mut rows = Vec::new();
     for speed in [200.0, 1000.0] {
         let name = format!("balls at {speed} mm/s");
-        rows.push(jabs(hands, &places, &name, ball, quick(speed))?);
+        let ways = ways(hands, &places, ball, quick(speed), false)?;
+        rows.push(jabs(hands, &name, &ways, true)?);
     }
+    let leaps = ways(hands, &places, ball, leap, true)?;
     let name = "balls that leap 12 to 39 mm in a step";
-    rows.push(jabs(hands, &places, name, ball, leap)?);
-    rows.push(jabs(hands, &places, "needles of 0.5 mm", needle, slow)?);
+    rows.push(jabs(hands, name, &leaps, true)?);
+    let needles = ways(hands, &places, needle, slow, false)?;
+    rows.push(jabs(hands, "needles of 0.5 mm", &needles, true)?);
+    rows.push(truth::row(hands, "needles of 0.5 mm", &needles)?);
+    let points = ways(hands, &places, cone, slow, false)?;
     let name = "hulls with a point, half angle 17 degrees";
-    rows.push(jabs(hands, &places, name, cone, slow)?);
+    rows.push(jabs(hands, name, &points, true)?);
     rows.push(buried(hands, &places)?);
+    let border = format!("nearer than {BORDER_MM} mm to what tools do not touch");
+    let balls = ways(hands, &near, ball, quick(200.0), false)?;
+    let name = format!("balls at 200 mm/s, {border}");
+    rows.push(jabs(hands, &name, &balls, false)?);
+    let needles = ways(hands, &near, needle, slow, false)?;
+    let name = format!("needles of 0.5 mm, {border}");
+    rows.push(jabs(hands, &name, &needles, false)?);
     Ok(rows)
 }
 
@@ -69,104 +80,8 @@ fn pointed_hull() -> Shape {
     }
 }
 
-/// What a tool met at all its places.
-#[derive(Default)]
-struct Met {
-    places: usize,
-    /// With contact in each of the steps that are looked at, and with contact or a flag.
-    found: usize,
-    told: usize,
-    /// Never deeper than [`MOST_MM`] at the end of a step in which it must be told of, and never deeper than [`GOAL_MM`].
-    held: usize,
-    good: usize,
-    /// Deeper without a flag.
-    silent: usize,
-    worst_mm: f64,
-    error: Option<String>,
-}
-
-impl Met {
-    /// The tool goes through poses; in the steps `told_in` it must be told of and held, or only in the last where it begins in the tissue.
-    fn place(
-        &mut self,
-        hands: &mut Hands,
-        tool: &Tool,
-        poses: &[ToolPose],
-        told_in: std::ops::Range<usize>,
-        held_from: usize,
-    ) -> Result<()> {
-        hands.driver.reset()?;
-        hands.driver.take(std::slice::from_ref(tool))?;
-        self.places += 1;
-        let body = [Body::new(&tool.shape)?];
-        let (mut found, mut told, mut deepest, mut silent) = (true, true, 0.0f64, false);
-        for (step, pose) in poses.iter().enumerate() {
-            let made = match hands.driver.step(&[*pose], &mut hands.field) {
-                Ok(made) => made,
-                Err(error) => {
-                    self.error = Some(format!("{error:#}"));
-                    return Ok(());
-                }
-            };
-            let touches = made.felt.iter().any(|felt| felt.contacts > 0);
-            let is_told = made.flags & flag::DEEP != 0;
-            if told_in.contains(&step) {
-                found &= touches;
-                told &= touches || is_told;
-            }
-            if step >= held_from {
-                let felt = made.felt.iter().map(|felt| felt.penetration_mm);
-                let depth = hands.yard.penetration(&hands.field, &body, &[pose.pose]);
-                let depth = felt.fold(depth, f64::max);
-                deepest = deepest.max(depth);
-                silent |= depth > MOST_MM && !is_told;
-            }
-        }
-        self.found += usize::from(found);
-        self.told += usize::from(told);
-        self.held += usize::from(deepest <= MOST_MM);
-        self.good += usize::from(deepest <= GOAL_MM);
-        self.silent += usize::from(silent);
-        self.worst_mm = self.worst_mm.max(deepest);
-        Ok(())
-    }
-
-    /// Good if the tool was found, or told of, everywhere; `all_held`: and nowhere deeper than it may be.
-    fn row(self, hands: &Hands, name: &str, all_held: bool) -> Row {
-        let mut text = format!(
-            "contact in {} of {} places, contact or a flag in {}; at most {MOST_MM} mm deep in {} of {} ({GOAL_MM} mm: {}), {:.2} mm at most, deeper without a flag in {}",
-            self.found,
-            self.places,
-            self.told,
-            self.held,
-            self.places,
-            self.good,
-            self.worst_mm,
-            self.silent
-        );
-        if let Some(error) = &self.error {
-            text += &format!("; error: {error}");
-        }
-        let met = match all_held {
-            true => self.found == self.places && self.held == self.places,
-            false => self.told == self.places && self.silent == 0,
-        };
-        Row::new(
-            &hands.bench.subject,
-            name,
-            text,
-            self.error.is_none() && met,
-        )
-    }
-}
-
-/// As many places as there are to be, those whose surroundings are free.
-fn spread(hands: &Hands) -> Result<Vec<Site>> {
-    let count = if hands.bench.quick {
-        PLACES / 10
-    } else {
-        PLACES
-    };
+/// Places whose surroundings are free, and those near to what tools do not touch.
+fn spread(hands: &Hands) -> Result<[Vec<Site>; 2]> {
     let mesh = &hands.bench.mesh;
     let of = |rows: &mut dyn Iterator<Item = u32>| {
         let faces = rows.map(|row| mesh.surface[row as usize]);
@@ -179,34 +94,40 @@ fn spread(hands: &Hands) -> Result<Vec<Site>> {
     let mut border = of(&mut (0..mesh.surface.len() as u32));
     border.retain(|node| touched.binary_search(node).is_err());
     let place = |node: &u32| Vector::from(mesh.positions[*node as usize]);
-    let mut found = sites(hands.bench, 4 * count)?;
-    found.retain(|site| (border.iter()).all(|node| place(node).distance(site.at) >= BORDER_MM));
-    Ok(found)
+    let is_free =
+        |site: &Site| (border.iter()).all(|node| place(node).distance(site.at) >= BORDER_MM);
+    let found = sites(hands.bench, 4 * most(hands))?;
+    let (free, near) = found.into_iter().partition(is_free);
+    Ok([free, near])
+}
+
+/// Places of a row.
+fn most(hands: &Hands) -> usize {
+    PLACES / if hands.bench.quick { 10 } else { 1 }
 }
 
 /// Tools that come from clear of the tissue to 2 to 6 mm deep, `way` mm a step, and stay there.
-fn jabs(
+fn ways(
     hands: &mut Hands,
     places: &[Site],
-    name: &str,
     make: impl Fn(&mut SplitMix) -> Tool,
     way: impl Fn(&mut SplitMix) -> f32,
-) -> Result<Row> {
+    leaps: bool,
+) -> Result<Vec<Way>> {
     let mut random = SplitMix(42);
-    let mut met = Met::default();
-    let most = if hands.bench.quick {
-        PLACES / 10
-    } else {
-        PLACES
-    };
+    let mut ways = Vec::new();
     let still = vec![[0.0; 3]; hands.field.len()];
     for site in places {
-        if met.places == most {
+        if ways.len() == most(hands) {
             break;
         }
         let (tool, way) = (make(&mut random), way(&mut random));
         let depth = between(&mut random, 2.0, 6.0);
-        let start = (way - depth).max(2.0);
+        let start = match leaps {
+            true => (way - depth).max(2.0),
+            // A hand comes from farther than it goes within a step.
+            false => (way - depth).max(2.0) + LEAD * way,
+        };
         let body = [Body::new(&tool.shape)?];
         let mut clear = true;
         for millimetres in 0..=start as usize {
@@ -220,13 +141,25 @@ fn jabs(
         let heights = (0..=count).map(|step| (start - way * step as f32).max(-depth));
         let mut poses = Vec::new();
         for height in heights.chain(std::iter::repeat_n(-depth, HELD)) {
-            poses.push(at(&tool, site, -height)?);
+            poses.push((at(&tool, site, -height)?, height));
         }
-        let below = |step: &usize| start - way * *step as f32 <= -0.6;
-        let first = (0..poses.len()).find(below).unwrap_or(count);
-        met.place(hands, &tool, &poses, first..poses.len(), first)?;
+        ways.push(Way {
+            tool,
+            poses,
+            leaps,
+            begins_in_tissue: false,
+        });
     }
-    Ok(met.row(hands, name, true))
+    Ok(ways)
+}
+
+/// A row of tools on their ways.
+fn jabs(hands: &mut Hands, name: &str, ways: &[Way], all_held: bool) -> Result<Row> {
+    let mut met = Met::default();
+    for way in ways {
+        met.place(hands, way)?;
+    }
+    Ok(met.row(hands, name, all_held))
 }
 
 /// From the first step on wholly beneath the surface.
@@ -239,8 +172,14 @@ fn buried(hands: &mut Hands, places: &[Site]) -> Result<Row> {
         let ball = tool(Shape::Sphere { radius }, between(&mut random, 0.0, 0.3));
         let deep = at(&ball, site, 2.0 * radius + between(&mut random, 0.5, 3.0))?;
         // Once it is out, the tissue may swing off it for a step.
-        let steps = 4 * HELD;
-        met.place(hands, &ball, &vec![deep; steps], 0..1, steps - 1)?;
+        let poses = vec![(deep, f32::NEG_INFINITY); 4 * HELD];
+        let way = Way {
+            tool: ball,
+            poses,
+            leaps: true,
+            begins_in_tissue: true,
+        };
+        met.place(hands, &way)?;
     }
     Ok(met.row(hands, "balls that begin beneath the surface", false))
 }

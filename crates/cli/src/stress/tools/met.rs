@@ -1,0 +1,214 @@
+//! What a tool met at its places: at the ends of the steps, in the frames between them, and in a hand at 1 kHz.
+
+use anyhow::Result;
+use contact::{Body, Pose, pose};
+use tissue::solver::{Tool, ToolPose};
+use upt::flag;
+
+use super::run::Hands;
+use crate::stress::Row;
+
+/// How deep a tool may lie in the tissue, and how deep is the goal, mm.
+const MOST_MM: f64 = 1.0;
+const GOAL_MM: f64 = 0.3;
+/// Frames that are shown between two steps.
+const FRAMES: usize = 2;
+/// A hand may miss the tissue for so many calls, ms, and for more in one of so many places: it knows the samples that lay ahead of it.
+const MISSED: usize = 5;
+const HANDS: usize = 10;
+/// A tool so far beneath the surface at rest must be met, mm.
+const BENEATH_MM: f32 = 0.6;
+/// Part of a step that passes before its state reaches the hand.
+const LATENCY: f32 = 0.5;
+
+/// The way of a tool to a place.
+pub struct Way {
+    pub tool: Tool,
+    /// By step, and how high its end is then above the surface at rest, mm.
+    pub poses: Vec<(ToolPose, f32)>,
+    /// It leaps: a hand must feel it once the step has arrived.
+    pub leaps: bool,
+    /// It begins in the tissue: it must be told of in the first step and held in the last, and no frame or hand is asked.
+    pub begins_in_tissue: bool,
+}
+
+/// How deep tools lay at the ends of steps, or in frames.
+#[derive(Default)]
+struct Depths {
+    /// Places with no more than [`MOST_MM`], and with no more than [`GOAL_MM`].
+    held: usize,
+    good: usize,
+    worst_mm: f64,
+}
+
+impl Depths {
+    fn add(&mut self, deepest: f64) {
+        self.held += usize::from(deepest <= MOST_MM);
+        self.good += usize::from(deepest <= GOAL_MM);
+        self.worst_mm = self.worst_mm.max(deepest);
+    }
+
+    fn text(&self, places: usize) -> String {
+        format!(
+            "at most {MOST_MM} mm deep in {} of {places} ({GOAL_MM} mm: {}), {:.2} mm at most",
+            self.held, self.good, self.worst_mm
+        )
+    }
+}
+
+/// What a tool met at all its places.
+#[derive(Default)]
+pub struct Met {
+    places: usize,
+    /// With contact in each of the steps that are looked at, and with contact or a flag.
+    found: usize,
+    told: usize,
+    /// At the ends of steps, and in frames, where these are asked.
+    steps: Depths,
+    frames: Depths,
+    between: bool,
+    /// Met by a hand, and the most calls one after another in which none of them was: quick tissue may fly off for a moment.
+    felt: usize,
+    most_missed: usize,
+    /// Deeper than [`MOST_MM`] without a flag.
+    silent: usize,
+    error: Option<String>,
+}
+
+impl Met {
+    /// The tool goes its way from tissue at rest. Gives how deep it lay at the ends of steps, mm.
+    pub fn place(&mut self, hands: &mut Hands, way: &Way) -> Result<f64> {
+        hands.driver.reset()?;
+        hands.driver.take(std::slice::from_ref(&way.tool))?;
+        self.places += 1;
+        match self.follow(hands, way) {
+            Ok(deepest) => Ok(deepest),
+            Err(error) => {
+                self.error = Some(format!("{error:#}"));
+                Ok(f64::INFINITY)
+            }
+        }
+    }
+
+    fn follow(&mut self, hands: &mut Hands, way: &Way) -> Result<f64> {
+        let body = [Body::new(&way.tool.shape)?];
+        let start = way.poses[0].0;
+        let (told_in, held_from) = match way.begins_in_tissue {
+            true => (0..1, way.poses.len() - 1),
+            false => (way.first()..way.poses.len(), way.first()),
+        };
+        let step_ms = 1e3 * hands.step_s as f32;
+        // Frames and hands take corrections.
+        let corrects = hands.bench.model.manifest.corrections.is_some();
+        let mut hand = match corrects && !way.begins_in_tissue {
+            true => Some(hands.driver.hand(&start, LATENCY * step_ms)?),
+            false => None,
+        };
+        self.between |= hand.is_some();
+        let mut shown = vec![[0.0; 3]; hands.field.len()];
+        let (mut found, mut told, mut silent) = (true, true, false);
+        let (mut missed, mut most_missed) = (0, 0);
+        let (mut deepest, mut deepest_shown) = (0.0f64, 0.0f64);
+        for (step, (at, _)) in way.poses.iter().enumerate() {
+            let made = hands.driver.step(&[*at], &mut hands.field)?;
+            let touches = made.felt.iter().any(|felt| felt.contacts > 0);
+            let is_told = made.flags & flag::DEEP != 0;
+            if told_in.contains(&step) {
+                found &= touches;
+                told &= touches || is_told;
+            }
+            if step >= held_from {
+                let felt = made.felt.iter().map(|felt| felt.penetration_mm);
+                let depth = hands.yard.penetration(&hands.field, &body, &[at.pose]);
+                let depth = felt.fold(depth, f64::max);
+                deepest = deepest.max(depth);
+                silent |= depth > MOST_MM && !is_told;
+            }
+            let Some(hand) = &mut hand else { continue };
+            for frame in 1..=FRAMES {
+                let after = frame as f32 / FRAMES as f32;
+                let (pose, beneath) = way.at(step as f32 + after);
+                let now = ToolPose { pose, ..*at };
+                let seconds = f64::from(after) * hands.step_s;
+                hands.driver.present(seconds, &[now], &mut shown)?;
+                if beneath {
+                    let depth = hands.yard.penetration(&shown, &body, &[pose]);
+                    deepest_shown = deepest_shown.max(depth);
+                }
+            }
+            let calls = step_ms.round() as usize;
+            for call in 1..=calls {
+                let time = step as f32 + LATENCY + call as f32 / calls as f32;
+                let (pose, beneath) = way.at(time);
+                let contacts = hand.contacts(f64::from(time) * hands.step_s, &pose)?;
+                let arrived = !way.leaps || time > held_from as f32 + LATENCY;
+                missed = match contacts > 0 || !beneath || !arrived {
+                    true => 0,
+                    false => missed + 1,
+                };
+                most_missed = most_missed.max(missed);
+            }
+        }
+        self.found += usize::from(found);
+        self.told += usize::from(told);
+        self.felt += usize::from(most_missed <= MISSED);
+        self.most_missed = self.most_missed.max(most_missed);
+        self.steps.add(deepest);
+        self.frames.add(deepest_shown);
+        self.silent += usize::from(silent);
+        Ok(deepest)
+    }
+
+    /// Good if the tool was found, or told of, everywhere; `all_held`: and nowhere deeper than it may be.
+    pub fn row(self, hands: &Hands, name: &str, all_held: bool) -> Row {
+        let places = self.places;
+        let mut text = format!(
+            "contact in {} of {places} places, contact or a flag in {}; {}, deeper without a flag in {}",
+            self.found,
+            self.told,
+            self.steps.text(places),
+            self.silent
+        );
+        if self.between {
+            text += &format!(
+                "; frames: {}; a hand at 1 kHz: contact in {} of {places}, none for {} ms at most",
+                self.frames.text(places),
+                self.felt,
+                self.most_missed
+            );
+        }
+        if let Some(error) = &self.error {
+            text += &format!("; error: {error}");
+        }
+        let all = |count: usize| count == places;
+        let met = match all_held {
+            true => {
+                let missed = places - self.felt;
+                let between = all(self.frames.held) && HANDS * missed <= places;
+                all(self.found) && all(self.steps.held) && (between || !self.between)
+            }
+            false => all(self.told) && self.silent == 0,
+        };
+        let good = self.error.is_none() && met;
+        Row::new(&hands.bench.subject, name, text, good)
+    }
+}
+
+impl Way {
+    /// Where the tool is so many steps after the first, and whether it must be met there.
+    fn at(&self, time: f32) -> (Pose, bool) {
+        let last = self.poses.len() - 1;
+        let step = (time as usize).min(last);
+        let part = time - step as f32;
+        let ((from, high), (to, low)) = (self.poses[step], self.poses[(step + 1).min(last)]);
+        let height = high + (low - high) * part;
+        let pose = pose::between(&from.pose, &to.pose, part);
+        (pose, height <= -BENEATH_MM)
+    }
+
+    /// The first step at whose end it must be met.
+    pub fn first(&self) -> usize {
+        let met = |step: &usize| self.at(*step as f32).1;
+        (0..self.poses.len()).find(met).unwrap_or(0)
+    }
+}
