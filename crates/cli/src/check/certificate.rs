@@ -301,14 +301,15 @@ impl Certificate {
             .flatten()
             .map(|row| {
                 format!(
-                    "\ntool {:9} {:>11} mm²  worst of {} {:>11}  force error {}, {} of {} steps inverted",
+                    "\ntool {:9} {:>11} mm²  worst of {} {:>11}  force error {}, {} of {} steps inverted, {} mm in a tool at most",
                     row["programme"].as_str().unwrap_or_default(),
                     row["mse_mm2"].to_string(),
                     row["cases"],
                     row["worst_mse_mm2"].to_string(),
                     row["force_error"],
                     row["inverted_steps"],
-                    row["steps"]
+                    row["steps"],
+                    row["deepest_in_a_tool_mm"]
                 )
             })
             .collect();

@@ -11,6 +11,7 @@ use crate::tools::cases::ToolCase;
 #[derive(Clone, Debug, Serialize)]
 pub struct Tried {
     pub case: String,
+    pub programme: String,
     /// Smallest and largest of half the smallest extent of its tools, mm.
     pub size_mm: [f32; 2],
     /// Largest displacement of a node that a tool pushes, mm.
@@ -35,6 +36,7 @@ impl Tried {
     ) -> Option<Self> {
         let mut tried = Self {
             case: case.name.clone(),
+            programme: case.programme.clone(),
             size_mm: [f32::INFINITY, 0.0],
             depth_mm: 0.0,
             speed_mm_s: 0.0,
@@ -164,6 +166,7 @@ mod tests {
     fn case(size: f32, depth_mm: f32, speed_mm_s: f32, good: bool) -> Tried {
         Tried {
             case: String::new(),
+            programme: String::new(),
             size_mm: [size, size],
             depth_mm,
             speed_mm_s,

@@ -1,5 +1,7 @@
 //! What was measured, as a document's table: the limits, and errors by size, depth, speed and number of the tools.
 
+use tissue::programmes::ToolProgramme;
+
 use super::limits::{Limits, Tried};
 use crate::counted::counted;
 use crate::effort::Effort;
@@ -85,6 +87,28 @@ pub fn markdown(
     );
     for (name, is) in PARTS {
         add(name, cases.iter().filter(|case| is(case)).collect());
+    }
+    // What a hand does by mistake, and points finer than the mesh: whether the limits hold it is said by name.
+    let mut unknown = Vec::new();
+    for programme in ToolProgramme::every().filter(|one| one.specification().extreme) {
+        let name = programme.name();
+        let own: Vec<&Tried> = cases.iter().filter(|case| case.programme == name).collect();
+        if own.is_empty() {
+            unknown.push(name);
+        }
+        let inside = own.iter().filter(|case| limits.holds(case)).count();
+        let row = format!(
+            "programme `{name}`, {inside} of {} inside the limits",
+            own.len()
+        );
+        add(&row, own);
+    }
+    if !unknown.is_empty() {
+        out += &format!(
+            "\nNot measured: {}; `upt dataset --tools {}` makes cases.\n",
+            unknown.join(", "),
+            unknown.join(",")
+        );
     }
     out
 }
