@@ -106,6 +106,7 @@ fn limits_of_tools_are_measured_and_written() {
         text.starts_with("a\n") && text.contains("| more tools at once | 1 |"),
         "{text}"
     );
+    assert!(text.contains("Not measured: jab, needle;"), "{text}");
 
     // The library takes the sealed manifest, and everything else in it is as it was.
     let output = with("100", &["--dry-run"]);
