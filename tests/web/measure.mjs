@@ -18,7 +18,7 @@ function native(bundle) {
   return String(told).trim().split("\n").map(Number);
 }
 
-const quantile = (list, share) => list.toSorted((a, b) => a - b)[Math.min(Math.floor(share * list.length), list.length - 1)];
+const quantile = (list, share) => [...list].sort((a, b) => a - b)[Math.min(Math.floor(share * list.length), list.length - 1)];
 
 console.log(`${cpus()[0].model}, load ${loadavg()[0].toFixed(1)}; ${TURNS - 1} turns of ${STEPS} steps; ms: median, 99 %`);
 for (const bundle of bundles) {
