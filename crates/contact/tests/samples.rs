@@ -84,6 +84,17 @@ fn samples_are_convex_and_occur_once() {
 }
 
 #[test]
+fn a_node_knows_the_faces_that_have_it() {
+    let (positions, faces) = sheet(5, 3.0);
+    let samples = Samples::new(&positions, faces.iter().copied(), &[], 1.7);
+    for place in 0..samples.nodes().len() as u32 {
+        let has_it = |face: &u32| samples.corners(*face as usize).contains(&place);
+        let all: Vec<u32> = (0..faces.len() as u32).filter(has_it).collect();
+        assert_eq!(samples.faces_at(place), all);
+    }
+}
+
+#[test]
 fn samples_of_held_nodes_alone_are_left_out() {
     let (positions, faces) = sheet(3, 4.0);
     let all: Vec<u32> = (0..positions.len() as u32).collect();
