@@ -20,9 +20,37 @@ pub struct Compliance<'a> {
     pub held: &'a [bool],
     /// The natural modes, and for each what inertia takes off its part, mm/mN ([`CoarseSpace::inertial_compliance`]); none: static.
     pub inertia: Option<(&'a CoarseSpace, &'a [f32])>,
+    /// In place of all that: the compliance of the tissue as it is deformed.
+    pub tangent: Option<&'a dyn Tangent>,
 }
 
-impl Compliance<'_> {
+/// The compliance of deformed tissue at columns of the prior.
+pub trait Tangent {
+    /// Another number for another tissue, from 1.
+    fn generation(&self) -> u64;
+
+    /// The upper triangle of `A [3m,3m]` at `m` columns, ascending, mm/mN.
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
+    fn gather(&self, columns: &[u32], upper: &mut [f64]) -> Result<()>;
+}
+
+impl<'a> Compliance<'a> {
+    /// That of tissue at rest.
+    pub fn at_rest(
+        prior: &'a PriorTable,
+        held: &'a [bool],
+        inertia: Option<(&'a CoarseSpace, &'a [f32])>,
+    ) -> Compliance<'a> {
+        Compliance {
+            prior,
+            held,
+            inertia,
+            tangent: None,
+        }
+    }
+
     /// Columns of the nodes of a sample with their weights; nodes that do not move are left out.
     pub fn entries(&self, sample: Sample) -> impl Iterator<Item = (u32, f32)> {
         let columns = sample.nodes.into_iter().zip(sample.weights);
@@ -59,6 +87,8 @@ pub struct Delassus {
     a_before: Vec<f32>,
     /// `a` is the static compliance: nothing was taken off it for inertia.
     is_static: bool,
+    /// Of which tissue: 0 as it is at rest ([`Tangent::generation`]).
+    generation: u64,
     /// `W = B A B^T [3n,3n]`, mm/mN, and the samples whose rows `B` it is made of.
     w: Vec<f32>,
     of: Vec<u32>,
@@ -215,7 +245,9 @@ impl Delassus {
         self.wanted.sort_unstable();
         self.wanted.dedup();
         let known = |column: &u32| self.columns.binary_search(column).is_ok();
-        let same_kind = self.is_static == compliance.inertia.is_none();
+        let generation = compliance.tangent.map_or(0, |tangent| tangent.generation());
+        let same_kind =
+            self.is_static == compliance.inertia.is_none() && self.generation == generation;
         if same_kind
             && !self.columns.is_empty()
             && self.columns.len() <= 2 * self.wanted.len()
@@ -227,6 +259,7 @@ impl Delassus {
             self.forget();
         }
         self.is_static = compliance.inertia.is_none();
+        self.generation = generation;
         std::mem::swap(&mut self.columns, &mut self.wanted);
         std::mem::swap(&mut self.a, &mut self.a_before);
         let order = 3 * self.columns.len();
@@ -247,12 +280,20 @@ impl Delassus {
             return Err(error);
         }
         self.upper.resize(order * order, 0.0);
-        compliance
-            .prior
-            .gather_compliance(&self.columns, &mut self.upper, &mut self.widened);
-        self.a.extend(self.upper.iter().map(|value| *value as f32));
-        if let Some((space, inertial_compliance)) = compliance.inertia {
-            self.hold_back(space, inertial_compliance, order);
+        if let Some(tangent) = compliance.tangent {
+            if let Err(error) = tangent.gather(&self.columns, &mut self.upper) {
+                self.forget();
+                return Err(error);
+            }
+            self.a.extend(self.upper.iter().map(|value| *value as f32));
+        } else {
+            compliance
+                .prior
+                .gather_compliance(&self.columns, &mut self.upper, &mut self.widened);
+            self.a.extend(self.upper.iter().map(|value| *value as f32));
+            if let Some((space, inertial_compliance)) = compliance.inertia {
+                self.hold_back(space, inertial_compliance, order);
+            }
         }
         for i in 0..order {
             for j in 0..i {

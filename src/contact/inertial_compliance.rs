@@ -156,11 +156,7 @@ mod tests {
             let rows: Vec<u32> = (0..count).step_by(step).take(20).collect();
             let lost: Vec<f32> = space.holds_back(2.25 / (seconds * seconds)).collect();
             assert!(lost.iter().any(|lost| *lost > 0.0));
-            let compliance = Compliance {
-                prior,
-                held: &held,
-                inertia: Some((space, &lost)),
-            };
+            let compliance = Compliance::at_rest(prior, &held, Some((space, &lost)));
             let mut whole = Delassus::default();
             let wanted = whole.of(compliance, &samples, &rows).unwrap();
             let mut at = own.at(&mut between, compliance, &samples, &rows).unwrap();

@@ -24,8 +24,8 @@ pub mod state;
 mod stored;
 pub mod tool;
 
-pub use compliance::Compliance;
 pub(crate) use compliance::Delassus;
+pub use compliance::{Compliance, Tangent};
 pub use past::Past;
 pub use problem::ContactProblem;
 pub(crate) use rows::{Pair, outward};

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::local::Record;
+use super::local::{Linearisation, Record};
 use super::motion::Motion;
 use crate::error::{Error, Result};
 use crate::stored;
@@ -30,6 +30,8 @@ pub struct History {
     pub pairs: Vec<Pair>,
     /// Those of local iterations.
     pub local: Vec<Record>,
+    /// Where their tangent was taken.
+    pub linearisation: Linearisation,
 }
 
 impl History {
@@ -42,6 +44,7 @@ impl History {
             motion,
             pairs,
             local,
+            linearisation,
         } = self;
         motion.check(len, contacts)?;
         if pairs.len().max(local.len()) > PAIRS {
@@ -50,6 +53,7 @@ impl History {
                 pairs.len().max(local.len())
             )));
         }
+        linearisation.check(len / 3)?;
         for Pair { step, change } in pairs {
             stored::check(step, len)?;
             stored::check(change, len)?;

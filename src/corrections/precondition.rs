@@ -5,9 +5,6 @@
 //! (the prior's columns less what inertia holds back), so `Psi^T (K + kappa M) Psi = Phi^T (K + kappa M) Phi -
 //! Phi_C^T A_k,CC^-1 Phi_C` holds without a further product.
 //!
-//! Under loads the touched nodes move: the responses `W` to forces on them join the modes in the coarse space, whose Galerkin inverse
-//! is `Psi (..)^-1 Psi^T + W A_k,CC^-1 W^T`. Without them the tissue's stiffening under a tool takes tens of iterations.
-//!
 //! All products with fields go through the prior's block-wise bases: `U^T` once, the modes and columns on coordinates, `U` once.
 
 mod near;
@@ -77,8 +74,6 @@ pub struct Preconditioner {
     solved: Vec<f32>,
     at_contact: Vec<f32>,
     forces: Vec<f32>,
-    /// The nodes are loaded, not prescribed: they move.
-    loaded: bool,
     ready: bool,
 }
 
@@ -130,7 +125,6 @@ impl Preconditioner {
             solved: memory::zeros(count, WHAT)?,
             at_contact: memory::room(room, WHAT)?,
             forces: memory::room(room, WHAT)?,
-            loaded: false,
             ready: false,
         })
     }
@@ -156,21 +150,10 @@ impl Preconditioner {
 
     /// Takes the prescribed nodes (ascending); cheap where they are those of the last call.
     pub fn prescribe(&mut self, env: Env<'_>, nodes: &[u32]) -> Result<()> {
-        self.take(env, nodes, false)
-    }
-
-    /// Takes nodes that loads act on (ascending): the responses to forces on them join the modes in the coarse space.
-    pub fn engage(&mut self, env: Env<'_>, nodes: &[u32]) -> Result<()> {
-        self.take(env, nodes, true)
-    }
-
-    fn take(&mut self, env: Env<'_>, nodes: &[u32], loaded: bool) -> Result<()> {
         if self.ready && self.nodes == nodes {
-            self.loaded = loaded;
             return Ok(());
         }
         self.ready = false;
-        self.loaded = loaded;
         self.nodes.clear();
         self.nodes.extend_from_slice(nodes);
         self.columns.clear();
@@ -249,9 +232,7 @@ impl Preconditioner {
             z[1] += w * (xy * r[0] + yy * r[1] + yz * r[2]);
             z[2] += w * (xz * r[0] + yz * r[1] + zz * r[2]);
         }
-        if !self.loaded {
-            mask(&self.nodes, z);
-        }
+        mask(&self.nodes, z);
         mask_held(&env.body.held, z);
         Ok(())
     }
@@ -292,11 +273,10 @@ impl Preconditioner {
             }
         }
         self.galerkin.solve(isa, &self.on_modes, &mut self.solved);
-        // Forces at the contact, mN: those that keep it where it is, and under loads what it lacks besides.
-        let lacking = if self.loaded { 1e-3 } else { 0.0 };
+        // Forces that keep the contact where it is, mN.
         for (value, &dof) in self.at_contact.iter_mut().zip(&self.dofs) {
             let own = env.space.at_contact(dof as usize);
-            *value = lacking * *value - inner(own, &self.solved);
+            *value = -inner(own, &self.solved);
         }
         self.compliance
             .solve(isa, &self.at_contact, &mut self.forces);

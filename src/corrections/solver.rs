@@ -4,7 +4,7 @@ use crate::clock::Instant;
 
 use super::history::{History, PAIRS, Pair};
 use super::input::{Input, Report, SolverContext};
-use super::local::LocalSolver;
+use super::local::{Linearisation, LocalSolver};
 use super::memory::Memory;
 use super::motion::Motion;
 use super::oscillators::Oscillators;
@@ -101,6 +101,7 @@ impl ImplicitSolver {
         self.memory.clear();
         if let Some(local) = &mut self.local {
             local.pairs.clear();
+            local.factor.clear();
         }
     }
 
@@ -109,6 +110,7 @@ impl ImplicitSolver {
         self.memory.begin();
         if let Some(local) = &mut self.local {
             local.pairs.begin();
+            local.factor.begin();
         }
     }
 
@@ -116,6 +118,7 @@ impl ImplicitSolver {
         self.memory.commit();
         if let Some(local) = &mut self.local {
             local.pairs.commit();
+            local.factor.commit();
         }
     }
 
@@ -151,6 +154,10 @@ impl ImplicitSolver {
                 Some(local) => local.pairs.copy()?,
                 None => Vec::new(),
             },
+            linearisation: match &self.local {
+                Some(local) => local.factor.copy()?,
+                None => Linearisation::default(),
+            },
         })
     }
 
@@ -163,6 +170,7 @@ impl ImplicitSolver {
             motion,
             pairs,
             local,
+            linearisation,
         } = history;
         let corrections = context.corrections;
         let sizes = [corrections.body.mass.len(), corrections.space.count()];
@@ -174,12 +182,12 @@ impl ImplicitSolver {
             self.memory.store(context.env(), step, 1.0, change)?;
         }
         self.memory.commit();
-        if local.is_empty() {
+        if local.is_empty() && linearisation.u.is_empty() {
             return Ok(());
         }
-        LocalSolver::made(&mut self.local, context)?
-            .pairs
-            .restore(local)
+        let solver = LocalSolver::made(&mut self.local, context)?;
+        solver.factor.restore(linearisation)?;
+        solver.pairs.restore(local)
     }
 
     /// Velocities of a state that the model predicted and nothing corrected.

@@ -214,7 +214,7 @@ impl ImplicitSolver {
                     self.settle(env, at.u)?;
                     self.evaluate(context, input, at, report)?;
                     if at.det > SMALLEST_DET {
-                        self.begin_round(context, input, problem, false, at)?;
+                        self.begin_round(context, input, problem, at)?;
                         self.improve_at(context, input, problem, at, way)?;
                         self.end_round(context, input, at)?;
                     }
@@ -348,12 +348,12 @@ fn compliance<'a>(
     context: SolverContext<'a>,
     preconditioner: &'a Preconditioner,
 ) -> Compliance<'a> {
-    Compliance {
-        prior: context.prior,
-        held: &context.corrections.body.held,
-        inertia: Some((
+    Compliance::at_rest(
+        context.prior,
+        &context.corrections.body.held,
+        Some((
             &context.corrections.space,
             preconditioner.inertial_compliance(),
         )),
-    }
+    )
 }

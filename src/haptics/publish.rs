@@ -202,11 +202,11 @@ impl Link {
     pub fn publish(&mut self, step: &Stepped<'_>) -> Result<()> {
         self.find(step)?;
         let held = &step.corrections.body.held;
-        let compliance = Compliance {
-            prior: step.prior,
+        let compliance = Compliance::at_rest(
+            step.prior,
             held,
-            inertia: Some((&step.corrections.space, &self.inertial_compliance)),
-        };
+            Some((&step.corrections.space, &self.inertial_compliance)),
+        );
         let samples = &*self.samples;
         let of = self.found.iter().map(|(_, row)| samples.at(*row));
         let masses = of

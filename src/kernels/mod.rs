@@ -11,6 +11,7 @@
 #![allow(clippy::extra_unused_type_parameters)]
 
 pub mod aggregate;
+pub mod cholesky;
 pub mod contact;
 pub mod decoder;
 pub mod encode;

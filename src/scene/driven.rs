@@ -211,11 +211,7 @@ impl Core {
         };
         if near {
             let mut watch = Stopwatch::start();
-            let compliance = Compliance {
-                prior,
-                held: &self.held,
-                inertia: None,
-            };
+            let compliance = Compliance::at_rest(prior, &self.held, None);
             let shared = lock_read(published);
             let state = State {
                 rest: &self.mesh.positions,

@@ -5,9 +5,10 @@
 //! diagonal of `dT` follows the principal stresses `f(s)`, `s = ln lambda - ln J / 3`, and its other entries are
 //! `(f_i - f_j) / (l_i - l_j) dC_ij` with the eigenvalues `l` of `C`.
 
+use crate::laws::Law;
 use crate::material::Moduli;
 use crate::spectrum::spectrum;
-use crate::tetrahedron::{Deformation, LEAST_DET, Tetrahedron};
+use crate::tetrahedron::{Deformation, LEAST_DET, SMALLEST_DET, Tetrahedron, inverse_cube_root};
 use crate::vector::{cross, dot};
 
 /// Eigenvalues of `C` closer than this, relative, have a derivative in place of a difference.
@@ -19,6 +20,11 @@ type Matrix = [[f64; 3]; 3];
 
 /// `dP_ij / dF_kl` in row `3 i + j`, column `3 k + l`, Pa; symmetric.
 pub fn tangent(state: &Deformation, moduli: Moduli) -> [[f64; 9]; 9] {
+    tangent_with(state, moduli, 1.0)
+}
+
+/// The same with a part of what the pressure adds by the change of `cof F`.
+fn tangent_with(state: &Deformation, moduli: Moduli, turning: f64) -> [[f64; 9]; 9] {
     let law = moduli.law.stretches();
     let f = &state.f;
     let c = [0, 1, 2].map(|i| [0, 1, 2].map(|j| (0..3).map(|k| f[k][i] * f[k][j]).sum::<f64>()));
@@ -44,7 +50,7 @@ pub fn tangent(state: &Deformation, moduli: Moduli) -> [[f64; 9]; 9] {
     let deviator = from_principal(&vectors, |i, j| if i == j { pulls[i] - mean } else { 0.0 });
     let cofactor = &state.cofactor;
     let bounded = state.det.abs().max(LEAST_DET).copysign(state.det);
-    let pressure = moduli.bulk_pa * (state.det - 1.0);
+    let pressure = turning * moduli.bulk_pa * (state.det - 1.0);
     let mut inner = deviator.map(|row| row.map(|t| t / bounded));
     for i in 0..3 {
         inner[i][i] += pressure;
@@ -94,6 +100,55 @@ pub fn tangent(state: &Deformation, moduli: Moduli) -> [[f64; 9]; 9] {
     out
 }
 
+/// The stiffness of a unit of volume of neo-Hookean tissue, without eigenvectors: with `C = cof F`
+///
+/// ```text
+/// dP/dF = mu J^(-2/3) I + a (F (x) C + C (x) F) + b C (x) C + p dC/dF        a = -2/3 mu J^(-5/3)
+/// b = kappa + 5/9 mu I1 J^(-8/3)        p = kappa (J - 1) - 1/3 mu I1 J^(-5/3)
+/// ```
+///
+/// between shape gradients `g`, `h`; there `dC/dF` is the cross product with `F (g x h)`.
+fn neo_hookean(
+    state: &Deformation,
+    moduli: Moduli,
+    turning: f64,
+    gradients: [[f64; 3]; 4],
+) -> [[f64; 12]; 12] {
+    let (mu, det, f) = (moduli.shear_pa, state.det, &state.f);
+    let root = inverse_cube_root(det);
+    let own = mu * root * root;
+    let a = -2.0 / 3.0 * own / det;
+    let p = turning * moduli.bulk_pa * (det - 1.0) - own / det * state.invariant / 3.0;
+    let b = moduli.bulk_pa + 5.0 / 9.0 * own / (det * det) * state.invariant;
+    let turned = |rows: &Matrix, g: [f64; 3]| [0, 1, 2].map(|i| dot(rows[i], g));
+    let along = gradients.map(|g| turned(f, g));
+    let normal = gradients.map(|g| turned(&state.cofactor, g));
+    let mut out = [[0.0; 12]; 12];
+    for first in 0..4 {
+        for second in first..4 {
+            let [g, h] = [gradients[first], gradients[second]];
+            let [x, y, z] = turned(f, cross(g, h)).map(|x| p * x);
+            let spin = [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]];
+            let diagonal = own * dot(g, h);
+            for i in 0..3 {
+                let from_normal = a * along[first][i] + b * normal[first][i];
+                let from_along = a * normal[first][i];
+                for k in 0..3 {
+                    let mut sum = from_normal * normal[second][k]
+                        + from_along * along[second][k]
+                        + spin[i][k];
+                    if i == k {
+                        sum += diagonal;
+                    }
+                    out[3 * first + i][3 * second + k] = sum;
+                    out[3 * second + k][3 * first + i] = sum;
+                }
+            }
+        }
+    }
+    out
+}
+
 /// `V diag V^T` of a matrix that is given in the eigenvectors.
 fn from_principal(vectors: &Matrix, entry: impl Fn(usize, usize) -> f64) -> Matrix {
     let inner = [0, 1, 2].map(|i| [0, 1, 2].map(|j| entry(i, j)));
@@ -106,9 +161,29 @@ impl Tetrahedron {
     /// Derivatives of [`Tetrahedron::forces`] by the corners' displacements, µN/mm: entry `[3 a + i][3 b + j]` of corners `a`, `b` and
     /// axes `i`, `j`; symmetric. At rest its diagonal blocks are [`Tetrahedron::diagonal_blocks`].
     pub fn stiffness(&self, state: &Deformation, moduli: Moduli) -> [[f64; 12]; 12] {
-        let tangent = tangent(state, moduli);
+        self.stiffness_with(state, moduli, 1.0)
+    }
+
+    /// The same without what the pressure adds as `cof F` changes, `kappa (J - 1) dcof F`: the part that makes the tangent of nearly incompressible
+    /// tissue indefinite at a change of volume of some hundredths.
+    pub fn steady_stiffness(&self, state: &Deformation, moduli: Moduli) -> [[f64; 12]; 12] {
+        self.stiffness_with(state, moduli, 0.0)
+    }
+
+    fn stiffness_with(&self, state: &Deformation, moduli: Moduli, turning: f64) -> [[f64; 12]; 12] {
         let [a, b, c] = self.gradients;
         let gradients = [[0, 1, 2].map(|k| -(a[k] + b[k] + c[k])), a, b, c];
+        match moduli.law {
+            Law::NeoHookean(_) if state.det > SMALLEST_DET => {
+                neo_hookean(state, moduli, turning, gradients)
+                    .map(|row| row.map(|k| self.volume * k))
+            }
+            _ => self.contract(&tangent_with(state, moduli, turning), gradients),
+        }
+    }
+
+    /// `V g_a . tangent . g_b` of all corners.
+    fn contract(&self, tangent: &[[f64; 9]; 9], gradients: [[f64; 3]; 4]) -> [[f64; 12]; 12] {
         let mut out = [[0.0; 12]; 12];
         for i in 0..3 {
             for k in 0..3 {

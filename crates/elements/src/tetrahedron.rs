@@ -11,7 +11,7 @@ use crate::principal::{self, PLACE};
 use crate::vector::{cross, dot, subtract};
 
 /// Below this `det F` the isochoric factor is that of a nearly flat element, so that it stays finite.
-const SMALLEST_DET: f64 = 0.05;
+pub(crate) const SMALLEST_DET: f64 = 0.05;
 
 /// A tetrahedron's corners, rest volume times its stiffness over the material's, and gradients of its shape functions.
 #[derive(Debug, Clone, Copy)]

@@ -75,6 +75,8 @@ pub struct ContactProblem {
     search: Search,
     sweeps: Sweeps,
     delassus: Delassus,
+    /// The same of deformed tissue.
+    tangent: Delassus,
     inertial_compliance: InertialCompliance,
     rows: Vec<Row>,
     /// Rows that a solve had no room for: their forces go.
@@ -128,6 +130,7 @@ impl ContactProblem {
             search: memory::tried(Search::with_room(&samples), WHAT)?,
             sweeps,
             delassus: Delassus::default(),
+            tangent: Delassus::default(),
             inertial_compliance: InertialCompliance::default(),
             rows: memory::room(room, WHAT)?,
             shed: memory::room(room, WHAT)?,

@@ -120,7 +120,11 @@ impl ContactProblem {
         let samples = &self.samples;
         self.columns.clear();
         self.columns.extend(self.rows.iter().map(|row| row.sample));
-        let (own, all, rows) = (&mut self.delassus, &**samples, &self.columns);
+        let own = match compliance.tangent {
+            Some(_) => &mut self.tangent,
+            None => &mut self.delassus,
+        };
+        let (all, rows) = (&**samples, &self.columns);
         let (mut whole, mut at);
         let w: &mut dyn Rows = match time {
             Time::StepEnd => {

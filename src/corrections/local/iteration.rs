@@ -1,5 +1,8 @@
 //! One local iteration: a direction of L-BFGS with the contact's answer in it, and how far along it.
 
+use std::cell::RefCell;
+
+use super::columns::Response;
 use super::linear::WHAT;
 use super::step::{add, dot, resize};
 use super::{Gain, LocalSolver, StepContext, each_load};
@@ -59,6 +62,7 @@ impl LocalSolver {
                 self.place_at(base, 0.0);
                 problem.undo();
                 self.pairs.clear();
+                self.factor.clear();
                 break;
             }
             t *= if is_kept && slope_new.is_finite() {
@@ -80,19 +84,7 @@ impl LocalSolver {
         });
         self.take_loads_off(step, problem)?;
         let recursion = self.pairs.descend(env.isa, &mut self.reduced);
-        // z = w D^-1 r on the inside nodes, and the coarse level.
         self.d.clear(&self.near)?;
-        let rows = self.reduced.r.as_chunks::<3>().0.iter();
-        let nodes = self.near.nodes.iter();
-        for ((t, r), &node) in (self.d.t.as_chunks_mut::<3>().0.iter_mut())
-            .zip(rows)
-            .zip(nodes)
-        {
-            let [xx, xy, xz, yy, yz, zz] = env.time_step.inverse_blocks[node as usize];
-            t[0] = DIAGONAL_WEIGHT * (xx * r[0] + xy * r[1] + xz * r[2]);
-            t[1] = DIAGONAL_WEIGHT * (xy * r[0] + yy * r[1] + yz * r[2]);
-            t[2] = DIAGONAL_WEIGHT * (xz * r[0] + yz * r[1] + zz * r[2]);
-        }
         self.precondition(step)?;
         self.pairs.ascend(env.isa, recursion, &mut self.d);
         self.decode_direction(step)
@@ -131,59 +123,39 @@ impl LocalSolver {
         Ok(())
     }
 
-    /// The coarse level of the reduced residual, added to the direction.
+    /// `P` of the reduced residual, added to the direction ([`super::factor`]); outside of the core `w D^-1`. Leaves what it moves the modes by at the near nodes,
+    /// by place, in `room.linear`.
     fn precondition(&mut self, step: &mut StepContext<'_>) -> Result<()> {
         let env = step.context.env();
-        let preconditioner = &mut *step.preconditioner;
-        let (near, q) = (&self.near, &mut self.room.q);
-        let whole = &self.reduced.p;
-        // Of a column's response: (A_k E)_S^T r_S + E^T Phi G^-1 (Phi^T r - Phi_S^T r_S).
-        resize(&mut self.room.field, 3 * near.free)?;
-        self.room.field[..3 * near.inside].copy_from_slice(&self.reduced.r);
-        near.project(env, &self.room.field, q);
-        let inside = &mut self.more_on_modes;
-        preconditioner.on_modes_in(env, &near.ranges, q, inside);
-        memory::replace(&mut self.columns, preconditioner.dofs(), WHAT)?;
-        resize(&mut self.on_columns, self.columns.len())?;
-        let known = (q.as_slice(), inside.as_slice());
-        preconditioner.on_columns(
-            env,
-            &self.columns,
-            &near.ranges,
-            known,
-            &mut self.on_columns,
-        );
-        for (value, whole) in inside.iter_mut().zip(whole) {
-            *value = whole - *value;
+        let preconditioner = &*step.preconditioner;
+        let (near, room) = (&self.near, &mut self.room);
+        let core = 3 * near.core;
+        let (t, outer) = self.reduced.r.split_at_mut(core);
+        let rows = outer.as_chunks::<3>().0.iter();
+        let places = self.d.t[core..].as_chunks_mut::<3>().0.iter_mut();
+        for ((t, r), &node) in places.zip(rows).zip(&near.nodes[near.core..]) {
+            let [xx, xy, xz, yy, yz, zz] = env.time_step.inverse_blocks[node as usize];
+            t[0] += DIAGONAL_WEIGHT * (xx * r[0] + xy * r[1] + xz * r[2]);
+            t[1] += DIAGONAL_WEIGHT * (xy * r[0] + yy * r[1] + yz * r[2]);
+            t[2] += DIAGONAL_WEIGHT * (xz * r[0] + yz * r[1] + zz * r[2]);
         }
-        preconditioner.respond_on_modes(env, inside, &mut self.solved)?;
-        for (work, &dof) in self.on_columns.iter_mut().zip(&self.columns) {
-            let own = env.space.at_contact(dof as usize);
-            *work += 1e3 * dot(own, &self.solved) as f32;
-        }
-        let (c, forces) = preconditioner.coarse_on(env, whole, &self.on_columns);
-        self.d.c.copy_from_slice(c);
-        self.loads.clear();
-        memory::fit(&mut self.loads, forces.len(), WHAT)?;
-        let loads = self.columns.iter().copied().zip(forces.iter().copied());
-        self.loads.extend(loads);
-        self.respond(step)
-    }
-
-    /// Adds the response to `loads` to the direction.
-    fn respond(&mut self, step: &mut StepContext<'_>) -> Result<()> {
-        let env = step.context.env();
-        let preconditioner = &mut *step.preconditioner;
-        preconditioner.work_of_modes(env, &self.loads, &mut self.more_on_modes);
-        preconditioner.respond_on_modes(env, &self.more_on_modes, &mut self.solved)?;
+        let p = &mut self.reduced.p;
+        resize(&mut room.field, 3 * near.free)?;
+        room.field[..core].copy_from_slice(t);
+        self.factor.solve(env.isa, t);
+        self.factor
+            .take_off(env, near, preconditioner, room, (t, p))?;
+        preconditioner.respond_on_modes(env, p, &mut self.solved)?;
         add(1.0, &self.solved, &mut self.d.c);
-        // What is near of it beside these modes.
-        self.solved.iter_mut().for_each(|c| *c = -*c);
-        let (ranges, q) = (&self.near.ranges, &mut self.room.q);
-        preconditioner.near_coordinates(env, &self.solved, &self.loads, ranges, q);
-        resize(&mut self.room.field, 3 * self.near.nodes.len())?;
-        self.near.decode(env, q, &mut self.room.field)?;
-        add(1.0, &self.room.field, &mut self.d.t);
+        add(1.0, t, &mut self.d.t);
+        preconditioner.near_coordinates(env, &self.solved, &near.ranges, &mut room.q);
+        resize(&mut room.linear, 3 * near.nodes.len())?;
+        near.decode(env, &room.q, &mut room.linear)?;
+        // In the core the field that the move of the modes stretches over it takes its place.
+        self.factor.stretch(&room.linear, t);
+        self.factor.solve(env.isa, t);
+        add(-1.0, t, &mut self.d.t);
+        add(-1.0, &room.linear[..core], &mut self.d.t);
         Ok(())
     }
 
@@ -202,7 +174,15 @@ impl LocalSolver {
             u: &self.trial,
             start: step.input.last,
         };
+        let own = (&mut self.factor, &mut self.columns, &mut self.room);
+        let response = Response {
+            env,
+            near: &self.near,
+            preconditioner: step.preconditioner,
+            own: RefCell::new(own),
+        };
         let compliance = Compliance {
+            tangent: Some(&response),
             prior: step.context.prior,
             held: &env.body.held,
             inertia: Some((env.space, step.preconditioner.inertial_compliance())),
@@ -219,16 +199,29 @@ impl LocalSolver {
         if self.loads.is_empty() {
             return Ok(());
         }
-        self.respond(step)?;
-        self.decode_direction(step)
+        self.reduced.clear(&self.near)?;
+        let (near, reduced) = (&self.near, &mut self.reduced);
+        for &(dof, force) in &self.loads {
+            let node = env.prior.contact_nodes[dof as usize / 3];
+            if near.holds(node)
+                && let Some(place) = near.place(node)
+            {
+                reduced.r[3 * place + dof as usize % 3] += 1e3 * force;
+            }
+        }
+        (step.preconditioner).work_of_modes(env, &self.loads, &mut reduced.p);
+        self.precondition(step)?;
+        // The modes' part of it is decoded already.
+        add(1.0, &self.room.linear, &mut self.d_modes);
+        Ok(())
     }
 
     /// `Phi c` of the direction at the near nodes.
     pub(super) fn decode_direction(&mut self, step: &mut StepContext<'_>) -> Result<()> {
         let env = step.context.env();
         let (ranges, q) = (&self.near.ranges, &mut self.room.q);
-        let preconditioner = &mut *step.preconditioner;
-        preconditioner.near_coordinates(env, &self.d.c, &[], ranges, q);
+        let preconditioner = &*step.preconditioner;
+        preconditioner.near_coordinates(env, &self.d.c, ranges, q);
         self.near.decode(env, q, &mut self.d_modes)
     }
 

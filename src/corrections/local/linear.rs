@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use ::elements::Tetrahedron;
+use ::elements::{Moduli, Tetrahedron};
 
 use crate::corrections::far::FarField;
 use crate::error::Result;
@@ -52,6 +52,43 @@ impl LinearElements {
         for element in &mut self.0 {
             element.places = element.places.map(|node| of_node[node as usize]);
         }
+    }
+
+    /// How many they are.
+    pub fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    /// The places of the corners.
+    pub fn places(&self) -> impl Iterator<Item = [u32; 4]> + '_ {
+        self.0.iter().map(|element| element.places)
+    }
+
+    /// An element, its corners as places.
+    pub fn tetrahedron(&self, at: usize, moduli: Moduli) -> Tetrahedron {
+        let element = &self.0[at];
+        Tetrahedron {
+            corners: element.places,
+            volume: f64::from(element.shear) / moduli.shear_pa,
+            gradients: element.gradients.map(|g| g.map(f64::from)),
+        }
+    }
+
+    /// The largest entry of the gradient of a field in an element.
+    pub fn largest_gradient(&self, at: usize, field: impl Fn(u32) -> [f32; 3]) -> f32 {
+        let element = &self.0[at];
+        let [first, rest @ ..] = element.places.map(field);
+        let mut h = [[0.0f32; 3]; 3];
+        for (corner, gradient) in rest.iter().zip(&element.gradients) {
+            for i in 0..3 {
+                for j in 0..3 {
+                    h[i][j] += (corner[i] - first[i]) * gradient[j];
+                }
+            }
+        }
+        h.as_flattened()
+            .iter()
+            .fold(0.0, |most, x| most.max(x.abs()))
     }
 
     /// `K v` at the first places, as many as `out [.., 3]` has, µN, of a field `[.., 3]` by place, mm.

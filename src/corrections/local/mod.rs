@@ -9,14 +9,17 @@
 //! ```
 //!
 //! with `G = Phi^T (K + kappa M) Phi`, and `far` what the law adds in the far clusters ([`super::far`]): a Galerkin method on the modes and the
-//! nodes near the tools. The response to a force is all of it near, `t = (A_k E f - Phi c)_S`, and elsewhere what the modes have of it, `c =
-//! G^-1 Phi^T E f`. An iteration is L-BFGS around the two levels of the preconditioner, the contact solved in it, a search along the line.
+//! nodes near the tools. An iteration is L-BFGS around a preconditioner of two levels, the exact factor of the tangent close to the tools and the modes
+//! ([`factor`]), the contact solved in it with the compliance of that preconditioner ([`columns`]), a search along the line.
 //! The field is decoded once, at the end, when the far nodes get the preconditioner's first level of the base. `docs/decisions/023-local-iterations.md` says
 //! what was tried.
 
 mod clusters;
+mod columns;
+mod factor;
 mod iteration;
 mod linear;
+mod linearisation;
 mod near;
 mod pairs;
 mod record;
@@ -25,6 +28,8 @@ mod step;
 use ::elements::Scratch;
 
 use self::clusters::Clusters;
+use self::columns::NearColumns;
+use self::factor::NearFactor;
 use self::linear::WHAT;
 use self::near::{NearSet, add_centres};
 use self::pairs::{Pairs, Room};
@@ -35,6 +40,7 @@ use crate::contact::ContactProblem;
 use crate::error::Result;
 use crate::memory::{self, HeldBytes};
 
+pub use self::linearisation::Linearisation;
 pub use self::record::Record;
 
 /// Far elements of a chunk that is near in part are looked at where its smallest det F is below this.
@@ -72,6 +78,8 @@ pub struct LocalSolver {
     near: NearSet,
     pub(super) pairs: Pairs,
     clusters: Clusters,
+    pub(super) factor: NearFactor,
+    columns: NearColumns,
     /// Nodes that the tools touch, thinned out: what the pairs are about.
     about: Vec<u32>,
     /// Since the base.
@@ -110,8 +118,6 @@ pub struct LocalSolver {
     on_modes: Vec<f32>,
     more_on_modes: Vec<f32>,
     solved: Vec<f32>,
-    on_columns: Vec<f32>,
-    columns: Vec<u32>,
     loads: Vec<(u32, f32)>,
 }
 
@@ -130,6 +136,8 @@ impl LocalSolver {
             near: NearSet::new(env)?,
             pairs: Pairs::new(count)?,
             clusters: Clusters::new(far, count)?,
+            factor: NearFactor::default(),
+            columns: NearColumns::default(),
             about: memory::room(64, WHAT)?,
             now: Step::with_modes(count)?,
             residual: Change::with_modes(count)?,
@@ -158,8 +166,6 @@ impl LocalSolver {
             on_modes: modes()?,
             more_on_modes: modes()?,
             solved: modes()?,
-            on_columns: memory::room(columns, WHAT)?,
-            columns: memory::room(columns, WHAT)?,
             loads: memory::room(columns, WHAT)?,
         })
     }
@@ -179,7 +185,7 @@ impl LocalSolver {
         Ok(slot.insert(local))
     }
 
-    /// Starts from `base`, with `touched` nodes. The preconditioner holds the columns of these nodes.
+    /// Starts from `base`, with `touched` nodes.
     pub(super) fn begin(&mut self, step: &mut StepContext<'_>, base: Base<'_>) -> Result<()> {
         let env = step.context.env();
         let far = &step.context.corrections.far;
@@ -198,8 +204,10 @@ impl LocalSolver {
             self.near.fill(env, far, rest)?;
             let (near, room) = (&self.near, &mut self.room);
             (self.clusters).leave_out(env, far, near, step.preconditioner, room)?;
+            self.factor.plan(&self.near, rest)?;
             self.near.finish();
         }
+        (self.factor).renew(env, &self.near, far.moduli, base.u)?;
         self.pairs
             .lay_out(env, &self.near, step.preconditioner, &mut self.room)?;
         self.now.clear(&self.near)?;

@@ -26,6 +26,9 @@ const APART_MM: f32 = 3.0;
 const SLACK_MM: f32 = 5.0;
 /// A centre is left out that lies this far from all that is touched, mm.
 const LEFT_MM: f32 = 12.0;
+/// Nodes are of the core that lie this close to a centre at rest, mm, and as many mean edges.
+const CORE_MM: f32 = 20.0;
+const CORE_EDGES: f32 = 4.0;
 /// A node that is not near.
 const NONE: u32 = u32::MAX;
 
@@ -41,6 +44,8 @@ pub(in crate::corrections) struct NearSet {
     /// Places that are inside, and those that are free.
     pub inside: usize,
     pub free: usize,
+    /// Inside places that lie closest to the centres: the first ones.
+    pub core: usize,
     /// By node; [`NONE`] elsewhere.
     places: Vec<u32>,
     /// Within reach of a centre, and near elements at a node, while a set is filled.
@@ -49,7 +54,7 @@ pub(in crate::corrections) struct NearSet {
     subset: Subset,
     /// Numbers of the near elements in the mesh, ascending.
     numbers: Vec<u32>,
-    elements: LinearElements,
+    pub(super) elements: LinearElements,
     /// What of the far field's clusters is near.
     pub(super) parts: Parts,
     plan: RowPlan,
@@ -69,6 +74,7 @@ impl NearSet {
             nodes: Vec::new(),
             inside: 0,
             free: 0,
+            core: 0,
             places: memory::filled(count, NONE, WHAT)?,
             is_reached: memory::filled(count, false, WHAT)?,
             counts: memory::filled(count, 0, WHAT)?,
@@ -148,18 +154,24 @@ impl NearSet {
         if reach < f32::MAX && self.nodes.len() as f32 > most {
             self.take_elements(env, far, rest, f32::MAX)?;
         }
-        (self.inside, self.free) = (0, 0);
+        (self.inside, self.free, self.core) = (0, 0, 0);
+        let core = CORE_MM.min(CORE_EDGES * far.edge_mm);
+        for at in 0..self.nodes.len() {
+            let node = self.nodes[at];
+            self.is_reached[node as usize] = is_by(rest, &self.chosen, node, core);
+        }
         let rank = |node: u32| {
             let at = node as usize;
             let whole = self.counts[at] == far.elements_at[at];
-            (env.body.held[at], !whole, node)
+            (env.body.held[at], !whole, !self.is_reached[at], node)
         };
         self.nodes.sort_unstable_by_key(|node| rank(*node));
         for (place, &node) in self.nodes.iter().enumerate() {
-            let (is_held, is_cut, _) = rank(node);
+            let (is_held, is_cut, is_outer, _) = rank(node);
             self.places[node as usize] = place as u32;
             self.free += usize::from(!is_held);
             self.inside += usize::from(!is_held && !is_cut);
+            self.core += usize::from(!is_held && !is_cut && !is_outer);
         }
         self.elements.take_places(&self.places);
         self.parts.fill(&self.elements, far, self.free)?;

@@ -165,7 +165,7 @@ impl Pairs {
             // Where it was far it was linear.
             resize(&mut room.field, 3 * near.nodes.len())?;
             resize(&mut room.linear, 3 * near.free)?;
-            preconditioner.near_coordinates(env, &step.c, &[], &near.ranges, &mut room.q);
+            preconditioner.near_coordinates(env, &step.c, &near.ranges, &mut room.q);
             near.decode(env, &room.q, &mut room.field)?;
             add(1.0, &step.t, &mut room.field);
             near.linear(env, &room.field, &mut room.linear);

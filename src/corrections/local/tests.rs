@@ -110,7 +110,6 @@ fn errors(bench: &Bench, base_mm: f32, step_mm: f32) -> [f64; 2] {
     let middle = bench.mesh.domain_nodes[bench.mesh.domain_nodes.len() / 2];
     let local = solver.local.as_deref_mut().unwrap();
     local.touched = vec![middle];
-    solver.preconditioner.engage(env, &[middle]).unwrap();
     let mut step = StepContext {
         context,
         input: &input,

@@ -1,4 +1,4 @@
-//! The coarse level on modes and columns alone, without a field: what local iterations ask of the preconditioner.
+//! The coarse level on modes alone, without a field: what local iterations ask of the preconditioner.
 
 use std::ops::Range;
 
@@ -45,21 +45,16 @@ impl Preconditioner {
         )?)
     }
 
-    /// The block coordinates of `Phi c + A_k E f` in some ranges; the others keep what they hold.
+    /// The block coordinates of `Phi c` in some ranges; the others keep what they hold.
     pub fn near_coordinates(
-        &mut self,
+        &self,
         env: Env<'_>,
         c: &[f32],
-        forces: &[(u32, f32)],
         ranges: &[Range<usize>],
         q: &mut [f32],
     ) {
-        self.split(env, c, forces);
-        let modes = (env.space.rows(), self.solved.as_slice());
+        let modes = (env.space.rows(), c);
         accumulate_in(env.isa, env.space.modes(), modes, ranges, false, q);
-        let columns = (self.load_dofs.as_slice(), self.load_forces.as_slice());
-        let response = env.prior.response.stored();
-        accumulate_in(env.isa, response, columns, ranges, true, q);
     }
 
     /// The block coordinates of `Phi c`, as `coordinates`.
@@ -67,22 +62,6 @@ impl Preconditioner {
         let (modes, rows) = (env.space.modes(), env.space.rows());
         let (isa, pool, q) = (env.isa, env.pool, &mut self.coordinates);
         Ok(accumulate_rows(isa, pool, modes, rows, c, false, q)?)
-    }
-
-    /// `solved` on the modes, with what inertia takes off the responses, and the forces as two lists.
-    fn split(&mut self, env: Env<'_>, c: &[f32], forces: &[(u32, f32)]) {
-        self.solved.copy_from_slice(c);
-        self.load_dofs.clear();
-        self.load_forces.clear();
-        for &(dof, force) in forces {
-            let own = env.space.at_contact(dof as usize);
-            let natural = self.inertial_compliance.iter().zip(own);
-            for (y, (inertial_compliance, own)) in self.solved.iter_mut().zip(natural) {
-                *y -= inertial_compliance * own * force;
-            }
-            self.load_dofs.push(dof);
-            self.load_forces.push(force);
-        }
     }
 
     /// `Phi^T r` from `coordinates = U^T r [Q]`.
@@ -95,42 +74,5 @@ impl Preconditioner {
     pub fn on_modes_in(&self, env: Env<'_>, ranges: &[Range<usize>], q: &[f32], out: &mut [f32]) {
         let (modes, rows) = (env.space.modes(), env.space.rows());
         row_dots_in(env.isa, modes, rows, ranges, q, out);
-    }
-
-    /// `(A_k E)^T r` of columns, mm/mN µN, from `U^T r [Q]`, zero outside of some ranges, and `Phi^T r`.
-    pub fn on_columns(
-        &self,
-        env: Env<'_>,
-        dofs: &[u32],
-        ranges: &[Range<usize>],
-        (q, on_modes): (&[f32], &[f32]),
-        out: &mut [f32],
-    ) {
-        row_dots_in(env.isa, env.prior.response.stored(), dofs, ranges, q, out);
-        for (work, &dof) in out.iter_mut().zip(dofs) {
-            let own = env.space.at_contact(dof as usize);
-            let natural = self.inertial_compliance.iter().zip(own).zip(on_modes);
-            for ((inertial_compliance, own), on_mode) in natural {
-                *work -= inertial_compliance * own * on_mode;
-            }
-        }
-    }
-
-    /// The coarse level from `Phi^T r` (µN) and `(A_k E)^T r` of the touched columns: modes (mm) and forces (mN) on those columns.
-    pub fn coarse_on(
-        &mut self,
-        env: Env<'_>,
-        on_modes: &[f32],
-        at_contact: &[f32],
-    ) -> (&[f32], &[f32]) {
-        self.on_modes.copy_from_slice(on_modes);
-        self.at_contact.copy_from_slice(at_contact);
-        self.solve_coarse(env);
-        (&self.solved, &self.forces)
-    }
-
-    /// Columns of the touched nodes, as degrees of freedom.
-    pub fn dofs(&self) -> &[u32] {
-        &self.dofs
     }
 }

@@ -48,7 +48,7 @@ impl ImplicitSolver {
             return Ok(0.0);
         }
         loop {
-            self.begin_round(context, input, problem, true, at)?;
+            self.begin_round(context, input, problem, at)?;
             self.improve_round(context, input, problem, at, (&mut made, report))?;
             self.end_round(context, input, at)?;
             let most = input.enough.iterations;
@@ -112,19 +112,16 @@ impl ImplicitSolver {
         Ok(())
     }
 
-    /// Makes `at` the base of local iterations; with `touched` nodes in the coarse space, where they are to be.
+    /// Makes `at` the base of local iterations.
     pub(super) fn begin_round(
         &mut self,
         context: SolverContext<'_>,
         input: &Input<'_>,
         problem: &mut ContactProblem,
-        touched: bool,
         at: &Iterate<'_>,
     ) -> Result<()> {
         let env = context.env();
         let nodes = problem.touched(&env.body.held);
-        let engaged = if touched { nodes } else { &[] };
-        self.preconditioner.engage(env, engaged)?;
         let (local, mut step) = self.local_solver(context, input)?;
         memory::replace(&mut local.touched, nodes, "local iterations")?;
         let base = Base {

@@ -157,7 +157,11 @@ unsafe fn add_tile<V: DenseLanes, const M: usize>(
         }
         for (&local, &output) in locals.iter().zip(outputs) {
             let mut row = basis.wrapping_add(3 * local as usize * rank);
-            for &force in &r[3 * output as usize..3 * output as usize + 3] {
+            let forces = &r[3 * output as usize..3 * output as usize + 3];
+            if *forces == [0.0; 3] {
+                continue;
+            }
+            for &force in forces {
                 let force = V::splat(force);
                 for v in 0..M {
                     sum[v] = Number::lanes::<V>(row.add(v * V::COUNT)).mul_add(force, sum[v]);

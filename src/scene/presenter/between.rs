@@ -276,11 +276,11 @@ impl Between {
             if tau <= AT_ONCE_S || !self.problem.is_near(state)? {
                 return Ok(false);
             }
-            let compliance = Compliance {
+            let compliance = Compliance::at_rest(
                 prior,
-                held: &self.held,
-                inertia: Some((&corrections.space, &self.inertial_compliance)),
-            };
+                &self.held,
+                Some((&corrections.space, &self.inertial_compliance)),
+            );
             let change = self.problem.solve_between(compliance, state)?;
             response.add(change, &mut self.natural, false, q)?;
             // As in a step: a quick or thin tool that has lost the contact is pressed again about where the tissue has come to.

@@ -56,11 +56,7 @@ impl Linear {
         self.problem.begin(tools, &self.rest, start)?;
         let (mut nodes, mut vectors) = (Vec::new(), Vec::new());
         if self.problem.is_near(state)? {
-            let compliance = Compliance {
-                prior: self.prior.table(),
-                held: self.prior.held(),
-                inertia: None,
-            };
+            let compliance = Compliance::at_rest(self.prior.table(), self.prior.held(), None);
             let found = self.problem.prescribe(compliance, state)?;
             nodes.extend_from_slice(found.0);
             vectors.extend_from_slice(found.1.as_chunks().0);

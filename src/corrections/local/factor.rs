@@ -1,0 +1,300 @@
+//! The exact factor of the tangent on the inside nodes, and the preconditioner that it makes with the modes.
+//!
+//! ```text
+//! B = (K_SS + kappa M_SS)^-1        K the tangent of the law at a state, S the inside nodes
+//! P = B + (I - B K) Phi G^-1 Phi^T (I - K B)
+//! ```
+//!
+//! Since `B K_SS` is the identity, what a move of the modes leaves inside is `-B K_SR Phi_R`, with the near nodes `R` around the inside: the field
+//! that their move stretches over `S`. Contact takes the same operator for its compliance, `E^T P E`: with that of the body at rest the forces
+//! that it finds are not those that the iterations balance (`docs/decisions/026-near-factor.md`).
+
+use ::elements::Moduli;
+
+use super::linear::WHAT;
+use super::linearisation::Linearisation;
+use super::near::NearSet;
+use crate::corrections::precondition::Env;
+use crate::error::{Error, Result};
+use crate::kernels::Isa;
+use crate::kernels::cholesky::{BlockRows, SparseFactor};
+use crate::memory::{self, HeldBytes};
+
+/// An entry that an element does not have: its row is not inside.
+const NONE: u32 = u32::MAX;
+/// An element is taken at rest where its det F is less.
+const LEAST_DET: f64 = 0.2;
+/// The tangent is taken anew where an entry of F has changed by more than this since.
+const MOST_CHANGE: f32 = 0.2;
+
+/// See the module.
+#[derive(Default, HeldBytes)]
+pub(in crate::corrections) struct NearFactor {
+    /// Where the tangent is taken in the step being made, in the last published one, and in the factor that there is.
+    current: Linearisation,
+    published: Linearisation,
+    made: Linearisation,
+    /// Rows of the core, columns of the free nodes, by place.
+    rows: BlockRows,
+    /// Of each element: the blocks of its corners.
+    targets: Vec<[u32; 16]>,
+    factor: SparseFactor,
+    /// Where the core's nodes are at rest.
+    points: Vec<[f32; 3]>,
+    /// Columns of each row with those that come twice, while the pattern is made.
+    entries: Vec<u32>,
+    /// Factors made so far, for what is kept of one.
+    pub generation: u64,
+}
+
+impl NearFactor {
+    /// Back to the last published state.
+    pub fn begin(&mut self) {
+        self.current.take(&self.published);
+    }
+
+    /// The state being made is published.
+    pub fn commit(&mut self) {
+        self.published.take(&self.current);
+    }
+
+    /// Forgets where the tangent was taken, in the step being made.
+    pub fn clear(&mut self) {
+        self.current.clear();
+    }
+
+    /// A copy of what is kept of the last published state.
+    pub fn copy(&self) -> Result<Linearisation> {
+        let mut copy = Linearisation::default();
+        copy.fit(&self.published)?;
+        copy.take(&self.published);
+        Ok(copy)
+    }
+
+    /// Takes what was kept.
+    pub fn restore(&mut self, kept: &Linearisation) -> Result<()> {
+        self.fit(kept)?;
+        self.published.take(kept);
+        self.begin();
+        Ok(())
+    }
+
+    /// Room for the same state in all three places.
+    fn fit(&mut self, state: &Linearisation) -> Result<()> {
+        self.current.fit(state)?;
+        self.published.fit(state)?;
+        self.made.fit(state)
+    }
+
+    /// Takes the pattern of another near set.
+    pub fn plan(&mut self, near: &NearSet, rest: &[f32]) -> Result<()> {
+        let (elements, core) = (&near.elements, near.core);
+        self.factor.forget();
+        self.made.clear();
+        self.points.clear();
+        memory::fit(&mut self.points, core, WHAT)?;
+        let nodes = near.nodes[..core].iter().map(|node| 3 * *node as usize);
+        self.points
+            .extend(nodes.map(|at| [rest[at], rest[at + 1], rest[at + 2]]));
+        self.fill_rows(near)?;
+        let rows = &mut self.rows;
+        rows.blocks.resize(rows.columns.len(), [0.0; 9]);
+        self.targets.clear();
+        memory::fit(&mut self.targets, elements.len(), WHAT)?;
+        for places in elements.places() {
+            let mut targets = [NONE; 16];
+            for (at, target) in targets.iter_mut().enumerate() {
+                let (row, column) = (places[at / 4] as usize, places[at % 4]);
+                if row < core
+                    && let Some(found) = rows.position(row, column)
+                {
+                    *target = found as u32;
+                }
+            }
+            self.targets.push(targets);
+        }
+        self.factor.plan(&self.rows, &self.points)
+    }
+
+    /// Which nodes share an element with each of the core.
+    fn fill_rows(&mut self, near: &NearSet) -> Result<()> {
+        let (rows, core) = (&mut self.rows, near.core);
+        let is_core = |place: &u32| (*place as usize) < core;
+        rows.starts.clear();
+        memory::fit(&mut rows.starts, core + 1, WHAT)?;
+        rows.starts.resize(core + 1, 0);
+        for row in near.elements.places().flatten().filter(is_core) {
+            rows.starts[row as usize + 1] += 4;
+        }
+        for row in 0..core {
+            rows.starts[row + 1] += rows.starts[row];
+        }
+        let most = rows.starts[core] as usize;
+        self.entries.clear();
+        memory::fit(&mut self.entries, most, WHAT)?;
+        self.entries.resize(most, NONE);
+        for places in near.elements.places() {
+            for row in places.into_iter().filter(is_core) {
+                // The start of a row moves to that of the next while it is filled.
+                let at = &mut rows.starts[row as usize];
+                self.entries[*at as usize..][..4].copy_from_slice(&places);
+                *at += 4;
+            }
+        }
+        rows.columns.clear();
+        memory::fit(&mut rows.columns, most, WHAT)?;
+        let mut start = 0;
+        for row in 0..core {
+            let end = rows.starts[row] as usize;
+            let own = &mut self.entries[start..end];
+            own.sort_unstable();
+            rows.starts[row] = rows.columns.len() as u32;
+            let mut last = NONE;
+            for &column in own.iter().filter(|column| (**column as usize) < near.free) {
+                if column != last {
+                    rows.columns.push(column);
+                    last = column;
+                }
+            }
+            start = end;
+        }
+        rows.starts[core] = rows.columns.len() as u32;
+        rows.blocks.clear();
+        memory::fit(&mut rows.blocks, rows.columns.len(), WHAT)
+    }
+
+    /// Makes the factor that serves a state `[K,3]`: that of the state where it was taken last, unless that is another's or has been deformed since.
+    pub fn renew(&mut self, env: Env<'_>, near: &NearSet, moduli: Moduli, u: &[f32]) -> Result<()> {
+        let kappa = env.time_step.integrator.kappa() as f32;
+        let serves = self.current.is_of(&near.centres, kappa)
+            && self.current.u.len() == 3 * near.nodes.len()
+            && self.change(near, u) <= MOST_CHANGE;
+        if !serves {
+            let near = (near.centres.as_slice(), near.nodes.as_slice());
+            self.current.set(near, kappa, u)?;
+            self.published.fit(&self.current)?;
+            self.made.fit(&self.current)?;
+        }
+        if self.made == self.current {
+            return Ok(());
+        }
+        self.made.clear();
+        self.generation += 1;
+        for is_at_rest in [false, true] {
+            self.assemble(env, near, moduli, is_at_rest);
+            // A tangent need not be positive; that at rest is.
+            if self.factor.factor(env.isa, &self.rows)? {
+                self.made.take(&self.current);
+                return Ok(());
+            }
+        }
+        Err(Error::bundle(
+            "mesh.safetensors",
+            format!(
+                "the stiffness at rest of {} nodes is not positive definite: remake the bundle",
+                near.core
+            ),
+        ))
+    }
+
+    /// How far the core's elements have been deformed since the tangent was taken: the largest change of an entry of F.
+    fn change(&self, near: &NearSet, u: &[f32]) -> f32 {
+        let before = self.current.u.as_chunks::<3>().0;
+        let moved = |place: u32| {
+            let now = &u[3 * near.nodes[place as usize] as usize..][..3];
+            [0, 1, 2].map(|axis| now[axis] - before[place as usize][axis])
+        };
+        let elements = self.targets.iter().enumerate();
+        let core = elements.filter(|(_, targets)| **targets != [NONE; 16]);
+        let changes = core.map(|(at, _)| near.elements.largest_gradient(at, moved));
+        changes.fold(0.0, f32::max)
+    }
+
+    fn assemble(&mut self, env: Env<'_>, near: &NearSet, moduli: Moduli, is_at_rest: bool) {
+        self.rows.blocks.fill([0.0; 9]);
+        let u = self.current.u.as_chunks::<3>().0;
+        for (at, targets) in self.targets.iter().enumerate() {
+            if *targets == [NONE; 16] {
+                continue;
+            }
+            let element = near.elements.tetrahedron(at, moduli);
+            let rest = element.deformation([[0.0; 3]; 4]);
+            let moved = element
+                .corners
+                .map(|place| u[place as usize].map(f64::from));
+            let state = match is_at_rest {
+                true => rest,
+                false => element.deformation(moved),
+            };
+            let state = if state.det > LEAST_DET { state } else { rest };
+            let stiffness = element.steady_stiffness(&state, moduli);
+            add(&mut self.rows.blocks, targets, &stiffness);
+        }
+        for (row, &node) in near.nodes[..near.core].iter().enumerate() {
+            let inertia = self.current.kappa * env.body.mass[node as usize];
+            if let Some(own) = self.rows.position(row, row as u32) {
+                for axis in 0..3 {
+                    self.rows.blocks[own][4 * axis] += inertia;
+                }
+            }
+        }
+    }
+
+    /// `t = B t` in place, `[3 S]`, µN to mm.
+    pub fn solve(&mut self, isa: Isa, t: &mut [f32]) {
+        self.factor.solve(isa, t);
+    }
+
+    /// `out = K_RS t`, µN, at the places from the inside on, `[3 R]`.
+    pub fn around(&self, t: &[f32], out: &mut [f32]) {
+        out.fill(0.0);
+        let inside = self.rows.rows();
+        let out = out.as_chunks_mut::<3>().0;
+        for (row, t) in t.as_chunks::<3>().0.iter().enumerate() {
+            self.each_around(row, |column, block| {
+                let out = &mut out[column - inside];
+                for (axis, out) in out.iter_mut().enumerate() {
+                    *out += block[axis] * t[0] + block[3 + axis] * t[1] + block[6 + axis] * t[2];
+                }
+            });
+        }
+    }
+
+    /// `out = K_SR v_R`, µN, `[3 S]`, of a field `[.., 3]` by place.
+    pub fn stretch(&self, v: &[f32], out: &mut [f32]) {
+        out.fill(0.0);
+        let v = v.as_chunks::<3>().0;
+        for (row, out) in out.as_chunks_mut::<3>().0.iter_mut().enumerate() {
+            self.each_around(row, |column, block| {
+                let v = &v[column];
+                for (axis, out) in out.iter_mut().enumerate() {
+                    let line = &block[3 * axis..];
+                    *out += line[0] * v[0] + line[1] * v[1] + line[2] * v[2];
+                }
+            });
+        }
+    }
+
+    /// The entries of a row beyond the inside: the last ones.
+    fn each_around(&self, row: usize, mut take: impl FnMut(usize, &[f32; 9])) {
+        let inside = self.rows.rows() as u32;
+        let columns = self.rows.row(row);
+        let first = columns.partition_point(|column| *column < inside);
+        let blocks = &self.rows.blocks[self.rows.starts[row] as usize..];
+        for (column, block) in columns.iter().zip(blocks).skip(first) {
+            take(*column as usize, block);
+        }
+    }
+}
+
+/// Adds an element's stiffness to the blocks of its corners.
+fn add(blocks: &mut [[f32; 9]], targets: &[u32; 16], stiffness: &[[f64; 12]; 12]) {
+    for (at, &target) in targets.iter().enumerate() {
+        if let Some(block) = blocks.get_mut(target as usize) {
+            let (row, column) = (3 * (at / 4), 3 * (at % 4));
+            for (k, value) in block.iter_mut().enumerate() {
+                *value += stiffness[row + k / 3][column + k % 3] as f32;
+            }
+        }
+    }
+}

@@ -1,0 +1,134 @@
+//! Dense kernels of a front, upper triangle, row-major.
+
+/// Rows of `U` that are made before the others are changed by them.
+const PANEL: usize = 8;
+/// Partial sums of an inner product.
+const LANES: usize = 16;
+
+lanes::by_isa! {
+    /// The first `own` rows of `[width, width]` become rows of `U` with the inverse on the diagonal, the others what is left; whether all
+    /// pivots are positive.
+    pub fn eliminate(a: &mut [f32], width: usize, own: usize, is_positive: &mut bool) = eliminate_lanes, eliminate_plain;
+}
+
+/// Compiled with the instructions of `L`; the compiler makes the vectors.
+#[inline(always)]
+unsafe fn eliminate_lanes<L>(a: &mut [f32], width: usize, own: usize, is_positive: &mut bool) {
+    eliminate_plain(a, width, own, is_positive);
+}
+
+#[inline(always)]
+fn eliminate_plain(a: &mut [f32], width: usize, own: usize, is_positive: &mut bool) {
+    let mut first = 0;
+    while first < own {
+        let end = (first + PANEL).min(own);
+        for k in first..end {
+            let (above, rows) = a.split_at_mut(k * width);
+            let row = &mut rows[k..width];
+            for earlier in first..k {
+                let earlier = &above[earlier * width + k..(earlier + 1) * width];
+                subtract(row, earlier, earlier[0]);
+            }
+            let pivot = row[0];
+            *is_positive &= pivot > 0.0 && pivot.is_finite();
+            if !*is_positive {
+                return;
+            }
+            let inverse = 1.0 / pivot.sqrt();
+            row[0] = inverse;
+            for value in &mut row[1..] {
+                *value *= inverse;
+            }
+        }
+        let (panel, rest) = a.split_at_mut(end * width);
+        let panel = &panel[first * width..];
+        for (i, row) in rest.chunks_exact_mut(width).enumerate() {
+            let i = end + i;
+            let row = &mut row[i..];
+            if end - first == PANEL {
+                let lines: [&[f32]; PANEL] =
+                    std::array::from_fn(|k| &panel[k * width + i..(k + 1) * width]);
+                subtract_panel(row, lines);
+            } else {
+                for line in panel.chunks_exact(width) {
+                    subtract(row, &line[i..], line[i]);
+                }
+            }
+        }
+        first = end;
+    }
+}
+
+#[inline(always)]
+fn subtract(row: &mut [f32], line: &[f32], factor: f32) {
+    for (value, line) in row.iter_mut().zip(line) {
+        *value -= factor * line;
+    }
+}
+
+#[inline(always)]
+fn subtract_panel(row: &mut [f32], lines: [&[f32]; PANEL]) {
+    let len = row.len();
+    let lines = lines.map(|line| &line[..len]);
+    let factors = lines.map(|line| line[0]);
+    for j in 0..len {
+        let mut sum = row[j];
+        for k in 0..PANEL {
+            sum -= factors[k] * lines[k][j];
+        }
+        row[j] = sum;
+    }
+}
+
+lanes::by_isa! {
+    /// `U11^T y1 = b1`, `b2 -= U12^T y1` with the rows `[own, width]` of `U`, of a right side `[width]`.
+    pub fn solve_forward(upper: &[f32], width: usize, x: &mut [f32]) = forward_lanes, forward_plain;
+}
+lanes::by_isa! {
+    /// `U11 x1 = y1 - U12 x2` of a right side `[width]`.
+    pub fn solve_back(upper: &[f32], width: usize, x: &mut [f32]) = back_lanes, back_plain;
+}
+
+#[inline(always)]
+unsafe fn forward_lanes<L>(upper: &[f32], width: usize, x: &mut [f32]) {
+    forward_plain(upper, width, x);
+}
+
+#[inline(always)]
+unsafe fn back_lanes<L>(upper: &[f32], width: usize, x: &mut [f32]) {
+    back_plain(upper, width, x);
+}
+
+#[inline(always)]
+fn forward_plain(upper: &[f32], width: usize, x: &mut [f32]) {
+    for (k, row) in upper.chunks_exact(width).enumerate() {
+        let y = x[k] * row[k];
+        x[k] = y;
+        subtract(&mut x[k + 1..], &row[k + 1..], y);
+    }
+}
+
+#[inline(always)]
+fn back_plain(upper: &[f32], width: usize, x: &mut [f32]) {
+    for (k, row) in upper.chunks_exact(width).enumerate().rev() {
+        let (line, known) = (&row[k + 1..], &x[k + 1..width]);
+        let mut sums = [0.0f32; LANES];
+        let (wide, rest) = line.as_chunks::<LANES>();
+        let (wide_x, rest_x) = known.as_chunks::<LANES>();
+        for (a, b) in wide.iter().zip(wide_x) {
+            for lane in 0..LANES {
+                sums[lane] += a[lane] * b[lane];
+            }
+        }
+        let mut sum: f32 = rest.iter().zip(rest_x).map(|(a, b)| a * b).sum();
+        let mut half = LANES / 2;
+        while half > 0 {
+            for lane in 0..half {
+                sums[lane] += sums[lane + half];
+            }
+            half /= 2;
+        }
+        sum += sums[0];
+        x[k] = (x[k] - sum) * row[k];
+    }
+}
