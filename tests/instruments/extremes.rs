@@ -24,7 +24,7 @@ fn a_tool_that_starts_deep_inside_is_told_of_and_comes_out_on_its_own_side() {
         );
         deepest.push(reading.penetration_mm);
     }
-    assert!(deepest[11] < 0.1 && deepest[11] < deepest[0], "{deepest:?}");
+    assert!(deepest[11] < 0.1, "{deepest:?}");
     let stats = scene.stats();
     assert!(stats.min_det > 0.0 && stats.flags & flag::DEEP == 0);
 }

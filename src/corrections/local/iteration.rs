@@ -196,9 +196,15 @@ impl LocalSolver {
             .copied()
             .zip(change.forces.iter().copied());
         self.loads.extend(loads.filter(|load| load.1 != 0.0));
-        if self.loads.is_empty() {
-            return Ok(());
+        match self.loads.is_empty() {
+            true => Ok(()),
+            false => self.respond(step),
         }
+    }
+
+    /// Adds the response to `loads` to the direction.
+    pub(super) fn respond(&mut self, step: &mut StepContext<'_>) -> Result<()> {
+        let env = step.context.env();
         self.reduced.clear(&self.near)?;
         let (near, reduced) = (&self.near, &mut self.reduced);
         for &(dof, force) in &self.loads {

@@ -23,6 +23,7 @@ impl Linearisation {
     /// There is none.
     pub(super) fn clear(&mut self) {
         self.centres.clear();
+        self.kappa = 0.0;
         self.u.clear();
     }
 

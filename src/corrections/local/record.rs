@@ -31,13 +31,11 @@ pub struct Record {
 impl Record {
     /// Checks what was read.
     pub fn check(&self, [nodes, modes]: [usize; 2]) -> Result<()> {
-        let ascends = |list: &[u32], end: usize| {
-            list.windows(2).all(|pair| pair[0] < pair[1])
-                && list.last().is_none_or(|&last| (last as usize) < end)
-        };
-        let sound = self.about.iter().all(|&node| (node as usize) < nodes)
-            && ascends(&self.centres, nodes)
-            && ascends(&self.nodes, nodes);
+        let inside = |list: &[u32]| list.iter().all(|&node| (node as usize) < nodes);
+        let sound = inside(&self.about)
+            && inside(&self.nodes)
+            && inside(&self.centres)
+            && self.centres.windows(2).all(|pair| pair[0] < pair[1]);
         if !sound {
             return Err(crate::Error::Snapshot(
                 "holds corrections of another body".into(),

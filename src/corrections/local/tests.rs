@@ -1,9 +1,12 @@
 //! What the local products say of a state against the residual of the whole body there.
 
+use std::cell::RefCell;
 use std::path::Path;
 
+use super::columns::Response;
 use super::*;
 use crate::bundle::{BundleFiles, Mesh};
+use crate::contact::Tangent;
 use crate::corrections::input::{Enough, Report};
 use crate::corrections::{Corrections, ImplicitSolver};
 use crate::field::ContactSet;
@@ -177,4 +180,68 @@ fn the_products_are_those_of_the_whole_body() {
     // From a body that has turned: near exact, far the nonlinearity of the clusters.
     let [near, modes] = errors(&bench, 4.0, 0.5);
     assert!(near < 1e-3 && modes < 0.1, "turned: {near:e}, {modes:e}");
+}
+
+#[test]
+fn contact_has_the_compliance_of_the_preconditioner() {
+    let bench = Bench::open();
+    let (context, input) = (bench.context(), bench.input());
+    let env = context.env();
+    let mut solver = ImplicitSolver::new(context).unwrap();
+    let mut report = Report::default();
+    let mut random = Random::new(5);
+    let (_, u) = bench.smooth(&mut random, 4.0);
+    let mut r = bench.zero.clone();
+    let still = bench.zero.clone();
+    solver
+        .residual(context, [&still, &u, &u], &mut r, &mut report)
+        .unwrap();
+    LocalSolver::made(&mut solver.local, context).unwrap();
+    let local = solver.local.as_deref_mut().unwrap();
+    let nodes = &bench.prior.contact_nodes;
+    let middle = nodes.len() / 2;
+    local.touched = vec![nodes[middle]];
+    let mut step = StepContext {
+        context,
+        input: &input,
+        preconditioner: &mut solver.preconditioner,
+        scratch: &mut solver.scratch,
+        drift: &solver.drift,
+    };
+    let base = Base {
+        u: &u,
+        residual: &r,
+    };
+    local.begin(&mut step, base).unwrap();
+    let is_close = |column: &u32| local.near.holds(nodes[*column as usize]);
+    let columns: Vec<u32> = (0..nodes.len() as u32).filter(is_close).take(4).collect();
+    assert_eq!(columns.len(), 4);
+    let order = 3 * columns.len();
+    let mut upper = vec![0.0; order * order];
+    let own = (&mut local.factor, &mut local.columns, &mut local.room);
+    let response = Response {
+        env,
+        near: &local.near,
+        preconditioner: step.preconditioner,
+        own: RefCell::new(own),
+    };
+    response.gather(&columns, &mut upper).unwrap();
+    let largest = upper.iter().fold(0.0f64, |most, a| most.max(a.abs()));
+    for from in 0..order {
+        // The preconditioner's answer to 1 mN there, at all of them.
+        local.loads = vec![(3 * columns[from / 3] + (from % 3) as u32, 1.0)];
+        local.d.clear(&local.near).unwrap();
+        resize(&mut local.d_modes, 3 * local.near.nodes.len()).unwrap();
+        local.respond(&mut step).unwrap();
+        for to in 0..order {
+            let node = nodes[columns[to / 3] as usize];
+            let at = 3 * local.near.place(node).unwrap() + to % 3;
+            let found = f64::from(local.d.t[at] + local.d_modes[at]);
+            let wanted = upper[from.min(to) * order + from.max(to)];
+            assert!(
+                (found - wanted).abs() < 2e-3 * largest,
+                "{found} for {wanted} of {largest}, {from} to {to}"
+            );
+        }
+    }
 }

@@ -206,6 +206,9 @@ impl SparseFactor {
         for (index, &place) in border.iter().enumerate() {
             self.local[place as usize] = (own + index) as u32;
         }
+        if width == 0 {
+            return Ok(true);
+        }
         let dense = &mut self.front[..width * width];
         dense.fill(0.0);
         for (index, place) in (first..first + own).enumerate() {
@@ -285,7 +288,7 @@ impl SparseFactor {
             front.scatter(values, &mut self.permuted);
             front.scatter_border(borders, values, &mut self.permuted);
         }
-        for front in self.fronts.iter().rev() {
+        for front in self.fronts.iter().rev().filter(|front| front.own > 0) {
             let width = front.gather(borders, &self.permuted, values);
             let upper = &self.upper[front.upper..][..3 * front.own as usize * width];
             solve_back(isa, upper, width, &mut values[..width]);
