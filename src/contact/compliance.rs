@@ -10,6 +10,8 @@ use crate::memory::{self, HeldBytes};
 use crate::prior::{CoarseSpace, PriorTable};
 
 pub(super) const WHAT: &str = "the compliance of a contact";
+/// Columns that a contact reads of deformed tissue, each of which takes some solves; where it touches more, it takes those of tissue at rest.
+const MOST_DEFORMED: usize = 40;
 
 /// The tables of a solve.
 #[derive(Clone, Copy)]
@@ -245,7 +247,9 @@ impl Delassus {
         self.wanted.sort_unstable();
         self.wanted.dedup();
         let known = |column: &u32| self.columns.binary_search(column).is_ok();
-        let generation = compliance.tangent.map_or(0, |tangent| tangent.generation());
+        let few = |_: &&dyn Tangent| self.wanted.len() <= MOST_DEFORMED;
+        let tangent = compliance.tangent.filter(few);
+        let generation = tangent.map_or(0, |tangent| tangent.generation());
         let same_kind =
             self.is_static == compliance.inertia.is_none() && self.generation == generation;
         if same_kind
@@ -280,7 +284,7 @@ impl Delassus {
             return Err(error);
         }
         self.upper.resize(order * order, 0.0);
-        if let Some(tangent) = compliance.tangent {
+        if let Some(tangent) = tangent {
             if let Err(error) = tangent.gather(&self.columns, &mut self.upper) {
                 self.forget();
                 return Err(error);

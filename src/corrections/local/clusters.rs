@@ -89,7 +89,8 @@ impl Clusters {
                     room.field[3 * place as usize + i] = weight[j];
                 }
                 near.project(env, &room.field, &mut room.q);
-                preconditioner.on_modes_in(env, &near.ranges, &room.q, &mut room.linear);
+                room.find_used(near)?;
+                preconditioner.on_modes_in(env, &room.used, &room.q, &mut room.linear);
                 add(-1.0, &room.linear, own);
             }
         }

@@ -141,7 +141,8 @@ impl NearFactor {
         resize(&mut room.linear, p.len())?;
         self.around(t, &mut room.field[t.len()..]);
         near.project(env, &room.field, &mut room.q);
-        preconditioner.on_modes_in(env, &near.ranges, &room.q, &mut room.linear);
+        room.find_used(near)?;
+        preconditioner.on_modes_in(env, &room.used, &room.q, &mut room.linear);
         add(-1.0, &room.linear, p);
         Ok(())
     }

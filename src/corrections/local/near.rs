@@ -29,6 +29,8 @@ const LEFT_MM: f32 = 12.0;
 /// Nodes are of the core that lie this close to a centre at rest, mm, and as many mean edges.
 const CORE_MM: f32 = 20.0;
 const CORE_EDGES: f32 = 4.0;
+/// Nodes of the core, unless so few lie within an edge of the centres.
+const MOST_CORE: usize = 700;
 /// A node that is not near.
 const NONE: u32 = u32::MAX;
 
@@ -51,6 +53,8 @@ pub(in crate::corrections) struct NearSet {
     /// Within reach of a centre, and near elements at a node, while a set is filled.
     is_reached: Vec<bool>,
     counts: Vec<u16>,
+    /// Of the near nodes from the nearest centre, squared, mm².
+    distances: Vec<f32>,
     subset: Subset,
     /// Numbers of the near elements in the mesh, ascending.
     numbers: Vec<u32>,
@@ -78,6 +82,7 @@ impl NearSet {
             places: memory::filled(count, NONE, WHAT)?,
             is_reached: memory::filled(count, false, WHAT)?,
             counts: memory::filled(count, 0, WHAT)?,
+            distances: Vec::new(),
             subset: memory::tried(Subset::new(&env.body.forces), WHAT)?,
             numbers: Vec::new(),
             elements: LinearElements::default(),
@@ -155,11 +160,7 @@ impl NearSet {
             self.take_elements(env, far, rest, f32::MAX)?;
         }
         (self.inside, self.free, self.core) = (0, 0, 0);
-        let core = CORE_MM.min(CORE_EDGES * far.edge_mm);
-        for at in 0..self.nodes.len() {
-            let node = self.nodes[at];
-            self.is_reached[node as usize] = is_by(rest, &self.chosen, node, core);
-        }
+        self.find_core(far, rest)?;
         let rank = |node: u32| {
             let at = node as usize;
             let whole = self.counts[at] == far.elements_at[at];
@@ -189,6 +190,26 @@ impl NearSet {
             self.ranges.push(ends[0] as usize..ends[1] as usize);
         }
         memory::replace(&mut self.centres, &self.chosen, WHAT)
+    }
+
+    /// Marks the nodes of the core as reached, and no others that are near.
+    fn find_core(&mut self, far: &FarField, rest: &[f32]) -> Result<()> {
+        let mut reach = CORE_MM.min(CORE_EDGES * far.edge_mm);
+        self.distances.clear();
+        memory::fit(&mut self.distances, self.nodes.len(), WHAT)?;
+        let nearest = |node: &u32| nearest_squared(rest, &self.chosen, *node);
+        self.distances.extend(self.nodes.iter().map(nearest));
+        let within = |reach: f32| {
+            let found = self.distances.iter().filter(|d| **d < reach * reach);
+            found.count()
+        };
+        while within(reach) > MOST_CORE && reach > far.edge_mm {
+            reach *= 0.75;
+        }
+        for (&node, distance) in self.nodes.iter().zip(&self.distances) {
+            self.is_reached[node as usize] = *distance < reach * reach;
+        }
+        Ok(())
     }
 
     /// The elements of the nodes within reach, and their nodes; `elements` have these for places.
@@ -308,6 +329,17 @@ impl NearSet {
         }
         project_rows(env.isa, &env.prior.basis(), &self.plan, r, q);
     }
+}
+
+/// The square of the distance from a node to the nearest of some nodes at rest, mm².
+fn nearest_squared(rest: &[f32], nodes: &[u32], node: u32) -> f32 {
+    let at = |node: u32| &rest[3 * node as usize..][..3];
+    let own = at(node);
+    let squares = nodes.iter().map(|&other| {
+        let apart = own.iter().zip(at(other)).map(|(a, b)| (a - b) * (a - b));
+        apart.sum::<f32>()
+    });
+    squares.fold(f32::MAX, f32::min)
 }
 
 /// Whether one of some nodes lies within a distance of a node at rest.

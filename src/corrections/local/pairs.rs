@@ -6,6 +6,8 @@
 //! A pair is kept as a [`Record`] that does not depend on what else is near, and laid out for the near set of the moment: where nodes
 //! have come to it the change is that of linear elasticity, as it was while they were far.
 
+use std::ops::Range;
+
 use super::linear::WHAT;
 use super::near::NearSet;
 use super::record::Record;
@@ -293,6 +295,21 @@ pub(in crate::corrections) struct Room {
     /// A field by place, and one at the free nodes.
     pub field: Vec<f32>,
     pub linear: Vec<f32>,
+    /// Those of the near blocks in which `q` is not all zero.
+    pub used: Vec<Range<usize>>,
+}
+
+impl Room {
+    /// Finds the blocks in which the coordinates are not all zero.
+    pub fn find_used(&mut self, near: &NearSet) -> Result<()> {
+        self.used.clear();
+        memory::fit(&mut self.used, near.ranges.len(), WHAT)?;
+        let q = &self.q;
+        let is_used = |range: &&Range<usize>| q[(*range).clone()].iter().any(|q| *q != 0.0);
+        self.used
+            .extend(near.ranges.iter().filter(is_used).cloned());
+        Ok(())
+    }
 }
 
 /// Adds `rows_i . x` to the first `count` sums; rows may be longer than `x`. Sums over pieces are in f64.
