@@ -65,6 +65,9 @@ def a_recording_comes_again(browser: Browser, address: str, name: str) -> None:
     browser.wait("uptView.recording")
     browser.drag([(x, y), (x + 6, y)], release=False)
     browser.wait("uptView.largest > 2")
+    # Held for a second: long enough to be seen between two looks when it comes again.
+    steps = browser.run("return uptView.steps")
+    browser.wait(f"uptView.steps > {steps + 50}")
     browser.release()
     browser.click("#record")
     browser.wait("!uptView.recording")
