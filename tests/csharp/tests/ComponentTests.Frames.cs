@@ -52,7 +52,7 @@ namespace Upt.Tests
             }
             Assert.That(Debug.Errors, Is.Empty);
             Assert.That(touched, Is.GreaterThan(0));
-            Assert.That(deepest, Is.LessThan(0.5f), "mm");
+            Assert.That(deepest, Is.LessThan(0.6f), "mm");
             sample.gameObject.SetActive(false);
         }
 
