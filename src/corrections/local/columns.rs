@@ -8,16 +8,19 @@ use super::near::NearSet;
 use super::pairs::Room;
 use super::step::{add, dot, resize};
 use crate::contact::Tangent;
-use crate::corrections::precondition::{Env, Preconditioner};
+use crate::corrections::precondition::{DIAGONAL_WEIGHT, Env, Preconditioner};
 use crate::error::Result;
 use crate::memory::{self, HeldBytes};
+
+/// Where an entry of a symmetric block is among its six.
+const SYMMETRIC: [[usize; 3]; 3] = [[0, 1, 2], [1, 3, 4], [2, 4, 5]];
 
 /// What is known of columns, with the factor that it was made by.
 #[derive(Default, HeldBytes)]
 pub(super) struct NearColumns {
     generation: u64,
     columns: Vec<u32>,
-    /// By column and axis: `B e` of a force of 1 mN `[3 S]`, mm; what of the force is left to the modes `[r]`, µN; what they make of it `[r]`, mm.
+    /// By column and axis: `B e` of a force of 1 mN `[3 C]`, `C` the core, mm; what of the force is left to the modes `[r]`, µN; what they make of it `[r]`, mm.
     moved: Vec<f32>,
     on_modes: Vec<f32>,
     modes: Vec<f32>,
@@ -59,16 +62,22 @@ impl Tangent for Response<'_> {
                 let response = &known.modes[index * modes..][..modes];
                 for (i, &row) in columns[..=j].iter().enumerate() {
                     let node = self.env.prior.contact_nodes[row as usize];
-                    let place = self
-                        .near
-                        .place(node)
-                        .filter(|place| *place < self.near.core);
+                    let place = self.near.place(node);
+                    let is_diagonal = i == j;
                     let row = at(row);
                     for a in 0..3 {
                         let work = &known.on_modes[(3 * row + a) * modes..][..modes];
                         let mut sum = 1e-3 * dot(work, response);
-                        if let Some(place) = place {
-                            sum += f64::from(moved[3 * place + a]);
+                        match place {
+                            Some(place) if place < self.near.core => {
+                                sum += f64::from(moved[3 * place + a]);
+                            }
+                            // Outside of the core there is the diagonal.
+                            Some(place) if place < self.near.inside && is_diagonal => {
+                                let block = &self.env.time_step.inverse_blocks[node as usize];
+                                sum += f64::from(1e3 * DIAGONAL_WEIGHT * block[SYMMETRIC[a][b]]);
+                            }
+                            _ => {}
                         }
                         upper[(3 * i + a) * order + 3 * j + b] = sum;
                     }
@@ -101,7 +110,12 @@ impl NearColumns {
         memory::reserve(&mut self.on_modes, 3 * modes, WHAT)?;
         memory::reserve(&mut self.modes, 3 * modes, WHAT)?;
         let node = env.prior.contact_nodes[column as usize];
-        let (moved, on_modes) = (self.moved.len(), self.on_modes.len());
+        // What an error has left half made is made anew.
+        let known = 3 * self.columns.len();
+        let (moved, on_modes) = (known * size, known * modes);
+        self.moved.truncate(moved);
+        self.on_modes.truncate(on_modes);
+        self.modes.truncate(on_modes);
         self.moved.resize(moved + 3 * size, 0.0);
         self.on_modes.resize(on_modes + 3 * modes, 0.0);
         self.modes.resize(on_modes + 3 * modes, 0.0);

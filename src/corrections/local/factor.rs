@@ -1,13 +1,14 @@
-//! The exact factor of the tangent on the inside nodes, and the preconditioner that it makes with the modes.
+//! The exact factor of the tangent in the core, the inside nodes closest to the tools, and the preconditioner that it makes with the modes.
 //!
 //! ```text
-//! B = (K_SS + kappa M_SS)^-1        K the tangent of the law at a state, S the inside nodes
+//! B = (K_CC + kappa M_CC)^-1        K the tangent of the law at a state, C the core
 //! P = B + (I - B K) Phi G^-1 Phi^T (I - K B)
 //! ```
 //!
-//! Since `B K_SS` is the identity, what a move of the modes leaves inside is `-B K_SR Phi_R`, with the near nodes `R` around the inside: the field
-//! that their move stretches over `S`. Contact takes the same operator for its compliance, `E^T P E`: with that of the body at rest the forces
-//! that it finds are not those that the iterations balance (`docs/decisions/026-near-factor.md`).
+//! Since `B K_CC` is the identity, what a move of the modes leaves in the core is `-B K_CR Phi_R`, with the near nodes `R` around the core: the field
+//! that their move stretches over it. Contact takes the same operator for its compliance, `E^T P E`, unless it touches too many nodes
+//! for that: with the compliance of the body at rest the forces that it finds are not those that the iterations balance
+//! (`docs/decisions/026-near-factor.md`).
 
 use ::elements::Moduli;
 
@@ -20,12 +21,21 @@ use crate::kernels::Isa;
 use crate::kernels::cholesky::{BlockRows, SparseFactor};
 use crate::memory::{self, HeldBytes};
 
-/// An entry that an element does not have: its row is not inside.
+/// An entry that an element does not have: its row is not of the core.
 const NONE: u32 = u32::MAX;
 /// An element is taken at rest where its det F is less.
 const LEAST_DET: f64 = 0.2;
 /// The tangent is taken anew where an entry of F has changed by more than this since.
 const MOST_CHANGE: f32 = 0.2;
+/// What is factored until it is positive: the tangent, or the stiffness at rest, with so much of its diagonal added. A tangent need not be
+/// positive, and what rounding makes of a nearly incompressible body with slivers neither.
+const ATTEMPTS: [(bool, f32); 5] = [
+    (false, 0.0),
+    (true, 0.0),
+    (true, 1e-3),
+    (true, 0.1),
+    (true, 10.0),
+];
 
 /// See the module.
 #[derive(Default, HeldBytes)]
@@ -172,17 +182,17 @@ impl NearFactor {
         if !serves {
             let near = (near.centres.as_slice(), near.nodes.as_slice());
             self.current.set(near, kappa, u)?;
-            self.published.fit(&self.current)?;
-            self.made.fit(&self.current)?;
         }
+        // Taking it afterwards, and publishing it, cannot fail.
+        self.published.fit(&self.current)?;
+        self.made.fit(&self.current)?;
         if self.made == self.current {
             return Ok(());
         }
         self.made.clear();
         self.generation += 1;
-        for is_at_rest in [false, true] {
-            self.assemble(env, near, moduli, is_at_rest);
-            // A tangent need not be positive; that at rest is.
+        for (is_at_rest, more) in ATTEMPTS {
+            self.assemble(env, near, moduli, (is_at_rest, more));
             if self.factor.factor(env.isa, &self.rows)? {
                 self.made.take(&self.current);
                 return Ok(());
@@ -191,7 +201,7 @@ impl NearFactor {
         Err(Error::bundle(
             "mesh.safetensors",
             format!(
-                "the stiffness at rest of {} nodes is not positive definite: remake the bundle",
+                "the stiffness of {} nodes is not finite: remake the bundle",
                 near.core
             ),
         ))
@@ -210,7 +220,13 @@ impl NearFactor {
         changes.fold(0.0, f32::max)
     }
 
-    fn assemble(&mut self, env: Env<'_>, near: &NearSet, moduli: Moduli, is_at_rest: bool) {
+    fn assemble(
+        &mut self,
+        env: Env<'_>,
+        near: &NearSet,
+        moduli: Moduli,
+        (is_at_rest, more): (bool, f32),
+    ) {
         self.rows.blocks.fill([0.0; 9]);
         let u = self.current.u.as_chunks::<3>().0;
         for (at, targets) in self.targets.iter().enumerate() {
@@ -234,25 +250,26 @@ impl NearFactor {
             let inertia = self.current.kappa * env.body.mass[node as usize];
             if let Some(own) = self.rows.position(row, row as u32) {
                 for axis in 0..3 {
-                    self.rows.blocks[own][4 * axis] += inertia;
+                    let value = &mut self.rows.blocks[own][4 * axis];
+                    *value += more * *value + inertia;
                 }
             }
         }
     }
 
-    /// `t = B t` in place, `[3 S]`, µN to mm.
+    /// `t = B t` in place, `[3 C]`, µN to mm.
     pub fn solve(&mut self, isa: Isa, t: &mut [f32]) {
         self.factor.solve(isa, t);
     }
 
-    /// `out = K_RS t`, µN, at the places from the inside on, `[3 R]`.
+    /// `out = K_RC t`, µN, at the places beyond the core, `[3 R]`.
     pub fn around(&self, t: &[f32], out: &mut [f32]) {
         out.fill(0.0);
-        let inside = self.rows.rows();
+        let core = self.rows.rows();
         let out = out.as_chunks_mut::<3>().0;
         for (row, t) in t.as_chunks::<3>().0.iter().enumerate() {
             self.each_around(row, |column, block| {
-                let out = &mut out[column - inside];
+                let out = &mut out[column - core];
                 for (axis, out) in out.iter_mut().enumerate() {
                     *out += block[axis] * t[0] + block[3 + axis] * t[1] + block[6 + axis] * t[2];
                 }
@@ -260,7 +277,7 @@ impl NearFactor {
         }
     }
 
-    /// `out = K_SR v_R`, µN, `[3 S]`, of a field `[.., 3]` by place.
+    /// `out = K_CR v_R`, µN, `[3 C]`, of a field `[.., 3]` by place.
     pub fn stretch(&self, v: &[f32], out: &mut [f32]) {
         out.fill(0.0);
         let v = v.as_chunks::<3>().0;
@@ -275,11 +292,11 @@ impl NearFactor {
         }
     }
 
-    /// The entries of a row beyond the inside: the last ones.
+    /// The entries of a row beyond the core: the last ones.
     fn each_around(&self, row: usize, mut take: impl FnMut(usize, &[f32; 9])) {
-        let inside = self.rows.rows() as u32;
+        let core = self.rows.rows() as u32;
         let columns = self.rows.row(row);
-        let first = columns.partition_point(|column| *column < inside);
+        let first = columns.partition_point(|column| *column < core);
         let blocks = &self.rows.blocks[self.rows.starts[row] as usize..];
         for (column, block) in columns.iter().zip(blocks).skip(first) {
             take(*column as usize, block);

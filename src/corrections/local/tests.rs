@@ -90,6 +90,39 @@ impl Bench {
     }
 }
 
+impl Bench {
+    /// The local solver with `u` as its base and one node touched.
+    fn begun<'a>(
+        &'a self,
+        input: &'a Input<'a>,
+        solver: &'a mut ImplicitSolver,
+        u: &[f32],
+        touched: u32,
+    ) -> (&'a mut LocalSolver, StepContext<'a>) {
+        let context = self.context();
+        let (mut residual, still) = (self.zero.clone(), &self.zero);
+        let mut report = Report::default();
+        solver
+            .residual(context, [still, u, u], &mut residual, &mut report)
+            .unwrap();
+        let local = LocalSolver::made(&mut solver.local, context).unwrap();
+        local.touched = vec![touched];
+        let mut step = StepContext {
+            context,
+            input,
+            preconditioner: &mut solver.preconditioner,
+            scratch: &mut solver.scratch,
+            drift: &solver.drift,
+        };
+        let base = Base {
+            u,
+            residual: &residual,
+        };
+        local.begin(&mut step, base).unwrap();
+        (local, step)
+    }
+}
+
 fn relative(found: &[f32], wanted: &[f32], change: f64) -> f64 {
     let mut difference = found.to_vec();
     add(-1.0, wanted, &mut difference);
@@ -102,29 +135,9 @@ fn errors(bench: &Bench, base_mm: f32, step_mm: f32) -> [f64; 2] {
     let env = context.env();
     let mut random = Random::new(11);
     let mut solver = ImplicitSolver::new(context).unwrap();
-    let mut report = Report::default();
     let (_, u) = bench.smooth(&mut random, base_mm);
-    let mut r = bench.zero.clone();
-    let still = bench.zero.clone();
-    solver
-        .residual(context, [&still, &u, &u], &mut r, &mut report)
-        .unwrap();
-    LocalSolver::made(&mut solver.local, context).unwrap();
     let middle = bench.mesh.domain_nodes[bench.mesh.domain_nodes.len() / 2];
-    let local = solver.local.as_deref_mut().unwrap();
-    local.touched = vec![middle];
-    let mut step = StepContext {
-        context,
-        input: &input,
-        preconditioner: &mut solver.preconditioner,
-        scratch: &mut solver.scratch,
-        drift: &solver.drift,
-    };
-    let base = Base {
-        u: &u,
-        residual: &r,
-    };
-    local.begin(&mut step, base).unwrap();
+    let (local, mut step) = bench.begun(&input, &mut solver, &u, middle);
     assert!(local.near.inside > 20 && local.near.nodes.len() < bench.mesh.node_count() / 2);
 
     let (c, _) = bench.smooth(&mut random, step_mm);
@@ -149,8 +162,10 @@ fn errors(bench: &Bench, base_mm: f32, step_mm: f32) -> [f64; 2] {
     let (near, r_found) = (local.near.nodes.clone(), local.next.r.clone());
     let before = local.base.clone();
     let inside = local.near.inside;
+    let (mut r, still) = (bench.zero.clone(), &bench.zero);
+    let mut report = Report::default();
     solver
-        .residual(context, [&still, &whole, &whole], &mut r, &mut report)
+        .residual(context, [still, &whole, &whole], &mut r, &mut report)
         .unwrap();
     let r_whole: Vec<f32> = near[..inside]
         .iter()
@@ -188,33 +203,19 @@ fn contact_has_the_compliance_of_the_preconditioner() {
     let (context, input) = (bench.context(), bench.input());
     let env = context.env();
     let mut solver = ImplicitSolver::new(context).unwrap();
-    let mut report = Report::default();
-    let mut random = Random::new(5);
-    let (_, u) = bench.smooth(&mut random, 4.0);
-    let mut r = bench.zero.clone();
-    let still = bench.zero.clone();
-    solver
-        .residual(context, [&still, &u, &u], &mut r, &mut report)
-        .unwrap();
-    LocalSolver::made(&mut solver.local, context).unwrap();
-    let local = solver.local.as_deref_mut().unwrap();
+    let (_, u) = bench.smooth(&mut Random::new(5), 4.0);
     let nodes = &bench.prior.contact_nodes;
-    let middle = nodes.len() / 2;
-    local.touched = vec![nodes[middle]];
-    let mut step = StepContext {
-        context,
-        input: &input,
-        preconditioner: &mut solver.preconditioner,
-        scratch: &mut solver.scratch,
-        drift: &solver.drift,
+    let (local, mut step) = bench.begun(&input, &mut solver, &u, nodes[nodes.len() / 2]);
+    // Two in the core, two outside of it.
+    let all = 0..nodes.len() as u32;
+    let place = |column: &u32| local.near.place(nodes[*column as usize]);
+    let (core, inside) = (local.near.core, local.near.inside);
+    let within = |from: usize, to: usize| {
+        let is_there = move |column: &u32| place(column).is_some_and(|p| (from..to).contains(&p));
+        all.clone().filter(is_there).take(2)
     };
-    let base = Base {
-        u: &u,
-        residual: &r,
-    };
-    local.begin(&mut step, base).unwrap();
-    let is_close = |column: &u32| local.near.holds(nodes[*column as usize]);
-    let columns: Vec<u32> = (0..nodes.len() as u32).filter(is_close).take(4).collect();
+    let mut columns: Vec<u32> = within(0, core).chain(within(core, inside)).collect();
+    columns.sort_unstable();
     assert_eq!(columns.len(), 4);
     let order = 3 * columns.len();
     let mut upper = vec![0.0; order * order];
