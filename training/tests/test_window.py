@@ -45,7 +45,7 @@ def gradient(trainer: Trainer, windows: Windows, p: float, seed: int = 3) -> tor
 def plain(trainer: Trainer) -> PlainWindows:
     w = trainer.windows
     trainer.model.aggregate = padded_aggregate.__get__(trainer.model)
-    return PlainWindows(w.settings, w.stepper, w.cache, w.pool, w.generator, w.draw)
+    return PlainWindows(w.settings, w.stepper, w.cache, w.pool, w.generator, w.draw, w.noise)
 
 
 def relative(a: torch.Tensor, b: torch.Tensor) -> float:

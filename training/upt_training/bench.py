@@ -114,7 +114,7 @@ def trainer_of(lever: Lever, settings: Settings, options, mesh, table, folder: P
         trainer.model.aggregate = MethodType(padded_aggregate, trainer.model)
     if not lever.lazy:
         w = trainer.windows
-        trainer.windows = PlainWindows(w.settings, w.stepper, w.cache, w.pool, w.generator, w.draw)
+        trainer.windows = PlainWindows(w.settings, w.stepper, w.cache, w.pool, w.generator, w.draw, w.noise)
     if not lever.fused and settings.train.optimiser == "adamw":
         for group in trainer.optimiser.param_groups:
             group["fused"] = None
@@ -127,7 +127,7 @@ def reseed(trainer: Trainer, window: int) -> None:
     trainer.draw.manual_seed(window)
     torch.manual_seed(window)
     if trainer.pool is not None:
-        trainer.pool = ReplayPool(trainer.train_cache, POOL_SLOTS, trainer.generator)
+        trainer.pool = ReplayPool(trainer.train_cache, POOL_SLOTS, trainer.generator, trainer.device)
         trainer.windows.pool = trainer.pool
 
 

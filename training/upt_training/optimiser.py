@@ -17,16 +17,16 @@ class Lion(torch.optim.Optimizer):
     def step(self, closure=None):
         for group in self.param_groups:
             first, second = group["betas"]
-            for p in group["params"]:
-                if p.grad is None:
-                    continue
-                state = self.state[p]
-                if not state:
-                    state["momentum"] = torch.zeros_like(p)
-                m = state["momentum"]
-                p.mul_(1.0 - group["lr"] * group["weight_decay"])
-                p.add_(torch.sign(m.lerp(p.grad, 1.0 - first)), alpha=-group["lr"])
-                m.lerp_(p.grad, 1.0 - second)
+            own = [p for p in group["params"] if p.grad is not None]
+            for p in own:
+                if not self.state[p]:
+                    self.state[p]["momentum"] = torch.zeros_like(p)
+            gradients, momenta = [p.grad for p in own], [self.state[p]["momentum"] for p in own]
+            torch._foreach_mul_(own, 1.0 - group["lr"] * group["weight_decay"])
+            signs = torch._foreach_lerp(momenta, gradients, 1.0 - first)
+            torch._foreach_sign_(signs)
+            torch._foreach_add_(own, signs, alpha=-group["lr"])
+            torch._foreach_lerp_(momenta, gradients, 1.0 - second)
 
 
 def make_optimiser(settings, model: torch.nn.Module) -> torch.optim.Optimizer:

@@ -28,6 +28,7 @@ from upt_training.rollout import Stepper, autoregressive_scores, cache_rollout
 from upt_training.window import Windows
 
 POOL_SLOTS = 64
+POOL_BATCHES = 4  # rollouts in the pool are as many as this number of batches, and POOL_SLOTS at least
 
 
 class Trainer:
@@ -66,8 +67,13 @@ class Trainer:
         self.draw = torch.Generator().manual_seed(t.seed + 7919 * self.rank)
         if self.rank > 0:  # drop path differs too
             torch.manual_seed(t.seed + 7919 * self.rank)
-        self.pool = ReplayPool(train, POOL_SLOTS, self.generator) if t.strategy == "replay" else None
-        self.windows = Windows(settings, self.stepper, train, self.pool, self.generator, self.draw)
+        # Noise is drawn where the state lies: copies of it would take longer than the step of a GPU.
+        self.noise = self.draw
+        if self.device.type != "cpu":
+            self.noise = torch.Generator(self.device).manual_seed(t.seed + 7919 * self.rank)
+        slots = max(POOL_SLOTS, POOL_BATCHES * t.micro_batch)
+        self.pool = ReplayPool(train, slots, self.generator, self.device) if t.strategy == "replay" else None
+        self.windows = Windows(settings, self.stepper, train, self.pool, self.generator, self.draw, self.noise)
         self.step_count, self.best, self.stale = 0, float("inf"), 0
         self.core_seconds = 0.0  # CPU time of this process in training steps, over all resumed parts
         self.loss_scale = 1.0 / float((self.model.output_scale**2).sum())
@@ -209,7 +215,9 @@ class Trainer:
             "pool": self.pool.state_dict() if self.pool is not None and name == "last.pt" else None,
             "random": {
                 "torch": torch.get_rng_state(),
+                "device": torch.cuda.get_rng_state(self.device) if self.device.type == "cuda" else None,
                 "draw": self.draw.get_state(),
+                "noise": self.noise.get_state(),
                 "numpy": self.generator.bit_generator.state,
             },
             "step_count": self.step_count,
@@ -246,6 +254,9 @@ class Trainer:
             self.pool.load_state_dict(state["pool"])
         torch.set_rng_state(state["random"]["torch"])
         self.draw.set_state(state["random"]["draw"])
+        if self.device.type == "cuda" and state["random"].get("device") is not None:
+            torch.cuda.set_rng_state(state["random"]["device"], self.device)
+            self.noise.set_state(state["random"]["noise"])
         self.generator.bit_generator.state = state["random"]["numpy"]
 
     def start_from(self, path: Path) -> None:

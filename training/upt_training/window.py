@@ -37,7 +37,8 @@ class Plan:
 
 
 class Windows:
-    """Draws windows of the training cases. `generator` chooses cases and frames, `draw` everything else."""
+    """Draws windows of the training cases. `generator` chooses cases and frames, `noise` (of the device) is added to
+    states, `draw` chooses everything else."""
 
     def __init__(
         self,
@@ -47,9 +48,10 @@ class Windows:
         pool: ReplayPool | None,
         generator: np.random.Generator,
         draw: torch.Generator,
+        noise: torch.Generator,
     ):
         self.settings, self.stepper, self.cache, self.pool = settings, stepper, cache, pool
-        self.generator, self.draw, self.device = generator, draw, stepper.device
+        self.generator, self.draw, self.noise, self.device = generator, draw, noise, stepper.device
         self.bf16 = settings.train.bf16 and fast_bf16(self.device)
 
     def plan(self, p: float) -> Plan:
@@ -57,7 +59,7 @@ class Windows:
         t, slots, first = self.settings.train, None, 1
         if self.pool is not None:
             window = t.window
-            slots, case, frame, state = self.pool.take(t.micro_batch, window, self.device)
+            slots, case, frame, state = self.pool.take(t.micro_batch, window)
             if p > 0:
                 state = self.teach(state, case, frame, self.forced(p))
         else:
@@ -132,7 +134,7 @@ class Windows:
                 state = state.part(part)
             target = {k: v.to(self.device) for k, v in self.cache.fields(case[part], frame[part]).items()}
             if t.corrupt_contact > 0 or t.input_noise_mm > 0:
-                state = corrupt(state, target["contact"], t.corrupt_contact, t.input_noise_mm, self.draw)
+                state = corrupt(state, target["contact"], t.corrupt_contact, t.input_noise_mm, self.draw, self.noise)
             base, rows = self.base(state, target), self.rows(n) if 0 < t.scored_rows < n else None
             scored = None if rows is None else (rows, read, readers.to(self.device))
             state = self.stepper.step(state, target, tables, scored, drawn)
