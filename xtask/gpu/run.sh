@@ -1,6 +1,8 @@
 #!/usr/bin/env bash
 # Runs on the GPU machine, in the unpacked folder:  run.sh OUT [--rehearse] [PROVIDERS]
 #   PROVIDERS   a list like cpu,cuda,tensorrt,tensorrt-rtx; default cpu,cuda
+#   STEPS, SCENES and TORCH (default 1000, 1,2,4,8 and eager,compiled) say how many steps are timed, how many scenes at once,
+#   and how PyTorch runs
 #   --rehearse  a few steps on the CPU alone: all parts run, and OUT/missing says what was not measured
 # Writes OUT/rows.jsonl (a row a line, also of what a provider refused), OUT/rows-torch.json (PyTorch's, and the card's rates),
 # OUT/missing (what else was not measured: why), OUT/doctor.json, OUT/errors-P/ (`upt report`: errors of rollouts against
@@ -11,8 +13,8 @@ set -euo pipefail
 out=${1:?usage: run.sh OUT [--rehearse] [PROVIDERS]}
 shift
 providers=cpu,cuda
-steps=1000
-scenes=1,2,4,8
+steps=${STEPS:-1000}
+scenes=${SCENES:-1,2,4,8}
 rehearse=
 if [ "${1:-}" = --rehearse ]; then
   shift
@@ -43,6 +45,14 @@ export ORT_DYLIB_PATH ORT_DISABLE_TELEMETRY=1
 cd "$here"
 missing() { printf '%s: %s\n' "$1" "$2" | tee -a "$out/log" >>"$out/missing"; }
 : >"$out/missing"
+for config in random/*.toml; do
+  name=$(basename "$config" .toml)
+  if [ -e "$config" ] && [ ! -e "bundles/$name" ]; then
+    PYTHONPATH=$here/training "$python" -m upt_training.random_bundle --config "$config" --mesh "random/$name.mesh.safetensors" \
+      --out "bundles/$name" --name "$name" --step --paper-split >>"$out/log" 2>&1 ||
+      missing "rows of $name" "random_bundle ended with status $?; see log"
+  fi
+done
 if [ -x upt ]; then ./upt doctor --json bundles/* >"$out/doctor.json" 2>>"$out/log" || true; fi
 for provider in ${providers//,/ }; do
   echo "provider $provider" | tee -a "$out/log"
@@ -54,7 +64,7 @@ for bundle in bundles/*; do
   if grep -q '"random_weights": *true' "$bundle/bundle.json"; then random+=("$bundle"); fi
 done
 echo PyTorch | tee -a "$out/log"
-PYTHONPATH=$here/training timeout 1200 "$python" torch_rows.py "$out/rows-torch.json" "$steps" "${random[@]}" >>"$out/log" 2>&1 ||
+PYTHONPATH=$here/training timeout 1200 "$python" torch_rows.py "$out/rows-torch.json" "$steps" "${TORCH:-eager,compiled}" "${random[@]}" >>"$out/log" 2>&1 ||
   missing PyTorch "torch_rows.py ended with status $?; see log"
 cases=()
 for case in cases/*.trajectory.safetensors; do

@@ -1,4 +1,4 @@
-"""PyTorch on the card, eager and compiled, with the weights of a random bundle: `torch_rows.py OUT STEPS BUNDLE...`.
+"""PyTorch on the card, eager and compiled, with the weights of a random bundle: `torch_rows.py OUT STEPS KINDS BUNDLE...`.
 
 Needs torch and the packed `upt_training`. Also measures the card's rates for the floor: float32 products without TF32,
 and copies. What cannot run is a line under `not_measured`.
@@ -14,12 +14,12 @@ from pathlib import Path
 import numpy as np
 
 
-def main(out: str, steps: str, *bundles: str) -> None:
+def main(out: str, steps: str, kinds: str, *bundles: str) -> None:
     result = {"rows": [], "not_measured": []}
     try:
         import torch
     except ImportError as error:
-        result["not_measured"] = [{"what": f"PyTorch {kind}", "why": str(error)} for kind in ("eager", "compiled")]
+        result["not_measured"] = [{"what": f"PyTorch {kind}", "why": str(error)} for kind in kinds.split(",")]
         result["not_measured"].append({"what": "the card's rates", "why": str(error)})
         Path(out).write_text(json.dumps(result))
         return
@@ -32,7 +32,7 @@ def main(out: str, steps: str, *bundles: str) -> None:
         result["not_measured"].append({"what": "the card's rates", "why": "torch finds no CUDA device"})
     Path(out).write_text(json.dumps(result))
     for bundle in bundles:
-        for kind in ("eager", "compiled"):
+        for kind in kinds.split(","):
             try:
                 result["rows"].append(row(torch, device, Path(bundle), kind, int(steps)))
             except Exception as error:  # a rival that fails leaves the other rows
