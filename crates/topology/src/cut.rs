@@ -1,0 +1,223 @@
+//! A blade passes: touched elements become cells on both sides of it.
+//!
+//! Of each stroke a node has one signed distance from the blade, linear in each element, fixed once used: so neighbours see the same
+//! line on their common face, whatever the blade's form.
+
+use std::sync::Arc;
+
+use crate::body::{Body, Cell, Change, place};
+use crate::polytope::{Polytope, Side, Weights};
+use crate::rest::{length, minus};
+use crate::{Point, Sweep, TopologyError};
+
+/// A node nearer to the blade than this part of the edges around it is put onto it.
+pub const SNAP: f64 = 0.1;
+/// An element is touched where the blade has passed more than this part of its cut.
+const TOUCHED: f64 = 0.01;
+/// A part of an element that is smaller than this is nothing.
+const LEAST_SHARE: f64 = 1e-9;
+
+impl Body {
+    /// Cuts along a sweep; `positions` says where each node is now, copies included. Calls with the same `stroke` are one blade that goes on: what it
+    /// has parted it does not part again.
+    ///
+    /// # Errors
+    /// Positions of another number of nodes or not finite, more copies than there is room for; nothing has then changed.
+    pub fn cut(
+        &mut self,
+        sweep: &Sweep,
+        stroke: u32,
+        positions: &[Point],
+    ) -> Result<Change, TopologyError> {
+        self.check(positions)?;
+        let mut next = self.clone();
+        let change = next.cut_in_place(sweep, stroke, positions)?;
+        *self = next;
+        Ok(change)
+    }
+
+    fn cut_in_place(
+        &mut self,
+        sweep: &Sweep,
+        stroke: u32,
+        positions: &[Point],
+    ) -> Result<Change, TopologyError> {
+        let mut distances = self.strokes.remove(&stroke).unwrap_or_default();
+        let mut change = Change::default();
+        let mut fixed = Vec::new();
+        for element in self.near(sweep, positions) {
+            let mut cells = self.cells(element).into_owned();
+            let mut parted = Vec::with_capacity(2 * cells.len());
+            let mut is_touched = false;
+            for cell in cells.drain(..) {
+                let corners = cell.nodes.map(|node| positions[node as usize]);
+                let distance: Weights = std::array::from_fn(|corner| {
+                    let node = cell.nodes[corner];
+                    (distances.get(&node).copied())
+                        .unwrap_or_else(|| self.distance(sweep, node, corners[corner]))
+                });
+                let edge = longest(&corners);
+                let met = match cell.is_alive {
+                    true => meet(&cell, &distance, stroke),
+                    false => None,
+                };
+                let Some(met) = met else {
+                    parted.push(cell);
+                    continue;
+                };
+                let points: Vec<Point> = (met.cut.iter()).map(|at| place(at, &corners)).collect();
+                let area = sweep.overlap(&points, edge);
+                let whole = length(crate::polygon::normal(&points));
+                if area <= TOUCHED * whole {
+                    parted.push(cell);
+                    continue;
+                }
+                // Both sides have the cut; it is counted once.
+                change.area_mm2 += if met.counts { area } else { 0.0 };
+                fixed.extend((0..4).map(|corner| (cell.nodes[corner], distance[corner])));
+                if met.cells.is_empty() {
+                    parted.push(cell);
+                } else {
+                    is_touched = true;
+                    parted.extend(met.cells);
+                }
+            }
+            if is_touched {
+                change.elements.push(element);
+                *self.cells_mut(element) = parted;
+            }
+        }
+        distances.extend(fixed);
+        self.strokes.insert(stroke, distances);
+        self.part_nodes(&mut change)?;
+        Ok(change)
+    }
+
+    /// Elements whose box meets that of the sweep.
+    fn near(&self, sweep: &Sweep, positions: &[Point]) -> Vec<u32> {
+        let [low, high] = sweep.bounds();
+        let meets = |nodes: [u32; 4]| {
+            let corners = nodes.map(|node| positions[node as usize]);
+            // Nodes near the blade count as on it.
+            let more = 2.0 * SNAP * longest(&corners);
+            (0..3).all(|k| {
+                let is_below = corners.iter().any(|at| at[k] <= high[k] + more);
+                is_below && corners.iter().any(|at| at[k] >= low[k] - more)
+            })
+        };
+        let elements = 0..self.mesh().element_count() as u32;
+        let near = elements.filter(|element| match self.cells.get(element) {
+            Some(cells) => cells.iter().any(|cell| meets(cell.nodes)),
+            None => meets(self.mesh().tet(*element)),
+        });
+        near.collect()
+    }
+
+    /// Of a node from the blade: 0 where it is near.
+    fn distance(&self, sweep: &Sweep, node: u32, at: Point) -> f64 {
+        let own = sweep.distance(at);
+        match own.abs() < SNAP * self.mesh().edge_length(self.parent(node)) {
+            true => 0.0,
+            false => own,
+        }
+    }
+}
+
+/// How a blade meets a cell.
+struct Met {
+    /// Where: the polygon of the cut.
+    cut: Vec<Weights>,
+    /// What becomes of the cell; nothing where the stroke has parted it before.
+    cells: Vec<Cell>,
+    counts: bool,
+}
+
+/// `None` where the blade's surface does not go through the cell, or only along an edge.
+fn meet(cell: &Cell, distance: &Weights, stroke: u32) -> Option<Met> {
+    let material = cell.material();
+    if let Some(positive) = cell.side_of(stroke) {
+        let own = |(side, _): &&(Side, Vec<Weights>)| *side == Side::Cut { stroke, positive };
+        let face = material.faces.iter().find(own).map(|(_, points)| points);
+        let cut = match face {
+            Some(points) => points.clone(),
+            None => face_on_plane(material, distance)?,
+        };
+        return Some(Met {
+            cut,
+            cells: Vec::new(),
+            counts: positive,
+        });
+    }
+    let [low, high] = material.range(distance);
+    if low < 0.0 && high > 0.0 {
+        let parts = [true, false].map(|positive| material.part(distance, stroke, positive));
+        if let [Some(above), Some(below)] = parts {
+            let whole: f64 = material.share();
+            let part = above.share() / whole;
+            if (LEAST_SHARE..=1.0 - LEAST_SHARE).contains(&(cell.share * part)) {
+                let (_, cut) = above.faces.last()?;
+                let cut = cut.clone();
+                let shares = [cell.share * part, cell.share - cell.share * part];
+                let sides = [(true, above), (false, below)];
+                let halves = sides.into_iter().zip(shares);
+                let cells = halves.map(|((positive, part), share)| {
+                    let mut half = cell.clone();
+                    half.sides.push((stroke, positive));
+                    half.points = crate::remove::points_in(&part);
+                    half.share = share;
+                    half.polytope = Some(Arc::new(part));
+                    half
+                });
+                let mut cells: Vec<Cell> = cells.collect();
+                divide_removed(cell, &mut cells);
+                return Some(Met {
+                    cut,
+                    cells,
+                    counts: true,
+                });
+            }
+        }
+    }
+    // A face of it lies on the blade: the cell is on one side, and is parted from what is on the other.
+    let cut = face_on_plane(material, distance)?;
+    let positive = high > -low;
+    let mut marked = cell.clone();
+    marked.sides.push((stroke, positive));
+    Some(Met {
+        cut,
+        cells: vec![marked],
+        counts: positive,
+    })
+}
+
+/// What has been removed of a cell is missing in its halves, by the points that they have lost.
+fn divide_removed(cell: &Cell, halves: &mut [Cell]) {
+    if cell.gone == 0 {
+        return;
+    }
+    let left = |half: &Cell| f64::from(half.points_left()) / f64::from(half.points.count_ones());
+    let sum: f64 = halves.iter().map(|half| half.share * left(half)).sum();
+    for half in halves {
+        half.kept = match sum > 0.0 {
+            true => left(half) * cell.share * cell.kept / sum,
+            false => cell.kept,
+        };
+        half.is_alive = half.kept > 0.0;
+    }
+}
+
+/// The face of a polytope that lies on the plane of a cut.
+fn face_on_plane(material: &Polytope, distance: &Weights) -> Option<Vec<Weights>> {
+    let largest = distance.iter().fold(0.0f64, |most, d| most.max(d.abs()));
+    let value = |at: &Weights| (0..4).map(|k| at[k] * distance[k]).sum::<f64>();
+    let lies = |points: &[Weights]| points.iter().all(|at| value(at).abs() <= 1e-9 * largest);
+    let mut faces = material.faces.iter();
+    let found = faces.find(|(_, points)| lies(points));
+    found.map(|(_, points)| points.clone())
+}
+
+fn longest(corners: &[Point; 4]) -> f64 {
+    let ends = (0..4).flat_map(|a| (a + 1..4).map(move |b| (a, b)));
+    let lengths = ends.map(|(a, b)| length(minus(corners[a], corners[b])));
+    lengths.fold(0.0, f64::max)
+}

@@ -1,0 +1,50 @@
+//! What an operation refuses; the body is then what it was.
+
+/// Why an operation was refused.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum TopologyError {
+    /// A number that is not finite.
+    #[error("{field}[{index}] is not finite; check what the host computes it from")]
+    NotFinite { field: &'static str, index: usize },
+    /// Positions of another body.
+    #[error("{found} positions for {nodes} nodes; a cut adds nodes, and each has one")]
+    Positions { found: usize, nodes: usize },
+    /// A blade that passes nothing.
+    #[error(
+        "the blade sweeps no area: give at least two poses of an edge of at least two points, with the edge moved across itself"
+    )]
+    NoArea,
+    /// Edges of another number of points.
+    #[error(
+        "blade[{index}] has {found} points, the edge before it {expected}: each pose is of the same edge"
+    )]
+    EdgeLength {
+        index: usize,
+        found: usize,
+        expected: usize,
+    },
+    /// A tetrahedron without volume, or with its corners the other way round.
+    #[error(
+        "tetrahedron {index} has a volume of {volume:e} mm³; corners must be those of a positive volume"
+    )]
+    Volume { index: usize, volume: f64 },
+    /// An index beyond its list.
+    #[error("{field}[{index}] is {found}; there are {count}")]
+    Index {
+        field: &'static str,
+        index: usize,
+        found: u32,
+        count: usize,
+    },
+    /// A stiffness that no element may have.
+    #[error("a stiffness factor of {factor} is not between 0.001 and 1000")]
+    Factor { factor: f32 },
+    /// Nothing would be left.
+    #[error("nothing of the body would be left; remove less")]
+    NothingLeft,
+    /// More copies than a body may have.
+    #[error(
+        "the body would have {nodes} nodes, with room for {most}; make a scene with more room, or undo"
+    )]
+    Room { nodes: usize, most: usize },
+}

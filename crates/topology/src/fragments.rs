@@ -1,0 +1,93 @@
+//! Pieces that nothing holds.
+
+use crate::body::Body;
+use crate::connect::Groups;
+use crate::elements::filled;
+use crate::rest::OUTSIDE;
+
+/// Joined cells without a held node.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fragment {
+    /// Mesh element and place in its list of cells.
+    pub cells: Vec<(u32, u32)>,
+    /// Ascending.
+    pub nodes: Vec<u32>,
+    /// What is left of it, mm³.
+    pub volume_mm3: f64,
+}
+
+impl Body {
+    /// The pieces of which no node is held, by the number of their first element. Where nothing is held the largest piece is the body.
+    pub fn fragments(&self, is_held: impl Fn(u32) -> bool) -> Vec<Fragment> {
+        let pieces = self.pieces();
+        let holds = |piece: &Fragment| piece.nodes.iter().any(|node| is_held(*node));
+        let body = match pieces.iter().any(holds) {
+            true => None,
+            false => (pieces.iter().enumerate())
+                .max_by(|a, b| a.1.volume_mm3.total_cmp(&b.1.volume_mm3))
+                .map(|(at, _)| at),
+        };
+        let loose = pieces.into_iter().enumerate();
+        let loose = loose.filter(|(at, piece)| Some(*at) != body && !holds(piece));
+        loose.map(|(_, piece)| piece).collect()
+    }
+
+    /// All pieces of joined living cells.
+    pub fn pieces(&self) -> Vec<Fragment> {
+        let mesh = self.mesh();
+        let count = mesh.element_count() as u32;
+        let mut starts = vec![0u32];
+        for element in 0..count {
+            let own = self.cells.get(&element).map_or(1, Vec::len) as u32;
+            starts.push(starts[element as usize] + own);
+        }
+        let mut groups = Groups::new(starts[count as usize] as usize);
+        for element in 0..count {
+            for (face, &over) in mesh.neighbours(element).iter().enumerate() {
+                if over == OUTSIDE || over < element {
+                    continue;
+                }
+                let (first, other) = (starts[element as usize], starts[over as usize]);
+                if !self.cells.contains_key(&element) && !self.cells.contains_key(&over) {
+                    groups.join(first, other);
+                    continue;
+                }
+                for (a, cell) in self.cells(element).iter().enumerate() {
+                    for (b, next) in self.cells(over).iter().enumerate() {
+                        if self.is_joined((element, cell), face, over, next) {
+                            groups.join(first + a as u32, other + b as u32);
+                        }
+                    }
+                }
+            }
+        }
+        let mut place = vec![u32::MAX; starts[count as usize] as usize];
+        let mut pieces: Vec<Fragment> = Vec::new();
+        for element in 0..count {
+            let cells = self.cells(element);
+            for (at, (cell, share)) in cells.iter().zip(filled(&cells)).enumerate() {
+                if !cell.is_alive {
+                    continue;
+                }
+                let group = groups.of(starts[element as usize] + at as u32) as usize;
+                if place[group] == u32::MAX {
+                    place[group] = pieces.len() as u32;
+                    pieces.push(Fragment {
+                        cells: Vec::new(),
+                        nodes: Vec::new(),
+                        volume_mm3: 0.0,
+                    });
+                }
+                let piece = &mut pieces[place[group] as usize];
+                piece.cells.push((element, at as u32));
+                piece.nodes.extend(cell.nodes);
+                piece.volume_mm3 += share * mesh.volume(element);
+            }
+        }
+        for piece in &mut pieces {
+            piece.nodes.sort_unstable();
+            piece.nodes.dedup();
+        }
+        pieces
+    }
+}

@@ -1,0 +1,208 @@
+//! An aspirator takes material: each element has 64 fixed points, and a cell keeps the share of those that are left.
+
+use std::sync::OnceLock;
+
+use crate::body::{Body, Cell, Change, place};
+use crate::elements::filled;
+use crate::polytope::{Polytope, Weights};
+use crate::{Point, TopologyError};
+
+/// A cell of which less is left, as a part of its element, goes.
+pub const LEAST_LEFT: f64 = 0.02;
+
+impl Body {
+    /// Takes what lies where `depth` is positive, the deepest first, up to `most_mm3`; `positions` says where each node is now, copies included. `depth` must
+    /// not change by more than a millimetre a millimetre. Cells of which next to
+    /// nothing is left go, and nodes part where tissue hung by an edge or a point.
+    ///
+    /// # Errors
+    /// A volume or a position that is not a number, nothing left, no room for copies; nothing has then changed.
+    pub fn remove(
+        &mut self,
+        depth: impl Fn(Point) -> f64,
+        most_mm3: f64,
+        positions: &[Point],
+    ) -> Result<Change, TopologyError> {
+        self.check(positions)?;
+        if most_mm3.is_nan() {
+            return Err(TopologyError::NotFinite {
+                field: "most_mm3",
+                index: 0,
+            });
+        }
+        let mut found = Vec::new();
+        for element in 0..self.mesh().element_count() as u32 {
+            let cells = self.cells(element);
+            for (index, (cell, share)) in cells.iter().zip(filled(&cells)).enumerate() {
+                if cell.is_alive {
+                    self.inside((element, index, cell), share, &depth, positions, &mut found);
+                }
+            }
+        }
+        found.sort_by(|a, b| (b.depth.total_cmp(&a.depth)).then(a.key().cmp(&b.key())));
+        let mut next = self.clone();
+        let mut change = Change::default();
+        let mut taken = 0.0;
+        for point in found {
+            if taken + 0.5 * point.volume > most_mm3 {
+                break;
+            }
+            let cell = &mut next.cells_mut(point.element)[point.cell];
+            let before = cell.points_left();
+            cell.gone |= 1 << point.at;
+            cell.kept *= f64::from(before - 1) / f64::from(before);
+            taken += point.volume;
+            change.elements.push(point.element);
+        }
+        change.elements.sort_unstable();
+        change.elements.dedup();
+        for &element in &change.elements {
+            let cells = next.cells_mut(element);
+            for cell in cells.iter_mut().filter(|cell| cell.gone & cell.points != 0) {
+                cell.is_alive &= cell.share * cell.kept >= LEAST_LEFT;
+            }
+        }
+        next.account(self, &mut change);
+        if next.is_nothing() {
+            return Err(TopologyError::NothingLeft);
+        }
+        next.part_nodes(&mut change)?;
+        *self = next;
+        Ok(change)
+    }
+
+    /// Drops cells, by element and place in its list.
+    ///
+    /// # Errors
+    /// Nothing left, no room for copies; nothing has then changed.
+    pub fn drop_cells(&mut self, cells: &[(u32, u32)]) -> Result<Change, TopologyError> {
+        let mut next = self.clone();
+        let mut change = Change::default();
+        for &(element, index) in cells {
+            if let Some(cell) = next.cells_mut(element).get_mut(index as usize) {
+                cell.is_alive = false;
+                change.elements.push(element);
+            }
+        }
+        if next.is_nothing() {
+            return Err(TopologyError::NothingLeft);
+        }
+        change.elements.sort_unstable();
+        change.elements.dedup();
+        next.account(self, &mut change);
+        next.part_nodes(&mut change)?;
+        *self = next;
+        Ok(change)
+    }
+
+    /// What has been lost since `before`.
+    fn account(&self, before: &Body, change: &mut Change) {
+        let elements = change.elements.iter();
+        let lost = elements.map(|element| before.volume_of(*element) - self.volume_of(*element));
+        change.removed_mm3 = lost.sum();
+    }
+
+    fn is_nothing(&self) -> bool {
+        let is_dead = |cells: &Vec<Cell>| cells.iter().all(|cell| !cell.is_alive);
+        self.cells.len() == self.mesh().element_count() && self.cells.values().all(is_dead)
+    }
+
+    /// The points of a cell that are left and lie deep.
+    fn inside(
+        &self,
+        (element, index, cell): (u32, usize, &Cell),
+        share: f64,
+        depth: &impl Fn(Point) -> f64,
+        positions: &[Point],
+        found: &mut Vec<Inside>,
+    ) {
+        let corners = cell.nodes.map(|node| positions[node as usize]);
+        let left = f64::from(cell.points_left().max(1));
+        let volume = share * self.mesh().volume(element) / left;
+        // A sphere around the element that lies outside needs no points: depth falls by at most a millimetre a millimetre.
+        let middle = place(&[0.25; 4], &corners);
+        let reach = corners
+            .iter()
+            .map(|at| crate::rest::length(crate::rest::minus(*at, middle)));
+        if depth(middle) <= -reach.fold(0.0, f64::max) {
+            return;
+        }
+        for (at, weights) in points().iter().enumerate() {
+            if cell.points & !cell.gone & (1 << at) == 0 {
+                continue;
+            }
+            let depth = depth(place(weights, &corners));
+            if depth > 0.0 {
+                found.push(Inside {
+                    depth,
+                    element,
+                    cell: index,
+                    at: at as u32,
+                    volume,
+                });
+            }
+        }
+    }
+}
+
+/// A point to be taken.
+struct Inside {
+    depth: f64,
+    element: u32,
+    cell: usize,
+    at: u32,
+    volume: f64,
+}
+
+impl Inside {
+    fn key(&self) -> (u32, usize, u32) {
+        (self.element, self.cell, self.at)
+    }
+}
+
+/// Which of the fixed points lie in a polytope; the one nearest to its middle where it holds none.
+pub(crate) fn points_in(polytope: &Polytope) -> u64 {
+    let mut mask = 0;
+    for (at, point) in points().iter().enumerate() {
+        mask |= u64::from(polytope.holds(point)) << at;
+    }
+    if mask == 0 {
+        let middle = polytope.middle();
+        let off = |point: &Weights| (0..4).map(|k| (point[k] - middle[k]).powi(2)).sum::<f64>();
+        let nearest = (points().iter().enumerate()).min_by(|a, b| off(a.1).total_cmp(&off(b.1)));
+        mask = 1 << nearest.map_or(0, |(at, _)| at);
+    }
+    mask
+}
+
+/// 64 points of a tetrahedron, evenly: the middles of its 64 parts by halving edges twice.
+fn points() -> &'static [Weights; 64] {
+    static POINTS: OnceLock<[Weights; 64]> = OnceLock::new();
+    POINTS.get_or_init(|| {
+        let corner =
+            |at: usize| -> Weights { std::array::from_fn(|k| f64::from(u8::from(k == at))) };
+        let mut parts = vec![[0, 1, 2, 3].map(corner)];
+        for _ in 0..2 {
+            parts = parts.iter().flat_map(eighths).collect();
+        }
+        std::array::from_fn(|at| crate::polygon::middle(&parts[at]))
+    })
+}
+
+/// A tetrahedron halved along its edges.
+fn eighths([a, b, c, d]: &[Weights; 4]) -> [[Weights; 4]; 8] {
+    let half =
+        |p: &Weights, q: &Weights| -> Weights { std::array::from_fn(|k| 0.5 * (p[k] + q[k])) };
+    let [ab, ac, ad] = [half(a, b), half(a, c), half(a, d)];
+    let [bc, bd, cd] = [half(b, c), half(b, d), half(c, d)];
+    [
+        [*a, ab, ac, ad],
+        [ab, *b, bc, bd],
+        [ac, bc, *c, cd],
+        [ad, bd, cd, *d],
+        [ab, bc, ac, bd],
+        [ab, ac, ad, bd],
+        [ac, bc, cd, bd],
+        [ac, ad, cd, bd],
+    ]
+}

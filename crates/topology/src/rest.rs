@@ -1,0 +1,171 @@
+//! The mesh before any cut.
+
+use crate::{Point, TopologyError};
+
+/// Faces of a tetrahedron by opposite corner, outward.
+pub const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
+/// A face without an element on its other side.
+pub const OUTSIDE: u32 = u32::MAX;
+
+/// Rest positions, tetrahedra, and what follows from them.
+#[derive(Clone, Debug)]
+pub struct RestMesh {
+    positions: Vec<[f32; 3]>,
+    tets: Vec<[u32; 4]>,
+    /// Over each face, by opposite corner; [`OUTSIDE`] at the border.
+    neighbours: Vec<[u32; 4]>,
+    /// Where the elements of each node start in `around`.
+    starts: Vec<u32>,
+    around: Vec<u32>,
+}
+
+impl RestMesh {
+    /// Takes `[K,3]` rest positions, mm, and `[T,4]` corners of positive volume.
+    ///
+    /// # Errors
+    /// A corner beyond the nodes, a position that is not finite, an element without volume.
+    pub fn new(positions: &[[f32; 3]], tets: &[[u32; 4]]) -> Result<RestMesh, TopologyError> {
+        if let Some(index) = (positions.iter()).position(|at| !at.iter().all(|x| x.is_finite())) {
+            return Err(TopologyError::NotFinite {
+                field: "positions",
+                index,
+            });
+        }
+        let count = positions.len();
+        for (index, tet) in tets.iter().enumerate() {
+            if let Some(&found) = tet.iter().find(|node| **node as usize >= count) {
+                return Err(TopologyError::Index {
+                    field: "tets",
+                    index,
+                    found,
+                    count,
+                });
+            }
+            let volume = volume(tet.map(|node| positions[node as usize].map(f64::from)));
+            if volume.is_nan() || volume <= 0.0 {
+                return Err(TopologyError::Volume { index, volume });
+            }
+        }
+        let mut starts = vec![0; count + 1];
+        for node in tets.iter().flatten() {
+            starts[*node as usize + 1] += 1;
+        }
+        for node in 0..count {
+            starts[node + 1] += starts[node];
+        }
+        let mut next = starts.clone();
+        let mut around = vec![0; 4 * tets.len()];
+        for (element, tet) in tets.iter().enumerate() {
+            for &node in tet {
+                around[next[node as usize] as usize] = element as u32;
+                next[node as usize] += 1;
+            }
+        }
+        Ok(RestMesh {
+            neighbours: neighbours(tets),
+            positions: positions.to_vec(),
+            tets: tets.to_vec(),
+            starts,
+            around,
+        })
+    }
+
+    /// Nodes, `K`.
+    pub fn node_count(&self) -> usize {
+        self.positions.len()
+    }
+
+    /// Elements, `T`.
+    pub fn element_count(&self) -> usize {
+        self.tets.len()
+    }
+
+    /// Corners of an element.
+    pub fn tet(&self, element: u32) -> [u32; 4] {
+        self.tets[element as usize]
+    }
+
+    /// Elements over the four faces of one; [`OUTSIDE`] at the border.
+    pub fn neighbours(&self, element: u32) -> [u32; 4] {
+        self.neighbours[element as usize]
+    }
+
+    /// Elements that have a node, ascending.
+    pub fn around(&self, node: u32) -> &[u32] {
+        let at = node as usize;
+        &self.around[self.starts[at] as usize..self.starts[at + 1] as usize]
+    }
+
+    /// Where a node is at rest.
+    pub fn position(&self, node: u32) -> Point {
+        self.positions[node as usize].map(f64::from)
+    }
+
+    /// Volume of an element at rest, mm³.
+    pub fn volume(&self, element: u32) -> f64 {
+        volume(self.tet(element).map(|node| self.position(node)))
+    }
+
+    /// Mean length of the edges at a node, mm.
+    pub fn edge_length(&self, node: u32) -> f64 {
+        let own = self.position(node);
+        let around = self.around(node);
+        let ends = around.iter().flat_map(|element| self.tet(*element));
+        let sum: f64 = ends.map(|end| length(minus(self.position(end), own))).sum();
+        sum / (3 * around.len().max(1)) as f64
+    }
+
+    /// Bytes of the heap that this holds.
+    pub fn heap_bytes(&self) -> usize {
+        size_of_val(self.positions.as_slice())
+            + size_of_val(self.tets.as_slice())
+            + size_of_val(self.neighbours.as_slice())
+            + size_of_val(self.starts.as_slice())
+            + size_of_val(self.around.as_slice())
+    }
+}
+
+fn neighbours(tets: &[[u32; 4]]) -> Vec<[u32; 4]> {
+    let mut faces = Vec::with_capacity(4 * tets.len());
+    for (element, tet) in tets.iter().enumerate() {
+        for (face, corners) in FACES.iter().enumerate() {
+            let mut nodes = corners.map(|corner| tet[corner]);
+            nodes.sort_unstable();
+            faces.push((nodes, element as u32, face));
+        }
+    }
+    faces.sort_unstable();
+    let mut found = vec![[OUTSIDE; 4]; tets.len()];
+    for pair in faces.windows(2) {
+        let [(nodes, a, at_a), (others, b, at_b)] = [pair[0], pair[1]];
+        if nodes == others {
+            found[a as usize][at_a] = b;
+            found[b as usize][at_b] = a;
+        }
+    }
+    found
+}
+
+fn volume([a, b, c, d]: [Point; 4]) -> f64 {
+    dot(cross(minus(b, a), minus(c, a)), minus(d, a)) / 6.0
+}
+
+pub(crate) fn minus(a: Point, b: Point) -> Point {
+    [0, 1, 2].map(|k| a[k] - b[k])
+}
+
+pub(crate) fn dot(a: Point, b: Point) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+pub(crate) fn cross(a: Point, b: Point) -> Point {
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
+}
+
+pub(crate) fn length(a: Point) -> f64 {
+    dot(a, a).sqrt()
+}
