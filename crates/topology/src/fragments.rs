@@ -2,7 +2,6 @@
 
 use crate::body::Body;
 use crate::connect::Groups;
-use crate::elements::filled;
 use crate::rest::OUTSIDE;
 
 /// Joined cells without a held node.
@@ -64,8 +63,7 @@ impl Body {
         let mut place = vec![u32::MAX; starts[count as usize] as usize];
         let mut pieces: Vec<Fragment> = Vec::new();
         for element in 0..count {
-            let cells = self.cells(element);
-            for (at, (cell, share)) in cells.iter().zip(filled(&cells)).enumerate() {
+            for (at, cell) in self.cells(element).iter().enumerate() {
                 if !cell.is_alive {
                     continue;
                 }
@@ -81,7 +79,7 @@ impl Body {
                 let piece = &mut pieces[place[group] as usize];
                 piece.cells.push((element, at as u32));
                 piece.nodes.extend(cell.nodes);
-                piece.volume_mm3 += share * mesh.volume(element);
+                piece.volume_mm3 += cell.share * cell.kept * mesh.volume(element);
             }
         }
         for piece in &mut pieces {

@@ -13,6 +13,7 @@
 //! | [`connect`] | which cells are joined, and where nodes part |
 //! | [`elements`] | what a solver takes: nodes, shares and stiffness of each cell |
 //! | [`surface`] | the closed surface, inside faces included |
+//! | `touchable` | faces that tools may touch |
 //!
 //! Lengths are millimetres. Nothing here knows an element law or a time.
 
@@ -28,6 +29,7 @@ mod remove;
 pub mod rest;
 pub mod surface;
 pub mod sweep;
+mod touchable;
 
 pub use body::{Body, Cell, Change};
 pub use elements::Element;

@@ -160,8 +160,10 @@ impl Solver {
                 .slot_of_node
                 .iter()
                 .position(|slot| {
-                    let u = self.fields.displacement[*slot as usize].0;
-                    !u[..3].iter().all(|v| v.abs() < 1e5)
+                    let u = self.fields.displacement.get(*slot as usize);
+                    !u.copied().unwrap_or_default().0[..3]
+                        .iter()
+                        .all(|v| v.abs() < 1e5)
                 })
                 .unwrap_or(0);
             let element = self

@@ -24,6 +24,8 @@ pub enum SolverError {
         value: f64,
         wanted: &'static str,
     },
+    #[error(transparent)]
+    Topology(#[from] topology::TopologyError),
     #[error("tools[{index}]: {reason}")]
     Tool { index: usize, reason: String },
     #[error(

@@ -6,8 +6,8 @@
 //! as they are, and dynamics change by the mass that is added.
 
 use crate::material::Material;
-use crate::mesh::{Mesh, tet_volume};
-use elements::shape_gradients;
+use crate::mesh::tet_volume;
+use elements::{Tetrahedra, shape_gradients};
 
 /// Nodal masses and what scaling added to them.
 pub(super) struct LumpedMass {
@@ -22,20 +22,27 @@ pub(super) struct LumpedMass {
 }
 
 impl LumpedMass {
-    /// `shortest_step_s`: elements with a shorter critical step of their own are scaled to it; 0 scales none.
-    pub fn new(mesh: &Mesh, material: &Material, shortest_step_s: f64) -> Self {
+    /// `shares`: by how much of its volume each element counts, all of it where the list is empty. `shortest_step_s`: elements with a shorter critical step of
+    /// their own are scaled to it; 0 scales none.
+    pub fn new(
+        mesh: Tetrahedra<'_>,
+        shares: &[f32],
+        material: &Material,
+        shortest_step_s: f64,
+    ) -> Self {
         let density = material.density_g_mm3();
         let mut result = Self {
-            mass: vec![0.0; mesh.node_count()],
-            stiff_volume: vec![0.0; mesh.node_count()],
+            mass: vec![0.0; mesh.positions.len()],
+            stiff_volume: vec![0.0; mesh.positions.len()],
             factor: Vec::with_capacity(mesh.tets.len()),
             added: 0.0,
         };
         let (mut plain, mut scaled) = (0.0, 0.0);
         for (element, tet) in mesh.tets.iter().enumerate() {
-            let volume = tet_volume(&mesh.positions, *tet);
+            let share = shares.get(element).copied().map_or(1.0, f64::from);
+            let volume = tet_volume(mesh.positions, *tet) * share;
             let stiffness = f64::from(mesh.stiffness_of(element));
-            let step = element_step_s(&mesh.positions, *tet, material) / stiffness.sqrt();
+            let step = element_step_s(mesh.positions, *tet, material) / stiffness.sqrt();
             let factor = (shortest_step_s / step).powi(2).max(1.0);
             plain += volume;
             scaled += factor * volume;

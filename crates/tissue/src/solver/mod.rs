@@ -7,6 +7,8 @@
 //! bits for any number of threads.
 
 mod barrier;
+mod cut_body;
+mod cutting;
 mod diagnosis;
 mod error;
 mod fields;
@@ -14,6 +16,7 @@ mod frame;
 mod march;
 mod mass;
 mod options;
+mod parts;
 mod stability;
 mod stiffest;
 mod touch;
@@ -27,11 +30,12 @@ pub use options::{Pressure, SolverOptions, Substep};
 pub use touch::{SampleForce, Tool, ToolPose, ToolReport};
 
 use crate::mesh::{Boundary, Mesh};
-use elements::{Kernels, Partition};
+use cut_body::Topology;
+use elements::{Kernels, PADDING, Partition};
 use fields::{Fields, Node};
 use march::Path;
-use mass::LumpedMass;
 use options::check_positive;
+use parts::Parts;
 use touch::Touch;
 
 /// One prescribed node of a frame.
@@ -76,6 +80,8 @@ pub struct Solver {
     tets: Vec<[u32; 4]>,
     options: SolverOptions,
     kernels: Kernels,
+    /// What cuts have done.
+    topology: Topology,
     partition: Partition,
     /// By slot: nodal mass, g (ghosts and padding zero).
     mass: Vec<f32>,
@@ -128,20 +134,9 @@ impl Solver {
                     })?,
             ),
         };
-        let partition = Partition::new(mesh.tetrahedra(), &options.material)?;
-        let slots = partition.node_of_slot.len();
-        let lumped = LumpedMass::new(mesh, &options.material, options.mass_scaling_s);
-        let mut mass = vec![0.0; slots];
-        let mut rest_volume = vec![0.0; slots];
-        let bulk = options.material.bulk_pa();
-        for (node, slot) in partition.slot_of_node.iter().enumerate() {
-            mass[*slot as usize] = lumped.mass[node] as f32;
-            rest_volume[*slot as usize] = (4.0 * bulk * lumped.stiff_volume[node]) as f32;
-        }
-        let mut held = vec![false; slots];
-        for node in mesh.held_nodes(boundary) {
-            held[partition.slot_of_node[node as usize] as usize] = true;
-        }
+        let held_nodes = mesh.held_nodes(boundary);
+        let parts = Parts::new(mesh.tetrahedra(), &[], &held_nodes, &options)?;
+        let slots = parts.partition.node_of_slot.len();
         let zero = vec![Node::default(); slots];
         let fields = Fields {
             displacement: zero.clone(),
@@ -152,14 +147,13 @@ impl Solver {
             positions: mesh.positions.clone(),
             tets: mesh.tets.clone(),
             kernels,
-            partition,
-            mass,
-            rest_volume,
-            speed_squared: (0..mesh.tets.len())
-                .map(|tet| mesh.stiffness_of(tet) / lumped.factor[tet])
-                .collect(),
-            added_mass: lumped.added,
-            held,
+            topology: Topology::new(mesh, held_nodes),
+            partition: parts.partition,
+            mass: parts.mass,
+            rest_volume: parts.rest_volume,
+            speed_squared: parts.speed_squared,
+            added_mass: parts.added_mass,
+            held: parts.held,
             backup: fields.clone(),
             touch: None,
             touch_backup: None,
@@ -181,7 +175,7 @@ impl Solver {
         Ok(solver)
     }
 
-    /// Back to rest at time zero, without tools.
+    /// Back to rest at time zero, without tools. A body that has been cut stays so.
     pub fn reset(&mut self) {
         for field in [
             &mut self.fields.displacement,
@@ -265,13 +259,16 @@ impl Solver {
         }
     }
 
-    /// Writes the displacement, `[K,3]` mm, in the mesh's node order.
+    /// Writes the displacement, `[K,3]` mm, in the mesh's node order, then those of the nodes that cuts added. Zero where all tissue around a
+    /// node has been removed.
     ///
     /// Panics when `out` does not have `K` rows.
     pub fn displacement(&self, out: &mut [[f32; 3]]) {
         assert_eq!(out.len(), self.positions.len(), "one row a node");
         for (row, slot) in out.iter_mut().zip(&self.partition.slot_of_node) {
-            let [x, y, z, _] = self.fields.displacement[*slot as usize].0;
+            // Nothing is left around a node without a slot.
+            let found = self.fields.displacement.get(*slot as usize);
+            let [x, y, z, _] = found.copied().unwrap_or_default().0;
             *row = [x, y, z];
         }
     }
@@ -330,6 +327,9 @@ impl Solver {
             };
             if entry.node as usize >= self.positions.len() {
                 return fail("the mesh has no such node");
+            }
+            if self.partition.slot_of_node[entry.node as usize] == PADDING {
+                return fail("the tissue around it has been removed; leave it out");
             }
             if index > 0 && contact[index - 1].node >= entry.node {
                 return fail("nodes must be ascending, each once");

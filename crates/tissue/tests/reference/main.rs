@@ -4,6 +4,7 @@
 mod calculix;
 mod closed_forms;
 mod contact;
+mod cuts;
 mod dataset;
 mod determinism;
 mod dynamics;

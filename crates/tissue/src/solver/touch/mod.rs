@@ -120,6 +120,25 @@ pub(super) struct Touch {
 }
 
 impl Touch {
+    /// Nodes have been added, and lie elsewhere; the touchable faces are others. What is grasped is let go.
+    pub fn follow(&mut self, positions: &[[f32; 3]], slot_of_node: &[u32], samples: Samples) {
+        self.rows.clear();
+        self.before.clear();
+        self.reached.clear();
+        self.sums.clear();
+        self.search = Search::default();
+        for tool in &mut self.tools {
+            tool.grasp = Grasp::default();
+            tool.torn = tool.closed;
+        }
+        self.scene = Arc::new(Scene {
+            samples,
+            tools: self.scene.tools.clone(),
+            rest: positions.iter().map(|p| Vector::from(*p)).collect(),
+            slot_of_node: slot_of_node.to_vec(),
+        });
+    }
+
     pub fn tool_count(&self) -> usize {
         self.tools.len()
     }
