@@ -20,6 +20,8 @@ pub struct Mesh {
     pub tets: Vec<u32>,
     /// Young's modulus of each tetrahedron over the material's `[T]`; empty where the body is uniform.
     pub stiffness: Vec<f32>,
+    /// By how much of its volume each tetrahedron of a cut body counts `[T]`; empty where all count whole. `stiffness` has it as a factor.
+    pub shares: Vec<f32>,
     /// Boundary triangles `[F,3]`, outward.
     pub surface_faces: Vec<u32>,
     /// Triangles of the domain `[D,3]`.
@@ -119,6 +121,7 @@ impl Mesh {
             positions,
             tets,
             stiffness,
+            shares: Vec::new(),
             surface_faces,
             domain_faces,
             sha256: hex(&hash.finalize()),
@@ -141,7 +144,7 @@ impl Mesh {
     }
 }
 
-fn unique(mut nodes: Vec<u32>) -> Vec<u32> {
+pub(super) fn unique(mut nodes: Vec<u32>) -> Vec<u32> {
     nodes.sort_unstable();
     nodes.dedup();
     nodes

@@ -1,6 +1,7 @@
 //! Bundles: bytes on disk -> checked values. The format is `docs/reference/formats.md`.
 
 mod checks;
+mod cut_mesh;
 mod faults;
 mod files;
 mod known;

@@ -8,6 +8,7 @@
 //! Displacements mm, forces µN, masses g, times s.
 
 mod body;
+mod cut;
 mod estimate;
 mod far;
 mod free;
@@ -41,6 +42,7 @@ pub use body::Body;
 pub use far::FarField;
 pub use history::{History, PAIRS};
 pub use input::{Enough, Input, Report, SolverContext};
+pub use local::Linearisation;
 pub use motion::Motion;
 pub use solver::{ImplicitSolver, SMALLEST_DET};
 pub use substepper::Substepper;
@@ -55,6 +57,8 @@ pub struct Corrections {
     pub far: FarField,
     /// Steps as long as the bundle's.
     pub time_step: Arc<TimeStep>,
+    /// Of a body that has been cut: nodes of what has changed, a few millimetres apart, ascending. They are near in every step.
+    pub changed: Vec<u32>,
 }
 
 impl Corrections {
@@ -82,6 +86,7 @@ impl Corrections {
             space,
             body,
             time_step: Arc::new(TimeStep::new(&diagonal, integrator)?),
+            changed: Vec::new(),
         })
     }
 

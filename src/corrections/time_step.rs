@@ -80,7 +80,10 @@ impl Diagonal {
             let rest = corners.map(|node| positions[node as usize].map(f64::from));
             let stiffness = f64::from(body.stiffness_of(at));
             let tet = Tetrahedron::new(corners, rest, stiffness);
-            let share = 0.25 * tet.volume / stiffness * material.density_g_mm3();
+            let mut share = 0.25 * tet.volume / stiffness * material.density_g_mm3();
+            if let Some(&counts) = mesh.shares.get(at) {
+                share *= f64::from(counts);
+            }
             for (node, block) in corners.into_iter().zip(tet.diagonal_blocks(moduli)) {
                 mass[node as usize] += share;
                 for (sum, value) in blocks[node as usize].iter_mut().zip(block) {

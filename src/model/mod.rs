@@ -1,6 +1,7 @@
 //! [`Model`]: a bundle made ready to step. Immutable, shared by scenes, safe from any thread.
 
 mod anchors;
+mod cut;
 mod info;
 mod reduced;
 mod upt;

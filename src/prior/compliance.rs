@@ -122,6 +122,69 @@ impl Compliance {
         }))
     }
 
+    /// That of other contact nodes: each has the response of the one that `base` names here. `place` as in [`Compliance::read`], of the new ones.
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
+    pub fn of_bases(
+        &self,
+        base: &[u32],
+        place: impl Fn(usize) -> (u32, u32, u32),
+    ) -> Result<Compliance> {
+        const WHAT: &str = "the compliance of a cut body";
+        let near = match self {
+            Compliance::Whole(whole) => {
+                let n = whole.len().isqrt();
+                let dofs = base
+                    .iter()
+                    .flat_map(|b| [0, 1, 2].map(|axis| 3 * *b as usize + axis));
+                let all = dofs.clone().flat_map(|row| {
+                    let row = &whole[row * n..][..n];
+                    dofs.clone().map(move |column| row[column])
+                });
+                return Ok(Compliance::Whole(memory::collected(
+                    9 * base.len() * base.len(),
+                    all,
+                    WHAT,
+                )?));
+            }
+            Compliance::Near(near) => near,
+        };
+        let mut members = vec![Vec::new(); near.offsets.len() - 1];
+        for (at, b) in base.iter().enumerate() {
+            memory::push(&mut members[*b as usize], at as u32, WHAT)?;
+        }
+        let mut entries = Vec::new();
+        for (p, range) in near.offsets.windows(2).enumerate() {
+            for at in range[0] as usize..range[1] as usize {
+                let q = near.nodes[at] as usize;
+                for (i, j) in members[p]
+                    .iter()
+                    .flat_map(|i| members[q].iter().map(move |j| (*i, *j)))
+                {
+                    let block = &near.blocks[at];
+                    let back = std::array::from_fn(|k| block[k % 3 * 3 + k / 3]);
+                    if i <= j {
+                        memory::push(&mut entries, (i, j, *block), WHAT)?;
+                    } else if p != q {
+                        memory::push(&mut entries, (j, i, back), WHAT)?;
+                    }
+                }
+            }
+        }
+        entries.sort_unstable_by_key(|(i, j, _)| (*i, *j));
+        let starts =
+            (0..=base.len() as u32).map(|row| entries.partition_point(|e| e.0 < row) as u32);
+        let ranks = (0..base.len()).map(&place).map(|place| (place.1, place.2));
+        Ok(Compliance::Near(Near {
+            offsets: memory::collected(base.len() + 1, starts, WHAT)?,
+            nodes: memory::collected(entries.len(), entries.iter().map(|e| e.1), WHAT)?,
+            blocks: memory::collected(entries.len(), entries.iter().map(|e| e.2), WHAT)?,
+            rows: memory::collected(base.len(), (0..base.len()).map(|at| place(at).0), WHAT)?,
+            ranks: memory::collected(base.len(), ranks, WHAT)?,
+        }))
+    }
+
     /// Writes the upper triangle of the block of contact nodes `columns` (ascending), `[3m,3m]` row-major, into `upper`.
     ///
     /// `scratch` is kept between calls and grows to six rows of the widest block's rank.

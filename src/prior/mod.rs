@@ -16,6 +16,6 @@ mod vibration;
 
 pub use numbers::Numbers;
 pub use response::{ContactResponse, SolveReport};
-pub use space::CoarseSpace;
+pub use space::{CoarseSpace, Lost};
 pub use table::PriorTable;
 pub use vibration::{FreeVibration, propagator};

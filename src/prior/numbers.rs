@@ -8,7 +8,7 @@ use crate::kernels::rows::Stored;
 use crate::memory::{self, HeldBytes};
 
 /// Numbers kept at the width in which they are stored.
-#[derive(Debug, HeldBytes)]
+#[derive(Clone, Debug, HeldBytes)]
 pub enum Numbers {
     /// float32.
     F32(Vec<f32>),
@@ -40,6 +40,30 @@ impl Numbers {
             )?));
         }
         Ok(Numbers::F16(half))
+    }
+
+    /// Ranges of these, one after another.
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
+    pub(super) fn gathered(
+        &self,
+        ranges: impl Iterator<Item = std::ops::Range<usize>> + Clone,
+    ) -> Result<Numbers> {
+        const WHAT: &str = "a table's numbers";
+        let count = ranges.clone().map(|range| range.len()).sum();
+        Ok(match self {
+            Numbers::F32(values) => {
+                let mut all = memory::room(count, WHAT)?;
+                ranges.for_each(|range| all.extend_from_slice(&values[range]));
+                Numbers::F32(all)
+            }
+            Numbers::F16(values) => {
+                let mut all = memory::room(count, WHAT)?;
+                ranges.for_each(|range| all.extend_from_slice(&values[range]));
+                Numbers::F16(all)
+            }
+        })
     }
 
     /// As the kernels take it.

@@ -11,7 +11,7 @@ const LIMIT: usize = 128;
 const SQUARINGS: usize = 6;
 
 /// Modes and their step.
-#[derive(Debug, Default, HeldBytes)]
+#[derive(Clone, Debug, Default, HeldBytes)]
 pub struct Release {
     /// Modes `Phi` in block coordinates `[r,Q]`, orthonormal.
     pub modes: Vec<f32>,

@@ -35,6 +35,16 @@ pub struct CoarseSpace {
     at_contact: Vec<f32>,
 }
 
+/// What an element of a cut body has lost.
+pub struct Lost {
+    pub corners: [u32; 4],
+    pub is_free: [bool; 4],
+    /// µN/mm.
+    pub stiffness: [[f64; 12]; 12],
+    /// At each corner, g.
+    pub mass: f64,
+}
+
 impl CoarseSpace {
     /// Reads and checks the tables for a prior.
     pub fn parse(file: &TensorFile, prior: &PriorTable) -> Result<CoarseSpace> {
@@ -65,6 +75,63 @@ impl CoarseSpace {
             mass,
             frequency,
         };
+        space.restrict(prior);
+        Ok(space)
+    }
+
+    /// The modes of a body that has been cut, by its own tables: of each changed element its corners, stiffness `[12,12]` (µN/mm) and mass at a corner (g), both less
+    /// what they were.
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
+    pub fn cut<'a>(
+        &self,
+        prior: &PriorTable,
+        changes: impl Iterator<Item = &'a Lost>,
+    ) -> Result<CoarseSpace> {
+        let (count, width) = (self.count(), prior.width());
+        let mut space = CoarseSpace {
+            at_contact: memory::zeros(3 * prior.contact_nodes.len() * count, WHAT)?,
+            rows: memory::copied(&self.rows, WHAT)?,
+            modes: self.modes.clone(),
+            stiffness: memory::copied(&self.stiffness, WHAT)?,
+            mass: memory::copied(&self.mass, WHAT)?,
+            frequency: memory::copied(&self.frequency, WHAT)?,
+        };
+        let mut rows = memory::zeros(12 * count, WHAT)?;
+        let mut forces = memory::zeros(12 * count, WHAT)?;
+        for lost in changes {
+            for (corner, is_free) in lost.is_free.into_iter().enumerate() {
+                for axis in 0..3 {
+                    for mode in 0..count {
+                        let q = |at: usize| self.modes.at(mode * width + at);
+                        rows[(3 * corner + axis) * count + mode] = match is_free {
+                            true => prior.value_at(lost.corners[corner], axis, q),
+                            false => 0.0,
+                        };
+                    }
+                }
+            }
+            for (at, row) in forces.chunks_exact_mut(count).enumerate() {
+                row.fill(0.0);
+                for (part, from) in lost.stiffness[at].iter().zip(rows.chunks_exact(count)) {
+                    for (sum, value) in row.iter_mut().zip(from) {
+                        *sum += *part as f32 * value;
+                    }
+                }
+            }
+            for (own, force) in rows.chunks_exact(count).zip(forces.chunks_exact(count)) {
+                for (i, value) in own.iter().enumerate() {
+                    let stiffness = &mut space.stiffness[i * count..][..count];
+                    let mass = &mut space.mass[i * count..][..count];
+                    let pairs = stiffness.iter_mut().zip(mass);
+                    for ((k, m), (force, other)) in pairs.zip(force.iter().zip(own)) {
+                        *k -= value * force;
+                        *m -= value * lost.mass as f32 * other;
+                    }
+                }
+            }
+        }
         space.restrict(prior);
         Ok(space)
     }

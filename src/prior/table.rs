@@ -1,5 +1,6 @@
 //! The tables of the linear response: compliance, block-wise basis, response, residual modes.
 
+mod cut;
 mod read;
 
 use super::compliance::{Bases, Compliance};

@@ -19,7 +19,7 @@ use crate::memory::{self, HeldBytes};
 const LIMIT: usize = 4096;
 
 /// Modes and their exact step.
-#[derive(Debug, HeldBytes)]
+#[derive(Clone, Debug, HeldBytes)]
 pub struct FreeVibration {
     /// Mode amplitude of a unit force at a contact dof `[3D,m]`, mm/mN.
     force_to_mode: Vec<f32>,
@@ -81,6 +81,18 @@ impl FreeVibration {
         let count = self.count.max(self.release.count);
         self.rows = memory::collected(count, 0..count as u32, WHAT)?;
         Ok(())
+    }
+
+    /// The same for contact nodes each of which moves what another one moved, `base [D']`.
+    pub(super) fn of_bases(&self, base: &[u32]) -> FreeVibration {
+        let width = 3 * self.count;
+        let rows = base
+            .iter()
+            .flat_map(|b| &self.force_to_mode[*b as usize * width..][..width]);
+        FreeVibration {
+            force_to_mode: rows.copied().collect(),
+            ..self.clone()
+        }
     }
 
     /// Number of modes, `m`.

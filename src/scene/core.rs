@@ -6,6 +6,7 @@ use std::sync::{Arc, PoisonError, RwLock};
 use super::StepInput;
 use super::corrected::Corrector;
 use super::counters::Counters;
+use super::cut_state::CutState;
 use super::engine::Engine;
 use super::inputs::{Decode, Inputs, Which};
 use super::inversion::ContactElements;
@@ -43,6 +44,8 @@ pub struct Core {
     pub(super) engine: Engine,
     #[held(skip)]
     pub(super) corrected: Option<Corrector>,
+    /// What cuts have made of the body; none while it is intact.
+    pub(super) cut: Option<Box<CutState>>,
     /// Contact of tools, from the first step that has one.
     pub(super) problem: Option<Proven<Instruments, ContactProblem>>,
     /// The tools of the step being made, where the bundle's limits for tools say something about it.
@@ -139,6 +142,7 @@ impl Core {
             },
             engine: parts.engine,
             corrected: parts.corrected,
+            cut: None,
             problem: None,
             used: None,
             hands: Vec::new(),
@@ -204,6 +208,7 @@ impl Core {
             lock_read(published).check_len(View::Region, out.len())?;
         }
         input.check()?;
+        self.check_cut(&input)?;
         input.contact.gather(&mut self.incoming, count)?;
         let given = match input.displacement {
             Some(field) => {

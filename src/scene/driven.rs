@@ -9,7 +9,7 @@ use super::corrected::Corrector;
 use super::published::Published;
 use super::timing::Stopwatch;
 use super::{Contact, StepInput};
-use crate::contact::{Compliance, ContactProblem, State};
+use crate::contact::{Compliance, ContactProblem, State, Tool};
 use crate::corrections::{Input, SolverContext};
 use crate::error::{Error, Result};
 use crate::features::Proven;
@@ -35,11 +35,16 @@ impl Core {
             Contact::None => self.counters.driven,
             Contact::Dense(_) | Contact::Sparse { .. } => false,
         };
-        let Contact::Tools(tools) = input.contact else {
-            if let Some(problem) = &mut self.problem {
-                problem.forget_tools();
+        let tools: &[Tool] = match input.contact {
+            Contact::Tools(tools) => tools,
+            // The elements make each step of a cut body, as if tools were there.
+            Contact::None if self.cut.is_some() => &[],
+            _ => {
+                if let Some(problem) = &mut self.problem {
+                    problem.forget_tools();
+                }
+                return Ok(false);
             }
-            return Ok(false);
         };
         if self.model.prior.is_none() {
             return Err(Error::Unsupported(
@@ -78,7 +83,8 @@ impl Core {
         let Some(mut problem) = self.problem.take() else {
             return Ok(false);
         };
-        let result = match problem.tools().is_empty() && !near {
+        let is_free = problem.tools().is_empty() && !near && self.cut.is_none();
+        let result = match is_free {
             true => Ok(false),
             false if self.corrected.is_some() => {
                 self.drive_corrected(published, &mut problem, near, start, stats)
@@ -97,6 +103,10 @@ impl Core {
         start: Instant,
         stats: &mut SceneStats,
     ) -> Result<bool> {
+        if self.cut.is_some() {
+            self.load(published, problem, start, stats)?;
+            return Ok(true);
+        }
         if near && (problem.had_forces() || problem.has_grasp()) {
             let before = *stats;
             self.load(published, problem, start, stats)?;

@@ -7,6 +7,9 @@ mod core;
 mod correct;
 mod corrected;
 mod counters;
+mod cut;
+mod cut_state;
+mod cutting;
 mod driven;
 mod elastic;
 mod engine;
@@ -42,6 +45,7 @@ mod worker;
 use std::sync::Arc;
 use std::time::Duration;
 
+pub use cutting::Cut;
 pub use points::check_point_count;
 pub use publish::{QUIET_DISPLACEMENT, QUIET_STEPS};
 pub use published::View;
@@ -58,7 +62,7 @@ use crate::output::Output;
 use build::build;
 use core::Core;
 use points::AttachedPoints;
-use published::{Frame, Published};
+use published::Published;
 use region::check_nodes;
 use shared::Shared;
 use tissue::Tissue;
@@ -104,20 +108,7 @@ impl Scene {
         let core = build(&model, options)?;
         let mesh = Arc::clone(&core.mesh);
         let integrator = core.integrator();
-        let count = mesh.node_count();
-        let earlier = options.cubic_sampling.then(|| Frame::rest(count));
-        let published = Published {
-            last: Frame::rest(count)?,
-            before: Frame::rest(count)?,
-            earlier: earlier.transpose()?,
-            region: None,
-            stats: core.blank_stats(),
-            contact_nodes: memory::room(count, core::SCENE)?,
-            contact_vectors: memory::room(3 * count, core::SCENE)?,
-            tools: Default::default(),
-            frame_state: None,
-            attached: Arc::default(),
-        };
+        let published = core.blank_published()?;
         Ok(Scene {
             worker: Worker::new(options.latest_wins),
             shared: Arc::new(Shared::new(core, published)),
@@ -155,9 +146,9 @@ impl Scene {
         }
     }
 
-    /// Nodes of the scene's mesh, `K`.
+    /// Nodes of the scene's mesh, `K`, and those that cuts have added.
     pub fn node_count(&self) -> usize {
-        self.mesh.node_count()
+        core::lock_read(&self.shared.published).last.field.len() / 3
     }
 
     fn with<T>(
@@ -233,6 +224,7 @@ impl Scene {
     /// ```
     pub fn set_region(&self, nodes: Option<&[u32]>) -> Result<()> {
         self.with(|core, published| {
+            core.check_intact("set_region")?;
             if let Some(nodes) = nodes {
                 check_nodes(nodes, core.mesh.node_count())?;
             }
@@ -260,6 +252,7 @@ impl Scene {
     /// ```
     pub fn attach_points(&self, points: Option<&[f32]>) -> Result<()> {
         self.with(|core, published| {
+            core.check_intact("attach_points")?;
             let mut points = match points {
                 Some(points) => AttachedPoints::new(&core.mesh, points)?,
                 None => AttachedPoints::default(),

@@ -3,10 +3,11 @@
 //! A magic and a version, little-endian; then in postcard's format the scene's origin and its [`State`]; at the end the SHA-256 of all
 //! before it (`docs/decisions/013-state.md`).
 
-use std::sync::RwLock;
+use std::sync::{Arc, PoisonError, RwLock};
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
+use topology::{Body, Kept};
 
 use super::core::Core;
 use super::published::Published;
@@ -16,7 +17,7 @@ use crate::kernels::FlushToZero;
 use crate::stored;
 
 const MAGIC: &[u8; 8] = b"UPTSNAP\0";
-const VERSION: u32 = 11;
+const VERSION: u32 = 12;
 /// Magic and version.
 const HEAD: usize = MAGIC.len() + 4;
 const DIGEST: usize = 32;
@@ -50,7 +51,9 @@ impl Core {
     /// The state as bytes.
     pub(super) fn save(&self, published: &RwLock<Published>) -> Result<Vec<u8>> {
         let state = self.state(published)?;
-        let mut bytes = stored::write(&(self.origin(state.is_driven()), state), HEAD, DIGEST)?;
+        let body = self.cut.as_ref().map(|cut| cut.body.kept());
+        let whole = (self.origin(state.is_driven()), body, state);
+        let mut bytes = stored::write(&whole, HEAD, DIGEST)?;
         bytes[..MAGIC.len()].copy_from_slice(MAGIC);
         bytes[MAGIC.len()..HEAD].copy_from_slice(&VERSION.to_le_bytes());
         let end = bytes.len() - DIGEST;
@@ -61,7 +64,11 @@ impl Core {
 
     /// Takes a saved state; on error nothing has changed.
     pub(super) fn restore(&mut self, published: &RwLock<Published>, bytes: &[u8]) -> Result<()> {
-        let state = self.read(bytes)?;
+        let (body, mut state) = self.read(bytes)?;
+        if body.is_some() || self.cut.is_some() {
+            return self.restore_body(published, body, state);
+        }
+        self.admit(&mut state)?;
         // What is computed from it may still fail: the old state is kept until then.
         let _flush = FlushToZero::enter();
         let old = self.state(published)?;
@@ -78,10 +85,39 @@ impl Core {
         Ok(())
     }
 
-    /// Reads a snapshot of this scene's.
-    fn read(&self, bytes: &[u8]) -> Result<State> {
+    /// Takes a saved state of another body than the scene's, or of a cut one: a core is made for it.
+    fn restore_body(
+        &mut self,
+        published: &RwLock<Published>,
+        body: Option<Kept>,
+        mut state: State,
+    ) -> Result<()> {
+        let body = match body {
+            Some(kept) => {
+                let mesh = Arc::new(match &self.cut {
+                    Some(cut) => cut.body.mesh().clone(),
+                    None => self.whole_body()?.mesh().clone(),
+                });
+                Some(self.with_most_copies(Body::of_kept(mesh, kept)?))
+            }
+            None => None,
+        };
+        let mut next = self.with_body(body)?;
+        let shown = RwLock::new(next.blank_published()?);
+        next.admit(&mut state)?;
+        let _flush = FlushToZero::enter();
+        next.put(&shown, state)?;
+        next.recompute(&shown)?;
+        next.fit_state(&shown)?;
+        let shown = shown.into_inner().unwrap_or_else(PoisonError::into_inner);
+        self.replace(published, next, shown);
+        Ok(())
+    }
+
+    /// Reads a snapshot of this scene's: what its body was cut to, and the state.
+    fn read(&self, bytes: &[u8]) -> Result<(Option<Kept>, State)> {
         // Asked first: a count that was never set is not followed to the end of the host's memory.
-        if bytes.len() > HEAD + self.most_bytes() + DIGEST {
+        if bytes.len() > HEAD + self.most_bytes() + self.most_body_bytes() + DIGEST {
             return Err(Error::Snapshot(format!(
                 "has {} bytes, more than any snapshot of this scene",
                 bytes.len()
@@ -109,15 +145,15 @@ impl Core {
         }
         let (saved, rest) = stored::read::<Origin>(rest)?;
         self.check_origin(&saved)?;
-        let (mut state, rest) = stored::read::<State>(rest)?;
+        let (body, rest) = stored::read::<Option<Kept>>(rest)?;
+        let (state, rest) = stored::read::<State>(rest)?;
         if !rest.is_empty() {
             return Err(Error::Snapshot(format!(
                 "has {} bytes too many",
                 rest.len()
             )));
         }
-        self.admit(&mut state)?;
-        Ok(state)
+        Ok((body, state))
     }
 
     fn check_origin(&self, saved: &Origin) -> Result<()> {

@@ -3,11 +3,13 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, OnceLock};
 
+use serde::{Deserialize, Serialize};
+
 use crate::polytope::{Polytope, Weights};
 use crate::{Point, RestMesh, TopologyError};
 
 /// Part of an element, with nodes of its own.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Cell {
     /// One a corner of the element.
     pub nodes: [u32; 4],
@@ -137,6 +139,33 @@ impl Body {
     /// Whether nothing has been done to it.
     pub fn is_intact(&self) -> bool {
         self.cells.is_empty() && self.stiffness.is_empty()
+    }
+
+    /// Elements with other cells or another stiffness than the mesh's, ascending.
+    pub fn changed_elements(&self) -> impl Iterator<Item = u32> + '_ {
+        let stiff = self
+            .stiffness
+            .keys()
+            .filter(|element| !self.cells.contains_key(element));
+        let mut all: Vec<u32> = self.cells.keys().chain(stiff).copied().collect();
+        all.sort_unstable();
+        all.into_iter()
+    }
+
+    /// Of each copy of a node: the mesh node that it stems from.
+    pub fn parents(&self) -> &[u32] {
+        &self.parents
+    }
+
+    /// Bytes of the heap that it holds, nearly.
+    pub fn heap_bytes(&self) -> usize {
+        let corners = |cell: &Cell| cell.polytope.as_ref().map_or(0, |own| own.points().count());
+        let cells = self.cells.values().flatten();
+        let cells: usize = cells
+            .map(|cell| size_of::<Cell>() + 40 * corners(cell))
+            .sum();
+        let distances: usize = self.strokes.values().map(|own| 16 * own.len()).sum();
+        self.mesh.heap_bytes() + cells + distances + 4 * self.parents.len()
     }
 
     /// Cells of an element.

@@ -42,6 +42,9 @@ pub enum TopologyError {
     /// Nothing would be left.
     #[error("nothing of the body would be left; remove less")]
     NothingLeft,
+    /// What was kept is of another mesh, or damaged.
+    #[error("no cuts of this mesh lead to what was kept; it is of another mesh, or damaged")]
+    Kept,
     /// More copies than a body may have.
     #[error(
         "the body would have {nodes} nodes, with room for {most}; make a scene with more room, or undo"

@@ -1,5 +1,7 @@
 //! The material of a cell: a convex polytope in barycentric coordinates of its element.
 
+use serde::{Deserialize, Serialize};
+
 use crate::Point;
 use crate::polygon;
 use crate::rest::{FACES, cross, dot, minus};
@@ -11,7 +13,7 @@ pub type Weights = [f64; 4];
 const ON_PLANE: f64 = 1e-9;
 
 /// Whence a face of a polytope is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Side {
     /// Part of the element's face opposite to a corner.
     Face(u8),
@@ -20,7 +22,7 @@ pub enum Side {
 }
 
 /// See the module.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Polytope {
     /// Convex polygons, outward.
     pub faces: Vec<(Side, Vec<Weights>)>,

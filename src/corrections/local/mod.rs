@@ -31,7 +31,7 @@ use self::clusters::Clusters;
 use self::columns::NearColumns;
 use self::factor::NearFactor;
 use self::linear::WHAT;
-use self::near::{NearSet, add_centres};
+use self::near::NearSet;
 use self::pairs::{Pairs, Room};
 use self::step::{Change, Step, add, dot, resize};
 use super::input::{Input, SolverContext};
@@ -41,6 +41,7 @@ use crate::error::Result;
 use crate::memory::{self, HeldBytes};
 
 pub use self::linearisation::Linearisation;
+pub(super) use self::near::add_centres;
 pub use self::record::Record;
 
 /// Far elements of a chunk that is near in part are looked at where its smallest det F is below this.
@@ -191,6 +192,7 @@ impl LocalSolver {
         let far = &step.context.corrections.far;
         let rest = step.input.rest;
         self.about.clear();
+        add_centres(rest, &step.context.corrections.changed, &mut self.about)?;
         add_centres(rest, &self.touched, &mut self.about)?;
         let pairs = &self.pairs;
         let abouts = pairs.records().map(|record| record.about.as_slice());

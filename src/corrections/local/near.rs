@@ -353,7 +353,11 @@ fn is_by(rest: &[f32], nodes: &[u32], node: u32, distance: f32) -> bool {
 }
 
 /// Adds those nodes that do not lie by one of the centres.
-pub(super) fn add_centres(rest: &[f32], nodes: &[u32], centres: &mut Vec<u32>) -> Result<()> {
+pub(in crate::corrections) fn add_centres(
+    rest: &[f32],
+    nodes: &[u32],
+    centres: &mut Vec<u32>,
+) -> Result<()> {
     for &node in nodes {
         if !is_by(rest, centres, node, APART_MM) {
             memory::push(centres, node, WHAT)?;

@@ -132,7 +132,7 @@ impl PriorTable {
 }
 
 /// By node: where its three rows in the basis start, where the coordinates of its block start, and how many.
-fn basis_places(
+pub(super) fn basis_places(
     block_nodes: &[u32],
     block_offsets: &[usize],
     rank_offsets: &[usize],

@@ -181,6 +181,12 @@ impl Core {
 
     /// Back to rest.
     pub(super) fn reset(&mut self, published: &RwLock<Published>) -> Result<()> {
+        if self.cut.is_some() {
+            let next = self.with_body(None)?;
+            let shown = next.blank_published()?;
+            self.replace(published, next, shown);
+            return Ok(());
+        }
         self.counters = Counters::REST;
         self.contact.clear();
         self.contact_before.clear();

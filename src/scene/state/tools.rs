@@ -22,7 +22,7 @@ impl Core {
         tools.check(&*self.model.samples()?)
     }
 
-    pub(super) fn put_tools(&mut self, tools: Option<Tools>) -> Result<()> {
+    pub(in crate::scene) fn put_tools(&mut self, tools: Option<Tools>) -> Result<()> {
         match (&mut self.problem, tools) {
             (Some(problem), Some(past)) => problem.past = past,
             (Some(problem), None) => problem.past.clear(),

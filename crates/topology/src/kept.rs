@@ -1,0 +1,74 @@
+//! What of a body lasts beside its mesh: for snapshots.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+
+use crate::body::{Body, Cell};
+use crate::{RestMesh, TopologyError};
+
+/// All that operations have made of a mesh.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Kept {
+    cells: BTreeMap<u32, Vec<Cell>>,
+    parents: Vec<u32>,
+    strokes: BTreeMap<u32, BTreeMap<u32, f64>>,
+    stiffness: BTreeMap<u32, f32>,
+}
+
+impl Body {
+    /// A copy of what lasts.
+    pub fn kept(&self) -> Kept {
+        Kept {
+            cells: self.cells.clone(),
+            parents: self.parents.clone(),
+            strokes: self.strokes.clone(),
+            stiffness: self.stiffness.clone(),
+        }
+    }
+
+    /// The body that this was kept of.
+    ///
+    /// # Errors
+    /// [`TopologyError::Kept`] where no operations on the mesh lead there.
+    pub fn of_kept(mesh: Arc<RestMesh>, kept: Kept) -> Result<Body, TopologyError> {
+        let mut body = Body::new(mesh);
+        let (own, count) = (body.mesh().node_count(), body.mesh().element_count());
+        let nodes = own + kept.parents.len();
+        let is_node = |node: &u32| (*node as usize) < nodes;
+        let is_element = |element: &u32| (*element as usize) < count;
+        let is_part = |part: f64| (0.0..=1.0 + 1e-6).contains(&part);
+        let parent = |node: u32| match (node as usize).checked_sub(own) {
+            Some(copy) => kept.parents[copy],
+            None => node,
+        };
+        let is_sound = |element: u32, cell: &Cell| {
+            let corners = cell.polytope.iter().flat_map(|own| own.points());
+            cell.nodes.iter().all(is_node)
+                && cell.nodes.map(parent) == body.mesh().tet(element)
+                && is_part(cell.share)
+                && is_part(cell.kept)
+                && corners.flatten().all(|weight| is_part(*weight))
+        };
+        let fine = kept.parents.iter().all(|node| (*node as usize) < own)
+            && kept.cells.keys().all(is_element)
+            && kept.stiffness.keys().all(is_element)
+            && (kept.cells.iter()).all(|(element, cells)| {
+                !cells.is_empty() && cells.iter().all(|cell| is_sound(*element, cell))
+            })
+            && kept
+                .stiffness
+                .values()
+                .all(|factor| (1e-3..=1e3).contains(factor))
+            && (kept.strokes.values().flatten()).all(|(node, d)| is_node(node) && d.is_finite());
+        if !fine {
+            return Err(TopologyError::Kept);
+        }
+        body.cells = kept.cells;
+        body.parents = kept.parents;
+        body.strokes = kept.strokes;
+        body.stiffness = kept.stiffness;
+        Ok(body)
+    }
+}

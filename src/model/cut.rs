@@ -1,0 +1,49 @@
+//! A model of a body that has been cut: what a scene goes on with.
+//!
+//! It shares files and runtime with the model of the intact body, and has a mesh, a linear response, corrections and touchable samples of its own. The
+//! learned part knows the intact body alone and is off.
+
+use std::sync::{Arc, Mutex, OnceLock};
+
+use topology::Body;
+
+use super::{KindModel, Model, ReducedModel};
+use crate::error::{Error, Result};
+use crate::library::Alive;
+
+impl Model {
+    /// The model of a body that this one's has been cut to; this is that of the intact body.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] where the bundle has no corrections, [`Error::OutOfMemory`].
+    pub(crate) fn cut(&self, body: &Body) -> Result<Arc<Model>> {
+        let Some(prior) = &self.prior else {
+            return Err(Error::Unsupported(
+                "cut: the bundle has no linear response (`prior` in bundle.json)".into(),
+            ));
+        };
+        let intact = self.corrections()?;
+        let mesh = self.mesh.cut(body)?;
+        let prior = prior.cut(&mesh, body.parents())?;
+        let material = &self.manifest.material;
+        let corrections = intact.cut((&self.mesh, &mesh), body, material, &prior)?;
+        Ok(Arc::new(Model {
+            manifest: self.manifest.clone(),
+            hash: self.hash,
+            mesh: Arc::new(mesh),
+            prior: Some(Arc::new(prior)),
+            kind: KindModel::Reduced(Arc::new(ReducedModel { learned: None })),
+            corrections: OnceLock::from(corrections),
+            samples: OnceLock::new(),
+            opening: Mutex::new(()),
+            files: Arc::clone(&self.files),
+            runtime: self.runtime,
+            plan: self.plan.clone(),
+            threads: self.threads,
+            precision: self.precision,
+            choice: self.choice.clone(),
+            load_seconds: self.load_seconds,
+            _alive: Alive::new(),
+        }))
+    }
+}

@@ -1,0 +1,249 @@
+//! A scene whose body changes: the core of the cut body takes the place of the one before it, with its state.
+//!
+//! The cut body is a model like any other ([`crate::model::Model`]): its mesh has the copies of nodes, its tables their parents' rows, its near set
+//! the cut. A new core of it is made beside the old one; only when it is whole, with the state moved over, do they change places. Copies take
+//! displacement and velocity of the node that they come from, so that nothing moves at the moment of a cut.
+
+use std::sync::{Arc, RwLock};
+
+use topology::{Body, Change, Point, RestMesh, TopologyError};
+
+use super::build::build;
+use super::core::{Core, SCENE, lock_read, lock_write};
+use super::cut_state::CutState;
+use super::published::{Frame, Published};
+use super::{Contact, StepInput};
+use crate::contact::Past;
+use crate::corrections::{History, Linearisation, Motion};
+use crate::error::{Error, Result};
+use crate::memory::{self, HeldBytes};
+use crate::model::Model;
+
+/// A cut body has at most as many copies as the mesh has nodes.
+const MOST_COPIES: usize = 1;
+
+impl From<TopologyError> for Error {
+    fn from(error: TopologyError) -> Error {
+        match error {
+            TopologyError::Kept => Error::Snapshot(error.to_string()),
+            TopologyError::NotFinite { .. } => Error::NonFinite(error.to_string()),
+            other => Error::Argument(format!("cut: {other}")),
+        }
+    }
+}
+
+impl Core {
+    /// Published states at rest, without region and points.
+    pub(super) fn blank_published(&self) -> Result<Published> {
+        let count = self.mesh.node_count();
+        let earlier = self.options.cubic_sampling.then(|| Frame::rest(count));
+        Ok(Published {
+            last: Frame::rest(count)?,
+            before: Frame::rest(count)?,
+            earlier: earlier.transpose()?,
+            region: None,
+            stats: self.blank_stats(),
+            contact_nodes: memory::room(count, SCENE)?,
+            contact_vectors: memory::room(3 * count, SCENE)?,
+            tools: Default::default(),
+            frame_state: None,
+            attached: Arc::default(),
+        })
+    }
+
+    /// What a scene of a cut body does not do.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`].
+    pub(super) fn check_intact(&self, what: &str) -> Result<()> {
+        match &self.cut {
+            None => Ok(()),
+            Some(_) => Err(Error::Unsupported(format!(
+                "{what}: the body of this scene has been cut; reset it, or restore a snapshot from before"
+            ))),
+        }
+    }
+
+    /// Whether a cut body can make such a step.
+    pub(super) fn check_cut(&self, input: &StepInput<'_>) -> Result<()> {
+        match (input.contact, input.displacement) {
+            (Contact::None | Contact::Tools(_), None) => Ok(()),
+            _ => self.check_intact("a step with prescribed nodes or a displacement"),
+        }
+    }
+
+    /// Changes the body, and the scene with it; or neither.
+    pub(super) fn change(
+        &mut self,
+        published: &RwLock<Published>,
+        operation: impl FnOnce(&mut Body, &[Point]) -> std::result::Result<Change, TopologyError>,
+    ) -> Result<Change> {
+        if self.corrected.is_none() {
+            return Err(Error::Unsupported(
+                "cut: the elements move a cut body, and this scene makes no corrections; set `corrections`".into(),
+            ));
+        }
+        self.hands.retain(|hand| !hand.is_over());
+        let region = lock_read(published).region.is_some();
+        if region || self.points.len() > 0 || !self.hands.is_empty() {
+            return Err(Error::Unsupported(
+                "cut: a scene with a region, attached points or haptics cannot be cut; take them off first".into(),
+            ));
+        }
+        let mut body = match &self.cut {
+            Some(cut) => cut.body.clone(),
+            None => self.whole_body()?,
+        };
+        let positions = self.positions(&lock_read(published).last);
+        let change = operation(&mut body, &positions)?;
+        let first = self.mesh.node_count();
+        let source = |node: usize| {
+            let mut node = node;
+            while node >= first {
+                node = change.copied[node - first] as usize;
+            }
+            node
+        };
+        let mut next = self.with_body(Some(body))?;
+        let mut shown = next.blank_published()?;
+        {
+            let own = lock_read(published);
+            let pairs = [
+                (&own.last, &mut shown.last),
+                (&own.before, &mut shown.before),
+            ];
+            for (from, to) in pairs {
+                spread(&from.field, &mut to.field, source);
+            }
+            if let (Some(from), Some(to)) = (&own.earlier, &mut shown.earlier) {
+                spread(&from.field, &mut to.field, source);
+            }
+        }
+        next.take_motion(self, source)?;
+        next.counters = self.counters;
+        next.counters.sleeping = false;
+        next.counters.quiet = 0;
+        next.counters.was_corrected = [true; 2];
+        next.logged_flags = self.logged_flags;
+        self.replace(published, next, shown);
+        Ok(change)
+    }
+
+    /// Another core takes this one's place.
+    pub(super) fn replace(&mut self, published: &RwLock<Published>, next: Core, shown: Published) {
+        *self = next;
+        *lock_write(published) = shown;
+        self.publish_state(published);
+    }
+
+    /// A core at rest of the intact body, or of a cut one.
+    pub(super) fn with_body(&self, body: Option<Body>) -> Result<Core> {
+        let intact = self.intact();
+        let Some(body) = body else {
+            return build(intact, &self.options);
+        };
+        let model = intact.cut(&body)?;
+        let mut core = build(&model, &self.options)?;
+        let cut = CutState {
+            intact: Arc::clone(intact),
+            model_bytes: bytes_of(&model)?,
+            body,
+        };
+        core.cut = Some(memory::boxed(cut, SCENE)?);
+        Ok(core)
+    }
+
+    /// The intact mesh, as what can be cut.
+    pub(super) fn whole_body(&self) -> Result<Body> {
+        let mesh = &self.intact().mesh;
+        let rest = RestMesh::new(mesh.positions.as_chunks().0, mesh.tets.as_chunks().0)?;
+        Ok(self.with_most_copies(Body::new(Arc::new(rest))))
+    }
+
+    pub(super) fn with_most_copies(&self, body: Body) -> Body {
+        let room = MOST_COPIES * body.mesh().node_count();
+        body.with_room(room)
+    }
+
+    /// Bytes of what a snapshot says of a cut body, at most, with its longer fields.
+    pub(super) fn most_body_bytes(&self) -> usize {
+        match self.corrected {
+            Some(_) => MOST_COPIES * self.most_bytes() + 4096 * self.mesh.tets.len() / 4,
+            None => 0,
+        }
+    }
+
+    /// The model that the scene was made with.
+    pub(super) fn intact(&self) -> &Arc<Model> {
+        self.cut.as_ref().map_or(&self.model, |cut| &cut.intact)
+    }
+
+    /// Where each node is in a state.
+    fn positions(&self, frame: &Frame) -> Vec<Point> {
+        let rest = self.mesh.positions.as_chunks::<3>().0;
+        let moved = frame.field.as_chunks::<3>().0;
+        let place = |(rest, u): (&[f32; 3], &[f32; 3])| -> Point {
+            [0, 1, 2].map(|k| f64::from(rest[k]) + f64::from(u[k]))
+        };
+        rest.iter().zip(moved).map(place).collect()
+    }
+
+    /// Takes velocities, inertia and the tools' places of the core before it.
+    fn take_motion(&mut self, before: &Core, source: impl Fn(usize) -> usize + Copy) -> Result<()> {
+        let (Some(own), Some(old)) = (&self.corrected, &before.corrected) else {
+            return Ok(());
+        };
+        let len = 3 * self.mesh.node_count();
+        let was = &old.solver.motion;
+        let mut motion = Motion {
+            velocity: memory::zeros(len, SCENE)?,
+            velocity_before: memory::zeros(len, SCENE)?,
+            inertia: memory::zeros(len, SCENE)?,
+            min_det: was.min_det,
+            truncated_mm: was.truncated_mm,
+            error_mm: was.error_mm,
+            reaction: Vec::new(),
+        };
+        spread(&was.velocity, &mut motion.velocity, source);
+        spread(&was.velocity_before, &mut motion.velocity_before, source);
+        spread(&was.inertia, &mut motion.inertia, source);
+        // Inertia is that of the mass which is at the node now.
+        let masses = |core: &Core| core.model.corrections().map(|made| made.body.mass.clone());
+        let (now, then) = (masses(self)?, masses(before)?);
+        for (node, inertia) in motion.inertia.chunks_exact_mut(3).enumerate() {
+            let part = now[node] / then[source(node)].max(f32::MIN_POSITIVE);
+            inertia.iter_mut().for_each(|x| *x *= part);
+        }
+        debug_assert_eq!(own.basis_starts.len(), old.basis_starts.len());
+        self.put_history(Some(History {
+            motion,
+            pairs: Vec::new(),
+            local: Vec::new(),
+            linearisation: Linearisation::default(),
+        }))?;
+        let Some(problem) = &before.problem else {
+            return Ok(());
+        };
+        // Samples have other numbers: forces are found anew, and a grasp lets go.
+        let mut past: Past = problem.past.copy()?;
+        past.forces.clear();
+        for held in &mut past.tools {
+            held.grasp.open();
+        }
+        self.put_tools(Some(past))
+    }
+}
+
+/// Values `[K,3]` of the nodes that each node comes from.
+fn spread(from: &[f32], to: &mut [f32], source: impl Fn(usize) -> usize) {
+    for (node, to) in to.chunks_exact_mut(3).enumerate() {
+        to.copy_from_slice(&from[3 * source(node)..][..3]);
+    }
+}
+
+fn bytes_of(model: &Model) -> Result<usize> {
+    let made = model.corrections()?;
+    let prior = model.prior.as_ref().map_or(0, |table| table.held_bytes());
+    let corrections = made.space.held_bytes() + made.body.held_bytes() + made.far.held_bytes();
+    Ok(model.mesh.held_bytes() + prior + corrections)
+}

@@ -1,0 +1,123 @@
+//! Operations that change the body of a scene.
+
+use ::contact::Vector;
+use topology::{Change, Sweep};
+
+use super::Scene;
+use crate::contact::Tool;
+use crate::error::Result;
+
+/// What an operation did to the body.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Cut {
+    /// New area of a cut, mm².
+    pub area_mm2: f32,
+    /// Volume that the body has lost, mm³.
+    pub removed_mm3: f32,
+    /// Of each new node, whose number is the next after the ones that there were: the node whose place and velocity it took.
+    pub copied: Vec<u32>,
+    /// Elements of the intact mesh of which something has changed, ascending.
+    pub elements: Vec<u32>,
+}
+
+impl From<Change> for Cut {
+    fn from(change: Change) -> Cut {
+        Cut {
+            area_mm2: change.area_mm2 as f32,
+            removed_mm3: change.removed_mm3 as f32,
+            copied: change.copied,
+            elements: change.elements,
+        }
+    }
+}
+
+impl Scene {
+    /// A blade's edge, `points` points in a line, goes from pose to pose, `poses [.., points, 3]`, mm, and cuts what it passes of the tissue as it is now. Calls with
+    /// the same `stroke` are one blade that goes on; another number cuts anew, also through what the first has cut.
+    ///
+    /// Elements that the blade has touched become two, with copies of nodes where they have come apart
+    /// (`docs/decisions/027-virtual-nodes.md`): the lips lie on the blade's path to a tenth of an element's edge, mass and volume stay, and nothing moves
+    /// before the next step. The scene has more nodes then ([`Scene::node_count`]); those that there were keep their numbers. From then on the elements make
+    /// each step, with tools or without.
+    ///
+    /// # Errors
+    /// [`crate::Error::Argument`] for a blade that sweeps no area, poses of other lengths, and more copies than nodes; [`crate::Error::NonFinite`];
+    /// [`crate::Error::Unsupported`] for a scene without corrections, or with a region, attached points or haptics. The scene is
+    /// then what it was.
+    pub fn cut(&self, stroke: u32, points: usize, poses: &[[f32; 3]]) -> Result<Cut> {
+        let wide = |point: &[f32; 3]| point.map(f64::from);
+        let edges: Vec<_> = (poses.chunks(points.max(1)))
+            .map(|edge| edge.iter().map(wide).collect())
+            .collect();
+        let sweep = Sweep::new(&edges)?;
+        let change = self.with(|core, published| {
+            core.change(published, |body, at| body.cut(&sweep, stroke, at))
+        });
+        change.map(Cut::from)
+    }
+
+    /// Removes what lies inside of a tool, the deepest first, up to `most_mm3`: an aspirator with a rate takes that times the step. Elements are removed in 64 parts
+    /// each; what is left of one counts by its share.
+    ///
+    /// # Errors
+    /// As [`Scene::cut`]; [`crate::Error::Argument`] where nothing would be left.
+    pub fn remove(&self, tool: &Tool, most_mm3: f32) -> Result<Cut> {
+        let depth = |at: [f64; 3]| {
+            let at = Vector::from(at.map(|x| x as f32));
+            f64::from(-tool.body.nearest_at(&tool.pose, at).distance)
+        };
+        let change = self.with(|core, published| {
+            core.change(published, |body, at| {
+                body.remove(depth, f64::from(most_mm3), at)
+            })
+        });
+        change.map(Cut::from)
+    }
+
+    /// Multiplies the stiffness of elements of the intact mesh: coagulation, oedema, softening.
+    ///
+    /// # Errors
+    /// As [`Scene::cut`]; [`crate::Error::Argument`] for a factor that takes an element out of 0.001 to 1000 times its own.
+    pub fn scale_stiffness(&self, elements: &[u32], factor: f32) -> Result<Cut> {
+        let change = self.with(|core, published| {
+            core.change(published, |body, _| body.scale_stiffness(elements, factor))
+        });
+        change.map(Cut::from)
+    }
+
+    /// Takes the pieces that nothing holds out of the body; their volumes, mm³.
+    ///
+    /// # Errors
+    /// As [`Scene::cut`].
+    pub fn drop_fragments(&self) -> Result<Vec<f32>> {
+        self.with(|core, published| {
+            let Some(cut) = &core.cut else {
+                return Ok(Vec::new());
+            };
+            let held = &cut.intact.mesh.held_nodes;
+            let is_held = |node| held.binary_search(&cut.body.parent(node)).is_ok();
+            let fragments = cut.body.fragments(is_held);
+            let cells: Vec<_> = fragments.iter().flat_map(|one| one.cells.clone()).collect();
+            if !cells.is_empty() {
+                core.change(published, |body, _| body.drop_cells(&cells))?;
+            }
+            Ok(fragments.iter().map(|one| one.volume_mm3 as f32).collect())
+        })
+    }
+
+    /// The closed surface of the body as it is now: new lips and walls, with vertices at weights on nodes.
+    ///
+    /// # Errors
+    /// [`crate::Error::Busy`].
+    pub fn cut_surface(&self) -> Result<topology::Surface> {
+        self.with(|core, _| {
+            let body = match &core.cut {
+                Some(cut) => cut.body.clone(),
+                None => core.whole_body()?,
+            };
+            let mut surface = topology::Surface::new(body.mesh());
+            surface.update(&body);
+            Ok(surface)
+        })
+    }
+}

@@ -1,0 +1,154 @@
+//! Cuts, removal and stiffness in a scene: what moves, what is kept, what is refused.
+
+use super::*;
+use upt::Error;
+
+pub(crate) fn liver() -> std::sync::Arc<upt::Model> {
+    let path = std::path::Path::new("onnx/liver-coarse");
+    upt::Model::open(path, &upt::ModelOptions::default()).unwrap()
+}
+
+pub(crate) fn options() -> SceneOptions {
+    SceneOptions {
+        corrections: Corrections::Fixed(5),
+        ..SceneOptions::default()
+    }
+}
+
+/// A scene of the liver and a tool 4 mm deep in its top, pressed for a few steps.
+fn pressed() -> (Scene, Tool) {
+    let scene = Scene::new(liver(), &options()).unwrap();
+    let tool = pressing(&scene, 4.0, Vector::ZERO);
+    for _ in 0..6 {
+        step(&scene, std::slice::from_ref(&tool));
+    }
+    (scene, tool)
+}
+
+/// A straight blade 40 mm long, `aside` mm from the site, pushed `depth` mm in along the normal.
+pub(crate) fn slit(scene: &Scene, aside: f32, depth: f32) -> [[f32; 3]; 4] {
+    let (at, normal) = site(scene);
+    let along = normal.any_orthonormal_vector();
+    let across = normal.cross(along);
+    let point =
+        |a: f32, n: f32| (Vector::from(at) + across * aside + along * a + normal * n).to_array();
+    [
+        point(-20.0, 6.0),
+        point(20.0, 6.0),
+        point(-20.0, -depth),
+        point(20.0, -depth),
+    ]
+}
+
+#[test]
+fn nothing_moves_at_the_moment_of_a_cut() {
+    let (scene, tool) = pressed();
+    let tools = std::slice::from_ref(&tool);
+    let before = step(&scene, tools);
+    let count = scene.node_count();
+    let cut = scene.cut(0, 2, &slit(&scene, 6.0, 15.0)).unwrap();
+    assert!(!cut.copied.is_empty() && cut.area_mm2 > 100.0 && cut.removed_mm3.abs() < 1e-3);
+    assert_eq!(scene.node_count(), count + cut.copied.len());
+    let mut now = vec![0.0; 3 * scene.node_count()];
+    scene.read(&mut now).unwrap();
+    assert_eq!(bits(&now[..3 * count]), bits(&before));
+    for (at, source) in cut.copied.iter().enumerate() {
+        let [own, from] = [count + at, *source as usize].map(|node| &now[3 * node..][..3]);
+        assert_eq!(own, from);
+    }
+    let surface = scene.cut_surface().unwrap();
+    assert!(surface.inside.iter().filter(|inside| **inside).count() > 20);
+    // Without the tool it goes home.
+    for _ in 0..40 {
+        now = step(&scene, &[]);
+        assert!(scene.stats().min_det > 0.3);
+    }
+    assert!(now.iter().all(|u| u.abs() < 0.3));
+}
+
+#[test]
+fn snapshots_go_across_cuts_and_reset_gives_the_intact_body() {
+    let (scene, tool) = pressed();
+    let tools = std::slice::from_ref(&tool);
+    let whole = scene.save().unwrap();
+    let uncut = step(&scene, tools);
+    scene.restore(&whole).unwrap();
+    scene.cut(0, 2, &slit(&scene, 6.0, 12.0)).unwrap();
+    step(&scene, tools);
+    let parted = scene.save().unwrap();
+    let next = step(&scene, tools);
+    scene.cut(1, 2, &slit(&scene, -4.0, 18.0)).unwrap();
+    step(&scene, tools);
+    scene.restore(&parted).unwrap();
+    assert_eq!(scene.save().unwrap(), parted);
+    assert_eq!(bits(&step(&scene, tools)), bits(&next));
+    scene.restore(&whole).unwrap();
+    assert_eq!(bits(&step(&scene, tools)), bits(&uncut));
+    // In another scene, with another number of threads.
+    let threads = SceneOptions {
+        threads: 2,
+        ..options()
+    };
+    let other = Scene::new(liver(), &threads).unwrap();
+    other.restore(&parted).unwrap();
+    assert_eq!(bits(&step(&other, tools)), bits(&next));
+    other.cut(1, 2, &slit(&scene, -4.0, 18.0)).unwrap();
+    scene.restore(&parted).unwrap();
+    step(&scene, tools);
+    scene.cut(1, 2, &slit(&scene, -4.0, 18.0)).unwrap();
+    assert_eq!(bits(&step(&other, tools)), bits(&step(&scene, tools)));
+    other.reset().unwrap();
+    let fresh = Scene::new(liver(), &options()).unwrap();
+    assert_eq!(other.node_count(), fresh.node_count());
+    assert_eq!(bits(&step(&other, tools)), bits(&step(&fresh, tools)));
+}
+
+#[test]
+fn what_cannot_be_cut_stays_as_it_is() {
+    let (scene, tool) = pressed();
+    let saved = scene.save().unwrap();
+    let edge = slit(&scene, 6.0, 10.0);
+    let still = [edge[0], edge[1], edge[0], edge[1]];
+    assert!(matches!(scene.cut(0, 2, &still), Err(Error::Argument(_))));
+    assert!(matches!(scene.cut(0, 0, &[]), Err(Error::Argument(_))));
+    assert!(matches!(scene.cut(0, 3, &edge), Err(Error::Argument(_))));
+    let lost = [edge[0], [f32::NAN; 3], edge[2], edge[3]];
+    assert!(matches!(scene.cut(0, 2, &lost), Err(Error::NonFinite(_))));
+    assert!(matches!(
+        scene.remove(&tool, f32::NAN),
+        Err(Error::NonFinite(_))
+    ));
+    let all = ball(500.0, [0.0; 3]);
+    assert!(matches!(
+        scene.remove(&all, f32::MAX),
+        Err(Error::Argument(_))
+    ));
+    assert!(matches!(
+        scene.scale_stiffness(&[0], 0.0),
+        Err(Error::Argument(_))
+    ));
+    assert!(matches!(
+        scene.scale_stiffness(&[u32::MAX], 2.0),
+        Err(Error::Argument(_))
+    ));
+    assert_eq!(scene.save().unwrap(), saved);
+    scene.set_region(Some(&[1])).unwrap();
+    assert!(matches!(scene.cut(0, 2, &edge), Err(Error::Unsupported(_))));
+    scene.set_region(None).unwrap();
+    scene.cut(0, 2, &edge).unwrap();
+    assert!(matches!(
+        scene.set_region(Some(&[1])),
+        Err(Error::Unsupported(_))
+    ));
+    assert!(matches!(
+        scene.attach_points(Some(&[0.0; 3])),
+        Err(Error::Unsupported(_))
+    ));
+    let node = Contact::Sparse {
+        nodes: &[1],
+        vectors: &[0.0; 3],
+    };
+    assert!(matches!(scene.step(node, None), Err(Error::Unsupported(_))));
+    let bare = Scene::new(liver(), &with(0)).unwrap();
+    assert!(matches!(bare.cut(0, 2, &edge), Err(Error::Unsupported(_))));
+}
