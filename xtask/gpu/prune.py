@@ -17,7 +17,9 @@ from pathlib import Path
 
 MAGIC = 0xBA55ED50
 CUBIN = 2
-UNREACHED = re.compile(rb"MoeFCGemm|flash|fpA_intB|moe|GroupProblemShape|attention_kernel_batched|SaveNoSpeech|3llm|paged|[fF]mha")
+UNREACHED = re.compile(
+    rb"MoeFCGemm|flash|fpA_intB|moe|GroupProblemShape|attention_kernel_batched|SaveNoSpeech|3llm|paged|[fF]mha"
+)
 NAME = re.compile(rb"\.text\.([A-Za-z0-9_]{10,400})")
 
 

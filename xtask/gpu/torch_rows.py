@@ -1,4 +1,5 @@
-"""PyTorch on the card, eager and compiled, with the weights of a random bundle: `torch_rows.py OUT STEPS KINDS BUNDLE...`.
+"""PyTorch on the card, eager and compiled, with the weights of random bundles:
+`torch_rows.py OUT STEPS KINDS BUNDLE...`.
 
 Needs torch and the packed `upt_training`. Also measures the card's rates for the floor: float32 products without TF32,
 and copies. What cannot run is a line under `not_measured`.

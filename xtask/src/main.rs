@@ -11,6 +11,7 @@ mod ort;
 mod package;
 mod parts;
 mod process;
+mod rivals;
 mod stages;
 mod system;
 mod test;
@@ -83,6 +84,15 @@ enum Task {
         #[arg(long, value_name = "FILE", default_value = "docs/results/README.md")]
         page: std::path::PathBuf,
     },
+    /// Compare with what a developer would pick instead, on the same mesh and poses: MuJoCo, Newton, Jolt, rapier, Bullet.
+    #[command(
+        after_help = "Examples:\n  cargo xtask rivals -- --cases press --only libupt Jolt\n  cargo xtask rivals -- --page docs/results/rivals.md"
+    )]
+    Rivals {
+        /// Arguments of the study, such as `--help`.
+        #[arg(last = true)]
+        arguments: Vec<String>,
+    },
     /// Build libupt for each cargo feature and write what it adds to docs/results/footprint.md.
     #[command(after_help = "Example:\n  cargo xtask footprint")]
     Footprint,
@@ -134,6 +144,7 @@ fn run(workspace: &Workspace, task: Task) -> Result<bool> {
         Task::Package(options) => package::run(workspace, &options),
         Task::Site { out } => web::site(workspace, &out),
         Task::Readme { reports, page } => upkeep::readme(workspace, &page, &reports),
+        Task::Rivals { arguments } => rivals::run(workspace, &arguments),
         Task::Footprint => footprint::run(workspace),
         Task::Header { check } => upkeep::header(workspace, check),
         Task::Bundle { module, arguments } => upkeep::bundle(workspace, &module, &arguments),
