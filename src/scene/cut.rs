@@ -47,8 +47,24 @@ impl Core {
             contact_vectors: memory::room(3 * count, SCENE)?,
             tools: Default::default(),
             frame_state: None,
+            is_cut: self.cut.is_some(),
             attached: Arc::default(),
         })
+    }
+
+    /// What a cut body does not have.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`].
+    pub(super) fn check_bare(&mut self, published: &RwLock<Published>) -> Result<()> {
+        self.hands.retain(|hand| !hand.is_over());
+        let region = lock_read(published).region.is_some();
+        if region || self.points.len() > 0 || !self.hands.is_empty() {
+            return Err(Error::Unsupported(
+                "cut: a scene with a region, attached points or haptics cannot be cut; take them off first".into(),
+            ));
+        }
+        Ok(())
     }
 
     /// What a scene of a cut body does not do.
@@ -58,9 +74,7 @@ impl Core {
     pub(super) fn check_intact(&self, what: &str) -> Result<()> {
         match &self.cut {
             None => Ok(()),
-            Some(_) => Err(Error::Unsupported(format!(
-                "{what}: the body of this scene has been cut; reset it, or restore a snapshot from before"
-            ))),
+            Some(_) => Err(refused(what)),
         }
     }
 
@@ -83,13 +97,7 @@ impl Core {
                 "cut: the elements move a cut body, and this scene makes no corrections; set `corrections`".into(),
             ));
         }
-        self.hands.retain(|hand| !hand.is_over());
-        let region = lock_read(published).region.is_some();
-        if region || self.points.len() > 0 || !self.hands.is_empty() {
-            return Err(Error::Unsupported(
-                "cut: a scene with a region, attached points or haptics cannot be cut; take them off first".into(),
-            ));
-        }
+        self.check_bare(published)?;
         let mut body = match &self.cut {
             Some(cut) => cut.body.clone(),
             None => self.whole_body()?,
@@ -232,6 +240,13 @@ impl Core {
         }
         self.put_tools(Some(past))
     }
+}
+
+/// What a cut scene says to a call that it does not make.
+pub(super) fn refused(what: &str) -> Error {
+    Error::Unsupported(format!(
+        "{what}: the body of this scene has been cut; reset it, or restore a snapshot from before"
+    ))
 }
 
 /// Values `[K,3]` of the nodes that each node comes from.

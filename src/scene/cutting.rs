@@ -1,9 +1,15 @@
 //! Operations that change the body of a scene.
 
+use std::sync::MutexGuard;
+
 use ::contact::Vector;
 use topology::{Change, Sweep};
 
 use super::Scene;
+use super::core::lock_read;
+use super::cut::refused;
+use super::presenter::Presenters;
+use super::shared::lock;
 use crate::contact::Tool;
 use crate::error::Result;
 
@@ -50,6 +56,7 @@ impl Scene {
             .map(|edge| edge.iter().map(wide).collect())
             .collect();
         let sweep = Sweep::new(&edges)?;
+        let _frames = self.hold_frames(true)?;
         let change = self.with(|core, published| {
             core.change(published, |body, at| body.cut(&sweep, stroke, at))
         });
@@ -66,6 +73,7 @@ impl Scene {
             let at = Vector::from(at.map(|x| x as f32));
             f64::from(-tool.body.nearest_at(&tool.pose, at).distance)
         };
+        let _frames = self.hold_frames(true)?;
         let change = self.with(|core, published| {
             core.change(published, |body, at| {
                 body.remove(depth, f64::from(most_mm3), at)
@@ -79,6 +87,7 @@ impl Scene {
     /// # Errors
     /// As [`Scene::cut`]; [`crate::Error::Argument`] for a factor that takes an element out of 0.001 to 1000 times its own.
     pub fn scale_stiffness(&self, elements: &[u32], factor: f32) -> Result<Cut> {
+        let _frames = self.hold_frames(true)?;
         let change = self.with(|core, published| {
             core.change(published, |body, _| body.scale_stiffness(elements, factor))
         });
@@ -90,6 +99,7 @@ impl Scene {
     /// # Errors
     /// As [`Scene::cut`].
     pub fn drop_fragments(&self) -> Result<Vec<f32>> {
+        let _frames = self.hold_frames(true)?;
         self.with(|core, published| {
             let Some(cut) = &core.cut else {
                 return Ok(Vec::new());
@@ -103,6 +113,33 @@ impl Scene {
             }
             Ok(fragments.iter().map(|one| one.volume_mm3 as f32).collect())
         })
+    }
+
+    /// Keeps frames from being made while the body changes, where it may; those that there were are forgotten.
+    ///
+    /// # Errors
+    /// [`crate::Error::Busy`] while one is made.
+    pub(super) fn hold_frames(
+        &self,
+        may_change: bool,
+    ) -> Result<Option<MutexGuard<'_, Presenters>>> {
+        if !may_change {
+            return Ok(None);
+        }
+        let mut frames = lock(&self.tools.presenters)?;
+        *frames = Presenters::default();
+        Ok(Some(frames))
+    }
+
+    /// Whether the body is intact, for a call of its own thread.
+    ///
+    /// # Errors
+    /// [`crate::Error::Unsupported`].
+    pub(super) fn check_intact(&self, what: &str) -> Result<()> {
+        match lock_read(&self.shared.published).is_cut {
+            true => Err(refused(what)),
+            false => Ok(()),
+        }
     }
 
     /// The closed surface of the body as it is now: new lips and walls, with vertices at weights on nodes.

@@ -70,6 +70,9 @@ impl Scene {
             }),
         };
         let published = lock_read(&self.shared.published);
+        if published.is_cut {
+            return Err(super::cut::refused("contacts from instruments"));
+        }
         let step = Some(published.stats.step_count);
         let mut pairs = asked.instruments.iter().zip(instruments);
         let same = asked.instruments.len() == instruments.len() && pairs.all(|(a, b)| a.is_same(b));

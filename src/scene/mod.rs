@@ -60,7 +60,7 @@ use crate::model::{KindModel, Model};
 use crate::options::SceneOptions;
 use crate::output::Output;
 use build::build;
-use core::Core;
+use core::{Core, lock_read};
 use points::AttachedPoints;
 use published::Published;
 use region::check_nodes;
@@ -148,7 +148,7 @@ impl Scene {
 
     /// Nodes of the scene's mesh, `K`, and those that cuts have added.
     pub fn node_count(&self) -> usize {
-        core::lock_read(&self.shared.published).last.field.len() / 3
+        lock_read(&self.shared.published).last.field.len() / 3
     }
 
     fn with<T>(
@@ -165,6 +165,7 @@ impl Scene {
 
     /// Back to rest; region and points stay.
     pub fn reset(&self) -> Result<()> {
+        let _frames = self.hold_frames(lock_read(&self.shared.published).is_cut)?;
         self.with(|core, published| {
             core.reset(published)?;
             self.tools.reset();
@@ -331,6 +332,8 @@ impl Scene {
     /// # Errors
     /// [`Error::Snapshot`] when it is damaged or of another model or mesh, [`Error::Version`].
     pub fn restore(&self, bytes: &[u8]) -> Result<()> {
+        let is_cut = lock_read(&self.shared.published).is_cut;
+        let _frames = self.hold_frames(is_cut || snapshot::has_body(bytes))?;
         self.with(|core, published| core.restore(published, bytes))
     }
 }

@@ -63,6 +63,7 @@ impl Scene {
         lock_read(&self.shared.published).check_len(view, out.len())?;
         let _flush = FlushToZero::enter();
         let mut presenters = lock(&self.tools.presenters)?;
+        self.check_intact("present")?;
         let tissue = self.tissue();
         presenters.prepare(&tissue, view, || {
             let begun = lock_read(&self.shared.published).frame_state.is_some();

@@ -74,6 +74,8 @@ pub struct Published {
     pub tools: crate::contact::ContactReport,
     /// What frames between steps are made of, from the first that a host asks for.
     pub frame_state: Option<super::frame_state::FrameState>,
+    /// These are states of a cut body.
+    pub is_cut: bool,
     /// The attached points.
     pub attached: std::sync::Arc<super::points::AttachedPoints>,
 }

@@ -59,6 +59,7 @@ impl Scene {
         if core.corrected_reaction(out) || core.prior_reaction(out)? {
             return Ok(());
         }
+        core.check_intact("contact_force")?;
         let mut haptics = lock(&self.tools.forces)?;
         let haptics = match &mut *haptics {
             Some(made) => made,

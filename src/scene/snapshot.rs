@@ -37,6 +37,14 @@ struct Origin {
     driven: bool,
 }
 
+/// Whether bytes say that they are of a cut body; they may be damaged.
+pub(super) fn has_body(bytes: &[u8]) -> bool {
+    let rest = bytes.get(HEAD..).unwrap_or_default();
+    let body =
+        stored::read::<Origin>(rest).and_then(|(_, rest)| stored::read::<Option<Kept>>(rest));
+    matches!(body, Ok((Some(_), _)))
+}
+
 impl Core {
     fn origin(&self, driven: bool) -> Origin {
         Origin {
@@ -94,6 +102,7 @@ impl Core {
     ) -> Result<()> {
         let body = match body {
             Some(kept) => {
+                self.check_bare(published)?;
                 let mesh = Arc::new(match &self.cut {
                     Some(cut) => cut.body.mesh().clone(),
                     None => self.whole_body()?.mesh().clone(),
