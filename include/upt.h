@@ -840,6 +840,36 @@ typedef struct upt_instrument_contact {
 } upt_instrument_contact;
 
 /**
+ * What an operation has made of the body of a scene; filled by `upt_scene_cut` and the calls beside it.
+ */
+typedef struct upt_cut {
+  /**
+   * `sizeof(upt_cut)`, set by the caller.
+   */
+  uint32_t struct_size;
+  /**
+   * Pieces that were dropped.
+   */
+  uint32_t fragment_count;
+  /**
+   * Nodes that the scene has now. Outputs have 3 floats for each.
+   */
+  uint64_t node_count;
+  /**
+   * New ones, the last of them.
+   */
+  uint64_t copied_count;
+  /**
+   * New area of the cut, mm².
+   */
+  float area_mm2;
+  /**
+   * Volume that the body has lost, mm³.
+   */
+  float removed_mm3;
+} upt_cut;
+
+/**
  * What is shown of a state. Where a call takes one, NULL is the region.
  */
 typedef struct upt_view {
@@ -1318,10 +1348,10 @@ upt_status upt_scene_create(const struct upt_model *model,
 upt_status upt_scene_destroy(struct upt_scene *scene);
 
 /**
- * Returns the scene to rest. The region and the attached points stay.
+ * Returns the scene to rest, a cut body to the intact one. The region and the attached points stay.
  *
  * Threads: one at a time.
- * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_PANIC`.
+ * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_PANIC`; of a cut body also `UPT_ERR_RUNTIME` and `UPT_ERR_OUT_OF_MEMORY`.
  */
 upt_status upt_scene_reset(struct upt_scene *scene);
 
@@ -1442,7 +1472,7 @@ upt_status upt_scene_sample(struct upt_scene *scene,
  *
  * Threads: one at a time.
  * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT` for an index of K or more or too many of
- * them, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
+ * them, `UPT_ERR_UNSUPPORTED` for a cut body, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
  */
 upt_status upt_scene_set_region(struct upt_scene *scene,
                                 const uint32_t *nodes,
@@ -1562,6 +1592,80 @@ upt_status upt_hull_create(const float *points,
 upt_status upt_hull_destroy(struct upt_hull *hull);
 
 /**
+ * Cuts along the way of a blade's edge through the tissue as it is now. Elements that the blade touches become two, with copies of
+ * nodes where they have come apart, so that the lips lie on the blade's path to a tenth of an element's edge; mass and volume stay, and nothing moves before the
+ * next step.
+ *
+ * The scene has more nodes then (`out->node_count`): those that there were keep their numbers, and outputs have `3 * node_count` floats. The elements make each step from then on,
+ * with instruments or without. A cut scene steps with instruments or free, reads, saves and restores. Frames between steps, regions, attached points, haptics,
+ * prescribed nodes and dense fields are `UPT_ERR_UNSUPPORTED` until `upt_scene_reset`, or until a snapshot from before is restored, which is undo.
+ *
+ * - `stroke`: calls with the same number are one blade that goes on; another number cuts anew.
+ * - `points`: `[pose_count, edge_count, 3]`, mm: the edge as a line of points, at each pose.
+ * - `pose_count`: 2 or more.
+ * - `edge_count`: 2 for a straight edge, or more.
+ * - `out`: what was done; set `struct_size`.
+ *
+ * Threads: one at a time.
+ * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT` for a blade that sweeps no area or more copies than
+ * nodes, `UPT_ERR_NON_FINITE`, `UPT_ERR_UNSUPPORTED` for a scene without corrections, or with a region, attached points or haptics,
+ * `UPT_ERR_BUNDLE`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`. The scene is then what it was.
+ */
+upt_status upt_scene_cut(struct upt_scene *scene,
+                         uint32_t stroke,
+                         const float *points,
+                         uint64_t pose_count,
+                         uint64_t edge_count,
+                         struct upt_cut *out);
+
+/**
+ * Removes what lies inside of an instrument, the deepest first, up to a volume: an aspirator with a rate takes that times the step. Elements go in 64 parts
+ * each. What `upt_scene_cut` says of a cut scene holds.
+ *
+ * - `instrument`: its shape and pose; friction and mode do not matter.
+ * - `most_mm3`: largest volume.
+ * - `out`: what was done; set `struct_size`.
+ *
+ * Threads: one at a time.
+ * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT` for the instrument or where nothing would be
+ * left, `UPT_ERR_NON_FINITE`, `UPT_ERR_UNSUPPORTED` as `upt_scene_cut` and in a build without feature "instruments",
+ * `UPT_ERR_BUNDLE`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`. The scene is then what it was.
+ */
+upt_status upt_scene_remove(struct upt_scene *scene,
+                            const struct upt_instrument *instrument,
+                            float most_mm3,
+                            struct upt_cut *out);
+
+/**
+ * Multiplies the stiffness of elements of the model's mesh: coagulation, oedema, softening. What `upt_scene_cut` says of a cut scene holds.
+ *
+ * - `elements`: `[count]` rows of `UPT_INDICES_TETS`.
+ * - `factor`: what an element has then must lie between 0.001 and 1000 times its own stiffness.
+ * - `out`: what was done; set `struct_size`.
+ *
+ * Threads: one at a time.
+ * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`, `UPT_ERR_UNSUPPORTED` as `upt_scene_cut`,
+ * `UPT_ERR_BUNDLE`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`. The scene is then what it was.
+ */
+upt_status upt_scene_scale_stiffness(struct upt_scene *scene,
+                                     const uint32_t *elements,
+                                     uint64_t count,
+                                     float factor,
+                                     struct upt_cut *out);
+
+/**
+ * Takes the pieces that nothing holds out of the body.
+ *
+ * - `out`: what was done; set `struct_size`.
+ *
+ * Threads: one at a time.
+ * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`, `UPT_ERR_UNSUPPORTED` as `upt_scene_cut`,
+ * `UPT_ERR_BUNDLE`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`. The scene is then what it was.
+ */
+upt_status upt_scene_drop_fragments(struct upt_scene *scene,
+                                    struct upt_cut *out);
+
+/**
  * The tissue at a moment between steps, with the instruments where they are at that moment: frames without lag.
  *
  * The velocities of the last published state continue as far as the instruments do, and contact is solved at the poses given here with
@@ -1676,7 +1780,7 @@ upt_status upt_scene_contacts_from_instruments(struct upt_scene *scene,
  *
  * Threads: one at a time.
  * Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "instruments", `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`,
- * `UPT_ERR_ARGUMENT`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
+ * `UPT_ERR_ARGUMENT`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`; `UPT_ERR_UNSUPPORTED` also for a cut body.
  */
 upt_status upt_scene_contact_force(struct upt_scene *scene,
                                    float *out,
@@ -1713,7 +1817,8 @@ upt_status upt_scene_save(struct upt_scene *scene,
  *
  * Threads: one at a time.
  * Errors: `UPT_ERR_SNAPSHOT`, `UPT_ERR_VERSION`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`,
- * `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`; the state does not change.
+ * `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`, `UPT_ERR_UNSUPPORTED` for one of a cut body in a scene with a region, attached points or
+ * haptics; the state does not change.
  */
 upt_status upt_scene_restore(struct upt_scene *scene,
                              const uint8_t *bytes,

@@ -915,6 +915,32 @@ class InstrumentContact(Record):
     ]
 
 
+class Cut(Record):
+    """What an operation has made of the body of a scene; filled by `upt_scene_cut` and the calls beside it."""
+
+    struct_size: int
+    """`sizeof(upt_cut)`, set by the caller."""
+    fragment_count: int
+    """Pieces that were dropped."""
+    node_count: int
+    """Nodes that the scene has now. Outputs have 3 floats for each."""
+    copied_count: int
+    """New ones, the last of them."""
+    area_mm2: float
+    """New area of the cut, mm²."""
+    removed_mm3: float
+    """Volume that the body has lost, mm³."""
+
+    _fields_ = [
+        ("struct_size", ctypes.c_uint32),
+        ("fragment_count", ctypes.c_uint32),
+        ("node_count", ctypes.c_uint64),
+        ("copied_count", ctypes.c_uint64),
+        ("area_mm2", ctypes.c_float),
+        ("removed_mm3", ctypes.c_float),
+    ]
+
+
 #: Name: (result, parameters).
 FUNCTIONS: dict[str, tuple[Any, list[Any]]] = {
     "upt_init": (ctypes.c_int32, [ctypes.c_void_p]),
@@ -950,6 +976,10 @@ FUNCTIONS: dict[str, tuple[Any, list[Any]]] = {
     "upt_scene_instrument_contacts": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p]),
     "upt_hull_create": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p]),
     "upt_hull_destroy": (ctypes.c_int32, [ctypes.c_void_p]),
+    "upt_scene_cut": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_uint32, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_uint64, ctypes.c_void_p]),
+    "upt_scene_remove": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_float, ctypes.c_void_p]),
+    "upt_scene_scale_stiffness": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_float, ctypes.c_void_p]),
+    "upt_scene_drop_fragments": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p]),
     "upt_scene_present": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
     "upt_haptics_create": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p]),
     "upt_haptics_render": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p]),

@@ -77,6 +77,8 @@ pub(super) unsafe fn field<'a>(
     if pointer.is_null() {
         return Ok(None);
     }
+    // A host's field may be of the intact body.
+    scene.check_intact(name)?;
     // SAFETY: the caller's.
     unsafe { slice(pointer, 3 * scene.node_count() as u64, name) }.map(Some)
 }

@@ -8,6 +8,7 @@
 mod call;
 mod constants;
 mod convert;
+mod cut;
 mod driven;
 mod failure;
 mod hands;
@@ -35,6 +36,7 @@ mod worker;
 mod fault;
 
 pub use constants::*;
+pub use cut::*;
 pub use driven::*;
 pub use haptics::*;
 pub use instrument::*;

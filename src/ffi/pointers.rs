@@ -30,6 +30,7 @@ sized!(
     upt_model_info,
     upt_scene_options,
     upt_instrument_reading,
+    upt_cut,
     upt_haptics_options,
     upt_haptic_pose,
     upt_haptic_force,

@@ -60,10 +60,10 @@ pub unsafe extern "C" fn upt_scene_destroy(scene: *mut upt_scene) -> upt_status 
     )
 }
 
-/// Returns the scene to rest. The region and the attached points stay.
+/// Returns the scene to rest, a cut body to the intact one. The region and the attached points stay.
 ///
 /// Threads: one at a time.
-/// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_PANIC`.
+/// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_PANIC`; of a cut body also `UPT_ERR_RUNTIME` and `UPT_ERR_OUT_OF_MEMORY`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_scene_reset(scene: *mut upt_scene) -> upt_status {
     call_scene("upt_scene_reset", scene, |scene| {

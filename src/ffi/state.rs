@@ -96,7 +96,8 @@ pub unsafe extern "C" fn upt_scene_save(
 ///
 /// Threads: one at a time.
 /// Errors: `UPT_ERR_SNAPSHOT`, `UPT_ERR_VERSION`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`,
-/// `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`; the state does not change.
+/// `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`, `UPT_ERR_UNSUPPORTED` for one of a cut body in a scene with a region, attached points or
+/// haptics; the state does not change.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_scene_restore(
     scene: *mut upt_scene,

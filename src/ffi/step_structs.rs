@@ -159,3 +159,22 @@ pub struct upt_instrument_contact {
     /// On the instrument, mN.
     pub force: [f32; 3],
 }
+
+/// What an operation has made of the body of a scene; filled by `upt_scene_cut` and the calls beside it.
+#[derive_ReprC]
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct upt_cut {
+    /// `sizeof(upt_cut)`, set by the caller.
+    pub struct_size: u32,
+    /// Pieces that were dropped.
+    pub fragment_count: u32,
+    /// Nodes that the scene has now. Outputs have 3 floats for each.
+    pub node_count: u64,
+    /// New ones, the last of them.
+    pub copied_count: u64,
+    /// New area of the cut, mm².
+    pub area_mm2: f32,
+    /// Volume that the body has lost, mm³.
+    pub removed_mm3: f32,
+}

@@ -135,7 +135,7 @@ impl Scene {
     ///
     /// # Errors
     /// [`crate::Error::Unsupported`].
-    pub(super) fn check_intact(&self, what: &str) -> Result<()> {
+    pub(crate) fn check_intact(&self, what: &str) -> Result<()> {
         match lock_read(&self.shared.published).is_cut {
             true => Err(refused(what)),
             false => Ok(()),

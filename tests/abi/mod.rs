@@ -4,6 +4,7 @@
     reason = "a host in a test: every call keeps to the header, or breaks it on purpose"
 )]
 
+mod cut_calls;
 mod driven_calls;
 mod haptic_calls;
 mod header;
@@ -62,6 +63,10 @@ pub enum Function {
     Restore,
     SetLog,
     Texts,
+    Cut,
+    Remove,
+    ScaleStiffness,
+    DropFragments,
 }
 
 /// What each function of `include/upt.h` is called by.
@@ -108,6 +113,10 @@ pub const CALLED_BY: &[(&str, Function)] = &[
     ("upt_scene_get_stats", Stats),
     ("upt_scene_save", Save),
     ("upt_scene_restore", Restore),
+    ("upt_scene_cut", Cut),
+    ("upt_scene_remove", Remove),
+    ("upt_scene_scale_stiffness", ScaleStiffness),
+    ("upt_scene_drop_fragments", DropFragments),
 ];
 
 use Function::*;
@@ -157,6 +166,7 @@ pub fn call() -> impl Strategy<Value = Call> {
         60 => few(&[Step, Step, Step, Step, StepField, Present, Present, Readings]),
         2 => few(&[HullCreate, HullCreate, HullDestroy]),
         20 => few(&[HapticsCreate, HapticsRender, HapticsRender, HapticsRender, HapticsDestroy]),
+        6 => few(&[Cut, Cut, Remove, ScaleStiffness, DropFragments]),
         12 => few(&[Submit, Submit, Poll, Wait, Wait]),
         30 => few(&[
             Read, Sample, SetRegion, Decode, AttachPoints, ReadPoints, SamplePoints, Instruments,

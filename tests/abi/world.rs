@@ -200,6 +200,7 @@ impl<'a> World<'a> {
             Instruments | Readings | InstrumentContacts | HullCreate | HullDestroy => {
                 self.call_instruments(call, scene, nodes)
             }
+            Cut | Remove | ScaleStiffness | DropFragments => self.call_cuts(call, scene),
             HapticsCreate | HapticsRender | HapticsDestroy => self.call_haptics(call, scene),
             _ => self.call_scene(call, scene, nodes),
         }

@@ -297,3 +297,14 @@ export const upt_instrument_contact = {
     force: ["Float32", 16, 3],
   },
 };
+export const upt_cut = {
+  size: 32,
+  fields: {
+    struct_size: ["Uint32", 0, 1],
+    fragment_count: ["Uint32", 4, 1],
+    node_count: ["BigUint64", 8, 1],
+    copied_count: ["BigUint64", 16, 1],
+    area_mm2: ["Float32", 24, 1],
+    removed_mm3: ["Float32", 28, 1],
+  },
+};

@@ -411,6 +411,24 @@ namespace Upt.Interop
         public fixed float force[3];
     }
 
+    /// <summary>What an operation has made of the body of a scene; filled by `upt_scene_cut` and the calls beside it.</summary>
+    [StructLayout(LayoutKind.Sequential)]
+    public unsafe struct upt_cut
+    {
+        /// <summary>`sizeof(upt_cut)`, set by the caller.</summary>
+        public uint struct_size;
+        /// <summary>Pieces that were dropped.</summary>
+        public uint fragment_count;
+        /// <summary>Nodes that the scene has now. Outputs have 3 floats for each.</summary>
+        public ulong node_count;
+        /// <summary>New ones, the last of them.</summary>
+        public ulong copied_count;
+        /// <summary>New area of the cut, mm².</summary>
+        public float area_mm2;
+        /// <summary>Volume that the body has lost, mm³.</summary>
+        public float removed_mm3;
+    }
+
     /// <summary>The C ABI, as it is.</summary>
     public static unsafe class Native
     {
@@ -759,10 +777,10 @@ namespace Upt.Interop
         public static extern int upt_scene_destroy(IntPtr scene);
 
         /// <summary>
-        /// Returns the scene to rest. The region and the attached points stay.
+        /// Returns the scene to rest, a cut body to the intact one. The region and the attached points stay.
         ///
         /// Threads: one at a time.
-        /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_PANIC`.
+        /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_PANIC`; of a cut body also `UPT_ERR_RUNTIME` and `UPT_ERR_OUT_OF_MEMORY`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_scene_reset(IntPtr scene);
@@ -877,7 +895,7 @@ namespace Upt.Interop
         ///
         /// Threads: one at a time.
         /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT` for an index of K or more or too many of
-        /// them, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
+        /// them, `UPT_ERR_UNSUPPORTED` for a cut body, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_scene_set_region(IntPtr scene, uint* nodes, ulong count);
@@ -986,6 +1004,71 @@ namespace Upt.Interop
         public static extern int upt_hull_destroy(IntPtr hull);
 
         /// <summary>
+        /// Cuts along the way of a blade's edge through the tissue as it is now. Elements that the blade touches become two, with copies of
+        /// nodes where they have come apart, so that the lips lie on the blade's path to a tenth of an element's edge; mass and volume stay, and nothing moves before the
+        /// next step.
+        ///
+        /// The scene has more nodes then (`out-&gt;node_count`): those that there were keep their numbers, and outputs have `3 * node_count` floats. The elements make each step from then on,
+        /// with instruments or without. A cut scene steps with instruments or free, reads, saves and restores. Frames between steps, regions, attached points, haptics,
+        /// prescribed nodes and dense fields are `UPT_ERR_UNSUPPORTED` until `upt_scene_reset`, or until a snapshot from before is restored, which is undo.
+        ///
+        /// - `stroke`: calls with the same number are one blade that goes on; another number cuts anew.
+        /// - `points`: `[pose_count, edge_count, 3]`, mm: the edge as a line of points, at each pose.
+        /// - `pose_count`: 2 or more.
+        /// - `edge_count`: 2 for a straight edge, or more.
+        /// - `out`: what was done; set `struct_size`.
+        ///
+        /// Threads: one at a time.
+        /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT` for a blade that sweeps no area or more copies than
+        /// nodes, `UPT_ERR_NON_FINITE`, `UPT_ERR_UNSUPPORTED` for a scene without corrections, or with a region, attached points or haptics,
+        /// `UPT_ERR_BUNDLE`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`. The scene is then what it was.
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_scene_cut(IntPtr scene, uint stroke, float* points, ulong pose_count, ulong edge_count, upt_cut* @out);
+
+        /// <summary>
+        /// Removes what lies inside of an instrument, the deepest first, up to a volume: an aspirator with a rate takes that times the step. Elements go in 64 parts
+        /// each. What `upt_scene_cut` says of a cut scene holds.
+        ///
+        /// - `instrument`: its shape and pose; friction and mode do not matter.
+        /// - `most_mm3`: largest volume.
+        /// - `out`: what was done; set `struct_size`.
+        ///
+        /// Threads: one at a time.
+        /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT` for the instrument or where nothing would be
+        /// left, `UPT_ERR_NON_FINITE`, `UPT_ERR_UNSUPPORTED` as `upt_scene_cut` and in a build without feature "instruments",
+        /// `UPT_ERR_BUNDLE`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`. The scene is then what it was.
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_scene_remove(IntPtr scene, upt_instrument* instrument, float most_mm3, upt_cut* @out);
+
+        /// <summary>
+        /// Multiplies the stiffness of elements of the model's mesh: coagulation, oedema, softening. What `upt_scene_cut` says of a cut scene holds.
+        ///
+        /// - `elements`: `[count]` rows of `UPT_INDICES_TETS`.
+        /// - `factor`: what an element has then must lie between 0.001 and 1000 times its own stiffness.
+        /// - `out`: what was done; set `struct_size`.
+        ///
+        /// Threads: one at a time.
+        /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`, `UPT_ERR_UNSUPPORTED` as `upt_scene_cut`,
+        /// `UPT_ERR_BUNDLE`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`. The scene is then what it was.
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_scene_scale_stiffness(IntPtr scene, uint* elements, ulong count, float factor, upt_cut* @out);
+
+        /// <summary>
+        /// Takes the pieces that nothing holds out of the body.
+        ///
+        /// - `out`: what was done; set `struct_size`.
+        ///
+        /// Threads: one at a time.
+        /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`, `UPT_ERR_UNSUPPORTED` as `upt_scene_cut`,
+        /// `UPT_ERR_BUNDLE`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`. The scene is then what it was.
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_scene_drop_fragments(IntPtr scene, upt_cut* @out);
+
+        /// <summary>
         /// The tissue at a moment between steps, with the instruments where they are at that moment: frames without lag.
         ///
         /// The velocities of the last published state continue as far as the instruments do, and contact is solved at the poses given here with
@@ -1090,7 +1173,7 @@ namespace Upt.Interop
         ///
         /// Threads: one at a time.
         /// Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "instruments", `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`,
-        /// `UPT_ERR_ARGUMENT`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
+        /// `UPT_ERR_ARGUMENT`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`; `UPT_ERR_UNSUPPORTED` also for a cut body.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_scene_contact_force(IntPtr scene, float* @out, ulong out_count);
@@ -1124,7 +1207,8 @@ namespace Upt.Interop
         ///
         /// Threads: one at a time.
         /// Errors: `UPT_ERR_SNAPSHOT`, `UPT_ERR_VERSION`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`,
-        /// `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`; the state does not change.
+        /// `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`, `UPT_ERR_UNSUPPORTED` for one of a cut body in a scene with a region, attached points or
+        /// haptics; the state does not change.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_scene_restore(IntPtr scene, byte* bytes, ulong count);

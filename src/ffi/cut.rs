@@ -1,0 +1,172 @@
+//! `upt_scene`: cuts, removal, stiffness.
+
+use super::constants::*;
+use super::convert;
+use super::failure::{Answer, Failure, fail};
+use super::output::fill;
+use super::pointers::{required, slice};
+use super::registry::call_scene;
+use super::step_structs::*;
+use super::structs::*;
+use crate::features;
+use crate::scene::{Cut, Scene};
+
+/// Points of a sweep, and elements of a list, at most: asked before the host's array is touched.
+const MOST: u64 = 1 << 20;
+
+/// Cuts along the way of a blade's edge through the tissue as it is now. Elements that the blade touches become two, with copies of
+/// nodes where they have come apart, so that the lips lie on the blade's path to a tenth of an element's edge; mass and volume stay, and nothing moves before the
+/// next step.
+///
+/// The scene has more nodes then (`out->node_count`): those that there were keep their numbers, and outputs have `3 * node_count` floats. The elements make each step from then on,
+/// with instruments or without. A cut scene steps with instruments or free, reads, saves and restores. Frames between steps, regions, attached points, haptics,
+/// prescribed nodes and dense fields are `UPT_ERR_UNSUPPORTED` until `upt_scene_reset`, or until a snapshot from before is restored, which is undo.
+///
+/// - `stroke`: calls with the same number are one blade that goes on; another number cuts anew.
+/// - `points`: `[pose_count, edge_count, 3]`, mm: the edge as a line of points, at each pose.
+/// - `pose_count`: 2 or more.
+/// - `edge_count`: 2 for a straight edge, or more.
+/// - `out`: what was done; set `struct_size`.
+///
+/// Threads: one at a time.
+/// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT` for a blade that sweeps no area or more copies than
+/// nodes, `UPT_ERR_NON_FINITE`, `UPT_ERR_UNSUPPORTED` for a scene without corrections, or with a region, attached points or haptics,
+/// `UPT_ERR_BUNDLE`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`. The scene is then what it was.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn upt_scene_cut(
+    scene: *mut upt_scene,
+    stroke: u32,
+    points: *const f32,
+    pose_count: u64,
+    edge_count: u64,
+    out: *mut upt_cut,
+) -> upt_status {
+    call_scene("upt_scene_cut", scene, |scene| {
+        let count = pose_count.saturating_mul(edge_count);
+        if pose_count < 2 || edge_count < 2 || count > MOST {
+            return fail(
+                UPT_ERR_ARGUMENT,
+                format!(
+                    "pose_count is {pose_count} and edge_count {edge_count}; each must be 2 or more, and their product at most {MOST}"
+                ),
+            );
+        }
+        // SAFETY: the host passes that many floats, as the header asks.
+        let points = unsafe { slice(points, 3 * count, "points") }?.as_chunks().0;
+        let make = || Ok(scene.cut(stroke, edge_count as usize, points)?);
+        // SAFETY: `out` points to a struct whose first field is its size, as the header asks.
+        unsafe { report(scene, out, make) }
+    })
+}
+
+/// Removes what lies inside of an instrument, the deepest first, up to a volume: an aspirator with a rate takes that times the step. Elements go in 64 parts
+/// each. What `upt_scene_cut` says of a cut scene holds.
+///
+/// - `instrument`: its shape and pose; friction and mode do not matter.
+/// - `most_mm3`: largest volume.
+/// - `out`: what was done; set `struct_size`.
+///
+/// Threads: one at a time.
+/// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT` for the instrument or where nothing would be
+/// left, `UPT_ERR_NON_FINITE`, `UPT_ERR_UNSUPPORTED` as `upt_scene_cut` and in a build without feature "instruments",
+/// `UPT_ERR_BUNDLE`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`. The scene is then what it was.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn upt_scene_remove(
+    scene: *mut upt_scene,
+    instrument: *const upt_instrument,
+    most_mm3: f32,
+    out: *mut upt_cut,
+) -> upt_status {
+    call_scene("upt_scene_remove", scene, |scene| {
+        features::instruments()?;
+        // SAFETY: the host passes a struct whose first field is its size, as the header asks.
+        let tool = convert::tool(0, &unsafe { required(instrument, "instrument") }?)?;
+        // SAFETY: `out` points to a struct whose first field is its size, as the header asks.
+        unsafe { report(scene, out, || Ok(scene.remove(&tool, most_mm3)?)) }
+    })
+}
+
+/// Multiplies the stiffness of elements of the model's mesh: coagulation, oedema, softening. What `upt_scene_cut` says of a cut scene holds.
+///
+/// - `elements`: `[count]` rows of `UPT_INDICES_TETS`.
+/// - `factor`: what an element has then must lie between 0.001 and 1000 times its own stiffness.
+/// - `out`: what was done; set `struct_size`.
+///
+/// Threads: one at a time.
+/// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`, `UPT_ERR_UNSUPPORTED` as `upt_scene_cut`,
+/// `UPT_ERR_BUNDLE`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`. The scene is then what it was.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn upt_scene_scale_stiffness(
+    scene: *mut upt_scene,
+    elements: *const u32,
+    count: u64,
+    factor: f32,
+    out: *mut upt_cut,
+) -> upt_status {
+    call_scene("upt_scene_scale_stiffness", scene, |scene| {
+        let most = scene.mesh().tets.len() as u64 / 4;
+        if count > most {
+            return fail(
+                UPT_ERR_ARGUMENT,
+                format!("count is {count}, the mesh has {most} elements"),
+            );
+        }
+        // SAFETY: the host passes that many elements, as the header asks.
+        let elements = unsafe { slice(elements, count, "elements") }?;
+        // SAFETY: `out` points to a struct whose first field is its size, as the header asks.
+        unsafe { report(scene, out, || Ok(scene.scale_stiffness(elements, factor)?)) }
+    })
+}
+
+/// Takes the pieces that nothing holds out of the body.
+///
+/// - `out`: what was done; set `struct_size`.
+///
+/// Threads: one at a time.
+/// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`, `UPT_ERR_UNSUPPORTED` as `upt_scene_cut`,
+/// `UPT_ERR_BUNDLE`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`. The scene is then what it was.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn upt_scene_drop_fragments(
+    scene: *mut upt_scene,
+    out: *mut upt_cut,
+) -> upt_status {
+    call_scene("upt_scene_drop_fragments", scene, |scene| {
+        let make = |struct_size| {
+            let volumes = scene.drop_fragments()?;
+            Ok(upt_cut {
+                struct_size,
+                fragment_count: volumes.len() as u32,
+                node_count: scene.node_count() as u64,
+                copied_count: 0,
+                area_mm2: 0.0,
+                removed_mm3: volumes.iter().sum(),
+            })
+        };
+        // SAFETY: `out` points to a struct whose first field is its size, as the header asks.
+        unsafe { fill(out, make) }
+    })
+}
+
+/// Makes an operation and says what it did.
+///
+/// # Safety
+/// NULL, or a struct whose first field is its size.
+unsafe fn report(
+    scene: &Scene,
+    out: *mut upt_cut,
+    operation: impl FnOnce() -> Result<Cut, Failure>,
+) -> Answer {
+    let make = |struct_size| {
+        let cut = operation()?;
+        Ok(upt_cut {
+            struct_size,
+            fragment_count: 0,
+            node_count: scene.node_count() as u64,
+            copied_count: cut.copied.len() as u64,
+            area_mm2: cut.area_mm2,
+            removed_mm3: cut.removed_mm3,
+        })
+    };
+    // SAFETY: the caller's.
+    unsafe { fill(out, make) }
+}
