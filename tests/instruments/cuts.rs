@@ -2,6 +2,7 @@
 
 use super::*;
 use upt::Error;
+use upt::ffi::*;
 
 pub(crate) fn liver() -> std::sync::Arc<upt::Model> {
     let path = std::path::Path::new("onnx/liver-coarse");
@@ -162,4 +163,84 @@ fn what_cannot_be_cut_stays_as_it_is() {
         .unwrap();
     let bare = Scene::new(liver(), &with(0)).unwrap();
     assert!(matches!(bare.cut(0, 2, &edge), Err(Error::Unsupported(_))));
+}
+
+/// The same through the C interface: the same bits, and undo by a snapshot.
+#[test]
+fn a_host_in_c_cuts_as_one_in_rust() {
+    let (own, tool) = pressed();
+    let tools = std::slice::from_ref(&tool);
+    let edge = slit(&own, 6.0, 15.0);
+    let model = crate::host::open(std::path::Path::new("onnx/liver-coarse"));
+    let mut options = crate::host::scene_options();
+    options.corrections = 5;
+    let scene = crate::host::create(model, &options);
+    // SAFETY: zeros are values of these structs, and each call keeps to the header.
+    unsafe {
+        let mut one: upt_instrument = std::mem::zeroed();
+        one.struct_size = size_of::<upt_instrument>() as u32;
+        one.radius = 3.0;
+        one.rotation[3] = 1.0;
+        one.position = tool.pose.translation.to_array();
+        let input = upt_input::of_instruments(std::slice::from_ref(&one));
+        let step_in_c = |out: &mut [f32]| {
+            let status = upt_scene_step(scene, &input, out.as_mut_ptr(), out.len() as u64);
+            assert_eq!(status, UPT_OK, "{}", crate::host::message());
+        };
+        let mut u = vec![0.0f32; 3 * own.node_count()];
+        for _ in 0..6 {
+            step_in_c(&mut u);
+        }
+        let mut saved = vec![0u8; 1 << 22];
+        let mut needed = 0;
+        let room = saved.len() as u64;
+        assert_eq!(
+            upt_scene_save(scene, saved.as_mut_ptr().cast(), room, &mut needed),
+            UPT_OK
+        );
+        let mut out: upt_cut = std::mem::zeroed();
+        let at = edge.as_flattened().as_ptr();
+        assert_eq!(
+            upt_scene_cut(scene, 0, at, 2, 2, &mut out),
+            UPT_ERR_STRUCT_SIZE
+        );
+        out.struct_size = size_of::<upt_cut>() as u32;
+        assert_eq!(
+            upt_scene_cut(scene, 0, at, 1, 2, &mut out),
+            UPT_ERR_ARGUMENT
+        );
+        assert_eq!(
+            upt_scene_cut(scene, 0, at, 2, 2, &mut out),
+            UPT_OK,
+            "{}",
+            crate::host::message()
+        );
+        let cut = own.cut(0, 2, &edge).unwrap();
+        assert_eq!(out.node_count, own.node_count() as u64);
+        assert_eq!(out.copied_count, cut.copied.len() as u64);
+        let mut u = vec![0.0f32; 3 * own.node_count()];
+        step_in_c(&mut u);
+        assert_eq!(bits(&u), bits(&step(&own, tools)));
+        one.position[2] -= 12.0;
+        one.radius = 5.0;
+        assert_eq!(upt_scene_remove(scene, &one, 100.0, &mut out), UPT_OK);
+        assert!(out.removed_mm3 > 90.0);
+        assert_eq!(
+            upt_scene_scale_stiffness(scene, [1, 2].as_ptr(), 2, 2.0, &mut out),
+            UPT_OK
+        );
+        assert_eq!(upt_scene_drop_fragments(scene, &mut out), UPT_OK);
+        assert_eq!(
+            upt_scene_restore(scene, saved.as_ptr().cast(), needed),
+            UPT_OK
+        );
+        let status = upt_scene_read(
+            scene,
+            u.as_mut_ptr(),
+            3 * crate::host::node_count(model) as u64,
+        );
+        assert_eq!(status, UPT_OK);
+        upt_scene_destroy(scene);
+        upt_model_close(model);
+    }
 }
