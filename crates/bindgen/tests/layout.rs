@@ -58,7 +58,8 @@ structs!(
     upt_view,
     upt_instrument,
     upt_instrument_reading,
-    upt_instrument_contact
+    upt_instrument_contact,
+    upt_cut
 );
 
 fn run(command: &mut Command) -> String {
