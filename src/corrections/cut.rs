@@ -24,7 +24,7 @@ use crate::prior::{Lost, PriorTable};
 const SAME: f64 = 1e-9;
 
 impl Corrections {
-    /// The tables of a mesh that `intact` was cut to, with its linear response.
+    /// The tables of a mesh that `intact` was cut to, with the linear response of either.
     ///
     /// # Errors
     /// [`crate::Error::OutOfMemory`].
@@ -33,12 +33,12 @@ impl Corrections {
         (intact, cut): (&Mesh, &Mesh),
         body: &CutBody,
         material: &Material,
-        prior: &PriorTable,
+        (before, prior): (&PriorTable, &PriorTable),
     ) -> Result<Corrections> {
         let lost: Vec<Lost> = (body.changed_elements())
             .filter_map(|element| self.lost(intact, body, material, element))
             .collect();
-        let space = self.space.cut(prior, lost.iter())?;
+        let space = (self.space).cut((before, prior), |node| body.parent(node), lost.iter())?;
         let diagonal = Diagonal::of(cut, material)?;
         let own = Body::new(cut, material, &diagonal, Isa::detect())?;
         let mut changed = Vec::new();

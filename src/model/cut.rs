@@ -24,14 +24,15 @@ impl Model {
         };
         let intact = self.corrections()?;
         let mesh = self.mesh.cut(body)?;
-        let prior = prior.cut(&mesh, body.parents())?;
+        let own = prior.cut(&mesh, body.parents())?;
         let material = &self.manifest.material;
-        let corrections = intact.cut((&self.mesh, &mesh), body, material, &prior)?;
+        let priors = (&**prior, &own);
+        let corrections = intact.cut((&self.mesh, &mesh), body, material, priors)?;
         Ok(Arc::new(Model {
             manifest: self.manifest.clone(),
             hash: self.hash,
             mesh: Arc::new(mesh),
-            prior: Some(Arc::new(prior)),
+            prior: Some(Arc::new(own)),
             kind: KindModel::Reduced(Arc::new(ReducedModel { learned: None })),
             corrections: OnceLock::from(corrections),
             samples: OnceLock::new(),

@@ -79,14 +79,15 @@ impl CoarseSpace {
         Ok(space)
     }
 
-    /// The modes of a body that has been cut, by its own tables: of each changed element its corners, stiffness `[12,12]` (µN/mm) and mass at a corner (g), both less
+    /// The modes of a body that has been cut, by its own tables and those of the intact one, whose node each of its contact nodes is or stems from: of each changed element its corners, stiffness `[12,12]` (µN/mm) and mass at a corner (g), both less
     /// what they were.
     ///
     /// # Errors
     /// [`crate::Error::OutOfMemory`].
     pub fn cut<'a>(
         &self,
-        prior: &PriorTable,
+        (intact, prior): (&PriorTable, &PriorTable),
+        parent: impl Fn(u32) -> u32,
         changes: impl Iterator<Item = &'a Lost>,
     ) -> Result<CoarseSpace> {
         let (count, width) = (self.count(), prior.width());
@@ -132,19 +133,32 @@ impl CoarseSpace {
                 }
             }
         }
-        space.restrict(prior);
+        for (at, &node) in prior.contact_nodes.iter().enumerate() {
+            match intact.contact_nodes.binary_search(&parent(node)) {
+                Ok(known) => {
+                    let rows = &self.at_contact[3 * known * count..][..3 * count];
+                    space.at_contact[3 * at * count..][..3 * count].copy_from_slice(rows);
+                }
+                Err(_) => space.restrict_to(prior, at, node),
+            }
+        }
         Ok(space)
     }
 
     /// Rows of the modes at the contact nodes.
     fn restrict(&mut self, prior: &PriorTable) {
+        for (at, &node) in prior.contact_nodes.iter().enumerate() {
+            self.restrict_to(prior, at, node);
+        }
+    }
+
+    /// Those at one.
+    fn restrict_to(&mut self, prior: &PriorTable, at: usize, node: u32) {
         let (count, width) = (self.rows.len(), prior.width());
-        for (i, &node) in prior.contact_nodes.iter().enumerate() {
-            for axis in 0..3 {
-                for mode in 0..count {
-                    let q = |at: usize| self.modes.at(mode * width + at);
-                    self.at_contact[(3 * i + axis) * count + mode] = prior.value_at(node, axis, q);
-                }
+        for axis in 0..3 {
+            for mode in 0..count {
+                let q = |at: usize| self.modes.at(mode * width + at);
+                self.at_contact[(3 * at + axis) * count + mode] = prior.value_at(node, axis, q);
             }
         }
     }
