@@ -97,6 +97,12 @@ impl Solver {
         &mut self,
         operation: impl FnOnce(&mut Body) -> Result<Change, TopologyError>,
     ) -> Result<Change, SolverError> {
+        if self.load.is_some() {
+            return Err(SolverError::Load {
+                field: "all".into(),
+                reason: "act on the body as it was meshed; cut it before any load, without one".into(),
+            });
+        }
         let mut body = match &self.topology.body {
             Some(body) => body.clone(),
             None => Body::new(Arc::new(RestMesh::new(&self.positions, &self.tets)?)),

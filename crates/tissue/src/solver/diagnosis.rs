@@ -190,6 +190,9 @@ impl Solver {
         if let Some(touch) = &mut self.touch {
             touch.begin(tools, steps, dt);
         }
+        if let Some(load) = &mut self.load {
+            load.begin(steps);
+        }
         if step > 1 {
             self.run(step - 1);
         }

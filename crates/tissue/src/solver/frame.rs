@@ -57,6 +57,9 @@ impl Solver {
         if let Some(touch) = &mut self.touch {
             touch.begin(tools, steps, dt);
         }
+        if let Some(load) = &mut self.load {
+            load.begin(steps);
+        }
         let tallies = self.run(steps);
         let inverted = tallies
             .iter()
@@ -72,10 +75,13 @@ impl Solver {
     pub(super) fn run(&mut self, steps: u32) -> Vec<Tally> {
         let mut fields = std::mem::take(&mut self.fields);
         let mut touch = self.touch.take();
+        let mut load = self.load.take();
         let mut march = self.marcher(steps);
         march.touch = touch.as_mut().map(Mutex::new);
+        march.load = load.as_mut().map(Mutex::new);
         let tallies = march.run(&mut fields, self.pool.as_ref());
         self.touch = touch;
+        self.load = load;
         self.fields = fields;
         tallies
     }
@@ -93,6 +99,7 @@ impl Solver {
             damping,
             paths: &self.paths,
             touch: None,
+            load: None,
             steps,
         }
     }

@@ -5,9 +5,10 @@
 //! and `g = dt² / (m (1 + alpha dt/2))`; `g` sits in the fourth component of `d`,
 //! zero at held and prescribed nodes. Contact nodes move on a straight line and
 //! end the frame exactly at their target. Tools ([`super::touch`]) then correct what has moved. Two phases a step, a barrier after each:
-//! chunks add element forces to their own slots; owners collect ghost forces and move.
+//! chunks add element forces to their own slots; owners collect ghost forces and move. Loads ([`super::body_load`]) are added in between.
 
 use super::barrier::SpinBarrier;
+use super::body_load::{self, BodyLoad};
 use super::fields::{Fields, Node};
 use super::touch::{Access, Touch};
 use elements::PADDED;
@@ -27,7 +28,7 @@ pub(crate) struct Path {
 /// What one chunk reports from a march.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct Tally {
-    /// Work done by contact nodes on the tissue, nJ.
+    /// Work done by contact nodes and loads on the tissue, nJ.
     pub work: f64,
     /// First inner step (from 1) at which an element was inverted; 0 when none was.
     pub inverted_at: u32,
@@ -49,6 +50,8 @@ pub(crate) struct March<'a> {
     pub paths: &'a [Path],
     /// Tools, resolved by the first thread between two barriers.
     pub touch: Option<Mutex<&'a mut Touch>>,
+    /// Loads beside contact, computed by the first thread between two barriers.
+    pub load: Option<Mutex<&'a mut BodyLoad>>,
     pub steps: u32,
 }
 
@@ -65,6 +68,8 @@ struct Shared {
     displacement: *mut Node,
     increment: *mut Node,
     force: *mut Node,
+    /// Loads of the inner step; null where there are none.
+    load: *const Node,
     tallies: *mut Tally,
 }
 
@@ -74,6 +79,7 @@ impl Shared {
             displacement: fields.displacement.as_mut_ptr(),
             increment: fields.increment.as_mut_ptr(),
             force: fields.force.as_mut_ptr(),
+            load: std::ptr::null(),
             tallies: tallies.as_mut_ptr(),
         }
     }
@@ -88,7 +94,10 @@ impl March<'_> {
     /// Runs all inner steps; one tally a chunk. The same bits for any pool.
     pub fn run(&self, fields: &mut Fields, pool: Option<&ThreadPool>) -> Vec<Tally> {
         let mut tallies = vec![Tally::default(); self.partition.chunks.len()];
-        let shared = Shared::new(fields, &mut tallies);
+        let mut shared = Shared::new(fields, &mut tallies);
+        if let Some(Ok(load)) = self.load.as_ref().map(Mutex::lock) {
+            shared.load = load.now.as_ptr();
+        }
         self.on_threads(pool, |first, mine, barrier| {
             let mut positions = self.positions();
             for step in 1..=self.steps {
@@ -96,6 +105,13 @@ impl March<'_> {
                 unsafe {
                     self.element_phase(shared, mine.clone(), barrier, &mut positions, step);
                     barrier.wait();
+                    if let Some(load) = &self.load {
+                        // Poisoned only where this thread panicked, which ends the march.
+                        if first && let Ok(mut load) = load.lock() {
+                            load.evaluate(shared.displacement, step);
+                        }
+                        barrier.wait();
+                    }
                     for chunk in mine.clone() {
                         self.node_phase(shared, chunk, step);
                     }
@@ -276,6 +292,10 @@ impl March<'_> {
                 .partition_point(|path| (path.slot as usize) < own.end);
             let paths = &self.paths[first..last];
             let tally = &mut *shared.tallies.add(index);
+            if !shared.load.is_null() {
+                body_load::add(shared.load, shared.force, own.clone());
+                tally.work += body_load::half_work(shared.load, shared.increment, own.clone());
+            }
             for path in paths {
                 tally.work += self.follow(shared, path, step);
             }
@@ -296,6 +316,9 @@ impl March<'_> {
                     increment.0[k] = end[k] - start[k];
                     displacement.0[k] = end[k];
                 }
+            }
+            if !shared.load.is_null() {
+                tally.work += body_load::half_work(shared.load, shared.increment, own);
             }
         }
     }

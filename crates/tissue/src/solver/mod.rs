@@ -7,6 +7,7 @@
 //! bits for any number of threads.
 
 mod barrier;
+mod body_load;
 mod cut_body;
 mod cutting;
 mod diagnosis;
@@ -24,12 +25,14 @@ mod touch;
 #[cfg(all(test, feature = "linear"))]
 mod tests;
 
+pub use body_load::{Loads, SurfacePressure};
 pub use error::SolverError;
 pub use lanes::Isa;
 pub use options::{Pressure, SolverOptions, Substep};
 pub use touch::{SampleForce, Tool, ToolPose, ToolReport};
 
 use crate::mesh::{Boundary, Mesh};
+use body_load::BodyLoad;
 use cut_body::Topology;
 use elements::{Kernels, PADDING, Partition};
 use fields::{Fields, Node};
@@ -55,7 +58,7 @@ pub struct FrameReport {
     pub strain_energy: f64,
     /// mJ, from the half-step velocities.
     pub kinetic_energy: f64,
-    /// Work done by contact nodes and tools since rest, mJ.
+    /// Work done by contact nodes, tools and loads since rest, mJ.
     pub external_work: f64,
     /// Smallest det F over the elements.
     pub min_det_f: f64,
@@ -78,6 +81,7 @@ const MAX_REFINEMENTS: u32 = 3;
 pub struct Solver {
     positions: Vec<[f32; 3]>,
     tets: Vec<[u32; 4]>,
+    surface: Vec<[u32; 3]>,
     options: SolverOptions,
     kernels: Kernels,
     /// What cuts have done.
@@ -97,6 +101,7 @@ pub struct Solver {
     backup: Fields,
     touch: Option<Touch>,
     touch_backup: Option<Touch>,
+    load: Option<BodyLoad>,
     paths: Vec<Path>,
     pool: Option<rayon::ThreadPool>,
     /// Inner step that the increments in `fields` belong to, s.
@@ -146,6 +151,7 @@ impl Solver {
         let mut solver = Self {
             positions: mesh.positions.clone(),
             tets: mesh.tets.clone(),
+            surface: mesh.surface.clone(),
             kernels,
             topology: Topology::new(mesh, held_nodes),
             partition: parts.partition,
@@ -157,6 +163,7 @@ impl Solver {
             backup: fields.clone(),
             touch: None,
             touch_backup: None,
+            load: None,
             fields,
             paths: Vec::new(),
             pool,
@@ -175,7 +182,7 @@ impl Solver {
         Ok(solver)
     }
 
-    /// Back to rest at time zero, without tools. A body that has been cut stays so.
+    /// Back to rest at time zero, without tools and loads. A body that has been cut stays so.
     pub fn reset(&mut self) {
         for field in [
             &mut self.fields.displacement,
@@ -186,6 +193,7 @@ impl Solver {
         }
         self.paths.clear();
         self.touch = None;
+        self.load = None;
         self.dt = self.options.inner_step_s;
         self.time_s = 0.0;
         self.external_work = 0.0;
@@ -242,6 +250,9 @@ impl Solver {
                 Ok(work) => {
                     self.time_s += duration_s;
                     self.external_work += work;
+                    if let Some(load) = &mut self.load {
+                        load.arrive();
+                    }
                     return Ok(self.report(contact, steps));
                 }
                 Err(error) => {

@@ -1,7 +1,9 @@
 //! The same bits for any number of threads; the same answer on any instruction set.
 
 use tissue::mesh::{Boundary, box_phantom};
-use tissue::solver::{ContactNode, FrameReport, Isa, Pressure, Solver, SolverOptions};
+use tissue::solver::{
+    ContactNode, FrameReport, Isa, Loads, Pressure, Solver, SolverOptions, SurfacePressure,
+};
 
 fn march(threads: usize, isa: Option<Isa>, pressure: Pressure) -> (Vec<[f32; 3]>, FrameReport) {
     // Six chunks, so that threads really share nodes.
@@ -19,6 +21,15 @@ fn march(threads: usize, isa: Option<Isa>, pressure: Pressure) -> (Vec<[f32; 3]>
         .collect();
     nodes.sort_unstable();
     nodes.dedup();
+    let loads = Loads {
+        gravity: [2000.0, 0.0, 0.0],
+        pressures: vec![SurfacePressure {
+            faces: mesh.domain[..200].to_vec(),
+            pascal: 40.0,
+        }],
+        ..Loads::default()
+    };
+    solver.set_loads(&loads).unwrap();
     let mut report = None;
     for frame in 1..=3 {
         let contact: Vec<ContactNode> = nodes

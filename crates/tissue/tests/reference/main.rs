@@ -1,6 +1,7 @@
 //! The reference solver against what others computed: closed forms, conservation,
 //! wave speed, refinement, CalculiX; and the promises of the files it writes.
 
+mod body_loads;
 mod calculix;
 mod closed_forms;
 mod contact;
