@@ -733,6 +733,28 @@ typedef struct upt_instrument {
 } upt_instrument;
 
 /**
+ * A pressure on a part of the surface, which follows the surface as it moves. A face in several of them takes their sum.
+ */
+typedef struct upt_pressure {
+  /**
+   * `sizeof(upt_pressure)`, the same in every element of an array.
+   */
+  uint32_t struct_size;
+  /**
+   * From outside on the body, Pa, at most 1000000; negative for suction.
+   */
+  float pascal;
+  /**
+   * `[node_count]`: it acts on the boundary triangles with all three corners among these nodes.
+   */
+  const uint32_t *nodes;
+  /**
+   * At most K; 0: it acts on the domain.
+   */
+  uint64_t node_count;
+} upt_pressure;
+
+/**
  * The input of a step, submitted or not, and of a frame between steps. All zero but `struct_size`: nothing happens, the tissue moves on
  * by itself.
  *
@@ -781,6 +803,27 @@ typedef struct upt_input {
    * The moment of the end of the step on the host's clock, s, from which `upt_scene_present` counts; 0 for hosts that keep none.
    */
   double time_s;
+  /**
+   * `[K,3]`, mN: forces on the nodes at the end of the step; NULL: none. Loads (this field and those after it) act beside whatever drives the
+   * step, in scenes with corrections; they change on a line over the step, and a frame goes on from those of its step.
+   */
+  const float *forces;
+  /**
+   * `[pressure_count]`: pressure on parts of the surface at the end of the step, all with the same `struct_size`.
+   */
+  const struct upt_pressure *pressures;
+  /**
+   * At most 32.
+   */
+  uint64_t pressure_count;
+  /**
+   * Gravity in the mesh's frame at the end of the step, m/s², at most 1000 in each direction.
+   */
+  float gravity[3];
+  /**
+   * Gravity under which the mesh was scanned, m/s²: what acts is `gravity - gravity_at_rest`, on the mass of each node.
+   */
+  float gravity_at_rest[3];
 } upt_input;
 
 /**

@@ -31,8 +31,8 @@ use measure::Row;
 use pushes::{patch, push, pushed};
 use upt::model::KindModel;
 use upt::{
-    Contact, Corrections, GuardPolicy, IndexSet, Kind, Model, ModelOptions, Scene, SceneOptions,
-    StepInput,
+    Contact, Corrections, GuardPolicy, IndexSet, Kind, Loads, Model, ModelOptions, Scene,
+    SceneOptions, StepInput,
 };
 
 fn main() {
@@ -131,6 +131,7 @@ fn limits(model: &Model, threads: usize, surface: bool) -> (Option<f64>, Option<
 const FREE: StepInput<'static> = StepInput {
     displacement: None,
     contact: Contact::None,
+    loads: Loads::NONE,
     time_s: 0.0,
 };
 

@@ -793,6 +793,17 @@ class Input(Record):
     """`[K,3]`, mm, the displacement that the step starts from; NULL: the scene's own state. Not with `instruments`."""
     time_s: float
     """The moment of the end of the step on the host's clock, s, from which `upt_scene_present` counts; 0 for hosts that keep none."""
+    forces: int | None
+    """`[K,3]`, mN: forces on the nodes at the end of the step; NULL: none. Loads (this field and those after it) act beside whatever drives the
+    step, in scenes with corrections; they change on a line over the step, and a frame goes on from those of its step."""
+    pressures: int | None
+    """`[pressure_count]`: pressure on parts of the surface at the end of the step, all with the same `struct_size`."""
+    pressure_count: int
+    """At most 32."""
+    gravity: tuple[float, ...] = vector("_gravity")
+    """Gravity in the mesh's frame at the end of the step, m/s², at most 1000 in each direction."""
+    gravity_at_rest: tuple[float, ...] = vector("_gravity_at_rest")
+    """Gravity under which the mesh was scanned, m/s²: what acts is `gravity - gravity_at_rest`, on the mass of each node."""
 
     _fields_ = [
         ("struct_size", ctypes.c_uint32),
@@ -805,6 +816,31 @@ class Input(Record):
         ("collision", ctypes.c_void_p),
         ("displacement", ctypes.c_void_p),
         ("time_s", ctypes.c_double),
+        ("forces", ctypes.c_void_p),
+        ("pressures", ctypes.c_void_p),
+        ("pressure_count", ctypes.c_uint64),
+        ("_gravity", ctypes.c_float * 3),
+        ("_gravity_at_rest", ctypes.c_float * 3),
+    ]
+
+
+class Pressure(Record):
+    """A pressure on a part of the surface, which follows the surface as it moves. A face in several of them takes their sum."""
+
+    struct_size: int
+    """`sizeof(upt_pressure)`, the same in every element of an array."""
+    pascal: float
+    """From outside on the body, Pa, at most 1000000; negative for suction."""
+    nodes: int | None
+    """`[node_count]`: it acts on the boundary triangles with all three corners among these nodes."""
+    node_count: int
+    """At most K; 0: it acts on the domain."""
+
+    _fields_ = [
+        ("struct_size", ctypes.c_uint32),
+        ("pascal", ctypes.c_float),
+        ("nodes", ctypes.c_void_p),
+        ("node_count", ctypes.c_uint64),
     ]
 
 

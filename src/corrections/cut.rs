@@ -7,7 +7,7 @@
 //! with the gather `G` of copies from their parents: a cut alone changes no product of the modes, since its shares sum to 1. The nodes of what has changed
 //! are near in every step, so the exact factor of the tangent has the copies in its core.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use ::elements::{Material, Tetrahedron};
 use topology::Body as CutBody;
@@ -55,6 +55,7 @@ impl Corrections {
             body: own,
             time_step: Arc::new(TimeStep::new(&diagonal, integrator)?),
             changed,
+            gravity: OnceLock::new(),
         })
     }
 

@@ -22,8 +22,10 @@ impl ImplicitSolver {
     ) -> Result<Report> {
         let mut report = Report::default();
         let rests = |field: &[f32]| field.iter().all(|value| *value == 0.0);
-        if rests(input.last) && rests(input.before) && (input.still || self.rests()) {
+        let is_free = input.load.is_none();
+        if is_free && rests(input.last) && rests(input.before) && (input.still || self.rests()) {
             next.fill(0.0);
+            self.load.clear();
             self.finish(context, input, next)?;
             report.min_det = 1.0;
             return Ok(report);
@@ -43,6 +45,7 @@ impl ImplicitSolver {
             self.finish_free(context, input.last, next);
             if report.fell_back {
                 self.stop_next();
+                self.leave_load();
             }
             self.next.min_det = report.min_det;
             self.estimate(&mut report);
@@ -89,6 +92,7 @@ impl ImplicitSolver {
         self.preconditioner
             .of_natural(env, &self.free.values, &mut self.d)?;
         passes::shorten(env, input.last, &self.d, 1.0, u)?;
+        self.add_gravity(context, input, u)?;
         mask_held(&env.body.held, u);
         let lost = det.is_nan() || det < SMALLEST_DET;
         let mut det = self.residual(context, [input.last, u, u], g, report)?.0;
@@ -141,6 +145,13 @@ impl ImplicitSolver {
         self.free.take(|mode| &mut mode.inner);
         for mode in &mut self.free.modes {
             mode.inner -= mode.drift;
+            mode.load = 0.0;
+        }
+        if self.mean_load(input) {
+            mask_held(&env.body.held, &mut self.q);
+            let values = &mut self.free.values;
+            self.preconditioner.on_natural(env, &self.q, values)?;
+            self.free.take(|mode| &mut mode.load);
         }
         Ok(())
     }

@@ -3,6 +3,7 @@
 use crate::clock::Instant;
 
 use super::Corrections;
+use super::load::Load;
 use super::precondition::Env;
 use super::time_step::TimeStep;
 use crate::field::ContactSet;
@@ -55,6 +56,8 @@ pub struct Input<'a> {
     pub before: &'a [f32],
     /// The host handed `last` over: nothing is known of its velocity.
     pub still: bool,
+    /// Loads beside contact, where there are any.
+    pub load: Option<Load<'a>>,
     /// When to stop.
     pub enough: Enough,
 }

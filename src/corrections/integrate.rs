@@ -12,7 +12,7 @@ const BEND: f64 = 0.02;
 const JERK: f64 = 0.05;
 
 impl ImplicitSolver {
-    /// Inertia and damping of the step at the last displacement.
+    /// Inertia and damping of the step at the last displacement, less the loads.
     pub(super) fn prepare(&mut self, context: SolverContext<'_>, input: &Input<'_>) -> Result<()> {
         let env = context.env();
         let (last, before) = (input.last, input.before);
@@ -39,7 +39,8 @@ impl ImplicitSolver {
                 let a = (3.0 * (v - v_n) - (v_n - v_before)) * half;
                 drift[i] = mass[i] * (a + alpha * v);
             }
-        })
+        })?;
+        self.take_load(input, step_s as f32)
     }
 
     /// Velocity and inertia at `next`, the end of the step from `last`, and what a step of this length leaves out.
@@ -94,6 +95,8 @@ impl ImplicitSolver {
         let nodes = (next.len() / 3) as f64;
         let [bend, jerk] = [0, 1].map(|at| (sums.total(at) / nodes).sqrt());
         let truncated = (BEND * bend).hypot(JERK * jerk);
+        self.leave_load();
+        let own = &mut self.next;
         own.min_det = 1.0;
         own.truncated_mm = match truncated.is_finite() {
             true => truncated as f32,

@@ -12,9 +12,11 @@ mod cut;
 mod estimate;
 mod far;
 mod free;
+mod gravity;
 mod history;
 mod input;
 mod integrate;
+mod load;
 mod local;
 mod memory;
 mod motion;
@@ -28,7 +30,7 @@ mod substeps;
 mod time_step;
 mod tool_contact;
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use elements::Material;
 
@@ -36,12 +38,14 @@ use crate::bundle::{BundleFiles, CorrectionsEntry, Manifest, Mesh};
 use crate::error::{Error, Result};
 use crate::kernels::Isa;
 use crate::prior::{CoarseSpace, PriorTable};
+use gravity::GravityResponse;
 use time_step::Diagonal;
 
 pub use body::Body;
 pub use far::FarField;
 pub use history::{History, PAIRS};
 pub use input::{Enough, Input, Report, SolverContext};
+pub use load::Load;
 pub use local::Linearisation;
 pub use motion::Motion;
 pub use solver::{ImplicitSolver, SMALLEST_DET};
@@ -59,6 +63,8 @@ pub struct Corrections {
     pub time_step: Arc<TimeStep>,
     /// Of a body that has been cut: nodes of what has changed, a few millimetres apart, ascending. They are near in every step.
     pub changed: Vec<u32>,
+    /// Made at the first step in which gravity turns.
+    gravity: OnceLock<GravityResponse>,
 }
 
 impl Corrections {
@@ -87,6 +93,7 @@ impl Corrections {
             body,
             time_step: Arc::new(TimeStep::new(&diagonal, integrator)?),
             changed: Vec::new(),
+            gravity: OnceLock::new(),
         })
     }
 

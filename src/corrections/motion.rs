@@ -15,7 +15,7 @@ pub struct Motion {
     /// Velocity at the state before.
     #[serde(with = "stored")]
     pub velocity_before: Vec<f32>,
-    /// `M (a + alpha v)` at the last state, µN.
+    /// `M (a + alpha v)` at the last state, less the loads beside contact, µN.
     #[serde(with = "stored")]
     pub inertia: Vec<f32>,
     /// Smallest det F of the last corrected state.

@@ -35,10 +35,12 @@ pub(super) struct Oscillator {
     pub(super) place: f64,
     pub(super) before: f64,
     pub(super) velocity: f64,
-    /// `p`: BDF2's inertia at the last place.
+    /// `p`: BDF2's inertia at the last place, less the load at the end of the step.
     pub(super) drift: f64,
     /// `N^T f_int` there.
     pub(super) inner: f64,
+    /// The mean load beside contact over the step.
+    pub(super) load: f64,
 }
 
 impl Oscillators {
@@ -88,7 +90,7 @@ impl Oscillator {
     /// Where it is after a step of `h`, and how fast.
     pub(super) fn after(&self, h: f64) -> (f64, f64) {
         let ([a, b, c, d], w) = (self.over, h * self.velocity);
-        let rest = self.beside() / self.square;
+        let rest = (self.beside() + self.load) / self.square;
         let place = self.place - rest;
         (rest + a * place + b * w, (c * place + d * w) / h)
     }
@@ -137,6 +139,7 @@ mod tests {
                 velocity: v[0],
                 drift: a + alpha * half,
                 inner: omega * omega * u[0] - push,
+                load: 0.0,
             };
             let next =
                 (mode.forced(h, kappa) + push + kappa * u[0] - mode.drift) / (mode.square + kappa);

@@ -132,6 +132,7 @@ impl ImplicitSolver {
                 u.fill(0.0);
             } else {
                 u.copy_from_slice(input.last);
+                self.add_gravity(context, input, u)?;
             }
             let part = 1.0 / parts as f32;
             let det = self.lead(context, input, part, u, g, report)?;

@@ -43,8 +43,10 @@ pub struct ImplicitSolver {
     pub(super) u: Vec<f32>,
     /// The first guess of a step that tools drive.
     pub(super) guess: Vec<f32>,
-    /// `M p`: inertia of the step at the last displacement, µN.
+    /// `M p`: inertia of the step at the last displacement, less the loads, µN.
     pub(super) drift: Vec<f32>,
+    /// Loads beside contact at the end of the step `[K,3]`, µN; empty where there are none.
+    pub(super) load: Vec<f32>,
     pub(super) partial: PartialSums,
     /// Where the tissue would be, at the nodes of the domain.
     pub(super) touched: Vec<f32>,
@@ -82,6 +84,7 @@ impl ImplicitSolver {
             u: field()?,
             guess: field()?,
             drift: field()?,
+            load: Vec::new(),
             partial: PartialSums::with_room(len, PAIRS)?,
             touched: field()?,
             local: None,
@@ -198,6 +201,7 @@ impl ImplicitSolver {
         next: &[f32],
     ) -> Result<()> {
         self.memory.begin();
+        self.load.clear();
         self.finish(context, input, next)
     }
 

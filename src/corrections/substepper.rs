@@ -188,7 +188,7 @@ impl ImplicitSolver {
         substepper: &mut Substepper,
     ) -> Result<Report> {
         let mut told = Report::default();
-        for _ in 0..substepper.count {
+        for part in 1..=substepper.count {
             let short = SolverContext {
                 time_step: &substepper.time_step,
                 ..context
@@ -197,6 +197,7 @@ impl ImplicitSolver {
                 last: &substepper.last,
                 before: &substepper.before,
                 still: false,
+                load: input.load.map(|load| load.of_part(part, substepper.count)),
                 ..*input
             };
             let report = self.swing_once(short, &own, &mut substepper.next)?;

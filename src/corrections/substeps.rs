@@ -161,6 +161,7 @@ impl ImplicitSolver {
                 last,
                 before,
                 enough,
+                load: input.load.map(|load| load.of_part(part, count)),
                 ..*input
             };
             let report = self.make_loaded(short, &own, problem, next, false)?;

@@ -118,6 +118,7 @@ impl ImplicitSolver {
             next.copy_from_slice(&u);
             if report.fell_back {
                 self.stop_next();
+                self.leave_load();
             }
             self.next.min_det = report.min_det;
             self.estimate(&mut report);
@@ -199,6 +200,7 @@ impl ImplicitSolver {
         loop {
             problem.restart();
             at.u.copy_from_slice(input.last);
+            self.add_gravity(context, input, at.u)?;
             self.move_freely(env)?;
             let parts = ways.max(iterated);
             let mut part = 0;

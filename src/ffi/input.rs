@@ -7,9 +7,9 @@ use super::pointers::{each, options, slice};
 use super::step_structs::*;
 use crate::contact::{MAX_TOOLS, Tool};
 use crate::features;
-use crate::scene::{Contact, Scene, StepInput, View};
+use crate::scene::{Contact, Loads, MAX_PRESSURES, Pressure, Scene, StepInput, View};
 
-/// The host's input; its instruments are read into `tools`, its arrays stay where they are.
+/// The host's input; its instruments and pressures are read into lists, its arrays stay where they are.
 ///
 /// # Safety
 /// NULL, or a struct whose first field is its size; its pointers lead to as many elements as the header says.
@@ -17,6 +17,7 @@ pub(super) unsafe fn read_input<'a>(
     scene: &Scene,
     raw: *const upt_input,
     tools: &'a mut Vec<Tool>,
+    pressures: &'a mut [Pressure<'static>; MAX_PRESSURES],
 ) -> Result<StepInput<'a>, Failure> {
     // SAFETY: the caller's.
     let raw = unsafe { options(raw, "input") }?;
@@ -61,7 +62,48 @@ pub(super) unsafe fn read_input<'a>(
         // SAFETY: the caller's.
         displacement: unsafe { field(scene, raw.displacement, "input.displacement") }?,
         contact,
+        // SAFETY: the caller's.
+        loads: unsafe { read_loads(scene, &raw, pressures) }?,
         time_s: raw.time_s,
+    })
+}
+
+/// The host's loads.
+///
+/// # Safety
+/// As [`read_input`]; the lists of nodes outlive what is read.
+unsafe fn read_loads<'a>(
+    scene: &Scene,
+    raw: &upt_input,
+    pressures: &'a mut [Pressure<'static>; MAX_PRESSURES],
+) -> Result<Loads<'a>, Failure> {
+    if raw.pressure_count > MAX_PRESSURES as u64 {
+        return fail(
+            UPT_ERR_ARGUMENT,
+            format!(
+                "input.pressure_count is {}, must be at most {MAX_PRESSURES}",
+                raw.pressure_count
+            ),
+        );
+    }
+    let read = |index: usize, pressure: upt_pressure| {
+        let name = format!("input.pressures[{index}].nodes");
+        scene.check_node_count(&name, pressure.node_count)?;
+        pressures[index] = Pressure {
+            // SAFETY: the caller's.
+            nodes: unsafe { slice(pressure.nodes, pressure.node_count, &name) }?,
+            pascal: pressure.pascal,
+        };
+        Ok(())
+    };
+    // SAFETY: the caller's.
+    unsafe { each(raw.pressures, raw.pressure_count, "input.pressures", read) }?;
+    Ok(Loads {
+        gravity: raw.gravity,
+        gravity_at_rest: raw.gravity_at_rest,
+        // SAFETY: the caller's.
+        forces: unsafe { field(scene, raw.forces, "input.forces") }?,
+        pressures: &pressures[..raw.pressure_count as usize],
     })
 }
 

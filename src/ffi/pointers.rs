@@ -36,6 +36,7 @@ sized!(
     upt_haptic_force,
     upt_scene_stats,
     upt_input,
+    upt_pressure,
     upt_view
 );
 

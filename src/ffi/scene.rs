@@ -8,8 +8,8 @@ use super::registry::{add_scene, call_scene, find_model, remove_scene};
 use super::step_structs::upt_input;
 use super::structs::*;
 use super::{convert, pointers};
-use crate::scene::View;
-use crate::scene::{Contact, Scene, StepInput};
+use crate::scene::{Contact, Loads, MAX_PRESSURES, Pressure, Scene, StepInput, View};
+use std::borrow::Cow;
 
 /// Creates a scene at rest.
 ///
@@ -99,8 +99,9 @@ pub unsafe extern "C" fn upt_scene_step(
 ) -> upt_status {
     call_scene("upt_scene_step", scene, |scene| {
         let mut tools = scene.tool_list()?;
+        let mut pressures = Default::default();
         // SAFETY: the host passes what the header asks for.
-        let input = unsafe { read_input(scene, input, &mut tools) }?;
+        let input = unsafe { read_input(scene, input, &mut tools, &mut pressures) }?;
         // SAFETY: the host passes `out_count` floats of room, as the header asks.
         unsafe { step(scene, input, out, out_count) }
     })
@@ -131,7 +132,7 @@ pub unsafe extern "C" fn upt_scene_step_field(
             // SAFETY: the host passes NULL or `[K,3]`, as the header asks.
             displacement: unsafe { field(scene, displacement, "displacement") }?,
             contact: collision.map_or(Contact::None, Contact::Dense),
-            time_s: 0.0,
+            ..StepInput::default()
         };
         // SAFETY: the host passes `out_count` floats of room, as the header asks.
         unsafe { step(scene, input, out, out_count) }
@@ -191,9 +192,28 @@ unsafe fn step(
             }
         }
     };
+    let forces = (input.loads.forces.map(|forces| apart(forces, &out))).transpose()?;
+    let mut regions: [Cow<'_, [u32]>; MAX_PRESSURES] = Default::default();
+    let mut pressures = [Pressure::default(); MAX_PRESSURES];
+    let count = input.loads.pressures.len();
+    for (region, pressure) in regions.iter_mut().zip(input.loads.pressures) {
+        *region = apart(pressure.nodes, &out)?;
+    }
+    for ((own, region), pressure) in (pressures.iter_mut().zip(&regions)).zip(input.loads.pressures)
+    {
+        *own = Pressure {
+            nodes: region,
+            ..*pressure
+        };
+    }
     let input = StepInput {
         displacement: displacement.as_deref(),
         contact,
+        loads: Loads {
+            forces: forces.as_deref(),
+            pressures: &pressures[..count],
+            ..input.loads
+        },
         time_s: input.time_s,
     };
     scene.step_to(input, Some(out))?;

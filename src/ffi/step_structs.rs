@@ -34,6 +34,17 @@ pub struct upt_input {
     pub displacement: *const f32,
     /// The moment of the end of the step on the host's clock, s, from which `upt_scene_present` counts; 0 for hosts that keep none.
     pub time_s: f64,
+    /// `[K,3]`, mN: forces on the nodes at the end of the step; NULL: none. Loads (this field and those after it) act beside whatever drives the
+    /// step, in scenes with corrections; they change on a line over the step, and a frame goes on from those of its step.
+    pub forces: *const f32,
+    /// `[pressure_count]`: pressure on parts of the surface at the end of the step, all with the same `struct_size`.
+    pub pressures: *const upt_pressure,
+    /// At most 32.
+    pub pressure_count: u64,
+    /// Gravity in the mesh's frame at the end of the step, m/s², at most 1000 in each direction.
+    pub gravity: [f32; 3],
+    /// Gravity under which the mesh was scanned, m/s²: what acts is `gravity - gravity_at_rest`, on the mass of each node.
+    pub gravity_at_rest: [f32; 3],
 }
 
 /// For hosts in Rust; the pointers are the lists', which must outlive the call that reads them.
@@ -50,6 +61,11 @@ impl upt_input {
         collision: null(),
         displacement: null(),
         time_s: 0.0,
+        forces: null(),
+        pressures: null(),
+        pressure_count: 0,
+        gravity: [0.0; 3],
+        gravity_at_rest: [0.0; 3],
     };
 
     /// Instruments drive the step.
@@ -71,6 +87,21 @@ impl upt_input {
             ..Self::NOTHING
         }
     }
+}
+
+/// A pressure on a part of the surface, which follows the surface as it moves. A face in several of them takes their sum.
+#[derive_ReprC]
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct upt_pressure {
+    /// `sizeof(upt_pressure)`, the same in every element of an array.
+    pub struct_size: u32,
+    /// From outside on the body, Pa, at most 1000000; negative for suction.
+    pub pascal: f32,
+    /// `[node_count]`: it acts on the boundary triangles with all three corners among these nodes.
+    pub nodes: *const u32,
+    /// At most K; 0: it acts on the domain.
+    pub node_count: u64,
 }
 
 /// What is shown of a state. Where a call takes one, NULL is the region.

@@ -29,8 +29,9 @@ pub unsafe extern "C" fn upt_scene_submit(
 ) -> upt_status {
     call_scene("upt_scene_submit", scene, |scene| {
         let mut tools = scene.tool_list()?;
+        let mut pressures = Default::default();
         // SAFETY: the host passes what the header asks for.
-        scene.submit(unsafe { read_input(scene, input, &mut tools) }?)?;
+        scene.submit(unsafe { read_input(scene, input, &mut tools, &mut pressures) }?)?;
         Ok(UPT_OK)
     })
 }

@@ -10,6 +10,7 @@ use super::cut_state::CutState;
 use super::engine::Engine;
 use super::inputs::{Decode, Inputs, Which};
 use super::inversion::ContactElements;
+use super::loads::LoadState;
 use super::plan::NodePlan;
 use super::points::AttachedPoints;
 use super::published::{Frame, Published, View};
@@ -48,6 +49,10 @@ pub struct Core {
     pub(super) cut: Option<Box<CutState>>,
     /// Contact of tools, from the first step that has one.
     pub(super) problem: Option<Proven<Instruments, ContactProblem>>,
+    /// From the first step that has loads.
+    pub(super) loads: Option<Box<LoadState>>,
+    /// Whether loads act in the step being made, or did and the body has not come back from where they took it.
+    pub(super) loaded: bool,
     /// The tools of the step being made, where the bundle's limits for tools say something about it.
     #[held(skip)]
     pub(super) used: Option<ToolUse>,
@@ -144,6 +149,8 @@ impl Core {
             corrected: parts.corrected,
             cut: None,
             problem: None,
+            loads: None,
+            loaded: false,
             used: None,
             hands: Vec::new(),
             took_s: 0.0,
@@ -217,10 +224,17 @@ impl Core {
             }
             None => None,
         };
+        let has_load = self.take_loads(&input.loads)?;
         stats.check_ms = watch.lap();
         let near = self.update_tools(published, &input)?;
+        self.loaded = has_load || (self.counters.loaded && self.is_swung());
 
-        if self.counters.sleeping && given.is_none() && self.incoming.is_empty() && !near {
+        if self.counters.sleeping
+            && given.is_none()
+            && self.incoming.is_empty()
+            && !near
+            && !has_load
+        {
             self.fit_published(published)?;
             self.counters.time_s = input.time_s;
             self.publish_rest(published);
@@ -243,6 +257,7 @@ impl Core {
             self.publish(published, given.is_some(), replaced, &stats);
         }
         self.counters.driven = self.driven;
+        self.counters.loaded = self.loaded;
         self.took_s = start.elapsed().as_secs_f64();
         self.publish_to_hands(published);
         self.counters.step_count += 1;

@@ -7,7 +7,7 @@ use super::core::{Core, lock_read};
 use super::engine::Engine;
 use super::published::Published;
 use super::timing::Stopwatch;
-use crate::corrections::{History, Input, Integrator, SolverContext};
+use crate::corrections::{Enough, History, Input, Integrator, SolverContext};
 use crate::error::Result;
 use crate::stats::SceneStats;
 
@@ -44,9 +44,10 @@ impl Core {
         };
         let touched = !self.incoming.is_empty();
         // The learned part takes over some steps after a release; with a length of step of the scene's own it never does.
-        self.next_corrected = touched || (!learns && !corrected.own_pace);
-        // A length of step of the scene's own may be short enough to need no substeps.
-        let in_parts = corrected.free_substeps > 1 || !corrected.own_pace;
+        self.next_corrected = touched || (!learns && !corrected.own_pace) || self.loaded;
+        let load = self.loads.as_ref().and_then(|loads| loads.load());
+        // A length of step of the scene's own may be short enough to need no substeps. Under a load that acts everywhere iterations are worth more.
+        let in_parts = (corrected.free_substeps > 1 || !corrected.own_pace) && load.is_none();
         if !touched && !learns && in_parts {
             corrected.be_shorter(context, &self.model)?;
         }
@@ -57,7 +58,15 @@ impl Core {
             last: given.unwrap_or(&shared.last.field),
             before: given.unwrap_or(&shared.before.field),
             still: given.is_some(),
-            enough: corrected.enough(start),
+            load,
+            enough: match load {
+                // What the whole body does settles later than an iteration's own step says.
+                Some(_) => Enough {
+                    error_mm: 0.0,
+                    ..corrected.enough(start)
+                },
+                None => corrected.enough(start),
+            },
         };
         if touched {
             let report = corrected
@@ -82,10 +91,13 @@ impl Core {
         let Some(corrected) = &self.corrected else {
             return true;
         };
-        let lifted = corrected.most_substeps > 1
-            && self.driven
-            && self.counters.max_displacement > SWUNG_MM + self.model.manifest.rest_displacement_mm;
-        !(corrected.own_pace || lifted)
+        let lifted = corrected.most_substeps > 1 && self.driven && self.is_swung();
+        !(corrected.own_pace || lifted || self.loaded)
+    }
+
+    /// Whether the last state is displaced by more than where the model's own free motion ends.
+    pub(super) fn is_swung(&self) -> bool {
+        self.counters.max_displacement > SWUNG_MM + self.model.manifest.rest_displacement_mm
     }
 
     /// The length of a step and the damping.

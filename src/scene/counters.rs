@@ -34,6 +34,8 @@ pub struct Counters {
     pub was_corrected: [bool; 2],
     /// Whether tools drove the last step that anything drove.
     pub driven: bool,
+    /// Whether loads acted in the last step, or did before and the body has not come back.
+    pub loaded: bool,
     /// The moment of the last step on the host's clock, s.
     pub time_s: f64,
 }
@@ -50,6 +52,7 @@ impl Counters {
         max_displacement: 0.0,
         was_corrected: [false; 2],
         driven: false,
+        loaded: false,
         time_s: 0.0,
     };
 }

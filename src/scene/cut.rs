@@ -80,6 +80,9 @@ impl Core {
 
     /// Whether a cut body can make such a step.
     pub(super) fn check_cut(&self, input: &StepInput<'_>) -> Result<()> {
+        if input.loads.acts() {
+            return self.check_intact("a step with loads");
+        }
         match (input.contact, input.displacement) {
             (Contact::None | Contact::Tools(_), None) => Ok(()),
             _ => self.check_intact("a step with prescribed nodes or a displacement"),
@@ -98,6 +101,11 @@ impl Core {
             ));
         }
         self.check_bare(published)?;
+        if self.loads.as_ref().is_some_and(|loads| loads.acted()) {
+            return Err(Error::Unsupported(
+                "cut: a body under loads cannot be cut; make a step without loads first".into(),
+            ));
+        }
         let mut body = match &self.cut {
             Some(cut) => cut.body.clone(),
             None => self.whole_body()?,

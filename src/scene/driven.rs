@@ -166,6 +166,7 @@ impl Core {
             last: &shared.last.field,
             before: &shared.before.field,
             still: false,
+            load: self.loads.as_ref().and_then(|loads| loads.load()),
             enough: corrected.enough(start),
         };
         let next = &mut self.next.field;

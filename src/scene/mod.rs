@@ -20,6 +20,7 @@ mod inputs;
 mod instruments;
 mod inversion;
 mod linear;
+mod loads;
 mod own_pace;
 mod plan;
 mod points;
@@ -46,6 +47,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 pub use cutting::Cut;
+pub use loads::{LARGEST_FORCE, LARGEST_GRAVITY, LARGEST_PRESSURE, Loads, MAX_PRESSURES, Pressure};
 pub use points::check_point_count;
 pub use publish::{QUIET_DISPLACEMENT, QUIET_STEPS};
 pub use published::View;
@@ -279,8 +281,7 @@ impl Scene {
     /// step has not finished, unless the scene was made with `latest_wins`: then an input that has not started is
     /// replaced. [`Error::State`] where no thread can be started.
     pub fn submit<'a>(&self, input: impl Into<StepInput<'a>>) -> Result<()> {
-        self.worker
-            .submit(&self.shared, &input.into(), self.node_count())
+        self.worker.submit(&self.shared, &input.into(), &self.mesh)
     }
 
     /// Whether the submitted step has finished; an error that was not told yet, once, also of an earlier step. With

@@ -41,6 +41,9 @@ impl Core {
         if let Some(problem) = &mut self.problem {
             problem.commit();
         }
+        if let Some(loads) = &mut self.loads {
+            loads.commit();
+        }
         self.counters.source_before = self.counters.source;
         self.counters.source = if replaced {
             Source::Fallback

@@ -1,5 +1,6 @@
 //! What a step gets, and what has become of it.
 
+use super::loads::Loads;
 use crate::contact::Tool;
 use crate::error::{Error, Result};
 use crate::field::ContactSet;
@@ -47,6 +48,8 @@ pub struct StepInput<'a> {
     pub displacement: Option<&'a [f32]>,
     /// What drives the step. A node that the boundary condition holds stays held.
     pub contact: Contact<'a>,
+    /// What acts on the body beside contact. A frame goes on from the loads of its step, and does not ask for these.
+    pub loads: Loads<'a>,
     /// The moment of the end of the step on the host's clock, s, from which [`Scene::present`](crate::Scene::present) counts; 0 for hosts
     /// that keep none. Not for a frame.
     pub time_s: f64,

@@ -37,12 +37,12 @@ impl Core {
         let _span = tracing::trace_span!("guard").entered();
         let max = self.largest_of_next();
         let bound = self.model.manifest.envelope.displacement_bound_mm;
-        let mut verdict = guard::judge(
-            bound,
-            max,
-            self.counters.max_displacement,
-            self.incoming.max_push(),
-        );
+        // A load may move the body as far as its bound.
+        let cause = match self.loaded {
+            true => bound,
+            false => self.incoming.max_push(),
+        };
+        let mut verdict = guard::judge(bound, max, self.counters.max_displacement, cause);
         if self.options.check_inversion
             && verdict & flag::NON_FINITE == 0
             && guard::inverted(

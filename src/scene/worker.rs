@@ -9,8 +9,10 @@ use std::time::Duration;
 
 use crate::clock::Instant;
 
+use super::loads::{CopiedLoads, Loads};
 use super::shared::Shared;
 use super::{Contact, Progress, StepInput};
+use crate::bundle::Mesh;
 use crate::contact::Tool;
 use crate::error::{Error, Result};
 use crate::field::{ContactSet, check_displacement};
@@ -49,6 +51,7 @@ struct Copied {
     /// Whether the step starts from `displacement [K,3]`, mm.
     starts: bool,
     displacement: Vec<f32>,
+    loads: CopiedLoads,
     time_s: f64,
 }
 
@@ -75,6 +78,7 @@ impl Copied {
         memory::fit(&mut self.vectors, vectors.len(), SUBMITTED)?;
         memory::fit(&mut self.tools, tools.len(), SUBMITTED)?;
         memory::fit(&mut self.displacement, displacement.len(), SUBMITTED)?;
+        self.loads.take(&input.loads)?;
         self.drive = drive;
         self.starts = input.displacement.is_some();
         self.time_s = input.time_s;
@@ -89,7 +93,12 @@ impl Copied {
         Ok(())
     }
 
-    fn input(&self) -> StepInput<'_> {
+    /// Calls with the input.
+    fn with_input<T>(&self, call: impl FnOnce(StepInput<'_>) -> T) -> T {
+        self.loads.with(|loads| call(self.input(loads)))
+    }
+
+    fn input<'a>(&'a self, loads: Loads<'a>) -> StepInput<'a> {
         StepInput {
             displacement: self.starts.then_some(&*self.displacement),
             contact: match self.drive {
@@ -100,6 +109,7 @@ impl Copied {
                 },
                 Drive::Tools => Contact::Tools(&self.tools),
             },
+            loads,
             time_s: self.time_s,
         }
     }
@@ -139,14 +149,11 @@ impl Worker {
         }
     }
 
-    /// Hands an input on a mesh of `node_count` nodes to the worker, checked.
-    pub fn submit(
-        &self,
-        shared: &Arc<Shared>,
-        input: &StepInput<'_>,
-        node_count: usize,
-    ) -> Result<()> {
+    /// Hands an input to the worker, checked.
+    pub fn submit(&self, shared: &Arc<Shared>, input: &StepInput<'_>, mesh: &Mesh) -> Result<()> {
         input.check()?;
+        input.loads.check(mesh)?;
+        let node_count = mesh.node_count();
         let mut checked = self.checked.lock().unwrap_or_else(PoisonError::into_inner);
         input.contact.gather(&mut checked, node_count)?;
         if let Contact::Tools(tools) = input.contact {
@@ -291,7 +298,7 @@ fn run(shared: &Shared, signal: &Signal) {
         slot.running = true;
         std::mem::swap(&mut own, &mut slot.input);
         drop(slot);
-        let result = shared.step_blocking(own.input());
+        let result = own.with_input(|input| shared.step_blocking(input));
         slot = signal.lock();
         slot.running = false;
         match result {

@@ -10,6 +10,7 @@
 mod fixture;
 #[path = "../host/mod.rs"]
 mod host;
+mod loads;
 mod mistakes;
 
 use std::ptr::{null, null_mut};

@@ -96,6 +96,18 @@ fn mistakes_are_named_and_change_nothing() {
             "contact_vectors",
         ),
         (
+            "NULL pressures",
+            |i| i.pressure_count = 1,
+            UPT_ERR_NULL,
+            "input.pressures",
+        ),
+        (
+            "many pressures",
+            |i| i.pressure_count = 33,
+            UPT_ERR_ARGUMENT,
+            "input.pressure_count",
+        ),
+        (
             "NULL tools",
             |i| i.instrument_count = 1,
             UPT_ERR_NULL,

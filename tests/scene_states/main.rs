@@ -7,11 +7,12 @@ mod worker;
 use fixture::{BUNDLES, bits, largest_difference, model, plain, push, rollout, scene, sparse};
 use sha2::{Digest, Sha256};
 use upt::scene::{QUIET_DISPLACEMENT, QUIET_STEPS};
-use upt::{Contact, Corrections, Error, SceneOptions, StepInput};
+use upt::{Contact, Corrections, Error, Loads, SceneOptions, StepInput};
 
 const FREE: StepInput<'static> = StepInput {
     displacement: None,
     contact: Contact::None,
+    loads: Loads::NONE,
     time_s: 0.0,
 };
 

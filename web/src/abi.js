@@ -238,7 +238,7 @@ export const upt_scene_stats = {
   },
 };
 export const upt_input = {
-  size: 56,
+  size: 96,
   fields: {
     struct_size: ["Uint32", 0, 1],
     reserved: ["Uint8", 4, 4],
@@ -250,6 +250,20 @@ export const upt_input = {
     collision: ["Uint32", 40, 1],
     displacement: ["Uint32", 44, 1],
     time_s: ["Float64", 48, 1],
+    forces: ["Uint32", 56, 1],
+    pressures: ["Uint32", 60, 1],
+    pressure_count: ["BigUint64", 64, 1],
+    gravity: ["Float32", 72, 3],
+    gravity_at_rest: ["Float32", 84, 3],
+  },
+};
+export const upt_pressure = {
+  size: 24,
+  fields: {
+    struct_size: ["Uint32", 0, 1],
+    pascal: ["Float32", 4, 1],
+    nodes: ["Uint32", 8, 1],
+    node_count: ["BigUint64", 16, 1],
   },
 };
 export const upt_view = {

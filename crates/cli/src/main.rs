@@ -26,6 +26,7 @@ mod haptics;
 mod host;
 #[cfg(not(feature = "linear"))]
 mod left_out;
+mod load_report;
 mod loads;
 mod machine;
 #[cfg(feature = "linear")]

@@ -1,29 +1,36 @@
-//! `upt simulate`: one case of a scheme on a mesh, as a trajectory file.
+//! `upt simulate`: one case of a scheme, of tools or of loads on a mesh, as a trajectory file.
 
 use crate::{loads, materials, tool_scale};
 use anyhow::Context;
 use std::path::PathBuf;
 use std::process::ExitCode;
+use tissue::load_programmes::{LoadProgramme, LoadSizes};
 use tissue::mesh::{Boundary, Mesh};
 use tissue::programmes::ToolProgramme;
 use tissue::schemes::{FRAMES, Scheme};
-use tissue::simulate::{ToolOrder, simulate_tools};
+use tissue::simulate::{ToolOrder, simulate_loads, simulate_tools};
 use tissue::solver::{Pressure, SolverOptions};
 
 #[derive(clap::Args)]
 #[command(
-    after_help = "Example:\n  upt simulate --mesh onnx/meshes/brain-coarse.mesh.safetensors --scheme 5 --seed 7 --threads 2 --out push.trajectory.safetensors\n  upt simulate --mesh onnx/meshes/brain-coarse.mesh.safetensors --tool stroke --seed 3 --out stroke.trajectory.safetensors"
+    after_help = "Example:\n  upt simulate --mesh onnx/meshes/brain-coarse.mesh.safetensors --scheme 5 --seed 7 --threads 2 --out push.trajectory.safetensors\n  upt simulate --mesh onnx/meshes/brain-coarse.mesh.safetensors --tool stroke --seed 3 --out stroke.trajectory.safetensors\n  upt simulate --mesh onnx/meshes/brain-coarse.mesh.safetensors --load tilt --out tilt.trajectory.safetensors"
 )]
 pub struct Options {
     /// Mesh file (*.mesh.safetensors).
     #[arg(long)]
     mesh: PathBuf,
     /// Scheme of prescribed contact.
-    #[arg(long, value_parser = loads::scheme(), required_unless_present = "tool")]
+    #[arg(long, value_parser = loads::scheme(), required_unless_present_any = ["tool", "load"])]
     scheme: Option<Scheme>,
     /// Programme of rigid tools.
     #[arg(long, value_parser = loads::programme(), conflicts_with = "scheme")]
     tool: Option<ToolProgramme>,
+    /// Programme of loads, nothing in contact: tilt (gravity turns by 90 degrees in 2 s), pulse (pressure on the domain, 1.2 a second) or sag (a
+    /// pressure on the domain is lost).
+    #[arg(long, conflicts_with_all = ["scheme", "tool"])]
+    load: Option<LoadProgramme>,
+    #[command(flatten)]
+    load_sizes: LoadArguments,
     /// STL, OBJ or PLY file whose convex hull replaces the programme's tool (mm; y up the shaft, the lowest end touches).
     #[cfg(feature = "files")]
     #[arg(long, requires = "tool")]
@@ -64,6 +71,36 @@ impl Options {
     fn own_shape(&self) -> anyhow::Result<Option<contact::Shape>> {
         Ok(None)
     }
+}
+
+/// How strong loads are.
+#[derive(clap::Args, Clone, Copy)]
+pub struct LoadArguments {
+    /// Gravity under which the mesh is in equilibrium, m/s²: what a tilt turns. A thirtieth of 9.81 is what the weight of a brain in its fluid comes to.
+    #[arg(long, value_name = "X,Y,Z", value_parser = vector, allow_hyphen_values = true, default_value = "0,-0.3,0")]
+    gravity: [f64; 3],
+    /// Largest pressure of pulse and sag, Pa.
+    #[arg(long, value_name = "PA", default_value_t = LoadSizes::default().pascal)]
+    pressure: f64,
+}
+
+impl LoadArguments {
+    pub fn sizes(self) -> LoadSizes {
+        LoadSizes {
+            gravity_m_s2: self.gravity,
+            pascal: self.pressure,
+        }
+    }
+}
+
+fn vector(text: &str) -> Result<[f64; 3], String> {
+    let numbers: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse()).collect();
+    let numbers = numbers
+        .ok()
+        .and_then(|list| <[f64; 3]>::try_from(list).ok());
+    numbers
+        .filter(|list| list.iter().all(|v| v.is_finite()))
+        .ok_or_else(|| format!("`{text}` is not three numbers X,Y,Z"))
 }
 
 /// Settings of the solver that `simulate` and `dataset` share.
@@ -124,12 +161,17 @@ pub fn run(options: &Options) -> anyhow::Result<ExitCode> {
     let start = std::time::Instant::now();
     let settings = options.solver.options(options.threads);
     let (boundary, seed) = (options.boundary, options.seed);
-    let (load, outcome) = match (options.tool, options.scheme) {
-        (Some(tool), _) => {
-            let advance = |frame, count| {
-                bar.set_length(count as u64);
-                bar.set_position(frame as u64);
-            };
+    let advance = |frame, count| {
+        bar.set_length(count as u64);
+        bar.set_position(frame as u64);
+    };
+    let (load, outcome) = match (options.load, options.tool, options.scheme) {
+        (Some(load), _, _) => {
+            let order = (load, options.load_sizes.sizes());
+            let case = simulate_loads(&mesh, boundary, order, &settings, advance);
+            (format!("load {}", load.name()), case)
+        }
+        (None, Some(tool), _) => {
             let own = options.own_shape()?;
             let sizes = tool_scale::Chosen::of(options.sizes, &mesh, None);
             bar.suspend(|| eprintln!("{}", sizes.words()));
@@ -141,13 +183,13 @@ pub fn run(options: &Options) -> anyhow::Result<ExitCode> {
             let case = simulate_tools(&mesh, boundary, order, &settings, advance);
             (format!("tool {}", tool.name()), case)
         }
-        (None, Some(scheme)) => {
+        (None, None, Some(scheme)) => {
             let advance = |frame| bar.set_position(frame as u64);
             let case =
                 tissue::simulate::simulate(&mesh, boundary, scheme, seed, &settings, advance);
             (format!("scheme {}", scheme.name()), case)
         }
-        (None, None) => anyhow::bail!("give --scheme or --tool"),
+        (None, None, None) => anyhow::bail!("give --scheme, --tool or --load"),
     };
     let trajectory = outcome.with_context(|| format!("{load}, seed {seed}"))?;
     bar.finish_and_clear();

@@ -23,6 +23,7 @@ pub mod dataset;
 pub mod export;
 #[cfg(feature = "linear")]
 pub mod linear;
+pub mod load_programmes;
 pub mod loads;
 pub mod mesh;
 #[cfg(feature = "files")]

@@ -1,6 +1,7 @@
-//! One case from rest to the last frame: contact that is prescribed, or tools.
+//! One case from rest to the last frame: contact that is prescribed, tools, or loads alone.
 
 use crate::contact::{ContactDomain, ContactError};
+use crate::load_programmes::{LoadProgramme, LoadSizes};
 use crate::mesh::{Boundary, Mesh};
 use crate::programmes::{ProgrammeError, ToolCase, ToolProgramme, ToolScale};
 use crate::schemes::{FRAME_S, FRAMES, Programme, Scheme};
@@ -79,6 +80,8 @@ pub struct ToolOrder<'a> {
     pub seed: u64,
     /// What the table's sizes are multiplied by.
     pub scale: ToolScale,
+    /// Loads that act meanwhile.
+    pub load: Option<(LoadProgramme, LoadSizes)>,
     /// Frames that each step of the programme is recorded in.
     pub frames_per_step: usize,
     /// Its last frame is the one at whose end this is over, but not one of the first [`LEAST_FRAMES`].
@@ -96,6 +99,7 @@ impl ToolOrder<'_> {
             own: None,
             seed,
             scale: ToolScale::TABLE,
+            load: None,
             frames_per_step: 1,
             until: None,
         }
@@ -140,6 +144,10 @@ pub fn simulate_tools(
     let mut tracks = ToolTracks::at_rest(&case.tools, &case.start);
     let held = mesh.held_nodes(boundary);
     for (frame, poses) in case.frames.iter().enumerate() {
+        if let Some((programme, sizes)) = order.load {
+            let time_s = (frame + 1) as f64 * frame_s;
+            solver.set_loads(&programme.loads(sizes, mesh, time_s))?;
+        }
         let report = solver.step_tools(&[], poses, frame_s)?;
         record(&mut trajectory, &solver, &report);
         let moved = trajectory.frame(frame + 1);
@@ -157,6 +165,29 @@ pub fn simulate_tools(
         }
     }
     trajectory.tools = Some(tracks);
+    Ok(trajectory)
+}
+
+/// Simulates a programme of loads on `mesh`, nothing in contact; `progress` hears of each finished frame and of how many there will be.
+pub fn simulate_loads(
+    mesh: &Mesh,
+    boundary: Boundary,
+    (programme, sizes): (LoadProgramme, LoadSizes),
+    options: &SolverOptions,
+    mut progress: impl FnMut(usize, usize),
+) -> Result<Trajectory, SimulationError> {
+    let mut solver = Solver::new(mesh, boundary, options.clone())?;
+    let name = format!("load-{}", programme.name());
+    let header = header(mesh, boundary, name, 0, options);
+    let mut trajectory = Trajectory::at_rest(header, mesh.node_count());
+    let frames = (programme.duration_s() / FRAME_S).round() as usize;
+    for frame in 1..=frames {
+        solver.set_loads(&programme.loads(sizes, mesh, frame as f64 * FRAME_S))?;
+        let report = solver.step_frame(&[], FRAME_S)?;
+        record(&mut trajectory, &solver, &report);
+        close_row(&mut trajectory);
+        progress(frame, frames);
+    }
     Ok(trajectory)
 }
 

@@ -60,6 +60,7 @@ impl Bench {
             last: &self.zero,
             before: &self.zero,
             still: false,
+            load: None,
             enough: Enough {
                 iterations: 3,
                 error_mm: 0.0,

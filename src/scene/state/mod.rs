@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 use super::core::{Core, lock_read, lock_write};
 use super::counters::Counters;
 use super::engine::Engine;
+use super::loads::Acting;
 use super::published::Published;
 use crate::corrections::{History, PAIRS};
 use crate::error::{Error, Result};
@@ -34,6 +35,8 @@ pub struct State {
     fields: Option<[Field; 2]>,
     /// Of corrections.
     history: Option<History>,
+    /// Loads beside contact; none where none act.
+    acting: Option<Acting>,
     /// Of instruments; none where none were used.
     tools: Option<Tools>,
 }
@@ -70,6 +73,7 @@ impl Core {
             history: corrected
                 .map(|corrected| corrected.solver.history(self.contact.len()))
                 .transpose()?,
+            acting: self.acting()?,
             tools: self.tools()?,
         })
     }
@@ -83,7 +87,7 @@ impl Core {
             .as_ref()
             .map(|_| (4 + 8 * PAIRS) * 12 * count + PAIRS * 16384);
         let (contacts, fields) = (2 * 16 * count, 2 * 12 * count);
-        let rest = history.unwrap_or(0) + self.tool_bytes() + 2048;
+        let rest = history.unwrap_or(0) + self.tool_bytes() + self.load_bytes() + 2048;
         self.engine.record_bytes() + contacts + fields + rest
     }
 
@@ -96,6 +100,7 @@ impl Core {
             records,
             fields,
             history,
+            acting,
             tools,
         } = state;
         let count = self.mesh.node_count();
@@ -132,6 +137,9 @@ impl Core {
             // Decoded again.
             *fields = None;
         }
+        if let Some(acting) = acting {
+            acting.admit(&self.mesh)?;
+        }
         match tools {
             Some(tools) => self.admit_tools(tools),
             None => Ok(()),
@@ -147,6 +155,7 @@ impl Core {
             records,
             fields,
             history,
+            acting,
             tools,
         } = state;
         self.counters = counters;
@@ -159,6 +168,7 @@ impl Core {
         }
         self.engine.put(records)?;
         self.put_tools(tools)?;
+        self.put_acting(acting)?;
         self.put_history(history)
     }
 
@@ -190,6 +200,7 @@ impl Core {
         self.counters = Counters::REST;
         self.contact.clear();
         self.contact_before.clear();
+        self.clear_loads();
         self.engine.reset();
         if let Some(corrected) = &mut self.corrected {
             corrected.solver.reset();

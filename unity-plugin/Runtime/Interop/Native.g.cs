@@ -335,6 +335,33 @@ namespace Upt.Interop
         public float* displacement;
         /// <summary>The moment of the end of the step on the host's clock, s, from which `upt_scene_present` counts; 0 for hosts that keep none.</summary>
         public double time_s;
+        /// <summary>
+        /// `[K,3]`, mN: forces on the nodes at the end of the step; NULL: none. Loads (this field and those after it) act beside whatever drives the
+        /// step, in scenes with corrections; they change on a line over the step, and a frame goes on from those of its step.
+        /// </summary>
+        public float* forces;
+        /// <summary>`[pressure_count]`: pressure on parts of the surface at the end of the step, all with the same `struct_size`.</summary>
+        public upt_pressure* pressures;
+        /// <summary>At most 32.</summary>
+        public ulong pressure_count;
+        /// <summary>Gravity in the mesh's frame at the end of the step, m/s², at most 1000 in each direction.</summary>
+        public fixed float gravity[3];
+        /// <summary>Gravity under which the mesh was scanned, m/s²: what acts is `gravity - gravity_at_rest`, on the mass of each node.</summary>
+        public fixed float gravity_at_rest[3];
+    }
+
+    /// <summary>A pressure on a part of the surface, which follows the surface as it moves. A face in several of them takes their sum.</summary>
+    [StructLayout(LayoutKind.Sequential)]
+    public unsafe struct upt_pressure
+    {
+        /// <summary>`sizeof(upt_pressure)`, the same in every element of an array.</summary>
+        public uint struct_size;
+        /// <summary>From outside on the body, Pa, at most 1000000; negative for suction.</summary>
+        public float pascal;
+        /// <summary>`[node_count]`: it acts on the boundary triangles with all three corners among these nodes.</summary>
+        public uint* nodes;
+        /// <summary>At most K; 0: it acts on the domain.</summary>
+        public ulong node_count;
     }
 
     /// <summary>What is shown of a state. Where a call takes one, NULL is the region.</summary>

@@ -30,6 +30,7 @@ use std::process::ExitCode;
 use anyhow::{Result, bail};
 use tissue::mesh::Mesh;
 
+use crate::load_report;
 use crate::machine::Machine;
 use crate::shown;
 use crate::tools;
@@ -45,6 +46,19 @@ use setting::Region;
 
 pub fn run(options: &Options) -> Result<ExitCode> {
     let threads = options.threads.iter().copied().max().unwrap_or(1);
+    if !options.load.is_empty() {
+        return load_report::report(&load_report::Plan {
+            programmes: &options.load,
+            sizes: options.load_sizes.sizes(),
+            tool: options.tool,
+            seed: options.seed,
+            bundles: &options.bundles,
+            corrections: &options.corrections,
+            threads,
+            markdown: &options.markdown,
+            json: options.json,
+        });
+    }
     if let Some(hz) = options.shown {
         return shown::report(&shown::Plan {
             hz,

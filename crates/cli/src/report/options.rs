@@ -3,9 +3,12 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use tissue::load_programmes::LoadProgramme;
+use tissue::programmes::ToolProgramme;
 
 use super::setting::{Precision, Provider, Region};
 use crate::effort::Effort;
+use crate::simulate::LoadArguments;
 use crate::tools::cases::Split;
 
 #[derive(Args)]
@@ -15,6 +18,8 @@ use crate::tools::cases::Split;
   upt report --data data/brain-fixed --threads 1,2 --region all,surface --precision f32,bf16 --json
   upt report --tools data/brain-tools --bundle onnx/brain-reduced --corrections 0,3,5 --out target/tools
   upt report --shown 90 --tools data/brain-frames --split all --bundle onnx/brain-reduced --out target/shown
+  upt report --load tilt,pulse,sag --bundle onnx/brain-coarse-reduced
+  upt report --load pulse --tool press --bundle onnx/brain-coarse-reduced
   upt report --step-ms 10,20,25,50 --tools data/brain-frames --split all --bundle onnx/brain-reduced
 
 The command writes report.json, report.html and report.md (the table for a document of yours) to --out (with --tools: tools.json and tools.html), and prints the table.")]
@@ -49,8 +54,20 @@ pub struct Options {
     #[arg(long, value_name = "MS", value_delimiter = ',', requires = "tools")]
     pub(super) step_ms: Vec<f64>,
     /// Page whose part between the markers `upt report --tools MESH` (with `--boundary NAME` behind where it is not `fixed`) is replaced by the tables of --tools, or by a narrow table if the markers end in `summary` (repeat for several).
-    #[arg(long, value_name = "FILE", requires = "tools")]
+    #[arg(long, value_name = "FILE")]
     pub(super) markdown: Vec<PathBuf>,
+    /// Measure programmes of loads (tilt, pulse, sag) in the bundles of --bundle against the reference solver, which runs here. --markdown replaces the
+    /// part between the markers `upt report --load`.
+    #[arg(long, value_delimiter = ',', conflicts_with_all = ["trajectories", "data", "tools"])]
+    pub(super) load: Vec<LoadProgramme>,
+    /// With --load: a tool that touches the body meanwhile.
+    #[arg(long, value_parser = crate::loads::programme(), requires = "load")]
+    pub(super) tool: Option<ToolProgramme>,
+    /// With --tool: seed of its case.
+    #[arg(long, default_value_t = 1, requires = "load")]
+    pub(super) seed: u64,
+    #[command(flatten)]
+    pub(super) load_sizes: LoadArguments,
     /// The most cases of each scheme or programme.
     #[arg(long, default_value_t = 2)]
     pub(super) cases: usize,

@@ -100,7 +100,8 @@ impl Solver {
         if self.load.is_some() {
             return Err(SolverError::Load {
                 field: "all".into(),
-                reason: "act on the body as it was meshed; cut it before any load, without one".into(),
+                reason: "act on the body as it was meshed; cut it before any load, without one"
+                    .into(),
             });
         }
         let mut body = match &self.topology.body {

@@ -1,0 +1,397 @@
+//! What acts on the body beside contact: gravity that turns, forces on nodes, pressure on the surface. A scene without loads keeps nothing of them.
+
+use serde::{Deserialize, Serialize};
+
+use super::core::Core;
+use crate::bundle::Mesh;
+use crate::corrections::Load;
+use crate::error::{Error, Result};
+use crate::memory::{self, HeldBytes};
+use crate::stored;
+
+/// Pressures of a step at most.
+pub const MAX_PRESSURES: usize = 32;
+/// The largest gravity, in each direction, m/s².
+pub const LARGEST_GRAVITY: f32 = 1e3;
+/// The largest force on a node, in each direction, mN.
+pub const LARGEST_FORCE: f32 = 1e6;
+/// The largest pressure, Pa: ten times that of the air.
+pub const LARGEST_PRESSURE: f32 = 1e6;
+
+const WHAT: &str = "the loads of a scene";
+
+/// Loads at the end of a step; within the step they change on a line from those of the last. By default there are none. They act in scenes
+/// that correct (`corrections`).
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Loads<'a> {
+    /// Gravity in the mesh's frame, m/s².
+    pub gravity: [f32; 3],
+    /// Gravity under which the mesh was scanned, m/s²: what acts is the difference.
+    pub gravity_at_rest: [f32; 3],
+    /// Forces on the nodes `[K,3]`, mN.
+    pub forces: Option<&'a [f32]>,
+    /// At most [`MAX_PRESSURES`]; a face in several of them takes their sum.
+    pub pressures: &'a [Pressure<'a>],
+}
+
+/// A pressure on a part of the surface.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Pressure<'a> {
+    /// The boundary triangles with all three corners among these nodes; empty: the domain.
+    pub nodes: &'a [u32],
+    /// From outside on the body, Pa; negative for suction. It follows the surface as it moves.
+    pub pascal: f32,
+}
+
+impl Loads<'_> {
+    /// No loads.
+    pub const NONE: Loads<'static> = Loads {
+        gravity: [0.0; 3],
+        gravity_at_rest: [0.0; 3],
+        forces: None,
+        pressures: &[],
+    };
+
+    /// Whether they are not all zero.
+    pub(crate) fn acts(&self) -> bool {
+        self.acceleration() != [0.0; 3]
+            || self.forces.is_some()
+            || self.pressures.iter().any(|pressure| pressure.pascal != 0.0)
+    }
+
+    /// What acts of gravity, m/s².
+    fn acceleration(&self) -> [f32; 3] {
+        std::array::from_fn(|axis| self.gravity[axis] - self.gravity_at_rest[axis])
+    }
+
+    /// # Errors
+    /// [`Error::NonFinite`] and [`Error::Argument`], with the field.
+    pub(crate) fn check(&self, mesh: &Mesh) -> Result<()> {
+        for (name, gravity) in [
+            ("gravity", self.gravity),
+            ("gravity_at_rest", self.gravity_at_rest),
+        ] {
+            for (axis, value) in gravity.into_iter().enumerate() {
+                check_size(value, LARGEST_GRAVITY, "m/s²", || {
+                    format!("{name}[{axis}]")
+                })?;
+            }
+        }
+        if let Some(forces) = self.forces {
+            if forces.len() != mesh.positions.len() {
+                return Err(Error::Argument(format!(
+                    "forces has {} numbers, must have three a node, {}",
+                    forces.len(),
+                    mesh.positions.len()
+                )));
+            }
+            for (at, &value) in forces.iter().enumerate() {
+                check_size(value, LARGEST_FORCE, "mN", || {
+                    format!("forces: node {}", at / 3)
+                })?;
+            }
+        }
+        if self.pressures.len() > MAX_PRESSURES {
+            return Err(Error::Argument(format!(
+                "pressures has {} entries, must have at most {MAX_PRESSURES}",
+                self.pressures.len()
+            )));
+        }
+        for (index, pressure) in self.pressures.iter().enumerate() {
+            check_size(pressure.pascal, LARGEST_PRESSURE, "Pa", || {
+                format!("pressures[{index}].pascal")
+            })?;
+            let count = mesh.node_count();
+            if let Some(node) = pressure.nodes.iter().find(|node| **node as usize >= count) {
+                return Err(Error::Argument(format!(
+                    "pressures[{index}]: node {node} is beyond the mesh's {count} nodes"
+                )));
+            }
+        }
+        Ok(())
+    }
+}
+
+fn check_size(value: f32, most: f32, unit: &str, name: impl Fn() -> String) -> Result<()> {
+    if !value.is_finite() {
+        return Err(Error::NonFinite(format!("{} is {value}", name())));
+    }
+    if value.abs() > most {
+        return Err(Error::Argument(format!(
+            "{} is {value} {unit}, must be at most {most}",
+            name()
+        )));
+    }
+    Ok(())
+}
+
+/// The loads of a state.
+#[derive(Debug, Default, HeldBytes, Serialize, Deserialize)]
+pub struct Acting {
+    /// Forces that do not follow the body `[K,3]`, µN.
+    #[serde(with = "stored")]
+    dead: Vec<f32>,
+    /// Gravity among them, mm/s².
+    gravity: [f32; 3],
+    /// Pressure by boundary triangle `[F]`, Pa.
+    #[serde(with = "stored")]
+    pascal: Vec<f32>,
+    /// Whether any of it is not zero.
+    acts: bool,
+}
+
+impl Acting {
+    fn zeros(mesh: &Mesh) -> Result<Acting> {
+        Ok(Acting {
+            dead: memory::zeros(mesh.positions.len(), WHAT)?,
+            gravity: [0.0; 3],
+            pascal: memory::zeros(mesh.surface_faces.len() / 3, WHAT)?,
+            acts: false,
+        })
+    }
+
+    fn clear(&mut self) {
+        self.dead.fill(0.0);
+        self.gravity = [0.0; 3];
+        self.pascal.fill(0.0);
+        self.acts = false;
+    }
+
+    /// Checks what was read.
+    pub(super) fn admit(&self, mesh: &Mesh) -> Result<()> {
+        stored::check(&self.dead, mesh.positions.len())?;
+        stored::check(&self.gravity, 3)?;
+        stored::check(&self.pascal, mesh.surface_faces.len() / 3)
+    }
+}
+
+/// What a scene has for loads, made at the first step that has any.
+#[derive(HeldBytes)]
+pub struct LoadState {
+    /// Of the last published state, and of the one being made.
+    last: Acting,
+    next: Acting,
+    /// Faces under pressure in either, and the pressure there.
+    faces: Vec<[u32; 3]>,
+    pascal: [Vec<f32>; 2],
+    /// Nodes of a region, and boundary triangles of the domain.
+    marked: Vec<bool>,
+    is_domain: Vec<bool>,
+}
+
+impl LoadState {
+    fn new(mesh: &Mesh) -> Result<LoadState> {
+        let faces = mesh.surface_faces.len() / 3;
+        let mut domain = memory::copied(&mesh.domain_faces, WHAT)?;
+        let domain = domain.as_chunks_mut::<3>().0;
+        domain.sort_unstable();
+        let rows = mesh.surface_faces.as_chunks::<3>().0.iter();
+        let is_domain = rows.map(|face| domain.binary_search(face).is_ok());
+        let numbers = || memory::room(faces, WHAT);
+        Ok(LoadState {
+            last: Acting::zeros(mesh)?,
+            next: Acting::zeros(mesh)?,
+            faces: memory::room(faces, WHAT)?,
+            pascal: [numbers()?, numbers()?],
+            marked: memory::filled(mesh.node_count(), false, WHAT)?,
+            is_domain: memory::collected(faces, is_domain, WHAT)?,
+        })
+    }
+
+    /// Takes the loads at the end of a step of a body of these masses, g.
+    fn take(&mut self, loads: &Loads<'_>, mesh: &Mesh, mass: &[f32]) -> Result<()> {
+        let next = &mut self.next;
+        next.acts = loads.acts();
+        let acceleration = loads.acceleration().map(|a| 1e3 * a);
+        next.gravity = acceleration;
+        for ((node, dead), mass) in
+            (next.dead.as_chunks_mut::<3>().0.iter_mut().enumerate()).zip(mass)
+        {
+            for axis in 0..3 {
+                let own = loads.forces.map_or(0.0, |forces| forces[3 * node + axis]);
+                dead[axis] = mass * acceleration[axis] + 1e3 * own;
+            }
+        }
+        next.pascal.fill(0.0);
+        let faces = mesh.surface_faces.as_chunks::<3>().0;
+        for (index, pressure) in loads.pressures.iter().enumerate() {
+            self.marked.fill(false);
+            let (nodes, marked) = (pressure.nodes, &mut self.marked);
+            nodes.iter().for_each(|node| marked[*node as usize] = true);
+            let mut is_on_none = true;
+            for (row, (face, pascal)) in faces.iter().zip(&mut next.pascal).enumerate() {
+                let is_in = match nodes.is_empty() {
+                    true => self.is_domain[row],
+                    false => face.iter().all(|node| marked[*node as usize]),
+                };
+                if is_in {
+                    *pascal += pressure.pascal;
+                    is_on_none = false;
+                }
+            }
+            if is_on_none {
+                return Err(Error::Argument(format!(
+                    "pressures[{index}]: no boundary triangle has all three corners among its {} nodes; pass the nodes of whole faces",
+                    pressure.nodes.len()
+                )));
+            }
+        }
+        self.faces.clear();
+        self.pascal.iter_mut().for_each(Vec::clear);
+        for (row, face) in faces.iter().enumerate() {
+            let both = [self.last.pascal[row], next.pascal[row]];
+            if both != [0.0; 2] {
+                self.faces.push(*face);
+                for (list, pascal) in self.pascal.iter_mut().zip(both) {
+                    list.push(pascal);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether any acts in the last published state.
+    pub(super) fn acted(&self) -> bool {
+        self.last.acts
+    }
+
+    fn acts(&self) -> bool {
+        self.last.acts || self.next.acts
+    }
+
+    /// What the step being made has of them.
+    pub(super) fn load(&self) -> Option<Load<'_>> {
+        self.acts().then(|| Load {
+            dead: [&self.last.dead, &self.next.dead],
+            gravity: [self.last.gravity, self.next.gravity],
+            faces: &self.faces,
+            pascal: [&self.pascal[0], &self.pascal[1]],
+            way: [0.0, 1.0],
+        })
+    }
+
+    /// The state being made becomes the last.
+    pub(super) fn commit(&mut self) {
+        std::mem::swap(&mut self.last, &mut self.next);
+    }
+}
+
+/// A copy of a host's loads, for a step that is submitted.
+#[derive(Default)]
+pub(super) struct CopiedLoads {
+    gravity: [f32; 3],
+    gravity_at_rest: [f32; 3],
+    has_forces: bool,
+    forces: Vec<f32>,
+    /// One list of nodes after the other.
+    nodes: Vec<u32>,
+    /// How many of them each pressure has, and its size, Pa.
+    pressures: Vec<(usize, f32)>,
+}
+
+impl CopiedLoads {
+    /// Takes loads. All lists have room before one changes.
+    pub(super) fn take(&mut self, loads: &Loads<'_>) -> Result<()> {
+        let forces = loads.forces.unwrap_or_default();
+        let nodes = loads.pressures.iter().map(|pressure| pressure.nodes.len());
+        memory::fit(&mut self.forces, forces.len(), WHAT)?;
+        memory::fit(&mut self.nodes, nodes.sum(), WHAT)?;
+        memory::fit(&mut self.pressures, loads.pressures.len(), WHAT)?;
+        self.gravity = loads.gravity;
+        self.gravity_at_rest = loads.gravity_at_rest;
+        self.has_forces = loads.forces.is_some();
+        self.forces.clear();
+        self.forces.extend_from_slice(forces);
+        self.nodes.clear();
+        self.pressures.clear();
+        for pressure in loads.pressures {
+            self.nodes.extend_from_slice(pressure.nodes);
+            let own = (pressure.nodes.len(), pressure.pascal);
+            self.pressures.push(own);
+        }
+        Ok(())
+    }
+
+    /// Calls with the loads.
+    pub(super) fn with<T>(&self, call: impl FnOnce(Loads<'_>) -> T) -> T {
+        let mut pressures = [Pressure::default(); MAX_PRESSURES];
+        let mut nodes = &*self.nodes;
+        for (pressure, &(count, pascal)) in pressures.iter_mut().zip(&self.pressures) {
+            let (own, rest) = nodes.split_at(count);
+            *pressure = Pressure { nodes: own, pascal };
+            nodes = rest;
+        }
+        call(Loads {
+            gravity: self.gravity,
+            gravity_at_rest: self.gravity_at_rest,
+            forces: self.has_forces.then_some(&*self.forces),
+            pressures: &pressures[..self.pressures.len()],
+        })
+    }
+}
+
+impl Core {
+    /// Takes the loads of a step; says whether it has any, at its start or its end.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] in a scene that does not correct, [`Error::Argument`] and [`Error::NonFinite`] for the loads: what was published stays.
+    pub(super) fn take_loads(&mut self, loads: &Loads<'_>) -> Result<bool> {
+        loads.check(&self.mesh)?;
+        if self.loads.is_none() && !loads.acts() {
+            return Ok(false);
+        }
+        if self.corrected.is_none() {
+            return Err(Error::Unsupported(
+                "loads: the scene makes no corrections, in which gravity, forces and pressure act; set `corrections`".into(),
+            ));
+        }
+        let mass = &self.model.corrections()?.body.mass;
+        let state = match &mut self.loads {
+            Some(state) => state,
+            slot => slot.insert(memory::boxed(LoadState::new(&self.mesh)?, WHAT)?),
+        };
+        state.take(loads, &self.mesh, mass)?;
+        Ok(state.acts())
+    }
+
+    /// No load acts, and none did.
+    pub(super) fn clear_loads(&mut self) {
+        if let Some(state) = &mut self.loads {
+            state.last.clear();
+            state.next.clear();
+        }
+    }
+
+    /// A copy of what acts in the last published state, where anything does.
+    pub(super) fn acting(&self) -> Result<Option<Acting>> {
+        let acting = self.loads.as_ref().filter(|state| state.last.acts);
+        let copied = acting.map(|state| {
+            Ok(Acting {
+                dead: memory::copied(&state.last.dead, WHAT)?,
+                gravity: state.last.gravity,
+                pascal: memory::copied(&state.last.pascal, WHAT)?,
+                acts: true,
+            })
+        });
+        copied.transpose()
+    }
+
+    /// Takes what acts in a state that was saved or admitted.
+    pub(super) fn put_acting(&mut self, acting: Option<Acting>) -> Result<()> {
+        self.clear_loads();
+        let Some(acting) = acting else {
+            return Ok(());
+        };
+        let state = match &mut self.loads {
+            Some(state) => state,
+            slot => slot.insert(memory::boxed(LoadState::new(&self.mesh)?, WHAT)?),
+        };
+        state.last = acting;
+        Ok(())
+    }
+
+    /// Bytes of saved loads at most.
+    pub(super) fn load_bytes(&self) -> usize {
+        4 * (self.mesh.positions.len() + self.mesh.surface_faces.len()) + 64
+    }
+}
