@@ -11,6 +11,8 @@
 
 #include "upt.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -183,6 +185,24 @@ public:
   /// The moment of the end of the step on a clock of your own, s.
   Input &at(double time_s) noexcept {
     raw_.time_s = time_s;
+    return *this;
+  }
+  /// Gravity and that under which the mesh was scanned, m/s², in the mesh's frame: the difference acts on the body.
+  Input &gravity(const std::array<float, 3> &now,
+                 const std::array<float, 3> &at_rest = {}) noexcept {
+    std::copy(now.begin(), now.end(), raw_.gravity);
+    std::copy(at_rest.begin(), at_rest.end(), raw_.gravity_at_rest);
+    return *this;
+  }
+  /// Forces on the nodes, [K,3], mN.
+  Input &forces(span<const float> forces) noexcept {
+    raw_.forces = forces.data();
+    return *this;
+  }
+  /// Pressures on parts of the surface; struct_size is set in each.
+  Input &pressures(span<const upt_pressure> pressures) noexcept {
+    raw_.pressures = pressures.data();
+    raw_.pressure_count = pressures.size();
     return *this;
   }
   const upt_input *get() const noexcept { return &raw_; }

@@ -55,6 +55,7 @@ from upt.errors import (
 )
 from upt.haptics import Haptics
 from upt.instrument import Hull, Instrument
+from upt.loads import Loads
 from upt.log import set_log
 from upt.model import Model
 from upt.scene import Scene
@@ -95,6 +96,7 @@ __all__ = [
     "InstrumentReading",
     "Kernel",
     "Kind",
+    "Loads",
     "LogLevel",
     "Mode",
     "Model",

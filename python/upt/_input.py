@@ -16,11 +16,12 @@ from numpy.typing import ArrayLike
 from upt import _native
 from upt._arrays import Contacts, address, number, vectors
 from upt.instrument import Instrument, records
+from upt.loads import OFFSET, Loads
 
-#: `upt_input` as it lies in memory.
+#: `upt_input` as it lies in memory, but for its loads.
 _LAYOUT = Struct("@I4xPQPPQPPd")
 _SIZE = ctypes.sizeof(_native.Input)
-assert _LAYOUT.size == _SIZE
+assert _LAYOUT.size == OFFSET
 _BLANK = bytes(_SIZE)
 
 #: Where the input lies, how many instruments it has, and what must live over the call.
@@ -43,6 +44,7 @@ class Inputs:
         collision: ArrayLike | None,
         displacement: ArrayLike | None,
         time_s: float,
+        loads: Loads | None = None,
     ) -> Place:
         """An input of these fields; `Scene.step` says what they are."""
         packed, count = records(instruments)
@@ -50,9 +52,10 @@ class Inputs:
         at = addressof(c_char.from_buffer(memory))
         tools = at + _SIZE if count else 0
         time_s = number(time_s, "time_s")
+        acting = None if loads is None else loads.pack_into(memory, self._node_count)
         if contacts is None and collision is None and displacement is None:
             _LAYOUT.pack_into(memory, 0, _SIZE, tools, count, 0, 0, 0, 0, 0, time_s)
-            return at, count, memory
+            return at, count, (memory, acting)
         nodes = imposed = listed = 0
         lists = None
         if contacts is not None:
@@ -64,7 +67,7 @@ class Inputs:
             memory, 0, _SIZE, tools, count, nodes, imposed, listed,
             0 if field is None else address(field), 0 if start is None else address(start), time_s,
         )  # fmt: skip
-        return at, count, (memory, lists, field, start)
+        return at, count, (memory, acting, lists, field, start)
 
 
 def _pair(contacts: tuple[ArrayLike, ArrayLike]) -> tuple[ArrayLike, ArrayLike]:

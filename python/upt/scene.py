@@ -19,6 +19,7 @@ from upt._input import Inputs
 from upt._library import check, lib
 from upt._native import InstrumentContact, InstrumentReading, SceneOptions, SceneStats, Status, View, ViewKind
 from upt.instrument import Instrument, records
+from upt.loads import Loads
 
 if TYPE_CHECKING:
     if sys.version_info >= (3, 12):
@@ -85,6 +86,7 @@ class Scene:
         collision: ArrayLike | None = None,
         displacement: ArrayLike | None = None,
         time_s: float = 0.0,
+        loads: Loads | None = None,
         out: Floats | None = None,
     ) -> Floats:
         """One step. Instruments, contacts or a collision field drive it; without any the tissue moves on by itself.
@@ -100,6 +102,7 @@ class Scene:
                 step.
             displacement: `u(t)`, `[K, 3]`, mm, to start from; None takes the scene's own state. Not with instruments.
             time_s: the moment of the end of the step on a clock of your own, s, from which `present` counts.
+            loads: gravity, forces and pressure that act meanwhile; only in scenes with corrections.
             out: `[n, 3]` to write to (n: K, or the region's count); None makes a new array.
 
         Returns:
@@ -110,7 +113,7 @@ class Scene:
             upt.UnsupportedError: the bundle has no linear response to solve the contact of instruments with; use
                 `contacts` of this class for the nodes that they touch.
         """
-        at, count, kept = self._inputs.place(instruments, contacts, collision, displacement, time_s)
+        at, count, kept = self._inputs.place(instruments, contacts, collision, displacement, time_s, loads)
         result, place, length, _ = self._steps.place(out, self._out_count)
         if (status := _step(self._handle, at, place, length)) < 0:
             check(status)
@@ -185,9 +188,10 @@ class Scene:
         collision: ArrayLike | None = None,
         displacement: ArrayLike | None = None,
         time_s: float = 0.0,
+        loads: Loads | None = None,
     ) -> None:
         """Starts a step on the scene's worker and returns at once; arguments as in `step`, copied."""
-        at, count, kept = self._inputs.place(instruments, contacts, collision, displacement, time_s)
+        at, count, kept = self._inputs.place(instruments, contacts, collision, displacement, time_s, loads)
         check(lib.upt_scene_submit(self._handle, at))
         self._instrument_count = count
 

@@ -5,11 +5,6 @@
 //! iterations keep a symmetric tangent. With `p` in the drift (and off the inertia that a step leaves behind) all stages see it: the guess
 //! by the natural modes, the residual near and far, and the oscillators of a free step.
 
-use super::input::Input;
-use super::solver::ImplicitSolver;
-use crate::error::Result;
-use crate::memory;
-
 /// What acts over a step, or a part of one.
 #[derive(Clone, Copy)]
 pub struct Load<'a> {
@@ -43,7 +38,13 @@ impl Load<'_> {
     }
 
     /// The forces at one of its two ends, 0 or 1, into `out [K,3]`, with the body at `rest + u(0..3K)`.
-    fn evaluate(&self, end: usize, rest: &[f32], u: impl Fn(usize) -> f32, out: &mut [f32]) {
+    pub(super) fn evaluate(
+        &self,
+        end: usize,
+        rest: &[f32],
+        u: impl Fn(usize) -> f32,
+        out: &mut [f32],
+    ) {
         let way = self.way[end];
         let between = |from: f32, to: f32| from + way * (to - from);
         let [from, to] = self.dead;
@@ -69,45 +70,6 @@ impl Load<'_> {
                     *out -= share * twice;
                 }
             }
-        }
-    }
-}
-
-impl ImplicitSolver {
-    /// Takes the loads of the step: those at its end off the drift.
-    pub(super) fn take_load(&mut self, input: &Input<'_>, step_s: f32) -> Result<()> {
-        let Some(load) = &input.load else {
-            self.load.clear();
-            return Ok(());
-        };
-        memory::fit(&mut self.load, self.drift.len(), "the loads of a scene")?;
-        self.load.resize(self.drift.len(), 0.0);
-        let ahead = if input.still { 0.0 } else { step_s };
-        let (last, velocity) = (input.last, &self.motion.velocity);
-        let there = |at: usize| last[at] + ahead * velocity[at];
-        load.evaluate(1, input.rest, there, &mut self.load);
-        for (drift, load) in self.drift.iter_mut().zip(&self.load) {
-            *drift -= load;
-        }
-        Ok(())
-    }
-
-    /// The mean load over the step into `q`; false where there is none.
-    pub(super) fn mean_load(&mut self, input: &Input<'_>) -> bool {
-        let Some(load) = &input.load else {
-            return false;
-        };
-        load.evaluate(0, input.rest, |at| input.last[at], &mut self.q);
-        for (mean, end) in self.q.iter_mut().zip(&self.load) {
-            *mean = 0.5 * (*mean + end);
-        }
-        true
-    }
-
-    /// Takes the loads off the inertia of the state being made.
-    pub(super) fn leave_load(&mut self) {
-        for (inertia, load) in self.next.inertia.iter_mut().zip(&self.load) {
-            *inertia -= load;
         }
     }
 }

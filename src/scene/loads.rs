@@ -2,7 +2,6 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::core::Core;
 use crate::bundle::Mesh;
 use crate::corrections::Load;
 use crate::error::{Error, Result};
@@ -18,7 +17,7 @@ pub const LARGEST_FORCE: f32 = 1e6;
 /// The largest pressure, Pa: ten times that of the air.
 pub const LARGEST_PRESSURE: f32 = 1e6;
 
-const WHAT: &str = "the loads of a scene";
+pub(super) const WHAT: &str = "the loads of a scene";
 
 /// Loads at the end of a step; within the step they change on a line from those of the last. By default there are none. They act in scenes
 /// that correct (`corrections`).
@@ -150,11 +149,24 @@ impl Acting {
         })
     }
 
-    fn clear(&mut self) {
+    pub(super) fn clear(&mut self) {
         self.dead.fill(0.0);
         self.gravity = [0.0; 3];
         self.pascal.fill(0.0);
         self.acts = false;
+    }
+
+    /// A copy, where anything acts.
+    pub(super) fn copy(&self) -> Result<Option<Acting>> {
+        if !self.acts {
+            return Ok(None);
+        }
+        Ok(Some(Acting {
+            dead: memory::copied(&self.dead, WHAT)?,
+            gravity: self.gravity,
+            pascal: memory::copied(&self.pascal, WHAT)?,
+            acts: true,
+        }))
     }
 
     /// Checks what was read.
@@ -169,8 +181,8 @@ impl Acting {
 #[derive(HeldBytes)]
 pub struct LoadState {
     /// Of the last published state, and of the one being made.
-    last: Acting,
-    next: Acting,
+    pub(super) last: Acting,
+    pub(super) next: Acting,
     /// Faces under pressure in either, and the pressure there.
     faces: Vec<[u32; 3]>,
     pascal: [Vec<f32>; 2],
@@ -180,7 +192,7 @@ pub struct LoadState {
 }
 
 impl LoadState {
-    fn new(mesh: &Mesh) -> Result<LoadState> {
+    pub(super) fn new(mesh: &Mesh) -> Result<LoadState> {
         let faces = mesh.surface_faces.len() / 3;
         let mut domain = memory::copied(&mesh.domain_faces, WHAT)?;
         let domain = domain.as_chunks_mut::<3>().0;
@@ -199,7 +211,7 @@ impl LoadState {
     }
 
     /// Takes the loads at the end of a step of a body of these masses, g.
-    fn take(&mut self, loads: &Loads<'_>, mesh: &Mesh, mass: &[f32]) -> Result<()> {
+    pub(super) fn take(&mut self, loads: &Loads<'_>, mesh: &Mesh, mass: &[f32]) -> Result<()> {
         let next = &mut self.next;
         next.acts = loads.acts();
         let acceleration = loads.acceleration().map(|a| 1e3 * a);
@@ -255,7 +267,7 @@ impl LoadState {
         self.last.acts
     }
 
-    fn acts(&self) -> bool {
+    pub(super) fn acts(&self) -> bool {
         self.last.acts || self.next.acts
     }
 
@@ -327,71 +339,5 @@ impl CopiedLoads {
             forces: self.has_forces.then_some(&*self.forces),
             pressures: &pressures[..self.pressures.len()],
         })
-    }
-}
-
-impl Core {
-    /// Takes the loads of a step; says whether it has any, at its start or its end.
-    ///
-    /// # Errors
-    /// [`Error::Unsupported`] in a scene that does not correct, [`Error::Argument`] and [`Error::NonFinite`] for the loads: what was published stays.
-    pub(super) fn take_loads(&mut self, loads: &Loads<'_>) -> Result<bool> {
-        loads.check(&self.mesh)?;
-        if self.loads.is_none() && !loads.acts() {
-            return Ok(false);
-        }
-        if self.corrected.is_none() {
-            return Err(Error::Unsupported(
-                "loads: the scene makes no corrections, in which gravity, forces and pressure act; set `corrections`".into(),
-            ));
-        }
-        let mass = &self.model.corrections()?.body.mass;
-        let state = match &mut self.loads {
-            Some(state) => state,
-            slot => slot.insert(memory::boxed(LoadState::new(&self.mesh)?, WHAT)?),
-        };
-        state.take(loads, &self.mesh, mass)?;
-        Ok(state.acts())
-    }
-
-    /// No load acts, and none did.
-    pub(super) fn clear_loads(&mut self) {
-        if let Some(state) = &mut self.loads {
-            state.last.clear();
-            state.next.clear();
-        }
-    }
-
-    /// A copy of what acts in the last published state, where anything does.
-    pub(super) fn acting(&self) -> Result<Option<Acting>> {
-        let acting = self.loads.as_ref().filter(|state| state.last.acts);
-        let copied = acting.map(|state| {
-            Ok(Acting {
-                dead: memory::copied(&state.last.dead, WHAT)?,
-                gravity: state.last.gravity,
-                pascal: memory::copied(&state.last.pascal, WHAT)?,
-                acts: true,
-            })
-        });
-        copied.transpose()
-    }
-
-    /// Takes what acts in a state that was saved or admitted.
-    pub(super) fn put_acting(&mut self, acting: Option<Acting>) -> Result<()> {
-        self.clear_loads();
-        let Some(acting) = acting else {
-            return Ok(());
-        };
-        let state = match &mut self.loads {
-            Some(state) => state,
-            slot => slot.insert(memory::boxed(LoadState::new(&self.mesh)?, WHAT)?),
-        };
-        state.last = acting;
-        Ok(())
-    }
-
-    /// Bytes of saved loads at most.
-    pub(super) fn load_bytes(&self) -> usize {
-        4 * (self.mesh.positions.len() + self.mesh.surface_faces.len()) + 64
     }
 }

@@ -20,6 +20,7 @@ mod inputs;
 mod instruments;
 mod inversion;
 mod linear;
+mod loading;
 mod loads;
 mod own_pace;
 mod plan;

@@ -4,8 +4,6 @@
 //! the area vector `A n` takes `-p A n`, a third at each corner. Loads change on a line over a frame. Forces are µN inside.
 
 use super::fields::Node;
-use super::{Solver, SolverError};
-use crate::mesh::tet_volume;
 use elements::vector::{cross, subtract};
 
 /// Loads at the end of a frame. By default there are none.
@@ -30,23 +28,23 @@ pub struct SurfacePressure {
 
 /// A face under pressure.
 #[derive(Clone, Debug)]
-struct Face {
-    slots: [u32; 3],
-    rest: [[f32; 3]; 3],
+pub(super) struct Face {
+    pub slots: [u32; 3],
+    pub rest: [[f32; 3]; 3],
     /// At the start and the end of the frame, Pa.
-    pascal: [f64; 2],
+    pub pascal: [f64; 2],
 }
 
 /// The loads of a solver, from the first time that it has any.
 #[derive(Clone, Debug, Default)]
 pub(super) struct BodyLoad {
     /// Forces that do not follow the body, by slot, at the start of the frame and at its end.
-    dead: [Vec<Node>; 2],
-    faces: Vec<Face>,
+    pub dead: [Vec<Node>; 2],
+    pub faces: Vec<Face>,
     /// By row of the surface, Pa, at the end of the frame.
-    pascal: Vec<f64>,
+    pub pascal: Vec<f64>,
     /// Inner steps of the frame.
-    steps: u32,
+    pub steps: u32,
     /// Forces of an inner step, by slot.
     pub now: Vec<Node>,
 }
@@ -95,97 +93,6 @@ impl BodyLoad {
         for face in &mut self.faces {
             face.pascal[0] = face.pascal[1];
         }
-    }
-}
-
-impl Solver {
-    /// Sets the loads that the next frame ends with; it takes the body there from the present ones, and they stay.
-    ///
-    /// # Errors
-    /// [`SolverError::Load`], with which nothing has changed.
-    pub fn set_loads(&mut self, loads: &Loads) -> Result<(), SolverError> {
-        if self.load.is_none() && *loads == Loads::default() {
-            return Ok(());
-        }
-        self.check_loads(loads)?;
-        let slots = self.partition.node_of_slot.len();
-        let load = self.load.get_or_insert_with(|| BodyLoad {
-            dead: [vec![Node::default(); slots], vec![Node::default(); slots]],
-            now: vec![Node::default(); slots],
-            ..BodyLoad::default()
-        });
-        let mut mass = vec![0.0; self.positions.len()];
-        let density = self.options.material.density_g_mm3();
-        for tet in &self.tets {
-            let share = 0.25 * density * tet_volume(&self.positions, *tet);
-            tet.iter().for_each(|node| mass[*node as usize] += share);
-        }
-        for (node, slot) in self.partition.slot_of_node.iter().enumerate() {
-            let own = loads.forces.get(node).copied().unwrap_or_default();
-            let force = &mut load.dead[1][*slot as usize].0;
-            for axis in 0..3 {
-                let weight = mass[node] * loads.gravity[axis];
-                force[axis] = (weight + 1e3 * f64::from(own[axis])) as f32;
-            }
-        }
-        let before = std::mem::take(&mut load.pascal);
-        load.pascal = vec![0.0; self.surface.len()];
-        for pressure in &loads.pressures {
-            for face in &pressure.faces {
-                load.pascal[*face as usize] += pressure.pascal;
-            }
-        }
-        load.faces.clear();
-        for (row, face) in self.surface.iter().enumerate() {
-            let pascal = [before.get(row).copied().unwrap_or(0.0), load.pascal[row]];
-            if pascal != [0.0; 2] {
-                load.faces.push(Face {
-                    slots: face.map(|node| self.partition.slot_of_node[node as usize]),
-                    rest: face.map(|node| self.positions[node as usize]),
-                    pascal,
-                });
-            }
-        }
-        Ok(())
-    }
-
-    fn check_loads(&self, loads: &Loads) -> Result<(), SolverError> {
-        let fail = |field: String, reason: &str| {
-            Err(SolverError::Load {
-                field,
-                reason: reason.into(),
-            })
-        };
-        if !loads.gravity.iter().all(|v| v.is_finite()) {
-            return fail("gravity".into(), "is not finite");
-        }
-        if self.topology.body.is_some() {
-            return fail(
-                "all".into(),
-                "act on the body as it was meshed; this one has been cut",
-            );
-        }
-        let count = self.positions.len();
-        if !loads.forces.is_empty() && loads.forces.len() != count {
-            return fail("forces".into(), "must have a row a node, or none");
-        }
-        if let Some(node) = (loads.forces.iter()).position(|f| !f.iter().all(|v| v.is_finite())) {
-            return fail(format!("forces[{node}]"), "is not finite");
-        }
-        for (index, pressure) in loads.pressures.iter().enumerate() {
-            let field = format!("pressures[{index}]");
-            if !pressure.pascal.is_finite() {
-                return fail(field, "is not finite");
-            }
-            if pressure.faces.is_empty() {
-                return fail(field, "has no faces to press on");
-            }
-            let known = |face: &u32| (*face as usize) < self.surface.len();
-            if !pressure.faces.iter().all(known) {
-                return fail(field, "names a face that the surface does not have");
-            }
-        }
-        Ok(())
     }
 }
 

@@ -14,6 +14,7 @@ mod diagnosis;
 mod error;
 mod fields;
 mod frame;
+mod loading;
 mod march;
 mod mass;
 mod options;

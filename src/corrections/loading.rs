@@ -1,0 +1,45 @@
+//! Loads in a step: off the drift before it, off the inertia that it leaves.
+
+use super::input::Input;
+use super::solver::ImplicitSolver;
+use crate::error::Result;
+use crate::memory;
+
+impl ImplicitSolver {
+    /// Takes the loads of the step: those at its end off the drift.
+    pub(super) fn take_load(&mut self, input: &Input<'_>, step_s: f32) -> Result<()> {
+        let Some(load) = &input.load else {
+            self.load.clear();
+            return Ok(());
+        };
+        memory::fit(&mut self.load, self.drift.len(), "the loads of a scene")?;
+        self.load.resize(self.drift.len(), 0.0);
+        let ahead = if input.still { 0.0 } else { step_s };
+        let (last, velocity) = (input.last, &self.motion.velocity);
+        let there = |at: usize| last[at] + ahead * velocity[at];
+        load.evaluate(1, input.rest, there, &mut self.load);
+        for (drift, load) in self.drift.iter_mut().zip(&self.load) {
+            *drift -= load;
+        }
+        Ok(())
+    }
+
+    /// The mean load over the step into `q`; false where there is none.
+    pub(super) fn mean_load(&mut self, input: &Input<'_>) -> bool {
+        let Some(load) = &input.load else {
+            return false;
+        };
+        load.evaluate(0, input.rest, |at| input.last[at], &mut self.q);
+        for (mean, end) in self.q.iter_mut().zip(&self.load) {
+            *mean = 0.5 * (*mean + end);
+        }
+        true
+    }
+
+    /// Takes the loads off the inertia of the state being made.
+    pub(super) fn leave_load(&mut self) {
+        for (inertia, load) in self.next.inertia.iter_mut().zip(&self.load) {
+            *inertia -= load;
+        }
+    }
+}
