@@ -55,6 +55,7 @@ structs!(
     upt_haptic_force,
     upt_scene_stats,
     upt_input,
+    upt_pressure,
     upt_view,
     upt_instrument,
     upt_instrument_reading,

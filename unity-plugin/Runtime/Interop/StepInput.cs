@@ -33,6 +33,13 @@ namespace Upt.Interop
         /// <summary>The moment of the end of the step on a clock of the caller's, s.</summary>
         public double Time;
 
+        /// <summary>Gravity at the end of the step, m/s², in the mesh's frame: x, y, z. Not in scenes without
+        /// corrections.</summary>
+        public (float X, float Y, float Z) Gravity;
+
+        /// <summary>Gravity under which the mesh was scanned, m/s²: the difference acts.</summary>
+        public (float X, float Y, float Z) GravityAtRest;
+
         /// <summary>The first <paramref name="count"/> instruments drive the step.</summary>
         public static StepInput OfInstruments(upt_instrument[] instruments, int count)
         {
@@ -76,6 +83,12 @@ namespace Upt.Interop
             raw.collision = collision;
             raw.displacement = displacement;
             raw.time_s = Time;
+            raw.gravity[0] = Gravity.X;
+            raw.gravity[1] = Gravity.Y;
+            raw.gravity[2] = Gravity.Z;
+            raw.gravity_at_rest[0] = GravityAtRest.X;
+            raw.gravity_at_rest[1] = GravityAtRest.Y;
+            raw.gravity_at_rest[2] = GravityAtRest.Z;
             return raw;
         }
 
