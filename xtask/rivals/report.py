@@ -25,7 +25,9 @@ COLOURS = {
 
 
 def number(value: float | None, digits: int = 2) -> str:
-    return "-" if value is None else f"{value:.{digits}g}"
+    if value is None:
+        return "-"
+    return f"{value:,.0f}" if abs(value) >= 100 else f"{value:.{digits}g}"
 
 
 def table(rows: list[dict], case: str) -> list[str]:
@@ -60,16 +62,29 @@ def chart(rows: list[dict], cases: list[str], path: Path) -> None:
         found = [r for r in rows if r["case"] == case and r.get("mse_mm2")]
         for method in COLOURS:
             own = sorted((r for r in found if r["method"] == method), key=lambda r: r["ms"])
-            if own:
-                panel.plot(
-                    [r["ms"] for r in own],
-                    [r["mse_mm2"] for r in own],
-                    "o-" if method == "libupt" else "o",
-                    ms=7 if method == "libupt" else 5,
-                    color=COLOURS[method],
-                    label=method,
-                    lw=1.2,
-                )
+            if not own:
+                continue
+            colour, is_ours = COLOURS[method], method == "libupt"
+            at = [[r["ms"] for r in own], [r["mse_mm2"] for r in own]]
+            if is_ours:
+                panel.plot(*at, color=colour, lw=1.2)
+            # A run that was cut has not met the deepest frames: it is drawn hollow.
+            faces = [colour if r["frames"] == most(rows, case) else "white" for r in own]
+            size = 60 if is_ours else 30
+            panel.scatter(*at, s=size, c=faces, edgecolors=colour, zorder=3)
+            panel.scatter([], [], s=size, color=colour, label=method)
+        truth = next((r for r in rows if r["case"] == case and r["method"] == "reference solver" and "ms" in r), None)
+        if truth:
+            panel.axvline(truth["ms"], color=COLOURS["reference solver"], ls="-.", lw=1)
+            panel.text(
+                truth["ms"],
+                0.04,
+                "the truth takes ",
+                color=COLOURS["reference solver"],
+                fontsize=8,
+                ha="right",
+                transform=panel.get_xaxis_transform(),
+            )
         rest = next((r["rest_mse_mm2"] for r in found if r["frames"] == most(rows, case)), None)
         if rest:
             panel.axhline(rest, color="0.7", ls=":", lw=1)

@@ -28,16 +28,15 @@ fn read<const N: usize, T>(path: &Path, convert: impl Fn([u8; 4]) -> T) -> Vec<[
     .collect()
 }
 
+/// Processor time of this thread, the only one, s (Linux).
 fn processor_s() -> f64 {
-    let text = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
-    let after = text.rsplit(')').next().unwrap_or_default();
-    let ticks: f64 = after
-        .split_whitespace()
-        .skip(11)
-        .take(2)
-        .filter_map(|t| t.parse::<f64>().ok())
-        .sum();
-    ticks / 100.0
+    let text = std::fs::read_to_string("/proc/self/schedstat").unwrap_or_default();
+    let nanoseconds: f64 = text
+        .split(' ')
+        .next()
+        .and_then(|n| n.parse().ok())
+        .unwrap_or(0.0);
+    1e-9 * nanoseconds
 }
 
 fn main() {
