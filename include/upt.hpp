@@ -187,7 +187,8 @@ public:
     raw_.time_s = time_s;
     return *this;
   }
-  /// Gravity and that under which the mesh was scanned, m/s², in the mesh's frame: the difference acts on the body.
+  /// Gravity and that under which the mesh was scanned, m/s², in the mesh's frame: the difference
+  /// acts on the body.
   Input &gravity(const std::array<float, 3> &now,
                  const std::array<float, 3> &at_rest = {}) noexcept {
     std::copy(now.begin(), now.end(), raw_.gravity);

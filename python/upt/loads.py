@@ -22,7 +22,8 @@ OFFSET: int = _native.Input.forces.offset  # type: ignore[attr-defined]
 class Loads:
     """Loads at the end of a step; within the step they change on a line from those of the last.
 
-    They act in scenes with corrections, beside whatever drives the step. What acts of gravity is `gravity - gravity_at_rest`.
+    They act in scenes with corrections, beside whatever drives the step. What acts of gravity is
+    `gravity - gravity_at_rest`.
     """
 
     gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -32,8 +33,9 @@ class Loads:
     forces: ArrayLike | None = None
     """`[K, 3]`, mN, on the nodes."""
     pressures: Sequence[tuple[ArrayLike | None, float]] = ()
-    """Pairs of nodes and a pressure from outside, Pa: on the boundary triangles with all corners among the nodes; None: on the
-    domain. It follows the surface."""
+    """Pairs of nodes and a pressure from outside, Pa, which follows the surface.
+
+    It acts on the boundary triangles with all corners among the nodes; None: on the domain."""
 
     def pack_into(self, memory: bytearray, node_count: int) -> object:
         """Puts these loads into a `upt_input`; gives what must live over the call."""
@@ -50,7 +52,5 @@ class Loads:
         array = (_native.Pressure * len(records))(*records)
         gravity = [number(value, "gravity") for value in (*self.gravity, *self.gravity_at_rest)]
         at = addressof(array) if records else 0
-        _LAYOUT.pack_into(
-            memory, OFFSET, 0 if forces is None else address(forces), at, len(records), *gravity
-        )
+        _LAYOUT.pack_into(memory, OFFSET, 0 if forces is None else address(forces), at, len(records), *gravity)
         return forces, regions, array
