@@ -27,7 +27,7 @@ COLOURS = {
 def number(value: float | None, digits: int = 2) -> str:
     if value is None:
         return "-"
-    return f"{value:,.0f}" if abs(value) >= 100 else f"{value:.{digits}g}"
+    return f"{value:,.0f}" if abs(value) >= 99.5 else f"{value:.{digits}g}"
 
 
 def table(rows: list[dict], case: str) -> list[str]:
