@@ -11,7 +11,9 @@ from safetensors.numpy import load_file, save_file
 
 from upt_training.__main__ import main
 from upt_training.box_mesh import box_mesh
+from upt_training.dataset import open_dataset
 from upt_training.errors import InputError
+from upt_training.evaluate import check_tissue
 from upt_training.mesh_file import load_mesh
 
 
@@ -45,6 +47,14 @@ def test_dataset_of_another_mesh(copy, tmp_path, capsys):
     box_mesh((4, 4, 4)).save(other)
     expect(capsys, run(copy, other, tmp_path / "run"), "another mesh", "manifest.json")
     assert not (tmp_path / "run").exists()
+
+
+def test_dataset_of_another_tissue(data, mesh_path):
+    dataset = open_dataset(data, load_mesh(mesh_path))
+    own = dataset.manifest["material"]
+    check_tissue({**own, "damping_per_s": 5.0}, dataset)
+    with pytest.raises(InputError, match="young_pa is 3000, the bundle is made for 5000.*--young"):
+        check_tissue({**own, "young_pa": 5000}, dataset)
 
 
 def test_truncated_trajectory(copy, mesh_path, tmp_path, capsys):

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from upt_training.bundle_rollout import BundleRunner
-from upt_training.dataset import open_dataset, open_trajectory
+from upt_training.dataset import Dataset, open_dataset, open_trajectory
 from upt_training.errors import InputError
 from upt_training.mesh_file import load_mesh
 from upt_training.metrics import RolloutMetrics, summary
@@ -78,10 +78,22 @@ def evaluate_bundle(
     }
 
 
+def check_tissue(own: dict, dataset: Dataset) -> None:
+    """Refuses data of another tissue: errors on it say nothing about the bundle. Damping may differ (hard schemes)."""
+    theirs = dataset.manifest.get("material", own)
+    for name in ("young_pa", "poisson", "density_kg_m3", "law"):
+        if own.get(name) != theirs.get(name):
+            raise InputError(
+                f"{dataset.folder}: material.{name} is {theirs.get(name)}, the bundle is made for {own.get(name)}; "
+                "make the data with --young, --poisson, --density and --law of the bundle"
+            )
+
+
 def evaluate_command(options) -> int:
     mesh = load_mesh(options.mesh) if options.mesh else None
     runner = BundleRunner(options.bundle, mesh, options.prior, options.precision, options.vibration)
     dataset = open_dataset(options.data, runner.mesh)
+    check_tissue(runner.manifest["material"], dataset)
     cases = dataset.select(options.split, options.schemes, options.count)
     if not cases:
         wanted = f" of schemes {', '.join(options.schemes)}" if options.schemes else ""
