@@ -25,6 +25,7 @@ use crate::effort::Effort;
 use crate::quantile::median;
 use crate::report::method::BundleFolder;
 use crate::stress::replace_between;
+use crate::tool_scale;
 
 /// What is measured.
 pub struct Plan<'a> {
@@ -121,6 +122,7 @@ fn truth(
         Some(tool) => {
             let order = ToolOrder {
                 load: Some(load),
+                scale: tool_scale::Chosen::of(tool_scale::Arguments::default(), mesh, None).scale,
                 ..ToolOrder::new(tool, plan.seed)
             };
             simulate_tools(mesh, boundary, order, &options, |_, _| {})

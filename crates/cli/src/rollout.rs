@@ -66,6 +66,8 @@ pub fn run(options: &Options) -> Result<ExitCode> {
             "note: the trajectory has the boundary `{}`, the bundle was made for `{}`",
             trajectory.header.boundary, bundle.boundary
         );
+    } else if let Some(reason) = bundle.misfit(&trajectory.header) {
+        eprintln!("note: {reason}");
     }
     let corrections = match (options.corrections, bundle.corrections) {
         (Some(count), _) => count,

@@ -121,6 +121,20 @@ fn cases_that_cannot_be_measured_are_refused_by_name() {
         &["has no tools", "--tool NAME"],
     );
     let press = simulate(folder.path(), MESH, ["--tool", "press"]);
+    let stiff = folder.path().join("stiff.trajectory.safetensors");
+    let stiff = stiff.to_str().unwrap();
+    let output = upt(&[
+        "simulate", "--mesh", MESH, "--tool", "press", "--young", "5000", "--out", stiff,
+    ]);
+    assert!(output.status.success(), "{}", told(&output));
+    refused(
+        &["--tools", stiff, "--bundle", BUNDLE],
+        &["E = 3000 Pa", "have E = 5000 Pa", "--young"],
+    );
+    refused(
+        &["--tools", &press, "--tools", stiff, "--bundle", BUNDLE],
+        &["its tissue is not the first case's"],
+    );
     refused(
         &["--tools", &press, "--bundle", "onnx/brain-coarse-reduced"],
         &["a mesh other than", "brain-coarse-reduced"],

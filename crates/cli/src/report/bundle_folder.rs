@@ -3,6 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
+use tissue::material::Material;
+use tissue::trajectory::TrajectoryHeader;
 use upt::kernels::decoder::DecoderPrecision;
 
 use super::setting::Precision;
@@ -15,6 +17,7 @@ pub struct BundleFolder {
     pub name: String,
     pub boundary: String,
     pub mesh_sha256: String,
+    pub material: Material,
     pub mesh_file: PathBuf,
     pub sha256: String,
     /// Float32, the variants of the graphs that the manifest lists, and bfloat16 where kind and CPU have it.
@@ -67,8 +70,52 @@ impl BundleFolder {
             name: text(&fields["name"], "name")?,
             boundary: text(&fields["boundary"], "boundary")?,
             mesh_sha256: text(&fields["mesh"]["mesh_sha256"], "mesh.mesh_sha256")?,
+            material: serde_json::from_value(fields["material"].clone())
+                .with_context(|| format!("{}: field `material`", file.display()))?,
             mesh_file: path.join(text(&fields["mesh"]["file"], "mesh.file")?),
             sha256: format!("{:x}", sha2::Sha256::digest(&bytes)),
         })
     }
+
+    /// Why errors on a case would say nothing about the bundle: it is made for another mesh, boundary or tissue.
+    pub fn misfit(&self, case: &TrajectoryHeader) -> Option<String> {
+        let name = &self.name;
+        if self.mesh_sha256 != case.mesh_sha256 {
+            return Some(format!(
+                "{name}: made for a mesh other than that of the cases ({})",
+                case.mesh_name
+            ));
+        }
+        if self.boundary != case.boundary {
+            return Some(format!(
+                "{name}: made for the boundary `{}`, but the cases have `{}`",
+                self.boundary, case.boundary
+            ));
+        }
+        let [own, theirs] = [&self.material, &case.material];
+        (!is_one_tissue(own, theirs)).then(|| {
+            format!(
+                "{name}: made for {}, but the cases have {}; simulate them with --young, --poisson, --density and --law",
+                tissue_of(own),
+                tissue_of(theirs)
+            )
+        })
+    }
+}
+
+/// Whether two materials differ in nothing but damping, which a scene takes from its options.
+pub fn is_one_tissue(a: &Material, b: &Material) -> bool {
+    let damping_per_s = a.damping_per_s;
+    *a == Material {
+        damping_per_s,
+        ..*b
+    }
+}
+
+fn tissue_of(material: &Material) -> String {
+    let law = serde_json::to_string(&material.law).unwrap_or_default();
+    format!(
+        "E = {} Pa, nu = {}, {} kg/m³, law {law}",
+        material.young_pa, material.poisson, material.density_kg_m3
+    )
 }

@@ -7,6 +7,8 @@ use sha2::{Digest, Sha256};
 use tissue::baselines::DecayFit;
 use tissue::trajectory::{Trajectory, TrajectoryHeader};
 
+use super::bundle_folder::is_one_tissue;
+
 /// One simulated contact.
 pub struct Case {
     pub name: String,
@@ -53,6 +55,12 @@ impl Cases {
                     path.display(),
                     header.mesh_name,
                     header.boundary
+                );
+            }
+            if !is_one_tissue(&header.material, &first.material) {
+                bail!(
+                    "{}: its tissue is not the first case's; write one report for each",
+                    path.display()
                 );
             }
         }

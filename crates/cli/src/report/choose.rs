@@ -12,7 +12,7 @@ use super::prior_alone::PriorAlone;
 use super::{Options, Region, paper_split, same_body};
 use crate::effort::Effort;
 
-/// The bundles whose mesh and boundary are the cases'; the others are named in `notes`.
+/// The bundles whose mesh, boundary and tissue are the cases'; the others are named in `notes`.
 pub fn fitting_bundles(
     options: &Options,
     cases: &Cases,
@@ -26,18 +26,9 @@ pub fn fitting_bundles(
     let mut fitting = Vec::new();
     for path in &paths {
         let bundle = BundleFolder::read(path)?;
-        if bundle.mesh_sha256 != cases.mesh_sha256 {
-            notes.push(format!(
-                "{}: made for a mesh other than that of the cases",
-                bundle.name
-            ));
-        } else if bundle.boundary != cases.boundary {
-            notes.push(format!(
-                "{}: made for the boundary `{}`, but the cases have `{}`",
-                bundle.name, bundle.boundary, cases.boundary
-            ));
-        } else {
-            fitting.push(bundle);
+        match bundle.misfit(&cases.list[0].trajectory.header) {
+            Some(reason) => notes.push(reason),
+            None => fitting.push(bundle),
         }
     }
     Ok(fitting)

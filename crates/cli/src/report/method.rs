@@ -12,7 +12,7 @@ use tissue::trajectory::TrajectoryHeader;
 use tissue::{baselines::LinearQuasiStatic, linear::Lame};
 use upt::ffi;
 
-pub use super::bundle_folder::BundleFolder;
+pub use super::bundle_folder::{BundleFolder, is_one_tissue};
 use super::setting::{Precision, Provider, Region};
 use crate::effort::Effort;
 use crate::host;

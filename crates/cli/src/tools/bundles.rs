@@ -7,7 +7,7 @@ use anyhow::{Result, bail};
 use super::cases::ToolCases;
 use crate::report::method::BundleFolder;
 
-/// The bundles on the cases' mesh under their boundary condition; where bundles were named, another mesh is an error.
+/// The bundles made for the cases' mesh, boundary and tissue; where bundles were named, another is an error.
 pub fn fitting(
     named_paths: &[PathBuf],
     cases: &ToolCases,
@@ -22,17 +22,7 @@ pub fn fitting(
     let mut fitting = Vec::new();
     for path in &paths {
         let bundle = BundleFolder::read(path)?;
-        let reason = if bundle.mesh_sha256 != cases.mesh_sha256 {
-            format!(
-                "{}: made for a mesh other than that of the cases ({mesh})",
-                bundle.name
-            )
-        } else if bundle.boundary != cases.boundary {
-            format!(
-                "{}: made for the boundary `{}`, but the cases have `{}`",
-                bundle.name, bundle.boundary, cases.boundary
-            )
-        } else {
+        let Some(reason) = bundle.misfit(&cases.list[0].trajectory.header) else {
             fitting.push(bundle);
             continue;
         };

@@ -13,6 +13,7 @@ use tissue::trajectory::Trajectory;
 
 use super::drive::{Load, load};
 use crate::report::cases::finished;
+use crate::report::method::is_one_tissue;
 
 /// Which part of a dataset is measured.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
@@ -228,6 +229,12 @@ impl ToolCases {
                     case.name,
                     header.mesh_name,
                     header.boundary
+                );
+            }
+            if !is_one_tissue(&header.material, &first.material) {
+                bail!(
+                    "{}: its tissue is not the first case's; write one report for each",
+                    case.name
                 );
             }
         }
