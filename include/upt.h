@@ -913,6 +913,37 @@ typedef struct upt_cut {
 } upt_cut;
 
 /**
+ * The surface of a scene's body, and what of it is new; filled by `upt_scene_update_surface`.
+ */
+typedef struct upt_surface {
+  /**
+   * `sizeof(upt_surface)`, set by the caller.
+   */
+  uint32_t struct_size;
+  /**
+   * 1: every vertex and triangle is new, so upload all. That is so at the first call, and at the first after `upt_scene_reset` or
+   * `upt_scene_restore` has put another body back.
+   */
+  uint32_t is_new;
+  /**
+   * Vertices now.
+   */
+  uint64_t vertex_count;
+  /**
+   * Slots of triangles now, empty ones included.
+   */
+  uint64_t triangle_count;
+  /**
+   * Vertices from this one on are new.
+   */
+  uint64_t first_vertex;
+  /**
+   * Slots whose corners have changed.
+   */
+  uint64_t changed_count;
+} upt_surface;
+
+/**
  * What is shown of a state. Where a call takes one, NULL is the region.
  */
 typedef struct upt_view {
@@ -1408,8 +1439,8 @@ upt_status upt_scene_reset(struct upt_scene *scene);
  * each place of the array: pass every instrument every time, in the same order.
  *
  * - `input`: what drives the step; NULL: nothing does, the tissue moves on by itself.
- * - `out`: `[n,3]`, mm (n: K, or the region's count), may be NULL; it may be the memory of an input, at the cost of a
- *   copy.
+ * - `out`: `[n,3]`, mm (n: K, or the region's count; K of a cut body counts the copies of its nodes, `upt_scene_node_count`), may be NULL;
+ *   it may be the memory of an input, at the cost of a copy.
  * - `out_count`: number of floats in `out`, 3 n; 0 when out is NULL.
  *
  * Threads: one at a time.
@@ -1707,6 +1738,68 @@ upt_status upt_scene_scale_stiffness(struct upt_scene *scene,
  */
 upt_status upt_scene_drop_fragments(struct upt_scene *scene,
                                     struct upt_cut *out);
+
+/**
+ * Writes how many nodes the scene has now: K, and the copies that cuts have made. Wherever this header says K of a scene, it is this number. It
+ * changes with `upt_scene_cut` and the calls beside it, `upt_scene_restore` and `upt_scene_reset`.
+ *
+ * Threads: any, at any time, even while a step runs.
+ * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` for a place that is not aligned, `UPT_ERR_PANIC`.
+ */
+upt_status upt_scene_node_count(struct upt_scene *scene,
+                                uint64_t *out);
+
+/**
+ * Brings the closed surface of the body up to date: the mesh's own where nothing has happened, the lips of cuts, and what removal has laid
+ * bare. Tells what has changed since the last call. Where the body has not changed since, it does nothing, so it may be called in every frame.
+ *
+ * Vertices and slots of triangles keep their numbers, so that a renderer uploads the vertices from `first_vertex` on and the slots that
+ * `upt_scene_surface` lists, unless `is_new` is 1. The first vertices are the nodes of the mesh, also those inside, which no triangle has;
+ * vertices that nothing uses any more stay. Works on an intact body, too.
+ *
+ * - `out`: counts; set `struct_size`.
+ *
+ * Threads: one at a time.
+ * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`, `UPT_ERR_RUNTIME`,
+ * `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
+ */
+upt_status upt_scene_update_surface(struct upt_scene *scene,
+                                    struct upt_surface *out);
+
+/**
+ * Copies the surface as the last `upt_scene_update_surface` left it, with the counts that it gave. An array that is NULL is not wanted.
+ *
+ * - `rest`: `[vertex_count, 3]`, mm: where each vertex lies in the tissue at rest, for textures, also on faces that a cut has opened.
+ * - `triangles`: `[triangle_count, 3]` vertices, outward; 0, 0, 0 in slots that are empty.
+ * - `inside`: `[triangle_count]`: 1 where the triangle was inside of the intact body, else 0.
+ * - `changed`: `[changed_count]`: the slots that the last update has changed, ascending.
+ *
+ * Threads: one at a time in the calls of a scene's surface; another may step meanwhile.
+ * Errors: `UPT_ERR_STATE` before the first update, `UPT_ERR_ARGUMENT` for other counts and an array that is not aligned, `UPT_ERR_HANDLE`,
+ * `UPT_ERR_NULL` for the scene, `UPT_ERR_BUSY`, `UPT_ERR_PANIC`.
+ */
+upt_status upt_scene_surface(struct upt_scene *scene,
+                             float *rest,
+                             uint64_t vertex_count,
+                             uint32_t *triangles,
+                             uint8_t *inside,
+                             uint64_t triangle_count,
+                             uint32_t *changed,
+                             uint64_t changed_count);
+
+/**
+ * Copies where the vertices of the surface are in the last published state.
+ *
+ * - `out`: `[vertex_count, 3]`, mm.
+ * - `out_count`: number of floats in `out`, 3 `vertex_count`.
+ *
+ * Threads: one at a time in the calls of a scene's surface; another may step meanwhile.
+ * Errors: `UPT_ERR_STATE` where the body has changed since the last `upt_scene_update_surface`, `UPT_ERR_ARGUMENT`, `UPT_ERR_UNSUPPORTED` for a scene
+ * with a region, `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_PANIC`.
+ */
+upt_status upt_scene_surface_positions(struct upt_scene *scene,
+                                       float *out,
+                                       uint64_t out_count);
 
 /**
  * The tissue at a moment between steps, with the instruments where they are at that moment: frames without lag.

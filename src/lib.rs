@@ -98,5 +98,8 @@ pub use options::{
     Corrections, DecoderKernel, GuardPolicy, IndexSet, InitOptions, LONGEST_STEP_S, ModelOptions,
     Precision, Provider, SHORTEST_STEP_S, SceneOptions, StepPath, UserStream,
 };
-pub use scene::{Contact, Cut, Loads, MAX_PRESSURES, Pressure, Progress, Scene, StepInput, View};
+pub use scene::{
+    Contact, Cut, CutSurface, Loads, MAX_PRESSURES, Pressure, Progress, Scene, StepInput,
+    SurfaceUpdate, View,
+};
 pub use stats::{SceneStats, flag};

@@ -977,6 +977,33 @@ class Cut(Record):
     ]
 
 
+class Surface(Record):
+    """The surface of a scene's body, and what of it is new; filled by `upt_scene_update_surface`."""
+
+    struct_size: int
+    """`sizeof(upt_surface)`, set by the caller."""
+    is_new: int
+    """1: every vertex and triangle is new, so upload all. That is so at the first call, and at the first after `upt_scene_reset` or
+    `upt_scene_restore` has put another body back."""
+    vertex_count: int
+    """Vertices now."""
+    triangle_count: int
+    """Slots of triangles now, empty ones included."""
+    first_vertex: int
+    """Vertices from this one on are new."""
+    changed_count: int
+    """Slots whose corners have changed."""
+
+    _fields_ = [
+        ("struct_size", ctypes.c_uint32),
+        ("is_new", ctypes.c_uint32),
+        ("vertex_count", ctypes.c_uint64),
+        ("triangle_count", ctypes.c_uint64),
+        ("first_vertex", ctypes.c_uint64),
+        ("changed_count", ctypes.c_uint64),
+    ]
+
+
 #: Name: (result, parameters).
 FUNCTIONS: dict[str, tuple[Any, list[Any]]] = {
     "upt_init": (ctypes.c_int32, [ctypes.c_void_p]),
@@ -1016,6 +1043,10 @@ FUNCTIONS: dict[str, tuple[Any, list[Any]]] = {
     "upt_scene_remove": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_float, ctypes.c_void_p]),
     "upt_scene_scale_stiffness": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_float, ctypes.c_void_p]),
     "upt_scene_drop_fragments": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p]),
+    "upt_scene_node_count": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p]),
+    "upt_scene_update_surface": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p]),
+    "upt_scene_surface": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p, ctypes.c_uint64]),
+    "upt_scene_surface_positions": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
     "upt_scene_present": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
     "upt_haptics_create": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p]),
     "upt_haptics_render": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p]),

@@ -30,6 +30,7 @@ mod scene;
 mod state;
 mod step_structs;
 mod structs;
+mod surface;
 mod worker;
 
 #[cfg(feature = "fault")]
@@ -49,4 +50,5 @@ pub use scene::*;
 pub use state::*;
 pub use step_structs::*;
 pub use structs::*;
+pub use surface::*;
 pub use worker::*;

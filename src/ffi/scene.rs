@@ -81,8 +81,8 @@ pub unsafe extern "C" fn upt_scene_reset(scene: *mut upt_scene) -> upt_status {
 /// each place of the array: pass every instrument every time, in the same order.
 ///
 /// - `input`: what drives the step; NULL: nothing does, the tissue moves on by itself.
-/// - `out`: `[n,3]`, mm (n: K, or the region's count), may be NULL; it may be the memory of an input, at the cost of a
-///   copy.
+/// - `out`: `[n,3]`, mm (n: K, or the region's count; K of a cut body counts the copies of its nodes, `upt_scene_node_count`), may be NULL;
+///   it may be the memory of an input, at the cost of a copy.
 /// - `out_count`: number of floats in `out`, 3 n; 0 when out is NULL.
 ///
 /// Threads: one at a time.

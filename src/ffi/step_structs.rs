@@ -209,3 +209,23 @@ pub struct upt_cut {
     /// Volume that the body has lost, mm³.
     pub removed_mm3: f32,
 }
+
+/// The surface of a scene's body, and what of it is new; filled by `upt_scene_update_surface`.
+#[derive_ReprC]
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct upt_surface {
+    /// `sizeof(upt_surface)`, set by the caller.
+    pub struct_size: u32,
+    /// 1: every vertex and triangle is new, so upload all. That is so at the first call, and at the first after `upt_scene_reset` or
+    /// `upt_scene_restore` has put another body back.
+    pub is_new: u32,
+    /// Vertices now.
+    pub vertex_count: u64,
+    /// Slots of triangles now, empty ones included.
+    pub triangle_count: u64,
+    /// Vertices from this one on are new.
+    pub first_vertex: u64,
+    /// Slots whose corners have changed.
+    pub changed_count: u64,
+}

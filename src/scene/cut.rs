@@ -11,7 +11,7 @@ use topology::{Body, Change, Point, RestMesh, TopologyError};
 use super::build::build;
 use super::core::{Core, SCENE, lock_read, lock_write};
 use super::cut_state::CutState;
-use super::published::{Frame, Published};
+use super::published::{BodyNumber, Frame, Published};
 use super::{Contact, StepInput};
 use crate::contact::Past;
 use crate::corrections::{History, Linearisation, Motion};
@@ -48,6 +48,7 @@ impl Core {
             tools: Default::default(),
             frame_state: None,
             is_cut: self.cut.is_some(),
+            body: BodyNumber::default(),
             attached: Arc::default(),
         })
     }
@@ -141,12 +142,32 @@ impl Core {
         next.counters.quiet = 0;
         next.counters.was_corrected = [true; 2];
         next.logged_flags = self.logged_flags;
+        let before = lock_read(published).body;
+        shown.body = BodyNumber {
+            change: before.change + 1,
+            ..before
+        };
         self.replace(published, next, shown);
         Ok(change)
     }
 
+    /// A core of a body that is not the next of this one's takes its place.
+    pub(super) fn put_back(
+        &mut self,
+        published: &RwLock<Published>,
+        next: Core,
+        mut shown: Published,
+    ) {
+        let before = lock_read(published).body;
+        shown.body = BodyNumber {
+            line: before.line + 1,
+            change: before.change + 1,
+        };
+        self.replace(published, next, shown);
+    }
+
     /// Another core takes this one's place.
-    pub(super) fn replace(&mut self, published: &RwLock<Published>, next: Core, shown: Published) {
+    fn replace(&mut self, published: &RwLock<Published>, next: Core, shown: Published) {
         *self = next;
         *lock_write(published) = shown;
         self.publish_state(published);
@@ -179,6 +200,12 @@ impl Core {
     pub(super) fn with_most_copies(&self, body: Body) -> Body {
         let room = MOST_COPIES * body.mesh().node_count();
         body.with_room(room)
+    }
+
+    /// Bytes that making the surface of the body takes, at most.
+    pub(super) fn most_surface_bytes(&self) -> usize {
+        let mesh = 64 * self.mesh.tets.len() + 320 * self.mesh.node_count();
+        mesh + self.cut.as_ref().map_or(0, |cut| 8 * cut.body.heap_bytes())
     }
 
     /// Bytes of what a snapshot says of a cut body, at most, with its longer fields.

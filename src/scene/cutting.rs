@@ -141,20 +141,4 @@ impl Scene {
             false => Ok(()),
         }
     }
-
-    /// The closed surface of the body as it is now: new lips and walls, with vertices at weights on nodes.
-    ///
-    /// # Errors
-    /// [`crate::Error::Busy`].
-    pub fn cut_surface(&self) -> Result<topology::Surface> {
-        self.with(|core, _| {
-            let body = match &core.cut {
-                Some(cut) => cut.body.clone(),
-                None => core.whole_body()?,
-            };
-            let mut surface = topology::Surface::new(body.mesh());
-            surface.update(&body);
-            Ok(surface)
-        })
-    }
 }

@@ -5,6 +5,15 @@ use crate::memory::{self, HeldBytes};
 use crate::output::Output;
 use crate::stats::SceneStats;
 
+/// Which body a scene has: operations lead from one to the next, `reset` and `restore` to another one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct BodyNumber {
+    /// Changes with each reset and each restored snapshot that puts another body in the place of the one before.
+    pub line: u64,
+    /// Changes with each operation, too.
+    pub change: u64,
+}
+
 /// One published state.
 #[derive(Debug, Clone, Default, HeldBytes)]
 pub struct Frame {
@@ -76,6 +85,8 @@ pub struct Published {
     pub frame_state: Option<super::frame_state::FrameState>,
     /// These are states of a cut body.
     pub is_cut: bool,
+    /// Which body they are states of.
+    pub body: BodyNumber,
     /// The attached points.
     pub attached: std::sync::Arc<super::points::AttachedPoints>,
 }

@@ -119,7 +119,7 @@ impl Core {
         next.recompute(&shown)?;
         next.fit_state(&shown)?;
         let shown = shown.into_inner().unwrap_or_else(PoisonError::into_inner);
-        self.replace(published, next, shown);
+        self.put_back(published, next, shown);
         Ok(())
     }
 

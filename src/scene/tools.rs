@@ -2,6 +2,7 @@
 //! nothing.
 
 use super::elastic::Haptics;
+use super::followed_surface::Followed;
 use super::presenter::Presenters;
 use crate::contact::Tool;
 use crate::instrument::{Instrument, InstrumentContacts};
@@ -19,6 +20,7 @@ pub(super) struct Asked {
 pub struct Tools {
     pub(super) contacts: Mutex<Option<Asked>>,
     pub(super) presenters: Mutex<Presenters>,
+    pub(super) surface: Mutex<Option<Followed>>,
     /// The instruments of a step are read into this list, so that a call allocates nothing.
     pub(super) list: Mutex<Vec<Tool>>,
     /// Those of a frame between steps: another thread may present while one steps.

@@ -12,6 +12,7 @@ mod inputs;
 mod instrument_calls;
 mod library_calls;
 mod scene_calls;
+mod surface_calls;
 mod traps;
 mod world;
 
@@ -67,6 +68,10 @@ pub enum Function {
     Remove,
     ScaleStiffness,
     DropFragments,
+    NodeCount,
+    UpdateSurface,
+    Surface,
+    SurfacePositions,
 }
 
 /// What each function of `include/upt.h` is called by.
@@ -117,6 +122,10 @@ pub const CALLED_BY: &[(&str, Function)] = &[
     ("upt_scene_remove", Remove),
     ("upt_scene_scale_stiffness", ScaleStiffness),
     ("upt_scene_drop_fragments", DropFragments),
+    ("upt_scene_node_count", NodeCount),
+    ("upt_scene_update_surface", UpdateSurface),
+    ("upt_scene_surface", Surface),
+    ("upt_scene_surface_positions", SurfacePositions),
 ];
 
 use Function::*;
@@ -167,6 +176,7 @@ pub fn call() -> impl Strategy<Value = Call> {
         2 => few(&[HullCreate, HullCreate, HullDestroy]),
         20 => few(&[HapticsCreate, HapticsRender, HapticsRender, HapticsRender, HapticsDestroy]),
         6 => few(&[Cut, Cut, Remove, ScaleStiffness, DropFragments]),
+        6 => few(&[NodeCount, UpdateSurface, UpdateSurface, Surface, SurfacePositions]),
         12 => few(&[Submit, Submit, Poll, Wait, Wait]),
         30 => few(&[
             Read, Sample, SetRegion, Decode, AttachPoints, ReadPoints, SamplePoints, Instruments,

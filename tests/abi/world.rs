@@ -201,6 +201,9 @@ impl<'a> World<'a> {
                 self.call_instruments(call, scene, nodes)
             }
             Cut | Remove | ScaleStiffness | DropFragments => self.call_cuts(call, scene),
+            NodeCount | UpdateSurface | Surface | SurfacePositions => {
+                self.call_surface(call, scene)
+            }
             HapticsCreate | HapticsRender | HapticsDestroy => self.call_haptics(call, scene),
             _ => self.call_scene(call, scene, nodes),
         }

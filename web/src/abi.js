@@ -322,3 +322,14 @@ export const upt_cut = {
     removed_mm3: ["Float32", 28, 1],
   },
 };
+export const upt_surface = {
+  size: 40,
+  fields: {
+    struct_size: ["Uint32", 0, 1],
+    is_new: ["Uint32", 4, 1],
+    vertex_count: ["BigUint64", 8, 1],
+    triangle_count: ["BigUint64", 16, 1],
+    first_vertex: ["BigUint64", 24, 1],
+    changed_count: ["BigUint64", 32, 1],
+  },
+};

@@ -12,7 +12,7 @@ const BEGIN: &str = "<!-- cargo xtask header: begin -->\n";
 const END: &str = "<!-- cargo xtask header: end -->";
 
 /// Headings of the calls, by the file of `src/ffi/` that holds them.
-const CHAPTERS: [(&str, &str); 12] = [
+const CHAPTERS: [(&str, &str); 13] = [
     ("library.rs", "Library"),
     ("model.rs", "Models"),
     ("scene.rs", "Scenes and steps"),
@@ -21,6 +21,7 @@ const CHAPTERS: [(&str, &str); 12] = [
     ("points.rs", "Attached points"),
     ("driven.rs", "What instruments are told, and hulls"),
     ("cut.rs", "Cuts, removal, stiffness"),
+    ("surface.rs", "The surface of a cut body"),
     ("present.rs", "Frames between steps"),
     ("haptics.rs", "Forces for a hand"),
     ("instrument.rs", "Contact found by geometry, and forces"),

@@ -9,7 +9,7 @@ use syn::{Attribute, Expr, FnArg, Item, Lit, Pat, ReturnType, Type};
 pub const FOLDER: &str = "src/ffi";
 
 /// The files with exported items, in the order of the header.
-pub const FILES: [&str; 16] = [
+pub const FILES: [&str; 17] = [
     "../status.rs",
     "constants.rs",
     "structs.rs",
@@ -22,6 +22,7 @@ pub const FILES: [&str; 16] = [
     "points.rs",
     "driven.rs",
     "cut.rs",
+    "surface.rs",
     "present.rs",
     "haptics.rs",
     "instrument.rs",

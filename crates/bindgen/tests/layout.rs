@@ -60,7 +60,8 @@ structs!(
     upt_instrument,
     upt_instrument_reading,
     upt_instrument_contact,
-    upt_cut
+    upt_cut,
+    upt_surface
 );
 
 fn run(command: &mut Command) -> String {

@@ -194,7 +194,7 @@ impl Core {
         if self.cut.is_some() {
             let next = self.with_body(None)?;
             let shown = next.blank_published()?;
-            self.replace(published, next, shown);
+            self.put_back(published, next, shown);
             return Ok(());
         }
         self.counters = Counters::REST;

@@ -456,6 +456,27 @@ namespace Upt.Interop
         public float removed_mm3;
     }
 
+    /// <summary>The surface of a scene's body, and what of it is new; filled by `upt_scene_update_surface`.</summary>
+    [StructLayout(LayoutKind.Sequential)]
+    public unsafe struct upt_surface
+    {
+        /// <summary>`sizeof(upt_surface)`, set by the caller.</summary>
+        public uint struct_size;
+        /// <summary>
+        /// 1: every vertex and triangle is new, so upload all. That is so at the first call, and at the first after `upt_scene_reset` or
+        /// `upt_scene_restore` has put another body back.
+        /// </summary>
+        public uint is_new;
+        /// <summary>Vertices now.</summary>
+        public ulong vertex_count;
+        /// <summary>Slots of triangles now, empty ones included.</summary>
+        public ulong triangle_count;
+        /// <summary>Vertices from this one on are new.</summary>
+        public ulong first_vertex;
+        /// <summary>Slots whose corners have changed.</summary>
+        public ulong changed_count;
+    }
+
     /// <summary>The C ABI, as it is.</summary>
     public static unsafe class Native
     {
@@ -822,8 +843,8 @@ namespace Upt.Interop
         /// each place of the array: pass every instrument every time, in the same order.
         ///
         /// - `input`: what drives the step; NULL: nothing does, the tissue moves on by itself.
-        /// - `out`: `[n,3]`, mm (n: K, or the region's count), may be NULL; it may be the memory of an input, at the cost of a
-        /// copy.
+        /// - `out`: `[n,3]`, mm (n: K, or the region's count; K of a cut body counts the copies of its nodes, `upt_scene_node_count`), may be NULL;
+        /// it may be the memory of an input, at the cost of a copy.
         /// - `out_count`: number of floats in `out`, 3 n; 0 when out is NULL.
         ///
         /// Threads: one at a time.
@@ -1094,6 +1115,61 @@ namespace Upt.Interop
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_scene_drop_fragments(IntPtr scene, upt_cut* @out);
+
+        /// <summary>
+        /// Writes how many nodes the scene has now: K, and the copies that cuts have made. Wherever this header says K of a scene, it is this number. It
+        /// changes with `upt_scene_cut` and the calls beside it, `upt_scene_restore` and `upt_scene_reset`.
+        ///
+        /// Threads: any, at any time, even while a step runs.
+        /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` for a place that is not aligned, `UPT_ERR_PANIC`.
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_scene_node_count(IntPtr scene, ulong* @out);
+
+        /// <summary>
+        /// Brings the closed surface of the body up to date: the mesh's own where nothing has happened, the lips of cuts, and what removal has laid
+        /// bare. Tells what has changed since the last call. Where the body has not changed since, it does nothing, so it may be called in every frame.
+        ///
+        /// Vertices and slots of triangles keep their numbers, so that a renderer uploads the vertices from `first_vertex` on and the slots that
+        /// `upt_scene_surface` lists, unless `is_new` is 1. The first vertices are the nodes of the mesh, also those inside, which no triangle has;
+        /// vertices that nothing uses any more stay. Works on an intact body, too.
+        ///
+        /// - `out`: counts; set `struct_size`.
+        ///
+        /// Threads: one at a time.
+        /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`, `UPT_ERR_RUNTIME`,
+        /// `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_scene_update_surface(IntPtr scene, upt_surface* @out);
+
+        /// <summary>
+        /// Copies the surface as the last `upt_scene_update_surface` left it, with the counts that it gave. An array that is NULL is not wanted.
+        ///
+        /// - `rest`: `[vertex_count, 3]`, mm: where each vertex lies in the tissue at rest, for textures, also on faces that a cut has opened.
+        /// - `triangles`: `[triangle_count, 3]` vertices, outward; 0, 0, 0 in slots that are empty.
+        /// - `inside`: `[triangle_count]`: 1 where the triangle was inside of the intact body, else 0.
+        /// - `changed`: `[changed_count]`: the slots that the last update has changed, ascending.
+        ///
+        /// Threads: one at a time in the calls of a scene's surface; another may step meanwhile.
+        /// Errors: `UPT_ERR_STATE` before the first update, `UPT_ERR_ARGUMENT` for other counts and an array that is not aligned, `UPT_ERR_HANDLE`,
+        /// `UPT_ERR_NULL` for the scene, `UPT_ERR_BUSY`, `UPT_ERR_PANIC`.
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_scene_surface(IntPtr scene, float* rest, ulong vertex_count, uint* triangles, byte* inside, ulong triangle_count, uint* changed, ulong changed_count);
+
+        /// <summary>
+        /// Copies where the vertices of the surface are in the last published state.
+        ///
+        /// - `out`: `[vertex_count, 3]`, mm.
+        /// - `out_count`: number of floats in `out`, 3 `vertex_count`.
+        ///
+        /// Threads: one at a time in the calls of a scene's surface; another may step meanwhile.
+        /// Errors: `UPT_ERR_STATE` where the body has changed since the last `upt_scene_update_surface`, `UPT_ERR_ARGUMENT`, `UPT_ERR_UNSUPPORTED` for a scene
+        /// with a region, `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_PANIC`.
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_scene_surface_positions(IntPtr scene, float* @out, ulong out_count);
 
         /// <summary>
         /// The tissue at a moment between steps, with the instruments where they are at that moment: frames without lag.

@@ -1,0 +1,204 @@
+//! The closed surface of a body that is cut, as a host follows it: what changed since it last asked, and where its vertices are.
+
+use super::Scene;
+use super::core::{Core, lock_read};
+use super::followed_surface::Followed;
+use super::published::BodyNumber;
+use super::shared::lock;
+use crate::error::{Error, Result};
+use crate::memory;
+use crate::output::Output;
+
+const WHAT: &str = "the surface of a body";
+
+/// What [`Scene::update_surface`] has found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SurfaceUpdate {
+    /// All vertices and triangles are new: the first call, and the first one after the body before was put back.
+    pub is_new: bool,
+    /// Vertices now. They keep their numbers, places at rest and nodes.
+    pub vertices: usize,
+    /// Slots of triangles now, empty ones included.
+    pub triangles: usize,
+    /// Vertices from here on are new.
+    pub first_vertex: usize,
+    /// Slots whose corners are others than before.
+    pub changed: usize,
+}
+
+/// The surface as the last [`Scene::update_surface`] left it.
+#[derive(Clone, Copy, Debug)]
+pub struct CutSurface<'a> {
+    /// Where each vertex lies in the tissue at rest, mm, for textures. The first `K` are the mesh's nodes, also those that no triangle has.
+    pub rest: &'a [[f32; 3]],
+    /// Corners of each slot, outward; `[0, 0, 0]` where it is empty.
+    pub triangles: &'a [[u32; 3]],
+    /// By slot: the triangle was inside of the intact body.
+    pub inside: &'a [bool],
+    /// The slots that the last update has changed, ascending.
+    pub changed: &'a [u32],
+}
+
+impl Scene {
+    /// Brings the closed surface of the body up to date: the mesh's own where nothing has happened, the lips of cuts, and what removal has
+    /// laid bare. What it finds is what has changed since the last call. Where the body has not changed since, it does nothing.
+    ///
+    /// Vertices and slots of triangles keep their numbers where nothing changed, until the intact body is put back by [`Scene::reset`] or a body by
+    /// [`Scene::restore`]. Vertices that nothing uses any more stay in the list.
+    ///
+    /// ```
+    /// # use std::path::Path;
+    /// # use upt::{Model, ModelOptions, Scene, SceneOptions};
+    /// # let model = Model::open(Path::new("onnx/liver-coarse"), &ModelOptions::default())?;
+    /// # let scene = Scene::new(model.clone(), &SceneOptions::default())?;
+    /// let update = scene.update_surface()?;
+    /// assert!(update.is_new && update.changed == update.triangles);
+    /// let mut positions = vec![0.0; 3 * update.vertices];
+    /// scene.surface_positions(&mut positions)?;
+    /// let triangles = scene.with_surface(|surface| surface.triangles.to_vec())?;
+    /// assert_eq!(scene.update_surface()?.changed, 0);
+    /// # assert_eq!(triangles.len(), update.triangles);
+    /// # upt::Result::Ok(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`Error::Busy`], [`Error::OutOfMemory`].
+    pub fn update_surface(&self) -> Result<SurfaceUpdate> {
+        let mut held = lock(&self.tools.surface)?;
+        self.with(|core, published| {
+            let body = lock_read(published).body;
+            let (first_vertex, is_new) = match &mut *held {
+                Some(own) if own.body == body => {
+                    own.changed.clear();
+                    (own.rest.len(), false)
+                }
+                _ => core.follow(&mut held, body)?,
+            };
+            let own = held.as_ref();
+            let [vertices, triangles, changed] = own.map_or([0; 3], |own| {
+                [
+                    own.rest.len(),
+                    own.surface.triangles.len(),
+                    own.changed.len(),
+                ]
+            });
+            Ok(SurfaceUpdate {
+                is_new,
+                vertices,
+                triangles,
+                first_vertex,
+                changed,
+            })
+        })
+    }
+
+    /// Reads the surface as the last [`Scene::update_surface`] left it.
+    ///
+    /// # Errors
+    /// [`Error::State`] before the first update, [`Error::Busy`] while another thread uses the surface.
+    pub fn with_surface<T>(&self, read: impl FnOnce(CutSurface<'_>) -> T) -> Result<T> {
+        let held = lock(&self.tools.surface)?;
+        let own = held.as_ref().ok_or_else(not_asked)?;
+        Ok(read(CutSurface {
+            rest: &own.rest,
+            triangles: &own.surface.triangles,
+            inside: &own.surface.inside,
+            changed: &own.changed,
+        }))
+    }
+
+    /// Where the vertices of the surface are in the last published state, `[vertices, 3]`, mm. Any thread, also while a step is in flight.
+    ///
+    /// # Errors
+    /// [`Error::State`] where the surface is not that of the body as it is now: update it; [`Error::Argument`] for an output of another
+    /// length, [`Error::Unsupported`] for a scene with a region, whose other nodes are not decoded, [`Error::Busy`].
+    pub fn surface_positions(&self, out: &mut [f32]) -> Result<()> {
+        self.surface_positions_to(out.into())
+    }
+
+    /// [`Scene::surface_positions`] into memory that need not be initialised.
+    pub(crate) fn surface_positions_to(&self, out: Output<'_, f32>) -> Result<()> {
+        let held = lock(&self.tools.surface)?;
+        let own = held.as_ref().ok_or_else(not_asked)?;
+        let shown = lock_read(&self.shared.published);
+        if own.body != shown.body {
+            return Err(Error::State(
+                "surface: the body has changed since its surface was updated; update it first"
+                    .into(),
+            ));
+        }
+        if shown.region.is_some() {
+            return Err(Error::Unsupported(
+                "surface: a scene with a region decodes its nodes alone; take the region off first"
+                    .into(),
+            ));
+        }
+        if out.len() != 3 * own.rest.len() {
+            return Err(Error::Argument(format!(
+                "out has {} floats, must have {}: 3 for each vertex of the surface",
+                out.len(),
+                3 * own.rest.len()
+            )));
+        }
+        let moved = shown.last.field.as_chunks::<3>().0;
+        let vertices = own.surface.vertices.iter().zip(&own.rest);
+        out.write_rows(vertices.map(|(vertex, rest)| {
+            let mut at = *rest;
+            for (node, weight) in vertex.nodes.into_iter().zip(vertex.weights) {
+                if node != topology::surface::NONE {
+                    let u = moved[node as usize];
+                    at = [0, 1, 2].map(|k| at[k] + weight as f32 * u[k]);
+                }
+            }
+            at
+        }));
+        Ok(())
+    }
+
+    /// Bytes of the surface that a host follows.
+    pub(super) fn surface_bytes(&self) -> usize {
+        let held = lock(&self.tools.surface);
+        held.map_or(0, |held| held.as_ref().map_or(0, Followed::held_bytes))
+    }
+}
+
+impl Core {
+    /// Makes or updates the surface. Returns the first new vertex, and whether all are new.
+    fn follow(&self, held: &mut Option<Followed>, body: BodyNumber) -> Result<(usize, bool)> {
+        memory::probe(self.most_surface_bytes(), WHAT)?;
+        let whole;
+        let now = match &self.cut {
+            Some(cut) => &cut.body,
+            None => {
+                whole = self.whole_body()?;
+                &whole
+            }
+        };
+        let known = held.take().filter(|own| own.body.line == body.line);
+        let is_new = known.is_none();
+        let mut own = known.unwrap_or_else(|| Followed {
+            surface: topology::Surface::new(now.mesh()),
+            body,
+            rest: Vec::new(),
+            changed: Vec::new(),
+        });
+        let change = own.surface.update(now);
+        let first = own.rest.len();
+        let nodes = self.mesh.positions.as_chunks::<3>().0;
+        let place = |node: u32| nodes[node as usize].map(f64::from);
+        let new = first as u32..own.surface.vertices.len() as u32;
+        own.rest
+            .extend(new.map(|vertex| own.surface.place(vertex, place).map(|x| x as f32)));
+        own.changed = match is_new {
+            true => (0..own.surface.triangles.len() as u32).collect(),
+            false => change.triangles,
+        };
+        own.body = body;
+        *held = Some(own);
+        Ok((first, is_new))
+    }
+}
+
+fn not_asked() -> Error {
+    Error::State("surface: there is none before the first update; update it first".into())
+}
