@@ -15,7 +15,7 @@ from upt._arrays import address, number, vectors
 
 #: The end of `upt_input`: forces, pressures, how many, gravity and that at rest.
 _LAYOUT = Struct("@PPQ6f")
-OFFSET: int = _native.Input.forces.offset  # type: ignore[attr-defined]
+OFFSET: int = _native.Input.forces.offset  # type: ignore[union-attr]
 
 
 @dataclass(frozen=True, slots=True)
