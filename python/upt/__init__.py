@@ -18,6 +18,7 @@ from typing import Any
 from upt._library import check, ensure_started, init, lib, read_text
 from upt._native import (
     ABI_VERSION,
+    Cut,
     Flag,
     GuardPolicy,
     HapticForce,
@@ -41,6 +42,7 @@ from upt._native import (
 )
 from upt.batch import BatchedScenes
 from upt.bundles import bundle
+from upt.cuts import Surface
 from upt.errors import (
     ArgumentError,
     BundleError,
@@ -82,6 +84,7 @@ __all__ = [
     "BatchedScenes",
     "BundleError",
     "BusyError",
+    "Cut",
     "Error",
     "Flag",
     "GuardError",
@@ -113,6 +116,7 @@ __all__ = [
     "StateError",
     "Status",
     "StepPath",
+    "Surface",
     "UnsupportedError",
     "ViewKind",
     "bundle",

@@ -18,6 +18,7 @@ from upt._arrays import Floats, Indices, Outputs, address, indices, number, vect
 from upt._input import Inputs
 from upt._library import check, lib
 from upt._native import InstrumentContact, InstrumentReading, SceneOptions, SceneStats, Status, View, ViewKind
+from upt.cuts import Cuts
 from upt.instrument import Instrument, records
 from upt.loads import Loads
 
@@ -46,7 +47,7 @@ class OpenModel(Protocol):
         ...
 
 
-class Scene:
+class Scene(Cuts):
     """One deforming body, made by `Model.scene`.
 
     Arrays are float32, `[n, 3]`, mm; node indices are uint32. An input that is C-contiguous and of this type is not
@@ -70,7 +71,7 @@ class Scene:
 
     @property
     def node_count(self) -> int:
-        """K, the nodes of the scene's mesh."""
+        """K, the nodes of the scene's mesh and the copies that cuts have made."""
         return self._node_count
 
     @property
@@ -301,11 +302,18 @@ class Scene:
             raise TypeError(f"snapshot is {short(snapshot)}, expected the bytes of `save`")
         check(lib.upt_scene_restore(self._handle, snapshot, len(snapshot)))
         self._instrument_count = 0
+        self._fit()
 
     def reset(self) -> None:
-        """Back to rest. The region and attached points stay."""
+        """Back to rest, with the intact body. The region and attached points stay."""
         check(lib.upt_scene_reset(self._handle))
         self._instrument_count = 0
+        self._fit()
+
+    def _resize(self, node_count: int) -> None:
+        if node_count != self._node_count:
+            self._node_count = self._out_count = node_count
+            self._inputs = Inputs(node_count)
 
     def close(self) -> None:
         """Frees the scene after waiting for a step in flight. Also done when the object is collected."""
