@@ -377,6 +377,22 @@ private:
   upt_hull *handle_ = nullptr;
 };
 
+/// The closed surface of a scene's body, and what of it is new since it was asked for before.
+struct Surface {
+  /// [v,3], mm: where each vertex lies in the tissue at rest. The first are the mesh's nodes.
+  std::vector<float> rest;
+  /// [t,3], outward; 0, 0, 0 in slots that are empty.
+  std::vector<std::uint32_t> triangles;
+  /// [t]: 1 where the triangle was inside of the intact body.
+  std::vector<std::uint8_t> inside;
+  /// Slots of triangles whose corners have changed, ascending.
+  std::vector<std::uint32_t> changed;
+  /// Vertices from this one on are new; the others keep their numbers and places.
+  std::size_t first_vertex = 0;
+  /// Every vertex and triangle is new: the first surface, and after another body was put back.
+  bool is_new = false;
+};
+
 /// One deforming body. Used by one thread at a time.
 class Scene {
 public:
@@ -520,6 +536,59 @@ public:
     return check(upt_scene_contact_force(handle_, out.data(), out.size()));
   }
 
+  /// K, and the copies of nodes that cuts have made: outputs have three floats for each.
+  upt_status node_count(std::uint64_t &out) const {
+    return check(upt_scene_node_count(handle_, &out));
+  }
+  /// Cuts along the way of a blade's edge of edge_points points; poses: [poses,edge_points,3], mm.
+  /// Calls with the same stroke are one blade that goes on.
+  upt_status cut(std::uint32_t stroke, span<const float> poses, std::size_t edge_points,
+                 upt_cut &out) {
+    if (edge_points == 0 || poses.size() % (3 * edge_points) != 0) {
+      return detail::mismatch();
+    }
+    out = make<upt_cut>();
+    return check(upt_scene_cut(handle_, stroke, poses.data(), poses.size() / (3 * edge_points),
+                               edge_points, &out));
+  }
+  /// Removes what lies inside of an instrument, the deepest first, up to most_mm3.
+  upt_status remove(const upt_instrument &instrument, float most_mm3, upt_cut &out) {
+    out = make<upt_cut>();
+    return check(upt_scene_remove(handle_, &instrument, most_mm3, &out));
+  }
+  /// Multiplies the stiffness of elements of the model's mesh.
+  upt_status scale_stiffness(span<const std::uint32_t> elements, float factor, upt_cut &out) {
+    out = make<upt_cut>();
+    return check(
+        upt_scene_scale_stiffness(handle_, elements.data(), elements.size(), factor, &out));
+  }
+  /// Takes the pieces that nothing holds out of the body.
+  upt_status drop_fragments(upt_cut &out) {
+    out = make<upt_cut>();
+    return check(upt_scene_drop_fragments(handle_, &out));
+  }
+  /// The closed surface of the body as it is now, and what has changed since the last call.
+  upt_status surface(Surface &out) {
+    upt_surface now = make<upt_surface>();
+    const upt_status status = check(upt_scene_update_surface(handle_, &now));
+    if (status != UPT_OK) {
+      return status;
+    }
+    out.rest.resize(static_cast<std::size_t>(3 * now.vertex_count));
+    out.triangles.resize(static_cast<std::size_t>(3 * now.triangle_count));
+    out.inside.resize(static_cast<std::size_t>(now.triangle_count));
+    out.changed.resize(static_cast<std::size_t>(now.changed_count));
+    out.first_vertex = static_cast<std::size_t>(now.first_vertex);
+    out.is_new = now.is_new != 0;
+    return check(upt_scene_surface(handle_, out.rest.data(), now.vertex_count, out.triangles.data(),
+                                   out.inside.data(), now.triangle_count, out.changed.data(),
+                                   now.changed_count));
+  }
+  /// Where the vertices of the last surface are in the last state; out: [v,3], mm.
+  upt_status surface_positions(span<float> out) {
+    return check(upt_scene_surface_positions(handle_, out.data(), out.size()));
+  }
+
   upt_status stats(upt_scene_stats &out) const {
     out = make<upt_scene_stats>();
     return check(upt_scene_get_stats(handle_, &out));
@@ -552,6 +621,21 @@ public:
   std::vector<upt_instrument_contact> instrument_contacts() {
     std::vector<upt_instrument_contact> out;
     instrument_contacts(out);
+    return out;
+  }
+  std::size_t node_count() const {
+    std::uint64_t out = 0;
+    node_count(out);
+    return static_cast<std::size_t>(out);
+  }
+  upt_cut cut(std::uint32_t stroke, span<const float> poses, std::size_t edge_points) {
+    upt_cut out;
+    cut(stroke, poses, edge_points, out);
+    return out;
+  }
+  Surface surface() {
+    Surface out;
+    surface(out);
     return out;
   }
   std::vector<std::uint8_t> save() {

@@ -4,6 +4,7 @@
 #include "expect.h"
 
 #include <array>
+#include <cmath>
 #include <string>
 #include <type_traits>
 #include <vector>
@@ -97,6 +98,51 @@ static void haptics(const char *bundle) {
   EXPECT_TRUE(thrown([&] { other.render(pose); }) == UPT_ERR_STATE);
 }
 
+// A blade through the upper half of a body with corrections: outputs and the surface grow, and go
+// back.
+static void cuts(const char *bundle) {
+  upt::Model model = upt::Model::open(bundle);
+  upt_scene_options options = upt::make<upt_scene_options>();
+  options.corrections = 5;
+  upt::Scene scene(model, &options);
+  const std::vector<float> rest = model.positions();
+  float low[3] = {rest[0], rest[1], rest[2]}, high[3] = {rest[0], rest[1], rest[2]};
+  for (std::size_t k = 0; k < rest.size(); k++) {
+    low[k % 3] = std::fmin(low[k % 3], rest[k]);
+    high[k % 3] = std::fmax(high[k % 3], rest[k]);
+  }
+  const float x = low[0] + 0.45F * (high[0] - low[0]), z = low[2] + 0.6F * (high[2] - low[2]);
+  const float blade[12] = {x, low[1] - 1, high[2] + 1, x, high[1] + 1, high[2] + 1,
+                           x, low[1] - 1, z,           x, high[1] + 1, z};
+  EXPECT_TRUE(thrown([&] { scene.cut(0, blade, 5); }) == UPT_ERR_ARGUMENT);
+  const upt::Surface whole = scene.surface();
+  EXPECT_TRUE(whole.is_new && whole.changed.size() == whole.inside.size());
+  const upt_cut made = scene.cut(0, blade, 2);
+  EXPECT_TRUE(made.copied_count > 0 && made.area_mm2 > 0);
+  EXPECT_TRUE(scene.node_count() == rest.size() / 3 + made.copied_count);
+  std::vector<float> field(3 * scene.node_count()), at(whole.rest.size());
+  EXPECT_TRUE(thrown([&] { scene.surface_positions(at); }) == UPT_ERR_STATE);
+  const upt::Surface parted = scene.surface();
+  EXPECT_TRUE(!parted.is_new && parted.first_vertex == whole.rest.size() / 3);
+  EXPECT_TRUE(parted.inside.size() > whole.inside.size() && !parted.changed.empty());
+  EXPECT(scene.step({}, field), UPT_OK);
+  at.resize(parted.rest.size());
+  EXPECT(scene.surface_positions(at), UPT_OK);
+  EXPECT_TRUE(std::fabs(at[0] - rest[0] - field[0]) < 1e-4F);
+  upt_cut out;
+  const std::uint32_t elements[1] = {0};
+  EXPECT(scene.scale_stiffness(elements, 2.0F, out), UPT_OK);
+  EXPECT(scene.drop_fragments(out), UPT_OK);
+  upt_instrument tip = upt::sphere(2.0F);
+  tip.position[0] = x;
+  tip.position[1] = 0.5F * (low[1] + high[1]);
+  tip.position[2] = high[2];
+  EXPECT(scene.remove(tip, 5.0F, out), UPT_OK);
+  EXPECT_TRUE(out.removed_mm3 > 0);
+  EXPECT(scene.reset(), UPT_OK);
+  EXPECT_TRUE(scene.node_count() == rest.size() / 3 && scene.surface().is_new);
+}
+
 int main(int argc, char **argv) {
   if (argc != 4) {
     return 2;
@@ -152,6 +198,7 @@ int main(int argc, char **argv) {
   instruments(argv[2]);
   haptics(argv[2]);
   haptics(argv[3]);
+  cuts(argv[3]);
   EXPECT(upt::shutdown(), UPT_OK);
   return expect_result("wrapper");
 }
