@@ -28,6 +28,7 @@ for name in "${UPT_TEST_BUNDLE:-}" "$bundles/brain-reduced" "$bundles/brain-coar
 done
 [ -n "$bundle" ] || { echo "no bundle in $bundles: expected brain-reduced, brain-coarse or brain-fast" >&2; exit 1; }
 export UPT_TEST_BUNDLE=$bundle
+export UPT_TEST_CORRECTED=$root/tests/fixtures/tiny-corrected
 
 rm -rf "$build"
 mkdir -p "$build"

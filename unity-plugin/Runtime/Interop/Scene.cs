@@ -11,7 +11,7 @@ namespace Upt.Interop
     {
         private readonly SceneHandle handle;
 
-        /// <summary>Number of mesh nodes, <c>K</c>.</summary>
+        /// <summary>Number of mesh nodes, <c>K</c>, and of the copies that cuts have made.</summary>
         public int NodeCount { get; private set; }
 
         /// <summary>Number of nodes that steps write and reads return: <c>K</c>, or the region's.</summary>
@@ -52,12 +52,13 @@ namespace Upt.Interop
             get { return handle.IsClosed; }
         }
 
-        /// <summary>Back to rest.</summary>
+        /// <summary>Back to rest, with the intact body.</summary>
         public void Reset()
         {
             IntPtr scene = Enter();
             try { Status.Check(Native.upt_scene_reset(scene)); }
             finally { Leave(); }
+            Fit();
         }
 
         /// <summary>
@@ -230,6 +231,7 @@ namespace Upt.Interop
                     Status.Check(Native.upt_scene_restore(scene, b, (ulong)snapshot.Length));
             }
             finally { Leave(); }
+            Fit();
         }
 
         /// <summary>Ends the scene. Waits for a step in flight. May be called again.</summary>
