@@ -19,7 +19,7 @@ pub struct Cell {
     pub polytope: Option<Arc<Polytope>>,
     /// Part of the element's volume.
     pub share: f64,
-    /// Fixed points of the element that lie in the cell, and those that have been removed ([`crate::remove`]).
+    /// Fixed points of the element that lie in the cell, and those that have been removed (`remove.rs`).
     pub points: u64,
     pub gone: u64,
     /// The part of its material that has not been removed.
