@@ -44,7 +44,7 @@ impl Mesh {
             domain.push(corners);
         }
         domain.sort_unstable();
-        let faces = body.touchable(|corners| domain.binary_search(&corners).is_ok());
+        let faces = body.touchable(|corners| domain.binary_search(&corners).is_ok())?;
         let domain_faces = memory::copied(faces.as_flattened(), WHAT)?;
         let held = nodes.filter(|node| {
             let is_held = self.held_nodes.binary_search(&body.parent(*node)).is_ok();
@@ -62,7 +62,7 @@ impl Mesh {
             domain_nodes: unique(memory::copied(&domain_faces, WHAT)?),
             domain_faces,
             surface_nodes: memory::copied(&self.surface_nodes, WHAT)?,
-            held_nodes: held.collect(),
+            held_nodes: memory::collected(count, held, WHAT)?,
             node_area,
             sha256: self.sha256.clone(),
         })

@@ -18,6 +18,7 @@ use super::{Body, Corrections, FarField};
 use crate::bundle::Mesh;
 use crate::error::Result;
 use crate::kernels::Isa;
+use crate::memory;
 use crate::prior::{Lost, PriorTable};
 
 /// A factor of volume or stiffness that has changed by less has not.
@@ -35,9 +36,12 @@ impl Corrections {
         material: &Material,
         (before, prior): (&PriorTable, &PriorTable),
     ) -> Result<Corrections> {
-        let lost: Vec<Lost> = (body.changed_elements())
-            .filter_map(|element| self.lost(intact, body, material, element))
-            .collect();
+        let mut lost = Vec::new();
+        for element in body.changed_elements() {
+            if let Some(own) = self.lost(intact, body, material, element) {
+                memory::push(&mut lost, own, "what a cut body has lost")?;
+            }
+        }
         let space = (self.space).cut((before, prior), |node| body.parent(node), lost.iter())?;
         let diagonal = Diagonal::of(cut, material)?;
         let own = Body::new(cut, material, &diagonal, Isa::detect())?;

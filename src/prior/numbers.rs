@@ -42,6 +42,18 @@ impl Numbers {
         Ok(Numbers::F16(half))
     }
 
+    /// A copy.
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
+    pub(super) fn copied(&self) -> Result<Numbers> {
+        const WHAT: &str = "a table's numbers";
+        Ok(match self {
+            Numbers::F32(values) => Numbers::F32(memory::copied(values, WHAT)?),
+            Numbers::F16(values) => Numbers::F16(memory::copied(values, WHAT)?),
+        })
+    }
+
     /// Ranges of these, one after another.
     ///
     /// # Errors

@@ -94,7 +94,7 @@ impl CoarseSpace {
         let mut space = CoarseSpace {
             at_contact: memory::zeros(3 * prior.contact_nodes.len() * count, WHAT)?,
             rows: memory::copied(&self.rows, WHAT)?,
-            modes: self.modes.clone(),
+            modes: self.modes.copied()?,
             stiffness: memory::copied(&self.stiffness, WHAT)?,
             mass: memory::copied(&self.mass, WHAT)?,
             frequency: memory::copied(&self.frequency, WHAT)?,

@@ -27,6 +27,7 @@ impl From<TopologyError> for Error {
         match error {
             TopologyError::Kept => Error::Snapshot(error.to_string()),
             TopologyError::NotFinite { .. } => Error::NonFinite(error.to_string()),
+            TopologyError::Memory { .. } => Error::OutOfMemory(error.to_string()),
             other => Error::Argument(format!("cut: {other}")),
         }
     }
@@ -111,7 +112,9 @@ impl Core {
             Some(cut) => cut.body.clone(),
             None => self.whole_body()?,
         };
-        let positions = self.positions(&lock_read(published).last);
+        let positions = self.positions(&lock_read(published).last)?;
+        // Beside its lists the topology makes many small parts.
+        memory::probe(body.most_bytes(), SCENE)?;
         let change = operation(&mut body, &positions)?;
         let first = self.mesh.node_count();
         let source = |node: usize| {
@@ -222,13 +225,13 @@ impl Core {
     }
 
     /// Where each node is in a state.
-    fn positions(&self, frame: &Frame) -> Vec<Point> {
+    fn positions(&self, frame: &Frame) -> Result<Vec<Point>> {
         let rest = self.mesh.positions.as_chunks::<3>().0;
         let moved = frame.field.as_chunks::<3>().0;
         let place = |(rest, u): (&[f32; 3], &[f32; 3])| -> Point {
             [0, 1, 2].map(|k| f64::from(rest[k]) + f64::from(u[k]))
         };
-        rest.iter().zip(moved).map(place).collect()
+        memory::collected(rest.len(), rest.iter().zip(moved).map(place), SCENE)
     }
 
     /// Takes velocities, inertia and the tools' places of the core before it.
@@ -251,8 +254,8 @@ impl Core {
         spread(&was.velocity_before, &mut motion.velocity_before, source);
         spread(&was.inertia, &mut motion.inertia, source);
         // Inertia is that of the mass which is at the node now.
-        let masses = |core: &Core| core.model.corrections().map(|made| made.body.mass.clone());
-        let (now, then) = (masses(self)?, masses(before)?);
+        let (now, then) = (self.model.corrections()?, before.model.corrections()?);
+        let (now, then) = (&now.body.mass, &then.body.mass);
         for (node, inertia) in motion.inertia.chunks_exact_mut(3).enumerate() {
             let part = now[node] / then[source(node)].max(f32::MIN_POSITIVE);
             inertia.iter_mut().for_each(|x| *x *= part);

@@ -2,14 +2,12 @@
 
 use super::Scene;
 use super::core::{Core, lock_read};
-use super::followed_surface::Followed;
+use super::followed_surface::{self, Followed};
 use super::published::BodyNumber;
 use super::shared::lock;
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::output::Output;
-
-const WHAT: &str = "the surface of a body";
 
 /// What [`Scene::update_surface`] has found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -68,7 +66,7 @@ impl Scene {
         self.with(|core, published| {
             let body = lock_read(published).body;
             let (first_vertex, is_new) = match &mut *held {
-                Some(own) if own.body == body => {
+                Some(own) if own.is_of(body) => {
                     own.changed.clear();
                     (own.rest.len(), false)
                 }
@@ -121,7 +119,7 @@ impl Scene {
         let held = lock(&self.tools.surface)?;
         let own = held.as_ref().ok_or_else(not_asked)?;
         let shown = lock_read(&self.shared.published);
-        if own.body != shown.body {
+        if !own.is_of(shown.body) {
             return Err(Error::State(
                 "surface: the body has changed since its surface was updated; update it first"
                     .into(),
@@ -165,7 +163,7 @@ impl Scene {
 impl Core {
     /// Makes or updates the surface. Returns the first new vertex, and whether all are new.
     fn follow(&self, held: &mut Option<Followed>, body: BodyNumber) -> Result<(usize, bool)> {
-        memory::probe(self.most_surface_bytes(), WHAT)?;
+        memory::probe(self.most_surface_bytes(), followed_surface::WHAT)?;
         let whole;
         let now = match &self.cut {
             Some(cut) => &cut.body,
@@ -174,28 +172,16 @@ impl Core {
                 &whole
             }
         };
-        let known = held.take().filter(|own| own.body.line == body.line);
-        let is_new = known.is_none();
-        let mut own = known.unwrap_or_else(|| Followed {
-            surface: topology::Surface::new(now.mesh()),
-            body,
-            rest: Vec::new(),
-            changed: Vec::new(),
-        });
-        let change = own.surface.update(now);
-        let first = own.rest.len();
-        let nodes = self.mesh.positions.as_chunks::<3>().0;
-        let place = |node: u32| nodes[node as usize].map(f64::from);
-        let new = first as u32..own.surface.vertices.len() as u32;
-        own.rest
-            .extend(new.map(|vertex| own.surface.place(vertex, place).map(|x| x as f32)));
-        own.changed = match is_new {
-            true => (0..own.surface.triangles.len() as u32).collect(),
-            false => change.triangles,
+        if held.as_ref().is_some_and(|own| own.body.line != body.line) {
+            *held = None;
+        }
+        let own = match held {
+            Some(own) => own,
+            None => held.insert(Followed::new(now.mesh())?),
         };
+        let found = own.follow(now, &self.mesh)?;
         own.body = body;
-        *held = Some(own);
-        Ok((first, is_new))
+        Ok(found)
     }
 }
 

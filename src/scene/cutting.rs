@@ -106,7 +106,7 @@ impl Scene {
             };
             let held = &cut.intact.mesh.held_nodes;
             let is_held = |node| held.binary_search(&cut.body.parent(node)).is_ok();
-            let fragments = cut.body.fragments(is_held);
+            let fragments = cut.body.fragments(is_held)?;
             let cells: Vec<_> = fragments.iter().flat_map(|one| one.cells.clone()).collect();
             if !cells.is_empty() {
                 core.change(published, |body, _| body.drop_cells(&cells))?;

@@ -3,7 +3,7 @@
 //! A magic and a version, little-endian; then in postcard's format the scene's origin and its [`State`]; at the end the SHA-256 of all
 //! before it (`docs/decisions/013-state.md`).
 
-use std::sync::{Arc, PoisonError, RwLock};
+use std::sync::{PoisonError, RwLock};
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -103,10 +103,10 @@ impl Core {
         let body = match body {
             Some(kept) => {
                 self.check_bare(published)?;
-                let mesh = Arc::new(match &self.cut {
-                    Some(cut) => cut.body.mesh().clone(),
-                    None => self.whole_body()?.mesh().clone(),
-                });
+                let mesh = match &self.cut {
+                    Some(cut) => cut.body.shared_mesh(),
+                    None => self.whole_body()?.shared_mesh(),
+                };
                 Some(self.with_most_copies(Body::of_kept(mesh, kept)?))
             }
             None => None,

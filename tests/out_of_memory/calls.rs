@@ -14,9 +14,9 @@ pub struct Rig {
     options: upt_scene_options,
     path: CString,
     model: *mut upt_model,
-    scene: *mut upt_scene,
+    pub scene: *mut upt_scene,
     hand: *mut upt_haptics,
-    positions: Vec<f32>,
+    pub positions: Vec<f32>,
     domain: Vec<u32>,
     pub tools: [upt_instrument; 2],
     snapshot: Vec<u8>,
@@ -49,7 +49,7 @@ impl Rig {
         }
     }
 
-    fn give<T: Copy>(&mut self, status: i32, values: &[T]) -> i32 {
+    pub fn give<T: Copy>(&mut self, status: i32, values: &[T]) -> i32 {
         let bytes = size_of_val(values);
         // SAFETY: plain numbers without padding.
         let values = unsafe { std::slice::from_raw_parts(values.as_ptr().cast::<u8>(), bytes) };
@@ -95,11 +95,16 @@ impl Rig {
     }
 
     /// What the scene shows after a call.
-    fn shown(&mut self, status: i32) -> i32 {
+    pub fn shown(&mut self, status: i32) -> i32 {
         if status != UPT_OK {
             return status;
         }
-        let mut out = vec![0.0f32; self.positions.len()];
+        let mut nodes = 0;
+        assert_eq!(
+            unsafe { upt_scene_node_count(self.scene, &mut nodes) },
+            UPT_OK
+        );
+        let mut out = vec![0.0f32; 3 * nodes as usize];
         let mut floats = out.len() as u64;
         let mut read = counted(|| unsafe { upt_scene_read(self.scene, out.as_mut_ptr(), floats) });
         if read != UPT_OK {

@@ -48,6 +48,23 @@ pub const CORRECTED: &[Call] = &[
     ("a last free step", Rig::free),
 ];
 
+/// Those of a scene whose body is cut.
+pub const CUT: &[Call] = &[
+    OPEN,
+    CREATE,
+    ("a first step with two tools", |rig| rig.drive(0.5)),
+    ("upt_scene_update_surface", Rig::surface),
+    ("upt_scene_cut", Rig::cut),
+    ("the surface of a cut", Rig::surface),
+    ("a step of a cut body", |rig| rig.drive(1.5)),
+    ("upt_scene_save of a cut body", Rig::save),
+    ("upt_scene_remove", Rig::remove),
+    ("upt_scene_scale_stiffness", Rig::stiffen),
+    ("upt_scene_restore of a cut body", Rig::restore),
+    ("upt_scene_reset of a cut body", Rig::reset),
+    ("a step after a reset", |rig| rig.drive(1.0)),
+];
+
 /// Those of a scene that does not.
 pub const PLAIN: &[Call] = &[
     OPEN,

@@ -123,6 +123,11 @@ impl Body {
         &self.mesh
     }
 
+    /// The mesh, for another body of it.
+    pub fn shared_mesh(&self) -> Arc<RestMesh> {
+        Arc::clone(&self.mesh)
+    }
+
     /// Nodes with copies.
     pub fn node_count(&self) -> usize {
         self.mesh.node_count() + self.parents.len()
@@ -143,13 +148,18 @@ impl Body {
 
     /// Elements with other cells or another stiffness than the mesh's, ascending.
     pub fn changed_elements(&self) -> impl Iterator<Item = u32> + '_ {
-        let stiff = self
-            .stiffness
-            .keys()
-            .filter(|element| !self.cells.contains_key(element));
-        let mut all: Vec<u32> = self.cells.keys().chain(stiff).copied().collect();
-        all.sort_unstable();
-        all.into_iter()
+        let mut cut = self.cells.keys().copied().peekable();
+        let mut stiff = self.stiffness.keys().copied().peekable();
+        std::iter::from_fn(move || {
+            let next = match (cut.peek(), stiff.peek()) {
+                (Some(a), Some(b)) => *a.min(b),
+                (Some(next), None) | (None, Some(next)) => *next,
+                (None, None) => return None,
+            };
+            cut.next_if_eq(&next);
+            stiff.next_if_eq(&next);
+            Some(next)
+        })
     }
 
     /// Of each copy of a node: the mesh node that it stems from.
@@ -166,6 +176,13 @@ impl Body {
             .sum();
         let distances: usize = self.strokes.values().map(|own| 16 * own.len()).sum();
         self.mesh.heap_bytes() + cells + distances + 4 * self.parents.len()
+    }
+
+    /// Bytes of small parts that an operation makes at most beside lists as long as the mesh, nearly: a copy of the body, and as much again for what it
+    /// becomes.
+    pub fn most_bytes(&self) -> usize {
+        let copy = self.heap_bytes() - self.mesh().heap_bytes();
+        4 * copy + 64 * self.mesh().element_count()
     }
 
     /// Cells of an element.
@@ -202,7 +219,7 @@ impl Body {
                 count,
             });
         }
-        let mut changed = elements.to_vec();
+        let mut changed = crate::room::copied(elements)?;
         changed.sort_unstable();
         changed.dedup();
         let products = changed

@@ -10,6 +10,7 @@ use crate::body::{Body, Cell, Change};
 use crate::polygon;
 use crate::polytope::{Side, Weights};
 use crate::rest::{FACES, OUTSIDE};
+use crate::room::{collected, push};
 
 /// Parts of a face that overlap by less, of its area, do not.
 const LEAST_OVERLAP: f64 = 1e-9;
@@ -57,8 +58,8 @@ pub(crate) fn common(a: &[[f64; 2]], b: &[[f64; 2]]) -> Vec<[f64; 2]> {
 pub(crate) struct Groups(Vec<u32>);
 
 impl Groups {
-    pub fn new(count: usize) -> Groups {
-        Groups((0..count as u32).collect())
+    pub fn new(count: usize) -> Result<Groups, TopologyError> {
+        Ok(Groups(collected(count, 0..count as u32)?))
     }
 
     pub fn of(&mut self, mut at: u32) -> u32 {
@@ -103,15 +104,14 @@ impl Body {
 
     /// Gives each group of joined cells around the nodes of changed elements its own nodes.
     pub(crate) fn part_nodes(&mut self, change: &mut Change) -> Result<(), TopologyError> {
-        let mut nodes: Vec<u32> = (change.elements.iter())
-            .flat_map(|element| self.mesh().tet(*element))
-            .collect();
+        let corners = (change.elements.iter()).flat_map(|element| self.mesh().tet(*element));
+        let mut nodes = collected(4 * change.elements.len(), corners)?;
         nodes.sort_unstable();
         nodes.dedup();
         let before = self.node_count();
         let mut elements = std::mem::take(&mut change.elements);
         for node in nodes {
-            self.part_node(node, change, &mut elements);
+            self.part_node(node, change, &mut elements)?;
             if self.node_count() > self.most_nodes {
                 return Err(TopologyError::Room {
                     nodes: self.node_count(),
@@ -133,7 +133,12 @@ impl Body {
         Ok(())
     }
 
-    fn part_node(&mut self, node: u32, change: &mut Change, elements: &mut Vec<u32>) {
+    fn part_node(
+        &mut self,
+        node: u32,
+        change: &mut Change,
+        elements: &mut Vec<u32>,
+    ) -> Result<(), TopologyError> {
         let around = self.mesh().around(node).to_vec();
         // The cells around the node, and where those of each element start.
         let lists: Vec<_> = around.iter().map(|element| self.cells(*element)).collect();
@@ -141,7 +146,7 @@ impl Body {
         for list in &lists {
             starts.push(starts[starts.len() - 1] + list.len() as u32);
         }
-        let mut groups = Groups::new(starts[lists.len()] as usize);
+        let mut groups = Groups::new(starts[lists.len()] as usize)?;
         for (at, &element) in around.iter().enumerate() {
             let own = self.mesh().tet(element);
             for (face, &over) in self.mesh().neighbours(element).iter().enumerate() {
@@ -188,11 +193,11 @@ impl Body {
             for group in all.into_keys().filter(|group| Some(*group) != keeper) {
                 renamed.insert((old, group), (self.node_count() + parents.len()) as u32);
                 parents.push(node);
-                change.copied.push(old);
+                push(&mut change.copied, old)?;
             }
         }
         if renamed.is_empty() {
-            return;
+            return Ok(());
         }
         let mut moved = Vec::new();
         for (at, list) in lists.iter().enumerate() {
@@ -208,7 +213,8 @@ impl Body {
         self.parents.extend(parents);
         for (element, at, corner, new) in moved {
             self.cells_mut(element)[at].nodes[corner] = new;
-            elements.push(element);
+            push(elements, element)?;
         }
+        Ok(())
     }
 }

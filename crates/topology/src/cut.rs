@@ -8,6 +8,7 @@ use std::sync::Arc;
 use crate::body::{Body, Cell, Change, place};
 use crate::polytope::{Polytope, Side, Weights};
 use crate::rest::{length, minus};
+use crate::room::{collected, push};
 use crate::{Point, Sweep, TopologyError};
 
 /// A node nearer to the blade than this part of the edges around it is put onto it.
@@ -45,7 +46,7 @@ impl Body {
         let mut distances = self.strokes.remove(&stroke).unwrap_or_default();
         let mut change = Change::default();
         let mut fixed = Vec::new();
-        for element in self.near(sweep, positions) {
+        for element in self.near(sweep, positions)? {
             let mut cells = self.cells(element).into_owned();
             let mut parted = Vec::with_capacity(2 * cells.len());
             let mut is_touched = false;
@@ -74,7 +75,9 @@ impl Body {
                 }
                 // Both sides have the cut; it is counted once.
                 change.area_mm2 += if met.counts { area } else { 0.0 };
-                fixed.extend((0..4).map(|corner| (cell.nodes[corner], distance[corner])));
+                for pair in cell.nodes.into_iter().zip(distance) {
+                    push(&mut fixed, pair)?;
+                }
                 if met.cells.is_empty() {
                     parted.push(cell);
                 } else {
@@ -83,7 +86,7 @@ impl Body {
                 }
             }
             if is_touched {
-                change.elements.push(element);
+                push(&mut change.elements, element)?;
                 *self.cells_mut(element) = parted;
             }
         }
@@ -94,7 +97,7 @@ impl Body {
     }
 
     /// Elements whose box meets that of the sweep.
-    fn near(&self, sweep: &Sweep, positions: &[Point]) -> Vec<u32> {
+    fn near(&self, sweep: &Sweep, positions: &[Point]) -> Result<Vec<u32>, TopologyError> {
         let [low, high] = sweep.bounds();
         let meets = |nodes: [u32; 4]| {
             let corners = nodes.map(|node| positions[node as usize]);
@@ -110,7 +113,7 @@ impl Body {
             Some(cells) => cells.iter().any(|cell| meets(cell.nodes)),
             None => meets(self.mesh().tet(*element)),
         });
-        near.collect()
+        collected(self.mesh().element_count(), near)
     }
 
     /// Of a node from the blade: 0 where it is near.

@@ -45,6 +45,9 @@ pub enum TopologyError {
     /// What was kept is of another mesh, or damaged.
     #[error("no cuts of this mesh lead to what was kept; it is of another mesh, or damaged")]
     Kept,
+    /// The system has no memory.
+    #[error("no memory for {bytes} bytes of a cut body; free some, or cut less at once")]
+    Memory { bytes: usize },
     /// More copies than a body may have.
     #[error(
         "the body would have {nodes} nodes, with room for {most}; make a scene with more room, or undo"

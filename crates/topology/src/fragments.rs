@@ -1,8 +1,10 @@
 //! Pieces that nothing holds.
 
+use crate::TopologyError;
 use crate::body::Body;
 use crate::connect::Groups;
 use crate::rest::OUTSIDE;
+use crate::room::{filled, push, room};
 
 /// Joined cells without a held node.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,8 +19,8 @@ pub struct Fragment {
 
 impl Body {
     /// The pieces of which no node is held, by the number of their first element. Where nothing is held the largest piece is the body.
-    pub fn fragments(&self, is_held: impl Fn(u32) -> bool) -> Vec<Fragment> {
-        let pieces = self.pieces();
+    pub fn fragments(&self, is_held: impl Fn(u32) -> bool) -> Result<Vec<Fragment>, TopologyError> {
+        let pieces = self.pieces()?;
         let holds = |piece: &Fragment| piece.nodes.iter().any(|node| is_held(*node));
         let body = match pieces.iter().any(holds) {
             true => None,
@@ -28,19 +30,20 @@ impl Body {
         };
         let loose = pieces.into_iter().enumerate();
         let loose = loose.filter(|(at, piece)| Some(*at) != body && !holds(piece));
-        loose.map(|(_, piece)| piece).collect()
+        Ok(loose.map(|(_, piece)| piece).collect())
     }
 
     /// All pieces of joined living cells.
-    pub fn pieces(&self) -> Vec<Fragment> {
+    pub fn pieces(&self) -> Result<Vec<Fragment>, TopologyError> {
         let mesh = self.mesh();
         let count = mesh.element_count() as u32;
-        let mut starts = vec![0u32];
+        let mut starts: Vec<u32> = room(count as usize + 1)?;
+        starts.push(0);
         for element in 0..count {
             let own = self.cells.get(&element).map_or(1, Vec::len) as u32;
             starts.push(starts[element as usize] + own);
         }
-        let mut groups = Groups::new(starts[count as usize] as usize);
+        let mut groups = Groups::new(starts[count as usize] as usize)?;
         for element in 0..count {
             for (face, &over) in mesh.neighbours(element).iter().enumerate() {
                 if over == OUTSIDE || over < element {
@@ -60,7 +63,7 @@ impl Body {
                 }
             }
         }
-        let mut place = vec![u32::MAX; starts[count as usize] as usize];
+        let mut place = filled(u32::MAX, starts[count as usize] as usize)?;
         let mut pieces: Vec<Fragment> = Vec::new();
         for element in 0..count {
             for (at, cell) in self.cells(element).iter().enumerate() {
@@ -77,8 +80,10 @@ impl Body {
                     });
                 }
                 let piece = &mut pieces[place[group] as usize];
-                piece.cells.push((element, at as u32));
-                piece.nodes.extend(cell.nodes);
+                push(&mut piece.cells, (element, at as u32))?;
+                for node in cell.nodes {
+                    push(&mut piece.nodes, node)?;
+                }
                 piece.volume_mm3 += cell.share * cell.kept * mesh.volume(element);
             }
         }
@@ -86,6 +91,6 @@ impl Body {
             piece.nodes.sort_unstable();
             piece.nodes.dedup();
         }
-        pieces
+        Ok(pieces)
     }
 }

@@ -28,6 +28,7 @@ pub mod polygon;
 pub mod polytope;
 mod remove;
 pub mod rest;
+mod room;
 pub mod surface;
 pub mod sweep;
 mod touchable;

@@ -5,6 +5,7 @@ use std::sync::OnceLock;
 use crate::body::{Body, Cell, Change, place};
 use crate::elements::filled;
 use crate::polytope::{Polytope, Weights};
+use crate::room::push;
 use crate::{Point, TopologyError};
 
 /// A cell of which less is left, as a part of its element, goes.
@@ -35,11 +36,11 @@ impl Body {
             let cells = self.cells(element);
             for (index, (cell, share)) in cells.iter().zip(filled(&cells)).enumerate() {
                 if cell.is_alive {
-                    self.inside((element, index, cell), share, &depth, positions, &mut found);
+                    self.inside((element, index, cell), share, &depth, positions, &mut found)?;
                 }
             }
         }
-        found.sort_by(|a, b| (b.depth.total_cmp(&a.depth)).then(a.key().cmp(&b.key())));
+        found.sort_unstable_by(|a, b| (b.depth.total_cmp(&a.depth)).then(a.key().cmp(&b.key())));
         let mut next = self.clone();
         let mut change = Change::default();
         let mut taken = 0.0;
@@ -52,7 +53,7 @@ impl Body {
             cell.gone |= 1 << point.at;
             cell.kept *= f64::from(before - 1) / f64::from(before);
             taken += point.volume;
-            change.elements.push(point.element);
+            push(&mut change.elements, point.element)?;
         }
         change.elements.sort_unstable();
         change.elements.dedup();
@@ -81,7 +82,7 @@ impl Body {
         for &(element, index) in cells {
             if let Some(cell) = next.cells_mut(element).get_mut(index as usize) {
                 cell.is_alive = false;
-                change.elements.push(element);
+                push(&mut change.elements, element)?;
             }
         }
         if next.is_nothing() {
@@ -115,7 +116,7 @@ impl Body {
         depth: &impl Fn(Point) -> f64,
         positions: &[Point],
         found: &mut Vec<Inside>,
-    ) {
+    ) -> Result<(), TopologyError> {
         let corners = cell.nodes.map(|node| positions[node as usize]);
         let left = f64::from(cell.points_left().max(1));
         let volume = share * self.mesh().volume(element) / left;
@@ -125,7 +126,7 @@ impl Body {
             .iter()
             .map(|at| crate::rest::length(crate::rest::minus(*at, middle)));
         if depth(middle) <= -reach.fold(0.0, f64::max) {
-            return;
+            return Ok(());
         }
         for (at, weights) in points().iter().enumerate() {
             if cell.points & !cell.gone & (1 << at) == 0 {
@@ -133,15 +134,17 @@ impl Body {
             }
             let depth = depth(place(weights, &corners));
             if depth > 0.0 {
-                found.push(Inside {
+                let point = Inside {
                     depth,
                     element,
                     cell: index,
                     at: at as u32,
                     volume,
-                });
+                };
+                push(found, point)?;
             }
         }
+        Ok(())
     }
 }
 

@@ -1,5 +1,6 @@
 //! The mesh before any cut.
 
+use crate::room::{copied, filled, room};
 use crate::{Point, TopologyError};
 
 /// Faces of a tetrahedron by opposite corner, outward.
@@ -23,7 +24,7 @@ impl RestMesh {
     /// Takes `[K,3]` rest positions, mm, and `[T,4]` corners of positive volume.
     ///
     /// # Errors
-    /// A corner beyond the nodes, a position that is not finite, an element without volume.
+    /// A corner beyond the nodes, a position that is not finite, an element without volume, no memory.
     pub fn new(positions: &[[f32; 3]], tets: &[[u32; 4]]) -> Result<RestMesh, TopologyError> {
         if let Some(index) = (positions.iter()).position(|at| !at.iter().all(|x| x.is_finite())) {
             return Err(TopologyError::NotFinite {
@@ -46,15 +47,15 @@ impl RestMesh {
                 return Err(TopologyError::Volume { index, volume });
             }
         }
-        let mut starts = vec![0; count + 1];
+        let mut starts = filled(0, count + 1)?;
         for node in tets.iter().flatten() {
             starts[*node as usize + 1] += 1;
         }
         for node in 0..count {
             starts[node + 1] += starts[node];
         }
-        let mut next = starts.clone();
-        let mut around = vec![0; 4 * tets.len()];
+        let mut next: Vec<u32> = copied(&starts)?;
+        let mut around = filled(0, 4 * tets.len())?;
         for (element, tet) in tets.iter().enumerate() {
             for &node in tet {
                 around[next[node as usize] as usize] = element as u32;
@@ -62,9 +63,9 @@ impl RestMesh {
             }
         }
         Ok(RestMesh {
-            neighbours: neighbours(tets),
-            positions: positions.to_vec(),
-            tets: tets.to_vec(),
+            neighbours: neighbours(tets)?,
+            positions: copied(positions)?,
+            tets: copied(tets)?,
             starts,
             around,
         })
@@ -125,8 +126,8 @@ impl RestMesh {
     }
 }
 
-fn neighbours(tets: &[[u32; 4]]) -> Vec<[u32; 4]> {
-    let mut faces = Vec::with_capacity(4 * tets.len());
+fn neighbours(tets: &[[u32; 4]]) -> Result<Vec<[u32; 4]>, TopologyError> {
+    let mut faces = room(4 * tets.len())?;
     for (element, tet) in tets.iter().enumerate() {
         for (face, corners) in FACES.iter().enumerate() {
             let mut nodes = corners.map(|corner| tet[corner]);
@@ -135,7 +136,7 @@ fn neighbours(tets: &[[u32; 4]]) -> Vec<[u32; 4]> {
         }
     }
     faces.sort_unstable();
-    let mut found = vec![[OUTSIDE; 4]; tets.len()];
+    let mut found = filled([OUTSIDE; 4], tets.len())?;
     for pair in faces.windows(2) {
         let [(nodes, a, at_a), (others, b, at_b)] = [pair[0], pair[1]];
         if nodes == others {
@@ -143,7 +144,7 @@ fn neighbours(tets: &[[u32; 4]]) -> Vec<[u32; 4]> {
             found[b as usize][at_b] = a;
         }
     }
-    found
+    Ok(found)
 }
 
 fn volume([a, b, c, d]: [Point; 4]) -> f64 {

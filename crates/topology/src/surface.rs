@@ -9,7 +9,8 @@ use crate::body::{Body, Cell};
 use crate::connect::{common, on_face};
 use crate::polytope::{Side, Weights};
 use crate::rest::{FACES, OUTSIDE};
-use crate::{Point, RestMesh};
+use crate::room::{push, reserve, room};
+use crate::{Point, RestMesh, TopologyError};
 
 mod edges;
 
@@ -57,7 +58,10 @@ struct Piece {
 
 impl Surface {
     /// That of the intact body: its slots are in the order of elements and faces.
-    pub fn new(mesh: &RestMesh) -> Surface {
+    ///
+    /// # Errors
+    /// No memory.
+    pub fn new(mesh: &RestMesh) -> Result<Surface, TopologyError> {
         let mut surface = Surface {
             vertices: Vec::new(),
             triangles: Vec::new(),
@@ -66,7 +70,7 @@ impl Surface {
             border: BTreeMap::new(),
         };
         for node in 0..mesh.node_count() as u32 {
-            surface.vertex(vec![(node, 1.0)]);
+            surface.vertex(vec![(node, 1.0)])?;
         }
         for element in 0..mesh.element_count() as u32 {
             for (face, &over) in mesh.neighbours(element).iter().enumerate() {
@@ -74,14 +78,13 @@ impl Surface {
                     let slot = surface.triangles.len() as u32;
                     surface.border.insert((element, face as u8), slot);
                     let tet = mesh.tet(element);
-                    surface
-                        .triangles
-                        .push(FACES[face].map(|corner| tet[corner]));
-                    surface.inside.push(false);
+                    let corners = FACES[face].map(|corner| tet[corner]);
+                    push(&mut surface.triangles, corners)?;
+                    push(&mut surface.inside, false)?;
                 }
             }
         }
-        surface
+        Ok(surface)
     }
 
     /// Where a vertex is, given where nodes are.
@@ -98,11 +101,14 @@ impl Surface {
     }
 
     /// Follows the body; says what is different.
-    pub fn update(&mut self, body: &Body) -> SurfaceChange {
+    ///
+    /// # Errors
+    /// No memory: another call then follows the body from where it was.
+    pub fn update(&mut self, body: &Body) -> Result<SurfaceChange, TopologyError> {
         let first_vertex = self.vertices.len() as u32;
-        let mut pieces = self.pieces(body);
+        let mut pieces = self.pieces(body)?;
         cancel(&mut pieces);
-        let split = self.split_edges(body, &mut pieces);
+        let split = self.split_edges(body, &mut pieces)?;
         let mut wanted: BTreeMap<[u32; 3], bool> = BTreeMap::new();
         let mut extra = Vec::new();
         for piece in pieces {
@@ -112,11 +118,16 @@ impl Surface {
                 if wanted.insert(turned, inside).is_some() {
                     extra.push((turned, inside));
                 }
-            });
+            })?;
         }
+        // From here on nothing asks for memory, so that no slot changes without being listed.
+        let slots = self.triangles.len() + wanted.len() + extra.len();
+        reserve(&mut self.triangles, wanted.len() + extra.len())?;
+        reserve(&mut self.inside, wanted.len() + extra.len())?;
+        let mut empty = room(slots)?;
         let mut change = SurfaceChange {
             first_vertex,
-            triangles: Vec::new(),
+            triangles: room(slots)?,
         };
         let mesh = body.mesh();
         for (&(element, face), &slot) in &self.border {
@@ -129,7 +140,6 @@ impl Surface {
                 change.triangles.push(slot);
             }
         }
-        let mut empty = Vec::new();
         for slot in self.border.len()..self.triangles.len() {
             let own = self.triangles[slot];
             if wanted.get(&own) == Some(&self.inside[slot]) {
@@ -159,11 +169,11 @@ impl Surface {
             }
         }
         change.triangles.sort_unstable();
-        change
+        Ok(change)
     }
 
     /// The vertex at weights on nodes.
-    fn vertex(&mut self, mut at: Vec<(u32, f64)>) -> u32 {
+    fn vertex(&mut self, mut at: Vec<(u32, f64)>) -> Result<u32, TopologyError> {
         at.retain(|(_, weight)| *weight > SAME);
         at.sort_unstable_by_key(|(node, _)| *node);
         let mut vertex = Vertex {
@@ -180,45 +190,55 @@ impl Surface {
             (0..4).all(|k| (other[k] - vertex.weights[k]).abs() < SAME)
         };
         if let Some(found) = known.iter().copied().find(is_same) {
-            return found;
+            return Ok(found);
         }
         let number = self.vertices.len() as u32;
+        push(&mut self.vertices, vertex)?;
         known.push(number);
-        self.vertices.push(vertex);
-        number
+        Ok(number)
     }
 
     /// Adds a polygon of a cell, given in its element's coordinates.
-    fn add(&mut self, cell: &Cell, points: &[Weights], inside: bool, pieces: &mut Vec<Piece>) {
+    fn add(
+        &mut self,
+        cell: &Cell,
+        points: &[Weights],
+        inside: bool,
+        pieces: &mut Vec<Piece>,
+    ) -> Result<(), TopologyError> {
         let corner = |at: &Weights| (0..4).map(|k| (cell.nodes[k], at[k])).collect();
-        let mut corners: Vec<u32> = points.iter().map(|at| self.vertex(corner(at))).collect();
+        let mut corners = Vec::with_capacity(points.len());
+        for at in points {
+            corners.push(self.vertex(corner(at))?);
+        }
         corners.dedup();
         if corners.len() > 1 && corners.first() == corners.last() {
             corners.pop();
         }
         if corners.len() >= 3 {
-            pieces.push(Piece { inside, corners });
+            push(pieces, Piece { inside, corners })?;
         }
+        Ok(())
     }
 
     /// The surface where it is not the mesh's own.
-    fn pieces(&mut self, body: &Body) -> Vec<Piece> {
+    fn pieces(&mut self, body: &Body) -> Result<Vec<Piece>, TopologyError> {
         let mesh = body.mesh();
         let mut pieces = Vec::new();
         for (&element, cells) in &body.cells {
             for cell in cells.iter().filter(|cell| cell.is_alive) {
                 for (side, points) in &cell.material().faces {
                     match side {
-                        Side::Cut { .. } => self.add(cell, points, true, &mut pieces),
+                        Side::Cut { .. } => self.add(cell, points, true, &mut pieces)?,
                         Side::Face(face)
                             if mesh.neighbours(element)[usize::from(*face)] == OUTSIDE =>
                         {
-                            self.add(cell, points, false, &mut pieces);
+                            self.add(cell, points, false, &mut pieces)?;
                         }
                         Side::Face(face) => {
                             let over = mesh.neighbours(element)[usize::from(*face)];
                             let own = (element, cell, usize::from(*face));
-                            self.add_bare(body, own, over, &mut pieces);
+                            self.add_bare(body, own, over, &mut pieces)?;
                         }
                     }
                 }
@@ -230,11 +250,11 @@ impl Surface {
                 let back = mesh.neighbours(over).iter().position(|own| *own == element);
                 let whole = Cell::whole(mesh.tet(over));
                 if let Some(face) = back {
-                    self.add_bare(body, (over, &whole, face), element, &mut pieces);
+                    self.add_bare(body, (over, &whole, face), element, &mut pieces)?;
                 }
             }
         }
-        pieces
+        Ok(pieces)
     }
 
     /// What of a cell's part of a face no cell beyond it is joined to.
@@ -244,11 +264,11 @@ impl Surface {
         (element, cell, face): (u32, &Cell, usize),
         over: u32,
         pieces: &mut Vec<Piece>,
-    ) {
+    ) -> Result<(), TopologyError> {
         let mesh = body.mesh();
         let back = mesh.neighbours(over).iter().position(|own| *own == element);
         let (Some(back), Some(own)) = (back, on_face(mesh.tet(element), cell, face)) else {
-            return;
+            return Ok(());
         };
         let tet = mesh.tet(element);
         let mut corners = FACES[face];
@@ -276,18 +296,23 @@ impl Surface {
                 weights
             };
             let points: Vec<Weights> = bare.iter().map(widen).collect();
-            self.add(cell, &points, true, pieces);
+            self.add(cell, &points, true, pieces)?;
         }
+        Ok(())
     }
 
     /// Triangles of a convex polygon.
-    fn fill(&mut self, piece: &Piece, take: &mut impl FnMut([u32; 3], bool)) {
+    fn fill(
+        &mut self,
+        piece: &Piece,
+        take: &mut impl FnMut([u32; 3], bool),
+    ) -> Result<(), TopologyError> {
         let corners = &piece.corners;
         if corners.len() <= 4 {
             for pair in corners[1..].windows(2) {
                 take([corners[0], pair[0], pair[1]], piece.inside);
             }
-            return;
+            return Ok(());
         }
         // From its middle, so that none has its corners on one line.
         let part = 1.0 / corners.len() as f64;
@@ -300,13 +325,14 @@ impl Surface {
                 }
             }
         }
-        let middle = self.vertex(sum.into_iter().collect());
+        let middle = self.vertex(sum.into_iter().collect())?;
         for (at, corner) in corners.iter().enumerate() {
             take(
                 [*corner, corners[(at + 1) % corners.len()], middle],
                 piece.inside,
             );
         }
+        Ok(())
     }
 }
 

@@ -3,10 +3,12 @@
 //! The lips of a cut run through elements, the faces do not: a face of which more than half is bare counts, and of the cells that share a face of the mesh's border the
 //! one with the largest part.
 
+use crate::TopologyError;
 use crate::body::{Body, Cell};
 use crate::connect::{common, on_face};
 use crate::polygon::double_area;
 use crate::rest::{FACES, OUTSIDE};
+use crate::room::push;
 
 /// Of a whole face in barycentric coordinates, twice: a face of which less is bare does not count.
 const MOSTLY: f64 = 0.5;
@@ -14,7 +16,10 @@ const MOSTLY: f64 = 0.5;
 impl Body {
     /// Faces `[.., 3]`, outward: those of the mesh's border for which `is_wanted` says so, by their mesh nodes in ascending order, where tissue is left behind
     /// them, then those that have been laid bare.
-    pub fn touchable(&self, is_wanted: impl Fn([u32; 3]) -> bool) -> Vec<[u32; 3]> {
+    pub fn touchable(
+        &self,
+        is_wanted: impl Fn([u32; 3]) -> bool,
+    ) -> Result<Vec<[u32; 3]>, TopologyError> {
         let mesh = self.mesh();
         let nodes = |cell: &Cell, face: usize| FACES[face].map(|corner| cell.nodes[corner]);
         let mut faces = Vec::new();
@@ -30,11 +35,9 @@ impl Body {
                 let living = cells.iter().filter(|cell| cell.is_alive);
                 let part = |cell: &Cell| on_face(own, cell, face).map_or(0.0, |p| double_area(&p));
                 let largest = living.max_by(|a, b| part(a).total_cmp(&part(b)));
-                faces.extend(
-                    largest
-                        .filter(|cell| part(cell) > 0.0)
-                        .map(|cell| nodes(cell, face)),
-                );
+                if let Some(cell) = largest.filter(|cell| part(cell) > 0.0) {
+                    push(&mut faces, nodes(cell, face))?;
+                }
             }
         }
         for &element in self.cells.keys() {
@@ -44,19 +47,19 @@ impl Body {
                 }
                 for cell in self.cells(element).iter().filter(|cell| cell.is_alive) {
                     if self.is_bare((element, cell), face, over) {
-                        faces.push(nodes(cell, face));
+                        push(&mut faces, nodes(cell, face))?;
                     }
                 }
                 let back = mesh.neighbours(over).iter().position(|own| *own == element);
                 if let (false, Some(back)) = (self.cells.contains_key(&over), back) {
                     let whole = Cell::whole(mesh.tet(over));
                     if self.is_bare((over, &whole), back, element) {
-                        faces.push(nodes(&whole, back));
+                        push(&mut faces, nodes(&whole, back))?;
                     }
                 }
             }
         }
-        faces
+        Ok(faces)
     }
 
     fn is_bare(&self, (element, cell): (u32, &Cell), face: usize, over: u32) -> bool {

@@ -55,7 +55,7 @@ impl Solver {
             return Ok(Vec::new());
         };
         let held = &self.topology.held_nodes;
-        let fragments = body.fragments(|node| held.binary_search(&node).is_ok());
+        let fragments = body.fragments(|node| held.binary_search(&node).is_ok())?;
         let cells: Vec<(u32, u32)> = (fragments
             .iter()
             .flat_map(|fragment| fragment.cells.iter().copied()))
@@ -109,6 +109,8 @@ impl Solver {
             None => Body::new(Arc::new(RestMesh::new(&self.positions, &self.tets)?)),
         };
         let change = operation(&mut body)?;
+        let domain = &self.topology.domain;
+        let faces = body.touchable(|corners| domain.contains(&corners))?;
         let positions: Vec<[f32; 3]> = (0..body.node_count() as u32)
             .map(|node| self.positions[body.parent(node) as usize])
             .collect();
@@ -163,22 +165,14 @@ impl Solver {
         self.tets = tets;
         self.topology.held_nodes = held;
         self.topology.body = Some(body);
-        let samples = self.samples();
-        if let (Some(touch), Some(samples)) = (&mut self.touch, samples) {
+        if let Some(touch) = &mut self.touch {
+            let held = &self.topology.held_nodes;
+            let samples = Samples::new(&self.positions, faces, held, SPACING_MM);
             touch.follow(&self.positions, &self.partition.slot_of_node, samples);
         }
         self.critical_now =
             self.critical_at_rest * (self.bound_at_rest / self.diagnose().largest_bound).sqrt();
         Ok(change)
-    }
-
-    /// Samples of the touchable faces of the body as it is now, for [`Solver::set_tools`]; `None` while it is intact.
-    pub fn samples(&self) -> Option<Samples> {
-        let body = self.topology.body.as_ref()?;
-        let domain = &self.topology.domain;
-        let faces = body.touchable(|corners| domain.contains(&corners));
-        let held = &self.topology.held_nodes;
-        Some(Samples::new(&self.positions, faces, held, SPACING_MM))
     }
 
     /// Held nodes with their copies, ascending: a copy of a held node is held.

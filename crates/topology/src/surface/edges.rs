@@ -3,18 +3,24 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::{NONE, Piece, SAME, Surface};
+use crate::TopologyError;
 use crate::body::Body;
 use crate::rest::{FACES, OUTSIDE};
+use crate::room::push;
 
 impl Surface {
     /// Splits edges at corners of others that lie on them. Gives the triangles of the mesh's own border, by element and face, that became pieces for that.
-    pub(super) fn split_edges(&self, body: &Body, pieces: &mut Vec<Piece>) -> BTreeSet<(u32, u8)> {
+    pub(super) fn split_edges(
+        &self,
+        body: &Body,
+        pieces: &mut Vec<Piece>,
+    ) -> Result<BTreeSet<(u32, u8)>, TopologyError> {
         let mut used: BTreeMap<[u32; 4], BTreeSet<u32>> = BTreeMap::new();
         for corner in pieces.iter().flat_map(|piece| &piece.corners) {
             let nodes = self.vertices[*corner as usize].nodes;
             used.entry(nodes).or_default().insert(*corner);
         }
-        let split = self.touched_border(body, &used, pieces);
+        let split = self.touched_border(body, &used, pieces)?;
         for piece in pieces {
             let mut corners = Vec::with_capacity(piece.corners.len());
             for (at, &a) in piece.corners.iter().enumerate() {
@@ -24,7 +30,7 @@ impl Surface {
             }
             piece.corners = corners;
         }
-        split
+        Ok(split)
     }
 
     /// Untouched elements' faces at the border with a corner on an edge.
@@ -33,7 +39,7 @@ impl Surface {
         body: &Body,
         used: &BTreeMap<[u32; 4], BTreeSet<u32>>,
         pieces: &mut Vec<Piece>,
-    ) -> BTreeSet<(u32, u8)> {
+    ) -> Result<BTreeSet<(u32, u8)>, TopologyError> {
         let mesh = body.mesh();
         let mut split = BTreeSet::new();
         for nodes in used.keys() {
@@ -52,15 +58,16 @@ impl Surface {
                     let corners = FACES[face].map(|corner| tet[corner]);
                     let is_on = over == OUTSIDE && corners.contains(&a) && corners.contains(&b);
                     if is_on && split.insert((element, face as u8)) {
-                        pieces.push(Piece {
+                        let piece = Piece {
                             inside: false,
                             corners: corners.to_vec(),
-                        });
+                        };
+                        push(pieces, piece)?;
                     }
                 }
             }
         }
-        split
+        Ok(split)
     }
 
     /// Corners strictly between two, in order.
