@@ -39,6 +39,34 @@ def test_variants_are_added_one_by_one_and_the_page_holds_them_all(data, mesh_pa
     assert {p.name for p in (page.parent / "images").iterdir()} == {"window-size.png", "error-accumulation.png"}
 
 
+def test_variants_of_some_minutes_are_joined_under_a_label(data, mesh_path, page):
+    page.write_text(PAGE.replace("ablate windows", "ablate windows paper"))
+    out = page.parent
+    for name, only in (("a", "stochastic, window 3"), ("b", "teacher forcing")):
+        assert main(["ablate", "windows", "--config", str(CONFIGS / "tiny.toml"), "--data", str(data), "--mesh",
+                     str(mesh_path), "--device", "cpu", "--minutes", "0.02", "--out", str(out / name),
+                     "--only", only]) == 0  # fmt: skip
+    row = json.loads((out / "a/windows.json").read_text())["variants"]["stochastic, window 3"]
+    assert row["steps"] > 1 and row["samples"] == row["steps"] * samples("tiny.toml", window=3)
+    assert row["curve"][-1]["mse_mm2"] == row["mse_mm2"] and "unfinished" not in row
+    files = [str(out / name / "windows.json") for name in "ab"]
+    assert main(["ablate", "windows", "--merge", *files, "--out", str(out / "both"), "--label", "paper",
+                 "--page", str(page)]) == 0  # fmt: skip
+    text = page.read_text()
+    assert f"| stochastic, window 3 | {row['mse_mm2']:.4f} |" in text and f"| {row['samples']:,} | " in text
+    assert text.index("| teacher forcing |") < text.index("| stochastic, window 3 |")
+    names = {p.name for p in (page.parent / "images").iterdir()}
+    assert names == {"paper-window-size.png", "paper-error-accumulation.png"}
+
+
+def samples(config, **changes):
+    settings = load_settings(CONFIGS / config)
+    settings.train.strategy = "stf"
+    for name, value in changes.items():
+        setattr(settings.train, name, value)
+    return settings.train.samples_per_step
+
+
 def test_an_unknown_variant_or_a_page_without_marks_is_an_error(data, mesh_path, page, capsys):
     assert ablate("windows", data, mesh_path, page, "window 3") == 2
     assert "'window 3' is not a variant of windows" in capsys.readouterr().err

@@ -8,8 +8,10 @@ import pytest
 import torch
 from conftest import CONFIGS
 
-from upt_training.bench import PlainWindows, padded_aggregate
+from upt_training.bench import PlainWindows
+from upt_training.captured import CapturedWindows
 from upt_training.config import Settings, load_settings
+from upt_training.errors import InputError
 from upt_training.layers import attend
 from upt_training.mesh_file import load_mesh
 from upt_training.run import make_trainer
@@ -44,7 +46,7 @@ def gradient(trainer: Trainer, windows: Windows, p: float, seed: int = 3) -> tor
 
 def plain(trainer: Trainer) -> PlainWindows:
     w = trainer.windows
-    trainer.model.aggregate = padded_aggregate.__get__(trainer.model)
+    trainer.model.padded = True
     return PlainWindows(w.settings, w.stepper, w.cache, w.pool, w.generator, w.draw, w.noise)
 
 
@@ -63,6 +65,45 @@ def test_a_window_has_the_gradient_of_the_plain_path(make, p, resident, batch):
         expected = gradient(reference, plain(reference), p, seed)
         assert relative(gradient(trainer, trainer.windows, p, seed), expected) < 1e-5
     assert bool(trainer.train_cache.resident) == (resident > 0)
+
+
+@pytest.mark.parametrize(("strategy", "p"), [("stf", 1.0), ("stf", 0.6), ("stf", 0.0), ("teacher", 1.0)])
+def test_passes_of_fixed_shape_have_the_gradient_of_the_plain_path(make, strategy, p):
+    """What a CUDA graph records, run pass by pass. At p = 1 the plain path starts a prediction later."""
+    settings = settings_with("tiny.toml", micro_batch=3, window=4, strategy=strategy, resident_gb=1.0)
+    trainer = make(settings)
+    captured = CapturedWindows(trainer.windows, trainer.loss_scale, capture=False)
+    if strategy == "stf" and p == 1.0:
+        p = 1.0 - 1e-9
+    for seed in range(3):
+        expected = gradient(trainer, trainer.windows, p, seed) * trainer.loss_scale
+        trainer.generator.bit_generator.state = np.random.PCG64([seed]).state
+        trainer.draw.manual_seed(seed)
+        mse = captured.step(p)
+        found = torch.cat([q.grad.flatten() for q in trainer.model.parameters()])
+        assert relative(found, expected) < 1e-5 and mse > 0.0
+
+
+def test_passes_of_fixed_shape_draw_rows_and_supernodes(make):
+    """On the same rows and supernodes as a window that makes every prediction; the state has the same gradient."""
+    settings = settings_with("tiny.toml", micro_batch=2, window=3, resident_gb=1.0, scored_rows=20, drawn_supernodes=16)
+    trainer = make(settings)
+    captured = CapturedWindows(trainer.windows, trainer.loss_scale, capture=False)
+    expected = gradient(trainer, trainer.windows, 0.0) * trainer.loss_scale
+    trainer.generator.bit_generator.state = np.random.PCG64([3]).state
+    trainer.draw.manual_seed(3)
+    captured.step(0.0)
+    found = torch.cat([q.grad.flatten() for q in trainer.model.parameters()])
+    assert relative(found, expected) < 1e-5
+    assert not trainer.model.padded  # evaluation goes over the edges that there are
+
+
+@pytest.mark.parametrize("change", [{"strategy": "replay"}, {"accumulate": 2}, {"resident_gb": 0.0}])
+def test_a_graph_refuses_what_its_passes_leave_out(make, change):
+    values = {"resident_gb": 1.0, "accumulate": 1, **change}
+    trainer = make(settings_with("tiny.toml", **values))
+    with pytest.raises(InputError, match=r"train.cuda_graph does not go with this " + next(iter(change))):
+        CapturedWindows(trainer.windows, 1.0, capture=False)
 
 
 def test_a_first_prediction_that_nothing_reads_is_not_made(make):

@@ -37,6 +37,12 @@ def parser() -> argparse.ArgumentParser:
     train.add_argument("--max-minutes", type=float, default=0.0, help="stop with a checkpoint after this time")
 
     train.add_argument(
+        "--evaluate-minutes",
+        type=float,
+        default=0.0,
+        help="score so often; the schedule then fills --max-minutes, however many steps that makes",
+    )
+    train.add_argument(
         "--checkpoint-minutes", type=float, default=10.0, help="write last.pt so often; 0: only at scores"
     )
 
@@ -137,14 +143,19 @@ def parser() -> argparse.ArgumentParser:
 
     ablate = commands.add_parser("ablate", help="variants of a configuration at one small budget: tables and plots")
     ablate.add_argument("suite", choices=["windows", "tricks"])
-    ablate.add_argument("--config", type=Path, required=True)
-    ablate.add_argument("--data", type=Path, required=True)
+    ablate.add_argument("--config", type=Path)
+    ablate.add_argument("--data", type=Path)
     ablate.add_argument("--mesh", type=Path)
     ablate.add_argument("--prior", type=Path)
     ablate.add_argument("--vibration", type=Path)
     ablate.add_argument("--out", type=Path, required=True)
     ablate.add_argument("--steps", type=int, default=2000, help="optimiser steps of each variant")
     ablate.add_argument("--max-minutes", type=float, default=0.0, help="time limit of each variant")
+    ablate.add_argument(
+        "--minutes", type=float, default=0.0, help="train each variant so long, in place of --steps: the clock leads"
+    )
+    ablate.add_argument("--merge", type=Path, nargs="*", help="results of runs (SUITE.json), joined; nothing is run")
+    ablate.add_argument("--label", default="", help="tells reports of one suite apart: in the page's marks, in names")
     ablate.add_argument("--cases", type=int, default=10, help="held-out cases scored")
     ablate.add_argument("--only", nargs="*", help="only these variants, by name")
     ablate.add_argument("--page", type=Path, help="page to write into: docs/results/training.md and its images")

@@ -3,7 +3,8 @@
 Suites: `windows` (pure teacher forcing and stochastic teacher forcing with windows 2 to 8, the paper's Fig. "window
 size" and Fig. "error accumulation") and `tricks` (each departure from the paper's recipe, taken away one at a time).
 Results go to `OUT/SUITE.{json,md}` and `OUT/*.png`, and with `--page docs/results/training.md` into that page and
-the images next to it; finished variants are not run again.
+the images next to it; finished variants are not run again. With `--minutes` a variant gets time in place of steps, and
+what it has so far is in `OUT/SUITE.json` after each minute. `--merge` joins the files of runs side by side.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from upt_training.ablation_report import write_report
+from upt_training.ablation_report import marks, write_report
 from upt_training.config import Settings, load_settings
 from upt_training.dataset import open_dataset
 from upt_training.errors import InputError
@@ -79,39 +80,67 @@ def _uniform(base: Settings):
     return graph
 
 
-def run_variant(settings: Settings, base: Settings, options, mesh, folder: Path) -> dict:
-    """Train for the budget, then score full rollouts of the held-out cases on the nodes of the configuration `base`."""
+def run_variant(settings: Settings, base: Settings, options, mesh, folder: Path, partial) -> dict:
+    """Train for the budget, then score full rollouts of the held-out cases on the nodes of the configuration `base`.
+
+    With a budget of minutes, `partial` is given the result so far once a minute.
+    """
     folder.mkdir(parents=True, exist_ok=True)
+    began, cpu = time.monotonic(), time.process_time()
     table = open_prior(settings.model, mesh, options.prior, options.vibration)
     trainer = make_trainer(settings, options.data, mesh, table, folder, choose_device(options.device))
     t = settings.train
-    trainer.steps_per_epoch = max(1, options.steps // (t.epochs + t.autoregressive_epochs))
-    trainer.total_steps = trainer.steps_per_epoch * (t.epochs + t.autoregressive_epochs)
-    t.evaluate_every = 10**9
-    began = time.process_time()
-    trainer.fit(options.max_minutes, report=lambda *a, **k: None)
-    seconds = time.process_time() - began
+
+    def spent() -> dict:
+        return {
+            "minutes": round((time.monotonic() - began) / 60, 3),
+            "cpu_seconds": round(time.process_time() - cpu, 1),
+        }
+
+    def scores(result: dict[str, np.ndarray]) -> dict:
+        return {
+            **autoregressive_scores(result),
+            "mse_per_step": np.nanmean(result["mse"], axis=0).tolist(),
+            "mse_min": np.nanmin(result["mse"], axis=0).tolist(),
+            "mse_max": np.nanmax(result["mse"], axis=0).tolist(),
+            "mse_by_case": np.nanmean(result["mse"][:, 1:], axis=1).tolist(),
+            "largest_displacement_mm": float(np.nanmax(result["moved"])),
+            "steps": trainer.step_count,
+            "samples": trainer.step_count * t.samples_per_step,
+            "cases": len(result["mse"]),
+        }
+
+    if options.minutes:
+        t.evaluate_cases, curve = options.cases, []
+
+        def keep(*_, **__) -> None:
+            if trainer.rollouts and (not curve or curve[-1]["steps"] < trainer.step_count):
+                now = {**scores(trainer.rollouts), **spent()}
+                curve.append({k: now[k] for k in ("minutes", "steps", "samples", "mse_mm2", "max_mm")})
+                partial({**now, "curve": curve, "unfinished": True})
+
+        trainer.fit(options.minutes - spent()["minutes"], report=keep, evaluate_minutes=1.0)
+        keep()
+    else:
+        trainer.steps_per_epoch = max(1, options.steps // (t.epochs + t.autoregressive_epochs))
+        trainer.total_steps = trainer.steps_per_epoch * (t.epochs + t.autoregressive_epochs)
+        t.evaluate_every, curve = 10**9, None
+        trainer.fit(options.max_minutes, report=lambda *a, **k: None)
+    budget = spent()
     count = min(options.cases, trainer.test_cache.case_count)
     cases = np.unique(np.linspace(0, trainer.test_cache.case_count - 1, count).round().astype(int))
     model = trainer.ema if trainer.ema is not None else trainer.model
     scored = training_nodes(mesh, build_graph(mesh, base.model.graph), base.train.loss_nodes)
     graph = build_graph(mesh, settings.model.graph)
     nodes = np.union1d(scored, graph.needed_nodes())
+    if options.minutes and np.array_equal(nodes, trainer.test_cache.nodes) and len(scored) == len(nodes):
+        return {**scores(trainer.rollouts), **budget, "curve": curve}
     cache = build_cache(
         folder / "cache", mesh, open_dataset(options.data, mesh).select("test", t.schemes), nodes, table
     )
     stepper = Stepper(model, mesh, graph, nodes, trainer.boundary, t.exact_boundary, trainer.device)
     result = cache_rollout(stepper, cache, cases, np.searchsorted(nodes, scored))
-    return {
-        **autoregressive_scores(result),
-        "mse_per_step": np.nanmean(result["mse"], axis=0).tolist(),
-        "mse_min": np.nanmin(result["mse"], axis=0).tolist(),
-        "mse_max": np.nanmax(result["mse"], axis=0).tolist(),
-        "largest_displacement_mm": float(np.nanmax(result["moved"])),
-        "steps": trainer.step_count,
-        "cpu_seconds": round(seconds, 1),
-        "cases": len(cases),
-    }
+    return {**scores(result), **budget, **({"curve": curve} if curve else {})}
 
 
 def reference_scores(trainer_cache, cases: np.ndarray) -> dict[str, float]:
@@ -129,36 +158,53 @@ def reference_scores(trainer_cache, cases: np.ndarray) -> dict[str, float]:
 
 def ablate_command(options) -> int:
     torch.set_num_threads(options.threads)
-    base = load_settings(options.config)
-    mesh = find_mesh(options.mesh, options.data)
     out = Path(options.out)
     out.mkdir(parents=True, exist_ok=True)
     path = out / f"{options.suite}.json"
     results = json.loads(path.read_text()) if path.exists() else {"variants": {}, "references": {}}
-    suite = variants(options.suite, base)
+    if options.page:  # a page without marks fails before hours of work
+        replaced(options.page.read_text(), marks(options.suite, options.label), [], options.page)
+    if options.merge:
+        for source in options.merge:
+            part = json.loads(source.read_text())
+            results = {**part, "variants": {**results["variants"], **part["variants"]}}
+        order = list(variants(options.suite, Settings("")))
+    else:
+        if not (options.config and options.data):
+            raise InputError("ablate needs --config and --data, or --merge with files of finished runs")
+        base = load_settings(options.config)
+        order = list(variants(options.suite, base))
+        train_variants(results, base, options, path)
+    results["variants"] = {n: results["variants"][n] for n in order if n in results["variants"]}
+    write_report(options.suite, results, out, options.page, options.label)
+    print((out / f"{options.suite}.md").read_text())
+    return 0
+
+
+def train_variants(results: dict, base: Settings, options, path: Path) -> None:
+    """Train what `--only` asks for and `results` lacks; `path` has the results after each variant."""
+    mesh, work, suite = find_mesh(options.mesh, options.data), path.parent / "work", variants(options.suite, base)
     unknown = [n for n in options.only or [] if n not in suite]
     if unknown:
         raise InputError(f"--only: {unknown[0]!r} is not a variant of {options.suite}; known are {', '.join(suite)}")
-    if options.page:  # a page without marks fails before hours of work
-        replaced(options.page.read_text(), f"ablate {options.suite}", [], options.page)
-    for name, settings in suite.items():
-        if name in results["variants"] or (options.only and name not in options.only):
-            continue
-        results["variants"][name] = run_variant(settings, base, options, mesh, out / "work")
-        print(name, {k: v for k, v in results["variants"][name].items() if not isinstance(v, list)}, flush=True)
-        path.write_text(json.dumps(results))
-    trainer = make_trainer(
-        base, options.data, mesh, open_prior(base.model, mesh, options.prior, options.vibration), out / "work", "cpu"
-    )
+    table = open_prior(base.model, mesh, options.prior, options.vibration)
+    plain = copy.deepcopy(base)
+    plain.train.resident_gb = 0.0
+    trainer = make_trainer(plain, options.data, mesh, table, work, "cpu")
     count = min(options.cases, trainer.test_cache.case_count)
     cases = np.unique(np.linspace(0, trainer.test_cache.case_count - 1, count).round().astype(int))
     results["references"] = reference_scores(trainer.test_cache, cases)
-    results["budget"] = {
-        "optimiser_steps": options.steps,
-        "config": base.name,
-        "train_cases": trainer.train_cache.case_count,
-    }
-    results["variants"] = {n: results["variants"][n] for n in suite if n in results["variants"]}
-    write_report(options.suite, results, out, options.page)
-    print((out / f"{options.suite}.md").read_text())
-    return 0
+    results["budget"] = {"config": base.name, "train_cases": trainer.train_cache.case_count}
+    results["budget"] |= {"minutes": options.minutes} if options.minutes else {"optimiser_steps": options.steps}
+    for name, settings in suite.items():
+        finished = name in results["variants"] and not results["variants"][name].get("unfinished")
+        if finished or (options.only and name not in options.only):
+            continue
+
+        def keep(row: dict, name: str = name) -> None:
+            results["variants"][name] = row
+            path.with_suffix(".tmp").write_text(json.dumps(results))
+            path.with_suffix(".tmp").rename(path)
+
+        keep(run_variant(settings, base, options, mesh, work, keep))
+        print(name, {k: v for k, v in results["variants"][name].items() if not isinstance(v, list)}, flush=True)

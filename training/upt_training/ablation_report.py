@@ -12,18 +12,30 @@ from upt_training.page import write_table
 TEACHER = "teacher forcing"
 
 
+def marks(suite: str, label: str) -> str:
+    """Name of the table in a page; images begin with the label too."""
+    return f"ablate {suite} {label}".strip()
+
+
 def table(results: dict) -> list[str]:
     """Markdown: a row a variant, then the reference scores."""
-    lines = ["| variant | MSE, mm² | max error, mm | steps | CPU s |", "|---|---|---|---|---|"]
+    timed = "minutes" in results.get("budget", {})
+    head = ["samples", "minutes"] if timed else ["CPU s"]
+    lines = [f"| variant | MSE, mm² | max error, mm | steps | {' | '.join(head)} |", "|---" * (4 + len(head)) + "|"]
     for name, r in results["variants"].items():
-        lines.append(f"| {name} | {r['mse_mm2']:.4f} | {r['max_mm']:.2f} | {r['steps']} | {r['cpu_seconds']:.0f} |")
+        spent = f"{r['samples']:,} | {r['minutes']:.1f}" if timed else f"{r['cpu_seconds']:.0f}"
+        ended = ", cut short" if r.get("unfinished") else ""
+        lines.append(f"| {name}{ended} | {r['mse_mm2']:.4f} | {r['max_mm']:.2f} | {r['steps']} | {spent} |")
     for name, value in results["references"].items():
-        lines.append(f"| *{name}* | {value:.4f} | | | |")
+        lines.append(f"| *{name}* | {value:.4f} |{' |' * (2 + len(head))}")
     return lines
 
 
-def write_report(suite: str, results: dict, out: Path, page: Path | None) -> None:
-    """`OUT/SUITE.json`, `OUT/SUITE.md`, plots in `OUT`; with `page`, also into it and into `images/` beside it."""
+def write_report(suite: str, results: dict, out: Path, page: Path | None, label: str = "") -> None:
+    """`OUT/SUITE.json`, `OUT/SUITE.md`, plots in `OUT`; with `page`, also into it and into `images/` beside it.
+
+    `label` tells two reports of one suite apart: it is part of the page's marks and of the images' names.
+    """
     (out / f"{suite}.json").write_text(json.dumps(results, indent=1) + "\n")
     lines = table(results)
     (out / f"{suite}.md").write_text("\n".join(lines) + "\n")
@@ -31,9 +43,9 @@ def write_report(suite: str, results: dict, out: Path, page: Path | None) -> Non
     plots = window_plots(results) if suite == "windows" else {"ablation": trick_plot(results)}
     for name, figure in plots.items():
         for folder in folders:
-            figure.savefig(folder / f"{name}.png", dpi=130)
+            figure.savefig(folder / f"{label}-{name}.png".removeprefix("-"), dpi=130)
     if page is not None:
-        write_table(page, f"ablate {suite}", lines)
+        write_table(page, marks(suite, label), lines)
 
 
 def _pyplot():

@@ -13,11 +13,9 @@ import tempfile
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import MethodType
 
 import numpy as np
 import torch
-from torch.nn import functional
 
 from upt_training.config import Settings, load_settings
 from upt_training.errors import InputError
@@ -96,12 +94,6 @@ class PlainWindows(Windows):
         return state, frame, losses, errors
 
 
-def padded_aggregate(self, source, target, neighbours, mask) -> torch.Tensor:
-    """The mean of the messages over rows padded to the largest degree."""
-    edge = functional.gelu(source[..., neighbours, :] + target[..., :, None, :])
-    return (edge * mask[..., None]).sum(-2) / mask.sum(-1, keepdim=True)
-
-
 def trainer_of(lever: Lever, settings: Settings, options, mesh, table, folder: Path) -> Trainer:
     """A trainer of the configuration with this lever's settings; corrupted states and noise are left out."""
     settings = copy.deepcopy(settings)
@@ -111,7 +103,7 @@ def trainer_of(lever: Lever, settings: Settings, options, mesh, table, folder: P
     if options.init:
         trainer.start_from(options.init)
     if not lever.flat:
-        trainer.model.aggregate = MethodType(padded_aggregate, trainer.model)
+        trainer.model.padded = True
     if not lever.lazy:
         w = trainer.windows
         trainer.windows = PlainWindows(w.settings, w.stepper, w.cache, w.pool, w.generator, w.draw, w.noise)

@@ -93,6 +93,7 @@ class TrainSettings:
     scored_rows: int = 0  # rows a prediction is scored on, drawn anew for each; 0: all of the subset
     drawn_supernodes: int = 0  # supernodes a window is encoded with, drawn anew for each; 0: all
     exact_boundary: bool = False  # held nodes 0 and contact nodes c inside the training rollout
+    cuda_graph: bool = False  # on a GPU a window's gradient is one CUDA graph (`stf` and `teacher`, captured.py)
     bf16: bool = False  # bfloat16 products where the device has fast ones
     resident_gb: float = 0.0  # training cases that take no more than this are held in memory; 0: memory-mapped
     seed: int = 1

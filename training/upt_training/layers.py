@@ -6,6 +6,8 @@ All tensors are `[..., tokens, width]`; any leading batch dimensions.
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 import torch
 from torch import nn
@@ -22,9 +24,15 @@ def sincos_frequencies(width: int) -> np.ndarray:
     return (10000.0 ** (-2.0 * np.arange(m // 2) / m)).astype(np.float32)
 
 
+@lru_cache
+def frequencies_on(width: int, device: torch.device) -> torch.Tensor:
+    """`sincos_frequencies`, copied to a device once: a CUDA graph holds no such copy."""
+    return torch.from_numpy(sincos_frequencies(width)).to(device)
+
+
 def sincos(coordinates: torch.Tensor, width: int) -> torch.Tensor:
     """`[n, 3]` model coordinates -> `[n, width]`: per coordinate `[sin | cos]`, zeros appended."""
-    frequency = torch.from_numpy(sincos_frequencies(width)).to(coordinates)
+    frequency = frequencies_on(width, coordinates.device).to(coordinates.dtype)
     angle = coordinates[..., :, None] * frequency
     wave = torch.cat([angle.sin(), angle.cos()], dim=-1).flatten(-2)
     return functional.pad(wave, (0, width - wave.shape[-1]))

@@ -37,6 +37,7 @@ class Upt(nn.Module):
     def __init__(self, settings: ModelSettings):
         super().__init__()
         self.settings = settings
+        self.padded = False  # messages over padded rows in place of the edges that there are
         d = settings.encoder
         self.embed = nn.Linear(settings.feature_count, d)
         self.message1 = nn.Linear(2 * d, d)
@@ -123,8 +124,13 @@ class Upt(nn.Module):
     def aggregate(self, source, target, neighbours, mask) -> torch.Tensor:
         """Mean over a row of `GELU(source_j + target_i)`: `[..., n, d]`, `[..., n_S, d]` -> `[..., n_S, d]`.
 
-        Computed on the edges that there are: on coarse meshes half of the padded rows is padding.
+        Computed on the edges that there are: on coarse meshes half of the padded rows is padding. With `padded` over
+        the rows as they are, whose shape does not depend on what was drawn.
         """
+        if self.padded:
+            sent = source.index_select(-2, neighbours.flatten()).unflatten(-2, neighbours.shape)
+            edge = functional.gelu(sent + target[..., :, None, :])
+            return (edge * mask[..., None]).sum(-2) / mask.sum(-1, keepdim=True)
         receivers, column = mask.nonzero(as_tuple=True)
         senders = neighbours[receivers, column]
         edge = functional.gelu(source.index_select(-2, senders) + target.index_select(-2, receivers))
@@ -157,7 +163,7 @@ class Upt(nn.Module):
         with torch.autocast(features.device.type, enabled=False):  # differences of the features need float32
             w_source, w_target = self.encoder_weights()
             source = features @ w_source.T + tables[0]
-            target = features[..., supernodes, :] @ w_target.T + tables[1][supernodes]
+            target = features.index_select(-2, supernodes) @ w_target.T + tables[1].index_select(0, supernodes)
         k, v = self.latent(self.aggregate(source, target, neighbours, mask))
         if scored is None:
             return self.decode(query, k, v)
@@ -166,7 +172,7 @@ class Upt(nn.Module):
         if len(readers) > 0:
             with torch.no_grad():
                 out[readers[:, None], read] = self.decode(query[read], k[readers], v[readers]).float()
-        return out.index_copy(-2, rows, self.decode(query[rows], k, v).float())
+        return out.index_copy(-2, rows, self.decode(query.index_select(0, rows), k, v).float())
 
     def forward_unfactored(self, features, positions, neighbours, mask, supernodes) -> torch.Tensor:
         """The paper's layout, edge by edge, all nodes decoded; for the export's self-check."""

@@ -104,6 +104,8 @@ def train_command(options) -> int:
     torch.set_num_threads(options.threads)
     device = choose_device(options.device)
     out = Path(options.out)
+    if options.evaluate_minutes > 0 and (options.resume or options.max_minutes <= 0):
+        raise InputError("--evaluate-minutes fills --max-minutes of a new run: give the latter, and leave out --resume")
     if options.resume and (out / "config.toml").exists():
         settings = load_settings(out / "config.toml")
     else:
@@ -134,7 +136,11 @@ def train_command(options) -> int:
         print(f"{settings.name}: {trainer.model.parameter_count()} parameters, {trainer.train_cache.case_count} cases, "
               f"{trainer.stepper.node_count} of {mesh.node_count} nodes, {trainer.total_steps} steps, "
               f"from step {trainer.step_count}, {device}", flush=True)  # fmt: skip
-    ended = trainer.fit(options.max_minutes, checkpoint_minutes=options.checkpoint_minutes)
+    ended = trainer.fit(
+        options.max_minutes,
+        checkpoint_minutes=options.checkpoint_minutes,
+        evaluate_minutes=options.evaluate_minutes,
+    )
     if trainer.rank == 0:
         print(
             f"{ended} at step {trainer.step_count}; best autoregressive MSE {trainer.best:.5f} mm²",

@@ -18,6 +18,7 @@ import torch
 import torch.distributed as distributed
 
 from upt_training.bundle_weights import bundle_state
+from upt_training.captured import CapturedWindows
 from upt_training.config import Settings
 from upt_training.errors import InputError
 from upt_training.field_cache import FieldCache
@@ -74,6 +75,9 @@ class Trainer:
         slots = max(POOL_SLOTS, POOL_BATCHES * t.micro_batch)
         self.pool = ReplayPool(train, slots, self.generator, self.device) if t.strategy == "replay" else None
         self.windows = Windows(settings, self.stepper, train, self.pool, self.generator, self.draw, self.noise)
+        self.captured: CapturedWindows | None = None
+        self.rollouts: dict[str, np.ndarray] = {}  # of the last evaluation: errors by case and step
+        self.slice: tuple[float, float] | None = None  # where the clock leads the schedule: its start and its seconds
         self.step_count, self.best, self.stale = 0, float("inf"), 0
         self.core_seconds = 0.0  # CPU time of this process in training steps, over all resumed parts
         self.loss_scale = 1.0 / float((self.model.output_scale**2).sum())
@@ -87,18 +91,29 @@ class Trainer:
         t = self.settings.train
         if t.strategy == "teacher":
             return 1.0
-        return max(0.0, 1.0 - self.step_count / max(1, self.steps_per_epoch * t.epochs))
+        return max(0.0, 1.0 - self.epoch() / max(1, t.epochs))
+
+    def epoch(self) -> float:
+        """How far the schedule is, by steps, or by the clock where it fills a slice of time (`fit`)."""
+        if self.slice is None:
+            return self.step_count / self.steps_per_epoch
+        t, (began, seconds) = self.settings.train, self.slice
+        return (t.epochs + t.autoregressive_epochs) * min(1.0, (time.monotonic() - began) / seconds)
 
     def train_step(self) -> tuple[float, float]:
         """One optimiser step over `accumulate` windows: mean loss in mm² and the gradient norm before clipping."""
         t, began = self.settings.train, time.process_time()
-        rate = learning_rate(t, self.step_count / self.steps_per_epoch)
+        rate = learning_rate(t, self.epoch())
         for group in self.optimiser.param_groups:
             group["lr"] = rate
         self.model.train()
         self.optimiser.zero_grad(set_to_none=True)
         p, total = self.teacher_probability(), 0.0
-        for _ in range(t.accumulate):
+        if t.cuda_graph and self.device.type == "cuda":
+            if self.captured is None:
+                self.captured = CapturedWindows(self.windows, self.loss_scale, capture=True)
+            total = self.captured.step(p)
+        for _ in range(t.accumulate if self.captured is None else 0):
             loss, mse = self.windows.loss(p)
             (loss * self.loss_scale / t.accumulate).backward()
             total += mse / t.accumulate
@@ -124,17 +139,23 @@ class Trainer:
         count = min(self.settings.train.evaluate_cases, self.test_cache.case_count)
         cases = np.unique(np.linspace(0, self.test_cache.case_count - 1, count).round().astype(int))
         self.stepper.model = self.ema if self.ema is not None else self.model
-        scores = autoregressive_scores(cache_rollout(self.stepper, self.test_cache, cases))
+        self.rollouts = cache_rollout(self.stepper, self.test_cache, cases)
         self.stepper.model = self.model
-        return scores
+        return autoregressive_scores(self.rollouts)
 
-    def fit(self, max_minutes: float = 0.0, report=print, checkpoint_minutes: float = 0.0) -> str:
+    def fit(
+        self, max_minutes: float = 0.0, report=print, checkpoint_minutes: float = 0.0, evaluate_minutes: float = 0.0
+    ) -> str:
         """Train to the end, to early stopping or to the time limit; returns which. Resumes exactly from `last.pt`.
 
-        `last.pt` is written at each evaluation, at the end, and every `checkpoint_minutes` if that is above 0.
+        `last.pt` is written at each evaluation, at the end, and every `checkpoint_minutes` if that is above 0. With
+        `evaluate_minutes` above 0 the clock leads: the schedule fills `max_minutes` however many steps that makes,
+        and evaluations come after so many minutes and at the end.
         """
         t, began, first = self.settings.train, time.monotonic(), self.step_count
-        saved = began
+        saved = evaluated = began
+        if evaluate_minutes > 0:
+            self.slice, self.total_steps = (began, 60.0 * max_minutes), 10**9
         running, norms, spoken = [], [], time.monotonic()
         while self.step_count < self.total_steps:
             loss, norm = self.train_step()
@@ -146,14 +167,19 @@ class Trainer:
                 left = elapsed / (self.step_count - first) * (self.total_steps - self.step_count)
                 report(f"step {self.step_count}/{self.total_steps} loss {np.mean(running[-200:]):.4f} mm², "
                        f"{left / 60:.0f} min left", flush=True)  # fmt: skip
-            if self.step_count % (self.steps_per_epoch * t.evaluate_every) == 0 or self.step_count == self.total_steps:
+            ended = bool(max_minutes) and self._any_process(elapsed > 60 * max_minutes)
+            due = self.step_count % (self.steps_per_epoch * t.evaluate_every) == 0
+            if evaluate_minutes > 0:
+                due = ended or time.monotonic() - evaluated > 60 * evaluate_minutes
+            if due or self.step_count == self.total_steps:
                 if self._evaluate_and_save(running, norms, elapsed, report):
                     return "stopped early"
                 running, norms, saved = [], [], time.monotonic()
+                evaluated = saved
             elif checkpoint_minutes and time.monotonic() - saved > 60 * checkpoint_minutes:
                 self.save("last.pt")
                 saved = time.monotonic()
-            if max_minutes and self._any_process(elapsed > 60 * max_minutes):
+            if ended:
                 self.save("last.pt")
                 return "time limit"
         return "finished"
@@ -171,9 +197,9 @@ class Trainer:
         scores = self.evaluate()
         row = {
             "step": self.step_count,
-            "epoch": round(self.step_count / self.steps_per_epoch, 3),
+            "epoch": round(self.epoch(), 3),
             "teacher_probability": round(self.teacher_probability(), 4),
-            "learning_rate": learning_rate(t, self.step_count / self.steps_per_epoch),
+            "learning_rate": learning_rate(t, self.epoch()),
             "train_mse_mm2": float(np.mean(running)) if running else float("nan"),
             "max_gradient_norm": float(np.max(norms)) if norms else float("nan"),
             **{f"test_{k}": v for k, v in scores.items()},
