@@ -111,16 +111,16 @@ def run_variant(settings: Settings, base: Settings, options, mesh, folder: Path,
         }
 
     if options.minutes:
-        t.evaluate_cases, curve = options.cases, []
+        t.evaluate_cases, curve, kept = options.cases, [], [trainer.rollouts]
 
         def keep(*_, **__) -> None:
-            if trainer.rollouts and (not curve or curve[-1]["steps"] < trainer.step_count):
+            if trainer.rollouts is not kept[0]:  # other messages come between scores
+                kept[0] = trainer.rollouts
                 now = {**scores(trainer.rollouts), **spent()}
                 curve.append({k: now[k] for k in ("minutes", "steps", "samples", "mse_mm2", "max_mm")})
                 partial({**now, "curve": curve, "unfinished": True})
 
         trainer.fit(options.minutes - spent()["minutes"], report=keep, evaluate_minutes=1.0)
-        keep()
     else:
         trainer.steps_per_epoch = max(1, options.steps // (t.epochs + t.autoregressive_epochs))
         trainer.total_steps = trainer.steps_per_epoch * (t.epochs + t.autoregressive_epochs)
