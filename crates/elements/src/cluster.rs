@@ -9,6 +9,7 @@ use lanes::WIDTH;
 use std::collections::{HashMap, TryReserveError};
 
 /// Sixteen clusters of one kind, structure of arrays. All tetrahedra of a cluster share the edge of its nodes 0 and 1.
+#[derive(Clone, Copy)]
 #[repr(C, align(64))]
 pub struct Cluster<const NODES: usize, const TETS: usize> {
     /// `springs[t]`: `-mu V G`, µN/mm, entries 11, 12, 13, 22, 23, 33 in the order of `corners(t)`, with the rest
@@ -41,6 +42,20 @@ impl<const NODES: usize, const TETS: usize> Cluster<NODES, TETS> {
             }
             self.inverse[tet][at] = source.inverse[tet][lane];
             self.bulk[tet][at] = source.bulk[tet][lane];
+        }
+    }
+
+    /// Lane `at` becomes the shape and the slots of another batch's cluster, without stiffness.
+    pub fn take_shape(&mut self, source: &Self, lane: usize, at: usize) {
+        for row in self.springs.as_flattened_mut() {
+            row[at] = 0.0;
+        }
+        for tet in 0..TETS {
+            self.inverse[tet][at] = source.inverse[tet][lane];
+            self.bulk[tet][at] = 0.0;
+        }
+        for (own, source) in self.slots.iter_mut().zip(&source.slots) {
+            own[at] = source[lane];
         }
     }
 

@@ -3,6 +3,7 @@
 use lanes::WIDTH;
 
 /// Of sixteen clusters with `TETS` tetrahedra each.
+#[derive(Clone, Copy)]
 #[repr(C, align(64))]
 pub struct Gradients<const TETS: usize> {
     /// `rows[t][3 k + i]`: component `i` of the gradient of corner `k` of `corners(t)`, 1/mm.

@@ -27,6 +27,8 @@ pub struct ElementForces {
     pub(crate) partition: Partition,
     pub(crate) kernels: Kernels,
     node_count: usize,
+    /// Of each chunk that a cut has made: the chunk of the intact body that its elements were in.
+    parents: Vec<u32>,
 }
 
 /// A slot as the kernels read it.
@@ -84,7 +86,23 @@ impl ElementForces {
             kernels: kernels.unwrap_or_else(|| panic!("{isa:?} is not available here")),
             partition: Partition::in_chunks(body, material, elements)?,
             node_count: body.positions.len(),
+            parents: Vec::new(),
         })
+    }
+
+    /// The same kernels over what a cut has made of the body.
+    pub(crate) fn with(&self, partition: Partition, parents: Vec<u32>, node_count: usize) -> Self {
+        Self {
+            partition,
+            kernels: self.kernels,
+            node_count,
+            parents,
+        }
+    }
+
+    /// Of each chunk that a cut has made, behind those of the intact body: the one of these that its elements were in; ascending.
+    pub fn cut_chunks(&self) -> &[u32] {
+        &self.parents
     }
 
     /// Nodes of the body, `K`.

@@ -14,6 +14,7 @@
 mod batches;
 mod chunks;
 mod cluster;
+mod cut;
 mod dispatch;
 mod fault;
 mod gradients;
@@ -33,6 +34,7 @@ mod tetrahedron;
 pub mod vector;
 
 pub use batches::{Element, Kind, PADDING, shape_gradients};
+pub use cut::CutTetrahedra;
 pub use dispatch::Kernels;
 pub use fault::MaterialError;
 pub use internal_forces::{ElementForces, ParallelFor, Scratch};

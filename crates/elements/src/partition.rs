@@ -120,9 +120,10 @@ impl Partition {
             moduli: material.moduli(),
         };
         for (chunk, leaf) in leaves().enumerate() {
-            partition.push_chunk(chunk as u32, leaf, &owner, mesh, material)?;
+            let is_own = |node: u32| owner[node as usize] == chunk as u32;
+            partition.push_chunk(leaf, is_own, mesh, material)?;
         }
-        partition.connect()?;
+        partition.connect_from(0)?;
         partition.fit_zeros()?;
         Ok(partition)
     }
@@ -158,11 +159,11 @@ impl Partition {
         }
     }
 
-    fn push_chunk(
+    /// A chunk of some elements behind the others; `is_own` says whether it owns a node.
+    pub(crate) fn push_chunk(
         &mut self,
-        chunk: u32,
         leaf: &[u32],
-        owner: &[u32],
+        is_own: impl Fn(u32) -> bool,
         mesh: Tetrahedra<'_>,
         material: &Material,
     ) -> Result<(), TryReserveError> {
@@ -172,7 +173,7 @@ impl Partition {
         nodes.extend(leaf.iter().flat_map(|e| tets[*e as usize]));
         nodes.sort_unstable();
         nodes.dedup();
-        let owned = |node: &&u32| owner[**node as usize] == chunk;
+        let owned = |node: &&u32| is_own(**node);
         let count = nodes.iter().filter(owned).count();
         let (mut own, mut ghost) = (room(count)?, room(nodes.len() - count)?);
         own.extend(nodes.iter().filter(owned));
@@ -279,21 +280,21 @@ impl Partition {
             .chain(self.singles.elements(chunk.singles.clone()))
     }
 
-    /// Turns ghost node numbers into owner slots and lists the forces that each owner collects.
-    fn connect(&mut self) -> Result<(), TryReserveError> {
+    /// Turns the ghost node numbers of the chunks from the `first`-th on into owner slots and lists the forces that each owner collects from them.
+    pub(crate) fn connect_from(&mut self, first: usize) -> Result<(), TryReserveError> {
         let starts = collected(self.chunks.iter().map(|c| c.first))?;
         let owner = |slot: u32| starts.partition_point(|s| *s <= slot as usize) - 1;
         let mut counts = filled(self.chunks.len(), 0)?;
-        for chunk in &mut self.chunks {
+        for chunk in &mut self.chunks[first..] {
             for ghost in &mut chunk.ghosts {
                 *ghost = self.slot_of_node[*ghost as usize];
                 counts[owner(*ghost)] += 1;
             }
         }
         for (chunk, count) in self.chunks.iter_mut().zip(counts) {
-            chunk.contributions = room(count)?;
+            chunk.contributions.try_reserve_exact(count)?;
         }
-        for at in 0..self.chunks.len() {
+        for at in first..self.chunks.len() {
             for offset in 0..self.chunks[at].ghosts.len() {
                 let chunk = &self.chunks[at];
                 let (slot, here) = (chunk.ghosts[offset], chunk.first + chunk.owned + offset);

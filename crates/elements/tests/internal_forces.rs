@@ -1,6 +1,8 @@
 //! The SIMD forces of a whole body against the f64 law, element by element.
 
-use elements::{ElementForces, Isa, Law, Material, MooneyRivlin, Ogden, Subset, Tetrahedron};
+use elements::{
+    CutTetrahedra, ElementForces, Isa, Law, Material, MooneyRivlin, Ogden, Subset, Tetrahedron,
+};
 use tissue::mesh::{Mesh, box_phantom};
 
 fn body() -> Mesh {
@@ -255,6 +257,86 @@ fn a_subset_has_the_forces_of_the_body_where_it_is_whole() {
                 }
                 let own: f64 = subset.tetrahedra().map(|(_, element)| element.volume).sum();
                 assert!((own - volume).abs() <= 1e-5 * volume, "{own} of {volume}");
+            }
+        }
+    }
+}
+
+/// A body of which some elements are gone and others have become two, one of them with copies of two nodes, against the same elements packed from nothing.
+#[test]
+fn a_cut_body_has_the_forces_of_its_elements_whatever_they_were_packed_with() {
+    let mesh = body();
+    let count = mesh.tets.len();
+    let is_gone = |element: &u32| mesh.tets[*element as usize].contains(&0);
+    let mut changed: Vec<u32> = (0..count as u32).filter(|e| e % 7 == 0).collect();
+    changed.extend((0..count as u32).filter(is_gone));
+    changed.sort_unstable();
+    changed.dedup();
+    let mut positions = mesh.positions.clone();
+    let mut cells = Vec::new();
+    for (place, element) in changed
+        .iter()
+        .enumerate()
+        .filter(|(at, element)| at % 3 > 0 && !is_gone(element))
+    {
+        let mut corners = mesh.tets[*element as usize];
+        cells.push((
+            place as u32,
+            corners,
+            0.4 * mesh.stiffness[*element as usize],
+        ));
+        for corner in &mut corners[..2] {
+            positions.push(mesh.positions[*corner as usize]);
+            *corner = positions.len() as u32 - 1;
+        }
+        cells.push((
+            place as u32,
+            corners,
+            0.6 * mesh.stiffness[*element as usize],
+        ));
+    }
+    let mut whole = mesh.clone();
+    let is_left = |element: &usize| changed.binary_search(&(*element as u32)).is_err();
+    let left: Vec<usize> = (0..count).filter(is_left).collect();
+    whole.tets = left.iter().map(|element| mesh.tets[*element]).collect();
+    whole.stiffness = left
+        .iter()
+        .map(|element| mesh.stiffness[*element])
+        .collect();
+    whole.tets.extend(cells.iter().map(|cell| cell.1));
+    whole.stiffness.extend(cells.iter().map(|cell| cell.2));
+    whole.positions = positions;
+    let mut u = wave(&whole, 0.3);
+    // What no element is left of may be turned inside out.
+    assert!(!whole.tets.as_flattened().contains(&0));
+    u[0] += 50.0;
+    for material in [Material::default(), ogden_laws()[0]] {
+        let (exact, least) = exact(&whole, &material, &u);
+        for isa in Isa::available() {
+            let intact = ElementForces::new(mesh.tetrahedra(), &material, isa).unwrap();
+            let cut = CutTetrahedra {
+                positions: &whole.positions,
+                tets: &mesh.tets,
+                stiffness: &mesh.stiffness,
+                changed: &changed,
+                cells: &cells,
+            };
+            let own = intact.cut(cut, &material).unwrap();
+            let mut numbers: Vec<u32> = (0..own.chunk_count())
+                .flat_map(|chunk| own.chunk_tetrahedra(chunk).map(|(number, _)| number))
+                .collect();
+            numbers.sort_unstable();
+            let behind = count as u32..(count + cells.len()) as u32;
+            let wanted: Vec<u32> = left.iter().map(|e| *e as u32).chain(behind).collect();
+            assert_eq!(numbers, wanted);
+            let mut scratch = own.scratch(1).unwrap();
+            let mut out = vec![f32::NAN; u.len()];
+            let det = own.evaluate(&u, &mut scratch, &mut out, &serial);
+            assert!((f64::from(det) - least).abs() < 1e-4, "{det} {least}");
+            let largest = exact.iter().fold(0.0f64, |most, f| most.max(f.abs()));
+            for (found, wanted) in out.iter().zip(&exact) {
+                let off = (f64::from(*found) - wanted).abs();
+                assert!(off < 2e-5 * largest, "{isa:?}: {found} {wanted}");
             }
         }
     }

@@ -1,0 +1,242 @@
+//! A body some of whose elements have become others: a cut, a resection, other stiffness. The packing of the body before stays, and what is new is packed
+//! behind it.
+//!
+//! A cluster with an element that has changed is taken out of its lane. Its other elements and what the changed ones have become lie in chunks of their own,
+//! one or more for each chunk that they were in. What results depends on the body before and the change alone, not on the way to it.
+
+use crate::batches::{Kind, PADDING};
+use crate::internal_forces::ElementForces;
+use crate::material::Material;
+use crate::partition::{CHUNK_ELEMENTS, Chunk, Partition};
+use crate::room::{collected, filled, push, room};
+use crate::tetrahedra::Tetrahedra;
+use lanes::WIDTH;
+use std::collections::TryReserveError;
+
+/// What an intact body has become.
+#[derive(Clone, Copy, Debug)]
+pub struct CutTetrahedra<'a> {
+    /// Rest positions `[K',3]`, mm: those of the intact body, and behind them those of copies of nodes.
+    pub positions: &'a [[f32; 3]],
+    /// Corners of the intact body's elements `[T,4]`.
+    pub tets: &'a [[u32; 4]],
+    /// Stiffness of the intact body's elements over the material's `[T]`; empty where it is uniform.
+    pub stiffness: &'a [f32],
+    /// Elements of the intact body that are there no more, ascending.
+    pub changed: &'a [u32],
+    /// What is there in their place: the place in `changed`, corners, stiffness over the material's; ascending. The number of the `i`-th is `T + i`.
+    pub cells: &'a [(u32, [u32; 4], f32)],
+}
+
+/// An element of a new chunk.
+struct Packed {
+    number: u32,
+    corners: [u32; 4],
+    stiffness: f32,
+}
+
+impl ElementForces {
+    /// This body, after some of its elements have become others.
+    ///
+    /// # Errors
+    /// No memory.
+    pub fn cut(
+        &self,
+        cut: CutTetrahedra<'_>,
+        material: &Material,
+    ) -> Result<Self, TryReserveError> {
+        let mut partition = self.partition.copied()?;
+        let more = cut.positions.len() - partition.slot_of_node.len();
+        partition.slot_of_node.try_reserve_exact(more)?;
+        partition.slot_of_node.resize(cut.positions.len(), PADDING);
+        let mut is_changed = filled(cut.tets.len(), false)?;
+        for &element in cut.changed {
+            is_changed[element as usize] = true;
+        }
+        let base = partition.chunks.len();
+        let mut parents = Vec::new();
+        // The chunk of each changed element, by its place in `changed`.
+        let mut chunk_of = filled(cut.changed.len(), 0)?;
+        let mut out = Vec::new();
+        let mut packed = room(base)?;
+        for at in 0..base {
+            out.clear();
+            let Partition {
+                chunks,
+                octahedra,
+                pairs,
+                singles,
+                ..
+            } = &mut partition;
+            let chunk = &mut chunks[at];
+            octahedra.take_out(&mut chunk.octahedra, &is_changed, &mut out)?;
+            pairs.take_out(&mut chunk.pairs, &is_changed, &mut out)?;
+            singles.take_out(&mut chunk.singles, &is_changed, &mut out)?;
+            out.sort_unstable();
+            let mut own = Vec::new();
+            for &number in &out {
+                match cut.changed.binary_search(&number) {
+                    Ok(place) => chunk_of[place] = at,
+                    Err(_) => push(
+                        &mut own,
+                        Packed {
+                            number,
+                            corners: cut.tets[number as usize],
+                            stiffness: cut.stiffness.get(number as usize).copied().unwrap_or(1.0),
+                        },
+                    )?,
+                }
+            }
+            packed.push(own);
+        }
+        for (at, &(place, corners, stiffness)) in cut.cells.iter().enumerate() {
+            let number = (cut.tets.len() + at) as u32;
+            let own = Packed {
+                number,
+                corners,
+                stiffness,
+            };
+            push(&mut packed[chunk_of[place as usize]], own)?;
+        }
+        for (at, own) in packed.iter().enumerate() {
+            for own in own.chunks(CHUNK_ELEMENTS) {
+                partition.push_packed(own, cut.positions, material)?;
+                push(&mut parents, at as u32)?;
+            }
+        }
+        partition.connect_from(base)?;
+        partition.fit_zeros()?;
+        Ok(self.with(partition, parents, cut.positions.len()))
+    }
+}
+
+impl Partition {
+    /// A copy.
+    fn copied(&self) -> Result<Partition, TryReserveError> {
+        let mut chunks = room(self.chunks.len() + 8)?;
+        for chunk in &self.chunks {
+            chunks.push(Chunk {
+                ghosts: collected(chunk.ghosts.iter().copied())?,
+                contributions: collected(chunk.contributions.iter().copied())?,
+                octahedra: chunk.octahedra.clone(),
+                pairs: chunk.pairs.clone(),
+                singles: chunk.singles.clone(),
+                ..*chunk
+            });
+        }
+        let mut copy = Partition::empty(self.moduli);
+        copy.chunks = chunks;
+        copy.octahedra = self.octahedra.copied()?;
+        copy.pairs = self.pairs.copied()?;
+        copy.singles = self.singles.copied()?;
+        copy.node_of_slot = collected(self.node_of_slot.iter().copied())?;
+        copy.slot_of_node = collected(self.slot_of_node.iter().copied())?;
+        copy.rest = collected(self.rest.iter().copied())?;
+        Ok(copy)
+    }
+
+    /// A chunk of elements behind the others. It owns the nodes that have no owner yet.
+    fn push_packed(
+        &mut self,
+        elements: &[Packed],
+        positions: &[[f32; 3]],
+        material: &Material,
+    ) -> Result<(), TryReserveError> {
+        let tets = collected(elements.iter().map(|element| element.corners))?;
+        let stiffness = collected(elements.iter().map(|element| element.stiffness))?;
+        let leaf = collected(0..elements.len() as u32)?;
+        let mut fresh = room(4 * tets.len())?;
+        let owners = &self.slot_of_node;
+        fresh.extend((tets.iter().flatten()).filter(|node| owners[**node as usize] == PADDING));
+        fresh.sort_unstable();
+        let mesh = Tetrahedra {
+            positions,
+            tets: &tets,
+            stiffness: &stiffness,
+        };
+        self.push_chunk(
+            &leaf,
+            |node| fresh.binary_search(&node).is_ok(),
+            mesh,
+            material,
+        )?;
+        let Some(chunk) = self.chunks.last() else {
+            return Ok(());
+        };
+        let number = |place: u32| elements[place as usize].number;
+        self.octahedra.renumber(chunk.octahedra.clone(), number);
+        self.pairs.renumber(chunk.pairs.clone(), number);
+        self.singles.renumber(chunk.singles.clone(), number);
+        Ok(())
+    }
+}
+
+impl<const NODES: usize, const TETS: usize> Kind<NODES, TETS> {
+    fn copied(&self) -> Result<Self, TryReserveError> {
+        Ok(Kind {
+            batches: collected(self.batches.iter().copied())?,
+            gradients: collected(self.gradients.iter().copied())?,
+            elements: collected(self.elements.iter().copied())?,
+        })
+    }
+
+    fn renumber(&mut self, batches: std::ops::Range<usize>, number: impl Fn(u32) -> u32) {
+        for element in self.elements[batches].as_flattened_mut().as_flattened_mut() {
+            if *element != PADDING {
+                *element = number(*element);
+            }
+        }
+    }
+
+    /// Takes the clusters out of which an element has changed; their elements go to `out`. A lane that is free has the shape of another one that is not, without
+    /// stiffness: what no element is left of must not show in det F.
+    fn take_out(
+        &mut self,
+        batches: &mut std::ops::Range<usize>,
+        is_changed: &[bool],
+        out: &mut Vec<u32>,
+    ) -> Result<(), TryReserveError> {
+        let is_out = |element: u32| element != PADDING && is_changed[element as usize];
+        let mut touched = Vec::new();
+        for batch in batches.clone() {
+            let mut is_touched = false;
+            for lane in 0..WIDTH {
+                let elements = &mut self.elements[batch];
+                if !elements.iter().any(|row| is_out(row[lane])) {
+                    continue;
+                }
+                for row in elements {
+                    push(out, std::mem::replace(&mut row[lane], PADDING))?;
+                }
+                is_touched = true;
+            }
+            if is_touched {
+                push(&mut touched, batch)?;
+            }
+        }
+        let live = |batch: usize| (0..WIDTH).find(|lane| self.elements[batch][0][*lane] != PADDING);
+        let Some(any) = batches
+            .clone()
+            .find_map(|batch| Some((batch, live(batch)?)))
+        else {
+            batches.end = batches.start;
+            return Ok(());
+        };
+        for batch in touched {
+            let from = live(batch).map_or(any, |lane| (batch, lane));
+            let source = self.batches[from.0];
+            let gradients = self.gradients.get(from.0).copied();
+            for lane in 0..WIDTH {
+                if self.elements[batch][0][lane] != PADDING {
+                    continue;
+                }
+                self.batches[batch].take_shape(&source, from.1, lane);
+                if let (Some(own), Some(source)) = (self.gradients.get_mut(batch), &gradients) {
+                    own.copy_lane(source, from.1, lane);
+                    own.volume.iter_mut().for_each(|row| row[lane] = 0.0);
+                }
+            }
+        }
+        Ok(())
+    }
+}
