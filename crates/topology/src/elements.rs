@@ -18,7 +18,26 @@ pub struct Element {
     pub stiffness: f32,
 }
 
+/// What of the mesh is not as it was.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Changes {
+    /// Elements with other cells or another stiffness, ascending.
+    pub gone: Vec<u32>,
+    /// What is there in their place, in their order.
+    pub new: Vec<Element>,
+}
+
 impl Body {
+    /// What is not as in the mesh.
+    pub fn changes(&self) -> Changes {
+        let gone: Vec<u32> = self.changed_elements().collect();
+        let new = gone.iter().flat_map(|element| self.elements_of(*element));
+        Changes {
+            new: new.collect(),
+            gone,
+        }
+    }
+
     /// All living elements: those that nothing has touched in the mesh's order, each where it was, and the cells of each touched one together.
     pub fn elements(&self) -> impl Iterator<Item = Element> + '_ {
         (0..self.mesh().element_count() as u32).flat_map(|parent| self.elements_of(parent))

@@ -34,7 +34,7 @@ pub mod sweep;
 mod touchable;
 
 pub use body::{Body, Cell, Change};
-pub use elements::Element;
+pub use elements::{Changes, Element};
 pub use error::TopologyError;
 pub use fragments::Fragment;
 pub use kept::Kept;

@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 use crate::body::{Body, Cell, Change, place};
 use crate::elements::filled;
 use crate::polytope::{Polytope, Weights};
-use crate::room::push;
+use crate::room::{collected, push};
 use crate::{Point, TopologyError};
 
 /// A cell of which less is left, as a part of its element, goes.
@@ -32,7 +32,13 @@ impl Body {
             });
         }
         let mut found = Vec::new();
+        let depths = collected(positions.len(), positions.iter().map(|at| depth(*at)))?;
+        let mut cut = self.cells.keys().peekable();
         for element in 0..self.mesh().element_count() as u32 {
+            let is_whole = cut.next_if_eq(&&element).is_none();
+            if is_whole && is_outside(self.mesh().tet(element), positions, &depths) {
+                continue;
+            }
             let cells = self.cells(element);
             for (index, (cell, share)) in cells.iter().zip(filled(&cells)).enumerate() {
                 if cell.is_alive {
@@ -146,6 +152,16 @@ impl Body {
         }
         Ok(())
     }
+}
+
+/// Whether depth at its first corner says that no point of an element is deep: depth changes by at most a millimetre a millimetre.
+fn is_outside([first, rest @ ..]: [u32; 4], positions: &[Point], depths: &[f64]) -> bool {
+    let (own, depth) = (positions[first as usize], depths[first as usize]);
+    let squares = rest.map(|node| {
+        let way = crate::rest::minus(positions[node as usize], own);
+        crate::rest::dot(way, way)
+    });
+    depth < 0.0 && squares.iter().all(|square| *square <= depth * depth)
 }
 
 /// A point to be taken.

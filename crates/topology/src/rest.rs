@@ -1,6 +1,6 @@
 //! The mesh before any cut.
 
-use crate::room::{copied, filled, room};
+use crate::room::{copied, filled, push, room};
 use crate::{Point, TopologyError};
 
 /// Faces of a tetrahedron by opposite corner, outward.
@@ -89,6 +89,27 @@ impl RestMesh {
     /// Elements over the four faces of one; [`OUTSIDE`] at the border.
     pub fn neighbours(&self, element: u32) -> [u32; 4] {
         self.neighbours[element as usize]
+    }
+
+    /// Faces without an element on their other side for which `is_wanted` says so, by their nodes in ascending order: an element and a face each, ascending.
+    ///
+    /// # Errors
+    /// No memory.
+    pub fn border(
+        &self,
+        is_wanted: impl Fn([u32; 3]) -> bool,
+    ) -> Result<Vec<(u32, u8)>, TopologyError> {
+        let mut border = Vec::new();
+        for (element, over) in self.neighbours.iter().enumerate() {
+            for face in (0..4).filter(|face| over[*face] == OUTSIDE) {
+                let mut corners = FACES[face].map(|corner| self.tets[element][corner]);
+                corners.sort_unstable();
+                if is_wanted(corners) {
+                    push(&mut border, (element as u32, face as u8))?;
+                }
+            }
+        }
+        Ok(border)
     }
 
     /// Elements that have a node, ascending.

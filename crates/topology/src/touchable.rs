@@ -8,7 +8,7 @@ use crate::body::{Body, Cell};
 use crate::connect::{common, on_face};
 use crate::polygon::double_area;
 use crate::rest::{FACES, OUTSIDE};
-use crate::room::push;
+use crate::room::{push, room};
 
 /// Of a whole face in barycentric coordinates, twice: a face of which less is bare does not count.
 const MOSTLY: f64 = 0.5;
@@ -20,24 +20,25 @@ impl Body {
         &self,
         is_wanted: impl Fn([u32; 3]) -> bool,
     ) -> Result<Vec<[u32; 3]>, TopologyError> {
+        self.touchable_of(&self.mesh().border(is_wanted)?)
+    }
+
+    /// The same for faces of the mesh's border, an element and a face each ([`crate::RestMesh::border`]).
+    pub fn touchable_of(&self, border: &[(u32, u8)]) -> Result<Vec<[u32; 3]>, TopologyError> {
         let mesh = self.mesh();
         let nodes = |cell: &Cell, face: usize| FACES[face].map(|corner| cell.nodes[corner]);
-        let mut faces = Vec::new();
-        for element in 0..mesh.element_count() as u32 {
-            let own = mesh.tet(element);
-            for (face, &over) in mesh.neighbours(element).iter().enumerate() {
-                let mut corners = FACES[face].map(|corner| own[corner]);
-                corners.sort_unstable();
-                if over != OUTSIDE || !is_wanted(corners) {
-                    continue;
-                }
-                let cells = self.cells(element);
-                let living = cells.iter().filter(|cell| cell.is_alive);
-                let part = |cell: &Cell| on_face(own, cell, face).map_or(0.0, |p| double_area(&p));
-                let largest = living.max_by(|a, b| part(a).total_cmp(&part(b)));
-                if let Some(cell) = largest.filter(|cell| part(cell) > 0.0) {
-                    push(&mut faces, nodes(cell, face))?;
-                }
+        let mut faces = room(border.len())?;
+        for &(element, face) in border {
+            let (own, face) = (mesh.tet(element), usize::from(face));
+            let Some(cells) = self.cells.get(&element) else {
+                push(&mut faces, FACES[face].map(|corner| own[corner]))?;
+                continue;
+            };
+            let living = cells.iter().filter(|cell| cell.is_alive);
+            let part = |cell: &Cell| on_face(own, cell, face).map_or(0.0, |p| double_area(&p));
+            let largest = living.max_by(|a, b| part(a).total_cmp(&part(b)));
+            if let Some(cell) = largest.filter(|cell| part(cell) > 0.0) {
+                push(&mut faces, nodes(cell, face))?;
             }
         }
         for &element in self.cells.keys() {
