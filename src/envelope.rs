@@ -86,6 +86,32 @@ impl EnvelopeCheck {
         })
     }
 
+    /// That of a body that has been cut from the same one, of `intact` nodes: patches are those of its surface.
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
+    pub fn cut(&self, mesh: &Mesh, intact: usize) -> Result<EnvelopeCheck> {
+        const WHAT: &str = "the surface's edges";
+        let count = mesh.node_count();
+        let mut offsets = memory::room(count + 1, WHAT)?;
+        offsets.extend_from_slice(&self.offsets[..=intact]);
+        offsets.resize(count + 1, offsets[intact]);
+        let mut in_domain = memory::filled(count, false, WHAT)?;
+        for &node in &mesh.domain_nodes {
+            in_domain[node as usize] = true;
+        }
+        Ok(EnvelopeCheck {
+            offsets,
+            neighbours: memory::copied(&self.neighbours, WHAT)?,
+            in_domain,
+            patch: memory::filled(count, NO_PATCH, WHAT)?,
+            stack: memory::room(count, WHAT)?,
+            nodes: memory::room(count, WHAT)?,
+            patch_flags: 0,
+            patch_ratio: 0.0,
+        })
+    }
+
     /// Compares a step's contact, and the one of the step before, with the envelope; `step`: the length of a step in the bundle's.
     pub fn check(
         &mut self,

@@ -28,6 +28,7 @@ pub fn tables() {
         block_offsets: &blocks,
         rank_offsets: &ranks,
         basis: stored,
+        copies: None,
     };
     let stored = [("f32", Stored::F32(&wide)), ("f16", Stored::F16(&half))];
     let cases: Vec<(Isa, usize, &str, Stored)> =

@@ -1,6 +1,8 @@
 //! The mesh of a body that has been cut.
 
-use topology::Body;
+use std::sync::OnceLock;
+
+use topology::{Body, Changes};
 
 use super::mesh::{Mesh, unique};
 use crate::error::Result;
@@ -9,33 +11,83 @@ use crate::memory;
 const WHAT: &str = "the mesh of a cut body";
 
 impl Mesh {
-    /// This mesh as a body that was made of it is now: copies of nodes behind the mesh's own, elements by their cells. Nodes that nothing is
-    /// left around are held. Boundary triangles, their areas and the hash stay those of the intact mesh.
+    /// This mesh as a body that was made of it is now: copies of nodes behind the mesh's own; elements without those that have changed, and behind them the
+    /// cells of these. Nodes that nothing is left around are held. Boundary triangles, their areas and the hash stay those of the intact mesh.
     ///
     /// # Errors
     /// [`crate::Error::OutOfMemory`].
-    pub fn cut(&self, body: &Body) -> Result<Mesh> {
-        let count = body.node_count();
-        let nodes = 0..count as u32;
-        let places = nodes
-            .clone()
-            .flat_map(|node| self.position(body.parent(node)));
-        let (mut tets, mut stiffness, mut shares) = (Vec::new(), Vec::new(), Vec::new());
-        let mut is_left = memory::filled(count, false, WHAT)?;
-        for element in body.elements() {
-            let own = self.stiffness.get(element.parent as usize).copied();
-            let share = element.share as f32;
-            memory::reserve(&mut tets, 4, WHAT)?;
-            tets.extend(element.nodes);
-            memory::push(
-                &mut stiffness,
-                own.unwrap_or(1.0) * element.stiffness * share,
-                WHAT,
-            )?;
-            memory::push(&mut shares, share, WHAT)?;
-            for node in element.nodes {
-                is_left[node as usize] = true;
+    pub fn cut(&self, body: &Body, changes: &Changes) -> Result<Mesh> {
+        let (count, own) = (body.node_count(), self.node_count());
+        let Changes { gone, new } = changes;
+        let mut positions = memory::room(3 * count, WHAT)?;
+        positions.extend_from_slice(&self.positions);
+        for &parent in body.parents() {
+            positions.extend(self.position(parent));
+        }
+        let most = self.tets.len() / 4 + new.len();
+        let mut tets = memory::room(4 * most, WHAT)?;
+        let mut stiffness = memory::room(most, WHAT)?;
+        let ends = gone.iter().map(|element| *element as usize);
+        let mut start = 0;
+        for end in ends.chain([self.tets.len() / 4]) {
+            tets.extend_from_slice(&self.tets[4 * start..4 * end]);
+            match self.stiffness.is_empty() {
+                true => stiffness.resize(stiffness.len() + end - start, 1.0),
+                false => stiffness.extend_from_slice(&self.stiffness[start..end]),
             }
+            start = end + 1;
+        }
+        for element in new {
+            tets.extend(element.nodes);
+            stiffness.push(self.stiffness_of(element));
+        }
+        let faces = body.touchable_of(self.domain_sides(body)?)?;
+        let domain_faces = memory::copied(faces.as_flattened(), WHAT)?;
+        let mut left = memory::room(4 * new.len(), WHAT)?;
+        left.extend(new.iter().flat_map(|element| element.nodes));
+        let left = unique(left);
+        let mesh = body.mesh();
+        let is_left = |node: u32| {
+            let is_around = |element: &u32| gone.binary_search(element).is_err();
+            let stays = (node as usize) < own && mesh.around(node).iter().any(is_around);
+            stays || left.binary_search(&node).is_ok()
+        };
+        let corners = gone.iter().flat_map(|element| mesh.tet(*element));
+        let copies = own as u32..count as u32;
+        let mut held_nodes = memory::copied(&self.held_nodes, WHAT)?;
+        for node in corners.chain(copies) {
+            let is_held = self.held_nodes.binary_search(&body.parent(node)).is_ok();
+            if is_held || !is_left(node) {
+                memory::push(&mut held_nodes, node, WHAT)?;
+            }
+        }
+        let mut node_area = memory::room(count, WHAT)?;
+        node_area.extend_from_slice(&self.node_area);
+        node_area.resize(count, 0.0);
+        Ok(Mesh {
+            positions,
+            tets,
+            stiffness,
+            surface_faces: memory::copied(&self.surface_faces, WHAT)?,
+            domain_nodes: unique(memory::copied(&domain_faces, WHAT)?),
+            domain_faces,
+            surface_nodes: memory::copied(&self.surface_nodes, WHAT)?,
+            held_nodes: unique(held_nodes),
+            node_area,
+            sha256: self.sha256.clone(),
+            domain_sides: OnceLock::new(),
+        })
+    }
+
+    /// Stiffness over the material's of an element that one of this mesh's has become, its share with it.
+    pub fn stiffness_of(&self, element: &topology::Element) -> f32 {
+        let own = self.stiffness.get(element.parent as usize).copied();
+        own.unwrap_or(1.0) * element.stiffness * element.share as f32
+    }
+
+    fn domain_sides(&self, body: &Body) -> Result<&[(u32, u8)]> {
+        if let Some(sides) = self.domain_sides.get() {
+            return Ok(sides);
         }
         let mut domain = memory::room(self.domain_faces.len() / 3, WHAT)?;
         for face in self.domain_faces.as_chunks::<3>().0 {
@@ -44,27 +96,7 @@ impl Mesh {
             domain.push(corners);
         }
         domain.sort_unstable();
-        let faces = body.touchable(|corners| domain.binary_search(&corners).is_ok())?;
-        let domain_faces = memory::copied(faces.as_flattened(), WHAT)?;
-        let held = nodes.filter(|node| {
-            let is_held = self.held_nodes.binary_search(&body.parent(*node)).is_ok();
-            is_held || !is_left[*node as usize]
-        });
-        let mut node_area = memory::copied(&self.node_area, WHAT)?;
-        memory::reserve(&mut node_area, count - self.node_count(), WHAT)?;
-        node_area.resize(count, 0.0);
-        Ok(Mesh {
-            positions: memory::collected(3 * count, places, WHAT)?,
-            tets,
-            stiffness,
-            shares,
-            surface_faces: memory::copied(&self.surface_faces, WHAT)?,
-            domain_nodes: unique(memory::copied(&domain_faces, WHAT)?),
-            domain_faces,
-            surface_nodes: memory::copied(&self.surface_nodes, WHAT)?,
-            held_nodes: memory::collected(count, held, WHAT)?,
-            node_area,
-            sha256: self.sha256.clone(),
-        })
+        let sides = (body.mesh()).border(|corners| domain.binary_search(&corners).is_ok())?;
+        Ok(self.domain_sides.get_or_init(|| sides))
     }
 }

@@ -1,5 +1,7 @@
 //! `mesh.safetensors`: the tetrahedral mesh of a bundle, checked, and the node sets that follow from it.
 
+use std::sync::OnceLock;
+
 use sha2::{Digest, Sha256};
 
 use super::files::hex;
@@ -20,8 +22,6 @@ pub struct Mesh {
     pub tets: Vec<u32>,
     /// Young's modulus of each tetrahedron over the material's `[T]`; empty where the body is uniform.
     pub stiffness: Vec<f32>,
-    /// By how much of its volume each tetrahedron of a cut body counts `[T]`; empty where all count whole. `stiffness` has it as a factor.
-    pub shares: Vec<f32>,
     /// Boundary triangles `[F,3]`, outward.
     pub surface_faces: Vec<u32>,
     /// Triangles of the domain `[D,3]`.
@@ -36,6 +36,9 @@ pub struct Mesh {
     pub node_area: Vec<f32>,
     /// The mesh hash of `docs/reference/formats.md`.
     pub sha256: String,
+    /// The domain's triangles as faces of elements, from the first cut on.
+    #[held(skip)]
+    pub(super) domain_sides: OnceLock<Vec<(u32, u8)>>,
 }
 
 impl Mesh {
@@ -121,10 +124,10 @@ impl Mesh {
             positions,
             tets,
             stiffness,
-            shares: Vec::new(),
             surface_faces,
             domain_faces,
             sha256: hex(&hash.finalize()),
+            domain_sides: OnceLock::new(),
         })
     }
 

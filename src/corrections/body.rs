@@ -36,6 +36,15 @@ impl Body {
             tets: mesh.tets.as_chunks().0,
             stiffness: &mesh.stiffness,
         };
+        let forces = memory::tried(ElementForces::new(body, material, isa), WHAT)?;
+        Body::of(mesh, diagonal, forces)
+    }
+
+    /// A mesh with these elements.
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
+    pub(super) fn of(mesh: &Mesh, diagonal: &Diagonal, forces: ElementForces) -> Result<Body> {
         let count = mesh.node_count();
         let mut held = memory::filled(count, false, WHAT)?;
         for &node in &mesh.held_nodes {
@@ -48,7 +57,7 @@ impl Body {
         Ok(Body {
             held_nodes: memory::collected(mesh.held_nodes.len(), ascending, WHAT)?,
             mass_of_dof: memory::collected(3 * count, of_dof, WHAT)?,
-            forces: memory::tried(ElementForces::new(body, material, isa), WHAT)?,
+            forces,
             mass,
             held,
         })

@@ -6,23 +6,25 @@
 //!
 //! with the gather `G` of copies from their parents: a cut alone changes no product of the modes, since its shares sum to 1. The nodes of what has changed
 //! are near in every step, so the exact factor of the tangent has the copies in its core.
+//!
+//! Every table is the intact body's with what the changed elements make of it, so that it follows from the body alone and not from the way to it.
 
 use std::sync::{Arc, OnceLock};
 
-use ::elements::{Material, Tetrahedron};
-use topology::Body as CutBody;
+use ::elements::{CutTetrahedra, Material, Tetrahedron};
+use topology::{Body as CutBody, Changes};
 
 use super::local::add_centres;
-use super::time_step::{Diagonal, TimeStep};
-use super::{Body, Corrections, FarField};
+use super::time_step::{Diagonal, TimeStep, inverse};
+use super::{Body, Corrections};
 use crate::bundle::Mesh;
 use crate::error::Result;
-use crate::kernels::Isa;
 use crate::memory;
 use crate::prior::{Lost, PriorTable};
 
 /// A factor of volume or stiffness that has changed by less has not.
 const SAME: f64 = 1e-9;
+const WHAT: &str = "the corrections of a cut body";
 
 impl Corrections {
     /// The tables of a mesh that `intact` was cut to, with the linear response of either.
@@ -32,34 +34,40 @@ impl Corrections {
     pub fn cut(
         &self,
         (intact, cut): (&Mesh, &Mesh),
-        body: &CutBody,
+        (body, changes): (&CutBody, &Changes),
         material: &Material,
         (before, prior): (&PriorTable, &PriorTable),
     ) -> Result<Corrections> {
-        let mut lost = Vec::new();
-        for element in body.changed_elements() {
+        let mut list = Vec::new();
+        for &element in &changes.gone {
             if let Some(own) = self.lost(intact, body, material, element) {
-                memory::push(&mut lost, own, "what a cut body has lost")?;
+                memory::push(&mut list, own, "what a cut body has lost")?;
             }
         }
-        let space = (self.space).cut((before, prior), |node| body.parent(node), lost.iter())?;
-        let diagonal = Diagonal::of(cut, material)?;
-        let own = Body::new(cut, material, &diagonal, Isa::detect())?;
+        let lost = self.space.lost(list, before)?;
+        let space = (self.space).cut((before, prior), |node| body.parent(node), &lost)?;
+        let touched = touched(body, changes)?;
+        let diagonal = self.cut_diagonal((intact, body, changes), material, &touched)?;
+        let own = self.cut_body((intact, cut), changes, material, &diagonal)?;
         let mut changed = Vec::new();
-        for element in body.changed_elements() {
-            for element in body.elements_of(element) {
-                add_centres(&cut.positions, &element.nodes, &mut changed)?;
-            }
+        for element in &changes.new {
+            add_centres(&cut.positions, &element.nodes, &mut changed)?;
         }
         changed.sort_unstable();
-        let integrator = self.time_step.integrator;
+        let gone = changes.gone.iter();
+        let gone = gone.map(|element| (*element, body.mesh().tet(*element)));
+        let gone = memory::collected(changes.gone.len(), gone, WHAT)?;
+        let new = (changes.new.iter()).map(|element| (element.parent, element.nodes));
+        let new = memory::collected(changes.new.len(), new, WHAT)?;
+        let far = self.far.cut((&own, cut), (&gone, &new), &lost)?;
         Ok(Corrections {
-            far: FarField::new(&own, cut, material.moduli(), prior, &space)?,
+            far,
             space,
             body: own,
-            time_step: Arc::new(TimeStep::new(&diagonal, integrator)?),
+            time_step: Arc::new(self.time_step.cut(&diagonal, &touched)?),
             changed,
             gravity: OnceLock::new(),
+            diagonal: OnceLock::from(diagonal),
         })
     }
 
@@ -82,10 +90,142 @@ impl Corrections {
         let moduli = material.moduli();
         lost.volume *= 1.0 - stiff;
         Some(Lost {
+            element,
             corners,
             is_free: corners.map(|node| !self.body.held[node as usize]),
+            volume: lost.volume,
+            gradients: lost.gradients,
             stiffness: lost.steady_stiffness(&lost.deformation([[0.0; 3]; 4]), moduli),
             mass: 0.25 * whole.volume * (1.0 - share) * material.density_g_mm3(),
         })
     }
+
+    /// Makes what the first cut of this intact body takes longest for.
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
+    pub fn prepare_cut(&self, mesh: &Mesh, material: &Material) -> Result<()> {
+        self.whole_diagonal(mesh, material).map(|_| ())
+    }
+
+    fn whole_diagonal(&self, mesh: &Mesh, material: &Material) -> Result<&Diagonal> {
+        if let Some(whole) = self.diagonal.get() {
+            return Ok(whole);
+        }
+        let made = Diagonal::of(mesh, material)?;
+        Ok(self.diagonal.get_or_init(|| made))
+    }
+
+    /// Masses and diagonal blocks: the intact body's, summed anew at the touched nodes.
+    fn cut_diagonal(
+        &self,
+        (intact, body, changes): (&Mesh, &CutBody, &Changes),
+        material: &Material,
+        touched: &[u32],
+    ) -> Result<Diagonal> {
+        let whole = self.whole_diagonal(intact, material)?;
+        let count = body.node_count();
+        let mut own = Diagonal {
+            mass: memory::room(count, WHAT)?,
+            blocks: memory::room(count, WHAT)?,
+        };
+        own.mass.extend_from_slice(&whole.mass);
+        own.mass.resize(count, 0.0);
+        own.blocks.extend_from_slice(&whole.blocks);
+        own.blocks.resize(count, [0.0; 6]);
+        let first = intact.node_count() as u32;
+        let mut around = Vec::new();
+        for &node in touched {
+            own.mass[node as usize] = 0.0;
+            own.blocks[node as usize] = [0.0; 6];
+            if node < first {
+                let elements = body.mesh().around(node);
+                memory::reserve(&mut around, elements.len(), WHAT)?;
+                around.extend_from_slice(elements);
+            }
+        }
+        around.sort_unstable();
+        around.dedup();
+        let moduli = material.moduli();
+        let mut add = |corners: [u32; 4], parent: u32, (stiffness, share): (f32, f64)| {
+            let rest = (body.mesh().tet(parent)).map(|node| intact.position(node).map(f64::from));
+            let tet = Tetrahedron::new(corners, rest, f64::from(stiffness));
+            let volume = tet.volume / f64::from(stiffness) * share;
+            let mass = 0.25 * volume * material.density_g_mm3();
+            for (node, block) in corners.into_iter().zip(tet.diagonal_blocks(moduli)) {
+                if touched.binary_search(&node).is_err() {
+                    continue;
+                }
+                own.mass[node as usize] += mass;
+                let sums = own.blocks[node as usize].iter_mut();
+                sums.zip(block).for_each(|(sum, value)| *sum += value);
+            }
+        };
+        for element in around {
+            if changes.gone.binary_search(&element).is_err() {
+                let stiffness = intact.stiffness.get(element as usize).copied();
+                let corners = body.mesh().tet(element);
+                add(corners, element, (stiffness.unwrap_or(1.0), 1.0));
+            }
+        }
+        for element in &changes.new {
+            let stiffness = intact.stiffness_of(element);
+            add(element.nodes, element.parent, (stiffness, element.share));
+        }
+        Ok(own)
+    }
+
+    fn cut_body(
+        &self,
+        (intact, cut): (&Mesh, &Mesh),
+        changes: &Changes,
+        material: &Material,
+        diagonal: &Diagonal,
+    ) -> Result<Body> {
+        let mut cells = memory::room(changes.new.len(), WHAT)?;
+        for element in &changes.new {
+            let place = changes.gone.partition_point(|gone| *gone < element.parent);
+            cells.push((place as u32, element.nodes, intact.stiffness_of(element)));
+        }
+        let elements = CutTetrahedra {
+            positions: cut.positions.as_chunks().0,
+            tets: intact.tets.as_chunks().0,
+            stiffness: &intact.stiffness,
+            changed: &changes.gone,
+            cells: &cells,
+        };
+        let forces = memory::tried(self.body.forces.cut(elements, material), WHAT)?;
+        Body::of(cut, diagonal, forces)
+    }
+}
+
+impl TimeStep {
+    /// The same of a body that has been cut, with its diagonal.
+    fn cut(&self, diagonal: &Diagonal, touched: &[u32]) -> Result<TimeStep> {
+        let count = diagonal.mass.len();
+        let mut inverse_blocks = memory::room(count, WHAT)?;
+        inverse_blocks.extend_from_slice(&self.inverse_blocks);
+        inverse_blocks.resize(count, [0.0; 6]);
+        let kappa = self.integrator.kappa();
+        for &node in touched {
+            let at = node as usize;
+            inverse_blocks[at] = inverse(diagonal.blocks[at], kappa * diagonal.mass[at]);
+        }
+        Ok(TimeStep {
+            integrator: self.integrator,
+            inverse_blocks,
+        })
+    }
+}
+
+/// Nodes of what has changed, as it was and as it is, and all copies; ascending.
+fn touched(body: &CutBody, changes: &Changes) -> Result<Vec<u32>> {
+    let copies = body.mesh().node_count() as u32..body.node_count() as u32;
+    let most = 4 * (changes.gone.len() + changes.new.len()) + copies.len();
+    let before = (changes.gone.iter()).flat_map(|element| body.mesh().tet(*element));
+    let after = changes.new.iter().flat_map(|element| element.nodes);
+    let mut touched = memory::collected(most, before.chain(after).chain(copies), WHAT)?;
+    touched.sort_unstable();
+    touched.dedup();
+    Ok(touched)
 }

@@ -11,6 +11,8 @@
 //! with the stress `P` of the law and `H = F - I`. The mean of a gradient over a cluster is a sum over the cluster's border, so the tables
 //! below are short; on the modes it is a matrix.
 
+mod cut;
+
 use ::elements::{Deformation, Moduli, stress, vector};
 
 use super::body::Body;
@@ -34,8 +36,11 @@ pub struct FarField {
     pub(super) moduli: Moduli,
     /// Chunks of a cluster, one after another.
     pub(super) group: usize,
-    /// Rest volume of each chunk times its stiffness over the material's, mm³.
+    /// Rest volume of each chunk times its stiffness over the material's, mm³. After a cut these are the chunks of the intact body, with all that their
+    /// elements have become.
     pub(super) volumes: Vec<f64>,
+    /// The same of the chunks that the elements are packed in.
+    pub(super) packed_volumes: Vec<f64>,
     /// Where each chunk's nodes start in the two lists below `[C+1]`.
     starts: Vec<u32>,
     /// Nodes of each chunk whose displacement changes its mean gradient, those of its border.
@@ -50,7 +55,7 @@ pub struct FarField {
     pub(super) cluster_of: Vec<u16>,
     /// Mean edge of the elements, were they regular, mm.
     pub(super) edge_mm: f32,
-    /// Box of each chunk at rest, mm.
+    /// Box of each chunk that the elements are packed in at rest, mm.
     pub(super) boxes: Vec<[[f32; 3]; 2]>,
 }
 
@@ -72,6 +77,7 @@ impl FarField {
             moduli,
             group: (count / CLUSTERS).max(1),
             volumes: memory::room(count, WHAT)?,
+            packed_volumes: memory::room(count, WHAT)?,
             starts: memory::room(count + 1, WHAT)?,
             nodes: Vec::new(),
             weights: Vec::new(),
@@ -113,6 +119,7 @@ impl FarField {
             }
         }
         self.volumes.push(volume);
+        self.packed_volumes.push(volume);
         memory::reserve(&mut self.nodes, nodes.len(), WHAT)?;
         memory::reserve(&mut self.weights, nodes.len(), WHAT)?;
         let mut bounds = [[f32::MAX; 3], [f32::MIN; 3]];

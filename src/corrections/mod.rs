@@ -67,6 +67,8 @@ pub struct Corrections {
     pub changed: Vec<u32>,
     /// Made at the first step in which gravity turns.
     gravity: OnceLock<GravityResponse>,
+    /// Of the intact body from its first cut on, and of every cut one.
+    diagonal: OnceLock<Diagonal>,
 }
 
 impl Corrections {
@@ -96,6 +98,7 @@ impl Corrections {
             time_step: Arc::new(TimeStep::new(&diagonal, integrator)?),
             changed: Vec::new(),
             gravity: OnceLock::new(),
+            diagonal: OnceLock::new(),
         })
     }
 
@@ -109,7 +112,10 @@ impl Corrections {
         material: &Material,
         integrator: Integrator,
     ) -> Result<TimeStep> {
-        TimeStep::new(&Diagonal::of(mesh, material)?, integrator)
+        match self.diagonal.get() {
+            Some(diagonal) => TimeStep::new(diagonal, integrator),
+            None => TimeStep::new(&Diagonal::of(mesh, material)?, integrator),
+        }
     }
 }
 

@@ -67,6 +67,8 @@ pub struct Preconditioner {
     galerkin_narrow: Vec<f32>,
     galerkin_inverse: Vec<f32>,
     load_dofs: Vec<u32>,
+    /// Rows of the tables that degrees of freedom have.
+    stored: Vec<u32>,
     load_forces: Vec<f32>,
     widened: Vec<f32>,
     pub(super) coordinates: Vec<f32>,
@@ -118,6 +120,7 @@ impl Preconditioner {
             galerkin_free,
             galerkin_inverse: env.space.galerkin_inverse(kappa, env.isa)?,
             load_dofs: memory::room(dofs, WHAT)?,
+            stored: Vec::new(),
             load_forces: memory::room(dofs, WHAT)?,
             widened: memory::zeros(6 * env.prior.widest_block(), WHAT)?,
             coordinates: memory::zeros(env.prior.width(), WHAT)?,
@@ -288,7 +291,7 @@ impl Preconditioner {
             env.isa,
             env.pool,
             env.prior.response.stored(),
-            &self.dofs,
+            env.prior.stored_dofs(&self.dofs, &mut self.stored)?,
             &self.coordinates,
             &mut self.at_contact,
         )?;

@@ -54,9 +54,10 @@ impl TimeStep {
 }
 
 /// Lumped mass `[K]`, g, and the 3x3 diagonal blocks of the stiffness at rest, µN/mm.
+#[derive(HeldBytes)]
 pub struct Diagonal {
     pub mass: Vec<f64>,
-    blocks: Vec<[f64; 6]>,
+    pub(super) blocks: Vec<[f64; 6]>,
 }
 
 impl Diagonal {
@@ -80,10 +81,7 @@ impl Diagonal {
             let rest = corners.map(|node| positions[node as usize].map(f64::from));
             let stiffness = f64::from(body.stiffness_of(at));
             let tet = Tetrahedron::new(corners, rest, stiffness);
-            let mut share = 0.25 * tet.volume / stiffness * material.density_g_mm3();
-            if let Some(&counts) = mesh.shares.get(at) {
-                share *= f64::from(counts);
-            }
+            let share = 0.25 * tet.volume / stiffness * material.density_g_mm3();
             for (node, block) in corners.into_iter().zip(tet.diagonal_blocks(moduli)) {
                 mass[node as usize] += share;
                 for (sum, value) in blocks[node as usize].iter_mut().zip(block) {
@@ -96,7 +94,7 @@ impl Diagonal {
 }
 
 /// Inverse of a symmetric 3x3 block with `shift` on its diagonal.
-fn inverse([xx, xy, xz, yy, yz, zz]: [f64; 6], shift: f64) -> [f32; 6] {
+pub(super) fn inverse([xx, xy, xz, yy, yz, zz]: [f64; 6], shift: f64) -> [f32; 6] {
     let matrix = nalgebra::Matrix3::new(xx + shift, xy, xz, xy, yy + shift, yz, xz, yz, zz + shift);
     let inverse = matrix
         .try_inverse()

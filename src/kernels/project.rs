@@ -5,7 +5,7 @@
 
 use super::parts::Parts;
 use super::pool::{Pool, PoolError};
-use super::rows::{BlockBasis, Number, Stored};
+use super::rows::{BlockBasis, Number, Stored, add_copies};
 use half::f16;
 use lanes::DenseLanes;
 use lanes::{Isa, by_isa};
@@ -43,12 +43,12 @@ pub fn project_field(
         let ranks = basis.rank_offsets[k] as usize..basis.rank_offsets[k + 1] as usize;
         // SAFETY: these coordinates belong to this block alone.
         let q = unsafe { parts.part(ranks.start, ranks.len()) };
-        let nodes = basis.block_offsets[k] as usize..basis.block_offsets[k + 1] as usize;
-        let nodes = &basis.block_nodes[nodes];
+        let nodes = &basis.block_nodes[basis.block_offsets[k] as usize..][..basis.own_nodes(k)];
         match basis.basis {
             Stored::F32(u) => block_f32(isa, &u[starts[k]..starts[k + 1]], nodes, r, q),
             Stored::F16(u) => block_f16(isa, &u[starts[k]..starts[k + 1]], nodes, r, q),
         }
+        add_copies(isa, basis, k, starts[k]..starts[k + 1], r, q);
     })
 }
 
@@ -369,6 +369,7 @@ mod tests {
                 block_offsets: &block_offsets,
                 rank_offsets: &rank_offsets,
                 basis,
+                copies: None,
             };
             let run = |isa, threads| {
                 let pool = Pool::new(threads).unwrap();

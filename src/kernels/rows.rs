@@ -15,6 +15,7 @@ use half::f16;
 use lanes::DenseLanes;
 use lanes::{Isa, by_isa};
 
+pub(super) use some::add_copies;
 pub use some::project_rows;
 
 /// Numbers stored as f32 or f16.
@@ -58,6 +59,36 @@ pub struct BlockBasis<'a> {
     pub rank_offsets: &'a [u32],
     /// `[sum_k 3 n_k r_k]`.
     pub basis: Stored<'a>,
+    /// Of a body that has been cut; none where every node has rows of its own.
+    pub copies: Option<Copies<'a>>,
+}
+
+/// Copies of nodes have the rows of the node that they stem from. In `block_nodes` they come behind the other nodes of its block.
+#[derive(Debug, Clone, Copy)]
+pub struct Copies<'a> {
+    /// Nodes with rows of their own before each block `[B + 1]`: what `block_offsets` would be without copies.
+    pub row_offsets: &'a [u32],
+    /// Place in its block of the node whose rows each node of `block_nodes` has.
+    pub locals: &'a [u32],
+}
+
+impl BlockBasis<'_> {
+    /// Nodes of block `k` with rows of their own, the first ones.
+    pub(super) fn own_nodes(&self, k: usize) -> usize {
+        let offsets = match &self.copies {
+            Some(copies) => copies.row_offsets,
+            None => self.block_offsets,
+        };
+        (offsets[k + 1] - offsets[k]) as usize
+    }
+
+    /// Where in its block the rows lie of node `local` of block `k`.
+    fn row_of(&self, k: usize, local: usize) -> u32 {
+        match &self.copies {
+            Some(copies) => copies.locals[self.block_offsets[k] as usize + local],
+            None => local as u32,
+        }
+    }
 }
 
 /// A run of wanted nodes in one block.
@@ -125,7 +156,7 @@ impl RowPlan {
         let mut basis_offsets = memory::room(blocks, WHAT)?;
         basis_offsets.push(0);
         for k in 0..basis.block_offsets.len() - 1 {
-            let n = (basis.block_offsets[k + 1] - basis.block_offsets[k]) as usize;
+            let n = basis.own_nodes(k);
             let rank = (basis.rank_offsets[k + 1] - basis.rank_offsets[k]) as usize;
             assert!(
                 rank.is_multiple_of(8),
@@ -157,7 +188,7 @@ impl RowPlan {
                 if row == u32::MAX {
                     continue;
                 }
-                plan.locals.push(local as u32);
+                plan.locals.push(basis.row_of(k, local));
                 plan.outputs.push(row);
                 if plan.locals.len() - start == RUN_NODES {
                     plan.end_run(k, &mut start);

@@ -5,13 +5,26 @@
 
 use std::sync::{Arc, Mutex, OnceLock};
 
-use topology::Body;
+use topology::{Body, RestMesh};
 
 use super::{KindModel, Model, ReducedModel};
 use crate::error::{Error, Result};
 use crate::library::Alive;
 
 impl Model {
+    /// The mesh as what can be cut; made when it is first asked for.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`].
+    pub(crate) fn rest_mesh(&self) -> Result<Arc<RestMesh>> {
+        if let Some(made) = self.rest.get() {
+            return Ok(Arc::clone(made));
+        }
+        let mesh = &self.mesh;
+        let made = RestMesh::new(mesh.positions.as_chunks().0, mesh.tets.as_chunks().0)?;
+        Ok(Arc::clone(self.rest.get_or_init(|| Arc::new(made))))
+    }
+
     /// The model of a body that this one's has been cut to; this is that of the intact body.
     ///
     /// # Errors
@@ -23,11 +36,12 @@ impl Model {
             ));
         };
         let intact = self.corrections()?;
-        let mesh = self.mesh.cut(body)?;
+        let changes = body.changes();
+        let mesh = self.mesh.cut(body, &changes)?;
         let own = prior.cut(&mesh, body.parents())?;
         let material = &self.manifest.material;
         let priors = (&**prior, &own);
-        let corrections = intact.cut((&self.mesh, &mesh), body, material, priors)?;
+        let corrections = intact.cut((&self.mesh, &mesh), (body, &changes), material, priors)?;
         Ok(Arc::new(Model {
             manifest: self.manifest.clone(),
             hash: self.hash,
@@ -36,6 +50,7 @@ impl Model {
             kind: KindModel::Reduced(Arc::new(ReducedModel { learned: None })),
             corrections: OnceLock::from(corrections),
             samples: OnceLock::new(),
+            rest: OnceLock::new(),
             opening: Mutex::new(()),
             files: Arc::clone(&self.files),
             runtime: self.runtime,

@@ -53,6 +53,8 @@ pub struct Model {
     pub kind: KindModel,
     corrections: OnceLock<Corrections>,
     samples: OnceLock<Arc<::contact::Samples>>,
+    /// The mesh as what can be cut, from the first time that a scene asks for it.
+    rest: OnceLock<Arc<topology::RestMesh>>,
     opening: Mutex<()>,
     files: Arc<BundleFiles>,
     /// ONNX Runtime; none where the bundle has no graph.
@@ -185,6 +187,7 @@ impl Model {
             hash: files.hash,
             corrections: OnceLock::new(),
             samples: OnceLock::new(),
+            rest: OnceLock::new(),
             opening: Mutex::new(()),
             files,
             mesh: Arc::new(mesh),

@@ -35,6 +35,15 @@ pub struct Near {
     ranks: Vec<(u32, u32)>,
 }
 
+/// Columns that have the response of others: those of a body that has been cut.
+#[derive(Clone, Copy)]
+pub struct Borrowed<'a> {
+    /// Of each of the columns behind the table's own: the one whose response it has.
+    pub sources: &'a [u32],
+    /// By column behind the table's own: where the rows of its node in the basis start, where its block's coordinates start, and how many.
+    pub places: &'a dyn Fn(usize) -> (u32, u32, u32),
+}
+
 /// The tables that far entries come from.
 #[derive(Debug, Clone, Copy)]
 pub struct Bases<'a> {
@@ -122,67 +131,48 @@ impl Compliance {
         }))
     }
 
-    /// That of other contact nodes: each has the response of the one that `base` names here. `place` as in [`Compliance::read`], of the new ones.
-    ///
-    /// # Errors
-    /// [`crate::Error::OutOfMemory`].
-    pub fn of_bases(
+    /// As [`Compliance::gather`], with columns behind the table's own.
+    pub fn gather_borrowed(
         &self,
-        base: &[u32],
-        place: impl Fn(usize) -> (u32, u32, u32),
-    ) -> Result<Compliance> {
-        const WHAT: &str = "the compliance of a cut body";
-        let near = match self {
-            Compliance::Whole(whole) => {
-                let n = whole.len().isqrt();
-                let dofs = base
-                    .iter()
-                    .flat_map(|b| [0, 1, 2].map(|axis| 3 * *b as usize + axis));
-                let all = dofs.clone().flat_map(|row| {
-                    let row = &whole[row * n..][..n];
-                    dofs.clone().map(move |column| row[column])
-                });
-                return Ok(Compliance::Whole(memory::collected(
-                    9 * base.len() * base.len(),
-                    all,
-                    WHAT,
-                )?));
-            }
-            Compliance::Near(near) => near,
+        bases: Bases<'_>,
+        borrowed: Borrowed<'_>,
+        columns: &[u32],
+        upper: &mut [f64],
+        scratch: &mut Vec<f32>,
+    ) {
+        let order = 3 * columns.len();
+        let own = match self {
+            Compliance::Whole(whole) => whole.len().isqrt() / 3,
+            Compliance::Near(near) => near.ranks.len(),
         };
-        let mut members = vec![Vec::new(); near.offsets.len() - 1];
-        for (at, b) in base.iter().enumerate() {
-            memory::push(&mut members[*b as usize], at as u32, WHAT)?;
-        }
-        let mut entries = Vec::new();
-        for (p, range) in near.offsets.windows(2).enumerate() {
-            for at in range[0] as usize..range[1] as usize {
-                let q = near.nodes[at] as usize;
-                for (i, j) in members[p]
-                    .iter()
-                    .flat_map(|i| members[q].iter().map(move |j| (*i, *j)))
-                {
-                    let block = &near.blocks[at];
-                    let back = std::array::from_fn(|k| block[k % 3 * 3 + k / 3]);
-                    if i <= j {
-                        memory::push(&mut entries, (i, j, *block), WHAT)?;
-                    } else if p != q {
-                        memory::push(&mut entries, (j, i, back), WHAT)?;
+        let source = |column: u32| match (column as usize).checked_sub(own) {
+            Some(behind) => borrowed.sources[behind] as usize,
+            None => column as usize,
+        };
+        for (i, &column) in columns.iter().enumerate() {
+            for (j, &other) in columns.iter().enumerate().skip(i) {
+                let (row, across) = (source(column), source(other));
+                let block = match self {
+                    Compliance::Whole(whole) => std::array::from_fn(|at| {
+                        whole[(3 * row + at / 3) * 3 * own + 3 * across + at % 3]
+                    }),
+                    Compliance::Near(near) => {
+                        let place = match (column as usize) < own {
+                            true => {
+                                let (start, rank) = near.ranks[row];
+                                (near.rows[row], start, rank)
+                            }
+                            false => (borrowed.places)(column as usize - own),
+                        };
+                        near.block(row, across)
+                            .unwrap_or_else(|| far_block(bases, place, across, scratch))
                     }
+                };
+                for (at, &value) in block.iter().enumerate() {
+                    upper[(3 * i + at / 3) * order + 3 * j + at % 3] = f64::from(value);
                 }
             }
         }
-        entries.sort_unstable_by_key(|(i, j, _)| (*i, *j));
-        let starts =
-            (0..=base.len() as u32).map(|row| entries.partition_point(|e| e.0 < row) as u32);
-        let ranks = (0..base.len()).map(&place).map(|place| (place.1, place.2));
-        Ok(Compliance::Near(Near {
-            offsets: memory::collected(base.len() + 1, starts, WHAT)?,
-            nodes: memory::collected(entries.len(), entries.iter().map(|e| e.1), WHAT)?,
-            blocks: memory::collected(entries.len(), entries.iter().map(|e| e.2), WHAT)?,
-            rows: memory::collected(base.len(), (0..base.len()).map(|at| place(at).0), WHAT)?,
-            ranks: memory::collected(base.len(), ranks, WHAT)?,
-        }))
     }
 
     /// Writes the upper triangle of the block of contact nodes `columns` (ascending), `[3m,3m]` row-major, into `upper`.
@@ -217,7 +207,49 @@ impl Compliance {
     }
 }
 
+/// `U_i response[j]`: of a node by where its rows and coordinates are, and of a column.
+fn far_block(
+    bases: Bases<'_>,
+    (row, start, rank): (u32, u32, u32),
+    other: usize,
+    scratch: &mut Vec<f32>,
+) -> [f32; 9] {
+    let (start, rank) = (start as usize, rank as usize);
+    if scratch.len() < 6 * rank {
+        scratch.resize(6 * rank, 0.0);
+    }
+    let (rows, forces) = scratch[..6 * rank].split_at_mut(3 * rank);
+    widen(bases.basis, row as usize, rows);
+    for (axis, force) in forces.chunks_exact_mut(rank.max(1)).enumerate() {
+        widen(
+            bases.response,
+            (3 * other + axis) * bases.width + start,
+            force,
+        );
+    }
+    std::array::from_fn(|at| {
+        dot(
+            &rows[at / 3 * rank..][..rank],
+            &forces[at % 3 * rank..][..rank],
+        )
+    })
+}
+
 impl Near {
+    /// The stored block of two contact nodes, where they are neighbours.
+    fn block(&self, row: usize, across: usize) -> Option<[f32; 9]> {
+        let (low, high) = (row.min(across), row.max(across));
+        let range = self.offsets[low] as usize..self.offsets[low + 1] as usize;
+        let at = self.nodes[range.clone()]
+            .binary_search(&(high as u32))
+            .ok()?;
+        let block = self.blocks[range.start + at];
+        Some(match row <= across {
+            true => block,
+            false => std::array::from_fn(|k| block[k % 3 * 3 + k / 3]),
+        })
+    }
+
     fn gather(&self, bases: Bases<'_>, columns: &[u32], upper: &mut [f64], scratch: &mut Vec<f32>) {
         let order = 3 * columns.len();
         for (i, &node) in columns.iter().enumerate() {

@@ -6,6 +6,7 @@
 //! when the contact is gone.
 
 mod compliance;
+mod lost;
 mod numbers;
 mod reaction;
 mod release;
@@ -14,8 +15,9 @@ mod space;
 mod table;
 mod vibration;
 
+pub use lost::{Lost, LostElements};
 pub use numbers::Numbers;
 pub use response::{ContactResponse, SolveReport};
-pub use space::{CoarseSpace, Lost};
+pub use space::CoarseSpace;
 pub use table::PriorTable;
 pub use vibration::{FreeVibration, propagator};

@@ -42,42 +42,6 @@ impl Numbers {
         Ok(Numbers::F16(half))
     }
 
-    /// A copy.
-    ///
-    /// # Errors
-    /// [`crate::Error::OutOfMemory`].
-    pub(super) fn copied(&self) -> Result<Numbers> {
-        const WHAT: &str = "a table's numbers";
-        Ok(match self {
-            Numbers::F32(values) => Numbers::F32(memory::copied(values, WHAT)?),
-            Numbers::F16(values) => Numbers::F16(memory::copied(values, WHAT)?),
-        })
-    }
-
-    /// Ranges of these, one after another.
-    ///
-    /// # Errors
-    /// [`crate::Error::OutOfMemory`].
-    pub(super) fn gathered(
-        &self,
-        ranges: impl Iterator<Item = std::ops::Range<usize>> + Clone,
-    ) -> Result<Numbers> {
-        const WHAT: &str = "a table's numbers";
-        let count = ranges.clone().map(|range| range.len()).sum();
-        Ok(match self {
-            Numbers::F32(values) => {
-                let mut all = memory::room(count, WHAT)?;
-                ranges.for_each(|range| all.extend_from_slice(&values[range]));
-                Numbers::F32(all)
-            }
-            Numbers::F16(values) => {
-                let mut all = memory::room(count, WHAT)?;
-                ranges.for_each(|range| all.extend_from_slice(&values[range]));
-                Numbers::F16(all)
-            }
-        })
-    }
-
     /// As the kernels take it.
     pub fn stored(&self) -> Stored<'_> {
         match self {

@@ -28,6 +28,8 @@ pub struct ContactResponse {
     regularised: bool,
     pub(super) columns: Vec<u32>,
     rows: Vec<u32>,
+    /// The rows of the tables that they are.
+    stored: Vec<u32>,
     values: Vec<f32>,
     widened: Vec<f32>,
     pub(super) forces: Vec<f32>,
@@ -48,6 +50,7 @@ impl ContactResponse {
             regularised: false,
             columns: memory::room(columns, WHAT)?,
             rows: memory::room(3 * columns, WHAT)?,
+            stored: memory::room(3 * columns, WHAT)?,
             values: memory::room(3 * columns, WHAT)?,
             widened: memory::zeros(6 * table.widest_block(), WHAT)?,
             forces: memory::room(3 * columns, WHAT)?,
@@ -105,6 +108,9 @@ impl ContactResponse {
             self.count[slot] = 0;
             self.own[slot] = false;
         }
+        self.stored.clear();
+        self.stored
+            .extend(self.rows.iter().map(|row| table.stored_dof(*row)));
         if self.rows != self.factored {
             self.factored.clear();
             self.regularised = false;
@@ -145,7 +151,7 @@ impl ContactResponse {
             out.fill(0.0);
             return Ok(());
         }
-        let (rows, forces) = (&self.rows, &self.forces);
+        let (rows, forces) = (&self.stored, &self.forces);
         Ok(accumulate_rows(isa, pool, table, rows, forces, false, out)?)
     }
 }

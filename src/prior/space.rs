@@ -5,6 +5,10 @@
 //! contact is the static one less what inertia holds back, `A_k = A - N diag(kappa / (w² (w² + kappa))) N^T` with
 //! natural modes `N` of frequency `w`.
 
+mod cut;
+
+use std::sync::{Arc, Mutex, PoisonError};
+
 use super::numbers::Numbers;
 use super::table::PriorTable;
 use crate::bundle::TensorFile;
@@ -22,7 +26,8 @@ const LIMIT: usize = 1024;
 #[derive(Debug, HeldBytes)]
 pub struct CoarseSpace {
     /// `[r,Q]`, each of Euclidean length 1 as a field.
-    modes: Numbers,
+    #[held(own)]
+    modes: Arc<Numbers>,
     /// `0..r`, as a row list.
     rows: Vec<u32>,
     /// `Phi^T K Phi [r,r]`, µN/mm.
@@ -31,19 +36,17 @@ pub struct CoarseSpace {
     mass: Vec<f32>,
     /// Angular frequency of the natural modes, which are the first rows of `modes`, rad/s.
     frequency: Vec<f32>,
-    /// Modes at the contact degrees of freedom `[3D,r]`.
-    at_contact: Vec<f32>,
+    /// Modes at the contact degrees of freedom of the tables `[3D,r]`, and at those that a cut has added behind them.
+    #[held(own)]
+    at_contact: Arc<Vec<f32>>,
+    at_added: Vec<f32>,
+    /// Inverses of the Galerkin matrix that cut bodies have asked for, by the bits of kappa: the intact body's products serve all that have lost nothing.
+    #[held(skip)]
+    inverses: Arc<Mutex<Inverses>>,
+    keeps: bool,
 }
 
-/// What an element of a cut body has lost.
-pub struct Lost {
-    pub corners: [u32; 4],
-    pub is_free: [bool; 4],
-    /// µN/mm.
-    pub stiffness: [[f64; 12]; 12],
-    /// At each corner, g.
-    pub mass: f64,
-}
+type Inverses = Vec<(u64, Vec<f32>)>;
 
 impl CoarseSpace {
     /// Reads and checks the tables for a prior.
@@ -68,99 +71,31 @@ impl CoarseSpace {
             return Err(file.bad("frequency", format!("element {at} is not positive")));
         }
         let mut space = CoarseSpace {
-            at_contact: memory::zeros(3 * prior.contact_nodes.len() * count, WHAT)?,
+            at_contact: Arc::default(),
+            at_added: Vec::new(),
+            inverses: Arc::default(),
+            keeps: false,
             rows: memory::collected(count, 0..count as u32, WHAT)?,
-            modes: Numbers::of_f16(modes)?,
+            modes: Arc::new(Numbers::of_f16(modes)?),
             stiffness,
             mass,
             frequency,
         };
-        space.restrict(prior);
-        Ok(space)
-    }
-
-    /// The modes of a body that has been cut, by its own tables and those of the intact one, whose node each of its contact nodes is or stems from: of each changed element its corners, stiffness `[12,12]` (µN/mm) and mass at a corner (g), both less
-    /// what they were.
-    ///
-    /// # Errors
-    /// [`crate::Error::OutOfMemory`].
-    pub fn cut<'a>(
-        &self,
-        (intact, prior): (&PriorTable, &PriorTable),
-        parent: impl Fn(u32) -> u32,
-        changes: impl Iterator<Item = &'a Lost>,
-    ) -> Result<CoarseSpace> {
-        let (count, width) = (self.count(), prior.width());
-        let mut space = CoarseSpace {
-            at_contact: memory::zeros(3 * prior.contact_nodes.len() * count, WHAT)?,
-            rows: memory::copied(&self.rows, WHAT)?,
-            modes: self.modes.copied()?,
-            stiffness: memory::copied(&self.stiffness, WHAT)?,
-            mass: memory::copied(&self.mass, WHAT)?,
-            frequency: memory::copied(&self.frequency, WHAT)?,
-        };
-        let mut rows = memory::zeros(12 * count, WHAT)?;
-        let mut forces = memory::zeros(12 * count, WHAT)?;
-        for lost in changes {
-            for (corner, is_free) in lost.is_free.into_iter().enumerate() {
-                for axis in 0..3 {
-                    for mode in 0..count {
-                        let q = |at: usize| self.modes.at(mode * width + at);
-                        rows[(3 * corner + axis) * count + mode] = match is_free {
-                            true => prior.value_at(lost.corners[corner], axis, q),
-                            false => 0.0,
-                        };
-                    }
-                }
-            }
-            for (at, row) in forces.chunks_exact_mut(count).enumerate() {
-                row.fill(0.0);
-                for (part, from) in lost.stiffness[at].iter().zip(rows.chunks_exact(count)) {
-                    for (sum, value) in row.iter_mut().zip(from) {
-                        *sum += *part as f32 * value;
-                    }
-                }
-            }
-            for (own, force) in rows.chunks_exact(count).zip(forces.chunks_exact(count)) {
-                for (i, value) in own.iter().enumerate() {
-                    let stiffness = &mut space.stiffness[i * count..][..count];
-                    let mass = &mut space.mass[i * count..][..count];
-                    let pairs = stiffness.iter_mut().zip(mass);
-                    for ((k, m), (force, other)) in pairs.zip(force.iter().zip(own)) {
-                        *k -= value * force;
-                        *m -= value * lost.mass as f32 * other;
-                    }
-                }
-            }
-        }
-        for (at, &node) in prior.contact_nodes.iter().enumerate() {
-            match intact.contact_nodes.binary_search(&parent(node)) {
-                Ok(known) => {
-                    let rows = &self.at_contact[3 * known * count..][..3 * count];
-                    space.at_contact[3 * at * count..][..3 * count].copy_from_slice(rows);
-                }
-                Err(_) => space.restrict_to(prior, at, node),
-            }
-        }
+        space.at_contact = Arc::new(space.restricted(prior)?);
         Ok(space)
     }
 
     /// Rows of the modes at the contact nodes.
-    fn restrict(&mut self, prior: &PriorTable) {
-        for (at, &node) in prior.contact_nodes.iter().enumerate() {
-            self.restrict_to(prior, at, node);
-        }
-    }
-
-    /// Those at one.
-    fn restrict_to(&mut self, prior: &PriorTable, at: usize, node: u32) {
+    fn restricted(&self, prior: &PriorTable) -> Result<Vec<f32>> {
         let (count, width) = (self.rows.len(), prior.width());
-        for axis in 0..3 {
-            for mode in 0..count {
-                let q = |at: usize| self.modes.at(mode * width + at);
-                self.at_contact[(3 * at + axis) * count + mode] = prior.value_at(node, axis, q);
+        let mut rows = memory::zeros(3 * prior.contact_nodes.len() * count, WHAT)?;
+        for (at, row) in rows.chunks_exact_mut(count.max(1)).enumerate() {
+            let (node, axis) = (prior.contact_nodes[at / 3], at % 3);
+            for (mode, value) in row.iter_mut().enumerate() {
+                *value = prior.value_at(node, axis, |at| self.modes.at(mode * width + at));
             }
         }
+        Ok(rows)
     }
 
     /// The block coordinates `[Q]` of a mode.
@@ -198,7 +133,12 @@ impl CoarseSpace {
 
     /// Modes at contact dof `dof`, `[r]`.
     pub fn at_contact(&self, dof: usize) -> &[f32] {
-        &self.at_contact[dof * self.count()..(dof + 1) * self.count()]
+        let at = dof * self.count()..(dof + 1) * self.count();
+        let own = self.at_contact.len();
+        match at.start < own {
+            true => &self.at_contact[at],
+            false => &self.at_added[at.start - own..at.end - own],
+        }
     }
 
     /// Frequency (rad/s) and mass (g) of each natural mode.
@@ -250,6 +190,20 @@ impl CoarseSpace {
     /// # Errors
     /// [`crate::Error::Bundle`] where it has none, [`crate::Error::OutOfMemory`].
     pub fn galerkin_inverse(&self, kappa: f64, isa: Isa) -> Result<Vec<f32>> {
+        if !self.keeps {
+            return self.inverse(kappa, isa);
+        }
+        let mut kept = self.inverses.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, known)) = kept.iter().find(|own| own.0 == kappa.to_bits()) {
+            return memory::copied(known, WHAT);
+        }
+        let made = self.inverse(kappa, isa)?;
+        let copy = memory::copied(&made, WHAT)?;
+        memory::push(&mut kept, (kappa.to_bits(), copy), WHAT)?;
+        Ok(made)
+    }
+
+    fn inverse(&self, kappa: f64, isa: Isa) -> Result<Vec<f32>> {
         let (count, galerkin) = (self.count(), self.galerkin(kappa)?);
         let mut factor = ContactFactor::try_with_capacity(count)?;
         factor

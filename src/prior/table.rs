@@ -3,11 +3,13 @@
 mod cut;
 mod read;
 
-use super::compliance::{Bases, Compliance};
+use std::sync::Arc;
+
+use super::compliance::{Bases, Borrowed, Compliance};
 use super::numbers::Numbers;
 use super::vibration::FreeVibration;
 use crate::error::Result;
-use crate::kernels::rows::BlockBasis;
+use crate::kernels::rows::{BlockBasis, Copies};
 use crate::memory::{self, HeldBytes};
 
 /// A node without a column near it.
@@ -15,15 +17,22 @@ pub const NO_COLUMN: u32 = u32::MAX;
 /// The tables of the linear response, as `prior.safetensors` has them.
 #[derive(Debug, HeldBytes)]
 pub struct PriorTable {
-    /// Nodes with compliance columns `[D]`, ascending.
+    /// Nodes with compliance columns `[D]`: those of the tables, ascending, and behind them those that a cut has laid bare.
     pub contact_nodes: Vec<u32>,
-    compliance: Compliance,
+    /// Of each of the latter: the column of the tables whose response it has.
+    sources: Vec<u32>,
+    #[held(own)]
+    compliance: Arc<Compliance>,
     block_nodes: Vec<u32>,
     block_offsets: Vec<u32>,
     rank_offsets: Vec<u32>,
-    basis: Numbers,
-    /// Response of a unit force `[3D,Q]`, mm/mN.
-    pub response: Numbers,
+    /// Of a cut body: nodes with rows of their own before each block, and whose rows each node of `block_nodes` has ([`Copies`]).
+    copies: Option<(Vec<u32>, Vec<u32>)>,
+    #[held(own)]
+    basis: Arc<Numbers>,
+    /// Response of a unit force on a column of the tables `[3D,Q]`, mm/mN; see [`PriorTable::stored_dof`].
+    #[held(own)]
+    pub response: Arc<Numbers>,
     /// Residual modes `[r,Q]`; empty where the bundle has none.
     pub residual: Vec<f32>,
     /// `[3D,r_z]`; empty where the bundle has none.
@@ -55,7 +64,51 @@ impl PriorTable {
             response: &self.response,
             width: self.width(),
         };
-        self.compliance.gather(bases, columns, upper, scratch);
+        if self.sources.is_empty() {
+            self.compliance.gather(bases, columns, upper, scratch);
+            return;
+        }
+        let own = self.contact_nodes.len() - self.sources.len();
+        let borrowed = Borrowed {
+            sources: &self.sources,
+            places: &|behind| self.places[self.contact_nodes[own + behind] as usize],
+        };
+        (self.compliance).gather_borrowed(bases, borrowed, columns, upper, scratch);
+    }
+
+    /// The row of the tables that a degree of freedom of a column has: its own, or that of the column whose response it has.
+    pub fn stored_dof(&self, dof: u32) -> u32 {
+        let own = self.contact_nodes.len() - self.sources.len();
+        match (dof as usize / 3).checked_sub(own) {
+            Some(behind) => 3 * self.sources[behind] + dof % 3,
+            None => dof,
+        }
+    }
+
+    /// Whether some columns have the response of others.
+    pub fn borrows(&self) -> bool {
+        !self.sources.is_empty()
+    }
+
+    /// The same of a list; `room` is taken where they are others.
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
+    pub fn stored_dofs<'a>(&self, dofs: &'a [u32], room: &'a mut Vec<u32>) -> Result<&'a [u32]> {
+        if self.sources.is_empty() {
+            return Ok(dofs);
+        }
+        room.clear();
+        memory::fit(room, dofs.len(), "the linear response of a cut body")?;
+        room.extend(dofs.iter().map(|dof| self.stored_dof(*dof)));
+        Ok(room)
+    }
+
+    /// Bytes that it shares with the table of the intact body.
+    pub(crate) fn shared_bytes(&self) -> usize {
+        memory::behind(&self.compliance)
+            + memory::behind(&self.basis)
+            + memory::behind(&self.response)
     }
 
     /// Largest rank of a block.
@@ -72,6 +125,12 @@ impl PriorTable {
         columns
             .map(|at| self.basis.at(row + at) * q(start as usize + at))
             .sum()
+    }
+
+    /// Coordinates of the block that a node is of.
+    pub fn coordinates_of(&self, node: u32) -> std::ops::Range<usize> {
+        let (_, start, rank) = self.places[node as usize];
+        start as usize..(start + rank) as usize
     }
 
     /// `q += U^T f` of a vector on one node.
@@ -93,10 +152,11 @@ impl PriorTable {
     pub fn basis_starts(&self) -> Result<Vec<usize>> {
         let mut starts = memory::room(self.rank_offsets.len(), "the linear response")?;
         starts.push(0);
-        let blocks = self
-            .block_offsets
-            .windows(2)
-            .zip(self.rank_offsets.windows(2));
+        let offsets = match &self.copies {
+            Some((own, _)) => own,
+            None => &self.block_offsets,
+        };
+        let blocks = offsets.windows(2).zip(self.rank_offsets.windows(2));
         for (nodes, ranks) in blocks {
             let size = 3 * (nodes[1] - nodes[0]) as usize * (ranks[1] - ranks[0]) as usize;
             starts.push(starts[starts.len() - 1] + size);
@@ -111,6 +171,10 @@ impl PriorTable {
             block_offsets: &self.block_offsets,
             rank_offsets: &self.rank_offsets,
             basis: self.basis.stored(),
+            copies: (self.copies.as_ref()).map(|(own, locals)| Copies {
+                row_offsets: own,
+                locals,
+            }),
         }
     }
 
@@ -126,27 +190,24 @@ impl PriorTable {
 
     /// `q += U^T u` of a field `[K,3]`: its coordinates in the orthonormal block bases.
     pub fn project(&self, field: &[f32], q: &mut [f32]) {
-        let mut row = 0;
-        for (block, ranks) in self.rank_offsets.windows(2).enumerate() {
-            let (start, rank) = (ranks[0] as usize, (ranks[1] - ranks[0]) as usize);
+        for &node in &self.block_nodes {
+            let (row, start, rank) = self.places[node as usize];
+            let (mut row, start, rank) = (row as usize, start as usize, rank as usize);
             let q = &mut q[start..start + rank];
-            let nodes = self.block_offsets[block] as usize..self.block_offsets[block + 1] as usize;
-            for &node in &self.block_nodes[nodes] {
-                for &u in &field[3 * node as usize..3 * node as usize + 3] {
-                    match &self.basis {
-                        Numbers::F32(basis) => {
-                            for (q, &phi) in q.iter_mut().zip(&basis[row..row + rank]) {
-                                *q += phi * u;
-                            }
-                        }
-                        Numbers::F16(basis) => {
-                            for (q, phi) in q.iter_mut().zip(&basis[row..row + rank]) {
-                                *q += phi.to_f32() * u;
-                            }
+            for &u in &field[3 * node as usize..3 * node as usize + 3] {
+                match &*self.basis {
+                    Numbers::F32(basis) => {
+                        for (q, &phi) in q.iter_mut().zip(&basis[row..row + rank]) {
+                            *q += phi * u;
                         }
                     }
-                    row += rank;
+                    Numbers::F16(basis) => {
+                        for (q, phi) in q.iter_mut().zip(&basis[row..row + rank]) {
+                            *q += phi.to_f32() * u;
+                        }
+                    }
                 }
+                row += rank;
             }
         }
     }
@@ -164,12 +225,14 @@ mod tests {
         (0..6).for_each(|i| compliance[7 * i] = 2.0);
         PriorTable {
             contact_nodes: vec![0, 1],
-            compliance: Compliance::Whole(compliance),
+            sources: Vec::new(),
+            compliance: Arc::new(Compliance::Whole(compliance)),
             block_nodes: vec![0, 1, 2, 3],
             block_offsets: vec![0, 4],
             rank_offsets: vec![0, 8],
-            basis: Numbers::F32(vec![0.0; 96]),
-            response: Numbers::F32(vec![0.0; 48]),
+            copies: None,
+            basis: Arc::new(Numbers::F32(vec![0.0; 96])),
+            response: Arc::new(Numbers::F32(vec![0.0; 48])),
             residual: Vec::new(),
             force_to_z: Vec::new(),
             force_to_p: Vec::new(),

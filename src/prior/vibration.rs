@@ -83,18 +83,6 @@ impl FreeVibration {
         Ok(())
     }
 
-    /// The same for contact nodes each of which moves what another one moved, `base [D']`.
-    pub(super) fn of_bases(&self, base: &[u32]) -> FreeVibration {
-        let width = 3 * self.count;
-        let rows = base
-            .iter()
-            .flat_map(|b| &self.force_to_mode[*b as usize * width..][..width]);
-        FreeVibration {
-            force_to_mode: rows.copied().collect(),
-            ..self.clone()
-        }
-    }
-
     /// Number of modes, `m`.
     pub fn count(&self) -> usize {
         self.count

@@ -7,6 +7,7 @@ use super::corrected::Corrector;
 use super::engine::Engine;
 use super::{reduced, upt};
 use crate::bundle::{Mesh, TensorFile};
+use crate::envelope::EnvelopeCheck;
 use crate::error::{Error, Result};
 use crate::features::Proven;
 use crate::kernels::{Isa, Pool};
@@ -15,7 +16,13 @@ use crate::model::{KindModel, Model};
 use crate::options::{SceneOptions, StepPath};
 
 /// The core of a new scene, at rest.
-pub(super) fn build(model: &Arc<Model>, options: &SceneOptions) -> Result<Core> {
+///
+/// `envelope`: that of a cut body, which need not be made anew.
+pub(super) fn build(
+    model: &Arc<Model>,
+    options: &SceneOptions,
+    envelope: Option<EnvelopeCheck>,
+) -> Result<Core> {
     let threads = match options.threads {
         0 => model.threads,
         threads => threads,
@@ -82,5 +89,6 @@ pub(super) fn build(model: &Arc<Model>, options: &SceneOptions) -> Result<Core> 
         pool,
         engine,
         corrected,
+        envelope,
     })
 }

@@ -84,7 +84,7 @@ pub struct Core {
     pub(super) counters: Counters,
     /// Flags of the last step, which the log has.
     pub(super) logged_flags: u32,
-    envelope: EnvelopeCheck,
+    pub(super) envelope: EnvelopeCheck,
     /// The state being made. It is valid from the end of the prediction or the contact solve until it is published, when it
     /// changes places with the oldest published frame; a refused step leaves it behind, and the next one overwrites it.
     pub(super) next: Frame,
@@ -98,6 +98,8 @@ pub struct CoreParts {
     pub pool: Pool,
     pub engine: Engine,
     pub corrected: Option<Corrector>,
+    /// None: it is made here.
+    pub envelope: Option<EnvelopeCheck>,
 }
 
 pub(super) fn lock_read(
@@ -122,7 +124,10 @@ impl Core {
         let plan = NodePlan::all(count, parts.engine.planned_prior())?;
         let contact = ContactSet::with_capacity(count)?;
         Ok(Core {
-            envelope: EnvelopeCheck::new(&parts.mesh)?,
+            envelope: match parts.envelope {
+                Some(envelope) => envelope,
+                None => EnvelopeCheck::new(&parts.mesh)?,
+            },
             planned_tets: if parts.options.check_inversion {
                 memory::copied(&parts.mesh.tets, SCENE)?
             } else {

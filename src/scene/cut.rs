@@ -6,7 +6,7 @@
 
 use std::sync::{Arc, RwLock};
 
-use topology::{Body, Change, Point, RestMesh, TopologyError};
+use topology::{Body, Change, Point, TopologyError};
 
 use super::build::build;
 use super::core::{Core, SCENE, lock_read, lock_write};
@@ -180,10 +180,11 @@ impl Core {
     pub(super) fn with_body(&self, body: Option<Body>) -> Result<Core> {
         let intact = self.intact();
         let Some(body) = body else {
-            return build(intact, &self.options);
+            return build(intact, &self.options, None);
         };
         let model = intact.cut(&body)?;
-        let mut core = build(&model, &self.options)?;
+        let envelope = self.envelope.cut(&model.mesh, intact.mesh.node_count())?;
+        let mut core = build(&model, &self.options, Some(envelope))?;
         let cut = CutState {
             intact: Arc::clone(intact),
             model_bytes: bytes_of(&model)?,
@@ -195,9 +196,7 @@ impl Core {
 
     /// The intact mesh, as what can be cut.
     pub(super) fn whole_body(&self) -> Result<Body> {
-        let mesh = &self.intact().mesh;
-        let rest = RestMesh::new(mesh.positions.as_chunks().0, mesh.tets.as_chunks().0)?;
-        Ok(self.with_most_copies(Body::new(Arc::new(rest))))
+        Ok(self.with_most_copies(Body::new(self.intact().rest_mesh()?)))
     }
 
     pub(super) fn with_most_copies(&self, body: Body) -> Body {
@@ -294,9 +293,11 @@ fn spread(from: &[f32], to: &mut [f32], source: impl Fn(usize) -> usize) {
     }
 }
 
+/// Bytes of a cut body's model beside what it shares with the intact one's.
 fn bytes_of(model: &Model) -> Result<usize> {
     let made = model.corrections()?;
-    let prior = model.prior.as_ref().map_or(0, |table| table.held_bytes());
-    let corrections = made.space.held_bytes() + made.body.held_bytes() + made.far.held_bytes();
+    let prior = (model.prior.as_ref()).map_or(0, |table| table.held_bytes() - table.shared_bytes());
+    let space = made.space.held_bytes() - made.space.shared_bytes();
+    let corrections = space + made.body.held_bytes() + made.far.held_bytes();
     Ok(model.mesh.held_bytes() + prior + corrections)
 }

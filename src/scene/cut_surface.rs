@@ -169,6 +169,10 @@ impl Core {
             Some(cut) => &cut.body,
             None => {
                 whole = self.whole_body()?;
+                if self.corrected.is_some() {
+                    let material = &self.model.manifest.material;
+                    (self.model.corrections()?).prepare_cut(&self.mesh, material)?;
+                }
                 &whole
             }
         };

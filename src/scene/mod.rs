@@ -111,7 +111,7 @@ impl Scene {
     /// has a prior; [`Error::Io`] and [`Error::Bundle`] for that mesh.
     pub fn new(model: Arc<Model>, options: &SceneOptions) -> Result<Scene> {
         let _span = tracing::info_span!("scene").entered();
-        let core = build(&model, options)?;
+        let core = build(&model, options, None)?;
         let mesh = Arc::clone(&core.mesh);
         let integrator = core.integrator();
         let published = core.blank_published()?;

@@ -248,12 +248,13 @@ impl NearSet {
                 }
                 let is_reached = &self.is_reached;
                 let near = (self.subset).push(forces, chunk, |node| is_reached[node as usize]);
-                let near = memory::tried(near, WHAT)? / far.volumes[chunk];
+                let near = memory::tried(near, WHAT)?;
+                let whole = far.packed_volumes[chunk];
                 // What rounding leaves of a chunk is nothing.
-                self.far_share[chunk] = if near > 1.0 - 1e-4 {
-                    0.0
-                } else {
-                    1.0 - near as f32
+                let share = if whole > 0.0 { near / whole } else { 1.0 };
+                self.far_share[chunk] = match share > 1.0 - 1e-4 {
+                    true => 0.0,
+                    false => 1.0 - share as f32,
                 };
             }
         }

@@ -55,7 +55,7 @@ impl Preconditioner {
             isa,
             pool,
             response,
-            &self.dofs,
+            env.prior.stored_dofs(&self.dofs, &mut self.stored)?,
             &self.forces,
             true,
             q,
@@ -119,6 +119,7 @@ impl Preconditioner {
         let modes = env.space.modes();
         accumulate_rows(isa, pool, modes, rows, natural, true, q)?;
         let response = env.prior.response.stored();
+        let dofs = env.prior.stored_dofs(dofs, &mut self.stored)?;
         Ok(accumulate_rows(isa, pool, response, dofs, forces, true, q)?)
     }
 

@@ -31,7 +31,7 @@ impl RowPlan {
             let mut start = self.locals.len();
             for (local, &node) in basis.block_nodes[range].iter().enumerate() {
                 if let Some(row) = row_of(node) {
-                    self.locals.push(local as u32);
+                    self.locals.push(basis.row_of(k, local));
                     self.outputs.push(row);
                     if self.locals.len() - start == RUN_NODES {
                         self.end_run(k, &mut start);
@@ -70,6 +70,27 @@ pub fn project_rows(isa: Isa, basis: &BlockBasis<'_>, plan: &RowPlan, r: &[f32],
             Stored::F32(basis) => add_f32(isa, &basis[range], locals, outputs, r, q),
             Stored::F16(basis) => add_f16(isa, &basis[range], locals, outputs, r, q),
         }
+    }
+}
+
+/// `q += U^T r` of the copies of nodes in block `k`, whose rows lie at `rows`; `r` by node.
+pub(in crate::kernels) fn add_copies(
+    isa: Isa,
+    basis: &BlockBasis<'_>,
+    k: usize,
+    rows: std::ops::Range<usize>,
+    r: &[f32],
+    q: &mut [f32],
+) {
+    let Some(copies) = &basis.copies else {
+        return;
+    };
+    let start = basis.block_offsets[k] as usize + basis.own_nodes(k);
+    let all = start..basis.block_offsets[k + 1] as usize;
+    let (locals, nodes) = (&copies.locals[all.clone()], &basis.block_nodes[all]);
+    match basis.basis {
+        Stored::F32(basis) => add_f32(isa, &basis[rows], locals, nodes, r, q),
+        Stored::F16(basis) => add_f16(isa, &basis[rows], locals, nodes, r, q),
     }
 }
 

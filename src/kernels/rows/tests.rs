@@ -46,6 +46,7 @@ impl Case {
             } else {
                 Stored::F32(&self.wide)
             },
+            copies: None,
         }
     }
 }

@@ -1,5 +1,7 @@
 //! `prior.safetensors`, read and checked.
 
+use std::sync::Arc;
+
 use super::{NO_COLUMN, PriorTable};
 use crate::bundle::{BundleFiles, Manifest, ManifestKind, Mesh, PriorEntry, TensorFile};
 use crate::error::Result;
@@ -112,12 +114,14 @@ impl PriorTable {
             nearest_column: nearest_columns(mesh, &contact_nodes)?,
             in_domain,
             contact_nodes,
-            compliance,
+            sources: Vec::new(),
+            compliance: Arc::new(compliance),
             block_nodes,
             block_offsets: narrow(block_offsets)?,
             rank_offsets: narrow(rank_offsets)?,
-            basis: Numbers::read(file, "basis", &[Some(size)])?,
-            response: Numbers::read(file, "response", &[Some(dofs), Some(width)])?,
+            copies: None,
+            basis: Arc::new(Numbers::read(file, "basis", &[Some(size)])?),
+            response: Arc::new(Numbers::read(file, "response", &[Some(dofs), Some(width)])?),
             residual: if modes > 0 {
                 file.float("residual", &[Some(modes), Some(width)])?
             } else {

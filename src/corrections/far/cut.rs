@@ -1,0 +1,188 @@
+//! The far field of a body that has been cut: that of the intact body, made anew in the chunks of which an element has changed.
+
+use std::ops::Range;
+
+use super::{FarField, NINE, WHAT};
+use crate::bundle::Mesh;
+use crate::corrections::body::Body;
+use crate::error::Result;
+use crate::memory;
+use crate::prior::{Lost, LostElements};
+
+/// An element of the intact body, and the corners that it or what it has become has.
+pub type Corners = (u32, [u32; 4]);
+
+/// The chunks that the elements of one chunk of the intact body are packed in.
+struct Packed<'a> {
+    first: usize,
+    behind: Range<usize>,
+    body: &'a Body,
+}
+
+impl Packed<'_> {
+    fn chunks(&self) -> impl Iterator<Item = usize> + '_ {
+        std::iter::once(self.first).chain(self.behind.clone())
+    }
+}
+
+impl FarField {
+    /// That of what this body has been cut to. `gone`: the elements that have changed; `new`: what they have become; `lost`: what they have lost.
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
+    pub fn cut(
+        &self,
+        (body, mesh): (&Body, &Mesh),
+        (gone, new): (&[Corners], &[Corners]),
+        lost: &LostElements,
+    ) -> Result<FarField> {
+        let forces = &body.forces;
+        let (count, parents) = (self.volumes.len(), forces.cut_chunks());
+        let mut own = FarField {
+            moduli: self.moduli,
+            group: self.group,
+            volumes: memory::copied(&self.volumes, WHAT)?,
+            packed_volumes: memory::room(forces.chunk_count(), WHAT)?,
+            starts: memory::room(count + 1, WHAT)?,
+            nodes: memory::room(self.nodes.len(), WHAT)?,
+            weights: memory::room(self.weights.len(), WHAT)?,
+            on_modes: memory::copied(&self.on_modes, WHAT)?,
+            elements_at: memory::room(mesh.node_count(), WHAT)?,
+            cluster_of: memory::room(self.cluster_of.len() + new.len(), WHAT)?,
+            edge_mm: self.edge_mm,
+            boxes: memory::room(forces.chunk_count(), WHAT)?,
+        };
+        own.packed_volumes.extend_from_slice(&self.volumes);
+        own.packed_volumes.resize(forces.chunk_count(), 0.0);
+        own.boxes.extend_from_slice(&self.boxes);
+        for chunk in count..forces.chunk_count() {
+            own.boxes.push(bounds(mesh, forces.chunk_nodes(chunk)));
+        }
+        own.elements_at.extend_from_slice(&self.elements_at);
+        own.elements_at.resize(mesh.node_count(), 0);
+        for node in gone.iter().flat_map(|(_, corners)| corners) {
+            own.elements_at[*node as usize] -= 1;
+        }
+        for node in new.iter().flat_map(|(_, corners)| corners) {
+            own.elements_at[*node as usize] += 1;
+        }
+        own.cluster_of.extend_from_slice(&self.cluster_of);
+        let clusters = new
+            .iter()
+            .map(|(parent, _)| self.cluster_of[*parent as usize]);
+        own.cluster_of.extend(clusters);
+        own.starts.push(0);
+        let is_changed = is_changed(self, gone, count)?;
+        for (chunk, is_changed) in is_changed.into_iter().enumerate() {
+            if is_changed {
+                let from = count + parents.partition_point(|parent| (*parent as usize) < chunk);
+                let to = count + parents.partition_point(|parent| *parent as usize <= chunk);
+                let packed = Packed {
+                    first: chunk,
+                    behind: from..to,
+                    body,
+                };
+                own.take_anew(&packed)?;
+            } else {
+                let range = self.starts[chunk] as usize..self.starts[chunk + 1] as usize;
+                memory::reserve(&mut own.nodes, range.len(), WHAT)?;
+                memory::reserve(&mut own.weights, range.len(), WHAT)?;
+                own.nodes.extend_from_slice(&self.nodes[range.clone()]);
+                own.weights.extend_from_slice(&self.weights[range]);
+            }
+            own.starts.push(own.nodes.len() as u32);
+        }
+        for one in &lost.list {
+            own.lose(one, lost);
+        }
+        Ok(own)
+    }
+
+    /// Volumes of a chunk and of what its elements have become, and which nodes' displacements change their mean gradient.
+    fn take_anew(&mut self, packed: &Packed<'_>) -> Result<()> {
+        let forces = &packed.body.forces;
+        let mut sums: Vec<(u32, [f64; 3])> = Vec::new();
+        let (mut whole, mut largest) = (0.0, 0.0f64);
+        for chunk in packed.chunks() {
+            let nodes = forces.chunk_nodes(chunk);
+            let mut volume = 0.0;
+            for (_, element) in forces.chunk_tetrahedra(chunk) {
+                volume += element.volume;
+                let [a, b, c] = element.gradients;
+                let first = [0, 1, 2].map(|k| -(a[k] + b[k] + c[k]));
+                memory::reserve(&mut sums, 4, WHAT)?;
+                for (corner, gradient) in element.corners.into_iter().zip([first, a, b, c]) {
+                    let part = gradient.map(|value| element.volume * value);
+                    largest = part
+                        .iter()
+                        .fold(largest, |most, value| most.max(value.abs()));
+                    sums.push((nodes[corner as usize], part));
+                }
+            }
+            self.packed_volumes[chunk] = volume;
+            whole += volume;
+        }
+        self.volumes[packed.first] = whole;
+        // In the order of the nodes, and at each of the elements.
+        sums.sort_by_key(|(node, _)| *node);
+        for same in sums.chunk_by(|a, b| a.0 == b.0) {
+            let mut sum = [0.0; 3];
+            for (_, part) in same {
+                sum.iter_mut()
+                    .zip(part)
+                    .for_each(|(sum, part)| *sum += part);
+            }
+            let node = same[0].0;
+            let matters = sum.iter().any(|value| value.abs() > 1e-5 * largest);
+            if matters && !packed.body.held[node as usize] {
+                memory::push(&mut self.nodes, node, WHAT)?;
+                memory::push(&mut self.weights, sum.map(|value| value as f32), WHAT)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes what an element has lost off the mean gradients on the modes. Which chunk of a cluster that is off does not matter: they are added.
+    fn lose(&mut self, one: &Lost, lost: &LostElements) {
+        let cluster = usize::from(self.cluster_of[one.element as usize]);
+        let size = NINE * lost.modes;
+        let first = self.chunks_of(cluster).start;
+        let out = &mut self.on_modes[first * size..][..size];
+        let [a, b, c] = one.gradients;
+        let first = [0, 1, 2].map(|k| -(a[k] + b[k] + c[k]));
+        for (node, gradient) in one.corners.into_iter().zip([first, a, b, c]) {
+            let Some(rows) = lost.at(node) else { continue };
+            for (at, out) in out.chunks_exact_mut(lost.modes).enumerate() {
+                let (i, j) = (at / 3, at % 3);
+                let weight = (one.volume * gradient[j]) as f32;
+                for (out, value) in out.iter_mut().zip(&rows[i * lost.modes..][..lost.modes]) {
+                    *out -= weight * value;
+                }
+            }
+        }
+    }
+}
+
+/// By chunk of the intact body: whether one of its elements may have changed. Chunks of a cluster go together.
+fn is_changed(far: &FarField, gone: &[Corners], count: usize) -> Result<Vec<bool>> {
+    let mut changed = memory::filled(count, false, WHAT)?;
+    for (element, _) in gone {
+        let cluster = usize::from(far.cluster_of[*element as usize]);
+        for chunk in far.chunks_of(cluster) {
+            changed[chunk] = true;
+        }
+    }
+    Ok(changed)
+}
+
+/// The box of some nodes at rest, mm.
+fn bounds(mesh: &Mesh, nodes: &[u32]) -> [[f32; 3]; 2] {
+    let mut bounds = [[f32::MAX; 3], [f32::MIN; 3]];
+    for &node in nodes {
+        for (axis, x) in mesh.position(node).into_iter().enumerate() {
+            bounds[0][axis] = bounds[0][axis].min(x);
+            bounds[1][axis] = bounds[1][axis].max(x);
+        }
+    }
+    bounds
+}
