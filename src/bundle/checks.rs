@@ -96,6 +96,9 @@ impl Manifest {
             )?;
         }
         self.listed(&self.mesh.file, "mesh.file")?;
+        if let Some(whole) = (self.corrections.as_ref()).and_then(|own| own.whole.as_ref()) {
+            self.listed(whole, "corrections.whole")?;
+        }
         if let Some(prior) = &self.prior {
             self.listed(&prior.file, "prior.file")?;
             if let Some(vibration) = &prior.vibration {

@@ -91,6 +91,7 @@ const KEYS: &[(&str, &[&str])] = &[
             "substeps",
             "calibration",
             "frame_step_s",
+            "whole",
         ],
     ),
     (

@@ -96,6 +96,8 @@ pub struct CorrectionsEntry {
     pub calibration: f32,
     /// Length of step that suits scenes whose frames are presented, s; none: the bundle's.
     pub frame_step_s: Option<f64>,
+    /// File with natural modes as whole fields, for steps under loads.
+    pub whole: Option<String>,
 }
 
 fn one() -> f32 {

@@ -68,6 +68,7 @@ impl Corrections {
             changed,
             gravity: OnceLock::new(),
             diagonal: OnceLock::from(diagonal),
+            whole: OnceLock::new(),
         })
     }
 

@@ -33,6 +33,7 @@ impl ImplicitSolver {
         let _awake = context.pool.keep_awake();
         self.nodes.clear();
         self.preconditioner.prescribe(context.env(), &[])?;
+        (self.preconditioner).expect_load(context.env(), input.load.is_some())?;
         self.memory.mask(&[]);
         self.prepare(context, input)?;
         let mut u = std::mem::take(&mut self.u);

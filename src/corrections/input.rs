@@ -93,6 +93,7 @@ impl<'a> SolverContext<'a> {
             space: &self.corrections.space,
             body: &self.corrections.body,
             time_step: self.time_step,
+            whole: self.corrections.whole.get().and_then(Option::as_ref),
         }
     }
 }

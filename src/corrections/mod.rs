@@ -31,6 +31,7 @@ mod substepper;
 mod substeps;
 mod time_step;
 mod tool_contact;
+mod whole;
 
 use std::sync::{Arc, OnceLock};
 
@@ -42,6 +43,7 @@ use crate::kernels::Isa;
 use crate::prior::{CoarseSpace, PriorTable};
 use gravity::GravityResponse;
 use time_step::Diagonal;
+use whole::WholeModes;
 
 pub use body::Body;
 pub use far::FarField;
@@ -69,6 +71,8 @@ pub struct Corrections {
     gravity: OnceLock<GravityResponse>,
     /// Of the intact body from its first cut on, and of every cut one.
     diagonal: OnceLock<Diagonal>,
+    /// Read at the first step that has a load; none where the bundle has no such file.
+    whole: OnceLock<Option<WholeModes>>,
 }
 
 impl Corrections {
@@ -99,7 +103,37 @@ impl Corrections {
             changed: Vec::new(),
             gravity: OnceLock::new(),
             diagonal: OnceLock::new(),
+            whole: OnceLock::new(),
         })
+    }
+
+    /// Reads what steps under a load need beside the modes, once.
+    ///
+    /// # Errors
+    /// [`Error::Bundle`] and [`Error::Io`] for the file, [`Error::OutOfMemory`].
+    pub fn prepare_loads(&self, files: &BundleFiles) -> Result<()> {
+        if self.whole.get().is_some() {
+            return Ok(());
+        }
+        let entry = files.manifest.corrections.as_ref();
+        let modes = match entry.and_then(|entry| entry.whole.as_ref()) {
+            Some(name) => {
+                let nodes = self.body.mass.len();
+                Some(WholeModes::parse(
+                    &files.tensors(name)?,
+                    nodes,
+                    &self.space,
+                )?)
+            }
+            None => None,
+        };
+        self.whole.get_or_init(|| modes);
+        Ok(())
+    }
+
+    /// Whether the bundle has whole modes, and they have been read.
+    pub fn has_whole_modes(&self) -> bool {
+        self.whole.get().is_some_and(Option::is_some)
     }
 
     /// Steps of another length or damping.

@@ -7,11 +7,13 @@
 //!
 //! All products with fields go through the prior's block-wise bases: `U^T` once, the modes and columns on coordinates, `U` once.
 
+mod loaded;
 mod near;
 mod response;
 
 use super::body::Body;
 use super::time_step::TimeStep;
+use super::whole::{WholeModes, WholeSolve};
 use crate::error::{Error, Result};
 use crate::kernels::contact::{ContactFactor, subtract_gram};
 use crate::kernels::project::{project_field, row_dots};
@@ -36,6 +38,8 @@ pub struct Env<'a> {
     pub space: &'a CoarseSpace,
     pub body: &'a Body,
     pub time_step: &'a TimeStep,
+    /// Read by then where the step has a load.
+    pub whole: Option<&'a WholeModes>,
 }
 
 /// The preconditioner for one set of prescribed nodes, and its buffers.
@@ -76,6 +80,9 @@ pub struct Preconditioner {
     solved: Vec<f32>,
     at_contact: Vec<f32>,
     forces: Vec<f32>,
+    /// Made at the first step with a load.
+    whole: Option<Box<WholeSolve>>,
+    has_load: bool,
     ready: bool,
 }
 
@@ -128,6 +135,8 @@ impl Preconditioner {
             solved: memory::zeros(count, WHAT)?,
             at_contact: memory::room(room, WHAT)?,
             forces: memory::room(room, WHAT)?,
+            whole: None,
+            has_load: false,
             ready: false,
         })
     }
@@ -220,8 +229,12 @@ impl Preconditioner {
         let (isa, pool) = (env.isa, env.pool);
         let basis = env.prior.basis();
         project_field(isa, pool, &basis, &self.starts, r, &mut self.coordinates)?;
-        self.coarse(env)?;
+        let whole = self.whole_modes(env);
+        self.coarse(env, whole.map(|modes| (modes, r)))?;
         decode_rows(isa, pool, &basis, &self.plan, &self.coordinates, z)?;
+        if let (Some(modes), Some(solve)) = (whole, &self.whole) {
+            solve.add(env.compute(), modes, z)?;
+        }
         let blocks = env.time_step.inverse_blocks.iter();
         for ((z, r), [xx, xy, xz, yy, yz, zz]) in z
             .as_chunks_mut::<3>()
@@ -241,7 +254,9 @@ impl Preconditioner {
     }
 
     /// The coarse level in coordinates: `coordinates` of a residual become those of the field that it asks for.
-    pub(super) fn coarse(&mut self, env: Env<'_>) -> Result<()> {
+    ///
+    /// With whole modes, for the residual there: what is left of their field is theirs to add.
+    fn coarse(&mut self, env: Env<'_>, whole: Option<(&WholeModes, &[f32])>) -> Result<()> {
         let (isa, pool) = (env.isa, env.pool);
         let rows = env.space.rows();
         row_dots(
@@ -252,10 +267,16 @@ impl Preconditioner {
             &self.coordinates,
             &mut self.on_modes,
         )?;
+        if let (Some((modes, r)), Some(own)) = (whole, &mut self.whole) {
+            own.solve(env.compute(), modes, r, &self.on_modes)?;
+        }
         if !self.dofs.is_empty() {
             self.contact_work(env)?;
         }
         self.solve_coarse(env);
+        if let (Some(_), Some(own)) = (whole, &self.whole) {
+            own.take_off(&mut self.solved);
+        }
         self.spread(env)
     }
 

@@ -25,6 +25,7 @@ impl ImplicitSolver {
         self.nodes
             .extend(nodes.filter(|&&node| !held[node as usize]));
         self.preconditioner.prescribe(env, &self.nodes)?;
+        self.preconditioner.expect_load(env, input.load.is_some())?;
         self.memory.begin();
         self.memory.mask(&self.nodes);
         self.prepare(context, input)?;

@@ -101,6 +101,7 @@ impl ImplicitSolver {
     ) -> Result<Report> {
         self.nodes.clear();
         self.memory.mask(&[]);
+        (self.preconditioner).expect_load(context.env(), input.load.is_some())?;
         self.prepare(context, input)?;
         let mut report = Report::default();
         let mut u = std::mem::take(&mut self.u);
@@ -218,7 +219,7 @@ impl ImplicitSolver {
                     if at.det > SMALLEST_DET {
                         self.begin_round(context, input, problem, at)?;
                         self.improve_at(context, input, problem, at, way)?;
-                        self.end_round(context, input, at)?;
+                        self.end_round(context, input, problem, at)?;
                     }
                     self.preconditioner.coordinates.fill(0.0);
                 }

@@ -222,6 +222,17 @@ impl Model {
         Ok(self.corrections.get_or_init(|| made))
     }
 
+    /// Reads what corrections need for loads, at the first that a scene is given.
+    ///
+    /// # Errors
+    /// Those of [`Model::corrections`], and those of the file.
+    #[doc(hidden)]
+    pub fn prepare_loads(&self) -> Result<()> {
+        let corrections = self.corrections()?;
+        let _opening = self.opening.lock().unwrap_or_else(PoisonError::into_inner);
+        (corrections.prepare_loads(&self.files)).map_err(|error| self.files.name_maker(error))
+    }
+
     /// Where tools touch the domain, those of the reference solver; made when the first scene is given tools.
     ///
     /// # Errors

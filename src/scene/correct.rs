@@ -61,11 +61,12 @@ impl Core {
             load,
             enough: match load {
                 // What the whole body does settles later than an iteration's own step says.
-                Some(_) => Enough {
+                // Whole modes know what it does.
+                Some(_) if !corrections.has_whole_modes() => Enough {
                     error_mm: 0.0,
                     ..corrected.enough(start)
                 },
-                None => corrected.enough(start),
+                _ => corrected.enough(start),
             },
         };
         if touched {

@@ -20,6 +20,7 @@ impl Core {
                 "loads: the scene makes no corrections, in which gravity, forces and pressure act; set `corrections`".into(),
             ));
         }
+        self.model.prepare_loads()?;
         let mass = &self.model.corrections()?.body.mass;
         let state = match &mut self.loads {
             Some(state) => state,
@@ -51,6 +52,7 @@ impl Core {
         let Some(acting) = acting else {
             return Ok(());
         };
+        self.model.prepare_loads()?;
         let state = match &mut self.loads {
             Some(state) => state,
             slot => slot.insert(memory::boxed(LoadState::new(&self.mesh)?, WHAT)?),

@@ -175,6 +175,41 @@ fn forces_that_are_the_weight_are_gravity() {
     assert!(moved > 0.05 && off < 5e-3 * moved, "{off} of {moved} mm");
 }
 
+/// No contact moves the hemisphere without a domain, and the block bases that contact is made of hardly hold it.
+#[test]
+fn the_half_that_no_tool_reaches_turns_with_gravity_too() {
+    let options = SceneOptions {
+        corrections: Corrections::Fixed(2),
+        ..plain()
+    };
+    let scene = scene(&model("../../onnx/brain-coarse-reduced"), &options);
+    let positions = scene.model().positions();
+    let mut u = vec![0.0; positions.len()];
+    for t in 1..=12 {
+        let loads = Loads {
+            gravity: [0.0, 0.025 * t as f32, 0.0],
+            ..Loads::default()
+        };
+        let input = StepInput {
+            loads,
+            ..StepInput::default()
+        };
+        scene.step(input, Some(&mut u)).unwrap();
+    }
+    let half = |side: f32| {
+        let rows = positions.chunks_exact(3).zip(u.chunks_exact(3));
+        let own: Vec<f32> = rows
+            .filter(|(x, _)| x[0] * side > 5.0)
+            .map(|(_, u)| u[1])
+            .collect();
+        own.iter().sum::<f32>() / own.len() as f32
+    };
+    let [left, right] = [-1.0, 1.0].map(half);
+    println!("{left} and {right} mm");
+    assert!(left > 0.5, "{left} mm");
+    assert!((left / right - 1.0).abs() < 0.1, "{left} and {right} mm");
+}
+
 #[test]
 fn a_snapshot_under_loads_resumes_to_the_bit() {
     let model = model(BUNDLE);

@@ -213,6 +213,43 @@ fn a_coarse_space_is_extended_by_what_data_has_outside_of_it() {
 }
 
 #[test]
+fn whole_modes_are_a_file_more_until_the_space_changes() {
+    find_runtime();
+    let folder = corrected();
+    let path = folder.path().to_str().unwrap();
+    let file = folder.path().join("whole.safetensors");
+    let entry = || {
+        let text = std::fs::read(folder.path().join("bundle.json")).unwrap();
+        let manifest: serde_json::Value = serde_json::from_slice(&text).unwrap();
+        manifest["corrections"].clone()
+    };
+    let space = std::fs::read(folder.path().join("corrections.safetensors")).unwrap();
+    let (done, text) = upt(&["corrections", path, "--keep", "--whole", "40"]);
+    assert!(done && text.contains("whole modes"), "{text}");
+    assert_eq!(entry()["whole"], "whole.safetensors");
+    let model = Model::open(folder.path(), &ModelOptions::default()).unwrap();
+    let scene = Scene::new(std::sync::Arc::clone(&model), &SceneOptions::default()).unwrap();
+    let loads = upt::Loads {
+        gravity: [1.0, 0.0, 0.0],
+        ..upt::Loads::default()
+    };
+    let input = upt::StepInput {
+        loads,
+        ..upt::StepInput::default()
+    };
+    scene.step(input, None).unwrap();
+    assert_eq!(
+        space,
+        std::fs::read(folder.path().join("corrections.safetensors")).unwrap()
+    );
+
+    let (done, text) = upt(&["corrections", path, "--natural", "12", "--patch-modes", "0"]);
+    assert!(done, "{text}");
+    assert!(entry()["whole"].is_null() && !file.exists());
+    Model::open(folder.path(), &ModelOptions::default()).unwrap();
+}
+
+#[test]
 fn what_a_bundle_recommends_changes_key_by_key() {
     find_runtime();
     let folder = corrected();

@@ -6,6 +6,7 @@ use super::{Iterate, is_sound, is_spent, sunk};
 use crate::contact::ContactProblem;
 use crate::corrections::input::{Input, Report, SolverContext};
 use crate::corrections::local::{Base, LocalSolver, StepContext};
+use crate::corrections::precondition::mask_held;
 use crate::corrections::solver::{ImplicitSolver, SMALLEST_DET};
 use crate::error::Result;
 use crate::memory;
@@ -50,7 +51,7 @@ impl ImplicitSolver {
         loop {
             self.begin_round(context, input, problem, at)?;
             self.improve_round(context, input, problem, at, (&mut made, report))?;
-            self.end_round(context, input, at)?;
+            self.end_round(context, input, problem, at)?;
             let most = input.enough.iterations;
             if made.is_enough || made.iterations >= most || problem.is_spent() {
                 break;
@@ -136,11 +137,23 @@ impl ImplicitSolver {
         &mut self,
         context: SolverContext<'_>,
         input: &Input<'_>,
+        problem: &ContactProblem,
         at: &mut Iterate<'_>,
     ) -> Result<()> {
         let mut q = std::mem::take(&mut self.q);
         let (local, mut step) = self.local_solver(context, input)?;
-        let result = local.settle(&mut step, at.g, &mut q, at.u);
+        let mut result = local.settle(&mut step, at.g, &mut q, at.u);
+        if input.load.is_some() && result.is_ok() {
+            // What loads do far from the tools is not in the span of the iterations; what the tools push with is balanced in them.
+            problem.each_load(|node, force| {
+                let rows = at.g[3 * node as usize..].iter_mut();
+                rows.zip(force.to_array())
+                    .for_each(|(g, force)| *g -= 1e3 * force);
+            });
+            mask_held(&context.env().body.held, at.g);
+            let env = context.env();
+            result = self.preconditioner.move_whole(env, at.g, &mut q, at.u);
+        }
         self.q = q;
         result
     }

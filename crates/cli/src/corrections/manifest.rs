@@ -15,6 +15,18 @@ pub fn add(bundle: &Path, file: &str, entry: &Value) -> Result<()> {
     })
 }
 
+/// Takes a file off the list, and away.
+pub fn forget(bundle: &Path, file: &str) -> Result<()> {
+    let mut manifest = Manifest::read(bundle)?;
+    let mut files: IndexMap<String, Value> = manifest.get("files")?.unwrap_or_default();
+    if files.shift_remove(file).is_none() {
+        return Ok(());
+    }
+    manifest.set("files", &json!(files), "")?;
+    manifest.write()?;
+    Ok(std::fs::remove_file(bundle.join(file))?)
+}
+
 /// Lists `file`, changes the manifest, sets the requirement, and seals it.
 pub fn list(
     bundle: &Path,

@@ -12,6 +12,7 @@ mod principal;
 mod pushes;
 mod space;
 mod trajectories;
+mod whole;
 mod workbench;
 
 pub use beyond::Beyond;
@@ -42,7 +43,8 @@ pub use principal::principal;
   upt corrections my-bundle --natural 60 --patches 160 --recommended 3
   upt corrections my-bundle --extend --data data/tools
   upt corrections my-bundle --keep --recommended 10@0.02/4
-  upt corrections my-bundle --keep --frame-step-s 0.02")]
+  upt corrections my-bundle --keep --frame-step-s 0.02
+  upt corrections my-bundle --keep --whole 60")]
 pub struct Options {
     /// Bundle folder with a linear response; `corrections.safetensors` and the manifest's entry are written there.
     pub bundle: PathBuf,
@@ -83,6 +85,10 @@ pub struct Options {
     /// Keep the bundle's file and change only the manifest's entry.
     #[arg(long)]
     pub keep: bool,
+    /// For steps under loads: as whole fields what the coarse space lacks of so many natural modes (`whole.safetensors`). Wanted where contact can
+    /// hardly move a part of the body, such as the other half of a brain.
+    #[arg(long, value_name = "NATURAL", value_parser = clap::value_parser!(u32).range(1..=128))]
+    pub whole: Option<u32>,
     /// Seed of the patches.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
@@ -128,29 +134,52 @@ pub fn run(args: &Options) -> Result<ExitCode> {
         bail!("--calibration is {calibration}; it must be positive");
     }
     if args.keep {
+        let whole = add_whole(args)?;
         let entry = recommend(&args.bundle, &args.change())?;
         let path = args.bundle.join("bundle.json");
         if args.json {
-            println!("{}", json!({"file": path, "corrections": entry}));
+            println!(
+                "{}",
+                json!({"file": path, "corrections": entry, "whole_modes": whole})
+            );
         } else {
             println!("{}: {entry}", path.display());
+            if let Some(count) = whole {
+                println!("{count} whole modes");
+            }
         }
         return Ok(ExitCode::SUCCESS);
     }
     let started = Instant::now();
     let (count, natural) = write(args)?;
+    let whole = add_whole(args)?;
     let seconds = started.elapsed().as_secs_f64();
     let path = args.bundle.join(FILE);
     if args.json {
-        let value = json!({"file": path, "modes": count, "natural": natural, "seconds": seconds});
+        let value = json!({
+            "file": path, "modes": count, "natural": natural, "whole_modes": whole, "seconds": seconds
+        });
         println!("{value}");
     } else {
         println!(
             "{}: {count} modes, {natural} of them natural ({seconds:.0} s)",
             path.display()
         );
+        if let Some(count) = whole {
+            println!("{count} whole modes");
+        }
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Writes the whole modes that the options ask for; returns how many there are.
+fn add_whole(args: &Options) -> Result<Option<usize>> {
+    let Some(natural) = args.whole else {
+        return Ok(None);
+    };
+    let (known, natural) = (Known::default(), natural as usize);
+    let bench = Workbench::open(&args.bundle, natural, &known, args.threads, args.json)?;
+    bench.write_whole(&args.bundle).map(Some)
 }
 
 /// Changes what the manifest says of the corrections; gives the new entry.

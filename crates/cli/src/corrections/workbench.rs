@@ -10,11 +10,13 @@ use tissue::linear::{
 };
 use tissue::mesh::{Boundary, Mesh};
 use upt::bundle::BundleFiles;
-use upt::prior::PriorTable;
+use upt::prior::{CoarseSpace, PriorTable};
 
 use super::pushes::Pushes;
 use super::space::Space;
+use super::whole::{self, Source};
 use super::{FILE, manifest};
+use crate::manifest::Manifest;
 use crate::modes;
 use crate::progress::spinner;
 
@@ -166,7 +168,44 @@ impl Workbench {
         let count = space
             .write(&path, &frequency)
             .with_context(|| format!("{}: cannot be written", path.display()))?;
-        manifest::add(bundle, FILE, entry)?;
+        // What the space of before lacks is not what this one does.
+        let mut entry = entry.clone();
+        if let Some(keys) = entry.as_object_mut() {
+            keys.remove(whole::KEY);
+        }
+        manifest::add(bundle, FILE, &entry)?;
+        manifest::forget(bundle, whole::FILE)?;
+        Ok(count)
+    }
+
+    /// Writes as whole fields what the coarse space of a bundle lacks of the natural modes; returns how many they are. None is no file.
+    pub fn write_whole(&self, bundle: &Path) -> Result<usize> {
+        let files = BundleFiles::open(bundle)?;
+        let Some(mut entry) = Manifest::read(bundle)?.get::<Value>("corrections")? else {
+            bail!(
+                "{}: has no corrections whose modes to complete; leave --keep out to make them",
+                bundle.display()
+            );
+        };
+        let space = CoarseSpace::parse(&files.tensors(FILE)?, &self.prior)?;
+        let source = Source {
+            mesh: &self.mesh,
+            stiffness: &self.stiffness,
+            natural: &self.natural,
+            prior: &self.prior,
+            space: &space,
+            density_kg_m3: self.material.density_kg_m3,
+        };
+        let count = whole::write(&source, &bundle.join(whole::FILE))?;
+        if count > 0 {
+            entry[whole::KEY] = whole::FILE.into();
+            manifest::add(bundle, FILE, &entry)?;
+            manifest::list(bundle, whole::FILE, "corrections", |_| Ok(()))?;
+        } else if let Some(keys) = entry.as_object_mut() {
+            keys.remove(whole::KEY);
+            manifest::add(bundle, FILE, &entry)?;
+            manifest::forget(bundle, whole::FILE)?;
+        }
         Ok(count)
     }
 }

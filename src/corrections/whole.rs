@@ -1,0 +1,196 @@
+//! Whole modes: what the body does under a load that acts everywhere and the prior's block bases do not hold.
+//!
+//! The bases are made of responses to contact in the domain. What contact hardly moves (the other hemisphere of a brain) they cannot swing, and
+//! the modes of the corrections, which live in them, neither. So a bundle may have natural modes as whole fields `V [m,3K]`, less what `Phi` has
+//! of them. With `A = K + kappa M` the coarse level of a step without contact is that of both together,
+//!
+//! ```text
+//! X = G^-1 Phi^T A V        V' = V - Phi X        S = V'^T A V' = V^T A V - (Phi^T A V)^T X
+//! [Phi V] (([Phi V]^T A [Phi V])^-1 [Phi V]^T = Phi G^-1 Phi^T + V' S^-1 V'^T
+//! ```
+
+use crate::bundle::TensorFile;
+use crate::error::{Error, Result};
+use crate::kernels::Compute;
+use crate::kernels::contact::ContactFactor;
+use crate::kernels::vectors::{PartialSums, add_scaled, dots};
+use crate::memory::{self, HeldBytes};
+use crate::prior::CoarseSpace;
+
+const WHAT: &str = "the whole modes of the corrections";
+/// Fields of a pass.
+const AT_ONCE: usize = 8;
+/// Most modes that a file may hold.
+const LIMIT: usize = 256;
+
+/// The tables of a bundle.
+#[derive(HeldBytes)]
+pub struct WholeModes {
+    /// `V [m,3K]`, zero at held nodes.
+    fields: Vec<f32>,
+    /// `Phi^T K V [r,m]`, µN/mm, and `Phi^T M V`, g.
+    cross: [Vec<f32>; 2],
+    /// `V^T K V [m,m]` and `V^T M V`.
+    own: [Vec<f32>; 2],
+}
+
+impl WholeModes {
+    /// Reads and checks the file for a body of `nodes` nodes.
+    pub fn parse(file: &TensorFile, nodes: usize, space: &CoarseSpace) -> Result<WholeModes> {
+        let stored = file.f16("modes", &[None, Some(3 * nodes)])?;
+        let count = stored.len() / (3 * nodes).max(1);
+        if count == 0 || count > LIMIT {
+            return Err(file.bad("modes", format!("must hold 1 to {LIMIT} modes")));
+        }
+        let cross = [Some(space.count()), Some(count)];
+        let own = [Some(count); 2];
+        let values = stored.iter().map(|value| value.to_f32());
+        Ok(WholeModes {
+            fields: memory::collected(stored.len(), values, WHAT)?,
+            cross: [
+                file.f32("cross_stiffness", &cross)?,
+                file.f32("cross_mass", &cross)?,
+            ],
+            own: [file.f32("stiffness", &own)?, file.f32("mass", &own)?],
+        })
+    }
+
+    fn count(&self) -> usize {
+        self.own[0].len().isqrt()
+    }
+}
+
+/// What a length of step makes of them, and buffers.
+#[derive(HeldBytes)]
+pub(super) struct WholeSolve {
+    /// `X [r,m]`.
+    cross: Vec<f32>,
+    /// `0..m`, and the factor of `S`.
+    rows: Vec<u32>,
+    schur: ContactFactor,
+    work: Vec<f32>,
+    amounts: Vec<f32>,
+    partial: PartialSums,
+}
+
+impl WholeSolve {
+    /// For `K + kappa M` and the modes `Phi` of `space`.
+    pub fn new(
+        compute: Compute<'_>,
+        modes: &WholeModes,
+        space: &CoarseSpace,
+        kappa: f64,
+    ) -> Result<WholeSolve> {
+        let (own, coarse) = (modes.count(), space.count());
+        let inverse = space.galerkin_inverse(kappa, compute.isa)?;
+        let joined = |tables: &[Vec<f32>; 2], at: usize| {
+            f64::from(tables[0][at]) + kappa * f64::from(tables[1][at])
+        };
+        let mut cross = memory::zeros(coarse * own, WHAT)?;
+        for (row, inverse) in cross
+            .chunks_exact_mut(own)
+            .zip(inverse.chunks_exact(coarse))
+        {
+            for (column, value) in row.iter_mut().enumerate() {
+                let products = inverse.iter().enumerate();
+                let sum: f64 = products
+                    .map(|(i, g)| f64::from(*g) * joined(&modes.cross, i * own + column))
+                    .sum();
+                *value = sum as f32;
+            }
+        }
+        let rows = memory::collected(own, 0..own as u32, WHAT)?;
+        let mut schur = ContactFactor::try_with_capacity(own)?;
+        schur
+            .factor(compute.isa, &rows, |upper| {
+                for i in 0..own {
+                    for j in i..own {
+                        let lost: f64 = (0..coarse)
+                            .map(|row| {
+                                joined(&modes.cross, row * own + i)
+                                    * f64::from(cross[row * own + j])
+                            })
+                            .sum();
+                        upper[i * own + j] = joined(&modes.own, i * own + j) - lost;
+                    }
+                }
+            })
+            .map_err(|error| Error::bundle("whole.safetensors", error.to_string()))?;
+        let len = modes.fields.len() / own;
+        Ok(WholeSolve {
+            cross,
+            rows,
+            schur,
+            work: memory::zeros(own, WHAT)?,
+            amounts: memory::zeros(own, WHAT)?,
+            partial: PartialSums::with_room(len, AT_ONCE)?,
+        })
+    }
+
+    /// `S^-1 V'^T r` from `r [K,3]` and `Phi^T r`.
+    pub fn solve(
+        &mut self,
+        compute: Compute<'_>,
+        modes: &WholeModes,
+        r: &[f32],
+        on_modes: &[f32],
+    ) -> Result<()> {
+        let mut views = [r; AT_ONCE];
+        let mut sums = [0.0; AT_ONCE];
+        let fields = modes.fields.chunks(AT_ONCE * r.len());
+        for (fields, work) in fields.zip(self.work.chunks_mut(AT_ONCE)) {
+            for (view, field) in views.iter_mut().zip(fields.chunks_exact(r.len())) {
+                *view = field;
+            }
+            let count = work.len();
+            let sums = &mut sums[..count];
+            dots(
+                compute.isa,
+                compute.pool,
+                &views[..count],
+                r,
+                &mut self.partial,
+                sums,
+            )?;
+            for (work, sum) in work.iter_mut().zip(sums) {
+                *work = *sum as f32;
+            }
+        }
+        for (row, on_mode) in self.cross.chunks_exact(self.rows.len()).zip(on_modes) {
+            for (work, x) in self.work.iter_mut().zip(row) {
+                *work -= x * on_mode;
+            }
+        }
+        self.schur.solve(compute.isa, &self.work, &mut self.amounts);
+        Ok(())
+    }
+
+    /// Takes what `V'` has of the modes `Phi` in the last solve off their amounts.
+    pub fn take_off(&self, solved: &mut [f32]) {
+        for (row, solved) in self.cross.chunks_exact(self.rows.len()).zip(solved) {
+            for (amount, x) in self.amounts.iter().zip(row) {
+                *solved -= x * amount;
+            }
+        }
+    }
+
+    /// `z += V S^-1 V'^T r` of the last solve.
+    pub fn add(&self, compute: Compute<'_>, modes: &WholeModes, z: &mut [f32]) -> Result<()> {
+        let empty: &[f32] = &[];
+        let mut views = [empty; AT_ONCE];
+        let fields = modes.fields.chunks(AT_ONCE * z.len());
+        for (fields, amounts) in fields.zip(self.amounts.chunks(AT_ONCE)) {
+            for (view, field) in views.iter_mut().zip(fields.chunks_exact(z.len())) {
+                *view = field;
+            }
+            add_scaled(
+                compute.isa,
+                compute.pool,
+                &views[..amounts.len()],
+                amounts,
+                z,
+            )?;
+        }
+        Ok(())
+    }
+}
