@@ -53,7 +53,7 @@ class Cuts:
 
         Raises:
             upt.ArgumentError: the blade sweeps no area, or the body would have more copies than nodes.
-            upt.UnsupportedError: the scene makes no corrections, or has a region, attached points or haptics.
+            upt.UnsupportedError: the scene makes no corrections.
         """
         path = floats(poses, "poses")
         if path.ndim != 3 or path.shape[2] != 3:

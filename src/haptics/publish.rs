@@ -1,5 +1,7 @@
 //! The scene's end: after each published state the contact problem near the tool.
 
+pub mod tissue;
+
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
@@ -111,8 +113,6 @@ pub fn join(
     let ends = Arc::new(Ends::default());
     let modes = Modes::new(&natural, integrator.damping_per_s)?;
     let kappa = integrator.over(AT_ONCE_S).kappa();
-    let nodes = corrections.body.mass.len();
-    let count = natural.len();
     let link = Link {
         instrument: options.instrument,
         body: tool.body.clone(),
@@ -130,9 +130,9 @@ pub fn join(
         sampled: memory::room(MOST_SAMPLES, WHAT)?,
         starts: prior.basis_starts()?,
         coordinates: memory::zeros(prior.width(), WHAT)?,
-        field: memory::zeros(3 * nodes, WHAT)?,
-        masses: memory::collected(count, natural.iter().map(|mode| mode.1), WHAT)?,
-        rows: memory::collected(count, 0..count as u32, WHAT)?,
+        field: memory::zeros(3 * corrections.body.mass.len(), WHAT)?,
+        masses: memory::collected(natural.len(), natural.iter().map(|mode| mode.1), WHAT)?,
+        rows: memory::collected(natural.len(), 0..natural.len() as u32, WHAT)?,
         number: 0,
         latency_s: options.latency_s,
         last_pose: None,

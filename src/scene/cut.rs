@@ -4,18 +4,20 @@
 //! the cut. A new core of it is made beside the old one; only when it is whole, with the state moved over, do they change places. Copies take
 //! displacement and velocity of the node that they come from, so that nothing moves at the moment of a cut.
 
-use std::sync::{Arc, RwLock};
+use std::sync::{Arc, PoisonError, RwLock};
 
 use topology::{Body, Change, Point, TopologyError};
 
 use super::build::build;
 use super::core::{Core, SCENE, lock_read, lock_write};
 use super::cut_state::CutState;
-use super::published::{BodyNumber, Frame, Published};
+use super::published::{BodyNumber, CutModel, Frame, Published};
 use super::{Contact, StepInput};
+use crate::bundle::Mesh;
 use crate::contact::Past;
 use crate::corrections::{History, Linearisation, Motion};
 use crate::error::{Error, Result};
+use crate::haptics::publish::tissue::HandTissue;
 use crate::memory::{self, HeldBytes};
 use crate::model::Model;
 
@@ -48,25 +50,10 @@ impl Core {
             contact_vectors: memory::room(3 * count, SCENE)?,
             tools: Default::default(),
             frame_state: None,
-            is_cut: self.cut.is_some(),
+            cut: (self.cut.as_ref()).map(|_| CutModel(Arc::clone(&self.model))),
             body: BodyNumber::default(),
             attached: Arc::default(),
         })
-    }
-
-    /// What a cut body does not have.
-    ///
-    /// # Errors
-    /// [`Error::Unsupported`].
-    pub(super) fn check_bare(&mut self, published: &RwLock<Published>) -> Result<()> {
-        self.hands.retain(|hand| !hand.is_over());
-        let region = lock_read(published).region.is_some();
-        if region || self.points.len() > 0 || !self.hands.is_empty() {
-            return Err(Error::Unsupported(
-                "cut: a scene with a region, attached points or haptics cannot be cut; take them off first".into(),
-            ));
-        }
-        Ok(())
     }
 
     /// What a scene of a cut body does not do.
@@ -102,7 +89,6 @@ impl Core {
                 "cut: the elements move a cut body, and this scene makes no corrections; set `corrections`".into(),
             ));
         }
-        self.check_bare(published)?;
         if self.loads.as_ref().is_some_and(|loads| loads.acted()) {
             return Err(Error::Unsupported(
                 "cut: a body under loads cannot be cut; make a step without loads first".into(),
@@ -150,23 +136,69 @@ impl Core {
             change: before.change + 1,
             ..before
         };
+        let shown = self.hand_over(published, &mut next, shown)?;
+        // Nothing has moved: hands go on with what they were told, forces included, until the next step.
+        let hands = std::mem::take(&mut next.hands);
         self.replace(published, next, shown);
+        self.hands = hands;
         Ok(change)
     }
 
+    /// What the host has asked of this core goes over to the next: its region, the attached points, frames between steps and hands. Where it fails, the hands
+    /// stay this core's.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`], a panic on another thread of the pool.
+    fn hand_over(
+        &mut self,
+        published: &RwLock<Published>,
+        next: &mut Core,
+        shown: Published,
+    ) -> Result<Published> {
+        self.hands.retain(|hand| !hand.is_over());
+        let region = self.region_copy(published)?;
+        let has_frames = lock_read(published).frame_state.is_some();
+        let shown = RwLock::new(shown);
+        if region.is_some() || self.points.len() > 0 {
+            let body = next.cut.as_ref().map(|cut| &cut.body);
+            let points = self.points.following(self.intact_mesh(), body)?;
+            next.set_plan(&shown, region, Arc::new(points))?;
+        }
+        if has_frames {
+            next.start_frame_states(&shown)?;
+        }
+        if let (false, Some(prior)) = (self.hands.is_empty(), &next.model.prior) {
+            let (corrections, samples) = (next.model.corrections()?, next.model.samples()?);
+            let mut tissues = memory::room(self.hands.len(), SCENE)?;
+            for _ in &self.hands {
+                let integrator = next.integrator();
+                tissues.push(HandTissue::new(prior, corrections, integrator, &samples)?);
+            }
+            next.hands = std::mem::take(&mut self.hands);
+            let hands = next.hands.iter_mut();
+            hands.zip(tissues).for_each(|(hand, own)| hand.take(own));
+        }
+        Ok(shown.into_inner().unwrap_or_else(PoisonError::into_inner))
+    }
+
     /// A core of a body that is not the next of this one's takes its place.
+    ///
+    /// # Errors
+    /// Those of handing over; nothing has then changed.
     pub(super) fn put_back(
         &mut self,
         published: &RwLock<Published>,
-        next: Core,
-        mut shown: Published,
-    ) {
+        mut next: Core,
+        shown: Published,
+    ) -> Result<()> {
+        let mut shown = self.hand_over(published, &mut next, shown)?;
         let before = lock_read(published).body;
         shown.body = BodyNumber {
             line: before.line + 1,
             change: before.change + 1,
         };
         self.replace(published, next, shown);
+        Ok(())
     }
 
     /// Another core takes this one's place.
@@ -216,6 +248,11 @@ impl Core {
             Some(_) => MOST_COPIES * self.most_bytes() + 4096 * self.mesh.tets.len() / 4,
             None => 0,
         }
+    }
+
+    /// The mesh before any cut.
+    pub(super) fn intact_mesh(&self) -> &Arc<Mesh> {
+        self.cut.as_ref().map_or(&self.mesh, |cut| &cut.intact.mesh)
     }
 
     /// The model that the scene was made with.

@@ -48,8 +48,7 @@ impl Scene {
     ///
     /// # Errors
     /// [`crate::Error::Argument`] for a blade that sweeps no area, poses of other lengths, and more copies than nodes; [`crate::Error::NonFinite`];
-    /// [`crate::Error::Unsupported`] for a scene without corrections, or with a region, attached points or haptics. The scene is
-    /// then what it was.
+    /// [`crate::Error::Unsupported`] for a scene without corrections. The scene is then what it was.
     pub fn cut(&self, stroke: u32, points: usize, poses: &[[f32; 3]]) -> Result<Cut> {
         let wide = |point: &[f32; 3]| point.map(f64::from);
         let edges: Vec<_> = (poses.chunks(points.max(1)))
@@ -136,7 +135,7 @@ impl Scene {
     /// # Errors
     /// [`crate::Error::Unsupported`].
     pub(crate) fn check_intact(&self, what: &str) -> Result<()> {
-        match lock_read(&self.shared.published).is_cut {
+        match lock_read(&self.shared.published).cut.is_some() {
             true => Err(refused(what)),
             false => Ok(()),
         }

@@ -52,7 +52,6 @@ impl Core {
         published: &RwLock<Published>,
         options: &HapticOptions,
     ) -> Result<Haptics> {
-        self.check_intact("haptics")?;
         let (Some(prior), Some(_)) = (&self.model.prior, &self.corrected) else {
             return Err(Error::Unsupported(
                 "haptics: the bundle has no linear response, or the scene makes no corrections; use a bundle with both, and leave `corrections` on".into(),

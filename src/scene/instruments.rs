@@ -70,7 +70,7 @@ impl Scene {
             }),
         };
         let published = lock_read(&self.shared.published);
-        if published.is_cut {
+        if published.cut.is_some() {
             return Err(super::cut::refused("contacts from instruments"));
         }
         let step = Some(published.stats.step_count);

@@ -143,11 +143,11 @@ impl Scene {
     }
 
     /// What its readers know of it.
-    fn tissue(&self) -> Tissue<'_> {
+    fn tissue<'a>(&'a self, model: &'a Arc<Model>, mesh: &'a Arc<Mesh>) -> Tissue<'a> {
         Tissue {
             published: &self.shared.published,
-            model: &self.model,
-            mesh: &self.mesh,
+            model,
+            mesh,
             integrator: self.integrator,
         }
     }
@@ -171,7 +171,7 @@ impl Scene {
 
     /// Back to rest; region and points stay.
     pub fn reset(&self) -> Result<()> {
-        let _frames = self.hold_frames(lock_read(&self.shared.published).is_cut)?;
+        let _frames = self.hold_frames(lock_read(&self.shared.published).cut.is_some())?;
         self.with(|core, published| {
             core.reset(published)?;
             self.tools.reset();
@@ -231,7 +231,6 @@ impl Scene {
     /// ```
     pub fn set_region(&self, nodes: Option<&[u32]>) -> Result<()> {
         self.with(|core, published| {
-            core.check_intact("set_region")?;
             if let Some(nodes) = nodes {
                 check_nodes(nodes, core.mesh.node_count())?;
             }
@@ -242,7 +241,7 @@ impl Scene {
     }
 
     /// Attaches points `[n,3]` in rest mm; `None` detaches. A `upt` bundle decodes them, unless the scene was made with
-    /// `interpolate_points`; a `reduced` bundle has no network in space: its tables are interpolated.
+    /// `interpolate_points`; a `reduced` bundle has no network in space: its tables are interpolated. A point goes with the side of a cut on which it lies.
     ///
     /// ```
     /// # use std::path::Path;
@@ -259,11 +258,14 @@ impl Scene {
     /// ```
     pub fn attach_points(&self, points: Option<&[f32]>) -> Result<()> {
         self.with(|core, published| {
-            core.check_intact("attach_points")?;
+            let mesh = core.intact_mesh();
             let mut points = match points {
-                Some(points) => AttachedPoints::new(&core.mesh, points)?,
+                Some(points) => AttachedPoints::new(mesh, points)?,
                 None => AttachedPoints::default(),
             };
+            if let Some(cut) = &core.cut {
+                points = points.following(mesh, Some(&cut.body))?;
+            }
             let interpolated = core.corrected.is_some() || core.options.interpolate_points;
             match &core.model.kind {
                 KindModel::Upt(kind) if !interpolated && points.len() > 0 => {
@@ -337,7 +339,7 @@ impl Scene {
     /// # Errors
     /// [`Error::Snapshot`] when it is damaged or of another model or mesh, [`Error::Version`].
     pub fn restore(&self, bytes: &[u8]) -> Result<()> {
-        let is_cut = lock_read(&self.shared.published).is_cut;
+        let is_cut = lock_read(&self.shared.published).cut.is_some();
         let _frames = self.hold_frames(is_cut || snapshot::has_body(bytes))?;
         self.with(|core, published| core.restore(published, bytes))
     }

@@ -3,6 +3,8 @@
 //! node a point moves with the node, boundary conditions included. A point outside of the mesh takes the closest combination of the nearest tetrahedra, weights clamped to `[0, 1]`; one
 //! that is [`REACH`] or more away is refused, because a mesh in other axes or units is a mistake, not a surface.
 
+use topology::Body;
+
 use crate::bundle::Mesh;
 use crate::error::{Error, Result};
 use crate::field::check;
@@ -33,7 +35,9 @@ pub fn check_point_count(count: u64) -> Result<()> {
 /// Attached points.
 #[derive(Debug, Clone, Default, HeldBytes)]
 pub struct AttachedPoints {
-    /// Corners of each point's tetrahedron, and their weights: a point's displacement is that mean of its corners'.
+    /// Each point's tetrahedron of the intact mesh.
+    tets: Vec<u32>,
+    /// Its corners, or those of the part of it in which the point lies, and their weights: a point's displacement is that mean of its corners'.
     nodes: Vec<[u32; 4]>,
     weights: Vec<[f32; 4]>,
     /// Where the network is asked, `[n,3]` rest mm: the point, or for one outside of the mesh the closest combination.
@@ -61,13 +65,15 @@ impl AttachedPoints {
         let finder = TetFinder::new(mesh)?;
         let count = points.len() / 3;
         let mut attached = AttachedPoints {
+            tets: memory::room(count, WHAT)?,
             nodes: memory::room(count, WHAT)?,
             weights: memory::room(count, WHAT)?,
             places: memory::room(3 * count, WHAT)?,
             ..AttachedPoints::default()
         };
         for (index, p) in points.chunks_exact(3).enumerate() {
-            let (nodes, weights, miss) = finder.locate([p[0], p[1], p[2]]);
+            let (tet, weights, miss) = finder.locate([p[0], p[1], p[2]]);
+            let nodes = [0, 1, 2, 3].map(|k| mesh.tets[4 * tet as usize + k]);
             if miss >= REACH {
                 return Err(Error::Argument(format!(
                     "points: point {index} at ({}, {}, {}) lies {miss:.0} mm outside the mesh; check axes (RAS) and units (mm)",
@@ -82,10 +88,31 @@ impl AttachedPoints {
                     combination.sum::<f32>()
                 }));
             }
+            attached.tets.push(tet);
             attached.nodes.push(nodes);
             attached.weights.push(weights);
         }
         Ok(attached)
+    }
+
+    /// The same points in a body that the mesh has been cut to, or in the intact one: each goes with the part of its tetrahedron in which it lies.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`].
+    pub fn following(&self, mesh: &Mesh, body: Option<&Body>) -> Result<AttachedPoints> {
+        let places = self.tets.iter().zip(&self.weights);
+        let nodes = places.map(|(&tet, weights)| match body {
+            Some(body) => body.nodes_at(tet, &weights.map(f64::from)),
+            None => [0, 1, 2, 3].map(|k| mesh.tets[4 * tet as usize + k]),
+        });
+        Ok(AttachedPoints {
+            nodes: memory::collected(self.tets.len(), nodes, WHAT)?,
+            tets: memory::copied(&self.tets, WHAT)?,
+            weights: memory::copied(&self.weights, WHAT)?,
+            places: memory::copied(&self.places, WHAT)?,
+            queries: memory::copied(&self.queries, WHAT)?,
+            rows: memory::copied(&self.rows, WHAT)?,
+        })
     }
 
     /// Number of points.
@@ -163,7 +190,7 @@ impl<'a> TetFinder<'a> {
     }
 
     /// The tetrahedron that holds `p`, or the one whose clamped combination comes closest to it.
-    fn locate(&self, p: [f32; 3]) -> ([u32; 4], [f32; 4], f64) {
+    fn locate(&self, p: [f32; 3]) -> (u32, [f32; 4], f64) {
         let mut best: Option<(f64, u32, [f64; 4])> = None;
         let mut radius = self.reach * (1.0 + 1e-6);
         loop {
@@ -175,9 +202,7 @@ impl<'a> TetFinder<'a> {
                 }
             });
             if let Some((miss, tet, weights)) = best {
-                let tet = 4 * tet as usize;
-                let nodes = [0, 1, 2, 3].map(|k| self.mesh.tets[tet + k]);
-                return (nodes, weights.map(|w| w as f32), miss.sqrt());
+                return (tet, weights.map(|w| w as f32), miss.sqrt());
             }
             let nearest = self.centres.nearest(p);
             let tet = &self.mesh.tets[4 * nearest as usize..4 * nearest as usize + 4];

@@ -63,8 +63,11 @@ impl Scene {
         lock_read(&self.shared.published).check_len(view, out.len())?;
         let _flush = FlushToZero::enter();
         let mut presenters = lock(&self.tools.presenters)?;
-        self.check_intact("present")?;
-        let tissue = self.tissue();
+        // While frames are held no body changes.
+        let cut = lock_read(&self.shared.published).cut.clone();
+        let model = cut.as_ref().map_or(&self.model, |cut| &cut.0);
+        let mesh = cut.as_ref().map_or(&self.mesh, |cut| &cut.0.mesh);
+        let tissue = self.tissue(model, mesh);
         presenters.prepare(&tissue, view, || {
             let begun = lock_read(&self.shared.published).frame_state.is_some();
             match begun {
@@ -83,7 +86,7 @@ impl Scene {
 
 impl Core {
     /// From now on each published step leaves a moment.
-    fn start_frame_states(&mut self, published: &RwLock<Published>) -> Result<()> {
+    pub(super) fn start_frame_states(&mut self, published: &RwLock<Published>) -> Result<()> {
         if self.corrected.is_none() {
             return Err(Error::Unsupported(
                 "present: the scene makes no corrections (`corrections`); show its steps with upt_scene_sample".into(),

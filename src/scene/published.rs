@@ -62,6 +62,16 @@ pub enum View {
     Points,
 }
 
+/// The model of a cut body, for those who read its states.
+#[derive(Clone)]
+pub struct CutModel(pub std::sync::Arc<crate::model::Model>);
+
+impl std::fmt::Debug for CutModel {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("CutModel")
+    }
+}
+
 /// The published part of a scene.
 #[derive(Debug)]
 pub struct Published {
@@ -83,8 +93,8 @@ pub struct Published {
     pub tools: crate::contact::ContactReport,
     /// What frames between steps are made of, from the first that a host asks for.
     pub frame_state: Option<super::frame_state::FrameState>,
-    /// These are states of a cut body.
-    pub is_cut: bool,
+    /// The model of the body, where it has been cut.
+    pub cut: Option<CutModel>,
     /// Which body they are states of.
     pub body: BodyNumber,
     /// The attached points.

@@ -102,7 +102,6 @@ impl Core {
     ) -> Result<()> {
         let body = match body {
             Some(kept) => {
-                self.check_bare(published)?;
                 let mesh = match &self.cut {
                     Some(cut) => cut.body.shared_mesh(),
                     None => self.whole_body()?.shared_mesh(),
@@ -119,8 +118,7 @@ impl Core {
         next.recompute(&shown)?;
         next.fit_state(&shown)?;
         let shown = shown.into_inner().unwrap_or_else(PoisonError::into_inner);
-        self.put_back(published, next, shown);
-        Ok(())
+        self.put_back(published, next, shown)
     }
 
     /// Reads a snapshot of this scene's: what its body was cut to, and the state.

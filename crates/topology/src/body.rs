@@ -193,6 +193,22 @@ impl Body {
         }
     }
 
+    /// The nodes that a point of an element follows, given by its weights on the element's corners: those of the living cell in which it lies, or of
+    /// the nearest one; the element's own where nothing of it is left.
+    pub fn nodes_at(&self, element: u32, at: &Weights) -> [u32; 4] {
+        let Some(cells) = self.cells.get(&element) else {
+            return self.mesh.tet(element);
+        };
+        let mut found = (f64::MIN, self.mesh.tet(element));
+        for cell in cells.iter().filter(|cell| cell.is_alive) {
+            let depth = cell.material().depth(at);
+            if depth > found.0 {
+                found = (depth, cell.nodes);
+            }
+        }
+        found.1
+    }
+
     /// Factor of an element's stiffness.
     pub fn stiffness(&self, element: u32) -> f32 {
         self.stiffness.get(&element).copied().unwrap_or(1.0)

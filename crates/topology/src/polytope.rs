@@ -82,6 +82,22 @@ impl Polytope {
         })
     }
 
+    /// How far inside of it a point of the element lies, in its coordinates: the least distance from its faces, negative outside.
+    pub fn depth(&self, at: &Weights) -> f64 {
+        let place = |at: &Weights| -> Point { [at[1], at[2], at[3]] };
+        let off = |points: &Vec<Weights>| {
+            let corners: Vec<Point> = points.iter().map(place).collect();
+            let normal = polygon::normal(&corners);
+            let length = dot(normal, normal).sqrt();
+            match length > 0.0 {
+                true => dot(normal, minus(corners[0], place(at))) / length,
+                false => f64::MAX,
+            }
+        };
+        let faces = self.faces.iter().map(|(_, points)| off(points));
+        faces.fold(f64::MAX, f64::min)
+    }
+
     /// Whether a corner of the element is in it.
     pub fn has_corner(&self, corner: usize) -> bool {
         self.points().any(|at| at[corner] == 1.0)

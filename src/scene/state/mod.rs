@@ -194,8 +194,7 @@ impl Core {
         if self.cut.is_some() {
             let next = self.with_body(None)?;
             let shown = next.blank_published()?;
-            self.put_back(published, next, shown);
-            return Ok(());
+            return self.put_back(published, next, shown);
         }
         self.counters = Counters::REST;
         self.contact.clear();
