@@ -52,3 +52,13 @@ def test_a_page_without_marks_stays(tmp_path):
     page.write_text("no marks\n")
     outcome = run(write(tmp_path / "a.json", s1=[1.0]), "--page", page)
     assert outcome.returncode != 0 and "evaluation: begin" in outcome.stderr and page.read_text() == "no marks\n"
+
+
+def test_the_papers_figures_beside_a_named_bundle(tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text(PAGE.replace("evaluation", "paper figures"))
+    results = f"large={write(tmp_path / 'a.json', s1=[1.0, 3.0])}"
+    assert run(results, "--paper", "--marks", "paper figures", "--page", page).returncode == 0
+    text = page.read_text()
+    assert "| scheme 1, K = 9 (2) | **large** | 2.000 ± 1.000 |" in text and "coarse FEM" not in text
+    assert "| scheme 5, K = 21679 (10) | *the paper* | 0.09 ± 0.04 | - | 1.99 ± 0.27 |" in text
