@@ -14,6 +14,7 @@ from urllib.parse import unquote
 
 sys.path.insert(0, str(Path(__file__).parent))
 import blocks
+import bundles
 import commands
 import links
 
@@ -94,6 +95,7 @@ def main() -> int:
             tally.add(commands.faults(path))
     for name in ("README.md", "SUMMARY.md", "decisions/README.md"):
         tally.add(index(pages, name))
+    tally.add(bundles.faults())
     tally.add(book())
     for path in pages:
         page = links.page(path)
