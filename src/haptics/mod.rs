@@ -1,4 +1,4 @@
-//! Forces for a hand: the contact of one tool at 1 kHz, between the steps of a scene (`docs/guide/frames-and-haptics.md`).
+//! Forces for a hand: the contact of one tool at 1 kHz, between the steps of a scene (`docs/guide/haptics.md`).
 //!
 //! After each step the scene publishes a small contact problem near the tool; a thread of the host's own solves it at the pose of
 //! each millisecond. Neither waits for the other.

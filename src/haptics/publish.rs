@@ -30,7 +30,7 @@ const REACH_MM: f32 = 6.0;
 const AT_ONCE_S: f64 = 1e-3;
 
 /// Times the impedance of a sample's mass on its spring. With 1 taps on two meshes lag behind the solver's force, with 2 strokes feel
-/// too much of it (`docs/guide/frames-and-haptics.md`).
+/// too much of it (`docs/guide/haptics.md`).
 const IMPEDANCE: f32 = 1.5;
 
 /// A tool of a scene that a hand feels.

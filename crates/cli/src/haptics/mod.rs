@@ -34,7 +34,7 @@ use table::{Account, Row};
 
 #[derive(clap::Args)]
 #[command(
-    after_help = "Examples:\n  upt haptics onnx/brain-coarse-reduced --minutes 1 --load 2\n  upt haptics onnx/brain-coarse-reduced --hours 24 --within 20\n  upt haptics onnx/brain-reduced --minutes 10 --reference 4 --markdown docs/guide/frames-and-haptics.md --plot force.svg"
+    after_help = "Examples:\n  upt haptics onnx/brain-coarse-reduced --minutes 1 --load 2\n  upt haptics onnx/brain-coarse-reduced --hours 24 --within 20\n  upt haptics onnx/brain-reduced --minutes 10 --reference 4 --markdown docs/results/frames-and-haptics.md --plot force.svg"
 )]
 pub struct Options {
     /// Bundle folder with corrections.

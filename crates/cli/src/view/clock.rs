@@ -1,4 +1,4 @@
-//! When to step: the host's part between frames (docs/guide/frames-and-haptics.md), for one tool.
+//! When to step: the host's part between frames (docs/guide/frames.md), for one tool.
 //!
 //! The tool's poses of the last frames are kept with their times. A step is submitted with the pose of its own moment, which lies between
 //! two frames; the next one is due a step later, or now where more than 0.1 s or two steps were lost.
