@@ -41,13 +41,14 @@ def paper_rows() -> list[str]:
     ]
 
 
-def rows(named: str, only_bundle: bool = False) -> list[str]:
+def rows(named: str, only_bundle: bool = False, overall: bool = False) -> list[str]:
     name, _, path = named.rpartition("=")
     result = json.loads(Path(path).read_text())
     bundle = name or result["bundle"]
     groups = {f"scheme {k}": v for k, v in result["schemes"].items()}
     if len(groups) > 1:
-        groups = {"schemes " + "-".join((min(result["schemes"]), max(result["schemes"]))): result["all"], **groups}
+        every = {"schemes " + "-".join((min(result["schemes"]), max(result["schemes"]))): result["all"]}
+        groups = every if overall else every | groups
     out = []
     for group, table in groups.items():
         count = sum(group.endswith(c["scheme"]) for c in result["cases"])
@@ -74,6 +75,7 @@ def main() -> None:
     parser.add_argument("results", nargs="+", help="JSON of `evaluate`, or NAME=JSON")
     parser.add_argument("--page", type=Path, help="page whose table to exchange")
     parser.add_argument("--marks", default="evaluation", help="of the table in the page (evaluation)")
+    parser.add_argument("--overall", action="store_true", help="leave out the single schemes of a file with several")
     parser.add_argument("--paper", action="store_true", help="the bundle alone, and the paper's figures below it")
     options = parser.parse_args()
     lines = [
@@ -81,7 +83,7 @@ def main() -> None:
         "|---|---|---|---|---|---|---|",
     ]
     for named in options.results:
-        lines += rows(named, options.paper)
+        lines += rows(named, options.paper, options.overall)
     lines += paper_rows() if options.paper else []
     if options.page:
         write_table(options.page, options.marks, lines)

@@ -57,8 +57,9 @@ def test_a_page_without_marks_stays(tmp_path):
 def test_the_papers_figures_beside_a_named_bundle(tmp_path):
     page = tmp_path / "page.md"
     page.write_text(PAGE.replace("evaluation", "paper figures"))
-    results = f"large={write(tmp_path / 'a.json', s1=[1.0, 3.0])}"
-    assert run(results, "--paper", "--marks", "paper figures", "--page", page).returncode == 0
+    results = f"large={write(tmp_path / 'a.json', s1=[1.0, 3.0], s2=[2.0])}"
+    assert run(results, "--paper", "--overall", "--marks", "paper figures", "--page", page).returncode == 0
     text = page.read_text()
-    assert "| scheme 1, K = 9 (2) | **large** | 2.000 ± 1.000 |" in text and "coarse FEM" not in text
+    assert "| schemes 1-2, K = 9 (3) | **large** | 2.000 ± 0.816 |" in text and "coarse FEM" not in text
+    assert "scheme 1, K = 9" not in text
     assert "| scheme 5, K = 21679 (10) | *the paper* | 0.09 ± 0.04 | - | 1.99 ± 0.27 |" in text
