@@ -1,4 +1,4 @@
-"""What each minute of `upt make` buys: SOFA's liver and the brain of 21,708 nodes, as the table of docs/guide/make.md.
+"""What each minute of `upt make` buys: SOFA's liver and the brain of 21,708 nodes, as the table of docs/results/gallery.md.
 
     python training/scripts/make_minutes.py --upt target/release/upt --sofa FOLDER --out minutes
     python training/scripts/make_minutes.py --sofa FOLDER --out minutes --only 21,708
@@ -16,7 +16,7 @@ import subprocess
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-PAGE = ROOT / "docs" / "guide" / "make.md"
+PAGE = ROOT / "docs" / "results" / "gallery.md"
 COARSE = ["--nodes", "1200", "--domain", "ball:-20,100,60,55", "--natural", "40"]
 COLUMNS = [
     "nodes",

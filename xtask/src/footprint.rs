@@ -1,4 +1,4 @@
-//! `cargo xtask footprint`: what each cargo feature of libupt adds, into docs/results/footprint.md: the library is built
+//! `cargo xtask footprint`: what each cargo feature of libupt adds, into docs/results/performance.md: the library is built
 //! once for each set of features, stripped, and read. What a process maps is `tests/mapped_libraries.rs`.
 
 use std::fmt::Write;
@@ -29,7 +29,7 @@ pub fn run(workspace: &Workspace) -> Result<bool> {
     );
     let builds = FEATURES.map(|(features, _)| build(workspace, features));
     let builds = builds.into_iter().collect::<Result<Vec<Build>>>()?;
-    let page = workspace.path("docs/results/footprint.md");
+    let page = workspace.path("docs/results/performance.md");
     write_between_markers(&page, "footprint", |_| table(&builds))?;
     Ok(true)
 }

@@ -93,7 +93,7 @@ enum Task {
         #[arg(last = true)]
         arguments: Vec<String>,
     },
-    /// Build libupt for each cargo feature and write what it adds to docs/results/footprint.md.
+    /// Build libupt for each cargo feature and write what it adds to docs/results/performance.md.
     #[command(after_help = "Example:\n  cargo xtask footprint")]
     Footprint,
     /// Write include/upt.h and the C# bindings from the library's source.
