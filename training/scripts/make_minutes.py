@@ -1,4 +1,4 @@
-"""What each minute of `upt make` buys: SOFA's liver and the brain of 21,708 nodes, as the table of docs/results/gallery.md.
+"""What each minute of `upt make` buys: SOFA's liver and the brain of 21,708 nodes (docs/results/gallery.md).
 
     python training/scripts/make_minutes.py --upt target/release/upt --sofa FOLDER --out minutes
     python training/scripts/make_minutes.py --sofa FOLDER --out minutes --only 21,708
