@@ -16,6 +16,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 import blocks
 import bundles
 import commands
+import english
 import links
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -91,6 +92,7 @@ def main() -> int:
     pages = sorted(path for path in known if path.suffix == ".md")
     for path in pages:
         tally.add(links.faults(path, known.__contains__))
+        tally.add(english.faults(path))
         if path.name != "CHANGELOG.md":
             tally.add(commands.faults(path))
     for name in ("README.md", "SUMMARY.md", "decisions/README.md"):

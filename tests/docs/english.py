@@ -1,0 +1,48 @@
+"""Phrases that pages do not have: those of a laboratory's diary, and those that readers stumble over.
+
+Pages say what is. What was before, and when which machine was busy, belongs into the history, the changelog and the
+decisions, which are not looked at.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+DIARY = (
+    "weights before(?! tools)",
+    "before the present",
+    "used to be",
+    "we tried",
+    "earlier attempts?",
+    "its first weights",
+    "the machine (below|at hand)",
+    "another program had",
+)
+STILTED = (
+    "of which (nothing|none|many|several|half)",
+    "the same of",
+    "(is|are) to be",
+    "goes by",
+    "gives way",
+    "so many a",
+    "what it leaves out",
+    "answer for nothing",
+)
+PHRASES = re.compile(r"\b(" + "|".join(DIARY + STILTED) + r")\b", re.IGNORECASE)
+
+
+def looked_at(path: Path) -> bool:
+    """README and the pages of docs/ but for the decisions."""
+    inside = path.relative_to(ROOT).parts
+    return path == ROOT / "README.md" or (inside[0] == "docs" and inside[1] != "decisions")
+
+
+def faults(path: Path) -> list[str]:
+    """The phrases of a page, by line."""
+    if not looked_at(path):
+        return []
+    lines = enumerate(path.read_text(encoding="utf-8").splitlines(), 1)
+    found = ((number, PHRASES.search(line)) for number, line in lines)
+    return [f"{path}:{number}: '{phrase[0]}': say it plainly, and say what is" for number, phrase in found if phrase]
