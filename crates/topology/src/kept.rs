@@ -38,7 +38,8 @@ impl Body {
         let nodes = own + kept.parents.len();
         let is_node = |node: &u32| (*node as usize) < nodes;
         let is_element = |element: &u32| (*element as usize) < count;
-        let is_part = |part: f64| (0.0..=1.0 + 1e-6).contains(&part);
+        // Rounding takes a weight of a cut's corner below nothing.
+        let is_part = |part: f64| (-1e-6..=1.0 + 1e-6).contains(&part);
         let parent = |node: u32| match (node as usize).checked_sub(own) {
             Some(copy) => kept.parents[copy],
             None => node,
@@ -48,7 +49,9 @@ impl Body {
             cell.nodes.iter().all(is_node)
                 && cell.nodes.map(parent) == body.mesh().tet(element)
                 && is_part(cell.share)
-                && is_part(cell.kept)
+                // Of a half the points that are left may be more than their part: its material alone is at most the element's.
+                && cell.kept >= 0.0
+                && is_part(cell.share * cell.kept)
                 && corners.flatten().all(|weight| is_part(*weight))
         };
         let fine = kept.parents.iter().all(|node| (*node as usize) < own)

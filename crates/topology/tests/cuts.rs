@@ -240,6 +240,7 @@ fn ten_thousand_operations_break_nothing() {
     for series in 0..2500 {
         let mut body = Body::new(Arc::clone(&mesh));
         let mut surface = Surface::new(&mesh).unwrap();
+        let mut followed = surface.clone();
         let mut removed = 0.0;
         for step in 0..4 {
             let nodes = body.node_count();
@@ -267,6 +268,9 @@ fn ten_thousand_operations_break_nothing() {
                 }
                 Err(_) => refused += 1,
             }
+            if series % 10 == 0 {
+                followed.update(&body).unwrap();
+            }
         }
         assert!(
             (body.volume() + removed - whole).abs() < 1e-6 * whole,
@@ -289,8 +293,16 @@ fn ten_thousand_operations_break_nothing() {
         assert!((pieces + removed - whole).abs() < 1e-6 * whole);
         if series % 10 == 0 {
             surface.update(&body).unwrap();
-            open += open_edges(&surface);
+            open += open_edges(&surface) + open_edges(&followed);
+            let counts = [&surface, &followed].map(|own| {
+                let full = own.triangles.iter().filter(|corners| **corners != [0; 3]);
+                full.count()
+            });
+            assert_eq!(counts[0], counts[1], "series {series}");
         }
+        // What a snapshot keeps is taken again, also of halves that kept more than their part.
+        let again = Body::of_kept(Arc::clone(&mesh), body.kept()).unwrap();
+        assert_eq!(again.kept(), body.kept());
     }
     assert_eq!((refused, open), (0, 0));
 }
