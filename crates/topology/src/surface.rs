@@ -46,8 +46,10 @@ pub struct Surface {
     /// By triangle: it was inside of the intact body.
     pub inside: Vec<bool>,
     by_nodes: BTreeMap<[u32; 4], Vec<u32>>,
-    /// The border of the mesh by element and face: the first slots.
-    border: BTreeMap<(u32, u8), u32>,
+    /// The border of the mesh by element and face, ascending: the first slots.
+    border: Vec<(u32, u8)>,
+    /// Those of its slots that are empty, ascending.
+    hidden: Vec<u32>,
 }
 
 /// A polygon of the surface, outward.
@@ -67,7 +69,8 @@ impl Surface {
             triangles: Vec::new(),
             inside: Vec::new(),
             by_nodes: BTreeMap::new(),
-            border: BTreeMap::new(),
+            border: Vec::new(),
+            hidden: Vec::new(),
         };
         for node in 0..mesh.node_count() as u32 {
             surface.vertex(vec![(node, 1.0)])?;
@@ -75,8 +78,7 @@ impl Surface {
         for element in 0..mesh.element_count() as u32 {
             for (face, &over) in mesh.neighbours(element).iter().enumerate() {
                 if over == OUTSIDE {
-                    let slot = surface.triangles.len() as u32;
-                    surface.border.insert((element, face as u8), slot);
+                    push(&mut surface.border, (element, face as u8))?;
                     let tet = mesh.tet(element);
                     let corners = FACES[face].map(|corner| tet[corner]);
                     push(&mut surface.triangles, corners)?;
@@ -120,6 +122,16 @@ impl Surface {
                 }
             })?;
         }
+        let mut hidden = Vec::new();
+        let faces =
+            (body.cells.keys()).flat_map(|element| (0..4).map(move |face| (*element, face)));
+        for own in faces.chain(split) {
+            if let Ok(slot) = self.border.binary_search(&own) {
+                push(&mut hidden, slot as u32)?;
+            }
+        }
+        hidden.sort_unstable();
+        hidden.dedup();
         // From here on nothing asks for memory, so that no slot changes without being listed.
         let slots = self.triangles.len() + wanted.len() + extra.len();
         reserve(&mut self.triangles, wanted.len() + extra.len())?;
@@ -129,17 +141,24 @@ impl Surface {
             first_vertex,
             triangles: room(slots)?,
         };
-        let mesh = body.mesh();
-        for (&(element, face), &slot) in &self.border {
-            let is_own = !body.cells.contains_key(&element) && !split.contains(&(element, face));
-            let tet = mesh.tet(element);
-            let corners = FACES[usize::from(face)].map(|corner| tet[corner]);
-            let now = if is_own { corners } else { [0; 3] };
-            if self.triangles[slot as usize] != now {
-                self.triangles[slot as usize] = now;
-                change.triangles.push(slot);
-            }
+        for &slot in self
+            .hidden
+            .iter()
+            .filter(|slot| hidden.binary_search(slot).is_err())
+        {
+            let (element, face) = self.border[slot as usize];
+            let tet = body.mesh().tet(element);
+            self.triangles[slot as usize] = FACES[usize::from(face)].map(|corner| tet[corner]);
+            change.triangles.push(slot);
         }
+        for &slot in hidden
+            .iter()
+            .filter(|slot| self.hidden.binary_search(slot).is_err())
+        {
+            self.triangles[slot as usize] = [0; 3];
+            change.triangles.push(slot);
+        }
+        self.hidden = hidden;
         for slot in self.border.len()..self.triangles.len() {
             let own = self.triangles[slot];
             if wanted.get(&own) == Some(&self.inside[slot]) {
