@@ -147,6 +147,9 @@ pub(super) struct Parts {
     /// `sum_e v_e grad N` of their free nodes, by place, mm².
     weights: Vec<(u32, [f32; 3])>,
     sums: Vec<[f32; 3]>,
+    /// Elements by cluster, and where each cluster's end.
+    order: Vec<u32>,
+    ends: Vec<u32>,
 }
 
 /// That of one of them.
@@ -168,10 +171,12 @@ impl Parts {
         self.sums.clear();
         memory::fit(&mut self.sums, free, WHAT)?;
         self.sums.resize(free, [0.0; 3]);
+        self.sort(elements, far.clusters())?;
         for cluster in 0..far.clusters() {
-            let own = |element: &&Linear| element.cluster as usize == cluster;
+            let start = cluster.checked_sub(1).map_or(0, |before| self.ends[before]);
+            let own = start as usize..self.ends[cluster] as usize;
             let (mut volume, mut largest) = (0.0f64, 0.0f32);
-            for element in elements.0.iter().filter(own) {
+            for element in self.order[own].iter().map(|at| &elements.0[*at as usize]) {
                 let share = element.shear / far.moduli.shear_pa as f32;
                 volume += f64::from(share);
                 let [a, b, c] = element.gradients;
@@ -202,6 +207,30 @@ impl Parts {
                 weights: start..self.weights.len(),
             };
             memory::push(&mut self.list, part, WHAT)?;
+        }
+        Ok(())
+    }
+
+    /// Puts the elements in the order of their clusters, those of one in their own.
+    fn sort(&mut self, elements: &LinearElements, clusters: usize) -> Result<()> {
+        self.ends.clear();
+        memory::fit(&mut self.ends, clusters, WHAT)?;
+        self.ends.resize(clusters, 0);
+        self.order.clear();
+        memory::fit(&mut self.order, elements.len(), WHAT)?;
+        self.order.resize(elements.len(), 0);
+        for element in &elements.0 {
+            self.ends[element.cluster as usize] += 1;
+        }
+        let mut start = 0;
+        for end in &mut self.ends {
+            start += std::mem::replace(end, start);
+        }
+        for (at, element) in elements.0.iter().enumerate() {
+            // The start of a cluster moves to its end while it is filled.
+            let place = &mut self.ends[element.cluster as usize];
+            self.order[*place as usize] = at as u32;
+            *place += 1;
         }
         Ok(())
     }
