@@ -1,0 +1,161 @@
+//! Random cuts, removals, stiffness, undo and presses on a brain of 3,152 nodes: nothing that is not finite, no lost state.
+//!
+//! 150 operations; 10,000 with `UPT_NIGHTLY=1`. `UPT_FUZZ_SEED` is where their numbers begin. The counts are printed.
+
+use super::*;
+use upt::{Error, GuardPolicy, Model, ModelOptions, flag};
+
+/// Operations to a body; then the intact one takes its place.
+const TO_A_BODY: usize = 12;
+
+struct Draw(u64);
+
+impl Draw {
+    fn next(&mut self) -> f32 {
+        self.0 = self
+            .0
+            .wrapping_mul(6364136223846793005)
+            .wrapping_add(1442695040888963407);
+        (self.0 >> 40) as f32 / (1u64 << 24) as f32
+    }
+
+    fn within(&mut self, low: f32, high: f32) -> f32 {
+        low + (high - low) * self.next()
+    }
+}
+
+#[derive(Debug, Default)]
+struct Counts {
+    operations: usize,
+    refused: usize,
+    copies: usize,
+    steps: usize,
+    not_finite: usize,
+    /// Steps that left an inverted element: those that said so, and those that did not.
+    inverted: usize,
+    inverted_untold: usize,
+    fell_back: usize,
+    guarded: usize,
+    lost_states: usize,
+}
+
+/// Does something to the body at a place.
+fn operate(scene: &Scene, draw: &mut Draw, at: Vector, normal: Vector) -> Result<usize, Error> {
+    let along = normal.any_orthonormal_vector();
+    let along = along.lerp(normal.cross(along), draw.next()).normalize();
+    let before = scene.node_count();
+    match (6.0 * draw.next()) as u32 {
+        0..=2 => {
+            let (long, deep) = (draw.within(5.0, 60.0), draw.within(3.0, 25.0));
+            let bend = normal.cross(along) * draw.within(-4.0, 4.0);
+            let edge = |depth: f32, aside: Vector| {
+                [-0.5, 0.5]
+                    .map(|part| (at + along * (part * long) - normal * depth + aside).to_array())
+            };
+            let poses = [
+                edge(-8.0, Vector::ZERO),
+                edge(0.5 * deep, bend),
+                edge(deep, Vector::ZERO),
+            ];
+            let stroke = (3.0 * draw.next()) as u32;
+            scene.cut(stroke, 2, poses.as_flattened())?;
+        }
+        3 => {
+            let tool = ball(
+                draw.within(2.0, 9.0),
+                (at - normal * draw.within(0.0, 8.0)).to_array(),
+            );
+            scene.remove(&tool, draw.within(10.0, 300.0))?;
+        }
+        4 => {
+            let first = (draw.next() * 12_000.0) as u32;
+            let elements: Vec<u32> = (first..first + 60).collect();
+            scene.scale_stiffness(&elements, draw.within(0.4, 2.5))?;
+        }
+        _ => {
+            scene.drop_fragments()?;
+        }
+    }
+    Ok(scene.node_count().saturating_sub(before))
+}
+
+#[test]
+fn random_operations_leave_every_state_finite_and_none_is_lost() {
+    let number =
+        |name: &str, or: usize| std::env::var(name).map_or(or, |text| text.parse().unwrap_or(or));
+    let operations = match number("UPT_NIGHTLY", 0) {
+        0 => 150,
+        _ => 10_000,
+    };
+    let path = std::path::Path::new("onnx/brain-coarse-reduced");
+    let model = Model::open(path, &ModelOptions::default()).unwrap();
+    let options = SceneOptions {
+        corrections: Corrections::Fixed(3),
+        guard_policy: GuardPolicy::Blend,
+        ..SceneOptions::default()
+    };
+    let scene = Scene::new(model, &options).unwrap();
+    let mesh = std::sync::Arc::clone(scene.mesh());
+    let faces = mesh.domain_faces.as_chunks::<3>().0;
+    let place = |node: u32| Vector::from_slice(&mesh.positions[3 * node as usize..][..3]);
+    let mut draw = Draw(number("UPT_FUZZ_SEED", 0) as u64 + 46);
+    let mut counts = Counts::default();
+    for operation in 0..operations {
+        if operation % TO_A_BODY == 0 {
+            scene.reset().unwrap();
+            assert_eq!(scene.node_count(), mesh.node_count());
+        }
+        let face = faces[(draw.next() * faces.len() as f32) as usize % faces.len()];
+        let [a, b, c] = face.map(place);
+        let (at, normal) = ((a + b + c) / 3.0, (b - a).cross(c - a).normalize());
+        let saved = scene.save().unwrap();
+        counts.operations += 1;
+        match operate(&scene, &mut draw, at, normal) {
+            Ok(copies) => counts.copies += copies,
+            Err(error) => {
+                let known = matches!(error, Error::Argument(_));
+                assert!(known, "operation {operation}: {error}");
+                counts.refused += 1;
+                counts.lost_states += usize::from(scene.save().unwrap() != saved);
+            }
+        }
+        for step in 0..3 {
+            // It leaps to the place, and then presses.
+            let depth = [-1.0, 1.5, 3.0][step];
+            let tool = ball(4.0, (at + normal * (4.0 - depth)).to_array());
+            let mut u = vec![f32::NAN; 3 * scene.node_count()];
+            scene.step(Contact::Tools(&[tool]), Some(&mut u)).unwrap();
+            let stats = scene.stats();
+            counts.steps += 1;
+            counts.not_finite += usize::from(!u.iter().all(|x| x.is_finite()));
+            counts.fell_back += usize::from(stats.flags & flag::FELL_BACK != 0);
+            let guarded = flag::BOUND | flag::GROWTH | flag::NON_FINITE;
+            let told = guarded | flag::FELL_BACK | flag::INVERTED;
+            let inverted = usize::from(stats.min_det < 0.0);
+            match stats.flags & told {
+                0 => counts.inverted_untold += inverted,
+                _ => counts.inverted += inverted,
+            }
+            counts.guarded += usize::from(stats.flags & guarded != 0);
+        }
+        if operation % 10 == 9 {
+            // Undo gives the state before back, and there is a way forward again.
+            let now = scene.save().unwrap();
+            scene.restore(&saved).unwrap();
+            counts.lost_states += usize::from(scene.save().unwrap() != saved);
+            scene.restore(&now).unwrap();
+            counts.lost_states += usize::from(scene.save().unwrap() != now);
+        }
+    }
+    println!("{counts:?}");
+    assert!(
+        counts.copies > operations && counts.refused < operations / 2,
+        "{counts:?}"
+    );
+    let wrong = [
+        counts.not_finite,
+        counts.inverted_untold,
+        counts.lost_states,
+    ];
+    assert_eq!(wrong, [0; 3], "{counts:?}");
+}
