@@ -21,6 +21,10 @@ pub struct Report {
     pub residual: f32,
     /// Root mean square over the nodes of what a further iteration would move, estimated, mm.
     pub remaining_mm: f32,
+    /// Root mean square over the nodes that the smoothing far from the tools has moved, mm: as much at least is out of balance there.
+    pub far_mm: f32,
+    /// How far from the tools the next step iterates, a level of the near set.
+    pub level: usize,
     /// Root mean square error over the nodes, estimated before the bundle's calibration, mm.
     pub error_mm: f32,
     /// Smallest det F at the end.

@@ -98,6 +98,7 @@ impl ImplicitSolver {
         self.leave_load();
         let own = &mut self.next;
         own.min_det = 1.0;
+        own.level = 0;
         own.truncated_mm = match truncated.is_finite() {
             true => truncated as f32,
             false => 0.0,

@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::error::Result;
+use super::local::LEVELS;
+use crate::error::{Error, Result};
 use crate::memory::HeldBytes;
 use crate::{memory, stored};
 
@@ -20,6 +21,8 @@ pub struct Motion {
     pub inertia: Vec<f32>,
     /// Smallest det F of the last corrected state.
     pub min_det: f32,
+    /// How far from the tools the next step iterates, a level of the near set (`src/corrections/local/near.rs`).
+    pub level: u32,
     /// What a step of this length leaves out in the last state, and the whole estimated error of it, before the bundle's
     /// calibration: root mean squares over the nodes, mm. The error is 0 where nothing was corrected.
     pub truncated_mm: f32,
@@ -36,6 +39,7 @@ impl Motion {
             velocity_before: memory::zeros(len, "velocities")?,
             inertia: memory::zeros(len, "inertia")?,
             min_det: 1.0,
+            level: 0,
             truncated_mm: 0.0,
             error_mm: 0.0,
             reaction: memory::room(len, "contact forces")?,
@@ -49,12 +53,18 @@ impl Motion {
             velocity_before,
             inertia,
             min_det,
+            level,
             truncated_mm,
             error_mm,
             reaction,
         } = self;
         for field in [velocity, velocity_before, inertia] {
             stored::check(field, len)?;
+        }
+        if *level as usize >= LEVELS {
+            return Err(Error::Snapshot(format!(
+                "holds a reach of level {level}, there are {LEVELS}"
+            )));
         }
         stored::check(&[*min_det, *truncated_mm, *error_mm], 3)?;
         stored::check(reaction, 3 * contacts)
@@ -71,6 +81,7 @@ impl Motion {
             velocity_before: copied(&self.velocity_before)?,
             inertia: copied(&self.inertia)?,
             min_det: self.min_det,
+            level: self.level,
             truncated_mm: self.truncated_mm,
             error_mm: self.error_mm,
             reaction: copied(&self.reaction)?,
@@ -87,6 +98,7 @@ impl Motion {
         self.velocity_before.copy_from_slice(&other.velocity_before);
         self.inertia.copy_from_slice(&other.inertia);
         self.min_det = other.min_det;
+        self.level = other.level;
         self.truncated_mm = other.truncated_mm;
         self.error_mm = other.error_mm;
         self.reaction.clear();
@@ -99,6 +111,7 @@ impl Motion {
         self.velocity_before.fill(0.0);
         self.inertia.fill(0.0);
         self.min_det = 1.0;
+        self.level = 0;
         self.truncated_mm = 0.0;
         self.error_mm = 0.0;
         self.reaction.clear();

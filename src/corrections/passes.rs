@@ -3,12 +3,16 @@
 
 use std::ops::Range;
 
-use super::precondition::DIAGONAL_WEIGHT;
 use super::precondition::Env;
 use crate::error::Result;
 use crate::kernels::Pool;
 use crate::kernels::parts::Parts;
 use crate::kernels::vectors::{PartialSums, piece_dots};
+
+/// Weight of the smoothing far from the tools. It is added to the iterations' answer without a search along it, from a residual that is older than
+/// they are: the error of the modes' own part shrinks only if `w lambda < 1`, where `lambda`, at most 4, is the largest eigenvalue of `D^-1 K`
+/// (`docs/decisions/030-reach.md`).
+const FAR_WEIGHT: f32 = 0.2;
 
 /// Numbers a piece.
 const PIECE: usize = 3 * 1360;
@@ -64,43 +68,46 @@ pub(super) fn sum_of_squares(count: usize, value: impl Fn(usize) -> f32) -> f32 
     lanes.into_iter().sum::<f32>() + rest.sum::<f32>()
 }
 
-/// `u += change` where nodes are free, and `- w D^-1 r` with it where they are not near; the change is lost at held ones.
+/// `u += change` where nodes are free, and `- w D^-1 r` with it where they are not near; the change is lost at held ones. Gives the sum of the
+/// squares of what the smoothing moves, mm².
 pub(super) fn add_smoothed(
     env: Env<'_>,
-    r: &[f32],
-    change: &mut [f32],
-    u: &mut [f32],
+    (r, change, u): (&[f32], &mut [f32], &mut [f32]),
     is_near: impl Fn(u32) -> bool + Sync,
-) -> Result<()> {
+    partial: &mut PartialSums,
+) -> Result<f64> {
     let len = u.len();
-    let (u, change) = (Parts::new(u), Parts::new(change));
+    let mut sums = Sums::new(partial, len, 1);
+    let (u, change, parts) = (Parts::new(u), Parts::new(change), sums.parts());
     let blocks = &env.time_step.inverse_blocks;
-    each(env.pool, len, 4, |range, _| {
+    each(env.pool, len, 4, |range, piece| {
         // SAFETY: these parts belong to this piece alone.
         let [u, change] =
             unsafe { [&u, &change].map(|field| field.part(range.start, range.len())) };
-        let w = DIAGONAL_WEIGHT;
+        // SAFETY: this sum belongs to this piece alone.
+        let sum = unsafe { parts.part(piece, 1) };
         let rows = r[range.clone()].as_chunks::<3>().0.iter();
-        let nodes = range.start / 3..range.end / 3;
-        for ((change, r), node) in change
-            .as_chunks_mut::<3>()
-            .0
-            .iter_mut()
-            .zip(rows)
-            .zip(nodes)
-        {
-            if !is_near(node as u32) {
+        let places = change.as_chunks_mut::<3>().0.iter_mut();
+        for ((change, r), node) in places.zip(rows).zip(range.start / 3..) {
+            if !is_near(node as u32) && !env.body.held[node] {
                 let [xx, xy, xz, yy, yz, zz] = blocks[node];
-                change[0] -= w * (xx * r[0] + xy * r[1] + xz * r[2]);
-                change[1] -= w * (xy * r[0] + yy * r[1] + yz * r[2]);
-                change[2] -= w * (xz * r[0] + yz * r[1] + zz * r[2]);
+                let own = [
+                    xx * r[0] + xy * r[1] + xz * r[2],
+                    xy * r[0] + yy * r[1] + yz * r[2],
+                    xz * r[0] + yz * r[1] + zz * r[2],
+                ];
+                for (change, own) in change.iter_mut().zip(own) {
+                    *change -= FAR_WEIGHT * own;
+                    sum[0] += (FAR_WEIGHT * own).powi(2);
+                }
             }
         }
         hold(env, &range, change);
         u.iter_mut()
             .zip(&*change)
             .for_each(|(u, change)| *u += change);
-    })
+    })?;
+    Ok(sums.total(0))
 }
 
 /// `u += change` where nodes are free; the change is lost at held ones.

@@ -140,6 +140,7 @@ impl ImplicitSolver {
         own.velocity.copy_from_slice(&last.velocity);
         own.inertia.copy_from_slice(&last.inertia);
         own.min_det = last.min_det;
+        own.level = last.level;
         own.error_mm = last.error_mm;
         Ok(())
     }

@@ -103,7 +103,10 @@ impl ImplicitSolver {
         self.memory.mask(&[]);
         (self.preconditioner).expect_load(context.env(), input.load.is_some())?;
         self.prepare(context, input)?;
-        let mut report = Report::default();
+        let mut report = Report {
+            level: self.motion.level as usize,
+            ..Report::default()
+        };
         let mut u = std::mem::take(&mut self.u);
         let mut g = std::mem::take(&mut self.g);
         let mut at = Iterate {
@@ -122,6 +125,7 @@ impl ImplicitSolver {
                 self.leave_load();
             }
             self.next.min_det = report.min_det;
+            self.next.level = report.level as u32;
             self.estimate(&mut report);
         }
         (self.u, self.g) = (u, g);

@@ -282,6 +282,7 @@ impl Core {
             velocity_before: memory::zeros(len, SCENE)?,
             inertia: memory::zeros(len, SCENE)?,
             min_det: was.min_det,
+            level: was.level,
             truncated_mm: was.truncated_mm,
             error_mm: was.error_mm,
             reaction: Vec::new(),

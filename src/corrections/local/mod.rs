@@ -35,13 +35,15 @@ use self::near::NearSet;
 use self::pairs::{Pairs, Room};
 use self::step::{Change, Step, add, dot, resize};
 use super::input::{Input, SolverContext};
+use super::passes::add_smoothed;
 use super::precondition::Preconditioner;
 use crate::contact::ContactProblem;
 use crate::error::Result;
+use crate::kernels::vectors::PartialSums;
 use crate::memory::{self, HeldBytes};
 
 pub use self::linearisation::Linearisation;
-pub(super) use self::near::add_centres;
+pub(super) use self::near::{LEVELS, add_centres};
 pub use self::record::Record;
 
 /// Far elements of a chunk that is near in part are looked at where its smallest det F is below this.
@@ -110,11 +112,17 @@ pub struct LocalSolver {
     mass_g: f64,
     /// Nodes that the tools touch, while a round begins.
     pub(super) touched: Vec<u32>,
+    /// How far the next round reaches, a level of the near set.
+    pub(super) level: usize,
     /// Smallest det F of the far elements at the base.
     far_det: f32,
     /// Smallest det F, and the root mean square that the last direction moves, mm.
     pub(super) det: f32,
     pub(super) moved_mm: f32,
+    /// Root mean square over the nodes that the last smoothing of the far ones moved, mm.
+    pub(super) far_mm: f32,
+    #[held(skip)]
+    partial: PartialSums,
     room: Room,
     on_modes: Vec<f32>,
     more_on_modes: Vec<f32>,
@@ -157,9 +165,12 @@ impl LocalSolver {
             trial: memory::zeros(3 * env.body.mass.len(), WHAT)?,
             mass_g: env.body.mass.iter().map(|&mass| f64::from(mass)).sum(),
             touched: memory::room(256, WHAT)?,
+            level: 0,
             far_det: 1.0,
             det: 1.0,
             moved_mm: 0.0,
+            far_mm: 0.0,
+            partial: PartialSums::with_room(3 * env.body.mass.len(), 1)?,
             room: Room {
                 q: memory::zeros(width, WHAT)?,
                 ..Room::default()
@@ -201,9 +212,9 @@ impl LocalSolver {
             .last()
             .map(|record| record.centres.as_slice());
         self.near.choose(rest, last, &self.about, abouts)?;
-        if !self.near.is_chosen() {
+        if !self.near.is_chosen(self.level) {
             self.pairs.forget_layout();
-            self.near.fill(env, far, rest)?;
+            self.near.fill(env, far, rest, self.level)?;
             let (near, room) = (&self.near, &mut self.room);
             (self.clusters).leave_out(env, far, near, step.preconditioner, room)?;
             self.factor.plan(&self.near, rest)?;
@@ -252,6 +263,15 @@ impl LocalSolver {
         let mut holds = true;
         problem.each_load(|node, _| holds &= held[node as usize] || self.near.holds(node));
         holds
+    }
+
+    /// The level that the next step begins with, `u` being the state of this one.
+    pub(super) fn next_level(&self, u: &[f32]) -> usize {
+        let u = u.as_chunks::<3>().0;
+        let squares = self.touched.iter().map(|&node| u[node as usize]);
+        let squares = squares.map(|u| u.iter().map(|u| u * u).sum::<f32>());
+        let pushed_mm = squares.fold(0.0, f32::max).sqrt();
+        near::next_level(self.level, self.far_mm, pushed_mm)
     }
 
     /// `|r_S - loads|`, µN: what is out of balance near the tools.
@@ -317,7 +337,7 @@ impl LocalSolver {
         Ok(det.min(far_det).min(self.far_det))
     }
 
-    /// The whole field into `u`, which holds the base, of which `residual` is; `scratch [K,3]`.
+    /// The whole field into `u`, which holds the base, of which `residual` is; `scratch [K,3]`. Leaves what the far nodes were smoothed by in `far_mm`.
     pub(super) fn settle(
         &mut self,
         step: &mut StepContext<'_>,
@@ -333,8 +353,11 @@ impl LocalSolver {
             let node = self.near.nodes[place] as usize;
             add(1.0, t, &mut scratch[3 * node..][..3]);
         }
-        let near = &self.near;
-        super::passes::add_smoothed(env, residual, scratch, u, |node| near.holds(node))
+        let (near, count) = (&self.near, u.len() / 3);
+        let fields = (residual, scratch, u);
+        let moved = add_smoothed(env, fields, |node| near.holds(node), &mut self.partial)?;
+        self.far_mm = (moved / count.max(1) as f64).sqrt() as f32;
+        Ok(())
     }
 }
 

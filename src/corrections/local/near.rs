@@ -18,6 +18,11 @@ use crate::memory::{self, HeldBytes};
 /// Nodes are near that lie this close to a centre at rest, mm, or as many mean edges of the mesh.
 const REACH_MM: f32 = 25.0;
 const REACH_EDGES: f32 = 3.0;
+/// Levels of the reach, and what multiplies it in each.
+pub(in crate::corrections) const LEVELS: usize = 4;
+const WIDER: [f32; LEVELS] = [1.0, 1.5, 2.25, f32::INFINITY];
+/// A set is too narrow where the far nodes are smoothed by more than this part of how far the touched ones have been pushed.
+const FAR_PART: f32 = 6e-5;
 /// Where a larger part of the nodes would be near, all are, and so they are in a body of fewer nodes: whole, it costs no more than its modes do.
 const LARGEST_PART: f32 = 0.5;
 const FEWEST_NODES: usize = 1000;
@@ -46,6 +51,8 @@ pub(in crate::corrections) struct NearSet {
     /// Places that are inside, and those that are free.
     pub inside: usize,
     pub free: usize,
+    /// Index of [`WIDER`].
+    pub level: usize,
     /// Inside places that lie closest to the centres: the first ones.
     pub core: usize,
     /// By node; [`NONE`] elsewhere.
@@ -78,6 +85,7 @@ impl NearSet {
             nodes: Vec::new(),
             inside: 0,
             free: 0,
+            level: 0,
             core: 0,
             places: memory::filled(count, NONE, WHAT)?,
             is_reached: memory::filled(count, false, WHAT)?,
@@ -135,8 +143,8 @@ impl NearSet {
     }
 
     /// Whether what is near is what lies about the chosen centres.
-    pub fn is_chosen(&self) -> bool {
-        self.is_whole && self.chosen == self.centres
+    pub fn is_chosen(&self, level: usize) -> bool {
+        self.is_whole && self.level == level && self.chosen == self.centres
     }
 
     /// All that depends on what is near has been made for it.
@@ -144,15 +152,16 @@ impl NearSet {
         self.is_whole = true;
     }
 
-    /// Takes the elements about the chosen centres.
-    pub fn fill(&mut self, env: Env<'_>, far: &FarField, rest: &[f32]) -> Result<()> {
+    /// Takes the elements about the chosen centres, as far as a level reaches.
+    pub fn fill(&mut self, env: Env<'_>, far: &FarField, rest: &[f32], level: usize) -> Result<()> {
         self.is_whole = false;
+        self.level = level;
         for &node in &self.nodes {
             self.places[node as usize] = NONE;
         }
         let reach = match self.places.len() < FEWEST_NODES {
             true => f32::MAX,
-            false => REACH_MM.max(REACH_EDGES * far.edge_mm),
+            false => WIDER[level] * REACH_MM.max(REACH_EDGES * far.edge_mm),
         };
         self.take_elements(env, far, rest, reach)?;
         let most = LARGEST_PART * self.places.len() as f32;
@@ -329,6 +338,16 @@ impl NearSet {
             q[range.clone()].fill(0.0);
         }
         project_rows(env.isa, &env.prior.basis(), &self.plan, r, q);
+    }
+}
+
+/// The level of the next step, whose set is wider where the far nodes are out of balance: they were smoothed by `far_mm`, the touched ones have
+/// been pushed by `pushed_mm`. It is not narrower until the tools have left: under a tool that is held still the far nodes come to balance
+/// also in a set that is too narrow for the next motion.
+pub(in crate::corrections) fn next_level(level: usize, far_mm: f32, pushed_mm: f32) -> usize {
+    match far_mm > FAR_PART * pushed_mm {
+        true => (level + 1).min(LEVELS - 1),
+        false => level,
     }
 }
 

@@ -63,6 +63,10 @@ impl ImplicitSolver {
             self.evaluate(context, input, at, report)?;
         }
         report.residual = (made.size / made.start.max(f64::MIN_POSITIVE)) as f32;
+        if let Some(local) = &self.local {
+            report.far_mm = local.far_mm;
+            report.level = local.next_level(at.u);
+        }
         Ok(made.size)
     }
 
@@ -123,7 +127,9 @@ impl ImplicitSolver {
     ) -> Result<()> {
         let env = context.env();
         let nodes = problem.touched(&env.body.held);
+        let level = self.motion.level as usize;
         let (local, mut step) = self.local_solver(context, input)?;
+        local.level = level;
         memory::replace(&mut local.touched, nodes, "local iterations")?;
         let base = Base {
             u: at.u,
