@@ -392,6 +392,11 @@
 #define UPT_SHAPE_HULL 3
 
 /**
+ * An instrument's shape: a ball of `radius`.
+ */
+#define UPT_SHAPE_SPHERE 4
+
+/**
  * An instrument pushes, with Coulomb friction.
  */
 #define UPT_MODE_SLIDE 0
@@ -695,15 +700,15 @@ typedef struct upt_instrument {
    */
   float position[3];
   /**
-   * Unit quaternion x, y, z, w.
+   * Unit quaternion x, y, z, w; all zero is no rotation.
    */
   float rotation[4];
   /**
-   * Half sizes along the local axes, mm; a capsule's half length is `[1]` (local y).
+   * Half sizes along the local axes, mm; a capsule's half length is `[1]` (local y). A sphere has none.
    */
   float half_extents[3];
   /**
-   * A capsule's radius or a spatula's corner radius, mm.
+   * A sphere's or a capsule's radius or a spatula's corner radius, mm.
    */
   float radius;
   /**
@@ -1024,7 +1029,7 @@ typedef struct upt_haptic_pose {
    */
   float position_m[3];
   /**
-   * Unit quaternion x, y, z, w.
+   * Unit quaternion x, y, z, w; all zero is no rotation.
    */
   float rotation[4];
   /**

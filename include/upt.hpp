@@ -110,7 +110,7 @@ using instrument_contact = upt_instrument_contact;
 /// A ball, at the origin of the mesh's frame until you set `position`. radius: mm.
 inline upt_instrument sphere(float radius) noexcept {
   upt_instrument made = make<upt_instrument>();
-  made.shape = UPT_SHAPE_CAPSULE;
+  made.shape = UPT_SHAPE_SPHERE;
   made.rotation[3] = 1.0F;
   made.radius = radius;
   return made;
@@ -118,6 +118,7 @@ inline upt_instrument sphere(float radius) noexcept {
 /// A capsule along its local y; half_length without the caps, mm.
 inline upt_instrument capsule(float radius, float half_length) noexcept {
   upt_instrument made = sphere(radius);
+  made.shape = UPT_SHAPE_CAPSULE;
   made.half_extents[1] = half_length;
   return made;
 }

@@ -233,6 +233,8 @@ class Shape(IntEnum):
     """An instrument's shape: a box with rounded corners."""
     HULL = 3
     """An instrument's shape: a hull from `upt_hull_create`."""
+    SPHERE = 4
+    """An instrument's shape: a ball of `radius`."""
 
 
 class Mode(IntEnum):
@@ -587,7 +589,7 @@ class HapticPose(Record):
     position_m: tuple[float, ...] = vector("_position_m")
     """In the mesh's frame, metres."""
     rotation: tuple[float, ...] = vector("_rotation")
-    """Unit quaternion x, y, z, w."""
+    """Unit quaternion x, y, z, w; all zero is no rotation."""
     velocity_m_per_s: tuple[float, ...] = vector("_velocity_m_per_s")
     """Of the tool's position."""
     angular_velocity_rad_per_s: tuple[float, ...] = vector("_angular_velocity_rad_per_s")
@@ -868,11 +870,11 @@ class Instrument(Record):
     position: tuple[float, ...] = vector("_position")
     """Centre, mm, in the mesh's frame."""
     rotation: tuple[float, ...] = vector("_rotation")
-    """Unit quaternion x, y, z, w."""
+    """Unit quaternion x, y, z, w; all zero is no rotation."""
     half_extents: tuple[float, ...] = vector("_half_extents")
-    """Half sizes along the local axes, mm; a capsule's half length is `[1]` (local y)."""
+    """Half sizes along the local axes, mm; a capsule's half length is `[1]` (local y). A sphere has none."""
     radius: float
-    """A capsule's radius or a spatula's corner radius, mm."""
+    """A sphere's or a capsule's radius or a spatula's corner radius, mm."""
     sticking: bool = boolean("_sticking")
     """Only for `upt_scene_contacts_from_instruments`. 1: touched nodes move with the instrument until it leaves; 0: they slide."""
     mode: Mode = choice("_mode", Mode)

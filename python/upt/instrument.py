@@ -48,7 +48,7 @@ class Instrument:
     """
 
     shape: Shape | str
-    """`upt.Shape` or its name: capsule (along local y), box, spatula (a box with rounded corners), hull."""
+    """`upt.Shape` or its name: sphere, capsule (along local y), box, spatula (a box with rounded corners), hull."""
     position: Sequence[float] = (0.0, 0.0, 0.0)
     """Centre at the end of the step, mm, in the mesh's frame; a hull's origin."""
     rotation: Sequence[float] = (0.0, 0.0, 0.0, 1.0)
@@ -56,7 +56,7 @@ class Instrument:
     half_extents: Sequence[float] = (0.0, 0.0, 0.0)
     """Half sizes along the local axes, mm; a capsule's half length without its caps is `[1]`."""
     radius: float = 0.0
-    """A capsule's radius or a spatula's corner radius, mm."""
+    """A sphere's or a capsule's radius or a spatula's corner radius, mm."""
     friction: float = 0.0
     """Coulomb's coefficient, 0 or more. Only for `step`."""
     grasp: bool = False
@@ -79,7 +79,7 @@ class Instrument:
         tear_off: float = 0.0,
     ) -> Instrument:
         """A ball of this radius, mm."""
-        return cls.capsule(radius, position=position, friction=friction, grasp=grasp, tear_off=tear_off)
+        return cls(Shape.SPHERE, position, radius=radius, friction=friction, grasp=grasp, tear_off=tear_off)
 
     @classmethod
     def capsule(

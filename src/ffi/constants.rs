@@ -129,6 +129,8 @@ pub const UPT_SHAPE_BOX: i32 = 1;
 pub const UPT_SHAPE_SPATULA: i32 = 2;
 /// An instrument's shape: a hull from `upt_hull_create`.
 pub const UPT_SHAPE_HULL: i32 = 3;
+/// An instrument's shape: a ball of `radius`.
+pub const UPT_SHAPE_SPHERE: i32 = 4;
 
 /// An instrument pushes, with Coulomb friction.
 pub const UPT_MODE_SLIDE: u8 = 0;

@@ -85,13 +85,14 @@ pub(super) fn index_set(value: i32) -> Result<IndexSet, Failure> {
 pub(super) fn tool(index: usize, raw: &upt_instrument) -> Result<crate::contact::Tool, Failure> {
     use crate::contact::{Mode, Tool};
     reserved(&raw.reserved)?;
-    let (at, turn, half_extents, radius) =
-        (raw.position, raw.rotation, raw.half_extents, raw.radius);
+    let (at, half_extents, radius) = (raw.position, raw.half_extents, raw.radius);
+    let turn = rotation(raw.rotation);
     let shape = match raw.shape {
         UPT_SHAPE_CAPSULE => ::contact::Shape::Capsule {
             half_length: half_extents[1],
             radius,
         },
+        UPT_SHAPE_SPHERE => ::contact::Shape::Sphere { radius },
         UPT_SHAPE_BOX => ::contact::Shape::Box { half_extents },
         UPT_SHAPE_SPATULA => ::contact::Shape::Spatula {
             half_extents,
@@ -126,6 +127,14 @@ pub(super) fn tool(index: usize, raw: &upt_instrument) -> Result<crate::contact:
         (tool.friction, tool.tear_off_mn) = (raw.friction, raw.tear_off_mn);
         tool.check(index)?;
         Ok(tool)
+    }
+}
+
+/// A quaternion that was never set turns nothing.
+pub(super) fn rotation(raw: [f32; 4]) -> [f32; 4] {
+    match raw {
+        [0.0, 0.0, 0.0, 0.0] => [0.0, 0.0, 0.0, 1.0],
+        raw => raw,
     }
 }
 

@@ -100,7 +100,7 @@ pub unsafe extern "C" fn upt_haptics_render(
             let at = HapticPose {
                 time_s: raw.time_s,
                 position_m: raw.position_m,
-                rotation: raw.rotation,
+                rotation: convert::rotation(raw.rotation),
                 velocity: has_velocity.then_some(velocity),
             };
             let force = hands::with(haptics.addr(), |hand| {

@@ -135,11 +135,11 @@ pub struct upt_instrument {
     pub shape: i32,
     /// Centre, mm, in the mesh's frame.
     pub position: [f32; 3],
-    /// Unit quaternion x, y, z, w.
+    /// Unit quaternion x, y, z, w; all zero is no rotation.
     pub rotation: [f32; 4],
-    /// Half sizes along the local axes, mm; a capsule's half length is `[1]` (local y).
+    /// Half sizes along the local axes, mm; a capsule's half length is `[1]` (local y). A sphere has none.
     pub half_extents: [f32; 3],
-    /// A capsule's radius or a spatula's corner radius, mm.
+    /// A sphere's or a capsule's radius or a spatula's corner radius, mm.
     pub radius: f32,
     /// Only for `upt_scene_contacts_from_instruments`. 1: touched nodes move with the instrument until it leaves; 0: they slide.
     pub sticking: u8,

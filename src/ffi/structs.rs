@@ -209,7 +209,7 @@ pub struct upt_haptic_pose {
     pub time_s: f64,
     /// In the mesh's frame, metres.
     pub position_m: [f32; 3],
-    /// Unit quaternion x, y, z, w.
+    /// Unit quaternion x, y, z, w; all zero is no rotation.
     pub rotation: [f32; 4],
     /// Of the tool's position.
     pub velocity_m_per_s: [f32; 3],

@@ -131,6 +131,7 @@ static void expect_sum(const upt_instrument_contact *contacts, uint64_t count, u
 static void walk_driven(upt_scene *scene, const float *rest, uint32_t node, upt_hull *hull) {
   static const int32_t shapes[4] = {UPT_SHAPE_CAPSULE, UPT_SHAPE_BOX, UPT_SHAPE_SPATULA,
                                     UPT_SHAPE_HULL};
+  float *round_tip;
   upt_instrument_reading readings[2];
   upt_instrument_contact *contacts;
   upt_instrument two[2];
@@ -179,6 +180,19 @@ static void walk_driven(upt_scene *scene, const float *rest, uint32_t node, upt_
     EXPECT(upt_scene_get_stats(scene, &stats), UPT_OK);
     EXPECT_TRUE(stats.step_count == 4 && stats.contact_ms > 0.0);
   }
+
+  /* A ball that was never turned is a capsule without length. */
+  round_tip = calloc(floats, sizeof *round_tip);
+  for (i = 0; i < 2; i++) {
+    upt_instrument ball = at_node(rest, node, i ? UPT_SHAPE_SPHERE : UPT_SHAPE_CAPSULE, NULL);
+    memset(ball.half_extents, 0, sizeof ball.half_extents);
+    ball.rotation[3] = i ? 0.0F : 1.0F;
+    EXPECT(upt_scene_reset(scene), UPT_OK);
+    EXPECT(step_tools(scene, &ball, 1, i ? after : round_tip, floats), UPT_OK);
+  }
+  EXPECT_TRUE(memcmp(after, round_tip, floats * sizeof *after) == 0);
+  free(round_tip);
+  EXPECT(step_tools(scene, two, 2, NULL, 0), UPT_OK);
 
   /* On the worker; a hull may end while its step runs. */
   EXPECT(submit_tools(scene, two, 2), UPT_OK);

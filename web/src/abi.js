@@ -77,6 +77,7 @@ export const UPT_SHAPE_CAPSULE = 0;
 export const UPT_SHAPE_BOX = 1;
 export const UPT_SHAPE_SPATULA = 2;
 export const UPT_SHAPE_HULL = 3;
+export const UPT_SHAPE_SPHERE = 4;
 export const UPT_MODE_SLIDE = 0;
 export const UPT_MODE_GRASP = 1;
 export const UPT_ABI_VERSION = 1;

@@ -224,20 +224,18 @@ fn a_press_held_deep_at_the_edge_of_a_lobe_stays_where_the_solver_has_it() {
     ]);
     assert!(output.status.success(), "{}", told(&output));
     let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
-    let solved = |row: &&serde_json::Value| {
-        let method = row["method"].as_str().unwrap_or_default();
-        row["programme"] == "press" && method.contains("contact solved") && row["corrections"] != 0
+    let methods = report["methods"].as_array().unwrap().iter();
+    let is_solved = |method: &&serde_json::Value| {
+        let name = method["method"].as_str().unwrap_or_default();
+        name.starts_with("liver, contact solved")
     };
-    let rows: Vec<_> = report["rows"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .filter(solved)
-        .collect();
-    assert_eq!(rows.len(), 2, "{report}");
-    for row in rows {
-        // Before the iterations reached farther: 0.2 mm² and 7 mm, a third of the force.
-        assert!(row["mse_mean_mm2"].as_f64().unwrap() < 0.01, "{row}");
-        assert!(row["max_error_mm"].as_f64().unwrap() < 1.2, "{row}");
+    let solved: Vec<_> = methods.filter(is_solved).collect();
+    assert_eq!(solved.len(), 2);
+    for method in solved {
+        // Until the tool draws back. Before the iterations reached farther: 0.9 mm², the tissue had slipped aside by 7 mm.
+        let errors = method["cases"][0]["mse_by_step_mm2"].as_array().unwrap();
+        for (step, error) in errors.iter().take(36).enumerate() {
+            assert!(error.as_f64().unwrap() < 0.02, "step {step}: {error} mm²");
+        }
     }
 }

@@ -487,9 +487,8 @@ namespace Upt
         {
             upt_instrument sphere = default(upt_instrument);
             sphere.struct_size = (uint)sizeof(upt_instrument);
-            sphere.shape = Native.UPT_SHAPE_CAPSULE;
+            sphere.shape = Native.UPT_SHAPE_SPHERE;
             sphere.position[0] = 5000f;
-            sphere.rotation[3] = 1f;
             sphere.radius = 1f;
             return sphere;
         }

@@ -186,7 +186,7 @@ namespace Upt.Interop
         public double time_s;
         /// <summary>In the mesh's frame, metres.</summary>
         public fixed float position_m[3];
-        /// <summary>Unit quaternion x, y, z, w.</summary>
+        /// <summary>Unit quaternion x, y, z, w; all zero is no rotation.</summary>
         public fixed float rotation[4];
         /// <summary>Of the tool's position.</summary>
         public fixed float velocity_m_per_s[3];
@@ -384,11 +384,11 @@ namespace Upt.Interop
         public int shape;
         /// <summary>Centre, mm, in the mesh's frame.</summary>
         public fixed float position[3];
-        /// <summary>Unit quaternion x, y, z, w.</summary>
+        /// <summary>Unit quaternion x, y, z, w; all zero is no rotation.</summary>
         public fixed float rotation[4];
-        /// <summary>Half sizes along the local axes, mm; a capsule's half length is `[1]` (local y).</summary>
+        /// <summary>Half sizes along the local axes, mm; a capsule's half length is `[1]` (local y). A sphere has none.</summary>
         public fixed float half_extents[3];
-        /// <summary>A capsule's radius or a spatula's corner radius, mm.</summary>
+        /// <summary>A sphere's or a capsule's radius or a spatula's corner radius, mm.</summary>
         public float radius;
         /// <summary>Only for `upt_scene_contacts_from_instruments`. 1: touched nodes move with the instrument until it leaves; 0: they slide.</summary>
         public byte sticking;
@@ -640,6 +640,8 @@ namespace Upt.Interop
         public const int UPT_SHAPE_SPATULA = 2;
         /// <summary>An instrument's shape: a hull from `upt_hull_create`.</summary>
         public const int UPT_SHAPE_HULL = 3;
+        /// <summary>An instrument's shape: a ball of `radius`.</summary>
+        public const int UPT_SHAPE_SPHERE = 4;
         /// <summary>An instrument pushes, with Coulomb friction.</summary>
         public const int UPT_MODE_SLIDE = 0;
         /// <summary>
