@@ -4,6 +4,7 @@
 //! the area vector `A n` takes `-p A n`, a third at each corner. Loads change on a line over a frame. Forces are µN inside.
 
 use super::fields::Node;
+use super::support::Support;
 use elements::vector::{cross, subtract};
 
 /// Loads at the end of a frame. By default there are none.
@@ -45,21 +46,32 @@ pub(super) struct BodyLoad {
     pub pascal: Vec<f64>,
     /// Inner steps of the frame.
     pub steps: u32,
+    /// The support, where it moves.
+    pub support: Option<Support>,
     /// Forces of an inner step, by slot.
     pub now: Vec<Node>,
 }
 
 impl BodyLoad {
+    /// None yet, for a body of so many slots.
+    pub fn with_slots(slots: usize) -> Self {
+        BodyLoad {
+            dead: [vec![Node::default(); slots], vec![Node::default(); slots]],
+            now: vec![Node::default(); slots],
+            ..BodyLoad::default()
+        }
+    }
+
     /// Starts a frame of `steps` inner steps.
     pub fn begin(&mut self, steps: u32) {
         self.steps = steps;
     }
 
-    /// Computes `now` at inner step `step` of the frame.
+    /// Computes `now` at inner step `step` of the frame, and moves the support there.
     ///
     /// # Safety
-    /// `displacement` holds every slot of the faces, and nobody writes there.
-    pub unsafe fn evaluate(&mut self, displacement: *const Node, step: u32) {
+    /// `displacement` holds every slot, and nobody else looks there.
+    pub unsafe fn evaluate(&mut self, displacement: *mut Node, step: u32) {
         let part = f64::from(step) / f64::from(self.steps);
         let (from, to) = (&self.dead[0], &self.dead[1]);
         for ((now, from), to) in self.now.iter_mut().zip(from).zip(to) {
@@ -67,6 +79,10 @@ impl BodyLoad {
             *now = Node(std::array::from_fn(|k| {
                 from.0[k] + part * (to.0[k] - from.0[k])
             }));
+        }
+        if let Some(support) = &self.support {
+            // SAFETY: the caller's.
+            unsafe { support.move_to(displacement, (step, self.steps), &mut self.now) };
         }
         for face in &self.faces {
             let corner = |k: usize| {
@@ -92,6 +108,9 @@ impl BodyLoad {
         from.copy_from_slice(to);
         for face in &mut self.faces {
             face.pascal[0] = face.pascal[1];
+        }
+        if let Some(support) = &mut self.support {
+            support.arrive();
         }
     }
 }

@@ -1,7 +1,6 @@
 //! A solver takes loads: checked, and put where the inner steps find them.
 
 use super::body_load::{BodyLoad, Face, Loads};
-use super::fields::Node;
 use super::{Solver, SolverError};
 use crate::mesh::tet_volume;
 
@@ -16,17 +15,8 @@ impl Solver {
         }
         self.check_loads(loads)?;
         let slots = self.partition.node_of_slot.len();
-        let load = self.load.get_or_insert_with(|| BodyLoad {
-            dead: [vec![Node::default(); slots], vec![Node::default(); slots]],
-            now: vec![Node::default(); slots],
-            ..BodyLoad::default()
-        });
-        let mut mass = vec![0.0; self.positions.len()];
-        let density = self.options.material.density_g_mm3();
-        for tet in &self.tets {
-            let share = 0.25 * density * tet_volume(&self.positions, *tet);
-            tet.iter().for_each(|node| mass[*node as usize] += share);
-        }
+        let mass = self.mass_of_nodes();
+        let load = self.load.get_or_insert_with(|| BodyLoad::with_slots(slots));
         for (node, slot) in self.partition.slot_of_node.iter().enumerate() {
             let own = loads.forces.get(node).copied().unwrap_or_default();
             let force = &mut load.dead[1][*slot as usize].0;
@@ -54,6 +44,17 @@ impl Solver {
             }
         }
         Ok(())
+    }
+
+    /// Of the body itself by node, g.
+    pub(super) fn mass_of_nodes(&self) -> Vec<f64> {
+        let mut mass = vec![0.0; self.positions.len()];
+        let density = self.options.material.density_g_mm3();
+        for tet in &self.tets {
+            let share = 0.25 * density * tet_volume(&self.positions, *tet);
+            tet.iter().for_each(|node| mass[*node as usize] += share);
+        }
+        mass
     }
 
     fn check_loads(&self, loads: &Loads) -> Result<(), SolverError> {

@@ -21,6 +21,7 @@ mod options;
 mod parts;
 mod stability;
 mod stiffest;
+mod support;
 mod touch;
 // Against the energy of `statics`.
 #[cfg(all(test, feature = "linear"))]
@@ -30,6 +31,7 @@ pub use body_load::{Loads, SurfacePressure};
 pub use error::SolverError;
 pub use lanes::Isa;
 pub use options::{Pressure, SolverOptions, Substep};
+pub use support::SupportMotion;
 pub use touch::{SampleForce, Tool, ToolPose, ToolReport};
 
 use crate::mesh::{Boundary, Mesh};

@@ -2,7 +2,8 @@
 
 use tissue::mesh::{Boundary, Mesh, box_phantom, regular_box};
 use tissue::solver::{
-    ContactNode, FrameReport, Loads, Solver, SolverError, SolverOptions, SurfacePressure,
+    ContactNode, FrameReport, Loads, Solver, SolverError, SolverOptions, SupportMotion,
+    SurfacePressure,
 };
 
 /// 1000 kg/m³ under 0.5 m/s², in N/m³.
@@ -206,4 +207,103 @@ fn bad_loads_are_typed_errors_and_change_nothing() {
     solver.step_frame(&[], 0.01).unwrap();
     let u = displacement(&solver, &mesh);
     assert!(u.as_flattened().iter().all(|v| v.abs() < 1e-5));
+}
+
+/// Down to nothing at both ends: part and rate of a smooth way, by part of the time.
+fn eased(s: f64) -> [f64; 2] {
+    let s = s.min(1.0);
+    [s * s * (3.0 - 2.0 * s), 6.0 * s * (1.0 - s)]
+}
+
+/// Turned by 90 degrees and carried 60 mm, a body has no stress at the end: a large motion of the frame is no strain.
+#[test]
+fn a_body_that_its_support_carries_comes_to_rest_without_stress() {
+    let mesh = box_phantom([20.0, 20.0, 12.0], [4, 4, 3]).unwrap();
+    let mut solver = Solver::new(&mesh, Boundary::Fixed, options(0.45, 40.0)).unwrap();
+    let (turn, way) = ([0.0, 0.0, std::f64::consts::FRAC_PI_2], [60.0, -20.0, 10.0]);
+    let mut largest = 0.0f64;
+    for frame in 1..=36 {
+        let [part, rate] = eased(f64::from(frame) / 20.0);
+        let motion = SupportMotion {
+            position: way.map(|x| part * x),
+            velocity: way.map(|x| rate * x),
+            turn: turn.map(|x| part * x),
+            turning: turn.map(|x| rate * x),
+        };
+        solver.set_support(motion, 0.05).unwrap();
+        largest = largest.max(solver.step_frame(&[], 0.05).unwrap().strain_energy);
+    }
+    let report = solver.step_frame(&[], 0.05).unwrap();
+    let u = displacement(&solver, &mesh);
+    let squares = mesh.positions.iter().zip(&u).map(|(x, u)| {
+        let wanted = [-x[1] + 60.0, x[0] - 20.0, x[2] + 10.0];
+        (0..3)
+            .map(|k| f64::from(x[k] + u[k] - wanted[k]).powi(2))
+            .sum::<f64>()
+    });
+    let mse = squares.sum::<f64>() / u.len() as f64;
+    println!("{mse:e} mm², {:e} of {largest:e} mJ", report.strain_energy);
+    assert!(mse < 1e-6, "{mse:e} mm²");
+    assert!(report.strain_energy < 1e-4 * largest && (report.min_det_f - 1.0).abs() < 1e-4);
+}
+
+/// In the frame of a support that is pushed to and fro the body feels its acceleration as gravity.
+#[test]
+fn a_pushed_support_is_gravity_in_its_frame() {
+    let mesh = box_phantom([20.0, 20.0, 12.0], [4, 4, 3]).unwrap();
+    let new = || Solver::new(&mesh, Boundary::Fixed, options(0.45, 20.0)).unwrap();
+    let (mut carried, mut shaken) = (new(), new());
+    let (size, omega) = (4.0, 12.0);
+    let (mut off, mut most) = (0.0f64, 0.0f64);
+    for frame in 1..=30 {
+        let time = 0.01 * f64::from(frame);
+        let (sine, cosine) = (omega * time).sin_cos();
+        let motion = SupportMotion {
+            position: [size * (1.0 - cosine), 0.0, 0.0],
+            velocity: [size * omega * sine, 0.0, 0.0],
+            ..SupportMotion::default()
+        };
+        carried.set_support(motion, 0.01).unwrap();
+        carried.step_frame(&[], 0.01).unwrap();
+        let loads = Loads {
+            gravity: [-size * omega * omega * cosine, 0.0, 0.0],
+            ..Loads::default()
+        };
+        if frame == 1 {
+            // Loads change on a line over a frame: at its start it stands under the first acceleration already.
+            let at_once = Loads {
+                gravity: [-size * omega * omega, 0.0, 0.0],
+                ..Loads::default()
+            };
+            shaken.set_loads(&at_once).unwrap();
+            shaken.step_frame(&[], 1e-6).unwrap();
+        }
+        shaken.set_loads(&loads).unwrap();
+        shaken.step_frame(&[], 0.01).unwrap();
+        let [one, other] = [&carried, &shaken].map(|solver| displacement(solver, &mesh));
+        for (one, other) in one.iter().zip(&other) {
+            let moved = f64::from(one[0]) - size * (1.0 - cosine);
+            off = off.max((moved - f64::from(other[0])).abs());
+            most = most.max(f64::from(other[0]).abs());
+        }
+    }
+    println!("{off} of {most} mm");
+    assert!(most > 0.05 && off < 0.02 * most, "{off} of {most} mm");
+}
+
+#[test]
+fn a_support_that_is_nowhere_is_refused() {
+    let mesh = box_phantom([20.0, 20.0, 12.0], [2, 2, 2]).unwrap();
+    let mut solver = Solver::new(&mesh, Boundary::Fixed, options(0.45, 20.0)).unwrap();
+    let motion = SupportMotion {
+        turn: [f64::NAN, 0.0, 0.0],
+        ..SupportMotion::default()
+    };
+    let error = solver.set_support(motion, 0.05).unwrap_err();
+    assert!(
+        matches!(&error, SolverError::Load { field, .. } if field == "support"),
+        "{error}"
+    );
+    let report = solver.step_frame(&[], 0.05).unwrap();
+    assert!(report.strain_energy < 1e-9, "{}", report.strain_energy);
 }
