@@ -829,6 +829,20 @@ typedef struct upt_input {
    * Gravity under which the mesh was scanned, m/s²: what acts is `gravity - gravity_at_rest`, on the mass of each node.
    */
   float gravity_at_rest[3];
+  /**
+   * Where what holds the body is at the end of the step, mm: a point `x` of the mesh's frame is at `R x + support_position` in the world. All else stays in
+   * the mesh's frame, which goes with the support, but `gravity`, which is the world's then; the body feels the support's motion as inertia. Pass it in every step; a
+   * support that goes farther than 40 mm or half a radian in a step is put there.
+   */
+  float support_position[3];
+  /**
+   * `R` as a unit quaternion x, y, z, w; all zero: there is no support that moves.
+   */
+  float support_rotation[4];
+  /**
+   * Zero.
+   */
+  uint8_t reserved_end[4];
 } upt_input;
 
 /**

@@ -180,16 +180,14 @@ public:
   }
   /// The step starts from this displacement, [K,3], mm.
   Input &from(span<const float> displacement) noexcept {
-    raw_.displacement = displacement.data();
-    return *this;
+    return raw_.displacement = displacement.data(), *this;
   }
   /// The moment of the end of the step on a clock of your own, s.
   Input &at(double time_s) noexcept {
     raw_.time_s = time_s;
     return *this;
   }
-  /// Gravity and that under which the mesh was scanned, m/s², in the mesh's frame: the difference
-  /// acts on the body.
+  /// Gravity and that of the scan, m/s², in the mesh's frame: the difference acts on the body.
   Input &gravity(const std::array<float, 3> &now,
                  const std::array<float, 3> &at_rest = {}) noexcept {
     std::copy(now.begin(), now.end(), raw_.gravity);
@@ -205,6 +203,12 @@ public:
   Input &pressures(span<const upt_pressure> pressures) noexcept {
     raw_.pressures = pressures.data();
     raw_.pressure_count = pressures.size();
+    return *this;
+  }
+  /// Where what holds the body is: position (mm), unit quaternion x, y, z, w.
+  Input &support(const float *position, const float *rotation) noexcept {
+    std::copy_n(position, 3, raw_.support_position);
+    std::copy_n(rotation, 4, raw_.support_rotation);
     return *this;
   }
   const upt_input *get() const noexcept { return &raw_; }

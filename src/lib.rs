@@ -100,6 +100,6 @@ pub use options::{
 };
 pub use scene::{
     Contact, Cut, CutSurface, Loads, MAX_PRESSURES, Pressure, Progress, Scene, StepInput,
-    SurfaceUpdate, View,
+    SupportPose, SurfaceUpdate, View,
 };
 pub use stats::{SceneStats, flag};

@@ -806,6 +806,14 @@ class Input(Record):
     """Gravity in the mesh's frame at the end of the step, m/s², at most 1000 in each direction."""
     gravity_at_rest: tuple[float, ...] = vector("_gravity_at_rest")
     """Gravity under which the mesh was scanned, m/s²: what acts is `gravity - gravity_at_rest`, on the mass of each node."""
+    support_position: tuple[float, ...] = vector("_support_position")
+    """Where what holds the body is at the end of the step, mm: a point `x` of the mesh's frame is at `R x + support_position` in the world. All else stays in
+    the mesh's frame, which goes with the support, but `gravity`, which is the world's then; the body feels the support's motion as inertia. Pass it in every step; a
+    support that goes farther than 40 mm or half a radian in a step is put there."""
+    support_rotation: tuple[float, ...] = vector("_support_rotation")
+    """`R` as a unit quaternion x, y, z, w; all zero: there is no support that moves."""
+    reserved_end: tuple[int, ...] = vector("_reserved_end")
+    """Zero."""
 
     _fields_ = [
         ("struct_size", ctypes.c_uint32),
@@ -823,6 +831,9 @@ class Input(Record):
         ("pressure_count", ctypes.c_uint64),
         ("_gravity", ctypes.c_float * 3),
         ("_gravity_at_rest", ctypes.c_float * 3),
+        ("_support_position", ctypes.c_float * 3),
+        ("_support_rotation", ctypes.c_float * 4),
+        ("_reserved_end", ctypes.c_uint8 * 4),
     ]
 
 

@@ -1,4 +1,4 @@
-"""What acts on the body beside contact: gravity that turns, forces on nodes, pressure on the surface."""
+"""What acts on the body beside contact: gravity, forces, pressure on the surface, a support that moves."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike
 from upt import _native
 from upt._arrays import address, number, vectors
 
-#: The end of `upt_input`: forces, pressures, how many, gravity and that at rest.
-_LAYOUT = Struct("@PPQ6f")
+#: The end of `upt_input`: forces, pressures, how many, gravity and that at rest, the support's pose.
+_LAYOUT = Struct("@PPQ13f")
 OFFSET: int = _native.Input.forces.offset  # type: ignore[union-attr]
 
 
@@ -37,6 +37,11 @@ class Loads:
 
     It acts on the boundary triangles with all corners among the nodes; None: on the domain."""
 
+    support: tuple[tuple[float, float, float], tuple[float, float, float, float]] | None = None
+    """Where what holds the body is: position (mm) and unit quaternion x, y, z, w; in every step, where it moves.
+
+    All else stays in the mesh's frame, which goes with the support, but gravity, which is the world's then."""
+
     def pack_into(self, memory: bytearray, node_count: int) -> object:
         """Puts these loads into a `upt_input`; gives what must live over the call."""
         forces = None if self.forces is None else vectors(self.forces, "forces", node_count)
@@ -51,6 +56,8 @@ class Loads:
         ]
         array = (_native.Pressure * len(records))(*records)
         gravity = [number(value, "gravity") for value in (*self.gravity, *self.gravity_at_rest)]
+        position, rotation = self.support or ((0.0,) * 3, (0.0,) * 4)
+        gravity += [number(value, "support") for value in (*position, *rotation)]
         at = addressof(array) if records else 0
         _LAYOUT.pack_into(memory, OFFSET, 0 if forces is None else address(forces), at, len(records), *gravity)
         return forces, regions, array

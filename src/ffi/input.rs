@@ -7,7 +7,7 @@ use super::pointers::{each, options, slice};
 use super::step_structs::*;
 use crate::contact::{MAX_TOOLS, Tool};
 use crate::features;
-use crate::scene::{Contact, Loads, MAX_PRESSURES, Pressure, Scene, StepInput, View};
+use crate::scene::{Contact, Loads, MAX_PRESSURES, Pressure, Scene, StepInput, SupportPose, View};
 
 /// The host's input; its instruments and pressures are read into lists, its arrays stay where they are.
 ///
@@ -21,10 +21,10 @@ pub(super) unsafe fn read_input<'a>(
 ) -> Result<StepInput<'a>, Failure> {
     // SAFETY: the caller's.
     let raw = unsafe { options(raw, "input") }?;
-    if raw.reserved != [0; 4] {
+    if raw.reserved != [0; 4] || raw.reserved_end != [0; 4] {
         return fail(
             UPT_ERR_ARGUMENT,
-            "input.reserved is not zero; clear the struct before you set its fields",
+            "input.reserved or reserved_end is not zero; clear the struct before you set its fields",
         );
     }
     let drives = [
@@ -104,6 +104,12 @@ unsafe fn read_loads<'a>(
         // SAFETY: the caller's.
         forces: unsafe { field(scene, raw.forces, "input.forces") }?,
         pressures: &pressures[..raw.pressure_count as usize],
+        support: (raw.support_rotation != [0.0; 4] || raw.support_position != [0.0; 3]).then_some(
+            SupportPose {
+                position: raw.support_position,
+                rotation: raw.support_rotation,
+            },
+        ),
     })
 }
 

@@ -45,6 +45,14 @@ pub struct upt_input {
     pub gravity: [f32; 3],
     /// Gravity under which the mesh was scanned, m/s²: what acts is `gravity - gravity_at_rest`, on the mass of each node.
     pub gravity_at_rest: [f32; 3],
+    /// Where what holds the body is at the end of the step, mm: a point `x` of the mesh's frame is at `R x + support_position` in the world. All else stays in
+    /// the mesh's frame, which goes with the support, but `gravity`, which is the world's then; the body feels the support's motion as inertia. Pass it in every step; a
+    /// support that goes farther than 40 mm or half a radian in a step is put there.
+    pub support_position: [f32; 3],
+    /// `R` as a unit quaternion x, y, z, w; all zero: there is no support that moves.
+    pub support_rotation: [f32; 4],
+    /// Zero.
+    pub reserved_end: [u8; 4],
 }
 
 /// For hosts in Rust; the pointers are the lists', which must outlive the call that reads them.
@@ -66,6 +74,9 @@ impl upt_input {
         pressure_count: 0,
         gravity: [0.0; 3],
         gravity_at_rest: [0.0; 3],
+        support_position: [0.0; 3],
+        support_rotation: [0.0; 4],
+        reserved_end: [0; 4],
     };
 
     /// Instruments drive the step.

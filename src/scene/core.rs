@@ -229,7 +229,7 @@ impl Core {
             }
             None => None,
         };
-        let has_load = self.take_loads(&input.loads)?;
+        let has_load = self.take_loads(published, &input.loads)?;
         stats.check_ms = watch.lap();
         let near = self.update_tools(published, &input)?;
         self.loaded = has_load || (self.counters.loaded && self.is_swung());
@@ -243,6 +243,7 @@ impl Core {
             self.fit_published(published)?;
             self.counters.time_s = input.time_s;
             self.publish_rest(published);
+            self.commit_loads();
         } else {
             if !self.drive(published, near, start, &mut stats)? {
                 let learned =

@@ -1,7 +1,10 @@
 //! A scene takes the loads of its steps, and gives and takes those of saved states.
 
-use super::core::Core;
+use std::sync::RwLock;
+
+use super::core::{Core, lock_read};
 use super::loads::{Acting, LoadState, Loads, WHAT};
+use super::published::Published;
 use crate::error::{Error, Result};
 use crate::memory;
 
@@ -10,24 +13,38 @@ impl Core {
     ///
     /// # Errors
     /// [`Error::Unsupported`] in a scene that does not correct, [`Error::Argument`] and [`Error::NonFinite`] for the loads: what was published stays.
-    pub(super) fn take_loads(&mut self, loads: &Loads<'_>) -> Result<bool> {
+    pub(super) fn take_loads(
+        &mut self,
+        published: &RwLock<Published>,
+        loads: &Loads<'_>,
+    ) -> Result<bool> {
         loads.check(&self.mesh)?;
         if self.loads.is_none() && !loads.acts() {
             return Ok(false);
         }
-        if self.corrected.is_none() {
+        let step_s = self.step_s();
+        let Some(corrected) = &self.corrected else {
             return Err(Error::Unsupported(
                 "loads: the scene makes no corrections, in which gravity, forces and pressure act; set `corrections`".into(),
             ));
-        }
+        };
         self.model.prepare_loads()?;
         let mass = &self.model.corrections()?.body.mass;
         let state = match &mut self.loads {
             Some(state) => state,
             slot => slot.insert(memory::boxed(LoadState::new(&self.mesh)?, WHAT)?),
         };
-        state.take(loads, &self.mesh, mass)?;
+        let shared = lock_read(published);
+        let (u, v) = (&shared.last.field, &corrected.solver.motion.velocity);
+        state.take(loads, &self.mesh, mass, (u, v, step_s))?;
         Ok(state.acts())
+    }
+
+    /// The loads of the step being made become those of the last.
+    pub(super) fn commit_loads(&mut self) {
+        if let Some(loads) = &mut self.loads {
+            loads.commit();
+        }
     }
 
     /// No load acts, and none did.

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::support::{Carriage, Carried, SupportPose};
 use crate::bundle::Mesh;
 use crate::corrections::Load;
 use crate::error::{Error, Result};
@@ -23,7 +24,7 @@ pub(super) const WHAT: &str = "the loads of a scene";
 /// that correct (`corrections`).
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Loads<'a> {
-    /// Gravity in the mesh's frame, m/s².
+    /// Gravity in the mesh's frame, m/s²; with a support in the world's.
     pub gravity: [f32; 3],
     /// Gravity under which the mesh was scanned, m/s²: what acts is the difference.
     pub gravity_at_rest: [f32; 3],
@@ -31,6 +32,9 @@ pub struct Loads<'a> {
     pub forces: Option<&'a [f32]>,
     /// At most [`MAX_PRESSURES`]; a face in several of them takes their sum.
     pub pressures: &'a [Pressure<'a>],
+    /// Where what holds the body is at the end of the step, where it moves. All else stays in the mesh's frame, which goes with the support: displacements,
+    /// tools, forces. The body feels the motion as inertia. Pass it in every step; one that goes farther than 40 mm or half a radian in a step is put there.
+    pub support: Option<SupportPose>,
 }
 
 /// A pressure on a part of the surface.
@@ -49,18 +53,24 @@ impl Loads<'_> {
         gravity_at_rest: [0.0; 3],
         forces: None,
         pressures: &[],
+        support: None,
     };
 
-    /// Whether they are not all zero.
+    /// Whether they are not all zero, or a support is given.
     pub(crate) fn acts(&self) -> bool {
-        self.acceleration() != [0.0; 3]
+        self.acts_with(self.acceleration(None)) || self.support.is_some()
+    }
+
+    fn acts_with(&self, acceleration: [f32; 3]) -> bool {
+        acceleration != [0.0; 3]
             || self.forces.is_some()
             || self.pressures.iter().any(|pressure| pressure.pascal != 0.0)
     }
 
     /// What acts of gravity, m/s².
-    fn acceleration(&self) -> [f32; 3] {
-        std::array::from_fn(|axis| self.gravity[axis] - self.gravity_at_rest[axis])
+    fn acceleration(&self, carriage: Option<&Carriage>) -> [f32; 3] {
+        let gravity = carriage.map_or(self.gravity, |own| own.in_frame(self.gravity));
+        std::array::from_fn(|axis| gravity[axis] - self.gravity_at_rest[axis])
     }
 
     /// # Errors
@@ -75,6 +85,9 @@ impl Loads<'_> {
                     format!("{name}[{axis}]")
                 })?;
             }
+        }
+        if let Some(support) = &self.support {
+            support.checked()?;
         }
         if let Some(forces) = self.forces {
             if forces.len() != mesh.positions.len() {
@@ -137,6 +150,8 @@ pub struct Acting {
     pascal: Vec<f32>,
     /// Whether any of it is not zero.
     acts: bool,
+    /// The support, where the host gives one.
+    pub(super) carried: Option<Carried>,
 }
 
 impl Acting {
@@ -146,6 +161,7 @@ impl Acting {
             gravity: [0.0; 3],
             pascal: memory::zeros(mesh.surface_faces.len() / 3, WHAT)?,
             acts: false,
+            carried: None,
         })
     }
 
@@ -154,18 +170,20 @@ impl Acting {
         self.gravity = [0.0; 3];
         self.pascal.fill(0.0);
         self.acts = false;
+        self.carried = None;
     }
 
     /// A copy, where anything acts.
     pub(super) fn copy(&self) -> Result<Option<Acting>> {
-        if !self.acts {
+        if !self.acts && self.carried.is_none() {
             return Ok(None);
         }
         Ok(Some(Acting {
             dead: memory::copied(&self.dead, WHAT)?,
             gravity: self.gravity,
             pascal: memory::copied(&self.pascal, WHAT)?,
-            acts: true,
+            acts: self.acts,
+            carried: self.carried,
         }))
     }
 
@@ -173,6 +191,9 @@ impl Acting {
     pub(super) fn admit(&self, mesh: &Mesh) -> Result<()> {
         stored::check(&self.dead, mesh.positions.len())?;
         stored::check(&self.gravity, 3)?;
+        if self.carried.is_some_and(|carried| !carried.is_sound()) {
+            return Err(Error::Snapshot("the support's motion is damaged".into()));
+        }
         stored::check(&self.pascal, mesh.surface_faces.len() / 3)
     }
 }
@@ -189,6 +210,8 @@ pub struct LoadState {
     /// Nodes of a region, and boundary triangles of the domain.
     marked: Vec<bool>,
     is_domain: Vec<bool>,
+    /// Mean of the nodes at rest.
+    middle: [f32; 3],
 }
 
 impl LoadState {
@@ -200,7 +223,13 @@ impl LoadState {
         let rows = mesh.surface_faces.as_chunks::<3>().0.iter();
         let is_domain = rows.map(|face| domain.binary_search(face).is_ok());
         let numbers = || memory::room(faces, WHAT);
+        let nodes = mesh.positions.as_chunks::<3>().0;
+        let middle = [0, 1, 2].map(|axis| {
+            let sum: f64 = nodes.iter().map(|node| f64::from(node[axis])).sum();
+            (sum / nodes.len().max(1) as f64) as f32
+        });
         Ok(LoadState {
+            middle,
             last: Acting::zeros(mesh)?,
             next: Acting::zeros(mesh)?,
             faces: memory::room(faces, WHAT)?,
@@ -210,18 +239,40 @@ impl LoadState {
         })
     }
 
-    /// Takes the loads at the end of a step of a body of these masses, g.
-    pub(super) fn take(&mut self, loads: &Loads<'_>, mesh: &Mesh, mass: &[f32]) -> Result<()> {
+    /// Takes the loads at the end of a step of `step_s` of a body of these masses, g, which is displaced by `u [K,3]` and moves at `v` (mm/s) at its start.
+    pub(super) fn take(
+        &mut self,
+        loads: &Loads<'_>,
+        mesh: &Mesh,
+        mass: &[f32],
+        (u, v, step_s): (&[f32], &[f32], f64),
+    ) -> Result<()> {
         let next = &mut self.next;
-        next.acts = loads.acts();
-        let acceleration = loads.acceleration().map(|a| 1e3 * a);
+        let pose = loads.support.map(|support| support.checked()).transpose()?;
+        let carried = pose.map(|pose| Carried::follow(self.last.carried.as_ref(), &pose, step_s));
+        next.carried = carried.map(|(carried, _)| carried);
+        let carriage = carried.map(|(_, carriage)| carriage);
+        let acceleration = loads.acceleration(carriage.as_ref());
+        next.acts = loads.acts_with(acceleration) || carriage.is_some_and(|own| own.acts());
+        let acceleration = acceleration.map(|a| 1e3 * a);
         next.gravity = acceleration;
+        let carriage = carriage.filter(Carriage::acts);
+        if let Some(carriage) = &carriage {
+            let origin = carriage.borne(self.middle, [0.0; 3]);
+            (next.gravity.iter_mut().zip(origin)).for_each(|(g, own)| *g += own);
+        }
+        let rest = mesh.positions.as_chunks::<3>().0;
         for ((node, dead), mass) in
             (next.dead.as_chunks_mut::<3>().0.iter_mut().enumerate()).zip(mass)
         {
+            let at = |field: &[f32], axis| field.get(3 * node + axis).copied().unwrap_or(0.0);
+            let borne = carriage.map_or([0.0; 3], |carriage| {
+                let x = [0, 1, 2].map(|axis| rest[node][axis] + at(u, axis));
+                carriage.borne(x, [0, 1, 2].map(|axis| at(v, axis)))
+            });
             for axis in 0..3 {
                 let own = loads.forces.map_or(0.0, |forces| forces[3 * node + axis]);
-                dead[axis] = mass * acceleration[axis] + 1e3 * own;
+                dead[axis] = mass * (acceleration[axis] + borne[axis]) + 1e3 * own;
             }
         }
         next.pascal.fill(0.0);
@@ -293,6 +344,7 @@ impl LoadState {
 pub(super) struct CopiedLoads {
     gravity: [f32; 3],
     gravity_at_rest: [f32; 3],
+    support: Option<SupportPose>,
     has_forces: bool,
     forces: Vec<f32>,
     /// One list of nodes after the other.
@@ -311,6 +363,7 @@ impl CopiedLoads {
         memory::fit(&mut self.pressures, loads.pressures.len(), WHAT)?;
         self.gravity = loads.gravity;
         self.gravity_at_rest = loads.gravity_at_rest;
+        self.support = loads.support;
         self.has_forces = loads.forces.is_some();
         self.forces.clear();
         self.forces.extend_from_slice(forces);
@@ -338,6 +391,7 @@ impl CopiedLoads {
             gravity_at_rest: self.gravity_at_rest,
             forces: self.has_forces.then_some(&*self.forces),
             pressures: &pressures[..self.pressures.len()],
+            support: self.support,
         })
     }
 }

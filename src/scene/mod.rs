@@ -39,6 +39,7 @@ mod shared;
 mod snapshot;
 mod state;
 mod step_input;
+mod support;
 mod timing;
 mod tissue;
 mod tools;
@@ -56,6 +57,7 @@ pub use points::check_point_count;
 pub use publish::{QUIET_DISPLACEMENT, QUIET_STEPS};
 pub use published::View;
 pub use step_input::{Contact, Progress, StepInput};
+pub use support::SupportPose;
 
 use crate::bundle::Mesh;
 use crate::corrections::Integrator;

@@ -41,9 +41,7 @@ impl Core {
         if let Some(problem) = &mut self.problem {
             problem.commit();
         }
-        if let Some(loads) = &mut self.loads {
-            loads.commit();
-        }
+        self.commit_loads();
         self.counters.source_before = self.counters.source;
         self.counters.source = if replaced {
             Source::Fallback

@@ -12,6 +12,7 @@ mod fixture;
 mod host;
 mod loads;
 mod mistakes;
+mod supports;
 
 use std::ptr::{null, null_mut};
 

@@ -239,7 +239,7 @@ export const upt_scene_stats = {
   },
 };
 export const upt_input = {
-  size: 96,
+  size: 128,
   fields: {
     struct_size: ["Uint32", 0, 1],
     reserved: ["Uint8", 4, 4],
@@ -256,6 +256,9 @@ export const upt_input = {
     pressure_count: ["BigUint64", 64, 1],
     gravity: ["Float32", 72, 3],
     gravity_at_rest: ["Float32", 84, 3],
+    support_position: ["Float32", 96, 3],
+    support_rotation: ["Float32", 108, 4],
+    reserved_end: ["Uint8", 124, 4],
   },
 };
 export const upt_pressure = {

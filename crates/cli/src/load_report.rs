@@ -1,6 +1,6 @@
-//! `upt report --load`: gravity that turns, a pulse, a lost pressure, through the library and the reference solver, with a tool and without.
+//! `upt report --load`: gravity that turns, a pulse, a lost pressure, a support that breathes, through the library and the reference solver, with a tool and without.
 //!
-//! Both get the same loads, step by step from their own last state. The solver runs here: a case of loads is seconds of tissue.
+//! Both get the same loads, step by step from their own last state. A moving support is compared in its own frame, in which the library has all. The solver runs here: a case of loads is seconds of tissue.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -8,17 +8,17 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
-use contact::Body;
+use contact::{Body, Pose, Vector, pose};
 use serde::Serialize;
 use tissue::load_programmes::{LoadProgramme, LoadSizes};
 use tissue::mesh::{Boundary, Mesh};
 use tissue::programmes::ToolProgramme;
 use tissue::simulate::{ToolOrder, simulate_loads, simulate_tools};
-use tissue::solver::SolverOptions;
+use tissue::solver::{SolverOptions, SupportMotion};
 use tissue::trajectory::Trajectory;
 use upt::{
     Contact, Corrections, Loads, Model, ModelOptions, Pressure, Scene, SceneOptions, StepInput,
-    Tool,
+    SupportPose, Tool,
 };
 
 use crate::effort::Effort;
@@ -49,7 +49,7 @@ struct Row {
     load: &'static str,
     tool: &'static str,
     corrections: String,
-    /// How far the solver's tissue goes, mm.
+    /// How far the solver's tissue goes in the support's frame, mm.
     farthest_mm: f64,
     /// Over the frames, mm².
     mse: f64,
@@ -156,13 +156,29 @@ fn measure(
     let (nodes, mut u) = (scene.node_count(), vec![0.0; 3 * scene.node_count()]);
     let mut tools = tools(truth)?;
     let (mut errors, mut times) = (Vec::new(), Vec::new());
-    let (mut off, mut felt, mut smallest_det) = (0.0, 0.0, 1.0f64);
-    for frame in 1..truth.frame_count() {
-        let time_s = frame as f64 * truth.header.dt_s;
+    let (mut off, mut felt, mut smallest_det, mut farthest) = (0.0, 0.0, 1.0f64, 0.0f64);
+    if let Some(start) = programme.support_at(0.0) {
+        // From here on the scene knows how fast it goes.
+        let loads = Loads {
+            support: Some(support_pose(start)),
+            ..Loads::default()
+        };
+        let input = StepInput {
+            loads,
+            ..StepInput::default()
+        };
+        scene.step(input, None)?;
+    }
+    for step in 1..truth.frame_count() {
+        let time_s = step as f64 * truth.header.dt_s;
         let (gravity, pascal) = programme.at(plan.sizes, time_s);
+        let support = programme.support_at(time_s).map(support_pose);
+        let frame = (support.as_ref())
+            .map(|support| pose::checked(support.position, support.rotation))
+            .transpose()?;
         if let Some(tracks) = &truth.tools {
-            for (tool, at) in tools.iter_mut().zip(tracks.frame(frame)) {
-                tool.pose = at.pose;
+            for (tool, at) in tools.iter_mut().zip(tracks.frame(step)) {
+                tool.pose = frame.map_or(at.pose, |frame| frame.inverse() * at.pose);
             }
         }
         let pressures = [Pressure {
@@ -177,6 +193,7 @@ fn measure(
             loads: Loads {
                 gravity: gravity.map(|g| g as f32),
                 pressures: &pressures,
+                support,
                 ..Loads::default()
             },
             ..StepInput::default()
@@ -184,40 +201,72 @@ fn measure(
         let start = Instant::now();
         scene.step(input, Some(&mut u))?;
         times.push(1e3 * start.elapsed().as_secs_f64());
-        let wanted = truth.frame(frame).as_flattened();
-        let squares = u.iter().zip(wanted).map(|(a, b)| f64::from(a - b).powi(2));
-        errors.push(squares.sum::<f64>() / nodes as f64);
-        smallest_det = smallest_det.min(f64::from(scene.stats().min_det));
+        let mut squares = 0.0;
+        let rows = model.positions().as_chunks::<3>().0.iter();
+        for ((rest, u), wanted) in rows.zip(u.as_chunks::<3>().0).zip(truth.frame(step)) {
+            let wanted = in_frame(frame.as_ref(), *rest, *wanted);
+            let pairs = u.iter().zip(wanted);
+            squares += pairs.map(|(a, b)| f64::from(a - b).powi(2)).sum::<f64>();
+            let square: f32 = wanted.iter().map(|v| v * v).sum();
+            farthest = farthest.max(f64::from(square));
+        }
+        errors.push(squares / nodes as f64);
+        let det = f64::from(scene.stats().min_det);
+        // 0 where nothing was corrected.
+        if det != 0.0 {
+            smallest_det = smallest_det.min(det);
+        }
         if let Some(tracks) = &truth.tools {
             let readings = scene.with_contact_report(|report| {
                 let forces = report.readings.iter().map(|reading| reading.force);
                 forces.collect::<Vec<_>>()
             });
-            let wrenches = &tracks.wrenches[frame * tools.len()..];
+            let wrenches = &tracks.wrenches[step * tools.len()..];
             for (force, wanted) in readings.iter().zip(wrenches) {
                 let size = |v: [f32; 3]| v.iter().map(|x| f64::from(x * x)).sum::<f64>().sqrt();
                 let wanted = [wanted[0], wanted[1], wanted[2]];
+                let turned = |frame: &Pose| frame.rotation.inverse() * Vector::from(wanted);
+                let wanted = frame
+                    .as_ref()
+                    .map_or(wanted, |frame| turned(frame).to_array());
                 felt += size(wanted);
                 off += size(std::array::from_fn(|k| force[k] - wanted[k]));
             }
         }
     }
-    let farthest = truth.displacement.iter().map(|u| {
-        let square: f32 = u.iter().map(|v| v * v).sum();
-        f64::from(square)
-    });
     Ok(Row {
         bundle: bundle.name.clone(),
         load: programme.name(),
         tool: plan.tool.map_or("none", |tool| tool.name()),
         corrections: effort.to_string(),
-        farthest_mm: farthest.fold(0.0, f64::max).sqrt(),
+        farthest_mm: farthest.sqrt(),
         mse: median(errors.iter().copied()),
         worst_mse: errors.iter().copied().fold(0.0, f64::max),
         force_error: (felt > 0.0).then(|| off / felt),
         smallest_det,
         step_ms: median(times),
     })
+}
+
+/// The pose of a support from its rotation vector.
+fn support_pose(motion: SupportMotion) -> SupportPose {
+    let angle = motion.turn.iter().map(|v| v * v).sum::<f64>().sqrt();
+    let (sine, cosine) = (0.5 * angle).sin_cos();
+    let part = if angle > 0.0 { sine / angle } else { 0.5 };
+    let [x, y, z] = motion.turn.map(|v| (part * v) as f32);
+    SupportPose {
+        position: motion.position.map(|v| v as f32),
+        rotation: [x, y, z, cosine as f32],
+    }
+}
+
+/// A displacement of the world in the support's frame.
+fn in_frame(frame: Option<&Pose>, rest: [f32; 3], u: [f32; 3]) -> [f32; 3] {
+    let Some(frame) = frame else {
+        return u;
+    };
+    let (rest, u) = (Vector::from(rest), Vector::from(u));
+    (frame.rotation.inverse() * (rest + u - frame.translation) - rest).to_array()
 }
 
 fn tools(truth: &Trajectory) -> Result<Vec<Tool>> {

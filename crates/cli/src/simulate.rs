@@ -25,8 +25,8 @@ pub struct Options {
     /// Programme of rigid tools.
     #[arg(long, value_parser = loads::programme(), conflicts_with = "scheme")]
     tool: Option<ToolProgramme>,
-    /// Programme of loads, nothing in contact: tilt (gravity turns by 90 degrees in 2 s), pulse (pressure on the domain, 1.2 a second) or sag (a
-    /// pressure on the domain is lost).
+    /// Programme of loads, nothing in contact: tilt (gravity turns by 90 degrees in 2 s), pulse (pressure on the domain, 1.2 a second), sag (a
+    /// pressure on the domain is lost) or breathe (the support goes up by 15 mm, turns by 15 degrees, and comes back).
     #[arg(long, conflicts_with_all = ["scheme", "tool"])]
     load: Option<LoadProgramme>,
     #[command(flatten)]

@@ -1,7 +1,7 @@
-//! Programmes of loads: gravity that turns, a pulse, a pressure that is lost. What acts at each moment of a case without tools.
+//! Programmes of loads: gravity that turns, a pulse, a pressure that is lost, a support that breathes. What acts at each moment of a case without tools.
 
 use crate::mesh::Mesh;
-use crate::solver::{Loads, SurfacePressure};
+use crate::solver::{Loads, SupportMotion, SurfacePressure};
 
 /// What a case of loads does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -12,6 +12,8 @@ pub enum LoadProgramme {
     Pulse,
     /// The domain loses a pressure within half a second.
     Sag,
+    /// The support goes up by 15 mm (z) and turns by 15 degrees (about x) and comes back, once in four seconds.
+    Breathe,
 }
 
 /// How strong the loads of a programme are.
@@ -36,10 +38,13 @@ impl Default for LoadSizes {
 const TURN_S: f64 = 2.0;
 const PULSES_PER_S: f64 = 1.2;
 const LOSS_S: f64 = 0.5;
+const BREATHS_PER_S: f64 = 0.25;
+const BREATH_MM: f64 = 15.0;
+const BREATH_RAD: f64 = std::f64::consts::PI / 12.0;
 
 impl LoadProgramme {
     /// All programmes.
-    pub const ALL: [Self; 3] = [Self::Tilt, Self::Pulse, Self::Sag];
+    pub const ALL: [Self; 4] = [Self::Tilt, Self::Pulse, Self::Sag, Self::Breathe];
 
     /// The word for it.
     pub fn name(self) -> &'static str {
@@ -47,6 +52,7 @@ impl LoadProgramme {
             Self::Tilt => "tilt",
             Self::Pulse => "pulse",
             Self::Sag => "sag",
+            Self::Breathe => "breathe",
         }
     }
 
@@ -55,6 +61,7 @@ impl LoadProgramme {
         match self {
             Self::Tilt | Self::Pulse => 3.0,
             Self::Sag => 2.0,
+            Self::Breathe => 4.0,
         }
     }
 
@@ -77,7 +84,24 @@ impl LoadProgramme {
                 ([0.0; 3], 0.5 * sizes.pascal * (1.0 - phase.cos()))
             }
             Self::Sag => ([0.0; 3], -sizes.pascal * (time_s / LOSS_S).min(1.0)),
+            Self::Breathe => ([0.0; 3], 0.0),
         }
+    }
+
+    /// Where the support is at a time from rest, where it moves.
+    pub fn support_at(self, time_s: f64) -> Option<SupportMotion> {
+        if self != Self::Breathe {
+            return None;
+        }
+        let omega = std::f64::consts::TAU * BREATHS_PER_S;
+        let (sine, cosine) = (omega * time_s).sin_cos();
+        let (part, rate) = (0.5 * (1.0 - cosine), 0.5 * omega * sine);
+        Some(SupportMotion {
+            position: [0.0, 0.0, part * BREATH_MM],
+            velocity: [0.0, 0.0, rate * BREATH_MM],
+            turn: [part * BREATH_RAD, 0.0, 0.0],
+            turning: [rate * BREATH_RAD, 0.0, 0.0],
+        })
     }
 
     /// The same as loads of the solver.
@@ -103,6 +127,6 @@ impl std::str::FromStr for LoadProgramme {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let named = Self::ALL.into_iter().find(|own| own.name() == text);
-        named.ok_or_else(|| format!("load `{text}` is unknown; use tilt, pulse or sag"))
+        named.ok_or_else(|| format!("load `{text}` is unknown; use tilt, pulse, sag or breathe"))
     }
 }

@@ -147,6 +147,9 @@ pub fn simulate_tools(
         if let Some((programme, sizes)) = order.load {
             let time_s = (frame + 1) as f64 * frame_s;
             solver.set_loads(&programme.loads(sizes, mesh, time_s))?;
+            if let Some(motion) = programme.support_at(time_s) {
+                solver.set_support(motion, frame_s)?;
+            }
         }
         let report = solver.step_tools(&[], poses, frame_s)?;
         record(&mut trajectory, &solver, &report);
@@ -182,7 +185,11 @@ pub fn simulate_loads(
     let mut trajectory = Trajectory::at_rest(header, mesh.node_count());
     let frames = (programme.duration_s() / FRAME_S).round() as usize;
     for frame in 1..=frames {
-        solver.set_loads(&programme.loads(sizes, mesh, frame as f64 * FRAME_S))?;
+        let time_s = frame as f64 * FRAME_S;
+        solver.set_loads(&programme.loads(sizes, mesh, time_s))?;
+        if let Some(motion) = programme.support_at(time_s) {
+            solver.set_support(motion, FRAME_S)?;
+        }
         let report = solver.step_frame(&[], FRAME_S)?;
         record(&mut trajectory, &solver, &report);
         close_row(&mut trajectory);

@@ -348,6 +348,16 @@ namespace Upt.Interop
         public fixed float gravity[3];
         /// <summary>Gravity under which the mesh was scanned, m/s²: what acts is `gravity - gravity_at_rest`, on the mass of each node.</summary>
         public fixed float gravity_at_rest[3];
+        /// <summary>
+        /// Where what holds the body is at the end of the step, mm: a point `x` of the mesh's frame is at `R x + support_position` in the world. All else stays in
+        /// the mesh's frame, which goes with the support, but `gravity`, which is the world's then; the body feels the support's motion as inertia. Pass it in every step; a
+        /// support that goes farther than 40 mm or half a radian in a step is put there.
+        /// </summary>
+        public fixed float support_position[3];
+        /// <summary>`R` as a unit quaternion x, y, z, w; all zero: there is no support that moves.</summary>
+        public fixed float support_rotation[4];
+        /// <summary>Zero.</summary>
+        public fixed byte reserved_end[4];
     }
 
     /// <summary>A pressure on a part of the surface, which follows the surface as it moves. A face in several of them takes their sum.</summary>

@@ -58,6 +58,13 @@ namespace Upt.Interop
             return new StepInput { Collision = collision };
         }
 
+        /// <summary>Where what holds the body is at the end of the step, mm: in every step, where it moves. All else stays in
+        /// the mesh's frame, which goes with it, but gravity, which is the world's then.</summary>
+        public (float X, float Y, float Z) SupportPosition;
+
+        /// <summary>Its rotation, a unit quaternion; all zero: it does not move.</summary>
+        public (float X, float Y, float Z, float W) SupportRotation;
+
         /// <summary>Refuses counts that the arrays do not hold, and fields of another size than <c>[K,3]</c>.</summary>
         internal void Require(int nodeCount)
         {
@@ -89,6 +96,13 @@ namespace Upt.Interop
             raw.gravity_at_rest[0] = GravityAtRest.X;
             raw.gravity_at_rest[1] = GravityAtRest.Y;
             raw.gravity_at_rest[2] = GravityAtRest.Z;
+            raw.support_position[0] = SupportPosition.X;
+            raw.support_position[1] = SupportPosition.Y;
+            raw.support_position[2] = SupportPosition.Z;
+            raw.support_rotation[0] = SupportRotation.X;
+            raw.support_rotation[1] = SupportRotation.Y;
+            raw.support_rotation[2] = SupportRotation.Z;
+            raw.support_rotation[3] = SupportRotation.W;
             return raw;
         }
 

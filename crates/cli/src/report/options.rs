@@ -56,7 +56,7 @@ pub struct Options {
     /// Page whose part between the markers `upt report --tools MESH` (with `--boundary NAME` behind where it is not `fixed`) is replaced by the tables of --tools, or by a narrow table if the markers end in `summary` (repeat for several).
     #[arg(long, value_name = "FILE")]
     pub(super) markdown: Vec<PathBuf>,
-    /// Measure programmes of loads (tilt, pulse, sag) in the bundles of --bundle against the reference solver, which runs here. --markdown replaces the
+    /// Measure programmes of loads (tilt, pulse, sag, breathe) in the bundles of --bundle against the reference solver, which runs here. --markdown replaces the
     /// part between the markers `upt report --load`.
     #[arg(long, value_delimiter = ',', conflicts_with_all = ["trajectories", "data", "tools"])]
     pub(super) load: Vec<LoadProgramme>,

@@ -1,6 +1,8 @@
 //! A solver takes loads: checked, and put where the inner steps find them.
 
 use super::body_load::{BodyLoad, Face, Loads};
+use super::options::check_positive;
+use super::support::{Support, SupportMotion};
 use super::{Solver, SolverError};
 use crate::mesh::tet_volume;
 
@@ -43,6 +45,58 @@ impl Solver {
                 });
             }
         }
+        Ok(())
+    }
+
+    /// Sets where the support ends the next frame, which takes `duration_s`; the held nodes go there from where it is now, and stay after that.
+    ///
+    /// # Errors
+    /// [`SolverError::Load`] for numbers that are not finite and a body that has been cut; nothing has changed.
+    pub fn set_support(
+        &mut self,
+        motion: SupportMotion,
+        duration_s: f64,
+    ) -> Result<(), SolverError> {
+        let fail = |field: &str, reason: &str| {
+            Err(SolverError::Load {
+                field: field.into(),
+                reason: reason.into(),
+            })
+        };
+        let SupportMotion {
+            position,
+            velocity,
+            turn,
+            turning,
+        } = motion;
+        let numbers = [position, velocity, turn, turning];
+        if !numbers.as_flattened().iter().all(|v| v.is_finite()) {
+            return fail("support", "is not finite");
+        }
+        check_positive("duration_s", duration_s)?;
+        if self.topology.body.is_some() {
+            return fail(
+                "support",
+                "moves the body as it was meshed; this one has been cut",
+            );
+        }
+        let slots = self.partition.node_of_slot.len();
+        let mass = self.mass_of_nodes();
+        let load = self.load.get_or_insert_with(|| BodyLoad::with_slots(slots));
+        let support = load.support.get_or_insert_with(|| {
+            let nodes = self
+                .partition
+                .slot_of_node
+                .iter()
+                .zip(&self.positions)
+                .zip(mass);
+            let nodes = nodes.map(|((slot, rest), mass)| {
+                let is_held = self.held[*slot as usize];
+                (*slot, rest.map(f64::from), mass, is_held)
+            });
+            Support::new(self.options.material.damping_per_s, nodes)
+        });
+        support.lead(motion, duration_s);
         Ok(())
     }
 

@@ -3,9 +3,7 @@
 //! Within a frame position and rotation vector follow the cubic through their values and rates at its two ends. Damping takes `-alpha M (v - w)`
 //! with the velocity `w` that the support has at the node, so a body that is carried at a constant speed feels nothing.
 
-use super::body_load::BodyLoad;
 use super::fields::Node;
-use super::{Solver, SolverError};
 use elements::vector::cross;
 
 /// Where a support is at the end of a frame: a point `x` of the mesh's frame is at `R x + position`.
@@ -46,6 +44,30 @@ fn turned(turn: [f64; 3], x: [f64; 3]) -> [f64; 3] {
 }
 
 impl Support {
+    /// At rest where it was meshed, with nodes by slot, place at rest, mass (g) and whether they are held.
+    pub fn new(
+        damping_per_s: f64,
+        nodes: impl Iterator<Item = (u32, [f64; 3], f64, bool)>,
+    ) -> Self {
+        let mut support = Support {
+            damping_per_s,
+            ..Support::default()
+        };
+        for (slot, rest, mass, is_held) in nodes {
+            match is_held {
+                true => support.held.push((slot, rest)),
+                false => support.free.push((slot, rest, mass)),
+            }
+        }
+        support
+    }
+
+    /// The next frame, of `duration_s`, ends there.
+    pub fn lead(&mut self, to: SupportMotion, duration_s: f64) {
+        self.to = to;
+        self.duration_s = duration_s;
+    }
+
     /// Position and rotation vector at part `s` of the frame.
     fn at(&self, s: f64) -> [[f64; 3]; 2] {
         let (s2, s3) = (s * s, s * s * s);
@@ -107,61 +129,5 @@ impl Support {
     /// The end of the frame becomes the start of the next, in which it rests unless it is told to go on.
     pub fn arrive(&mut self) {
         self.from = self.to;
-    }
-}
-
-impl Solver {
-    /// Sets where the support ends the next frame, which takes `duration_s`; the held nodes go there from where it is now, and stay after that.
-    ///
-    /// # Errors
-    /// [`SolverError::Load`] for numbers that are not finite and a body that has been cut; nothing has changed.
-    pub fn set_support(
-        &mut self,
-        motion: SupportMotion,
-        duration_s: f64,
-    ) -> Result<(), SolverError> {
-        let fail = |field: &str, reason: &str| {
-            Err(SolverError::Load {
-                field: field.into(),
-                reason: reason.into(),
-            })
-        };
-        let SupportMotion {
-            position,
-            velocity,
-            turn,
-            turning,
-        } = motion;
-        let numbers = [position, velocity, turn, turning];
-        if !numbers.as_flattened().iter().all(|v| v.is_finite()) {
-            return fail("support", "is not finite");
-        }
-        super::check_positive("duration_s", duration_s)?;
-        if self.topology.body.is_some() {
-            return fail(
-                "support",
-                "moves the body as it was meshed; this one has been cut",
-            );
-        }
-        let slots = self.partition.node_of_slot.len();
-        let mass = self.mass_of_nodes();
-        let load = self.load.get_or_insert_with(|| BodyLoad::with_slots(slots));
-        let support = load.support.get_or_insert_with(|| {
-            let mut support = Support {
-                damping_per_s: self.options.material.damping_per_s,
-                ..Support::default()
-            };
-            for (node, &slot) in self.partition.slot_of_node.iter().enumerate() {
-                let rest = self.positions[node].map(f64::from);
-                match self.held[slot as usize] {
-                    true => support.held.push((slot, rest)),
-                    false => support.free.push((slot, rest, mass[node])),
-                }
-            }
-            support
-        });
-        support.to = motion;
-        support.duration_s = duration_s;
-        Ok(())
     }
 }

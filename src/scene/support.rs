@@ -1,0 +1,196 @@
+//! A support that moves: the mesh's frame moves with what holds the organ, and the body feels that as inertia.
+//!
+//! With the support's pose `A = [R c]` (mesh to world) at three ends of steps, BDF2 gives the frame's velocity and acceleration as the same kind
+//! of matrix, `V` and `W`. At a node `X`, in the frame, the body then bears `-m R^T (W X + 2 V v)`: translation, Euler's, centrifugal and
+//! Coriolis' forces together. Displacements, tools and forces stay in the frame, in which a large motion of the support is none of the body.
+
+use ::contact::{Pose, pose};
+use serde::{Deserialize, Serialize};
+
+use crate::error::{Error, Result};
+use crate::memory::HeldBytes;
+
+/// A support that goes farther in a step is put there, without inertia, mm and rad.
+const PUT_MM: f32 = 40.0;
+const PUT_RAD: f32 = 0.5;
+
+/// A point `x` of the mesh's frame is at `R x + position` in the world.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SupportPose {
+    /// mm.
+    pub position: [f32; 3],
+    /// `R` as a unit quaternion x, y, z, w.
+    pub rotation: [f32; 4],
+}
+
+impl SupportPose {
+    pub(super) fn checked(&self) -> Result<Pose> {
+        pose::checked(self.position, self.rotation).map_err(|error| match error {
+            pose::PoseError::NotFinite => Error::NonFinite(format!("support: {error}")),
+            pose::PoseError::NotUnit { .. } => Error::Argument(format!("support: {error}")),
+        })
+    }
+}
+
+/// `[R c]` by rows, mm; and its rates.
+type Affine = [[f64; 4]; 3];
+
+fn affine(pose: &Pose) -> Affine {
+    let columns = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+        .map(|axis| (pose.rotation * ::contact::Vector::from(axis)).to_array());
+    let place = pose.translation.to_array();
+    [0, 1, 2].map(|row| {
+        let [x, y, z] = columns.map(|column| f64::from(column[row]));
+        [x, y, z, f64::from(place[row])]
+    })
+}
+
+fn combined(parts: [(f64, &Affine); 3]) -> Affine {
+    [0, 1, 2].map(|row| {
+        [0, 1, 2, 3].map(|column| parts.iter().map(|(part, a)| part * a[row][column]).sum())
+    })
+}
+
+/// Where the support is at the last end of a step, where it was at the one before, and how fast at both; poses as position and quaternion.
+#[derive(Clone, Copy, Debug, PartialEq, HeldBytes, Serialize, Deserialize)]
+pub(super) struct Carried {
+    pose: [f32; 7],
+    places: [Affine; 2],
+    speeds: [Affine; 2],
+}
+
+/// What a step has of a support: the frame's rotation, velocity and acceleration at its end.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Carriage {
+    rotation: Affine,
+    velocity: Affine,
+    acceleration: Affine,
+}
+
+impl Carried {
+    /// At rest in a pose.
+    fn put(pose: &Pose) -> Carried {
+        let [x, y, z] = pose.translation.to_array();
+        let [i, j, k, w] = pose.rotation.to_array();
+        Carried {
+            pose: [x, y, z, i, j, k, w],
+            places: [affine(pose); 2],
+            speeds: [[[0.0; 4]; 3]; 2],
+        }
+    }
+
+    fn leaps_to(&self, to: &Pose) -> bool {
+        let [x, y, z, i, j, k, w] = self.pose;
+        let Ok(from) = pose::checked([x, y, z], [i, j, k, w]) else {
+            return true;
+        };
+        let way = (to.translation - from.translation).length();
+        way > PUT_MM || pose::angle(&from.rotation, &to.rotation) > PUT_RAD
+    }
+
+    /// After a step of `step_s` that ends in `pose`, and what the body bears in it; `last` is that of the last state.
+    pub(super) fn follow(last: Option<&Carried>, pose: &Pose, step_s: f64) -> (Carried, Carriage) {
+        let mut next = Carried::put(pose);
+        let mut acceleration = [[0.0; 4]; 3];
+        if let Some(last) = last.filter(|last| !last.leaps_to(pose)) {
+            let part = 0.5 / step_s;
+            let derived = |now: &Affine, [last, before]: &[Affine; 2]| {
+                combined([(3.0 * part, now), (-4.0 * part, last), (part, before)])
+            };
+            let velocity = derived(&next.places[0], &last.places);
+            acceleration = derived(&velocity, &last.speeds);
+            next.places[1] = last.places[0];
+            next.speeds = [velocity, last.speeds[0]];
+        }
+        let carriage = Carriage {
+            rotation: next.places[0],
+            velocity: next.speeds[0],
+            acceleration,
+        };
+        (next, carriage)
+    }
+
+    /// Checks what was read.
+    pub(super) fn is_sound(&self) -> bool {
+        let numbers = [self.places, self.speeds];
+        let finite = numbers.as_flattened().as_flattened().as_flattened();
+        let [x, y, z, i, j, k, w] = self.pose;
+        finite.iter().all(|v| v.is_finite()) && pose::checked([x, y, z], [i, j, k, w]).is_ok()
+    }
+}
+
+impl Carriage {
+    /// `R^T v`.
+    fn back(&self, v: [f64; 3]) -> [f64; 3] {
+        [0, 1, 2].map(|axis| (0..3).map(|row| self.rotation[row][axis] * v[row]).sum())
+    }
+
+    /// A direction of the world in the frame.
+    pub(super) fn in_frame(&self, v: [f32; 3]) -> [f32; 3] {
+        self.back(v.map(f64::from)).map(|v| v as f32)
+    }
+
+    /// What the body bears at `x` of the frame (mm) where it moves at `v` (mm/s), per mass, mm/s².
+    pub(super) fn borne(&self, x: [f32; 3], v: [f32; 3]) -> [f32; 3] {
+        let (x, v) = (x.map(f64::from), v.map(f64::from));
+        let felt = [0, 1, 2].map(|row| {
+            let (a, b) = (&self.acceleration[row], &self.velocity[row]);
+            let carried: f64 = (0..3).map(|k| a[k] * x[k] + 2.0 * b[k] * v[k]).sum();
+            carried + a[3]
+        });
+        self.back(felt).map(|a| -a as f32)
+    }
+
+    /// Whether the body bears anything of it.
+    pub(super) fn acts(&self) -> bool {
+        let numbers = [self.velocity, self.acceleration];
+        numbers
+            .as_flattened()
+            .as_flattened()
+            .iter()
+            .any(|v| *v != 0.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A frame that turns evenly about an axis through its origin: what rests in it is pulled outwards by `w² r`, what moves in it by `2 w v` aside.
+    #[test]
+    fn an_even_turn_pulls_outwards_and_aside() {
+        let (omega, h) = (2.0f32, 0.01);
+        let at = |step: i32| {
+            let angle = 0.5 * omega * h * step as f32;
+            pose::checked([0.0; 3], [0.0, 0.0, angle.sin(), angle.cos()]).unwrap()
+        };
+        let (mut last, _) = Carried::follow(None, &at(0), f64::from(h));
+        let mut carriage = None;
+        for step in 1..60 {
+            let (next, own) = Carried::follow(Some(&last), &at(step), f64::from(h));
+            (last, carriage) = (next, Some(own));
+        }
+        let carriage = carriage.unwrap();
+        let [x, y, z] = carriage.borne([50.0, 0.0, 7.0], [0.0; 3]);
+        assert!(
+            (x - 200.0).abs() < 1.0 && y.abs() < 1.0 && z == 0.0,
+            "{x} {y} {z}"
+        );
+        let [x, y, _] = carriage.borne([0.0; 3], [30.0, 0.0, 0.0]);
+        assert!(x.abs() < 0.5 && (y + 120.0).abs() < 0.5, "{x} {y}");
+        let gravity = carriage.in_frame([0.0, 0.0, -9.81]);
+        assert!((gravity[2] + 9.81).abs() < 1e-5);
+    }
+
+    #[test]
+    fn a_leap_leaves_no_inertia() {
+        let at = |x: f32| pose::checked([x, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]).unwrap();
+        let (last, _) = Carried::follow(None, &at(0.0), 0.05);
+        let (last, slow) = Carried::follow(Some(&last), &at(30.0), 0.05);
+        assert!(slow.acts());
+        let (last, leapt) = Carried::follow(Some(&last), &at(90.0), 0.05);
+        assert!(!leapt.acts());
+        let (_, still) = Carried::follow(Some(&last), &at(90.0), 0.05);
+        assert!(!still.acts());
+    }
+}
