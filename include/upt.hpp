@@ -184,8 +184,7 @@ public:
   }
   /// The moment of the end of the step on a clock of your own, s.
   Input &at(double time_s) noexcept {
-    raw_.time_s = time_s;
-    return *this;
+    return raw_.time_s = time_s, *this;
   }
   /// Gravity and that of the scan, m/s², in the mesh's frame: the difference acts on the body.
   Input &gravity(const std::array<float, 3> &now,
