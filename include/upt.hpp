@@ -183,9 +183,7 @@ public:
     return raw_.displacement = displacement.data(), *this;
   }
   /// The moment of the end of the step on a clock of your own, s.
-  Input &at(double time_s) noexcept {
-    return raw_.time_s = time_s, *this;
-  }
+  Input &at(double time_s) noexcept { return raw_.time_s = time_s, *this; }
   /// Gravity and that of the scan, m/s², in the mesh's frame: the difference acts on the body.
   Input &gravity(const std::array<float, 3> &now,
                  const std::array<float, 3> &at_rest = {}) noexcept {
