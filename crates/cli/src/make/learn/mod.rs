@@ -98,7 +98,26 @@ pub fn run(learning: &Learning<'_>, stage: &mut Stage) -> Result<()> {
         teach(learning, stage, &recording, count, until)?;
     }
     calibrate(learning.effort, &recording, &learned, stage)?;
+    complete(learning, &learned, stage)?;
     bundle::publish(&learned, &options.out)
+}
+
+/// For steps under loads: the natural modes that contact in the domain shows nothing of (`docs/decisions/029-whole-modes.md`).
+fn complete(learning: &Learning<'_>, learned: &Path, stage: &mut Stage) -> Result<()> {
+    let bench = Workbench::open(
+        learned,
+        learning.natural,
+        learning.known,
+        learning.options.threads,
+        learning.options.json,
+    )?;
+    let count = bench.write_whole(learned)?;
+    if count > 0 {
+        stage.decided(&format!(
+            "{count} fields for loads: how the body swings where contact in the domain does not reach"
+        ));
+    }
+    Ok(())
 }
 
 /// Simulates tools; the bundle in `learned` gets what lessens the recording's errors.
