@@ -54,13 +54,16 @@ namespace Upt.Interop
             IntPtr scene = Enter();
             try
             {
+                upt_pressure* p = stackalloc upt_pressure[PinnedPressures.Most];
+                using (PinnedPressures pins = new PinnedPressures(input.Pressures, p))
                 fixed (upt_instrument* i = input.Instruments)
                 fixed (uint* n = input.ContactNodes)
                 fixed (float* v = input.ContactVectors)
                 fixed (float* c = input.Collision)
                 fixed (float* u = input.Displacement)
+                fixed (float* f = input.Forces)
                 {
-                    upt_input raw = input.Raw(i, n, v, c, u);
+                    upt_input raw = input.Raw(i, n, v, c, u, f, p);
                     Status.Check(Native.upt_scene_present(scene, &raw, when, &shown, output, checked((ulong)floats)));
                 }
             }

@@ -71,14 +71,17 @@ namespace Upt.Interop
             IntPtr scene = Enter();
             try
             {
+                upt_pressure* p = stackalloc upt_pressure[PinnedPressures.Most];
+                using (PinnedPressures pins = new PinnedPressures(input.Pressures, p))
                 fixed (upt_instrument* i = input.Instruments)
                 fixed (uint* n = input.ContactNodes)
                 fixed (float* v = input.ContactVectors)
                 fixed (float* c = input.Collision)
                 fixed (float* u = input.Displacement)
+                fixed (float* f = input.Forces)
                 fixed (float* o = output)
                 {
-                    upt_input raw = input.Raw(i, n, v, c, u);
+                    upt_input raw = input.Raw(i, n, v, c, u, f, p);
                     Status.Check(Native.upt_scene_step(scene, &raw, o, Length(output)));
                 }
             }
@@ -102,13 +105,16 @@ namespace Upt.Interop
             IntPtr scene = Enter();
             try
             {
+                upt_pressure* p = stackalloc upt_pressure[PinnedPressures.Most];
+                using (PinnedPressures pins = new PinnedPressures(input.Pressures, p))
                 fixed (upt_instrument* i = input.Instruments)
                 fixed (uint* n = input.ContactNodes)
                 fixed (float* v = input.ContactVectors)
                 fixed (float* c = input.Collision)
                 fixed (float* u = input.Displacement)
+                fixed (float* f = input.Forces)
                 {
-                    upt_input raw = input.Raw(i, n, v, c, u);
+                    upt_input raw = input.Raw(i, n, v, c, u, f, p);
                     Status.Check(Native.upt_scene_submit(scene, &raw));
                 }
             }

@@ -33,6 +33,13 @@ namespace Upt.Interop
         /// <summary>The moment of the end of the step on a clock of the caller's, s.</summary>
         public double Time;
 
+        /// <summary><c>[K,3]</c>, mN: forces on the nodes at the end of the step; null: none. Loads act in scenes with
+        /// corrections.</summary>
+        public float[] Forces;
+
+        /// <summary>Pressure on parts of the surface, at most 32.</summary>
+        public Pressure[] Pressures;
+
         /// <summary>Gravity at the end of the step, m/s², in the mesh's frame: x, y, z. Not in scenes without
         /// corrections.</summary>
         public (float X, float Y, float Z) Gravity;
@@ -74,11 +81,15 @@ namespace Upt.Interop
             RequireCount(ContactCount, room, "ContactCount");
             RequireField(Collision, nodeCount, "Collision");
             RequireField(Displacement, nodeCount, "Displacement");
+            RequireField(Forces, nodeCount, "Forces");
+            if (Pressures != null && Pressures.Length > PinnedPressures.Most)
+                throw new ArgumentException(
+                    "Pressures holds " + Pressures.Length + " entries, at most " + PinnedPressures.Most, "Pressures");
         }
 
         /// <summary>As the library's struct, with the arrays where they are pinned.</summary>
         internal upt_input Raw(upt_instrument* instruments, uint* nodes, float* vectors, float* collision,
-                               float* displacement)
+                               float* displacement, float* forces, upt_pressure* pressures)
         {
             upt_input raw = default(upt_input);
             raw.struct_size = (uint)sizeof(upt_input);
@@ -90,6 +101,9 @@ namespace Upt.Interop
             raw.collision = collision;
             raw.displacement = displacement;
             raw.time_s = Time;
+            raw.forces = forces;
+            raw.pressures = pressures;
+            raw.pressure_count = (ulong)(Pressures == null ? 0 : Pressures.Length);
             raw.gravity[0] = Gravity.X;
             raw.gravity[1] = Gravity.Y;
             raw.gravity[2] = Gravity.Z;
