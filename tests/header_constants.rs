@@ -86,6 +86,7 @@ const CONSTANTS: &[(&str, i64, i64)] = constants! {
     UPT_SHAPE_BOX = 1,
     UPT_SHAPE_SPATULA = 2,
     UPT_SHAPE_HULL = 3,
+    UPT_SHAPE_SPHERE = 4,
     UPT_MODE_SLIDE = 0,
     UPT_MODE_GRASP = 1,
     UPT_ABI_VERSION = 1,

@@ -73,6 +73,60 @@ fn tools_allocate_nothing() {
     }
 }
 
+/// A ball presses while gravity turns, the surface is under pressure and the support moves.
+fn loads_allocate_nothing() {
+    let model = model("tiny-corrected");
+    let scene = scene(&model, &plain());
+    let node = model.indices(IndexSet::DomainNodes)[0] as usize;
+    let at: Vec<f32> = model.positions()[3 * node..3 * node + 3].to_vec();
+    let shape = contact::Shape::Sphere { radius: 3.0 };
+    let mut forces = vec![0.0; 3 * scene.node_count()];
+    forces[3 * node] = 5.0;
+    let domain = model.indices(IndexSet::DomainNodes);
+    let mut turn = || {
+        let before = ALLOCATIONS.load(Ordering::Relaxed);
+        for t in 0..20 {
+            let wave = (0.314 * t as f32).sin();
+            let centre = [at[0], at[1], at[2] + 3.0 - 0.5 * wave];
+            let tool = upt::contact::Tool::new(&shape, centre, [0.0, 0.0, 0.0, 1.0]).unwrap();
+            let pressures = [
+                upt::Pressure {
+                    nodes: &[],
+                    pascal: 10.0 * wave,
+                },
+                upt::Pressure {
+                    nodes: domain,
+                    pascal: -4.0,
+                },
+            ];
+            let loads = upt::Loads {
+                gravity: [wave, 0.0, -1.0],
+                forces: Some(&forces),
+                pressures: &pressures,
+                support: Some(upt::SupportPose {
+                    position: [0.0, 0.0, 2.0 * wave],
+                    rotation: [0.0, 0.0, 0.0, 1.0],
+                }),
+                ..upt::Loads::NONE
+            };
+            let tools = [tool];
+            let input = StepInput {
+                contact: match t < 10 {
+                    true => Contact::Tools(&tools),
+                    false => Contact::Tools(&[]),
+                },
+                loads,
+                ..StepInput::default()
+            };
+            scene.step(input, None).unwrap();
+        }
+        ALLOCATIONS.load(Ordering::Relaxed) - before
+    };
+    turn();
+    let count = (0..5).map(|_| turn()).min().unwrap();
+    assert_eq!(count, 0, "steps under loads");
+}
+
 /// Frames of the region and of attached points between the steps.
 fn frames_allocate_nothing() {
     let model = model("tiny-corrected");
@@ -156,6 +210,7 @@ fn steps_allocate_nothing_and_keep_the_floating_point_mode() {
     tools_allocate_nothing();
     frames_allocate_nothing();
     haptics_allocate_nothing();
+    loads_allocate_nothing();
     for name in BUNDLES {
         for (kernel, step_path) in [
             (DecoderKernel::Native, StepPath::Split),

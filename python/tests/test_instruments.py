@@ -31,8 +31,13 @@ def pressing(model: upt.Model, depth: float, radius: float = 3.0) -> np.ndarray:
     return place + (radius - depth) * normal
 
 
-def test_a_sphere_is_a_capsule_without_length():
-    assert upt.Instrument.sphere(3.0, position=(1, 2, 3)) == upt.Instrument.capsule(3.0, position=(1, 2, 3))
+def test_a_sphere_is_a_capsule_without_length(corrected):
+    pressed = []
+    for made in (upt.Instrument.sphere, upt.Instrument.capsule):
+        with corrected.scene() as scene:
+            ball = made(3.0, position=pressing(corrected, 0.5))
+            pressed.append(np.array(scene.step([ball])))
+    assert np.abs(pressed[0]).max() > 0.1 and np.array_equal(*pressed)
 
 
 def test_a_press_is_read_and_a_lift_ends_it(corrected):

@@ -42,6 +42,7 @@ impl Model {
         let material = &self.manifest.material;
         let priors = (&**prior, &own);
         let corrections = intact.cut((&self.mesh, &mesh), (body, &changes), material, priors)?;
+        let corrections = crate::memory::boxed(corrections, "the corrections of a cut body")?;
         Ok(Arc::new(Model {
             manifest: self.manifest.clone(),
             hash: self.hash,

@@ -51,7 +51,7 @@ pub struct Model {
     /// The kind's own part.
     #[doc(hidden)]
     pub kind: KindModel,
-    corrections: OnceLock<Corrections>,
+    corrections: OnceLock<Box<Corrections>>,
     samples: OnceLock<Arc<::contact::Samples>>,
     /// The mesh as what can be cut, from the first time that a scene asks for it.
     rest: OnceLock<Arc<topology::RestMesh>>,
@@ -218,6 +218,7 @@ impl Model {
             return Ok(made);
         }
         let made = Corrections::open(&self.files, &self.mesh, self.prior.as_deref())
+            .and_then(|made| crate::memory::boxed(made, "the corrections"))
             .map_err(|error| self.files.name_maker(error))?;
         Ok(self.corrections.get_or_init(|| made))
     }

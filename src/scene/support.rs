@@ -36,13 +36,31 @@ impl SupportPose {
 type Affine = [[f64; 4]; 3];
 
 fn affine(pose: &Pose) -> Affine {
-    let columns = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
-        .map(|axis| (pose.rotation * ::contact::Vector::from(axis)).to_array());
-    let place = pose.translation.to_array();
-    [0, 1, 2].map(|row| {
-        let [x, y, z] = columns.map(|column| f64::from(column[row]));
-        [x, y, z, f64::from(place[row])]
-    })
+    // In f64: accelerations are second differences of it.
+    let raw = pose.rotation.to_array().map(f64::from);
+    let size = raw.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let [x, y, z, w] = raw.map(|part| part / size);
+    let [a, b, c] = pose.translation.to_array().map(f64::from);
+    [
+        [
+            1.0 - 2.0 * (y * y + z * z),
+            2.0 * (x * y - w * z),
+            2.0 * (x * z + w * y),
+            a,
+        ],
+        [
+            2.0 * (x * y + w * z),
+            1.0 - 2.0 * (x * x + z * z),
+            2.0 * (y * z - w * x),
+            b,
+        ],
+        [
+            2.0 * (x * z - w * y),
+            2.0 * (y * z + w * x),
+            1.0 - 2.0 * (x * x + y * y),
+            c,
+        ],
+    ]
 }
 
 fn combined(parts: [(f64, &Affine); 3]) -> Affine {

@@ -13,6 +13,7 @@ struct Lists {
     nodes: Vec<u32>,
     vectors: Vec<f32>,
     field: Vec<f32>,
+    pressures: Vec<upt_pressure>,
 }
 
 impl World<'_> {
@@ -29,6 +30,9 @@ impl World<'_> {
         let right = call.null == 7
             || input.instrument_count <= lists.tools.len() as u64
                 && input.contact_count <= lists.nodes.len() as u64
+                && input.pressure_count <= lists.pressures.len() as u64
+                && (input.pressure_count == 0
+                    || lists.pressures[0].node_count <= lists.nodes.len() as u64)
                 && drives < 2
                 && input.reserved == [0; 4]
                 && input.struct_size == size_of::<upt_input>() as u32;
@@ -114,7 +118,16 @@ impl World<'_> {
         let at = call.seed as usize % (3 * nodes);
         field[at] = 1.5;
         spoil(&mut field, call.odd, at);
+        let mut pascal = [40.0, -25.0];
+        spoil(&mut pascal, call.odd, call.seed as usize % 5);
+        let pressure = |pascal: f32| upt_pressure {
+            struct_size: sized::<upt_pressure>(call),
+            pascal,
+            nodes: listed.as_ptr(),
+            node_count: absurd(listed.len(), nodes, call),
+        };
         Lists {
+            pressures: pascal.map(pressure).into(),
             tools: self.instruments(call, 4),
             nodes: listed,
             vectors,
@@ -147,6 +160,9 @@ fn input(call: &Call, lists: &Lists, nodes: usize) -> (upt_input, usize) {
     if call.odd == Odd::Wrong && call.seed.is_multiple_of(7) {
         input.reserved[3] = 1;
     }
+    if (call.seed / 104).is_multiple_of(3) {
+        load(&mut input, call, lists);
+    }
     let mut time = [0.0];
     if call.seed.is_multiple_of(3) {
         spoil(&mut time, call.odd, 0);
@@ -158,6 +174,24 @@ fn input(call: &Call, lists: &Lists, nodes: usize) -> (upt_input, usize) {
         !input.collision.is_null(),
     ];
     (input, drives.into_iter().filter(|&given| given).count())
+}
+
+/// Loads beside the drive.
+fn load(input: &mut upt_input, call: &Call, lists: &Lists) {
+    let at = call.seed as usize % 7;
+    input.gravity = [0.0, -1.0, 0.5];
+    spoil(&mut input.gravity, call.odd, at);
+    input.pressures = lists.pressures.as_ptr();
+    input.pressure_count = absurd(lists.pressures.len(), 32, call);
+    if call.seed.is_multiple_of(2) {
+        input.forces = lists.field.as_ptr();
+    }
+    if call.seed.is_multiple_of(5) {
+        let angle = (call.seed % 100) as f32 * 0.02;
+        input.support_rotation = [angle.sin(), 0.0, 0.0, angle.cos()];
+        input.support_position = [0.2 * (call.seed % 60) as f32, 1.0, 0.0];
+        spoil(&mut input.support_rotation, call.odd, at);
+    }
 }
 
 /// The input, or NULL where a call has none.
