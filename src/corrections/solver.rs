@@ -127,8 +127,19 @@ impl ImplicitSolver {
 
     /// The state being made becomes the last.
     pub fn commit(&mut self) {
+        self.leave_level();
         std::mem::swap(&mut self.motion, &mut self.next);
         self.commit_pairs();
+    }
+
+    /// Where the next step reaches farther, or no longer as far, the local pairs are of no use: what they know of a narrower set is linear where the
+    /// wider one is not.
+    pub(super) fn leave_level(&mut self) {
+        if let Some(local) = &mut self.local
+            && self.next.level != self.motion.level
+        {
+            local.pairs.clear();
+        }
     }
 
     /// The state being made is one that no equation of motion led to: without velocity.

@@ -126,6 +126,7 @@ impl ImplicitSolver {
             }
             self.next.min_det = report.min_det;
             self.next.level = report.level as u32;
+            self.leave_level();
             self.estimate(&mut report);
         }
         (self.u, self.g) = (u, g);

@@ -213,10 +213,6 @@ impl LocalSolver {
             .map(|record| record.centres.as_slice());
         self.near.choose(rest, last, &self.about, abouts)?;
         if !self.near.is_chosen(self.level) {
-            if self.near.level != self.level {
-                // What pairs know of a narrower set is linear where the wider one is not.
-                self.pairs.clear();
-            }
             self.pairs.forget_layout();
             self.near.fill(env, far, rest, self.level)?;
             let (near, room) = (&self.near, &mut self.room);
