@@ -118,3 +118,42 @@ fn cases_and_tools_that_were_asked_for_stop_in_time_and_what_is_left_out_is_said
     );
     assert!(said.contains("not good enough: "), "{said}");
 }
+
+/// A bar that is held in the middle and touched on one arm: no contact shows how the other one swings, but gravity moves it.
+#[test]
+fn an_arm_that_no_tool_reaches_has_modes_for_loads() {
+    let folder = tempfile::tempdir().unwrap();
+    let (surface, out) = (folder.path().join("bar.obj"), folder.path().join("bar"));
+    let mut bar = String::new();
+    for corner in 0..8 {
+        let at = |bit: u32, half: i32| if corner >> bit & 1 == 1 { half } else { -half };
+        bar += &format!("v {} {} {}\n", at(2, 90), at(1, 24), at(0, 24));
+    }
+    for [a, b, c, d] in [
+        [1, 2, 4, 3],
+        [5, 7, 8, 6],
+        [1, 5, 6, 2],
+        [3, 4, 8, 7],
+        [1, 3, 7, 5],
+        [2, 6, 8, 4],
+    ] {
+        bar += &format!("f {a} {b} {c}\nf {a} {c} {d}\n");
+    }
+    std::fs::write(&surface, bar).unwrap();
+    let output = Command::new(env!("CARGO_BIN_EXE_upt"))
+        .args(["make".as_ref(), surface.as_os_str(), "--out".as_ref()])
+        .arg(&out)
+        .args(["--fixed", "ball:0,0,0,30", "--domain", "plane:1,0,0,-45"])
+        .args(["--nodes", "700", "--patches", "24", "--natural", "24"])
+        .args(["--cases", "1", "--minutes", "0.4"])
+        .env("ORT_DYLIB_PATH", "/nowhere/libonnxruntime.so")
+        .output()
+        .unwrap();
+    let said = text(&output);
+    assert!(output.status.success(), "{said}");
+    assert!(said.contains("fields for loads"), "{said}");
+    let manifest = std::fs::read(out.join("bundle.json")).unwrap();
+    let manifest: serde_json::Value = serde_json::from_slice(&manifest).unwrap();
+    assert_eq!(manifest["corrections"]["whole"], "whole.safetensors");
+    works(&out);
+}
