@@ -83,7 +83,7 @@ fn loads_allocate_nothing() {
     let mut forces = vec![0.0; 3 * scene.node_count()];
     forces[3 * node] = 5.0;
     let domain = model.indices(IndexSet::DomainNodes);
-    let mut turn = || {
+    let turn = || {
         let before = ALLOCATIONS.load(Ordering::Relaxed);
         for t in 0..20 {
             let wave = (0.314 * t as f32).sin();
