@@ -121,7 +121,6 @@ pub struct LocalSolver {
     pub(super) moved_mm: f32,
     /// Root mean square over the nodes that the last smoothing of the far ones moved, mm.
     pub(super) far_mm: f32,
-    #[held(skip)]
     partial: PartialSums,
     room: Room,
     on_modes: Vec<f32>,
