@@ -185,7 +185,7 @@ impl Solver {
             let (point, start) = (self.place(snapshot, at), self.points[at]);
             let mut contact = pair.contact(point, start, snapshot.outward[at], force);
             match contact.law {
-                Law::Bound => contact.slip -= error,
+                Law::Bound | Law::Tie(_) => contact.slip -= error,
                 Law::Touch { .. } if contact.gap < f32::MAX => contact.gap -= error.x,
                 Law::Touch { .. } => {}
             }
@@ -249,7 +249,7 @@ impl Solver {
             let along = force.dot(contact.normal);
             let across = (force - contact.normal * along).length();
             let sticks = match contact.law {
-                Law::Bound => true,
+                Law::Bound | Law::Tie(_) => true,
                 Law::Touch { friction } => across < 0.999 * friction * along,
             };
             let frame = ::contact::friction::frame(contact.normal);

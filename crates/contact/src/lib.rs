@@ -8,6 +8,7 @@
 //! | [`search`] | which samples are near which tool |
 //! | [`friction`], [`sweeps`] | forces: no penetration, Coulomb friction, bound samples |
 //! | [`grasp`] | samples that a tool holds, and when they tear off |
+//! | [`tie`] | springs from the tissue to something else |
 //!
 //! Lengths are millimetres, single precision throughout. Nothing here knows what tissue does under a force:
 //! the solver brings lumped masses, the runtime a dense compliance.
@@ -16,18 +17,22 @@ pub mod body;
 mod error;
 pub mod friction;
 pub mod grasp;
+mod nearest;
 pub mod pose;
 pub mod samples;
 pub mod search;
 pub mod shape;
 pub mod sweeps;
+pub mod tie;
 mod triangles;
 
 pub use body::{Body, Nearest};
 pub use error::ShapeError;
 pub use grasp::Grasp;
+pub use nearest::nearest;
 pub use parry3d::math::{Matrix, Pose, Rotation, Vector};
 pub use samples::{SPACING_MM, Sample, Samples};
 pub use search::{Candidate, Placed, SKIN_MM, Search};
 pub use shape::{Shape, THINNEST_MM};
 pub use sweeps::{Contact, Law, Limits, Outcome, Rows, Sweeps, Whole};
+pub use tie::{End, Spring, Tie};

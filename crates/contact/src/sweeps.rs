@@ -6,6 +6,7 @@
 //! that is open and has no force costs a distance a sweep, and its rows of `W` are never asked for.
 
 use crate::friction::{coulomb, frame};
+use crate::tie::Pull;
 use parry3d::math::{Matrix, Vector};
 use std::collections::TryReserveError;
 
@@ -16,6 +17,8 @@ pub enum Law {
     Touch { friction: f32 },
     /// Holds the sample in all directions, as a grasper does.
     Bound,
+    /// Pulls as a tie does.
+    Tie(Pull),
 }
 
 /// A contact at the forces that come in.
@@ -27,7 +30,7 @@ pub struct Contact {
     /// Distance from the tool's surface, negative inside, mm.
     pub gap: f32,
     /// The sample's way relative to the tool since the start of the step, mm; only what lies across the normal counts.
-    /// Of a bound sample the way from its place on the tool.
+    /// Of a bound sample the way from its place on the tool, of a tie from its far end.
     pub slip: Vector,
 }
 
@@ -206,6 +209,10 @@ impl Sweeps {
             let now = contact.slip + Vector::from_slice(&self.shift[3 * i..]);
             let local = block.frame.transpose() * forces[i];
             let wanted = match contact.law {
+                Law::Tie(pull) => {
+                    let way = block.frame.transpose() * now;
+                    pull.solve(&block.w, way - block.w * local)
+                }
                 _ if block.rigid => Vector::ZERO,
                 Law::Touch { friction } => {
                     let mut r = block.frame.transpose() * now;

@@ -1,6 +1,6 @@
 //! The contact solver against closed forms, and its conditions over random problems.
 
-use contact::{Contact, Law, Limits, Sweeps, Vector, Whole};
+use contact::{Contact, Law, Limits, Spring, Sweeps, Vector, Whole};
 use proptest::prelude::*;
 
 /// `W = 1/k I` for every contact: springs that do not know each other.
@@ -115,6 +115,16 @@ fn what_nothing_moves_takes_no_force() {
     );
 }
 
+/// A thread, the stiffer and the slacker the larger `part` (0 to 0.3) is.
+fn tie(part: f32) -> Spring {
+    Spring {
+        stiffness: 300.0 * part,
+        slack_mm: part,
+        damping: if part < 0.1 { 0.1 } else { 0.0 },
+        pushes: false,
+    }
+}
+
 /// A problem: `W = G G^T + I / 4` scaled, contacts with random normals, gaps, slips.
 fn problem() -> impl Strategy<Value = (Vec<f32>, Vec<Contact>)> {
     (2usize..9, 0.0f32..0.8).prop_flat_map(|(n, friction)| {
@@ -142,9 +152,11 @@ fn problem() -> impl Strategy<Value = (Vec<f32>, Vec<Contact>)> {
             let contacts = contacts
                 .into_iter()
                 .map(|(normal, gap, slip, bound)| Contact {
-                    law: match bound && gap > 0.3 {
-                        true => Law::Bound,
-                        false => Law::Touch { friction },
+                    law: match (bound, gap) {
+                        (true, 0.3..) => Law::Bound,
+                        // Stiff and soft, some of them slack.
+                        (true, 0.0..) => Law::Tie(tie(gap).over(gap, 0.05)),
+                        _ => Law::Touch { friction },
                     },
                     normal: (Vector::from(normal) + Vector::new(0.0, 0.0, 1e-3)).normalize(),
                     gap,
@@ -168,6 +180,10 @@ fn violation(w: &[f32], contacts: &[Contact], forces: &[Vector]) -> f32 {
         let moved = Vector::from_slice(&shift[3 * i..]);
         let force = forces[i];
         match contact.law {
+            Law::Tie(pull) => {
+                let wanted = pull.force(contact.slip + moved);
+                worst = worst.max((force - wanted).length() / (1.0 + 300.0 * 0.3));
+            }
             Law::Bound => worst = worst.max((contact.slip + moved).abs().max_element()),
             Law::Touch { friction } => {
                 let gap = contact.gap + moved.dot(contact.normal);

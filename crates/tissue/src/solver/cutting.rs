@@ -161,6 +161,8 @@ impl Solver {
         self.backup = fields.clone();
         self.fields = fields;
         self.paths.clear();
+        // Their nodes may be others.
+        self.ties = None;
         self.positions = positions;
         self.tets = tets;
         self.topology.held_nodes = held;

@@ -1,6 +1,7 @@
 //! What a frame reports, and why it failed: f64 passes over the elements, once a frame.
 
 use super::stiffest::stiffest;
+use super::ties::Ties;
 use super::touch::{ToolPose, Touch};
 use super::{ContactNode, FrameReport, Solver, SolverError};
 use elements::Chunk;
@@ -120,6 +121,7 @@ impl Solver {
             external_work: self.external_work,
             min_det_f: diagnosis.min_det_f,
             reaction,
+            ties: self.ties.as_ref().map_or_else(Vec::new, Ties::reports),
             inner_steps: steps,
             tools: self.touch.as_ref().map_or_else(Vec::new, Touch::reports),
             sample_forces: self

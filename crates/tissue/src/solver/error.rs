@@ -32,6 +32,8 @@ pub enum SolverError {
         "{poses} poses for {tools} tools; give each tool one pose (`step_frame` alone moves no tools)"
     )]
     ToolCount { tools: usize, poses: usize },
+    #[error("ties[{index}]: {reason}")]
+    Tie { index: usize, reason: String },
     #[error("loads.{field} {reason}")]
     Load { field: String, reason: String },
     #[error("contact entry {index} (node {node}): {reason}")]

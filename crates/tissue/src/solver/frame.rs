@@ -60,6 +60,9 @@ impl Solver {
         if let Some(load) = &mut self.load {
             load.begin(steps);
         }
+        if let Some(ties) = &mut self.ties {
+            ties.begin(self.time_s, steps, dt);
+        }
         let tallies = self.run(steps);
         let inverted = tallies
             .iter()
@@ -76,12 +79,15 @@ impl Solver {
         let mut fields = std::mem::take(&mut self.fields);
         let mut touch = self.touch.take();
         let mut load = self.load.take();
+        let mut ties = self.ties.take();
         let mut march = self.marcher(steps);
         march.touch = touch.as_mut().map(Mutex::new);
         march.load = load.as_mut().map(Mutex::new);
+        march.ties = ties.as_mut().map(Mutex::new);
         let tallies = march.run(&mut fields, self.pool.as_ref());
         self.touch = touch;
         self.load = load;
+        self.ties = ties;
         self.fields = fields;
         tallies
     }
@@ -100,6 +106,7 @@ impl Solver {
             paths: &self.paths,
             touch: None,
             load: None,
+            ties: None,
             steps,
         }
     }

@@ -22,6 +22,7 @@ mod parts;
 mod stability;
 mod stiffest;
 mod support;
+mod ties;
 mod touch;
 // Against the energy of `statics`.
 #[cfg(all(test, feature = "linear"))]
@@ -32,6 +33,7 @@ pub use error::SolverError;
 pub use lanes::Isa;
 pub use options::{Pressure, SolverOptions, Substep};
 pub use support::SupportMotion;
+pub use ties::TieReport;
 pub use touch::{SampleForce, Tool, ToolPose, ToolReport};
 
 use crate::mesh::{Boundary, Mesh};
@@ -42,6 +44,7 @@ use fields::{Fields, Node};
 use march::Path;
 use options::check_positive;
 use parts::Parts;
+use ties::Ties;
 use touch::Touch;
 
 /// One prescribed node of a frame.
@@ -61,7 +64,7 @@ pub struct FrameReport {
     pub strain_energy: f64,
     /// mJ, from the half-step velocities.
     pub kinetic_energy: f64,
-    /// Work done by contact nodes, tools and loads since rest, mJ.
+    /// Work done by contact nodes, tools, loads and ties since rest, mJ.
     pub external_work: f64,
     /// Smallest det F over the elements.
     pub min_det_f: f64,
@@ -71,6 +74,8 @@ pub struct FrameReport {
     pub tools: Vec<ToolReport>,
     /// Forces at samples of the surface, by tool and sample.
     pub sample_forces: Vec<SampleForce>,
+    /// A row a tie.
+    pub ties: Vec<TieReport>,
     /// Inner steps taken.
     pub inner_steps: u32,
     /// Estimated critical step at this state, s.
@@ -105,6 +110,8 @@ pub struct Solver {
     touch: Option<Touch>,
     touch_backup: Option<Touch>,
     load: Option<BodyLoad>,
+    ties: Option<Ties>,
+    ties_backup: Option<Ties>,
     paths: Vec<Path>,
     pool: Option<rayon::ThreadPool>,
     /// Inner step that the increments in `fields` belong to, s.
@@ -167,6 +174,8 @@ impl Solver {
             touch: None,
             touch_backup: None,
             load: None,
+            ties: None,
+            ties_backup: None,
             fields,
             paths: Vec::new(),
             pool,
@@ -185,7 +194,7 @@ impl Solver {
         Ok(solver)
     }
 
-    /// Back to rest at time zero, without tools and loads. A body that has been cut stays so.
+    /// Back to rest at time zero, without tools, loads and ties. A body that has been cut stays so.
     pub fn reset(&mut self) {
         for field in [
             &mut self.fields.displacement,
@@ -197,6 +206,7 @@ impl Solver {
         self.paths.clear();
         self.touch = None;
         self.load = None;
+        self.ties = None;
         self.dt = self.options.inner_step_s;
         self.time_s = 0.0;
         self.external_work = 0.0;
@@ -245,6 +255,7 @@ impl Solver {
         self.backup.clone_from(&self.fields);
         self.backup_dt = self.dt;
         self.touch_backup.clone_from(&self.touch);
+        self.ties_backup.clone_from(&self.ties);
         let paths_before = std::mem::take(&mut self.paths);
         let mut refinements = 0;
         loop {
@@ -256,11 +267,15 @@ impl Solver {
                     if let Some(load) = &mut self.load {
                         load.arrive();
                     }
+                    if let Some(ties) = &mut self.ties {
+                        ties.arrive();
+                    }
                     return Ok(self.report(contact, steps));
                 }
                 Err(error) => {
                     self.fields.clone_from(&self.backup);
                     self.touch.clone_from(&self.touch_backup);
+                    self.ties.clone_from(&self.ties_backup);
                     self.dt = self.backup_dt;
                     if self.options.substep == Substep::Refuse || refinements == MAX_REFINEMENTS {
                         self.paths = paths_before;

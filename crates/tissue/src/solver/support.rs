@@ -4,6 +4,7 @@
 //! with the velocity `w` that the support has at the node, so a body that is carried at a constant speed feels nothing.
 
 use super::fields::Node;
+use contact::Vector;
 use elements::vector::cross;
 
 /// Where a support is at the end of a frame: a point `x` of the mesh's frame is at `R x + position`.
@@ -85,6 +86,13 @@ impl Support {
             between([from.position, to.position, from.velocity, to.velocity]),
             between([from.turn, to.turn, from.turning, to.turning]),
         ]
+    }
+
+    /// Where a place of its frame is at part `s` of the solver's frame.
+    pub fn carried(&self, place: Vector, s: f32) -> Vector {
+        let [position, turn] = self.at(f64::from(s));
+        let there = turned(turn, place.to_array().map(f64::from));
+        Vector::from_array([0, 1, 2].map(|k| (there[k] + position[k]) as f32))
     }
 
     /// Puts the held nodes where they are at inner step `step` of `steps`, and adds to `now` what the support's motion takes off the damping.

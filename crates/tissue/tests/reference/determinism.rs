@@ -1,5 +1,6 @@
 //! The same bits for any number of threads; the same answer on any instruction set.
 
+use contact::{End, Sample, Spring, Tie, Vector};
 use tissue::mesh::{Boundary, box_phantom};
 use tissue::solver::{
     ContactNode, FrameReport, Isa, Loads, Pressure, Solver, SolverOptions, SurfacePressure,
@@ -30,6 +31,24 @@ fn march(threads: usize, isa: Option<Isa>, pressure: Pressure) -> (Vec<[f32; 3]>
         ..Loads::default()
     };
     solver.set_loads(&loads).unwrap();
+    // A thread from the block's farthest corner.
+    let corner = mesh.node_count() as u32 - 1;
+    let point = Sample {
+        nodes: [corner; 3],
+        weights: [1.0, 0.0, 0.0],
+    };
+    let spring = Spring {
+        stiffness: 50.0,
+        ..Spring::default()
+    };
+    let end = Vector::from(mesh.positions[corner as usize]) + Vector::Z;
+    let tie = Tie {
+        point,
+        end: End::World(end),
+        spring,
+        break_mn: 0.0,
+    };
+    solver.set_ties(&[tie]).unwrap();
     let mut report = None;
     for frame in 1..=3 {
         let contact: Vec<ContactNode> = nodes

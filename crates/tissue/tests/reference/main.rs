@@ -12,3 +12,4 @@ mod dynamics;
 mod failures;
 mod metrics;
 mod stiffness;
+mod ties;

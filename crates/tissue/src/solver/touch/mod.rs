@@ -10,7 +10,7 @@ mod row;
 mod rows;
 mod step;
 
-use contact::{Body, Grasp, Pose, Samples, Search, Shape, Vector};
+use contact::{Body, Grasp, Pose, Samples, Search, Shape, Vector, pose};
 use row::{Reached, Row};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -159,6 +159,26 @@ impl Touch {
                 tool.grasp.open();
             }
             tool.closed = to.grasp;
+        }
+    }
+
+    /// Where a tool is at a part of the frame.
+    pub fn pose_at(&self, tool: u32, part: f32) -> Pose {
+        let tool = &self.tools[tool as usize];
+        pose::between(&tool.from, &tool.to, part)
+    }
+
+    /// A tool takes the force of a tie at a point in inner step `step`, µN.
+    pub fn feel(&mut self, tool: u32, point: Vector, force: Vector, step: u32) {
+        if step + self.reported() <= self.steps {
+            return;
+        }
+        let arm = point - self.pose_at(tool, self.part(step)).translation;
+        let torque = arm.cross(force);
+        let tool = &mut self.tools[tool as usize];
+        for k in 0..3 {
+            tool.force[k] += f64::from(force[k]);
+            tool.torque[k] += f64::from(torque[k]);
         }
     }
 

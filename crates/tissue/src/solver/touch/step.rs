@@ -45,11 +45,16 @@ impl Access {
 }
 
 impl Touch {
-    /// Corrects displacements and increments after the free update of `step` (from 1); returns the work on the tissue, nJ.
+    /// Corrects displacements and increments after the free update of `step` (from 1), to which ties have added `tied` by slot; returns the work on the tissue, nJ.
     ///
     /// # Safety
     /// No other thread may touch the arrays behind `access`, which must have all of the solver's slots.
-    pub unsafe fn resolve(&mut self, access: Access, step: u32) -> f64 {
+    pub unsafe fn resolve(
+        &mut self,
+        access: Access,
+        step: u32,
+        tied: impl Fn(u32) -> Vector,
+    ) -> f64 {
         if (step - 1).is_multiple_of(SEARCH_STEPS) {
             // SAFETY: as the caller promises; `look` only reads through it.
             let scene = self.scene.clone();
@@ -64,7 +69,7 @@ impl Touch {
             return 0.0;
         }
         // SAFETY: as the caller promises.
-        unsafe { self.gather(access) };
+        unsafe { self.gather(access, tied) };
         let (from, to) = (self.part(step - 1), self.part(step));
         let poses: Vec<(Pose, Pose)> = self
             .tools
@@ -86,7 +91,7 @@ impl Touch {
         work
     }
 
-    unsafe fn gather(&mut self, access: Access) {
+    unsafe fn gather(&mut self, access: Access, tied: impl Fn(u32) -> Vector) {
         for at in 0..self.reached.len() {
             let slot = self.reached[at].slot as usize;
             let node = self.reached[at].node;
@@ -106,7 +111,7 @@ impl Touch {
             reached.increment = increment;
             // A prescribed or held node moves as it is told, before and after.
             reached.earlier = match gain > 0.0 {
-                true => (increment - force * gain) / access.beta,
+                true => (increment - tied(slot as u32) - force * gain) / access.beta,
                 false => increment,
             };
             reached.change = Vector::ZERO;
