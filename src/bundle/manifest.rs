@@ -52,7 +52,7 @@ pub struct Envelope {
     pub tools: Option<ToolEnvelope>,
 }
 
-/// The rigid tools that a bundle with corrections was measured with and found good for (`upt envelope`).
+/// The rigid tools that a bundle with corrections was measured with and found good for (`cargo xtask study envelope`).
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 pub struct ToolEnvelope {
     /// Corrections a step of the measurement; with fewer these limits say nothing.

@@ -59,6 +59,8 @@ def options(words: list[str]) -> list[str]:
 def fault(words: list[str]) -> str:
     """What is wrong with a command; empty where nothing is known to be."""
     if words[:2] == ["cargo", "xtask"] and len(words) > 2:
+        if words[2] == "study" and len(words) > 3:
+            return missing(help_of(("study", words[3])), words, f"cargo xtask study {words[3]}")
         own = words[: words.index("--")] if "--" in words else words
         return missing(help_of((own[2],)), own, f"cargo xtask {own[2]}")
     if words[0] == "upt" and len(words) > 1 and not words[1].startswith("-"):

@@ -1,9 +1,9 @@
-"""`upt view`: what is refused, and its page and that of `upt report` in headless Chromium.
+"""`upt view`: what is refused, and its page and that of `cargo xtask study report` in headless Chromium.
 
     python3 tests/view/run.py
 
-Reads UPT_COMMAND (the command `upt`), UPT_BUNDLES (default onnx/), UPT_BUILD_DIR (pictures go to view/ there) and
-ORT_DYLIB_PATH. The last line is `N passed, N failed, N skipped`.
+Reads UPT_COMMAND (the command `upt`), UPT_STUDY (the study), UPT_BUNDLES (default onnx/), UPT_BUILD_DIR (pictures go
+to view/ there) and ORT_DYLIB_PATH. The last line is `N passed, N failed, N skipped`.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ from client import Browser, RawClient, Refused
 
 ROOT = Path(__file__).resolve().parents[2]
 COMMAND = os.environ.get("UPT_COMMAND", str(ROOT / "target/release/upt"))
+STUDY = os.environ.get("UPT_STUDY", str(ROOT / "target/release/upt-study"))
 BUNDLES = Path(os.environ.get("UPT_BUNDLES", ROOT / "onnx"))
 PICTURES = Path(os.environ.get("UPT_BUILD_DIR", ROOT / "target")) / "view"
 TOOL = {"position": [0, 0, 0], "rotation": [0, 0, 0, 1], "radius": 5, "half_length": 20, "friction": 0.3}
@@ -298,7 +299,7 @@ def a_report_plays_its_first_case(browser: Browser, bundle: str) -> None:
         simulate += ["--young", str(material["young_pa"]), "--density", str(material["density_kg_m3"])]
         said = subprocess.run(simulate, check=True, capture_output=True, text=True).stdout
         largest = float(re.search(r"largest displacement ([0-9.]+) mm", said)[1])
-        report = [COMMAND, "report", "--bundle", str(BUNDLES / bundle), "--trajectory", case, "--plain", "zero"]
+        report = [STUDY, "report", "--bundle", str(BUNDLES / bundle), "--trajectory", case, "--plain", "zero"]
         report += ["--threads", "1", "--corrections", "3", "--out", folder]
         subprocess.run(report, check=True, capture_output=True)
         text = Path(folder, "report.html").read_text(encoding="utf-8")
@@ -330,7 +331,7 @@ def a_report_of_tools_shows_them(browser: Browser, bundle: str) -> None:
         simulate = [COMMAND, "simulate", "--mesh", mesh, "--tool", "two", "--seed", "5", "--out", case]
         simulate += ["--young", str(material["young_pa"]), "--density", str(material["density_kg_m3"])]
         subprocess.run(simulate, check=True, capture_output=True)
-        report = [COMMAND, "report", "--tools", case, "--bundle", str(BUNDLES / bundle), "--out", folder]
+        report = [STUDY, "report", "--tools", case, "--bundle", str(BUNDLES / bundle), "--out", folder]
         subprocess.run(report, check=True, capture_output=True)
         browser.open(Path(folder, "tools.html").as_uri())
         page = "document.querySelector('iframe').contentWindow"

@@ -1,8 +1,8 @@
 """Adds the reference solver on the coarse mesh to results of `evaluate`, as the method `coarse_fem`.
 
-    python training/scripts/coarse_fem.py EVALUATION.json --data DATA --upt target/release/upt
+    python training/scripts/coarse_fem.py EVALUATION.json --data DATA --study target/release/upt-study
 
-Each case of EVALUATION.json is replayed by `upt report --plain zero,coarse`: the solver runs on
+Each case of EVALUATION.json is replayed by `cargo xtask study report --plain zero,coarse`: the solver runs on
 onnx/meshes/brain-coarse.mesh.safetensors, led by the same contact, and its field is interpolated to the nodes of the
 case's mesh. Predicting zero is scored beside it and must agree with EVALUATION.json, so both sides have read the same
 case by the same metrics. `evaluation_table.py` then writes its rows with the others.
@@ -25,10 +25,10 @@ SCORES = ("mse_mm2", "max_mm", "relative_l2", "hausdorff_mm")
 AGREE = 1e-4
 
 
-def report(upt: Path, trajectory: Path) -> dict[str, dict[str, float]]:
+def report(study: Path, trajectory: Path) -> dict[str, dict[str, float]]:
     """Scores of `predict zero` and `coarse TLED` on one trajectory."""
     # A bundle of the coarse mesh fits no case here, so that the plain methods alone are run.
-    command = [upt, "report", "--trajectory", trajectory, "--bundle", "onnx/brain-coarse", "--plain", "zero,coarse"]
+    command = [study, "report", "--trajectory", trajectory, "--bundle", "onnx/brain-coarse", "--plain", "zero,coarse"]
     with tempfile.TemporaryDirectory() as out:
         run = subprocess.run(
             [*command, "--threads", "1", "--out", out, "--json"], check=True, stdout=subprocess.PIPE, text=True
@@ -43,11 +43,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("evaluation", type=Path, help="JSON of `evaluate`, changed in place")
     parser.add_argument("--data", type=Path, required=True, help="the dataset folder that it was made with")
-    parser.add_argument("--upt", type=Path, default=Path("target/release/upt"))
+    parser.add_argument("--study", type=Path, default=Path("target/release/upt-study"))
     options = parser.parse_args()
     result = json.loads(options.evaluation.read_text())
     for case in result["cases"]:
-        scores = report(options.upt, options.data / case["file"])
+        scores = report(options.study, options.data / case["file"])
         for name, value in scores["predict zero"].items():
             if abs(value - case["zero"][name]) > AGREE * case["zero"][name]:
                 sys.exit(f"error: {case['file']}: predicting zero has {name} {value}, evaluated {case['zero'][name]}")

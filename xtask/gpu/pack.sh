@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Packs what a measurement on a GPU machine without a network needs, in pieces of 60 MiB:
 #   xtask/gpu/pack.sh OUT [--rehearse | --small ARCH] [TRAJECTORY...]
-# the commands `upt` and `gpu-measure` (x86-64), ONNX Runtime's GPU build (of the onnxruntime-gpu wheel), bundles with random
+# the commands `upt`, `upt-study` and `gpu-measure` (x86-64), ONNX Runtime's GPU build (of the onnxruntime-gpu wheel), bundles with random
 # weights of the `paper`, `wide` and `plain` (`fast`) configuration with step.onnx and the paper's split, the brain bundles, the Python
 # package for the PyTorch rows, and the trajectories to replay (none given: one of scheme 5 is simulated).
 #   UPT_FINE_MESH=FILE   adds `paper-fine`, the `paper` configuration on that mesh (K = 151,201)
@@ -30,10 +30,10 @@ mkdir -p "$out" "$stage"/upt/{ort,bundles,cases,training} "$stage/wheel"
 out=$(cd "$out" && pwd)
 
 if [ -z "${UPT_GPU_BINARIES:-}" ]; then
-  (cd "$root" && cargo build --quiet --release -p upt-cli && cargo build --quiet --release -p upt --example gpu-measure)
+  (cd "$root" && cargo build --quiet --release -p upt-cli -p upt-study && cargo build --quiet --release -p upt --example gpu-measure)
   UPT_GPU_BINARIES="$target/release $target/release/examples"
 fi
-for command in upt gpu-measure; do
+for command in upt upt-study gpu-measure; do
   for folder in $UPT_GPU_BINARIES; do
     if [ -x "$folder/$command" ]; then cp "$folder/$command" "$stage/upt/"; fi
   done

@@ -5,7 +5,7 @@
 #   and how PyTorch runs
 #   --rehearse  a few steps on the CPU alone: all parts run, and OUT/missing says what was not measured
 # Writes OUT/rows.jsonl (a row a line, also of what a provider refused), OUT/rows-torch.json (PyTorch's, and the card's rates),
-# OUT/missing (what else was not measured: why), OUT/doctor.json, OUT/errors-P/ (`upt report`: errors of rollouts against
+# OUT/missing (what else was not measured: why), OUT/doctor.json, OUT/errors-P/ (`cargo xtask study report`: errors of rollouts against
 # the reference solver), OUT/log and OUT/machine. Bring back all of OUT. One process a provider and a rival: one that
 # crashes leaves the others' rows. Needs nothing but the folder; PyTorch rows need python3 with torch.
 set -euo pipefail
@@ -76,8 +76,8 @@ else
   bundles=()
   for bundle in bundles/brain-*; do bundles+=(--bundle "$bundle"); done
   for provider in ${providers//,/ }; do
-    ./upt report "${cases[@]}" "${bundles[@]}" --provider "$provider" --threads 1,2 --region all,surface --plain none \
-      --out "$out/errors-$provider" >>"$out/log" 2>&1 || missing "errors on $provider" "upt report ended with status $?; see log"
+    ./upt-study report "${cases[@]}" "${bundles[@]}" --provider "$provider" --threads 1,2 --region all,surface --plain none \
+      --out "$out/errors-$provider" >>"$out/log" 2>&1 || missing "errors on $provider" "cargo xtask study report ended with status $?; see log"
   done
 fi
 for card in cuda tensorrt tensorrt-rtx; do

@@ -192,7 +192,7 @@ fn simulate(
     Ok(file)
 }
 
-/// `upt report` of the bundles: driven by the poses of the tool alone, or given the nodes and vectors of a contact scheme,
+/// `cargo xtask study report` of the bundles: driven by the poses of the tool alone, or given the nodes and vectors of a contact scheme,
 /// the paper's own measure.
 fn report(
     workspace: &Workspace,
@@ -202,7 +202,7 @@ fn report(
     out: &Path,
 ) -> Result<()> {
     let (Organ { name, plain, .. }, (_, words)) = (options.organ(), options.driver());
-    let mut command = workspace.command(workspace.upt(), "report --out");
+    let mut command = workspace.command(workspace.study(), "report --out");
     ort::set_environment(workspace, &mut command)?;
     let title = format!("A {name} pushed by libupt: {words}");
     command.arg(out).arg("--title").arg(title);
@@ -223,7 +223,7 @@ fn report(
         }
     };
     let made = run_visibly(command.arg(trajectory))?;
-    ensure!(made, "`upt report` failed");
+    ensure!(made, "`upt-study report` failed");
     println!("4/4 in {}: {shows}", out.display());
     Ok(())
 }

@@ -74,10 +74,10 @@ enum Task {
         #[arg(long, default_value = "target/site")]
         out: std::path::PathBuf,
     },
-    /// Put tables that `upt report` wrote into a page, such as that of docs/results/README.md.
+    /// Put tables that `cargo xtask study report` wrote into a page, such as that of docs/results/README.md.
     #[command(after_help = "Example:\n  cargo xtask readme --report target/report/report.md")]
     Readme {
-        /// report.md files of `upt report`, in the order in which they should appear.
+        /// report.md files of `cargo xtask study report`, in the order in which they should appear.
         #[arg(long = "report", value_name = "FILE", required = true)]
         reports: Vec<std::path::PathBuf>,
         /// The page that takes them, between its markers; from the repository's root.
@@ -91,6 +91,15 @@ enum Task {
     Rivals {
         /// Arguments of the study, such as `--help`.
         #[arg(last = true)]
+        arguments: Vec<String>,
+    },
+    /// Measure libupt: errors, times, abuse, against the reference solver; the tables of docs/results/.
+    #[command(
+        after_help = "Examples:\n  cargo xtask study help\n  cargo xtask study report --bundle onnx/brain-coarse-reduced --data DATA\n  cargo xtask study stress --quick"
+    )]
+    Study {
+        /// A command of the study and its arguments.
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         arguments: Vec<String>,
     },
     /// Build libupt for each cargo feature and write what it adds to docs/results/performance.md.
@@ -145,6 +154,7 @@ fn run(workspace: &Workspace, task: Task) -> Result<bool> {
         Task::Site { out } => web::site(workspace, &out),
         Task::Readme { reports, page } => upkeep::readme(workspace, &page, &reports),
         Task::Rivals { arguments } => rivals::run(workspace, &arguments),
+        Task::Study { arguments } => upkeep::study(workspace, &arguments),
         Task::Footprint => footprint::run(workspace),
         Task::Header { check } => upkeep::header(workspace, check),
         Task::Bundle { module, arguments } => upkeep::bundle(workspace, &module, &arguments),

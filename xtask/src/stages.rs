@@ -37,7 +37,7 @@ const fn stage(name: &'static str, about: &'static str, needs: Needs, run: Run) 
 
 /// No leak, no force that is no number or that stays; the log says how many hours fitted.
 const HAPTICS: &str =
-    "run --release --package upt-cli -- haptics onnx/brain-coarse-reduced --hours 24 --within 20";
+    "run --release --package upt-study -- haptics onnx/brain-coarse-reduced --hours 24 --within 20";
 
 /// In this order: what is cheap and most often wrong comes first. Groups run one after another, the lanes of a group at the same
 /// time, the stages of a lane one after another. No stage runs beside `rust`, whose build replaces the programs that others use.

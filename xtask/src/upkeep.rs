@@ -1,10 +1,10 @@
-//! `cargo xtask header`, `bundle`, `view` and `readme`: one program or one page, with its set-up.
+//! `cargo xtask header`, `bundle`, `view`, `study` and `readme`: one program or one page, with its set-up.
 
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 
-use crate::process::run_visibly;
+use crate::process::{run_checked, run_visibly};
 use crate::workspace::{Workspace, write_between_markers};
 use crate::{ort, venv};
 
@@ -30,7 +30,19 @@ pub fn view(workspace: &Workspace, bundle: &Path) -> Result<bool> {
     run_visibly(command.arg(bundle))
 }
 
-/// The tables that `upt report` wrote for documents, one after another, between the markers of a page.
+/// Runs the study with all set-up.
+pub fn study(workspace: &Workspace, arguments: &[String]) -> Result<bool> {
+    run_checked(
+        workspace,
+        "cargo build",
+        &mut workspace.cargo("build --release -p upt-study"),
+    )?;
+    let mut command = workspace.command(workspace.study(), "");
+    ort::set_environment(workspace, &mut command)?;
+    run_visibly(command.args(arguments))
+}
+
+/// The tables that `cargo xtask study report` wrote for documents, one after another, between the markers of a page.
 pub fn readme(workspace: &Workspace, page: &Path, reports: &[PathBuf]) -> Result<bool> {
     let read = |path: &PathBuf| {
         let text = std::fs::read_to_string(path);

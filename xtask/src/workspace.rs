@@ -48,7 +48,16 @@ impl Workspace {
 
     /// The command `upt` as `cargo build --release` leaves it.
     pub fn upt(&self) -> PathBuf {
-        let name = format!("upt{}", std::env::consts::EXE_SUFFIX);
+        self.program("upt")
+    }
+
+    /// The study of libupt, `crates/study`.
+    pub fn study(&self) -> PathBuf {
+        self.program("upt-study")
+    }
+
+    fn program(&self, name: &str) -> PathBuf {
+        let name = format!("{name}{}", std::env::consts::EXE_SUFFIX);
         self.release.join(name)
     }
 

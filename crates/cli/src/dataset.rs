@@ -3,8 +3,8 @@
 use crate::counted::counted;
 use crate::simulate::SolverArguments;
 use crate::{loads, tool_scale};
-use anyhow::{Context, bail};
-use std::path::PathBuf;
+use anyhow::{Context, Result, bail};
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -49,7 +49,7 @@ pub struct Options {
     /// Store displacements as f16.
     #[arg(long)]
     half: bool,
-    /// Time between recorded frames of --tools, ms; it must divide the step of 50 ms. `upt report --shown` needs shorter frames.
+    /// Time between recorded frames of --tools, ms; it must divide the step of 50 ms. `cargo xtask study report --shown` needs shorter frames.
     #[arg(long, default_value_t = 1e3 * FRAME_S, requires = "tools", conflicts_with = "schemes")]
     frame_ms: f64,
     /// Inner step of the split `train`, ms; held-out cases keep `--inner-step-ms`. Needs `--train-mass-scaling-ms`.
@@ -104,7 +104,7 @@ fn parse_shard(text: &str) -> Result<(usize, usize), String> {
         .ok_or_else(|| format!("--shard `{text}`: write i/n with i from 0 to n - 1"))
 }
 
-pub fn run(options: &Options) -> anyhow::Result<ExitCode> {
+pub fn run(options: &Options) -> Result<ExitCode> {
     if options.jobs == 0 {
         bail!("--jobs must be at least 1");
     }
@@ -198,4 +198,34 @@ pub fn run(options: &Options) -> anyhow::Result<ExitCode> {
         counted(manifest.cases.len(), "case")
     );
     Ok(ExitCode::SUCCESS)
+}
+
+/// Finished cases of a split of a dataset, the first `per_scheme` of each scheme.
+pub fn finished(folder: &Path, split: &str, per_scheme: usize) -> Result<Vec<PathBuf>> {
+    let file = folder.join("manifest.json");
+    let text = std::fs::read(&file).with_context(|| {
+        format!(
+            "{}: cannot be read; `upt dataset` writes it",
+            file.display()
+        )
+    })?;
+    let manifest: serde_json::Value = serde_json::from_slice(&text)
+        .with_context(|| format!("{}: is not JSON", file.display()))?;
+    let cases = manifest["cases"]
+        .as_array()
+        .with_context(|| format!("{}: field `cases` is missing", file.display()))?;
+    let mut taken: std::collections::BTreeMap<String, usize> = std::collections::BTreeMap::new();
+    let mut paths = Vec::new();
+    for case in cases {
+        let text = |field: &str| case[field].as_str().unwrap_or("").to_owned();
+        if text("split") != split || text("status") != "done" {
+            continue;
+        }
+        let count = taken.entry(text("scheme")).or_default();
+        if *count < per_scheme {
+            *count += 1;
+            paths.push(folder.join(text("file")));
+        }
+    }
+    Ok(paths)
 }

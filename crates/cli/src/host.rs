@@ -1,6 +1,6 @@
 //! The library as a host sees it: the functions of `upt.h`, called through their C signatures.
 //!
-//! What is measured here is what a C or C# program gets. One row of `upt report` reaches behind the ABI, since no host can ask
+//! What is measured here is what a C or C# program gets. One row of `cargo xtask study report` reaches behind the ABI, since no host can ask
 //! for it: a bundle's linear response alone (`report/prior_alone.rs`).
 
 mod hand;

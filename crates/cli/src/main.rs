@@ -1,73 +1,18 @@
-//! The command `upt`. One file a subcommand: each has its options (`clap::Args`) and
-//! `run(options) -> anyhow::Result<ExitCode>`.
-//!
-//! Exit codes: 0 done; 1 the command ran and its finding is bad (`doctor`, `stress`); 2 wrong usage or
-//! input, with a message on stderr that says what to do. A closed pipe ends the program quietly.
+//! The command `upt`: its subcommands, which the library `upt_cli` runs. A closed pipe ends it quietly.
 
-mod bench;
-#[cfg(feature = "linear")]
-mod check;
-mod compare;
 mod completions;
-#[cfg(feature = "linear")]
-mod corrections;
-mod counted;
-mod dataset;
-mod date;
-mod doctor;
-mod effort;
-mod envelope;
-#[cfg(feature = "files")]
-mod export;
-mod fit;
-#[cfg(feature = "files")]
-mod foreign;
-mod haptics;
-mod host;
-#[cfg(not(feature = "linear"))]
-mod left_out;
-mod load_report;
-mod loads;
-mod machine;
-#[cfg(feature = "linear")]
-mod make;
-mod manifest;
-mod materials;
-mod mesh;
-#[cfg(feature = "linear")]
-mod modes;
-#[cfg(feature = "linear")]
-mod parallel;
-mod preview;
-#[cfg(feature = "linear")]
-mod prior;
-mod processor_time;
-#[cfg(feature = "files")]
-mod progress;
-mod python;
-mod quantile;
 mod reference;
-mod render;
-mod report;
-mod rollout;
-mod runtime;
-mod shown;
-mod simulate;
-mod soak;
-mod stress;
-mod tool_scale;
-mod tools;
-#[cfg(feature = "linear")]
-mod validate;
-mod view;
-
-// For their features alone: see Cargo.toml.
-use bitflags as _;
-use either as _;
 
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+#[cfg(feature = "files")]
+use upt_cli::export;
+#[cfg(not(feature = "linear"))]
+use upt_cli::left_out;
+#[cfg(feature = "linear")]
+use upt_cli::{check, corrections, make, modes, prior, validate};
+use upt_cli::{dataset, doctor, fit, loads, materials, mesh, rollout, runtime, simulate, view};
 
 /// Names what a build leaves out; `cargo xtask demo` builds without what it does not need.
 const VERSION: &str = match (cfg!(feature = "files"), cfg!(feature = "linear")) {
@@ -78,7 +23,7 @@ const VERSION: &str = match (cfg!(feature = "files"), cfg!(feature = "linear")) 
 
 macro_rules! explained {
     () => {
-        "Each command explains itself: `upt report --help`. Most take --json for machine-readable output."
+        "Each command explains itself: `upt make --help`. Most take --json for machine-readable output."
     };
 }
 
@@ -167,18 +112,6 @@ enum Command {
     Dataset(dataset::Options),
     /// Replay one contact through a bundle, with the paper's metrics.
     Rollout(rollout::Options),
-    /// Compare bundles and plain methods on the same contacts: error against run time.
-    Report(report::Options),
-    /// Find out which rigid tools a bundle is good for, and write them into its manifest.
-    Envelope(envelope::Options),
-    /// Run stiff and extreme cases, and say whether each ended as it should.
-    Stress(stress::Options),
-    /// Run a bundle and the reference solver side by side: error over random steps, warnings, forces, release.
-    Compare(compare::Options),
-    /// Let a simulated hand feel a bundle at 1 kHz: energy, force steps, call times, forces against the reference solver.
-    Haptics(haptics::Options),
-    /// Make many steps on one scene and log the memory.
-    Soak(soak::Options),
     /// Show a bundle in the browser: drag a tool, watch the tissue.
     View(view::Options),
     /// Print shell completions.
@@ -230,12 +163,6 @@ fn main() -> ExitCode {
         Command::Simulate(options) => simulate::run(&options),
         Command::Dataset(options) => dataset::run(&options),
         Command::Rollout(options) => rollout::run(&options),
-        Command::Report(options) => report::run(&options),
-        Command::Envelope(options) => envelope::run(&options),
-        Command::Stress(options) => stress::run(&options),
-        Command::Compare(options) => compare::run(&options),
-        Command::Haptics(options) => haptics::run(&options),
-        Command::Soak(options) => soak::run(&options),
         Command::View(options) => view::run(&options),
         Command::Completions(options) => completions::run::<Arguments>(&options),
         Command::Reference => reference::run::<Arguments>(),

@@ -1,9 +1,10 @@
 //! Progress of long work on a terminal; nothing elsewhere.
 
+use std::borrow::Cow;
+
 use indicatif::{ProgressBar, ProgressStyle};
 
 /// A counter for work of unknown length.
-#[cfg(feature = "linear")]
 pub fn spinner(quiet: bool, message: &'static str) -> ProgressBar {
     if quiet {
         return ProgressBar::hidden();
@@ -16,7 +17,7 @@ pub fn spinner(quiet: bool, message: &'static str) -> ProgressBar {
 }
 
 /// A bar with time left.
-pub fn bar(quiet: bool, length: u64, message: &'static str) -> ProgressBar {
+pub fn bar(quiet: bool, length: u64, message: impl Into<Cow<'static, str>>) -> ProgressBar {
     if quiet {
         return ProgressBar::hidden();
     }
@@ -25,4 +26,9 @@ pub fn bar(quiet: bool, length: u64, message: &'static str) -> ProgressBar {
         bar.set_style(style);
     }
     bar
+}
+
+/// A bar over so many cases.
+pub fn cases(count: usize, label: &str) -> ProgressBar {
+    bar(false, count as u64, label.to_owned())
 }

@@ -9,12 +9,12 @@ use serde_json::json;
 use tissue::mesh::Mesh;
 use tissue::trajectory::Trajectory;
 
+use crate::bundle_folder::BundleFolder;
 use crate::effort::Effort;
-use crate::render::Palette;
-use crate::report::errors::{CaseErrors, step_errors};
-use crate::report::method::{BundleFolder, Method, Stepper};
-use crate::report::pictures;
-use crate::report::setting::{Precision, Provider, Region};
+use crate::errors::{CaseErrors, step_errors};
+use crate::render::{Image, Palette, contact_camera, deformed, lengths};
+use crate::setting::{Precision, Provider, Region};
+use crate::surrogate::{self, Surrogate};
 
 #[derive(Args)]
 #[command(after_help = "Examples:
@@ -73,24 +73,23 @@ pub fn run(options: &Options) -> Result<ExitCode> {
         (Some(count), _) => count,
         (None, recommended) => recommended.unwrap_or(Effort::NONE),
     };
-    let method = Method::Surrogate {
-        bundle,
-        provider: options.provider,
-        precision: options.precision,
-        region: Region::All,
-        threads: options.threads,
+    let settings = surrogate::settings(
+        options.threads,
+        options.provider,
+        options.precision,
         corrections,
-    };
-    let mut stepper = Stepper::new(&method, &mesh, &trajectory.header)?;
+        trajectory.header.material.damping_per_s,
+    );
+    let mut surrogate = Surrogate::new(&bundle, &settings, Region::All)?;
     let mut field = vec![[0.0f32; 3]; mesh.node_count()];
     let (mut steps, mut times, mut frames) = (Vec::new(), Vec::new(), Vec::new());
     let (mut estimates, mut forces) = (Vec::new(), Vec::new());
     for frame in 1..trajectory.frame_count() {
         let (nodes, vectors) = trajectory.contact(frame);
-        times.push(stepper.step(nodes, vectors, &mut field)?);
-        estimates.push(stepper.estimated_mm()?);
-        let force = stepper.contact_force(nodes.len())?;
-        forces.push(force.filter(|_| !nodes.is_empty()).map(|force| Forces {
+        times.push(surrogate.step(nodes, vectors, &mut field)?);
+        estimates.push(surrogate.estimated_mm()?);
+        let force = surrogate.contact_force(nodes.len())?;
+        forces.push((!nodes.is_empty()).then(|| Forces {
             found: total(&force),
             wanted: total(trajectory.reaction(frame)),
         }));
@@ -179,16 +178,15 @@ fn write_png(
     trajectory: &Trajectory,
     frames: &[Vec<[f32; 3]>],
 ) -> Result<()> {
-    use crate::render::{Image, Surface, draw};
     let largest = |values: &[f32]| values.iter().copied().fold(0.0f32, f32::max);
     let deepest = (1..trajectory.frame_count())
         .max_by(|a, b| {
-            largest(&pictures::lengths(trajectory.frame(*a)))
-                .total_cmp(&largest(&pictures::lengths(trajectory.frame(*b))))
+            largest(&lengths(trajectory.frame(*a)))
+                .total_cmp(&largest(&lengths(trajectory.frame(*b))))
         })
         .unwrap_or(1);
     let (width, height) = (760, 560);
-    let camera = pictures::camera(mesh, trajectory.header.site, width, height);
+    let camera = contact_camera(&mesh.positions, trajectory.header.site, width, height);
     let truth = trajectory.frame(deepest);
     let predicted = &frames[deepest - 1];
     let error: Vec<[f32; 3]> = truth
@@ -196,18 +194,13 @@ fn write_png(
         .zip(predicted)
         .map(|(a, b)| [0, 1, 2].map(|k| a[k] - b[k]))
         .collect();
-    let scale = (0.75 * largest(&pictures::lengths(truth))).max(0.5);
-    let error_lengths = pictures::lengths(&error);
+    let scale = (0.75 * largest(&lengths(truth))).max(0.5);
+    let error_lengths = lengths(&error);
     let panels = [
-        (
-            truth,
-            pictures::lengths(truth),
-            Palette::Displacement,
-            scale,
-        ),
+        (truth, lengths(truth), Palette::Displacement, scale),
         (
             predicted.as_slice(),
-            pictures::lengths(predicted),
+            lengths(predicted),
             Palette::Displacement,
             scale,
         ),
@@ -220,20 +213,8 @@ fn write_png(
     ];
     let mut image = Image::filled(3 * width, height, [255, 255, 255, 255]);
     for (index, (field, values, palette, full_scale)) in panels.into_iter().enumerate() {
-        let positions: Vec<[f32; 3]> = mesh
-            .positions
-            .iter()
-            .zip(field)
-            .map(|(p, u)| [0, 1, 2].map(|k| p[k] + u[k]))
-            .collect();
-        let surface = Surface {
-            positions: &positions,
-            faces: &mesh.surface,
-            values: &values,
-            palette,
-            full_scale,
-        };
-        image.blend(&draw(&surface, &camera), index * width, 0);
+        let panel = deformed(mesh, field, &values, palette, full_scale, &camera);
+        image.blend(&panel, index * width, 0);
     }
     std::fs::write(path, image.png()?)?;
     eprintln!(

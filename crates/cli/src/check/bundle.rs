@@ -68,7 +68,7 @@ impl Bundle {
         let model = Model::open(folder, &options)?;
         if model.prior.is_none() {
             bail!(
-                "{}: has no linear response to compare with; use `upt report`",
+                "{}: has no linear response to compare with; use `cargo xtask study report`",
                 folder.display()
             );
         }

@@ -11,11 +11,11 @@ use tissue::solver::SolverOptions;
 
 use super::certificate::short;
 use super::{Bundle, Plan};
+use crate::bundle_folder::BundleFolder;
 use crate::parallel::{in_parallel, workers};
 use crate::progress;
-use crate::report::method::BundleFolder;
-use crate::tools::cases::{ToolCase, ToolCases};
-use crate::tools::{CaseFigures, solved};
+use crate::yardstick::cases::{ToolCase, ToolCases};
+use crate::yardstick::{CaseFigures, solved};
 
 /// Cases of a programme.
 const CASES: usize = 2;

@@ -8,8 +8,8 @@ use tissue::trajectory::Trajectory;
 
 use super::beyond::Beyond;
 use super::workbench::Workbench;
+use crate::dataset::finished;
 use crate::progress;
-use crate::report::cases::finished;
 
 /// So many states are kept at most, evenly over all trajectories: their Gram matrix is dense.
 const MOST_STATES: usize = 900;

@@ -3,7 +3,7 @@
 use elements::Ogden;
 
 use super::curve::{Curve, Mode, nominal_stress};
-use crate::report::plot::{Axes, Scale, colour};
+use crate::plot::{Axes, Scale, colour};
 
 /// Points of a drawn curve.
 const STEPS: usize = 120;

@@ -5,8 +5,10 @@
 
 mod camera;
 mod colour;
+mod contact;
 mod raster;
 
 pub use camera::Camera;
 pub use colour::Palette;
+pub use contact::{contact_camera, deformed, lengths};
 pub use raster::{Image, Surface, draw};

@@ -16,7 +16,7 @@ use std::process::ExitCode;
 use anyhow::{Context, Result};
 use clap::Args;
 
-use crate::stress::replace_between;
+use crate::marks::replace_between;
 use section::Section;
 
 #[derive(Args)]

@@ -1,0 +1,308 @@
+//! `upt-study report --load`: gravity that turns, a pulse, a lost pressure, a support that breathes, through the library and the reference solver, with a tool and without.
+//!
+//! Both get the same loads, step by step from their own last state. A moving support is compared in its own frame, in which the library has all. The solver runs here: a case of loads is seconds of tissue.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::time::Instant;
+
+use anyhow::{Context, Result, bail};
+use contact::{Body, Pose, Vector, pose};
+use serde::Serialize;
+use tissue::load_programmes::{LoadProgramme, LoadSizes};
+use tissue::mesh::{Boundary, Mesh};
+use tissue::programmes::ToolProgramme;
+use tissue::simulate::{ToolOrder, simulate_loads, simulate_tools};
+use tissue::solver::{SolverOptions, SupportMotion};
+use tissue::trajectory::Trajectory;
+use upt::{
+    Contact, Corrections, Loads, Model, ModelOptions, Pressure, Scene, SceneOptions, StepInput,
+    SupportPose, Tool,
+};
+
+use crate::quantile::median;
+use upt_cli::bundle_folder::BundleFolder;
+use upt_cli::effort::Effort;
+use upt_cli::marks::replace_between;
+use upt_cli::tool_scale;
+
+/// What is measured.
+pub struct Plan<'a> {
+    pub programmes: &'a [LoadProgramme],
+    pub sizes: LoadSizes,
+    /// A tool that touches the body meanwhile, with this seed.
+    pub tool: Option<ToolProgramme>,
+    pub seed: u64,
+    pub bundles: &'a [PathBuf],
+    /// Corrections a step; none: as many as a bundle recommends.
+    pub corrections: &'a [Effort],
+    pub threads: u32,
+    pub markdown: &'a [PathBuf],
+    pub json: bool,
+}
+
+/// A programme by a bundle.
+#[derive(Serialize)]
+struct Row {
+    bundle: String,
+    load: &'static str,
+    tool: &'static str,
+    corrections: String,
+    /// How far the solver's tissue goes in the support's frame, mm.
+    farthest_mm: f64,
+    /// Over the frames, mm².
+    mse: f64,
+    worst_mse: f64,
+    /// What forces on the tools are off by, over what they are; none without a tool.
+    force_error: Option<f64>,
+    smallest_det: f64,
+    /// Median, ms.
+    step_ms: f64,
+}
+
+/// Measures and prints the table.
+pub fn report(plan: &Plan<'_>) -> Result<ExitCode> {
+    if plan.bundles.is_empty() {
+        bail!("name the bundles to measure with --bundle");
+    }
+    let mut rows = Vec::new();
+    for path in plan.bundles {
+        let bundle = BundleFolder::read(path)?;
+        let mesh = Mesh::read(&bundle.mesh_file)?;
+        let boundary: Boundary = bundle.boundary.parse().map_err(anyhow::Error::msg)?;
+        let options = ModelOptions::default();
+        let model = Model::open(path, &options).with_context(|| path.display().to_string())?;
+        for programme in plan.programmes {
+            eprintln!("{}: {}", bundle.name, programme.name());
+            let truth = truth(plan, *programme, &mesh, boundary, &model)?;
+            let recommended = bundle.corrections.unwrap_or(Effort::NONE);
+            let efforts = match plan.corrections {
+                [] => &[recommended],
+                efforts => efforts,
+            };
+            for effort in efforts {
+                rows.push(measure(
+                    plan,
+                    (*programme, *effort),
+                    &bundle,
+                    &model,
+                    &truth,
+                )?);
+            }
+        }
+    }
+    if plan.json {
+        println!("{}", serde_json::to_string_pretty(&rows)?);
+    } else {
+        print!("{}", table(&rows));
+    }
+    for page in plan.markdown {
+        replace_between(page, "study report --load", &format!("\n{}", table(&rows)))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The reference solver's answer, with the bundle's material.
+fn truth(
+    plan: &Plan<'_>,
+    programme: LoadProgramme,
+    mesh: &Mesh,
+    boundary: Boundary,
+    model: &Model,
+) -> Result<Trajectory> {
+    let options = SolverOptions {
+        material: model.manifest.material,
+        threads: plan.threads as usize,
+        ..SolverOptions::default()
+    };
+    let load = (programme, plan.sizes);
+    let case = match plan.tool {
+        None => simulate_loads(mesh, boundary, load, &options, |_, _| {}),
+        Some(tool) => {
+            let order = ToolOrder {
+                load: Some(load),
+                scale: tool_scale::Chosen::of(tool_scale::Arguments::default(), mesh, None).scale,
+                ..ToolOrder::new(tool, plan.seed)
+            };
+            simulate_tools(mesh, boundary, order, &options, |_, _| {})
+        }
+    };
+    Ok(case?)
+}
+
+fn measure(
+    plan: &Plan<'_>,
+    (programme, effort): (LoadProgramme, Effort),
+    bundle: &BundleFolder,
+    model: &Arc<Model>,
+    truth: &Trajectory,
+) -> Result<Row> {
+    let options = SceneOptions {
+        threads: plan.threads as usize,
+        corrections: match (effort.most, effort.target_mm) {
+            (0, _) => bail!("loads act in corrections; give --corrections at least 1"),
+            (most, 0.0) => Corrections::Fixed(most),
+            (most, target_mm) => Corrections::Auto {
+                most,
+                target_mm,
+                budget_us: 0,
+            },
+        },
+        substeps: effort.substeps,
+        ..SceneOptions::default()
+    };
+    let scene = Scene::new(Arc::clone(model), &options)?;
+    let (nodes, mut u) = (scene.node_count(), vec![0.0; 3 * scene.node_count()]);
+    let mut tools = tools(truth)?;
+    let (mut errors, mut times) = (Vec::new(), Vec::new());
+    let (mut off, mut felt, mut smallest_det, mut farthest) = (0.0, 0.0, 1.0f64, 0.0f64);
+    if let Some(start) = programme.support_at(0.0) {
+        // From here on the scene knows how fast it goes.
+        let loads = Loads {
+            support: Some(support_pose(start)),
+            ..Loads::default()
+        };
+        let input = StepInput {
+            loads,
+            ..StepInput::default()
+        };
+        scene.step(input, None)?;
+    }
+    for step in 1..truth.frame_count() {
+        let time_s = step as f64 * truth.header.dt_s;
+        let (gravity, pascal) = programme.at(plan.sizes, time_s);
+        let support = programme.support_at(time_s).map(support_pose);
+        let frame = (support.as_ref())
+            .map(|support| pose::checked(support.position, support.rotation))
+            .transpose()?;
+        if let Some(tracks) = &truth.tools {
+            for (tool, at) in tools.iter_mut().zip(tracks.frame(step)) {
+                tool.pose = frame.map_or(at.pose, |frame| frame.inverse() * at.pose);
+            }
+        }
+        let pressures = [Pressure {
+            nodes: &[],
+            pascal: pascal as f32,
+        }];
+        let input = StepInput {
+            contact: match tools.is_empty() {
+                true => Contact::None,
+                false => Contact::Tools(&tools),
+            },
+            loads: Loads {
+                gravity: gravity.map(|g| g as f32),
+                pressures: &pressures,
+                support,
+                ..Loads::default()
+            },
+            ..StepInput::default()
+        };
+        let start = Instant::now();
+        scene.step(input, Some(&mut u))?;
+        times.push(1e3 * start.elapsed().as_secs_f64());
+        let mut squares = 0.0;
+        let rows = model.positions().as_chunks::<3>().0.iter();
+        for ((rest, u), wanted) in rows.zip(u.as_chunks::<3>().0).zip(truth.frame(step)) {
+            let wanted = in_frame(frame.as_ref(), *rest, *wanted);
+            let pairs = u.iter().zip(wanted);
+            squares += pairs.map(|(a, b)| f64::from(a - b).powi(2)).sum::<f64>();
+            let square: f32 = wanted.iter().map(|v| v * v).sum();
+            farthest = farthest.max(f64::from(square));
+        }
+        errors.push(squares / nodes as f64);
+        let det = f64::from(scene.stats().min_det);
+        // 0 where nothing was corrected.
+        if det != 0.0 {
+            smallest_det = smallest_det.min(det);
+        }
+        if let Some(tracks) = &truth.tools {
+            let readings = scene.with_contact_report(|report| {
+                let forces = report.readings.iter().map(|reading| reading.force);
+                forces.collect::<Vec<_>>()
+            });
+            let wrenches = &tracks.wrenches[step * tools.len()..];
+            for (force, wanted) in readings.iter().zip(wrenches) {
+                let size = |v: [f32; 3]| v.iter().map(|x| f64::from(x * x)).sum::<f64>().sqrt();
+                let wanted = [wanted[0], wanted[1], wanted[2]];
+                let turned = |frame: &Pose| frame.rotation.inverse() * Vector::from(wanted);
+                let wanted = frame
+                    .as_ref()
+                    .map_or(wanted, |frame| turned(frame).to_array());
+                felt += size(wanted);
+                off += size(std::array::from_fn(|k| force[k] - wanted[k]));
+            }
+        }
+    }
+    Ok(Row {
+        bundle: bundle.name.clone(),
+        load: programme.name(),
+        tool: plan.tool.map_or("none", |tool| tool.name()),
+        corrections: effort.to_string(),
+        farthest_mm: farthest.sqrt(),
+        mse: median(errors.iter().copied()),
+        worst_mse: errors.iter().copied().fold(0.0, f64::max),
+        force_error: (felt > 0.0).then(|| off / felt),
+        smallest_det,
+        step_ms: median(times),
+    })
+}
+
+/// The pose of a support from its rotation vector.
+fn support_pose(motion: SupportMotion) -> SupportPose {
+    let angle = motion.turn.iter().map(|v| v * v).sum::<f64>().sqrt();
+    let (sine, cosine) = (0.5 * angle).sin_cos();
+    let part = if angle > 0.0 { sine / angle } else { 0.5 };
+    let [x, y, z] = motion.turn.map(|v| (part * v) as f32);
+    SupportPose {
+        position: motion.position.map(|v| v as f32),
+        rotation: [x, y, z, cosine as f32],
+    }
+}
+
+/// A displacement of the world in the support's frame.
+fn in_frame(frame: Option<&Pose>, rest: [f32; 3], u: [f32; 3]) -> [f32; 3] {
+    let Some(frame) = frame else {
+        return u;
+    };
+    let (rest, u) = (Vector::from(rest), Vector::from(u));
+    (frame.rotation.inverse() * (rest + u - frame.translation) - rest).to_array()
+}
+
+fn tools(truth: &Trajectory) -> Result<Vec<Tool>> {
+    let Some(tracks) = &truth.tools else {
+        return Ok(Vec::new());
+    };
+    let poses = tracks.frame(0);
+    let made = tracks.tools.iter().zip(poses).map(|(tool, at)| {
+        let body = Body::new(&tool.shape)?;
+        let position = at.pose.translation.to_array();
+        let mut made = Tool::of_body(body, position, at.pose.rotation.to_array())?;
+        made.friction = tool.friction;
+        anyhow::Ok(made)
+    });
+    made.collect()
+}
+
+fn table(rows: &[Row]) -> String {
+    let mut text = String::from(
+        "| bundle | load | tool | k | farthest, mm | MSE, mm² (median) | worst | force error | smallest det F | ms a step |\n|---|---|---|---:|---:|---:|---:|---:|---:|---:|\n",
+    );
+    for row in rows {
+        let force = row.force_error;
+        let force = force.map_or("-".into(), |error| format!("{:.1} %", 100.0 * error));
+        text += &format!(
+            "| `{}` | {} | {} | {} | {:.2} | {:.2e} | {:.2e} | {force} | {:.2} | {:.1} |\n",
+            row.bundle,
+            row.load,
+            row.tool,
+            row.corrections,
+            row.farthest_mm,
+            row.mse,
+            row.worst_mse,
+            row.smallest_det,
+            row.step_ms,
+        );
+    }
+    text
+}

@@ -1,0 +1,277 @@
+//! The error of steps by their length (`upt-study report --step-ms`): the same tools, a scene that steps every 10 to 50 ms, and the reference
+//! solver's state at the end of each step.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::{Context, Result, bail};
+use serde::Serialize;
+use serde_json::json;
+use tissue::mesh::{Boundary, Mesh};
+use tissue::metrics;
+use tissue::schemes::FRAME_S;
+
+use super::truth::{Truth, places};
+use crate::quantile::median;
+use crate::tools::bundles::fitting;
+use upt_cli::counted::counted;
+use upt_cli::effort::Effort;
+use upt_cli::host::{Model, ModelSettings};
+use upt_cli::machine::Machine;
+use upt_cli::marks::replace_between;
+use upt_cli::plot::label;
+use upt_cli::progress;
+use upt_cli::yardstick::cases::{Split, ToolCase, ToolCases};
+use upt_cli::yardstick::drive::{Drive, Driver};
+use upt_cli::yardstick::yard::Yard;
+
+/// The truth's forces are taken as their mean over this time about a moment, s: impulses of contact are noisy.
+const FORCE_S: f64 = 0.025;
+
+/// What is measured.
+pub struct Plan<'a> {
+    pub step_ms: &'a [f64],
+    /// Dataset folders and trajectories with frames shorter than a step.
+    pub paths: &'a [PathBuf],
+    pub split: Split,
+    pub per_programme: usize,
+    pub bundles: &'a [PathBuf],
+    /// Corrections a step; none: as many as a bundle recommends.
+    pub corrections: &'a [Effort],
+    pub threads: u32,
+    pub markdown: &'a [PathBuf],
+    pub json: bool,
+}
+
+/// One length of step with one number of corrections, over all cases.
+#[derive(Debug, Serialize)]
+struct Row {
+    bundle: String,
+    #[serde(flatten)]
+    corrections: Effort,
+    step_ms: f64,
+    /// Medians over the cases of the mean over steps in which the truth touches, and in which it does not.
+    contact_mse_mm2: f64,
+    free_mse_mm2: f64,
+    worst_case_mm2: f64,
+    /// Relative L2 over all moments and tools.
+    force_error: f64,
+    penetration_mm: f64,
+    /// Median time of a step in contact, and of one without.
+    contact_ms: f64,
+    free_ms: f64,
+}
+
+/// A case's sums.
+#[derive(Default)]
+struct Sums {
+    /// Error and moments: in contact, and free.
+    error: [(f64, usize); 2],
+    /// Of squared force differences and forces.
+    force: [f64; 2],
+    penetration_mm: f64,
+    ms: [Vec<f64>; 2],
+}
+
+impl Sums {
+    fn mean(&self, free: usize) -> Option<f64> {
+        let (sum, count) = self.error[free];
+        (count > 0).then(|| sum / count as f64)
+    }
+
+    fn all(&self) -> f64 {
+        let [a, b] = self.error;
+        (a.0 + b.0) / (a.1 + b.1).max(1) as f64
+    }
+}
+
+/// Measures, and writes the table.
+pub fn report(plan: &Plan) -> Result<ExitCode> {
+    let cases = ToolCases::read(plan.paths, plan.split, plan.per_programme)?;
+    let mut notes = Vec::new();
+    let bundles = fitting(plan.bundles, &cases, &mut notes)?;
+    let boundary: Boundary = cases.boundary.parse().map_err(anyhow::Error::msg)?;
+    let mesh = Mesh::read(&bundles[0].mesh_file)?;
+    cases.check(&mesh)?;
+    let truths: Vec<Truth> = cases.list.iter().map(Truth::of).collect::<Result<_>>()?;
+    let mut yard = Yard::new(&mesh, boundary);
+    let header = &cases.list[0].trajectory.header;
+    let (machine, date) = (Machine::this(), crate::date::date());
+    let mut all = Vec::new();
+    for bundle in &bundles {
+        let Some(recommended) = bundle.corrections else {
+            let name = &bundle.name;
+            notes.push(format!("{name}: has no corrections, so it has only one length of step; add them with `upt corrections`"));
+            continue;
+        };
+        let counts = match plan.corrections {
+            [] => &[recommended],
+            given => given,
+        };
+        let mut rows = Vec::new();
+        for &count in counts {
+            for &step_ms in plan.step_ms {
+                let settings = ModelSettings {
+                    threads: plan.threads,
+                    corrections: Some(count),
+                    step_s: 1e-3 * step_ms,
+                    ..ModelSettings::default()
+                };
+                let model = Model::open(&bundle.path, &settings)?;
+                let mut driver = Driver::new(&model, Drive::Solved)?;
+                let bar =
+                    progress::cases(cases.list.len(), &format!("{}, {step_ms} ms", bundle.name));
+                let mut sums = Vec::new();
+                for (case, truth) in cases.list.iter().zip(&truths) {
+                    let own = replay(case, truth, 1e-3 * step_ms, &mut driver, &mut yard);
+                    sums.push(own.with_context(|| case.name.clone())?);
+                    bar.inc(1);
+                }
+                bar.finish_and_clear();
+                rows.push(row(&bundle.name, count, step_ms, &sums));
+            }
+        }
+        let text = format!(
+            "\n`{}`, {} of rigid tools on {} ({} nodes), {}. {} ({}), {date}.\n\n{}\n",
+            bundle.name,
+            counted(cases.list.len(), "case"),
+            header.mesh_name,
+            mesh.node_count(),
+            counted(plan.threads as usize, "thread"),
+            machine.cpu,
+            counted(machine.cores, "core"),
+            table(&rows)
+        );
+        for path in plan.markdown {
+            replace_between(
+                path,
+                &format!("study report --step-ms {}", bundle.name),
+                &text,
+            )?;
+        }
+        if !plan.json {
+            println!("{text}");
+        }
+        all.extend(rows);
+    }
+    if all.is_empty() {
+        bail!("nothing could be measured: {}", notes.join("; "));
+    }
+    if plan.json {
+        let report = json!({"machine": machine, "date": date, "rows": all, "left_out": notes});
+        println!("{}", serde_json::to_string_pretty(&report)?);
+    }
+    for note in notes.iter().filter(|_| !plan.json) {
+        println!("left out: {note}");
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// A case from rest to its end.
+fn replay(
+    case: &ToolCase,
+    truth: &Truth,
+    step_s: f64,
+    driver: &mut Driver,
+    yard: &mut Yard,
+) -> Result<Sums> {
+    driver.reset()?;
+    driver.take(&case.tools)?;
+    let nodes = case.trajectory.frame(0).len();
+    let (mut state, mut true_field) = (vec![[0.0f32; 3]; nodes], vec![[0.0f32; 3]; nodes]);
+    let mut sums = Sums::default();
+    for step in 1.. {
+        let at = step as f64 * step_s;
+        if at > truth.seconds() + 1e-9 {
+            break;
+        }
+        let poses = truth.poses(case, at);
+        let made = driver.step(&poses, &mut state)?;
+        if truth.slips(at) {
+            continue;
+        }
+        truth.field(case, at, &mut true_field);
+        let touches = case.touches(frame(truth, at).min(case.poses.len() - 1));
+        let free = usize::from(!touches);
+        sums.error[free].0 += metrics::mse_mm2(&true_field, &state);
+        sums.error[free].1 += 1;
+        sums.ms[free].push(made.ms);
+        let inside = yard.penetration(&state, &case.bodies, &places(&poses));
+        sums.penetration_mm = sums.penetration_mm.max(inside);
+        for (tool, felt) in made.felt.iter().enumerate() {
+            let force = true_force(case, truth, at, tool);
+            for (own, force) in felt.force.iter().zip(force) {
+                sums.force[0] += (own - force).powi(2);
+                sums.force[1] += force.powi(2);
+            }
+        }
+    }
+    Ok(sums)
+}
+
+/// The recorded frame at a moment.
+fn frame(truth: &Truth, seconds: f64) -> usize {
+    (seconds / FRAME_S * truth.parts as f64).round() as usize
+}
+
+/// Mean force on a tool about a moment, mN.
+fn true_force(case: &ToolCase, truth: &Truth, seconds: f64, tool: usize) -> [f64; 3] {
+    let tracks = case.tracks();
+    let half = (0.5 * FORCE_S / FRAME_S * truth.parts as f64).round() as usize;
+    let middle = frame(truth, seconds);
+    let last = (middle + half).min(case.poses.len() - 1);
+    let frames = middle.saturating_sub(half).max(1)..=last;
+    let count = frames.clone().count().max(1) as f64;
+    let mut mean = [0.0; 3];
+    for frame in frames {
+        let wrench = &tracks.wrenches[frame * case.tools.len() + tool];
+        for (sum, force) in mean.iter_mut().zip(wrench) {
+            *sum += f64::from(*force) / count;
+        }
+    }
+    mean
+}
+
+fn row(bundle: &str, corrections: Effort, step_ms: f64, sums: &[Sums]) -> Row {
+    let force = |at: usize| sums.iter().map(|own| own.force[at]).sum::<f64>();
+    let ms = |free: usize| median(sums.iter().flat_map(|own| own.ms[free].iter().copied()));
+    let mse = |free: usize| median(sums.iter().filter_map(|own| own.mean(free)));
+    Row {
+        bundle: bundle.into(),
+        corrections,
+        step_ms,
+        contact_mse_mm2: mse(0),
+        free_mse_mm2: mse(1),
+        worst_case_mm2: sums.iter().map(Sums::all).fold(0.0, f64::max),
+        force_error: (force(0) / force(1).max(f64::MIN_POSITIVE)).sqrt(),
+        penetration_mm: sums
+            .iter()
+            .map(|own| own.penetration_mm)
+            .fold(0.0, f64::max),
+        contact_ms: ms(0),
+        free_ms: ms(1),
+    }
+}
+
+fn table(rows: &[Row]) -> String {
+    let mut out = String::from(
+        "| k | step, ms | MSE in contact, mm² | MSE without, mm² | worst case, mm² | force error | deepest in a tool, mm | ms a step in contact | ms a step without | of real time, in contact |\n",
+    );
+    out += "|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n";
+    for row in rows {
+        out += &format!(
+            "| {} | {} | {} | {} | {} | {:.1} % | {} | {} | {} | {:.0} % |\n",
+            row.corrections,
+            row.step_ms,
+            label(row.contact_mse_mm2),
+            label(row.free_mse_mm2),
+            label(row.worst_case_mm2),
+            1e2 * row.force_error,
+            label(row.penetration_mm),
+            label(row.contact_ms),
+            label(row.free_ms),
+            1e2 * row.contact_ms / row.step_ms,
+        );
+    }
+    out
+}

@@ -1,0 +1,120 @@
+//! `upt-study stress`: a fixed suite of stiff and extreme cases for the reference solver and for bundles, as a table: what was
+//! done, what happened, and whether that is what must happen. Exit code 1 when a verdict is bad.
+
+mod half;
+mod inputs;
+mod outside;
+mod reference;
+mod row;
+mod storm;
+mod surrogate;
+mod tools;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::{Context, Result};
+
+pub use row::{Row, Verdict};
+use upt_cli::counted::counted;
+
+#[derive(clap::Args)]
+#[command(
+    after_help = "Examples:\n  upt-study stress --quick\n  upt-study stress --bundle onnx/brain-reduced --bundle onnx/brain-fast --markdown docs/results/stability.md\n  upt-study stress --no-reference --sudden --bundle onnx/brain-reduced"
+)]
+pub struct Options {
+    /// Bundle folders to stress. Default: only the reference solver.
+    #[arg(long = "bundle")]
+    bundles: Vec<PathBuf>,
+    /// Mesh of the reference cases. Default: an ellipsoid phantom.
+    #[arg(long)]
+    mesh: Option<PathBuf>,
+    /// Leave out the reference solver.
+    #[arg(long)]
+    no_reference: bool,
+    /// Of bundles only the rows of quick, thin, pointed and deep tools.
+    #[arg(long)]
+    sudden: bool,
+    /// Make a twentieth of the steps, for tests.
+    #[arg(long)]
+    quick: bool,
+    /// Rows as JSON.
+    #[arg(long)]
+    json: Option<PathBuf>,
+    /// The tables as a page; text outside its markers is kept.
+    #[arg(long)]
+    markdown: Option<PathBuf>,
+}
+
+pub fn run(options: &Options) -> Result<ExitCode> {
+    let mut rows = Vec::new();
+    if !options.no_reference {
+        rows.extend(reference::rows(options.mesh.as_deref(), options.quick)?);
+    }
+    for bundle in &options.bundles {
+        let found = match options.sudden {
+            true => surrogate::sudden_rows(bundle, options.quick),
+            false => surrogate::rows(bundle, options.quick),
+        };
+        rows.extend(found.with_context(|| format!("{}", bundle.display()))?);
+    }
+    print!("{}", table(&rows));
+    if let Some(path) = &options.json {
+        std::fs::write(path, serde_json::to_string_pretty(&rows)?)
+            .with_context(|| format!("{}", path.display()))?;
+    }
+    if let Some(path) = &options.markdown {
+        write_page(path, &rows)?;
+    }
+    let bad = rows.iter().filter(|r| r.verdict == Verdict::Bad).count();
+    let left = rows.iter().filter(|r| r.verdict == Verdict::Left).count();
+    println!(
+        "{}: {} as it should be, {bad} not, {left} left out",
+        counted(rows.len(), "case"),
+        rows.len() - bad - left
+    );
+    Ok(ExitCode::from(u8::from(bad > 0)))
+}
+
+fn word(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Good => "good",
+        Verdict::Bad => "BAD",
+        Verdict::Left => "left out",
+    }
+}
+
+fn table(rows: &[Row]) -> String {
+    let wide = |f: fn(&Row) -> usize| rows.iter().map(f).max().unwrap_or(0);
+    let (a, b) = (wide(|r| r.subject.len()), wide(|r| r.case.len()));
+    rows.iter()
+        .map(|r| {
+            format!(
+                "{:a$}  {:b$}  {:8}  {}\n",
+                r.subject,
+                r.case,
+                word(r.verdict),
+                r.happened
+            )
+        })
+        .collect()
+}
+
+fn write_page(path: &std::path::Path, rows: &[Row]) -> Result<()> {
+    let mut text = String::new();
+    let mut subject = "";
+    for row in rows {
+        if row.subject != subject {
+            subject = &row.subject;
+            text +=
+                &format!("\n### {subject}\n\n| case | what happened | verdict |\n|---|---|---|\n");
+        }
+        text += &format!(
+            "| {} | {} | {} |\n",
+            row.case,
+            row.happened.replace('|', "\\|"),
+            word(row.verdict)
+        );
+    }
+    upt_cli::marks::replace_between(path, "study stress", &text)
+}

@@ -1,0 +1,194 @@
+//! What `upt-study report --tools` writes: tools.json, tools.html and the tables of documents.
+
+use std::path::Path;
+
+use anyhow::{Context, Result};
+use serde_json::json;
+use tissue::mesh::Mesh;
+
+use super::row::{ALL, Row};
+use super::{Measured, Plan, force, page, section, table};
+use upt_cli::counted::counted;
+use upt_cli::machine::Machine;
+use upt_cli::marks::replace_between;
+use upt_cli::plot::colour;
+use upt_cli::yardstick::cases::ToolCases;
+use upt_cli::yardstick::drive::Drive;
+use upt_cli::yardstick::measure::{Outcome, Truth};
+
+/// The first case of each programme, with every method in it.
+fn pictures(
+    cases: &ToolCases,
+    mesh: &Mesh,
+    truths: &[Truth],
+    all: &[Measured],
+) -> Vec<page::Pictured> {
+    let mut seen: Vec<&str> = Vec::new();
+    let mut pictured = Vec::new();
+    for (index, case) in cases.list.iter().enumerate() {
+        if seen.contains(&case.programme.as_str()) {
+            continue;
+        }
+        seen.push(&case.programme);
+        let frame = case.moment();
+        let time = frame as f64 * case.trajectory.header.dt_s;
+        let each = all.iter().enumerate().map(|(at, one)| {
+            let outcome = &one.outcomes[index];
+            let mse = outcome.moments[frame - 1].mse_mm2;
+            let name = format!("{}: MSE {} mm²", one.name, upt_cli::plot::label(mse));
+            section::picture(mesh, case, frame, &outcome.pictured, &name, colour(at))
+        });
+        let lines: Vec<(&Outcome, &str)> = all
+            .iter()
+            .enumerate()
+            .map(|(at, one)| (&one.outcomes[index], colour(at)))
+            .collect();
+        pictured.push(page::Pictured {
+            title: format!("{}: {time:.2} s", case.name),
+            sections: each.collect(),
+            forces: force::plots(case, &truths[index], &lines),
+        });
+    }
+    pictured
+}
+
+/// What a report is written from.
+pub(super) struct Made {
+    pub cases: ToolCases,
+    pub mesh: Mesh,
+    pub viewer: Option<String>,
+    pub truths: Vec<Truth>,
+    pub all: Vec<Measured>,
+    pub rows: Vec<Row>,
+    pub details: Vec<serde_json::Value>,
+    pub notes: Vec<String>,
+}
+
+/// Writes all of it; returns what tools.json holds.
+pub(super) fn write(plan: &Plan, made: &Made) -> Result<serde_json::Value> {
+    let Made {
+        cases,
+        mesh,
+        viewer,
+        truths,
+        all,
+        rows,
+        details,
+        notes,
+    } = made;
+    std::fs::create_dir_all(&plan.out)
+        .with_context(|| format!("cannot make {}", plan.out.display()))?;
+    let machine = Machine::this();
+    let header = &cases.list[0].trajectory.header;
+    let date = crate::date::date();
+    let report = json!({
+        "machine": machine,
+        "date": date,
+        "threads": plan.threads,
+        "versions": {"upt": env!("CARGO_PKG_VERSION"), "solver": header.solver},
+        "mesh": {"name": header.mesh_name, "sha256": cases.mesh_sha256, "nodes": mesh.node_count(), "boundary": cases.boundary},
+        "rows": rows,
+        "methods": details,
+        "left_out": notes,
+    });
+    std::fs::write(
+        plan.out.join("tools.json"),
+        serde_json::to_string_pretty(&report)? + "\n",
+    )?;
+    let lead = format!(
+        "{} of rigid tools on {} ({} nodes), every method driven by the tools' poses alone.",
+        counted(cases.list.len(), "case"),
+        header.mesh_name,
+        mesh.node_count()
+    );
+    let facts = vec![
+        (
+            "machine".into(),
+            format!("{}, {} cores, {}", machine.cpu, machine.cores, machine.os),
+        ),
+        ("date".into(), date.clone()),
+        ("threads".into(), plan.threads.to_string()),
+        (
+            "versions".into(),
+            format!(
+                "upt {}, reference {}",
+                env!("CARGO_PKG_VERSION"),
+                header.solver
+            ),
+        ),
+        (
+            "cases".into(),
+            cases
+                .list
+                .iter()
+                .map(|case| case.name.as_str())
+                .collect::<Vec<_>>()
+                .join("; "),
+        ),
+    ];
+    let page = page::Page {
+        title: plan.title,
+        lead: lead.clone(),
+        rows,
+        keys: all
+            .iter()
+            .enumerate()
+            .map(|(at, one)| (one.name.clone(), colour(at)))
+            .collect(),
+        pictured: pictures(cases, mesh, truths, all),
+        viewer: viewer.clone(),
+        notes: notes.iter().map(|n| format!("Left out: {n}")).collect(),
+        facts,
+    };
+    std::fs::write(plan.out.join("tools.html"), page::page(&page))?;
+    let made = format!(
+        "{lead} {} ({}, {}), {date}.",
+        machine.cpu,
+        counted(machine.cores, "core"),
+        counted(plan.threads as usize, "thread")
+    );
+    for path in plan.markdown {
+        let cases = match header.boundary.as_str() {
+            "fixed" => header.mesh_name.clone(),
+            other => format!("{} --boundary {other}", header.mesh_name),
+        };
+        document(path, &cases, &made, rows)?;
+    }
+    Ok(report)
+}
+
+/// Writes the tables of a document: all columns between the markers `upt-study report --tools MESH [--boundary NAME]`, or few between those
+/// with `summary` behind.
+fn document(path: &Path, cases: &str, made: &str, rows: &[Row]) -> Result<()> {
+    let name = format!("study report --tools {cases}");
+    let summary = format!("{name} summary");
+    let over_all: Vec<&Row> = rows.iter().filter(|row| row.programme == ALL).collect();
+    let page = std::fs::read_to_string(path).with_context(|| format!("{}", path.display()))?;
+    if page.contains(&format!("begin: {summary} ")) {
+        // The geometric rule once, with the most corrections: their number hardly matters to it.
+        let most = rows
+            .iter()
+            .map(|row| row.corrections.most)
+            .max()
+            .unwrap_or(0);
+        let methods: Vec<&Row> = over_all
+            .into_iter()
+            .filter(|row| !row.bundle.is_empty())
+            .filter(|row| row.drive != Drive::Geometric.name() || row.corrections.most == most)
+            .collect();
+        let text = table::markdown(table::FEW, &methods);
+        return replace_between(path, &summary, &format!("\n{made}\n\n{text}"));
+    }
+    let each: Vec<&Row> = table::by_programme(rows)
+        .into_iter()
+        .filter(|row| {
+            row.bundle.is_empty() || row.corrections.most > 0 && row.drive == Drive::Solved.name()
+        })
+        .collect();
+    let text = format!(
+        "\n{made}\n\n{}\nBy programme, where contact is solved inside the corrections:\n\n{}",
+        table::markdown(table::COLUMNS, &over_all),
+        table::markdown(table::COLUMNS, &each)
+    );
+    replace_between(path, &name, &text)
+}

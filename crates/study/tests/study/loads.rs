@@ -1,0 +1,17 @@
+//! `report --load`: gravity that turns, and pressure.
+
+use crate::json;
+
+/// The library is where the reference solver is.
+#[test]
+fn loads_move_the_library_as_the_solver() {
+    let asked = "--load tilt,pulse --bundle onnx/liver-coarse --gravity 0,-1,0 --pressure 50 --threads 1 --json";
+    let asked: Vec<&str> = asked.split(' ').collect();
+    let rows = json(&[&["report"], &asked[..]].concat());
+    for row in rows.as_array().unwrap() {
+        let number = |name: &str| row[name].as_f64().unwrap();
+        assert!(number("farthest_mm") > 0.2, "{row}");
+        assert!(number("worst_mse") < 1e-3, "{row}");
+    }
+    assert_eq!(rows.as_array().unwrap().len(), 2);
+}
