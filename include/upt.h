@@ -750,11 +750,11 @@ typedef struct upt_pressure {
    */
   float pascal;
   /**
-   * `[node_count]`: it acts on the boundary triangles with all three corners among these nodes.
+   * `[node_count]`: it acts on the boundary triangles with all three corners among these nodes; where the scene has been cut, on what is left of them.
    */
   const uint32_t *nodes;
   /**
-   * At most K; 0: it acts on the domain.
+   * At most K; 0: it acts on the domain, and on all that cuts and removal have laid bare.
    */
   uint64_t node_count;
 } upt_pressure;
@@ -785,7 +785,7 @@ typedef struct upt_input {
    */
   uint64_t instrument_count;
   /**
-   * `[contact_count]` nodes in contact, each at most once, in any order.
+   * `[contact_count]` nodes in contact, each at most once, in any order; of a scene that has been cut also copies.
    */
   const uint32_t *contact_nodes;
   /**
@@ -797,7 +797,8 @@ typedef struct upt_input {
    */
   uint64_t contact_count;
   /**
-   * `[K,3]`, mm, zero except at nodes in contact, where it is their displacement at the end of the step; NULL: no such field.
+   * `[K,3]` of the model's mesh, also where the scene has been cut, mm; zero except at nodes in contact, where it is their displacement at the end of
+   * the step; NULL: no such field.
    */
   const float *collision;
   /**
@@ -809,8 +810,8 @@ typedef struct upt_input {
    */
   double time_s;
   /**
-   * `[K,3]`, mN: forces on the nodes at the end of the step; NULL: none. Loads (this field and those after it) act beside whatever drives the
-   * step, in scenes with corrections; they change on a line over the step, and a frame goes on from those of its step.
+   * `[K,3]`, mN: forces on the nodes of the model's mesh at the end of the step (where the scene has been cut, on the tissue at a node's place);
+   * NULL: none. Loads (this field and those after it) act beside whatever drives the step, in scenes with corrections; they change on a line over the step, and a frame goes on from those of its step.
    */
   const float *forces;
   /**
@@ -1690,8 +1691,8 @@ upt_status upt_hull_destroy(struct upt_hull *hull);
  * next step.
  *
  * The scene has more nodes then (`out->node_count`): those that there were keep their numbers, and outputs have `3 * node_count` floats. The elements make each step from then on,
- * with instruments or without. Steps with instruments or without, frames between them, regions, attached points (each goes with the side
- * on which it lies) and haptics go on. Prescribed nodes, dense fields and loads are `UPT_ERR_UNSUPPORTED` until `upt_scene_reset`, or until a snapshot from before is restored, which is undo.
+ * with instruments, nodes, loads or without. Frames between steps, regions, attached points (each goes with the side on which it lies) and haptics go on. A step that
+ * starts from a displacement, and a support that moves, are `UPT_ERR_UNSUPPORTED` until `upt_scene_reset`, or until a snapshot from before is restored, which is undo.
  *
  * - `stroke`: calls with the same number are one blade that goes on; another number cuts anew.
  * - `points`: `[pose_count, edge_count, 3]`, mm: the edge as a line of points, at each pose.
@@ -1701,7 +1702,7 @@ upt_status upt_hull_destroy(struct upt_hull *hull);
  *
  * Threads: one at a time.
  * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT` for a blade that sweeps no area or more copies than
- * nodes, `UPT_ERR_NON_FINITE`, `UPT_ERR_UNSUPPORTED` for a scene without corrections,
+ * nodes, `UPT_ERR_NON_FINITE`, `UPT_ERR_UNSUPPORTED` for a scene without corrections or one whose support moves,
  * `UPT_ERR_BUNDLE`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`. The scene is then what it was.
  */
 upt_status upt_scene_cut(struct upt_scene *scene,

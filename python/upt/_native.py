@@ -784,20 +784,21 @@ class Input(Record):
     instrument_count: int
     """At most 64."""
     contact_nodes: int | None
-    """`[contact_count]` nodes in contact, each at most once, in any order."""
+    """`[contact_count]` nodes in contact, each at most once, in any order; of a scene that has been cut also copies."""
     contact_vectors: int | None
     """`[contact_count,3]`, mm: the displacement of these nodes at the end of the step."""
     contact_count: int
     """At most K."""
     collision: int | None
-    """`[K,3]`, mm, zero except at nodes in contact, where it is their displacement at the end of the step; NULL: no such field."""
+    """`[K,3]` of the model's mesh, also where the scene has been cut, mm; zero except at nodes in contact, where it is their displacement at the end of
+    the step; NULL: no such field."""
     displacement: int | None
     """`[K,3]`, mm, the displacement that the step starts from; NULL: the scene's own state. Not with `instruments`."""
     time_s: float
     """The moment of the end of the step on the host's clock, s, from which `upt_scene_present` counts; 0 for hosts that keep none."""
     forces: int | None
-    """`[K,3]`, mN: forces on the nodes at the end of the step; NULL: none. Loads (this field and those after it) act beside whatever drives the
-    step, in scenes with corrections; they change on a line over the step, and a frame goes on from those of its step."""
+    """`[K,3]`, mN: forces on the nodes of the model's mesh at the end of the step (where the scene has been cut, on the tissue at a node's place);
+    NULL: none. Loads (this field and those after it) act beside whatever drives the step, in scenes with corrections; they change on a line over the step, and a frame goes on from those of its step."""
     pressures: int | None
     """`[pressure_count]`: pressure on parts of the surface at the end of the step, all with the same `struct_size`."""
     pressure_count: int
@@ -845,9 +846,9 @@ class Pressure(Record):
     pascal: float
     """From outside on the body, Pa, at most 1000000; negative for suction."""
     nodes: int | None
-    """`[node_count]`: it acts on the boundary triangles with all three corners among these nodes."""
+    """`[node_count]`: it acts on the boundary triangles with all three corners among these nodes; where the scene has been cut, on what is left of them."""
     node_count: int
-    """At most K; 0: it acts on the domain."""
+    """At most K; 0: it acts on the domain, and on all that cuts and removal have laid bare."""
 
     _fields_ = [
         ("struct_size", ctypes.c_uint32),

@@ -20,7 +20,7 @@ use super::{Body, Corrections};
 use crate::bundle::Mesh;
 use crate::error::Result;
 use crate::memory;
-use crate::prior::{Lost, PriorTable};
+use crate::prior::{Lost, LostElements, PriorTable};
 
 /// A factor of volume or stiffness that has changed by less has not.
 const SAME: f64 = 1e-9;
@@ -38,13 +38,7 @@ impl Corrections {
         material: &Material,
         (before, prior): (&PriorTable, &PriorTable),
     ) -> Result<Corrections> {
-        let mut list = Vec::new();
-        for &element in &changes.gone {
-            if let Some(own) = self.lost(intact, body, material, element) {
-                memory::push(&mut list, own, "what a cut body has lost")?;
-            }
-        }
-        let lost = self.space.lost(list, before)?;
+        let lost = self.lost_elements((intact, body), material, before)?;
         let space = (self.space).cut((before, prior), |node| body.parent(node), &lost)?;
         let touched = touched(body, changes)?;
         let diagonal = self.cut_diagonal((intact, body, changes), material, &touched)?;
@@ -70,6 +64,25 @@ impl Corrections {
             diagonal: OnceLock::from(diagonal),
             whole: OnceLock::new(),
         })
+    }
+
+    /// What the elements of a mesh have lost to the cuts of a body, with the modes there.
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
+    pub(super) fn lost_elements(
+        &self,
+        (mesh, body): (&Mesh, &CutBody),
+        material: &Material,
+        prior: &PriorTable,
+    ) -> Result<LostElements> {
+        let mut list = Vec::new();
+        for element in body.changed_elements() {
+            if let Some(own) = self.lost(mesh, body, material, element) {
+                memory::push(&mut list, own, "what a cut body has lost")?;
+            }
+        }
+        self.space.lost(list, prior)
     }
 
     /// What a mesh element has lost; `None` where its cells are still the whole of it.

@@ -4,6 +4,9 @@
 //! body at once, and what of its response is no mode (where the body is held above all) takes the iterations of a step too long: without it a
 //! body that turns by 90 degrees in two seconds is ten times as far off.
 
+use std::sync::Arc;
+
+use super::Corrections;
 use super::gravity::GravityResponse;
 use super::input::{Enough, Input, Report, SolverContext};
 use super::precondition::mask_held;
@@ -74,7 +77,10 @@ impl GravityResponse {
             }
             *column = u;
         }
-        Ok(GravityResponse(columns))
+        Ok(GravityResponse {
+            columns: Arc::new(columns),
+            parents: Vec::new(),
+        })
     }
 }
 
@@ -89,19 +95,47 @@ impl ImplicitSolver {
         let Some(change) = input.load.and_then(|load| load.turned_by()) else {
             return Ok(());
         };
-        let slot = &context.corrections.gravity;
-        let response = match slot.get() {
-            Some(response) => response,
-            None => {
-                let made = GravityResponse::new(context)?;
-                slot.get_or_init(|| made)
+        let response = context.corrections.gravity_response(context)?;
+        for (column, change) in response.columns.iter().zip(change) {
+            if change == 0.0 {
+                continue;
             }
-        };
-        for (column, change) in response.0.iter().zip(change) {
-            if change != 0.0 {
-                u.iter_mut().zip(column).for_each(|(u, w)| *u += change * w);
+            u.iter_mut().zip(column).for_each(|(u, w)| *u += change * w);
+            let copies = u[column.len()..].as_chunks_mut::<3>().0.iter_mut();
+            for (u, parent) in copies.zip(&response.parents) {
+                let from = &column[3 * *parent as usize..][..3];
+                u.iter_mut().zip(from).for_each(|(u, w)| *u += change * w);
             }
         }
+        mask_held(&context.corrections.body.held, u);
+        Ok(())
+    }
+}
+
+impl Corrections {
+    /// What the body does, made when it is first asked for.
+    fn gravity_response(&self, context: SolverContext<'_>) -> Result<&GravityResponse> {
+        if let Some(response) = self.gravity.get() {
+            return Ok(response);
+        }
+        let made = GravityResponse::new(context)?;
+        Ok(self.gravity.get_or_init(|| made))
+    }
+
+    /// The intact body's answer to gravity is that of this one, which it has been cut to; `context` is of the intact one.
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
+    pub fn follow_gravity(&self, context: SolverContext<'_>, parents: &[u32]) -> Result<()> {
+        if self.gravity.get().is_some() {
+            return Ok(());
+        }
+        let whole = context.corrections.gravity_response(context)?;
+        let parents = memory::copied(parents, WHAT)?;
+        self.gravity.get_or_init(|| GravityResponse {
+            columns: Arc::clone(&whole.columns),
+            parents,
+        });
         Ok(())
     }
 }

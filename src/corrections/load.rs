@@ -5,6 +5,24 @@
 //! iterations keep a symmetric tangent. With `p` in the drift (and off the inertia that a step leaves behind) all stages see it: the guess
 //! by the natural modes, the residual near and far, and the oscillators of a free step.
 
+use crate::memory::HeldBytes;
+
+/// A point that lies at weights on nodes; what is not needed weighs nothing.
+#[derive(Clone, Copy, Debug, HeldBytes)]
+pub struct LoadPoint {
+    pub nodes: [u32; 4],
+    pub weights: [f32; 4],
+}
+
+impl LoadPoint {
+    fn parts(&self) -> impl Iterator<Item = (usize, f32)> {
+        let parts = self.nodes.into_iter().zip(self.weights);
+        parts
+            .filter(|(_, weight)| *weight > 0.0)
+            .map(|(node, weight)| (3 * node as usize, weight))
+    }
+}
+
 /// What acts over a step, or a part of one.
 #[derive(Clone, Copy)]
 pub struct Load<'a> {
@@ -12,8 +30,9 @@ pub struct Load<'a> {
     pub dead: [&'a [f32]; 2],
     /// Gravity among them at the start and the end, mm/s².
     pub gravity: [[f32; 3]; 2],
-    /// Triangles under pressure, and the pressure there at the start and the end, Pa.
+    /// Triangles under pressure, and the pressure there at the start and the end, Pa. Their corners are nodes, and numbers from `K` on name `points`.
     pub faces: &'a [[u32; 3]],
+    pub points: &'a [LoadPoint],
     pub pascal: [&'a [f32]; 2],
     /// The parts of the scene's step at which this one starts and ends.
     pub way: [f32; 2],
@@ -51,10 +70,19 @@ impl Load<'_> {
         for ((out, from), to) in out.iter_mut().zip(from).zip(to) {
             *out = between(*from, *to);
         }
+        let count = rest.len() / 3;
+        let place = |at: usize| [0, 1, 2].map(|axis| rest[at + axis] + u(at + axis));
         for (face, nodes) in self.faces.iter().enumerate() {
-            let corner = |k: usize| {
-                let at = 3 * nodes[k] as usize;
-                [0, 1, 2].map(|axis| rest[at + axis] + u(at + axis))
+            let corner = |k: usize| match (nodes[k] as usize).checked_sub(count) {
+                None => place(3 * nodes[k] as usize),
+                Some(point) => {
+                    let mut sum = [0.0; 3];
+                    for (node, weight) in self.points[point].parts() {
+                        let own = place(node);
+                        sum = [0, 1, 2].map(|axis| sum[axis] + weight * own[axis]);
+                    }
+                    sum
+                }
             };
             let [a, b, c] = [corner(0), corner(1), corner(2)];
             let [p, q] = [b, c].map(|end| [0, 1, 2].map(|axis| end[axis] - a[axis]));
@@ -64,10 +92,15 @@ impl Load<'_> {
                 p[0] * q[1] - p[1] * q[0],
             ];
             let share = between(self.pascal[0][face], self.pascal[1][face]) / 6.0;
+            let mut add = |at: usize, weight: f32| {
+                for (out, twice) in out[at..at + 3].iter_mut().zip(twice) {
+                    *out -= weight * (share * twice);
+                }
+            };
             for node in nodes {
-                let out = &mut out[3 * *node as usize..][..3];
-                for (out, twice) in out.iter_mut().zip(twice) {
-                    *out -= share * twice;
+                match (*node as usize).checked_sub(count) {
+                    None => add(3 * *node as usize, 1.0),
+                    Some(point) => (self.points[point].parts()).for_each(|(at, w)| add(at, w)),
                 }
             }
         }

@@ -9,6 +9,7 @@
 
 mod body;
 mod cut;
+mod cut_loads;
 mod estimate;
 mod far;
 mod free;
@@ -49,7 +50,7 @@ pub use body::Body;
 pub use far::FarField;
 pub use history::{History, PAIRS};
 pub use input::{Enough, Input, Report, SolverContext};
-pub use load::Load;
+pub use load::{Load, LoadPoint};
 pub use local::Linearisation;
 pub use motion::Motion;
 pub use solver::{ImplicitSolver, SMALLEST_DET};

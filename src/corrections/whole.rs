@@ -9,13 +9,15 @@
 //! [Phi V] (([Phi V]^T A [Phi V])^-1 [Phi V]^T = Phi G^-1 Phi^T + V' S^-1 V'^T
 //! ```
 
+use std::sync::Arc;
+
 use crate::bundle::TensorFile;
 use crate::error::{Error, Result};
 use crate::kernels::Compute;
 use crate::kernels::contact::ContactFactor;
 use crate::kernels::vectors::{PartialSums, add_scaled, dots};
 use crate::memory::{self, HeldBytes};
-use crate::prior::CoarseSpace;
+use crate::prior::{CoarseSpace, LostElements};
 
 const WHAT: &str = "the whole modes of the corrections";
 /// Fields of a pass.
@@ -26,8 +28,11 @@ const LIMIT: usize = 256;
 /// The tables of a bundle.
 #[derive(HeldBytes)]
 pub struct WholeModes {
-    /// `V [m,3K]`, zero at held nodes.
-    fields: Vec<f32>,
+    /// `V [m,3K]`, zero at held nodes; a cut body has those of the intact one.
+    #[held(own)]
+    fields: Arc<Vec<f32>>,
+    /// Of each copy of a node of a cut body: the node that it stems from, whose values it has.
+    parents: Vec<u32>,
     /// `Phi^T K V [r,m]`, µN/mm, and `Phi^T M V`, g.
     cross: [Vec<f32>; 2],
     /// `V^T K V [m,m]` and `V^T M V`.
@@ -46,7 +51,8 @@ impl WholeModes {
         let own = [Some(count); 2];
         let values = stored.iter().map(|value| value.to_f32());
         Ok(WholeModes {
-            fields: memory::collected(stored.len(), values, WHAT)?,
+            fields: Arc::new(memory::collected(stored.len(), values, WHAT)?),
+            parents: Vec::new(),
             cross: [
                 file.f32("cross_stiffness", &cross)?,
                 file.f32("cross_mass", &cross)?,
@@ -55,8 +61,65 @@ impl WholeModes {
         })
     }
 
+    /// Those of a body that the modes' own was cut to: the products with what elements have lost are taken off.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`].
+    pub fn cut(&self, parents: &[u32], lost: &LostElements) -> Result<WholeModes> {
+        let (own, coarse, len) = (self.count(), lost.modes, self.fields.len() / self.count());
+        let values = |node: u32, axis: usize| {
+            let at = 3 * node as usize + axis;
+            (0..own).map(move |mode| self.fields[mode * len + at])
+        };
+        let copies = |tables: &[Vec<f32>; 2]| -> Result<[Vec<f32>; 2]> {
+            let [stiffness, mass] = tables;
+            Ok([
+                memory::copied(stiffness, WHAT)?,
+                memory::copied(mass, WHAT)?,
+            ])
+        };
+        let mut cut = WholeModes {
+            fields: Arc::clone(&self.fields),
+            parents: memory::copied(parents, WHAT)?,
+            cross: copies(&self.cross)?,
+            own: copies(&self.own)?,
+        };
+        // `dK V` and the masses at the free corners.
+        let (mut forces, masses) = lost.on_fields(own, values)?;
+        for table in 0..2 {
+            for (at, row) in forces.chunks_exact_mut(own).enumerate() {
+                let (node, axis) = (lost.nodes[at / 3], at % 3);
+                if table == 1 {
+                    let mass = masses[at / 3];
+                    let scaled = values(node, axis).map(|value| mass * value);
+                    row.iter_mut().zip(scaled).for_each(|(to, from)| *to = from);
+                }
+                let phi = &lost.rows[at * coarse..][..coarse];
+                for (phi, out) in phi.iter().zip(cut.cross[table].chunks_exact_mut(own)) {
+                    out.iter_mut()
+                        .zip(&*row)
+                        .for_each(|(out, f)| *out -= phi * f);
+                }
+                for (v, out) in values(node, axis).zip(cut.own[table].chunks_exact_mut(own)) {
+                    out.iter_mut().zip(&*row).for_each(|(out, f)| *out -= v * f);
+                }
+            }
+        }
+        Ok(cut)
+    }
+
     fn count(&self) -> usize {
         self.own[0].len().isqrt()
+    }
+
+    /// Numbers of a field of the intact body, `3K`.
+    fn len(&self) -> usize {
+        self.fields.len() / self.count()
+    }
+
+    /// The place of each copy's parent, behind the fields' own numbers.
+    fn copies(&self) -> impl Iterator<Item = usize> {
+        self.parents.iter().map(|parent| 3 * *parent as usize)
     }
 }
 
@@ -116,7 +179,7 @@ impl WholeSolve {
                 }
             })
             .map_err(|error| Error::bundle("whole.safetensors", error.to_string()))?;
-        let len = modes.fields.len() / own;
+        let len = modes.len();
         Ok(WholeSolve {
             cross,
             rows,
@@ -135,6 +198,7 @@ impl WholeSolve {
         r: &[f32],
         on_modes: &[f32],
     ) -> Result<()> {
+        let (r, copies) = r.split_at(modes.len());
         let mut views = [r; AT_ONCE];
         let mut sums = [0.0; AT_ONCE];
         let fields = modes.fields.chunks(AT_ONCE * r.len());
@@ -154,6 +218,11 @@ impl WholeSolve {
             )?;
             for (work, sum) in work.iter_mut().zip(sums) {
                 *work = *sum as f32;
+            }
+            for (work, field) in work.iter_mut().zip(fields.chunks_exact(r.len())) {
+                for (own, at) in copies.as_chunks::<3>().0.iter().zip(modes.copies()) {
+                    *work += (0..3).map(|k| own[k] * field[at + k]).sum::<f32>();
+                }
             }
         }
         for (row, on_mode) in self.cross.chunks_exact(self.rows.len()).zip(on_modes) {
@@ -176,6 +245,7 @@ impl WholeSolve {
 
     /// `z += V S^-1 V'^T r` of the last solve.
     pub fn add(&self, compute: Compute<'_>, modes: &WholeModes, z: &mut [f32]) -> Result<()> {
+        let (z, copies) = z.split_at_mut(modes.len());
         let empty: &[f32] = &[];
         let mut views = [empty; AT_ONCE];
         let fields = modes.fields.chunks(AT_ONCE * z.len());
@@ -190,6 +260,11 @@ impl WholeSolve {
                 amounts,
                 z,
             )?;
+            for (field, amount) in fields.chunks_exact(z.len()).zip(amounts) {
+                for (own, at) in copies.as_chunks_mut::<3>().0.iter_mut().zip(modes.copies()) {
+                    (0..3).for_each(|k| own[k] += amount * field[at + k]);
+                }
+            }
         }
         Ok(())
     }

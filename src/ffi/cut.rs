@@ -19,8 +19,8 @@ const MOST: u64 = 1 << 20;
 /// next step.
 ///
 /// The scene has more nodes then (`out->node_count`): those that there were keep their numbers, and outputs have `3 * node_count` floats. The elements make each step from then on,
-/// with instruments or without. Steps with instruments or without, frames between them, regions, attached points (each goes with the side
-/// on which it lies) and haptics go on. Prescribed nodes, dense fields and loads are `UPT_ERR_UNSUPPORTED` until `upt_scene_reset`, or until a snapshot from before is restored, which is undo.
+/// with instruments, nodes, loads or without. Frames between steps, regions, attached points (each goes with the side on which it lies) and haptics go on. A step that
+/// starts from a displacement, and a support that moves, are `UPT_ERR_UNSUPPORTED` until `upt_scene_reset`, or until a snapshot from before is restored, which is undo.
 ///
 /// - `stroke`: calls with the same number are one blade that goes on; another number cuts anew.
 /// - `points`: `[pose_count, edge_count, 3]`, mm: the edge as a line of points, at each pose.
@@ -30,7 +30,7 @@ const MOST: u64 = 1 << 20;
 ///
 /// Threads: one at a time.
 /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT` for a blade that sweeps no area or more copies than
-/// nodes, `UPT_ERR_NON_FINITE`, `UPT_ERR_UNSUPPORTED` for a scene without corrections,
+/// nodes, `UPT_ERR_NON_FINITE`, `UPT_ERR_UNSUPPORTED` for a scene without corrections or one whose support moves,
 /// `UPT_ERR_BUNDLE`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`. The scene is then what it was.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_scene_cut(

@@ -113,7 +113,7 @@ unsafe fn read_loads<'a>(
     })
 }
 
-/// A dense field `[K,3]`, or none.
+/// A dense field `[K,3]` of the intact mesh, or none.
 ///
 /// # Safety
 /// NULL, or a pointer to 3 K floats.
@@ -125,10 +125,9 @@ pub(super) unsafe fn field<'a>(
     if pointer.is_null() {
         return Ok(None);
     }
-    // A host's field may be of the intact body.
-    scene.check_intact(name)?;
+    let floats = scene.mesh().positions.len() as u64;
     // SAFETY: the caller's.
-    unsafe { slice(pointer, 3 * scene.node_count() as u64, name) }.map(Some)
+    unsafe { slice(pointer, floats, name) }.map(Some)
 }
 
 /// What the host wants to see.

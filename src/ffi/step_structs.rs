@@ -22,20 +22,21 @@ pub struct upt_input {
     pub instruments: *const upt_instrument,
     /// At most 64.
     pub instrument_count: u64,
-    /// `[contact_count]` nodes in contact, each at most once, in any order.
+    /// `[contact_count]` nodes in contact, each at most once, in any order; of a scene that has been cut also copies.
     pub contact_nodes: *const u32,
     /// `[contact_count,3]`, mm: the displacement of these nodes at the end of the step.
     pub contact_vectors: *const f32,
     /// At most K.
     pub contact_count: u64,
-    /// `[K,3]`, mm, zero except at nodes in contact, where it is their displacement at the end of the step; NULL: no such field.
+    /// `[K,3]` of the model's mesh, also where the scene has been cut, mm; zero except at nodes in contact, where it is their displacement at the end of
+    /// the step; NULL: no such field.
     pub collision: *const f32,
     /// `[K,3]`, mm, the displacement that the step starts from; NULL: the scene's own state. Not with `instruments`.
     pub displacement: *const f32,
     /// The moment of the end of the step on the host's clock, s, from which `upt_scene_present` counts; 0 for hosts that keep none.
     pub time_s: f64,
-    /// `[K,3]`, mN: forces on the nodes at the end of the step; NULL: none. Loads (this field and those after it) act beside whatever drives the
-    /// step, in scenes with corrections; they change on a line over the step, and a frame goes on from those of its step.
+    /// `[K,3]`, mN: forces on the nodes of the model's mesh at the end of the step (where the scene has been cut, on the tissue at a node's place);
+    /// NULL: none. Loads (this field and those after it) act beside whatever drives the step, in scenes with corrections; they change on a line over the step, and a frame goes on from those of its step.
     pub forces: *const f32,
     /// `[pressure_count]`: pressure on parts of the surface at the end of the step, all with the same `struct_size`.
     pub pressures: *const upt_pressure,
@@ -109,9 +110,9 @@ pub struct upt_pressure {
     pub struct_size: u32,
     /// From outside on the body, Pa, at most 1000000; negative for suction.
     pub pascal: f32,
-    /// `[node_count]`: it acts on the boundary triangles with all three corners among these nodes.
+    /// `[node_count]`: it acts on the boundary triangles with all three corners among these nodes; where the scene has been cut, on what is left of them.
     pub nodes: *const u32,
-    /// At most K; 0: it acts on the domain.
+    /// At most K; 0: it acts on the domain, and on all that cuts and removal have laid bare.
     pub node_count: u64,
 }
 

@@ -63,4 +63,16 @@ impl Model {
             _alive: Alive::new(),
         }))
     }
+
+    /// Gives the model of a body that this one's has been cut to what steps under loads need.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`].
+    pub(crate) fn cut_loads(&self, body: &Body, cut: &Model) -> Result<()> {
+        let Some(prior) = &self.prior else {
+            return Ok(());
+        };
+        let material = &self.manifest.material;
+        (self.corrections()?).cut_loads(cut.corrections()?, (&self.mesh, body), material, prior)
+    }
 }

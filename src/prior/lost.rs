@@ -1,5 +1,10 @@
 //! What elements of a body have lost to cuts, as the tables on the modes take it.
 
+use crate::error::Result;
+use crate::memory;
+
+const WHAT: &str = "what a cut body has lost";
+
 /// What an element of a cut body has lost.
 pub struct Lost {
     /// Its number in the intact mesh.
@@ -32,5 +37,37 @@ impl LostElements {
     pub fn at(&self, node: u32) -> Option<&[f32]> {
         let at = self.nodes.binary_search(&node).ok()?;
         Some(&self.rows[3 * at * self.modes..][..3 * self.modes])
+    }
+
+    /// `dK V [3 n,m]` and what each corner has lost of its mass, g, for `m` fields of which `value` gives a node's, an axis' numbers.
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
+    pub fn on_fields<I: Iterator<Item = f32>>(
+        &self,
+        count: usize,
+        values: impl Fn(u32, usize) -> I,
+    ) -> Result<(Vec<f32>, Vec<f32>)> {
+        let mut forces = memory::zeros(3 * self.nodes.len() * count, WHAT)?;
+        let mut masses = memory::zeros(self.nodes.len(), WHAT)?;
+        for own in &self.list {
+            let places = own.corners.map(|node| self.nodes.binary_search(&node).ok());
+            for (a, row) in places.iter().enumerate() {
+                let Some(row) = row else { continue };
+                masses[*row] += own.mass as f32;
+                for (b, column) in places.iter().enumerate() {
+                    let Some(column) = column else { continue };
+                    for at in 0..9 {
+                        let (i, j) = (at / 3, at % 3);
+                        let part = own.stiffness[3 * a + i][3 * b + j] as f32;
+                        let to = &mut forces[(3 * row + i) * count..][..count];
+                        for (to, from) in to.iter_mut().zip(values(self.nodes[*column], j)) {
+                            *to += part * from;
+                        }
+                    }
+                }
+            }
+        }
+        Ok((forces, masses))
     }
 }

@@ -10,7 +10,7 @@ use super::cut_state::CutState;
 use super::engine::Engine;
 use super::inputs::{Decode, Inputs, Which};
 use super::inversion::ContactElements;
-use super::loads::LoadState;
+use super::load_state::LoadState;
 use super::plan::NodePlan;
 use super::points::AttachedPoints;
 use super::published::{Frame, Published, View};
@@ -221,7 +221,8 @@ impl Core {
         }
         input.check()?;
         self.check_cut(&input)?;
-        input.contact.gather(&mut self.incoming, count)?;
+        let nodes = [self.intact_mesh().node_count(), count];
+        input.contact.gather(&mut self.incoming, nodes)?;
         let given = match input.displacement {
             Some(field) => {
                 check_displacement(field, count)?;

@@ -8,11 +8,11 @@ use std::sync::{Arc, PoisonError, RwLock};
 
 use topology::{Body, Change, Point, TopologyError};
 
+use super::StepInput;
 use super::build::build;
 use super::core::{Core, SCENE, lock_read, lock_write};
 use super::cut_state::CutState;
 use super::published::{BodyNumber, CutModel, Frame, Published};
-use super::{Contact, StepInput};
 use crate::bundle::Mesh;
 use crate::contact::Past;
 use crate::corrections::{History, Linearisation, Motion};
@@ -69,12 +69,12 @@ impl Core {
 
     /// Whether a cut body can make such a step.
     pub(super) fn check_cut(&self, input: &StepInput<'_>) -> Result<()> {
-        if input.loads.acts() {
-            return self.check_intact("a step with loads");
+        if input.loads.support.is_some() {
+            return self.check_intact("a step with a support that moves");
         }
-        match (input.contact, input.displacement) {
-            (Contact::None | Contact::Tools(_), None) => Ok(()),
-            _ => self.check_intact("a step with prescribed nodes or a displacement"),
+        match input.displacement {
+            Some(_) => self.check_intact("a step from a displacement"),
+            None => Ok(()),
         }
     }
 
@@ -89,9 +89,10 @@ impl Core {
                 "cut: the elements move a cut body, and this scene makes no corrections; set `corrections`".into(),
             ));
         }
-        if self.loads.as_ref().is_some_and(|loads| loads.acted()) {
+        if self.loads.as_ref().is_some_and(|loads| loads.carried()) {
             return Err(Error::Unsupported(
-                "cut: a body under loads cannot be cut; make a step without loads first".into(),
+                "cut: a body whose support moves cannot be cut; make a step without one first"
+                    .into(),
             ));
         }
         let mut body = match &self.cut {
@@ -126,6 +127,7 @@ impl Core {
             }
         }
         next.take_motion(self, source)?;
+        next.follow_loads(self, source)?;
         next.counters = self.counters;
         next.counters.sleeping = false;
         next.counters.quiet = 0;

@@ -6,8 +6,6 @@ use ::contact::Vector;
 use topology::{Change, Sweep};
 
 use super::Scene;
-use super::core::lock_read;
-use super::cut::refused;
 use super::presenter::Presenters;
 use super::shared::lock;
 use crate::contact::Tool;
@@ -128,16 +126,5 @@ impl Scene {
         let mut frames = lock(&self.tools.presenters)?;
         *frames = Presenters::default();
         Ok(Some(frames))
-    }
-
-    /// Whether the body is intact, for a call of its own thread.
-    ///
-    /// # Errors
-    /// [`crate::Error::Unsupported`].
-    pub(crate) fn check_intact(&self, what: &str) -> Result<()> {
-        match lock_read(&self.shared.published).cut.is_some() {
-            true => Err(refused(what)),
-            false => Ok(()),
-        }
     }
 }

@@ -83,7 +83,8 @@ impl Core {
         let Some(mut problem) = self.problem.take() else {
             return Ok(false);
         };
-        let is_free = problem.tools().is_empty() && !near && self.cut.is_none();
+        let is_prescribed = !self.incoming.is_empty();
+        let is_free = is_prescribed || (problem.tools().is_empty() && !near && self.cut.is_none());
         let result = match is_free {
             true => Ok(false),
             false if self.corrected.is_some() => {

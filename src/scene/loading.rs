@@ -3,8 +3,10 @@
 use std::sync::RwLock;
 
 use super::core::{Core, lock_read};
-use super::loads::{Acting, LoadState, Loads, WHAT};
+use super::load_state::LoadState;
+use super::loads::{Acting, Loads, WHAT};
 use super::published::Published;
+use crate::corrections::SolverContext;
 use crate::error::{Error, Result};
 use crate::memory;
 
@@ -18,7 +20,7 @@ impl Core {
         published: &RwLock<Published>,
         loads: &Loads<'_>,
     ) -> Result<bool> {
-        loads.check(&self.mesh)?;
+        loads.check(self.intact_mesh().node_count())?;
         if self.loads.is_none() && !loads.acts() {
             return Ok(false);
         }
@@ -28,16 +30,74 @@ impl Core {
                 "loads: the scene makes no corrections, in which gravity, forces and pressure act; set `corrections`".into(),
             ));
         };
-        self.model.prepare_loads()?;
-        let mass = &self.model.corrections()?.body.mass;
-        let state = match &mut self.loads {
-            Some(state) => state,
-            slot => slot.insert(memory::boxed(LoadState::new(&self.mesh)?, WHAT)?),
+        self.prepare_loads()?;
+        if self.loads.is_none() {
+            self.loads = Some(self.blank_loads()?);
+        }
+        let Some(state) = &mut self.loads else {
+            return Ok(false);
         };
+        let mass = &self.model.corrections()?.body.mass;
         let shared = lock_read(published);
         let (u, v) = (&shared.last.field, &corrected.solver.motion.velocity);
         state.take(loads, &self.mesh, mass, (u, v, step_s))?;
-        Ok(state.acts())
+        let (acts, turns) = (state.acts(), state.turns());
+        drop(shared);
+        if turns {
+            self.prepare_turning()?;
+        }
+        Ok(acts)
+    }
+
+    /// No loads, of the body as it is.
+    fn blank_loads(&self) -> Result<Box<LoadState>> {
+        let body = self.cut.as_ref().map(|cut| &cut.body);
+        let domain = &self.intact_mesh().domain_faces;
+        memory::boxed(LoadState::new(&self.mesh, body, domain)?, WHAT)
+    }
+
+    /// Makes what steps under loads need: read by the intact body's model, and followed by that of a cut one.
+    fn prepare_loads(&self) -> Result<()> {
+        self.intact().prepare_loads()?;
+        match &self.cut {
+            Some(cut) => cut.intact.cut_loads(&cut.body, &self.model),
+            None => Ok(()),
+        }
+    }
+
+    /// What a step in which gravity turns needs of a cut body: the intact one's answer to it.
+    fn prepare_turning(&self) -> Result<()> {
+        let Some(cut) = &self.cut else {
+            return Ok(());
+        };
+        let (Some(prior), corrections) = (&cut.intact.prior, cut.intact.corrections()?) else {
+            return Ok(());
+        };
+        let context = SolverContext {
+            isa: self.machine.isa,
+            pool: &self.machine.pool,
+            prior,
+            corrections,
+            time_step: &corrections.time_step,
+        };
+        (self.model.corrections()?).follow_gravity(context, cut.body.parents())
+    }
+
+    /// Takes what acts on the body before it was changed; `source` is the node that each of its nodes was.
+    pub(super) fn follow_loads(
+        &mut self,
+        before: &Core,
+        source: impl Fn(usize) -> usize,
+    ) -> Result<()> {
+        let Some(old) = &before.loads else {
+            return Ok(());
+        };
+        let mut state = self.blank_loads()?;
+        let mass = [&before.model, &self.model].map(|model| model.corrections());
+        let [then, now] = mass;
+        state.follow(&old.last, [&then?.body.mass, &now?.body.mass], source);
+        self.loads = Some(state);
+        Ok(())
     }
 
     /// The loads of the step being made become those of the last.
@@ -69,17 +129,18 @@ impl Core {
         let Some(acting) = acting else {
             return Ok(());
         };
-        self.model.prepare_loads()?;
-        let state = match &mut self.loads {
+        self.prepare_loads()?;
+        let mut state = match self.loads.take() {
             Some(state) => state,
-            slot => slot.insert(memory::boxed(LoadState::new(&self.mesh)?, WHAT)?),
+            None => self.blank_loads()?,
         };
         state.last = acting;
+        self.loads = Some(state);
         Ok(())
     }
 
     /// Bytes of saved loads at most.
     pub(super) fn load_bytes(&self) -> usize {
-        4 * (self.mesh.positions.len() + self.mesh.surface_faces.len()) + 64
+        4 * (self.mesh.positions.len() + self.mesh.surface_faces.len()) + 128
     }
 }

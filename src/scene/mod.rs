@@ -3,6 +3,7 @@
 //! at any time, also while a submitted step is in flight, and never waits for a step.
 
 mod build;
+mod copied_loads;
 mod core;
 mod correct;
 mod corrected;
@@ -22,6 +23,7 @@ mod inputs;
 mod instruments;
 mod inversion;
 mod linear;
+mod load_state;
 mod loading;
 mod loads;
 mod own_pace;
@@ -29,6 +31,7 @@ mod plan;
 mod points;
 mod present;
 mod presenter;
+mod pressed;
 mod publish;
 mod published;
 mod reaction;
@@ -150,6 +153,7 @@ impl Scene {
             published: &self.shared.published,
             model,
             mesh,
+            intact_nodes: self.mesh.node_count(),
             integrator: self.integrator,
         }
     }

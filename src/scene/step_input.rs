@@ -11,11 +11,11 @@ pub enum Contact<'a> {
     /// No contact.
     #[default]
     None,
-    /// `[K,3]`, mm, zero but at nodes in contact.
+    /// `[K,3]` of the intact mesh, mm, zero but at nodes in contact.
     Dense(&'a [f32]),
     /// Nodes in contact and their displacement.
     Sparse {
-        /// Node indices, each at most once, in any order.
+        /// Node indices, each at most once, in any order; of a body that has been cut they may name copies.
         nodes: &'a [u32],
         /// `[m,3]`, mm.
         vectors: &'a [f32],
@@ -25,16 +25,16 @@ pub enum Contact<'a> {
 }
 
 impl Contact<'_> {
-    /// As a set over a mesh of `node_count` nodes; that of tools is solved later.
+    /// As a set over a body whose intact mesh has `mesh` nodes and which has `now`; that of tools is solved later.
     ///
     /// # Errors
     /// What [`ContactSet::take_dense`] and [`ContactSet::take_sparse`] say.
-    pub(crate) fn gather(self, set: &mut ContactSet, node_count: usize) -> Result<()> {
+    pub(crate) fn gather(self, set: &mut ContactSet, [mesh, now]: [usize; 2]) -> Result<()> {
         match self {
             Contact::None => set.clear(),
             Contact::Tools(_) => set.clear(),
-            Contact::Dense(field) => set.take_dense(field, node_count)?,
-            Contact::Sparse { nodes, vectors } => set.take_sparse(nodes, vectors, node_count)?,
+            Contact::Dense(field) => set.take_dense(field, mesh)?,
+            Contact::Sparse { nodes, vectors } => set.take_sparse(nodes, vectors, now)?,
         }
         Ok(())
     }

@@ -13,6 +13,8 @@ pub struct Tissue<'a> {
     pub published: &'a RwLock<Published>,
     pub model: &'a Arc<Model>,
     pub mesh: &'a Arc<Mesh>,
+    /// Nodes of the mesh before any cut.
+    pub intact_nodes: usize,
     /// The length of a step and the damping.
     pub integrator: Integrator,
 }

@@ -9,7 +9,9 @@ use std::time::Duration;
 
 use crate::clock::Instant;
 
-use super::loads::{CopiedLoads, Loads};
+use super::copied_loads::CopiedLoads;
+use super::core::lock_read;
+use super::loads::Loads;
 use super::shared::Shared;
 use super::{Contact, Progress, StepInput};
 use crate::bundle::Mesh;
@@ -152,10 +154,11 @@ impl Worker {
     /// Hands an input to the worker, checked.
     pub fn submit(&self, shared: &Arc<Shared>, input: &StepInput<'_>, mesh: &Mesh) -> Result<()> {
         input.check()?;
-        input.loads.check(mesh)?;
         let node_count = mesh.node_count();
+        input.loads.check(node_count)?;
+        let now = lock_read(&shared.published).last.field.len() / 3;
         let mut checked = self.checked.lock().unwrap_or_else(PoisonError::into_inner);
-        input.contact.gather(&mut checked, node_count)?;
+        input.contact.gather(&mut checked, [node_count, now])?;
         if let Contact::Tools(tools) = input.contact {
             for (index, tool) in tools.iter().enumerate() {
                 tool.check(index)?;

@@ -132,11 +132,15 @@ fn what_cannot_be_cut_stays_as_it_is() {
     ));
     assert_eq!(scene.save().unwrap(), saved);
     scene.cut(0, 2, &edge).unwrap();
-    let node = Contact::Sparse {
-        nodes: &[1],
-        vectors: &[0.0; 3],
+    let rest = vec![0.0; 3 * scene.mesh().node_count()];
+    let given = upt::StepInput {
+        displacement: Some(&rest),
+        ..upt::StepInput::default()
     };
-    assert!(matches!(scene.step(node, None), Err(Error::Unsupported(_))));
+    assert!(matches!(
+        scene.step(given, None),
+        Err(Error::Unsupported(_))
+    ));
     let found = scene.contacts_from_instruments(&[], |_, _| Ok(()));
     assert!(matches!(found, Err(Error::Unsupported(_))));
     let bare = Scene::new(liver(), &with(0)).unwrap();

@@ -109,6 +109,7 @@ impl LoadProgramme {
         let (gravity, pascal) = self.at(sizes, time_s);
         let pressure = SurfacePressure {
             faces: mesh.domain.clone(),
+            walls: true,
             pascal,
         };
         Loads {

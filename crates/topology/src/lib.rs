@@ -12,12 +12,14 @@
 //! | [`body`] | cells, copies of nodes; cuts, removal, stiffness |
 //! | [`connect`] | which cells are joined, and where nodes part |
 //! | [`elements`] | what a solver takes: nodes, shares and stiffness of each cell |
-//! | [`surface`] | the closed surface, inside faces included |
+//! | [`surface`] | the closed surface, inside faces included; what outside pressure acts on |
+//! | `carry` | which nodes take what acts on a node of the mesh |
 //! | `touchable` | faces that tools may touch |
 //!
 //! Lengths are millimetres. Nothing here knows an element law or a time.
 
 pub mod body;
+mod carry;
 pub mod connect;
 mod cut;
 pub mod elements;
@@ -39,7 +41,7 @@ pub use error::TopologyError;
 pub use fragments::Fragment;
 pub use kept::Kept;
 pub use rest::RestMesh;
-pub use surface::{Surface, SurfaceChange, Vertex};
+pub use surface::{Skin, SkinTriangle, Surface, SurfaceChange, Vertex};
 pub use sweep::Sweep;
 
 /// A point, mm.

@@ -13,6 +13,9 @@ use crate::room::{push, reserve, room};
 use crate::{Point, RestMesh, TopologyError};
 
 mod edges;
+mod skin;
+
+pub use skin::{Skin, SkinTriangle};
 
 /// Weights below this are none, and vertices on the same nodes whose weights differ by less are one.
 const SAME: f64 = 1e-6;
@@ -54,7 +57,8 @@ pub struct Surface {
 
 /// A polygon of the surface, outward.
 struct Piece {
-    inside: bool,
+    /// Element and face of the mesh's border that it is a part of; none inside of the intact body.
+    border: Option<(u32, u8)>,
     corners: Vec<u32>,
 }
 
@@ -222,7 +226,7 @@ impl Surface {
         &mut self,
         cell: &Cell,
         points: &[Weights],
-        inside: bool,
+        border: Option<(u32, u8)>,
         pieces: &mut Vec<Piece>,
     ) -> Result<(), TopologyError> {
         let corner = |at: &Weights| (0..4).map(|k| (cell.nodes[k], at[k])).collect();
@@ -235,7 +239,7 @@ impl Surface {
             corners.pop();
         }
         if corners.len() >= 3 {
-            push(pieces, Piece { inside, corners })?;
+            push(pieces, Piece { border, corners })?;
         }
         Ok(())
     }
@@ -248,11 +252,11 @@ impl Surface {
             for cell in cells.iter().filter(|cell| cell.is_alive) {
                 for (side, points) in &cell.material().faces {
                     match side {
-                        Side::Cut { .. } => self.add(cell, points, true, &mut pieces)?,
+                        Side::Cut { .. } => self.add(cell, points, None, &mut pieces)?,
                         Side::Face(face)
                             if mesh.neighbours(element)[usize::from(*face)] == OUTSIDE =>
                         {
-                            self.add(cell, points, false, &mut pieces)?;
+                            self.add(cell, points, Some((element, *face)), &mut pieces)?;
                         }
                         Side::Face(face) => {
                             let over = mesh.neighbours(element)[usize::from(*face)];
@@ -315,7 +319,7 @@ impl Surface {
                 weights
             };
             let points: Vec<Weights> = bare.iter().map(widen).collect();
-            self.add(cell, &points, true, pieces)?;
+            self.add(cell, &points, None, pieces)?;
         }
         Ok(())
     }
@@ -329,7 +333,7 @@ impl Surface {
         let corners = &piece.corners;
         if corners.len() <= 4 {
             for pair in corners[1..].windows(2) {
-                take([corners[0], pair[0], pair[1]], piece.inside);
+                take([corners[0], pair[0], pair[1]], piece.border.is_none());
             }
             return Ok(());
         }
@@ -348,7 +352,7 @@ impl Surface {
         for (at, corner) in corners.iter().enumerate() {
             take(
                 [*corner, corners[(at + 1) % corners.len()], middle],
-                piece.inside,
+                piece.border.is_none(),
             );
         }
         Ok(())

@@ -79,27 +79,10 @@ impl CoarseSpace {
     fn take_off(&mut self, lost: &LostElements) -> Result<()> {
         let count = self.count();
         // `dK Phi` and the masses at the free corners.
-        let mut forces = memory::zeros(lost.rows.len(), WHAT)?;
-        let mut masses = memory::zeros(lost.nodes.len(), WHAT)?;
-        for own in &lost.list {
-            let places = own.corners.map(|node| lost.nodes.binary_search(&node).ok());
-            for (a, row) in places.iter().enumerate() {
-                let Some(row) = row else { continue };
-                masses[*row] += own.mass as f32;
-                for (b, column) in places.iter().enumerate() {
-                    let Some(column) = column else { continue };
-                    for at in 0..9 {
-                        let (i, j) = (at / 3, at % 3);
-                        let part = own.stiffness[3 * a + i][3 * b + j] as f32;
-                        let from = &lost.rows[(3 * column + j) * count..][..count];
-                        let to = &mut forces[(3 * row + i) * count..][..count];
-                        for (to, from) in to.iter_mut().zip(from) {
-                            *to += part * from;
-                        }
-                    }
-                }
-            }
-        }
+        let (forces, masses) = lost.on_fields(count, |node, axis| {
+            let rows = lost.at(node).unwrap_or_default();
+            rows.iter().skip(axis * count).take(count).copied()
+        })?;
         // Both products are symmetric: their upper halves, and what they are below.
         let rows = lost.rows.chunks_exact(count.max(1));
         for (at, (own, force)) in rows.zip(forces.chunks_exact(count.max(1))).enumerate() {

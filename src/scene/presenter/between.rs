@@ -205,7 +205,7 @@ impl Between {
                     .look(&self.problem, tools, (rest, last), (tau, alpha));
             }
             nodes => {
-                nodes.gather(&mut self.now, self.held.len())?;
+                nodes.gather(&mut self.now, [scene.intact_nodes, self.held.len()])?;
                 let stretch = self.nodes.stretch(&self.now, last, velocity, tau);
                 self.extrapolation.follow_evenly(stretch, (tau, alpha));
             }

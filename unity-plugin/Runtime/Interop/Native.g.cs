@@ -323,21 +323,24 @@ namespace Upt.Interop
         public upt_instrument* instruments;
         /// <summary>At most 64.</summary>
         public ulong instrument_count;
-        /// <summary>`[contact_count]` nodes in contact, each at most once, in any order.</summary>
+        /// <summary>`[contact_count]` nodes in contact, each at most once, in any order; of a scene that has been cut also copies.</summary>
         public uint* contact_nodes;
         /// <summary>`[contact_count,3]`, mm: the displacement of these nodes at the end of the step.</summary>
         public float* contact_vectors;
         /// <summary>At most K.</summary>
         public ulong contact_count;
-        /// <summary>`[K,3]`, mm, zero except at nodes in contact, where it is their displacement at the end of the step; NULL: no such field.</summary>
+        /// <summary>
+        /// `[K,3]` of the model's mesh, also where the scene has been cut, mm; zero except at nodes in contact, where it is their displacement at the end of
+        /// the step; NULL: no such field.
+        /// </summary>
         public float* collision;
         /// <summary>`[K,3]`, mm, the displacement that the step starts from; NULL: the scene's own state. Not with `instruments`.</summary>
         public float* displacement;
         /// <summary>The moment of the end of the step on the host's clock, s, from which `upt_scene_present` counts; 0 for hosts that keep none.</summary>
         public double time_s;
         /// <summary>
-        /// `[K,3]`, mN: forces on the nodes at the end of the step; NULL: none. Loads (this field and those after it) act beside whatever drives the
-        /// step, in scenes with corrections; they change on a line over the step, and a frame goes on from those of its step.
+        /// `[K,3]`, mN: forces on the nodes of the model's mesh at the end of the step (where the scene has been cut, on the tissue at a node's place);
+        /// NULL: none. Loads (this field and those after it) act beside whatever drives the step, in scenes with corrections; they change on a line over the step, and a frame goes on from those of its step.
         /// </summary>
         public float* forces;
         /// <summary>`[pressure_count]`: pressure on parts of the surface at the end of the step, all with the same `struct_size`.</summary>
@@ -368,9 +371,9 @@ namespace Upt.Interop
         public uint struct_size;
         /// <summary>From outside on the body, Pa, at most 1000000; negative for suction.</summary>
         public float pascal;
-        /// <summary>`[node_count]`: it acts on the boundary triangles with all three corners among these nodes.</summary>
+        /// <summary>`[node_count]`: it acts on the boundary triangles with all three corners among these nodes; where the scene has been cut, on what is left of them.</summary>
         public uint* nodes;
-        /// <summary>At most K; 0: it acts on the domain.</summary>
+        /// <summary>At most K; 0: it acts on the domain, and on all that cuts and removal have laid bare.</summary>
         public ulong node_count;
     }
 
@@ -1069,8 +1072,8 @@ namespace Upt.Interop
         /// next step.
         ///
         /// The scene has more nodes then (`out-&gt;node_count`): those that there were keep their numbers, and outputs have `3 * node_count` floats. The elements make each step from then on,
-        /// with instruments or without. Steps with instruments or without, frames between them, regions, attached points (each goes with the side
-        /// on which it lies) and haptics go on. Prescribed nodes, dense fields and loads are `UPT_ERR_UNSUPPORTED` until `upt_scene_reset`, or until a snapshot from before is restored, which is undo.
+        /// with instruments, nodes, loads or without. Frames between steps, regions, attached points (each goes with the side on which it lies) and haptics go on. A step that
+        /// starts from a displacement, and a support that moves, are `UPT_ERR_UNSUPPORTED` until `upt_scene_reset`, or until a snapshot from before is restored, which is undo.
         ///
         /// - `stroke`: calls with the same number are one blade that goes on; another number cuts anew.
         /// - `points`: `[pose_count, edge_count, 3]`, mm: the edge as a line of points, at each pose.
@@ -1080,7 +1083,7 @@ namespace Upt.Interop
         ///
         /// Threads: one at a time.
         /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT` for a blade that sweeps no area or more copies than
-        /// nodes, `UPT_ERR_NON_FINITE`, `UPT_ERR_UNSUPPORTED` for a scene without corrections,
+        /// nodes, `UPT_ERR_NON_FINITE`, `UPT_ERR_UNSUPPORTED` for a scene without corrections or one whose support moves,
         /// `UPT_ERR_BUNDLE`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`. The scene is then what it was.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]

@@ -12,7 +12,8 @@ use elements::vector::{cross, subtract};
 pub struct Loads {
     /// Gravity beyond that under which the mesh is in equilibrium, mm/s².
     pub gravity: [f64; 3],
-    /// On the nodes `[K,3]`, mN; empty for none.
+    /// On the nodes of the mesh `[K,3]`, mN; empty for none. In a body that has been cut the tissue at a node's place takes its force
+    /// ([`topology::Body::carriers`]).
     pub forces: Vec<[f32; 3]>,
     /// A face in several of them takes their sum.
     pub pressures: Vec<SurfacePressure>,
@@ -21,17 +22,26 @@ pub struct Loads {
 /// Pressure on a region of the surface.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SurfacePressure {
-    /// Rows of the mesh's `surface`.
+    /// Rows of the mesh's `surface`; of a body that has been cut, what is left of them.
     pub faces: Vec<u32>,
+    /// Whether it acts on what cuts and removal lay bare, too.
+    pub walls: bool,
     /// From outside on the body, Pa; negative for suction.
     pub pascal: f64,
 }
 
-/// A face under pressure.
+/// A point that lies at weights on nodes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Corner {
+    pub rest: [f64; 3],
+    /// Slots and weights, whose sum is 1; those that are not needed weigh nothing.
+    pub parts: [(u32, f64); 4],
+}
+
+/// A triangle under pressure.
 #[derive(Clone, Debug)]
 pub(super) struct Face {
-    pub slots: [u32; 3],
-    pub rest: [[f32; 3]; 3],
+    pub corners: [Corner; 3],
     /// At the start and the end of the frame, Pa.
     pub pascal: [f64; 2],
 }
@@ -42,8 +52,8 @@ pub(super) struct BodyLoad {
     /// Forces that do not follow the body, by slot, at the start of the frame and at its end.
     pub dead: [Vec<Node>; 2],
     pub faces: Vec<Face>,
-    /// By row of the surface, Pa, at the end of the frame.
-    pub pascal: Vec<f64>,
+    /// The loads at its start and its end, as they were set.
+    pub set: [Loads; 2],
     /// Inner steps of the frame.
     pub steps: u32,
     /// The support, where it moves.
@@ -85,18 +95,23 @@ impl BodyLoad {
             unsafe { support.move_to(displacement, (step, self.steps), &mut self.now) };
         }
         for face in &self.faces {
-            let corner = |k: usize| {
-                // SAFETY: the caller's.
-                let moved = unsafe { (*displacement.add(face.slots[k] as usize)).0 };
-                std::array::from_fn(|axis| f64::from(face.rest[k][axis]) + f64::from(moved[axis]))
-            };
-            let [a, b, c]: [[f64; 3]; 3] = [corner(0), corner(1), corner(2)];
+            let [a, b, c] = [0, 1, 2].map(|k: usize| {
+                let Corner { mut rest, parts } = face.corners[k];
+                for (slot, weight) in parts.into_iter().filter(|part| part.1 > 0.0) {
+                    // SAFETY: the caller's.
+                    let moved = unsafe { (*displacement.add(slot as usize)).0 };
+                    let at = rest.iter_mut().zip(moved);
+                    at.for_each(|(at, moved)| *at += weight * f64::from(moved));
+                }
+                rest
+            });
             let twice = cross(subtract(b, a), subtract(c, a));
             let pascal = face.pascal[0] + part * (face.pascal[1] - face.pascal[0]);
-            for slot in face.slots {
+            let parts = face.corners.iter().flat_map(|corner| corner.parts);
+            for (slot, weight) in parts.filter(|part| part.1 > 0.0) {
                 let force = &mut self.now[slot as usize].0;
                 for (force, twice) in force.iter_mut().zip(twice) {
-                    *force -= (pascal * twice / 6.0) as f32;
+                    *force -= (weight * pascal * twice / 6.0) as f32;
                 }
             }
         }
@@ -109,6 +124,8 @@ impl BodyLoad {
         for face in &mut self.faces {
             face.pascal[0] = face.pascal[1];
         }
+        let [before, now] = &mut self.set;
+        before.clone_from(now);
         if let Some(support) = &mut self.support {
             support.arrive();
         }

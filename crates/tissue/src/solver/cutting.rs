@@ -97,11 +97,14 @@ impl Solver {
         &mut self,
         operation: impl FnOnce(&mut Body) -> Result<Change, TopologyError>,
     ) -> Result<Change, SolverError> {
-        if self.load.is_some() {
+        if self
+            .load
+            .as_ref()
+            .is_some_and(|load| load.support.is_some())
+        {
             return Err(SolverError::Load {
-                field: "all".into(),
-                reason: "act on the body as it was meshed; cut it before any load, without one"
-                    .into(),
+                field: "support".into(),
+                reason: "moves the body as it was meshed; cut it without one".into(),
             });
         }
         let mut body = match &self.topology.body {
@@ -167,6 +170,7 @@ impl Solver {
         self.tets = tets;
         self.topology.held_nodes = held;
         self.topology.body = Some(body);
+        self.follow_loads()?;
         if let Some(touch) = &mut self.touch {
             let held = &self.topology.held_nodes;
             let samples = Samples::new(&self.positions, faces, held, SPACING_MM);

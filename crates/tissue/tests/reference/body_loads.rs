@@ -20,6 +20,7 @@ fn on_all_faces(mesh: &Mesh, pascal: f64) -> Vec<SurfacePressure> {
     vec![SurfacePressure {
         faces: (0..mesh.surface.len() as u32).collect(),
         pascal,
+        walls: true,
     }]
 }
 
@@ -172,7 +173,11 @@ fn bad_loads_are_typed_errors_and_change_nothing() {
     let mesh = box_phantom([20.0; 3], [2; 3]).unwrap();
     let mut solver = Solver::new(&mesh, Boundary::Fixed, SolverOptions::default()).unwrap();
     let pressure = |faces: Vec<u32>, pascal| Loads {
-        pressures: vec![SurfacePressure { faces, pascal }],
+        pressures: vec![SurfacePressure {
+            faces,
+            pascal,
+            walls: false,
+        }],
         ..Loads::default()
     };
     let bad = [

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use tissue::material::Material;
 use tissue::mesh::{Boundary, Mesh, boundary_faces, regular_box};
-use tissue::solver::{ContactNode, Solver, SolverOptions};
+use tissue::solver::{ContactNode, Loads, Solver, SolverOptions, SurfacePressure};
 use topology::Sweep;
 
 /// A beam of 60 x 12 x 12 mm, held at x = 0.
@@ -149,6 +149,114 @@ fn a_cut_keeps_mass_and_both_energies_and_a_fragment_flies_on() {
     assert!((body.mass() / mass - 1.0 + fragments[0].volume_mm3 / 8640.0).abs() < 1e-3);
     body.step_frame(&[], 0.01).unwrap();
     assert!(body.drop_fragments().unwrap().is_empty());
+}
+
+/// Gravity, a force on a node and pressure from all sides, also into the slit; where each node comes to rest, mm.
+fn loaded(solver: &mut Solver, mesh: &Mesh, force_at: usize) -> Vec<[f32; 3]> {
+    let mut forces = vec![[0.0; 3]; mesh.node_count()];
+    forces[force_at] = [0.0, 0.0, -1.5];
+    let loads = Loads {
+        gravity: [0.0, 0.0, -300.0],
+        forces,
+        pressures: vec![SurfacePressure {
+            faces: mesh.domain.clone(),
+            pascal: 40.0,
+            walls: true,
+        }],
+    };
+    solver.set_loads(&loads).unwrap();
+    for _ in 0..24 {
+        solver.step_frame(&[], 0.05).unwrap();
+    }
+    let mut u = vec![[0.0; 3]; solver.node_count()];
+    solver.displacement(&mut u);
+    u
+}
+
+#[test]
+fn a_sawn_beam_under_loads_is_one_that_was_meshed_so() {
+    let mesh = beam([20, 4, 4]);
+    let conforming = slit(mesh.clone(), 30.0, 6.0);
+    let near = |mesh: &Mesh, to: [f32; 3]| {
+        let off = |p: &[f32; 3]| (0..3).map(|k| (p[k] - to[k]).abs()).sum::<f32>();
+        let nodes = mesh.positions.iter().enumerate();
+        nodes
+            .min_by(|a, b| off(a.1).total_cmp(&off(b.1)))
+            .unwrap()
+            .0
+    };
+    let end = near(&mesh, [60.0, 6.0, 0.0]);
+    // On the blade itself: its tissue is half on each side. The conforming mesh has the other half at its copy.
+    let wanted = loaded(&mut solver(&conforming), &conforming, end);
+    let whole = loaded(&mut solver(&mesh), &mesh, end);
+    let down = |u: &[[f32; 3]]| f64::from(-u[end][2]);
+    assert!(
+        down(&wanted) > 1.1 * down(&whole),
+        "{} {}",
+        down(&wanted),
+        down(&whole)
+    );
+    for (x, most) in [(30.0, 1e-3), (31.1, 0.1)] {
+        let mut cut = solver(&mesh);
+        cut.cut(&sawn(x, 6.0), 0).unwrap();
+        let found = loaded(&mut cut, &mesh, end);
+        let off = (down(&found) - down(&wanted)).abs() / down(&wanted);
+        println!("x = {x}: {:.3} mm ({:.1} %)", down(&found), 100.0 * off);
+        assert!(off <= most, "{x}: {} not {}", down(&found), down(&wanted));
+        // Cut while the loads act, it comes to rest where it did.
+        let mut late = solver(&mesh);
+        loaded(&mut late, &mesh, end);
+        late.cut(&sawn(x, 6.0), 0).unwrap();
+        let moved = loaded(&mut late, &mesh, end);
+        let off = (down(&moved) - down(&found)).abs() / down(&found);
+        // The blade came in the body as it hangs.
+        assert!(off < 0.15, "{x}: {} and {}", down(&moved), down(&found));
+    }
+}
+
+/// What holds a cut body carries its weight and the forces on it, wherever a blade has gone through the tissue that they act on.
+#[test]
+fn supports_carry_the_weight_and_the_forces_of_a_cut_body() {
+    let mut mesh = beam([10, 2, 2]);
+    let held: Vec<ContactNode> = (std::mem::take(&mut mesh.fixed).into_iter())
+        .map(|node| ContactNode {
+            node,
+            displacement: [0.0; 3],
+        })
+        .collect();
+    let mut body = solver(&mesh);
+    body.cut(&sawn(31.3, 7.0), 0).unwrap();
+    // Through nodes.
+    body.cut(&sawn(42.0, 7.0), 1).unwrap();
+    let ball = |at: [f64; 3]| 7.0 - (at[0] - 54.0).hypot(at[2] + 2.0);
+    let removed = body.remove(ball, f64::MAX).unwrap().removed_mm3;
+    assert!(body.drop_fragments().unwrap().is_empty());
+    assert!(removed > 100.0);
+    let top = |node: &[f32; 3]| node[2] > 11.0 && node[0] > 20.0;
+    let forces: Vec<[f32; 3]> = (mesh.positions.iter())
+        .map(|p| if top(p) { [0.0, 0.2, -0.3] } else { [0.0; 3] })
+        .collect();
+    let sum = forces.iter().map(|f| f64::from(f[2])).sum::<f64>();
+    body.set_loads(&Loads {
+        gravity: [0.0, 0.0, -400.0],
+        forces,
+        ..Loads::default()
+    })
+    .unwrap();
+    let mut carried = 0.0;
+    for _ in 0..60 {
+        let report = body.step_frame(&held, 0.05).unwrap();
+        carried = report.reaction.iter().map(|f| f64::from(f[2])).sum();
+    }
+    // But for the half row of elements that hangs at the held nodes themselves; g mm/s² are µN.
+    let volume = 12.0 * 12.0 * 57.0 - removed;
+    let weight = -1e-3 * 400.0 * Material::default().density_g_mm3() * volume;
+    assert!(weight < -2.0 && sum < -4.0);
+    let wanted = weight + sum;
+    assert!(
+        (carried.abs() / wanted.abs() - 1.0).abs() < 5e-3,
+        "{carried} mN, not {wanted}"
+    );
 }
 
 #[test]

@@ -27,6 +27,7 @@ fn march(threads: usize, isa: Option<Isa>, pressure: Pressure) -> (Vec<[f32; 3]>
         pressures: vec![SurfacePressure {
             faces: mesh.domain[..200].to_vec(),
             pascal: 40.0,
+            walls: false,
         }],
         ..Loads::default()
     };

@@ -59,7 +59,7 @@ impl Surface {
                     let is_on = over == OUTSIDE && corners.contains(&a) && corners.contains(&b);
                     if is_on && split.insert((element, face as u8)) {
                         let piece = Piece {
-                            inside: false,
+                            border: Some((element, face as u8)),
                             corners: corners.to_vec(),
                         };
                         push(pieces, piece)?;

@@ -1,0 +1,217 @@
+//! What a scene has for loads: those of the last published state, and of the one being made.
+
+use topology::Body;
+
+use super::loads::{Acting, Loads, WHAT};
+use super::pressed::Pressed;
+use super::support::{Carriage, Carried};
+use crate::bundle::Mesh;
+use crate::corrections::Load;
+use crate::error::{Error, Result};
+use crate::memory::{self, HeldBytes};
+
+/// What a scene has for loads, made at the first step that has any.
+#[derive(HeldBytes)]
+pub struct LoadState {
+    /// Of the last published state, and of the one being made.
+    pub(super) last: Acting,
+    pub(super) next: Acting,
+    /// What pressure may act on.
+    pressed: Pressed,
+    /// Triangles under pressure in either, and the pressure there.
+    faces: Vec<[u32; 3]>,
+    pascal: [Vec<f32>; 2],
+    /// Nodes of a region, and boundary triangles of the domain.
+    marked: Vec<bool>,
+    is_domain: Vec<bool>,
+    /// Of each copy of a node: the node of the intact mesh that it stems from.
+    parents: Vec<u32>,
+    /// By node: its part of the force on the node of the intact mesh that it is or stems from; empty for an intact body.
+    takes: Vec<f32>,
+    /// Mean of the nodes at rest.
+    middle: [f32; 3],
+}
+
+impl LoadState {
+    /// For a mesh as a body that was made of it is now; `domain_faces` are those of the intact mesh.
+    pub(super) fn new(mesh: &Mesh, body: Option<&Body>, domain_faces: &[u32]) -> Result<LoadState> {
+        let faces = mesh.surface_faces.len() / 3;
+        let mut domain = memory::copied(domain_faces, WHAT)?;
+        let domain = domain.as_chunks_mut::<3>().0;
+        domain.sort_unstable();
+        let rows = mesh.surface_faces.as_chunks::<3>().0.iter();
+        let is_domain = rows.map(|face| domain.binary_search(face).is_ok());
+        let pressed = Pressed::new(mesh, body)?;
+        let most = pressed.triangles.len();
+        let numbers = || memory::room(most, WHAT);
+        let parents = memory::copied(body.map_or(&[], Body::parents), WHAT)?;
+        let count = mesh.node_count() - parents.len();
+        let nodes = &mesh.positions.as_chunks::<3>().0[..count];
+        let middle = [0, 1, 2].map(|axis| {
+            let sum: f64 = nodes.iter().map(|node| f64::from(node[axis])).sum();
+            (sum / nodes.len().max(1) as f64) as f32
+        });
+        let mut takes = Vec::new();
+        if let Some(body) = body {
+            takes = memory::filled(mesh.node_count(), 1.0, WHAT)?;
+            takes[count..].fill(0.0);
+            let mut parts = Vec::new();
+            let changed = body.changed_elements();
+            for node in changed.flat_map(|element| body.mesh().tet(element)) {
+                body.carriers(node, &mut parts)?;
+                takes[node as usize] = 0.0;
+                for (node, part) in &parts {
+                    takes[*node as usize] = *part as f32;
+                }
+            }
+        }
+        Ok(LoadState {
+            middle,
+            last: Acting::zeros(mesh)?,
+            next: Acting::zeros(mesh)?,
+            faces: numbers().and(memory::room(most, WHAT))?,
+            pascal: [numbers()?, numbers()?],
+            pressed,
+            marked: memory::filled(count, false, WHAT)?,
+            is_domain: memory::collected(faces, is_domain, WHAT)?,
+            parents,
+            takes,
+        })
+    }
+
+    /// Takes what acted on the body before it changed: a node has the part of its mass in what its source bore; `mass` are those of before and now.
+    pub(super) fn follow(
+        &mut self,
+        before: &Acting,
+        mass: [&[f32]; 2],
+        source: impl Fn(usize) -> usize,
+    ) {
+        let own = &mut self.last;
+        for (node, dead) in own.dead.as_chunks_mut::<3>().0.iter_mut().enumerate() {
+            let from = source(node);
+            let part = mass[1][node] / mass[0][from].max(f32::MIN_POSITIVE);
+            *dead = [0, 1, 2].map(|axis| part * before.dead[3 * from + axis]);
+        }
+        own.pascal.copy_from_slice(&before.pascal);
+        own.gravity = before.gravity;
+        own.acts = before.acts;
+        own.carried = before.carried;
+    }
+
+    /// Takes the loads at the end of a step of `step_s` of a body of these masses, g, which is displaced by `u [K,3]` and moves at `v` (mm/s) at its start.
+    pub(super) fn take(
+        &mut self,
+        loads: &Loads<'_>,
+        mesh: &Mesh,
+        mass: &[f32],
+        (u, v, step_s): (&[f32], &[f32], f64),
+    ) -> Result<()> {
+        let (parents, takes, first) = (&self.parents, &self.takes, self.marked.len());
+        let parent = |node: usize| match node.checked_sub(first) {
+            Some(copy) => parents[copy] as usize,
+            None => node,
+        };
+        let next = &mut self.next;
+        let pose = loads.support.map(|support| support.checked()).transpose()?;
+        let carried = pose.map(|pose| Carried::follow(self.last.carried.as_ref(), &pose, step_s));
+        next.carried = carried.map(|(carried, _)| carried);
+        let carriage = carried.map(|(_, carriage)| carriage);
+        let acceleration = loads.acceleration(carriage.as_ref());
+        next.acts = loads.acts_with(acceleration) || carriage.is_some_and(|own| own.acts());
+        let acceleration = acceleration.map(|a| 1e3 * a);
+        next.gravity = acceleration;
+        let carriage = carriage.filter(Carriage::acts);
+        if let Some(carriage) = &carriage {
+            let origin = carriage.borne(self.middle, [0.0; 3]);
+            (next.gravity.iter_mut().zip(origin)).for_each(|(g, own)| *g += own);
+        }
+        let rest = mesh.positions.as_chunks::<3>().0;
+        for ((node, dead), mass) in
+            (next.dead.as_chunks_mut::<3>().0.iter_mut().enumerate()).zip(mass)
+        {
+            let at = |field: &[f32], axis| field.get(3 * node + axis).copied().unwrap_or(0.0);
+            let borne = carriage.map_or([0.0; 3], |carriage| {
+                let x = [0, 1, 2].map(|axis| rest[node][axis] + at(u, axis));
+                carriage.borne(x, [0, 1, 2].map(|axis| at(v, axis)))
+            });
+            let (from, part) = (parent(node), takes.get(node).copied().unwrap_or(1.0));
+            for axis in 0..3 {
+                let own = (loads.forces).map_or(0.0, |forces| part * forces[3 * from + axis]);
+                dead[axis] = mass * (acceleration[axis] + borne[axis]) + 1e3 * own;
+            }
+        }
+        next.pascal.fill(0.0);
+        let faces = mesh.surface_faces.as_chunks::<3>().0;
+        for (index, pressure) in loads.pressures.iter().enumerate() {
+            self.marked.fill(false);
+            let (nodes, marked) = (pressure.nodes, &mut self.marked);
+            nodes
+                .iter()
+                .for_each(|node| marked[parent(*node as usize)] = true);
+            let mut is_on_none = true;
+            for (row, (face, pascal)) in faces.iter().zip(&mut next.pascal).enumerate() {
+                let is_in = match nodes.is_empty() {
+                    true => self.is_domain[row],
+                    false => face.iter().all(|node| marked[*node as usize]),
+                };
+                if is_in {
+                    *pascal += pressure.pascal;
+                    is_on_none = false;
+                }
+            }
+            if nodes.is_empty() {
+                next.pascal[faces.len()] += pressure.pascal;
+            }
+            if is_on_none {
+                return Err(Error::Argument(format!(
+                    "pressures[{index}]: no boundary triangle has all three corners among its {} nodes; pass the nodes of whole faces",
+                    pressure.nodes.len()
+                )));
+            }
+        }
+        self.faces.clear();
+        self.pascal.iter_mut().for_each(Vec::clear);
+        for (row, corners) in &self.pressed.triangles {
+            let both = [&self.last, &*next].map(|acting| acting.pascal[*row as usize]);
+            if both != [0.0; 2] {
+                self.faces.push(*corners);
+                for (list, pascal) in self.pascal.iter_mut().zip(both) {
+                    list.push(pascal);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether the last published state has a support that moves.
+    pub(super) fn carried(&self) -> bool {
+        self.last.carried.is_some()
+    }
+
+    /// Whether any acts in the last published state or the one being made.
+    pub(super) fn acts(&self) -> bool {
+        self.last.acts || self.next.acts
+    }
+
+    /// Whether gravity turns in the step being made.
+    pub(super) fn turns(&self) -> bool {
+        self.last.gravity != self.next.gravity
+    }
+
+    /// What the step being made has of them.
+    pub(super) fn load(&self) -> Option<Load<'_>> {
+        self.acts().then(|| Load {
+            dead: [&self.last.dead, &self.next.dead],
+            gravity: [self.last.gravity, self.next.gravity],
+            faces: &self.faces,
+            points: &self.pressed.points,
+            pascal: [&self.pascal[0], &self.pascal[1]],
+            way: [0.0, 1.0],
+        })
+    }
+
+    /// The state being made becomes the last.
+    pub(super) fn commit(&mut self) {
+        std::mem::swap(&mut self.last, &mut self.next);
+    }
+}
